@@ -1,0 +1,40 @@
+# `make demo` renders a first picture, `make test` checks everything; both set up what they need and reuse it.
+
+PICTURE := out/teapot.png
+# Processes that run tests side by side; each renders with all cores.
+JOBS ?= 2
+OPEN := $(if $(filter Darwin,$(shell uname -s)),open,xdg-open)
+
+.DEFAULT_GOAL := help
+.PHONY: help setup setup-dev demo test lint clean
+
+help:
+	@echo 'make demo    set up and render a teapot for a lenticular display into $(PICTURE)'
+	@echo 'make setup   set up only: virtual environment, package, LLVM runtime'
+	@echo 'make test    set up, lint and run the tests (JOBS=2 PYTEST="-k replay")'
+	@echo 'make lint    set up, check style and types'
+	@echo 'make clean   remove what set-up and tests made; pictures in out/ stay'
+
+setup:
+	@scripts/setup.sh
+
+setup-dev:
+	@scripts/setup.sh --dev
+
+demo: setup
+	@mkdir -p $(dir $(PICTURE))
+	.venv/bin/lippmann render teapot --display seed-lenticular -o $(PICTURE)
+	@echo 'The picture lies in $(CURDIR)/$(PICTURE). Look at it with:'
+	@echo '  $(OPEN) $(PICTURE)'
+
+lint: setup-dev
+	.venv/bin/ruff check
+	.venv/bin/ruff format --check
+	.venv/bin/mypy
+
+test: lint
+	.venv/bin/python -m pytest -n $(JOBS) -m 'not long' $(PYTEST)
+
+clean:
+	rm -rf .venv build dist src/*.egg-info .pytest_cache .ruff_cache .mypy_cache .hypothesis .coverage
+	find src tests benchmarks examples -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -1,0 +1,77 @@
+# Functions to install packages of the system (Debian, Ubuntu and their kin), to be sourced by other scripts.
+# Root is asked for only when something is to be installed, and only where someone can answer.
+
+say() { printf '%s\n' "$*" >&2; }
+
+have() { command -v "$1" >/dev/null 2>&1; }
+
+# Whether as_root would work; on a terminal it may ask for a password.
+can_be_root() {
+  [ "$(id -u)" -eq 0 ] && return
+  have sudo || return 1
+  sudo -n true 2>/dev/null || [ -t 0 ]
+}
+
+as_root() {
+  if [ "$(id -u)" -eq 0 ]; then "$@"; else sudo "$@"; fi
+}
+
+updated=no
+
+# Fetches the lists of packages, at most once.
+update_lists() {
+  [ "$updated" = no ] || return 0
+  updated=yes
+  can_be_root || return 1
+  say "setup: fetching the lists of packages (apt-get update)"
+  as_root apt-get update -qq >&2 || say "setup: some lists could not be fetched; going on with those that are there"
+}
+
+# candidate PACKAGE: succeeds if apt could install it.
+candidate() {
+  local policy
+  policy=$(apt-cache policy "$1" 2>/dev/null)
+  [[ $policy =~ $'\n  Candidate: '[^\(] ]]
+}
+
+# install_packages PURPOSE PACKAGE...: installs them; fails, having said what to do, where that cannot be done.
+install_packages() {
+  local purpose=$1 log
+  shift
+  if ! have apt-get; then
+    say "setup: $purpose is missing, and this system has no apt-get; install it with the system's own package manager"
+    return 1
+  fi
+  if ! can_be_root; then
+    say "setup: $purpose is missing, and installing it takes root, which cannot be had here."
+    say "setup: have this run by someone who can, then start again:"
+    say "  apt-get update && apt-get install $*"
+    return 1
+  fi
+  say "setup: installing $purpose: $*"
+  log=$(mktemp)
+  # Lists that are too old name files that are gone: the second attempt has new ones.
+  if as_root env DEBIAN_FRONTEND=noninteractive apt-get install -y --no-install-recommends "$@" >"$log" 2>&1 ||
+    { update_lists &&
+      as_root env DEBIAN_FRONTEND=noninteractive apt-get install -y --no-install-recommends "$@" >"$log" 2>&1; }; then
+    rm -f "$log"
+    return 0
+  fi
+  tail -n 5 "$log" >&2
+  rm -f "$log"
+  say "setup: $* could not be installed"
+  return 1
+}
+
+# newest_package PATTERN OLDEST NEWEST: the newest package that apt can install whose name matches PATTERN (a regular
+# expression) and whose number lies within the bounds.
+newest_package() {
+  local name number
+  while read -r number name; do
+    if [ "$number" -ge "$2" ] && [ "$number" -le "$3" ] && candidate "$name"; then
+      printf '%s\n' "$name"
+      return 0
+    fi
+  done < <(apt-cache search --names-only "$1" 2>/dev/null | awk '{ n = $1; gsub(/[^0-9]/, " ", n); split(n, a, " "); print a[1], $1 }' | sort -rn)
+  return 1
+}

@@ -1,0 +1,62 @@
+"""Lippmann renders 3D scenes into the native pixels of integral-imaging (light-field) displays.
+
+Importing this package does no work: the names below are loaded when they are first used.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+from lippmann._version import VERSION as __version__
+
+if TYPE_CHECKING:
+    from lippmann.api import load_scene, preview, render
+    from lippmann.display import Display, LensArray, Panel, list_displays, load_display
+    from lippmann.errors import LippmannError
+    from lippmann.image import IntegralImage, read_picture
+    from lippmann.progress import Progress
+    from lippmann.scene.scene import Scene
+
+_HOME = {
+    "load_scene": "lippmann.api",
+    "preview": "lippmann.api",
+    "render": "lippmann.api",
+    "Display": "lippmann.display",
+    "LensArray": "lippmann.display",
+    "Panel": "lippmann.display",
+    "list_displays": "lippmann.display",
+    "load_display": "lippmann.display",
+    "LippmannError": "lippmann.errors",
+    "IntegralImage": "lippmann.image",
+    "read_picture": "lippmann.image",
+    "Progress": "lippmann.progress",
+    "Scene": "lippmann.scene.scene",
+}
+
+__all__ = [
+    "Display",
+    "IntegralImage",
+    "LensArray",
+    "LippmannError",
+    "Panel",
+    "Progress",
+    "Scene",
+    "__version__",
+    "list_displays",
+    "load_display",
+    "load_scene",
+    "preview",
+    "read_picture",
+    "render",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module 'lippmann' has no attribute '{name}'")
+    return getattr(importlib.import_module(_HOME[name]), name)
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

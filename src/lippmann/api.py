@@ -1,0 +1,185 @@
+"""The library by its few calls: ``load_scene``, ``render``, ``preview``; everything else hangs on what they return.
+
+::
+
+    import lippmann
+
+    image = lippmann.render(lippmann.load_scene("x.glb"), display="seed-lenticular", spp=64)
+    image.save("x.png")
+    image.replay((0.0, 0.0, 500.0))
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, cast
+
+from lippmann.display import Display, load_display
+from lippmann.progress import ProgressCallback, silent
+from lippmann.render.settings import Device, IntegratorName, Method, PixelFilter, RenderSettings
+from lippmann.scene.load import load_scene as _load_scene
+from lippmann.scene.placement import Mode, PlacementOptions
+from lippmann.scene.scene import Scene
+
+if TYPE_CHECKING:
+    from lippmann.image import IntegralImage
+    from lippmann.render.pipeline import Preview
+
+#: Samples per pixel where nothing is said.
+DEFAULT_SPP = 16
+
+
+def load_scene(
+    source: object,
+    *,
+    environment: str | Path | Any | None = None,
+    background: tuple[float, float, float] | None = None,
+    allow_outside: bool = False,
+) -> Scene:
+    """A scene from a file, a bundled scene's name, or an object of another library.
+
+    Parameters
+    ----------
+    source:
+        Path of a ``.glb``, ``.gltf``, ``.obj``, ``.ply``, ``.stl`` or Mitsuba ``.xml`` file; name of a bundled scene; a
+        ``mi.Scene`` or Mitsuba dict; a trimesh scene or mesh; a PyVista mesh; a
+        :class:`~lippmann.scene.description.SceneDescription`.
+    environment:
+        An equirectangular EXR or HDR file (or an ``Environment``) that lights the scene in place of its own.
+    background:
+        Linear RGB seen where nothing is hit; None leaves the environment visible.
+    allow_outside:
+        Let the file refer to files outside its own folder.
+
+    Raises
+    ------
+    SceneError
+        If the file is missing, damaged, foreign, or beyond what can be rendered.
+    """
+    return _load_scene(source, environment=environment, background=background, allow_outside=allow_outside)
+
+
+def render(
+    scene: Scene | object,
+    display: Display | str | Path = "seed-lenticular",
+    *,
+    method: str = "full",
+    integrator: str = "path",
+    depth: int | None = None,
+    spp: int = DEFAULT_SPP,
+    seed: int = 0,
+    subpixels: bool = False,
+    pixel_filter: str = "box",
+    camera: str | None = None,
+    place: str | None = None,
+    turn: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    shift: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    scale: float = 1.0,
+    pop_out: float | None = None,
+    device: str = "auto",
+    threads: int | None = None,
+    memory: int | None = None,
+    progress: ProgressCallback = silent,
+) -> IntegralImage:
+    """Render a scene into the native pixels of a display.
+
+    Parameters
+    ----------
+    scene:
+        What :func:`load_scene` returned, or anything that it takes.
+    display:
+        A :class:`~lippmann.display.Display`, a preset's name, or a TOML file.
+    method, integrator, depth, spp, seed, subpixels, pixel_filter, device, threads, memory:
+        See :class:`~lippmann.render.settings.RenderSettings`.
+    camera, place, turn, shift, scale, pop_out:
+        Where the display stands in the scene, see :class:`~lippmann.scene.placement.PlacementOptions`: by a camera,
+        fitted to the display's depth (``place="fit"``), or with scene units taken for millimetres of the display
+        (``place="display"``); then turned (yaw, pitch, roll in degrees), moved (mm) and scaled.
+    progress:
+        Called with :class:`~lippmann.progress.Progress` as the work goes on.
+
+    Returns
+    -------
+    IntegralImage
+        With ``.pixels`` ``(H, W, 3)`` float32 linear RGB.
+
+    Raises
+    ------
+    LippmannError
+        Of the kind that says what was wrong; see ``lippmann.errors``.
+    """
+    from lippmann.render.pipeline import render_integral_image
+
+    settings = RenderSettings(
+        method=cast(Method, method),
+        integrator=cast(IntegratorName, integrator),
+        depth=depth,
+        spp=spp,
+        seed=seed,
+        subpixels=subpixels,
+        pixel_filter=cast(PixelFilter, pixel_filter),
+        device=cast(Device, device),
+        threads=threads,
+        memory=memory,
+    )
+    options = PlacementOptions(
+        mode=cast("Mode | None", place),
+        camera=camera,
+        turn=turn,
+        shift=shift,
+        scale=scale,
+        pop_out=pop_out,
+    )
+    shown = display if isinstance(display, Display) else load_display(display)
+    return render_integral_image(_scene(scene), shown, settings, options, progress)
+
+
+def preview(
+    scene: Scene | object,
+    size: tuple[int, int] = (512, 512),
+    *,
+    camera: str | None = None,
+    integrator: str = "path",
+    depth: int | None = None,
+    spp: int = DEFAULT_SPP,
+    seed: int = 0,
+    pixel_filter: str = "box",
+    device: str = "auto",
+    threads: int | None = None,
+    memory: int | None = None,
+    progress: ProgressCallback = silent,
+) -> Preview:
+    """The plain picture that a camera of the scene sees.
+
+    Parameters
+    ----------
+    size:
+        Width and height in pixels.
+    camera:
+        A camera of the scene by name; None takes the first, or one that frames a scene without any.
+
+    Returns
+    -------
+    Preview
+        With ``.pixels`` ``(height, width, 3)`` float32 linear RGB and ``.provenance``.
+    """
+    from lippmann.render.pipeline import render_preview
+
+    settings = RenderSettings(
+        integrator=cast(IntegratorName, integrator),
+        depth=depth,
+        spp=spp,
+        seed=seed,
+        pixel_filter=cast(PixelFilter, pixel_filter),
+        device=cast(Device, device),
+        threads=threads,
+        memory=memory,
+    )
+    return render_preview(_scene(scene), camera, size, settings, progress)
+
+
+def _scene(source: Scene | object) -> Scene:
+    return source if isinstance(source, Scene) else load_scene(source)
+
+
+__all__ = ["load_scene", "preview", "render"]

@@ -1,0 +1,224 @@
+"""Files and folders that appear whole or not at all.
+
+What is written goes to a temporary name beside its place and is renamed into it once it is complete and on the disk.
+Whatever fails on the way (a full disk, an error in the writer, Ctrl-C) leaves the place as it was.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import secrets
+import shutil
+import stat
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from lippmann.errors import OutputError
+
+#: Lists the files of a folder written by :func:`replacing_folder`, so that a later run may replace them and no others.
+CONTENTS_FILE = ".lippmann-files"
+
+_REASONS = {
+    errno.ENOSPC: ("no space is left on the disk", "free some space or choose another place"),
+    errno.EDQUOT: ("the disk quota is used up", "free some space or choose another place"),
+    errno.EFBIG: ("the file would be larger than the system allows here", "choose another place"),
+    errno.EACCES: ("permission to write is denied", "choose a place that you may write to"),
+    errno.EPERM: ("permission to write is denied", "choose a place that you may write to"),
+    errno.EROFS: ("the file system is read-only", "choose another place"),
+    errno.EISDIR: ("a folder of this name is in the way", "choose another name"),
+    errno.ENAMETOOLONG: ("the name is too long", "choose a shorter name"),
+}
+
+
+@contextmanager
+def replacing(path: Path) -> Iterator[Path]:
+    """Yield a temporary path beside ``path``, with the same suffix; rename it to ``path`` when the block succeeds.
+
+    The temporary file exists already, empty, with the permissions that ``path`` will have: those of the file it
+    replaces, else the usual ones. A symbolic link is followed: its target is replaced.
+
+    Raises
+    ------
+    OutputError
+        If ``path`` cannot be written, or the block fails with an :class:`OSError` about writing. Other exceptions
+        pass through.
+    """
+    place = _place(path)
+    temporary = place.with_name(f".{place.stem[:64]}-{secrets.token_hex(4)}.part{place.suffix}")
+    with _reported(path, temporary):
+        try:
+            _create(temporary, like=place)
+            yield temporary
+            _flush(temporary)
+            os.replace(temporary, place)
+            _flush_folder(place.parent)
+        except BaseException:
+            with suppress(OSError):
+                temporary.unlink(missing_ok=True)
+            raise
+
+
+@contextmanager
+def replacing_folder(path: Path) -> Iterator[Path]:
+    """Yield a temporary folder beside ``path``; rename it to ``path`` when the block succeeds.
+
+    A folder already at ``path`` is replaced if it is empty or was written by this function and holds nothing else
+    since; the file :data:`CONTENTS_FILE` inside tells. So no stale file of an earlier run survives, and no file of the
+    user's is lost.
+
+    Raises
+    ------
+    OutputError
+        If ``path`` cannot be written, holds files of another origin, or the block fails with an :class:`OSError` about
+        writing. Other exceptions pass through.
+    """
+    place = _place(path, folder=True)
+    temporary = place.with_name(f".{place.name[:64]}-{secrets.token_hex(4)}.part")
+    with _reported(path, temporary):
+        try:
+            temporary.mkdir()
+            yield temporary
+            names = sorted(_files(temporary))
+            (temporary / CONTENTS_FILE).write_text("".join(f"{name}\n" for name in names), encoding="utf-8")
+            for name in (*names, CONTENTS_FILE):
+                _flush(temporary / name)
+            _refuse_foreign_files(place, path)  # again: the block may have taken hours
+            _exchange(temporary, place)
+            _flush_folder(place.parent)
+        except BaseException:
+            shutil.rmtree(temporary, ignore_errors=True)
+            raise
+
+
+def check_writable(path: Path) -> None:
+    """Raise :class:`OutputError` now if :func:`replacing` could not write ``path`` later: before hours of work."""
+    place = _place(path)
+    temporary = place.with_name(f".{secrets.token_hex(8)}.part")
+    with _reported(path, temporary):
+        _create(temporary, like=place)
+        temporary.unlink()
+
+
+def check_folder_writable(path: Path) -> None:
+    """Raise :class:`OutputError` now if :func:`replacing_folder` could not write ``path`` later."""
+    place = _place(path, folder=True)
+    temporary = place.with_name(f".{secrets.token_hex(8)}.part")
+    with _reported(path, temporary):
+        temporary.mkdir()
+        temporary.rmdir()
+
+
+def _place(path: Path, *, folder: bool = False) -> Path:
+    """Where ``path`` really lies, once it is known that something can be put there."""
+    try:
+        place = path.resolve()
+        mode = place.stat().st_mode if place.exists() else None
+        parent = place.parent.stat().st_mode if place.parent.exists() else None
+    except (OSError, RuntimeError) as error:  # Python before 3.13 raises RuntimeError for a loop of links
+        raise _output_error(path, error) from None
+    if parent is None:
+        raise OutputError(
+            f"the folder '{path.parent}' is not there", where=str(path), fix=f"create it: mkdir -p '{path.parent}'"
+        )
+    if not stat.S_ISDIR(parent):
+        raise OutputError(f"'{path.parent}' is not a folder", where=str(path), fix="choose another place")
+    if folder:
+        if mode is not None and not stat.S_ISDIR(mode):
+            raise OutputError("this is a file, not a folder", where=str(path), fix="choose another name")
+        _refuse_foreign_files(place, path)
+    elif mode is not None and stat.S_ISDIR(mode):
+        raise OutputError("this is a folder", where=str(path), rule="a file is written here", fix="add a file name")
+    elif mode is not None and not stat.S_ISREG(mode):
+        # Renaming onto a device or a pipe would replace it for everyone.
+        raise OutputError("this is not a regular file", where=str(path), fix="choose another name")
+    return place
+
+
+def _create(temporary: Path, *, like: Path) -> None:
+    descriptor = os.open(temporary, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666)  # less the user's umask
+    os.close(descriptor)
+    if like.exists():
+        if not os.access(like, os.W_OK):
+            temporary.unlink()
+            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+        shutil.copymode(like, temporary)
+
+
+def _flush(path: Path) -> None:
+    """Wait until ``path`` is on the disk, so that a crash after the rename cannot leave an empty file."""
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    except OSError as error:
+        if error.errno not in (errno.EINVAL, errno.ENOTSUP):  # some file systems cannot; that is no failure
+            raise
+    finally:
+        os.close(descriptor)
+
+
+def _flush_folder(folder: Path) -> None:
+    """Make a rename last; where a folder cannot be flushed, the system does it in its own time."""
+    with suppress(OSError):
+        _flush(folder)
+
+
+def _files(folder: Path) -> Iterator[str]:
+    for parent, _, names in os.walk(folder):
+        for name in names:
+            yield (Path(parent) / name).relative_to(folder).as_posix()
+
+
+def _refuse_foreign_files(place: Path, path: Path) -> None:
+    if not place.exists():
+        return
+    try:
+        listed = (place / CONTENTS_FILE).read_text(encoding="utf-8").split("\n")
+    except (OSError, UnicodeDecodeError):
+        listed = []
+    foreign = sorted(set(_files(place)) - {CONTENTS_FILE, *listed})
+    if foreign:
+        raise OutputError(
+            f"the folder holds '{foreign[0]}', which Lippmann did not write there",
+            where=str(path),
+            rule="a folder is replaced as a whole",
+            fix="choose a new folder, or empty this one",
+        )
+
+
+def _exchange(temporary: Path, place: Path) -> None:
+    """Put the folder ``temporary`` in the place of the folder ``place``, which may be missing."""
+    if not place.exists():
+        os.rename(temporary, place)
+        return
+    # Folders cannot be renamed onto filled ones: for an instant the old one lies beside its place.
+    old = temporary.with_suffix(".old")
+    os.rename(place, old)
+    try:
+        os.rename(temporary, place)
+    except BaseException:
+        os.rename(old, place)
+        raise
+    shutil.rmtree(old, ignore_errors=True)
+
+
+@contextmanager
+def _reported(path: Path, temporary: Path) -> Iterator[None]:
+    """Turn an :class:`OSError` about ``path`` or ``temporary`` into an :class:`OutputError`."""
+    try:
+        yield
+    except OSError as error:
+        name = os.fspath(error.filename) if isinstance(error.filename, (str, os.PathLike)) else ""
+        ours = not name or name == str(path) or str(name).startswith(str(temporary))
+        if not ours:
+            raise  # the block failed to read something else
+        raise _output_error(path, error) from error
+
+
+def _output_error(path: Path, error: OSError | RuntimeError) -> OutputError:
+    number = error.errno if isinstance(error, OSError) else None
+    reason, fix = _REASONS.get(number or 0, ("", ""))
+    if not reason:
+        reason = (isinstance(error, OSError) and error.strerror) or str(error)
+    return OutputError(f"cannot be written: {reason}", where=str(path), fix=fix)

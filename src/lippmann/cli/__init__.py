@@ -1,0 +1,60 @@
+"""The command line: parse, call the library, leave with an exit code.
+
+0 is success, 1 a failure of the program or the machine, 2 bad input, 130 Ctrl-C.
+"""
+
+from __future__ import annotations
+
+import sys
+
+from typer import BadParameter
+
+from lippmann.errors import LippmannError
+
+#: The base of all complaints about the command line itself; its home moved between releases of typer.
+_ComplaintError = BadParameter.__mro__[2]
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Run one command and leave the process with its exit code."""
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    debug = "--debug" in words
+    sys.exit(run([word for word in words if word != "--debug"], debug=debug))
+
+
+def run(words: list[str], *, debug: bool = False) -> int:
+    """Run one command; errors become one line on standard error unless ``debug`` asks for the traceback."""
+    from lippmann.cli.app import app
+
+    try:
+        code = app(words, prog_name="lippmann", standalone_mode=False)
+    except KeyboardInterrupt:
+        return _leave("stopped; nothing was written", 130)
+    except BaseException as error:
+        if type(error).__name__ == "Abort":  # how typer passes Ctrl-C on
+            return _leave("stopped; nothing was written", 130)
+        if debug:
+            raise
+        if isinstance(error, LippmannError):
+            return _leave(str(error), error.exit_code)
+        if isinstance(error, _ComplaintError):
+            return _leave(_usage(error), 2)
+        if isinstance(error, MemoryError):
+            return _leave("out of memory; lower --memory or close other programs", 1)
+        if isinstance(error, Exception):
+            what = " ".join(f"{type(error).__name__}: {error}".split())
+            return _leave(f"internal error: {what}; run again with --debug and report it", 1)
+        raise
+    return code if isinstance(code, int) else 0
+
+
+def _usage(error: BaseException) -> str:
+    message = " ".join(getattr(error, "format_message", error.__str__)().split())
+    context = getattr(error, "ctx", None)
+    command = getattr(context, "command_path", "lippmann")
+    return f"{message} See '{command} --help'."
+
+
+def _leave(line: str, code: int) -> int:
+    print(f"lippmann: {line}", file=sys.stderr)
+    return code

@@ -1,0 +1,48 @@
+"""From what people type to values: sizes, triples, amounts of memory."""
+
+from __future__ import annotations
+
+import re
+
+from lippmann.errors import UsageError
+
+_MEMORY_UNITS = {"": 1, "k": 2**10, "m": 2**20, "g": 2**30, "t": 2**40}
+
+
+def numbers(text: str, option: str, counts: tuple[int, ...] = (3,)) -> tuple[float, ...]:
+    """Numbers separated by commas; ``counts`` says how many there may be."""
+    parts = text.split(",")
+    expected = " or ".join(str(count) for count in counts)
+    rule = f"{expected} numbers separated by commas" if counts != (1,) else "a number"
+    try:
+        values = tuple(float(part) for part in parts)
+    except ValueError:
+        raise UsageError(f"'{text}' will not do", where=option, rule=rule) from None
+    if len(values) not in counts or not all(abs(value) < float("inf") for value in values):
+        raise UsageError(f"'{text}' will not do", where=option, rule=rule)
+    return values
+
+
+def triple(text: str, option: str) -> tuple[float, float, float]:
+    """Three numbers separated by commas."""
+    x, y, z = numbers(text, option)
+    return x, y, z
+
+
+def size(text: str, option: str) -> tuple[int, int]:
+    """Width and height in pixels, such as ``512x512``."""
+    match = re.fullmatch(r"(\d{1,6})[xX](\d{1,6})", text.strip())
+    if match is None or "0" in (match[1].lstrip("0") or "0", match[2].lstrip("0") or "0"):
+        raise UsageError(f"'{text}' is no size", where=option, rule="width x height in pixels, such as 512x512")
+    return int(match[1]), int(match[2])
+
+
+def memory(text: str | None, option: str = "--memory") -> int | None:
+    """Bytes of an amount such as ``2G``, ``512M`` or a plain number of bytes."""
+    if text is None:
+        return None
+    match = re.fullmatch(r"(\d+(?:\.\d+)?)\s*([kmgt]?)(?:i?b)?", text.strip().lower())
+    amount = 0 if match is None else int(float(match[1]) * _MEMORY_UNITS[match[2]])
+    if amount <= 0:
+        raise UsageError(f"'{text}' is no amount of memory", where=option, rule="a number with K, M or G, such as 2G")
+    return amount

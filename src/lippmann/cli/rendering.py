@@ -1,0 +1,221 @@
+"""``lippmann render`` and ``lippmann preview``: a scene becomes a picture."""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from lippmann.cli import options, parse
+from lippmann.cli.console import Console
+from lippmann.progress import Progress
+
+if TYPE_CHECKING:
+    from lippmann.image import IntegralImage, Provenance
+
+Method = Annotated[str, typer.Option("--method", help="full: every ray is traced.")]
+Camera = Annotated[str | None, typer.Option("--camera", help="Place the display by this camera of the scene file.")]
+Place = Annotated[
+    str | None,
+    typer.Option(
+        "--place",
+        help="fit: the scene into the display's depth; camera: as the scene's camera looks; "
+        "display: scene units are its mm. By default a bundled scene's own camera, else fit.",
+    ),
+]
+Turn = Annotated[str | None, typer.Option("--turn", help="Turn the scene: YAW[,PITCH[,ROLL]] in degrees.")]
+Shift = Annotated[str | None, typer.Option("--shift", help="Move the scene: X,Y,Z in mm.")]
+Scale = Annotated[float, typer.Option("--scale", help="Enlarge the scene about the display's centre.")]
+PopOut = Annotated[
+    float | None, typer.Option("--pop-out", help="Share of the scene's depth in front of the lens plane, 0 to 1.")
+]
+Subpixels = Annotated[bool, typer.Option("--subpixels", help="A ray for every sub-pixel, at its own place.")]
+
+
+def render(
+    scene: options.Scene,
+    output: options.Output,
+    display: options.DisplayName = "seed-lenticular",
+    method: Method = "full",
+    integrator: options.Integrator = "path",
+    depth: options.Depth = None,
+    spp: options.Spp = 16,
+    seed: options.Seed = 0,
+    subpixels: Subpixels = False,
+    pixel_filter: options.PixelFilter = "box",
+    camera: Camera = None,
+    place: Place = None,
+    turn: Turn = None,
+    shift: Shift = None,
+    scale: Scale = 1.0,
+    pop_out: PopOut = None,
+    environment: options.Environment = None,
+    background: options.Background = None,
+    allow_outside: options.AllowOutside = False,
+    bits: options.Bits = None,
+    device: options.Device = "auto",
+    threads: options.Threads = None,
+    memory: options.Memory = None,
+    as_json: options.Json = False,
+    quiet: options.Quiet = False,
+) -> None:
+    """Render a scene into the native pixels of a display."""
+    from lippmann import api
+    from lippmann.atomic import check_writable
+    from lippmann.image.formats import format_for
+
+    console = Console(quiet, as_json)
+    format_for(output, bits)
+    check_writable(output)
+    with console.progress() as progress:
+        started = time.perf_counter()
+        loaded = api.load_scene(
+            scene, environment=environment, background=_color(background), allow_outside=allow_outside
+        )
+        load_seconds = time.perf_counter() - started
+        image = api.render(
+            loaded,
+            display=display,
+            method=method,
+            integrator=integrator,
+            depth=depth,
+            spp=spp,
+            seed=seed,
+            subpixels=subpixels,
+            pixel_filter=pixel_filter,
+            camera=camera,
+            place=place,
+            turn=_angles(turn),
+            shift=(0.0, 0.0, 0.0) if shift is None else parse.triple(shift, "--shift"),
+            scale=scale,
+            pop_out=pop_out,
+            device=device,
+            threads=threads,
+            memory=parse.memory(memory),
+            progress=progress,
+        )
+        progress(Progress("write", 0, 1))
+        writing = time.perf_counter()
+        image = _with_seconds(image, load=load_seconds)
+        image.save(output, bits=bits)
+    written = _with_seconds(image, write=time.perf_counter() - writing)
+    for note in image.provenance.notes:
+        console.remark(note)
+    console.result(report(output, written.provenance), _sentence(output, written))
+
+
+def preview(
+    scene: options.Scene,
+    output: options.Output,
+    size: Annotated[str, typer.Option("--size", help="Width x height in pixels.")] = "512x512",
+    camera: Annotated[str | None, typer.Option("--camera", help="A camera of the scene file.")] = None,
+    integrator: options.Integrator = "path",
+    depth: options.Depth = None,
+    spp: options.Spp = 16,
+    seed: options.Seed = 0,
+    pixel_filter: options.PixelFilter = "box",
+    environment: options.Environment = None,
+    background: options.Background = None,
+    allow_outside: options.AllowOutside = False,
+    bits: options.Bits = None,
+    device: options.Device = "auto",
+    threads: options.Threads = None,
+    memory: options.Memory = None,
+    as_json: options.Json = False,
+    quiet: options.Quiet = False,
+) -> None:
+    """Render the plain picture that the scene's camera sees."""
+    from lippmann import api
+    from lippmann.atomic import check_writable
+    from lippmann.image.formats import format_for, write_plain_picture
+
+    console = Console(quiet, as_json)
+    format_for(output, bits)
+    check_writable(output)
+    with console.progress() as progress:
+        started = time.perf_counter()
+        loaded = api.load_scene(
+            scene, environment=environment, background=_color(background), allow_outside=allow_outside
+        )
+        load_seconds = time.perf_counter() - started
+        plain = api.preview(
+            loaded,
+            size=parse.size(size, "--size"),
+            camera=camera,
+            integrator=integrator,
+            depth=depth,
+            spp=spp,
+            seed=seed,
+            pixel_filter=pixel_filter,
+            device=device,
+            threads=threads,
+            memory=parse.memory(memory),
+            progress=progress,
+        )
+        writing = time.perf_counter()
+        provenance = _add_seconds(plain.provenance, load=load_seconds)
+        write_plain_picture(plain.pixels, output, bits=bits, transfer=provenance.transfer)
+        provenance = _add_seconds(provenance, write=time.perf_counter() - writing)
+    for note in provenance.notes:
+        console.remark(note)
+    height, width = plain.pixels.shape[:2]
+    console.result(
+        report(output, provenance), f"{output}: {width}x{height} pixels in {provenance.seconds['total']:.1f} s"
+    )
+
+
+def report(output: Path, provenance: Provenance) -> dict[str, Any]:
+    """What ``--json`` says of a render."""
+    return {
+        "output": str(output),
+        "size": output.stat().st_size,
+        "method": provenance.method,
+        "integrator": provenance.integrator,
+        "depth": provenance.depth,
+        "spp": provenance.spp,
+        "seed": provenance.seed,
+        "traced_fraction": provenance.traced_fraction,
+        "rays": dict(provenance.rays),
+        "seconds": dict(provenance.seconds),
+        "options": dict(provenance.options),
+        "notes": list(provenance.notes),
+    }
+
+
+def _sentence(output: Path, image: IntegralImage) -> str:
+    height, width = image.pixels.shape[:2]
+    rays = image.provenance.rays
+    millions = sum(rays.values()) / 1e6
+    return (
+        f"{output}: {width}x{height} pixels for {image.display.name}, {image.provenance.spp} samples per pixel, "
+        f"{millions:.1f} M rays, {image.provenance.seconds['total']:.1f} s"
+    )
+
+
+def _with_seconds(image: IntegralImage, **seconds: float) -> IntegralImage:
+    return replace(image, provenance=_add_seconds(image.provenance, **seconds))
+
+
+def _add_seconds(provenance: Provenance, **seconds: float) -> Provenance:
+    """Time spent outside the renderer belongs to its stage and to the total."""
+    added = dict(provenance.seconds)
+    for stage, value in seconds.items():
+        added[stage] = added.get(stage, 0.0) + value
+        added["total"] = added.get("total", 0.0) + value
+    return replace(provenance, seconds=added)
+
+
+def _color(text: str | None) -> tuple[float, float, float] | None:
+    return None if text is None else parse.triple(text, "--background")
+
+
+def _angles(text: str | None) -> tuple[float, float, float]:
+    if text is None:
+        return 0.0, 0.0, 0.0
+    values = parse.numbers(text, "--turn", (1, 2, 3))
+    yaw, pitch, roll = (*values, *([0.0] * (3 - len(values))))
+    return math.fmod(yaw, 360.0), pitch, roll

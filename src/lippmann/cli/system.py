@@ -1,0 +1,85 @@
+"""``lippmann doctor`` and ``lippmann displays``: what is there."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+from lippmann.cli import options
+from lippmann.cli.console import Console
+
+if TYPE_CHECKING:
+    from lippmann.display import Display
+
+
+def doctor(as_json: options.Json = False) -> None:
+    """Say what a render would use here, and how to mend what is missing."""
+    from lippmann import engine
+
+    diagnosis = engine.diagnose()
+    width = max(len(check.name) for check in diagnosis.checks)
+    lines = []
+    for check in diagnosis.checks:
+        lines.append(f"{'ok ' if check.ok else '!! '} {check.name:<{width}}  {check.value}")
+        if check.fix:
+            lines.append(f"{'':<{width + 4}} -> {check.fix}")
+    verdict = "a render would run" if diagnosis.ok else "a render would not run"
+    checks = [asdict(check) for check in diagnosis.checks]
+    Console(as_json=as_json).result({"ok": diagnosis.ok, "checks": checks}, "\n".join([*lines, verdict]))
+    raise typer.Exit(0 if diagnosis.ok else 1)
+
+
+def displays(as_json: options.Json = False) -> None:
+    """List the displays that come with the program."""
+    from lippmann.display import list_displays
+
+    rows = [_display_row(display) for display in list_displays()]
+    header = {
+        "name": "name",
+        "pixels": "pixels",
+        "lenses": "lenses",
+        "pixels_per_lens": "pixels/lens",
+        "field_of_view": "field",
+        "depth": "depth behind/before",
+        "title": "",
+    }
+    table = [header, *({key: _cell(key, row) for key in header} for row in rows)]
+    widths = {key: max(len(line[key]) for line in table) for key in header}
+    lines = ["  ".join(line[key].ljust(widths[key]) for key in header).rstrip() for line in table]
+    Console(as_json=as_json).result({"displays": rows}, "\n".join(lines))
+
+
+def _display_row(display: Display) -> dict[str, Any]:
+    across, down = display.pixels_per_lens
+    front, back = display.depth_budget
+    grid = display.lens_grid
+    return {
+        "name": display.name,
+        "title": display.title,
+        "layout": display.lens_array.layout,
+        "pixels": [display.panel.width, display.panel.height],
+        "lenses": [grid.columns, grid.rows],
+        "pixels_per_lens": [across, down],
+        "field_of_view": display.field_of_view,
+        "depth_budget": [front, back],
+        "size_mm": list(display.size_mm),
+    }
+
+
+def _cell(key: str, row: dict[str, Any]) -> str:
+    if key == "pixels":
+        return "x".join(str(count) for count in row["pixels"])
+    if key == "lenses":
+        columns, rows = row["lenses"]
+        return str(columns) if row["layout"] == "lenticular" else f"{columns}x{rows}"
+    if key == "pixels_per_lens":
+        across, down = row["pixels_per_lens"]
+        return f"{across:.3g}" if down is None else f"{across:.3g}x{down:.3g}"
+    if key == "field_of_view":
+        return f"{row['field_of_view']:.1f} deg"
+    if key == "depth":
+        front, back = row["depth_budget"]
+        return f"{-back:.0f}/{front:.0f} mm"
+    return str(row[key])

@@ -1,0 +1,423 @@
+"""A panel behind a lens array: which lens shows a pixel, which ray a pixel records, which pixel sees a point.
+
+Geometry (display frame, millimetres, right-handed: origin at the array's centre in the lens plane, +x right, +y up,
++z toward the viewer; the panel lies at z = -gap g, the lens centres at z = 0):
+
+- The lens that shows the panel point q is the one that contains ``q D / (D + g)`` in the lens plane, D being the
+  viewing distance: seen from (0, 0, D), q lies exactly behind that point. So a micro-image is ``p (D + g) / D`` wide.
+- The light line of q runs through q and the centre of its lens. A cylindrical lens bends across its axis only: there
+  the line runs through the axis, and along the axis it aims at the viewer's point (0, 0, D), or runs parallel to z if
+  D is infinite. In coordinates across (u) and along (v) the lens it is ``u(z) = c + (c - u_q) z / g`` and
+  ``v(z) = v_q (D - z) / (D + g)``.
+- The ray traced is that line backwards, from ``aperture distance`` in front of the lens plane, away from the viewer.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lippmann.display.checks import check_keys, check_text, number, positive
+from lippmann.display.lattice import Lattice
+from lippmann.display.lens_array import LensArray
+from lippmann.display.ops import NUMPY, Array, ArrayOps
+from lippmann.display.panel import Panel
+from lippmann.errors import DisplayError
+
+#: How an infinite viewing distance is written in files.
+INFINITE = "infinite"
+
+Vector = tuple[Array, Array, Array]
+
+#: A point nearer to a boundary between micro-images than this counts as lying on it, in pixels. Rounding noise of
+#: double precision stays below 1e-10 pixels on a panel of 100 000 pixels; no optics is made to a billionth of a pixel.
+BOUNDARY_TOLERANCE = 1e-9
+
+#: A number of micro-images (or of pixels in one) that is whole to this is taken as whole.
+WHOLE_TOLERANCE = 1e-6
+
+#: A scene point is resolved while it spreads over at most this many lens pitches.
+RESOLVED_PITCHES = 1.0
+
+
+@dataclass(frozen=True)
+class LensGrid:
+    """All lenses that own a point of the panel: ``columns`` x ``rows`` of them, counted from (0, 0) at the top left.
+
+    The corners of a slanted or hexagonal array may hold indices of lenses that own none. A lenticular sheet has one
+    row.
+    """
+
+    columns: int
+    rows: int
+    first_column: int = 0
+    first_row: int = 0
+
+
+@dataclass(frozen=True)
+class Display:
+    """An integral-imaging display.
+
+    Parameters
+    ----------
+    name:
+        Short name for files and tables, such as ``seed-lenticular``.
+    panel, lens_array:
+        The pixels and the lenses.
+    gap:
+        Air-equivalent distance from the panel to the plane of the lens centres in millimetres.
+    title:
+        One line for people.
+    viewing_distance:
+        Where all lenses' central rays meet, in millimetres in front of the lens plane; ``math.inf`` allowed.
+    aperture_distance:
+        How far in front of the lens plane the recorded rays begin, in millimetres: at least 0, below the viewing
+        distance. What lies nearer to the viewer is not recorded.
+
+    Notes
+    -----
+    Without an explicit offset the lenses are aligned with the panel, axis by axis: if the number of micro-images
+    across the panel is whole and even, a boundary between two lenses lies at the origin, else a lens centre does; so
+    whole micro-images tile the panel exactly. A slanted sheet has a lens axis through the origin.
+
+    A number of micro-images that is whole to one part in a million is taken as whole: the pitch in effect is then the
+    one that makes it exact, so that rounded input does not leave slivers of lenses at the edges.
+
+    Methods that take ``ops`` work on arrays of any one shape, element by element; indices of lenses are reals that
+    hold whole numbers.
+
+    Raises
+    ------
+    DisplayError
+        If a value is out of range, or a lens has more pixels than the panel, or less than one.
+    """
+
+    name: str
+    panel: Panel
+    lens_array: LensArray
+    gap: float
+    title: str = ""
+    viewing_distance: float = math.inf
+    aperture_distance: float = 0.0
+
+    def __post_init__(self) -> None:
+        check_text(self.name, "name", empty=False)
+        check_text(self.title, "title")
+        object.__setattr__(self, "gap", positive(self.gap, "gap"))
+        rule = "it must be a length above zero, or infinite"
+        viewing_distance = number(self.viewing_distance, "viewing_distance", rule=rule)
+        if viewing_distance <= 0:
+            raise DisplayError(f"viewing_distance is {viewing_distance:g} mm", where="viewing_distance", rule=rule)
+        object.__setattr__(self, "viewing_distance", viewing_distance)
+        rule = "it must be a length of zero or more, below the viewing distance"
+        aperture_distance = number(self.aperture_distance, "aperture_distance", rule=rule)
+        if not 0 <= aperture_distance < viewing_distance:
+            raise DisplayError(f"aperture_distance is {aperture_distance:g} mm", where="aperture_distance", rule=rule)
+        object.__setattr__(self, "aperture_distance", aperture_distance)
+        self._check_pixels_per_lens()
+
+    def _check_pixels_per_lens(self) -> None:
+        key, fix = "lens_array.pitch", "look at the units of pitch and pixel_pitch"
+        for count, available, direction in zip(
+            self.pixels_per_lens, (self.panel.width, self.panel.height), ("across", "down"), strict=True
+        ):
+            if count is None:
+                continue
+            if count > available * (1 + WHOLE_TOLERANCE):
+                rule = f"the panel has only {available}"
+                raise DisplayError(f"a lens covers {count:.6g} pixels {direction}", where=key, rule=rule, fix=fix)
+            if count < 1 - WHOLE_TOLERANCE:
+                rule = "it must cover at least one"
+                raise DisplayError(f"a lens covers {count:.6g} pixels {direction}", where=key, rule=rule, fix=fix)
+
+    # ---- Sizes -----------------------------------------------------------------------------------------------------
+
+    @property
+    def size_mm(self) -> tuple[float, float]:
+        """Width and height of the panel in millimetres."""
+        return self.panel.size_mm
+
+    @property
+    def magnification(self) -> float:
+        """Size of a micro-image relative to its lens, (D + g) / D; 1 if D is infinite."""
+        return 1.0 + self.gap * self._convergence
+
+    @property
+    def micro_image_pitch(self) -> float:
+        """Distance between neighbouring micro-images on the panel, across the lenses, in millimetres."""
+        return self.lens_array.pitch * self.magnification
+
+    @property
+    def pixels_per_lens(self) -> tuple[float, float | None]:
+        """Pixels of one micro-image across and from row to row; ``None`` for the latter if lenticular.
+
+        Across means along a pixel row, so the slant counts: ``p (D + g) / (D d cos slant)``.
+        """
+        across = self.micro_image_pitch / (self.panel.pixel_pitch * math.cos(math.radians(self.lens_array.slant)))
+        if self.lens_array.layout == "lenticular":
+            return across, None
+        return across, self.lens_array.row_spacing * self.magnification / self.panel.pixel_pitch
+
+    @property
+    def lens_grid(self) -> LensGrid:
+        """The lenses that own at least one point inside the panel."""
+        return self._lenses[1]
+
+    @property
+    def lattice(self) -> Lattice:
+        """Where the lenses are: aligned, and counted as in :attr:`lens_grid`."""
+        return self._lenses[0]
+
+    # ---- What the display can show ---------------------------------------------------------------------------------
+
+    @property
+    def field_of_view(self) -> float:
+        """Angle in degrees, across the lenses, over which the central lens shows its own micro-image."""
+        return math.degrees(2 * math.atan(0.5 * self.micro_image_pitch / self.gap))
+
+    def depth_spread(self, z: float) -> float:
+        """Size in millimetres over which one pixel's light spreads at height ``z``: ``|z| d / g = |z| p / (N g)``."""
+        return abs(z) * self.panel.pixel_pitch / self.gap
+
+    @property
+    def resolvable_depth(self) -> tuple[float, float]:
+        """Nearest and farthest z in millimetres that the display resolves: ``(+N g, -N g)``, at most up to the viewer.
+
+        A point is held to be resolved while its spread is at most one lens pitch, the display's own sampling in the
+        lens plane; beyond, the picture is blurred below the resolution of the lenses. Sub-pixels that are addressed
+        one by one resolve more; that is not counted.
+        """
+        depth = RESOLVED_PITCHES * self.lens_array.pitch * self.gap / self.panel.pixel_pitch
+        return min(depth, self.viewing_distance), -depth
+
+    @property
+    def depth_budget(self) -> tuple[float, float]:
+        """:attr:`resolvable_depth`, cut at the aperture: nothing in front of it is recorded."""
+        near, far = self.resolvable_depth
+        return min(near, self.aperture_distance), far
+
+    # ---- Pixels and panel points -----------------------------------------------------------------------------------
+
+    def panel_point(self, u: Array, v: Array, ops: ArrayOps = NUMPY) -> tuple[Array, Array]:
+        """Panel point in millimetres of continuous pixel coordinates, see :meth:`Panel.point`."""
+        return self.panel.point(u, v, ops)
+
+    def subpixel_point(self, u: Array, v: Array, c: Array, ops: ArrayOps = NUMPY) -> tuple[Array, Array]:
+        """:meth:`panel_point` displaced by the offset of sub-pixel ``c`` (0 R, 1 G, 2 B)."""
+        return self.panel.subpixel_point(u, v, c, ops)
+
+    def pixel_coordinates(self, x: Array, y: Array, ops: ArrayOps = NUMPY) -> tuple[Array, Array]:
+        """Continuous pixel coordinates ``(u, v)`` of a panel point; the inverse of :meth:`panel_point`."""
+        return self.panel.coordinates(x, y, ops)
+
+    # ---- Panel points, lenses and rays -----------------------------------------------------------------------------
+
+    def lens_of(self, x: Array, y: Array, ops: ArrayOps = NUMPY) -> tuple[Array, Array]:
+        """Indices ``(i, j)`` of the lens that shows a panel point.
+
+        They lie within :attr:`lens_grid` for points inside the panel that keep 2e-9 pixels away from its right and
+        lower edge; points beyond the panel belong to the lenses that would be there.
+        """
+        k = 1.0 / self.magnification
+        return self.lattice.lens_at(x * k, y * k, ops)
+
+    def lens_center(self, i: Array, j: Array, x: Array, y: Array, ops: ArrayOps = NUMPY) -> tuple[Array, Array]:
+        """Where the light line of the panel point ``(x, y)`` through lens ``(i, j)`` meets the lens plane.
+
+        That is the lens's centre; for a lenticular lens a point of its axis.
+        """
+        k = 1.0 / self.magnification
+        return self.lattice.center(i, j, x * k, y * k, ops)
+
+    def light_ray(self, x: Array, y: Array, ops: ArrayOps = NUMPY) -> tuple[Vector, Vector]:
+        """The ray that a panel point records: origin in front of the lens plane, unit direction away from the viewer.
+
+        Returns
+        -------
+        ``(ox, oy, oz), (dx, dy, dz)`` in the display frame, millimetres; ``oz`` is the aperture distance and ``dz``
+        is negative.
+        """
+        i, j = self.lens_of(x, y, ops)
+        cx, cy = self.lens_center(i, j, x, y, ops)
+        slope_x, slope_y = (x - cx) / self.gap, (y - cy) / self.gap
+        length = ops.sqrt(slope_x * slope_x + slope_y * slope_y + 1.0)
+        origin = (cx - slope_x * self.aperture_distance, cy - slope_y * self.aperture_distance)
+        aperture = length * 0.0 + self.aperture_distance
+        return (*origin, aperture), (slope_x / length, slope_y / length, -1.0 / length)
+
+    def project(
+        self, px: Array, py: Array, pz: Array, i: Array, j: Array, ops: ArrayOps = NUMPY
+    ) -> tuple[Array, Array]:
+        """The panel point whose light line through lens ``(i, j)`` passes the point P; the inverse of a ray.
+
+        Lens ``(i, j)`` shows P only if the result is its own, ``lens_of(x, y) == (i, j)``, and lies on the panel. A
+        point nearer than a nanometre to the lens plane counts as lying one nanometre before it: lenses whose centre
+        it hits show it, for all others the result lies very far away.
+        """
+        lattice = self.lattice
+        scale = self.gap / _nonzero(pz, ops)
+        if lattice.layout != "lenticular":
+            cx, cy = lattice.center(i, j, px, py, ops)
+            return cx + (cx - px) * scale, cy + (cy - py) * scale
+        center = lattice.origin_x + i * lattice.pitch
+        across = center + (center - lattice.across(px, py)) * scale
+        along = lattice.along(px, py) * self.magnification / _nonzero(1.0 - pz * self._convergence, ops)
+        return lattice.from_axes(across, along)
+
+    def panel_point_seen_by(
+        self, ex: Array, ey: Array, ez: Array, lx: Array, ly: Array, ops: ArrayOps = NUMPY
+    ) -> tuple[Array, Array]:
+        """The panel point that an eye at E (``ez`` > 0) sees when it looks at the point ``(lx, ly)`` of the lens plane.
+
+        Every lens is ideal and in focus on the panel: the eye sees the panel point on its line through the lens's
+        centre, across a cylindrical lens; along its axis the line runs straight on. Outside the display's field the
+        point lies in a neighbouring micro-image, as it does on a real display. The result may lie off the panel.
+        """
+        i, j = self.lattice.lens_at(lx, ly, ops)
+        cx, cy = self.lattice.center(i, j, lx, ly, ops)
+        scale = self.gap / ez
+        return cx + (cx - ex) * scale, cy + (cy - ey) * scale
+
+    def lenses_seeing(self, point: tuple[float, float, float]) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+        """All lenses that show a 3D point, and where.
+
+        Returns
+        -------
+        ``(n, 2)`` lens indices ``(i, j)`` in the order of rows, then columns, and ``(n, 2)`` panel points in
+        millimetres. NumPy only.
+        """
+        grid = self.lens_grid
+        j, i = (a.ravel().astype(np.float64) for a in np.indices((grid.rows, grid.columns)))
+        px, py, pz = (np.full(i.shape, float(value)) for value in point)
+        x, y = self.project(px, py, pz, i, j, NUMPY)
+        owner_i, owner_j = self.lens_of(x, y, NUMPY)
+        u, v = self.pixel_coordinates(x, y, NUMPY)
+        on_panel = (u >= 0) & (u < self.panel.width) & (v >= 0) & (v < self.panel.height)
+        seen = on_panel & (owner_i == i) & (owner_j == j)
+        return np.stack([i[seen], j[seen]], axis=1).astype(np.intp), np.stack([x[seen], y[seen]], axis=1)
+
+    # ---- Copies and plain values -----------------------------------------------------------------------------------
+
+    def resized(self, width: int, height: int) -> Display:
+        """The same optics in front of ``width`` x ``height`` pixels."""
+        return replace(self, panel=replace(self.panel, width=width, height=height))
+
+    def summary(self) -> dict[str, Any]:
+        """What one wants to know of a display at a glance, as plain values for a table or JSON.
+
+        Keys: ``name``, ``title``, ``layout``; ``pixels`` and ``lenses`` as [columns, rows]; ``size`` [width, height],
+        ``pixel_pitch``, ``lens_pitch``, ``gap``, ``viewing_distance`` (or ``"infinite"``) and ``aperture_distance``
+        in mm; ``slant`` and ``field_of_view`` in degrees; ``pixels_per_lens`` [across] or [across, down];
+        ``resolvable_depth`` [behind, before] in mm as distances from the lens plane.
+        """
+        grid, (near, far) = self.lens_grid, self.resolvable_depth
+        return {
+            "name": self.name,
+            "title": self.title,
+            "layout": self.lens_array.layout,
+            "pixels": [self.panel.width, self.panel.height],
+            "lenses": [grid.columns, grid.rows],
+            "pixels_per_lens": [count for count in self.pixels_per_lens if count is not None],
+            "size": list(self.size_mm),
+            "pixel_pitch": self.panel.pixel_pitch,
+            "lens_pitch": self.lens_array.pitch,
+            "slant": self.lens_array.slant,
+            "gap": self.gap,
+            "viewing_distance": self._written_viewing_distance,
+            "aperture_distance": self.aperture_distance,
+            "field_of_view": self.field_of_view,
+            "resolvable_depth": [-far, near],
+        }
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values for JSON; lengths in millimetres, an infinite distance as ``"infinite"``."""
+        panel, lenses = self.panel, self.lens_array
+        return {
+            "name": self.name,
+            "title": self.title,
+            "gap": self.gap,
+            "viewing_distance": self._written_viewing_distance,
+            "aperture_distance": self.aperture_distance,
+            "panel": {
+                "width": panel.width,
+                "height": panel.height,
+                "pixel_pitch": panel.pixel_pitch,
+                "subpixel_offsets": [list(offset) for offset in panel.subpixel_offsets],
+            },
+            "lens_array": {
+                "layout": lenses.layout,
+                "pitch": lenses.pitch,
+                "slant": lenses.slant,
+                "offset": None if lenses.offset is None else list(lenses.offset),
+                "row_pitch": lenses.row_pitch,
+            },
+        }
+
+    @staticmethod
+    def from_dict(values: Mapping[str, Any]) -> Display:
+        """The display of :meth:`to_dict`, exactly; a :class:`DisplayError` if a key is missing or unknown."""
+        check_tables(values)
+        parts: dict[str, Any] = dict(values)
+        parts["panel"] = Panel(**values["panel"])
+        parts["lens_array"] = LensArray(**values["lens_array"])
+        if parts.get("viewing_distance") == INFINITE:
+            parts["viewing_distance"] = math.inf
+        return Display(**parts)
+
+    # ---- Derived once ----------------------------------------------------------------------------------------------
+
+    @property
+    def _written_viewing_distance(self) -> float | str:
+        return INFINITE if math.isinf(self.viewing_distance) else self.viewing_distance
+
+    @property
+    def _convergence(self) -> float:
+        return 1.0 / self.viewing_distance
+
+    @cached_property
+    def _lenses(self) -> tuple[Lattice, LensGrid]:
+        panel, lenses = self.panel, self.lens_array
+        across, down = self.pixels_per_lens
+        width, height = (side / self.magnification for side in panel.size_mm)
+        pitch, origin_x = lenses.pitch, 0.0
+        if lenses.slant == 0.0:
+            pitch, origin_x = _aligned(lenses.pitch, panel.width / across, width)
+        row_pitch, origin_y = math.inf, 0.0
+        if down is not None:
+            row_pitch, origin_y = _aligned(lenses.row_spacing, panel.height / down, height)
+        tolerance = BOUNDARY_TOLERANCE / across
+        lattice = Lattice(lenses.layout, pitch, row_pitch, lenses.slant, origin_x, origin_y, tolerance)
+        if lenses.offset is not None:
+            x, y = lenses.offset
+            origin = {"origin_x": lattice.across(x, y)} if down is None else {"origin_x": x, "origin_y": y}
+            lattice = replace(lattice, **origin)
+        lattice, columns, rows = lattice.from_corner_of((-width / 2, width / 2, -height / 2, height / 2))
+        return lattice, LensGrid(columns, rows)
+
+
+def check_tables(values: Mapping[str, Any]) -> None:
+    """Refuses what is not shaped like :meth:`Display.to_dict`: unknown or missing keys, tables that are none."""
+    check_keys(values, Display, "")
+    check_keys(values["panel"], Panel, "panel")
+    check_keys(values["lens_array"], LensArray, "lens_array")
+
+
+def _aligned(pitch: float, count: float, extent: float) -> tuple[float, float]:
+    """Pitch in effect and position of a lens centre, for ``count`` lenses over an extent centred on zero."""
+    whole = round(count)
+    if abs(count - whole) > WHOLE_TOLERANCE:
+        return pitch, 0.0
+    pitch = extent / whole
+    return pitch, 0.5 * pitch if whole % 2 == 0 else 0.0
+
+
+def _nonzero(value: Array, ops: ArrayOps) -> Array:
+    """``value``, kept a nanometre (or a millionth) away from zero, so that divisions stay finite."""
+    tiny = 1e-6
+    return ops.where(ops.abs(value) < tiny, tiny, value)

@@ -1,0 +1,177 @@
+"""Displays from files: the presets that come with Lippmann, and one's own, as TOML.
+
+A file holds the keys of :class:`Display`, with the tables ``[panel]`` and ``[lens_array]``::
+
+    title = "A 15.6-inch panel behind a slanted sheet"
+    gap = 0.885                         # a number is millimetres
+    viewing_distance = "60 cm"          # or a string with a unit: um, mm, cm, m, in; "infinite" is allowed here
+    aperture_distance = 10
+
+    [panel]
+    width = 3840
+    height = 2160
+    pixel_pitch = "282.4 dpi"           # dpi and ppi for the pixel pitch
+    subpixel_offsets = "rgb"            # or "bgr" ..., "none", or three pairs [right, down] in pixels
+
+    [lens_array]
+    layout = "lenticular"
+    pitch = "45.5 lpi"                  # lpi (lenses per inch) and px (pixels of the panel) for what the lenses repeat
+    slant = 9.46                        # degrees
+
+A file without a ``name`` has its own, less the ending.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import sys
+from collections.abc import Mapping
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+from lippmann.display.checks import positive, suggestion
+from lippmann.display.display import INFINITE, Display, check_tables
+from lippmann.errors import DisplayError
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
+_MILLIMETRES = {"um": 1e-3, "µm": 1e-3, "mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4, "inch": 25.4}
+_INCH = 25.4
+_MAXIMUM_BYTES = 1_000_000  # a picture given by mistake is not read to its end
+_QUANTITY = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([^\d\s.+-]\S*)?")
+
+#: Lengths of a file by table; beside plain lengths, the units per inch and whether the panel's pixel may be the unit.
+_LENGTHS: dict[str, dict[str, tuple[tuple[str, ...], bool]]] = {
+    "": {"gap": ((), False), "viewing_distance": ((), False), "aperture_distance": ((), False)},
+    "panel": {"pixel_pitch": (("dpi", "ppi"), False)},
+    "lens_array": {"pitch": (("lpi",), True), "row_pitch": (("lpi",), True), "offset": ((), True)},
+}
+
+
+def load_display(name_or_path: str | os.PathLike[str]) -> Display:
+    """The preset of that name, or the display of a TOML file.
+
+    Raises
+    ------
+    DisplayError
+        If there is neither, or the file cannot be read or does not describe a possible display.
+    """
+    presets = _preset_texts()
+    name = os.fspath(name_or_path)
+    if name in presets:
+        return _from_toml(presets[name], where=f"{name}.toml", stem=name)
+    path = Path(name)
+    if path.suffix != ".toml" and not path.exists():
+        rule = f"the displays are {', '.join(presets)}, or a .toml file"
+        raise DisplayError(f"unknown display {name!r}", rule=rule, fix=suggestion(name, presets))
+    return _from_toml(_read(path), where=name, stem=path.stem)
+
+
+def list_displays() -> list[Display]:
+    """All presets, by name."""
+    return [_from_toml(text, where=f"{name}.toml", stem=name) for name, text in _preset_texts().items()]
+
+
+def _preset_texts() -> dict[str, str]:
+    folder = files("lippmann.display") / "presets"
+    found = (entry for entry in folder.iterdir() if entry.name.endswith(".toml"))
+    return {entry.name[:-5]: entry.read_text(encoding="utf-8") for entry in sorted(found, key=lambda e: e.name)}
+
+
+def _read(path: Path) -> str:
+    rule = "a display is a preset's name or a TOML file"
+    try:
+        with path.open("rb") as file:
+            content = file.read(_MAXIMUM_BYTES + 1)
+        if len(content) > _MAXIMUM_BYTES:
+            raise DisplayError("this file is too large", where=str(path), rule=rule)
+        return content.decode("utf-8")
+    except UnicodeDecodeError:
+        raise DisplayError("this is not a text file", where=str(path), rule=rule) from None
+    except OSError as error:
+        raise DisplayError(f"cannot be read: {error.strerror}", where=str(path), rule=rule) from None
+
+
+def _from_toml(text: str, *, where: str, stem: str) -> Display:
+    try:
+        values = tomllib.loads(text)
+    except ValueError as error:
+        raise DisplayError(f"not valid TOML: {error}", where=where) from None  # also numbers of absurd length
+    try:
+        values = {"name": stem, **values}
+        check_tables(values)
+        return Display.from_dict(_in_millimetres(values))
+    except DisplayError as error:
+        place = _place(text, error.where, where)
+        raise DisplayError(error.what, where=place, rule=error.rule, fix=error.fix) from None
+
+
+def _place(text: str, key: str, where: str) -> str:
+    """``file:line`` of a dotted key, or the file and the table if it is not written there."""
+    table, _, name = key.rpartition(".")
+    current = ""
+    for line, content in enumerate(text.splitlines(), start=1):
+        if header := re.match(r"\s*\[\s*([\w.]+)\s*\]", content):
+            current = header[1]
+            if current == key:
+                return f"{where}:{line}"
+        elif current == table and re.match(rf"\s*[\"']?{re.escape(name)}[\"']?\s*=", content):
+            return f"{where}:{line}"
+    return f"{where} [{table or key}]" if key else where
+
+
+def _in_millimetres(values: Mapping[str, Any]) -> dict[str, Any]:
+    """The same tables with all lengths in millimetres and sub-pixels as offsets; what is no text stays as it is."""
+    panel = _converted(values["panel"], "panel", None)
+    if isinstance(panel.get("subpixel_offsets"), str):
+        panel["subpixel_offsets"] = _stripe(panel["subpixel_offsets"])
+    pixel = positive(panel["pixel_pitch"], "panel.pixel_pitch")
+    lenses = _converted(values["lens_array"], "lens_array", pixel)
+    return {**_converted(values, "", None), "panel": panel, "lens_array": lenses}
+
+
+def _converted(values: Mapping[str, Any], table: str, pixel: float | None) -> dict[str, Any]:
+    converted = dict(values)
+    for name, (per_inch, in_pixels) in _LENGTHS[table].items():
+        value, key = values.get(name), f"{table}.{name}" if table else name
+        scales = {**_MILLIMETRES, "px": pixel} if in_pixels and pixel is not None else _MILLIMETRES
+        if isinstance(value, list):
+            converted[name] = [_length(item, key, scales, per_inch) for item in value]
+        elif isinstance(value, str) and not (name == "viewing_distance" and value == INFINITE):
+            converted[name] = _length(value, key, scales, per_inch)
+    return converted
+
+
+def _length(value: object, key: str, scales: Mapping[str, float], per_inch: tuple[str, ...]) -> object:
+    """Millimetres of ``"6.8 mm"``; what is no string stays as it is."""
+    if not isinstance(value, str):
+        return value
+    units = ", ".join([*scales, *per_inch])
+    match = _QUANTITY.fullmatch(value.strip())
+    if match is None:
+        rule = 'a length is a number of millimetres or a string with a unit such as "6.8 mm"'
+        raise DisplayError(f"{value!r} is not a length", where=key, rule=rule)
+    amount, unit = float(match[1]), match[2] or "mm"
+    if unit in scales:
+        return amount * scales[unit]
+    if unit in per_inch:
+        return _INCH / amount if amount else 0.0
+    known = suggestion(unit, [*scales, *per_inch])
+    raise DisplayError(
+        f"{value!r} has the unknown unit {unit!r}", where=key, rule=f"the units here are {units}", fix=known
+    )
+
+
+def _stripe(order: str) -> list[list[float]]:
+    """Offsets of sub-pixels that stand side by side in this order, such as ``"rgb"``; ``"none"`` if they do not."""
+    if order == "none":
+        return [[0.0, 0.0]] * 3
+    if sorted(order) != sorted("rgb"):
+        rule = 'it must be an order of sub-pixels such as "rgb", "none", or three pairs [right, down] in pixels'
+        raise DisplayError(f"subpixel_offsets is {order!r}", where="panel.subpixel_offsets", rule=rule)
+    return [[(order.index(color) - 1) / 3, 0.0] for color in "rgb"]

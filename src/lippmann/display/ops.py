@@ -1,0 +1,46 @@
+"""The few array functions that the display's geometry is written against.
+
+Every formula of this package uses operators and an :class:`ArrayOps` only, so that the very same code runs on NumPy
+arrays here and on the renderer's device arrays there. Coordinates must be double precision on both: at single
+precision a coordinate on a panel of 28 000 pixels is known to about a thousandth of a pixel, too coarse for the
+boundaries between lenses.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Protocol, TypeAlias
+
+import numpy as np
+
+#: An array (or scalar) of reals of whatever kind the ``ops`` in use understand.
+Array: TypeAlias = Any
+
+
+class ArrayOps(Protocol):
+    """Element-wise functions; ``where`` takes a condition made by a comparison of arrays."""
+
+    def floor(self, a: Array, /) -> Array: ...
+
+    def sqrt(self, a: Array, /) -> Array: ...
+
+    def abs(self, a: Array, /) -> Array: ...
+
+    def minimum(self, a: Array, b: Array, /) -> Array: ...
+
+    def maximum(self, a: Array, b: Array, /) -> Array: ...
+
+    def where(self, condition: Array, a: Array, b: Array, /) -> Array: ...
+
+
+class _NumpyOps:
+    """NumPy's own functions under the names of :class:`ArrayOps`."""
+
+    floor = staticmethod(np.floor)
+    sqrt = staticmethod(np.sqrt)
+    abs = staticmethod(np.abs)
+    minimum = staticmethod(np.minimum)
+    maximum = staticmethod(np.maximum)
+    where = staticmethod(np.where)
+
+
+NUMPY: ArrayOps = _NumpyOps()

@@ -1,0 +1,75 @@
+"""Errors that a user can act on.
+
+Every error is one line: where it happened, what was found, the rule it breaks and how to mend it. The command line
+prints that line alone and leaves with the error's exit code; a library caller catches :class:`LippmannError`.
+"""
+
+from __future__ import annotations
+
+
+class LippmannError(Exception):
+    """Base of all errors that Lippmann raises on purpose.
+
+    Parameters
+    ----------
+    what:
+        What was found, with the offending value.
+    where:
+        The file (with line where known), option or argument concerned; empty if there is none.
+    rule:
+        What would have been right.
+    fix:
+        What the user can do about it.
+    """
+
+    exit_code = 2
+
+    def __init__(self, what: str, *, where: str = "", rule: str = "", fix: str = "") -> None:
+        self.what = what
+        self.where = where
+        self.rule = rule
+        self.fix = fix
+        super().__init__(str(self))
+
+    def __str__(self) -> str:
+        head = f"{self.where}: {self.what}" if self.where else self.what
+        line = "; ".join(part for part in (head, self.rule, self.fix) if part)
+        return " ".join(line.split())  # a value quoted from a file may hold line breaks
+
+    def __reduce__(self) -> tuple[object, ...]:
+        # Keyword-only fields are lost by the default pickling, which worker processes rely on.
+        return (_rebuild, (type(self), self.what, self.where, self.rule, self.fix))
+
+
+def _rebuild(kind: type[LippmannError], what: str, where: str, rule: str, fix: str) -> LippmannError:
+    return kind(what, where=where, rule=rule, fix=fix)
+
+
+class UsageError(LippmannError):
+    """An option or argument that cannot be honoured."""
+
+
+class SceneError(LippmannError):
+    """A scene file that is missing, damaged, foreign or beyond what can be rendered."""
+
+
+class DisplayError(LippmannError):
+    """A display description that is unknown, incomplete or physically impossible."""
+
+
+class PictureError(LippmannError):
+    """A picture that cannot be read, or that does not fit what is asked of it."""
+
+
+class OutputError(LippmannError):
+    """A place that cannot be written: unknown format, missing permission, full disk."""
+
+
+class MemoryLimitError(LippmannError):
+    """The memory limit is too small for the smallest piece of work."""
+
+
+class EngineError(LippmannError):
+    """The rendering engine cannot run on this machine as it is."""
+
+    exit_code = 1

@@ -1,0 +1,39 @@
+"""Finding an NVIDIA GPU that can trace rays, through its driver's own libraries."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+from typing import Any
+
+
+def find() -> str | None:
+    """The name of the first GPU, or ``None`` if there is no GPU or no driver for it."""
+    try:
+        driver = ctypes.CDLL(os.environ.get("DRJIT_LIBCUDA_PATH") or "libcuda.so.1")
+        count = ctypes.c_int(0)
+        if driver.cuInit(0) != 0 or driver.cuDeviceGetCount(ctypes.byref(count)) != 0 or count.value < 1:
+            return None
+        name = ctypes.create_string_buffer(256)
+        if driver.cuDeviceGetName(name, len(name), 0) != 0:
+            return None
+    except (OSError, AttributeError):
+        return None
+    return name.value.decode(errors="replace")
+
+
+def obstacle(dr: Any) -> str:
+    """Why Mitsuba cannot use the GPU; empty if it can. ``dr`` is the loaded Dr.Jit.
+
+    It takes a CUDA driver and OptiX, which containers often lack.
+    """
+    if not dr.has_backend(dr.JitBackend.CUDA):
+        return "no NVIDIA GPU with a driver of version 535 or newer was found"
+    if tuple(dr.detail.cuda_version())[:2] == (12, 7):
+        return "NVIDIA drivers of versions 560 to 569 miscompile kernels; install 570 or newer"
+    optix = os.environ.get("DRJIT_LIBOPTIX_PATH") or "libnvoptix.so.1"
+    try:
+        ctypes.CDLL(optix).optixQueryFunctionTable  # noqa: B018 - the look-up raises if it is missing
+    except (OSError, AttributeError):
+        return f"the GPU's driver cannot trace rays: '{optix}' (OptiX) cannot be loaded"
+    return ""

@@ -1,0 +1,53 @@
+"""Linear light to display codes and back.
+
+The curve is that of IEC 61966-2-1 (sRGB). Codes of ``bits`` bits stand for coded values ``code / (2**bits - 1)``; a
+value between two codes goes to the nearer one, values outside [0, 1] to the nearest end. ``code -> linear -> code`` is
+the identity for both bit depths and both transfers.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lippmann.image.provenance import Transfer
+
+FloatArray = NDArray[np.float32]
+
+#: Values coded at a time: keeps the temporary arrays small beside the picture.
+_BLOCK = 1 << 22
+
+
+def encode_srgb(linear: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
+    """sRGB-coded values in [0, 1] of linear values, which are clipped to [0, 1]; same shape and precision."""
+    value: NDArray[Any] = np.clip(linear, 0, 1)
+    return np.where(value <= 0.0031308, 12.92 * value, 1.055 * value ** (1 / 2.4) - 0.055)
+
+
+def decode_srgb(coded: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
+    """Linear values of sRGB-coded values in [0, 1]; same shape and precision."""
+    value: NDArray[Any] = coded
+    return np.where(value <= 0.04045, value / 12.92, ((value + 0.055) / 1.055) ** 2.4)
+
+
+def quantize(linear: FloatArray, bits: int, transfer: Transfer) -> NDArray[np.uint8] | NDArray[np.uint16]:
+    """Codes (uint8 for 8 bits, uint16 for 16) of linear values; same shape, always C-contiguous."""
+    codes: NDArray[Any] = np.empty(linear.shape, dtype=np.uint8 if bits == 8 else np.uint16)
+    top = 2**bits - 1
+    source, target = np.ascontiguousarray(linear).reshape(-1), codes.reshape(-1)
+    for start in range(0, source.size, _BLOCK):
+        block = source[start : start + _BLOCK]
+        coded = encode_srgb(block) if transfer == "srgb" else np.clip(block, 0, 1)
+        target[start : start + _BLOCK] = np.floor(coded * top + np.float32(0.5))
+    return codes
+
+
+def dequantize(codes: NDArray[np.uint8] | NDArray[np.uint16], transfer: Transfer) -> FloatArray:
+    """Linear float32 values of uint8 or uint16 codes; same shape."""
+    top = np.iinfo(codes.dtype).max
+    # One table look-up per value: exact in double precision, and quicker than the curve itself.
+    levels = np.arange(top + 1, dtype=np.float64) / top
+    table = (decode_srgb(levels) if transfer == "srgb" else levels).astype(np.float32)
+    return table[codes]

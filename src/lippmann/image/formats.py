@@ -1,0 +1,180 @@
+"""Picture files: which there are, what each can hold, reading and writing them.
+
+A file is recognized by its first bytes when it is read and by its ending when it is written. What the formats do to
+the values is told in :mod:`lippmann.image.codec`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lippmann.atomic import replacing
+from lippmann.display import Display
+from lippmann.errors import OutputError, PictureError
+from lippmann.image.codec import FORMATS, STORED, FormatName, decode_file, encode_file, read_header
+from lippmann.image.integral_image import FloatArray, IntegralImage, Stored
+from lippmann.image.metadata import Metadata, from_text, metadata_of, to_text
+from lippmann.image.provenance import Provenance, Transfer
+
+
+@dataclass(frozen=True)
+class PictureInfo:
+    """What is known of a picture file without decoding it.
+
+    ``layers`` are the names of its maps; ``metadata`` is None if it does not say for which display it is.
+    """
+
+    format: FormatName
+    width: int
+    height: int
+    stored: str
+    layers: tuple[str, ...]
+    metadata: Metadata | None
+
+
+def format_for(path: Path, bits: int | None = None, *, source: Stored = "float32") -> tuple[FormatName, Stored]:
+    """The format that a file name stands for and the type of the values that would be stored in it.
+
+    ``bits`` per channel: 8 or 16 for PNG, 16 or 32 for EXR (float), 8, 16 or 32 (float) for TIFF. None takes those of
+    ``source`` where the format has them, so that a picture is written as exactly as it was read, except that computed
+    values (``float32``) go to 8 bits unless the format is OpenEXR.
+
+    Raises
+    ------
+    OutputError
+        If the ending is unknown or the format has no such bits.
+    """
+    name = FORMATS.get(path.suffix.lower())
+    if name is None:
+        ending = f"the ending '{path.suffix}' is unknown" if path.suffix else "the name has no ending"
+        raise OutputError(ending, where=str(path), rule=f"known are {', '.join(FORMATS)}")
+    return name, stored_as(name, path, bits, source)
+
+
+def stored_as(name: FormatName, path: Path, bits: int | None, source: Stored) -> Stored:
+    """The type of the values that a file of the format ``name`` stores; see :func:`format_for`."""
+    depths = STORED[name]
+    if bits is None:
+        is_kept = source in depths.values() and source != "float32"
+        return source if is_kept else next(iter(depths.values()))
+    if bits not in depths:
+        known = " or ".join(str(depth) for depth in sorted(depths))
+        raise OutputError(f"{bits} bits per channel are not possible", where=str(path), rule=f"{name} has {known}")
+    return depths[bits]
+
+
+def write_picture(image: IntegralImage, path: Path, *, bits: int | None = None) -> None:
+    """Write an integral image with its metadata; see :func:`format_for` for endings and ``bits``.
+
+    Only OpenEXR keeps the picture's maps.
+
+    Raises
+    ------
+    OutputError
+        If the ending is unknown, the format has no such bits, or the place cannot be written.
+    """
+    name, stored = format_for(path, bits, source=image.stored)
+    layers = {"": image.pixels, **image.maps} if name == "exr" else {"": image.pixels}
+    with replacing(path) as temporary:
+        encode_file(
+            temporary,
+            name,
+            layers,
+            stored=stored,
+            transfer=image.provenance.transfer,
+            text=to_text(metadata_of(image)),
+            pixel_pitch=image.display.panel.pixel_pitch,
+        )
+
+
+def write_plain_picture(
+    pixels: FloatArray,
+    path: Path,
+    *,
+    bits: int | None = None,
+    transfer: Transfer = "srgb",
+    maps: Mapping[str, Any] | None = None,
+) -> None:
+    """Write an ordinary picture, ``(H, W, 3)`` linear RGB: a replay, a preview. OpenEXR takes ``maps`` with it.
+
+    Raises
+    ------
+    OutputError
+        As :func:`write_picture`.
+    PictureError
+        If a value is not finite.
+    """
+    name, stored = format_for(path, bits)
+    if not np.isfinite(pixels).all():
+        raise PictureError("the picture holds values that are not finite", where=str(path))
+    layers = {"": pixels, **(maps or {})} if name == "exr" else {"": pixels}
+    with replacing(path) as temporary:
+        encode_file(temporary, name, layers, stored=stored, transfer=transfer)
+
+
+def read_picture(path: Path, *, display: Display | None = None) -> IntegralImage:
+    """Read an integral image: PNG, OpenEXR or TIFF.
+
+    Parameters
+    ----------
+    path:
+        The file.
+    display:
+        The display that the picture is for, instead of the one that it carries; needed for files of other programs.
+
+    Raises
+    ------
+    PictureError
+        If the file is missing, empty, foreign or damaged, has no display, or a size other than the display's.
+    """
+    info = read_info(path)
+    metadata = _metadata_for(info, path, display)
+    layers, stored = decode_file(path, info.format, metadata.provenance.transfer)
+    pixels = layers.pop("")
+    try:
+        return IntegralImage(
+            pixels, metadata.display, metadata.world_from_display, metadata.provenance, layers, stored=stored
+        )
+    except PictureError as error:
+        raise PictureError(error.what, where=str(path), rule=error.rule, fix=error.fix) from error
+
+
+def read_metadata(path: Path, *, display: Display | None = None) -> Metadata:
+    """Display, placement and provenance of a picture, without decoding its pixels; raises as :func:`read_picture`."""
+    return _metadata_for(read_info(path), path, display)
+
+
+def read_info(path: Path) -> PictureInfo:
+    """Format, size and metadata of a picture file, without decoding its pixels.
+
+    Raises
+    ------
+    PictureError
+        If the file is missing, empty, foreign or damaged, or its metadata makes no sense.
+    """
+    header = read_header(path)
+    metadata = from_text(header.text, str(path)) if header.text else None
+    return PictureInfo(header.format, header.width, header.height, header.stored, header.layers, metadata)
+
+
+def _metadata_for(info: PictureInfo, path: Path, display: Display | None) -> Metadata:
+    metadata = info.metadata
+    if metadata is None:
+        if display is None:
+            raise PictureError("has no display in it", where=str(path), fix="say --display")
+        metadata = Metadata(display, np.eye(4), Provenance())
+    elif display is not None:
+        metadata = replace(metadata, display=display)
+    panel = metadata.display.panel
+    if (info.width, info.height) != (panel.width, panel.height):
+        raise PictureError(
+            f"has {info.width} x {info.height} pixels",
+            where=str(path),
+            rule=f"the display {metadata.display.name} has {panel.width} x {panel.height}",
+        )
+    return metadata

@@ -1,0 +1,275 @@
+"""The integral image: what the panel shows, with the display it is made for."""
+
+from __future__ import annotations
+
+import base64
+import html
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, Literal, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from lippmann.display import Display
+from lippmann.errors import PictureError
+from lippmann.image.permutation import Permutation, micro_images_as_views
+from lippmann.image.provenance import Provenance
+from lippmann.image.views import Resampling, exact_view_shape, resampled_views, view_grid
+
+FloatArray = NDArray[np.float32]
+Matrix = NDArray[np.float64]
+
+#: How values were stored in the file that a picture came from; ``float32`` if it came from none.
+Stored = Literal["uint8", "uint16", "float16", "float32"]
+
+#: Deviation of ``world_from_display`` from a similarity that rounding may leave.
+_SIMILARITY_TOLERANCE = 1e-6
+
+_MAP_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_-]*")
+
+#: Width of the picture that a notebook shows, in pixels.
+_NOTEBOOK_WIDTH = 512
+
+
+@dataclass(frozen=True, eq=False)
+class IntegralImage:
+    """The pixels of a panel in linear RGB.
+
+    Parameters
+    ----------
+    pixels:
+        ``(H, W, 3)`` linear RGB, row 0 on top, finite; kept as float32 and read-only. 1 is the brightest that integer
+        formats hold.
+    display:
+        The display that the pixels are for; its panel has ``W x H`` pixels.
+    world_from_display:
+        ``(4, 4)`` similarity (rotation, scale, translation) that puts the display frame (mm) into the scene.
+    provenance:
+        How the picture was made.
+    maps:
+        Further layers by name, such as ``depth`` and ``normal``: ``(H, W)`` or ``(H, W, 2 to 4)``, float32 or uint32.
+        Names begin with a letter and hold letters, digits, ``_`` and ``-``. OpenEXR files carry them, others do not.
+    stored:
+        Depth of the values in the file that the picture was read from, so that it can be written back exactly.
+
+    Raises
+    ------
+    PictureError
+        If shapes, types or values are not as said above.
+    """
+
+    pixels: FloatArray
+    display: Display
+    world_from_display: Matrix = field(default_factory=lambda: np.eye(4))
+    provenance: Provenance = field(default_factory=Provenance)
+    maps: Mapping[str, NDArray[Any]] = field(default_factory=dict)
+    stored: Stored = "float32"
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "pixels", _checked_pixels(self.pixels, self.display))
+        object.__setattr__(self, "world_from_display", checked_similarity(self.world_from_display))
+        size = self.pixels.shape[:2]
+        maps = {name: _checked_map(name, values, size) for name, values in self.maps.items()}
+        object.__setattr__(self, "maps", maps)
+        if self.stored not in get_args(Stored):
+            rule = f"it must be one of {', '.join(get_args(Stored))}"
+            raise PictureError(f"stored is {self.stored!r}", rule=rule)
+
+    # ---- Micro-images and views -----------------------------------------------------------------------------------
+
+    def micro_images(self) -> FloatArray:
+        """Micro-images ``(lens_rows, lens_cols, ny, nx, 3)``, an exact permutation of the pixels.
+
+        A lenticular sheet has ``(1, lens_cols, H, nx, 3)``. Places where a lens has no pixel, see
+        :meth:`micro_image_mask`, are zero. May share its memory with :attr:`pixels`.
+        """
+        return Permutation(self.display).split(self.pixels)
+
+    def micro_image_mask(self) -> NDArray[np.bool_]:
+        """``(lens_rows, lens_cols, ny, nx)``: which places of :meth:`micro_images` hold a pixel."""
+        return Permutation(self.display).mask
+
+    @property
+    def views_are_exact(self) -> bool:
+        """Whether :meth:`views` is a permutation of the pixels; else it is resampled, see :attr:`views_note`."""
+        return view_grid(self.display).exact
+
+    @property
+    def views_note(self) -> str:
+        """What is not exact about the views, as a sentence; empty if nothing is."""
+        return view_grid(self.display).note
+
+    def views(self, resampling: Resampling = "nearest") -> FloatArray:
+        """Views ``(ny, nx, lens_rows, lens_cols, 3)``; of a lenticular sheet ``(1, nx, H, lens_cols, 3)``.
+
+        Exact where whole pixels lie from lens to lens. Elsewhere ``resampling`` says what a lens gives that has no
+        pixel at the place of a view: its ``nearest`` pixel or a ``linear`` interpolation between its pixels. Values
+        that no pixel stands for, see :meth:`view_mask`, are zero. A larger ``kx`` is seen from further left, a larger
+        ``ky`` from further up.
+        """
+        if self.views_are_exact:
+            return micro_images_as_views(self.micro_images(), self.display)
+        return resampled_views(self.pixels, self.display, _checked_resampling(resampling))[0]
+
+    def view_mask(self) -> NDArray[np.bool_]:
+        """``(ny, nx, lens_rows, lens_cols)``: which values of :meth:`views` stand for a pixel."""
+        if self.views_are_exact:
+            return micro_images_as_views(self.micro_image_mask(), self.display)
+        return resampled_views(self.pixels, self.display, "nearest")[1]
+
+    @classmethod
+    def from_micro_images(cls, micro_images: ArrayLike, display: Display, **parts: Any) -> IntegralImage:
+        """The picture with these :meth:`micro_images`; ``parts`` are the class's other parameters.
+
+        Raises
+        ------
+        PictureError
+            If the shape is not that of the display's micro-images.
+        """
+        return cls(Permutation(display).join(np.asarray(micro_images, dtype=np.float32)), display, **parts)
+
+    @classmethod
+    def from_views(cls, views: ArrayLike, display: Display, **parts: Any) -> IntegralImage:
+        """The picture with these :meth:`views`; ``parts`` are the class's other parameters.
+
+        Raises
+        ------
+        PictureError
+            If the shape is not that of the display's views, or those are not exact.
+        """
+        return cls(_joined_views(np.asarray(views, dtype=np.float32), display), display, **parts)
+
+    # ---- What an eye sees, and files ------------------------------------------------------------------------------
+
+    def replay(self, eye: tuple[float, float, float] | None = None, **options: Any) -> FloatArray:
+        """What an eye at ``eye`` (mm, display frame) sees; see :func:`lippmann.replay.replay`."""
+        from lippmann.replay import replay
+
+        return replay(self, eye, **options)
+
+    def refocus(self, plane: float, **options: Any) -> FloatArray:
+        """The picture focused on the plane at z = ``plane`` mm; see :func:`lippmann.refocus.refocus`."""
+        from lippmann.refocus import refocus
+
+        return refocus(self, plane, **options)
+
+    def save(self, path: str | Path, bits: int | None = None) -> None:
+        """Write a PNG, OpenEXR or TIFF file; see :func:`lippmann.image.formats.write_picture`."""
+        from lippmann.image.formats import write_picture
+
+        write_picture(self, Path(path), bits=bits)
+
+    def with_pixels(self, pixels: ArrayLike, **parts: Any) -> IntegralImage:
+        """A copy with other pixels (and other ``parts``), for what works on the values alone."""
+        return replace(self, pixels=np.asarray(pixels, dtype=np.float32), **parts)
+
+    @property
+    def stats(self) -> dict[str, Any]:
+        """Sizes, rays, seconds and the rest of the provenance as plain values."""
+        grid, panel = self.display.lens_grid, self.display.panel
+        return {
+            "display": self.display.name,
+            "size": [panel.width, panel.height],
+            "lenses": [grid.columns, grid.rows],
+            **self.provenance.to_dict(),
+        }
+
+    # ---- Notebooks ------------------------------------------------------------------------------------------------
+
+    def __repr__(self) -> str:
+        grid, panel = self.display.lens_grid, self.display.panel
+        lenses = f"{grid.columns} x {grid.rows} lenses"
+        return f"<IntegralImage {panel.width} x {panel.height} pixels, {lenses}, display {self.display.name}>"
+
+    def _repr_png_(self) -> bytes:
+        """A PNG of what an eye in the middle sees, at most 512 pixels wide."""
+        from lippmann.image.color import quantize
+        from lippmann.image.png import encode_png
+        from lippmann.replay import default_size
+
+        width, height = default_size(self.display, _NOTEBOOK_WIDTH)
+        seen = self.replay(size=(width, height))
+        transfer = self.provenance.transfer
+        return encode_png(quantize(seen, 8, transfer), text={}, srgb=transfer == "srgb")
+
+    def _repr_html_(self) -> str:
+        """The picture of :meth:`_repr_png_` above a line of facts."""
+        made = ", ".join(part for part in (self.provenance.scene, self.provenance.method) if part)
+        caption = html.escape(repr(self)[1:-1] + (f" ({made})" if made else ""))
+        picture = base64.b64encode(self._repr_png_()).decode("ascii")
+        return f'<figure><img alt="" src="data:image/png;base64,{picture}"/><figcaption>{caption}</figcaption></figure>'
+
+
+def _joined_views(views: NDArray[Any], display: Display) -> NDArray[Any]:
+    """The ``(H, W, ...)`` values whose :meth:`IntegralImage.views` these are."""
+    expected = exact_view_shape(display)
+    if views.shape[:4] != expected:
+        rule = f"those of the display {display.name} have {expected}"
+        raise PictureError(f"the views have the shape {views.shape[:4]}", rule=rule)
+    # The change of axes is its own inverse.
+    return Permutation(display).join(micro_images_as_views(views, display))
+
+
+def _checked_resampling(resampling: Resampling) -> Resampling:
+    if resampling not in get_args(Resampling):
+        raise PictureError(f"resampling is {resampling!r}", rule=f"it must be one of {', '.join(get_args(Resampling))}")
+    return resampling
+
+
+def _checked_pixels(pixels: object, display: Display) -> FloatArray:
+    panel = display.panel
+    try:
+        values: FloatArray = np.asarray(pixels, dtype=np.float32)
+    except (TypeError, ValueError) as error:
+        raise PictureError(f"the pixels are no array of numbers ({error})") from None
+    if values.ndim != 3 or values.shape[2] != 3:
+        raise PictureError(f"the pixels have the shape {values.shape}", rule="it must be (height, width, 3)")
+    if values.shape[:2] != (panel.height, panel.width):
+        raise PictureError(
+            f"the picture has {values.shape[1]} x {values.shape[0]} pixels",
+            rule=f"the display {display.name} has {panel.width} x {panel.height}",
+        )
+    finite = np.isfinite(values)
+    if not finite.all():
+        row, column, _ = np.argwhere(~finite)[0]
+        count = int((~finite).any(axis=2).sum())
+        raise PictureError(f"{count} pixels are not finite, the first in column {column}, row {row}")
+    values = values.view()
+    values.flags.writeable = False
+    return values
+
+
+def checked_similarity(matrix: object) -> Matrix:
+    """``matrix`` as a read-only (4, 4) float64 array; a :class:`PictureError` if it is no similarity."""
+    rule = "it must be a 4 x 4 similarity: a rotation times a scale, a translation, and (0, 0, 0, 1) below"
+    try:
+        values: Matrix = np.array(matrix, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError):
+        raise PictureError("world_from_display is no matrix", rule=rule) from None
+    if values.shape != (4, 4) or not np.isfinite(values).all() or list(values[3]) != [0, 0, 0, 1]:
+        raise PictureError(f"world_from_display is {values.tolist()}", rule=rule)
+    linear = values[:3, :3]
+    volume = float(np.linalg.det(linear))
+    scale = np.cbrt(volume)
+    if not volume > 0 or np.abs(linear.T @ linear / scale**2 - np.eye(3)).max() > _SIMILARITY_TOLERANCE:
+        raise PictureError(f"world_from_display is {values.tolist()}", rule=rule)
+    values.flags.writeable = False
+    return values
+
+
+def _checked_map(name: str, values: NDArray[Any], size: tuple[int, ...]) -> NDArray[Any]:
+    if not _MAP_NAME.fullmatch(name):
+        rule = "it must begin with a letter and hold letters, digits, _ and - only"
+        raise PictureError(f"a map has the name {name!r}", rule=rule)
+    array = np.asarray(values)
+    if array.dtype not in (np.float32, np.uint32):
+        raise PictureError(f"the map {name} holds {array.dtype}", rule="it must hold float32 or uint32")
+    if array.shape[:2] != size or array.ndim not in (2, 3) or (array.ndim == 3 and not 2 <= array.shape[2] <= 4):
+        rule = f"it must be {size} or {size} and 2 to 4 channels"
+        raise PictureError(f"the map {name} has the shape {array.shape}", rule=rule)
+    array = array.view()
+    array.flags.writeable = False
+    return array

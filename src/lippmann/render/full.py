@@ -1,0 +1,134 @@
+"""Every ray of every pixel: the reference that all other methods are judged by."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from lippmann.progress import Progress, ProgressCallback, silent
+from lippmann.render.integrators.base import Integrator
+from lippmann.render.plan import Pass, Plan, Tile
+from lippmann.render.rays import RaySource
+from lippmann.render.sampling import SampleStream
+
+#: Sample dimension that places a sample in its pixel; integrators use those above.
+PIXEL_DIMENSION = 0
+
+
+@dataclass
+class RayTotals:
+    """Rays traced for a picture, by kind, and samples thrown away because they were not finite."""
+
+    primary: int = 0
+    shadow: int = 0
+    secondary: int = 0
+    discarded: int = 0
+
+
+@dataclass
+class Frame:
+    """A traced picture: ``pixels`` ``(height, width, 3)`` float32 linear radiance, with what it took."""
+
+    pixels: NDArray[np.float32]
+    rays: RayTotals = field(default_factory=RayTotals)
+    seconds_compile: float = 0.0
+    seconds_trace: float = 0.0
+
+
+def trace_frame(
+    integrator: Integrator,
+    source: RaySource,
+    plan: Plan,
+    *,
+    seed: int = 0,
+    box_filter: bool = True,
+    progress: ProgressCallback = silent,
+) -> Frame:
+    """Trace all samples of ``plan`` and average them per pixel."""
+    frame = Frame(np.zeros((plan.height, plan.width, 3), dtype=np.float32))
+    tracer = _Tracer(integrator, source, plan, seed, box_filter)
+    started = time.perf_counter()
+    done = 0
+    for tile, run in plan:
+        first = done == 0
+        with dr.scoped_set_flag(dr.JitFlag.KernelHistory, first):
+            sums = tracer.trace(tile, run, frame.rays)
+            if first:
+                frame.seconds_compile = _compile_seconds()
+        sums *= 1 / plan.samples
+        frame.pixels[tile.first_row : tile.first_row + tile.rows] += sums.reshape(tile.rows, plan.width, 3)
+        done += tile.rows * plan.width * plan.channels * run.count
+        progress(Progress("trace", done, plan.work))
+    frame.seconds_trace = time.perf_counter() - started - frame.seconds_compile
+    return frame
+
+
+class _Tracer:
+    """Traces the wavefronts of one plan.
+
+    Lanes are ordered pixel, then channel, then sample. Whatever differs from tile to tile is opaque to the compiler, so
+    that all tiles run the same kernel.
+    """
+
+    def __init__(self, integrator: Integrator, source: RaySource, plan: Plan, seed: int, box_filter: bool) -> None:
+        self._integrator = integrator
+        self._source = source
+        self._plan = plan
+        self._seed = seed
+        self._box_filter = box_filter
+
+    def trace(self, tile: Tile, run: Pass, totals: RayTotals) -> NDArray[np.float32]:
+        """Sums over the samples of one pass, ``(pixels of the tile, 3)``; ``totals`` grows by the rays it took."""
+        plan = self._plan
+        lanes = tile.rows * plan.width * plan.channels * run.count
+        per_channel, sample = _divide(dr.arange(mi.UInt32, lanes), dr.opaque(mi.UInt32, run.count))
+        pixel, channel = _divide(per_channel, plan.channels)
+        row, column = _divide(pixel, plan.width)
+        row += dr.opaque(mi.UInt32, tile.first_row)
+        sample += dr.opaque(mi.UInt32, run.first)
+        # The stream of a sub-pixel is its own; a picture has fewer than 2^32 sub-pixels.
+        number = (row * plan.width + column) * plan.channels + channel
+        stream = SampleStream.of_pixels(number, sample, dr.opaque(mi.UInt32, self._seed))
+        jitter = stream.next_2d(PIXEL_DIMENSION) if self._box_filter else mi.Point2f(0.5)
+        ray = self._source.rays(column, row, channel, jitter)
+        radiance, counts = self._integrator.sample(ray, stream, mi.Bool(True))
+
+        finite = dr.isfinite(radiance.x) & dr.isfinite(radiance.y) & dr.isfinite(radiance.z)
+        radiance = dr.select(finite, radiance, mi.Color3f(0))
+        # All at once: a sum of an unevaluated radiance would run the path loop anew.
+        dr.eval(radiance, counts.secondary, counts.shadow, finite)
+        totals.primary += lanes
+        totals.secondary += _total(counts.secondary)
+        totals.shadow += _total(counts.shadow)
+        totals.discarded += lanes - int(dr.count(finite)[0])
+        return _channel_sums(radiance, plan.channels, run.count)
+
+
+def _divide(number: Any, by: Any) -> tuple[Any, Any]:
+    quotient = number // by
+    return quotient, number - quotient * by
+
+
+def _channel_sums(radiance: Any, channels: int, count: int) -> NDArray[np.float32]:
+    sums = [dr.block_sum(component, count) if count > 1 else component for component in radiance]
+    if channels == 1:
+        return np.array(dr.ravel(mi.Color3f(*sums))).reshape(-1, 3)
+    sums = np.stack([np.array(component) for component in sums], axis=-1)
+    # A sub-pixel's rays carry all three colours; it shows its own.
+    return np.ascontiguousarray(np.diagonal(sums.reshape(-1, 3, 3), axis1=1, axis2=2))
+
+
+def _total(counts: Any) -> int:
+    # Sums of 32-bit counts overflow beyond 2^32 rays a wavefront; 64 bits do not.
+    return int(dr.sum(mi.UInt64(counts))[0])
+
+
+def _compile_seconds() -> float:
+    history = dr.kernel_history()
+    return sum(float(k.get("codegen_time", 0.0)) + float(k.get("backend_time", 0.0)) for k in history) / 1000.0

@@ -1,0 +1,211 @@
+"""From a scene and a display to a picture, stage by stage."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lippmann import engine as engines
+from lippmann import machine
+from lippmann._version import VERSION
+from lippmann.display import Display
+from lippmann.image import IntegralImage, Provenance
+from lippmann.progress import Progress, ProgressCallback, silent
+from lippmann.render.plan import make_plan
+from lippmann.render.settings import RenderSettings
+from lippmann.scene.placement import PlacementOptions, place
+from lippmann.scene.scene import Scene
+
+if TYPE_CHECKING:
+    from lippmann.render.full import Frame
+    from lippmann.render.rays import RaySource
+    from lippmann.scene.build import BuiltScene
+
+#: Share of the free memory that is used where no limit is given.
+DEFAULT_MEMORY_SHARE = 0.6
+
+T = TypeVar("T")
+
+
+@dataclass
+class Stopwatch:
+    """Seconds by stage, told to whoever listens as each stage begins and ends."""
+
+    progress: ProgressCallback = silent
+    seconds: dict[str, float] = field(default_factory=dict)
+    started: float = field(default_factory=time.perf_counter)
+
+    def stage(self, name: str, work: Callable[[], T]) -> T:
+        self.progress(Progress(name, 0, 1))
+        start = time.perf_counter()
+        result = work()
+        self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - start
+        self.progress(Progress(name, 1, 1))
+        return result
+
+    @property
+    def total(self) -> float:
+        return time.perf_counter() - self.started
+
+
+def render_integral_image(
+    scene: Scene,
+    display: Display,
+    settings: RenderSettings,
+    placement_options: PlacementOptions,
+    progress: ProgressCallback = silent,
+) -> IntegralImage:
+    """Render ``scene`` for ``display``.
+
+    Raises
+    ------
+    UsageError, SceneError, MemoryLimitError, EngineError
+        As the stages find them; nothing has been written then.
+    """
+    watch = Stopwatch(progress)
+    memory = settings.memory or default_memory()
+    plan = make_plan(
+        display.panel.width,
+        display.panel.height,
+        settings.spp,
+        channels=3 if settings.subpixels else 1,
+        memory=memory,
+    )
+    engine = watch.stage("load", lambda: engines.start(settings.device, settings.threads))
+    built = watch.stage("build", lambda: _build(scene))
+    placement = place(
+        scene.bounds, display, cameras=scene.cameras, options=placement_options, home_camera=scene.home_camera
+    )
+
+    from lippmann.render.full import trace_frame
+    from lippmann.render.rays import DisplayRays
+
+    source = DisplayRays(display, placement.world_from_display, settings.subpixels)
+    integrator = make_integrator(built, settings, np.linalg.inv(placement.world_from_display))
+    frame = trace_frame(
+        integrator, source, plan, seed=settings.seed, box_filter=settings.pixel_filter == "box", progress=progress
+    )
+    provenance = Provenance(
+        method=settings.method,
+        integrator=settings.integrator,
+        depth=settings.surfaces,
+        spp=settings.spp,
+        seed=settings.seed,
+        subpixels=settings.subpixels,
+        scene=scene.name,
+        version=VERSION,
+        device=engine.gpu_name or f"cpu, {engine.threads} threads",
+        traced_fraction=1.0,
+        rays=ray_counts(frame),
+        seconds=stage_seconds(watch, frame),
+        options={
+            "pixel_filter": settings.pixel_filter,
+            "placement": placement.mode,
+            "depth_range": list(placement.depth_range),
+            "resolvable_range": list(placement.resolvable_range),
+        },
+        notes=(*scene.notes, *built.notes, *placement.warnings, *_frame_notes(frame)),
+    )
+    return IntegralImage(frame.pixels, display, placement.world_from_display, provenance)
+
+
+@dataclass(frozen=True, eq=False)
+class Preview:
+    """A plain picture: ``pixels`` ``(height, width, 3)`` float32 linear RGB, with how it was made."""
+
+    pixels: NDArray[np.float32]
+    provenance: Provenance
+
+
+def render_preview(
+    scene: Scene,
+    camera: str | None,
+    size: tuple[int, int],
+    settings: RenderSettings,
+    progress: ProgressCallback = silent,
+) -> Preview:
+    """The plain picture that a camera of the scene sees; None takes the first one, or one that frames everything."""
+    watch = Stopwatch(progress)
+    plan = make_plan(*size, settings.spp, memory=settings.memory or default_memory())
+    engine = watch.stage("load", lambda: engines.start(settings.device, settings.threads))
+    built = watch.stage("build", lambda: _build(scene))
+    pose = scene.camera(camera)
+
+    from lippmann.render.full import trace_frame
+    from lippmann.render.rays import CameraRays
+
+    integrator = make_integrator(built, settings, np.linalg.inv(np.asarray(pose.world_from_camera, dtype=np.float64)))
+    source: RaySource = CameraRays(pose, *size)
+    frame = trace_frame(
+        integrator, source, plan, seed=settings.seed, box_filter=settings.pixel_filter == "box", progress=progress
+    )
+    provenance = Provenance(
+        method=settings.method,
+        integrator=settings.integrator,
+        depth=settings.surfaces,
+        spp=settings.spp,
+        seed=settings.seed,
+        scene=scene.name,
+        version=VERSION,
+        device=engine.gpu_name or f"cpu, {engine.threads} threads",
+        traced_fraction=1.0,
+        rays=ray_counts(frame),
+        seconds=stage_seconds(watch, frame),
+        options={"pixel_filter": settings.pixel_filter, "camera": pose.name},
+        notes=(*scene.notes, *built.notes, *_frame_notes(frame)),
+    )
+    return Preview(frame.pixels, provenance)
+
+
+def make_integrator(built: BuiltScene, settings: RenderSettings, display_from_world: NDArray[np.float64]) -> Any:
+    """The integrator that ``settings`` name, for a built scene."""
+    from lippmann.render.integrators.path import PathIntegrator
+    from lippmann.render.integrators.surface import SurfaceIntegrator
+    from lippmann.render.traits import make_traits
+
+    if settings.integrator in ("path", "direct"):
+        traits = make_traits(
+            built.mitsuba, background=built.background, has_null=built.has_null, absorption=built.absorption
+        )
+        return PathIntegrator(built.mitsuba, traits, settings.surfaces, name=settings.integrator)
+    return SurfaceIntegrator(built.mitsuba, settings.integrator, display_from_world)
+
+
+def default_memory() -> int:
+    """The memory limit in bytes where the user set none."""
+    return int(machine.available_memory() * DEFAULT_MEMORY_SHARE)
+
+
+def _build(scene: Scene) -> BuiltScene:
+    from lippmann.scene.build import build
+
+    return build(scene)
+
+
+def ray_counts(frame: Frame) -> dict[str, int]:
+    """The rays of a frame by kind."""
+    return {"primary": frame.rays.primary, "shadow": frame.rays.shadow, "secondary": frame.rays.secondary}
+
+
+def stage_seconds(watch: Stopwatch, frame: Frame) -> dict[str, float]:
+    """Seconds by stage, in the order of the work; ``write`` is added by who writes."""
+    return {
+        "load": watch.seconds.get("load", 0.0),
+        "build": watch.seconds.get("build", 0.0),
+        "compile": frame.seconds_compile,
+        "trace": frame.seconds_trace,
+        "reuse": 0.0,
+        "write": 0.0,
+        "total": watch.total,
+    }
+
+
+def _frame_notes(frame: Frame) -> tuple[str, ...]:
+    if not frame.rays.discarded:
+        return ()
+    return (f"{frame.rays.discarded} samples were not finite and count as black",)

@@ -1,0 +1,106 @@
+"""Cutting a picture into pieces of work that fit the memory.
+
+A tile is a band of whole rows; a pass is a run of samples of every pixel in it. Tile and pass together make one
+wavefront. All bands of a plan but the last are equally tall, so that one compiled kernel serves them all.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from lippmann.errors import MemoryLimitError
+
+#: Memory a lane needs at the widest moment: its radiance, its ray counts, the sums and their copies. Measured: see
+#: ``docs/methods.md``.
+BYTES_PER_LANE = 96
+#: Beyond this many lanes the wavefront leaves the caches and nothing is gained.
+PREFERRED_LANES = 1 << 20
+#: Fewer lanes than this leave the threads idle while kernels start.
+SMALLEST_LANES = 1 << 14
+#: The picture itself: float32 RGB, and the copy that a file writer makes of it.
+BYTES_PER_PIXEL = 24
+
+
+@dataclass(frozen=True)
+class Tile:
+    """Rows ``first_row`` to ``first_row + rows`` of the picture."""
+
+    index: int
+    first_row: int
+    rows: int
+
+
+@dataclass(frozen=True)
+class Pass:
+    """Samples ``first`` to ``first + count`` of every pixel."""
+
+    first: int
+    count: int
+
+
+@dataclass(frozen=True)
+class Plan:
+    """The pieces of one picture, in the order in which they are done."""
+
+    width: int
+    height: int
+    channels: int
+    samples: int
+    rows_per_tile: int
+    samples_per_pass: int
+
+    @property
+    def tiles(self) -> list[Tile]:
+        starts = range(0, self.height, self.rows_per_tile)
+        return [Tile(i, row, min(self.rows_per_tile, self.height - row)) for i, row in enumerate(starts)]
+
+    @property
+    def passes(self) -> list[Pass]:
+        starts = range(0, self.samples, self.samples_per_pass)
+        return [Pass(first, min(self.samples_per_pass, self.samples - first)) for first in starts]
+
+    @property
+    def lanes(self) -> int:
+        """Lanes of the largest wavefront."""
+        return self.rows_per_tile * self.width * self.channels * self.samples_per_pass
+
+    @property
+    def work(self) -> int:
+        """Samples of the whole picture, all channels."""
+        return self.width * self.height * self.channels * self.samples
+
+    def __iter__(self) -> Iterator[tuple[Tile, Pass]]:
+        return ((tile, run) for tile in self.tiles for run in self.passes)
+
+
+def make_plan(
+    width: int, height: int, samples: int, *, channels: int = 1, memory: int, preferred_lanes: int = PREFERRED_LANES
+) -> Plan:
+    """Divide ``width`` x ``height`` pixels of ``samples`` each so that the work fits into ``memory`` bytes.
+
+    Raises
+    ------
+    MemoryLimitError
+        If not even one row of one sample fits beside the picture.
+    """
+    free = memory - width * height * BYTES_PER_PIXEL
+    row_lanes = width * channels
+    most = min(preferred_lanes, free // BYTES_PER_LANE)
+    needed = max(row_lanes, min(SMALLEST_LANES, row_lanes * height * samples))
+    if free // BYTES_PER_LANE < needed:
+        required = width * height * BYTES_PER_PIXEL + needed * BYTES_PER_LANE
+        raise MemoryLimitError(
+            f"{memory / 2**20:.0f} MiB are too small for {width}x{height} pixels",
+            where="--memory",
+            rule=f"the picture and one tile need {required / 2**20:.0f} MiB",
+            fix="raise the limit",
+        )
+    most = max(most, row_lanes)
+    run = max(1, min(samples, most // row_lanes))
+    passes = -(-samples // run)
+    run = -(-samples // passes)  # equal passes, so that the last is not a stub with a kernel of its own
+    rows = max(1, min(height, most // (row_lanes * run)))
+    bands = -(-height // rows)
+    rows = -(-height // bands)
+    return Plan(width, height, channels, samples, rows, run)

@@ -1,0 +1,186 @@
+"""What a scene is, as plain values: no reader and no renderer in sight.
+
+Readers (``gltf.py``, ``obj.py``, ...) produce a :class:`SceneDescription`; ``build.py`` turns it into a Mitsuba scene.
+World units are the file's own; the frame is right-handed with +y up unless a reader's format says otherwise. Colours
+are linear RGB, non-negative. Matrices are 4x4 float64, acting on column vectors.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float32]
+IndexArray = NDArray[np.uint32]
+Matrix = NDArray[np.float64]
+Color = tuple[float, float, float]
+
+Wrap = Literal["repeat", "mirror", "clamp"]
+Filter = Literal["linear", "nearest"]
+AlphaMode = Literal["opaque", "mask", "blend"]
+
+
+@dataclass(frozen=True, eq=False)
+class Image:
+    """Decoded texels, shared by the textures that look at them.
+
+    ``pixels`` is ``(height, width, channels)`` uint8 or float32, row 0 on top, channels 1 (L), 3 (RGB) or 4 (RGBA) as
+    stored. Whether the values are sRGB-coded is the business of the texture that uses them.
+    """
+
+    name: str
+    pixels: NDArray[np.generic]
+
+
+@dataclass(frozen=True, eq=False)
+class Texture:
+    """An image seen through a sampler: ``uv' = uv_transform @ (u, v, 1)``, v pointing down from the top row."""
+
+    image: Image
+    srgb: bool
+    wrap_u: Wrap = "repeat"
+    wrap_v: Wrap = "repeat"
+    filter: Filter = "linear"
+    uv_transform: Matrix = field(default_factory=lambda: np.eye(3))
+    uv_set: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class Material:
+    """A surface in glTF's metallic-roughness terms (glTF 2.0 and its KHR_materials extensions).
+
+    A factor multiplies its texture where both are given. ``base_color_texture`` carries alpha in its fourth channel;
+    ``metallic_roughness_texture`` carries roughness in G and metallic in B; single-channel textures name the channel
+    that the extension fixes (transmission R, specular A, clearcoat R, clearcoat roughness G, sheen roughness A,
+    thickness G). Colours of light (``emission``) are radiances; all others lie in [0, 1].
+    """
+
+    name: str = ""
+    base_color: Color = (1.0, 1.0, 1.0)
+    base_color_texture: Texture | None = None
+    alpha: float = 1.0
+    alpha_mode: AlphaMode = "opaque"
+    alpha_cutoff: float = 0.5
+    metallic: float = 0.0
+    roughness: float = 1.0
+    metallic_roughness_texture: Texture | None = None
+    normal_texture: Texture | None = None
+    normal_scale: float = 1.0
+    emission: Color = (0.0, 0.0, 0.0)
+    emission_texture: Texture | None = None
+    double_sided: bool = False
+    unlit: bool = False
+    ior: float = 1.5
+    transmission: float = 0.0
+    transmission_texture: Texture | None = None
+    thickness: float = 0.0
+    thickness_texture: Texture | None = None
+    attenuation_color: Color = (1.0, 1.0, 1.0)
+    attenuation_distance: float = float("inf")
+    specular: float = 1.0
+    specular_texture: Texture | None = None
+    specular_color: Color = (1.0, 1.0, 1.0)
+    specular_color_texture: Texture | None = None
+    clearcoat: float = 0.0
+    clearcoat_texture: Texture | None = None
+    clearcoat_roughness: float = 0.0
+    clearcoat_roughness_texture: Texture | None = None
+    clearcoat_normal_texture: Texture | None = None
+    clearcoat_normal_scale: float = 1.0
+    sheen_color: Color = (0.0, 0.0, 0.0)
+    sheen_color_texture: Texture | None = None
+    sheen_roughness: float = 0.0
+    sheen_roughness_texture: Texture | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """Triangles with one material.
+
+    ``positions`` ``(n, 3)``, ``faces`` ``(m, 3)`` counter-clockwise seen from the front, ``normals`` ``(n, 3)`` unit or
+    None (flat), ``uvs`` a tuple of ``(n, 2)`` (v down from the image's top row, as in glTF), ``colors`` ``(n, 3 or 4)``
+    linear or None. Normal maps take the tangent frame of the uv parametrisation.
+    """
+
+    name: str
+    positions: FloatArray
+    faces: IndexArray
+    material: int
+    normals: FloatArray | None = None
+    uvs: tuple[FloatArray, ...] = ()
+    colors: FloatArray | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Instance:
+    """One placement of one mesh (index into ``SceneDescription.meshes``)."""
+
+    mesh: int
+    world_from_mesh: Matrix
+
+
+@dataclass(frozen=True, eq=False)
+class Light:
+    """A lamp without a body.
+
+    ``point``: ``color`` is radiant intensity (W/sr, falling with the square of the distance); ``spot``: the same inside
+    a cone about the lamp's -z, smooth between the inner and outer half-angle (radians); ``directional``: irradiance
+    (W/m^2) travelling along the lamp's -z. ``radius`` > 0 gives point and spot lamps a glowing sphere of that size.
+    """
+
+    kind: Literal["point", "spot", "directional"]
+    color: Color
+    world_from_light: Matrix
+    inner_angle: float = 0.0
+    outer_angle: float = float(np.pi / 4)
+    radius: float = 0.0
+    name: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Camera:
+    """A camera looking along its own -z with +y up.
+
+    ``fov_y`` is the full vertical angle in radians (perspective), ``height`` the full vertical extent in world units
+    (orthographic). ``focus_distance`` (world units) becomes the lens plane when the camera places a display; None means
+    the distance of the scene's centre.
+    """
+
+    name: str
+    world_from_camera: Matrix
+    fov_y: float | None = None
+    height: float | None = None
+    aspect: float = 1.0
+    focus_distance: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Environment:
+    """Light from far away: an equirectangular image ``(h, w, 3)`` float32 linear radiance, row 0 at +y (up)."""
+
+    pixels: FloatArray
+    world_from_environment: Matrix = field(default_factory=lambda: np.eye(4))
+    name: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class SceneDescription:
+    """All that a scene file said.
+
+    ``background`` is the colour seen where nothing is hit (None: the environment itself, black without one).
+    ``notes`` are the one-line remarks of the reader: what it could not honour and what it assumed.
+    """
+
+    name: str
+    meshes: Sequence[Mesh] = ()
+    materials: Sequence[Material] = ()
+    instances: Sequence[Instance] = ()
+    lights: Sequence[Light] = ()
+    cameras: Sequence[Camera] = ()
+    environment: Environment | None = None
+    background: Color | None = None
+    notes: Sequence[str] = ()

@@ -1,0 +1,231 @@
+"""Materials: the metallic-roughness model and the extensions that add to it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TypedDict
+
+from lippmann.scene.description import AlphaMode, Color, Material, Texture
+from lippmann.scene.gltf.document import Document
+from lippmann.scene.gltf.fields import LARGEST_NUMBER, Fields
+from lippmann.scene.gltf.specular_glossiness import lie_alike, metallic_roughness_of
+from lippmann.scene.gltf.textures import Textures
+
+_ALPHA_MODES: dict[str, AlphaMode] = {"OPAQUE": "opaque", "MASK": "mask", "BLEND": "blend"}
+_WHITE: Color = (1.0, 1.0, 1.0)
+_BLACK: Color = (0.0, 0.0, 0.0)
+
+# KHR_materials_ior writes 0 for "reflects all at normal incidence", the limit of an endless index of refraction.
+_ENDLESS_IOR = 1000.0
+
+
+class _Base(TypedDict, total=False):
+    base_color: Color
+    base_color_texture: Texture | None
+    alpha: float
+    metallic: float
+    roughness: float
+    metallic_roughness_texture: Texture | None
+
+
+class _Surface(TypedDict, total=False):
+    normal_texture: Texture | None
+    normal_scale: float
+    emission: Color
+    emission_texture: Texture | None
+    alpha_mode: AlphaMode
+    alpha_cutoff: float
+    double_sided: bool
+    unlit: bool
+
+
+class _Interior(TypedDict, total=False):
+    ior: float
+    transmission: float
+    transmission_texture: Texture | None
+    thickness: float
+    thickness_texture: Texture | None
+    attenuation_color: Color
+    attenuation_distance: float
+
+
+class _Layers(TypedDict, total=False):
+    specular: float
+    specular_texture: Texture | None
+    specular_color: Color
+    specular_color_texture: Texture | None
+    clearcoat: float
+    clearcoat_texture: Texture | None
+    clearcoat_roughness: float
+    clearcoat_roughness_texture: Texture | None
+    clearcoat_normal_texture: Texture | None
+    clearcoat_normal_scale: float
+    sheen_color: Color
+    sheen_color_texture: Texture | None
+    sheen_roughness: float
+    sheen_roughness_texture: Texture | None
+
+
+@dataclass(frozen=True, eq=False)
+class Materials:
+    """The materials of a document; only those that are used are read, in the order of their first use."""
+
+    document: Document
+    textures: Textures
+    read: list[Material] = field(default_factory=list)
+    _places: dict[int | None, int] = field(default_factory=dict)
+
+    def place(self, index: int | None) -> int:
+        """The place in :attr:`read` of ``materials[index]``; None stands for glTF's default material.
+
+        Raises
+        ------
+        SceneError
+            The material holds a value of a wrong kind or an image that cannot be read.
+        """
+        if index not in self._places:
+            self._places[index] = len(self.read)
+            self.read.append(self._material(index))
+        return self._places[index]
+
+    def _material(self, index: int | None) -> Material:
+        if index is None:
+            return Material(name="default", metallic=1.0)
+        fields = self.document.all("materials")[index]
+        return Material(
+            name=fields.text("name") or fields.place,
+            **self._base(fields),
+            **self._surface(fields),
+            **self._interior(fields),
+            **self._layers(fields),
+        )
+
+    def _base(self, fields: Fields) -> _Base:
+        archived = fields.extension("KHR_materials_pbrSpecularGlossiness")
+        if archived is not None:
+            return self._specular_glossiness(archived)
+        base = fields.child("pbrMetallicRoughness") or Fields({}, fields.place, fields.file)
+        red, green, blue, alpha = self._fractions(base, "baseColorFactor", (1.0, 1.0, 1.0, 1.0))
+        return {
+            "base_color": (red, green, blue),
+            "base_color_texture": self.textures.read(base, "baseColorTexture", srgb=True),
+            "alpha": alpha,
+            "metallic": self._fraction(base, "metallicFactor", 1.0),
+            "roughness": self._fraction(base, "roughnessFactor", 1.0),
+            "metallic_roughness_texture": self.textures.read(base, "metallicRoughnessTexture"),
+        }
+
+    def _specular_glossiness(self, fields: Fields) -> _Base:
+        red, green, blue, alpha = self._fractions(fields, "diffuseFactor", (1.0, 1.0, 1.0, 1.0))
+        specular = self._fractions(fields, "specularFactor", (1.0, 1.0, 1.0))
+        diffuse_texture = self.textures.read(fields, "diffuseTexture", srgb=True)
+        specular_texture = self.textures.read(fields, "specularGlossinessTexture", srgb=True)
+        if diffuse_texture and specular_texture and not lie_alike(diffuse_texture, specular_texture):
+            self.document.notes.add(
+                "a specular-glossiness texture lies otherwise than its diffuse texture and is left out", fields.place
+            )
+            specular_texture = None
+        converted = metallic_roughness_of(
+            diffuse=(red, green, blue),
+            diffuse_texture=diffuse_texture,
+            specular=(specular[0], specular[1], specular[2]),
+            glossiness=self._fraction(fields, "glossinessFactor", 1.0),
+            specular_glossiness_texture=specular_texture,
+        )
+        return {
+            "base_color": converted.base_color,
+            "base_color_texture": converted.base_color_texture,
+            "alpha": alpha,
+            "metallic": converted.metallic,
+            "roughness": converted.roughness,
+            "metallic_roughness_texture": converted.metallic_roughness_texture,
+        }
+
+    def _surface(self, fields: Fields) -> _Surface:
+        mode = fields.text("alphaMode") or "OPAQUE"
+        if mode not in _ALPHA_MODES:
+            raise fields.error("alphaMode", f"one of {', '.join(_ALPHA_MODES)} belongs here")
+        normal = fields.child("normalTexture")
+        strength = 1.0
+        extension = fields.extension("KHR_materials_emissive_strength")
+        if extension is not None:
+            strength = extension.number("emissiveStrength", 1.0, minimum=0.0)
+        emission = self._fractions(fields, "emissiveFactor", _BLACK)
+        return {
+            "normal_texture": self.textures.read(fields, "normalTexture"),
+            "normal_scale": 1.0 if normal is None else normal.number("scale", 1.0),
+            "emission": (emission[0] * strength, emission[1] * strength, emission[2] * strength),
+            "emission_texture": self.textures.read(fields, "emissiveTexture", srgb=True),
+            "alpha_mode": _ALPHA_MODES[mode],
+            "alpha_cutoff": fields.number("alphaCutoff", 0.5, minimum=0.0),
+            "double_sided": fields.flag("doubleSided"),
+            "unlit": fields.extension("KHR_materials_unlit") is not None,
+        }
+
+    def _interior(self, fields: Fields) -> _Interior:
+        found: _Interior = {}
+        ior = fields.extension("KHR_materials_ior")
+        if ior is not None:
+            value = ior.number("ior", 1.5)
+            if value != 0.0 and value < 1.0:
+                raise ior.error("ior", "it must be 1 or more, or 0")
+            found["ior"] = min(value, _ENDLESS_IOR) or _ENDLESS_IOR
+        transmission = fields.extension("KHR_materials_transmission")
+        if transmission is not None:
+            found["transmission"] = self._fraction(transmission, "transmissionFactor", 0.0)
+            found["transmission_texture"] = self.textures.read(transmission, "transmissionTexture")
+        volume = fields.extension("KHR_materials_volume")
+        if volume is not None:
+            found["thickness"] = volume.number("thicknessFactor", 0.0, minimum=0.0)
+            found["thickness_texture"] = self.textures.read(volume, "thicknessTexture")
+            found["attenuation_color"] = self._color(volume, "attenuationColor", _WHITE)
+            distance = volume.optional_number("attenuationDistance")
+            if distance is not None:
+                if distance <= 0.0:
+                    raise volume.error("attenuationDistance", "it must be above 0")
+                found["attenuation_distance"] = distance
+        return found
+
+    def _layers(self, fields: Fields) -> _Layers:
+        found: _Layers = {}
+        specular = fields.extension("KHR_materials_specular")
+        if specular is not None:
+            found["specular"] = self._fraction(specular, "specularFactor", 1.0)
+            found["specular_texture"] = self.textures.read(specular, "specularTexture")
+            found["specular_color"] = self._color(specular, "specularColorFactor", _WHITE, most=LARGEST_NUMBER)
+            found["specular_color_texture"] = self.textures.read(specular, "specularColorTexture", srgb=True)
+        coat = fields.extension("KHR_materials_clearcoat")
+        if coat is not None:
+            found["clearcoat"] = self._fraction(coat, "clearcoatFactor", 0.0)
+            found["clearcoat_texture"] = self.textures.read(coat, "clearcoatTexture")
+            found["clearcoat_roughness"] = self._fraction(coat, "clearcoatRoughnessFactor", 0.0)
+            found["clearcoat_roughness_texture"] = self.textures.read(coat, "clearcoatRoughnessTexture")
+            found["clearcoat_normal_texture"] = self.textures.read(coat, "clearcoatNormalTexture")
+            normal = coat.child("clearcoatNormalTexture")
+            found["clearcoat_normal_scale"] = 1.0 if normal is None else normal.number("scale", 1.0)
+        sheen = fields.extension("KHR_materials_sheen")
+        if sheen is not None:
+            found["sheen_color"] = self._color(sheen, "sheenColorFactor", _BLACK)
+            found["sheen_color_texture"] = self.textures.read(sheen, "sheenColorTexture", srgb=True)
+            found["sheen_roughness"] = self._fraction(sheen, "sheenRoughnessFactor", 0.0)
+            found["sheen_roughness_texture"] = self.textures.read(sheen, "sheenRoughnessTexture")
+        return found
+
+    def _color(self, fields: Fields, key: str, default: Color, *, most: float = 1.0) -> Color:
+        red, green, blue = self._fractions(fields, key, default, most=most)
+        return red, green, blue
+
+    def _fractions(
+        self, fields: Fields, key: str, default: tuple[float, ...], *, most: float = 1.0
+    ) -> tuple[float, ...]:
+        values = fields.numbers(key, len(default))
+        return default if values is None else tuple(self._limited(fields, value, most) for value in values)
+
+    def _fraction(self, fields: Fields, key: str, default: float) -> float:
+        return self._limited(fields, fields.number(key, default), 1.0)
+
+    def _limited(self, fields: Fields, value: float, most: float) -> float:
+        limited = min(max(value, 0.0), most)
+        if limited != value:
+            self.document.notes.add("material factors outside [0, 1] were cut to it", fields.place)
+        return limited

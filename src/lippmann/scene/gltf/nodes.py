@@ -1,0 +1,155 @@
+"""The node tree: which nodes are shown, and where each stands in the world."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from lippmann.errors import SceneError
+from lippmann.scene.description import Matrix
+from lippmann.scene.gltf import accessors as storage
+from lippmann.scene.gltf.accessors import Accessors
+from lippmann.scene.gltf.document import Document
+from lippmann.scene.gltf.fields import Fields
+from lippmann.scene.gltf.transforms import compose
+
+_FARTHEST = 1e30  # matrices of larger entries lead out of single precision
+
+
+class Nodes:
+    """The nodes of a document.
+
+    Raises
+    ------
+    SceneError
+        A child that does not exist, or one with two parents.
+    """
+
+    def __init__(self, document: Document) -> None:
+        self._document = document
+        self._parents: dict[int, int] = {}
+        self._worlds: dict[int, Matrix] = {}
+        for index, fields in enumerate(document.all("nodes")):
+            for child in document.references(fields, "children", "nodes"):
+                if child in self._parents:
+                    raise document.error(
+                        f"nodes[{child}] is a child of nodes[{self._parents[child]}] and of nodes[{index}]",
+                        rule="a node has one parent",
+                    )
+                self._parents[child] = index
+
+    def shown(self) -> Iterator[tuple[int, bool]]:
+        """The nodes of the default scene, parents first, and whether what they carry is visible.
+
+        Without a default scene it is the first one; without any scene, all nodes.
+        """
+        nodes = self._document.all("nodes")
+        stack = [(index, True) for index in reversed(self._roots())]
+        seen: set[int] = set()
+        while stack:
+            index, visible = stack.pop()
+            if index in seen:  # a scene may list a node beside its parent
+                continue
+            seen.add(index)
+            visibility = nodes[index].extension("KHR_node_visibility")
+            visible = visible and (visibility is None or visibility.flag("visible", default=True))
+            yield index, visible
+            stack += [(child, visible) for child in reversed(nodes[index].integers("children"))]
+
+    def _roots(self) -> list[int]:
+        document = self._document
+        scenes = document.all("scenes")
+        if not scenes:
+            if document.all("nodes"):
+                document.notes.add("the file has no scene; all its nodes are shown")
+            return [index for index in range(len(document.all("nodes"))) if index not in self._parents]
+        scene = scenes[document.reference(document.root, "scene", "scenes") or 0]
+        if len(scenes) > 1:
+            document.notes.add(f"of {len(scenes)} scenes '{scene.text('name') or scene.place}' is shown")
+        return document.references(scene, "nodes", "nodes")
+
+    def world(self, index: int) -> Matrix:
+        """``world_from_node`` of a node, 4x4 float64.
+
+        Raises
+        ------
+        SceneError
+            The node is its own ancestor, its transformation is no affine one, or numbers overflow.
+        """
+        chain: list[int] = []
+        on_chain: set[int] = set()
+        at: int | None = index
+        while at is not None and at not in self._worlds:
+            if at in on_chain:
+                raise self._document.error(f"nodes[{at}] is its own ancestor", rule="nodes form a tree")
+            chain.append(at)
+            on_chain.add(at)
+            at = self._parents.get(at)
+        world: Matrix = np.eye(4) if at is None else self._worlds[at]
+        for step in reversed(chain):
+            fields = self._document.all("nodes")[step]
+            with np.errstate(over="ignore", invalid="ignore"):
+                world = world @ _local(fields)
+            if not (np.abs(world) < _FARTHEST).all():
+                raise self._document.error(
+                    f"the transformation of {fields.place} overflows",
+                    rule=f"entries up to {_FARTHEST:g} are understood",
+                )
+            self._worlds[step] = world
+        return world
+
+
+def _local(fields: Fields) -> Matrix:
+    """``parent_from_node``: the matrix, or scale, then rotation, then translation."""
+    columns = fields.numbers("matrix", 16)
+    if columns is not None:
+        given: Matrix = np.array(columns).reshape(4, 4).T
+        if not np.allclose(given[3], (0.0, 0.0, 0.0, 1.0), rtol=0.0, atol=1e-6):
+            raise fields.error("matrix", "its last row must be 0, 0, 0, 1")
+        given[3] = (0.0, 0.0, 0.0, 1.0)
+        return given
+    rotation = fields.numbers("rotation", 4) or [0.0, 0.0, 0.0, 1.0]
+    if not any(rotation):
+        raise _no_rotation(fields, "rotation")
+    translation = fields.numbers("translation", 3) or [0.0, 0.0, 0.0]
+    scale = fields.numbers("scale", 3) or [1.0, 1.0, 1.0]
+    matrix: Matrix = compose(np.array([translation]), np.array([rotation]), np.array([scale]))[0]
+    return matrix
+
+
+def _no_rotation(fields: Fields, key: str) -> SceneError:
+    return fields.error(key, "a quaternion of length 0 is no rotation")
+
+
+def instance_matrices(node: Fields, document: Document, accessors: Accessors) -> Matrix:
+    """``node_from_mesh`` ``(k, 4, 4)`` of every copy that a node shows; one identity without EXT_mesh_gpu_instancing.
+
+    Raises
+    ------
+    SceneError
+        The extension's attributes differ in length, or hold what is no translation, rotation or scale.
+    """
+    instancing = node.extension("EXT_mesh_gpu_instancing")
+    attributes = None if instancing is None else instancing.child("attributes")
+    if attributes is None:
+        return np.eye(4)[None]
+    found: dict[str, Matrix] = {}
+    for key, kind in (
+        ("TRANSLATION", storage.TRANSLATION),
+        ("ROTATION", storage.ROTATION),
+        ("SCALE", storage.SCALE),
+    ):
+        index = document.reference(attributes, key, "accessors")
+        if index is not None:
+            found[key] = accessors.floats(index, kind).astype(np.float64)
+            if not np.isfinite(found[key]).all():
+                raise attributes.error(key, "its values must be finite")
+    counts = {len(values) for values in found.values()}
+    if len(counts) > 1:
+        raise document.error(f"the accessors of {attributes.place} differ in length", rule="one element per copy")
+    count = counts.pop() if counts else 1
+    rotations = found.get("ROTATION", np.tile([0.0, 0.0, 0.0, 1.0], (count, 1)))
+    if not rotations.any(axis=1).all():
+        raise _no_rotation(attributes, "ROTATION")
+    return compose(found.get("TRANSLATION", np.zeros((count, 3))), rotations, found.get("SCALE", np.ones((count, 3))))

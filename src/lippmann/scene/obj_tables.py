@@ -1,0 +1,128 @@
+"""The numbers of an OBJ file: tables of coordinates, and the corners of faces."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lippmann.errors import SceneError
+
+Integers = NDArray[np.int64]
+Points = NDArray[np.float64]
+
+
+@dataclass
+class Lines:
+    """The bodies of all lines of one kind, with the line number of each."""
+
+    bodies: list[str] = field(default_factory=list)
+    numbers: list[int] = field(default_factory=list)
+
+    def add(self, body: str, number: int) -> None:
+        self.bodies.append(body)
+        self.numbers.append(number)
+
+
+def read_table(lines: Lines, what: str, least: int, where: str) -> Points:
+    """Numbers ``(n, k)`` of ``v``, ``vt`` or ``vn`` lines; k is the smallest count on any line.
+
+    Raises
+    ------
+    SceneError
+        A line has fewer than ``least`` numbers, a word that is none, or a value that is not finite.
+    """
+    if not lines.bodies:
+        return np.zeros((0, least))
+    try:
+        table = np.loadtxt(lines.bodies, np.float64, ndmin=2, comments=None)
+        if len(table) != len(lines.bodies):  # loadtxt skips blank bodies
+            table = _ragged_table(lines, what, least, where)
+    except ValueError:
+        table = _ragged_table(lines, what, least, where)
+    if table.shape[1] < least:
+        raise SceneError(
+            f"{what} with {table.shape[1]} numbers", where=f"{where}:{lines.numbers[0]}", rule=f"it takes {least}"
+        )
+    with np.errstate(over="ignore"):
+        bad = np.flatnonzero(~np.isfinite(table.astype(np.float32)).all(axis=1))
+    if len(bad):
+        raise SceneError(
+            f"{what} '{lines.bodies[bad[0]].strip()}'",
+            where=f"{where}:{lines.numbers[bad[0]]}",
+            rule="coordinates must be finite numbers",
+        )
+    return np.asarray(table, np.float64)
+
+
+def _ragged_table(lines: Lines, what: str, least: int, where: str) -> Points:
+    rows: list[list[float]] = []
+    for body, number in zip(lines.bodies, lines.numbers, strict=True):
+        try:
+            rows.append([float(word) for word in body.split()])
+        except ValueError:
+            raise SceneError(f"{what} '{body.strip()[:60]}'", where=f"{where}:{number}", rule="numbers only") from None
+        if len(rows[-1]) < least:
+            raise SceneError(
+                f"{what} with {len(rows[-1])} numbers", where=f"{where}:{number}", rule=f"it takes {least}"
+            )
+    width = min(len(row) for row in rows)
+    return np.array([row[:width] for row in rows])
+
+
+def read_corners(faces: Lines, where: str) -> tuple[Integers, Integers]:
+    """Corners ``(c, 3)`` as 1-based (position, uv, normal), 0 where not given, and corners per face ``(f,)``."""
+    words = [body.split() for body in faces.bodies]
+    sizes = np.array([len(face) for face in words], np.int64)
+    if (sizes < 3).any():
+        bad = int(np.argmax(sizes < 3))
+        raise SceneError(
+            f"face with {sizes[bad]} corners",
+            where=f"{where}:{faces.numbers[bad]}",
+            rule="a face has at least 3",
+            fix="is the file cut short?",
+        )
+    flat = [corner for face in words for corner in face]
+    slashes = {corner.count("/") for corner in flat}
+    joined = " ".join(flat)
+    corners = np.zeros((len(flat), 3), np.int64)
+    doubles = joined.count("//")
+    slots = {(0, 0): [0], (1, 0): [0, 1], (2, 0): [0, 1, 2], (2, len(flat)): [0, 2]}.get(
+        (next(iter(slashes)), doubles) if len(slashes) == 1 else (-1, 0)
+    )
+    try:
+        if slots is None:
+            raise ValueError
+        numbers = np.array([int(word) for word in joined.replace("/", " ").split()], np.int64)
+        corners[:, slots] = numbers.reshape(len(flat), len(slots))
+    except (ValueError, OverflowError):
+        _mixed_corners(flat, corners, np.repeat(faces.numbers, sizes), where)
+    return corners, sizes
+
+
+def _mixed_corners(flat: Sequence[str], corners: Integers, numbers: Integers, where: str) -> None:
+    """Fill ``corners`` one at a time: for files that mix ``a``, ``a/b``, ``a//c`` and ``a/b/c``."""
+    for row, corner in enumerate(flat):
+        try:
+            places = [int(word) if word else 0 for word in corner.split("/")]
+            corners[row, : len(places)] = places
+        except (ValueError, OverflowError):
+            raise SceneError(
+                f"face corner '{corner[:40]}'", where=f"{where}:{numbers[row]}", rule="it is v, v/vt, v//vn or v/vt/vn"
+            ) from None
+
+
+def check_range(corners: Integers, counts: Sequence[int], numbers: Integers, where: str) -> None:
+    least = (1, 0, 0)
+    for slot, what in enumerate(("vertex", "texture coordinate", "normal")):
+        column = corners[:, slot]
+        bad = (column < least[slot]) | (column > counts[slot])
+        if bad.any():
+            row = int(np.argmax(bad))
+            raise SceneError(
+                f"face uses {what} {column[row]}",
+                where=f"{where}:{numbers[row]}",
+                rule=f"the file has 1 to {counts[slot]}" if counts[slot] else f"the file has no {what}",
+            )

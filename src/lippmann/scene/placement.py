@@ -1,0 +1,342 @@
+"""How a display stands in a scene: the similarity ``world_from_display``.
+
+The display frame is right-handed, in millimetres: origin at the array's centre in the lens plane, +x right, +y up,
++z toward the viewer.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lippmann.display import Display
+from lippmann.errors import SceneError, UsageError
+from lippmann.scene.description import Camera, Matrix
+from lippmann.scene.scene import box, find_camera
+
+Mode = Literal["fit", "camera", "display"]
+Bounds = NDArray[np.float64]
+Vector = tuple[float, float, float]
+
+#: Share of the panel's width or height that a fitted scene fills if it is shallow.
+FILL = 0.95
+
+#: Share that it fills however deep it is. A deep scene is shrunk into the depth that the display resolves, but that
+#: pays only so far: blur grows with the scene, so beyond the resolved depth a larger scene shows as much detail. On
+#: panels with few pixels per lens, which resolve millimetres, it would be a speck.
+LEAST_FILL = 0.4
+
+#: Share of the scene's depth that a fitted scene has in front of the lens plane, where the aperture allows it.
+POP_OUT = 1.0 / 3.0
+
+
+@dataclass(frozen=True)
+class PlacementOptions:
+    """How to place a display.
+
+    Parameters
+    ----------
+    mode:
+        ``fit``: the bounding box within the panel and the depth that the display resolves. ``camera``: as ``camera``
+        looks. ``display``: scene coordinates are millimetres of the display frame. None: ``camera`` if one is named,
+        else the scene's home camera if it has one, else ``fit``.
+    camera:
+        Name of a camera of the scene; None takes its home camera, or its first.
+    turn:
+        Degrees by which the scene is turned: yaw about the display's y axis (positive: its front toward +x), then pitch
+        about x (positive: its top toward the viewer), then roll about z (positive: counter-clockwise).
+    shift:
+        Millimetres by which the scene is moved in the display frame, last of all.
+    scale:
+        Factor on the size at which the scene appears.
+    pop_out:
+        Share of the scene's depth to lie in front of the lens plane, 0 to 1. None: a third when fitting, as the
+        camera focuses otherwise.
+
+    Raises
+    ------
+    UsageError
+        A value is out of its range, or two options contradict each other.
+    """
+
+    mode: Mode | None = None
+    camera: str | None = None
+    turn: Vector = (0.0, 0.0, 0.0)
+    shift: Vector = (0.0, 0.0, 0.0)
+    scale: float = 1.0
+    pop_out: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.mode is not None and self.mode not in get_args(Mode):
+            raise UsageError(f"placement '{self.mode}'", where="place", rule=f"known are {', '.join(get_args(Mode))}")
+        for name in ("turn", "shift"):
+            values = getattr(self, name)
+            if len(values) != 3 or not np.isfinite(values).all():
+                raise UsageError(f"{values!r}", where=name, rule="three finite numbers")
+        if not (np.isfinite(self.scale) and self.scale > 0.0):
+            raise UsageError(f"{self.scale:g}", where="scale", rule="a factor above 0")
+        if self.pop_out is not None and not 0.0 <= self.pop_out <= 1.0:
+            raise UsageError(f"{self.pop_out:g}", where="pop_out", rule="a share of the depth, 0 to 1")
+        if self.camera is not None and self.mode not in (None, "camera"):
+            raise UsageError(f"camera '{self.camera}' beside placement '{self.mode}'", where="camera", rule="only one")
+        if self.pop_out is not None and self.mode == "display":
+            raise UsageError(
+                "coordinates of the display leave nothing to choose", where="pop_out", fix="use shift 0,0,Z instead"
+            )
+
+
+@dataclass(frozen=True, eq=False)
+class Placement:
+    """Where the display stands.
+
+    ``world_from_display`` is ``scale * rotation`` with a translation, 4x4; its scale is in world units per
+    millimetre. ``depth_range`` is (back, front): the lowest and highest z of the scene's bounding box in millimetres
+    of the display frame; ``resolvable_range`` the same for what the display resolves. ``warnings`` say, one line each,
+    what will be blurred, cut or outside.
+    """
+
+    world_from_display: Matrix
+    depth_range: tuple[float, float]
+    resolvable_range: tuple[float, float]
+    mode: Mode
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def display_from_world(self) -> Matrix:
+        """The inverse, 4x4."""
+        return _inverse(self.world_from_display)
+
+
+def place(
+    bounds: Bounds,
+    display: Display,
+    *,
+    cameras: Sequence[Camera] = (),
+    options: PlacementOptions | None = None,
+    home_camera: str | None = None,
+) -> Placement:
+    """Place a display in a scene.
+
+    Parameters
+    ----------
+    bounds:
+        The scene's bounding box ``(2, 3)``, world units.
+    cameras:
+        The scene's cameras; ``options.camera`` names one of them.
+    home_camera:
+        The camera that the scene was made to be shown by, if there is one.
+
+    Raises
+    ------
+    SceneError
+        The box is a single point or not finite; the camera is not there, or has the whole scene behind it.
+    """
+    options = options or PlacementOptions()
+    box(bounds)
+    mode = options.mode or ("camera" if options.camera or home_camera else "fit")
+    warnings: list[str] = []
+    if mode == "fit":
+        display_from_world = _fitted(bounds, display, options, warnings)
+    elif mode == "camera":
+        camera = _chosen(cameras, options.camera or home_camera)
+        display_from_world = _resized(_seen_by(camera, bounds, display, options), options)
+    else:
+        display_from_world = _resized(np.eye(4), options)
+    display_from_world = _translation(options.shift) @ display_from_world
+    corners = _carried(display_from_world, _corners(bounds))
+    back, front = float(corners[:, 2].min()), float(corners[:, 2].max())
+    near, far = display.resolvable_depth
+    warnings += _warnings(corners, display)
+    return Placement(_inverse(display_from_world), (back, front), (far, near), mode, tuple(warnings))
+
+
+def _chosen(cameras: Sequence[Camera], name: str | None) -> Camera:
+    if name is not None:
+        return find_camera(cameras, name)
+    if not cameras:
+        raise SceneError("the scene has no cameras", where="place", fix="fit it instead")
+    return cameras[0]
+
+
+def _fitted(bounds: Bounds, display: Display, options: PlacementOptions, warnings: list[str]) -> Matrix:
+    """``display_from_world`` that puts the turned box into the panel and the display's depth.
+
+    In front of the lens plane lies ``pop_out`` of the depth, but no more than the aperture lets through: the rest of
+    it moves behind.
+    """
+    turned = _carried(_rotation(options.turn), _corners(bounds))
+    low, high = turned.min(axis=0), turned.max(axis=0)
+    depth = float(high[2] - low[2])
+    pop_out = POP_OUT if options.pop_out is None else options.pop_out
+    in_window = min(
+        _largest_in_window(float(size), FILL * window, depth, pop_out, display)
+        for size, window in zip((high - low)[:2], display.size_mm, strict=True)
+    )
+    in_depth = _largest_in_depth(depth, pop_out, display)
+    least = in_window * LEAST_FILL / FILL if np.isfinite(in_window) else 0.0  # a line toward the viewer has no width
+    scale = options.scale * min(in_window, max(in_depth, least))
+    wanted = pop_out * depth * scale
+    front = min(wanted, display.aperture_distance)
+    if options.pop_out is not None and front < wanted * (1.0 - 1e-9):
+        warnings.append(
+            f"{front:.3g} mm of the scene lie in front of the lens plane instead of {wanted:.3g}: "
+            f"recorded rays begin {display.aperture_distance:g} mm in front of it"
+        )
+    anchor = np.array([(low[0] + high[0]) / 2.0, (low[1] + high[1]) / 2.0, high[2]])
+    return _translation((0.0, 0.0, front)) @ _scaling(scale) @ _translation(-anchor) @ _rotation(options.turn)
+
+
+def _largest_in_window(size: float, window: float, depth: float, pop_out: float, display: Display) -> float:
+    """Largest scale s for which the box's front face, the nearest to the viewer, fits the panel as he sees it.
+
+    Seen from (0, 0, D) the panel's window narrows as 1 - z / D. The front face lies at f = min(pop_out depth s,
+    aperture distance), so s size <= window (1 - f / D) holds if it does for either term.
+    """
+    if size <= 0.0:
+        return np.inf
+    distance = display.viewing_distance
+    return max(
+        window / (size + window * pop_out * depth / distance),
+        window / size * (1.0 - display.aperture_distance / distance),
+    )
+
+
+def _largest_in_depth(depth: float, pop_out: float, display: Display) -> float:
+    """Largest scale s for which the box keeps to the depth that the display resolves.
+
+    In front lie f = min(pop_out depth s, aperture distance), which may not exceed the near limit; behind lie
+    depth s - f, which may not exceed the far one.
+    """
+    if depth <= 0.0:
+        return np.inf
+    near, far = display.resolvable_depth
+    aperture = display.aperture_distance
+    by_front = near / (pop_out * depth) if pop_out > 0.0 and aperture > near else np.inf
+    behind = (1.0 - pop_out) * depth
+    if behind > 0.0 and pop_out * depth * -far / behind <= aperture:
+        return min(by_front, -far / behind)
+    return min(by_front, (aperture - far) / depth)
+
+
+def _seen_by(camera: Camera, bounds: Bounds, display: Display, options: PlacementOptions) -> Matrix:
+    """``display_from_world`` that makes the camera's plane of focus the lens plane.
+
+    The viewing distance finite: the camera's eye becomes the viewing point. Infinite: the largest part of the camera's
+    picture that has the panel's shape fills the panel. An orthographic camera has no eye, so the latter holds for it.
+    """
+    frame = _rigid(camera)
+    in_camera = _carried(_inverse(frame), _corners(bounds))
+    farthest, nearest = -float(in_camera[:, 2].min()), max(-float(in_camera[:, 2].max()), 0.0)
+    if farthest <= 0.0:
+        raise SceneError(
+            f"camera '{camera.name}' has the whole scene behind it", where="camera", fix="choose another, or fit"
+        )
+    if options.pop_out is not None:
+        focus = nearest + options.pop_out * (farthest - nearest)
+    elif camera.focus_distance is not None:
+        focus = camera.focus_distance
+    else:
+        center = -float(in_camera[:, 2].mean())
+        focus = center if center > 0.0 else (nearest + farthest) / 2.0
+    if not (np.isfinite(focus) and focus > 0.0):
+        raise SceneError(f"camera '{camera.name}' focuses at {focus:g}", where="camera", rule="a distance above 0")
+    world_from_display = frame @ _translation((0.0, 0.0, -focus)) @ _scaling(_units_per_mm(camera, focus, display))
+    return _inverse(world_from_display)
+
+
+def _units_per_mm(camera: Camera, focus: float, display: Display) -> float:
+    if camera.fov_y is not None:
+        if np.isfinite(display.viewing_distance):
+            return focus / display.viewing_distance
+        height = 2.0 * focus * float(np.tan(camera.fov_y / 2.0))
+    elif camera.height is not None:
+        height = camera.height
+    else:
+        raise SceneError(f"camera '{camera.name}' has neither an angle nor a height", where="camera")
+    if not (np.isfinite(height) and height > 0.0 and camera.aspect > 0.0):
+        raise SceneError(f"camera '{camera.name}' has a field {height:g} high", where="camera", rule="above 0")
+    return min(height * camera.aspect / display.size_mm[0], height / display.size_mm[1])
+
+
+def _rigid(camera: Camera) -> Matrix:
+    """``world_from_camera`` without the scale, shear or mirroring that a file's nodes may carry.
+
+    Direction and upright are kept; +x follows from them.
+    """
+    matrix = np.asarray(camera.world_from_camera, np.float64)
+    back, up = matrix[:3, 2], matrix[:3, 1]
+    right = np.cross(up, back)
+    lengths = np.linalg.norm(back), np.linalg.norm(right)
+    if not np.isfinite(matrix).all() or min(lengths) <= 0.0:
+        raise SceneError(f"camera '{camera.name}' has a transform that is not invertible", where="camera")
+    back, right = back / lengths[0], right / lengths[1]
+    rigid = np.eye(4)
+    rigid[:3, :3] = np.stack([right, np.cross(back, right), back], axis=-1)
+    rigid[:3, 3] = matrix[:3, 3]
+    return rigid
+
+
+def _resized(display_from_world: Matrix, options: PlacementOptions) -> Matrix:
+    """Turned and scaled about the middle of the lens plane."""
+    return _scaling(options.scale) @ _rotation(options.turn) @ display_from_world
+
+
+def _warnings(corners: Bounds, display: Display) -> list[str]:
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    near, far = display.resolvable_depth
+    found = []
+    if high[2] > display.aperture_distance + 1e-6:
+        found.append(
+            f"the scene reaches {high[2]:.3g} mm in front of the lens plane; recorded rays begin at "
+            f"{display.aperture_distance:g} mm, what lies nearer is cut off"
+        )
+    if high[2] > near + 1e-6 or low[2] < far - 1e-6:
+        found.append(
+            f"the scene reaches from {low[2]:.3g} to {high[2]:.3g} mm; the display resolves "
+            f"{far:.3g} to {near:.3g} mm, what lies beyond is blurred"
+        )
+    half = np.array(display.size_mm) / 2.0
+    reach = max(abs(float(low[2])), abs(float(high[2]))) * np.tan(np.radians(display.field_of_view / 2.0))
+    window = half * np.maximum(1.0, 1.0 - min(float(low[2]), 0.0) / display.viewing_distance) + reach
+    if (low[:2] > window).any() or (high[:2] < -window).any():
+        found.append("the scene lies beside the panel: nothing of it will be seen")
+    return found
+
+
+def _corners(bounds: Bounds) -> Bounds:
+    low, high = np.asarray(bounds, np.float64)
+    grid = np.stack(np.meshgrid([0, 1], [0, 1], [0, 1], indexing="ij"), axis=-1).reshape(-1, 3)
+    return np.asarray(np.where(grid == 0, low, high), np.float64)
+
+
+def _carried(matrix: Matrix, points: Bounds) -> Bounds:
+    return np.asarray(points @ matrix[:3, :3].T + matrix[:3, 3], np.float64)
+
+
+def _inverse(matrix: Matrix) -> Matrix:
+    return np.asarray(np.linalg.inv(matrix), np.float64)
+
+
+def _translation(offset: Sequence[float] | Bounds) -> Matrix:
+    matrix = np.eye(4)
+    matrix[:3, 3] = offset
+    return matrix
+
+
+def _scaling(factor: float) -> Matrix:
+    return np.diag([factor, factor, factor, 1.0])
+
+
+def _rotation(turn: Vector) -> Matrix:
+    """Yaw about y, then pitch about x, then roll about z (degrees, right-handed)."""
+    (cy, cx, cz), (sy, sx, sz) = np.cos(np.radians(turn)), np.sin(np.radians(turn))
+    yaw = np.array([[cy, 0.0, sy], [0.0, 1.0, 0.0], [-sy, 0.0, cy]])
+    pitch = np.array([[1.0, 0.0, 0.0], [0.0, cx, -sx], [0.0, sx, cx]])
+    roll = np.array([[cz, -sz, 0.0], [sz, cz, 0.0], [0.0, 0.0, 1.0]])
+    matrix = np.eye(4)
+    matrix[:3, :3] = roll @ pitch @ yaw
+    return matrix

@@ -1,0 +1,271 @@
+"""The scene that everything else works with: what was read, how it is lit, where it lies."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lippmann.errors import SceneError
+from lippmann.scene.description import Camera, Color, Environment, Material, Mesh, SceneDescription
+from lippmann.scene.mitsuba_source import MitsubaSource
+
+Bounds = NDArray[np.float64]
+
+STUDIO_NOTE = "no lights in the scene: lit by the built-in studio"
+
+# Exact bounds look at each vertex of each instance; beyond this many the corners of the mesh's own box stand in,
+# which can only be too large.
+_EXACT_VERTICES = 20_000_000
+_FRAMING_FOV = np.radians(30.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """A scene ready to be placed and built.
+
+    ``description`` is what was read, with the environment and background that the caller asked for in it.
+    ``home_camera`` names the camera that the scene was made to be shown by (bundled scenes), None for all others.
+
+    A scene from Mitsuba knows its ``bounds``, ``cameras``, ``lights`` and hence ``environment``, ``background`` and
+    ``notes`` only once the engine has started: asked before, they raise :class:`EngineError`.
+    """
+
+    name: str
+    description: SceneDescription | MitsubaSource = field(repr=False)
+    home_camera: str | None = None
+
+    @cached_property
+    def bounds(self) -> Bounds:
+        """Lowest and highest corner ``(2, 3)`` of the box around all geometry, world units."""
+        if isinstance(self.description, MitsubaSource):
+            return self.description.bounds()
+        return bounds_of(self.description)
+
+    @cached_property
+    def cameras(self) -> tuple[Camera, ...]:
+        """The cameras that the scene brings, in its order."""
+        if isinstance(self.description, MitsubaSource):
+            return self.description.cameras()
+        return tuple(self.description.cameras)
+
+    @cached_property
+    def has_lights(self) -> bool:
+        """Whether anything in the scene shines: lamps, glowing or unlit surfaces, an environment that was asked for."""
+        if self.description.environment is not None:
+            return True
+        if isinstance(self.description, MitsubaSource):
+            return self.description.has_lights()
+        return has_lights(self.description)
+
+    @cached_property
+    def environment(self) -> Environment | None:
+        """Light from far away: the scene's or the caller's; the studio where the scene has no light at all."""
+        if self.has_lights:
+            return self.description.environment
+        from lippmann.scene.studio import studio
+
+        return studio()
+
+    @cached_property
+    def background(self) -> Color | None:
+        """What is seen where nothing is hit; None for the environment itself (black without one)."""
+        if self.description.background is not None or self.has_lights:
+            return self.description.background
+        from lippmann.scene.studio import BACKDROP
+
+        return BACKDROP
+
+    @cached_property
+    def notes(self) -> tuple[str, ...]:
+        """What the reader could not honour and what was assumed, one line each."""
+        read = () if isinstance(self.description, MitsubaSource) else tuple(self.description.notes)
+        return (*read, *(() if self.has_lights else (STUDIO_NOTE,)))
+
+    def camera(self, name: str | None = None, bounds: Bounds | None = None) -> Camera:
+        """A camera by name; without one the first, or for a scene without cameras one that frames it from +z.
+
+        Raises
+        ------
+        SceneError
+            No camera has that name.
+        """
+        if name is not None:
+            return find_camera(self.cameras, name)
+        if self.cameras:
+            return next((camera for camera in self.cameras if camera.name == self.home_camera), self.cameras[0])
+        return framing_camera(self.bounds if bounds is None else bounds)
+
+
+def find_camera(cameras: Sequence[Camera], name: str) -> Camera:
+    """The camera called ``name``.
+
+    Raises
+    ------
+    SceneError
+        There is none; the error lists those that there are.
+    """
+    for camera in cameras:
+        if camera.name == name:
+            return camera
+    names = [camera.name for camera in cameras]
+    close = difflib.get_close_matches(name, names, n=1)
+    raise SceneError(
+        f"no camera is named '{name}'",
+        where="camera",
+        rule=f"the scene has {', '.join(repr(known) for known in names)}" if names else "the scene has no cameras",
+        fix=f"is '{close[0]}' meant?" if close else "",
+    )
+
+
+def framing_camera(bounds: Bounds) -> Camera:
+    """A camera on the +z side that sees the whole box in a square picture, focused on its middle.
+
+    Raises
+    ------
+    SceneError
+        The box has no size, or is not finite.
+    """
+    center, size = box(bounds)
+    half = np.tan(_FRAMING_FOV / 2.0)
+    distance = max(size[:2].max() / 2.0 / half, 1e-3 * size.max()) * 1.05 + size[2] / 2.0
+    world_from_camera = np.eye(4)
+    world_from_camera[:3, 3] = center + np.array([0.0, 0.0, distance])
+    return Camera("framing", world_from_camera, fov_y=float(_FRAMING_FOV), focus_distance=float(distance))
+
+
+def box(bounds: Bounds) -> tuple[Bounds, Bounds]:
+    """Centre and size ``(3,)`` of a box ``(2, 3)``.
+
+    Raises
+    ------
+    SceneError
+        The box is empty, not finite, or a single point.
+    """
+    low, high = np.asarray(bounds, np.float64)
+    if not (np.isfinite(low).all() and np.isfinite(high).all()) or (high < low).any():
+        raise SceneError("the scene has no extent that could be measured", rule="it needs some finite geometry")
+    if not (high > low).any():
+        raise SceneError(
+            f"the scene is a single point at ({low[0]:g}, {low[1]:g}, {low[2]:g})",
+            rule="a scene needs some extent",
+            fix="is it scaled to nothing?",
+        )
+    return (low + high) / 2.0, high - low
+
+
+def bounds_of(description: SceneDescription) -> Bounds:
+    """The box ``(2, 3)`` around all vertices that some triangle of some instance uses, world units.
+
+    Raises
+    ------
+    SceneError
+        The description places no triangle.
+    """
+    used = {index: _used_positions(description.meshes[index]) for index in {one.mesh for one in description.instances}}
+    exact = sum(len(used[instance.mesh]) for instance in description.instances) <= _EXACT_VERTICES
+    lows, highs = [], []
+    for instance in description.instances:
+        points = used[instance.mesh]
+        if len(points) == 0:
+            continue
+        if not exact:
+            points = _box_corners(points)
+        matrix = np.asarray(instance.world_from_mesh, np.float64)
+        moved = points @ matrix[:3, :3].T + matrix[:3, 3]
+        lows.append(moved.min(axis=0))
+        highs.append(moved.max(axis=0))
+    if not lows:
+        raise SceneError("the scene holds no triangles", where=description.name, rule="there must be something to see")
+    return np.stack([np.min(lows, axis=0), np.max(highs, axis=0)])
+
+
+def _used_positions(mesh: Mesh) -> Bounds:
+    used = np.zeros(len(mesh.positions), bool)
+    used[mesh.faces.ravel()] = True
+    return np.asarray(mesh.positions[used], np.float64)
+
+
+def _box_corners(points: Bounds) -> Bounds:
+    low, high = points.min(axis=0), points.max(axis=0)
+    return np.array([[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])])
+
+
+def has_lights(description: SceneDescription) -> bool:
+    """Whether a description sheds light: a lamp, an environment, a glowing surface, or nothing but unlit surfaces."""
+    if description.environment is not None or any(max(light.color) > 0.0 for light in description.lights):
+        return True
+    indices = {description.meshes[instance.mesh].material for instance in description.instances}
+    materials = [description.materials[index] for index in indices]
+    return any(max(material.emission) > 0.0 for material in materials) or (
+        bool(materials) and all(material.unlit for material in materials)
+    )
+
+
+def checked(description: SceneDescription, where: str) -> SceneDescription:
+    """The description itself, once it is known to be sound.
+
+    Raises
+    ------
+    SceneError
+        Nothing to see; a number that is not finite; an index that is out of range.
+    """
+    for material in description.materials:
+        _check_material(material, where)
+    for mesh in description.meshes:
+        _check_mesh(mesh, len(description.materials), where)
+    for number, instance in enumerate(description.instances):
+        if not 0 <= instance.mesh < len(description.meshes):
+            raise SceneError(f"instance {number} uses mesh {instance.mesh} of {len(description.meshes)}", where=where)
+        if np.shape(instance.world_from_mesh) != (4, 4) or not np.isfinite(instance.world_from_mesh).all():
+            raise SceneError(f"instance {number} has a matrix that is not 4x4 finite numbers", where=where)
+    if not any(len(description.meshes[instance.mesh].faces) for instance in description.instances):
+        raise SceneError("the scene has no geometry", where=where, rule="there must be at least one triangle")
+    return description
+
+
+def _check_mesh(mesh: Mesh, materials: int, where: str) -> None:
+    count = len(mesh.positions)
+    tables = {"vertices": mesh.positions, "normals": mesh.normals, "vertex colours": mesh.colors}
+    tables |= {f"uv set {number}": uvs for number, uvs in enumerate(mesh.uvs)}
+    for what, table in tables.items():
+        if table is None:
+            continue
+        if len(table) != count:
+            raise SceneError(f"mesh '{mesh.name}' has {len(table)} {what} for {count} vertices", where=where)
+        bad = ~np.isfinite(table).all(axis=1)
+        if bad.any():
+            raise SceneError(
+                f"mesh '{mesh.name}' has {int(bad.sum())} {what} that are not finite (first: number {np.argmax(bad)})",
+                where=where,
+                rule="coordinates must be finite numbers",
+            )
+    if len(mesh.faces) and int(mesh.faces.max()) >= count:
+        raise SceneError(f"mesh '{mesh.name}' uses vertex {int(mesh.faces.max())} of {count}", where=where)
+    if not 0 <= mesh.material < materials:
+        raise SceneError(f"mesh '{mesh.name}' uses material {mesh.material} of {materials}", where=where)
+
+
+def _check_material(material: Material, where: str) -> None:
+    numbers = (*material.base_color, *material.emission, material.alpha, material.metallic, material.roughness)
+    if not np.isfinite(numbers).all() or min(numbers) < 0.0:
+        raise SceneError(
+            f"material '{material.name}' has a factor that is negative or not finite",
+            where=where,
+            rule="factors are numbers of 0 or more",
+        )
+
+
+def lit(
+    description: SceneDescription | MitsubaSource, environment: Environment | None, background: Color | None
+) -> SceneDescription | MitsubaSource:
+    """The description with the caller's environment and background, where given, in place of its own."""
+    if environment is not None:
+        description = replace(description, environment=environment)
+    if background is not None:
+        description = replace(description, background=background)
+    return description

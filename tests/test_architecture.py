@@ -1,0 +1,254 @@
+"""The shape of the code, held by reading its source: who may import whom, and what may be loaded when."""
+
+import ast
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+SOURCE = ROOT / "src" / "lippmann"
+
+#: From the ground up: a part imports only from parts before it. The package itself offers the API, so it comes after.
+ORDER = (
+    "_version",
+    "errors",
+    "atomic",
+    "progress",
+    "machine",
+    "llvm",
+    "gpu",
+    "engine",
+    "display",
+    "scene",
+    "image",
+    "render",
+    "replay",
+    "refocus",
+    "quality",
+    "report",
+    "viewer",
+    "cluster",
+    "api",
+    "",
+    "cli",
+    "__main__",
+)
+
+#: Conveniences of a part that reach up, each only from inside a function, so that using the part alone loads nothing
+#: more: ``IntegralImage.replay`` and ``.refocus``.
+REACHES_UP = {("image", "replay"), ("image", "refocus")}
+
+#: The only modules that may use Mitsuba or Dr.Jit; of the scene those that build it on the device, never its readers.
+USES_ENGINE = (
+    "engine",
+    "render",
+    "scene.build",
+    "scene.microfacet",
+    "scene.mitsuba_source",
+    "scene.surface",
+    "scene.textures",
+)
+#: Of those, the ones that may load it by being imported.
+LOADS_ENGINE = ("render", "scene.build")
+
+#: What a user imports; none of it may load the engine, which has to choose its library first.
+ENTRANCES = ("", "api", "cli", "engine", "display", "image", "scene", "render", "replay", "refocus", "quality")
+
+
+@dataclass(frozen=True)
+class Import:
+    """``importer`` (dotted, below the package) imports ``imported`` (a full name) in ``line``."""
+
+    importer: str
+    imported: str
+    line: int
+    inside_function: bool
+    for_annotations: bool
+
+    @property
+    def ours(self) -> str | None:
+        """The imported module below the package, or ``None`` for others' packages."""
+        if self.imported == "lippmann":
+            return ""
+        return self.imported.removeprefix("lippmann.") if self.imported.startswith("lippmann.") else None
+
+
+def part(module: str) -> str:
+    return module.partition(".")[0]
+
+
+def inside(module: str, parts: tuple[str, ...]) -> bool:
+    return any(module == name or module.startswith(f"{name}.") for name in parts)
+
+
+@cache
+def modules() -> dict[str, Path]:
+    """All modules below the package by dotted name; the package itself is the empty name."""
+    found = {}
+    for path in sorted(SOURCE.rglob("*.py")):
+        names = path.relative_to(SOURCE).with_suffix("").parts
+        found[".".join(names[:-1] if names[-1] == "__init__" else names)] = path
+    return found
+
+
+def imports_of(module: str, source: str) -> Iterator[Import]:
+    """All imports of ``source``, those inside functions and under ``if TYPE_CHECKING`` too."""
+    is_package = modules().get(module, Path()).name == "__init__.py"
+
+    def visit(node: ast.AST, in_function: bool, for_annotations: bool) -> Iterator[Import]:
+        if isinstance(node, ast.Import):
+            for alias in node.names:
+                yield Import(module, alias.name, node.lineno, in_function, for_annotations)
+        elif isinstance(node, ast.ImportFrom):
+            base = node.module or ""
+            if node.level:
+                above = ["lippmann", *module.split(".")] if module else ["lippmann"]
+                above = above[: len(above) + is_package - node.level]
+                base = ".".join([*above, base] if base else above)
+            for alias in node.names:
+                # "from lippmann import engine" names a module, "from lippmann import Display" what the package offers.
+                whole = f"{base}.{alias.name}"
+                imported = whole if whole.removeprefix("lippmann.") in modules() else base
+                yield Import(module, imported, node.lineno, in_function, for_annotations)
+        is_guard = isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test)
+        for child in ast.iter_child_nodes(node):
+            below = in_function or isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda))
+            yield from visit(child, below, for_annotations or is_guard)
+
+    return visit(ast.parse(source), False, False)
+
+
+@cache
+def imports() -> tuple[Import, ...]:
+    return tuple(
+        found for module, path in modules().items() for found in imports_of(module, path.read_text(encoding="utf-8"))
+    )
+
+
+def is_engine(found: Import) -> bool:
+    return found.imported.partition(".")[0] in ("mitsuba", "drjit")
+
+
+def breaks_order(found: Import) -> bool:
+    if found.ours is None:
+        return False
+    importer, imported = part(found.importer), part(found.ours)
+    if importer == imported or ((importer, imported) in REACHES_UP and found.inside_function):
+        return False
+    rank = {name: position for position, name in enumerate(ORDER)}
+    return rank.get(imported, len(ORDER)) > rank.get(importer, -1)
+
+
+def places(found: list[Import]) -> list[str]:
+    return [f"{modules()[item.importer].relative_to(ROOT)}:{item.line} imports {item.imported}" for item in found]
+
+
+def test_every_part_has_its_place_in_the_order():
+    assert {part(module) for module in modules()} <= set(ORDER)
+
+
+def test_parts_import_only_from_parts_before_them():
+    assert places([found for found in imports() if breaks_order(found)]) == []
+
+
+@pytest.mark.parametrize(
+    ("module", "source", "broken"),
+    [
+        ("display.display", "from lippmann.errors import DisplayError", False),
+        ("display.display", "from lippmann.display.panel import Panel", False),
+        ("display.display", "from .panel import Panel", False),
+        ("display.display", "import lippmann.scene.load", True),
+        ("display.display", "from lippmann import scene", True),
+        ("display.display", "from lippmann import Display", True),
+        ("display.display", "from ..scene.load import load_scene", True),
+        ("display.display", "def f():\n    import lippmann.cli", True),
+        ("image.picture", "def f():\n    from lippmann.replay import replay", False),
+        ("image.picture", "from lippmann.replay import replay", True),
+        ("cli", "import lippmann", False),
+    ],
+)
+def test_the_order_is_read_rightly(module, source, broken):
+    assert any(breaks_order(found) for found in imports_of(module, source)) == broken
+
+
+def test_only_the_modules_that_render_use_the_engine():
+    foreign = [found for found in imports() if is_engine(found) and not found.for_annotations]
+    assert places([found for found in foreign if not inside(found.importer, USES_ENGINE)]) == []
+    at_import = [found for found in foreign if not found.inside_function]
+    assert places([found for found in at_import if not inside(found.importer, LOADS_ENGINE)]) == []
+
+
+def loaded_with(module: str) -> set[str]:
+    """Names of all that importing ``module`` imports in turn, as far as it is written outside functions."""
+    loaded, waiting = set(), [module]
+    while waiting:
+        name = waiting.pop()
+        if name in loaded:
+            continue
+        loaded.add(name)
+        waiting += [name.rpartition(".")[0]]  # a package is imported before what lies in it
+        for found in imports():
+            if found.importer == name and not (found.inside_function or found.for_annotations):
+                if found.ours is None:
+                    loaded.add(found.imported.partition(".")[0])
+                else:
+                    waiting.append(found.ours)
+    return loaded
+
+
+@pytest.mark.parametrize("module", [name for name in ENTRANCES if name in modules()])
+def test_entrances_do_not_load_the_engine(module):
+    assert loaded_with(module) & {"mitsuba", "drjit"} == set()
+
+
+@pytest.mark.parametrize("module", [name for name in ("lippmann", "lippmann.cli") if name[9:] in modules()])
+def test_import_is_light(module):
+    code = f"import sys; import {module}; print(*sys.modules)"
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    heavy = {
+        "numpy",
+        "scipy",
+        "PIL",
+        "mitsuba",
+        "drjit",
+        "trimesh",
+        "pygltflib",
+        "OpenEXR",
+        "av",
+        "imagecodecs",
+        "tifffile",
+    }
+    assert set(run.stdout.split()) & heavy == set()
+
+
+def project_files() -> Iterator[Path]:
+    for folder in ("src", "tests", "docs", "examples", "benchmarks", "scripts", ".ci"):
+        yield from (ROOT / folder).rglob("*")
+    yield from ROOT.iterdir()
+
+
+TEXT = {".py", ".toml", ".md", ".sh", ".cfg", ".yml", ".yaml", ".json", ".html", ".js", ".css", ".txt"}
+#: Homes and working folders of one machine, at the start of an absolute path.
+MACHINE_PATH = re.compile(r"(?<![\w.~:/$}*-])/(?:root|work|home|Users|mnt|tmp)/\w")
+
+
+def test_no_path_of_one_machine():
+    found = []
+    for path in project_files():
+        if not path.is_file() or (path.suffix not in TEXT and path.name not in ("Makefile", "run")):
+            continue
+        for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1):
+            if MACHINE_PATH.search(line):
+                found.append(f"{path.relative_to(ROOT)}:{number}: {line.strip()}")
+    assert found == []
+
+
+@pytest.mark.parametrize("line", ["see /" + "home/me/x.py", 'open("/' + "tmp/x.png" + '")', "=/" + "work/a"])
+def test_paths_of_one_machine_are_recognised(line):
+    assert MACHINE_PATH.search(line)
