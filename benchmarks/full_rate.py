@@ -8,6 +8,7 @@ like ours. The target is a rate of at least 85 % of the rival's.
 from __future__ import annotations
 
 import numpy as np
+
 from harness import interleaved, median_ratio, save, summary
 
 

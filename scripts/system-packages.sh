@@ -29,31 +29,34 @@ update_lists() {
 
 # candidate PACKAGE: succeeds if apt could install it.
 candidate() {
-  local policy
+  local policy # not piped into grep, whose early end would count as a failure of the pipe
   policy=$(apt-cache policy "$1" 2>/dev/null)
   [[ $policy =~ $'\n  Candidate: '[^\(] ]]
 }
 
-# install_packages PURPOSE PACKAGE...: installs them; fails, having said what to do, where that cannot be done.
+apt_install() {
+  as_root env DEBIAN_FRONTEND=noninteractive apt-get -o DPkg::Lock::Timeout=300 install -y --no-install-recommends "$@"
+}
+
+# install_packages PACKAGE...: installs them; fails, having said what to do, where that cannot be done.
 install_packages() {
-  local purpose=$1 log
-  shift
+  local log
   if ! have apt-get; then
-    say "setup: $purpose is missing, and this system has no apt-get; install it with the system's own package manager"
+    say "setup: packages of the system are missing, and there is no apt-get to install them; on Debian they are called"
+    say "  $*"
+    say "setup: install them with the system's own package manager, then start again"
     return 1
   fi
   if ! can_be_root; then
-    say "setup: $purpose is missing, and installing it takes root, which cannot be had here."
+    say "setup: packages of the system are missing, and installing them takes root, which cannot be had here."
     say "setup: have this run by someone who can, then start again:"
     say "  apt-get update && apt-get install $*"
     return 1
   fi
-  say "setup: installing $purpose: $*"
+  say "setup: installing packages of the system: $*"
   log=$(mktemp)
   # Lists that are too old name files that are gone: the second attempt has new ones.
-  if as_root env DEBIAN_FRONTEND=noninteractive apt-get install -y --no-install-recommends "$@" >"$log" 2>&1 ||
-    { update_lists &&
-      as_root env DEBIAN_FRONTEND=noninteractive apt-get install -y --no-install-recommends "$@" >"$log" 2>&1; }; then
+  if apt_install "$@" >"$log" 2>&1 || { update_lists && apt_install "$@" >"$log" 2>&1; }; then
     rm -f "$log"
     return 0
   fi
@@ -72,6 +75,6 @@ newest_package() {
       printf '%s\n' "$name"
       return 0
     fi
-  done < <(apt-cache search --names-only "$1" 2>/dev/null | awk '{ n = $1; gsub(/[^0-9]/, " ", n); split(n, a, " "); print a[1], $1 }' | sort -rn)
+  done < <(apt-cache search --names-only "$1" 2>/dev/null | sed -nE 's/^([a-z]+([0-9]+)[^ ]*) .*/\2 \1/p' | sort -rn)
   return 1
 }

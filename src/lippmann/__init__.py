@@ -8,7 +8,7 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any
 
-from lippmann._version import VERSION as __version__
+from lippmann import _version
 
 if TYPE_CHECKING:
     from lippmann.api import load_scene, preview, render
@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from lippmann.image import IntegralImage, read_picture
     from lippmann.progress import Progress
     from lippmann.scene.scene import Scene
+
+__version__ = _version.VERSION
 
 _HOME = {
     "load_scene": "lippmann.api",

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Progress:
-    """One report: ``done`` of ``total`` units of work of one stage (``load``, ``build``, ``compile``, ``trace``, ``write``)."""
+    """One report: ``done`` of ``total`` units of work of one stage (``load``, ``build``, ``trace``, ``write``, ...)."""
 
     stage: str
     done: float

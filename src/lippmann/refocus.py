@@ -53,14 +53,15 @@ def refocus(image: IntegralImage, plane: float, *, size: tuple[int, int] | None 
         rule = f"it must be finite and below the viewing distance of {display.viewing_distance:g} mm"
         raise UsageError(f"the plane is at {plane:g} mm", rule=rule)
     width, height = checked_size(default_size(display, DEFAULT_WIDTH) if size is None else size)
-    views, masks = image.views(), image.view_mask()
+    views, masks = image.views_and_mask()
+    eyes = {(ky, kx): eye_of_view(display, ky, kx) for ky, kx in np.argwhere(masks.any(axis=(2, 3))).tolist()}
     picture = np.zeros((height, width, 3), dtype=np.float32)
     for rows, x, y in lens_plane_points(display, width, height):
         total, count = np.zeros((*x.shape, 3), dtype=np.float32), np.zeros(x.shape, dtype=np.float32)
-        for ky, kx in np.argwhere(masks.any(axis=(2, 3))).tolist():
-            row, column, inside = _line_of_sight(display, eye_of_view(display, ky, kx), (x, y, plane))
-            inside &= masks[ky, kx][row, column]
-            total += views[ky, kx][row, column] * inside[..., None]
+        for view, eye in eyes.items():
+            row, column, inside = _line_of_sight(display, eye, (x, y, plane))
+            inside &= masks[view][row, column]
+            total += views[view][row, column] * inside[..., None]
             count += inside
         picture[rows] = total / np.maximum(count, 1)[..., None]
     return picture

@@ -204,6 +204,19 @@ def test_boundaries_on_pixel_centers_belong_to_the_right(data, half_pixels, pixe
     np.testing.assert_array_equal(j, expected)
 
 
+@pytest.mark.parametrize("viewing_distance", [math.inf, 500.0])
+@pytest.mark.parametrize("half_pixels", [3, 13, 25])
+def test_ties_hold_on_the_widest_panels(half_pixels, viewing_distance):
+    """A sheet of 100 000 pixels: rounding noise stays far below the tolerance."""
+    lenses, pixel_pitch, gap = 2 * (100_000 // half_pixels), 25.4 / 720, 0.42
+    width = lenses * half_pixels // 2
+    lens_array = LensArray("lenticular", half_pixels * pixel_pitch / 2 / (1 + gap / viewing_distance))
+    display = Display("x", Panel(width, 1, pixel_pitch), lens_array, gap, viewing_distance=viewing_distance)
+    columns = np.arange(width)
+    i, _ = display.lens_of(*display.panel_point(columns + 0.5, np.full(width, 0.5)))
+    np.testing.assert_array_equal(i, (2 * columns + 1) // half_pixels)
+
+
 def test_hexagonal_ties_do_not_depend_on_noise():
     """Pixel corners half-way between two rows of lenses belong to the lower one, wherever they lie."""
     display = Display("x", Panel(160, 96, 25.4 / 96), LensArray("hexagonal", 16 * 25.4 / 96, row_pitch=25.4 / 8), gap=3)
@@ -402,7 +415,8 @@ def test_summary_is_plain():
     assert json.loads(json.dumps(summary)) == summary
     assert summary["pixels"] == [3840, 2160]
     assert summary["viewing_distance"] == 600
-    assert summary["resolvable_depth"] == pytest.approx([5.5, 5.5], abs=0.01)
+    assert summary["depth_budget"] == pytest.approx([5.5, -5.5], abs=0.01)
+    assert summary["pixels_per_lens"] == [pytest.approx(6.3, abs=0.01), None]
     assert load_display("mla-square").summary()["pixels_per_lens"] == pytest.approx([15, 15])
 
 

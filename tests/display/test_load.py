@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import pytest
 
@@ -84,6 +85,12 @@ def test_own_file_with_units(write):
     assert display.panel.subpixel_offsets == ((1 / 3, 0), (0, 0), (-1 / 3, 0))
     assert display.lens_array.pitch == 25.4 / 12
     assert display.lens_array.offset == pytest.approx((25.4 / 96, 0.5))
+
+
+def test_the_documented_example_is_a_display(write):
+    page = (Path(__file__).parents[2] / "docs" / "displays.md").read_text(encoding="utf-8")
+    example = page.split("```toml\n")[1].split("```")[0]
+    assert load_display(write(example)).lens_array.offset == pytest.approx((1.5 * 25.4 / 282.4, 0))
 
 
 def test_numbers_are_millimetres_and_infinity_has_two_spellings(write):

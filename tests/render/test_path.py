@@ -26,7 +26,9 @@ def trace(scene_dict, cam, size=32, spp=64, depth=6, seed=0, background=None, ab
     from lippmann.render.traits import make_traits
 
     scene = mi.load_dict(scene_dict)
-    integrator = PathIntegrator(scene, make_traits(scene, background=background, has_null="mask" in str(scene_dict), absorption=absorption), depth)
+    has_null = "mask" in str(scene_dict)
+    traits = make_traits(scene, background=background, has_null=has_null, absorption=absorption)
+    integrator = PathIntegrator(scene, traits, depth)
     return trace_frame(integrator, CameraRays(cam, size, size), make_plan(size, size, spp, memory=2**31), seed=seed)
 
 

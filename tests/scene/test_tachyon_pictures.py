@@ -18,10 +18,24 @@ from lippmann.scene.classic_builder import ClassicSceneBuilder
 from lippmann.scene.tachyon import read_tachyon
 
 SIZE = 96
-SCENES = (
-    "2balls attenuation clipplanes fisheye fog gears_s2 imagedef lscapes polycyl room smallballs spotlight teapot texfree "
-    "transtest tree_fcyl"
-).split()
+SCENES = [
+    "2balls",
+    "attenuation",
+    "clipplanes",
+    "fisheye",
+    "fog",
+    "gears_s2",
+    "imagedef",
+    "lscapes",
+    "polycyl",
+    "room",
+    "smallballs",
+    "spotlight",
+    "teapot",
+    "texfree",
+    "transtest",
+    "tree_fcyl",
+]
 
 
 @pytest.fixture(scope="session")
@@ -201,7 +215,9 @@ def test_all_words_written_again_give_the_same_picture(tachyon, tmp_path, suffix
     body = EVERYTHING.replace("PICTURE", f"pic.{suffix}")
     path.write_text(f"BEGIN_SCENE RESOLUTION 64 64 {body} END_SCENE")
     scene = read_tachyon(path)
-    assert scene.counts() == dict(sphere=1, tube=0, cylinder=1, ring=1, box=1, plane=1, triangle=4 + 96 + 2)
+    assert scene.counts() == {
+        "sphere": 1, "tube": 0, "cylinder": 1, "ring": 1, "box": 1, "plane": 1, "triangle": 4 + 96 + 2
+    }  # fmt: skip
     assert_same(picture(tachyon, path, tmp_path), picture(tachyon, written(scene, tmp_path), tmp_path))
 
 

@@ -103,6 +103,7 @@ def render(
         image = _with_seconds(image, load=load_seconds)
         image.save(output, bits=bits)
     written = _with_seconds(image, write=time.perf_counter() - writing)
+    console.remark(_depth_line(image))
     for note in image.provenance.notes:
         console.remark(note)
     console.result(report(output, written.provenance), _sentence(output, written))
@@ -194,6 +195,16 @@ def _sentence(output: Path, image: IntegralImage) -> str:
         f"{output}: {width}x{height} pixels for {image.display.name}, {image.provenance.spp} samples per pixel, "
         f"{millions:.1f} M rays, {image.provenance.seconds['total']:.1f} s"
     )
+
+
+def _depth_line(image: IntegralImage) -> str:
+    """Where the scene lies, beside what the display can resolve."""
+    (back, front), (far, near) = (image.provenance.options[key] for key in ("depth_range", "resolvable_range"))
+    return f"scene {_depths(back, front)}; the display resolves {_depths(far, near)}"
+
+
+def _depths(back: float, front: float) -> str:
+    return f"from {-back:.1f} mm behind to {front:.1f} mm before the lens plane"
 
 
 def _with_seconds(image: IntegralImage, **seconds: float) -> IntegralImage:

@@ -52,21 +52,7 @@ def displays(as_json: options.Json = False) -> None:
 
 
 def _display_row(display: Display) -> dict[str, Any]:
-    across, down = display.pixels_per_lens
-    front, back = display.depth_budget
-    grid = display.lens_grid
-    return {
-        "name": display.name,
-        "title": display.title,
-        "layout": display.lens_array.layout,
-        "pixels": [display.panel.width, display.panel.height],
-        "lenses": [grid.columns, grid.rows],
-        "pixels_per_lens": [across, down],
-        "field_of_view": display.field_of_view,
-        "depth_budget": [front, back],
-        "size_mm": list(display.size_mm),
-    }
-
+XX
 
 def _cell(key: str, row: dict[str, Any]) -> str:
     if key == "pixels":

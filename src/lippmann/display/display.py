@@ -56,8 +56,6 @@ class LensGrid:
 
     columns: int
     rows: int
-    first_column: int = 0
-    first_row: int = 0
 
 
 @dataclass(frozen=True)
@@ -311,28 +309,29 @@ class Display:
     def summary(self) -> dict[str, Any]:
         """What one wants to know of a display at a glance, as plain values for a table or JSON.
 
-        Keys: ``name``, ``title``, ``layout``; ``pixels`` and ``lenses`` as [columns, rows]; ``size`` [width, height],
-        ``pixel_pitch``, ``lens_pitch``, ``gap``, ``viewing_distance`` (or ``"infinite"``) and ``aperture_distance``
-        in mm; ``slant`` and ``field_of_view`` in degrees; ``pixels_per_lens`` [across] or [across, down];
-        ``resolvable_depth`` [behind, before] in mm as distances from the lens plane.
+        Keys: ``name``, ``title``, ``layout``; ``pixels``, ``lenses`` as [columns, rows]; ``pixels_per_lens`` as
+        [across, down], down being None if lenticular; ``size_mm`` as [width, height]; ``field_of_view`` and ``slant``
+        in degrees; ``depth_budget`` and ``resolvable_depth`` as [nearest, farthest] z, ``pixel_pitch``,
+        ``lens_pitch``, ``gap``, ``viewing_distance`` (or ``"infinite"``) and ``aperture_distance`` in mm.
         """
-        grid, (near, far) = self.lens_grid, self.resolvable_depth
+        grid = self.lens_grid
         return {
             "name": self.name,
             "title": self.title,
             "layout": self.lens_array.layout,
             "pixels": [self.panel.width, self.panel.height],
             "lenses": [grid.columns, grid.rows],
-            "pixels_per_lens": [count for count in self.pixels_per_lens if count is not None],
-            "size": list(self.size_mm),
+            "pixels_per_lens": list(self.pixels_per_lens),
+            "size_mm": list(self.size_mm),
+            "field_of_view": self.field_of_view,
+            "depth_budget": list(self.depth_budget),
+            "resolvable_depth": list(self.resolvable_depth),
             "pixel_pitch": self.panel.pixel_pitch,
             "lens_pitch": self.lens_array.pitch,
             "slant": self.lens_array.slant,
             "gap": self.gap,
             "viewing_distance": self._written_viewing_distance,
             "aperture_distance": self.aperture_distance,
-            "field_of_view": self.field_of_view,
-            "resolvable_depth": [-far, near],
         }
 
     def to_dict(self) -> dict[str, Any]:

@@ -53,6 +53,11 @@ class Lattice:
         sin, cos = self._axis
         return across * cos + along * sin, along * cos - across * sin
 
+    def axis_at(self, i: Array, y: Array) -> Array:
+        """The x at which the axis of the lenticular lens ``i`` passes the height ``y`` of the lens plane."""
+        sin, cos = self._axis
+        return (self.origin_x + i * self.pitch + y * sin) / cos
+
     def lens_at(self, x: Array, y: Array, ops: ArrayOps) -> tuple[Array, Array]:
         """Indices ``(i, j)``, reals that hold whole numbers, of the lens that contains a point of the lens plane."""
         if self.layout == "lenticular":

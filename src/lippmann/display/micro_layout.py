@@ -110,9 +110,7 @@ def _indices_of_block(display: Display, first: int, last: int) -> tuple[Indices,
     pixel_pitch, lattice, scale = display.panel.pixel_pitch, display.lattice, display.magnification
     width, height = _micro_image_size(display)
     if lattice.layout == "lenticular":
-        # The axis crosses the row of height y at across / cos + y tan.
-        slant = math.radians(lattice.slant)
-        center_x = (lattice.origin_x + i * lattice.pitch) * scale / math.cos(slant) + y * math.tan(slant)
+        center_x = lattice.axis_at(i, y / scale) * scale
         k_y = np.broadcast_to(np.arange(first, last, dtype=np.int32)[:, None], x.shape)
     else:
         center_x, center_y = (c * scale for c in lattice.center(i, j, x, y, NUMPY))

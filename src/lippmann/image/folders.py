@@ -78,12 +78,12 @@ def write_views(
         If the format is unknown or has no such bits, or the folder cannot be written.
     """
     name, stored = _storage(image, folder, format, bits)
-    if image.views_are_exact:
+    views, mask = image.views_and_mask()
+    parts: dict[str, NDArray[Any]] = {"": views}
+    if name == "exr" and image.views_are_exact:
         split = Permutation(image.display).split
-        parts = {k: micro_images_as_views(split(v), image.display) for k, v in _layers(image, name).items()}
-    else:
-        parts = {"": image.views()}
-    _write_parts(image, folder, "views", parts, image.view_mask(), (name, stored), progress)
+        parts |= {k: micro_images_as_views(split(v), image.display) for k, v in image.maps.items()}
+    _write_parts(image, folder, "views", parts, mask, (name, stored), progress)
 
 
 def write_micro_images(
@@ -100,7 +100,8 @@ def write_micro_images(
     """
     name, stored = _storage(image, folder, format, bits)
     permutation = Permutation(image.display)
-    parts = {k: permutation.split(v) for k, v in _layers(image, name).items()}
+    layers = {"": image.pixels, **image.maps} if name == "exr" else {"": image.pixels}
+    parts = {k: permutation.split(v) for k, v in layers.items()}
     _write_parts(image, folder, "micro-images", parts, permutation.mask, (name, stored), progress)
 
 
@@ -127,14 +128,12 @@ def compose(folder: Path, *, progress: ProgressCallback = silent) -> IntegralIma
         progress(Progress("read", row * columns + column + 1, rows * columns))
     metadata = manifest.metadata
     permutation = Permutation(metadata.display)
-    whole = {}
-    for key, values in parts.items():
-        is_views = manifest.kind == "views"
-        micro_images = micro_images_as_views(values, metadata.display) if is_views else values
-        whole[key] = permutation.join(micro_images)
-    pixels = whole.pop("")
+    if manifest.kind == "views":
+        parts = {key: micro_images_as_views(values, metadata.display) for key, values in parts.items()}
+    maps = {key: permutation.join(values) for key, values in parts.items()}
+    pixels = maps.pop("")
     return IntegralImage(
-        pixels, metadata.display, metadata.world_from_display, metadata.provenance, whole, stored=manifest.stored
+        pixels, metadata.display, metadata.world_from_display, metadata.provenance, maps, stored=manifest.stored
     )
 
 
@@ -149,10 +148,6 @@ def _storage(
     if bits is None and image.stored in STORED[name].values():
         return name, image.stored
     return name, stored_as(name, folder, bits, image.stored)
-
-
-def _layers(image: IntegralImage, name: FormatName) -> dict[str, NDArray[Any]]:
-    return {"": image.pixels, **image.maps} if name == "exr" else {"": image.pixels}
 
 
 def _write_parts(

@@ -110,15 +110,22 @@ class IntegralImage:
         that no pixel stands for, see :meth:`view_mask`, are zero. A larger ``kx`` is seen from further left, a larger
         ``ky`` from further up.
         """
-        if self.views_are_exact:
-            return micro_images_as_views(self.micro_images(), self.display)
-        return resampled_views(self.pixels, self.display, _checked_resampling(resampling))[0]
+        return self.views_and_mask(resampling)[0]
 
     def view_mask(self) -> NDArray[np.bool_]:
         """``(ny, nx, lens_rows, lens_cols)``: which values of :meth:`views` stand for a pixel."""
-        if self.views_are_exact:
-            return micro_images_as_views(self.micro_image_mask(), self.display)
-        return resampled_views(self.pixels, self.display, "nearest")[1]
+        return self.views_and_mask()[1]
+
+    def views_and_mask(self, resampling: Resampling = "nearest") -> tuple[FloatArray, NDArray[np.bool_]]:
+        """:meth:`views` and :meth:`view_mask` together, at the price of one."""
+        if resampling not in get_args(Resampling):
+            rule = f"it must be one of {', '.join(get_args(Resampling))}"
+            raise PictureError(f"resampling is {resampling!r}", rule=rule)
+        if not self.views_are_exact:
+            return resampled_views(self.pixels, self.display, resampling)
+        permutation = Permutation(self.display)
+        parts = permutation.split(self.pixels), permutation.mask
+        return micro_images_as_views(parts[0], self.display), micro_images_as_views(parts[1], self.display)
 
     @classmethod
     def from_micro_images(cls, micro_images: ArrayLike, display: Display, **parts: Any) -> IntegralImage:
@@ -211,12 +218,6 @@ def _joined_views(views: NDArray[Any], display: Display) -> NDArray[Any]:
         raise PictureError(f"the views have the shape {views.shape[:4]}", rule=rule)
     # The change of axes is its own inverse.
     return Permutation(display).join(micro_images_as_views(views, display))
-
-
-def _checked_resampling(resampling: Resampling) -> Resampling:
-    if resampling not in get_args(Resampling):
-        raise PictureError(f"resampling is {resampling!r}", rule=f"it must be one of {', '.join(get_args(Resampling))}")
-    return resampling
 
 
 def _checked_pixels(pixels: object, display: Display) -> FloatArray:

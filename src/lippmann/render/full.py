@@ -116,10 +116,10 @@ def _divide(number: Any, by: Any) -> tuple[Any, Any]:
 
 
 def _channel_sums(radiance: Any, channels: int, count: int) -> NDArray[np.float32]:
-    sums = [dr.block_sum(component, count) if count > 1 else component for component in radiance]
+    parts = [dr.block_sum(component, count) if count > 1 else component for component in radiance]
     if channels == 1:
-        return np.array(dr.ravel(mi.Color3f(*sums))).reshape(-1, 3)
-    sums = np.stack([np.array(component) for component in sums], axis=-1)
+        return np.array(dr.ravel(mi.Color3f(*parts))).reshape(-1, 3)
+    sums = np.stack([np.array(component) for component in parts], axis=-1)
     # A sub-pixel's rays carry all three colours; it shows its own.
     return np.ascontiguousarray(np.diagonal(sums.reshape(-1, 3, 3), axis1=1, axis2=2))
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -86,7 +86,7 @@ def render_integral_image(
     from lippmann.render.rays import DisplayRays
 
     source = DisplayRays(display, placement.world_from_display, settings.subpixels)
-    integrator = make_integrator(built, settings, np.linalg.inv(placement.world_from_display))
+    integrator = make_integrator(built, settings, placement.display_from_world)
     frame = trace_frame(
         integrator, source, plan, seed=settings.seed, box_filter=settings.pixel_filter == "box", progress=progress
     )
@@ -165,7 +165,7 @@ def render_preview(
 def make_integrator(built: BuiltScene, settings: RenderSettings, display_from_world: NDArray[np.float64]) -> Any:
     """The integrator that ``settings`` name, for a built scene."""
     from lippmann.render.integrators.path import PathIntegrator
-    from lippmann.render.integrators.surface import SurfaceIntegrator
+    from lippmann.render.integrators.surface import SurfaceIntegrator, SurfaceProperty
     from lippmann.render.traits import make_traits
 
     if settings.integrator in ("path", "direct"):
@@ -173,7 +173,7 @@ def make_integrator(built: BuiltScene, settings: RenderSettings, display_from_wo
             built.mitsuba, background=built.background, has_null=built.has_null, absorption=built.absorption
         )
         return PathIntegrator(built.mitsuba, traits, settings.surfaces, name=settings.integrator)
-    return SurfaceIntegrator(built.mitsuba, settings.integrator, display_from_world)
+    return SurfaceIntegrator(built.mitsuba, cast(SurfaceProperty, settings.integrator), display_from_world)
 
 
 def default_memory() -> int:

@@ -152,7 +152,7 @@ class ClassicSceneBuilder:
             clip_group,
             positions=corners,
             normals=_geometric_normals(corners) if normals is None else normals,
-            colors=np.zeros((1, 3, 3)) if colors is None else colors,
+            colors=np.zeros((3, 3)) if colors is None else colors,
             smooth=normals is not None,
             colored=colors is not None,
         )
@@ -209,7 +209,8 @@ class ClassicSceneBuilder:
             arrays[name] = array if array.dtype == np.bool_ else array.astype(np.float64)
         row_axes = {name: len(kind.shapes.get(name, ())) for name in arrays}
         try:
-            rows = max((len(array) for name, array in arrays.items() if array.ndim > row_axes[name]), default=1)
+            lengths = {len(array) for name, array in arrays.items() if array.ndim > row_axes[name]}
+            rows = 0 if 0 in lengths else max(lengths, default=1)
             full = {
                 name: np.broadcast_to(array, (rows, *kind.shapes.get(name, ()))).copy()
                 for name, array in arrays.items()

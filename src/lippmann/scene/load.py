@@ -115,7 +115,10 @@ def _suffix_by_content(path: Path) -> str | None:
 def _from_library(name: str) -> Scene:
     from lippmann.scene import library
 
-    description = checked(library.make(name), name)
+    made = library.make(name)
+    if not isinstance(made, SceneDescription):
+        raise SceneError(f"the bundled scene '{name}' has no physically based form yet")
+    description = checked(made, name)
     return Scene(name, description, home_camera=description.cameras[0].name if description.cameras else None)
 
 

@@ -220,9 +220,9 @@ def _assemble(statements: _Statements, where: str) -> _Geometry:
 
 
 def _complete_normals(geometry: _Geometry, smoothing: Integers) -> None:
-    """Unit normals, and those that smoothing groups ask for: the area-weighted mean around each vertex.
+    """Unit normals, and those that smoothing groups ask for: the mean around each vertex, weighted by angle.
 
-    A corner without a normal and outside any group stays flat (-1).
+    Weights by angle (Thuermer and Wuethrich 1998) do not depend on how polygons were cut into triangles. A corner without a normal and outside any group stays flat (-1).
     """
     lengths = np.linalg.norm(geometry.normals, axis=1)
     usable = lengths > 1e-12
@@ -231,21 +231,34 @@ def _complete_normals(geometry: _Geometry, smoothing: Integers) -> None:
     normal_of = np.where((given >= 0) & np.append(usable, False)[given], given, -1)
     smooth = (normal_of < 0) & (smoothing > 0)[:, None]
     if smooth.any():
-        weighted = face_normals(geometry.positions, geometry.position_of)
-        rows = np.nonzero(smooth)[0]
+        rows, corners = np.nonzero(smooth)
+        weighted = _weighted_normals(geometry.positions, geometry.position_of[rows], corners)
         key = geometry.position_of[smooth] * (int(smoothing.max()) + 1) + smoothing[rows]
         _, group = np.unique(key, return_inverse=True)
-        sums = np.stack([np.bincount(group, weighted[rows, axis]) for axis in range(3)], axis=-1)
+        sums = np.stack([np.bincount(group, weighted[:, axis]) for axis in range(3)], axis=-1)
         length = np.linalg.norm(sums, axis=1)
         normal_of[smooth] = np.where(length > 0.0, len(normals) + np.arange(len(sums)), -1)[group]
         normals = np.concatenate([normals, sums / np.where(length > 0.0, length, 1.0)[:, None]])
     geometry.normals, geometry.normal_of = normals, normal_of
 
 
-def face_normals(positions: Points, triangles: Integers) -> Points:
-    """Normals ``(m, 3)`` of triangles, twice the area long."""
+def _weighted_normals(positions: Points, triangles: Integers, corners: Integers) -> Points:
+    """Unit normals ``(n, 3)`` of triangles times their angle at one corner, 0 to 2, each."""
+    rows = np.arange(len(triangles))
+    here, ahead, behind = (positions[triangles[rows, (corners + step) % 3]] for step in range(3))
+    a, b = ahead - here, behind - here
+    cross = np.cross(a, b)
+    length = np.linalg.norm(cross, axis=1)
+    angle = np.arctan2(length, np.einsum("ni,ni->n", a, b))
+    return np.asarray(cross * np.divide(angle, length, out=np.zeros_like(length), where=length > 0.0)[:, None])
+
+
+def _face_normals(positions: Points, triangles: Integers) -> Points:
+    """Unit normals ``(m, 3)`` of triangles; +z for those without area."""
     a, b, c = (positions[triangles[:, corner]] for corner in range(3))
-    return np.asarray(np.cross(b - a, c - a), np.float64)
+    cross = np.cross(b - a, c - a)
+    length = np.linalg.norm(cross, axis=1, keepdims=True)
+    return np.asarray(np.where(length > 0.0, cross / np.where(length > 0.0, length, 1.0), (0.0, 0.0, 1.0)))
 
 
 def _mesh(geometry: _Geometry, rows: Integers, name: str, material: int) -> Mesh:
@@ -253,9 +266,7 @@ def _mesh(geometry: _Geometry, rows: Integers, name: str, material: int) -> Mesh
     position, uv, normal = (table[rows].ravel() for table in (geometry.position_of, geometry.uv_of, geometry.normal_of))
     normals = geometry.normals
     if (normal >= 0).any() and (normal < 0).any():
-        flat = face_normals(geometry.positions, geometry.position_of[rows])
-        length = np.linalg.norm(flat, axis=1, keepdims=True)
-        flat = np.where(length > 0.0, flat / np.where(length > 0.0, length, 1.0), (0.0, 0.0, 1.0))
+        flat = _face_normals(geometry.positions, geometry.position_of[rows])
         normal = np.where(normal < 0, len(normals) + np.repeat(np.arange(len(rows)), 3), normal)
         normals = np.concatenate([normals, flat])
     # Two steps keep the key within 64 bits however large the tables are.

@@ -85,7 +85,7 @@ def read_ply(path: Path, *, allow_outside: bool = False) -> SceneDescription:
     data = read_bytes(path)
     header = _read_header(data, where)
     columns = _read_body(data, header, where)
-    if "vertex" not in columns or not {"x", "y", "z"} <= columns["vertex"].keys():
+    if not all(isinstance(columns.get("vertex", {}).get(axis), np.ndarray) for axis in "xyz"):
         raise SceneError("holds no vertices with x, y and z", where=where)
     if not len(_outline(columns, where).sizes):
         raise SceneError("holds no faces", where=where, fix="a cloud of points must be meshed first")
@@ -254,6 +254,8 @@ def _sizes_at(element: _Element, data: bytes, start: int, order: str, where: str
             place += kind.itemsize + sizes[number] * np.dtype(each.type).itemsize
         else:
             place += np.dtype(each.type).itemsize
+    if place > len(data):
+        raise _cut_short(element, 0, where)
     return sizes
 
 

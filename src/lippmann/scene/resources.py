@@ -135,8 +135,8 @@ def decode_image(data: bytes, name: str, *, where: str) -> Image:
                 pixels = texels_of(picture)
     except UnidentifiedImageError:
         raise SceneError(f"texture '{name}' is not a picture that can be read", where=where) from None
-    except (OSError, SyntaxError, ValueError, Pillow.DecompressionBombError) as error:
-        raise SceneError(f"texture '{name}' cannot be decoded ({error})", where=where) from None
+    except Exception as error:  # Pillow's decoders pass on whatever their libraries throw at damaged data
+        raise SceneError(f"texture '{name}' cannot be decoded ({error})", where=where) from error
     return Image(name, pixels)
 
 

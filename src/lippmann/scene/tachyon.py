@@ -142,6 +142,7 @@ class _SceneReader:
             if words.left:
                 self._builder.notes.append(f"{words.place()}: what follows END_SCENE is not read")
         self._shapes.finish()
+        self._textures.finish()
         if not self._camera_seen:
             self._builder.notes.append("no CAMERA: seen from the origin along +z")
         if self._fog_values is not None:
@@ -177,9 +178,9 @@ class _SceneReader:
         return False
 
     @contextmanager
-    def _opened(self, path: Path, shown: str) -> Iterator[Words]:
+    def _opened(self, path: Path, where: str) -> Iterator[Words]:
         self._open_files.append(path)
-        yield Words.of_file(path, shown, comment=_COMMENT, single=True)
+        yield self._files.words(path, comment=_COMMENT, where=where)
         self._open_files.pop()
 
     def _include(self, words: Words, holder: Path) -> None:
@@ -192,7 +193,7 @@ class _SceneReader:
         if len(self._open_files) > _DEEPEST_INCLUDE or self._includes > _MOST_INCLUDES:
             limits = f"at most {_DEEPEST_INCLUDE} deep and {_MOST_INCLUDES} in all"
             raise SceneError(f"'{shown}' is one include too many", where=where, rule=limits)
-        with self._opened(path, shown) as inner:
+        with self._opened(path, where) as inner:
             self._read_items(inner)
 
     def _camera(self, words: Words, holder: Path) -> None:

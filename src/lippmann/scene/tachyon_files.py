@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from pathlib import Path
 
 import numpy as np
@@ -10,18 +11,25 @@ import numpy as np
 from lippmann.errors import SceneError
 from lippmann.scene.classic import ClassicImage
 from lippmann.scene.resources import decode_image, read_bytes, resolve
+from lippmann.scene.words import Words
+
+_MOST_WORDS = 20_000_000
+_MOST_TEXELS = 1 << 27
 
 
 class SceneFiles:
-    """Finds files beside the scene.
+    """Finds and reads files beside the scene.
 
     A name counts from the folder of the file that holds it, then from the folder of the scene itself (Tachyon knows
-    the working directory alone). Nothing outside the scene's folder is read unless ``allow_outside``.
+    the working directory alone). Nothing outside the scene's folder is read unless ``allow_outside``. What all files
+    together may hold is limited, because a short scene can name a long file many times.
     """
 
     def __init__(self, scene: Path, *, allow_outside: bool) -> None:
         self.folder = scene.parent
         self._allow_outside = allow_outside
+        self._words_left = _MOST_WORDS
+        self._texels_left = _MOST_TEXELS
 
     def find(self, name: str, holder: Path, *, where: str, what: str) -> Path:
         """The file that ``name`` means in the file ``holder``.
@@ -42,6 +50,32 @@ class SceneFiles:
     def shown(self, path: Path) -> str:
         """A file's name as errors give it: seen from the scene's folder."""
         return Path(os.path.relpath(path, self.folder)).as_posix()
+
+    def words(self, path: Path, *, comment: re.Pattern[str], where: str) -> Words:
+        """The words of a text file that is named at ``where``.
+
+        Raises
+        ------
+        SceneError
+            The file is unreadable, empty or not text, or one file too many.
+        """
+        words = Words.of_file(path, self.shown(path), comment=comment, single=True)
+        self._words_left -= words.left
+        if self._words_left < 0:
+            raise SceneError(
+                f"'{self.shown(path)}' is one file too many", where=where, rule=f"at most {_MOST_WORDS} words in all"
+            )
+        return words
+
+    def picture(self, path: Path, name: str, *, where: str) -> ClassicImage:
+        """The picture that is named at ``where``; see :func:`read_picture`."""
+        image = read_picture(path, name, where=where)
+        self._texels_left -= image.texels[..., 0].size
+        if self._texels_left < 0:
+            raise SceneError(
+                f"picture '{name}' is one too many", where=where, rule=f"at most {_MOST_TEXELS} texels in all"
+            )
+        return image
 
 
 def read_picture(path: Path, name: str, *, where: str) -> ClassicImage:

@@ -20,6 +20,7 @@ from lippmann.scene.words import Words
 
 _SHORTEST_EDGE = 1e-9  # Tachyon drops triangles with a shorter one
 _WIDEST_LANDSCAPE = 1024  # samples per side: the displacement takes time with the square of the longer one
+_LARGEST_LANDSCAPES = 1 << 19  # samples of all landscapes of a scene together
 _DEGREES = 3.1415926 / 180.0  # as the program has it
 _NO_COMMENT = re.compile(r"(?!)")
 
@@ -39,6 +40,7 @@ class ShapeReader:
         self._files = files
         self._rows: dict[str, list[Row]] = {}
         self._left_out: dict[str, int] = {}
+        self._landscape_samples = 0
 
     def sphere(self, words: Words, holder: Path) -> None:
         """``SPHERE CENTER V RAD r TEX``."""
@@ -134,6 +136,9 @@ class ShapeReader:
         """``SCAPE RES m n SCALE wx wy CENTER V TEX``."""
         words.keyword("RES")
         columns, rows = (words.integer(2, _WIDEST_LANDSCAPE) for _ in range(2))
+        self._landscape_samples += columns * rows
+        if self._landscape_samples > _LARGEST_LANDSCAPES:
+            raise words.wrong(f"at most {_LARGEST_LANDSCAPES} samples in all landscapes together", back=1)
         width, depth = words.positive("SCALE"), words.positive()
         center = words.vector("CENTER")
         material = self._textures.texture(words, holder)
@@ -147,7 +152,7 @@ class ShapeReader:
         where = words.place()
         path = self._files.find(words.name("the name of a file"), holder, where=where, what="triangle file")
         material = self._textures.texture(words, holder)
-        inner = Words.of_file(path, self._files.shown(path), comment=_NO_COMMENT, single=True)
+        inner = self._files.words(path, comment=_NO_COMMENT, where=where)
         corners = []
         while inner.left:
             inner.integer(3, 3)

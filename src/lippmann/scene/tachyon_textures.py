@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Collection
+from itertools import islice
 from pathlib import Path
 from typing import Any, Literal
 
@@ -11,12 +12,13 @@ import numpy as np
 
 from lippmann.scene.classic import TEXTURE_KINDS, ClassicImage, ClassicMaterial, ClassicTexture
 from lippmann.scene.classic_builder import ClassicSceneBuilder
-from lippmann.scene.tachyon_files import SceneFiles, read_picture
+from lippmann.scene.tachyon_files import SceneFiles
 from lippmann.scene.words import Words
 
 DEFAULT_MATERIAL = ClassicMaterial()
 """What an undefined texture name stands for: white, ambient 0.1, diffuse 0.9."""
 
+_MOST_NAMES = 5  # in one note
 _HEX = re.compile(r"[0-9a-fA-F]+").fullmatch
 
 
@@ -32,7 +34,7 @@ class TextureTable:
         self._reserved = reserved
         self._textures: dict[str, int] = {}
         self._images: dict[str, int] = {}
-        self._undefined: set[str] = set()
+        self._remarks: dict[str, dict[str, str]] = {}  # per remark: the names it holds for, and where each was met
 
     def texture(self, words: Words, holder: Path) -> int:
         """TEX: the name of a texture, or TEXTURE and its body. Returns the material's index."""
@@ -43,12 +45,12 @@ class TextureTable:
     def define(self, words: Words, holder: Path) -> None:
         """``TEXDEF name <body>``."""
         name = words.name("a name for the texture")
-        self._keep(name, self.body(words, holder))
+        self._keep(name, self.body(words, holder), words)
 
     def alias(self, words: Words) -> None:
         """``TEXALIAS newname oldname``."""
         name = words.name("a name for the texture")
-        self._keep(name, self._named(words))
+        self._keep(name, self._named(words), words)
 
     def body(self, words: Words, holder: Path) -> int:
         """A texture body with colour and function."""
@@ -80,10 +82,17 @@ class TextureTable:
         words.keyword("HEX")
         texels = np.array([_hex_color(words) for _ in range(width * height * depth)], np.uint8)
         if name in self._images:
-            self._builder.notes.append(f"{words.where}: image '{name}' is defined again; the first one is kept")
+            self._remark("images are defined again; the first ones are kept", name, words.place(back=1))
             return
         image = ClassicImage(name, texels.reshape(depth, height, width, 3))
         self._images[name] = self._builder.image(image)
+
+    def finish(self) -> None:
+        """Notes what was assumed, in one line per kind of remark."""
+        for remark, places in self._remarks.items():
+            shown = ", ".join(f"'{name}' ({where})" for name, where in islice(places.items(), _MOST_NAMES))
+            more = f" and {len(places) - _MOST_NAMES} more" if len(places) > _MOST_NAMES else ""
+            self._builder.notes.append(f"{shown}{more}: {remark}")
 
     def _named(self, words: Words) -> int:
         name = words.peek()
@@ -92,18 +101,16 @@ class TextureTable:
             return self._textures[name]
         if not name or name.upper() in self._reserved:
             raise words.wrong("the name of a texture, or TEXTURE")
-        if name not in self._undefined:
-            self._undefined.add(name)
-            self._builder.notes.append(
-                f"{words.place()}: texture '{name}' is not defined before it is used; a white one stands in"
-            )
+        self._remark("textures are not defined before they are used; a white one stands in", name, words.place())
         words.take()
         return self.default()
 
-    def _keep(self, name: str, material: int) -> None:
-        if name in self._textures and self._textures[name] != material:
-            self._builder.notes.append(f"texture '{name}' is defined again; the first one is kept")
-        self._textures.setdefault(name, material)
+    def _keep(self, name: str, material: int, words: Words) -> None:
+        if self._textures.setdefault(name, material) != material:
+            self._remark("textures are defined again; the first ones are kept", name, words.place(back=1))
+
+    def _remark(self, remark: str, name: str, where: str) -> None:
+        self._remarks.setdefault(remark, {}).setdefault(name, where)
 
     def _finish(self, words: Words) -> dict[str, Any]:
         """From AMBIENT to the highlight: the fields of ClassicMaterial."""
@@ -151,13 +158,11 @@ class TextureTable:
             raise words.wrong("the name of an image")
         where = words.place()
         if name.startswith("::"):  # by convention the name of an inline image, which no file can be meant by
-            self._builder.notes.append(
-                f"{where}: image '{name}' is not defined before it is used; a white one stands in"
-            )
+            self._remark("images are not defined before they are used; a white one stands in", name, where)
             image = ClassicImage(name, np.full((1, 4, 4, 3), 255, np.uint8))
         else:
             path = self._files.find(name, holder, where=where, what="picture")
-            image = read_picture(path, name, where=where)
+            image = self._files.picture(path, name, where=where)
         words.take()
         self._images[name] = self._builder.image(image)
         return self._images[name]

@@ -6,6 +6,7 @@ import re
 import struct
 from collections.abc import Callable
 from contextlib import suppress
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +19,7 @@ _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?").f
 _INTEGER = re.compile(r"[+-]?[0-9]{1,18}").fullmatch
 _FOREIGN = re.compile(r"[^-+.0-9eE]").search  # what no number holds
 _WORD = re.compile(r"\S+")
+_BREAK = re.compile("\n")
 _ONE, _THREE = struct.Struct("=f"), struct.Struct("=3f")
 _LONGEST_SHOWN = 40
 
@@ -79,10 +81,17 @@ class Words:
     def line(self, back: int = 0) -> int:
         """Line (from 1) of the next word, or of the one that was read ``back`` words ago."""
         index = min(self._at - back, self._count - 1)
-        for number, match in enumerate(_WORD.finditer(self._text)):
-            if number == index:
-                return self._text.count("\n", 0, match.start()) + 1
-        return 1
+        if index < 0:
+            return 1
+        starts, breaks = self._offsets
+        return int(np.searchsorted(breaks, starts[index])) + 1
+
+    @cached_property
+    def _offsets(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Where words start and lines end in the text; found only once somebody asks for a line."""
+        starts = (match.start() for match in _WORD.finditer(self._text))
+        breaks = (match.start() for match in _BREAK.finditer(self._text))
+        return np.fromiter(starts, np.int64), np.fromiter(breaks, np.int64)
 
     def place(self, back: int = 0) -> str:
         """File and line of the next word, or of the one read ``back`` words ago."""

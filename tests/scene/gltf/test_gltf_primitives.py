@@ -46,7 +46,7 @@ def test_points_and_lines_are_noted(writer, read, mode):
 
 def test_strips_lose_the_triangles_that_only_turn_corners(writer, read):
     writer.triangle(positions=SQUARE, mode=5, indices=writer.accessor([0, 1, 2, 2, 3, 4], "u1"))
-    np.testing.assert_array_equal(read(writer).meshes[0].faces, [[0, 1, 2], [2, 3, 4]])
+    np.testing.assert_array_equal(read(writer).meshes[0].faces, [[0, 1, 2], [2, 4, 3]])
 
 
 @pytest.mark.parametrize("dtype", ["u1", "u2", "u4"])

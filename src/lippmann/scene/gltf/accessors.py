@@ -27,7 +27,7 @@ _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 
 # An accessor without bytes of its own stands for zeros; this many elements at most, so that a few characters of JSON
 # cannot ask for all the memory there is.
-_MOST_ZEROS = 1 << 24
+_MOST_ZEROS = 1 << 22
 
 
 @dataclass(frozen=True)

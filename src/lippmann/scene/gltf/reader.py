@@ -23,6 +23,9 @@ from lippmann.scene.gltf.textures import Textures
 from lippmann.scene.gltf.transforms import ranks
 from lippmann.scene.gltf.viewpoints import read_camera, read_light
 
+# A few nodes that repeat one list of copies could otherwise ask for all the memory there is.
+_MOST_INSTANCES = 1 << 21
+
 
 def read_gltf(path: Path, *, allow_outside: bool = False) -> SceneDescription:
     """Read the default scene of a ``.gltf`` or ``.glb`` file as it stands at rest.
@@ -106,6 +109,10 @@ class _Contents:
             worlds = np.eye(4)[None]
             skin = read_skin(skin_index, self.document, self.accessors, self.nodes)
             places = self.meshes.places(mesh, node, skin)
+        if len(self.instances) + len(places) * len(worlds) > _MOST_INSTANCES:
+            raise self.document.error(
+                f"{node.place} brings the copies of meshes to more than {_MOST_INSTANCES}", rule="so many may be placed"
+            )
         for place in places:
             self._check_reach(place, worlds, node)
             self._place(place, worlds, node)

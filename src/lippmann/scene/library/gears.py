@@ -68,6 +68,8 @@ RAY_DEPTH = 8
 # Half-widths of a tooth at its root and at its tip, as fractions of the angle from tooth to tooth: on the pitch circle
 # just under a quarter, so that meshing teeth clear each other.
 _ROOT_HALF, _TIP_HALF = 0.31, 0.16
+# Teeth end this share of half their height beyond the pitch circle, so that they do not touch their neighbour's root.
+_TIP_SHARE = 0.9
 
 
 def outline(teeth: int, root_radius: float, tip_radius: float) -> Points:
@@ -100,7 +102,7 @@ def face_triangles(teeth: int) -> Faces:
 def wheel(layout: Layout = LAYOUT) -> tuple[Points, Faces]:
     """Return one wheel, axis along y, its lower face in y = 0: positions ``(8 teeth, 3)`` and outward triangles."""
     radius = layout.pitch / 2
-    flat = outline(layout.teeth, radius - layout.tooth / 2, radius + layout.tooth / 2 * 0.9)
+    flat = outline(layout.teeth, radius - layout.tooth / 2, radius + _TIP_SHARE * layout.tooth / 2)
     count = len(flat)
     positions = np.zeros((2, count, 3))
     positions[:, :, 0] = flat[:, 0]

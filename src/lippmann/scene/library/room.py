@@ -33,9 +33,9 @@ class Layout:
     the disc (x, z, inner radius, outer radius) and the balls (x, z, radius), of which the last is the mirror.
     """
 
-    back: float = -37.2
+    back: float = -36.7
     half_width: float = 45.0
-    splay: float = 0.8
+    splay: float = 0.9
     ceiling: float = 260.0
     rear: float = 440.0
     parquet: float = 30.0
@@ -43,7 +43,7 @@ class Layout:
     back_picture: float = 34.0
     back_pictures: tuple[tuple[float, float], tuple[float, float]] = ((-22.0, 87.0), (22.0, 87.0))
     side_picture: float = 26.0
-    side_pictures: tuple[float, float] = (84.0, -24.5)
+    side_pictures: tuple[float, float] = (84.0, -24.0)
     table: tuple[float, float, float, float] = (25.0, 38.0, 3.0, -9.0)
     stool: tuple[float, float, float, float] = (8.5, 20.0, 42.0, 11.0)
     disc: tuple[float, float, float, float] = (-15.5, 1.0, 1.2, 5.5)
@@ -56,7 +56,7 @@ class Layout:
 
 
 LAYOUT = Layout()
-STAGE = Stage(target=(0.0, 62.3, 0.0), elevation=16.0)
+STAGE = Stage(target=(0.0, 63.9, 0.0), elevation=16.0)
 
 WALL = ClassicMaterial(color=(0.90, 0.88, 0.84), ambient=0.22, diffuse=0.72)
 CEILING = ClassicMaterial(color=(1.0, 1.0, 1.0), ambient=0.4, diffuse=0.5)

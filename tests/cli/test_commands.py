@@ -1,0 +1,132 @@
+"""Every command does its work, and says so as text and as JSON."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from lippmann.image import read_picture
+
+
+def picture_size(path):
+    from PIL import Image
+
+    with Image.open(path) as picture:
+        return picture.size
+
+
+def test_render_says_what_it_did(lippmann, tmp_path, engine):
+    out = tmp_path / "a.png"
+    done = lippmann("render", "teapot", "--spp", 2, "--depth", 2, "--seed", 7, "--json", "-o", out)
+    assert done.code == 0
+    values = done.json
+    assert values["output"] == str(out)
+    assert (values["method"], values["spp"], values["seed"], values["traced_fraction"]) == ("full", 2, 7, 1.0)
+    assert values["size"] == out.stat().st_size
+    assert values["rays"]["primary"] == 512 * 512 * 2
+    assert set(values["rays"]) == {"primary", "shadow", "secondary"}
+    assert set(values["seconds"]) == {"load", "build", "compile", "trace", "reuse", "write", "total"}
+    assert values["seconds"]["total"] >= values["seconds"]["trace"] > 0
+    assert read_picture(out).provenance.depth == 2
+
+
+def test_render_prints_the_depth_range_beside_what_the_display_resolves(lippmann, tmp_path, engine):
+    done = lippmann("render", "teapot", "--spp", 1, "--integrator", "direct", "-o", tmp_path / "a.png")
+    assert done.code == 0
+    assert "mm behind" in done.err
+    assert "display resolves" in done.err
+
+
+def test_the_same_seed_gives_the_same_bytes_of_pixels(lippmann, tmp_path, engine):
+    for name in ("a", "b"):
+        assert lippmann("render", "teapot", "--spp", 2, "-q", "-o", tmp_path / f"{name}.exr").code == 0
+    a, b = (read_picture(tmp_path / f"{name}.exr").pixels for name in ("a", "b"))
+    assert np.array_equal(a, b)
+
+
+def test_memory_does_not_change_the_picture(lippmann, tmp_path, engine):
+    for name, memory in (("a", "4G"), ("b", "24M")):
+        words = ("render", "teapot", "--spp", 2, "-q", "--memory", memory, "-o", tmp_path / f"{name}.exr")
+        assert lippmann(*words).code == 0
+    a, b = (read_picture(tmp_path / f"{name}.exr").pixels for name in ("a", "b"))
+    assert np.array_equal(a, b)
+
+
+def test_quiet_says_nothing(lippmann, tmp_path, engine):
+    done = lippmann("render", "teapot", "--integrator", "normal", "--spp", 1, "-q", "-o", tmp_path / "a.png")
+    assert (done.code, done.out, done.err) == (0, "", "")
+
+
+def test_info_tells_where_a_picture_came_from(lippmann, picture):
+    text = lippmann("info", picture).out
+    assert "seed-lenticular" in text
+    assert "teapot" in text
+    values = lippmann("info", picture, "--json").json
+    assert values["size"] == [512, 512]
+    assert values["provenance"]["integrator"] == "direct"
+    assert values["display"]["gap"] == 6.8
+
+
+@pytest.mark.parametrize("command", ["views", "micro-images"])
+def test_taking_apart_and_composing_gives_the_same_pixels(lippmann, picture, tmp_path, command):
+    folder, out = tmp_path / "parts", tmp_path / "again.png"
+    done = lippmann(command, picture, "-o", folder, "--json")
+    assert done.code == 0
+    assert done.json["views" if command == "views" else "lenses"] == ([1, 8] if command == "views" else [1, 64])
+    assert lippmann("compose", folder, "-o", out).code == 0
+    assert np.array_equal(read_picture(out).pixels, read_picture(picture).pixels)
+
+
+def test_replay_and_refocus_write_plain_pictures(lippmann, picture, tmp_path):
+    assert lippmann("replay", picture, "--eye", "10,0,600", "--size", "64x48", "-o", tmp_path / "r.png").code == 0
+    assert picture_size(tmp_path / "r.png") == (64, 48)
+    assert lippmann("refocus", picture, "--plane", "-20", "--size", "32x32", "-o", tmp_path / "f.png").code == 0
+    assert picture_size(tmp_path / "f.png") == (32, 32)
+
+
+@pytest.mark.parametrize("ending", ["png", "mp4"])
+def test_a_sweep_is_an_animation(lippmann, picture, tmp_path, ending):
+    out = tmp_path / f"sweep.{ending}"
+    words = ("replay", picture, "--sweep", "--frames", 3, "--size", "32x32", "--json", "-o", out)
+    values = lippmann(*words).json
+    assert values["frames"] == 3
+    assert values["start"][0] == -values["stop"][0] < 0
+    if ending == "png":
+        from PIL import Image
+
+        with Image.open(out) as animation:
+            assert animation.n_frames == 3
+    else:
+        assert out.read_bytes()[4:8] == b"ftyp"
+
+
+def test_preview_renders_the_plain_picture(lippmann, tmp_path, engine):
+    done = lippmann("preview", "teapot", "--spp", 1, "--size", "40x30", "-o", tmp_path / "p.png", "--json")
+    assert done.json["rays"]["primary"] == 1200
+    assert picture_size(tmp_path / "p.png") == (40, 30)
+
+
+def test_displays_lists_pixels_lenses_field_and_depth(lippmann):
+    rows = {row["name"]: row for row in lippmann("displays", "--json").json["displays"]}
+    paper = rows["seed-lenticular"]
+    assert paper["pixels"] == [512, 512]
+    assert paper["lenses"][0] == 64
+    assert paper["field_of_view"] == pytest.approx(17.7, abs=0.05)
+    assert paper["depth_budget"] == pytest.approx([10, -54.4])
+    text = lippmann("displays").out
+    assert all(name in text for name in rows)
+
+
+def test_doctor_says_whether_a_render_would_run(lippmann):
+    done = lippmann("doctor", "--json")
+    assert done.code == 0
+    assert done.json["ok"] is True
+    assert "LLVM" in lippmann("doctor").out
+
+
+def test_version_and_help(lippmann):
+    import lippmann as package
+
+    assert lippmann("--version").out.strip() == f"lippmann {package.__version__}"
+    for words in ((), *((name,) for name in ("render", "preview", "info", "views", "compose", "replay", "refocus"))):
+        assert "--help" in lippmann(*words, "--help").out
