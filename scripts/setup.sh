@@ -42,37 +42,44 @@ can_load() {
 
 # Prints the package with the LLVM runtime: the newest that was tried and that apt can install.
 llvm_package() {
-  local bounds
-  bounds=$(ask_package 'from lippmann import llvm; print(llvm.OLDEST, llvm.NEWEST_TRIED)')
-  # shellcheck disable=SC2086
-  newest_package '^libllvm[0-9]+(t64)?$' $bounds
+  # shellcheck disable=SC2046
+  newest_package '^libllvm[0-9]+(t64)?$' $(ask_package 'from lippmann import llvm; print(llvm.OLDEST, llvm.NEWEST_TRIED)')
 }
 
 # Fills `missing` with the packages of the system that are not there.
 find_missing() {
-  local package
   missing=()
   # Debian keeps the modules that make environments in a package of their own.
   environment_works || "$python" -c 'import venv, ensurepip' 2>/dev/null ||
     missing+=("$("$python" -c 'import sys; print("python%d.%d-venv" % sys.version_info[:2])')")
-  [ "$(uname -s)" = Linux ] || return 0
-  # Mitsuba's package brings all its libraries but these.
-  can_load libatomic.so.1 || missing+=(libatomic1)
-  can_load libstdc++.so.6 || missing+=(libstdc++6)
-  ask_package 'from lippmann import llvm; llvm.choose()' && return
+  if [ "$(uname -s)" = Linux ]; then # Mitsuba's package brings all its libraries but these
+    can_load libatomic.so.1 || missing+=(libatomic1)
+    can_load libstdc++.so.6 || missing+=(libstdc++6)
+  fi
+  ask_package 'from lippmann import llvm; llvm.choose()' || find_llvm_package
+}
+
+# Adds the package with the LLVM runtime to `missing`, or says where to get it and ends.
+find_llvm_package() {
+  local package
   if [ -n "${DRJIT_LIBLLVM_PATH:-}" ]; then
     say "setup: DRJIT_LIBLLVM_PATH is '$DRJIT_LIBLLVM_PATH', which is no LLVM library that would do; unset or correct it"
     exit 1
   fi
+  if ! have apt-get; then
+    say "setup: no LLVM library that would do is installed; $(ask_package 'from lippmann import llvm; print(llvm.install_command())')"
+    exit 1
+  fi
   # A GPU needs no LLVM.
-  ask_package 'from lippmann import gpu; raise SystemExit(gpu.find() is None)' && ! can_be_root && return
+  if ! can_be_root && ask_package 'from lippmann import gpu; raise SystemExit(gpu.find() is None)'; then return; fi
   if package=$(llvm_package) || { update_lists && package=$(llvm_package); }; then
     missing+=("$package")
-  elif have apt-get && can_be_root; then
-    say "setup: this system offers no LLVM that would do; a newer release of it does, and so does apt.llvm.org"
-    exit 1
+  elif [ -z "$(apt-cache search --names-only '^libllvm[0-9]+')" ]; then
+    missing+=(libllvm19) # there are no lists to choose from; this one is the most widespread
   else
-    missing+=(libllvm19)
+    say "setup: this release of the system offers no LLVM that would do; LLVM's makers do. Get theirs, then start again:"
+    say "  wget https://apt.llvm.org/llvm.sh && sudo bash llvm.sh 19"
+    exit 1
   fi
 }
 

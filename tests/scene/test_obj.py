@@ -115,8 +115,8 @@ def test_rows_of_different_length(read):
 
 
 def test_layout_of_lines(read):
-    text = "\ufeff# a comment\r\nmtllib\r\nv 0 0 0 # origin\r\n\tv   1\t0 0\r\nv 0 1 \\\r\n0\r\ng a b\no thing\nf 1 2 \\\n3"
-    (mesh,) = read(text).meshes
+    text = "\ufeff# a comment\r\nmtllib\r\nv 0 0 0 # origin\r\n\tv   1\t0 0\r\nv 0 1 \\\r\n0\r\n"
+    (mesh,) = read(text + "g a b\no thing\nf 1 2 \\\n3").meshes
     assert corner_positions(mesh)[0].tolist() == [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
 
 

@@ -132,7 +132,7 @@ def test_every_cut_short_file_is_refused(read, data):
         (text_file().replace(b"2 0.5 0", b"2 0"), r"entry 4 of 'vertex' has too few numbers"),
         (binary_file()[:-1], r"ends after 1 of 2 entries of 'face'; is it cut short\?"),
         (binary_file().replace(b"\x04\0\0\0\0", b"\xff\0\0\0\0"), r"ends after 0 of 2 entries of 'face'"),
-        (text_file().replace(b"property float z", b"property list uchar float z"), "has too few numbers|holds no vertices"),
+        (header("ascii", faces=1).replace("float z", "list uchar float z").encode() + b"0 0 1 0\n" * 6, "x, y and z"),
         (
             b"ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\n"
             b"element tristrips 1\nproperty list int int vertex_indices\nend_header\n0 0 0\n3 0 0 0\n",

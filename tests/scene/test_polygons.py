@@ -70,7 +70,7 @@ def test_star_shaped_polygons_are_covered_once(radii, tilt):
 
 
 def test_an_outline_that_crosses_itself_still_ends():
-    points, corners, triangles, _ = cut([(0, 0, 0), (1, 1, 0), (1, 0, 0), (0, 1, 0), (0.5, 2, 0)])
+    *_, triangles, _ = cut([(0, 0, 0), (1, 1, 0), (1, 0, 0), (0, 1, 0), (0.5, 2, 0)])
     assert triangles.shape == (3, 3)
 
 

@@ -137,11 +137,11 @@ def test_triangle_file(tmp_path):
 
 
 def test_a_long_file_named_many_times_is_refused(tmp_path, monkeypatch):
-    monkeypatch.setattr("lippmann.scene.tachyon_files._MOST_WORDS", 100)
+    monkeypatch.setattr("lippmann.scene.tachyon_files._MOST_WORDS", 50)
     write(tmp_path, "t.tri", "3 0 0 0 1 0 0 0 1 0\n" * 3)
     item = f"TPOLYFILE SCALE 2 3 4 ROT 0 0 90 CENTER 10 0 0 FILE t.tri {TEXTURE.format(0)}\n"
     assert read_tachyon(scene(tmp_path, item)).counts()["triangle"] == 3
-    with pytest.raises(SceneError, match=r"^scene\.dat:3: 't\.tri' is one file too many; at most 100 words in all$"):
+    with pytest.raises(SceneError, match=r"^scene\.dat:3: 't\.tri' is one file too many; at most 50 words in all$"):
         read_tachyon(scene(tmp_path, item * 2))
 
 

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import typer
 
 from lippmann.cli import options
 from lippmann.cli.console import Console
-
-if TYPE_CHECKING:
-    from lippmann.display import Display
 
 
 def doctor(as_json: options.Json = False) -> None:
@@ -35,7 +32,7 @@ def displays(as_json: options.Json = False) -> None:
     """List the displays that come with the program."""
     from lippmann.display import list_displays
 
-    rows = [_display_row(display) for display in list_displays()]
+    rows = [display.summary() for display in list_displays()]
     header = {
         "name": "name",
         "pixels": "pixels",
@@ -50,9 +47,6 @@ def displays(as_json: options.Json = False) -> None:
     lines = ["  ".join(line[key].ljust(widths[key]) for key in header).rstrip() for line in table]
     Console(as_json=as_json).result({"displays": rows}, "\n".join(lines))
 
-
-def _display_row(display: Display) -> dict[str, Any]:
-XX
 
 def _cell(key: str, row: dict[str, Any]) -> str:
     if key == "pixels":

@@ -57,10 +57,10 @@ def write_animation(
 def _write_apng(frames: Iterator[NDArray[Any]], path: Path, frames_per_second: float) -> None:
     from PIL import Image
 
-    pictures = (Image.fromarray(frame) for frame in frames)
-    first = next(pictures)
+    # A list, though it holds all frames: Pillow goes through them twice, and finds a generator empty.
+    first, *others = [Image.fromarray(frame) for frame in frames]
     duration = 1000 / frames_per_second
-    first.save(path, format="PNG", save_all=True, append_images=pictures, duration=duration, loop=0)
+    first.save(path, format="PNG", save_all=True, append_images=others, duration=duration, loop=0)
 
 
 def _write_mp4(frames: Iterator[NDArray[Any]], path: Path, frames_per_second: float, place: Path) -> None:

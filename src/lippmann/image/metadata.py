@@ -86,8 +86,8 @@ def from_dict(values: dict[str, Any], where: str) -> Metadata:
         matrix = checked_similarity(values.get("world_from_display"))
         provenance = Provenance.from_dict(values.get("provenance"))
     except LippmannError as error:
-        what = f"its metadata makes no sense: {error.where}: {error.what}" if error.where else error.what
-        raise PictureError(what, where=where, rule=error.rule) from error
+        what = f"{error.where}: {error.what}" if error.where else error.what
+        raise PictureError(f"its metadata makes no sense: {what}", where=where, rule=error.rule) from error
     if not isinstance(display.name, str) or not isinstance(display.title, str):
         raise PictureError("its metadata makes no sense: the display's name is no text", where=where)
     return Metadata(display, matrix, provenance)

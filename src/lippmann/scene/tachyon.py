@@ -7,8 +7,7 @@ refused and where this reader is stricter. Numbers are rounded to single precisi
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -125,7 +124,7 @@ class _SceneReader:
         self._includes = 0
         self._projection: Projection = "perspective"
         self._aperture = 0.0
-        self._camera_seen = False
+        self._focal_length = 1.0
         self._planar_fog = False
         self._fog_values: dict[str, Any] | None = None
         self._background_values: dict[str, Any] = {}
@@ -133,18 +132,20 @@ class _SceneReader:
         self._scene_values: dict[str, Any] = {}
 
     def read(self) -> ClassicScene:
-        with self._opened(self._path, self._path.name) as words:
-            words.keyword("BEGIN_SCENE")
-            words.keyword("RESOLUTION")
-            width, height = (words.integer(1, _LARGEST_PICTURE) for _ in range(2))
-            if not self._read_items(words):
-                raise SceneError("the file ends without END_SCENE", where=words.place(), fix="is it cut short?")
-            if words.left:
-                self._builder.notes.append(f"{words.place()}: what follows END_SCENE is not read")
+        words = Words.of_file(self._path, self._path.name, comment=_COMMENT, single=True)
+        words.keyword("BEGIN_SCENE")
+        words.keyword("RESOLUTION")
+        width, height = (words.integer(1, _LARGEST_PICTURE) for _ in range(2))
+        if not self._read_items(words, self._path):
+            raise SceneError("the file ends without END_SCENE", where=words.place(), fix="is it cut short?")
+        if words.left:
+            self._builder.notes.append(f"{words.place()}: what follows END_SCENE is not read")
         self._shapes.finish()
         self._textures.finish()
-        if not self._camera_seen:
+        if "camera" not in self._scene_values:
             self._builder.notes.append("no CAMERA: seen from the origin along +z")
+        if self._focal_length != 1.0:
+            self._builder.notes.append("FOCALLENGTH has no effect: Tachyon focuses at distance 1")
         if self._fog_values is not None:
             self._scene_values["fog"] = Fog(planar=self._planar_fog, **self._fog_values)
         scene = self._builder.build(
@@ -157,31 +158,27 @@ class _SceneReader:
             raise SceneError("the scene has no geometry", where=self._path.name, rule="at least one primitive")
         return scene
 
-    def _read_items(self, words: Words) -> bool:
-        """Reads to END_SCENE (True) or the end of the file (False)."""
-        holder = self._open_files[-1]
-        while words.left:
+    def _read_items(self, words: Words, holder: Path) -> bool:
+        """Reads the file ``holder`` to END_SCENE (True) or to its end (False)."""
+        self._open_files.append(holder)
+        ended = False
+        while words.left and not ended:
             keyword = words.peek().upper()
-            if keyword == "END_SCENE":
-                words.take()
-                return True
             if keyword in SHAPES:
                 words.take()
                 SHAPES[keyword](self._shapes, words, holder)
             elif keyword in self._items:
                 words.take()
                 self._items[keyword](words, holder)
+            elif keyword == "END_SCENE":
+                words.take()
+                ended = True
             elif keyword in _REFUSED:
                 raise SceneError(f"{keyword} cannot be rendered", where=words.place(), rule=_REFUSED[keyword])
             else:
                 raise words.wrong("the keyword of an item, such as SPHERE, or END_SCENE")
-        return False
-
-    @contextmanager
-    def _opened(self, path: Path, where: str) -> Iterator[Words]:
-        self._open_files.append(path)
-        yield self._files.words(path, comment=_COMMENT, where=where)
         self._open_files.pop()
+        return ended
 
     def _include(self, words: Words, holder: Path) -> None:
         where = words.place()
@@ -193,17 +190,14 @@ class _SceneReader:
         if len(self._open_files) > _DEEPEST_INCLUDE or self._includes > _MOST_INCLUDES:
             limits = f"at most {_DEEPEST_INCLUDE} deep and {_MOST_INCLUDES} in all"
             raise SceneError(f"'{shown}' is one include too many", where=where, rule=limits)
-        with self._opened(path, where) as inner:
-            self._read_items(inner)
+        self._read_items(self._files.words(path, comment=_COMMENT, where=where), path)
 
     def _camera(self, words: Words, holder: Path) -> None:
         if words.has("PROJECTION"):
             self._projection = _choice(words, _PROJECTIONS)
             if self._projection == "perspective-dof":
-                focal_length = words.number("FOCALLENGTH")
+                self._focal_length = words.number("FOCALLENGTH")
                 self._aperture = words.number("APERTURE")
-                if focal_length != 1.0:
-                    self._builder.notes.append("FOCALLENGTH has no effect: Tachyon focuses at distance 1")
         start = words.place()
         values: dict[str, Any] = {
             "zoom": words.positive("ZOOM"),
@@ -222,7 +216,6 @@ class _SceneReader:
         except SceneError as error:
             raise SceneError(error.what, where=start, rule=error.rule) from None
         self._scene_values["camera"] = camera
-        self._camera_seen = True
 
     def _point_light(self, words: Words, holder: Path) -> None:
         center, radius = words.vector("CENTER"), words.radius("RAD")

@@ -21,8 +21,8 @@ class SceneFiles:
     """Finds and reads files beside the scene.
 
     A name counts from the folder of the file that holds it, then from the folder of the scene itself (Tachyon knows
-    the working directory alone). Nothing outside the scene's folder is read unless ``allow_outside``. What all files
-    together may hold is limited, because a short scene can name a long file many times.
+    the working directory alone). Nothing outside the scene's folder is read unless ``allow_outside``. What all named
+    files together may hold is limited, because a short scene can name a long file many times.
     """
 
     def __init__(self, scene: Path, *, allow_outside: bool) -> None:

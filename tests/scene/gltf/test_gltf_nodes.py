@@ -211,12 +211,13 @@ def test_bad_gpu_instances_are_refused(writer, read, key, values, words):
     assert words in _refusal(read, writer)
 
 
-def test_copies_of_copies_are_limited(writer, read):
-    attributes = {"TRANSLATION": writer.accessor(np.zeros((2**20, 3)))}
+def test_copies_of_copies_are_limited(writer, read, monkeypatch):
+    monkeypatch.setattr("lippmann.scene.gltf.reader._MOST_INSTANCES", 25)
+    attributes = {"TRANSLATION": writer.accessor(np.zeros((10, 3)))}
     mesh = writer.mesh()
     for _ in range(3):
         writer.node(mesh=mesh, extensions={"EXT_mesh_gpu_instancing": {"attributes": attributes}})
-    assert "nodes[2] brings the copies of meshes to more than 2097152" in _refusal(read, writer)
+    assert "nodes[2] brings the copies of meshes to more than 25" in _refusal(read, writer)
 
 
 def _skinned(writer, joints=((0, 1, 0, 0),) * 3, weights=((0.25, 0.75, 0, 0),) * 3, **skin):

@@ -28,6 +28,7 @@ class Meshes:
     materials: Materials
     read: list[Mesh] = field(default_factory=list)
     _places: dict[tuple[_Key, int], int] = field(default_factory=dict)
+    _by_mesh: dict[_Key, list[int]] = field(default_factory=dict)
     _geometries: dict[_Key, Geometry | None] = field(default_factory=dict)
 
     def places(self, index: int, node: Fields, skin: Skin | None) -> list[int]:
@@ -39,8 +40,14 @@ class Meshes:
             As :meth:`Primitives.read` and :meth:`Materials.place`.
         """
         fields = self.document.all("meshes")[index]
-        primitives = fields.children("primitives")
         weights = _weights(node) or _weights(fields)
+        key = (index, weights, None if skin is None else skin.index)
+        if key not in self._by_mesh:
+            self._by_mesh[key] = self._read(fields, weights, skin)
+        return self._by_mesh[key]
+
+    def _read(self, fields: Fields, weights: tuple[float, ...], skin: Skin | None) -> list[int]:
+        primitives = fields.children("primitives")
         found: list[int] = []
         for primitive in primitives:
             key = _key(primitive, weights, skin)

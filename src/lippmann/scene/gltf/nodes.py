@@ -23,12 +23,13 @@ class Nodes:
     Raises
     ------
     SceneError
-        A child that does not exist, or one with two parents.
+        A child that does not exist or has two parents, or a transformation that is no affine one.
     """
 
     def __init__(self, document: Document) -> None:
         self._document = document
         self._parents: dict[int, int] = {}
+        self._locals = _local_matrices(document.all("nodes"))
         self._worlds: dict[int, Matrix] = {}
         for index, fields in enumerate(document.all("nodes")):
             for child in document.references(fields, "children", "nodes"):
@@ -75,7 +76,7 @@ class Nodes:
         Raises
         ------
         SceneError
-            The node is its own ancestor, its transformation is no affine one, or numbers overflow.
+            The node is its own ancestor, or numbers overflow.
         """
         chain: list[int] = []
         on_chain: set[int] = set()
@@ -88,34 +89,38 @@ class Nodes:
             at = self._parents.get(at)
         world: Matrix = np.eye(4) if at is None else self._worlds[at]
         for step in reversed(chain):
-            fields = self._document.all("nodes")[step]
-            with np.errstate(over="ignore", invalid="ignore"):
-                world = world @ _local(fields)
-            if not (np.abs(world) < _FARTHEST).all():
+            world = world @ self._locals[step]
+            if not np.abs(world).max() < _FARTHEST:
                 raise self._document.error(
-                    f"the transformation of {fields.place} overflows",
-                    rule=f"entries up to {_FARTHEST:g} are understood",
+                    f"the transformation of nodes[{step}] overflows", rule=f"entries up to {_FARTHEST:g} are understood"
                 )
             self._worlds[step] = world
         return world
 
 
-def _local(fields: Fields) -> Matrix:
-    """``parent_from_node``: the matrix, or scale, then rotation, then translation."""
-    columns = fields.numbers("matrix", 16)
-    if columns is not None:
-        given: Matrix = np.array(columns).reshape(4, 4).T
-        if not np.allclose(given[3], (0.0, 0.0, 0.0, 1.0), rtol=0.0, atol=1e-6):
-            raise fields.error("matrix", "its last row must be 0, 0, 0, 1")
-        given[3] = (0.0, 0.0, 0.0, 1.0)
-        return given
-    rotation = fields.numbers("rotation", 4) or [0.0, 0.0, 0.0, 1.0]
-    if not any(rotation):
-        raise _no_rotation(fields, "rotation")
-    translation = fields.numbers("translation", 3) or [0.0, 0.0, 0.0]
-    scale = fields.numbers("scale", 3) or [1.0, 1.0, 1.0]
-    matrix: Matrix = compose(np.array([translation]), np.array([rotation]), np.array([scale]))[0]
-    return matrix
+def _local_matrices(nodes: list[Fields]) -> Matrix:
+    """``parent_from_node`` ``(n, 4, 4)``: each node's matrix, or its scale, then rotation, then translation."""
+    translations, rotations, scales = np.zeros((len(nodes), 3)), np.zeros((len(nodes), 4)), np.ones((len(nodes), 3))
+    rotations[:, 3] = 1.0
+    given: dict[int, Matrix] = {}
+    for index, fields in enumerate(nodes):
+        columns = fields.numbers("matrix", 16)
+        if columns is not None:
+            given[index] = np.array(columns).reshape(4, 4).T
+            if not np.allclose(given[index][3], (0.0, 0.0, 0.0, 1.0), rtol=0.0, atol=1e-6):
+                raise fields.error("matrix", "its last row must be 0, 0, 0, 1")
+            given[index][3] = (0.0, 0.0, 0.0, 1.0)
+            continue
+        for key, values in (("translation", translations), ("rotation", rotations), ("scale", scales)):
+            numbers = fields.numbers(key, values.shape[1])
+            if numbers is not None:
+                values[index] = numbers
+        if not rotations[index].any():
+            raise _no_rotation(fields, "rotation")
+    matrices = compose(translations, rotations, scales)
+    for index, matrix in given.items():
+        matrices[index] = matrix
+    return matrices
 
 
 def _no_rotation(fields: Fields, key: str) -> SceneError:

@@ -48,13 +48,14 @@ def read_gltf(path: Path, *, allow_outside: bool = False) -> SceneDescription:
     contents = _Contents.of(document)
     for index, visible in contents.nodes.shown():
         contents.add(index, visible=visible)
-    if not contents.instances:
+    meshes, instances = _placed(contents.meshes.read, contents.placements, document)
+    if not instances:
         raise document.error("the file shows no triangles", rule="a scene needs a mesh on a node of its default scene")
     return SceneDescription(
         name=path.stem,
-        meshes=tuple(contents.meshes.read),
+        meshes=meshes,
         materials=tuple(contents.meshes.materials.read),
-        instances=tuple(contents.instances),
+        instances=instances,
         lights=tuple(contents.lights),
         cameras=tuple(contents.cameras),
         notes=document.notes.lines(),
@@ -62,17 +63,25 @@ def read_gltf(path: Path, *, allow_outside: bool = False) -> SceneDescription:
 
 
 @dataclass(frozen=True, eq=False)
+class _Placements:
+    """Copies of one mesh (a place in the list of meshes) at ``worlds`` ``(k, 4, 4)``, shown by ``node``."""
+
+    mesh: int
+    worlds: Matrix
+    node: Fields
+
+
+@dataclass(frozen=True, eq=False)
 class _Contents:
-    """What the nodes walked so far hold."""
+    """What the nodes walked so far carry."""
 
     document: Document
     accessors: Accessors
     nodes: Nodes
     meshes: Meshes
-    instances: list[Instance] = field(default_factory=list)
+    placements: list[_Placements] = field(default_factory=list)
     lights: list[Light] = field(default_factory=list)
     cameras: list[Camera] = field(default_factory=list)
-    _bounds: dict[int, NDArray[np.float64]] = field(default_factory=dict)
 
     @classmethod
     def of(cls, document: Document) -> _Contents:
@@ -101,46 +110,55 @@ class _Contents:
     def _add_mesh(self, mesh: int, node: Fields, world: Matrix) -> None:
         skin_index = self.document.reference(node, "skin", "skins")
         if skin_index is None:
-            with np.errstate(over="ignore", invalid="ignore"):
-                worlds = world @ instance_matrices(node, self.document, self.accessors)
+            worlds = world @ instance_matrices(node, self.document, self.accessors)
             places = self.meshes.places(mesh, node, None)
         else:
             # A skin places its mesh in the world by itself, whatever the node's own transformation (section 3.7.3.3).
             worlds = np.eye(4)[None]
             skin = read_skin(skin_index, self.document, self.accessors, self.nodes)
             places = self.meshes.places(mesh, node, skin)
-        if len(self.instances) + len(places) * len(worlds) > _MOST_INSTANCES:
-            raise self.document.error(
-                f"{node.place} brings the copies of meshes to more than {_MOST_INSTANCES}", rule="so many may be placed"
-            )
-        for place in places:
-            self._check_reach(place, worlds, node)
-            self._place(place, worlds, node)
+        self.placements.extend(_Placements(place, worlds, node) for place in places)
 
-    def _check_reach(self, place: int, worlds: Matrix, node: Fields) -> None:
-        """Refuse placements that lead out of single precision."""
-        if place not in self._bounds:
-            positions = self.meshes.read[place].positions
-            low, high = positions.min(axis=0), positions.max(axis=0)
-            corners = np.stack(np.meshgrid(*np.stack([low, high], axis=1), indexing="ij"), axis=-1).reshape(8, 3)
-            self._bounds[place] = np.column_stack([corners, np.ones(8)]).astype(np.float64)
-        with np.errstate(over="ignore", invalid="ignore"):
-            reached = (worlds @ self._bounds[place].T).astype(np.float32)
-        if not np.isfinite(reached).all():
-            raise self.document.error(
-                f"{node.place} places its mesh beyond all bounds", rule="positions must be finite"
-            )
 
-    def _place(self, place: int, worlds: Matrix, node: Fields) -> None:
-        for world, rank in zip(worlds, ranks(worlds), strict=True):
+def _placed(
+    meshes: list[Mesh], placements: list[_Placements], document: Document
+) -> tuple[tuple[Mesh, ...], tuple[Instance, ...]]:
+    """Meshes and their instances.
+
+    A matrix that flattens its mesh cannot be inverted, which renderers do; that mesh gets a flattened copy instead.
+    """
+    reaches = [np.abs(mesh.positions).max(axis=0).astype(np.float64) for mesh in meshes]
+    copies: list[Mesh] = []
+    instances: list[Instance] = []
+    for placed, kept in zip(placements, _ranks(placements, document), strict=True):
+        farthest = np.abs(placed.worlds[:, :3, :3]) @ reaches[placed.mesh] + np.abs(placed.worlds[:, :3, 3])
+        if farthest.max() > np.finfo(np.float32).max:
+            raise document.error(
+                f"{placed.node.place} puts its mesh beyond all bounds", rule="positions must be finite"
+            )
+        for world, rank in zip(placed.worlds, kept, strict=True):
             if rank == 3:
-                self.instances.append(Instance(place, world))
+                instances.append(Instance(placed.mesh, world))
             elif rank == 2:
-                # A flattening matrix cannot be inverted, which renderers do; its mesh is flattened here instead.
-                self.instances.append(Instance(len(self.meshes.read), np.eye(4)))
-                self.meshes.read.append(_flattened(self.meshes.read[place], world))
+                instances.append(Instance(len(meshes) + len(copies), np.eye(4)))
+                copies.append(_flattened(meshes[placed.mesh], world))
             else:
-                self.document.notes.add("a mesh that is scaled to nothing is left out", node.place)
+                document.notes.add("a mesh that is scaled to nothing is left out", placed.node.place)
+    return (*meshes, *copies), tuple(instances)
+
+
+def _ranks(placements: list[_Placements], document: Document) -> list[NDArray[np.int64]]:
+    """The ranks of all matrices, found at one go, which many single ones would make slow."""
+    counts = np.array([len(placed.worlds) for placed in placements], np.int64)
+    if counts.sum() > _MOST_INSTANCES:
+        first = placements[int(np.argmax(np.cumsum(counts) > _MOST_INSTANCES))]
+        raise document.error(
+            f"{first.node.place} brings the copies of meshes to more than {_MOST_INSTANCES}",
+            rule="so many may be placed",
+        )
+    if not placements:
+        return []
+    return np.split(ranks(np.concatenate([placed.worlds for placed in placements])), np.cumsum(counts)[:-1])
 
 
 def _flattened(mesh: Mesh, world: Matrix) -> Mesh:

@@ -60,7 +60,7 @@ def make_classic(name: str) -> ClassicScene:
     return scene
 
 
-def stage(name: str) -> Stage:
+def stage_of(name: str) -> Stage:
     """Return how a bundled scene stands before the display: its camera, and the placement in millimetres.
 
     Raises

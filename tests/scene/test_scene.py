@@ -1,0 +1,167 @@
+"""The frozen scene: bounds, lights, cameras, and what is refused."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from lippmann.errors import SceneError
+from lippmann.scene import scene as scene_module
+from lippmann.scene.description import Camera, Environment, Instance, Light, Material, Mesh, SceneDescription
+from lippmann.scene.scene import STUDIO_NOTE, Scene, bounds_of, checked, find_camera, framing_camera, lit
+from lippmann.scene.studio import BACKDROP, studio
+
+
+def triangle(positions=((0, 0, 0), (2, 0, 0), (0, 1, 0)), **fields):
+    faces = np.array([[0, 1, 2]], np.uint32)
+    return Mesh("t", np.array(positions, np.float32), **({"faces": faces, "material": 0} | fields))
+
+
+def describe(mesh=None, material=None, matrices=(np.eye(4),), **fields):
+    instances = [Instance(0, np.asarray(matrix, float)) for matrix in matrices]
+    return SceneDescription("s", [mesh or triangle()], [material or Material()], instances, **fields)
+
+
+def moved(x, y, z):
+    matrix = np.eye(4)
+    matrix[:3, 3] = x, y, z
+    return matrix
+
+
+QUARTER_TURN = np.array([[0, -1, 0, 0], [1, 0, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]], float)
+
+
+def test_bounds_span_all_instances():
+    assert bounds_of(describe()).tolist() == [[0, 0, 0], [2, 1, 0]]
+    found = bounds_of(describe(matrices=[moved(10, 0, 0), QUARTER_TURN, moved(0, 0, -3)]))
+    assert found.tolist() == [[-1, 0, -3], [12, 2, 0]]
+
+
+def test_bounds_leave_out_unused_vertices_and_meshes():
+    mesh = triangle([(0, 0, 0), (1, 0, 0), (0, 1, 0), (99, 99, 99)])
+    description = describe(mesh)
+    spare = dataclasses.replace(description, meshes=[mesh, triangle([(7, 7, 7)] * 3)])
+    assert bounds_of(spare).tolist() == [[0, 0, 0], [1, 1, 0]]
+
+
+def test_bounds_of_a_turned_mesh_are_exact_until_there_are_very_many(monkeypatch):
+    eighth = np.eye(4)
+    eighth[:2, :2] = np.array([[1, -1], [1, 1]]) / np.sqrt(2)
+    exact = bounds_of(describe(matrices=[eighth]))
+    assert exact[1] == pytest.approx([np.sqrt(2), np.sqrt(2), 0])
+    monkeypatch.setattr(scene_module, "_EXACT_VERTICES", 2)
+    loose = bounds_of(describe(matrices=[eighth]))
+    assert (loose[0] <= exact[0] + 1e-12).all()
+    assert (loose[1] >= exact[1] - 1e-12).all()
+    assert loose[1] == pytest.approx([np.sqrt(2), 1.5 * np.sqrt(2), 0])
+
+
+def test_a_dark_scene_is_lit_by_the_studio():
+    scene = Scene("s", describe())
+    assert not scene.has_lights
+    assert scene.environment is studio()
+    assert scene.background == BACKDROP
+    assert scene.notes == (STUDIO_NOTE,)
+
+
+@pytest.mark.parametrize(
+    "description",
+    [
+        describe(material=Material(emission=(0, 2, 0))),
+        describe(material=Material(unlit=True)),
+        describe(lights=[Light("point", (1, 1, 1), np.eye(4))]),
+        describe(environment=Environment(np.ones((2, 4, 3), np.float32))),
+    ],
+)
+def test_a_scene_with_light_keeps_its_own(description):
+    scene = Scene("s", description)
+    assert scene.has_lights
+    assert scene.environment is description.environment
+    assert scene.background is None
+    assert scene.notes == ()
+
+
+def test_light_that_does_not_count():
+    assert not Scene("s", describe(lights=[Light("point", (0, 0, 0), np.eye(4))])).has_lights
+    unused = dataclasses.replace(describe(), materials=[Material(), Material(emission=(1, 1, 1))])
+    assert not Scene("s", unused).has_lights
+
+
+def test_the_callers_light_takes_the_place_of_the_files():
+    sky = Environment(np.ones((2, 4, 3), np.float32))
+    scene = Scene("s", lit(describe(environment=studio(), background=(1, 0, 0)), sky, (0, 0, 0)))
+    assert scene.environment is sky
+    assert scene.background == (0, 0, 0)
+    scene = Scene("s", lit(describe(), None, (0, 1, 0)))
+    assert (scene.background, scene.environment) == ((0, 1, 0), studio())
+
+
+def test_cameras_by_name():
+    cameras = [Camera("front", np.eye(4), fov_y=1.0), Camera("side", moved(1, 0, 0), fov_y=1.0)]
+    scene = Scene("s", describe(cameras=cameras))
+    assert scene.camera("side") is cameras[1]
+    assert scene.camera() is cameras[0]
+    assert Scene("s", scene.description, home_camera="side").camera() is cameras[1]
+    with pytest.raises(
+        SceneError, match=r"no camera is named 'sied'; the scene has 'front', 'side'; is 'side' meant\?"
+    ):
+        scene.camera("sied")
+    with pytest.raises(SceneError, match="the scene has no cameras"):
+        find_camera([], "front")
+
+
+@pytest.mark.parametrize("size", [(2, 1, 4), (1, 0, 0), (0, 0, 3), (1, 5, 0)])
+def test_a_scene_without_cameras_is_framed(size):
+    low = np.array([3.0, -1.0, 2.0])
+    camera = framing_camera(np.stack([low, low + size]))
+    corners = np.array(np.meshgrid(*zip(low, low + size, strict=True))).reshape(3, -1).T
+    seen = corners - camera.world_from_camera[:3, 3]
+    assert (seen[:, 2] < 0).all()
+    slopes = np.abs(seen[:, :2]) / -seen[:, 2:]
+    assert slopes.max() <= np.tan(camera.fov_y / 2)
+    assert slopes.max() >= 0.85 * np.tan(camera.fov_y / 2) or size[0] == size[1] == 0
+
+
+@pytest.mark.parametrize(
+    ("bounds", "message"),
+    [
+        ([[1, 2, 3], [1, 2, 3]], r"a single point at \(1, 2, 3\)"),
+        ([[0, 0, 0], [np.nan, 1, 1]], "no extent"),
+        ([[np.inf] * 3, [-np.inf] * 3], "no extent"),
+        ([[1, 0, 0], [0, 1, 1]], "no extent"),
+    ],
+)
+def test_boxes_that_are_none(bounds, message):
+    with pytest.raises(SceneError, match=message):
+        framing_camera(np.array(bounds, float))
+
+
+@pytest.mark.parametrize(
+    ("description", "message"),
+    [
+        (SceneDescription("s"), "the scene has no geometry"),
+        (describe(matrices=()), "the scene has no geometry"),
+        (describe(triangle(faces=np.zeros((0, 3), np.uint32))), "the scene has no geometry"),
+        (describe(triangle([(0, 0, np.nan), (1, 0, 0), (0, 1, 0)])), r"f: mesh 't' has 1 vertices that are not finite"),
+        (describe(triangle(normals=np.full((3, 3), np.inf, np.float32))), "3 normals that are not finite"),
+        (describe(triangle(uvs=(np.zeros((2, 2), np.float32),))), "2 uv set 0 for 3 vertices"),
+        (describe(triangle(faces=np.array([[0, 1, 3]], np.uint32))), "uses vertex 3 of 3"),
+        (describe(triangle(material=1)), "uses material 1 of 1"),
+        (describe(matrices=[np.eye(4) * np.nan]), "instance 0 has a matrix"),
+        (describe(matrices=[np.eye(3)]), "instance 0 has a matrix"),
+        (dataclasses.replace(describe(), instances=[Instance(3, np.eye(4))]), "instance 0 uses mesh 3 of 1"),
+        (describe(material=Material("m", base_color=(0, -1, 0))), "material 'm' has a factor that is negative"),
+        (describe(material=Material("m", roughness=np.nan)), "material 'm' has a factor"),
+    ],
+)
+def test_unsound_descriptions(description, message):
+    with pytest.raises(SceneError, match=message) as caught:
+        checked(description, "f")
+    assert "\n" not in str(caught.value)
+
+
+def test_a_scene_is_frozen_and_short_to_print():
+    scene = Scene("s", describe())
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        scene.name = "t"
+    assert repr(scene) == "Scene(name='s', home_camera=None)"
