@@ -57,7 +57,7 @@ def test_maps_travel_along(tmp_path, display, picture, write):
     np.testing.assert_array_equal(back.maps["id"], maps["id"])
 
 
-@settings(deadline=None, max_examples=25, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(deadline=None, max_examples=15, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
 def test_any_display_there_and_back(tmp_path, random_displays, picture, data):
     image = picture(data.draw(random_displays()))

@@ -60,7 +60,8 @@ def test_a_camera_sees_what_mitsuba_sees(save, engine):
     """A ray of our camera through a point of the picture is the ray of Mitsuba's."""
     import mitsuba as mi
 
-    scene = load_scene(save(LAMP + CAMERA.replace("thinlens", "perspective").replace('y="0,1,0"', 'y="0,1,0.3"')))
+    pinhole = CAMERA[CAMERA.index('<float name="fov"') :].replace("0,0,5", "4,3,5")
+    scene = load_scene(save(f'{LAMP}<sensor type="perspective">{pinhole}'))
     (camera,) = scene.cameras
     ray, _ = scene.description.scene().sensors()[0].sample_ray(0, 0.5, mi.Point2f(0.75, 0.1), mi.Point2f(0.5))
     top = np.tan(camera.fov_y / 2)

@@ -17,7 +17,10 @@ def triangle(positions=((0, 0, 0), (2, 0, 0), (0, 1, 0)), **fields):
     return Mesh("t", np.array(positions, np.float32), **({"faces": faces, "material": 0} | fields))
 
 
-def describe(mesh=None, material=None, matrices=(np.eye(4),), **fields):
+HERE = np.eye(4)
+
+
+def describe(mesh=None, material=None, matrices=(HERE,), **fields):
     instances = [Instance(0, np.asarray(matrix, float)) for matrix in matrices]
     return SceneDescription("s", [mesh or triangle()], [material or Material()], instances, **fields)
 

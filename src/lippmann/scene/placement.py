@@ -25,7 +25,7 @@ Vector = tuple[float, float, float]
 #: Share of the panel's width or height that a fitted scene fills if it is shallow.
 FILL = 0.95
 
-#: Share that it fills however deep it is. A deep scene is shrunk into the depth that the display resolves, but that
+#: Share that it fills, seen from the viewing distance, however deep it is. A deep scene is shrunk into the depth that the display resolves, but that
 #: pays only so far: blur grows with the scene, so beyond the resolved depth a larger scene shows as much detail. On
 #: panels with few pixels per lens, which resolve millimetres, it would be a speck.
 LEAST_FILL = 0.4

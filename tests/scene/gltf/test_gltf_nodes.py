@@ -211,6 +211,12 @@ def test_bad_gpu_instances_are_refused(writer, read, key, values, words):
     assert words in _refusal(read, writer)
 
 
+def test_a_list_of_no_copies_shows_none(writer, read):
+    attributes = {"TRANSLATION": writer.accessor(np.zeros((0, 3)))}
+    writer.triangle().node(mesh=0, extensions={"EXT_mesh_gpu_instancing": {"attributes": attributes}})
+    assert len(read(writer).instances) == 1
+
+
 def test_copies_of_copies_are_limited(writer, read, monkeypatch):
     monkeypatch.setattr("lippmann.scene.gltf.reader._MOST_INSTANCES", 25)
     attributes = {"TRANSLATION": writer.accessor(np.zeros((10, 3)))}

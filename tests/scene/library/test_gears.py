@@ -66,7 +66,7 @@ def test_wheel_is_closed_and_faces_outward():
     flat = positions[: len(positions) // 2, [0, 2]] * (1, -1)
     area = areas(flat, gears.face_triangles(layout.teeth)).sum()
     assert volume == pytest.approx(area * layout.thickness, rel=1e-12)
-    assert area == pytest.approx(np.pi * (layout.pitch / 2) ** 2, rel=0.03)
+    assert area == pytest.approx(np.pi * (layout.pitch / 2) ** 2, rel=0.05)
 
 
 def test_teeth_mesh_without_touching():

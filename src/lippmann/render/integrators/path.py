@@ -16,7 +16,7 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from lippmann.render.integrators.base import RayCounts
+from lippmann.render.integrators.base import FirstHit, RayCounts
 from lippmann.render.sampling import SampleStream
 from lippmann.render.traits import SceneTraits
 
@@ -58,8 +58,14 @@ class PathIntegrator:
         self.roulette_depth = roulette_depth
         self.name = name
 
-    @dr.syntax
     def sample(self, ray: Any, stream: SampleStream, active: Any) -> tuple[Any, RayCounts]:
+        """Radiance along ``ray`` and the rays it took."""
+        radiance, counts, _ = self.sample_with_hit(ray, stream, active)
+        return radiance, counts
+
+    @dr.syntax
+    def sample_with_hit(self, ray: Any, stream: SampleStream, active: Any) -> tuple[Any, RayCounts, FirstHit]:
+        """As :meth:`sample`, with what the primary rays met. A surface that is more than diffuse is view-dependent."""
         scene = self.scene
         context = mi.BSDFContext()
         background = self.traits.background
@@ -79,10 +85,15 @@ class PathIntegrator:
         vertex_delta = mi.Bool(True)
 
         pi = scene.ray_intersect_preliminary(ray, coherent=True, active=active)
+        distance_of_first = mi.Float(pi.t)
+        view_dependent = mi.Bool(False)
 
         while dr.hint(active, label="paths"):
             si = pi.compute_surface_interaction(ray, ray_flags=mi.RayFlags.All)
             bsdf = si.bsdf(ray)
+
+            shiny = (bsdf.flags() & int(mi.BSDFFlags.Glossy | mi.BSDFFlags.Delta | mi.BSDFFlags.Null)) != 0
+            view_dependent |= (depth == 0) & si.is_valid() & shiny
 
             # ---- absorption on the way here ----
             if dr.hint(self.traits.has_absorption, mode="scalar"):
@@ -142,7 +153,7 @@ class PathIntegrator:
             pi = scene.ray_intersect_preliminary(ray, coherent=False, active=active)
             secondary += dr.select(active, mi.UInt32(1), mi.UInt32(0))
 
-        return radiance, RayCounts(secondary, shadow)
+        return radiance, RayCounts(secondary, shadow), FirstHit(distance_of_first, view_dependent)
 
     @dr.syntax
     def _visibility(self, si: Any, ds: Any, active: Any) -> tuple[Any, Any]:

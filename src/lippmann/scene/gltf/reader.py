@@ -132,7 +132,7 @@ def _placed(
     instances: list[Instance] = []
     for placed, kept in zip(placements, _ranks(placements, document), strict=True):
         farthest = np.abs(placed.worlds[:, :3, :3]) @ reaches[placed.mesh] + np.abs(placed.worlds[:, :3, 3])
-        if farthest.max() > np.finfo(np.float32).max:
+        if (farthest > np.finfo(np.float32).max).any():
             raise document.error(
                 f"{placed.node.place} puts its mesh beyond all bounds", rule="positions must be finite"
             )

@@ -38,7 +38,7 @@ class Layout:
     layers: int = 8
     teeth: int = 36
     pitch: float = 28.5
-    tooth: float = 2.4
+    tooth: float = 2.0
     thickness: float = 2.6
     layer_rise: float = 6.0
     layer_back: float = 5.0
@@ -66,8 +66,8 @@ SKY = Background(color=(0.08, 0.32, 0.66))
 RAY_DEPTH = 8
 
 # Half-widths of a tooth at its root and at its tip, as fractions of the angle from tooth to tooth: on the pitch circle
-# just under a quarter, so that meshing teeth clear each other.
-_ROOT_HALF, _TIP_HALF = 0.31, 0.16
+# well under a quarter, because straight flanks need play where involutes would not.
+_ROOT_HALF, _TIP_HALF = 0.27, 0.12
 # Teeth end this share of half their height beyond the pitch circle, so that they do not touch their neighbour's root.
 _TIP_SHARE = 0.9
 

@@ -1,0 +1,336 @@
+"""How a display stands in a scene."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from lippmann.display import Display, LensArray, Panel, list_displays, load_display
+from lippmann.errors import SceneError, UsageError
+from lippmann.scene.description import Camera
+from lippmann.scene.placement import FILL, LEAST_FILL, POP_OUT, PlacementOptions, place
+
+
+def display(viewing_distance=math.inf, aperture=20.0, width=400, height=300, gap=5.0):
+    """100 mm x 75 mm, 10 pixels per lens; resolves 50 mm to either side."""
+    return Display(
+        "test",
+        Panel(width, height, 0.25),
+        LensArray("square", 2.5),
+        gap=gap,
+        viewing_distance=viewing_distance,
+        aperture_distance=aperture,
+    )
+
+
+def box(*size, center=(0, 0, 0)):
+    half = np.array(size, float) / 2
+    return np.stack([center - half, center + half])
+
+
+def corners(bounds):
+    return np.array(np.meshgrid(*np.asarray(bounds).T)).reshape(3, -1).T
+
+
+def in_display(placement, points):
+    matrix = np.linalg.inv(placement.world_from_display)
+    return np.atleast_2d(points) @ matrix[:3, :3].T + matrix[:3, 3]
+
+
+def scale_of(placement):
+    """World units per millimetre."""
+    return np.cbrt(np.linalg.det(placement.world_from_display[:3, :3]))
+
+
+def options(**fields):
+    return PlacementOptions(**fields)
+
+
+class TestFit:
+    def test_a_flat_scene_fills_the_panel_in_the_lens_plane(self):
+        placed = place(box(3, 1, 0, center=(7, 8, 9)), display())
+        points = in_display(placed, corners(box(3, 1, 0, center=(7, 8, 9))))
+        assert np.ptp(points, axis=0) == pytest.approx([FILL * 100, FILL * 100 / 3, 0])
+        assert points.mean(axis=0) == pytest.approx([0, 0, 0], abs=1e-9)
+        assert placed.depth_range == pytest.approx((0, 0), abs=1e-9)
+        assert placed.mode == "fit"
+        assert placed.warnings == ()
+
+    def test_a_tall_scene_is_held_by_the_height(self):
+        placed = place(box(1, 3, 0), display())
+        assert np.ptp(in_display(placed, corners(box(1, 3, 0))), axis=0)[1] == pytest.approx(FILL * 75)
+
+    def test_up_is_up_and_the_front_faces_the_viewer(self):
+        placed = place(box(2, 2, 1), display())
+        low, high = in_display(placed, [[-1, -1, -0.5], [1, 1, 0.5]])
+        assert (high > low).all()
+
+    def test_a_third_of_the_depth_pops_out(self):
+        back, front = place(box(10, 10, 2), display()).depth_range
+        assert front / (front - back) == pytest.approx(POP_OUT)
+
+    @pytest.mark.parametrize("share", [0.0, 0.25, 1.0])
+    def test_pop_out(self, share):
+        placed = place(box(10, 10, 2), display(), options=options(pop_out=share))
+        back, front = placed.depth_range
+        assert front / (front - back) == pytest.approx(share, abs=1e-9)
+        assert placed.warnings == ()
+
+    def test_the_aperture_cuts_nothing(self):
+        placed = place(box(10, 10, 5), display(aperture=3.0))
+        assert placed.depth_range[1] == pytest.approx(3.0)
+        assert placed.warnings == ()
+        wished = place(box(10, 10, 5), display(aperture=3.0), options=options(pop_out=0.5))
+        assert wished.depth_range[1] == pytest.approx(3.0)
+        (warning,) = wished.warnings
+        assert "3 mm of the scene lie in front of the lens plane instead of" in warning
+
+    def test_a_deep_scene_is_held_by_the_resolved_depth(self):
+        placed = place(box(6, 6, 8), display(aperture=0.0))
+        back, front = placed.depth_range
+        assert (back, front) == (pytest.approx(-50), pytest.approx(0, abs=1e-9))
+        assert placed.resolvable_range == (-50, 50)
+        assert placed.warnings == ()
+        back, front = place(box(6, 6, 8), display(aperture=60.0)).depth_range
+        assert (back, front) == (pytest.approx(-50), pytest.approx(25))
+
+    def test_a_scene_far_too_deep_stays_visible(self):
+        placed = place(box(1, 1, 40), display())
+        assert np.ptp(in_display(placed, corners(box(1, 1, 40))), axis=0)[1] == pytest.approx(LEAST_FILL * 75)
+        (warning,) = placed.warnings
+        assert "the display resolves -50 to 50 mm" in warning
+
+    def test_a_near_viewer_sees_the_front_face_whole(self):
+        near = display(viewing_distance=100.0, aperture=90.0)
+        bounds = box(4, 0.1, 1)
+        placed = place(bounds, near)
+        points = in_display(placed, corners(bounds))
+        seen = points[:, 0] / (1 - points[:, 2] / 100.0)  # where the viewer sees them in the lens plane
+        assert seen.max() == pytest.approx(FILL * 50)
+
+    @pytest.mark.parametrize(
+        ("turn", "of", "to"),
+        [
+            ((90, 0, 0), (0, 0, 1), (1, 0, 0)),
+            ((0, 90, 0), (0, 1, 0), (0, 0, 1)),
+            ((0, -90, 0), (0, 0, 1), (0, 1, 0)),
+            ((0, 0, 90), (1, 0, 0), (0, 1, 0)),
+            ((90, 90, 0), (1, 0, 0), (0, 1, 0)),  # to -z first, then up
+        ],
+    )
+    def test_turns(self, turn, of, to):
+        placed = place(box(2, 2, 2), display(), options=options(turn=turn))
+        origin, point = in_display(placed, [(0, 0, 0), of])
+        assert (point - origin) * scale_of(placed) == pytest.approx(to, abs=1e-9)
+
+    def test_the_turned_box_is_what_is_fitted(self):
+        bounds = box(1, 1, 4)
+        placed = place(bounds, display(), options=options(turn=(90, 0, 0)))
+        assert np.ptp(in_display(placed, corners(bounds)), axis=0)[0] == pytest.approx(FILL * 100)
+
+    def test_shift_and_scale(self):
+        bounds = box(10, 10, 1)
+        plain = place(bounds, display(), options=options(pop_out=0.0))
+        moved = place(bounds, display(), options=options(pop_out=0.0, shift=(1, 2, -3), scale=0.5))
+        assert scale_of(moved) == pytest.approx(2 * scale_of(plain))
+        assert in_display(moved, [(0, 0, 0.5)]) == pytest.approx(np.array([[1, 2, -3]]))
+
+    def test_a_line_toward_the_viewer(self):
+        back, front = place(box(0, 0, 3), display(aperture=0.0)).depth_range
+        assert (back, front) == (pytest.approx(-50), pytest.approx(0, abs=1e-9))
+
+    def test_a_scene_moved_off_the_panel(self):
+        placed = place(box(1, 1, 0), display(), options=options(shift=(500, 0, 0)))
+        assert any("beside the panel" in warning for warning in placed.warnings)
+        assert place(box(1, 1, 0), display(), options=options(shift=(30, 0, 0))).warnings == ()
+
+    @pytest.mark.parametrize("preset", [found.name for found in list_displays()])
+    def test_presets_show_a_ball_at_a_sensible_size(self, preset):
+        found = load_display(preset)
+        placed = place(box(2, 2, 2), found)
+        share = 2 / scale_of(placed) / min(found.size_mm)
+        assert 0.9 * LEAST_FILL <= share <= 1
+        assert placed.depth_range[1] <= found.aperture_distance + 1e-9
+
+    @settings(deadline=None, max_examples=60)
+    @given(
+        st.tuples(*[st.floats(0, 10)] * 3),
+        st.sampled_from([math.inf, 300.0, 60.0]),
+        st.floats(0, 50),
+        st.tuples(*[st.floats(-180, 180)] * 3),
+        st.none() | st.floats(0, 1),
+    )
+    def test_a_fitted_scene_is_inside(self, size, distance, aperture, turn, pop_out):
+        assume(max(size) > 1e-3)
+        found = display(distance, aperture)
+        bounds = box(*size, center=(3, -2, 1))
+        placed = place(bounds, found, options=options(turn=turn, pop_out=pop_out))
+        points = in_display(placed, corners(bounds))
+        rotation = placed.world_from_display[:3, :3] / scale_of(placed)
+        assert rotation @ rotation.T == pytest.approx(np.eye(3), abs=1e-9)
+        assert np.linalg.det(rotation) == pytest.approx(1)
+        assert points[:, 2].max() <= aperture + 1e-6
+        assert placed.depth_range == pytest.approx((points[:, 2].min(), points[:, 2].max()), abs=1e-6)
+        window = np.array(found.size_mm) / 2 * (1 - points[:, 2].max() / distance)
+        extent = np.abs(points[:, :2]).max(axis=0)
+        assert (extent <= FILL * window * (1 + 1e-6) + 1e-6).all()
+        resolved = points[:, 2].min() >= -50 - 1e-6 and points[:, 2].max() <= 50 + 1e-6
+        touches = (extent >= 0.999 * LEAST_FILL * window).any() or extent.max() < 1e-3
+        assert resolved or touches
+
+
+class TestCamera:
+    BOUNDS = box(2, 2, 2)
+
+    @staticmethod
+    def camera(**fields):
+        """At (0, 0, 10), looking along -z."""
+        matrix = np.eye(4)
+        matrix[2, 3] = 10.0
+        return Camera(**({"name": "eye", "world_from_camera": matrix, "fov_y": math.radians(40)} | fields))
+
+    def test_the_plane_of_focus_becomes_the_lens_plane(self):
+        placed = place(self.BOUNDS, display(), cameras=[self.camera(focus_distance=9.5)], options=options(camera="eye"))
+        assert in_display(placed, [(0, 0, 0.5)]) == pytest.approx(np.zeros((1, 3)), abs=1e-9)
+        assert placed.mode == "camera"
+
+    def test_without_focus_the_centre_lies_in_the_lens_plane(self):
+        placed = place(self.BOUNDS, display(), cameras=[self.camera()], options=options(mode="camera"))
+        assert in_display(placed, [(0, 0, 0)]) == pytest.approx(np.zeros((1, 3)), abs=1e-9)
+
+    def test_the_eye_becomes_the_viewing_point(self):
+        placed = place(self.BOUNDS, display(500.0), cameras=[self.camera()], options=options(camera="eye"))
+        assert in_display(placed, [(0, 0, 10)]) == pytest.approx(np.array([[0, 0, 500]]))
+
+    @pytest.mark.parametrize(("aspect", "filled"), [(2.0, "height"), (4 / 3, "both"), (1.0, "width")])
+    def test_a_distant_viewer_sees_the_field_fill_the_panel(self, aspect, filled):
+        camera = self.camera(aspect=aspect)
+        placed = place(self.BOUNDS, display(), cameras=[camera], options=options(camera="eye"))
+        top = 10 * math.tan(math.radians(20))
+        x, y, _ = in_display(placed, [(top * aspect, top, 0)])[0]
+        assert x >= 50 - 1e-9
+        assert y >= 37.5 - 1e-9
+        assert (y == pytest.approx(37.5)) == (filled in ("height", "both"))
+        assert (x == pytest.approx(50)) == (filled in ("width", "both"))
+
+    @pytest.mark.parametrize("distance", [math.inf, 500.0])
+    def test_an_orthographic_camera(self, distance):
+        camera = self.camera(fov_y=None, height=3.0, aspect=4 / 3)
+        placed = place(self.BOUNDS, display(distance), cameras=[camera], options=options(camera="eye"))
+        assert in_display(placed, [(2, 1.5, 0)])[0, :2] == pytest.approx([50, 37.5])
+
+    def test_scale_and_mirror_of_its_node_do_not_count(self):
+        bent = self.camera()
+        bent.world_from_camera[:3, :3] = np.diag([-3.0, 2.0, 5.0])
+        plain = place(self.BOUNDS, display(), cameras=[self.camera()], options=options(camera="eye"))
+        found = place(self.BOUNDS, display(), cameras=[bent], options=options(camera="eye"))
+        assert found.world_from_display == pytest.approx(plain.world_from_display)
+
+    def test_pop_out_moves_the_plane(self):
+        placed = place(self.BOUNDS, display(), cameras=[self.camera()], options=options(camera="eye", pop_out=0.25))
+        back, front = placed.depth_range
+        assert front / (front - back) == pytest.approx(0.25)
+
+    def test_turn_and_scale_leave_the_focus_where_it_is(self):
+        changed = options(camera="eye", turn=(30, 20, 10), scale=3.0, shift=(0, 0, 2))
+        placed = place(self.BOUNDS, display(), cameras=[self.camera()], options=changed)
+        assert in_display(placed, [(0, 0, 0)]) == pytest.approx(np.array([[0, 0, 2.0]]), abs=1e-9)
+
+    def test_a_camera_inside_the_scene(self):
+        placed = place(
+            box(40, 40, 40, center=(0, 0, 20)), display(), cameras=[self.camera()], options=options(mode="camera")
+        )
+        assert in_display(placed, [(0, 0, 5)]) == pytest.approx(np.zeros((1, 3)), abs=1e-9)  # between eye and far end
+        assert any("cut off" in warning for warning in placed.warnings)
+        assert any("blurred" in warning for warning in placed.warnings)
+
+    def test_the_home_camera(self):
+        cameras = [self.camera(name="other", focus_distance=1.0), self.camera()]
+        home = place(self.BOUNDS, display(), cameras=cameras, home_camera="eye")
+        assert home.mode == "camera"
+        assert in_display(home, [(0, 0, 0)]) == pytest.approx(np.zeros((1, 3)), abs=1e-9)
+        assert place(self.BOUNDS, display(), cameras=cameras).mode == "fit"
+        assert (
+            place(self.BOUNDS, display(), cameras=cameras, options=options(mode="fit"), home_camera="eye").mode == "fit"
+        )
+        other = place(self.BOUNDS, display(), cameras=cameras, options=options(camera="other"), home_camera="eye")
+        assert in_display(other, [(0, 0, 9)]) == pytest.approx(np.zeros((1, 3)), abs=1e-9)
+
+    def test_unknown_cameras(self):
+        with pytest.raises(SceneError, match="no camera is named 'eya'; the scene has 'eye'; is 'eye' meant?"):
+            place(self.BOUNDS, display(), cameras=[self.camera()], options=options(camera="eya"))
+
+    @pytest.mark.parametrize(
+        ("fields", "message"),
+        [
+            ({"focus_distance": 0.0}, "camera 'eye' focuses at 0"),
+            ({"focus_distance": math.nan}, "camera 'eye' focuses at nan"),
+            ({"fov_y": None}, "neither an angle nor a height"),
+            ({"fov_y": 0.0}, "has a field 0 high"),
+            ({"fov_y": None, "height": -1.0}, "has a field -1 high"),
+            ({"world_from_camera": np.diag([1.0, 1, 0, 1])}, "not invertible"),
+            ({"world_from_camera": np.full((4, 4), np.nan)}, "not invertible"),
+            ({"world_from_camera": np.array([[1.0, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, -9], [0, 0, 0, 1]])}, "behind it"),
+        ],
+    )
+    def test_cameras_that_see_nothing(self, fields, message):
+        with pytest.raises(SceneError, match=message):
+            place(self.BOUNDS, display(), cameras=[self.camera(**fields)], options=options(camera="eye"))
+
+    def test_no_camera_at_all(self):
+        with pytest.raises(SceneError, match="the scene has no cameras; fit it"):
+            place(self.BOUNDS, display(), options=options(mode="camera"))
+        with pytest.raises(SceneError, match="no camera is named 'eye'; the scene has no cameras"):
+            place(self.BOUNDS, display(), options=options(camera="eye"))
+
+
+class TestDisplayFrame:
+    def test_coordinates_are_millimetres(self):
+        placed = place(box(10, 10, 10), display(), options=options(mode="display"))
+        assert placed.world_from_display == pytest.approx(np.eye(4))
+        assert placed.depth_range == (-5, 5)
+        assert placed.warnings == ()
+
+    def test_changes_apply(self):
+        changed = options(mode="display", turn=(90, 0, 0), scale=2.0, shift=(0, 0, -10))
+        placed = place(box(10, 10, 10), display(), options=changed)
+        assert in_display(placed, [(0, 0, 1)]) == pytest.approx(np.array([[2, 0, -10]]))
+
+    def test_what_is_too_near_or_too_deep(self):
+        placed = place(box(10, 10, 200), display(), options=options(mode="display"))
+        cut, blurred = placed.warnings
+        assert "reaches 100 mm in front of the lens plane; recorded rays begin at 20 mm" in cut
+        assert "from -100 to 100 mm; the display resolves -50 to 50 mm" in blurred
+
+
+@pytest.mark.parametrize(
+    ("fields", "message"),
+    [
+        ({"mode": "middle"}, "place: placement 'middle'; known are fit, camera, display"),
+        ({"scale": 0.0}, "scale: 0; a factor above 0"),
+        ({"scale": -1.0}, "scale: -1"),
+        ({"scale": math.nan}, "scale: nan"),
+        ({"pop_out": 1.01}, r"pop_out: 1\.01; a share of the depth, 0 to 1"),
+        ({"pop_out": -0.1}, r"pop_out: -0\.1"),
+        ({"pop_out": math.nan}, "pop_out: nan"),
+        ({"turn": (1, 2)}, "turn: .*three finite numbers"),
+        ({"shift": (0, math.inf, 0)}, "shift: .*three finite numbers"),
+        ({"mode": "fit", "camera": "eye"}, "camera: camera 'eye' beside placement 'fit'"),
+        ({"mode": "display", "pop_out": 0.5}, "pop_out: coordinates of the display leave nothing to choose"),
+    ],
+)
+def test_options_that_cannot_be(fields, message):
+    with pytest.raises(UsageError, match=message):
+        PlacementOptions(**fields)
+
+
+@pytest.mark.parametrize("mode", ["fit", "display"])
+@pytest.mark.parametrize(
+    ("bounds", "message"),
+    [(box(0, 0, 0, center=(1, 2, 3)), "a single point"), (np.full((2, 3), np.nan), "no extent")],
+)
+def test_scenes_without_extent(mode, bounds, message):
+    with pytest.raises(SceneError, match=message):
+        place(bounds, display(), options=options(mode=mode))
