@@ -4,6 +4,7 @@ a bad one ends it."""
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -74,27 +75,40 @@ def test_no_library_found_on_the_device_of_choice():
     assert "no usable LLVM library is installed" in start_fails(NOTHING_FOUND, device="auto")
 
 
-@pytest.mark.skipif(not OLD, reason="no LLVM library too old to be used is installed")
-@pytest.mark.parametrize("library", OLD, ids=lambda library: library.version_text)
-def test_only_an_old_library_found(library):
-    before = NOTHING_FOUND + f"llvm.search_folders = lambda: [Path({str(library.path.parent)!r})]\n"
-    before += f"llvm.files_in = lambda folders: iter([Path({str(library.path)!r})])\n"
-    message = start_fails(before)
-    assert f"found only {library.version_text}" in message
-    assert llvm.install_command() in message
+def old_libraries(folder: Path) -> list[tuple[int, Path, str]]:
+    """Old libraries as (version, path, code that makes them look so): the machine's own, and some by name only."""
+    found = [(library.version[0], library.path, "") for library in OLD]
+    for version in {14, 15, 16} - {version for version, _, _ in found}:
+        path = folder / f"libLLVM-{version}.so.1"
+        path.write_text("its name is all that is looked at")
+        found.append((version, path, "llvm._own_name = lambda path: path.name\n"))
+    return found
 
 
-@pytest.mark.skipif(not OLD, reason="no LLVM library too old to be used is installed")
-@pytest.mark.parametrize("library", OLD, ids=lambda library: library.version_text)
+def test_only_an_old_library_found(tmp_path):
+    for version, path, look in old_libraries(tmp_path):
+        before = NOTHING_FOUND + look + f"llvm.files_in = lambda folders: iter([Path({str(path)!r})])\n"
+        message = start_fails(before)
+        assert f"found only {version}" in message
+        assert llvm.install_command() in message
+
+
 @pytest.mark.parametrize("device", ["cpu", "auto"])
-def test_named_library_is_an_old_one(library, device):
-    message = start_fails(device=device, **{llvm.PATH_VARIABLE: str(library.path)})
-    assert message.startswith(f"{llvm.PATH_VARIABLE}: '{library.path}' is LLVM {library.version[0]}")
+def test_named_library_is_an_old_one(tmp_path, device):
+    for version, path, look in old_libraries(tmp_path):
+        message = start_fails(NOTHING_FOUND + look, device=device, **{llvm.PATH_VARIABLE: str(path)})
+        assert message.startswith(f"{llvm.PATH_VARIABLE}: '{path}' is LLVM {version}")
 
 
 def test_named_library_is_missing(tmp_path):
     path = str(tmp_path / "libLLVM.so.19.1")
     assert f"'{path}' is not there" in start_fails(device="auto", **{llvm.PATH_VARIABLE: path})
+
+
+def test_named_library_is_missing_and_a_gpu_does_not_excuse_it(tmp_path):
+    before = "from lippmann import gpu; gpu.find = lambda: 'Test GPU'\n"
+    path = str(tmp_path / "libLLVM.so.19.1")
+    assert f"'{path}' is not there" in start_fails(before, device="auto", **{llvm.PATH_VARIABLE: path})
 
 
 def test_named_library_is_a_text_file(tmp_path):

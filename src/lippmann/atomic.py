@@ -113,10 +113,10 @@ def check_folder_writable(path: Path) -> None:
 def _place(path: Path, *, folder: bool = False) -> Path:
     """Where ``path`` really lies, once it is known that something can be put there."""
     try:
+        mode = _mode(path)
         place = path.resolve()
-        mode = place.stat().st_mode if place.exists() else None
-        parent = place.parent.stat().st_mode if place.parent.exists() else None
-    except (OSError, RuntimeError) as error:  # Python before 3.13 raises RuntimeError for a loop of links
+        parent = _mode(place.parent)
+    except OSError as error:
         raise _output_error(path, error) from None
     if parent is None:
         raise OutputError(
@@ -134,6 +134,14 @@ def _place(path: Path, *, folder: bool = False) -> Path:
         # Renaming onto a device or a pipe would replace it for everyone.
         raise OutputError("this is not a regular file", where=str(path), fix="choose another name")
     return place
+
+
+def _mode(path: Path) -> int | None:
+    """Kind and permissions of what lies at ``path``, links followed; ``None`` if nothing does."""
+    try:
+        return path.stat().st_mode
+    except (FileNotFoundError, NotADirectoryError):
+        return None
 
 
 def _create(temporary: Path, *, like: Path) -> None:
@@ -216,9 +224,6 @@ def _reported(path: Path, temporary: Path) -> Iterator[None]:
         raise _output_error(path, error) from error
 
 
-def _output_error(path: Path, error: OSError | RuntimeError) -> OutputError:
-    number = error.errno if isinstance(error, OSError) else None
-    reason, fix = _REASONS.get(number or 0, ("", ""))
-    if not reason:
-        reason = (isinstance(error, OSError) and error.strerror) or str(error)
+def _output_error(path: Path, error: OSError) -> OutputError:
+    reason, fix = _REASONS.get(error.errno or 0, (error.strerror or str(error), ""))
     return OutputError(f"cannot be written: {reason}", where=str(path), fix=fix)

@@ -140,6 +140,7 @@ def _on_cpu(dr: Any, library: llvm.Library | None) -> Engine:
         )
     version = tuple(dr.detail.llvm_version())
     if version[0] < llvm.OLDEST:
+        llvm.choose()  # raises the better explanation if there is no other library
         raise EngineError(
             f"Dr.Jit has loaded LLVM {version[0]}, which is too old",
             rule=f"LLVM {llvm.OLDEST} or newer is needed, and Dr.Jit takes another only before it is first imported",

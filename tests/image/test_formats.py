@@ -24,7 +24,7 @@ from lippmann.image import IntegralImage, Provenance, read_info, read_metadata, 
 from lippmann.image.color import dequantize, quantize
 from lippmann.image.exr import read_exr_header, write_exr
 from lippmann.image.formats import format_for, write_plain_picture
-from lippmann.image.png import encode_png
+from lippmann.image.png import encode_png, read_png_header
 
 KINDS = [("a.png", 8), ("a.png", 16), ("a.exr", 16), ("a.exr", 32), ("a.tif", 8), ("a.tiff", 16), ("a.TIF", 32)]
 
@@ -348,8 +348,18 @@ def test_a_text_that_unpacks_to_too_much_is_not_unpacked(tmp_path, display):
     data = b"lippmann\0\1\0\0\0" + packed
     chunk = struct.pack(">I", len(data)) + b"iTXt" + data + struct.pack(">I", zlib.crc32(b"iTXt" + data))
     (tmp_path / "a.png").write_bytes(whole[:33] + chunk + whole[33:])
+    assert len(read_png_header(tmp_path / "a.png").text["lippmann"]) == 1 << 24
     with pytest.raises(PictureError, match="has no display in it"):
         read_picture(tmp_path / "a.png")
+
+
+def test_a_damaged_text_is_noticed(tmp_path, display, picture):
+    path = tmp_path / "a.png"
+    picture(display("square")).save(path)
+    whole = path.read_bytes()
+    path.write_bytes(whole.replace(b'"spp":64', b'"spp":46'))
+    with pytest.raises(PictureError, match="the check sum of its iTXt chunk is wrong"):
+        read_metadata(path)
 
 
 def test_texts_packed_by_other_programs_are_read(tmp_path, display, picture):

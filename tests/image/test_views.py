@@ -42,12 +42,17 @@ def test_a_view_holds_the_pixels_at_its_place_behind_every_lens(data, random_dis
     display = data.draw(random_displays())
     image, grid = ramp(display), view_grid(display)
     views, mask = image.views_and_mask()
-    u_center, v_center, _ = micro_image_centers(display)
+    u_center, v_center, lens = micro_image_centers(display)
     lenticular = display.lens_array.layout == "lenticular"
     assert views.shape[:4] == (len(grid.down), len(grid.right), *u_center.shape)
     for ky, down in enumerate(grid.down):
         for kx, right in enumerate(grid.right):
             shown = mask[ky, kx]
+            if not grid.exact:
+                # Places in the corners of a hexagon's box are other lenses'.
+                place = display.panel_point(u_center + right, v_center + (0 if lenticular else down), NUMPY)
+                i, j = display.lens_of(*place, NUMPY)
+                assert (j * display.lens_grid.columns + i == lens)[shown].all()
             beside_u = (views[ky, kx, ..., 0] - u_center - right)[shown]
             beside_v = (views[ky, kx, ..., 1] - v_center - (0 if lenticular else down))[shown]
             # Exact views: by no more than is said. Resampled ones: the pixel at the place, or the next one if that is
@@ -109,6 +114,22 @@ def test_broken_numbers_of_pixels_are_resampled_and_said_so():
         IntegralImage.from_views(image.views(), image.display)
 
 
+def test_the_corners_of_a_hexagon_s_box_show_nothing():
+    array = Display("hexagons", Panel(60, 60, PIXEL), LensArray("hexagonal", 7.5 * PIXEL), gap=6.8)
+    views, mask = ramp(array).views_and_mask()
+    assert views.shape[:2] == (8, 7)
+    filled = mask.any(axis=(2, 3)).astype(int)
+    # Half-widths of a hexagon 7.5 across: 3.75 in the middle rows, less from 2.165 above the centre on.
+    assert filled.tolist() == [
+        [0, 0, 0, 1, 0, 0, 0],
+        [0, 1, 1, 1, 1, 1, 0],
+        *[[1] * 7] * 4,
+        [0, 1, 1, 1, 1, 1, 0],
+        [0, 0, 0, 1, 0, 0, 0],
+    ]
+    assert not views[~mask].any()
+
+
 def test_nearest_and_linear_by_hand():
     # Lenses of 2.5 pixels on 10: boundaries at 0, 2.5, 5, 7.5, 10; their own pixels are 0 1, 2 3 4, 5 6, 7 8 9 (a pixel
     # whose middle lies on a boundary belongs to the right), the two views stand 0.625 pixels beside the centres.
@@ -121,6 +142,17 @@ def test_nearest_and_linear_by_hand():
     np.testing.assert_allclose(
         image.views("linear")[0, :, 0, :, 0], np.minimum(places, [[9, 9, 9, 9], [1.5, 4.5, 6.5, 9.5]]), rtol=1e-6
     )
+
+
+@pytest.mark.parametrize("pixel_pitch", [0.1, 0.25, 25.4 / 96, 0.07])
+def test_a_place_between_two_pixels_takes_the_right_one_behind_every_lens(pixel_pitch):
+    # Lenses of 3.5 pixels: the middle of every second one lies between two pixels.
+    sheet = Display("sheet", Panel(701, 1, pixel_pitch), LensArray("lenticular", 3.5 * pixel_pitch), gap=6.8)
+    middle = ramp(sheet).views()[0, 1, 0, :, 0]
+    places = micro_image_centers(sheet)[0][0]
+    between = np.abs(places - np.round(places)) < 1e-3
+    assert between.sum() == 100
+    np.testing.assert_array_equal(middle[between], np.round(places[between]) + 0.5)
 
 
 @settings(deadline=None, max_examples=40)

@@ -105,6 +105,7 @@ def test_phong_materials():
 def test_cameras_and_lamps():
     scene = box().scene()
     assert load_scene(scene).cameras == ()
+    assert not load_scene(scene).has_lights
     scene.lights  # noqa: B018 - asking invents lamps
     invented = load_scene(scene)
     assert invented.has_lights

@@ -197,6 +197,7 @@ class TestRoom:
             # The top row of the picture is up, its left side to the left of who stands before it.
             assert corners[v < 0.5][:, 1].min() > corners[v > 0.5][:, 1].max()
             normal = scene.triangles.normals[scene.triangles.material == index][0, 0]
+            assert normal @ library.stage_of("room").rotation[:, 2] > 0.5
             to_the_right = np.cross((0, 1, 0), normal)
             assert (corners @ to_the_right)[u > 0.5].min() > (corners @ to_the_right)[u < 0.5].max()
 
@@ -240,6 +241,13 @@ class TestPrimitives:
         # Tachyon's normals are right on cubes alone.
         boxes = scenes["primitives"].boxes
         assert np.ptp(boxes.maximum - boxes.minimum, axis=1) == pytest.approx(0)
+
+    def test_endless_cylinder_stays_at_its_depth(self, scenes):
+        rotation = library.stage_of("primitives").rotation
+        cylinders = scenes["primitives"].cylinders
+        assert cylinders.axes @ rotation[:, 2] == pytest.approx(0, abs=1e-12)
+        depth = library.stage_of("primitives").in_display(cylinders.centers)[:, 2]
+        assert -54.4 < depth[0] < 0
 
     def test_height_field_has_the_normals_of_its_surface(self):
         fine = primitives.height_field((0.0, 0.0), size=1.0, cells=200)[0:3]

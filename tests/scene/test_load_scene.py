@@ -139,9 +139,13 @@ def test_objects():
 def test_light_and_background():
     scene = load_scene(triangle(), background=(0, 0.5, 2))
     assert (scene.background, scene.environment) == ((0, 0.5, 2), studio())
-    scene = load_scene(triangle(), environment="studio")
-    assert scene.environment is studio()
-    assert scene.notes == ()
+    for kind in (str, Path):
+        scene = load_scene(triangle(), environment=kind("studio"))
+        assert scene.environment is studio()
+        assert scene.notes == ()
+        scene = load_scene(triangle(), environment=kind("none"))
+        assert (scene.environment, scene.notes) == (None, ())
+        assert load_scene(scene).environment is None
     assert load_scene(triangle()).background == BACKDROP
     sky = Environment(np.ones((2, 4, 3), np.float32))
     assert load_scene(triangle(environment=studio()), environment=sky).environment is sky

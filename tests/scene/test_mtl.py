@@ -92,6 +92,8 @@ def test_glass(material):
     assert (found.base_color, found.alpha_mode, found.metallic) == ((0.9, 1.0, 0.9), "opaque", 0.0)
     assert material("Kd 0 0 0\nTf 0.8 0.8 0.8\nNi 1.5\nillum 6\n").transmission == 0.8
     assert material("d 0.2\nillum 4\n").thickness == 0.0
+    assert material("Kd 0 0 0\nTf 1 1 1\nillum 4\n").transmission == 0.0
+    assert material("Kd 0.5 0.5 0.5\nTf 1 1 1\nillum 7\n").transmission == 0.0
     assert material("Kd 0.5 0.5 0.5\nillum 4\nTf 1 1 1\nNi 1\n").transmission == 0.0  # what exporters write for plaster
 
 

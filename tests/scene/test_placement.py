@@ -96,6 +96,11 @@ class TestFit:
         back, front = place(box(6, 6, 8), display(aperture=60.0)).depth_range
         assert (back, front) == (pytest.approx(-50), pytest.approx(25))
 
+    @pytest.mark.parametrize("aperture", [60.0, 200.0])
+    def test_what_pops_out_is_held_by_the_resolved_depth_too(self, aperture):
+        placed = place(box(6, 6, 8), display(aperture=aperture), options=options(pop_out=0.6))
+        assert placed.depth_range == (pytest.approx(-100 / 3), pytest.approx(50))
+
     def test_a_scene_far_too_deep_stays_visible(self):
         placed = place(box(1, 1, 40), display())
         assert np.ptp(in_display(placed, corners(box(1, 1, 40))), axis=0)[1] == pytest.approx(LEAST_FILL * 75)
@@ -259,7 +264,7 @@ class TestCamera:
         assert in_display(other, [(0, 0, 9)]) == pytest.approx(np.zeros((1, 3)), abs=1e-9)
 
     def test_unknown_cameras(self):
-        with pytest.raises(SceneError, match="no camera is named 'eya'; the scene has 'eye'; is 'eye' meant?"):
+        with pytest.raises(SceneError, match=r"no camera is named 'eya'; the scene has 'eye'; is 'eye' meant\?"):
             place(self.BOUNDS, display(), cameras=[self.camera()], options=options(camera="eya"))
 
     @pytest.mark.parametrize(

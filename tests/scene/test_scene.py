@@ -67,6 +67,11 @@ def test_a_dark_scene_is_lit_by_the_studio():
     assert scene.notes == (STUDIO_NOTE,)
 
 
+def test_the_studio_may_be_kept_out():
+    scene = Scene("s", describe(), studio=False)
+    assert (scene.environment, scene.background, scene.notes) == (None, None, ())
+
+
 @pytest.mark.parametrize(
     "description",
     [
@@ -85,8 +90,9 @@ def test_a_scene_with_light_keeps_its_own(description):
 
 
 def test_light_that_does_not_count():
+    assert not Scene("s", describe(material=Material(emission=(1, 1, 1)))).has_lights  # a label, a screen
     assert not Scene("s", describe(lights=[Light("point", (0, 0, 0), np.eye(4))])).has_lights
-    unused = dataclasses.replace(describe(), materials=[Material(), Material(emission=(1, 1, 1))])
+    unused = dataclasses.replace(describe(), materials=[Material(), Material(emission=(9, 9, 9))])
     assert not Scene("s", unused).has_lights
 
 
@@ -167,4 +173,4 @@ def test_a_scene_is_frozen_and_short_to_print():
     scene = Scene("s", describe())
     with pytest.raises(dataclasses.FrozenInstanceError):
         scene.name = "t"
-    assert repr(scene) == "Scene(name='s', home_camera=None)"
+    assert repr(scene) == "Scene(name='s', home_camera=None, studio=True)"

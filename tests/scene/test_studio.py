@@ -46,8 +46,8 @@ def test_it_models_form():
     )
     assert left > 1.3 * right
     assert top > front > below
-    assert min(left, right, front, below, top, back) > 0.1
-    assert max(left, right, front, below, top, back) < 1.6
+    assert min(left, right, front, below, top, back) > 0.05
+    assert max(left, right, front, below, top, back) < 1.3
 
 
 def test_the_backdrop_is_a_middle_grey():

@@ -6,6 +6,7 @@ carry text and resolution are written and read here, after the PNG specification
 
 from __future__ import annotations
 
+import io
 import struct
 import zlib
 from collections.abc import Iterator, Mapping
@@ -96,12 +97,16 @@ def read_png(path: Path) -> NDArray[Any]:
     Raises
     ------
     PictureError
-        If the pixels cannot be decoded.
+        If a check sum is wrong or the pixels cannot be decoded.
     """
     import imagecodecs
 
+    data = path.read_bytes()
+    # libpng reports a wrong check sum of most chunks on standard error and goes on; so all are looked at first.
+    for _ in _chunks(io.BytesIO(data), path, all_bodies=True):
+        pass
     try:
-        codes: NDArray[Any] = imagecodecs.png_decode(path.read_bytes())
+        codes: NDArray[Any] = imagecodecs.png_decode(data)
     except (RuntimeError, ValueError) as error:
         raise _damaged(path, str(error)) from error
     return codes
@@ -111,8 +116,8 @@ def _chunk(kind: bytes, body: bytes) -> bytes:
     return struct.pack(">I", len(body)) + kind + body + struct.pack(">I", zlib.crc32(kind + body))
 
 
-def _chunks(file: BinaryIO, path: Path) -> Iterator[tuple[bytes, bytes]]:
-    """Kind and body of every chunk up to ``IEND``; the bodies of image data are skipped (and empty)."""
+def _chunks(file: BinaryIO, path: Path, *, all_bodies: bool = False) -> Iterator[tuple[bytes, bytes]]:
+    """Kind and checked body of every chunk up to ``IEND``; bodies of no interest are empty, unless ``all_bodies``."""
     if file.read(len(SIGNATURE)) != SIGNATURE:
         raise PictureError("is no PNG", where=str(path))
     size = file.seek(0, 2)
@@ -126,7 +131,7 @@ def _chunks(file: BinaryIO, path: Path) -> Iterator[tuple[bytes, bytes]]:
             raise _damaged(path, f"it ends within its {kind.decode('latin-1')!r} chunk")
         if kind == b"IEND":
             return
-        if kind not in (b"IHDR", b"iTXt"):
+        if not all_bodies and kind not in (b"IHDR", b"iTXt"):
             file.seek(length + 4, 1)
             yield kind, b""
             continue

@@ -20,6 +20,18 @@ SIGNATURES = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
 
 _MM_PER_INCH = 25.4
 
+#: What the library stumbles with over damaged tags, beside its own error.
+_LIBRARY_ERRORS = (
+    ArithmeticError,
+    AttributeError,
+    LookupError,
+    MemoryError,
+    RuntimeError,
+    TypeError,
+    ValueError,
+    struct.error,
+)
+
 
 @dataclass(frozen=True)
 class TiffHeader:
@@ -69,7 +81,8 @@ def read_tiff_header(path: Path) -> TiffHeader:
         interleaved = page.planarconfig == 1
     if len(shape) == 2:
         shape = (*shape, 1)
-    if len(shape) != 3 or dtype is None or not (interleaved or shape[2] == 1):
+    sizes = [size for size in shape if isinstance(size, int) and size >= 1]  # a damaged tag may be anything
+    if len(shape) != 3 or len(sizes) != 3 or dtype is None or not (interleaved or shape[2] == 1):
         raise PictureError(
             f"holds an array of shape {shape}", where=str(path), rule="it must be one interleaved picture"
         )
@@ -100,7 +113,7 @@ def _opened(path: Path) -> Iterator[Any]:
     try:
         with tifffile.TiffFile(path) as file:
             yield file.pages[0]
-    except (tifffile.TiffFileError, ValueError, RuntimeError, KeyError, IndexError, TypeError, struct.error) as error:
+    except (tifffile.TiffFileError, *_LIBRARY_ERRORS) as error:
         raise PictureError(f"this TIFF is damaged: {error}", where=str(path), fix="make or fetch it anew") from error
     finally:
         log.disabled = before

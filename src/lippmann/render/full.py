@@ -87,9 +87,9 @@ class _Tracer:
         """Sums over the samples of one pass, ``(pixels of the tile, 3)``; ``totals`` grows by the rays it took."""
         plan = self._plan
         lanes = tile.rows * plan.width * plan.channels * run.count
-        per_channel, sample = _divide(dr.arange(mi.UInt32, lanes), dr.opaque(mi.UInt32, run.count))
-        pixel, channel = _divide(per_channel, plan.channels)
-        row, column = _divide(pixel, plan.width)
+        per_channel, sample = divide(dr.arange(mi.UInt32, lanes), dr.opaque(mi.UInt32, run.count))
+        pixel, channel = divide(per_channel, plan.channels)
+        row, column = divide(pixel, plan.width)
         row += dr.opaque(mi.UInt32, tile.first_row)
         sample += dr.opaque(mi.UInt32, run.first)
         # The stream of a sub-pixel is its own; a picture has fewer than 2^32 sub-pixels.
@@ -104,13 +104,14 @@ class _Tracer:
         # All at once: a sum of an unevaluated radiance would run the path loop anew.
         dr.eval(radiance, counts.secondary, counts.shadow, finite)
         totals.primary += lanes
-        totals.secondary += _total(counts.secondary)
-        totals.shadow += _total(counts.shadow)
+        totals.secondary += lane_total(counts.secondary)
+        totals.shadow += lane_total(counts.shadow)
         totals.discarded += lanes - int(dr.count(finite)[0])
         return _channel_sums(radiance, plan.channels, run.count)
 
 
-def _divide(number: Any, by: Any) -> tuple[Any, Any]:
+def divide(number: Any, by: Any) -> tuple[Any, Any]:
+    """Quotient and remainder of whole numbers on the device."""
     quotient = number // by
     return quotient, number - quotient * by
 
@@ -124,7 +125,8 @@ def _channel_sums(radiance: Any, channels: int, count: int) -> NDArray[np.float3
     return np.ascontiguousarray(np.diagonal(sums.reshape(-1, 3, 3), axis1=1, axis2=2))
 
 
-def _total(counts: Any) -> int:
+def lane_total(counts: Any) -> int:
+    """The sum of evaluated counts over all lanes."""
     # Sums of 32-bit counts overflow beyond 2^32 rays a wavefront; 64 bits do not.
     return int(dr.sum(mi.UInt64(counts))[0])
 

@@ -17,6 +17,9 @@ from lippmann.scene.mitsuba_source import MitsubaSource
 from lippmann.scene.resources import read_bytes
 from lippmann.scene.scene import Scene, checked, lit
 
+#: Words in place of an environment file: the built-in studio, and no light but the scene's own.
+STUDIO, NO_ENVIRONMENT = "studio", "none"
+
 # Suffix -> "module:function" of its reader: read(path, *, allow_outside) -> SceneDescription | MitsubaSource.
 _READERS = {
     ".glb": "lippmann.scene.gltf:read_gltf",
@@ -48,7 +51,7 @@ def load_scene(
         ``mitsuba.load_dict``.
     environment:
         Light from all around in place of the scene's own: an EXR or HDR file, or "studio" for the built-in one.
-        A scene without any light gets the studio anyway.
+        A scene without any light gets the studio anyway, unless this is "none".
     background:
         Linear RGB seen where nothing is hit; None for the environment (for the studio a grey backdrop).
     allow_outside:
@@ -64,7 +67,8 @@ def load_scene(
     sky = _environment(environment)
     color = _background(background)
     scene = _from_name(source, allow_outside) if isinstance(source, str | Path) else _from_object(source)
-    return replace(scene, description=lit(scene.description, sky, color))
+    studio = scene.studio and str(environment) != NO_ENVIRONMENT
+    return replace(scene, description=lit(scene.description, sky, color), studio=studio)
 
 
 def known_suffixes() -> tuple[str, ...]:
@@ -150,7 +154,9 @@ def _from_object(source: object) -> Scene:
 def _environment(environment: str | Path | Environment | None) -> Environment | None:
     if environment is None or isinstance(environment, Environment):
         return environment
-    if environment == "studio":
+    if str(environment) == NO_ENVIRONMENT:
+        return None
+    if str(environment) == STUDIO:
         from lippmann.scene.studio import studio
 
         return studio()

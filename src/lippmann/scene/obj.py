@@ -7,7 +7,7 @@ Python (tinyobjloader). Materials are mapped in ``mtl_material.py``.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -110,27 +110,25 @@ def read_obj(path: Path, *, allow_outside: bool = False) -> SceneDescription:
 def _take_apart(text: str, where: str) -> _Statements:
     """Sort the lines by keyword. The only pass over the file in Python, so it does as little as it can."""
     found = _Statements()
-    numeric = {"v": found.positions, "vt": found.uvs, "vn": found.normals}
+    numeric = {
+        keyword: (lines.bodies.append, lines.numbers.append)
+        for keyword, lines in (("v", found.positions), ("vt", found.uvs), ("vn", found.normals), ("f", found.faces))
+    }
     material_index = {"": 0}
-    carried, number = "", 0
-    for number, line in enumerate(text.split("\n"), 1):
-        if carried:
-            line, carried = carried + line, ""
-        if line.endswith(("\\", "\\\r")):
-            carried = line.rstrip("\r")[:-1] + " "
-            continue
+    for number, line in _logical_lines(text, where) if "\\" in text else enumerate(text.split("\n"), 1):
         parts = line.split(None, 1)
-        if not parts or parts[0][0] == "#":
+        if not parts:
             continue
         key, body = parts[0], parts[1] if len(parts) > 1 else ""
         if key in numeric:
-            numeric[key].add(_uncommented(body), number)
-        elif key == "f":
-            body = _uncommented(body)
-            if "-" in body:
+            if "#" in body:
+                body = body.split("#", 1)[0]
+            if "-" in body and key == "f":
                 counts = (len(found.positions.bodies), len(found.uvs.bodies), len(found.normals.bodies))
                 body = _absolute(body, counts, f"{where}:{number}")
-            found.faces.add(body, number)
+            add_body, add_number = numeric[key]
+            add_body(body)
+            add_number(number)
         elif key == "usemtl":
             name = body.strip()
             index = material_index.setdefault(name, len(material_index))
@@ -141,18 +139,25 @@ def _take_apart(text: str, where: str) -> _Statements:
             found.smoothing_runs.append((len(found.faces.bodies), _smoothing_group(body)))
         elif key == "mtllib":
             found.libraries.add(body.strip(), number)
-        elif key in _UNSUPPORTED:
-            what = _UNSUPPORTED[key]
+        elif key[0] != "#" and key not in _SILENT:
+            what = _UNSUPPORTED.get(key, f"statements '{key[:40]}'")
             found.ignored[what] = found.ignored.get(what, 0) + 1
-        elif key not in _SILENT:
-            raise SceneError(f"unknown keyword '{key[:40]}'", where=f"{where}:{number}", fix="is it an OBJ file?")
-    if carried:
-        raise SceneError("the file ends in a continued line", where=f"{where}:{number}", fix="is it cut short?")
     return found
 
 
-def _uncommented(body: str) -> str:
-    return body.split("#", 1)[0] if "#" in body else body
+def _logical_lines(text: str, where: str) -> Iterator[tuple[int, str]]:
+    """Lines with the number they begin on; one that ends in a backslash goes on with the next."""
+    carried, start = "", 0
+    number = 0
+    for number, line in enumerate(text.split("\n"), 1):
+        start = start or number
+        if line.endswith(("\\", "\\\r")):
+            carried += line.rstrip("\r")[:-1] + " "
+            continue
+        yield start, carried + line
+        carried, start = "", 0
+    if carried:
+        raise SceneError("the file ends in a continued line", where=f"{where}:{number}", fix="is it cut short?")
 
 
 def _smoothing_group(body: str) -> int:
@@ -222,7 +227,8 @@ def _assemble(statements: _Statements, where: str) -> _Geometry:
 def _complete_normals(geometry: _Geometry, smoothing: Integers) -> None:
     """Unit normals, and those that smoothing groups ask for: the mean around each vertex, weighted by angle.
 
-    Weights by angle (Thuermer and Wuethrich 1998) do not depend on how polygons were cut into triangles. A corner without a normal and outside any group stays flat (-1).
+    Weights by angle (Thuermer and Wuethrich 1998) do not depend on how polygons were cut into triangles. A corner
+    without a normal and outside any group stays flat (-1).
     """
     lengths = np.linalg.norm(geometry.normals, axis=1)
     usable = lengths > 1e-12

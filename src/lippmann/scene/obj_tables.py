@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -85,25 +86,34 @@ def read_corners(faces: Lines, where: str) -> tuple[Integers, Integers]:
             fix="is the file cut short?",
         )
     flat = [corner for face in words for corner in face]
-    slashes = {corner.count("/") for corner in flat}
-    joined = " ".join(flat)
-    corners = np.zeros((len(flat), 3), np.int64)
-    doubles = joined.count("//")
-    slots = {(0, 0): [0], (1, 0): [0, 1], (2, 0): [0, 1, 2], (2, len(flat)): [0, 2]}.get(
-        (next(iter(slashes)), doubles) if len(slashes) == 1 else (-1, 0)
-    )
-    try:
-        if slots is None:
-            raise ValueError
-        numbers = np.array([int(word) for word in joined.replace("/", " ").split()], np.int64)
-        corners[:, slots] = numbers.reshape(len(flat), len(slots))
-    except (ValueError, OverflowError):
-        _mixed_corners(flat, corners, np.repeat(faces.numbers, sizes), where)
+    corners = _uniform_corners(flat)
+    if corners is None:
+        corners = _mixed_corners(flat, np.repeat(faces.numbers, sizes), where)
     return corners, sizes
 
 
-def _mixed_corners(flat: Sequence[str], corners: Integers, numbers: Integers, where: str) -> None:
-    """Fill ``corners`` one at a time: for files that mix ``a``, ``a/b``, ``a//c`` and ``a/b/c``."""
+def _uniform_corners(flat: Sequence[str]) -> Integers | None:
+    """The corners if all have the same form (``a``, ``a/b``, ``a//c`` or ``a/b/c``) and are numbers, else None."""
+    joined = " ".join(flat)
+    slashes = {corner.count("/") for corner in flat}
+    form = (slashes.pop(), joined.count("//")) if len(slashes) == 1 else None
+    slots = {(0, 0): [0], (1, 0): [0, 1], (2, 0): [0, 1, 2], (2, len(flat)): [0, 2]}.get(form) if form else None
+    if slots is None:
+        return None
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")  # NumPy only warns of a word that is no number
+            numbers = np.fromstring(joined.replace("/", " "), np.int64, sep=" ")
+        corners = np.zeros((len(flat), 3), np.int64)
+        corners[:, slots] = numbers.reshape(len(flat), len(slots))
+    except (ValueError, DeprecationWarning):
+        return None
+    return corners
+
+
+def _mixed_corners(flat: Sequence[str], numbers: Integers, where: str) -> Integers:
+    """The corners read one at a time."""
+    corners = np.zeros((len(flat), 3), np.int64)
     for row, corner in enumerate(flat):
         try:
             places = [int(word) if word else 0 for word in corner.split("/")]
@@ -112,6 +122,7 @@ def _mixed_corners(flat: Sequence[str], corners: Integers, numbers: Integers, wh
             raise SceneError(
                 f"face corner '{corner[:40]}'", where=f"{where}:{numbers[row]}", rule="it is v, v/vt, v//vn or v/vt/vn"
             ) from None
+    return corners
 
 
 def check_range(corners: Integers, counts: Sequence[int], numbers: Integers, where: str) -> None:

@@ -25,9 +25,9 @@ Vector = tuple[float, float, float]
 #: Share of the panel's width or height that a fitted scene fills if it is shallow.
 FILL = 0.95
 
-#: Share that it fills, seen from the viewing distance, however deep it is. A deep scene is shrunk into the depth that the display resolves, but that
-#: pays only so far: blur grows with the scene, so beyond the resolved depth a larger scene shows as much detail. On
-#: panels with few pixels per lens, which resolve millimetres, it would be a speck.
+#: Share that it fills, seen from the viewing distance, however deep it is. A deep scene is shrunk into the depth that
+#: the display resolves, but that pays only so far: blur grows with the scene, so beyond the resolved depth a larger
+#: scene shows as much detail. On panels with few pixels per lens, which resolve millimetres, it would be a speck.
 LEAST_FILL = 0.4
 
 #: Share of the scene's depth that a fitted scene has in front of the lens plane, where the aperture allows it.

@@ -67,10 +67,11 @@ class Batch:
         """The box ``(2, 3)`` around all primitives; None for none, or for shapes without end."""
         if not len(self):
             return None
-        low, high = self._extents()
+        low, high = self.extents()
         return np.stack([low.min(axis=0), high.max(axis=0)])
 
-    def _extents(self) -> tuple[Numbers, Numbers]:
+    def extents(self) -> tuple[Numbers, Numbers]:
+        """Lowest and highest corners ``(n, 3)`` of the boxes around the primitives, of kinds that have an end."""
         raise NotImplementedError  # every finite kind answers; kinds without end override bounds()
 
     def _require(self, good: Flags | np.bool_, rule: str) -> None:
@@ -100,7 +101,7 @@ class Spheres(Batch):
         super().__post_init__()
         self._require(self.radii > 0, "a radius is positive")
 
-    def _extents(self) -> tuple[Numbers, Numbers]:
+    def extents(self) -> tuple[Numbers, Numbers]:
         return self.centers - self.radii[:, None], self.centers + self.radii[:, None]
 
 
@@ -127,7 +128,7 @@ class Tubes(Batch):
         fair = (self.base_radius >= 0) & (self.apex_radius >= 0) & (self.base_radius + self.apex_radius > 0)
         self._require(fair, "radii are not negative, and not both zero")
 
-    def _extents(self) -> tuple[Numbers, Numbers]:
+    def extents(self) -> tuple[Numbers, Numbers]:
         axis = self.apex - self.base
         axis = axis / np.linalg.norm(axis, axis=1, keepdims=True)
         base, apex = _disc_extent(axis, self.base_radius), _disc_extent(axis, self.apex_radius)
@@ -172,7 +173,7 @@ class Rings(Batch):
         self._require(_unit(self.normals), "a normal is a unit vector")
         self._require((self.inner >= 0) & (self.inner < self.outer), "the inner radius is 0 or more, the outer larger")
 
-    def _extents(self) -> tuple[Numbers, Numbers]:
+    def extents(self) -> tuple[Numbers, Numbers]:
         extent = _disc_extent(self.normals, self.outer)
         return self.centers - extent, self.centers + extent
 
@@ -191,7 +192,7 @@ class Boxes(Batch):
         super().__post_init__()
         self._require((self.minimum <= self.maximum).all(axis=1), "the minimum is not above the maximum")
 
-    def _extents(self) -> tuple[Numbers, Numbers]:
+    def extents(self) -> tuple[Numbers, Numbers]:
         return self.minimum, self.maximum
 
 
@@ -236,7 +237,7 @@ class Triangles(Batch):
     smooth: Flags = field(default_factory=_no_flags)
     colored: Flags = field(default_factory=_no_flags)
 
-    def _extents(self) -> tuple[Numbers, Numbers]:
+    def extents(self) -> tuple[Numbers, Numbers]:
         return self.positions.min(axis=1), self.positions.max(axis=1)
 
 

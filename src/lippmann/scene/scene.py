@@ -30,6 +30,7 @@ class Scene:
 
     ``description`` is what was read, with the environment and background that the caller asked for in it.
     ``home_camera`` names the camera that the scene was made to be shown by (bundled scenes), None for all others.
+    ``studio`` says whether the built-in studio may light a scene that has no lights.
 
     A scene from Mitsuba knows its ``bounds``, ``cameras``, ``lights`` and hence ``environment``, ``background`` and
     ``notes`` only once the engine has started: asked before, they raise :class:`EngineError`.
@@ -38,6 +39,7 @@ class Scene:
     name: str
     description: SceneDescription | MitsubaSource = field(repr=False)
     home_camera: str | None = None
+    studio: bool = True
 
     @cached_property
     def bounds(self) -> Bounds:
@@ -55,36 +57,41 @@ class Scene:
 
     @cached_property
     def has_lights(self) -> bool:
-        """Whether anything in the scene shines: lamps, glowing or unlit surfaces, an environment that was asked for."""
+        """Whether the scene has light of its own, or an environment was asked for; see :func:`has_lights`."""
         if self.description.environment is not None:
             return True
         if isinstance(self.description, MitsubaSource):
             return self.description.has_lights()
         return has_lights(self.description)
 
-    @cached_property
+    @property
+    def in_studio(self) -> bool:
+        """Whether the built-in studio lights the scene, for want of other light."""
+        return self.studio and not self.has_lights
+
+    @property
     def environment(self) -> Environment | None:
         """Light from far away: the scene's or the caller's; the studio where the scene has no light at all."""
-        if self.has_lights:
+        if not self.in_studio:
             return self.description.environment
         from lippmann.scene.studio import studio
 
         return studio()
 
-    @cached_property
+    @property
     def background(self) -> Color | None:
         """What is seen where nothing is hit; None for the environment itself (black without one)."""
-        if self.description.background is not None or self.has_lights:
+        if self.description.background is not None or not self.in_studio:
             return self.description.background
         from lippmann.scene.studio import BACKDROP
 
         return BACKDROP
 
-    @cached_property
+    @property
     def notes(self) -> tuple[str, ...]:
         """What the reader could not honour and what was assumed, one line each."""
         read = () if isinstance(self.description, MitsubaSource) else tuple(self.description.notes)
-        return (*read, *(() if self.has_lights else (STUDIO_NOTE,)))
+        return (*read, STUDIO_NOTE) if self.in_studio else read
 
     def camera(self, name: str | None = None, bounds: Bounds | None = None) -> Camera:
         """A camera by name; without one the first, or for a scene without cameras one that frames it from +z.
@@ -196,12 +203,15 @@ def _box_corners(points: Bounds) -> Bounds:
 
 
 def has_lights(description: SceneDescription) -> bool:
-    """Whether a description sheds light: a lamp, an environment, a glowing surface, or nothing but unlit surfaces."""
+    """Whether a description sheds light: an environment, a lamp, a surface brighter than white, or only unlit surfaces.
+
+    Surfaces that glow no brighter than white (radiance 1) are labels and screens, which do not light a scene.
+    """
     if description.environment is not None or any(max(light.color) > 0.0 for light in description.lights):
         return True
     indices = {description.meshes[instance.mesh].material for instance in description.instances}
     materials = [description.materials[index] for index in indices]
-    return any(max(material.emission) > 0.0 for material in materials) or (
+    return any(max(material.emission) > 1.0 for material in materials) or (
         bool(materials) and all(material.unlit for material in materials)
     )
 

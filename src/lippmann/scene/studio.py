@@ -19,7 +19,7 @@ BACKDROP: Color = (0.18, 0.18, 0.18)
 _HEIGHT = 256
 
 # Radiance of the walls straight down, at the horizon and straight up, before scaling.
-_FLOOR, _HORIZON, _CEILING = 0.12, 0.35, 0.5
+_FLOOR, _HORIZON, _CEILING = 0.1, 0.25, 0.35
 
 # A white diffuse surface that faces the viewer, tilted this much upwards (degrees), comes out at radiance 1.
 _CALIBRATION_TILT = 30.0
@@ -38,10 +38,10 @@ class _SoftBox:
 
 
 _BOXES = (
-    _SoftBox(azimuth=-45.0, elevation=40.0, half_width=24.0, half_height=18.0, radiance=9.0),  # key, left of the viewer
-    _SoftBox(azimuth=60.0, elevation=20.0, half_width=16.0, half_height=30.0, radiance=2.5),  # fill, on the right
-    _SoftBox(azimuth=0.0, elevation=85.0, half_width=35.0, half_height=14.0, radiance=4.0),  # overhead
-    _SoftBox(azimuth=155.0, elevation=25.0, half_width=9.0, half_height=28.0, radiance=7.0),  # rim, from behind
+    _SoftBox(azimuth=-50.0, elevation=45.0, half_width=22.0, half_height=18.0, radiance=14.0),  # key, on the left
+    _SoftBox(azimuth=65.0, elevation=15.0, half_width=14.0, half_height=30.0, radiance=1.8),  # fill, on the right
+    _SoftBox(azimuth=0.0, elevation=80.0, half_width=30.0, half_height=10.0, radiance=3.0),  # overhead
+    _SoftBox(azimuth=150.0, elevation=25.0, half_width=8.0, half_height=28.0, radiance=10.0),  # rim, from behind
 )
 
 

@@ -163,12 +163,15 @@ def test_bad_buffer_views_are_refused(writer, read, changes, words):
 
 
 def test_an_accessor_is_decoded_once(writer, read):
-    first, second = writer.mesh(), None
-    second = writer.add("meshes", primitives=[dict(writer.json["meshes"][first]["primitives"][0], material=0)])
+    first = writer.mesh(indices=writer.accessor([0, 1, 2], "u2"))
+    primitive = writer.json["meshes"][first]["primitives"][0]
     writer.add("materials", name="other")
-    writer.node(mesh=first)
-    writer.node(mesh=second)
-    one, other = read(writer).meshes
+    same = writer.add("meshes", primitives=[{**primitive, "material": 0}])
+    turned = writer.add("meshes", primitives=[{**primitive, "indices": writer.accessor([2, 1, 0], "u2")}])
+    for mesh in (first, same, turned):
+        writer.node(mesh=mesh)
+    one, other, backward = read(writer).meshes
     assert one.material != other.material
-    assert one.positions is other.positions
+    assert one.positions is other.positions is backward.positions
     assert one.faces is other.faces
+    np.testing.assert_array_equal(backward.faces, [[2, 1, 0]])

@@ -155,7 +155,7 @@ def test_changed_json(tmp_path, original, data):
         for key in path[:-1]:
             holder = holder[key]
         if data.draw(st.booleans()):
-            holder[path[-1]] = data.draw(VALUES)
+            holder[path[-1]] = copy.deepcopy(data.draw(VALUES))  # a later change must not reach into the strategy
         else:
             del holder[path[-1]]
     (tmp_path / "changed.gltf").write_text(json.dumps(value))

@@ -7,7 +7,6 @@ import pytest
 
 from lippmann.errors import SceneError
 from lippmann.scene.description import Material
-from lippmann.scene.gltf.specular_glossiness import _convert
 
 
 @pytest.fixture
@@ -190,59 +189,40 @@ def test_bad_materials_are_refused(material, values, words):
     assert words in str(caught.value)
 
 
-def _reflectances(base, metallic):
-    """Diffuse colour and reflectance at normal incidence of the metallic-roughness model."""
-    return base * (1 - metallic) * (1 - 0.04), 0.04 * (1 - metallic) + base * metallic
-
-
-@pytest.mark.parametrize("level", [0.0, 0.2, 0.6])
-@pytest.mark.parametrize("metallic", [0.0, 1.0])
-def test_specular_glossiness_conversion_inverts_the_other_way(level, metallic):
-    diffuse, specular = _reflectances(np.array([level] * 3), metallic)
-    found_base, found_metallic = _convert(diffuse / (1 - specular.max()), specular)
-    found_diffuse, found_specular = _reflectances(found_base, found_metallic)
-    np.testing.assert_allclose(found_diffuse, diffuse, atol=2e-3)
-    np.testing.assert_allclose(found_specular, np.maximum(specular, 0.0), atol=0.041 if specular.max() < 0.04 else 2e-3)
-
-
-def test_specular_glossiness_gold_is_a_metal(material):
-    gold = {"diffuseFactor": [0, 0, 0, 0.5], "specularFactor": [1.0, 0.766, 0.336], "glossinessFactor": 0.9}
-    found = material(extensions={"KHR_materials_pbrSpecularGlossiness": gold})
-    assert found.metallic == pytest.approx(1.0)
-    np.testing.assert_allclose(found.base_color, (1.0, 0.766, 0.336), atol=1e-3)
+def test_specular_glossiness_of_numbers(material):
+    gold = {"diffuseFactor": [0.1, 0, 0, 0.5], "specularFactor": [1.0, 0.766, 0.336], "glossinessFactor": 0.9}
+    found = material(
+        pbrMetallicRoughness={"metallicFactor": 1},
+        extensions={
+            "KHR_materials_pbrSpecularGlossiness": gold,
+            "KHR_materials_specular": {"specularFactor": 0.5, "specularTexture": {"index": 0}},
+        },
+    )
+    assert (found.base_color, found.alpha, found.metallic) == ((0.1, 0, 0), 0.5, 0.0)
+    assert (found.specular, found.specular_texture, found.specular_color) == (1.0, None, (1.0, 0.766, 0.336))
     assert found.roughness == pytest.approx(0.1)
-    assert found.alpha == 0.5
+    assert found.metallic_roughness_texture is None
+    # What is reflected at normal incidence is the specular colour, all but the last few thousandths.
+    assert ((found.ior - 1) / (found.ior + 1)) ** 2 == pytest.approx(1.0, abs=4e-3)
 
 
-def test_specular_glossiness_plastic_keeps_its_texture(material):
-    plastic = {"diffuseTexture": {"index": 0}, "specularFactor": [0.04, 0.04, 0.04], "glossinessFactor": 0.25}
-    found = material(extensions={"KHR_materials_pbrSpecularGlossiness": plastic})
-    assert (found.metallic, found.roughness) == (0.0, 0.75)
-    np.testing.assert_allclose(found.base_color, (1, 1, 1), atol=1e-6)
-    assert _pixel(found.base_color_texture) == [255, 0, 0]
-
-
-def test_specular_glossiness_texels_are_converted_one_by_one(writer, read):
-    diffuse = writer.texture([[[0, 0, 0, 255], [188, 188, 188, 128]]])
-    specular = writer.texture([[[255, 255, 255, 255], [0, 0, 0, 0]]])
+def test_specular_glossiness_of_textures(writer, read):
+    diffuse = writer.texture([[[10, 20, 30, 255]]])
+    specular = writer.texture([[[1, 2, 3, 255], [4, 5, 6, 0]]])
     archived = {"diffuseTexture": {"index": diffuse}, "specularGlossinessTexture": {"index": specular}}
     writer.add("materials", extensions={"KHR_materials_pbrSpecularGlossiness": {**archived, "glossinessFactor": 0.8}})
-    uvs = writer.accessor([[0, 0], [1, 0], [0, 1]])
-    found = read(writer.triangle(material=0, attributes={"TEXCOORD_0": uvs})).materials[0]
-    metal = found.metallic_roughness_texture.image.pixels
-    base = found.base_color_texture.image.pixels
-    np.testing.assert_array_equal(metal[0, :, 1], [51, 255])  # roughness 1 - 0.8, and 1
-    np.testing.assert_array_equal(metal[0, :, 2], [255, 0])
-    np.testing.assert_array_equal(base[0, :, 3], [255, 128])
-    assert base[0, 0].tolist()[:3] == [255, 255, 255]
-    # sRGB 188 is 0.503 linear; over 0.96 it is 0.524, sRGB 191.
-    assert base[0, 1].tolist()[:3] == [191, 191, 191]
-    assert found.base_color_texture.srgb
+    found = read(writer.triangle(material=0)).materials[0]
+    assert _pixel(found.base_color_texture) == [10, 20, 30, 255]
+    assert _pixel(found.specular_color_texture) == [1, 2, 3, 255]
+    assert found.specular_color_texture.srgb
+    assert found.roughness == 1.0
+    texels = found.metallic_roughness_texture.image.pixels
+    np.testing.assert_array_equal(texels, [[[0, 51, 0], [0, 255, 0]]])  # roughness 1 - 0.8, and 1
     assert not found.metallic_roughness_texture.srgb
 
 
-def test_specular_texture_that_lies_otherwise_is_noted(writer, read):
-    first, second = writer.texture([[[9, 9, 9]]]), writer.texture([[[9, 9, 9, 9]]])
-    archived = {"diffuseTexture": {"index": first}, "specularGlossinessTexture": {"index": second, "texCoord": 1}}
-    writer.add("materials", extensions={"KHR_materials_pbrSpecularGlossiness": archived})
-    assert any("lies otherwise" in note for note in read(writer.triangle(material=0)).notes)
+def test_specular_glossiness_texture_without_alpha_has_the_factor_alone(material):
+    archived = {"specularGlossinessTexture": {"index": 0}, "glossinessFactor": 0.75}
+    found = material(extensions={"KHR_materials_pbrSpecularGlossiness": archived})
+    assert (found.roughness, found.metallic_roughness_texture) == (0.25, None)
+    assert _pixel(found.specular_color_texture) == [255, 0, 0]

@@ -26,6 +26,11 @@ def test_scale_then_rotation_then_translation_down_the_tree(writer, read, world_
     np.testing.assert_allclose(world_points(read(writer)), [[10, 1, 5], [10, 3, 5], [7, 1, 5]], atol=1e-12)
 
 
+def test_a_node_scales_along_its_own_axes(writer, read, world_points):
+    writer.node(mesh=writer.mesh(), rotation=TURN_Z, scale=[2, 3, 1])
+    np.testing.assert_allclose(world_points(read(writer)), [[0, 0, 0], [0, 2, 0], [-3, 0, 0]], atol=1e-12)
+
+
 @pytest.mark.parametrize(
     ("quaternion", "image_of_x"),
     [
@@ -53,6 +58,15 @@ def test_a_mesh_shown_by_many_nodes_is_kept_once(writer, read, world_points):
     assert len(scene.meshes) == 1
     assert [instance.mesh for instance in scene.instances] == [0, 0, 0]
     np.testing.assert_array_equal(world_points(scene)[::3, 0], [0, 1, 2])
+
+
+def test_meshes_of_the_same_data_and_material_are_one(writer, read):
+    first = writer.mesh()
+    writer.node(mesh=first)
+    writer.node(mesh=writer.add("meshes", primitives=writer.json["meshes"][first]["primitives"]))
+    scene = read(writer)
+    assert len(scene.meshes) == 1
+    assert [instance.mesh for instance in scene.instances] == [0, 0]
 
 
 def test_the_default_scene_is_shown(writer, read):
@@ -168,9 +182,12 @@ def test_vertices_that_leave_single_precision_are_refused(writer, read):
 
 
 def test_a_flattened_mesh_is_flattened_in_its_vertices(writer, read, world_points):
-    writer.node(mesh=writer.mesh([[0, 0, 3], [1, 0, 4], [0, 1, 5]]), scale=[2, 2, 0], translation=[0, 0, 7])
+    mesh = writer.mesh([[0, 0, 3], [1, 0, 4], [0, 1, 5]])
+    writer.node(mesh=mesh, scale=[2, 2, 0], translation=[0, 0, 7])
+    writer.node(mesh=mesh, scale=[0, 1, 1])
     scene = read(writer)
-    np.testing.assert_allclose(world_points(scene), [[0, 0, 7], [2, 0, 7], [0, 2, 7]])
+    np.testing.assert_allclose(world_points(scene, 0), [[0, 0, 7], [2, 0, 7], [0, 2, 7]])
+    np.testing.assert_allclose(world_points(scene, 1), [[0, 0, 3], [0, 0, 4], [0, 1, 5]])
     assert np.linalg.det(scene.instances[0].world_from_mesh) == 1.0
 
 

@@ -54,6 +54,11 @@ def test_no_two_boughs_are_alike(branches):
     assert len(np.unique(heights.round(3))) > 0.9 * len(tips)
 
 
+def test_crown_is_round(branches):
+    spread = np.ptp(branches.apex, axis=0)
+    assert spread[2] > 0.5 * spread[0]
+
+
 def test_stands_upright_on_the_lawn(branches):
     np.testing.assert_array_equal(branches.base[0], 0)
     assert branches.apex[0] == pytest.approx((0, tree.LAYOUT.trunk, 0))

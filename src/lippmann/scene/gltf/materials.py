@@ -8,14 +8,15 @@ from typing import TypedDict
 from lippmann.scene.description import AlphaMode, Color, Material, Texture
 from lippmann.scene.gltf.document import Document
 from lippmann.scene.gltf.fields import LARGEST_NUMBER, Fields
-from lippmann.scene.gltf.specular_glossiness import lie_alike, metallic_roughness_of
+from lippmann.scene.gltf.specular_glossiness import as_specular_glossiness
 from lippmann.scene.gltf.textures import Textures
 
 _ALPHA_MODES: dict[str, AlphaMode] = {"OPAQUE": "opaque", "MASK": "mask", "BLEND": "blend"}
 _WHITE: Color = (1.0, 1.0, 1.0)
 _BLACK: Color = (0.0, 0.0, 0.0)
 
-# KHR_materials_ior writes 0 for "reflects all at normal incidence", the limit of an endless index of refraction.
+# KHR_materials_ior writes 0 for what reflects all light at normal incidence, the limit of an endless index of
+# refraction; this one reflects 99.6 %.
 _ENDLESS_IOR = 1000.0
 
 
@@ -92,18 +93,17 @@ class Materials:
         if index is None:
             return Material(name="default", metallic=1.0)
         fields = self.document.all("materials")[index]
-        return Material(
+        archived = fields.extension("KHR_materials_pbrSpecularGlossiness")
+        material = Material(
             name=fields.text("name") or fields.place,
-            **self._base(fields),
+            **(self._base(fields) if archived is None else {}),
             **self._surface(fields),
             **self._interior(fields),
             **self._layers(fields),
         )
+        return material if archived is None else self._as_specular_glossiness(material, archived)
 
     def _base(self, fields: Fields) -> _Base:
-        archived = fields.extension("KHR_materials_pbrSpecularGlossiness")
-        if archived is not None:
-            return self._specular_glossiness(archived)
         base = fields.child("pbrMetallicRoughness") or Fields({}, fields.place, fields.file)
         red, green, blue, alpha = self._fractions(base, "baseColorFactor", (1.0, 1.0, 1.0, 1.0))
         return {
@@ -115,31 +115,17 @@ class Materials:
             "metallic_roughness_texture": self.textures.read(base, "metallicRoughnessTexture"),
         }
 
-    def _specular_glossiness(self, fields: Fields) -> _Base:
+    def _as_specular_glossiness(self, material: Material, fields: Fields) -> Material:
         red, green, blue, alpha = self._fractions(fields, "diffuseFactor", (1.0, 1.0, 1.0, 1.0))
-        specular = self._fractions(fields, "specularFactor", (1.0, 1.0, 1.0))
-        diffuse_texture = self.textures.read(fields, "diffuseTexture", srgb=True)
-        specular_texture = self.textures.read(fields, "specularGlossinessTexture", srgb=True)
-        if diffuse_texture and specular_texture and not lie_alike(diffuse_texture, specular_texture):
-            self.document.notes.add(
-                "a specular-glossiness texture lies otherwise than its diffuse texture and is left out", fields.place
-            )
-            specular_texture = None
-        converted = metallic_roughness_of(
-            diffuse=(red, green, blue),
-            diffuse_texture=diffuse_texture,
-            specular=(specular[0], specular[1], specular[2]),
+        return as_specular_glossiness(
+            material,
+            diffuse=(red, green, blue, alpha),
+            diffuse_texture=self.textures.read(fields, "diffuseTexture", srgb=True),
+            specular=self._color(fields, "specularFactor", _WHITE),
             glossiness=self._fraction(fields, "glossinessFactor", 1.0),
-            specular_glossiness_texture=specular_texture,
+            specular_glossiness_texture=self.textures.read(fields, "specularGlossinessTexture", srgb=True),
+            ior=_ENDLESS_IOR,
         )
-        return {
-            "base_color": converted.base_color,
-            "base_color_texture": converted.base_color_texture,
-            "alpha": alpha,
-            "metallic": converted.metallic,
-            "roughness": converted.roughness,
-            "metallic_roughness_texture": converted.metallic_roughness_texture,
-        }
 
     def _surface(self, fields: Fields) -> _Surface:
         mode = fields.text("alphaMode") or "OPAQUE"

@@ -41,7 +41,7 @@ class Layout:
 
     shelf: tuple[tuple[float, float], tuple[float, float]] = ((-2.7, -1.45), (2.7, 1.15))
     wall: float = 2.25
-    column: tuple[float, float] = (-2.35, -1.1)
+    column: tuple[float, float] = (-2.35, -0.95)
     globe: tuple[float, float] = (-1.4, -0.65)
     drum: tuple[float, float] = (-0.2, -0.8)
     mirror: tuple[float, float] = (1.0, -0.65)
@@ -54,7 +54,7 @@ class Layout:
 
 
 LAYOUT = Layout()
-STAGE = Stage(target=(0.0, 1.35, 0.32), elevation=30.0, unit=24.0)
+STAGE = Stage(target=(0.0, 1.25, 0.15), elevation=30.0, unit=24.0)
 
 SHELF = ClassicMaterial(color=(0.75, 0.76, 0.78), ambient=0.15, diffuse=0.6, specular=0.15)
 WALL = ClassicMaterial(color=(0.42, 0.50, 0.62), ambient=0.35, diffuse=0.45)
@@ -95,7 +95,8 @@ def make() -> ClassicScene:
 
 def _add_back_row(builder: ClassicSceneBuilder) -> None:
     x, z = LAYOUT.column
-    builder.cylinders((x, 0.0, z), (0.0, 1.0, 0.0), 0.26, _textured(builder, "marble", (x, 0.0, z)))
+    # It leans like the wall, or its upper part would come out in front of the points where rays begin.
+    builder.cylinders((x, 0.0, z), STAGE.rotation[:, 1], 0.26, _textured(builder, "marble", (x, 0.0, z)))
 
     x, z = LAYOUT.globe
     center = (x, 0.6, z)

@@ -114,11 +114,11 @@ def describe() -> SceneDescription:
         Material(
             "porcelain",
             base_color=(0.30, 0.52, 0.42),
-            roughness=0.1,
+            roughness=0.15,
             double_sided=True,
         ),
-        Material("light tiles", base_color=(0.86, 0.84, 0.78), metallic=0.6, roughness=0.08),
-        Material("dark tiles", base_color=(0.05, 0.05, 0.06), metallic=0.6, roughness=0.08),
+        Material("light tiles", base_color=(0.86, 0.84, 0.78), metallic=0.6, roughness=0.12),
+        Material("dark tiles", base_color=(0.05, 0.05, 0.06), metallic=0.6, roughness=0.12),
     ]
     return SceneDescription(
         NAME,
@@ -154,7 +154,7 @@ def _studio(height: int = 256) -> FloatArray:
         ]
         pixels[...] += (fade[1][:, None] * fade[0][None, :])[..., None] * np.array(radiance)
 
-    soft_box((-130.0, 42.0), (20.0, 15.0), (15.0, 14.0, 12.5))
+    soft_box((-130.0, 45.0), (38.0, 26.0), (4.6, 4.3, 3.8))
     soft_box((75.0, 30.0), (8.0, 24.0), (3.0, 3.4, 4.2))
     soft_box((0.0, 62.0), (60.0, 10.0), (2.0, 2.1, 2.3))
     radiance: FloatArray = pixels.astype(np.float32)
