@@ -41,8 +41,8 @@ ORDER = (
 )
 
 #: Conveniences of a part that reach up, each only from inside a function, so that using the part alone loads nothing
-#: more: ``IntegralImage.replay`` and ``.refocus``.
-REACHES_UP = {("image", "replay"), ("image", "refocus")}
+#: more: ``IntegralImage.replay`` and ``.refocus``, and the package ``lippmann.render`` answering as the call.
+REACHES_UP = {("image", "replay"), ("image", "refocus"), ("render", "api")}
 
 #: The only modules that may use Mitsuba or Dr.Jit; of the scene those that build it on the device, never its readers.
 USES_ENGINE = (

@@ -46,6 +46,10 @@ def workplace(tmp_path, monkeypatch):
     trimesh.creation.box().export(tmp_path / "model.stl")
     sky = np.ones((8, 16, 3), dtype=np.float32)
     write_plain_picture(sky, tmp_path / "sky.exr")
+    body = "CAMERA ZOOM 1 ASPECTRATIO 1 ANTIALIASING 0 RAYDEPTH 2 CENTER 0 0 -5 VIEWDIR 0 0 1 UPDIR 0 1 0 END_CAMERA"
+    ball = "SPHERE CENTER 0 0 0 RAD 1 TEXTURE AMBIENT 0.2 DIFFUSE 0.8 SPECULAR 0 OPACITY 1 COLOR 1 1 1 TEXFUNC 0"
+    (tmp_path / "room.dat").write_text(f"BEGIN_SCENE RESOLUTION 64 64 {body} {ball} END_SCENE")
+    (tmp_path / "room.cam").write_text("0 0 1 0 1 0 0 0 -5\n")
     presets = ROOT / "src" / "lippmann" / "display" / "presets"
     shutil.copy(presets / "mla-square.toml", tmp_path / "my-display.toml")
     monkeypatch.chdir(tmp_path)

@@ -30,7 +30,7 @@ pytestmark = pytest.mark.usefixtures("engine")
 PIXEL, GAP, DISTANCE, APERTURE = 0.5, 10.0, 400.0, 60.0
 
 #: A camera this far away (mm) starts in front of every scene here.
-ORTHOGRAPHIC_START = 300.0
+ORTHOGRAPHIC_START = 100.0
 
 #: How far (mm in the lens plane) a stable sample may be moved, and how far (mm) its surface point may jump then.
 NUDGE, JUMP = 1e-4, 1e-2
@@ -123,10 +123,10 @@ class Sheet:
         return centers[order[:, 0]], second - first > 1e-6
 
 
-STRAIGHT = Sheet("lenticular", across=9, columns=24, rows=60)
+STRAIGHT = Sheet("lenticular", across=9, columns=24, rows=160)
 # Three rows down is one pixel across: sub-pixels of neighbouring rows stand behind the same places of their lenses.
-SLANTED = Sheet("lenticular", across=8, columns=20, rows=60, tangent=1 / 3)
-LEANING_LEFT = Sheet("lenticular", across=8, columns=20, rows=60, tangent=-1 / 6)
+SLANTED = Sheet("lenticular", across=8, columns=20, rows=120, tangent=1 / 3)
+LEANING_LEFT = Sheet("lenticular", across=8, columns=20, rows=120, tangent=-1 / 6)
 SQUARE = Sheet("square", across=8, columns=24, rows=20)
 HEXAGONAL = Sheet("hexagonal", across=8, columns=24, rows=24, row_pixels=7)
 SHEETS = {
@@ -207,7 +207,7 @@ def camera_rays(world_from_display, distance, viewpoint, points):
     direction = np.array([0.0, 0.0, -1.0]) if math.isfinite(distance) else np.array([*-viewpoint, -1.0])
     direction /= np.linalg.norm(direction)
     origin = np.array([*viewpoint, distance]) if math.isfinite(distance) else -direction * ORTHOGRAPHIC_START
-    pose = mi.ScalarTransform4f().look_at(
+    pose = mi.ScalarTransform4d().look_at(
         origin=in_world(origin), target=in_world(origin + direction), up=world_from_display[:3, 1] / unit
     )
     # The camera's picture: a square about the middle of its view that holds all points.
@@ -219,19 +219,19 @@ def camera_rays(world_from_display, distance, viewpoint, points):
     half = 1.1 * np.abs(picture).max()
     common = {
         "film": {"type": "hdrfilm", "width": 100, "height": 100, "rfilter": {"type": "box"}},
-        "near_clip": 1e-2 * unit,
-        "far_clip": 1e4 * unit,
+        "near_clip": unit,
+        "far_clip": 1e3 * unit,
     }
     if math.isfinite(distance):
         fov = math.degrees(2 * math.atan(half / distance))
         sensor = mi.load_dict({"type": "perspective", "to_world": pose, "fov": fov, "fov_axis": "x", **common})
     else:
-        pose = pose @ mi.ScalarTransform4f().scale([half * unit, half * unit, 1.0])
+        pose = pose @ mi.ScalarTransform4d().scale([half * unit, half * unit, 1.0])
         sensor = mi.load_dict({"type": "orthographic", "to_world": pose, **common})
     film = 0.5 + 0.5 * picture / half * [1.0, -1.0]
     position = mi.Point2f(film[:, 0].astype(np.float32), film[:, 1].astype(np.float32))
     ray, _ = sensor.sample_ray(0.0, 0.5, position, mi.Point2f(0.5, 0.5))
-    return np.array(ray.o).T, np.array(ray.d).T
+    return tuple(np.broadcast_to(np.array(vector).T, (len(points), 3)) for vector in (ray.o, ray.d))
 
 
 @dataclass
@@ -386,8 +386,8 @@ def figures_of(seen, samples, direct, depth, part):
     hit = usable & direct.hit
     assert 0.1 < hit[usable].mean()
     # What is nothing to the one is nothing to the other.
-    assert (seen["position"][usable & ~direct.hit] == 0).all()
-    assert (np.abs(seen["position"][hit]).max(axis=1) > 0).all()
+    assert (seen["position"][usable & ~direct.hit, part] == 0).all()
+    assert (np.abs(seen["position"][hit, part]).max(axis=1) > 0).all()
     position = seen["position"][:, part] - direct.position[:, part]
     assert np.abs(position[hit]).max() < 0.05 # no single lens may stand aside
     return {

@@ -28,10 +28,8 @@ def run(words: list[str], *, debug: bool = False) -> int:
 
     try:
         code = app(words, prog_name="lippmann", standalone_mode=False)
-    except KeyboardInterrupt:
-        return _leave("stopped; nothing was written", 130)
     except BaseException as error:
-        if type(error).__name__ == "Abort":  # how typer passes Ctrl-C on
+        if _is_interrupt(error):
             return _leave("stopped; nothing was written", 130)
         if debug:
             raise
@@ -46,6 +44,15 @@ def run(words: list[str], *, debug: bool = False) -> int:
             return _leave(f"internal error: {what}; run again with --debug and report it", 1)
         raise
     return code if isinstance(code, int) else 0
+
+
+def _is_interrupt(error: BaseException | None) -> bool:
+    """Whether Ctrl-C is behind an error: typer passes it on as Abort, and Dr.Jit wraps what happens in its loops."""
+    while error is not None:
+        if isinstance(error, KeyboardInterrupt) or type(error).__name__ == "Abort":
+            return True
+        error = error.__cause__ or error.__context__
+    return False
 
 
 def _usage(error: BaseException) -> str:

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import asdict
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
 from lippmann.cli import options
 from lippmann.cli.console import Console
+
+if TYPE_CHECKING:
+    from lippmann.engine import Check
 
 
 def doctor(as_json: options.Json = False) -> None:
@@ -19,13 +22,19 @@ def doctor(as_json: options.Json = False) -> None:
     width = max(len(check.name) for check in diagnosis.checks)
     lines = []
     for check in diagnosis.checks:
-        lines.append(f"{'ok ' if check.ok else '!! '} {check.name:<{width}}  {check.value}")
+        lines.append(f"{_mark(check)} {check.name:<{width}}  {check.value}")
         if check.fix:
             lines.append(f"{'':<{width + 4}} -> {check.fix}")
     verdict = "a render would run" if diagnosis.ok else "a render would not run"
     checks = [asdict(check) for check in diagnosis.checks]
     Console(as_json=as_json).result({"ok": diagnosis.ok, "checks": checks}, "\n".join([*lines, verdict]))
     raise typer.Exit(0 if diagnosis.ok else 1)
+
+
+def _mark(check: Check) -> str:
+    if check.ok:
+        return "ok "
+    return "!! " if check.needed else "-  "
 
 
 def displays(as_json: options.Json = False) -> None:

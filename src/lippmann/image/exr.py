@@ -160,7 +160,9 @@ def _channel_list(raw: bytes) -> dict[str, str]:
 
 
 def _check_chunks(file: BinaryIO, height: int, compression: int) -> None:
-    """EOFError if a chunk of rows lies (partly) beyond the file's end."""
+    """EOFError if a chunk of rows lies (partly) beyond the file's end; later compressions are left to the library."""
+    if compression >= len(_ROWS_PER_CHUNK):
+        return
     count = -(-height // _ROWS_PER_CHUNK[compression])
     table = file.tell()
     size = file.seek(0, 2)

@@ -93,7 +93,7 @@ class Scene:
         read = () if isinstance(self.description, MitsubaSource) else tuple(self.description.notes)
         return (*read, STUDIO_NOTE) if self.in_studio else read
 
-    def camera(self, name: str | None = None, bounds: Bounds | None = None) -> Camera:
+    def camera(self, name: str | None = None) -> Camera:
         """A camera by name; without one the first, or for a scene without cameras one that frames it from +z.
 
         Raises
@@ -105,7 +105,7 @@ class Scene:
             return find_camera(self.cameras, name)
         if self.cameras:
             return next((camera for camera in self.cameras if camera.name == self.home_camera), self.cameras[0])
-        return framing_camera(self.bounds if bounds is None else bounds)
+        return framing_camera(self.bounds)
 
 
 def find_camera(cameras: Sequence[Camera], name: str) -> Camera:

@@ -1,0 +1,17 @@
+"""The package by its few names."""
+
+from __future__ import annotations
+
+import lippmann
+
+
+def test_render_can_be_called_again_and_again(engine):
+    for _ in range(2):
+        image = lippmann.render("teapot", integrator="normal", spp=1)
+        assert image.pixels.shape == (512, 512, 3)
+
+
+def test_all_names_are_there():
+    for name in lippmann.__all__:
+        assert getattr(lippmann, name) is not None
+    assert set(lippmann.__all__) <= set(dir(lippmann))
