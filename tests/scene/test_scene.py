@@ -174,3 +174,12 @@ def test_a_scene_is_frozen_and_short_to_print():
     with pytest.raises(dataclasses.FrozenInstanceError):
         scene.name = "t"
     assert repr(scene) == "Scene(name='s', home_camera=None, studio=True)"
+
+
+def test_bounds_in_another_frame_are_those_of_the_vertices():
+    eighth = np.eye(4)
+    eighth[:2, :2] = np.array([[1, -1], [1, 1]]) / np.sqrt(2)
+    eighth[:3, 3] = (0, 0, 5)
+    scene = Scene("triangle", describe())
+    corners = np.array([[0, 0, 0], [2, 0, 0], [0, 1, 0]]) @ eighth[:3, :3].T + eighth[:3, 3]
+    assert scene.bounds_in(eighth) == pytest.approx(np.stack([corners.min(axis=0), corners.max(axis=0)]))

@@ -30,9 +30,9 @@ def test_directions_cover_the_sphere():
     assert np.linalg.norm(directions, axis=-1) == pytest.approx(np.ones((64, 128)))
     assert solid_angles.sum() == pytest.approx(4 * np.pi)
     assert (directions[0, :, 1] > 0.99).all()  # row 0 is up
-    assert directions[32, 0] == pytest.approx([0, 0, -1], abs=0.05)  # the first column lies behind the scene
-    assert directions[32, 32] == pytest.approx([1, 0, 0], abs=0.05)
-    assert directions[32, 64] == pytest.approx([0, 0, 1], abs=0.05)  # the middle is the viewer's own place
+    assert directions[32, 0] == pytest.approx([0, 0, 1], abs=0.05)  # the first column is the viewer's own place
+    assert directions[32, 64] == pytest.approx([0, 0, -1], abs=0.05)  # the middle lies behind the scene
+    assert directions[32, 96] == pytest.approx([1, 0, 0], abs=0.05)
 
 
 def test_white_comes_out_white():

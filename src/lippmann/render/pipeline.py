@@ -79,7 +79,12 @@ def render_integral_image(
     engine = watch.stage("load", lambda: engines.start(settings.device, settings.threads))
     built = watch.stage("build", lambda: _build(scene))
     placement = place(
-        scene.bounds, display, cameras=scene.cameras, options=placement_options, home_camera=scene.home_camera
+        scene.bounds,
+        display,
+        cameras=scene.cameras,
+        options=placement_options,
+        home_camera=scene.home_camera,
+        bounds_in=scene.bounds_in,
     )
 
     from lippmann.render.full import trace_frame

@@ -160,7 +160,10 @@ class Camera:
 
 @dataclass(frozen=True, eq=False)
 class Environment:
-    """Light from far away: an equirectangular image ``(h, w, 3)`` float32 linear radiance, row 0 at +y (up)."""
+    """Light from far away: an equirectangular image ``(h, w, 3)`` of float32 linear radiance.
+
+    Row 0 lies at +y (up), the middle column at -z, ahead of a viewer who looks that way; columns run to his right (+x).
+    """
 
     pixels: FloatArray
     world_from_environment: Matrix = field(default_factory=lambda: np.eye(4))

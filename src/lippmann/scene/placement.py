@@ -6,7 +6,7 @@ The display frame is right-handed, in millimetres: origin at the array's centre 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Literal, get_args
 
@@ -118,6 +118,7 @@ def place(
     cameras: Sequence[Camera] = (),
     options: PlacementOptions | None = None,
     home_camera: str | None = None,
+    bounds_in: Callable[[Matrix], Bounds] | None = None,
 ) -> Placement:
     """Place a display in a scene.
 
@@ -129,6 +130,9 @@ def place(
         The scene's cameras; ``options.camera`` names one of them.
     home_camera:
         The camera that the scene was made to be shown by, if there is one.
+    bounds_in:
+        The scene's box in another frame (:meth:`lippmann.scene.scene.Scene.bounds_in`), for a depth range that is
+        tight; without it the corners of ``bounds`` are carried over, which can only be too large.
 
     Raises
     ------
@@ -148,6 +152,8 @@ def place(
         display_from_world = _resized(np.eye(4), options)
     display_from_world = _translation(options.shift) @ display_from_world
     corners = _carried(display_from_world, _corners(bounds))
+    if bounds_in is not None:
+        corners = _corners(bounds_in(display_from_world))
     back, front = float(corners[:, 2].min()), float(corners[:, 2].max())
     near, far = display.resolvable_depth
     warnings += _warnings(corners, display)

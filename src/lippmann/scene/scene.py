@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.errors import SceneError
-from lippmann.scene.description import Camera, Color, Environment, Material, Mesh, SceneDescription
+from lippmann.scene.description import Camera, Color, Environment, Material, Matrix, Mesh, SceneDescription
 from lippmann.scene.mitsuba_source import MitsubaSource
 
 Bounds = NDArray[np.float64]
@@ -47,6 +47,16 @@ class Scene:
         if isinstance(self.description, MitsubaSource):
             return self.description.bounds()
         return bounds_of(self.description)
+
+    def bounds_in(self, frame: Matrix) -> Bounds:
+        """The box ``(2, 3)`` along the axes of another frame: ``frame`` is the 4x4 matrix that leads there from world.
+
+        Tight around the vertices of a description; around the corners of the world's box for a scene of Mitsuba's.
+        """
+        if isinstance(self.description, SceneDescription):
+            return bounds_of(self.description, frame)
+        corners = _box_corners(np.asarray(self.bounds)) @ frame[:3, :3].T + frame[:3, 3]
+        return np.stack([corners.min(axis=0), corners.max(axis=0)])
 
     @cached_property
     def cameras(self) -> tuple[Camera, ...]:
@@ -165,8 +175,10 @@ def box(bounds: Bounds) -> tuple[Bounds, Bounds]:
     return (low + high) / 2.0, high - low
 
 
-def bounds_of(description: SceneDescription) -> Bounds:
-    """The box ``(2, 3)`` around all vertices that some triangle of some instance uses, world units.
+def bounds_of(description: SceneDescription, frame: Matrix | None = None) -> Bounds:
+    """The box ``(2, 3)`` around all vertices that some triangle of some instance uses.
+
+    Its sides run along the axes of the world, or of the frame that the 4x4 matrix ``frame`` (from world) leads to.
 
     Raises
     ------
@@ -183,6 +195,7 @@ def bounds_of(description: SceneDescription) -> Bounds:
         if not exact:
             points = _box_corners(points)
         matrix = np.asarray(instance.world_from_mesh, np.float64)
+        matrix = matrix if frame is None else frame @ matrix
         moved = points @ matrix[:3, :3].T + matrix[:3, 3]
         lows.append(moved.min(axis=0))
         highs.append(moved.max(axis=0))

@@ -70,13 +70,13 @@ def studio() -> Environment:
 def directions_of(height: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Unit directions ``(height, 2 height, 3)`` and solid angles (sr) of the texels of an environment.
 
-    Row 0 lies at +y; the first column at -z, and columns run by way of +x (a quarter) and +z (the middle).
+    Row 0 lies at +y and the middle column at -z, ahead of a viewer who looks that way; columns run to his right (+x).
     """
     theta = np.pi * (np.arange(height) + 0.5) / height
     phi = np.pi * (np.arange(2 * height) + 0.5) / height
     sine = np.sin(theta)[:, None]
     directions = np.stack(
-        [sine * np.sin(phi), np.broadcast_to(np.cos(theta)[:, None], (height, 2 * height)), -sine * np.cos(phi)],
+        [-sine * np.sin(phi), np.broadcast_to(np.cos(theta)[:, None], (height, 2 * height)), sine * np.cos(phi)],
         axis=-1,
     )
     edges = np.cos(np.pi * np.arange(height + 1) / height)
