@@ -32,7 +32,7 @@ def main() -> None:
     scene = load_scene("teapot")
     built = build(scene)
     display = load_display("seed-lenticular")
-    placement = place(built.bounds, display, cameras=scene.cameras, home_camera=scene.home_camera)
+    placement = place(scene.bounds, display, cameras=scene.cameras, home_camera=scene.home_camera)
     source = DisplayRays(display, placement.world_from_display)
     width, height = source.width, source.height
     plan = make_plan(width, height, 1, memory=2**31)

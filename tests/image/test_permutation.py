@@ -3,8 +3,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lippmann.display import NUMPY
+from lippmann.display import NUMPY, Display, LensArray, Panel
 from lippmann.errors import PictureError
+from lippmann.image import IntegralImage
 from lippmann.image.permutation import Permutation, lens_indices, micro_images_as_views, row_blocks
 
 
@@ -49,6 +50,30 @@ def test_a_micro_image_holds_the_pixels_of_its_lens_in_their_order(data, random_
         )
         if axis == 3 or display.lens_array.slant == 0:
             np.testing.assert_array_equal((after - before)[both], 1.0)
+
+
+@pytest.mark.parametrize("excess", [0.0, 1e-9, 3e-9, 1e-8, 1e-7, 9e-7, -1e-8, -9e-7])
+@pytest.mark.parametrize("layout", ["lenticular", "square", "hexagonal"])
+@pytest.mark.parametrize("offset", [None, (0.0, 0.0), (0.875, 0.875)])
+def test_boxes_a_hair_above_or_below_whole_pixels_lose_nothing(layout, excess, offset):
+    # A hexagon half as high as wide is (7 + excess) pixels high from tip to tip, and pixels lie right on the tips.
+    across = 7 + (excess if layout != "hexagonal" else 0)
+    row_pitch = 0.5 * (7 + max(excess, 0)) * 0.25 if layout == "hexagonal" else None
+    lenses = LensArray(layout, across * 0.25, offset=offset, row_pitch=row_pitch)
+    for width, height in ((7, 7), (14, 14), (21, 8), (8, 21)):
+        if layout != "lenticular" and height * 0.25 < lenses.row_spacing * (1 - 1e-6):
+            continue
+        display = Display("hair", Panel(width, height, 0.25), lenses, gap=1.0)
+        permutation, values = Permutation(display), numbered(display)
+        micro_images = permutation.split(values)
+        np.testing.assert_array_equal(np.sort(micro_images[permutation.mask]), values.ravel())
+        np.testing.assert_array_equal(permutation.join(micro_images), values)
+        image = IntegralImage(np.repeat(values[..., None], 3, axis=2), display)
+        np.testing.assert_array_equal(
+            IntegralImage.from_micro_images(image.micro_images(), display).pixels, image.pixels
+        )
+        if image.views_are_exact:
+            np.testing.assert_array_equal(IntegralImage.from_views(image.views(), display).pixels, image.pixels)
 
 
 def test_whole_lenticular_lenses_by_hand(display):

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from lippmann._version import VERSION
-from lippmann.cli import pictures, rendering, system
+from lippmann.cli import pictures, quality, rendering, system
 
 app = typer.Typer(
     help="Render 3D scenes into the native pixels of integral-imaging displays.",
@@ -26,6 +26,7 @@ app.command("micro-images")(pictures.micro_images)
 app.command("compose")(pictures.compose)
 app.command("replay")(pictures.replay)
 app.command("refocus")(pictures.refocus)
+app.command("compare")(quality.compare)
 
 
 @app.callback(invoke_without_command=True)

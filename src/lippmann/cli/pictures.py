@@ -43,16 +43,18 @@ def views(
 ) -> None:
     """Write each view (one direction, one pixel of every lens) as a picture of its own."""
     from lippmann.image import read_picture, write_views
+    from lippmann.image.views import view_grid
 
     console = Console(quiet, as_json)
     image = read_picture(picture, display=_display(display))
     with console.progress() as progress:
-        write_views(image, output, format=format, bits=bits, progress=progress)  # type: ignore[arg-type]
-    if not image.views_are_exact:
+        count = write_views(image, output, format=format, bits=bits, progress=progress)  # type: ignore[arg-type]
+    if image.views_note:
         console.remark(image.views_note)
-    rows, columns = image.views().shape[:2]
-    result = {"output": str(output), "views": [rows, columns], "exact": image.views_are_exact}
-    console.result(result, f"{output}: {rows * columns} views")
+    grid = view_grid(image.display)
+    shape = [len(grid.down), len(grid.right)]
+    result = {"output": str(output), "views": shape, "written": count, "exact": grid.exact}
+    console.result(result, f"{output}: {count} views")
 
 
 def micro_images(
@@ -70,10 +72,10 @@ def micro_images(
     console = Console(quiet, as_json)
     image = read_picture(picture, display=_display(display))
     with console.progress() as progress:
-        write_micro_images(image, output, format=format, bits=bits, progress=progress)  # type: ignore[arg-type]
-    rows, columns = image.micro_images().shape[:2]
-    result = {"output": str(output), "lenses": [rows, columns]}
-    console.result(result, f"{output}: {rows * columns} micro-images")
+        count = write_micro_images(image, output, format=format, bits=bits, progress=progress)  # type: ignore[arg-type]
+    grid = image.display.lens_grid
+    result = {"output": str(output), "lenses": [grid.rows, grid.columns], "written": count}
+    console.result(result, f"{output}: {count} micro-images")
 
 
 def compose(

@@ -5,6 +5,7 @@ from lippmann.display.lens_array import LensArray
 from lippmann.display.load import list_displays, load_display
 from lippmann.display.micro_layout import (
     covers_whole_pixels,
+    micro_image_extent,
     micro_image_shape,
     pixel_indices_under_lens,
     pixel_lenses,
@@ -22,6 +23,7 @@ __all__ = [
     "covers_whole_pixels",
     "list_displays",
     "load_display",
+    "micro_image_extent",
     "micro_image_shape",
     "pixel_indices_under_lens",
     "pixel_lenses",

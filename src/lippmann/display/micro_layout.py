@@ -46,8 +46,10 @@ def micro_image_shape(display: Display) -> tuple[int, int]:
     Where micro-images are not whole rectangles of pixels (hexagons, slant, broken numbers) a box has places without
     a pixel.
     """
-    width, height = _micro_image_size(display)
-    return math.ceil(height - WHOLE_TOLERANCE), math.ceil(width - WHOLE_TOLERANCE)
+    width, height = micro_image_extent(display)
+    # Pixels on the box's edge belong to its neighbour, to the tolerance at either end; those inside it need a place.
+    slack = 2 * BOUNDARY_TOLERANCE
+    return math.ceil(height - slack), math.ceil(width - slack)
 
 
 def covers_whole_pixels(display: Display) -> bool:
@@ -70,12 +72,14 @@ def _is_whole(count: float) -> bool:
     return abs(count - round(count)) <= WHOLE_TOLERANCE
 
 
-def _micro_image_size(display: Display) -> tuple[float, float]:
-    """Width and height of the box around one lens's pixels, in pixels, not rounded."""
-    across, down = display.pixels_per_lens
-    if down is None:
+def micro_image_extent(display: Display) -> tuple[float, float]:
+    """Width and height of the box around one micro-image in pixels, not rounded; for the pitches in effect."""
+    lattice, pixel_pitch = display.lattice, display.panel.pixel_pitch
+    across = lattice.pitch * display.magnification / (pixel_pitch * math.cos(math.radians(lattice.slant)))
+    if lattice.layout == "lenticular":
         return across, float(display.panel.height)
-    if display.lens_array.layout == "square":
+    down = lattice.row_pitch * display.magnification / pixel_pitch
+    if lattice.layout == "square":
         return across, down
     # The tips of a hexagonal cell lie where two neighbours of the next row are as near as its own centre.
     return across, down + across * across / (4 * down)
@@ -108,7 +112,7 @@ def _indices_of_block(display: Display, first: int, last: int) -> tuple[Indices,
     x, y = _pixel_centers(display, first, last)
     i, j = display.lens_of(x, y, NUMPY)
     pixel_pitch, lattice, scale = display.panel.pixel_pitch, display.lattice, display.magnification
-    width, height = _micro_image_size(display)
+    width, height = micro_image_extent(display)
     if lattice.layout == "lenticular":
         center_x = lattice.axis_at(i, y / scale) * scale
         k_y = np.broadcast_to(np.arange(first, last, dtype=np.int32)[:, None], x.shape)

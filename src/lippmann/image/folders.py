@@ -64,13 +64,17 @@ def write_views(
     format: FormatName | None = None,
     bits: int | None = None,
     progress: ProgressCallback = silent,
-) -> None:
+) -> int:
     """Write one picture per view, ``view_ROW_COLUMN``, each with one pixel per lens.
 
     Those of a lenticular sheet are as high as the panel. ``format`` and ``bits`` say how values are stored (``png`` 8
     or 16, ``exr`` 32 or 16, ``tiff`` 8, 16 or 32); by default as in the file that the picture came from, computed
     pictures as 32-bit OpenEXR. Where lenses do not cover whole pixels the views are resampled, and cannot be put
     together again; elsewhere OpenEXR keeps the picture's maps too.
+
+    Returns
+    -------
+    The number of views written: those that hold any pixel.
 
     Raises
     ------
@@ -83,7 +87,7 @@ def write_views(
     if name == "exr" and image.views_are_exact:
         split = Permutation(image.display).split
         parts |= {k: micro_images_as_views(split(v), image.display) for k, v in image.maps.items()}
-    _write_parts(image, folder, "views", parts, mask, (name, stored), progress)
+    return _write_parts(image, folder, "views", parts, mask, (name, stored), progress)
 
 
 def write_micro_images(
@@ -93,16 +97,17 @@ def write_micro_images(
     format: FormatName | None = None,
     bits: int | None = None,
     progress: ProgressCallback = silent,
-) -> None:
+) -> int:
     """Write one picture per lens, ``lens_ROW_COLUMN``; parameters and errors as for :func:`write_views`.
 
-    Exact on every display. Places of a micro-image's box that hold no pixel of the lens are black.
+    Exact on every display. Places of a micro-image's box that hold no pixel of the lens are black. Returns the number
+    of micro-images written.
     """
     name, stored = _storage(image, folder, format, bits)
     permutation = Permutation(image.display)
     layers = {"": image.pixels, **image.maps} if name == "exr" else {"": image.pixels}
     parts = {k: permutation.split(v) for k, v in layers.items()}
-    _write_parts(image, folder, "micro-images", parts, permutation.mask, (name, stored), progress)
+    return _write_parts(image, folder, "micro-images", parts, permutation.mask, (name, stored), progress)
 
 
 def compose(folder: Path, *, progress: ProgressCallback = silent) -> IntegralImage:
@@ -158,10 +163,11 @@ def _write_parts(
     mask: NDArray[np.bool_],
     storage: tuple[FormatName, Stored],
     progress: ProgressCallback,
-) -> None:
-    """Write the parts ``(rows, columns, ...)`` of which the mask shows anything, and the manifest."""
+) -> int:
+    """Write the parts ``(rows, columns, ...)`` of which the mask shows anything, and the manifest; their number."""
     name, stored = storage
     present = np.any(mask, axis=(2, 3))
+    count = int(present.sum())
     rows, columns = present.shape
     digits = len(str(max(rows, columns) - 1))
     ending = {"png": ".png", "exr": ".exr", "tiff": ".tif"}[name]
@@ -172,7 +178,7 @@ def _write_parts(
             files[row][column] = file
             layers = {key: values[row, column] for key, values in parts.items()}
             encode_file(temporary / file, name, layers, stored=stored, transfer=image.provenance.transfer)
-            progress(Progress("write", done, int(present.sum())))
+            progress(Progress("write", done, count))
         manifest = {
             **metadata_of(image).to_dict(),
             "kind": kind,
@@ -183,6 +189,7 @@ def _write_parts(
         }
         text = json.dumps(manifest, allow_nan=False, indent=1)
         (temporary / MANIFEST).write_text(text + "\n", encoding="ascii")
+    return count
 
 
 def _read_manifest(folder: Path) -> _Manifest:

@@ -88,7 +88,11 @@ class Permutation:
 
     @property
     def _has_whole_rectangles(self) -> bool:
-        return self.display.lens_array.layout != "hexagonal" and covers_whole_pixels(self.display)
+        if self.display.lens_array.layout == "hexagonal" or not covers_whole_pixels(self.display):
+            return False
+        # A box can be larger than the whole number of pixels that the lenses nearly cover.
+        rows, columns, ny, nx = self.shape
+        return (rows * ny, columns * nx) == (self.display.panel.height, self.display.panel.width)
 
     @cached_property
     def _places(self) -> NDArray[np.int64]:

@@ -22,7 +22,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.display import NUMPY, Display, micro_image_shape
+from lippmann.display import NUMPY, Display, micro_image_extent, micro_image_shape
 from lippmann.display.display import BOUNDARY_TOLERANCE, WHOLE_TOLERANCE
 from lippmann.errors import PictureError
 from lippmann.image.permutation import Permutation, lens_indices
@@ -73,13 +73,9 @@ def view_grid(display: Display) -> ViewGrid:
     across, down = display.pixels_per_lens
     if _is_whole(across) and (down is None or _is_whole(down)):
         return _pixel_views(display)
-    lenticular = down is None
-    return ViewGrid(
-        right=_evenly(across),
-        down=(0.0,) if lenticular else _evenly(_box_height(display)),
-        exact=False,
-        spread=0.0,
-    )
+    width, height = micro_image_extent(display)
+    places_down = (0.0,) if down is None else _evenly(height)
+    return ViewGrid(right=_evenly(width), down=places_down, exact=False, spread=0.0)
 
 
 def exact_view_shape(display: Display) -> tuple[int, int, int, int]:
@@ -151,12 +147,12 @@ def micro_image_centers(display: Display) -> tuple[Real, Real, NDArray[np.int32]
 def _pixel_views(display: Display) -> ViewGrid:
     """The views of a display with whole pixels from lens to lens: one per place of a micro-image's box."""
     u, v, _ = micro_image_centers(display)
-    across, down = display.pixels_per_lens
+    width, height = micro_image_extent(display)
     ny, nx = micro_image_shape(display)
-    right, spread = _first_pixel(u, across)
-    if down is None:
+    right, spread = _first_pixel(u, width)
+    if display.lens_array.layout == "lenticular":
         return ViewGrid(tuple(right + k for k in range(nx)), (0.0,), exact=True, spread=spread)
-    first, spread_down = _first_pixel(v, _box_height(display))
+    first, spread_down = _first_pixel(v, height)
     return ViewGrid(
         right=tuple(right + k for k in range(nx)),
         down=tuple(first + k for k in range(ny)),
@@ -178,16 +174,6 @@ def _evenly(size: float) -> tuple[float, ...]:
     """Places that share ``size`` pixels evenly, one for each whole pixel."""
     count = max(1, math.floor(size + WHOLE_TOLERANCE))
     return tuple((k + 0.5) * size / count - 0.5 * size for k in range(count))
-
-
-def _box_height(display: Display) -> float:
-    """Pixels from the top to the bottom of a micro-image, not rounded; square and hexagonal arrays."""
-    across, down = display.pixels_per_lens
-    assert down is not None
-    if display.lens_array.layout == "square":
-        return down
-    # The tips of a hexagonal cell lie where two neighbours of the next row are as near as its own centre.
-    return down + across * across / (4 * down)
 
 
 def _is_whole(count: float) -> bool:

@@ -25,8 +25,10 @@ from lippmann.scene.primitives import Batch, Boxes, Cylinders, Numbers, Planes, 
 MOST_LISTED_SPHERES = 12
 #: Up to this many other shapes with an end are tested one by one.
 MOST_LISTED_SHAPES = 48
-#: Up to this many shapes without an end have their numbers written into the kernel.
-MOST_LISTED_UNBOUNDED = 64
+#: How many of the largest spheres are looked at for being domes around the rest of the scene.
+_MOST_DOMES = 16
+#: Opacity from which a surface blocks light altogether (Tachyon).
+_CASTS_SHADOW = 0.99999
 
 
 class Kind(IntEnum):
@@ -89,21 +91,133 @@ class ShapeTable:
 
 def make_shape_table(scene: ClassicScene) -> ShapeTable:
     """All exact shapes of a scene; triangles are none."""
-    passes = passing(scene)
-    bounded, boxes = _all(scene, passes, (_spheres, _tubes, _rings, _boxes))
-    unbounded, _ = _all(scene, passes, (_cylinders, _planes))
-    lamps = _lamps(scene)
-
+    bounded, boxes = _joined(
+        scene,
+        (scene.spheres, _spheres(scene.spheres)),
+        (scene.tubes, _tubes(scene.tubes)),
+        (scene.rings, _rings(scene.rings)),
+        (scene.boxes, _boxes(scene.boxes)),
+    )
+    unbounded, _ = _joined(
+        scene, (scene.cylinders, _cylinders(scene.cylinders)), (scene.planes, _planes(scene.planes))
+    )
     traced = _traced(scene, bounded, boxes)
     others, other_boxes = bounded[~traced], boxes[~traced]
-    walked = others, other_boxes
-    listed = unbounded
-    if len(others) <= MOST_LISTED_SHAPES:
-        walked = others[:0], other_boxes[:0]
-        listed = np.concatenate([others, unbounded])
-    if len(unbounded) > MOST_LISTED_UNBOUNDED:
-        pass
-    rows = np.concatenate([bounded[traced], walked[0], listed, lamps])
-    return ShapeTable(rows.astype(np.float32), int(traced.sum()), len(walked[0]), len(listed), len(lamps), walked[1])
+    apart = len(others) > MOST_LISTED_SHAPES
+    walked, listed = (others, unbounded) if apart else (others[:0], np.concatenate([others, unbounded]))
+    lamps = _lamps(scene)
+    rows = np.concatenate([bounded[traced], walked, listed, lamps])
+    return ShapeTable(
+        rows=rows.astype(np.float32),
+        traced=int(traced.sum()),
+        walked=len(walked),
+        listed=len(listed),
+        lamps=len(lamps),
+        boxes=other_boxes[: len(walked)],
+    )
 
 
+def passing(scene: ClassicScene) -> Numbers:
+    """Share of a shadow ray's light that each material lets pass, per crossing ``(materials,)``."""
+    unfiltered = 1.0 if not scene.shading.shadow_filter else None
+    shares = [
+        0.0 if m.opacity >= _CASTS_SHADOW else (1.0 - m.opacity if unfiltered is None else unfiltered)
+        for m in scene.materials
+    ]
+    return np.array(shares or [0.0])
+
+
+def _traced(scene: ClassicScene, rows: Numbers, boxes: Numbers) -> NDArray[np.bool_]:
+    """Which rows are spheres that the engine may trace: it sees no sphere from inside, and clips nothing."""
+    plain = (rows[:, Column.KIND] == Kind.SPHERE) & (rows[:, Column.CLIP] < 0) & (rows[:, Column.INSIDE] == 0)
+    plain &= rows[:, Column.PASSES] == 0
+    plain &= ~np.array([m.opacity < 1.0 for m in scene.materials] or [False])[rows[:, Column.MATERIAL].astype(int)]
+    spheres = np.flatnonzero(plain)
+    viewpoints = [scene.camera.center, *(light.center for light in scene.lights if light.kind != "directional")]
+    for point in viewpoints:
+        plain[spheres] &= np.linalg.norm(rows[spheres, :3] - point, axis=1) > np.sqrt(rows[spheres, Column.K0])
+    centers = boxes.mean(axis=1)
+    for dome in spheres[np.argsort(-rows[spheres, Column.K0])][:_MOST_DOMES]:
+        within = np.linalg.norm(centers - rows[dome, :3], axis=1) < np.sqrt(rows[dome, Column.K0])
+        plain[dome] &= within.sum() - 1 <= (len(rows) - 1) / 2
+    return plain if plain.sum() > MOST_LISTED_SPHERES else np.zeros(len(rows), bool)
+
+
+def _joined(scene: ClassicScene, *parts: tuple[Batch, Numbers]) -> tuple[Numbers, Numbers]:
+    """Rows of all parts with material, clip group and light that passes, and the boxes of those that have an end."""
+    shares = passing(scene)
+    boxes = [np.zeros((0, 2, 3))]
+    for batch, rows in parts:
+        rows[:, Column.MATERIAL] = batch.material
+        rows[:, Column.CLIP] = batch.clip_group
+        rows[:, Column.INSIDE] = getattr(batch, "inside_only", 0)
+        rows[:, Column.PASSES] = shares[batch.material]
+        if len(batch) and not isinstance(batch, Cylinders | Planes):
+            boxes.append(np.stack(batch.extents(), axis=1))
+    return np.concatenate([rows for _, rows in parts]), np.concatenate(boxes)
+
+
+def _blank(count: int, kind: Kind) -> Numbers:
+    rows = np.zeros((count, ROW))
+    rows[:, Column.LOW], rows[:, Column.HIGH], rows[:, Column.KIND], rows[:, Column.CLIP] = -np.inf, np.inf, kind, -1
+    return rows
+
+
+def _spheres(batch: Spheres) -> Numbers:
+    rows = _blank(len(batch), Kind.SPHERE)
+    rows[:, :3], rows[:, Column.K0] = batch.centers, batch.radii**2
+    return rows
+
+
+def _lamps(scene: ClassicScene) -> Numbers:
+    seen = [(number, lamp) for number, lamp in enumerate(scene.lights) if lamp.kind != "directional" and lamp.radius]
+    rows = _blank(len(seen), Kind.SPHERE)
+    for row, (number, lamp) in zip(rows, seen, strict=True):
+        row[:3], row[Column.K0] = lamp.center, lamp.radius**2
+        row[Column.MATERIAL], row[Column.CLIP] = number, lamp.clip_group
+    return rows
+
+
+def _tubes(batch: Tubes) -> Numbers:
+    """The center is the middle of the axis: single precision serves best near it."""
+    rows = _blank(len(batch), Kind.QUADRIC)
+    axis = batch.apex - batch.base
+    length = np.linalg.norm(axis, axis=1)
+    slope = (batch.apex_radius - batch.base_radius) / length
+    middle = (batch.apex_radius + batch.base_radius) / 2.0
+    rows[:, :3], rows[:, Column.K0] = (batch.base + batch.apex) / 2.0, middle**2
+    rows[:, 4:7], rows[:, Column.K1] = axis / length[:, None], middle * slope
+    rows[:, Column.K2], rows[:, Column.LOW], rows[:, Column.HIGH] = 1.0 + slope**2, -length / 2.0, length / 2.0
+    return rows
+
+
+def _cylinders(batch: Cylinders) -> Numbers:
+    """The center is the point of the axis nearest to the world's origin."""
+    rows = _blank(len(batch), Kind.QUADRIC)
+    along = (batch.centers * batch.axes).sum(axis=1, keepdims=True)
+    rows[:, :3], rows[:, Column.K0] = batch.centers - batch.axes * along, batch.radii**2
+    rows[:, 4:7], rows[:, Column.K2] = batch.axes, 1.0
+    return rows
+
+
+def _rings(batch: Rings) -> Numbers:
+    rows = _blank(len(batch), Kind.FLAT)
+    # The middle of a disc belongs to it, although no distance is below 0.
+    rows[:, :3], rows[:, Column.K0] = batch.centers, np.where(batch.inner > 0.0, batch.inner**2, -1.0)
+    rows[:, 4:7], rows[:, Column.K1] = batch.normals, batch.outer**2
+    return rows
+
+
+def _planes(batch: Planes) -> Numbers:
+    """The center is the point of the plane nearest to the world's origin."""
+    rows = _blank(len(batch), Kind.FLAT)
+    offset = (batch.centers * batch.normals).sum(axis=1, keepdims=True)
+    rows[:, :3], rows[:, Column.K0] = batch.normals * offset, -1.0
+    rows[:, 4:7], rows[:, Column.K1] = batch.normals, np.inf
+    return rows
+
+
+def _boxes(batch: Boxes) -> Numbers:
+    rows = _blank(len(batch), Kind.BOX)
+    rows[:, :3], rows[:, 4:7] = batch.minimum, batch.maximum
+    return rows

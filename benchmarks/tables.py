@@ -1,0 +1,119 @@
+"""Writes the tables of ``docs/measurements.md`` from the results in ``results/``: figures are never copied by hand.
+
+python benchmarks/tables.py
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from harness import RESULTS
+
+README = Path(__file__).parent.parent / "README.md"
+BEGIN, END = "<!-- methods -->", "<!-- /methods -->"
+PAGE = Path(__file__).parent.parent / "docs" / "measurements.md"
+
+HEAD = """# Measurements
+
+Made by `benchmarks/tables.py` from `benchmarks/results/*.json`, which the scripts of the same names write. Times are
+medians of several warm runs, interleaved where things are compared; absolute times are the machine's that is named,
+the ratios are what counts.
+"""
+
+
+def main() -> None:
+    sections = [HEAD]
+    for name, describe in SECTIONS.items():
+        path = RESULTS / f"{name}.json"
+        if path.exists():
+            result = json.loads(path.read_text())
+            sections.append(describe(result) + "\n" + _machine(result["machine"]))
+            if name == "methods":
+                _into_readme(result)
+    PAGE.write_text("\n".join(sections))
+
+
+def _machine(machine: dict[str, Any]) -> str:
+    return (
+        f"Measured on {machine['processor']}, {machine['cores']} cores, with Mitsuba {machine['mitsuba']} and "
+        f"Dr.Jit {machine['drjit']}, {machine['date']}.\n"
+    )
+
+
+def _full_rate(result: dict[str, Any]) -> str:
+    ours, theirs = (1000 * result["seconds"][name]["median"] for name in ("full", "mitsuba"))
+    return f"""## `full` against Mitsuba's own integrator (`full_rate.py`)
+
+Direct light, {result["scene"]}, 512x512 pixels, 1 sample per pixel, the same rays.
+
+| | time | rate |
+|---|---|---|
+| `full`, with ledger and copy to the host | {ours:.1f} ms | {result["rate_relative_to_mitsuba"]:.0%} |
+| Mitsuba's `direct` | {theirs:.1f} ms | 100% |
+
+Target: at least {result["target"]:.0%}.
+"""
+
+
+def _large_frame(result: dict[str, Any]) -> str:
+    width, height = result["size"]
+    per_sample = result["nanoseconds_per_sample"]
+    return f"""## A large frame in bounded memory (`large_frame.py`)
+
+{width}x{height} pixels, path light, {result["spp"]} samples per pixel, limit {result["memory_limit"] / 2**30:.0f} GiB.
+
+| | measured | target |
+|---|---|---|
+| peak resident memory | {result["peak_resident_bytes"] / 1e9:.2f} GB | {result["target_peak_bytes"] / 1e9:.1f} GB |
+| time per sample | {per_sample["large"]:.0f} ns | |
+| time per sample at 512x512 | {per_sample["small"]:.0f} ns | |
+| ratio | {result["time_per_sample_relative_to_small"]:.2f} | {result["target_relative"]} |
+"""
+
+
+def _command(result: dict[str, Any]) -> str:
+    names = {
+        "render": "`lippmann render teapot --integrator direct --spp 1`, 512x512, warm cache",
+        "help": "`lippmann --help`",
+        "import": "`import lippmann`",
+        "python": "for comparison: Python alone",
+    }
+    rows = [
+        f"| {text} | {result['seconds'][name]['median']:.2f} s | {_seconds(result['targets'].get(name))} |"
+        for name, text in names.items()
+    ]
+    return "\n".join(["## Whole commands (`command.py`)", "", "| | median | target |", "|---|---|---|", *rows, ""])
+
+
+def _methods(result: dict[str, Any]) -> str:
+    return "\n".join([f"## Methods, {result['scene']} (`methods.py`)", "", *_method_rows(result), ""])
+
+
+def _method_rows(result: dict[str, Any]) -> list[str]:
+    rows = [
+        f"| `{row['method']}`{row['options']} | {row['spp']} | {row['seconds']:.2f} s | {row['psnr']:.1f} dB "
+        f"| {row['psnr_worst']:.1f} dB | {row['traced_fraction']:.0%} |"
+        for row in result["rows"]
+    ]
+    header = "| method | samples per pixel | time | PSNR | worst micro-image | pixels traced |"
+    return [header, "|---|---|---|---|---|---|", *rows]
+
+
+def _into_readme(result: dict[str, Any]) -> None:
+    """The table of methods stands in the README, between its two marks."""
+    page = README.read_text()
+    before, _, rest = page.partition(BEGIN)
+    _, _, after = rest.partition(END)
+    README.write_text("\n".join([before + BEGIN, *_method_rows(result), END]) + after)
+
+
+def _seconds(value: float | None) -> str:
+    return "" if value is None else f"{value:g} s"
+
+
+SECTIONS = {"methods": _methods, "full_rate": _full_rate, "large_frame": _large_frame, "command": _command}
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,97 @@
+"""Commands that judge: how far a picture is from a reference, and how this program stands to the paper's."""
+
+from __future__ import annotations
+
+import csv
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from lippmann.cli import options
+from lippmann.cli.console import Console
+
+if TYPE_CHECKING:
+    from lippmann.quality import Comparison, MicroImage
+
+
+def compare(
+    reference: Annotated[Path, typer.Argument(help="The picture to measure against (PNG, EXR or TIFF).")],
+    test: Annotated[Path, typer.Argument(help="The picture to judge: of the same display.")],
+    table: Annotated[
+        Path | None, typer.Option("--csv", help="Write the figures of every micro-image to this CSV file.")
+    ] = None,
+    picture: Annotated[
+        Path | None,
+        typer.Option("--map", help="Write a picture of the errors: .png, or .exr with layers.", show_default=False),
+    ] = None,
+    display: options.PictureDisplay = None,
+    as_json: options.Json = False,
+    quiet: options.Quiet = False,
+) -> None:
+    """Say how far a picture is from a reference: PSNR, its worst micro-images, SSIM of views, the paper's figures."""
+    from lippmann.atomic import check_writable
+    from lippmann.display import load_display
+    from lippmann.image import read_picture
+    from lippmann.image.formats import format_for
+    from lippmann.quality import compare as compare_pictures
+    from lippmann.quality import error_map
+
+    console = Console(quiet, as_json)
+    if picture is not None:
+        format_for(picture, None)
+    for path in (table, picture):
+        if path is not None:
+            check_writable(path)
+    given = None if display is None else load_display(display)
+    first, second = (read_picture(path, display=given) for path in (reference, test))
+    with console.progress() as progress:
+        comparison = compare_pictures(first, second, progress)
+    if table is not None:
+        _write_table(comparison, table)
+    if picture is not None:
+        error_map(comparison).save(picture)
+    for note in comparison.notes:
+        console.remark(note)
+    values = {"reference": str(reference), "test": str(test), **comparison.to_dict()}
+    console.result(values, "\n".join(_lines(comparison)))
+
+
+def _write_table(comparison: Comparison, path: Path) -> None:
+    from lippmann.atomic import replacing
+
+    rows = list(comparison.rows())
+    with replacing(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, fieldnames=list(rows[0]))
+        writer.writeheader()
+        writer.writerows(rows)
+
+
+def _lines(comparison: Comparison) -> list[str]:
+    views, paper, silhouettes = comparison.views, comparison.paper, comparison.silhouettes
+    ky, kx = views.worst
+    off = comparison.psnr_off_silhouettes
+    source = "depths" if silhouettes.source == "depth" else "strong edges"
+    lenses = int((comparison.micro_image_pixels > 0).sum())
+    lines = ["the pictures show the same"] if comparison.identical else []
+    lines += [
+        f"PSNR                {_decibels(comparison.psnr)}",
+        f"off silhouettes     {'no pixel' if off is None else _decibels(off)} "
+        f"({100 * (1 - silhouettes.share):.1f} % of the pixels; silhouettes by {source})",
+        f"worst micro-image   {_decibels(comparison.worst.psnr)} ({_lens(comparison.worst)} of {lenses})",
+        f"1st percentile      {_decibels(comparison.percentile_1.psnr)} ({_lens(comparison.percentile_1)})",
+        f"SSIM of views       {views.mean:.4f}, worst {views.values[ky, kx]:.4f} (view {kx}, {ky})",
+        f"the paper's PSNR    {_decibels(paper.mean_psnr)}, mean of micro-images"
+        + (f" ({paper.unchanged} without error left out)" if paper.unchanged else ""),
+        f'the paper\'s "RMSE"  {paper.mean_rmse:.4f}, mean of micro-images (a mean squared error of 8-bit codes)',
+    ]
+    return lines
+
+
+def _decibels(value: float) -> str:
+    return "infinite" if math.isinf(value) else f"{value:.2f} dB"
+
+
+def _lens(found: MicroImage) -> str:
+    return f"lens {found.column}, {found.row}"

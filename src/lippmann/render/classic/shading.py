@@ -1,0 +1,111 @@
+"""Light at a surface: ambient, diffuse, highlights, hard shadows and sky light, as the classic models have them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+
+from lippmann.render.classic.geometry import FAR, Geometry, Surface
+from lippmann.render.classic.lamps import LampTable
+from lippmann.render.classic.materials import LEAST, Finish, MaterialTable
+from lippmann.render.sampling import SampleStream
+from lippmann.scene.classic import AmbientOcclusion, ClassicScene
+
+#: First sample dimension of sky light; those below place the sample in its pixel and lens.
+_SKY_DIMENSION = 8
+
+
+class Shader:
+    """The local part of the light models: everything but mirrored and transmitted rays."""
+
+    def __init__(self, scene: ClassicScene, geometry: Geometry, lamps: LampTable, materials: MaterialTable) -> None:
+        self._geometry = geometry
+        self._lamps = lamps
+        self._materials = materials
+        self._shading = scene.shading
+        self._shadows = scene.shading.mode == "full"
+        self._sky: AmbientOcclusion | None = scene.ambient_occlusion if self._shadows else None
+
+    def light(
+        self, surface: Surface, finish: Finish, color: Any, d: Any, stream: SampleStream, hits: Any, active: Any
+    ) -> tuple[Any, Any, Any]:
+        """Colour that the surface sends back along -``d`` by itself, whether a highlight is in it, and shadow rays."""
+        diffuse, highlight, shadow = self._lamp_light(surface, finish, color, d, active)
+        if self._sky is not None:
+            sky, rays = self._sky_light(self._sky, surface, stream, hits, active & self._sees_light(finish))
+            diffuse += sky
+            shadow += rays
+        factor = finish.diffuse
+        if self._materials.outlined:
+            factor *= dr.select(finish.outline > 0, _outline(surface, finish, d), 1)
+        result = color * (diffuse * factor + finish.ambient)
+        shines = mi.Bool(False)
+        if self._materials.shines:
+            result += highlight
+            shines = dr.max(highlight) > 0
+        return result, shines, shadow
+
+    def _sees_light(self, finish: Finish) -> Any:
+        return (finish.diffuse > LEAST) | (finish.phong > LEAST)
+
+    @dr.syntax
+    def _lamp_light(self, surface: Surface, finish: Finish, color: Any, d: Any, active: Any) -> tuple[Any, Any, Any]:
+        diffuse, highlight, shadow = mi.Color3f(0), mi.Color3f(0), mi.UInt32(0)
+        index = mi.UInt32(0)
+        p, n, face, lift = surface.p, surface.n, surface.face, surface.lift
+        phong, phong_size, metal = finish.phong, finish.phong_size, finish.metal
+        active = active & self._sees_light(finish)
+        while dr.hint(active & (index < self._lamps.count), label="lamps"):
+            lamp = self._lamps.illuminate(index, p, n)
+            strength = lamp.strength * self._shading.light_scale
+            lit = strength > LEAST
+            if dr.hint(self._shadows, mode="scalar"):
+                start = p + face * dr.copysign(lift, dr.dot(face, lamp.toward))
+                passes = self._geometry.passing(start, lamp.toward, lamp.distance, lit)
+                shadow += dr.select(lit, mi.UInt32(1), mi.UInt32(0))
+                lit &= passes > 0
+                strength *= passes
+            diffuse += dr.select(lit, lamp.color * strength, 0)
+            if dr.hint(self._materials.shines, mode="scalar"):
+                shines = lit & (phong > LEAST)
+                tint = dr.select(metal, color, lamp.color) if self._materials.metal else lamp.color
+                peak = self._peak(lamp.toward, n, d, phong_size) * (phong * self._shading.light_scale)
+                highlight += dr.select(shines, tint * peak, 0)
+            index += 1
+        return diffuse, highlight, shadow
+
+    def _peak(self, toward: Any, n: Any, d: Any, exponent: Any) -> Any:
+        """Shape of a highlight, 0 to 1."""
+        if self._shading.highlight == "phong":
+            mirrored = n * (2 * dr.dot(n, toward)) - toward
+            cosine = -dr.dot(mirrored, d)
+            return dr.select(cosine > 0, dr.power(dr.maximum(cosine, 0), exponent), 0)
+        half = toward - d
+        cosine = dr.dot(n, half)
+        return dr.select(cosine > LEAST, dr.power(dr.maximum(cosine, 0) * dr.rsqrt(dr.dot(half, half)), exponent), 0)
+
+    @dr.syntax
+    def _sky_light(
+        self, sky: AmbientOcclusion, surface: Surface, stream: SampleStream, hits: Any, active: Any
+    ) -> tuple[Any, Any]:
+        total, shadow, number = mi.Float(0), mi.UInt32(0), mi.UInt32(0)
+        p, n, face, lift = surface.p, surface.n, surface.face, surface.lift
+        while dr.hint(active & (number < sky.samples), label="sky light"):
+            point = stream.next_2d(_SKY_DIMENSION + hits * sky.samples + number)
+            d = mi.warp.square_to_uniform_sphere(point)
+            cosine = dr.dot(d, n)
+            d = mi.Vector3f(dr.mulsign(d, cosine))
+            start = p + face * dr.copysign(lift, dr.dot(face, d))
+            total += dr.abs(cosine) * self._geometry.passing(start, d, mi.Float(FAR), active)
+            shadow += 1
+            number += 1
+        return mi.Color3f(*sky.color) * (total * (2 / sky.samples)), shadow
+
+
+def _outline(surface: Surface, finish: Finish, d: Any) -> Any:
+    """Factor that darkens diffuse light toward silhouettes."""
+    edge = dr.maximum(1 - dr.square(dr.dot(surface.n, d)), 0)
+    share = 1 - dr.power(edge, (1 - finish.outline_width) * 32)
+    return 1 - finish.outline + share * finish.outline

@@ -1,0 +1,245 @@
+"""The classic light models: Tachyon's, and Haines' for NFF.
+
+A surface sends back its own colour (``render/classic/shading.py``), a mirrored ray and a ray that goes through. Both are
+followed, depth first: the second waits on a small stack of each lane. All weights are single numbers, for no surface
+tints what it mirrors or lets through.
+
+Ray depth: the primary ray has ``depth``, each further ray one less. Where a ray of depth 1 needs another, Tachyon takes
+the background as that ray's own would see it, without the surface's factor; under NFF's rules nothing is added.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+
+from lippmann.render.classic.atmosphere import background_color, clearness
+from lippmann.render.classic.build import BuiltClassic
+from lippmann.render.classic.geometry import FAR, NONE, Hit, Surface
+from lippmann.render.classic.materials import LEAST, Finish
+from lippmann.render.integrators.base import RayCounts
+from lippmann.render.sampling import SampleStream
+
+#: Rays that may wait on a lane's stack. More would take 2^32 rays a pixel to need.
+DEEPEST_STACK = 32
+#: Rays of less weight are not followed: a thousandth of a step of an 8-bit picture.
+LEAST_WEIGHT = 4e-6
+
+
+@dataclass
+class FirstHit:
+    """What reprojection needs to know of a primary ray.
+
+    ``p``: the point hit (world), on which the ray's colour lies; ``valid``: False where the background is seen, which is
+    infinitely far; ``view_dependent``: the colour holds for this direction alone, for it has a mirrored or transmitted
+    part, a highlight or an outline.
+    """
+
+    p: Any
+    valid: Any
+    view_dependent: Any
+
+
+@dataclass
+class _Ray:
+    """A ray on its way: what it will count for, and what it has behind it."""
+
+    o: Any
+    d: Any
+    weight: Any
+    depth: Any
+    path: Any  # way from the eye, for image textures
+    surfaces: Any  # transparent surfaces that may still be shaded
+
+
+class ClassicIntegrator:
+    """Light along rays in a classic scene.
+
+    World space is right-handed: a scene of a left-handed format lies in it with its z negated.
+    """
+
+    # Not a dataclass: Dr.Jit would take it for loop state and write its fields.
+    def __init__(self, built: BuiltClassic, depth: int) -> None:
+        self.name = "classic"
+        self.depth = depth
+        self._built = built
+        self._scene = built.scene
+        self._mirrored = built.scene.handedness == "left"
+        self._nff = built.scene.rules == "nff"
+        shading = built.scene.shading
+        self._plain = shading.mode in ("low", "lowest")
+        materials = built.materials
+        self._raster3d = materials.raster3d or shading.raster3d
+        self._spawns = not self._plain and (materials.mirrors or materials.lets_through)
+        # Total reflection turns what should go through into a mirror: with both there is still but one ray.
+        self._branches = self._spawns and materials.branches
+        self._limited = shading.max_transparent_surfaces is not None and materials.lets_through
+
+    def sample(self, ray: Any, stream: SampleStream, active: Any) -> tuple[Any, RayCounts]:
+        radiance, counts, _ = self.sample_with_hit(ray, stream, active)
+        return radiance, counts
+
+    def sample_with_hit(self, ray: Any, stream: SampleStream, active: Any) -> tuple[Any, RayCounts, FirstHit]:
+        """As :meth:`sample`, with what the primary ray hit."""
+        o, d = mi.Vector3f(ray.o), mi.Vector3f(ray.d)
+        if self._mirrored:
+            o, d = _mirrored(o), _mirrored(d)
+        active = mi.Bool(active)
+        primary = _Ray(
+            o, d, mi.Float(1), mi.UInt32(self.depth), mi.Float(0), mi.UInt32(self._scene.shading.max_transparent_surfaces or 0)
+        )
+        hit = self._built.geometry.closest(o, d, active, coherent=True)
+        valid = active & (hit.index != NONE)
+        if not self._spawns or (self.depth == 1):
+            radiance, shadow, shown, _ = self._shade(primary, hit, stream, mi.UInt32(0), True, active)
+            counts = RayCounts(mi.UInt32(0) * shadow, shadow)
+        else:
+            radiance, counts, shown = self._follow(primary, hit, stream, active)
+        p = o + d * dr.select(valid, hit.t, 0)
+        return radiance, counts, FirstHit(mi.Point3f(_mirrored(p) if self._mirrored else p), valid, shown)
+
+    @dr.syntax
+    def _follow(self, ray: _Ray, hit: Hit, stream: SampleStream, active: Any) -> tuple[Any, RayCounts, Any]:
+        """Shades a ray and all that come of it."""
+        radiance, shadow, secondary = mi.Color3f(0), mi.UInt32(0), mi.UInt32(0)
+        view_dependent = mi.Bool(False)
+        hits = mi.UInt32(0)
+        waiting = mi.UInt32(0)
+        if dr.hint(self._branches, mode="scalar"):
+            stack = dr.alloc_local(_Ray, min(max(self.depth - 1, 1), DEEPEST_STACK), value=dr.zeros(_Ray))
+        while dr.hint(active, label="rays"):
+            color, tests, shown, (mirrored, through) = self._shade(ray, hit, stream, hits, hits == 0, active)
+            radiance += dr.select(active, color, 0)
+            shadow += dr.select(active, tests, 0)
+            view_dependent |= shown & (hits == 0) & active
+            hits += 1
+
+            goes_on = active & (mirrored.weight > LEAST_WEIGHT)
+            passes = active & (through.weight > LEAST_WEIGHT)
+            if dr.hint(self._branches, mode="scalar"):
+                waits = goes_on & passes & (waiting < len(stack))
+                if waits:
+                    stack[waiting] = through
+                waiting += dr.select(waits, mi.UInt32(1), mi.UInt32(0))
+                ray = _either(goes_on, mirrored, through)
+                active &= goes_on | passes | (waiting > 0)
+                if active & ~goes_on & ~passes:
+                    waiting -= 1
+                    ray = stack[waiting]
+            else:
+                ray = _either(goes_on, mirrored, through)
+                active &= goes_on | passes
+            secondary += dr.select(active, mi.UInt32(1), mi.UInt32(0))
+            hit = self._built.geometry.closest(ray.o, ray.d, active)
+        return radiance, RayCounts(secondary, shadow), view_dependent
+
+    def _shade(
+        self, ray: _Ray, hit: Hit, stream: SampleStream, hits: Any, primary: Any, active: Any
+    ) -> tuple[Any, Any, Any, tuple[_Ray, _Ray]]:
+        """What a ray brings by itself, weighted; shadow rays; view dependence; the mirrored ray and the one through."""
+        built, shading = self._built, self._scene.shading
+        met = active & (hit.index != NONE)
+        surface = built.geometry.surface(hit, ray.o, ray.d, met)
+        is_lamp = met & surface.lamp
+        met &= ~surface.lamp
+        finish = built.materials.fetch(surface.material, met)
+        path = ray.path + hit.t if shading.mode != "low" else mi.Float(FAR)
+        color = dr.select(surface.colored, surface.color, finish.color)
+        color = built.textures.color(dr.select(surface.colored, -1, finish.texture), color, surface.p, path, met)
+        lamp_color = built.lamps.color(surface.material, is_lamp)
+        behind = background_color(self._scene.background, ray.o, ray.d)
+        if self._plain:
+            if shading.mode == "lowest":
+                color, lamp_color, behind = mi.Color3f(1), mi.Color3f(1), mi.Color3f(0)
+            shown = dr.select(met, color, dr.select(is_lamp, lamp_color, behind))
+            return shown * ray.weight, mi.UInt32(0), mi.Bool(False), (_dropped(ray), _dropped(ray))
+
+        own, shines, shadow = built.shader.light(surface, finish, color, ray.d, stream, hits, met)
+        passed_over = mi.Bool(False)
+        if self._limited:
+            passed_over = met & (finish.opacity < 1) & (ray.surfaces == 0)
+        alpha = self._opacity(surface, finish, ray.d)
+        mirrors = met & (finish.specular > (0 if self._nff else LEAST)) & ~passed_over
+        lets_through = met & (finish.opacity < 1 - LEAST) & ~passed_over
+        kept = dr.select(lets_through, alpha, 1) if shading.local_times_opacity else mi.Float(1)
+        mirrored_share = dr.select(mirrors, finish.specular * kept, 0)
+        through_share = dr.select(lets_through, 1 - alpha, 0)
+        own = dr.select(passed_over, 0, own * kept)
+
+        direction = ray.d
+        if self._nff:
+            direction, reflected = _refracted(surface, finish, ray.d)
+            mirrored_share += dr.select(reflected, through_share, 0)
+            through_share = dr.select(reflected, 0, through_share)
+        through_share = dr.select(passed_over, 1, through_share)
+        ends = ray.depth <= 1
+        if not self._nff:
+            missing = dr.select(mirrors, kept, 0) + dr.select(lets_through | passed_over, 1, 0)
+            own += dr.select(ends & met, behind * missing, 0)
+
+        clear, haze = self._fog(hit, ray.d, met, active & ~met & ~is_lamp, passed_over, primary)
+        shown = dr.select(met, own, dr.select(is_lamp, lamp_color, behind)) * clear + haze
+        weight = dr.select(ends | ~met, 0, ray.weight * clear)
+        mirrored_d = ray.d - surface.n * (2 * dr.dot(surface.n, ray.d))
+        mirrored = _Ray(
+            surface.start(mirrored_d), mirrored_d, weight * mirrored_share, ray.depth - 1, path, ray.surfaces
+        )
+        through = _Ray(
+            surface.start(direction),
+            direction,
+            weight * through_share,
+            ray.depth - 1,
+            path,
+            dr.maximum(ray.surfaces, 1) - 1,
+        )
+        depends = met & (mirrors | lets_through | shines | passed_over)
+        if built.materials.outlined:
+            depends |= met & (finish.outline > 0)
+        return shown * ray.weight, shadow, depends, (mirrored, through)
+
+    def _opacity(self, surface: Surface, finish: Finish, d: Any) -> Any:
+        if not self._raster3d:
+            return finish.opacity
+        by_angle = dr.square(1 + dr.cos(_RASTER3D_PI * (1 - finish.opacity) * dr.dot(surface.n, d))) * 0.25
+        return by_angle if self._scene.shading.raster3d else dr.select(finish.raster3d, by_angle, finish.opacity)
+
+    def _fog(self, hit: Hit, d: Any, met: Any, missed: Any, passed_over: Any, primary: Any) -> tuple[Any, Any]:
+        """Share of a ray's colour that is seen through the fog, and what the fog adds."""
+        fog = self._scene.fog
+        if fog is None:
+            return mi.Float(1), mi.Color3f(0)
+        distance = dr.select(met, hit.t, FAR)
+        if fog.planar:
+            view = mi.Vector3f(*self._scene.camera.frame()[2].tolist())
+            distance = dr.select(primary, distance * dr.dot(d, view), distance)
+        foggy = (met & ~passed_over) if fog.planar else (met & ~passed_over) | missed
+        clear = dr.select(foggy, clearness(fog, distance), 1)
+        return clear, mi.Color3f(*fog.color) * (1 - clear)
+
+
+#: As Tachyon has it.
+_RASTER3D_PI = 3.1415926
+
+
+def _mirrored(v: Any) -> Any:
+    return mi.Vector3f(v.x, v.y, -v.z)
+
+
+def _dropped(ray: _Ray) -> _Ray:
+    return _Ray(ray.o, ray.d, mi.Float(0), ray.depth, ray.path, ray.surfaces)
+
+
+def _either(condition: Any, a: _Ray, b: _Ray) -> _Ray:
+    return _Ray(*(dr.select(condition, getattr(a, f.name), getattr(b, f.name)) for f in fields(_Ray)))
+
+
+def _refracted(surface: Surface, finish: Finish, d: Any) -> tuple[Any, Any]:
+    """Direction of the refracted ray by Snell's law, and whether all is reflected instead."""
+    ratio = dr.select(dr.dot(surface.face, d) < 0, dr.rcp(finish.ior), finish.ior)
+    cosine = -dr.dot(surface.n, d)
+    squared = 1 - ratio * ratio * (1 - cosine * cosine)
+    bent = d * ratio + surface.n * (ratio * cosine - dr.sqrt(dr.maximum(squared, 0)))
+    return dr.normalize(bent), squared < 0

@@ -1,0 +1,18 @@
+"""Tables, charts and pictures as one HTML page: the paper's system, measured again."""
+
+from lippmann.report.experiment import FULL, QUICK, VARIANTS, Experiment, Results, Run, Variant, run_experiment
+from lippmann.report.page import report_page
+from lippmann.report.summary import summary
+
+__all__ = [
+    "FULL",
+    "QUICK",
+    "VARIANTS",
+    "Experiment",
+    "Results",
+    "Run",
+    "Variant",
+    "report_page",
+    "run_experiment",
+    "summary",
+]
