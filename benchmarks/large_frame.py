@@ -1,7 +1,7 @@
 """An 8K frame in bounded memory: peak resident memory, and time per sample against that of a small frame.
 
-7680 x 4320 pixels, path light, 4 samples per pixel, a limit of 2 GiB, written as PNG. Between its tiles a 512 x 512 frame
-of the same optics is rendered again and again and taken out of the large one's time, so that both see the same machine.
+7680 x 4320 pixels, path light, 4 samples per pixel, a limit of 2 GiB, written as PNG. Between its tiles a 512 x 512
+frame of the same optics is rendered again and again, out of the large one's time, so that both see the same machine.
 Targets: a peak of at most 2.5 GB, and time per sample within 15 % of the small frame's.
 """
 

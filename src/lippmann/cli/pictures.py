@@ -14,7 +14,7 @@ from lippmann.errors import UsageError
 
 if TYPE_CHECKING:
     from lippmann.display import Display
-    from lippmann.image import PictureInfo
+    from lippmann.image import PictureInfo, Provenance
 
 Format = Annotated[str | None, typer.Option("--format", help="png, exr or tiff; by default as the picture is stored.")]
 Filter = Annotated[str, typer.Option("--filter", help="nearest, or linear between pixels of one lens.")]
@@ -210,6 +210,13 @@ def _info_values(path: Path, found: PictureInfo) -> dict[str, Any]:
     return values
 
 
+def _method(made: Provenance) -> str:
+    parts = [made.method or "unknown", made.integrator]
+    for text, value in (("depth {}", made.depth), ("{} samples per pixel", made.spp), ("seed {}", made.seed)):
+        parts.append("" if value is None else text.format(value))
+    return ", ".join(part for part in parts if part)
+
+
 def _info_lines(path: Path, found: PictureInfo) -> list[str]:
     lines = [f"{path}: {found.format.upper()}, {found.width}x{found.height}, {found.stored}"]
     if found.layers:
@@ -222,8 +229,7 @@ def _info_lines(path: Path, found: PictureInfo) -> list[str]:
         f"display     {display.name} ({display.lens_array.layout}, {grid.columns}x{grid.rows} lenses, "
         f"field {display.field_of_view:.1f} degrees)",
         f"scene       {made.scene or 'unknown'}",
-        f"method      {made.method or 'unknown'}, {made.integrator or 'unknown light'}, depth {made.depth}, "
-        f"{made.spp} samples per pixel, seed {made.seed}",
+        f"method      {_method(made)}",
         f"made by     Lippmann {made.version or '(unknown version)'} on {made.device or 'an unknown device'}",
     ]
     if made.rays:

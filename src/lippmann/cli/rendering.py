@@ -106,7 +106,8 @@ def render(
     console.remark(_depth_line(image))
     for note in image.provenance.notes:
         console.remark(note)
-    console.result(report(output, written.provenance), _sentence(output, written))
+    height, width = image.pixels.shape[:2]
+    console.result(report(output, (width, height), written.provenance), _sentence(output, written))
 
 
 def preview(
@@ -165,15 +166,16 @@ def preview(
         console.remark(note)
     height, width = plain.pixels.shape[:2]
     console.result(
-        report(output, provenance), f"{output}: {width}x{height} pixels in {provenance.seconds['total']:.1f} s"
+        report(output, (width, height), provenance),
+        f"{output}: {width}x{height} pixels in {provenance.seconds['total']:.1f} s",
     )
 
 
-def report(output: Path, provenance: Provenance) -> dict[str, Any]:
+def report(output: Path, size: tuple[int, int], provenance: Provenance) -> dict[str, Any]:
     """What ``--json`` says of a render."""
     return {
         "output": str(output),
-        "size": output.stat().st_size,
+        "size": list(size),
         "method": provenance.method,
         "integrator": provenance.integrator,
         "depth": provenance.depth,
