@@ -16,7 +16,8 @@ from typing import TYPE_CHECKING, Any, cast
 
 from lippmann.display import Display, load_display
 from lippmann.progress import ProgressCallback, silent
-from lippmann.render.settings import Device, IntegratorName, Method, PixelFilter, RenderSettings
+from lippmann.render.defaults import AUTO, choose
+from lippmann.render.settings import Device, Method, RenderSettings
 from lippmann.scene.load import load_scene as _load_scene
 from lippmann.scene.placement import Mode, PlacementOptions
 from lippmann.scene.scene import Scene
@@ -24,9 +25,6 @@ from lippmann.scene.scene import Scene
 if TYPE_CHECKING:
     from lippmann.image import IntegralImage
     from lippmann.render.pipeline import Preview
-
-#: Samples per pixel where nothing is said.
-DEFAULT_SPP = 16
 
 
 def load_scene(
@@ -41,7 +39,8 @@ def load_scene(
     Parameters
     ----------
     source:
-        Path of a ``.glb``, ``.gltf``, ``.obj``, ``.ply``, ``.stl`` or Mitsuba ``.xml`` file; name of a bundled scene; a
+        Path of a ``.glb``, ``.gltf``, ``.obj``, ``.ply``, ``.stl``, Mitsuba ``.xml``, Tachyon ``.dat`` or ``.nff``
+        file; name of a bundled scene; a
         ``mi.Scene`` or Mitsuba dict; a trimesh scene or mesh; a PyVista mesh; a
         :class:`~lippmann.scene.description.SceneDescription`.
     environment:
@@ -64,12 +63,12 @@ def render(
     display: Display | str | Path = "seed-lenticular",
     *,
     method: str = "full",
-    integrator: str = "path",
+    integrator: str = AUTO,
     depth: int | None = None,
-    spp: int = DEFAULT_SPP,
+    spp: int | None = None,
     seed: int = 0,
     subpixels: bool = False,
-    pixel_filter: str = "box",
+    pixel_filter: str = AUTO,
     camera: str | None = None,
     place: str | None = None,
     turn: tuple[float, float, float] = (0.0, 0.0, 0.0),
@@ -90,7 +89,8 @@ def render(
     display:
         A :class:`~lippmann.display.Display`, a preset's name, or a TOML file.
     method, integrator, depth, spp, seed, subpixels, pixel_filter, device, threads, memory:
-        See :class:`~lippmann.render.settings.RenderSettings`.
+        See :class:`~lippmann.render.settings.RenderSettings`; what is "auto" or None follows from the scene, see
+        :func:`~lippmann.render.defaults.choose`.
     camera, place, turn, shift, scale, pop_out:
         Where the display stands in the scene, see :class:`~lippmann.scene.placement.PlacementOptions`: by a camera,
         fitted to the display's depth (``place="fit"``), or with scene units taken for millimetres of the display
@@ -110,14 +110,13 @@ def render(
     """
     from lippmann.render.pipeline import render_integral_image
 
+    loaded = _scene(scene)
+    choice = choose(loaded, integrator=integrator, depth=depth, spp=spp, pixel_filter=pixel_filter)
     settings = RenderSettings(
         method=cast(Method, method),
-        integrator=cast(IntegratorName, integrator),
-        depth=depth,
-        spp=spp,
+        **vars(choice),
         seed=seed,
         subpixels=subpixels,
-        pixel_filter=cast(PixelFilter, pixel_filter),
         device=cast(Device, device),
         threads=threads,
         memory=memory,
@@ -131,7 +130,7 @@ def render(
         pop_out=pop_out,
     )
     shown = display if isinstance(display, Display) else load_display(display)
-    return render_integral_image(_scene(scene), shown, settings, options, progress)
+    return render_integral_image(loaded, shown, settings, options, progress)
 
 
 def preview(
@@ -139,11 +138,11 @@ def preview(
     size: tuple[int, int] = (512, 512),
     *,
     camera: str | None = None,
-    integrator: str = "path",
+    integrator: str = AUTO,
     depth: int | None = None,
-    spp: int = DEFAULT_SPP,
+    spp: int | None = None,
     seed: int = 0,
-    pixel_filter: str = "box",
+    pixel_filter: str = AUTO,
     device: str = "auto",
     threads: int | None = None,
     memory: int | None = None,
@@ -165,17 +164,16 @@ def preview(
     """
     from lippmann.render.pipeline import render_preview
 
+    loaded = _scene(scene)
+    choice = choose(loaded, integrator=integrator, depth=depth, spp=spp, pixel_filter=pixel_filter, own_camera=True)
     settings = RenderSettings(
-        integrator=cast(IntegratorName, integrator),
-        depth=depth,
-        spp=spp,
+        **vars(choice),
         seed=seed,
-        pixel_filter=cast(PixelFilter, pixel_filter),
         device=cast(Device, device),
         threads=threads,
         memory=memory,
     )
-    return render_preview(_scene(scene), camera, size, settings, progress)
+    return render_preview(loaded, camera, size, settings, progress)
 
 
 def _scene(source: Scene | object) -> Scene:

@@ -76,7 +76,7 @@ def test_content_counts_where_the_name_says_nothing(save):
         ("a.stl", OBJ.encode(), r"a\.stl: is no STL file"),
         ("a.xml", b"<html></html>", r"a\.xml: is XML of a 'html'"),
         ("a.xml", XML.encode()[:-3], r"a\.xml:1: is no well-formed XML"),
-        ("a.fbx", b"Kaydara FBX", r"a\.fbx: '\.fbx' is no known kind of scene file; known are \.glb, \.gltf, \.obj"),
+        ("a.fbx", b"Kaydara FBX", r"a\.fbx: '\.fbx' is no known kind of scene file; known are \.dat, \.glb, \.gltf"),
         ("a.obj", b"", r"a\.obj: the file is empty"),
         ("a.glb", b"", r"a\.glb: the file is empty"),
         ("a.glb", b"glTF", r"a\.glb"),

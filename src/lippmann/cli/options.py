@@ -20,18 +20,27 @@ PictureDisplay = Annotated[
 ]
 Scene = Annotated[
     str,
-    typer.Argument(help="A .glb, .gltf, .obj, .ply, .stl or Mitsuba .xml file, or the name of a bundled scene."),
+    typer.Argument(
+        help="A .glb, .gltf, .obj, .ply, .stl, Mitsuba .xml, Tachyon .dat or .nff file, or a bundled scene's name."
+    ),
 ]
 Integrator = Annotated[
     str,
     typer.Option(
-        "--integrator", help="path (all light), direct (lamps and sky only), or normal, depth, position, albedo."
+        "--integrator",
+        help="path (all light), direct (lamps and sky only), classic (light of Tachyon and NFF scenes), or normal, "
+        "depth, position, albedo. By default what the scene was made for.",
     ),
 ]
 Depth = Annotated[int | None, typer.Option("--depth", help="Surfaces a path may meet; the primary ray's counts 1.")]
-Spp = Annotated[int, typer.Option("--spp", help="Samples per pixel.")]
+Spp = Annotated[
+    int | None, typer.Option("--spp", help="Samples per pixel; 16 by default, for classic as the scene has it.")
+]
 Seed = Annotated[int, typer.Option("--seed", help="Of all random choices.")]
-PixelFilter = Annotated[str, typer.Option("--pixel-filter", help="box: over the pixel; point: at its centre.")]
+PixelFilter = Annotated[
+    str,
+    typer.Option("--pixel-filter", help="box: over the pixel; point: at its centre. By default box, but for classic."),
+]
 Device = Annotated[str, typer.Option("--device", help="auto, cpu or gpu.")]
 Threads = Annotated[int | None, typer.Option("--threads", help="CPU threads; all cores by default.")]
 Memory = Annotated[str | None, typer.Option("--memory", help="Memory to use, such as 2G; 60 % of the free by default.")]

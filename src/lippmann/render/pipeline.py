@@ -14,14 +14,18 @@ from lippmann import engine as engines
 from lippmann import machine
 from lippmann._version import VERSION
 from lippmann.display import Display
+from lippmann.errors import UsageError
 from lippmann.image import IntegralImage, Provenance
+from lippmann.image.provenance import Transfer
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.render.plan import make_plan
 from lippmann.render.settings import RenderSettings
+from lippmann.scene.description import Camera
 from lippmann.scene.placement import PlacementOptions, place
 from lippmann.scene.scene import Scene
 
 if TYPE_CHECKING:
+    from lippmann.render.classic.build import BuiltClassic
     from lippmann.render.full import Frame
     from lippmann.render.rays import RaySource
     from lippmann.scene.build import BuiltScene
@@ -77,7 +81,7 @@ def render_integral_image(
         memory=memory,
     )
     engine = watch.stage("load", lambda: engines.start(settings.device, settings.threads))
-    built = watch.stage("build", lambda: _build(scene))
+    built = watch.stage("build", lambda: build_for(scene, settings))
     placement = place(
         scene.bounds,
         display,
@@ -103,6 +107,7 @@ def render_integral_image(
         seed=settings.seed,
         subpixels=settings.subpixels,
         scene=scene.name,
+        transfer=transfer_of(settings),
         version=VERSION,
         device=engine.gpu_name or f"cpu, {engine.threads} threads",
         traced_fraction=1.0,
@@ -114,7 +119,7 @@ def render_integral_image(
             "depth_range": list(placement.depth_range),
             "resolvable_range": list(placement.resolvable_range),
         },
-        notes=(*scene.notes, *built.notes, *placement.warnings, *_frame_notes(frame)),
+        notes=(*scene_notes(scene, built), *placement.warnings, *_frame_notes(frame)),
     )
     return IntegralImage(frame.pixels, display, placement.world_from_display, provenance)
 
@@ -138,14 +143,13 @@ def render_preview(
     watch = Stopwatch(progress)
     plan = make_plan(*size, settings.spp, memory=settings.memory or default_memory())
     engine = watch.stage("load", lambda: engines.start(settings.device, settings.threads))
-    built = watch.stage("build", lambda: _build(scene))
+    built = watch.stage("build", lambda: build_for(scene, settings))
     pose = scene.camera(camera)
 
     from lippmann.render.full import trace_frame
-    from lippmann.render.rays import CameraRays
 
     integrator = make_integrator(built, settings, np.linalg.inv(np.asarray(pose.world_from_camera, dtype=np.float64)))
-    source: RaySource = CameraRays(pose, *size)
+    source = _camera_rays(scene, settings, pose, size)
     frame = trace_frame(
         integrator, source, plan, seed=settings.seed, box_filter=settings.pixel_filter == "box", progress=progress
     )
@@ -156,23 +160,41 @@ def render_preview(
         spp=settings.spp,
         seed=settings.seed,
         scene=scene.name,
+        transfer=transfer_of(settings),
         version=VERSION,
         device=engine.gpu_name or f"cpu, {engine.threads} threads",
         traced_fraction=1.0,
         rays=ray_counts(frame),
         seconds=stage_seconds(watch, frame),
         options={"pixel_filter": settings.pixel_filter, "camera": pose.name},
-        notes=(*scene.notes, *built.notes, *_frame_notes(frame)),
+        notes=(*scene_notes(scene, built), *_frame_notes(frame)),
     )
     return Preview(frame.pixels, provenance)
 
 
-def make_integrator(built: BuiltScene, settings: RenderSettings, display_from_world: NDArray[np.float64]) -> Any:
+def _camera_rays(scene: Scene, settings: RenderSettings, pose: Camera, size: tuple[int, int]) -> RaySource:
+    """Rays of the camera that takes the picture: of a classic scene its own, with all that only such a camera does."""
+    if settings.integrator == "classic" and scene.classic is not None:
+        from lippmann.render.classic.camera import ClassicCameraRays
+
+        return ClassicCameraRays(scene.classic.camera, scene.classic.handedness, *size)
+    from lippmann.render.rays import CameraRays
+
+    return CameraRays(pose, *size)
+
+
+def make_integrator(
+    built: BuiltScene | BuiltClassic, settings: RenderSettings, display_from_world: NDArray[np.float64]
+) -> Any:
     """The integrator that ``settings`` name, for a built scene."""
+    from lippmann.render.classic.build import BuiltClassic
+    from lippmann.render.integrators.classic import ClassicIntegrator
     from lippmann.render.integrators.path import PathIntegrator
     from lippmann.render.integrators.surface import SurfaceIntegrator, SurfaceProperty
     from lippmann.render.traits import make_traits
 
+    if isinstance(built, BuiltClassic):
+        return ClassicIntegrator(built, settings.surfaces)
     if settings.integrator in ("path", "direct"):
         traits = make_traits(
             built.mitsuba, background=built.background, has_null=built.has_null, absorption=built.absorption
@@ -186,10 +208,35 @@ def default_memory() -> int:
     return int(machine.available_memory() * DEFAULT_MEMORY_SHARE)
 
 
-def _build(scene: Scene) -> BuiltScene:
+def build_for(scene: Scene, settings: RenderSettings) -> BuiltScene | BuiltClassic:
+    """The scene on the device, in the form that the integrator needs.
+
+    Raises
+    ------
+    UsageError
+        The classic integrator is asked for a scene that has no such form.
+    """
+    if settings.integrator == "classic":
+        from lippmann.render.classic.build import build_classic
+
+        if scene.classic is None:
+            raise UsageError(f"'{scene.name}' has no form for the classic light models", where="--integrator")
+        return build_classic(scene.classic)
     from lippmann.scene.build import build
 
     return build(scene)
+
+
+def scene_notes(scene: Scene, built: BuiltScene | BuiltClassic) -> tuple[str, ...]:
+    """What reader and builder had to say, one line each."""
+    from lippmann.scene.build import BuiltScene
+
+    return (*scene.notes, *built.notes) if isinstance(built, BuiltScene) else built.scene.notes
+
+
+def transfer_of(settings: RenderSettings) -> Transfer:
+    """How the values become codes: those of the classic models are codes already, as their own programs write them."""
+    return "linear" if settings.integrator == "classic" else "srgb"
 
 
 def ray_counts(frame: Frame) -> dict[str, int]:

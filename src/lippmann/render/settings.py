@@ -8,12 +8,12 @@ from typing import Literal, get_args
 from lippmann.errors import UsageError
 
 Method = Literal["full"]
-IntegratorName = Literal["path", "direct", "normal", "depth", "position", "albedo"]
+IntegratorName = Literal["classic", "path", "direct", "normal", "depth", "position", "albedo"]
 PixelFilter = Literal["box", "point"]
 Device = Literal["auto", "cpu", "gpu"]
 
 #: Surfaces per path where nothing is said.
-DEFAULT_DEPTH = {"path": 8, "direct": 1}
+DEFAULT_DEPTH = {"classic": 2, "path": 8, "direct": 1}
 
 
 @dataclass(frozen=True)
@@ -25,8 +25,9 @@ class RenderSettings:
     method:
         The renderer: ``full`` traces every ray.
     integrator:
-        ``path`` (all light), ``direct`` (light that comes straight from lamps and sky), or a property of the first
-        surface without any light: ``normal``, ``depth``, ``position``, ``albedo``.
+        ``classic`` (Tachyon's and NFF's light models, for scenes made for them), ``path`` (all light), ``direct``
+        (light that comes straight from lamps and sky), or a property of the first surface without any light:
+        ``normal``, ``depth``, ``position``, ``albedo``.
     depth:
         Surfaces a path may meet, the primary ray's counting 1; None for the integrator's own default.
     spp:

@@ -12,7 +12,9 @@ from typing import Any
 import numpy as np
 
 from lippmann.errors import SceneError, UsageError
-from lippmann.scene.description import Color, Environment, SceneDescription
+from lippmann.scene.classic import Background, ClassicScene
+from lippmann.scene.classic_world import world_camera
+from lippmann.scene.description import Camera, Color, Environment, SceneDescription
 from lippmann.scene.mitsuba_source import MitsubaSource
 from lippmann.scene.resources import read_bytes
 from lippmann.scene.scene import Scene, checked, lit
@@ -20,10 +22,13 @@ from lippmann.scene.scene import Scene, checked, lit
 #: Words in place of an environment file: the built-in studio, and no light but the scene's own.
 STUDIO, NO_ENVIRONMENT = "studio", "none"
 
-# Suffix -> "module:function" of its reader: read(path, *, allow_outside) -> SceneDescription | MitsubaSource.
+# Suffix -> "module:function" of its reader: read(path, *, allow_outside) gives a SceneDescription, a MitsubaSource or a
+# ClassicScene.
 _READERS = {
+    ".dat": "lippmann.scene.tachyon:read_tachyon",
     ".glb": "lippmann.scene.gltf:read_gltf",
     ".gltf": "lippmann.scene.gltf:read_gltf",
+    ".nff": "lippmann.scene.nff:read_nff",
     ".obj": "lippmann.scene.obj:read_obj",
     ".ply": "lippmann.scene.ply:read_ply",
     ".stl": "lippmann.scene.stl:read_stl",
@@ -32,6 +37,9 @@ _READERS = {
 
 # How a file begins -> the suffix that goes with it, where the beginning leaves no doubt.
 _BEGINNINGS = {b"glTF": ".glb", b"ply\n": ".ply", b"ply\r": ".ply", b"<": ".xml", b"{": ".gltf"}
+
+
+_PAPER_DEPTH = 2
 
 
 def load_scene(
@@ -47,8 +55,8 @@ def load_scene(
     ----------
     source:
         The path of a scene file, the name of a bundled scene, or an object: a :class:`SceneDescription`, a
-        ``trimesh.Scene`` or ``Trimesh``, a PyVista data set, a ``mitsuba.Scene`` or a dictionary for
-        ``mitsuba.load_dict``.
+        :class:`ClassicScene`, a ``trimesh.Scene`` or ``Trimesh``, a PyVista data set, a ``mitsuba.Scene`` or a
+        dictionary for ``mitsuba.load_dict``.
     environment:
         Light from all around in place of the scene's own: an EXR or HDR file, or "studio" for the built-in one.
         A scene without any light gets the studio anyway, unless this is "none".
@@ -68,7 +76,12 @@ def load_scene(
     color = _background(background)
     scene = _from_name(source, allow_outside) if isinstance(source, str | Path) else _from_object(source)
     studio = scene.studio and str(environment) != NO_ENVIRONMENT
-    return replace(scene, description=lit(scene.description, sky, color), studio=studio)
+    if scene.classic is not None and color is not None:
+        scene = replace(scene, classic=replace(scene.classic, background=Background(color=color)))
+    if scene.is_classic and sky is None:
+        return replace(scene, studio=studio)
+    # The classic light models know no surroundings: who asks for them gets the physical form.
+    return replace(scene, description=lit(scene.physical, sky, color), studio=studio)
 
 
 def known_suffixes() -> tuple[str, ...]:
@@ -105,6 +118,8 @@ def _from_name(source: str | Path, allow_outside: bool) -> Scene:
         )
     module, function = reader.split(":")
     description = getattr(import_module(module), function)(path, allow_outside=allow_outside)
+    if isinstance(description, ClassicScene):
+        return _classic(description, world_camera(description))
     if isinstance(description, SceneDescription):
         checked(description, path.name)
     return Scene(description.name, description)
@@ -120,15 +135,25 @@ def _from_library(name: str) -> Scene:
     from lippmann.scene import library
 
     made = library.make(name)
-    if not isinstance(made, SceneDescription):
-        raise SceneError(f"the bundled scene '{name}' has no physically based form yet")
+    classic = made if isinstance(made, ClassicScene) else library.make_classic(name)
+    # The paper renders its scenes with this ray depth.
+    classic = replace(classic, camera=replace(classic.camera, ray_depth=_PAPER_DEPTH))
+    if isinstance(made, ClassicScene):
+        return _classic(classic, library.stage_of(name).camera())
     description = checked(made, name)
-    return Scene(name, description, home_camera=description.cameras[0].name if description.cameras else None)
+    home = description.cameras[0].name if description.cameras else None
+    return Scene(name, description, home_camera=home, classic=classic)
+
+
+def _classic(scene: ClassicScene, camera: Camera) -> Scene:
+    return Scene(scene.name, home_camera=camera.name, classic=scene, views=(camera,))
 
 
 def _from_object(source: object) -> Scene:
     if isinstance(source, Scene):
         return source
+    if isinstance(source, ClassicScene):
+        return _classic(source, world_camera(source))
     if isinstance(source, SceneDescription):
         return Scene(source.name, checked(source, source.name))
     if isinstance(source, MitsubaSource):

@@ -11,6 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.errors import SceneError
+from lippmann.scene.classic import ClassicScene
+from lippmann.scene.classic_world import world_bounds
 from lippmann.scene.description import Camera, Color, Environment, Material, Matrix, Mesh, SceneDescription
 from lippmann.scene.mitsuba_source import MitsubaSource
 
@@ -28,7 +30,9 @@ _FRAMING_FOV = np.radians(30.0)
 class Scene:
     """A scene ready to be placed and built.
 
-    ``description`` is what was read, with the environment and background that the caller asked for in it.
+    ``description`` is what was read, with the environment and background that the caller asked for in it. A scene made
+    for the classic light models has ``classic`` instead, with ``views`` for its cameras; its ``physical`` form is then
+    derived when it is first needed. A scene with both has a form of its own for either kind of light.
     ``home_camera`` names the camera that the scene was made to be shown by (bundled scenes), None for all others.
     ``studio`` says whether the built-in studio may light a scene that has no lights.
 
@@ -37,13 +41,37 @@ class Scene:
     """
 
     name: str
-    description: SceneDescription | MitsubaSource = field(repr=False)
+    description: SceneDescription | MitsubaSource | None = field(default=None, repr=False)
     home_camera: str | None = None
     studio: bool = True
+    classic: ClassicScene | None = field(default=None, repr=False)
+    views: tuple[Camera, ...] = field(default=(), repr=False)
+
+    def __post_init__(self) -> None:
+        if self.description is None and self.classic is None:
+            raise SceneError("a scene without any content", where=self.name)
+
+    @cached_property
+    def physical(self) -> SceneDescription | MitsubaSource:
+        """The scene in the terms of physically based light."""
+        if self.description is not None:
+            return self.description
+        from lippmann.scene.classic_to_physical import to_physical
+
+        assert self.classic is not None
+        return to_physical(self.classic, self.views)
+
+    @property
+    def is_classic(self) -> bool:
+        """Whether the classic light models are what the scene was made for."""
+        return self.description is None
 
     @cached_property
     def bounds(self) -> Bounds:
-        """Lowest and highest corner ``(2, 3)`` of the box around all geometry, world units."""
+        """Lowest and highest corner ``(2, 3)`` of the box around all geometry that has an end, world units."""
+        if self.description is None:
+            assert self.classic is not None
+            return world_bounds(self.classic)
         if isinstance(self.description, MitsubaSource):
             return self.description.bounds()
         return bounds_of(self.description)
@@ -53,6 +81,9 @@ class Scene:
 
         Tight around the vertices of a description; around the corners of the world's box for a scene of Mitsuba's.
         """
+        if self.description is None:
+            assert self.classic is not None
+            return world_bounds(self.classic, frame)
         if isinstance(self.description, SceneDescription):
             return bounds_of(self.description, frame)
         corners = _box_corners(np.asarray(self.bounds)) @ frame[:3, :3].T + frame[:3, 3]
@@ -61,6 +92,8 @@ class Scene:
     @cached_property
     def cameras(self) -> tuple[Camera, ...]:
         """The cameras that the scene brings, in its order."""
+        if self.description is None:
+            return self.views
         if isinstance(self.description, MitsubaSource):
             return self.description.cameras()
         return tuple(self.description.cameras)
@@ -68,11 +101,11 @@ class Scene:
     @cached_property
     def has_lights(self) -> bool:
         """Whether the scene has light of its own, or an environment was asked for; see :func:`has_lights`."""
-        if self.description.environment is not None:
+        if self.physical.environment is not None:
             return True
-        if isinstance(self.description, MitsubaSource):
-            return self.description.has_lights()
-        return has_lights(self.description)
+        if isinstance(self.physical, MitsubaSource):
+            return self.physical.has_lights()
+        return has_lights(self.physical)
 
     @property
     def in_studio(self) -> bool:
@@ -83,7 +116,7 @@ class Scene:
     def environment(self) -> Environment | None:
         """Light from far away: the scene's or the caller's; the studio where the scene has no light at all."""
         if not self.in_studio:
-            return self.description.environment
+            return self.physical.environment
         from lippmann.scene.studio import studio
 
         return studio()
@@ -91,8 +124,8 @@ class Scene:
     @property
     def background(self) -> Color | None:
         """What is seen where nothing is hit; None for the environment itself (black without one)."""
-        if self.description.background is not None or not self.in_studio:
-            return self.description.background
+        if self.physical.background is not None or not self.in_studio:
+            return self.physical.background
         from lippmann.scene.studio import BACKDROP
 
         return BACKDROP
@@ -100,7 +133,7 @@ class Scene:
     @property
     def notes(self) -> tuple[str, ...]:
         """What the reader could not honour and what was assumed, one line each."""
-        read = () if isinstance(self.description, MitsubaSource) else tuple(self.description.notes)
+        read = () if isinstance(self.physical, MitsubaSource) else tuple(self.physical.notes)
         return (*read, STUDIO_NOTE) if self.in_studio else read
 
     def camera(self, name: str | None = None) -> Camera:

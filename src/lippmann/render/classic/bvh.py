@@ -17,8 +17,10 @@ from lippmann.scene.primitives import Numbers
 
 #: Layouts, by the signs of a direction: 1 for x < 0, 2 for y < 0, 4 for z < 0.
 OCTANTS = 8
-#: Share of their greatest coordinate by which boxes are widened, against rounding to single precision.
-_WIDENING = 1e-6
+#: Steps of the grid on which the corners of boxes lie: a node then is four words, one fetch.
+GRID = 1 << 16
+#: Last words from here on are leaves.
+LEAF = 1 << 31
 #: Nodes with more members are halved at their median: the heuristic would not pay for its own time.
 _MOST_WEIGHED = 1 << 16
 #: From this level on all nodes are halved, so that no arrangement of members makes a tree as deep as they are many.
@@ -39,22 +41,39 @@ class _Tree:
     order: Whole
 
 
-def make_bvh(boxes: Numbers) -> NDArray[np.float32]:
-    """Eight layouts ``(8, 2 n - 1, 8)`` float32 of the tree over boxes ``(n, 2, 3)``, n at least 1.
+@dataclass(frozen=True, eq=False)
+class Bvh:
+    """Layouts ``(8, 2 n - 1, 4)`` uint32 over a grid of 2^16 steps along each axis.
 
-    A node is low x y z, entries to skip | high x y z, index of its box, or -1 for an inner node. Whole numbers are
-    exact up to 2**24.
+    A node is x, y and z, each low | high << 16 in steps of ``step (3,)`` from ``origin (3,)``, and a last word: below
+    ``LEAF`` how many entries to skip where the box is missed, else ``LEAF`` + the index of the one box inside.
     """
+
+    nodes: NDArray[np.uint32]
+    origin: Numbers
+    step: Numbers
+
+    @property
+    def count(self) -> int:
+        return int(self.nodes.shape[1])
+
+
+def make_bvh(boxes: Numbers) -> Bvh:
+    """The tree over boxes ``(n, 2, 3)``, n at least 1."""
     tree = _grow(boxes)
     low, high, sizes = _gather_up(tree, boxes)
-    margin = _WIDENING * np.abs(boxes).max()
-    nodes = np.zeros((len(tree.start), 8))
-    nodes[:, 0:3], nodes[:, 3] = low - margin, sizes
-    nodes[:, 4:7], nodes[:, 7] = high + margin, np.where(tree.left < 0, tree.order[tree.start], -1)
-    layouts = np.empty((OCTANTS, *nodes.shape), np.float32)
+    size = np.maximum(high[0] - low[0], 1e-6 * max(np.abs(boxes).max(), 1e-30))
+    # One step of margin on each side for rounding on the device, and boxes grow to whole steps.
+    step = size / (GRID - 5)
+    origin = low[0] - 2 * step
+    corners = np.floor((low - origin) / step) - 1, np.ceil((high - origin) / step) + 1
+    packed = corners[0].astype(np.uint32) | corners[1].astype(np.uint32) << 16
+    last = np.where(tree.left < 0, LEAF + tree.order[tree.start], sizes).astype(np.uint32)
+    nodes = np.column_stack([packed, last])
+    layouts = np.empty((OCTANTS, *nodes.shape), np.uint32)
     for octant in range(OCTANTS):
         layouts[octant, _places(tree, sizes, octant)] = nodes
-    return layouts
+    return Bvh(layouts, origin, step)
 
 
 def _grow(boxes: Numbers) -> _Tree:
@@ -62,7 +81,11 @@ def _grow(boxes: Numbers) -> _Tree:
     order = np.arange(count)
     centers = boxes.mean(axis=1)
     start, stop = np.array([0]), np.array([count])
-    starts, stops, lefts, axes, levels = [], [], [], [], []
+    starts: list[Whole] = []
+    stops: list[Whole] = []
+    lefts: list[Whole] = []
+    axes: list[Whole] = []
+    levels: list[int] = []
     total = 0
     while len(start):
         run, member = _members(start, stop)
@@ -83,7 +106,9 @@ def _grow(boxes: Numbers) -> _Tree:
             np.stack([start[inner], middle[inner]], axis=1).ravel(),
             np.stack([middle[inner], stop[inner]], axis=1).ravel(),
         )
-    return _Tree(levels, *(np.concatenate(column) for column in (starts, stops, lefts, axes)), order)
+    return _Tree(
+        levels, np.concatenate(starts), np.concatenate(stops), np.concatenate(lefts), np.concatenate(axes), order
+    )
 
 
 def _members(start: Whole, stop: Whole) -> tuple[Whole, Whole]:

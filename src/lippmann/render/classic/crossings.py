@@ -32,11 +32,11 @@ class Row:
     k0: Any
     k1: Any
     k2: Any
-    low: Any
-    high: Any
     kind: Any
     material: Any
     clip: Any
+    low: Any
+    high: Any
     inside: Any
     passes: Any
 
@@ -143,8 +143,16 @@ def _quadric(inside_only: bool, row: Row, o: Any, d: Any) -> list[Crossing]:
 
 
 def _box(inside_only: bool, row: Row, o: Any, d: Any) -> list[Crossing]:
-    near, far = slab(row.center, row.axis, o, reciprocal(d))
-    return [Crossing(near, near <= far), Crossing(far, near <= far)]
+    # A ray along a face counts as inside.
+    along = dr.abs(d) < _SMALLEST
+    between = (o >= row.center) & (o <= row.axis)
+    inverse = reciprocal(d)
+    a, b = (row.center - o) * inverse, (row.axis - o) * inverse
+    near = dr.select(along, dr.select(between, -dr.inf, dr.inf), dr.minimum(a, b))
+    far = dr.select(along, dr.inf, dr.maximum(a, b))
+    enter = dr.maximum(dr.maximum(near.x, near.y), near.z)
+    leave = dr.minimum(dr.minimum(far.x, far.y), far.z)
+    return [Crossing(enter, enter <= leave), Crossing(leave, enter <= leave)]
 
 
 def _flat(inside_only: bool, row: Row, o: Any, d: Any) -> list[Crossing]:

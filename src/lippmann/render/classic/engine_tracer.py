@@ -20,7 +20,7 @@ from lippmann.render.classic.clipping import Clipping
 from lippmann.render.classic.shape_table import ShapeTable, passing
 from lippmann.scene.classic import ClassicScene
 
-#: Surfaces that one ray may cross before it counts as blocked: bounds the loop where rounding would hold a ray in place.
+#: Surfaces that one ray may cross before it counts as blocked: a bound where rounding would hold a ray in place.
 MAX_CROSSINGS = 1024
 #: Step past a surface that was crossed, relative to the size of the coordinates.
 _STEP = 2e-6
@@ -53,7 +53,7 @@ class EngineTracer:
         solid, airy = positions[: triangles.solid], positions[triangles.solid :]
         parts = [
             (_mesh("solid", solid), 0) if len(solid) else None,
-            (_spheres(table), len(triangles)) if table.traced else None,
+            *((sphere, len(triangles) + row) for row, sphere in enumerate(_spheres(table))),
             (_mesh("airy", airy), triangles.solid) if len(airy) else None,
         ]
         shapes = [part[0] for part in parts if part is not None]
@@ -71,12 +71,13 @@ class EngineTracer:
         self._passes = mi.Float(shares.astype(np.float32)) if self._airy else None
         self._groups = mi.Float(groups.astype(np.float32)) if self._clips else None
 
-    def closest(self, o: Any, d: Any, t: Any, active: Any, coherent: bool) -> tuple[Any, Any, Any]:
+    def closest(self, o: Any, d: Any, t: Any, active: Any, coherent: Any) -> tuple[Any, Any, Any]:
         """Distance, index and barycentric coordinates of the nearest hit before ``t``; ``t`` and ``NONE`` without."""
         if self._all is None:
             return t, mi.UInt32(dr.full(mi.UInt32, _NONE)), mi.Point2f(0)
         if self._clips:
-            return self._closest_kept(o, d, t, active)
+            distance, found, at = self._closest_kept(o, d, t, active)
+            return distance, found, at
         ray = mi.Ray3f(mi.Point3f(o), mi.Vector3f(d), t, 0, [])
         pi = self._all.ray_intersect_preliminary(ray, coherent=coherent, active=active)
         hit = pi.is_valid()
@@ -154,7 +155,9 @@ def _past(o: Any, d: Any, t: Any) -> Any:
 def _scene(shapes: Sequence[Any]) -> Any:
     if not shapes:
         return None
-    return mi.load_dict({"type": "scene", **{f"shape{number}": shape for number, shape in enumerate(shapes)}})
+    # Robust: else level rays slip through the edge between two triangles.
+    named = {f"shape{number}": shape for number, shape in enumerate(shapes)}
+    return mi.load_dict({"type": "scene", "embree_use_robust_intersections": True, **named})
 
 
 def _starts(parts: Sequence[tuple[Any, int]]) -> Any:
@@ -177,15 +180,10 @@ def _mesh(name: str, positions: NDArray[np.float64]) -> Any:
     return mesh
 
 
-def _spheres(table: ShapeTable) -> Any:
-    rows = table.rows[: table.traced]
-    radii = np.sqrt(rows[:, 3])
-    return mi.load_dict(
-        {
-            "type": "ellipsoids",
-            "centers": mi.TensorXf(np.ascontiguousarray(rows[:, :3])),
-            "scales": mi.TensorXf(np.repeat(radii[:, None], 3, axis=1)),
-            "quaternions": mi.TensorXf(np.tile(np.float32([0, 0, 0, 1]), (table.traced, 1))),
-            "extent": 1.0,
-        }
-    )
+def _spheres(table: ShapeTable) -> list[Any]:
+    """One shape each: what costs time with many shapes is asking them for their surface, which is not done here."""
+    bsdf = mi.load_dict({"type": "diffuse"})
+    return [
+        mi.load_dict({"type": "sphere", "center": row[:3].tolist(), "radius": float(np.sqrt(row[3])), "bsdf": bsdf})
+        for row in table.rows[: table.traced]
+    ]

@@ -1,7 +1,7 @@
 """All geometry of a classic scene as one: where a ray hits, how the surface lies there, what light gets past.
 
-A hit is a distance and an index: triangles first, in the order of :class:`TriangleOrder`, then the rows of the shape
-table, lamps last.
+A hit is a distance and an index: triangles first, in the order of ``engine_tracer.triangle_order``, then the rows of
+the shape table, lamps last.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ import numpy as np
 
 from lippmann.render.classic.clipping import Clipping
 from lippmann.render.classic.crossings import Row, fetch, xyz
-from lippmann.render.classic.engine_tracer import EngineTracer, TriangleOrder, triangle_order
-from lippmann.render.classic.shape_table import Column, Kind, ShapeTable, make_shape_table
+from lippmann.render.classic.engine_tracer import EngineTracer, triangle_order
+from lippmann.render.classic.shape_table import Column, Kind, make_shape_table
 from lippmann.render.classic.shape_tracer import ShapeTracer
 from lippmann.scene.classic import ClassicScene
 
@@ -41,9 +41,9 @@ class Hit:
 class Surface:
     """A surface where a ray hits it.
 
-    ``p`` is the point; ``n`` the normal to shade with, turned as the light model says; ``face`` the true one, unit
-    length, either side; ``lift`` how far rays start from the surface; ``material`` the index, for ``lamp`` that of the
-    lamp; ``color`` the interpolated colour where ``colored``.
+    ``p`` is the point; ``n`` the normal to shade with, turned as the light model says; ``face`` the true one, of unit
+    length, to either side; ``lift`` how far rays start from the surface; ``material`` the index; ``color`` the
+    interpolated colour where ``colored``.
     """
 
     p: Any
@@ -51,7 +51,6 @@ class Surface:
     face: Any
     lift: Any
     material: Any
-    lamp: Any
     color: Any
     colored: Any
 
@@ -72,6 +71,9 @@ class Geometry:
         self._triangles = len(self._order)
         self._smooth = bool(scene.triangles.smooth.any())
         self._colored = bool(scene.triangles.colored.any())
+        if self._table.lamps:
+            numbers = self._table.rows[self._table.lamp_rows.start :, Column.MATERIAL]
+            self._lamps = mi.UInt32(numbers.astype(np.uint32))
         self._load_triangles(scene)
 
     def _load_triangles(self, scene: ClassicScene) -> None:
@@ -93,7 +95,7 @@ class Geometry:
         if self._colored:
             self._colors = _corner_table(batch.colors[order])
 
-    def closest(self, o: Any, d: Any, active: Any, coherent: bool = False) -> Hit:
+    def closest(self, o: Any, d: Any, active: Any, coherent: Any = False) -> Hit:
         """The nearest hit of rays from ``o`` along unit ``d``."""
         t, index, uv = self._engine.closest(o, d, mi.Float(FAR), active, coherent)
         beyond = mi.UInt32(NONE)
@@ -105,22 +107,24 @@ class Geometry:
         light = dr.select(active, mi.Float(1), mi.Float(0))
         return self._engine.passing(o, d, t, self._shapes.passing(o, d, t, light))
 
-    def is_lamp(self, index: Any) -> Any:
-        """Whether a hit is the visible sphere of a lamp."""
-        lamps = self._table.lamp_rows
-        return (index >= self._triangles + lamps.start) & (index != NONE) if len(lamps) else mi.Bool(False)
+    def lamp(self, hit: Hit) -> tuple[Any, Any]:
+        """Whether a hit is the visible sphere of a lamp, and which."""
+        if not self._table.lamps:
+            return mi.Bool(False), mi.UInt32(0)
+        first = self._triangles + self._table.lamp_rows.start
+        is_lamp = (hit.index >= first) & (hit.index != NONE)
+        return is_lamp, dr.gather(mi.UInt32, self._lamps, hit.index - first, is_lamp)
 
     def surface(self, hit: Hit, o: Any, d: Any, active: Any) -> Surface:
-        """How the surface lies that a ray from ``o`` along ``d`` hits."""
+        """How the surface lies that a ray from ``o`` along ``d`` hits; it is no lamp."""
         p = o + d * hit.t
-        lamp = self.is_lamp(hit.index)
-        if not len(self._table.rows):
-            return self._triangle(hit, p, d, lamp, active)
+        if not self._table.lamp_rows.start:
+            return self._triangle(hit, p, d, active)
         if not self._triangles:
-            return self._shape(hit.index, p, d, lamp, active)
+            return self._shape(hit.index, p, d, active)
         on_triangle = hit.index < self._triangles
-        triangle = self._triangle(hit, p, d, lamp, active & on_triangle)
-        shape = self._shape(hit.index - self._triangles, p, d, lamp, active & ~on_triangle)
+        triangle = self._triangle(hit, p, d, active & on_triangle)
+        shape = self._shape(hit.index - self._triangles, p, d, active & ~on_triangle)
         return Surface(
             *(
                 dr.select(on_triangle, getattr(triangle, name), getattr(shape, name))
@@ -128,7 +132,7 @@ class Geometry:
             )
         )
 
-    def _triangle(self, hit: Hit, p: Any, d: Any, lamp: Any, active: Any) -> Surface:
+    def _triangle(self, hit: Hit, p: Any, d: Any, active: Any) -> Surface:
         plane = dr.gather(mi.Vector4f, self._faces, 2 * hit.index, active)
         rest = dr.gather(mi.Vector4f, self._faces, 2 * hit.index + 1, active)
         face = xyz(plane)
@@ -143,11 +147,11 @@ class Geometry:
             colored = rest.y > 0
             color = mi.Color3f(_interpolated(self._colors, hit.index, u, v, active & colored))
         lift = _LIFT * dr.maximum(rest.z, dr.max(dr.abs(p)))
-        return Surface(p, n, face, lift, mi.UInt32(rest.x), lamp, color, colored)
+        return Surface(p, n, face, lift, mi.UInt32(rest.x), color, colored)
 
-    def _shape(self, index: Any, p: Any, d: Any, lamp: Any, active: Any) -> Surface:
+    def _shape(self, index: Any, p: Any, d: Any, active: Any) -> Surface:
         row = fetch(self._shapes.rows, index, active)
-        kinds = {Kind(int(kind)) for kind in np.unique(self._table.rows[:, Column.KIND])}
+        kinds = {Kind(int(kind)) for kind in np.unique(self._table.rows[: self._table.lamp_rows.start, Column.KIND])}
         q = p - row.center
         n, face, refined, size = mi.Vector3f(0), mi.Vector3f(0), mi.Point3f(p), dr.max(dr.abs(q))
         ways = {Kind.SPHERE: _on_sphere, Kind.QUADRIC: _on_quadric, Kind.FLAT: _on_flat, Kind.BOX: _on_box}
@@ -158,7 +162,7 @@ class Geometry:
             refined = dr.select(this, kind_p, refined)
         n = dr.select(dr.dot(n, d) > 0, -n, n)
         lift = _LIFT * dr.maximum(size, dr.max(dr.abs(p)))
-        return Surface(refined, n, face, lift, mi.UInt32(row.material), lamp, mi.Color3f(0), mi.Bool(False))
+        return Surface(refined, n, face, lift, mi.UInt32(row.material), mi.Color3f(0), mi.Bool(False))
 
 
 def _on_sphere(row: Row, q: Any) -> tuple[Any, Any, Any]:

@@ -24,7 +24,9 @@ def pyramid(texels: Texels) -> list[Texels]:
     while texels.shape[0] == 1 and max(texels.shape[1:3]) > 1:
         height, width = (max(size // 2, 1) for size in texels.shape[1:3])
         rows, columns = min(texels.shape[1], 2 * height), min(texels.shape[2], 2 * width)
-        blocks = texels[0, :rows, :columns].astype(np.uint16).reshape(height, rows // height, width, columns // width, 3)
+        blocks = (
+            texels[0, :rows, :columns].astype(np.uint16).reshape(height, rows // height, width, columns // width, 3)
+        )
         texels = (blocks.sum(axis=(1, 3)) // ((rows // height) * (columns // width))).astype(np.uint8)[None]
         levels.append(texels)
     return levels
@@ -43,8 +45,8 @@ class ImageTable:
             firsts.append(len(levels))
             counts.append(len(copies))
             for copy in copies:
-                channels = copy.astype(np.uint32)
-                parts.append((channels[..., 0] | channels[..., 1] << 8 | channels[..., 2] << 16).ravel())
+                packed = copy.astype(np.uint32) @ np.array([1, 1 << 8, 1 << 16], np.uint32)
+                parts.append(packed.ravel().astype(np.uint32))
                 depth, height, width = copy.shape[:3]
                 levels.append((start, width, height, depth))
                 start += len(parts[-1])

@@ -42,8 +42,12 @@ class MaterialTable:
     def __init__(self, materials: Sequence[ClassicMaterial], textures: Sequence[int]) -> None:
         """``textures`` are the numbers of the materials' textures, -1 for a constant colour."""
         rows = [
-            (*m.color, m.ambient, m.diffuse, m.specular, m.opacity, m.phong, m.phong_size, m.phong_kind == "metal")
-            + (texture, m.raster3d, m.outline, m.outline_width, m.ior, 0.0)
+            [
+                *(*m.color, m.ambient),
+                *(m.diffuse, m.specular, m.opacity, m.phong),
+                *(m.phong_size, m.phong_kind == "metal", texture, m.raster3d),
+                *(m.outline, m.outline_width, m.ior, 0.0),
+            ]
             for m, texture in zip(materials, textures, strict=True)
         ]
         self._rows = mi.Float(np.array(rows, np.float32).ravel())
@@ -62,7 +66,9 @@ class MaterialTable:
     def fetch(self, index: Any, active: Any) -> Finish:
         """The material of each lane."""
         a, b, c, d = (dr.gather(mi.Vector4f, self._rows, 4 * index + part, active) for part in range(4))
-        color = mi.Color3f(xyz(a))
         return Finish(
-            color, a.w, b.x, b.y, b.z, b.w, c.x, c.y > 0, mi.Int32(c.z), c.w > 0, d.x, d.y, d.z
-        )  # in the order of the columns
+            *(mi.Color3f(xyz(a)), a.w),
+            *(b.x, b.y, b.z, b.w),
+            *(c.x, c.y > 0, mi.Int32(c.z), c.w > 0),
+            *(d.x, d.y, d.z),
+        )

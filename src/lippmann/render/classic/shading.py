@@ -34,8 +34,8 @@ class Shader:
         """Colour that the surface sends back along -``d`` by itself, whether a highlight is in it, and shadow rays."""
         diffuse, highlight, shadow = self._lamp_light(surface, finish, color, d, active)
         if self._sky is not None:
-            sky, rays = self._sky_light(self._sky, surface, stream, hits, active & self._sees_light(finish))
-            diffuse += sky
+            share, rays = self._open_sky(self._sky.samples, surface, stream, hits, active & self._sees_light(finish))
+            diffuse += mi.Color3f(*self._sky.color) * share
             shadow += rays
         factor = finish.diffuse
         if self._materials.outlined:
@@ -87,13 +87,14 @@ class Shader:
         return dr.select(cosine > LEAST, dr.power(dr.maximum(cosine, 0) * dr.rsqrt(dr.dot(half, half)), exponent), 0)
 
     @dr.syntax
-    def _sky_light(
-        self, sky: AmbientOcclusion, surface: Surface, stream: SampleStream, hits: Any, active: Any
+    def _open_sky(
+        self, samples: int, surface: Surface, stream: SampleStream, hits: Any, active: Any
     ) -> tuple[Any, Any]:
+        """Twice the mean of the cosine over the half sphere, where it is open; shadow rays."""
         total, shadow, number = mi.Float(0), mi.UInt32(0), mi.UInt32(0)
         p, n, face, lift = surface.p, surface.n, surface.face, surface.lift
-        while dr.hint(active & (number < sky.samples), label="sky light"):
-            point = stream.next_2d(_SKY_DIMENSION + hits * sky.samples + number)
+        while dr.hint(active & (number < samples), label="sky light"):
+            point = stream.next_2d(_SKY_DIMENSION + hits * samples + number)
             d = mi.warp.square_to_uniform_sphere(point)
             cosine = dr.dot(d, n)
             d = mi.Vector3f(dr.mulsign(d, cosine))
@@ -101,7 +102,7 @@ class Shader:
             total += dr.abs(cosine) * self._geometry.passing(start, d, mi.Float(FAR), active)
             shadow += 1
             number += 1
-        return mi.Color3f(*sky.color) * (total * (2 / sky.samples)), shadow
+        return total * (2 / samples), shadow
 
 
 def _outline(surface: Surface, finish: Finish, d: Any) -> Any:

@@ -8,9 +8,9 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from lippmann.render.classic.bvh import make_bvh
+from lippmann.render.classic.bvh import GRID, LEAF, make_bvh
 from lippmann.render.classic.clipping import Clipping
-from lippmann.render.classic.crossings import Row, crossings, fetch, literal, reciprocal, slab, xyz
+from lippmann.render.classic.crossings import Row, crossings, fetch, literal, reciprocal, slab
 from lippmann.render.classic.shape_table import Column, Kind, ShapeTable
 
 #: Up to this many listed shapes are written into the kernel; more are looped over.
@@ -30,9 +30,8 @@ class ShapeTracer:
         self.rows = mi.Float(table.rows.ravel())
         self.filters = bool((table.rows[:, Column.PASSES] > 0).any())
         if table.walked:
-            layouts = make_bvh(table.boxes)
-            self._nodes = mi.Float(layouts.ravel())
-            self._count = layouts.shape[1]
+            self._bvh = make_bvh(table.boxes)
+            self._nodes = mi.UInt32(self._bvh.nodes.ravel())
 
     def closest(self, o: Any, d: Any, t: Any, index: Any, active: Any) -> tuple[Any, Any]:
         """Distance and row of the nearest crossing before ``t``; where there is none, ``t`` and ``index``."""
@@ -63,18 +62,14 @@ class ShapeTracer:
     @dr.syntax
     def _nearest_walked(self, o: Any, d: Any, t: Any, index: Any, active: Any) -> tuple[Any, Any]:
         kinds = self._kinds(self._table.walked_rows)
-        inverse = reciprocal(d)
-        node, end = self._range(d)
+        foot, og, inverse, node, end = self._start(o, d)
         node = dr.select(active, node, end)
         while dr.hint(node < end, label="shapes"):
-            low = dr.gather(mi.Vector4f, self._nodes, 2 * node)
-            high = dr.gather(mi.Vector4f, self._nodes, 2 * node + 1)
-            enter, leave = slab(xyz(low), xyz(high), o, inverse)
-            meets = (enter <= dr.minimum(leave, t)) & (leave >= 0)
-            if meets & (high.w >= 0):
-                number = mi.UInt32(high.w) + self._table.traced
+            meets, last = self._meets(node, og, inverse, -foot, t - foot)
+            if meets & (last >= LEAF):
+                number = last - LEAF + self._table.traced
                 t, index = self._nearer(kinds, fetch(self.rows, number, True), number, o, d, t, index)
-            node += dr.select(meets, mi.UInt32(1), mi.UInt32(low.w))
+            node += dr.select(meets | (last >= LEAF), 1, last)
         return t, index
 
     @dr.syntax
@@ -98,17 +93,13 @@ class ShapeTracer:
     @dr.syntax
     def _past_walked(self, o: Any, d: Any, t: Any, light: Any) -> Any:
         kinds = self._kinds(self._table.walked_rows)
-        inverse = reciprocal(d)
-        node, end = self._range(d)
+        foot, og, inverse, node, end = self._start(o, d)
         while dr.hint((node < end) & (light > 0), label="shadows of shapes"):
-            low = dr.gather(mi.Vector4f, self._nodes, 2 * node)
-            high = dr.gather(mi.Vector4f, self._nodes, 2 * node + 1)
-            enter, leave = slab(xyz(low), xyz(high), o, inverse)
-            meets = (enter <= dr.minimum(leave, t)) & (leave >= 0)
-            if meets & (high.w >= 0):
-                row = fetch(self.rows, mi.UInt32(high.w) + self._table.traced, True)
+            meets, last = self._meets(node, og, inverse, -foot, t - foot)
+            if meets & (last >= LEAF):
+                row = fetch(self.rows, last - LEAF + self._table.traced, True)
                 light = self._past(kinds, row, o, d, t, light)
-            node += dr.select(meets, mi.UInt32(1), mi.UInt32(low.w))
+            node += dr.select(meets | (last >= LEAF), 1, last)
         return light
 
     @dr.syntax
@@ -132,8 +123,22 @@ class ShapeTracer:
     def _kinds(self, rows: range) -> set[Kind]:
         return {Kind(int(kind)) for kind in np.unique(self._table.rows[rows.start : rows.stop, Column.KIND])}
 
-    def _range(self, d: Any) -> tuple[Any, Any]:
-        """First and last entry of the layout for a direction."""
+    def _start(self, o: Any, d: Any) -> tuple[Any, Any, Any, Any, Any]:
+        """A ray on the grid of the hierarchy, counted from its point nearest to the middle: distance of that point,
+        its place, the reciprocal direction, and the first entry and the end of the layout to walk."""
+        bvh = self._bvh
+        middle = mi.Vector3f(*(bvh.origin + bvh.step * (GRID / 2)).tolist())
+        per_step = mi.Vector3f(*(1 / bvh.step).tolist())
+        foot = dr.dot(middle - o, d)
+        place = (o - middle + d * foot) * per_step + GRID / 2
         octant = dr.select(d.x < 0, mi.UInt32(1), mi.UInt32(0))
         octant += dr.select(d.y < 0, mi.UInt32(2), mi.UInt32(0)) + dr.select(d.z < 0, mi.UInt32(4), mi.UInt32(0))
-        return octant * self._count, (octant + 1) * self._count
+        return foot, place, reciprocal(d * per_step), octant * bvh.count, (octant + 1) * bvh.count
+
+    def _meets(self, node: Any, place: Any, inverse: Any, nearest: Any, farthest: Any) -> tuple[Any, Any]:
+        """Whether a ray meets a node's box between two distances, and the node's last word."""
+        words = dr.gather(mi.Vector4u, self._nodes, node)
+        low = mi.Vector3f(*(mi.Float(words[axis] & 0xFFFF) for axis in range(3)))
+        high = mi.Vector3f(*(mi.Float(words[axis] >> 16) for axis in range(3)))
+        enter, leave = slab(low, high, place, inverse)
+        return (enter <= dr.minimum(leave, farthest)) & (leave >= nearest), words[3]

@@ -70,7 +70,16 @@ class TextureTable:
         return color * dr.clip(self._noise.at(q, active), 0.01, 1)
 
     def _image(
-        self, name: TextureKind, index: Any, image: Any, q: Any, scale: Any, rotate: Any, largest: Any, path: Any, on: Any
+        self,
+        name: TextureKind,
+        index: Any,
+        image: Any,
+        q: Any,
+        scale: Any,
+        rotate: Any,
+        largest: Any,
+        path: Any,
+        on: Any,
     ) -> Any:
         reduction = _BLUR * path * largest
         w = mi.Float(0)
@@ -134,9 +143,7 @@ def _marble(p: Any, noise: Any) -> Any:
     whole = mi.Int32(d)
     d = d * mi.Float(whole - dr.trunc(mi.Float(whole) / 25) * 25)
     shade = dr.clip(0.1 * dr.abs(d - 10 - 20 * (mi.Float(mi.Int32(d)) * 0.05)), 0, 1)
-    return mi.Color3f(
-        (1 + dr.sin(shade * 6.28)) / 2, (1 + dr.sin(shade * 16.28)) / 2, (1 + dr.cos(shade * 30.28)) / 2
-    )
+    return mi.Color3f((1 + dr.sin(shade * 6.28)) / 2, (1 + dr.sin(shade * 16.28)) / 2, (1 + dr.cos(shade * 30.28)) / 2)
 
 
 def _around(x: Any, y: Any) -> Any:

@@ -1,8 +1,8 @@
 """The classic light models: Tachyon's, and Haines' for NFF.
 
-A surface sends back its own colour (``render/classic/shading.py``), a mirrored ray and a ray that goes through. Both are
-followed, depth first: the second waits on a small stack of each lane. All weights are single numbers, for no surface
-tints what it mirrors or lets through.
+A surface sends back its own colour (``render/classic/shading.py``), a mirrored ray and a ray that goes through. Both
+are followed, depth first: the second waits on a small stack of each lane. All weights are single numbers, for no
+surface tints what it mirrors or lets through.
 
 Ray depth: the primary ray has ``depth``, each further ray one less. Where a ray of depth 1 needs another, Tachyon takes
 the background as that ray's own would see it, without the surface's factor; under NFF's rules nothing is added.
@@ -20,27 +20,13 @@ from lippmann.render.classic.atmosphere import background_color, clearness
 from lippmann.render.classic.build import BuiltClassic
 from lippmann.render.classic.geometry import FAR, NONE, Hit, Surface
 from lippmann.render.classic.materials import LEAST, Finish
-from lippmann.render.integrators.base import RayCounts
+from lippmann.render.integrators.base import FirstHit, RayCounts
 from lippmann.render.sampling import SampleStream
 
 #: Rays that may wait on a lane's stack. More would take 2^32 rays a pixel to need.
 DEEPEST_STACK = 32
 #: Rays of less weight are not followed: a thousandth of a step of an 8-bit picture.
 LEAST_WEIGHT = 4e-6
-
-
-@dataclass
-class FirstHit:
-    """What reprojection needs to know of a primary ray.
-
-    ``p``: the point hit (world), on which the ray's colour lies; ``valid``: False where the background is seen, which is
-    infinitely far; ``view_dependent``: the colour holds for this direction alone, for it has a mirrored or transmitted
-    part, a highlight or an outline.
-    """
-
-    p: Any
-    valid: Any
-    view_dependent: Any
 
 
 @dataclass
@@ -79,62 +65,65 @@ class ClassicIntegrator:
         self._limited = shading.max_transparent_surfaces is not None and materials.lets_through
 
     def sample(self, ray: Any, stream: SampleStream, active: Any) -> tuple[Any, RayCounts]:
+        """As :class:`~lippmann.render.integrators.base.Integrator` has it."""
         radiance, counts, _ = self.sample_with_hit(ray, stream, active)
         return radiance, counts
 
     def sample_with_hit(self, ray: Any, stream: SampleStream, active: Any) -> tuple[Any, RayCounts, FirstHit]:
-        """As :meth:`sample`, with what the primary ray hit."""
+        """As :meth:`sample`, with what the primary ray hit.
+
+        The colour depends on the direction where a mirrored or transmitted part is in it, a highlight or an outline.
+        """
         o, d = mi.Vector3f(ray.o), mi.Vector3f(ray.d)
         if self._mirrored:
             o, d = _mirrored(o), _mirrored(d)
         active = mi.Bool(active)
-        primary = _Ray(
-            o, d, mi.Float(1), mi.UInt32(self.depth), mi.Float(0), mi.UInt32(self._scene.shading.max_transparent_surfaces or 0)
-        )
+        surfaces = mi.UInt32(self._scene.shading.max_transparent_surfaces or 0)
+        primary = _Ray(o, d, mi.Float(1), mi.UInt32(self.depth), mi.Float(0), surfaces)
+        if self._spawns and self.depth > 1:
+            radiance, counts, first = self._follow(primary, stream, active)
+            return radiance, counts, first
         hit = self._built.geometry.closest(o, d, active, coherent=True)
-        valid = active & (hit.index != NONE)
-        if not self._spawns or (self.depth == 1):
-            radiance, shadow, shown, _ = self._shade(primary, hit, stream, mi.UInt32(0), True, active)
-            counts = RayCounts(mi.UInt32(0) * shadow, shadow)
-        else:
-            radiance, counts, shown = self._follow(primary, hit, stream, active)
-        p = o + d * dr.select(valid, hit.t, 0)
-        return radiance, counts, FirstHit(mi.Point3f(_mirrored(p) if self._mirrored else p), valid, shown)
+        radiance, shadow, depends, _ = self._shade(primary, hit, stream, mi.UInt32(0), mi.Bool(True), active)
+        none = dr.zeros(mi.UInt32, dr.width(hit.t))
+        return radiance, RayCounts(none, shadow), FirstHit(_distance(hit, active), depends)
 
     @dr.syntax
-    def _follow(self, ray: _Ray, hit: Hit, stream: SampleStream, active: Any) -> tuple[Any, RayCounts, Any]:
+    def _follow(self, ray: _Ray, stream: SampleStream, active: Any) -> tuple[Any, RayCounts, FirstHit]:
         """Shades a ray and all that come of it."""
         radiance, shadow, secondary = mi.Color3f(0), mi.UInt32(0), mi.UInt32(0)
-        view_dependent = mi.Bool(False)
+        distance, view_dependent = mi.Float(dr.inf), mi.Bool(False)
         hits = mi.UInt32(0)
         waiting = mi.UInt32(0)
         if dr.hint(self._branches, mode="scalar"):
-            stack = dr.alloc_local(_Ray, min(max(self.depth - 1, 1), DEEPEST_STACK), value=dr.zeros(_Ray))
+            room = min(self.depth - 1, DEEPEST_STACK)
+            stack = {f.name: dr.alloc_local(type(getattr(ray, f.name)), room + 1) for f in fields(_Ray)}
         while dr.hint(active, label="rays"):
-            color, tests, shown, (mirrored, through) = self._shade(ray, hit, stream, hits, hits == 0, active)
+            is_primary = hits == 0
+            hit = self._built.geometry.closest(ray.o, ray.d, active, coherent=is_primary)
+            color, tests, depends, (mirrored, through) = self._shade(ray, hit, stream, hits, is_primary, active)
             radiance += dr.select(active, color, 0)
             shadow += dr.select(active, tests, 0)
-            view_dependent |= shown & (hits == 0) & active
+            secondary += dr.select(active & ~is_primary, mi.UInt32(1), mi.UInt32(0))
+            distance = dr.select(is_primary, _distance(hit, active), distance)
+            view_dependent |= depends & is_primary & active
             hits += 1
 
             goes_on = active & (mirrored.weight > LEAST_WEIGHT)
             passes = active & (through.weight > LEAST_WEIGHT)
+            ray = _either(goes_on, mirrored, through)
             if dr.hint(self._branches, mode="scalar"):
-                waits = goes_on & passes & (waiting < len(stack))
-                if waits:
-                    stack[waiting] = through
+                # What does not wait goes to a place of no meaning.
+                waits = goes_on & passes & (waiting < room)
+                _store(stack, dr.select(waits, waiting, room), through)
                 waiting += dr.select(waits, mi.UInt32(1), mi.UInt32(0))
-                ray = _either(goes_on, mirrored, through)
-                active &= goes_on | passes | (waiting > 0)
-                if active & ~goes_on & ~passes:
-                    waiting -= 1
-                    ray = stack[waiting]
+                returns = active & ~goes_on & ~passes & (waiting > 0)
+                waiting -= dr.select(returns, mi.UInt32(1), mi.UInt32(0))
+                ray = _either(returns, _load(stack, waiting), ray)
+                active &= goes_on | passes | returns
             else:
-                ray = _either(goes_on, mirrored, through)
                 active &= goes_on | passes
-            secondary += dr.select(active, mi.UInt32(1), mi.UInt32(0))
-            hit = self._built.geometry.closest(ray.o, ray.d, active)
-        return radiance, RayCounts(secondary, shadow), view_dependent
+        return radiance, RayCounts(secondary, shadow), FirstHit(distance, view_dependent)
 
     def _shade(
         self, ray: _Ray, hit: Hit, stream: SampleStream, hits: Any, primary: Any, active: Any
@@ -142,14 +131,15 @@ class ClassicIntegrator:
         """What a ray brings by itself, weighted; shadow rays; view dependence; the mirrored ray and the one through."""
         built, shading = self._built, self._scene.shading
         met = active & (hit.index != NONE)
+        is_lamp, lamp = built.geometry.lamp(hit)
+        is_lamp &= met
+        met &= ~is_lamp
         surface = built.geometry.surface(hit, ray.o, ray.d, met)
-        is_lamp = met & surface.lamp
-        met &= ~surface.lamp
         finish = built.materials.fetch(surface.material, met)
         path = ray.path + hit.t if shading.mode != "low" else mi.Float(FAR)
         color = dr.select(surface.colored, surface.color, finish.color)
         color = built.textures.color(dr.select(surface.colored, -1, finish.texture), color, surface.p, path, met)
-        lamp_color = built.lamps.color(surface.material, is_lamp)
+        lamp_color = built.lamps.color(lamp, is_lamp)
         behind = background_color(self._scene.background, ray.o, ray.d)
         if self._plain:
             if shading.mode == "lowest":
@@ -226,6 +216,19 @@ _RASTER3D_PI = 3.1415926
 
 def _mirrored(v: Any) -> Any:
     return mi.Vector3f(v.x, v.y, -v.z)
+
+
+def _store(stack: dict[str, Any], place: Any, ray: _Ray) -> None:
+    for name, column in stack.items():
+        column[place] = getattr(ray, name)
+
+
+def _load(stack: dict[str, Any], place: Any) -> _Ray:
+    return _Ray(**{name: column[place] for name, column in stack.items()})
+
+
+def _distance(hit: Hit, active: Any) -> Any:
+    return dr.select(active & (hit.index != NONE), hit.t, dr.inf)
 
 
 def _dropped(ray: _Ray) -> _Ray:
