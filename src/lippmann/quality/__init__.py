@@ -1,11 +1,11 @@
 """How far a picture is from a reference: the paper's figures and the standard ones."""
 
-from lippmann.quality.compare import Comparison, check_comparable, compare
-from lippmann.quality.error_map import error_map
+from lippmann.quality.comparison import Comparison, check_comparable, compare
+from lippmann.quality.error_picture import error_map
 from lippmann.quality.metrics import MicroImage, low_percentile, micro_image_means, psnr, squared_errors
 from lippmann.quality.paper import PaperFigures, paper_figures, paper_psnr, paper_rmse
 from lippmann.quality.silhouettes import Silhouettes, find_silhouettes
-from lippmann.quality.ssim import ViewSimilarity, ssim, view_similarity
+from lippmann.quality.similarity import ViewSimilarity, ssim, view_similarity
 
 __all__ = [
     "Comparison",

@@ -10,6 +10,7 @@ from __future__ import annotations
 import statistics
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from enum import Enum
 
 from lippmann.display import Display
 from lippmann.image import IntegralImage
@@ -20,44 +21,54 @@ from lippmann.quality import Comparison, compare
 STAGE = "reproducing the paper"
 
 
+class Manner(Enum):
+    """How the methods that reuse points go about it; the value is for headings."""
+
+    PAPER = "As the paper does it"
+    DEFAULT = "In the default order"
+    GLOSS = "In the default order, gloss respected"
+
+
 @dataclass(frozen=True)
 class Variant:
-    """A way of rendering.
+    """A way of rendering: a method, and a manner if it reuses points (None for full tracing, the reference)."""
 
-    Parameters
-    ----------
-    key:
-        Short name for JSON.
-    title:
-        For tables.
-    method, order, respect_gloss:
-        As in :class:`~lippmann.render.settings.RenderSettings`.
-    """
-
-    key: str
-    title: str
     method: str
-    order: str = "default"
-    respect_gloss: bool = False
+    manner: Manner | None = None
 
     @property
-    def is_reference(self) -> bool:
-        """Whether this is full tracing, which all others are compared with."""
-        return self.method == "full"
+    def key(self) -> str:
+        """Short name for JSON."""
+        return self.method if self.manner is None else f"{self.method}-{self.manner.name.lower()}"
+
+    @property
+    def title(self) -> str:
+        """For tables."""
+        words = {None: "", Manner.PAPER: ", as in the paper", Manner.DEFAULT: "", Manner.GLOSS: ", gloss respected"}
+        return self.method + words[self.manner]
+
+    @property
+    def order(self) -> str:
+        """As in :class:`~lippmann.render.settings.RenderSettings`."""
+        return "paper" if self.manner is Manner.PAPER else "default"
+
+    @property
+    def respect_gloss(self) -> bool:
+        """As in :class:`~lippmann.render.settings.RenderSettings`."""
+        return self.manner is Manner.GLOSS
 
 
-REFERENCE = Variant("full", "full", "full")
+#: The methods that reuse points.
+METHODS = ("lens-view", "interpolated")
 
-#: Every way that is measured, full tracing first.
-VARIANTS = (
-    REFERENCE,
-    Variant("lens-view-paper", "lens-view, order of the paper", "lens-view", "paper"),
-    Variant("interpolated-paper", "interpolated, order of the paper", "interpolated", "paper"),
-    Variant("lens-view", "lens-view, default order", "lens-view"),
-    Variant("interpolated", "interpolated, default order", "interpolated"),
-    Variant("lens-view-gloss", "lens-view, gloss respected", "lens-view", respect_gloss=True),
-    Variant("interpolated-gloss", "interpolated, gloss respected", "interpolated", respect_gloss=True),
-)
+#: What all others are compared with.
+REFERENCE = Variant("full")
+
+#: Every way that is measured.
+VARIANTS = (REFERENCE, *(Variant(method, manner) for manner in Manner for method in METHODS))
+
+#: Those compared with full tracing.
+COMPARED = VARIANTS[1:]
 
 Renderer = Callable[[str, Variant], IntegralImage]
 
@@ -72,21 +83,16 @@ class Experiment:
         Names of bundled scenes; the figures of missed pixels show the first.
     display:
         The display that they are rendered for.
-    variants:
-        One of them full tracing.
     runs, warm_up:
         Renderings whose times count, and those before them.
     """
 
     scenes: tuple[str, ...]
     display: Display
-    variants: tuple[Variant, ...] = VARIANTS
     runs: int = 3
     warm_up: int = 1
 
     def __post_init__(self) -> None:
-        if sum(variant.is_reference for variant in self.variants) != 1:
-            raise ValueError("exactly one of the variants must be full tracing")
         if self.runs < 1 or not self.scenes:
             raise ValueError("there must be a scene and a run")
 
@@ -158,35 +164,33 @@ class Results:
         """The run of one scene by a variant's key."""
         return self.runs[scene][key]
 
-    @property
-    def reference(self) -> Variant:
-        """The variant that is full tracing."""
-        return next(variant for variant in self.experiment.variants if variant.is_reference)
+    def full(self, scene: str) -> Run:
+        """The full tracing of one scene."""
+        return self.runs[scene][REFERENCE.key]
 
-    @property
-    def compared(self) -> tuple[Variant, ...]:
-        """The variants that are not."""
-        return tuple(variant for variant in self.experiment.variants if not variant.is_reference)
+    def of_manner(self, manner: Manner) -> list[Variant]:
+        """The variants of one manner, in the order of :data:`METHODS`."""
+        return [variant for variant in VARIANTS if variant.manner is manner]
 
 
 def run_experiment(experiment: Experiment, render: Renderer, progress: ProgressCallback = silent) -> Results:
     """Render everything, scene by scene; errors of the renderer pass through."""
     turns = experiment.warm_up + experiment.runs
-    total = len(experiment.scenes) * len(experiment.variants) * turns
+    total = len(experiment.scenes) * len(VARIANTS) * turns
     done = 0
     runs: dict[str, dict[str, Run]] = {}
     for scene in experiment.scenes:
         images: dict[str, IntegralImage] = {}
-        seconds: dict[str, list[float]] = {variant.key: [] for variant in experiment.variants}
+        seconds: dict[str, list[float]] = {variant.key: [] for variant in VARIANTS}
         for turn in range(turns):
-            for variant in experiment.variants:
+            for variant in VARIANTS:
                 progress(Progress(STAGE, done, total, f"{scene}, {variant.title}"))
                 image = images[variant.key] = render(scene, variant)
                 if turn >= experiment.warm_up:
                     seconds[variant.key].append(working_seconds(image))
                 done += 1
         medians = {key: statistics.median(values) for key, values in seconds.items()}
-        runs[scene] = _judged(scene, experiment.variants, images, medians)
+        runs[scene] = _judged(scene, images, medians)
     progress(Progress(STAGE, total, total))
     return Results(experiment, runs)
 
@@ -197,20 +201,12 @@ def working_seconds(image: IntegralImage) -> float:
     return seconds.get("trace", 0.0) + seconds.get("reuse", 0.0)
 
 
-def _judged(
-    scene: str, variants: tuple[Variant, ...], images: Mapping[str, IntegralImage], seconds: Mapping[str, float]
-) -> dict[str, Run]:
-    full = next(variant.key for variant in variants if variant.is_reference)
-    full_rays = sum(images[full].provenance.rays.values())
-    return {
-        variant.key: Run(
-            scene,
-            variant,
-            images[variant.key],
-            seconds[variant.key],
-            seconds[full],
-            full_rays,
-            None if variant.is_reference else compare(images[full], images[variant.key]),
-        )
-        for variant in variants
-    }
+def _judged(scene: str, images: Mapping[str, IntegralImage], seconds: Mapping[str, float]) -> dict[str, Run]:
+    full = images[REFERENCE.key]
+    full_rays = sum(full.provenance.rays.values())
+    runs = {}
+    for variant in VARIANTS:
+        image = images[variant.key]
+        judged = None if variant is REFERENCE else compare(full, image)
+        runs[variant.key] = Run(scene, variant, image, seconds[variant.key], seconds[REFERENCE.key], full_rays, judged)
+    return runs

@@ -14,7 +14,7 @@ from lippmann.display import Display, LensArray, Panel
 from lippmann.errors import PictureError
 from lippmann.image import IntegralImage, Provenance
 from lippmann.quality import compare, error_map, psnr
-from lippmann.quality.error_map import SCALE
+from lippmann.quality.error_picture import SCALE
 
 
 @pytest.fixture(scope="module")

@@ -26,6 +26,9 @@ WINDOW = 11
 SIGMA = 1.5
 K1, K2 = 0.01, 0.03
 
+#: Values of one picture that are worked on at a time.
+_BLOCK = 1 << 15
+
 
 def ssim(reference: ArrayLike, test: ArrayLike, mask: NDArray[np.bool_] | None = None) -> float:
     """Mean SSIM of two pictures ``(H, W)`` or ``(H, W, channels)`` with values in [0, 1]; 1 for equal ones.
@@ -45,25 +48,38 @@ def ssim(reference: ArrayLike, test: ArrayLike, mask: NDArray[np.bool_] | None =
     float
         In [-1, 1]; NaN if ``mask`` leaves no window.
     """
-    a, b = (np.atleast_3d(np.asarray(picture, dtype=np.float64)) for picture in (reference, test))
-    present = None if mask is None or mask.all() else mask[..., None].astype(np.float64)
-    weights = 1.0 if present is None else _filtered(present)
-    if present is not None:
-        a, b = a * present, b * present
-    # Where no pixel of a window exists the weight is 0; such windows are not centred on a pixel and drop out below.
+    a, b = (np.atleast_3d(np.asarray(picture)) for picture in (reference, test))
+    present = None if mask is None or mask.all() else mask
+    height, width = a.shape[:2]
+    windows = _window(height), _window(width)
+    # Rows are taken a few at a time, so that what is computed of them stays in the processor's cache.
+    step = max(3 * WINDOW, _BLOCK // a[0].size)
+    total, count = 0.0, 0
+    for first in range(0, height - len(windows[0]) + 1, step):
+        rows = slice(first, first + step + len(windows[0]) - 1)
+        values = _similarities(a[rows], b[rows], None if present is None else present[rows], windows)
+        total, count = total + float(values.sum()), count + values.size
+    return total / count if count else float("nan")
+
+
+def _similarities(a: Real, b: Real, mask: NDArray[np.bool_] | None, windows: tuple[Real, Real]) -> Real:
+    """SSIM of every window, in any order; with a mask of those that are centred on a pixel that exists."""
+    a, b = a.astype(np.float64), b.astype(np.float64)
+    weights: Real | float = 1.0
+    if mask is not None:
+        present = mask[..., None].astype(np.float64)
+        a, b, weights = a * present, b * present, _filtered(present, windows)
+    # Where no pixel of a window exists its weight is 0; such a window is not centred on a pixel and drops out below.
     with np.errstate(invalid="ignore", divide="ignore"):
-        mean_a, mean_b = _filtered(a) / weights, _filtered(b) / weights
-        variance_a = _filtered(a * a) / weights - mean_a * mean_a
-        variance_b = _filtered(b * b) / weights - mean_b * mean_b
-        covariance = _filtered(a * b) / weights - mean_a * mean_b
+        mean_a, mean_b = _filtered(a, windows) / weights, _filtered(b, windows) / weights
+        # Both variances are needed as a sum only.
+        variances = _filtered(a * a + b * b, windows) / weights - mean_a * mean_a - mean_b * mean_b
+        covariance = _filtered(a * b, windows) / weights - mean_a * mean_b
         c1, c2 = K1 * K1, K2 * K2
         similarity = ((2 * mean_a * mean_b + c1) * (2 * covariance + c2)) / (
-            (mean_a * mean_a + mean_b * mean_b + c1) * (variance_a + variance_b + c2)
+            (mean_a * mean_a + mean_b * mean_b + c1) * (variances + c2)
         )
-    if present is None:
-        return float(similarity.mean())
-    centred = _inside(present[..., 0]) > 0
-    return float(similarity[centred].mean()) if centred.any() else float("nan")
+    return similarity if mask is None else similarity[_centres(mask, windows)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,20 +132,22 @@ def _window(length: int) -> Real:
     return weights
 
 
-def _filtered(picture: Real) -> Real:
+def _filtered(picture: Real, windows: tuple[Real, Real]) -> Real:
     """Weighted means over all windows that lie inside ``(H, W, channels)``."""
-    for axis in (0, 1):
-        weights = _window(picture.shape[axis])
-        places = picture.shape[axis] - len(weights) + 1
-        total = np.zeros(tuple(places if a == axis else n for a, n in enumerate(picture.shape)))
-        for shift, weight in enumerate(weights):
-            part = slice(shift, shift + places)
-            total += weight * (picture[part] if axis == 0 else picture[:, part])
+    for axis, weights in enumerate(windows):
+        last = len(weights) - 1
+        places = picture.shape[axis] - last
+        parts = [slice(shift, shift + places) for shift in range(last + 1)]
+        at = [picture[part] if axis == 0 else picture[:, part] for part in parts]
+        total = at[last // 2] * weights[last // 2]
+        # The weights are the same on both sides of the middle.
+        for shift in range(last // 2):
+            total += (at[shift] + at[last - shift]) * weights[shift]
         picture = total
     return picture
 
 
-def _inside(picture: Real) -> Real:
+def _centres(mask: NDArray[np.bool_], windows: tuple[Real, Real]) -> NDArray[np.bool_]:
     """The part of ``(H, W)`` that the centres of those windows cover."""
-    margins = [len(_window(length)) // 2 for length in picture.shape]
-    return picture[tuple(slice(margin, length - margin) for margin, length in zip(margins, picture.shape, strict=True))]
+    margins = [len(weights) // 2 for weights in windows]
+    return mask[tuple(slice(margin, length - margin) for margin, length in zip(margins, mask.shape, strict=True))]

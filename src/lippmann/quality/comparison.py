@@ -25,7 +25,7 @@ from lippmann.quality.metrics import (
 )
 from lippmann.quality.paper import PaperFigures, paper_figures
 from lippmann.quality.silhouettes import Silhouettes, find_silhouettes
-from lippmann.quality.ssim import ViewSimilarity, view_similarity
+from lippmann.quality.similarity import ViewSimilarity, view_similarity
 
 Real = NDArray[np.float64]
 

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from lippmann.image import IntegralImage, Provenance
 from lippmann.image.permutation import lens_indices
-from lippmann.quality.compare import Comparison
+from lippmann.quality.comparison import Comparison
 
 #: The root-mean-square error of a pixel (coded values, 0 to 1) that gets the brightest colour.
 BRIGHTEST = 0.25

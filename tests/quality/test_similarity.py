@@ -32,6 +32,14 @@ def test_agrees_with_scikit_image(height, width, seed, noise):
     assert ssim(a, b) == pytest.approx(expected, abs=1e-12)
 
 
+def test_agrees_with_scikit_image_on_pictures_that_are_taken_in_parts():
+    a, b = random_pair((301, 410), 9)
+    expected = structural_similarity(
+        a, b, data_range=1.0, gaussian_weights=True, sigma=1.5, use_sample_covariance=False
+    )
+    assert ssim(a, b) == pytest.approx(expected, abs=1e-12)
+
+
 def test_equal_pictures_have_one_and_negatives_less():
     a, _ = random_pair((20, 20), 1)
     assert ssim(a, a) == pytest.approx(1.0, abs=1e-12)
@@ -94,3 +102,10 @@ def test_views_of_every_layout_are_one_for_equal_pictures(any_display, picture):
     present = views.values[np.isfinite(views.values)]
     assert present.size > 0
     np.testing.assert_allclose(present, 1.0, atol=1e-9)
+
+
+def test_windows_are_centred_on_pixels_that_exist():
+    mask = np.zeros((25, 25), dtype=bool)
+    mask[12, 12] = True
+    flat = (2 * 0.2 * 0.4 + 1e-4) / (0.2**2 + 0.4**2 + 1e-4)
+    assert ssim(np.full((25, 25), 0.2), np.full((25, 25), 0.4), mask) == pytest.approx(flat)
