@@ -1,6 +1,6 @@
 """Makes the picture at the top of the README: the bundled teapot's native pixels beside what an eye sees of them.
 
-    python examples/readme_picture.py docs/images/teapot.png
+python examples/readme_picture.py docs/images/teapot.png
 """
 
 from __future__ import annotations

@@ -2,8 +2,8 @@
 
 ``docs/classic.md`` holds the mapping in words. Colours and pictures of classic scenes are display codes; they are taken
 for sRGB, so that the physical picture, coded by that curve, looks alike; light adds up as numbers, so its colours stay.
-Lamps get a size and fall with the square of the distance, as bright as before in the middle of the scene. Round shapes become fine
-meshes, endless ones large ones.
+Lamps get a size and fall with the square of the distance, as bright as before in the middle of the scene. Round shapes
+become fine meshes, endless ones large ones.
 """
 
 from __future__ import annotations
