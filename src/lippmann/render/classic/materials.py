@@ -55,9 +55,9 @@ class MaterialTable:
         def some(holds: Callable[[ClassicMaterial], bool]) -> bool:
             return any(holds(material) for material in materials)
 
-        self.mirrors = some(lambda m: m.specular > LEAST)
+        self.mirrors = some(lambda m: m.specular > 0)
         self.lets_through = some(lambda m: m.opacity < 1.0)
-        self.branches = some(lambda m: m.specular > LEAST and m.opacity < 1.0)
+        self.branches = some(lambda m: m.specular > 0 and m.opacity < 1.0)
         self.shines = some(lambda m: m.phong > LEAST)
         self.metal = some(lambda m: m.phong_kind == "metal" and m.phong > LEAST)
         self.outlined = some(lambda m: m.outline > 0)

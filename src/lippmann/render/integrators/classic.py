@@ -113,7 +113,7 @@ class ClassicIntegrator:
             passes = active & (through.weight > LEAST_WEIGHT)
             ray = _either(goes_on, mirrored, through)
             if dr.hint(self._branches, mode="scalar"):
-                # What does not wait goes to a place of no meaning.
+                # What does not wait goes to a place of no meaning: conditional writes to local memory lose lanes.
                 waits = goes_on & passes & (waiting < room)
                 _store(stack, dr.select(waits, waiting, room), through)
                 waiting += dr.select(waits, mi.UInt32(1), mi.UInt32(0))

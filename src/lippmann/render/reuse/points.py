@@ -2,38 +2,47 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-#: Status of a pixel, as the paper keeps it: -1 is missed, 0 filled by tracing. What reprojection filled keeps its own
-#: marks, so that the maps can tell them apart.
+#: Status of a pixel, as the paper keeps it: -1 is missed, 0 filled. What was filled without tracing keeps marks of its
+#: own, so that maps and counts can tell them apart.
 MISSED, TRACED, REPROJECTED, INTERPOLATED = -1, 0, 1, 2
+#: A missed pixel that is about to be traced.
+WANTED = -2
 
-#: Height of what a ray meets that meets nothing: the background is infinitely far away.
-BACKGROUND = -np.inf
+#: Disparity of what a ray meets that meets nothing: infinitely far away, behind everything else. Not zero, because the
+#: sign says on which side of the lens plane a point lies.
+BACKGROUND = -1e-30
+#: Heights nearer to the lens plane than this count as this, in mm.
+SMALLEST_HEIGHT = 1e-6
 
 
-@dataclass
-class PointImage:
-    """Points of a whole picture, in place of one per micro-image: lens by lens they are the paper's point images.
+class PointImage(NamedTuple):
+    """Points of a whole picture; the pixels of one micro-image are what the paper calls that lens's point image.
+
+    A point is kept as its *disparity* g / z, the gap over its height: by that share of the lens pitch it moves within
+    the micro-image from one lens to the next. With the pixel's own light line it is the 3D point. Positive: in front of
+    the lens plane. Lines of sight are straight in it: along a plane surface, disparity is linear in the pixel.
 
     Attributes
     ----------
     color:
         ``(H, W, 3)`` float32 linear RGB.
-    z:
-        ``(H, W)`` float32, height of the point over the lens plane in mm (positive toward the viewer);
-        :data:`BACKGROUND` where nothing was hit. With the pixel's own light line this is the 3D point.
+    disparity:
+        ``(H, W)`` float32; :data:`BACKGROUND` where nothing was hit.
     fragile:
-        ``(H, W)`` bool: the colour is not to be used elsewhere (a mirror, glass, a highlight).
+        ``(H, W)`` bool: the colour depends on where it is seen from (a mirror, glass, a highlight), or the pixel
+        shows several surfaces.
     status:
-        ``(H, W)`` int8, one of :data:`MISSED`, :data:`TRACED`, :data:`REPROJECTED`, :data:`INTERPOLATED`.
+        ``(H, W)`` int8, one of :data:`MISSED`, :data:`TRACED`, :data:`REPROJECTED`, :data:`INTERPOLATED`, or while
+        work is under way :data:`WANTED`.
     """
 
     color: NDArray[np.float32]
-    z: NDArray[np.float32]
+    disparity: NDArray[np.float32]
     fragile: NDArray[np.bool_]
     status: NDArray[np.int8]
 
@@ -50,3 +59,7 @@ class PointImage:
     def share(self, status: int) -> float:
         """Fraction of pixels of one status."""
         return float(np.count_nonzero(self.status == status)) / self.status.size
+
+
+#: Memory that a point image takes beyond the colours, which the picture itself needs, and the maps of a search.
+BYTES_PER_PIXEL = 8
