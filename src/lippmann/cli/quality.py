@@ -93,10 +93,5 @@ def _decibels(value: float) -> str:
     return "infinite" if math.isinf(value) else f"{value:.2f} dB"
 
 
-def _given(decibels: float | None) -> str:
-    """A figure out of JSON, where an infinite one is None."""
-    return "no error" if decibels is None else f"{decibels:.2f} dB"
-
-
 def _lens(found: MicroImage) -> str:
     return f"lens {found.column}, {found.row}"
