@@ -70,3 +70,10 @@ def save(name: str, values: Mapping[str, Any]) -> None:
     text = json.dumps({"machine": machine(), **values}, indent=2)
     (RESULTS / f"{name}.json").write_text(text + "\n")
     print(text, file=sys.stderr)
+
+
+def saved(name: str) -> dict[str, Any]:
+    """What ``results/NAME.json`` holds; nothing if it is not there."""
+    path = RESULTS / f"{name}.json"
+    values: dict[str, Any] = json.loads(path.read_text()) if path.exists() else {}
+    return values

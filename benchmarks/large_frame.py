@@ -3,7 +3,8 @@
 7680 x 4320 pixels, path light, 4 samples per pixel, a limit of 2 GiB, written as PNG. Between its tiles a frame of
 680 x 384 pixels (as many as 512 x 512) is rendered again and again, out of the large one's time, so that both see the
 same machine; it has the same optics and the same shape, so that both see the same scene: a square frame would show more
-sky. Targets: a peak of at most 2.5 GB, and time per sample within 15 % of the small frame's.
+sky. The teapot grows with the panel, and with it the distance at which rays begin: else those of the large frame would
+start inside it. Targets: a peak of at most 2.5 GB, and time per sample within 15 % of the small frame's.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ import resource
 import statistics
 import tempfile
 import time
+from dataclasses import replace
 from pathlib import Path
 
 from harness import save
@@ -35,7 +37,8 @@ def main() -> None:
 
     scene = lippmann.load_scene("teapot")
     optics = lippmann.load_display("seed-lenticular")
-    display = optics.resized(*LARGE)
+    grown = optics.aperture_distance * LARGE[1] / SMALL[1]
+    display = replace(optics.resized(*LARGE), aperture_distance=grown)
     image = lippmann.render(scene, display, spp=SPP, memory=MEMORY)
     with tempfile.TemporaryDirectory() as folder:
         image.save(Path(folder) / "frame.png")

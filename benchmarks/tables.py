@@ -131,8 +131,33 @@ Tachyon's own "Ray Tracing Time", and ours with warm kernels. "Times faster" is 
 """
 
 
+def _reuse(result: dict[str, Any]) -> str:
+    titles = {
+        "small": "The paper's display, 512x512 pixels, classic light, ray depth 2, one ray a pixel",
+        "large": "The same optics, 3840x2160 pixels (480 lenses of 8 pixels)",
+        "dear": "The same panel, path light, 16 samples a pixel",
+    }
+    parts = [
+        """## Reusing points (`reuse.py`)
+
+Seconds are those of tracing and reuse; *saved* is the share of `full`'s time. The paper's PSNR is its average over the
+micro-images. [Reusing points](reuse.md) says what the ways mean."""
+    ]
+    header = "| scene | way | pixels traced | time | full | saved | paper's PSNR | worst micro-image |"
+    for name, rows in result["results"].items():
+        lines = [
+            f"| {row['scene']} | {row['way']} | {row['pixel_shares']['traced']:.0%} | {row['seconds']:.3f} s "
+            f"| {row['full_seconds']:.3f} s | {row['saved']:.0%} | {row['paper_mean_psnr']:.1f} dB "
+            f"| {row['worst_psnr']:.1f} dB |"
+            for row in rows
+        ]
+        parts.append("\n".join([f"### {titles[name]}", "", header, "|---|---|---|---|---|---|---|---|", *lines]))
+    return "\n\n".join(parts) + "\n"
+
+
 SECTIONS = {
     "methods": _methods,
+    "reuse": _reuse,
     "tachyon": _tachyon,
     "full_rate": _full_rate,
     "large_frame": _large_frame,

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, cast
 from lippmann.display import Display, load_display
 from lippmann.progress import ProgressCallback, silent
 from lippmann.render.defaults import AUTO, choose
-from lippmann.render.settings import Device, Method, RenderSettings
+from lippmann.render.settings import Device, Method, Order, RenderSettings
 from lippmann.scene.load import load_scene as _load_scene
 from lippmann.scene.placement import Mode, PlacementOptions
 from lippmann.scene.scene import Scene
@@ -63,6 +63,8 @@ def render(
     display: Display | str | Path = "seed-lenticular",
     *,
     method: str = "full",
+    order: str | None = None,
+    respect_gloss: bool | None = None,
     integrator: str = AUTO,
     depth: int | None = None,
     spp: int | None = None,
@@ -88,7 +90,7 @@ def render(
         What :func:`load_scene` returned, or anything that it takes.
     display:
         A :class:`~lippmann.display.Display`, a preset's name, or a TOML file.
-    method, integrator, depth, spp, seed, subpixels, pixel_filter, device, threads, memory:
+    method, order, respect_gloss, integrator, depth, spp, seed, subpixels, pixel_filter, device, threads, memory:
         See :class:`~lippmann.render.settings.RenderSettings`; what is "auto" or None follows from the scene, see
         :func:`~lippmann.render.defaults.choose`.
     camera, place, turn, shift, scale, pop_out:
@@ -114,6 +116,8 @@ def render(
     choice = choose(loaded, integrator=integrator, depth=depth, spp=spp, pixel_filter=pixel_filter)
     settings = RenderSettings(
         method=cast(Method, method),
+        order=cast("Order | None", order),
+        respect_gloss=respect_gloss,
         **vars(choice),
         seed=seed,
         subpixels=subpixels,

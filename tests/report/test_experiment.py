@@ -31,7 +31,7 @@ def test_the_variants_are_full_and_every_method_in_every_manner():
     assert (paper.order, paper.respect_gloss) == ("paper", False)
     respected = Variant("lens-view", Manner.GLOSS)
     assert (respected.order, respected.respect_gloss) == ("default", True)
-    assert [Variant("lens-view", Manner.DEFAULT).order, Variant("full").order] == ["default", "default"]
+    assert [Variant("lens-view", Manner.DEFAULT).order, Variant("full").order] == ["default", None]
 
 
 def test_warm_up_does_not_count_and_the_median_does(fake_renderer, small_display):

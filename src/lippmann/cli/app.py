@@ -27,6 +27,7 @@ app.command("compose")(pictures.compose)
 app.command("replay")(pictures.replay)
 app.command("refocus")(pictures.refocus)
 app.command("compare")(quality.compare)
+app.command("reproduce")(quality.reproduce)
 
 
 @app.callback(invoke_without_command=True)

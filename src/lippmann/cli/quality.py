@@ -58,6 +58,35 @@ def compare(
     console.result(values, "\n".join(_lines(comparison)))
 
 
+def reproduce(
+    output: options.Folder,
+    fast: Annotated[
+        bool, typer.Option("--quick", help="A minute's version: two scenes, fewer pixels, one run.")
+    ] = False,
+    device: options.Device = "auto",
+    threads: options.Threads = None,
+    as_json: options.Json = False,
+    quiet: options.Quiet = False,
+) -> None:
+    """Measure the paper's tables and figures again: its scenes, its methods, and a report of both."""
+    from lippmann.report.reproduction import PAGE
+    from lippmann.report.reproduction import reproduce as reproduce_paper
+
+    console = Console(quiet, as_json)
+    with console.progress() as progress:
+        figures = reproduce_paper(output, quick=fast, device=device, threads=threads, progress=progress)
+    page = output / PAGE
+    lines = [f"{page}: {', '.join(figures['scenes'])}"]
+    for scene, runs in figures["scenes"].items():
+        paper, gloss = runs["interpolated-paper"], runs["interpolated-gloss"]
+        lines.append(
+            f"{scene:<12} interpolated as in the paper: {paper['saved_percent']:.0f} % of the time saved, "
+            f"{_given(paper['paper_mean_psnr'])}; gloss respected: {gloss['saved_percent']:.0f} %, "
+            f"{_given(gloss['paper_mean_psnr'])}"
+        )
+    console.result({"output": str(page), **figures}, "\n".join(lines))
+
+
 def _write_table(comparison: Comparison, path: Path) -> None:
     from lippmann.atomic import replacing
 
@@ -91,6 +120,11 @@ def _lines(comparison: Comparison) -> list[str]:
 
 def _decibels(value: float) -> str:
     return "infinite" if math.isinf(value) else f"{value:.2f} dB"
+
+
+def _given(value: float | None) -> str:
+    """A figure of the report, where an infinite one stands as None."""
+    return _decibels(math.inf if value is None else value)
 
 
 def _lens(found: MicroImage) -> str:

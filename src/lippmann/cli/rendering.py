@@ -17,7 +17,31 @@ from lippmann.progress import Progress
 if TYPE_CHECKING:
     from lippmann.image import IntegralImage, Provenance
 
-Method = Annotated[str, typer.Option("--method", help="full: every ray is traced.")]
+Method = Annotated[
+    str,
+    typer.Option(
+        "--method",
+        help="full: every ray is traced; lens-view: points are carried from lens to lens and missed pixels traced; "
+        "interpolated: those of every other lens are averaged.",
+    ),
+]
+Order = Annotated[
+    str | None,
+    typer.Option("--order", help="For lens-view and interpolated: default, or paper (lens by lens, as the paper did)."),
+]
+RespectGloss = Annotated[
+    bool | None,
+    typer.Option(
+        "--respect-gloss/--no-respect-gloss",
+        help="For them: trace what carrying over would falsify (mirrors, glass, highlights, edges). "
+        "By default yes, but in the paper's order.",
+        show_default=False,
+    ),
+]
+Maps = Annotated[
+    Path | None,
+    typer.Option("--maps", help="Write pictures of where the pixels came from into this folder.", show_default=False),
+]
 Camera = Annotated[str | None, typer.Option("--camera", help="Place the display by this camera of the scene file.")]
 Place = Annotated[
     str | None,
@@ -41,6 +65,9 @@ def render(
     output: options.Output,
     display: options.DisplayName = "seed-lenticular",
     method: Method = "full",
+    order: Order = None,
+    respect_gloss: RespectGloss = None,
+    maps: Maps = None,
     integrator: options.Integrator = "auto",
     depth: options.Depth = None,
     spp: options.Spp = None,
@@ -65,12 +92,16 @@ def render(
 ) -> None:
     """Render a scene into the native pixels of a display."""
     from lippmann import api
-    from lippmann.atomic import check_writable
+    from lippmann.atomic import check_folder_writable, check_writable
+    from lippmann.cli.maps import check_maps, write_maps
     from lippmann.image.formats import format_for
 
     console = Console(quiet, as_json)
     format_for(output, bits)
     check_writable(output)
+    if maps is not None:
+        check_maps(method)
+        check_folder_writable(maps)
     with console.progress() as progress:
         started = time.perf_counter()
         loaded = api.load_scene(
@@ -81,6 +112,8 @@ def render(
             loaded,
             display=display,
             method=method,
+            order=order,
+            respect_gloss=respect_gloss,
             integrator=integrator,
             depth=depth,
             spp=spp,
@@ -102,6 +135,8 @@ def render(
         writing = time.perf_counter()
         image = _with_seconds(image, load=load_seconds)
         image.save(output, bits=bits)
+        if maps is not None:
+            write_maps(image, maps)
     written = _with_seconds(image, write=time.perf_counter() - writing)
     console.remark(_depth_line(image))
     for note in image.provenance.notes:
@@ -182,6 +217,7 @@ def report(output: Path, size: tuple[int, int], provenance: Provenance) -> dict[
         "spp": provenance.spp,
         "seed": provenance.seed,
         "traced_fraction": provenance.traced_fraction,
+        "pixel_shares": dict(provenance.pixel_shares),
         "rays": dict(provenance.rays),
         "seconds": dict(provenance.seconds),
         "options": dict(provenance.options),
@@ -193,9 +229,10 @@ def _sentence(output: Path, image: IntegralImage) -> str:
     height, width = image.pixels.shape[:2]
     rays = image.provenance.rays
     millions = sum(rays.values()) / 1e6
+    shares = "".join(f"{100 * share:.1f} % {name}, " for name, share in image.provenance.pixel_shares.items())
     return (
         f"{output}: {width}x{height} pixels for {image.display.name}, {image.provenance.spp} samples per pixel, "
-        f"{millions:.1f} M rays, {image.provenance.seconds['total']:.1f} s"
+        f"{shares}{millions:.1f} M rays, {image.provenance.seconds['total']:.1f} s"
     )
 
 

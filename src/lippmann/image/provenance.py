@@ -37,6 +37,9 @@ class Provenance:
     traced_fraction:
         Primary rays traced divided by the rays that a full rendering traces, in [0, 1] for one sample per pixel and
         method.
+    pixel_shares:
+        How the pixels came about, as shares of all (``traced``, ``reprojected``, ``interpolated``); empty where every
+        pixel was traced.
     rays:
         Rays traced by kind (``primary``, ``shadow``, ``secondary``).
     seconds:
@@ -64,6 +67,7 @@ class Provenance:
     version: str = ""
     device: str = ""
     traced_fraction: float | None = None
+    pixel_shares: Mapping[str, float] = field(default_factory=dict)
     rays: Mapping[str, int] = field(default_factory=dict)
     seconds: Mapping[str, float] = field(default_factory=dict)
     transfer: Transfer = "srgb"
@@ -83,6 +87,8 @@ class Provenance:
             )
             object.__setattr__(self, "traced_fraction", float(self.traced_fraction))
         _require(self.transfer in get_args(Transfer), "transfer", self.transfer, "'srgb' or 'linear'")
+        shares = _mapping("pixel_shares", self.pixel_shares, _is_amount, "shares of the pixels by origin", float)
+        object.__setattr__(self, "pixel_shares", shares)
         object.__setattr__(self, "rays", _mapping("rays", self.rays, _is_count, "counts by kind of ray", int))
         object.__setattr__(self, "seconds", _mapping("seconds", self.seconds, _is_amount, "seconds by stage", float))
         object.__setattr__(
@@ -97,6 +103,7 @@ class Provenance:
         """All fields as JSON-able values; :meth:`from_dict` gives an equal object back."""
         plain = {f.name: getattr(self, f.name) for f in fields(self)}
         return plain | {
+            "pixel_shares": dict(self.pixel_shares),
             "rays": dict(self.rays),
             "seconds": dict(self.seconds),
             "options": dict(self.options),

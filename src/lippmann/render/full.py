@@ -33,12 +33,25 @@ class RayTotals:
 
 @dataclass
 class Frame:
-    """A traced picture: ``pixels`` ``(height, width, 3)`` float32 linear radiance, with what it took."""
+    """A rendered picture with what it took.
+
+    Attributes
+    ----------
+    pixels:
+        ``(height, width, 3)`` float32 linear radiance.
+    maps:
+        Further layers ``(height, width)`` of the methods that have any.
+    shares:
+        How the pixels came about, as shares of all; empty where all were traced.
+    """
 
     pixels: NDArray[np.float32]
     rays: RayTotals = field(default_factory=RayTotals)
     seconds_compile: float = 0.0
     seconds_trace: float = 0.0
+    seconds_reuse: float = 0.0
+    maps: dict[str, NDArray[Any]] = field(default_factory=dict)
+    shares: dict[str, float] = field(default_factory=dict)
 
 
 def trace_frame(
@@ -60,7 +73,7 @@ def trace_frame(
         with dr.scoped_set_flag(dr.JitFlag.KernelHistory, first):
             sums = tracer.trace(tile, run, frame.rays)
             if first:
-                frame.seconds_compile = _compile_seconds()
+                frame.seconds_compile = compile_seconds()
         sums *= 1 / plan.samples
         frame.pixels[tile.first_row : tile.first_row + tile.rows] += sums.reshape(tile.rows, plan.width, 3)
         done += tile.rows * plan.width * plan.channels * run.count
@@ -131,6 +144,6 @@ def lane_total(counts: Any) -> int:
     return int(dr.sum(mi.UInt64(counts))[0])
 
 
-def _compile_seconds() -> float:
+def compile_seconds() -> float:
     history = dr.kernel_history()
     return sum(float(k.get("codegen_time", 0.0)) + float(k.get("backend_time", 0.0)) for k in history) / 1000.0

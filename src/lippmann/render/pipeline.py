@@ -18,8 +18,8 @@ from lippmann.errors import UsageError
 from lippmann.image import IntegralImage, Provenance
 from lippmann.image.provenance import Transfer
 from lippmann.progress import Progress, ProgressCallback, silent
-from lippmann.render.plan import make_plan
-from lippmann.render.settings import RenderSettings
+from lippmann.render.plan import Plan, make_plan
+from lippmann.render.settings import REUSING, RenderSettings
 from lippmann.scene.description import Camera
 from lippmann.scene.placement import PlacementOptions, place
 from lippmann.scene.scene import Scene
@@ -27,7 +27,7 @@ from lippmann.scene.scene import Scene
 if TYPE_CHECKING:
     from lippmann.render.classic.build import BuiltClassic
     from lippmann.render.full import Frame
-    from lippmann.render.rays import RaySource
+    from lippmann.render.rays import DisplayRays, RaySource
     from lippmann.scene.build import BuiltScene
 
 #: Share of the free memory that is used where no limit is given.
@@ -91,15 +91,91 @@ def render_integral_image(
         bounds_in=scene.bounds_in,
     )
 
-    from lippmann.render.full import trace_frame
     from lippmann.render.rays import DisplayRays
 
     source = DisplayRays(display, placement.world_from_display, settings.subpixels)
     integrator = make_integrator(built, settings, placement.display_from_world)
-    frame = trace_frame(
-        integrator, source, plan, seed=settings.seed, box_filter=settings.pixel_filter == "box", progress=progress
+    frame = _trace(integrator, source, plan, settings, placement.display_from_world, engine.threads, progress)
+    provenance = _provenance(
+        scene,
+        built,
+        settings,
+        engine,
+        frame,
+        watch,
+        options={
+            **_reuse_options(settings),
+            "pixel_filter": settings.pixel_filter,
+            "placement": placement.mode,
+            "depth_range": list(placement.depth_range),
+            "resolvable_range": list(placement.resolvable_range),
+        },
+        warnings=placement.warnings,
     )
-    provenance = Provenance(
+    return IntegralImage(frame.pixels, display, placement.world_from_display, provenance, _layers(frame))
+
+
+def _trace(
+    integrator: Any,
+    source: DisplayRays,
+    plan: Plan,
+    settings: RenderSettings,
+    display_from_world: NDArray[np.float64],
+    threads: int,
+    progress: ProgressCallback,
+) -> Frame:
+    """The picture by the method that was asked for."""
+    box_filter = settings.pixel_filter == "box"
+    if settings.method == "full":
+        from lippmann.render.full import trace_frame
+
+        return trace_frame(integrator, source, plan, seed=settings.seed, box_filter=box_filter, progress=progress)
+    from lippmann.render.reuse.renderer import trace_reused
+
+    return trace_reused(
+        integrator,
+        source,
+        method=settings.method,
+        order=settings.order or "default",
+        careful=settings.careful,
+        samples=settings.spp,
+        seed=settings.seed,
+        box_filter=box_filter,
+        transfer=transfer_of(settings),
+        memory=settings.memory or default_memory(),
+        display_from_world=display_from_world,
+        threads=threads,
+        progress=progress,
+    )
+
+
+def _layers(frame: Frame) -> dict[str, NDArray[Any]]:
+    """The maps of a frame in the types that pictures carry: whole numbers of 32 bits."""
+    return {
+        name: values.astype(np.uint32) if values.dtype.kind in "iu" else values for name, values in frame.maps.items()
+    }
+
+
+def _reuse_options(settings: RenderSettings) -> dict[str, Any]:
+    if settings.method not in REUSING:
+        return {}
+    return {"order": settings.order or "default", "respect_gloss": settings.careful}
+
+
+def _provenance(
+    scene: Scene,
+    built: BuiltScene | BuiltClassic,
+    settings: RenderSettings,
+    engine: engines.Engine,
+    frame: Frame,
+    watch: Stopwatch,
+    *,
+    options: dict[str, Any],
+    warnings: tuple[str, ...] = (),
+) -> Provenance:
+    height, width = frame.pixels.shape[:2]
+    all_rays = height * width * settings.spp * (3 if settings.subpixels else 1)
+    return Provenance(
         method=settings.method,
         integrator=settings.integrator,
         depth=settings.surfaces,
@@ -110,18 +186,13 @@ def render_integral_image(
         transfer=transfer_of(settings),
         version=VERSION,
         device=engine.gpu_name or f"cpu, {engine.threads} threads",
-        traced_fraction=1.0,
+        traced_fraction=frame.rays.primary / all_rays,
+        pixel_shares=frame.shares,
         rays=ray_counts(frame),
         seconds=stage_seconds(watch, frame),
-        options={
-            "pixel_filter": settings.pixel_filter,
-            "placement": placement.mode,
-            "depth_range": list(placement.depth_range),
-            "resolvable_range": list(placement.resolvable_range),
-        },
-        notes=(*scene_notes(scene, built), *placement.warnings, *_frame_notes(frame)),
+        options=options,
+        notes=(*scene_notes(scene, built), *warnings, *_frame_notes(frame)),
     )
-    return IntegralImage(frame.pixels, display, placement.world_from_display, provenance)
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,22 +224,8 @@ def render_preview(
     frame = trace_frame(
         integrator, source, plan, seed=settings.seed, box_filter=settings.pixel_filter == "box", progress=progress
     )
-    provenance = Provenance(
-        method=settings.method,
-        integrator=settings.integrator,
-        depth=settings.surfaces,
-        spp=settings.spp,
-        seed=settings.seed,
-        scene=scene.name,
-        transfer=transfer_of(settings),
-        version=VERSION,
-        device=engine.gpu_name or f"cpu, {engine.threads} threads",
-        traced_fraction=1.0,
-        rays=ray_counts(frame),
-        seconds=stage_seconds(watch, frame),
-        options={"pixel_filter": settings.pixel_filter, "camera": pose.name},
-        notes=(*scene_notes(scene, built), *_frame_notes(frame)),
-    )
+    options = {"pixel_filter": settings.pixel_filter, "camera": pose.name}
+    provenance = _provenance(scene, built, settings, engine, frame, watch, options=options)
     return Preview(frame.pixels, provenance)
 
 
@@ -251,7 +308,7 @@ def stage_seconds(watch: Stopwatch, frame: Frame) -> dict[str, float]:
         "build": watch.seconds.get("build", 0.0),
         "compile": frame.seconds_compile,
         "trace": frame.seconds_trace,
-        "reuse": 0.0,
+        "reuse": frame.seconds_reuse,
         "write": 0.0,
         "total": watch.total,
     }

@@ -7,10 +7,16 @@ from typing import Literal, get_args
 
 from lippmann.errors import UsageError
 
-Method = Literal["full"]
+Method = Literal["full", "lens-view", "interpolated"]
+Order = Literal["default", "paper"]
 IntegratorName = Literal["classic", "path", "direct", "normal", "depth", "position", "albedo"]
 PixelFilter = Literal["box", "point"]
 Device = Literal["auto", "cpu", "gpu"]
+
+#: The methods that reuse points of one micro-image in others.
+REUSING: tuple[Method, ...] = ("lens-view", "interpolated")
+#: Integrators that gather light; the others name a property of a surface.
+LIGHT: tuple[IntegratorName, ...] = ("classic", "path", "direct")
 
 #: Surfaces per path where nothing is said.
 DEFAULT_DEPTH = {"classic": 2, "path": 8, "direct": 1}
@@ -23,7 +29,14 @@ class RenderSettings:
     Parameters
     ----------
     method:
-        The renderer: ``full`` traces every ray.
+        The renderer: ``full`` traces every ray; ``lens-view`` carries points from micro-image to micro-image and traces
+        the pixels that none reached; ``interpolated`` averages those of every other micro-image from its neighbours.
+    order:
+        For the last two: ``paper`` goes lens by lens as the paper does; ``default`` (None is the same) in the order
+        that traces fewer pixels.
+    respect_gloss:
+        For them, too: trace what reprojection would falsify, such as mirrors, glass and highlights. None: in the
+        default order, not in the paper's, which does not know how.
     integrator:
         ``classic`` (Tachyon's and NFF's light models, for scenes made for them), ``path`` (all light), ``direct``
         (light that comes straight from lamps and sky), or a property of the first surface without any light:
@@ -43,6 +56,8 @@ class RenderSettings:
     """
 
     method: Method = "full"
+    order: Order | None = None
+    respect_gloss: bool | None = None
     integrator: IntegratorName = "path"
     depth: int | None = None
     spp: int = 16
@@ -56,6 +71,7 @@ class RenderSettings:
     def __post_init__(self) -> None:
         for field, allowed in (
             ("method", get_args(Method)),
+            ("order", (None, *get_args(Order))),
             ("integrator", get_args(IntegratorName)),
             ("pixel_filter", get_args(PixelFilter)),
             ("device", get_args(Device)),
@@ -65,13 +81,53 @@ class RenderSettings:
                 raise UsageError(
                     f"'{value}' is not known",
                     where=f"--{field.replace('_', '-')}",
-                    rule=f"known are {', '.join(allowed)}",
+                    rule=f"known are {', '.join(word for word in allowed if word)}",
                 )
         _check_whole("depth", self.depth, 1, 4096)
         _check_whole("spp", self.spp, 1, 2**24)
         _check_whole("seed", self.seed, 0, 2**32 - 1)
         _check_whole("threads", self.threads, 1, 4096)
         _check_whole("memory", self.memory, 1, 2**63)
+        self._check_reuse()
+
+    def _check_reuse(self) -> None:
+        """Options that belong together, or that do not."""
+        if self.method not in REUSING:
+            for name, value in (("--order", self.order), ("--respect-gloss", self.respect_gloss)):
+                if value is not None:
+                    raise UsageError(
+                        f"{self.method} carries no points over",
+                        where=name,
+                        rule=f"it is for --method {' and '.join(REUSING)}",
+                        fix="leave it out",
+                    )
+            return
+        if self.order == "paper" and self.respect_gloss:
+            raise UsageError(
+                "the paper's order takes every colour as it is",
+                where="--respect-gloss",
+                rule="it is for --order default",
+                fix="leave one of the two out",
+            )
+        if self.subpixels:
+            raise UsageError(
+                f"{self.method} carries whole pixels over",
+                where="--subpixels",
+                rule="a sub-pixel has rays of its own",
+                fix="use --method full",
+            )
+        if self.integrator not in LIGHT:
+            raise UsageError(
+                f"{self.method} carries light over, and {self.integrator} gathers none",
+                where="--integrator",
+                rule=f"it works with {', '.join(LIGHT)}",
+                fix="use --method full",
+            )
+
+    @property
+    def careful(self) -> bool:
+        """Whether what reprojection would falsify is traced."""
+        return self.order != "paper" if self.respect_gloss is None else self.respect_gloss
 
     @property
     def surfaces(self) -> int:

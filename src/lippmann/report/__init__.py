@@ -2,6 +2,7 @@
 
 from lippmann.report.experiment import VARIANTS, Experiment, Manner, Results, Run, Variant, run_experiment
 from lippmann.report.page import report_page
+from lippmann.report.reproduction import reproduce
 from lippmann.report.summary import summary
 
 __all__ = [
@@ -12,6 +13,7 @@ __all__ = [
     "Run",
     "Variant",
     "report_page",
+    "reproduce",
     "run_experiment",
     "summary",
 ]

@@ -48,14 +48,16 @@ class Variant:
         return self.method + words[self.manner]
 
     @property
-    def order(self) -> str:
+    def order(self) -> str | None:
         """As in :class:`~lippmann.render.settings.RenderSettings`."""
+        if self.manner is None:
+            return None
         return "paper" if self.manner is Manner.PAPER else "default"
 
     @property
-    def respect_gloss(self) -> bool:
+    def respect_gloss(self) -> bool | None:
         """As in :class:`~lippmann.render.settings.RenderSettings`."""
-        return self.manner is Manner.GLOSS
+        return None if self.manner is None else self.manner is Manner.GLOSS
 
 
 #: The methods that reuse points.

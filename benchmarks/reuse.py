@@ -1,0 +1,104 @@
+"""What reusing points saves, and what it costs in quality: six scenes, both methods, with and without gloss respected.
+
+Three experiments: the paper's display of 512 x 512 pixels, and the same optics before 3840 x 2160 pixels (480 lenses of
+8 pixels), both with the classic light, ray depth 2 and one ray through each pixel's middle, as in the paper; and dear
+shading on the large one: path light of the default depth, 16 samples per pixel, lamps of some size.
+
+Seconds are those of tracing and reuse, medians of runs that take turns after one to warm up; what a method saves is the
+median over the turns of its share of what ``full`` took in the same turn.
+
+python benchmarks/reuse.py [small] [large] [dear]
+"""
+
+from __future__ import annotations
+
+import statistics
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from harness import median_ratio, save, saved
+
+
+@dataclass(frozen=True)
+class Case:
+    """One experiment: a panel, the light, and how often each way is rendered (with one run more to warm up)."""
+
+    size: tuple[int, int]
+    light: dict[str, Any]
+    runs: int
+
+
+AS_THE_PAPER = {"integrator": "classic", "depth": 2, "spp": 1, "pixel_filter": "point"}
+CASES = {
+    "small": Case((512, 512), AS_THE_PAPER, 9),
+    "large": Case((3840, 2160), AS_THE_PAPER, 3),
+    "dear": Case((3840, 2160), {"integrator": "path", "spp": 16}, 1),
+}
+METHODS = ("lens-view", "interpolated")
+WAYS = {
+    "full": {},
+    **{f"{method}, {words}": {"method": method, "respect_gloss": careful}
+       for words, careful in (("gloss not respected", False), ("gloss respected", True)) for method in METHODS},
+    **{f"{method}, paper's order": {"method": method, "order": "paper"} for method in METHODS},
+}  # fmt: skip
+#: Ways of the large experiments: the paper's order goes lens by lens and is shown on the paper's own display.
+WAYS_OF_LARGE = [way for way in WAYS if not way.endswith("order")]
+#: The paper's order and gloss are no part of what is asked of dear shading.
+WAYS_OF_DEAR = ["full", *(f"{method}, gloss not respected" for method in METHODS)]
+
+
+def main(cases: list[str]) -> None:
+    results = saved("reuse").get("results", {})
+    for name in cases:
+        results[name] = list(_measure(CASES[name], name))
+        save("reuse", {"results": results})
+
+
+def _measure(case: Case, name: str) -> Iterator[dict[str, Any]]:
+    import lippmann
+    from lippmann.scene import library
+
+    display = lippmann.load_display("seed-lenticular").resized(*case.size)
+    ways = {"small": list(WAYS), "large": WAYS_OF_LARGE, "dear": WAYS_OF_DEAR}[name]
+    for scene_name in library.names():
+        scene = lippmann.load_scene(scene_name)
+        images: dict[str, Any] = {}
+        seconds: dict[str, list[float]] = {way: [] for way in ways}
+        for run in range(case.runs + 1):
+            for way in ways:
+                images[way] = lippmann.render(scene, display, **case.light, **WAYS[way])
+                if run:
+                    spent = images[way].provenance.seconds
+                    seconds[way].append(spent["trace"] + spent["reuse"])
+        full = images["full"]
+        for way in ways[1:]:
+            share = median_ratio(seconds[way], seconds["full"])
+            yield {
+                "scene": scene_name,
+                "way": way,
+                "seconds": statistics.median(seconds[way]),
+                "full_seconds": statistics.median(seconds["full"]),
+                "saved": 1 - share,
+                "pixel_shares": dict(images[way].provenance.pixel_shares),
+                **_quality(full, images[way]),
+            }
+
+
+def _quality(full: Any, image: Any) -> dict[str, float]:
+    """The paper's average, and the worst micro-image, against full tracing."""
+    from lippmann.quality.metrics import low_percentile, micro_image_means, psnr, squared_errors
+    from lippmann.quality.paper import paper_figures
+
+    errors = squared_errors(full, image)
+    worst = low_percentile(*micro_image_means(errors, full.display), 0.0)
+    return {
+        "paper_mean_psnr": paper_figures(full, image).mean_psnr,
+        "psnr": psnr(float(errors.mean())),
+        "worst_psnr": worst.psnr,
+    }
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:] or list(CASES))

@@ -1,0 +1,69 @@
+"""Kernels that are traced once per picture and then only launched.
+
+The reuse renderers trace many short lists of pixels. Telling Dr.Jit anew, list by list, what to compute takes longer
+than computing it; a frozen function does so once. It must be shown all device arrays that the kernel reads.
+"""
+
+from __future__ import annotations
+
+import gc
+from collections.abc import Callable
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+
+#: Integrators are shallow; what lies deeper belongs to others.
+_DEEPEST = 12
+
+
+class Frozen:
+    """A kernel that is recorded at its first call and only launched after that.
+
+    Parameters
+    ----------
+    kernel:
+        A function of Dr.Jit arrays of one width (or of width 1), whose results have that width.
+    reads:
+        An object through whose attributes all other device arrays are reached that the kernel reads.
+    """
+
+    def __init__(self, kernel: Callable[..., Any], reads: object) -> None:
+        state: list[Any] = []
+        _collect(reads, state, set(), 0)
+        dr.make_opaque(state)
+        self._recorded = dr.freeze(kernel, state_fn=lambda *_, **__: state)
+
+    def __call__(self, *arguments: Any) -> Any:
+        # The cyclic collector may free arrays of an earlier picture at any moment. Dr.Jit cannot record that, and
+        # aborts the process.
+        enabled = gc.isenabled()
+        gc.disable()
+        try:
+            return self._recorded(*arguments)
+        finally:
+            if enabled:
+                gc.enable()
+
+    @property
+    def recordings(self) -> int:
+        """How often the kernel had to be told anew."""
+        return int(self._recorded.n_recordings)
+
+
+def _collect(value: Any, found: list[Any], seen: set[int], depth: int) -> None:
+    if id(value) in seen or depth > _DEEPEST:
+        return
+    seen.add(id(value))
+    if isinstance(value, mi.Object) or type(value).__module__.startswith(("drjit.", "mitsuba.")):
+        # Arrays without entries have no variable behind them.
+        if not dr.is_array_v(value) or dr.width(value) > 0:
+            found.append(value)
+    elif isinstance(value, dict):
+        for item in value.values():
+            _collect(item, found, seen, depth + 1)
+    elif isinstance(value, (list, tuple, set, frozenset)):
+        for item in value:
+            _collect(item, found, seen, depth + 1)
+    elif hasattr(value, "__dict__") and type(value).__module__.startswith("lippmann."):
+        _collect(vars(value), found, seen, depth + 1)

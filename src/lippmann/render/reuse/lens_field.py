@@ -1,0 +1,91 @@
+"""Which lens every pixel has, and where the lenses are: all that reuse must know of a layout.
+
+Positions are in pixels, x to the right and y downwards, pixel centres at whole numbers. With the lens's centre c, a
+pixel at q sees along the line through q and c; a point of it with disparity s is seen by another lens, of centre c', at
+
+    q' = q + (c' - c) (1 + s),
+
+for a cylindrical lens with the points of the axes that are level with each other: along its axis nothing moves.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lippmann.display import NUMPY, Display, pixel_lenses
+
+
+class LensField(NamedTuple):
+    """Pixels and lenses of a display of any layout.
+
+    Lens ``(i, j)`` of the display's ``lens_grid`` has the number ``j * columns + i``.
+
+    Attributes
+    ----------
+    lens:
+        ``(H, W)`` number of each pixel's lens.
+    center:
+        ``(lenses, 2)`` their centres (x, y); of cylindrical lenses the foot of a perpendicular on the axis.
+    first:
+        ``(H, runs + 1)`` columns at which the stretches of one lens begin and end in each row. Rows of fewer stretches
+        end with empty ones.
+    columns:
+        Lenses in a row.
+    """
+
+    lens: NDArray[np.int32]
+    center: NDArray[np.float64]
+    first: NDArray[np.int64]
+    columns: int
+
+    @property
+    def rows(self) -> int:
+        """Rows of lenses."""
+        return len(self.center) // self.columns
+
+    @property
+    def reach(self) -> int:
+        """Columns of the widest micro-image."""
+        return int(np.diff(self.first, axis=1).max())
+
+    @staticmethod
+    def of(display: Display) -> LensField:
+        """The field of ``display``."""
+        grid = display.lens_grid
+        i, j = pixel_lenses(display)
+        lens = (j * np.int32(grid.columns) + i).astype(np.int32)
+        rows, columns = (a.ravel().astype(np.float64) for a in np.indices((grid.rows, grid.columns)))
+        zero = np.zeros_like(columns)
+        x, y = display.lens_center(columns, rows, zero, zero, NUMPY)
+        u, v = display.pixel_coordinates(x, y, NUMPY)
+        return LensField(lens, np.stack([u - 0.5, v - 0.5], axis=1), _stretches(lens), grid.columns)
+
+    def corresponding(self, numbers: NDArray[np.int64], other: NDArray[np.int64]) -> NDArray[np.int64]:
+        """The pixels of the lenses ``other`` (-1: none) whose light lines are nearest to parallel to those of pixels.
+
+        Pixels by linear number, row * width + column; -1 where that micro-image has no pixel there.
+        """
+        height, width = self.lens.shape
+        row, column = np.divmod(numbers, width)
+        moved = self.center[other] - self.center[self.lens[row, column]]
+        x = np.floor(column + moved[:, 0] + 0.5).astype(np.int64)
+        y = np.floor(row + moved[:, 1] + 0.5).astype(np.int64)
+        exists = (other >= 0) & (x >= 0) & (x < width) & (y >= 0) & (y < height)
+        x, y = np.where(exists, x, 0), np.where(exists, y, 0)
+        exists &= self.lens[y, x] == other
+        return np.where(exists, y * width + x, -1)
+
+
+def _stretches(lens: NDArray[np.int32]) -> NDArray[np.int64]:
+    height, width = lens.shape
+    begins = np.ones(lens.shape, dtype=np.bool_)
+    begins[:, 1:] = lens[:, 1:] != lens[:, :-1]
+    counts = begins.sum(axis=1)
+    first = np.full((height, int(counts.max()) + 1), width, dtype=np.int64)
+    row, column = np.nonzero(begins)
+    starts = np.cumsum(counts) - counts
+    first[row, np.arange(len(row)) - starts[row]] = column
+    return first

@@ -1,0 +1,119 @@
+"""The search for what reprojection has falsified."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+pytestmark = pytest.mark.usefixtures("engine")
+
+HEIGHT, LENSES, WIDE = 32, 6, 8
+
+
+class KnownTracer:
+    def __init__(self, truth):
+        self.truth, self.traced = truth, 0
+
+    def trace(self, numbers, points):
+        row, column = np.divmod(np.asarray(numbers, dtype=int), LENSES * WIDE)
+        assert not np.any(points.status[row, column] == 0), "traced twice"
+        points.color[row, column] = self.truth[row, column]
+        points.status[row, column] = 0
+        self.traced += len(numbers)
+
+
+def found(truth, taken, look_share=0, follow=lambda *_: None):
+    from lippmann.render.reuse.bands import Bands
+    from lippmann.render.reuse.points import REPROJECTED, PointImage
+    from lippmann.render.reuse.rules import Rules
+    from lippmann.render.reuse.search import search
+
+    points = PointImage.empty(HEIGHT, LENSES * WIDE)
+    points.color[:], points.disparity[:], points.status[:] = taken, -0.1, REPROJECTED
+    rules = Rules(True, 0.06, False, probe_rows=4, longest_gap=3, overhang=0, look_share=look_share)
+    lens = np.broadcast_to(np.repeat(np.arange(LENSES, dtype=np.int32), WIDE), points.status.shape)
+    tracer, counts = KnownTracer(truth), []
+    with Bands(1) as bands:
+        search(points, lens, WIDE, tracer, bands, rules, follow, counts.append)
+    assert sum(counts) == tracer.traced
+    return points
+
+
+def picture(value=0.2):
+    return np.full((HEIGHT, LENSES * WIDE, 3), value, np.float32)
+
+
+def test_a_smooth_picture_is_left_alone():
+    ramp = picture() + np.linspace(0, 1, LENSES * WIDE, dtype=np.float32)[:, None]
+    assert np.all(found(ramp, ramp).status == 1)
+
+
+def test_edges_between_lenses_are_none():
+    stripes = picture()
+    stripes[:, WIDE : 2 * WIDE] = 0.9
+    assert np.all(found(stripes, stripes).status == 1)
+
+
+def test_an_edge_that_is_right_ends_the_search():
+    halves = picture()
+    halves[:, 4:WIDE] = 0.9
+    points = found(halves, halves)
+    assert np.all(points.status[:, 3:5] == 0)
+    assert np.count_nonzero(points.status == 0) == 2 * HEIGHT
+
+
+def test_a_thing_is_found_whole_from_one_wrong_edge():
+    truth, taken = picture(), picture()
+    truth[10:22, WIDE + 1 : WIDE + 7] = 0.9
+    taken[12, WIDE + 3] = 0.9
+    points = found(truth, taken)
+    assert np.array_equal(points.color, truth)
+    assert np.count_nonzero(points.status == 0) < 0.3 * points.status.size
+
+
+@pytest.mark.parametrize("look_share", [0, 4])
+def test_what_begins_under_the_next_lens_is_looked_for(look_share):
+    truth = picture()
+    truth[10:16, 2 * WIDE + 4 : 3 * WIDE] = 0.9
+    taken = truth.copy()
+    truth[11:14, 3 * WIDE : 3 * WIDE + 6] = 0.9  # goes on under the next lens, where no source saw it
+    points = found(truth, taken, look_share)
+    assert np.array_equal(points.color, truth) == (look_share > 0)
+
+
+def test_an_outline_before_the_background_is_an_edge():
+    from lippmann.render.reuse.growth import mark_edges
+    from lippmann.render.reuse.points import BACKGROUND, REPROJECTED, PointImage
+
+    points = PointImage.empty(2, 8)
+    points.status[:] = REPROJECTED
+    points.disparity[:] = -0.1
+    points.disparity[:, 5:] = BACKGROUND
+    wanted = np.zeros((2, 8), dtype=np.bool_)
+    mark_edges(0, 2, points, np.zeros((2, 8), np.int32), 0.06, False, wanted)
+    assert np.array_equal(np.flatnonzero(wanted[0]), [4, 5])
+
+
+def test_surprising_points_are_followed_to_the_neighbouring_lenses():
+    from lippmann.render.reuse.growth import follow_across
+    from lippmann.render.reuse.points import REPROJECTED, PointImage
+    from lippmann.render.reuse.rows import Rows
+
+    first = np.arange(4, dtype=np.int64) * WIDE
+    offset = np.full(3, -3.5)
+    rows = Rows(first, offset, first[:-1] - offset)
+    points = PointImage.empty(1, 24)
+    points.status[:] = REPROJECTED
+    points.disparity[:] = -0.05
+    points.disparity[0, 12] = -0.125  # nearer; one lens on it is seen one pixel further back
+    lens = np.repeat(np.arange(3, dtype=np.int32), WIDE)[None]
+    wanted = np.zeros((1, 24), dtype=np.bool_)
+    follow_across(points, rows, np.array([12], np.uint32), lens, wanted)
+    assert {5, 19} <= set(np.flatnonzero(wanted[0]).tolist()) <= {5, 6, 19, 20}
+    # What lies nearer there already hides it.
+    points.disparity[0, :8], points.disparity[0, 16:] = -0.01, -0.01
+    wanted[:] = False
+    points.disparity[0, 12] = -0.02
+    points.disparity[0, 0:8], points.disparity[0, 16:24] = 0.1, 0.1
+    follow_across(points, rows, np.array([12], np.uint32), lens, wanted)
+    assert not wanted.any()
