@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, cast
 from lippmann.display import Display, load_display
 from lippmann.progress import ProgressCallback, silent
 from lippmann.render.defaults import AUTO, choose
-from lippmann.render.settings import Device, Method, Order, RenderSettings
+from lippmann.render.settings import Denoiser, Device, Method, Order, RenderSettings
 from lippmann.scene.load import load_scene as _load_scene
 from lippmann.scene.placement import Mode, PlacementOptions
 from lippmann.scene.scene import Scene
@@ -71,6 +71,8 @@ def render(
     seed: int = 0,
     subpixels: bool = False,
     pixel_filter: str = AUTO,
+    denoise: str = "none",
+    layers: bool = False,
     camera: str | None = None,
     place: str | None = None,
     turn: tuple[float, float, float] = (0.0, 0.0, 0.0),
@@ -90,9 +92,11 @@ def render(
         What :func:`load_scene` returned, or anything that it takes.
     display:
         A :class:`~lippmann.display.Display`, a preset's name, or a TOML file.
-    method, order, respect_gloss, integrator, depth, spp, seed, subpixels, pixel_filter, device, threads, memory:
+    method, order, respect_gloss, integrator, depth, spp, seed, subpixels, pixel_filter:
         See :class:`~lippmann.render.settings.RenderSettings`; what is "auto" or None follows from the scene, see
         :func:`~lippmann.render.defaults.choose`.
+    denoise, layers, device, threads, memory:
+        See there, too.
     camera, place, turn, shift, scale, pop_out:
         Where the display stands in the scene, see :class:`~lippmann.scene.placement.PlacementOptions`: by a camera,
         fitted to the display's depth (``place="fit"``), or with scene units taken for millimetres of the display
@@ -121,6 +125,8 @@ def render(
         **vars(choice),
         seed=seed,
         subpixels=subpixels,
+        denoise=cast("Denoiser", denoise),
+        layers=layers,
         device=cast(Device, device),
         threads=threads,
         memory=memory,

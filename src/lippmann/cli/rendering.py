@@ -57,6 +57,15 @@ Scale = Annotated[float, typer.Option("--scale", help="Enlarge the scene about t
 PopOut = Annotated[
     float | None, typer.Option("--pop-out", help="Share of the scene's depth in front of the lens plane, 0 to 1.")
 ]
+Denoise = Annotated[
+    str, typer.Option("--denoise", help="none, or oidn: take the noise out with Open Image Denoise (extra 'denoise').")
+]
+Layers = Annotated[
+    bool,
+    typer.Option(
+        "--layers", help="Add depth, position, normal, albedo and shape of what each pixel sees (OpenEXR only)."
+    ),
+]
 Subpixels = Annotated[bool, typer.Option("--subpixels", help="A ray for every sub-pixel, at its own place.")]
 
 
@@ -74,6 +83,8 @@ def render(
     seed: options.Seed = 0,
     subpixels: Subpixels = False,
     pixel_filter: options.PixelFilter = "auto",
+    denoise: Denoise = "none",
+    layers: Layers = False,
     camera: Camera = None,
     place: Place = None,
     turn: Turn = None,
@@ -97,7 +108,7 @@ def render(
     from lippmann.image.formats import format_for
 
     console = Console(quiet, as_json)
-    format_for(output, bits)
+    _check_layers(layers, format_for(output, bits)[0], output)
     check_writable(output)
     if maps is not None:
         check_maps(method)
@@ -120,6 +131,8 @@ def render(
             seed=seed,
             subpixels=subpixels,
             pixel_filter=pixel_filter,
+            denoise=denoise,
+            layers=layers,
             camera=camera,
             place=place,
             turn=_angles(turn),
@@ -204,6 +217,18 @@ def preview(
         report(output, (width, height), provenance),
         f"{output}: {width}x{height} pixels in {provenance.seconds['total']:.1f} s",
     )
+
+
+def _check_layers(layers: bool, name: str, output: Path) -> None:
+    from lippmann.errors import UsageError
+
+    if layers and name != "exr":
+        raise UsageError(
+            f"{output.name} cannot hold layers",
+            where="--layers",
+            rule="OpenEXR can",
+            fix="give the output the ending .exr",
+        )
 
 
 def report(output: Path, size: tuple[int, int], provenance: Provenance) -> dict[str, Any]:

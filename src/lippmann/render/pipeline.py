@@ -81,6 +81,10 @@ def render_integral_image(
         memory=memory,
     )
     engine = watch.stage("load", lambda: engines.start(settings.device, settings.threads))
+    if settings.denoise == "oidn":
+        from lippmann.render.denoise import load_denoiser
+
+        load_denoiser()  # found missing now, not after the work is done
     built = watch.stage("build", lambda: build_for(scene, settings))
     placement = place(
         scene.bounds,
@@ -91,11 +95,17 @@ def render_integral_image(
         bounds_in=scene.bounds_in,
     )
 
+    from lippmann.render.finish import Finish
     from lippmann.render.rays import DisplayRays
 
     source = DisplayRays(display, placement.world_from_display, settings.subpixels)
     integrator = make_integrator(built, settings, placement.display_from_world)
     frame = _trace(integrator, source, plan, settings, placement.display_from_world, engine.threads, progress)
+    finish = Finish(built, source, settings, placement.display_from_world, memory, progress)
+    if settings.denoise == "oidn":
+        watch.stage("denoise", lambda: finish.denoise(frame, engine.threads))
+    if settings.layers:
+        watch.stage("layers", lambda: finish.add_layers(frame))
     provenance = _provenance(
         scene,
         built,
@@ -105,6 +115,7 @@ def render_integral_image(
         watch,
         options={
             **_reuse_options(settings),
+            **finish.options,
             "pixel_filter": settings.pixel_filter,
             "placement": placement.mode,
             "depth_range": list(placement.depth_range),
@@ -309,6 +320,7 @@ def stage_seconds(watch: Stopwatch, frame: Frame) -> dict[str, float]:
         "compile": frame.seconds_compile,
         "trace": frame.seconds_trace,
         "reuse": frame.seconds_reuse,
+        **{name: watch.seconds[name] for name in ("denoise", "layers") if name in watch.seconds},
         "write": 0.0,
         "total": watch.total,
     }

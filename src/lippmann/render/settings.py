@@ -12,6 +12,7 @@ Order = Literal["default", "paper"]
 IntegratorName = Literal["classic", "path", "direct", "normal", "depth", "position", "albedo"]
 PixelFilter = Literal["box", "point"]
 Device = Literal["auto", "cpu", "gpu"]
+Denoiser = Literal["none", "oidn"]
 
 #: The methods that reuse points of one micro-image in others.
 REUSING: tuple[Method, ...] = ("lens-view", "interpolated")
@@ -51,6 +52,10 @@ class RenderSettings:
         A ray for each sub-pixel, at its own place.
     pixel_filter:
         ``box`` spreads the samples over the pixel, ``point`` takes its centre.
+    denoise:
+        What takes the noise out of the finished picture: ``oidn`` is Intel's Open Image Denoise.
+    layers:
+        Add depth, position, normal, albedo and shape of what each pixel sees to the picture's maps.
     device, threads, memory:
         Where it runs; ``memory`` in bytes, None for 60 % of what is free.
     """
@@ -64,6 +69,8 @@ class RenderSettings:
     seed: int = 0
     subpixels: bool = False
     pixel_filter: PixelFilter = "box"
+    denoise: Denoiser = "none"
+    layers: bool = False
     device: Device = "auto"
     threads: int | None = None
     memory: int | None = None
@@ -75,6 +82,7 @@ class RenderSettings:
             ("integrator", get_args(IntegratorName)),
             ("pixel_filter", get_args(PixelFilter)),
             ("device", get_args(Device)),
+            ("denoise", get_args(Denoiser)),
         ):
             value = getattr(self, field)
             if value not in allowed:
@@ -88,6 +96,13 @@ class RenderSettings:
         _check_whole("seed", self.seed, 0, 2**32 - 1)
         _check_whole("threads", self.threads, 1, 4096)
         _check_whole("memory", self.memory, 1, 2**63)
+        if self.denoise != "none" and self.integrator not in LIGHT:
+            raise UsageError(
+                f"{self.integrator} has no noise",
+                where="--denoise",
+                rule=f"it is for {', '.join(LIGHT)}",
+                fix="leave it out",
+            )
         self._check_reuse()
 
     def _check_reuse(self) -> None:

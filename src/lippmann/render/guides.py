@@ -1,0 +1,111 @@
+"""Guides for a denoiser: what each pixel sees on the average of its samples."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from lippmann.progress import Progress, ProgressCallback, silent
+from lippmann.render.full import PIXEL_DIMENSION, divide
+from lippmann.render.layers import to_numpy
+from lippmann.render.plan import Pass, Plan, Tile, make_plan
+from lippmann.render.rays import RaySource
+from lippmann.render.sampling import SampleStream
+from lippmann.render.surfaces import Surfaces, surfaces_of
+
+if TYPE_CHECKING:
+    from lippmann.render.classic.build import BuiltClassic
+    from lippmann.scene.build import BuiltScene
+
+FloatArray = NDArray[np.float32]
+
+#: Samples of a pixel: fewer leave steps in the guides where edges cross it, more gain nothing.
+LEAST_SAMPLES, MOST_SAMPLES = 8, 16
+
+#: Albedo and normal, and what a tile adds to them.
+_BYTES_PER_PIXEL = 48
+
+
+@dataclass(frozen=True, eq=False)
+class Guides:
+    """``albedo`` and ``normal``, ``(H, W, 3)`` float32 each; components in [0, 1] and in [-1, 1] (display frame)."""
+
+    albedo: FloatArray
+    normal: FloatArray
+
+
+def plan_guides(source: RaySource, samples: int, memory: int) -> Plan:
+    """Tiles and passes for the guides of a picture of so many samples a pixel, within ``memory`` bytes.
+
+    Raises
+    ------
+    MemoryLimitError
+        If that is too little for one row.
+    """
+    kept = source.width * source.height * _BYTES_PER_PIXEL
+    samples = min(max(samples, LEAST_SAMPLES), MOST_SAMPLES)
+    return make_plan(source.width, source.height, samples, channels=source.channels, memory=memory - kept)
+
+
+def trace_guides(
+    built: BuiltScene | BuiltClassic,
+    source: RaySource,
+    plan: Plan,
+    display_from_world: NDArray[np.float64],
+    *,
+    seed: int = 0,
+    box_filter: bool = True,
+    progress: ProgressCallback = silent,
+) -> Guides:
+    """Albedo and normal of the first surface that is neither mirror nor clear glass, as the pixel's samples see it.
+
+    ``plan`` comes from :func:`plan_guides`; ``seed`` and ``box_filter`` are those of the picture. The samples are the
+    picture's first ones, and where those fall is all the noise that the guides hold. A sub-pixel that has rays of its
+    own gets its own channel of the albedo from them; the normal is the mean of all three.
+    """
+    surfaces = surfaces_of(built)
+    linear = np.asarray(display_from_world, dtype=np.float64)[:3, :3]
+    rotation = (linear / np.cbrt(np.linalg.det(linear))).astype(np.float32)
+    albedo = np.zeros((plan.height, plan.width, 3), dtype=np.float32)
+    normal = np.zeros_like(albedo)
+    done = 0
+    for tile, run in plan:
+        rows = slice(tile.first_row, tile.first_row + tile.rows)
+        found = _trace_tile(surfaces, source, plan, tile, run, seed, box_filter)
+        shape = (tile.rows, plan.width, plan.channels, 3)
+        colors, normals = (to_numpy(part, shape[0] * shape[1] * shape[2]).reshape(shape) for part in found)
+        if plan.channels == 3:
+            colors = np.diagonal(colors, axis1=2, axis2=3)[:, :, None]
+        albedo[rows] += colors[:, :, 0] / plan.samples
+        normal[rows] += normals.mean(axis=2) @ rotation.T / plan.samples
+        done += tile.rows * plan.width * plan.channels * run.count
+        progress(Progress("guides", done, plan.work))
+    return Guides(albedo, normal)
+
+
+def _trace_tile(
+    surfaces: Surfaces, source: RaySource, plan: Plan, tile: Tile, run: Pass, seed: int, box_filter: bool
+) -> tuple[Any, Any]:
+    """Sums over the samples of one pass, for every pixel and channel: colours and world-space normals."""
+    lanes = tile.rows * plan.width * plan.channels * run.count
+    # Lanes and streams are those of the picture, so that the guides show the places that its samples hit.
+    per_channel, sample = divide(dr.arange(mi.UInt32, lanes), dr.opaque(mi.UInt32, run.count))
+    pixel, channel = divide(per_channel, plan.channels)
+    row, column = divide(pixel, plan.width)
+    row += dr.opaque(mi.UInt32, tile.first_row)
+    sample += dr.opaque(mi.UInt32, run.first)
+    number = (row * plan.width + column) * plan.channels + channel
+    stream = SampleStream.of_pixels(number, sample, dr.opaque(mi.UInt32, seed))
+    jitter = stream.next_2d(PIXEL_DIMENSION) if box_filter else mi.Point2f(0.5)
+    albedo, normal = surfaces.guide(source.rays(column, row, channel, jitter), mi.Bool(True))
+    values = [mi.Float(part) + dr.zeros(mi.Float, lanes) for part in (*albedo, *normal)]
+    # All at once: sums one by one would follow the rays six times.
+    dr.eval(values)
+    if run.count > 1:
+        values = [dr.block_sum(part, run.count) for part in values]
+    return mi.Color3f(*values[:3]), mi.Vector3f(*values[3:])

@@ -1,0 +1,68 @@
+"""Denoising and layers as options of a render."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from lippmann.image import read_picture
+
+
+def test_layers_go_into_the_file_with_the_picture(lippmann, engine, tmp_path):
+    plain, layered = tmp_path / "plain.exr", tmp_path / "layered.exr"
+    words = ("render", "teapot", "--integrator", "direct", "--spp", 1, "-q")
+    assert lippmann(*words, "-o", plain).code == 0
+    assert lippmann(*words, "--layers", "-o", layered).code == 0
+    image = read_picture(layered)
+    assert set(image.maps) == {"depth", "position", "normal", "albedo", "shape"}
+    assert np.array_equal(image.pixels, read_picture(plain).pixels)
+    back, front = image.provenance.options["depth_range"]
+    depth = image.maps["depth"][np.isfinite(image.maps["depth"])]
+    assert depth.size > 0.2 * image.maps["depth"].size
+    assert back - 1e-3 <= depth.min() < depth.max() <= front + 1e-3
+    assert image.provenance.seconds["layers"] > 0
+
+
+def test_layers_need_a_file_that_holds_them(lippmann, tmp_path):
+    done = lippmann("render", "teapot", "--layers", "-o", tmp_path / "a.png")
+    assert done.code == 2
+    assert "--layers: a.png cannot hold layers" in done.err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_denoising_brings_a_picture_nearer_to_a_long_one(lippmann, engine, tmp_path):
+    pytest.importorskip("pyoidn", reason="Open Image Denoise is not installed")
+    for name, words in {"noisy": (), "denoised": ("--denoise", "oidn")}.items():
+        done = lippmann("render", "teapot", "--spp", 2, *words, "--json", "-o", tmp_path / f"{name}.exr")
+        assert done.code == 0, done.err
+    assert done.json["options"]["denoise"] == "oidn"
+    assert done.json["seconds"]["denoise"] > 0
+    assert lippmann("render", "teapot", "--spp", 32, "--seed", 5, "-q", "-o", tmp_path / "long.exr").code == 0
+    found = {
+        name: lippmann("compare", tmp_path / "long.exr", tmp_path / f"{name}.exr", "--json").json["psnr"]
+        for name in ("noisy", "denoised")
+    }
+    assert found["denoised"] > found["noisy"] + 5
+
+
+@pytest.mark.parametrize(
+    ("words", "complaint"),
+    [
+        (("--denoise", "median"), "--denoise: 'median' is not known"),
+        (("--denoise", "oidn", "--integrator", "normal"), "--denoise: normal has no noise"),
+    ],
+)
+def test_what_cannot_be_denoised_is_refused(lippmann, tmp_path, words, complaint):
+    done = lippmann("render", "teapot", *words, "-o", tmp_path / "a.png")
+    assert done.code == 2
+    assert complaint in done.err
+
+
+def test_a_missing_denoiser_is_said_before_anything_is_rendered(lippmann, engine, tmp_path, monkeypatch):
+    import sys
+
+    monkeypatch.setitem(sys.modules, "pyoidn", None)
+    done = lippmann("render", "teapot", "--denoise", "oidn", "-o", tmp_path / "a.png")
+    assert done.code == 2
+    assert 'pip install "lippmann[denoise]"' in done.err
+    assert "trace" not in done.err
