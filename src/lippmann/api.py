@@ -68,6 +68,9 @@ def render(
     integrator: str = AUTO,
     depth: int | None = None,
     spp: int | None = None,
+    quality: float | None = None,
+    quality_mean: float | None = None,
+    max_time: float | None = None,
     seed: int = 0,
     subpixels: bool = False,
     pixel_filter: str = AUTO,
@@ -95,7 +98,7 @@ def render(
     method, order, respect_gloss, integrator, depth, spp, seed, subpixels, pixel_filter:
         See :class:`~lippmann.render.settings.RenderSettings`; what is "auto" or None follows from the scene, see
         :func:`~lippmann.render.defaults.choose`.
-    denoise, layers, device, threads, memory:
+    quality, quality_mean, max_time, denoise, layers, device, threads, memory:
         See there, too.
     camera, place, turn, shift, scale, pop_out:
         Where the display stands in the scene, see :class:`~lippmann.scene.placement.PlacementOptions`: by a camera,
@@ -117,12 +120,18 @@ def render(
     from lippmann.render.pipeline import render_integral_image
 
     loaded = _scene(scene)
-    choice = choose(loaded, integrator=integrator, depth=depth, spp=spp, pixel_filter=pixel_filter)
+    open_ended = not (quality is quality_mean is max_time is None)
+    choice = choose(
+        loaded, integrator=integrator, depth=depth, spp=spp, pixel_filter=pixel_filter, open_ended=open_ended
+    )
     settings = RenderSettings(
         method=cast(Method, method),
         order=cast("Order | None", order),
         respect_gloss=respect_gloss,
         **vars(choice),
+        quality=quality,
+        quality_mean=quality_mean,
+        max_time=max_time,
         seed=seed,
         subpixels=subpixels,
         denoise=cast("Denoiser", denoise),

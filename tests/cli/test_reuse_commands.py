@@ -57,7 +57,6 @@ def test_maps_show_parts_of_the_frame(lippmann, engine, tmp_path):
 @pytest.mark.parametrize(
     ("words", "complaint"),
     [
-        (("--maps", "maps"), "--maps"),
         (("--order", "paper"), "--order"),
         (("--respect-gloss",), "--respect-gloss"),
         (("--method", "lens-view", "--order", "paper", "--respect-gloss"), "--respect-gloss"),

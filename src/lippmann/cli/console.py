@@ -21,6 +21,9 @@ STAGE_NAMES = {
     "compile": "compiling",
     "trace": "tracing",
     "reuse": "reusing",
+    "guides": "looking for guides",
+    "denoise": "denoising",
+    "layers": "adding layers",
     "write": "writing",
 }
 
@@ -81,12 +84,19 @@ def _bar() -> Iterator[ProgressCallback]:
             if progress.stage != current:
                 current, began = progress.stage, time.perf_counter()
                 bar.reset(task, description=STAGE_NAMES.get(current, current), total=progress.total, rate="")
-            rate = ""
-            if progress.stage == "trace" and progress.done:
+            rate = progress.note
+            if not rate and progress.stage == "trace" and progress.done:
                 rate = f"{progress.done / max(time.perf_counter() - began, 1e-9) / 1e6:.1f} M samples/s"
             bar.update(task, completed=progress.done, total=progress.total, rate=rate)
 
         yield report
+
+
+def estimate_in_words(estimate: Mapping[str, Any]) -> str:
+    """What a picture says of its own error, as :attr:`Provenance.estimate` holds it."""
+    from lippmann.render.estimate import Estimate
+
+    return str(Estimate.from_dict(estimate))
 
 
 class _PlainProgress:
@@ -101,4 +111,5 @@ class _PlainProgress:
             return
         self._last = now
         share = 100 * progress.done / progress.total
-        print(f"{STAGE_NAMES.get(progress.stage, progress.stage)}: {share:.0f} %", file=sys.stderr)
+        note = f", {progress.note}" if progress.note else ""
+        print(f"{STAGE_NAMES.get(progress.stage, progress.stage)}: {share:.0f} %{note}", file=sys.stderr)

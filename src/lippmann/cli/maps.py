@@ -1,9 +1,11 @@
-"""``--maps``: where the pixels of a picture came from, as a folder of PNGs."""
+"""``--maps``: how the pixels of a picture came about and how good they are, as a folder of PNGs."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from lippmann.atomic import replacing_folder
 from lippmann.errors import UsageError
@@ -12,49 +14,56 @@ if TYPE_CHECKING:
     from lippmann.image import IntegralImage
 
 
-def check_maps(method: str) -> None:
-    """Refuse maps that could not be written, before anything is rendered.
+def write_maps(image: IntegralImage, folder: Path) -> None:
+    """Write what the picture knows of itself.
+
+    Of methods that reuse points: ``missed.png`` (dark pixels were reprojected, light ones missed and traced, orange
+    ones missed and interpolated), and ``reprojected.png``, ``traced.png`` and, where any were, ``interpolated.png``:
+    the pixels of one origin alone, the rest in violet. Of methods that know their noise: ``error.png``, the estimated
+    error of each pixel, in the false colours of ``lippmann compare --map``.
 
     Raises
     ------
     UsageError
-        If the method keeps no record of where pixels came from.
-    """
-    from lippmann.render.settings import REUSING
-
-    if method not in REUSING:
-        raise UsageError(
-            f"{method} traces every pixel",
-            where="--maps",
-            rule=f"maps are for --method {' and '.join(REUSING)}",
-            fix="leave it out",
-        )
-
-
-def write_maps(image: IntegralImage, folder: Path) -> None:
-    """Write ``missed.png``, ``reprojected.png``, ``traced.png`` and, where any were, ``interpolated.png``.
-
-    The first shows what became of each pixel: dark ones were reprojected, light ones missed and traced, orange ones
-    missed and interpolated. The others show the pixels of one origin alone, the rest in violet.
-
-    Raises
-    ------
+        If the picture knows nothing of itself.
     OutputError
         If the folder cannot be written.
     """
     from lippmann.image.png import encode_png
-    from lippmann.render.reuse.points import INTERPOLATED, REPROJECTED, TRACED
-    from lippmann.report.pictures import missed_codes, part_codes, pixel_status
 
-    status, missed = pixel_status(image), missed_codes(image)
-    # check_maps has let through only methods that have both.
-    assert status is not None
-    assert missed is not None
-    pictures = {"missed": missed}
-    for name, value in (("reprojected", REPROJECTED), ("traced", TRACED), ("interpolated", INTERPOLATED)):
-        if name != "interpolated" or (status == value).any():
-            pictures[name] = part_codes(image, status == value)
+    pictures = {**_origins(image), **_errors(image)}
+    if not pictures:
+        raise UsageError(
+            "this picture has nothing to map",
+            where="--maps",
+            rule="maps show how points were reused, or the estimated error of two or more samples per pixel",
+            fix="leave it out",
+        )
     with replacing_folder(folder) as temporary:
         for name, codes in pictures.items():
             png = encode_png(codes, text={}, pixel_pitch=image.display.panel.pixel_pitch)
             (temporary / f"{name}.png").write_bytes(png)
+
+
+def _origins(image: IntegralImage) -> dict[str, Any]:
+    from lippmann.render.reuse.points import INTERPOLATED, REPROJECTED, TRACED
+    from lippmann.report.pictures import missed_codes, part_codes, pixel_status
+
+    status, missed = pixel_status(image), missed_codes(image)
+    if status is None or missed is None:
+        return {}
+    pictures = {"missed": missed}
+    for name, value in (("reprojected", REPROJECTED), ("traced", TRACED), ("interpolated", INTERPOLATED)):
+        if name != "interpolated" or (status == value).any():
+            pictures[name] = part_codes(image, status == value)
+    return pictures
+
+
+def _errors(image: IntegralImage) -> dict[str, Any]:
+    from lippmann.image.color import quantize
+    from lippmann.quality.error_picture import BRIGHTEST, in_false_color
+
+    if "error" not in image.maps:
+        return {}
+    shown = in_false_color(np.sqrt(image.maps["error"]) / BRIGHTEST)
+    return {"error": quantize(shown, 8, "linear").astype(np.uint8)}

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from lippmann.cli import options, parse
-from lippmann.cli.console import Console
+from lippmann.cli.console import Console, estimate_in_words
 from lippmann.errors import UsageError
 
 if TYPE_CHECKING:
@@ -232,6 +232,8 @@ def _info_lines(path: Path, found: PictureInfo) -> list[str]:
         f"method      {_method(made)}",
         f"made by     Lippmann {made.version or '(unknown version)'} on {made.device or 'an unknown device'}",
     ]
+    if made.estimate is not None:
+        lines.append(f"estimated   {estimate_in_words(made.estimate)}")
     if made.rays:
         lines.append("rays        " + ", ".join(f"{count:,} {kind}" for kind, count in made.rays.items()))
     if made.seconds:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from lippmann.cli import options, parse
-from lippmann.cli.console import Console
+from lippmann.cli.console import Console, estimate_in_words
 from lippmann.progress import Progress
 
 if TYPE_CHECKING:
@@ -40,7 +40,11 @@ RespectGloss = Annotated[
 ]
 Maps = Annotated[
     Path | None,
-    typer.Option("--maps", help="Write pictures of where the pixels came from into this folder.", show_default=False),
+    typer.Option(
+        "--maps",
+        help="Write pictures of where pixels came from and of their estimated error into this folder.",
+        show_default=False,
+    ),
 ]
 Camera = Annotated[str | None, typer.Option("--camera", help="Place the display by this camera of the scene file.")]
 Place = Annotated[
@@ -56,6 +60,16 @@ Shift = Annotated[str | None, typer.Option("--shift", help="Move the scene: X,Y,
 Scale = Annotated[float, typer.Option("--scale", help="Enlarge the scene about the display's centre.")]
 PopOut = Annotated[
     float | None, typer.Option("--pop-out", help="Share of the scene's depth in front of the lens plane, 0 to 1.")
+]
+Quality = Annotated[
+    float | None,
+    typer.Option("--quality", help="Work until every micro-image is estimated to reach this PSNR in dB, such as 40."),
+]
+QualityMean = Annotated[
+    float | None, typer.Option("--quality-mean", help="Work until the whole picture is estimated to reach this PSNR.")
+]
+MaxTime = Annotated[
+    float | None, typer.Option("--max-time", help="Stop tracing after so many seconds, with the best so far.")
 ]
 Denoise = Annotated[
     str, typer.Option("--denoise", help="none, or oidn: take the noise out with Open Image Denoise (extra 'denoise').")
@@ -80,6 +94,9 @@ def render(
     integrator: options.Integrator = "auto",
     depth: options.Depth = None,
     spp: options.Spp = None,
+    quality: Quality = None,
+    quality_mean: QualityMean = None,
+    max_time: MaxTime = None,
     seed: options.Seed = 0,
     subpixels: Subpixels = False,
     pixel_filter: options.PixelFilter = "auto",
@@ -104,14 +121,13 @@ def render(
     """Render a scene into the native pixels of a display."""
     from lippmann import api
     from lippmann.atomic import check_folder_writable, check_writable
-    from lippmann.cli.maps import check_maps, write_maps
+    from lippmann.cli.maps import write_maps
     from lippmann.image.formats import format_for
 
     console = Console(quiet, as_json)
     _check_layers(layers, format_for(output, bits)[0], output)
     check_writable(output)
     if maps is not None:
-        check_maps(method)
         check_folder_writable(maps)
     with console.progress() as progress:
         started = time.perf_counter()
@@ -128,6 +144,9 @@ def render(
             integrator=integrator,
             depth=depth,
             spp=spp,
+            quality=quality,
+            quality_mean=quality_mean,
+            max_time=max_time,
             seed=seed,
             subpixels=subpixels,
             pixel_filter=pixel_filter,
@@ -147,13 +166,15 @@ def render(
         progress(Progress("write", 0, 1))
         writing = time.perf_counter()
         image = _with_seconds(image, load=load_seconds)
-        image.save(output, bits=bits)
         if maps is not None:
             write_maps(image, maps)
+        image.save(output, bits=bits)
     written = _with_seconds(image, write=time.perf_counter() - writing)
     console.remark(_depth_line(image))
     for note in image.provenance.notes:
         console.remark(note)
+    if image.provenance.estimate is not None:
+        console.remark(f"estimated PSNR {estimate_in_words(image.provenance.estimate)}")
     height, width = image.pixels.shape[:2]
     console.result(report(output, (width, height), written.provenance), _sentence(output, written))
 
@@ -243,6 +264,7 @@ def report(output: Path, size: tuple[int, int], provenance: Provenance) -> dict[
         "seed": provenance.seed,
         "traced_fraction": provenance.traced_fraction,
         "pixel_shares": dict(provenance.pixel_shares),
+        "estimate": None if provenance.estimate is None else dict(provenance.estimate),
         "rays": dict(provenance.rays),
         "seconds": dict(provenance.seconds),
         "options": dict(provenance.options),

@@ -44,6 +44,10 @@ class Provenance:
         Rays traced by kind (``primary``, ``shadow``, ``secondary``).
     seconds:
         Seconds spent by stage (``load``, ``build``, ``compile``, ``trace``, ``reuse``, ``total``).
+    estimate:
+        What the picture says of its own error, dB with the ends of their 95 % intervals: ``psnr``, ``psnr_low``,
+        ``psnr_high`` of the whole, ``worst``, ``worst_low``, ``worst_high`` of the worst micro-image, which is probably
+        ``worst_lens`` [column, row]. None where it says nothing.
     transfer:
         How integer formats code the linear values.
     options:
@@ -70,6 +74,7 @@ class Provenance:
     pixel_shares: Mapping[str, float] = field(default_factory=dict)
     rays: Mapping[str, int] = field(default_factory=dict)
     seconds: Mapping[str, float] = field(default_factory=dict)
+    estimate: Mapping[str, Any] | None = None
     transfer: Transfer = "srgb"
     options: Mapping[str, Any] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
@@ -86,6 +91,9 @@ class Provenance:
                 _is_amount(self.traced_fraction), "traced_fraction", self.traced_fraction, "a number of at least 0"
             )
             object.__setattr__(self, "traced_fraction", float(self.traced_fraction))
+        if self.estimate is not None:
+            estimate = _mapping("estimate", self.estimate, _is_plain, "figures by name, or nothing", _plain)
+            object.__setattr__(self, "estimate", estimate)
         _require(self.transfer in get_args(Transfer), "transfer", self.transfer, "'srgb' or 'linear'")
         shares = _mapping("pixel_shares", self.pixel_shares, _is_amount, "shares of the pixels by origin", float)
         object.__setattr__(self, "pixel_shares", shares)
@@ -106,6 +114,7 @@ class Provenance:
             "pixel_shares": dict(self.pixel_shares),
             "rays": dict(self.rays),
             "seconds": dict(self.seconds),
+            "estimate": None if self.estimate is None else dict(self.estimate),
             "options": dict(self.options),
             "notes": list(self.notes),
         }

@@ -6,13 +6,11 @@ from dataclasses import dataclass
 from typing import cast, get_args
 
 from lippmann.errors import UsageError
-from lippmann.render.settings import IntegratorName, PixelFilter
+from lippmann.render.settings import DEFAULT_SPP, IntegratorName, PixelFilter
 from lippmann.scene.scene import Scene
 
 #: Leaves the choice to the scene.
 AUTO = "auto"
-#: Samples per pixel of physically based light.
-DEFAULT_SPP = 16
 
 
 @dataclass(frozen=True)
@@ -21,7 +19,7 @@ class Choice:
 
     integrator: IntegratorName
     depth: int | None
-    spp: int
+    spp: int | None
     pixel_filter: PixelFilter
 
 
@@ -33,12 +31,14 @@ def choose(
     spp: int | None = None,
     pixel_filter: str = AUTO,
     own_camera: bool = False,
+    open_ended: bool = False,
 ) -> Choice:
     """Fill in what is left open.
 
     Scenes made for the classic light models are rendered by ``classic``, with the ray depth of their file and one
     sample in the middle of each pixel, or as many as the file asks for where its own camera takes the picture
-    (``own_camera``); all others by ``path`` with 16 samples over the pixel.
+    (``own_camera``); all others by ``path`` with 16 samples over the pixel. Where something else than a number of
+    samples says when to stop (``open_ended``), that number stays open.
 
     Raises
     ------
@@ -57,7 +57,7 @@ def choose(
         )
     if classic is not None:
         depth = classic.camera.ray_depth if depth is None else depth
-    if spp is None:
+    if spp is None and not open_ended:
         spp = DEFAULT_SPP if classic is None else 1 + (classic.camera.antialiasing if own_camera else 0)
     if pixel_filter == AUTO:
         pixel_filter = "point" if classic is not None and spp == 1 else "box"

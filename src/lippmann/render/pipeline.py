@@ -18,7 +18,10 @@ from lippmann.errors import UsageError
 from lippmann.image import IntegralImage, Provenance
 from lippmann.image.provenance import Transfer
 from lippmann.progress import Progress, ProgressCallback, silent
-from lippmann.render.plan import Plan, make_plan
+from lippmann.render.denoise import load_denoiser
+from lippmann.render.estimate import Estimate
+from lippmann.render.goal import goal_of
+from lippmann.render.plan import make_plan
 from lippmann.render.settings import REUSING, RenderSettings
 from lippmann.scene.description import Camera
 from lippmann.scene.placement import PlacementOptions, place
@@ -27,7 +30,7 @@ from lippmann.scene.scene import Scene
 if TYPE_CHECKING:
     from lippmann.render.classic.build import BuiltClassic
     from lippmann.render.full import Frame
-    from lippmann.render.rays import DisplayRays, RaySource
+    from lippmann.render.rays import RaySource
     from lippmann.scene.build import BuiltScene
 
 #: Share of the free memory that is used where no limit is given.
@@ -73,18 +76,12 @@ def render_integral_image(
     """
     watch = Stopwatch(progress)
     memory = settings.memory or default_memory()
-    plan = make_plan(
-        display.panel.width,
-        display.panel.height,
-        settings.spp,
-        channels=3 if settings.subpixels else 1,
-        memory=memory,
-    )
-    engine = watch.stage("load", lambda: engines.start(settings.device, settings.threads))
+    # What cannot be done is found before anything is loaded.
+    make_plan(display.panel.width, display.panel.height, 1, channels=3 if settings.subpixels else 1, memory=memory)
+    goal_of(settings)
     if settings.denoise == "oidn":
-        from lippmann.render.denoise import load_denoiser
-
-        load_denoiser()  # found missing now, not after the work is done
+        load_denoiser()
+    engine = watch.stage("load", lambda: engines.start(settings.device, settings.threads))
     built = watch.stage("build", lambda: build_for(scene, settings))
     placement = place(
         scene.bounds,
@@ -95,17 +92,31 @@ def render_integral_image(
         bounds_in=scene.bounds_in,
     )
 
-    from lippmann.render.finish import Finish
+    from lippmann.render.layers import plan_layers, trace_layers
+    from lippmann.render.methods import Job, trace
     from lippmann.render.rays import DisplayRays
 
     source = DisplayRays(display, placement.world_from_display, settings.subpixels)
     integrator = make_integrator(built, settings, placement.display_from_world)
-    frame = _trace(integrator, source, plan, settings, placement.display_from_world, engine.threads, progress)
-    finish = Finish(built, source, settings, placement.display_from_world, memory, progress)
-    if settings.denoise == "oidn":
-        watch.stage("denoise", lambda: finish.denoise(frame, engine.threads))
+    job = Job(
+        built,
+        integrator,
+        source,
+        settings,
+        placement.display_from_world,
+        transfer_of(settings),
+        memory,
+        engine.threads,
+        progress,
+    )
+    traced = trace(job)
+    frame = traced.frame
+    watch.seconds |= traced.seconds
     if settings.layers:
-        watch.stage("layers", lambda: finish.add_layers(frame))
+        frame.maps |= watch.stage(
+            "layers",
+            lambda: trace_layers(built, source, plan_layers(source, memory), placement.display_from_world, progress),
+        )
     provenance = _provenance(
         scene,
         built,
@@ -113,51 +124,19 @@ def render_integral_image(
         engine,
         frame,
         watch,
+        samples=traced.samples,
+        estimate=traced.estimate,
         options={
             **_reuse_options(settings),
-            **finish.options,
+            **traced.options,
             "pixel_filter": settings.pixel_filter,
             "placement": placement.mode,
             "depth_range": list(placement.depth_range),
             "resolvable_range": list(placement.resolvable_range),
         },
-        warnings=placement.warnings,
+        notes=(*placement.warnings, *traced.notes),
     )
     return IntegralImage(frame.pixels, display, placement.world_from_display, provenance, _layers(frame))
-
-
-def _trace(
-    integrator: Any,
-    source: DisplayRays,
-    plan: Plan,
-    settings: RenderSettings,
-    display_from_world: NDArray[np.float64],
-    threads: int,
-    progress: ProgressCallback,
-) -> Frame:
-    """The picture by the method that was asked for."""
-    box_filter = settings.pixel_filter == "box"
-    if settings.method == "full":
-        from lippmann.render.full import trace_frame
-
-        return trace_frame(integrator, source, plan, seed=settings.seed, box_filter=box_filter, progress=progress)
-    from lippmann.render.reuse.renderer import trace_reused
-
-    return trace_reused(
-        integrator,
-        source,
-        method=settings.method,
-        order=settings.order or "default",
-        careful=settings.careful,
-        samples=settings.spp,
-        seed=settings.seed,
-        box_filter=box_filter,
-        transfer=transfer_of(settings),
-        memory=settings.memory or default_memory(),
-        display_from_world=display_from_world,
-        threads=threads,
-        progress=progress,
-    )
 
 
 def _layers(frame: Frame) -> dict[str, NDArray[Any]]:
@@ -181,16 +160,18 @@ def _provenance(
     frame: Frame,
     watch: Stopwatch,
     *,
+    samples: int,
     options: dict[str, Any],
-    warnings: tuple[str, ...] = (),
+    estimate: Estimate | None = None,
+    notes: tuple[str, ...] = (),
 ) -> Provenance:
     height, width = frame.pixels.shape[:2]
-    all_rays = height * width * settings.spp * (3 if settings.subpixels else 1)
+    all_rays = height * width * samples * (3 if settings.subpixels else 1)
     return Provenance(
         method=settings.method,
         integrator=settings.integrator,
         depth=settings.surfaces,
-        spp=settings.spp,
+        spp=samples,
         seed=settings.seed,
         subpixels=settings.subpixels,
         scene=scene.name,
@@ -201,8 +182,9 @@ def _provenance(
         pixel_shares=frame.shares,
         rays=ray_counts(frame),
         seconds=stage_seconds(watch, frame),
+        estimate=None if estimate is None else estimate.to_dict(),
         options=options,
-        notes=(*scene_notes(scene, built), *warnings, *_frame_notes(frame)),
+        notes=(*scene_notes(scene, built), *notes, *_frame_notes(frame)),
     )
 
 
@@ -223,7 +205,7 @@ def render_preview(
 ) -> Preview:
     """The plain picture that a camera of the scene sees; None takes the first one, or one that frames everything."""
     watch = Stopwatch(progress)
-    plan = make_plan(*size, settings.spp, memory=settings.memory or default_memory())
+    plan = make_plan(*size, settings.samples, memory=settings.memory or default_memory())
     engine = watch.stage("load", lambda: engines.start(settings.device, settings.threads))
     built = watch.stage("build", lambda: build_for(scene, settings))
     pose = scene.camera(camera)
@@ -236,7 +218,7 @@ def render_preview(
         integrator, source, plan, seed=settings.seed, box_filter=settings.pixel_filter == "box", progress=progress
     )
     options = {"pixel_filter": settings.pixel_filter, "camera": pose.name}
-    provenance = _provenance(scene, built, settings, engine, frame, watch, options=options)
+    provenance = _provenance(scene, built, settings, engine, frame, watch, samples=settings.samples, options=options)
     return Preview(frame.pixels, provenance)
 
 

@@ -19,6 +19,8 @@ REUSING: tuple[Method, ...] = ("lens-view", "interpolated")
 #: Integrators that gather light; the others name a property of a surface.
 LIGHT: tuple[IntegratorName, ...] = ("classic", "path", "direct")
 
+#: Samples per pixel where nothing is said.
+DEFAULT_SPP = 16
 #: Surfaces per path where nothing is said.
 DEFAULT_DEPTH = {"classic": 2, "path": 8, "direct": 1}
 
@@ -45,7 +47,12 @@ class RenderSettings:
     depth:
         Surfaces a path may meet, the primary ray's counting 1; None for the integrator's own default.
     spp:
-        Samples per pixel (or sub-pixel), at least 1.
+        Samples per pixel (or sub-pixel), at least 1; None for 16, or with a quality or a time for as many as that
+        takes.
+    quality, quality_mean:
+        PSNR in dB that every micro-image, or the whole picture, is to reach by its own estimate.
+    max_time:
+        Seconds of tracing after which the best picture so far is taken.
     seed:
         Of all random choices, 0 to 2**32 - 1.
     subpixels:
@@ -65,7 +72,10 @@ class RenderSettings:
     respect_gloss: bool | None = None
     integrator: IntegratorName = "path"
     depth: int | None = None
-    spp: int = 16
+    spp: int | None = None
+    quality: float | None = None
+    quality_mean: float | None = None
+    max_time: float | None = None
     seed: int = 0
     subpixels: bool = False
     pixel_filter: PixelFilter = "box"
@@ -143,6 +153,11 @@ class RenderSettings:
     def careful(self) -> bool:
         """Whether what reprojection would falsify is traced."""
         return self.order != "paper" if self.respect_gloss is None else self.respect_gloss
+
+    @property
+    def samples(self) -> int:
+        """Samples per pixel where nothing else says when to stop."""
+        return DEFAULT_SPP if self.spp is None else self.spp
 
     @property
     def surfaces(self) -> int:

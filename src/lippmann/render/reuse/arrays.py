@@ -12,12 +12,13 @@ from lippmann.render.reuse.array_schedule import ArrayStep, array_key_stride, re
 from lippmann.render.reuse.bands import Bands
 from lippmann.render.reuse.following import follow_points
 from lippmann.render.reuse.gaps import Gaps, Settled
-from lippmann.render.reuse.gathering import Gathering, gather, mark_nearest
+from lippmann.render.reuse.gathering import Gathering, gather
 from lippmann.render.reuse.lens_field import LensField
 from lippmann.render.reuse.points import TRACED, PointImage
 from lippmann.render.reuse.rules import Rules
 from lippmann.render.reuse.schedule import Lenses, Step, odd_and_even
 from lippmann.render.reuse.tracing import Pixels, PixelTracer
+from lippmann.render.reuse.walking import mark_nearest
 
 #: One pixel in so many would be a probe, if all probes lay in the rows that the rules give them.
 _PROBE_COLUMNS = 4

@@ -25,6 +25,10 @@ ONE_SURFACE_PER_PIXEL = 0.06
 #: ... or its height by this part of the gap: near to the lens plane disparities are huge and change their sign.
 HEIGHT_PER_PIXEL = 0.02
 
+#: Where :func:`average` is careful, neighbours must agree to this part of the tolerance: nothing is known of what lies
+#: between them, and the two may be wrong in the same sense.
+AVERAGED_TOLERANCE = 0.5
+
 #: What :func:`bridge` does with gaps between different surfaces or colours: want all of their pixels, want the middle
 #: one, or give every pixel the colour of the nearest one that is known.
 TRACE_ALL, TRACE_MIDDLE, TAKE_NEAREST = 0, 1, 2
@@ -209,7 +213,7 @@ def average(first: int, last: int, points: PointImage, numbers: Any, left: Any, 
             or points.fragile[one_row, one_column]
             or points.fragile[other_row, other_column]
             or color_difference(points.color, one_row, one_column, other_row, other_column, rules.coded)
-            > rules.tolerance
+            > AVERAGED_TOLERANCE * rules.tolerance
         ):
             continue
         for channel in range(3):

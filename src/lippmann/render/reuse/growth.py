@@ -23,9 +23,6 @@ from lippmann.render.reuse.rules import coded_value, color_difference, nearer
 SURPRISE = 0.7
 #: Pixels around a surprise that are all traced: columns and rows to either side.
 NEAR_COLUMNS, NEAR_ROWS = 3, 3
-#: The wider surroundings: rows to either side, across the micro-image and those beside it, and the share
-#: of pixels that is looked at there.
-WIDE_ROWS, WIDE_SHARE = 6, 8
 #: A pixel of a neighbouring lens is looked at if what it shows lies farther away by this part.
 _BEHIND = 0.05
 
@@ -86,10 +83,10 @@ def surround(points: PointImage, lens: Any, surprised: Any, wanted: Any) -> None
 
 
 @compiled
-def look_around(points: PointImage, reach: int, share: int, around: Any, wanted: Any) -> None:
+def look_around(points: PointImage, reach: int, rows: int, share: int, around: Any, wanted: Any) -> None:
     """Set ``wanted`` for a few untraced pixels, one in ``share``, in the wider surroundings of the pixels ``around``.
 
-    ``reach`` is the width of a micro-image, about.
+    These are the micro-image, which is about ``reach`` columns wide, and those beside it, so many ``rows`` up and down.
     """
     height, width = points.status.shape
     # Surroundings overlap: one visit to each row of a micro-image is enough.
@@ -97,12 +94,13 @@ def look_around(points: PointImage, reach: int, share: int, around: Any, wanted:
     for i in range(len(around)):
         row, column = divmod(int(around[i]), width)
         cell = column // max(1, reach)
-        for r in range(max(0, row - WIDE_ROWS), min(height, row + WIDE_ROWS + 1)):
+        for r in range(max(0, row - rows), min(height, row + rows + 1)):
             if visited[r, cell]:
                 continue
             visited[r, cell] = True
             for c in range(max(0, (cell - 1) * reach), min(width, (cell + 2) * reach)):
-                if points.status[r, c] != TRACED and (c + 2 * r) % share == 0:
+                # Five has no factor in common with the shares in use: every column and row is visited.
+                if points.status[r, c] != TRACED and (c + 5 * r) % share == 0:
                     wanted[r, c] = True
 
 

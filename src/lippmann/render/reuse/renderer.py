@@ -21,7 +21,7 @@ from lippmann.render.reuse.bands import Bands
 from lippmann.render.reuse.gaps import Settled
 from lippmann.render.reuse.points import BYTES_PER_PIXEL, INTERPOLATED, REPROJECTED, TRACED, PointImage
 from lippmann.render.reuse.rules import Rules, choose_rules
-from lippmann.render.reuse.search import search
+from lippmann.render.reuse.search import choose_looks, search
 from lippmann.render.reuse.tracing import Pixels, PixelTracer
 
 ReuseMethod = Literal["lens-view", "interpolated"]
@@ -128,7 +128,8 @@ def trace_reused(
             _make(maker, method)
             if careful:
                 lens = maker.lens_numbers()
-                search(points, lens, maker.reach, tracer, bands, rules, maker.follow, settled)
+                looks = choose_looks(source.display, maker.reach)
+                search(points, lens, maker.reach, looks, tracer, bands, rules, maker.follow, settled)
     progress(Progress("trace", 1, 1))
     seconds_compile = tracer.seconds_compile + (compiling.duration if compiling.done else 0.0)
     return Frame(

@@ -40,8 +40,6 @@ class Rules(NamedTuple):
         Pixels from one traced pixel to the next in what no point reached; what lies between them is bridged.
     overhang:
         Pixels at the end of a micro-image that may be extrapolated.
-    look_share:
-        In the wider surroundings of an edge, one pixel in so many is traced in search of what is missing; 0: none.
     middles:
         Trace the middle of a gap between different surfaces, else each of them is taken to reach halfway.
     """
@@ -52,7 +50,6 @@ class Rules(NamedTuple):
     probe_rows: int
     longest_gap: int
     overhang: int
-    look_share: int = 0
     middles: bool = True
 
 
@@ -64,9 +61,9 @@ def choose_rules(display: Display, *, careful: bool, coded: bool) -> Rules:
     careful, coded:
         As in :class:`Rules`.
     """
-    few = few_lenses(display.lens_grid.columns)
     if careful:
-        return Rules(True, 0.06, coded, probe_rows=4, longest_gap=3, overhang=0, look_share=3 if few else 0)
+        return Rules(True, 0.06, coded, probe_rows=4, longest_gap=3, overhang=0)
+    few = few_lenses(display.lens_grid.columns)
     return Rules(False, 0.12, coded, probe_rows=8 if few else 16, longest_gap=5, overhang=1, middles=not few)
 
 

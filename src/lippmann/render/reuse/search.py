@@ -3,19 +3,49 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from lippmann.display import Display
 from lippmann.render.reuse import growth
 from lippmann.render.reuse.bands import Bands
 from lippmann.render.reuse.gaps import Settled
 from lippmann.render.reuse.points import PointImage
 from lippmann.render.reuse.rules import Rules
+from lippmann.render.reuse.schedule import few_lenses
 from lippmann.render.reuse.tracing import Pixels, PixelTracer
 
 #: Rounds at most. They die out by themselves; what is left then is a handful of pixels.
 MOST_ROUNDS = 16
+
+
+class Look(NamedTuple):
+    """A look at the surroundings of some pixels: so many ``rows`` up and down, one pixel in ``share``."""
+
+    rows: int
+    share: int
+
+
+class Looks(NamedTuple):
+    """Where the search looks beside the very neighbours: around all edges at first, around surprises in every round."""
+
+    at_edges: tuple[Look, ...]
+    at_surprises: tuple[Look, ...]
+
+
+def choose_looks(display: Display, reach: int) -> Looks:
+    """Looks for a display whose micro-images are ``reach`` columns wide.
+
+    Square and hexagonal micro-images have so few pixels that one wrong pixel spoils them, and a thing near to the lens
+    plane may be under one of them only: they are looked through most closely. The tall ones of cylindrical lenses are
+    so where there are few of them.
+    """
+    if display.lens_array.layout != "lenticular":
+        return Looks((Look(1, 1),), (Look(4, 1), Look(reach, 3)))
+    return Looks((Look(6, 3),) if few_lenses(display.lens_grid.columns) else (), (Look(6, 8),))
+
 
 Follow = Callable[[Pixels, NDArray[np.int32], NDArray[np.bool_]], None]
 
@@ -24,6 +54,7 @@ def search(
     points: PointImage,
     lens: NDArray[np.int32],
     reach: int,
+    looks: Looks,
     tracer: PixelTracer,
     bands: Bands,
     rules: Rules,
@@ -46,9 +77,10 @@ def search(
     """
     wanted = np.zeros(points.status.shape, dtype=np.bool_)
     bands.rows(growth.mark_edges, points, lens, rules.tolerance, rules.coded, wanted)
-    if rules.look_share:
-        # Where one thing ends under a lens, another may begin that only the next lens shows.
-        growth.look_around(points, reach, rules.look_share, np.flatnonzero(wanted), wanted)
+    # Where one thing ends under a lens, another may begin that only the next lens shows.
+    edges = np.flatnonzero(wanted)
+    for look in looks.at_edges:
+        growth.look_around(points, reach, *look, edges, wanted)
     colors = points.color.reshape(-1, 3)
     for _ in range(MOST_ROUNDS):
         numbers = np.flatnonzero(wanted).astype(np.uint32)
@@ -60,5 +92,6 @@ def search(
         settled(len(numbers))
         surprised = growth.surprises(points, numbers, expected, rules.tolerance, rules.coded)
         growth.surround(points, lens, surprised, wanted)
-        growth.look_around(points, reach, growth.WIDE_SHARE, surprised, wanted)
+        for look in looks.at_surprises:
+            growth.look_around(points, reach, *look, surprised, wanted)
         follow(surprised, lens, wanted)

@@ -1,0 +1,90 @@
+"""A picture whose noise is taken out, and that still knows how good it is.
+
+Each half of the samples is denoised by itself, and the picture is the mean of the two. A denoised half knows nothing of
+the other, noisy half, which therefore can judge it: for a denoised half D(a), the noisy halves a and b and the truth t,
+the mean of (D(a) - b)^2 is that of (D(a) - t)^2 and the noise of b, and half the mean of (a - b)^2 is that noise. What
+is told is the mean error of the halves; that of their mean is never larger.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lippmann.image.color import encode_srgb
+from lippmann.image.provenance import Transfer
+from lippmann.progress import ProgressCallback, silent
+from lippmann.render.estimate import CROSS_NOISE, PixelErrors
+
+Floats = NDArray[np.float32]
+Denoise = Callable[[Floats], Floats]
+
+#: Difference by which the slope of the coding curve is taken.
+_STEP = 1e-4
+
+
+class Halved(Protocol):
+    """A renderer whose samples come from two streams that know nothing of each other."""
+
+    def add(self, samples: int, progress: ProgressCallback = silent) -> None: ...
+
+    def halves(self) -> tuple[Floats, Floats]: ...
+
+
+class Denoised:
+    """The pictures of ``renderer`` after ``denoise``; see the head of this module.
+
+    Parameters
+    ----------
+    renderer:
+        Gathers the samples.
+    denoise:
+        From a noisy ``(H, W, 3)`` linear picture to a clean one.
+    transfer:
+        How values become codes; errors are measured between codes.
+    """
+
+    def __init__(self, renderer: Halved, denoise: Denoise, transfer: Transfer) -> None:
+        self._renderer = renderer
+        self._denoise = denoise
+        self._transfer: Transfer = transfer
+        self._cleaned: tuple[Floats, Floats] | None = None
+
+    def add(self, samples: int, progress: ProgressCallback = silent) -> None:
+        """Take ``samples`` more of every pixel."""
+        self._cleaned = None
+        self._renderer.add(samples, progress)
+
+    def picture(self) -> Floats:
+        """``(H, W, 3)`` float32 linear RGB."""
+        first, second = self._clean_halves()
+        mean: Floats = np.float32(0.5) * (first + second)
+        return mean
+
+    def squared_error(self) -> PixelErrors:
+        """Squared error of every pixel's code, as the halves judge each other."""
+        noisy, clean = self._renderer.halves(), self._clean_halves()
+        error = np.square(clean[0] - noisy[1])
+        error += np.square(clean[1] - noisy[0])
+        error -= np.square(noisy[0] - noisy[1])
+        error *= np.float32(0.5) * np.square(coding_slope(self.picture(), self._transfer))
+        return PixelErrors(error.mean(axis=2), None, CROSS_NOISE)
+
+    def _clean_halves(self) -> tuple[Floats, Floats]:
+        if self._cleaned is None:
+            first, second = (self._denoise(half) for half in self._renderer.halves())
+            self._cleaned = first, second
+        return self._cleaned
+
+
+def coding_slope(linear: Floats, transfer: Transfer) -> Floats:
+    """By how much a code changes with its linear value; 0 where it is cut off at 0 or 1."""
+    if transfer == "linear":
+        return ((linear >= 0) & (linear <= 1)).astype(np.float32)
+    upper, lower = (encode_srgb(np.maximum(linear.astype(np.float64) + side, 0)) for side in (_STEP, -_STEP))
+    # Below the first step the curve is a straight line; a difference that is cut off there would halve its slope.
+    width = np.minimum(linear, _STEP) + _STEP
+    return np.asarray(np.maximum(upper - lower, 0) / np.maximum(width, _STEP), dtype=np.float32)

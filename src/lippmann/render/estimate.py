@@ -1,0 +1,301 @@
+"""How good a picture is by its own account: PSNR with a 95 % interval, of the whole and of its worst micro-image.
+
+It starts from estimates of each pixel's squared error that come out of the rendering itself; no reference is needed.
+PSNR is that of :mod:`lippmann.quality`: the codes' mean squared error over all channels, in dB.
+
+Three things stand between the estimates and a statement about a micro-image:
+
+- The estimates are noisy, and so is the error itself: a picture's error is one draw of what the rendering could have
+  done. Both add to the interval.
+- The worst of many is not the one with the worst estimate. Each micro-image's estimate is drawn towards what its
+  neighbours say, as far as its own noise asks for (empirical Bayes), then pictures that fit are drawn
+  at random, and the worst of each is looked at.
+- Light that few paths find is missing from most pixels before it shows in any. Errors that rest on lone hits widen the
+  interval to the worse side.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lippmann.display import Display
+from lippmann.image.permutation import lens_indices, row_blocks
+from lippmann.render.settings import RenderSettings
+
+Real = NDArray[np.float64]
+Floats = NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class NoiseShares:
+    """What a pixel's estimate x says about variances, as multiples of the mean of x^2.
+
+    ``estimate``: of the estimate about the expected error; ``picture``: of the true error about the expected one. What
+    is independent from pixel to pixel adds up over a region.
+    """
+
+    estimate: float
+    picture: float
+
+
+#: Estimates by the difference of two independent halves of a picture. For normal noise of variance s its square is
+#: distributed as chi^2 with one degree of freedom: its own variance is 2 s^2, that of the true error 2 s^2 as well, and
+#: its mean square 3 s^2.
+OWN_NOISE = NoiseShares(2 / 3, 2 / 3)
+#: Products (p - a)(p - b) of a picture p with two unpooled pictures independent of it and of each other: they estimate
+#: the very error that p has, and a and b are all that is random.
+CROSS_NOISE = NoiseShares(1.0, 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class PixelErrors:
+    """Estimates of the squared error of each pixel's code, averaged over its channels.
+
+    Parameters
+    ----------
+    values:
+        ``(H, W)`` float32, unbiased; single ones may be negative.
+    lone:
+        ``(H, W)`` float32 of at least 0: the part of ``values`` that rests on single bright hits; None if there is no
+        such thing.
+    noise:
+        How uncertain ``values`` are.
+    """
+
+    values: Floats
+    lone: Floats | None = None
+    noise: NoiseShares = CROSS_NOISE
+
+
+def why_no_estimate(settings: RenderSettings) -> str | None:
+    """Why a picture made with ``settings`` says nothing of its own error, as a sentence; None if it does."""
+    if settings.pixel_filter == "point" and settings.integrator not in ("path", "direct"):
+        return "no estimate of the error: one ray through each pixel's middle leaves nothing to chance"
+    if settings.spp == 1:
+        return "no estimate of the error: one sample per pixel does not tell it, two or more do"
+    return None
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A picture's PSNR in dB by its own account, each with the ends of its 95 % interval.
+
+    ``psnr``: of all pixels; ``worst``: of the worst micro-image, which is probably lens ``worst_lens`` (column, row). A
+    picture without any noise at all has the PSNR ``CEILING``.
+    """
+
+    psnr: float
+    psnr_low: float
+    psnr_high: float
+    worst: float
+    worst_low: float
+    worst_high: float
+    worst_lens: tuple[int, int]
+
+    def to_dict(self) -> dict[str, Any]:
+        """All fields as JSON-able values, rounded to hundredths of a dB; :meth:`from_dict` reads them."""
+        plain = asdict(self)
+        return {name: list(v) if name == "worst_lens" else round(v, 2) for name, v in plain.items()}
+
+    @classmethod
+    def from_dict(cls, plain: Mapping[str, Any]) -> Estimate:
+        """What :meth:`to_dict` wrote.
+
+        Raises
+        ------
+        KeyError
+            If a field is missing.
+        """
+        values = {field.name: plain[field.name] for field in fields(cls)}
+        return cls(**values | {"worst_lens": tuple(values["worst_lens"])})
+
+    def __str__(self) -> str:
+        return (
+            f"{self.psnr:.1f} dB ({self.psnr_low:.1f} to {self.psnr_high:.1f}), "
+            f"worst micro-image {self.worst:.1f} dB ({self.worst_low:.1f} to {self.worst_high:.1f})"
+        )
+
+
+#: PSNR in dB beyond which nothing is told apart: a tenth of the step of 16-bit codes.
+CEILING = 116.0
+#: What curve and clipping leave of bias, as a share of the error; measured, see ``benchmarks/estimate_coverage.py``.
+MODEL_UNCERTAINTY = 0.08
+#: By how much more than what lone hits show the error may be: measured where they are most of it.
+LONE_DOUBT = 0.8
+#: The share of a lone hit's estimate that is no estimate but the error itself.
+LONE_CERTAIN = 0.7
+#: Micro-images that may be the worst are drawn this many times.
+_DRAWS = 2000
+#: Of very many micro-images only so many can be the worst.
+_CANDIDATES = 1024
+#: Pixels' worth of belief that a lens is as noisy as its neighbours.
+_LEAN = 64.0
+_NORMAL_95 = 1.96
+#: Of the draws of the worst error: lenses that are worse pull their neighbours, so the better side goes farther.
+_LOW_QUANTILE = 0.01
+_FLOOR = 10 ** (-CEILING / 10)
+
+
+class PictureEstimator:
+    """Estimates for pictures of one display; which lens a pixel belongs to is found once."""
+
+    def __init__(self, display: Display) -> None:
+        grid = display.lens_grid
+        self._rows, self._columns = grid.rows, grid.columns
+        self._owner = lens_indices(display).ravel()
+        self._pixels = np.bincount(self._owner, minlength=grid.rows * grid.columns)
+
+    def estimate(self, errors: PixelErrors) -> Estimate:
+        """PSNR of the whole and of the worst micro-image."""
+        sums = self._sums(errors)
+        psnr = _whole(sums, errors.noise)
+        lenses = self._lenses(sums, errors.noise)
+        draws = lenses.draws()
+        worst = _psnr(np.quantile(draws.max(axis=0), (0.5, 0.975, _LOW_QUANTILE)))
+        model = 10 * math.log10(1 + MODEL_UNCERTAINTY)
+        row, column = divmod(int(lenses.index[np.argmax(lenses.expected)]), self._columns)
+        return Estimate(
+            *psnr,
+            worst=float(worst[0]),
+            worst_low=float(worst[1]) - model,
+            worst_high=float(worst[2]) + model,
+            worst_lens=(column, row),
+        )
+
+    def _sums(self, errors: PixelErrors) -> _Sums:
+        lenses = len(self._pixels)
+        sums = _Sums(self._pixels.astype(np.float64), *np.zeros((3, lenses)))
+        height, width = errors.values.shape
+        # Block by block: double precision of a whole panel would take gigabytes.
+        for first, last in row_blocks(height, width):
+            owner = self._owner[first * width : last * width]
+            values = errors.values[first:last].astype(np.float64).ravel()
+            if errors.lone is not None:
+                lone = errors.lone[first:last].astype(np.float64).ravel()
+                sums.lone[:] += np.bincount(owner, weights=lone, minlength=lenses)
+            sums.values[:] += np.bincount(owner, weights=values, minlength=lenses)
+            # A lone hit shows in the picture as it does in the estimate.
+            uncertain = values if errors.lone is None else values - LONE_CERTAIN * lone
+            sums.squares[:] += np.bincount(owner, weights=np.square(uncertain), minlength=lenses)
+        return sums
+
+    def _lenses(self, sums: _Sums, noise: NoiseShares) -> _Lenses:
+        index = np.flatnonzero(sums.pixels)
+        of_lenses = _Sums(*(getattr(sums, field.name)[index] for field in fields(_Sums)))
+        return _shrunk(of_lenses, index, (self._rows, self._columns), noise)
+
+
+@dataclass(frozen=True, eq=False)
+class _Sums:
+    """Sums over the pixels of each lens: their number, estimates, squares of what is uncertain of them, lone parts."""
+
+    pixels: Real
+    values: Real
+    squares: Real
+    lone: Real
+
+
+@dataclass(frozen=True, eq=False)
+class _Lenses:
+    """Micro-images with pixels: their flat ``index``, the ``expected`` squared error, that ``doubted``, log variances.
+
+    ``variance`` is that of the logarithm of the expected error, ``fluctuation`` that of the true about the expected.
+    """
+
+    index: NDArray[np.intp]
+    expected: Real
+    doubted: Real
+    variance: Real
+    fluctuation: Real
+
+    def draws(self) -> Real:
+        """``(candidates, draws)``: true squared errors of the micro-images that may be the worst."""
+        reach = np.log(self.doubted) + 2.5 * np.sqrt(self.variance + self.fluctuation)
+        best = np.argsort(-reach)[:_CANDIDATES]
+        random = np.random.default_rng(1)
+        shape = (len(best), _DRAWS)
+        spread = np.sqrt(self.variance[best] + self.fluctuation[best])[:, None]
+        # The logarithm of a lognormal's mean lies above its median's by half the variance.
+        middle = np.log(self.expected)[best][:, None] - 0.5 * np.square(spread)
+        doubt = (np.log(self.doubted) - np.log(self.expected))[best][:, None]
+        drawn: Real = np.exp(middle + spread * random.standard_normal(shape) + doubt * np.square(random.random(_DRAWS)))
+        return drawn
+
+
+def _shrunk(sums: _Sums, index: NDArray[np.intp], grid: tuple[int, int], noise: NoiseShares) -> _Lenses:
+    """Micro-images whose noisy means are drawn towards their neighbours', and those towards the mean of all."""
+    count = sums.pixels
+    mean, lone = sums.values / count, sums.lone / count
+    average = max(_FLOOR, float(sums.values.sum() / count.sum()))
+    # The mean square of one lens is noisy itself, so it leans on that of its neighbours.
+    nearby, neighbours = _neighbourhood(np.stack([mean, sums.squares / count]), index, grid)
+    square = (sums.squares + _LEAN * nearby[1]) / (count + _LEAN)
+    of_estimate, of_picture = noise.estimate * square / count, noise.picture * square / count
+
+    of_nearby = of_estimate / np.maximum(neighbours, 1)
+    everywhere = np.full_like(mean, average)
+    trust = _spread(nearby[0], everywhere, of_nearby, 1.0)
+    trust = trust / (trust + of_nearby / average**2)
+    around = np.maximum(average + trust * (nearby[0] - average), 1e-3 * average)
+
+    telling = around > 0.25 * average
+    usual = _spread(mean[telling], around[telling], of_estimate[telling], 1.0) * np.square(around)
+    # Where a lens is worse by more than three deviations of its noise, it is no accident but another sight. A lens that
+    # seems better may have had luck: of few pixels and samples, none may have met what the others met.
+    other = np.where(mean > around, np.square(mean - around) - 9 * of_estimate, 0.0)
+    between = np.maximum(usual, other)
+    trust = between / (between + of_estimate)
+    expected = np.maximum(around + trust * (mean - around), 1e-3 * average)
+    doubted = expected + LONE_DOUBT * np.clip(lone, 0, expected)
+    variance, fluctuation = (np.log1p(v / np.square(expected)) for v in (trust * of_estimate, of_picture))
+    return _Lenses(index, expected, doubted, variance, fluctuation)
+
+
+def _spread(values: Real, about: Real, noise: Real, default: float) -> float:
+    """Relative variance of ``values`` about what is expected, beyond their ``noise``.
+
+    By the median, as a few differ from all: that of squared normal values is 0.455 of their variance.
+    """
+    if not len(values):
+        return default
+    return max(0.02, float(np.median((np.square(values - about) / 0.455 - noise) / np.square(about))))
+
+
+def _neighbourhood(values: Real, index: NDArray[np.intp], grid: tuple[int, int]) -> tuple[Real, Real]:
+    """Means of ``(n, lenses)`` values over the up to eight lenses around each, and how many these are.
+
+    A lens without neighbours is its own.
+    """
+    known = np.zeros((len(values) + 1, grid[0] * grid[1]))
+    known[:-1, index], known[-1, index] = values, 1
+    array = known.reshape(-1, *grid)
+    wide = np.pad(array, ((0, 0), (1, 1), (1, 1)))
+    total = -array
+    for a, b in np.ndindex(3, 3):
+        total += wide[:, a : a + grid[0], b : b + grid[1]]
+    of_lenses = total.reshape(len(known), -1)[:, index]
+    number = of_lenses[-1]
+    return np.where(number > 0, of_lenses[:-1] / np.maximum(number, 1), values), number
+
+
+def _whole(sums: _Sums, noise: NoiseShares) -> tuple[float, float, float]:
+    """PSNR of all pixels and the ends of its interval."""
+    pixels, total = float(sums.pixels.sum()), float(sums.values.sum())
+    mean = max(total / pixels, _FLOOR)
+    deviation = math.sqrt((noise.estimate + noise.picture) * float(sums.squares.sum()))
+    relative = deviation / (mean * pixels)
+    spread = _NORMAL_95 * math.sqrt(math.log1p(relative**2) + MODEL_UNCERTAINTY**2)
+    doubt = 1 + LONE_DOUBT * min(1.0, float(sums.lone.sum()) / (mean * pixels))
+    ends = mean * math.exp(spread) * doubt, mean * math.exp(-spread)
+    low, high = (float(end) for end in _psnr(np.array(ends)))
+    return float(_psnr(np.array(mean))), low, high
+
+
+def _psnr(squared_error: Real) -> Real:
+    return np.asarray(-10 * np.log10(np.maximum(squared_error, _FLOOR)))

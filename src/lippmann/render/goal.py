@@ -1,0 +1,260 @@
+"""Rendering until a picture is good enough: rounds of samples, each judged by the picture's own estimate.
+
+A round is as large as the estimates so far say that it must be, but never more than a few times what has gone before:
+early estimates are rough, and what is overshot is lost. All micro-images get the same samples: one that seems good
+already may only not have met the light that few paths find, and would stay wrong.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Literal, Protocol
+
+from lippmann.errors import UsageError
+from lippmann.progress import Progress, ProgressCallback, silent
+from lippmann.render.estimate import Estimate, PictureEstimator, PixelErrors, why_no_estimate
+from lippmann.render.settings import RenderSettings
+
+End = Literal["quality", "time", "samples"]
+
+#: Samples of the first round: with fewer the estimate is too rough to be believed.
+FIRST_ROUND = 16
+#: The first round where time is short: the fewest that tell an error.
+FIRST_PROBE = 2
+#: Samples add up to multiples of this, so that all batches get the same.
+STEP = 8
+#: The most by which one round multiplies the samples of a pixel, and the least.
+MOST_GROWTH, LEAST_GROWTH = 4.0, 1.2
+#: The promise: the worst micro-image may miss the quality asked for by this much, in dB.
+TOLERANCE = 1.0
+#: Samples per pixel at which it is given up: the noise of single precision sums comes near.
+MOST_SAMPLES = 1 << 20
+#: Of the time that is left, the share that a round is planned to take: rates vary.
+_TIME_SHARE = 0.9
+
+
+@dataclass(frozen=True)
+class Goal:
+    """When to stop: at the first of what is set.
+
+    Parameters
+    ----------
+    quality:
+        PSNR in dB that every micro-image is to reach.
+    quality_mean:
+        PSNR in dB that the mean squared error of all micro-images is to reach.
+    max_time:
+        Seconds.
+    spp:
+        Samples per pixel; at least two, fewer tell no error.
+
+    Raises
+    ------
+    UsageError
+        If nothing is set, or a value is out of its range.
+    """
+
+    quality: float | None = None
+    quality_mean: float | None = None
+    max_time: float | None = None
+    spp: int | None = None
+
+    def __post_init__(self) -> None:
+        for name, value in (("quality", self.quality), ("quality-mean", self.quality_mean)):
+            if value is not None and not 0 < value <= 80:
+                raise UsageError(f"{value:g} dB will not do", where=f"--{name}", rule="above 0 and at most 80 dB")
+        if self.max_time is not None and not (self.max_time > 0 and math.isfinite(self.max_time)):
+            raise UsageError(f"{self.max_time:g} s will not do", where="--max-time", rule="seconds above 0")
+        if self.spp is not None and self.spp < FIRST_PROBE:
+            raise UsageError(f"{self.spp} will not do", where="--spp", rule="two samples or more tell their error")
+        if self.quality is self.quality_mean is self.max_time is self.spp is None:
+            raise UsageError("nothing says when to stop", fix="give --quality, --quality-mean, --max-time or --spp")
+
+    @property
+    def has_quality(self) -> bool:
+        """Whether some quality is asked for."""
+        return self.quality is not None or self.quality_mean is not None
+
+    def missing(self, estimate: Estimate) -> float:
+        """How many dB the picture is short of the quality; at most 0 if it has it.
+
+        It has it where the quality is the likely one, and is missed by more than ``TOLERANCE`` only with a probability
+        of 2.5 %.
+        """
+        short = [-math.inf]
+        if self.quality is not None:
+            short += [self.quality - estimate.worst, self.quality - TOLERANCE - estimate.worst_low]
+        if self.quality_mean is not None:
+            short += [self.quality_mean - estimate.psnr, self.quality_mean - TOLERANCE - estimate.psnr_low]
+        return max(short)
+
+    def describe(self, estimate: Estimate) -> str:
+        """Where the picture stands, for a progress report."""
+        parts = []
+        if self.quality is not None or self.quality_mean is None:
+            wanted = f" of {self.quality:g}" if self.quality is not None else ""
+            parts.append(f"worst micro-image {estimate.worst:.1f}{wanted} dB")
+        if self.quality_mean is not None:
+            parts.append(f"{estimate.psnr:.1f} of {self.quality_mean:g} dB")
+        return ", ".join(parts)
+
+
+def goal_of(settings: RenderSettings) -> Goal | None:
+    """When to stop, where that is not a number of samples alone.
+
+    Raises
+    ------
+    UsageError
+        If a value is out of range, or the method or the light has no noise that more samples would reduce.
+    """
+    if settings.quality is settings.quality_mean is settings.max_time is None:
+        return None
+    goal = Goal(settings.quality, settings.quality_mean, settings.max_time, settings.spp)
+    given = "--max-time" if settings.max_time is not None else "--quality"
+    if settings.method != "full":
+        rule = "methods that get better with every sample can be asked for a quality"
+        raise UsageError(f"{settings.method} is done when it is done", where=given, rule=rule, fix="use --method full")
+    why = why_no_estimate(settings)
+    if why is not None:
+        raise UsageError(why, where=given, fix="leave it out")
+    return goal
+
+
+class ProgressiveRenderer(Protocol):
+    """A picture that gets better with every call of :meth:`add`."""
+
+    def add(self, samples: int, progress: ProgressCallback = silent) -> None: ...
+
+    def squared_error(self) -> PixelErrors: ...
+
+
+@dataclass(frozen=True)
+class Round:
+    """After a round: samples per pixel, seconds since the start, and how good the picture then was."""
+
+    samples: int
+    seconds: float
+    estimate: Estimate
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How the rendering ended: ``quality`` reached, ``time`` up, or ``samples`` spent; with the last estimate."""
+
+    end: End
+    estimate: Estimate
+    samples: int
+    rounds: tuple[Round, ...]
+
+
+def reach(
+    goal: Goal,
+    renderer: ProgressiveRenderer,
+    estimator: PictureEstimator,
+    progress: ProgressCallback = silent,
+    clock: Callable[[], float] = time.perf_counter,
+) -> Outcome:
+    """Give ``renderer`` rounds of samples until ``goal`` is reached; ``estimator`` is that of its display."""
+    return _Climb(goal, renderer, estimator, progress, clock).run()
+
+
+@dataclass
+class _Climb:
+    """One rendering on its way; ``spent`` is in samples per pixel."""
+
+    goal: Goal
+    renderer: ProgressiveRenderer
+    estimator: PictureEstimator
+    progress: ProgressCallback
+    clock: Callable[[], float]
+    rounds: list[Round] = field(default_factory=list)
+    spent: int = 0
+
+    def __post_init__(self) -> None:
+        self._began = self.clock()
+
+    def run(self) -> Outcome:
+        samples = self._first_round()
+        while True:
+            self.renderer.add(samples, self._report(samples))
+            self.spent += samples
+            estimate = self.estimator.estimate(self.renderer.squared_error())
+            self.rounds.append(Round(self.spent, self._seconds(), estimate))
+            end = self._end(estimate)
+            if end is None:
+                samples = self._next_round(estimate)
+                end = "time" if samples < 1 else None
+            if end is not None:
+                return Outcome(end, estimate, self.spent, tuple(self.rounds))
+
+    def _seconds(self) -> float:
+        return self.clock() - self._began
+
+    def _end(self, estimate: Estimate) -> End | None:
+        if self.goal.has_quality and self.goal.missing(estimate) <= 0 and self.spent >= FIRST_ROUND:
+            return "quality"
+        if self.goal.max_time is not None and self._seconds() >= self.goal.max_time:
+            return "time"
+        return "samples" if self.spent >= min(self.goal.spp or MOST_SAMPLES, MOST_SAMPLES) else None
+
+    def _first_round(self) -> int:
+        most = self.goal.spp or MOST_SAMPLES
+        if self.goal.max_time is not None:
+            return min(most, FIRST_PROBE)
+        return min(most, FIRST_ROUND) if self.goal.has_quality else most
+
+    def _next_round(self, estimate: Estimate) -> int:
+        """Samples of the next round; fewer than one if there is no time for any."""
+        wanted = max(self.spent * self._growth(estimate), FIRST_ROUND)
+        samples = max(STEP * round(wanted / STEP) - self.spent, STEP)
+        samples = min(samples, (self.goal.spp or MOST_SAMPLES) - self.spent)
+        if self.goal.max_time is not None:
+            left = self.goal.max_time - self._seconds()
+            samples = min(samples, math.floor(_TIME_SHARE * left * self._rate()))
+        return samples
+
+    def _rate(self) -> float:
+        """Samples per pixel that a second brings, by the last round."""
+        last = self.rounds[-1]
+        samples, seconds = (self.rounds[-2].samples, self.rounds[-2].seconds) if len(self.rounds) > 1 else (0, 0.0)
+        return (last.samples - samples) / max(last.seconds - seconds, 1e-6)
+
+    def _growth(self, estimate: Estimate) -> float:
+        """By how much samples must be multiplied, as far as one round may."""
+        if not self.goal.has_quality:
+            return MOST_GROWTH
+        needed = 10 ** (self.goal.missing(estimate) / (10 * self._slope()))
+        return min(MOST_GROWTH, max(LEAST_GROWTH, needed))
+
+    def _slope(self) -> float:
+        """The power of the number of samples by which the error falls, by the rounds so far: 1 for plain noise."""
+        if len(self.rounds) < 2:
+            return 1.0
+        before, last = self.rounds[-2:]
+        gained = last.estimate.psnr - before.estimate.psnr
+        slope = gained / (10 * math.log10(last.samples / before.samples))
+        # Half belief in what two noisy estimates say; a renderer with bias may gain much less than noise would.
+        return min(1.2, max(0.3, 0.5 + 0.5 * slope))
+
+    def _report(self, coming: int) -> ProgressCallback:
+        """Reports of one round as reports of all the work, as far as it can be foreseen."""
+        note, total = "", float(self.spent + coming)
+        if self.rounds:
+            estimate = self.rounds[-1].estimate
+            note = self.goal.describe(estimate)
+            if self.goal.has_quality:
+                total = max(total, self.spent * 10 ** (max(0.0, self.goal.missing(estimate)) / (10 * self._slope())))
+            total = min(total, float(self.goal.spp or MOST_SAMPLES))
+            left = (total - self.spent) / self._rate()
+            if self.goal.max_time is not None:
+                left = min(left, self.goal.max_time - self._seconds())
+            note += f", about {max(0.0, left):.0f} s left"
+
+        def report(inner: Progress) -> None:
+            done = self.spent + coming * inner.done / max(inner.total, 1e-9)
+            self.progress(Progress(inner.stage, done, max(total, done), note))
+
+        return report

@@ -1,0 +1,122 @@
+"""When a rendering stops, with renderers whose error is known and a clock that is told."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from lippmann.display import Display
+from lippmann.display.lens_array import LensArray
+from lippmann.display.panel import Panel
+from lippmann.errors import UsageError
+from lippmann.progress import Progress
+from lippmann.render.estimate import OWN_NOISE, Estimate, PictureEstimator, PixelErrors
+from lippmann.render.goal import FIRST_ROUND, TOLERANCE, Goal, reach
+
+SHOWN = Display("test", Panel(64, 64, 0.25), LensArray("square", 2.0), gap=6.8)
+
+
+class Noise:
+    """A renderer whose squared error is ``error * samples**-slope``; a sample takes ``seconds`` of its own clock."""
+
+    def __init__(self, error=0.05, slope=1.0, seconds=0.01, floor=0.0):
+        self.error, self.slope, self.seconds, self.floor = error, slope, seconds, floor
+        self.samples, self.now = 0, 0.0
+        self.random = np.random.default_rng(1)
+
+    def add(self, samples, progress=lambda _: None):
+        self.samples += samples
+        self.now += samples * self.seconds
+        progress(Progress("trace", samples, samples))
+
+    def squared_error(self):
+        expected = self.error * self.samples**-self.slope + self.floor
+        return PixelErrors((expected * self.random.chisquare(1, (64, 64))).astype(np.float32), None, OWN_NOISE)
+
+    def clock(self):
+        return self.now
+
+
+def run(goal, renderer, reports=None):
+    listen = reports.append if reports is not None else lambda _: None
+    return reach(goal, renderer, PictureEstimator(SHOWN), listen, renderer.clock)
+
+
+@pytest.mark.parametrize("slope", [0.8, 1.0, 1.5])
+def test_the_quality_is_reached_without_wasting_samples(slope):
+    renderer = Noise(slope=slope)
+    outcome = run(Goal(quality=40), renderer)
+    assert outcome.end == "quality"
+    assert outcome.estimate.worst >= 40
+    assert outcome.estimate.worst_low >= 40 - TOLERANCE
+    # The worst of 64 lenses of 64 pixels is about 2 dB worse than all together.
+    assert outcome.estimate.worst < 42
+    assert len(outcome.rounds) <= 9
+    assert outcome.samples == renderer.samples
+
+
+def test_the_mean_asks_for_less_than_the_worst():
+    worst, mean = Noise(), Noise()
+    run(Goal(quality=40), worst)
+    outcome = run(Goal(quality_mean=40), mean)
+    assert outcome.estimate.psnr >= 40
+    assert mean.samples < 0.8 * worst.samples
+
+
+def test_time_ends_it_with_the_best_so_far():
+    renderer = Noise(seconds=0.05)
+    outcome = run(Goal(quality=60, max_time=10.0), renderer)
+    assert outcome.end == "time"
+    assert 8.0 <= renderer.now <= 10.0
+
+
+def test_samples_end_it():
+    renderer = Noise()
+    outcome = run(Goal(quality=60, spp=100), renderer)
+    assert (outcome.end, outcome.samples) == ("samples", 100)
+
+
+def test_samples_alone_are_spent_in_one_go():
+    outcome = run(Goal(spp=37), Noise())
+    assert (outcome.end, outcome.samples, len(outcome.rounds)) == ("samples", 37, 1)
+
+
+def test_a_renderer_that_stops_getting_better_is_not_followed_for_ever():
+    outcome = run(Goal(quality=50, spp=5000), Noise(floor=1e-3))
+    assert outcome.end == "samples"
+
+
+def test_a_few_samples_are_not_believed():
+    class Lucky(Noise):
+        def squared_error(self):
+            return PixelErrors(np.full((64, 64), 1e-9, np.float32), None, OWN_NOISE)
+
+    outcome = run(Goal(quality=30, max_time=100.0), Lucky())
+    assert outcome.end == "quality"
+    assert outcome.samples >= FIRST_ROUND
+
+
+def test_reports_climb_to_the_end_and_say_where_the_picture_stands():
+    reports = []
+    run(Goal(quality=40), Noise(), reports)
+    done = [report.done for report in reports]
+    assert done == sorted(done)
+    assert all(report.done <= report.total for report in reports)
+    assert "of 40 dB, about" in reports[-1].note
+    assert reports[-1].note.endswith("s left")
+
+
+def test_missing_is_by_the_likely_value_and_by_the_low_end():
+    wide = Estimate(45, 44, 46, 41.0, 38.0, 43.0, (0, 0))
+    assert Goal(quality=40).missing(wide) == pytest.approx(1.0)
+    narrow = Estimate(45, 44.9, 45.1, 41.0, 40.8, 41.2, (0, 0))
+    assert Goal(quality=42).missing(narrow) == pytest.approx(1.0)
+    assert Goal(quality_mean=44).missing(wide) <= 0
+
+
+@pytest.mark.parametrize(
+    "values", [{}, {"quality": 0}, {"quality": 81}, {"quality_mean": -1}, {"max_time": 0}, {"spp": 1}]
+)
+def test_goals_without_sense_are_refused(values):
+    with pytest.raises(UsageError):
+        Goal(**values)
