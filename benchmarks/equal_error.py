@@ -43,9 +43,9 @@ DISPLAYS: dict[str, tuple[str, dict[str, Any], int | None]] = {
 }
 #: Samples per pixel of either reference, and on which the others are stopped.
 REFERENCE = 256
-FULL = (1, 2, 4, 8, 16, 32, 64, 128)
+FULL = (1, 4, 16, 64)
 DENOISED = (1, 4, 16, 64)
-POOLED = (1, 2, 4, 8, 16, 32)
+POOLED = (1, 4, 16)
 #: No method spends more than this on one picture, in seconds.
 MOST_SECONDS = 60.0
 TARGETS = (35.0, 40.0)
@@ -195,9 +195,38 @@ def _limited(curve: Iterator[tuple[int, float, float, Picture]], judge: Judge) -
             return
 
 
+def _pooled(stage: Stage, denoised: bool = False) -> Iterator[tuple[int, float, float, Picture]]:
+    from lippmann.render.denoise_views import denoise_views
+    from lippmann.render.guides import Guides
+    from lippmann.render.pooled.renderer import Pooled
+
+    def clean(color: Picture, albedo: Picture, normal: Picture) -> Picture:
+        return np.maximum(denoise_views(color, stage.display, Guides(albedo, normal)), 0)
+
+    def made(samples: int) -> tuple[float, Picture]:
+        started = time.perf_counter()
+        path = stage.integrator
+        denoiser = clean if denoised else None
+        pooled = Pooled(path.scene, path.traits, path.depth, stage.source, seed=3, denoiser=denoiser)
+        pooled.add(samples)
+        picture = pooled.picture()
+        return time.perf_counter() - started, picture
+
+    made(1)
+    for samples in POOLED:
+        seconds, picture = made(samples)
+        yield samples, seconds, 1.0, picture
+
+
+def _pooled_denoised(stage: Stage) -> Iterator[tuple[int, float, float, Picture]]:
+    yield from _pooled(stage, denoised=True)
+
+
 CURVES: dict[str, Callable[[Stage], Iterator[tuple[int, float, float, Picture]]]] = {
     "full": _full,
     "full + oidn": _full_denoised,
+    "pooled": _pooled,
+    "pooled + oidn": _pooled_denoised,
 }
 
 

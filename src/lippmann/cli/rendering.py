@@ -22,7 +22,7 @@ Method = Annotated[
     typer.Option(
         "--method",
         help="full: every ray is traced; lens-view: points are carried from lens to lens and missed pixels traced; "
-        "interpolated: those of every other lens are averaged.",
+        "interpolated: those of every other lens are averaged; pooled: light is gathered in the scene and shared.",
     ),
 ]
 Order = Annotated[

@@ -115,8 +115,12 @@ def goal_of(settings: RenderSettings) -> Goal | None:
     goal = Goal(settings.quality, settings.quality_mean, settings.max_time, settings.spp)
     given = "--max-time" if settings.max_time is not None else "--quality"
     if settings.method != "full":
-        rule = "methods that get better with every sample can be asked for a quality"
-        raise UsageError(f"{settings.method} is done when it is done", where=given, rule=rule, fix="use --method full")
+        raise UsageError(
+            f"{settings.method} does not know its own error",
+            where=given,
+            rule="full does, denoised or not",
+            fix="use --method full",
+        )
     why = why_no_estimate(settings)
     if why is not None:
         raise UsageError(why, where=given, fix="leave it out")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
@@ -11,11 +13,13 @@ from numpy.typing import NDArray
 from lippmann.image.provenance import Transfer
 from lippmann.progress import ProgressCallback, silent
 from lippmann.render.batches import FullInBatches, trace_in_batches
+from lippmann.render.denoise_views import denoise_views
 from lippmann.render.denoised import Denoised
 from lippmann.render.estimate import Estimate, PictureEstimator, why_no_estimate
 from lippmann.render.full import Frame, trace_frame
 from lippmann.render.goal import Goal, Outcome, goal_of, reach
 from lippmann.render.guided import GuidedDenoiser
+from lippmann.render.guides import Guides
 from lippmann.render.plan import make_plan
 from lippmann.render.rays import DisplayRays
 from lippmann.render.reuse.renderer import trace_reused
@@ -24,6 +28,8 @@ from lippmann.render.settings import REUSING, RenderSettings
 if TYPE_CHECKING:
     from lippmann.render.classic.build import BuiltClassic
     from lippmann.scene.build import BuiltScene
+
+Floats = NDArray[np.float32]
 
 #: The layer with the estimated squared error of each pixel's code.
 ERROR = "error"
@@ -89,6 +95,8 @@ def trace(job: Job) -> Traced:
     why = why_no_estimate(job.settings)
     if job.settings.method in REUSING:
         return _cleaned(job, _reused(job))
+    if job.settings.method == "pooled":
+        return _pooled(job)
     if why is not None:
         return _cleaned(job, _plain(job, why))
     if goal is None and job.settings.denoise == "none":
@@ -161,6 +169,43 @@ def _reused(job: Job) -> Traced:
         progress=job.progress,
     )
     return Traced(frame, settings.samples, notes=(f"no estimate of the error: {settings.method} has more than noise",))
+
+
+def _pooled(job: Job) -> Traced:
+    """So many paths per pixel, and their light where every lens finds it."""
+    from lippmann.render.pooled.renderer import Pooled
+
+    settings, integrator = job.settings, job.integrator
+    denoiser = None if settings.denoise == "none" else _light_denoiser(job)
+    pooled = Pooled(
+        integrator.scene,
+        integrator.traits,
+        integrator.depth,
+        job.source,
+        seed=settings.seed,
+        box_filter=job.box_filter,
+        memory=job.memory,
+        denoiser=denoiser,
+    )
+    started = time.perf_counter()
+    pooled.add(settings.samples, job.progress)
+    gathered = time.perf_counter()
+    frame = Frame(pooled.picture(), pooled.rays)
+    frame.seconds_trace = gathered - started
+    frame.seconds_reuse = time.perf_counter() - gathered
+    options = {} if denoiser is None else {"denoise": settings.denoise}
+    notes = (*pooled.notes, "no estimate of the error: that of pooled light is not proven")
+    return Traced(frame, settings.samples, notes=notes, options=options)
+
+
+def _light_denoiser(job: Job) -> Callable[[Floats, Floats, Floats], Floats]:
+    """Takes the noise out of pictures of light, guided by what pooled rendering has seen of the surfaces."""
+
+    def clean(color: Floats, albedo: Floats, normal: Floats) -> Floats:
+        cleaned = denoise_views(color, job.source.display, Guides(albedo, normal), threads=job.threads)
+        return np.maximum(cleaned, np.float32(0))
+
+    return clean
 
 
 def _cleaned(job: Job, traced: Traced) -> Traced:

@@ -42,7 +42,7 @@ class DisplayRays:
         self.width = display.panel.width
         self.height = display.panel.height
         self.channels = 3 if subpixels else 1
-        self._matrix = np.asarray(world_from_display, dtype=np.float64)
+        self.world_from_display = np.asarray(world_from_display, dtype=np.float64)
 
     def rays(self, column: Any, row: Any, channel: Any, jitter: Any) -> Any:
         u = mi.Float64(column) + mi.Float64(jitter.x)
@@ -53,7 +53,7 @@ class DisplayRays:
         else:
             x, y = self.display.panel_point(u, v, DEVICE)
         origin, direction = self.display.light_ray(x, y, DEVICE)
-        return _world_ray(self._matrix, origin, direction)
+        return _world_ray(self.world_from_display, origin, direction)
 
 
 class CameraRays:

@@ -7,7 +7,7 @@ from typing import Literal, get_args
 
 from lippmann.errors import UsageError
 
-Method = Literal["full", "lens-view", "interpolated"]
+Method = Literal["full", "lens-view", "interpolated", "pooled"]
 Order = Literal["default", "paper"]
 IntegratorName = Literal["classic", "path", "direct", "normal", "depth", "position", "albedo"]
 PixelFilter = Literal["box", "point"]
@@ -18,6 +18,8 @@ Denoiser = Literal["none", "oidn"]
 REUSING: tuple[Method, ...] = ("lens-view", "interpolated")
 #: Integrators that gather light; the others name a property of a surface.
 LIGHT: tuple[IntegratorName, ...] = ("classic", "path", "direct")
+#: Those whose light can be pooled.
+POOLED_LIGHT: tuple[IntegratorName, ...] = ("path", "direct")
 
 #: Samples per pixel where nothing is said.
 DEFAULT_SPP = 16
@@ -33,7 +35,8 @@ class RenderSettings:
     ----------
     method:
         The renderer: ``full`` traces every ray; ``lens-view`` carries points from micro-image to micro-image and traces
-        the pixels that none reached; ``interpolated`` averages those of every other micro-image from its neighbours.
+        the pixels that none reached; ``interpolated`` averages those of every other micro-image from its neighbours;
+        ``pooled`` gathers light in the scene and lets every micro-image take it from there.
     order:
         For the last two: ``paper`` goes lens by lens as the paper does; ``default`` (None is the same) in the order
         that traces fewer pixels.
@@ -112,6 +115,13 @@ class RenderSettings:
                 where="--denoise",
                 rule=f"it is for {', '.join(LIGHT)}",
                 fix="leave it out",
+            )
+        if self.method == "pooled" and self.integrator not in POOLED_LIGHT:
+            raise UsageError(
+                f"the light of {self.integrator} cannot be pooled",
+                where="--integrator",
+                rule=f"--method pooled works with {' and '.join(POOLED_LIGHT)}",
+                fix="use --method full",
             )
         self._check_reuse()
 

@@ -1,0 +1,48 @@
+"""Which of two pictures is nearer to the truth, told by a noisy third."""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+def noisy(truth, sigma, seed):
+    return (truth + np.random.default_rng(seed).normal(0, sigma, truth.shape)).astype(np.float32)
+
+
+def flat(value=0.4, size=(96, 96)):
+    return np.full((*size, 3), value, np.float32)
+
+
+def test_finds_the_better_picture_region_by_region():
+    from lippmann.render.pooled.blending import blended
+
+    truth, left = flat(), np.arange(96)[None, :, None] < 48
+    x = np.where(left, truth, truth + 0.1).astype(np.float32)
+    y = np.where(left, truth + 0.1, truth).astype(np.float32)
+    best, _ = blended(x, y, noisy(truth, 0.1, 1), 8)
+    assert np.abs(best - truth)[:, :24].mean() < 0.03
+    assert np.abs(best - truth)[:, 72:].mean() < 0.03
+
+
+def test_opposite_errors_cancel():
+    from lippmann.render.pooled.blending import blended
+
+    truth = flat()
+    best, _ = blended(truth - 0.03, truth + 0.06, noisy(truth, 0.05, 2), 8)
+    assert abs(float((best - truth).mean())) < 0.003
+
+
+def test_leverage_makes_up_for_what_the_judge_has_chosen():
+    from lippmann.render.pooled.blending import blended
+
+    truth = flat()
+    measured, true = [], []
+    for seed in range(40):
+        x, y = noisy(truth, 0.02, 3 * seed), noisy(truth, 0.02, 3 * seed + 1)
+        noise = noisy(np.zeros_like(truth), 0.2, 1000 + seed)
+        best, leverage = blended(x, y, truth + noise, 8)
+        against_noise = -2 * (best - truth) * noise
+        measured.append(float((against_noise + 2 * leverage * 0.2**2).mean()))
+        true.append(float((against_noise).mean()))
+    assert np.mean(true) < 0
+    assert abs(np.mean(measured)) < 0.5 * abs(np.mean(true))
