@@ -256,7 +256,7 @@ class TestPrimitives:
         facing = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         facing /= np.linalg.norm(facing, axis=1, keepdims=True)
         assert np.einsum("tk,tck->tc", facing, normals[faces]).min() > 0.99
-        assert vertices[:, 1].min() == pytest.approx(0, abs=1e-12)
+        assert vertices[:, 1].min() == pytest.approx(0.005, abs=1e-12)
 
 
 class TestTextures:

@@ -36,7 +36,7 @@ STREAMS = 2
 #: Batches where the memory allows: their number limits how well rare bright light is told from steady noise.
 MOST_BATCHES = 8
 #: Seeds of the streams: the user's, each changed by another odd multiple of the golden ratio's 32 bits.
-_SEED_STEP = 0x9E3779B9
+SEED_STEP = 0x9E3779B9
 
 
 @dataclass(frozen=True)
@@ -217,7 +217,7 @@ class FullInBatches:
         row, column = divide(pixel, width)
         sample += dr.gather(mi.UInt32, mi.UInt32(list(run.starts)), place)
         stream_of = dr.gather(mi.UInt32, mi.UInt32([batch // per_stream for batch in run.batches]), place)
-        seed = dr.opaque(mi.UInt32, self._seed) + stream_of * _SEED_STEP
+        seed = dr.opaque(mi.UInt32, self._seed) + stream_of * SEED_STEP
 
         stream = SampleStream.of_pixels(pixel * channels + channel, sample, seed)
         jitter = stream.next_2d(PIXEL_DIMENSION) if self._box_filter else mi.Point2f(0.5)

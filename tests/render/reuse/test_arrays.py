@@ -45,7 +45,7 @@ def make(display, tracer, the_rules, method="lens_view", threads=1, searching=Fa
     from lippmann.render.reuse.arrays import ArrayRenderer
     from lippmann.render.reuse.bands import Bands
     from lippmann.render.reuse.points import PointImage
-    from lippmann.render.reuse.search import search
+    from lippmann.render.reuse.search import choose_looks, search
 
     points = PointImage.empty(display.panel.height, display.panel.width)
     with Bands(threads) as bands:
@@ -53,7 +53,8 @@ def make(display, tracer, the_rules, method="lens_view", threads=1, searching=Fa
         getattr(renderer, method)()
         if searching:
             lens = renderer.lens_numbers()
-            search(points, lens, renderer.reach, tracer, bands, the_rules, renderer.follow, lambda _: None)
+            looks = choose_looks(display, renderer.reach)
+            search(points, lens, renderer.reach, looks, tracer, bands, the_rules, renderer.follow, lambda _: None)
     return points
 
 
@@ -192,6 +193,89 @@ def test_threads_change_nothing(name, flat_tracer, sheet):
     ]
     for one, other in zip(*pictures, strict=True):
         assert np.array_equal(one, other)
+
+
+def test_a_point_behind_what_probes_have_met_is_not_taken(flat_tracer, sheet):
+    """A wall seen by all lenses, but the probes of one lens have met something nearer there."""
+    from lippmann.render.reuse.gathering import Gathering, gather, probed_limit
+    from lippmann.render.reuse.lens_field import LensField
+    from lippmann.render.reuse.points import MISSED, REPROJECTED, TRACED
+    from lippmann.render.reuse.walking import mark_nearest
+
+    display = DISPLAYS["square"]
+    field = LensField.of(display)
+    points = flat_tracer(display, [sheet(-30.0, soft)]).full()
+    wall, near = -GAP / 30, GAP / 3
+    lens, count = 5 * field.columns + 5, len(field.center)
+    here = field.lens == lens
+    points.status[~here], points.status[here] = REPROJECTED, MISSED
+    target = np.zeros(count, dtype=np.bool_)
+    target[lens] = True
+    source = np.full((count, 2), -1)
+    source[lens] = lens - 1, lens + 1
+    gathering = Gathering(target, source, 8, 3, 3)
+    probes = here & ((np.arange(96) - 3 * np.arange(96)[:, None]) % 8 == 0)
+    assert probes.sum() == 8
+    nearest = np.zeros(here.shape, np.float32)
+    mark_nearest(0, 96, points, field, ~target, nearest)
+    missed = {}
+    for name, seen in (("wall", [wall]), ("mixed", [wall, near]), ("near", [near])):
+        points.status[here], points.status[probes] = MISSED, TRACED
+        points.disparity[probes] = np.resize(seen, 8)
+        unsettled = np.zeros((96, field.first.shape[1] - 1), dtype=np.bool_)
+        gather(0, 96, points, field, gathering, rules(), nearest, unsettled)
+        missed[name] = np.count_nonzero(points.status[here] == MISSED)
+        middle = probed_limit(points, field, 43, 43, gathering)
+        assert middle == pytest.approx(wall if name == "wall" else near)
+    assert missed["wall"] < 20
+    assert missed["near"] == 56
+    assert missed["wall"] + 10 < missed["mixed"] <= 56
+
+
+@pytest.mark.parametrize(("apart", "careful", "taken"), [(0.02, True, True), (0.3, True, False), (0.3, False, True)])
+def test_care_does_not_gather_what_the_sources_dispute(apart, careful, taken, flat_tracer, sheet):
+    from lippmann.render.reuse.gathering import Gathering, gather
+    from lippmann.render.reuse.lens_field import LensField
+    from lippmann.render.reuse.points import MISSED, REPROJECTED
+    from lippmann.render.reuse.walking import mark_nearest
+
+    field = LensField.of(DISPLAYS["square"])
+    points = flat_tracer(DISPLAYS["square"], [], sky=(0.2, 0.2, 0.2)).full()
+    lens, count = 5 * field.columns + 5, len(field.center)
+    here = field.lens == lens
+    points.status[here] = MISSED
+    points.color[field.lens == lens + 1] += apart
+    target = np.arange(count) == lens
+    source = np.where(target[:, None], (lens - 1, lens + 1), -1)
+    nearest = np.zeros(here.shape, np.float32)
+    mark_nearest(0, 96, points, field, ~target, nearest)
+    unsettled = np.zeros((96, field.first.shape[1] - 1), dtype=np.bool_)
+    gather(0, 96, points, field, Gathering(target, source, 8, 3, 3), rules(careful), nearest, unsettled)
+    both = here & np.isin(np.arange(96) % 8, np.arange(1, 7))  # the outermost are shown by one source only
+    assert np.all(points.status[both] == (REPROJECTED if taken else MISSED))
+    if taken:
+        assert points.color[both] == pytest.approx(0.2 + apart / 2)
+
+
+@pytest.mark.parametrize(("shown", "missing"), [(-0.05, True), (-0.2, False), (0.1, False), (0.3, False)])
+def test_a_traced_point_is_missing_beside_unless_something_hides_it(shown, missing, flat_tracer, sheet):
+    from lippmann.render.reuse.following import follow_points
+    from lippmann.render.reuse.lens_field import LensField
+    from lippmann.render.reuse.points import REPROJECTED, TRACED
+
+    field = LensField.of(DISPLAYS["square"])
+    points = flat_tracer(DISPLAYS["square"], [sheet(-30.0, soft)]).full()
+    points.status[:], points.disparity[:], points.color[:] = REPROJECTED, shown, 0.3
+    points.status[44, 44], points.disparity[44, 44] = TRACED, -0.2
+    wanted = np.zeros(points.status.shape, dtype=np.bool_)
+    numbers = np.array([44 * 96 + 44], np.uint32)
+    lens = int(field.lens[44, 44])
+    neighbors = np.full((len(field.center), 2), -1)
+    neighbors[lens] = lens + 1, lens + field.columns
+    follow_points(points, field, neighbors, numbers, rules(), wanted)
+    # One lens on, 8 pixels away, the point lies 8 * 0.2 pixels back, between four pixels.
+    expected = {(r, c) for i in (44, 45) for k in (50, 51) for r, c in ((i, k), (k, i))} if missing else set()
+    assert {(int(r), int(c)) for r, c in np.argwhere(wanted)} == expected
 
 
 # ---- Interpolated ----------------------------------------------------------------------------------------------------

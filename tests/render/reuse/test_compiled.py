@@ -65,7 +65,10 @@ def test_the_stamp_covers_all_modules_of_the_package(tmp_path, monkeypatch):
     assert stamps[2] == stamps[3]
 
 
-@pytest.mark.parametrize("module", ["bridging", "drawing", "growth", "plain", "tracing"])
+@pytest.mark.parametrize(
+    "module",
+    ["bridging", "carrying", "drawing", "following", "gathering", "growth", "places", "plain", "tracing", "walking"],
+)
 def test_no_kernel_is_left_out(module):
     import importlib
 

@@ -127,6 +127,30 @@ def test_the_nearest_wins():
     assert farther[4:7].any()
 
 
+def test_the_nearest_wins_of_one_source_whichever_is_drawn_first():
+    rows = the_rows()
+    # Under the next lens a near thing comes to lie before the wall beside it: on its left, or on its right.
+    for source, near, seen in ((1, slice(12, 16), slice(16, 20)), (3, slice(24, 28), slice(20, 24))):
+        points = plane(rows, -0.05, 0.0, constant(0.2))
+        points.disparity[:, near], points.color[:, near] = -0.5, 0.9
+        forget(points, rows, [2])
+        draw(points, rows, [2], [[source, -1] if source < 2 else [-1, source]], the_rules(careful=False))
+        assert points.color[0, seen, 0] == pytest.approx(0.9)
+        assert points.disparity[0, seen] == pytest.approx(-0.5)
+
+
+@pytest.mark.parametrize("careful", [False, True])
+@pytest.mark.parametrize("plain", [False, True])
+def test_the_nearer_source_has_the_larger_share(careful, plain):
+    rows = the_rows()
+    for sources, expected in (([1, 4], 0.3), ([0, 3], 0.4)):
+        points = plane(rows, -1e-4, 0.0, constant(0.2))
+        points.color[:, 24:] = 0.5
+        forget(points, rows, [2])
+        draw(points, rows, [2], [sources], the_rules(careful=careful), plain)
+        assert points.color[0, 17:23] == pytest.approx(expected, abs=1e-3)
+
+
 def test_a_point_in_front_of_the_lens_plane_hides_one_behind():
     rows = the_rows()
     points = plane(rows, -0.1, 0.0, constant(0.2))
@@ -157,10 +181,11 @@ def test_nothing_farther_than_what_probes_met_is_taken():
     from lippmann.render.reuse.points import MISSED, REPROJECTED, TRACED
 
     rows = the_rows()
-    for met, expected in ((-0.1, REPROJECTED), (0.5, MISSED)):
+    # Between probes that have met different surfaces, the nearer one counts.
+    for above, below, expected in ((-0.1, -0.1, REPROJECTED), (0.5, 0.5, MISSED), (-0.1, 0.5, MISSED)):
         points = plane(rows, -0.1, 0.0, constant(0.2), height=5)
         forget(points, rows, [2])
-        for row, places in ((0, (0, 4)), (4, (2, 6))):
+        for row, places, met in ((0, (0, 4), above), (4, (2, 6), below)):
             columns = [16 + place for place in places]
             points.status[row, columns], points.disparity[row, columns] = TRACED, met
         unsettled = draw(points, rows, [2], [[1, 3]], the_rules(careful=False, probe_rows=4))
@@ -190,7 +215,24 @@ def test_care_leaves_fragile_points_and_edges_to_tracing(careful):
     assert not missed[5:7].any()
 
 
-def test_care_leaves_to_tracing_what_the_sources_dispute():
+@pytest.mark.parametrize("plain", [False, True])
+@pytest.mark.parametrize("column", [12, 28])
+def test_one_fragile_pixel_of_one_source_is_enough(column, plain):
+    from lippmann.render.reuse.points import MISSED
+
+    rows = the_rows()
+    points = plane(rows, -1e-4, 0.0, constant(0.2))
+    points.fragile[:, column] = True
+    forget(points, rows, [2])
+    draw(points, rows, [2], [[1, 3]], the_rules(), plain)
+    missed = points.status[0, 16:24] == MISSED
+    assert missed[4]
+    assert not missed[1:3].any()
+    assert not missed[6]
+
+
+@pytest.mark.parametrize("plain", [False, True])
+def test_care_leaves_to_tracing_what_the_sources_dispute(plain):
     from lippmann.render.reuse.points import MISSED, REPROJECTED
 
     rows = the_rows()
@@ -198,7 +240,26 @@ def test_care_leaves_to_tracing_what_the_sources_dispute():
         points = plane(rows, -1e-4, 0.0, constant(0.2))
         points.color[:, 24:32] += apart
         forget(points, rows, [2])
-        draw(points, rows, [2], [[1, 3]], the_rules(tolerance=0.06))
+        draw(points, rows, [2], [[1, 3]], the_rules(tolerance=0.06), plain)
         assert np.all(points.status[:, 17:23] == expected)
         if expected == REPROJECTED:
             assert points.color[0, 17:23] == pytest.approx(0.2 + apart / 2, abs=1e-4)
+
+
+@pytest.mark.parametrize("careful", [False, True])
+@pytest.mark.parametrize("sources", [1, 2])
+def test_where_an_outline_may_reach_farther_points_are_not_taken(careful, sources):
+    """Between its last pixel and the next one, which sees the wall, the nearer thing may go on."""
+    from lippmann.render.reuse.points import MISSED
+
+    rows = the_rows()
+    points = plane(rows, -1e-4, 0.0, constant(0.2))
+    # Near to the left of either source's place 4; it comes to the left by 0.4 pixels, or to the right.
+    for lens in (1, 3)[:sources]:
+        points.disparity[:, 8 * lens : 8 * lens + 4] = -0.05
+    forget(points, rows, [2])
+    draw(points, rows, [2], [[1, 3]], the_rules(careful=careful), plain=False)
+    missed = points.status[0, 16:24] == MISSED
+    # The outline of the left source ends between the places 2.6 and 3.6, that of the right one between 3.4 and 4.4.
+    assert missed[3] == (careful and sources == 1)
+    assert not missed[[1, 2, 6]].any()

@@ -119,6 +119,21 @@ def test_without_care_each_side_takes_its_part(middles, rounds):
     assert np.all(np.abs(wrong - 5.5) <= 2)
 
 
+@pytest.mark.parametrize(("missed", "overhang", "extrapolated"), [(1, 0, False), (1, 1, True), (2, 1, False)])
+@pytest.mark.parametrize("at_end", [False, True])
+def test_no_more_than_the_overhang_is_extrapolated(missed, overhang, extrapolated, at_end):
+    from lippmann.render.reuse import bridging
+    from lippmann.render.reuse.points import MISSED, REPROJECTED, TRACED, WANTED
+
+    points = shown(np.full(8, 0.2), np.full(8, GAP))
+    columns = np.arange(8)[-missed:] if at_end else np.arange(missed)
+    points.status[0] = TRACED
+    points.status[0, columns] = MISSED
+    arguments = np.array([[0, 8]]), np.ones((1, 1), np.bool_), np.zeros(1, np.int64)
+    bridging.bridge(0, 1, points, *arguments, the_rules(overhang=overhang), bridging.TRACE_ALL)
+    assert np.all(points.status[0, columns] == (REPROJECTED if extrapolated else WANTED))
+
+
 def test_runs_do_not_lend_to_each_other():
     truth = shown([0.2] * 6 + [0.21] * 6, np.full(12, GAP))
     points, _ = fill(truth, the_rules(careful=False, longest_gap=5, overhang=1), [0, 6, 12])
@@ -141,6 +156,8 @@ def mean_of(left, right, rules, fragile=False):
     points.status[0] = [0, MISSED, 0]
     points.fragile[0, 2] = fragile
     bridging.average(0, 1, points, np.array([1], np.uint32), np.array([left]), np.array([right]), rules)
+    # Where it shows something, that is as far away as what the neighbours show.
+    assert points.disparity[0, 1] == pytest.approx(0.0 if points.status[0, 1] == MISSED else GAP)
     return points.color[0, 1, 0], points.status[0, 1]
 
 
@@ -162,6 +179,13 @@ def test_the_mean_of_corresponding_pixels(left, right, careful, expected):
     assert status == (MISSED if expected is None else INTERPOLATED)
     if expected is not None:
         assert color == pytest.approx(expected)
+
+
+def test_with_care_neighbors_of_a_mean_agree_to_half_the_tolerance():
+    from lippmann.render.reuse.points import INTERPOLATED, MISSED
+
+    for tolerance, expected in ((0.19, MISSED), (0.21, INTERPOLATED)):  # they are 0.1 apart
+        assert mean_of(0, 2, the_rules(tolerance=tolerance))[1] == expected
 
 
 def test_care_takes_no_mean_of_mirrors():

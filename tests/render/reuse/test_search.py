@@ -22,19 +22,20 @@ class KnownTracer:
         self.traced += len(numbers)
 
 
-def found(truth, taken, look_share=0, follow=lambda *_: None):
+def found(truth, taken, at_edges=(), follow=lambda *_: None):
     from lippmann.render.reuse.bands import Bands
     from lippmann.render.reuse.points import REPROJECTED, PointImage
     from lippmann.render.reuse.rules import Rules
-    from lippmann.render.reuse.search import search
+    from lippmann.render.reuse.search import Look, Looks, search
 
     points = PointImage.empty(HEIGHT, LENSES * WIDE)
     points.color[:], points.disparity[:], points.status[:] = taken, -0.1, REPROJECTED
-    rules = Rules(True, 0.06, False, probe_rows=4, longest_gap=3, overhang=0, look_share=look_share)
+    rules = Rules(True, 0.06, False, probe_rows=4, longest_gap=3, overhang=0)
     lens = np.broadcast_to(np.repeat(np.arange(LENSES, dtype=np.int32), WIDE), points.status.shape)
     tracer, counts = KnownTracer(truth), []
     with Bands(1) as bands:
-        search(points, lens, WIDE, tracer, bands, rules, follow, counts.append)
+        looks = Looks(tuple(Look(*look) for look in at_edges), (Look(6, 8),))
+        search(points, lens, WIDE, looks, tracer, bands, rules, follow, counts.append)
     assert sum(counts) == tracer.traced
     return points
 
@@ -71,14 +72,27 @@ def test_a_thing_is_found_whole_from_one_wrong_edge():
     assert np.count_nonzero(points.status == 0) < 0.3 * points.status.size
 
 
-@pytest.mark.parametrize("look_share", [0, 4])
-def test_what_begins_under_the_next_lens_is_looked_for(look_share):
+@pytest.mark.parametrize("at_edges", [(), ((6, 4),)])
+def test_what_begins_under_the_next_lens_is_looked_for(at_edges):
     truth = picture()
     truth[10:16, 2 * WIDE + 4 : 3 * WIDE] = 0.9
     taken = truth.copy()
     truth[11:14, 3 * WIDE : 3 * WIDE + 6] = 0.9  # goes on under the next lens, where no source saw it
-    points = found(truth, taken, look_share)
-    assert np.array_equal(points.color, truth) == (look_share > 0)
+    points = found(truth, taken, at_edges)
+    assert np.array_equal(points.color, truth) == (len(at_edges) > 0)
+
+
+def test_surprises_are_followed_and_looked_around():
+    truth, taken = picture(), picture()
+    truth[10:14, WIDE + 1 : WIDE + 7] = 0.9
+    truth[18:20, WIDE + 1 : 2 * WIDE] = 0.9  # apart from the first, and within the six rows of the wider look
+    taken[11, WIDE + 3] = 0.9
+    followed = []
+    points = found(truth, taken, follow=lambda surprised, lens, wanted: followed.extend(surprised.tolist()))
+    assert np.array_equal(points.color, truth)
+    row, column = np.divmod(np.array(followed), LENSES * WIDE)
+    assert set(row) == {10, 11, 12, 13, 18, 19}
+    assert np.all(truth[row, column] != taken[row, column])
 
 
 def test_an_outline_before_the_background_is_an_edge():
@@ -117,3 +131,32 @@ def test_surprising_points_are_followed_to_the_neighbouring_lenses():
     points.disparity[0, 0:8], points.disparity[0, 16:24] = 0.1, 0.1
     follow_across(points, rows, np.array([12], np.uint32), lens, wanted)
     assert not wanted.any()
+
+
+def test_arrays_are_looked_through_more_closely_than_few_and_many_cylinders():
+    from lippmann.display import load_display
+    from lippmann.render.reuse.search import Look, choose_looks
+
+    few = load_display("seed-lenticular")
+    assert choose_looks(few, 8).at_edges == (Look(6, 3),)
+    # Many lenses: rays are dearer than rounds.
+    assert choose_looks(few.resized(3840, 2160), 8).at_edges == ()
+    for name in ("mla-square", "mla-hexagonal"):
+        looks = choose_looks(load_display(name), 15)
+        assert looks.at_edges == (Look(1, 1),)
+        assert looks.at_surprises == (Look(4, 1), Look(15, 3))
+
+
+@pytest.mark.parametrize("share", [2, 3, 4, 8])
+def test_a_look_comes_to_every_row_and_column(share):
+    from lippmann.render.reuse.growth import look_around
+    from lippmann.render.reuse.points import REPROJECTED, PointImage
+
+    points = PointImage.empty(HEIGHT, LENSES * WIDE)
+    points.status[:] = REPROJECTED
+    wanted = np.zeros(points.status.shape, dtype=np.bool_)
+    look_around(points, WIDE, 8, share, np.array([16 * LENSES * WIDE + 3 * WIDE]), wanted)
+    row, column = np.nonzero(wanted)
+    assert set(row) == set(range(8, 25))
+    assert set(column) == set(range(2 * WIDE, 5 * WIDE))
+    assert wanted.sum() == pytest.approx(17 * 3 * WIDE / share, abs=17)

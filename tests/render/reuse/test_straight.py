@@ -32,14 +32,14 @@ def rules(careful=True, **others):
     from lippmann.render.reuse.rules import Rules
 
     if careful:
-        return Rules(True, 0.06, False, probe_rows=4, longest_gap=3, overhang=0, look_share=4)._replace(**others)
+        return Rules(True, 0.06, False, probe_rows=4, longest_gap=3, overhang=0)._replace(**others)
     return Rules(False, 0.12, False, probe_rows=8, longest_gap=5, overhang=1, middles=False)._replace(**others)
 
 
 def make(display, tracer, the_rules, method="lens_view", threads=1):
     from lippmann.render.reuse.bands import Bands
     from lippmann.render.reuse.points import PointImage
-    from lippmann.render.reuse.search import search
+    from lippmann.render.reuse.search import Look, Looks, search
     from lippmann.render.reuse.straight import StraightRenderer
 
     points = PointImage.empty(display.panel.height, display.panel.width)
@@ -49,7 +49,8 @@ def make(display, tracer, the_rules, method="lens_view", threads=1):
         getattr(renderer, method)()
         if the_rules.careful:
             lens = renderer.lens_numbers()
-            search(points, lens, renderer.reach, tracer, bands, the_rules, renderer.follow, counts.append)
+            looks = Looks((Look(6, 4),), (Look(6, 8),))
+            search(points, lens, renderer.reach, looks, tracer, bands, the_rules, renderer.follow, counts.append)
     assert sum(counts) == len(tracer.traced) == len(np.unique(tracer.traced))
     return points
 

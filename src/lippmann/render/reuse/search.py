@@ -78,7 +78,7 @@ def search(
     wanted = np.zeros(points.status.shape, dtype=np.bool_)
     bands.rows(growth.mark_edges, points, lens, rules.tolerance, rules.coded, wanted)
     # Where one thing ends under a lens, another may begin that only the next lens shows.
-    edges = np.flatnonzero(wanted)
+    edges = np.flatnonzero(wanted).astype(np.uint32)
     for look in looks.at_edges:
         growth.look_around(points, reach, *look, edges, wanted)
     colors = points.color.reshape(-1, 3)

@@ -10,6 +10,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from lippmann.render.batches import SEED_STEP, STREAMS
 from lippmann.render.full import PIXEL_DIMENSION, RayTotals, compile_seconds, divide
 from lippmann.render.integrators.base import ReusableIntegrator
 from lippmann.render.rays import DisplayRays
@@ -93,7 +94,8 @@ class PixelTracer:
 
     def _sample(self, pixel: Any, sample: Any, seed: Any) -> tuple[Any, ...]:
         row, column = divide(pixel, self._source.width)
-        stream = SampleStream.of_pixels(pixel, sample, seed)
+        number, of_stream = divide(sample, STREAMS)
+        stream = SampleStream.of_pixels(pixel, number, seed + of_stream * SEED_STEP)
         jitter = stream.next_2d(PIXEL_DIMENSION) if self._box_filter else mi.Point2f(0.5)
         ray = self._source.rays(column, row, mi.UInt32(0), jitter)
         radiance, counts, first = self._integrator.sample_with_hit(ray, stream, mi.Bool(True))
