@@ -30,6 +30,8 @@ ORDER = (
     "render",
     "replay",
     "refocus",
+    "quilt",
+    "weave",
     "quality",
     "report",
     "viewer",
@@ -58,7 +60,21 @@ USES_ENGINE = (
 LOADS_ENGINE = ("render", "scene.build")
 
 #: What a user imports; none of it may load the engine, which has to choose its library first.
-ENTRANCES = ("", "api", "cli", "engine", "display", "image", "scene", "render", "replay", "refocus", "quality")
+ENTRANCES = (
+    "",
+    "api",
+    "cli",
+    "engine",
+    "display",
+    "image",
+    "scene",
+    "render",
+    "replay",
+    "refocus",
+    "quilt",
+    "weave",
+    "quality",
+)
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import shlex
 import shutil
@@ -52,6 +53,14 @@ def workplace(tmp_path, monkeypatch):
     (tmp_path / "room.cam").write_text("0 0 1 0 1 0 0 0 -5\n")
     presets = ROOT / "src" / "lippmann" / "display" / "presets"
     shutil.copy(presets / "mla-square.toml", tmp_path / "my-display.toml")
+    numbers = {"pitch": 52.58, "slope": -7.145, "center": 0.42, "viewCone": 40, "invView": 1, "DPI": 324}
+    numbers |= {"screenW": 150, "screenH": 200}
+    calibration = {"serial": "LKG-P00001"} | {key: {"value": value} for key, value in numbers.items()}
+    (tmp_path / "visual.json").write_text(json.dumps(calibration))
+    (tmp_path / "views").mkdir()
+    for number in range(48):
+        view = np.full((64, 48, 3), number / 48, dtype=np.float32)
+        write_plain_picture(view, tmp_path / "views" / f"view_{number:02}.png")
     monkeypatch.chdir(tmp_path)
     return tmp_path
 

@@ -246,11 +246,15 @@ def _panel_colors(image: IntegralImage, x: Real, y: Real, filter_: Filter, subpi
     """``(..., 3)`` colours of panel points (mm); zero off the panel."""
     colors = np.empty((*x.shape, 3), dtype=np.float32)
     take = _nearest if filter_ == "nearest" else _linear
+    panel = image.display.panel
     if not subpixels:
         colors[...] = take(image, x, y, slice(0, 3), (0.0, 0.0))
         return colors
-    for channel, offset in enumerate(image.display.panel.subpixel_offsets):
+    for channel, offset in enumerate(panel.subpixel_offsets):
         part = slice(channel, channel + 1)
+        if panel.subpixel_cells is not None:
+            colors[..., part] = _of_cells(image, x, y, channel, filter_)
+            continue
         colors[..., part] = take(image, x, y, part, offset)
     return colors
 
@@ -288,6 +292,47 @@ def _linear(image: IntegralImage, x: Real, y: Real, channels: slice, offset: tup
     # Next to the edge of a micro-image all pixels about a point may belong to neighbours.
     usable = weights > _ON_BOUNDARY
     return np.where(usable[..., None], total / np.where(usable, weights, 1.0)[..., None], alone).astype(np.float32)
+
+
+def _of_cells(image: IntegralImage, x: Real, y: Real, channel: int, filter_: Filter) -> FloatArray:
+    """Values of one colour's sub-pixels at the points, ``(..., 1)``, where pixels are of several kinds.
+
+    The grid of such sub-pixels is uneven: ``nearest`` takes the one whose centre is nearest, ``linear`` weighs those
+    less than a pixel away, right and down, by their distances.
+    """
+    display = image.display
+    lens = display.lens_of(x, y, NUMPY)
+    u, v = display.pixel_coordinates(x, y, NUMPY)
+    middle_column, middle_row = pixel_at(u), pixel_at(v)
+    nearest, best = np.zeros(x.shape, dtype=np.float32), np.full(x.shape, np.inf)
+    total, weights = np.zeros(x.shape), np.zeros(x.shape)
+    cells = display.panel.subpixel_cells or ()
+    largest = max(abs(value) for row in cells for cell in row for pair in cell for value in pair)
+    # The sub-pixels within a pixel of a point belong to its pixel or the next; to the next but one, if they lie outside
+    # their own.
+    reach = 1 if largest <= 0.5 else 2
+    for dv in range(-reach, reach + 1):
+        for du in range(-reach, reach + 1):
+            column, row = middle_column + du, middle_row + dv
+            center = column + 0.5, row + 0.5
+            right, down = display.panel.subpixel_offset(*center, channel, NUMPY)
+            right, down = np.abs(center[0] + right - u), np.abs(center[1] + down - v)
+            inside = is_on_panel(display, column, row)
+            values = np.where(
+                inside, image.pixels[np.where(inside, row, 0), np.where(inside, column, 0), channel], np.float32(0)
+            )
+            distance = right * right + down * down
+            is_nearer = distance < best
+            nearest, best = np.where(is_nearer, values, nearest), np.where(is_nearer, distance, best)
+            if filter_ == "linear":
+                owner = display.lens_of(*display.subpixel_point(*center, channel, NUMPY), NUMPY)
+                usable = inside & (owner[0] == lens[0]) & (owner[1] == lens[1])
+                weight = np.where(usable, np.clip(1 - right, 0, 1) * np.clip(1 - down, 0, 1), 0.0)
+                total += weight * values
+                weights += weight
+    usable = weights > _ON_BOUNDARY
+    seen = np.where(usable, total / np.where(usable, weights, 1.0), nearest)
+    return seen.astype(np.float32)[..., None]
 
 
 def _lens_points(display: Display, eye: Eye) -> tuple[Real, Real, Real, Real]:

@@ -45,8 +45,10 @@ def write(tmp_path):
 
 def test_presets():
     names = [display.name for display in list_displays()]
+    devices = [name for name in names if name.startswith("looking-glass-")]
     expected = ["mla-hexagonal", "mla-square", "panel-4k", "panel-8k", "print-60lpi", "seed-lenticular"]
-    assert names == expected
+    assert names == sorted(expected + devices)
+    assert len(devices) == 14
     assert [load_display(name) for name in names] == list_displays()
     assert all(display.title for display in list_displays())
 
@@ -69,6 +71,15 @@ def test_presets_are_what_they_say():
         "mla-square",
         "seed-lenticular",
     }
+
+
+@pytest.mark.parametrize("name", [d.name for d in list_displays() if d.name.startswith("looking-glass-")])
+def test_presets_of_devices_are_nominal_and_say_so(name):
+    display = load_display(name)
+    assert "nominal calibration" in display.title
+    assert 6.2 < display.pixels_per_lens[0] < 6.4
+    assert display.field_of_view == pytest.approx(35, abs=0.1)
+    assert math.degrees(2 * math.atan(display.size_mm[1] / 2 / display.viewing_distance)) == pytest.approx(14, abs=0.1)
 
 
 # ---- Own files -------------------------------------------------------------------------------------------------------
@@ -184,5 +195,5 @@ def test_unreadable_places(tmp_path):
 def test_unknown_names_get_near_ones():
     with pytest.raises(DisplayError, match=r"unknown display 'panel4k'.*seed-lenticular.*did you mean 'panel-4k'"):
         load_display("panel4k")
-    with pytest.raises(DisplayError, match=r"or a \.toml file$"):
+    with pytest.raises(DisplayError, match=r"or a \.toml file, or a Looking Glass's visual\.json$"):
         load_display("zzz")

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from lippmann._version import VERSION
-from lippmann.cli import pictures, quality, rendering, system
+from lippmann.cli import panels, pictures, quality, rendering, system
 
 app = typer.Typer(
     help="Render 3D scenes into the native pixels of integral-imaging displays.",
@@ -26,6 +26,8 @@ app.command("micro-images")(pictures.micro_images)
 app.command("compose")(pictures.compose)
 app.command("replay")(pictures.replay)
 app.command("refocus")(pictures.refocus)
+app.add_typer(panels.quilt, name="quilt")
+app.command("weave")(panels.weave)
 app.command("compare")(quality.compare)
 app.command("reproduce")(quality.reproduce)
 

@@ -24,6 +24,8 @@ STAGE_NAMES = {
     "guides": "looking for guides",
     "denoise": "denoising",
     "layers": "adding layers",
+    "read": "reading",
+    "weave": "weaving",
     "write": "writing",
 }
 

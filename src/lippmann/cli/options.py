@@ -13,7 +13,8 @@ Output = Annotated[Path, typer.Option("--output", "-o", help="The file to write;
 Folder = Annotated[Path, typer.Option("--output", "-o", help="The folder to write; it appears whole or not at all.")]
 Picture = Annotated[Path, typer.Argument(help="A picture that Lippmann wrote (PNG, EXR or TIFF).")]
 DisplayName = Annotated[
-    str, typer.Option("--display", "-d", help="A display's name (see 'lippmann displays') or a TOML file.")
+    str,
+    typer.Option("--display", "-d", help="A name (see 'lippmann displays'), a TOML file or a device's visual.json."),
 ]
 PictureDisplay = Annotated[
     str | None, typer.Option("--display", "-d", help="The display of a picture that does not carry its own.")

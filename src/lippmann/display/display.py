@@ -348,6 +348,7 @@ class Display:
                 "height": panel.height,
                 "pixel_pitch": panel.pixel_pitch,
                 "subpixel_offsets": [list(offset) for offset in panel.subpixel_offsets],
+                **self._written_cells,
             },
             "lens_array": {
                 "layout": lenses.layout,
@@ -374,6 +375,14 @@ class Display:
     @property
     def _written_viewing_distance(self) -> float | str:
         return INFINITE if math.isinf(self.viewing_distance) else self.viewing_distance
+
+    @property
+    def _written_cells(self) -> dict[str, Any]:
+        """Empty where pixels are all alike, so that earlier versions read the display too."""
+        cells = self.panel.subpixel_cells
+        if cells is None:
+            return {}
+        return {"subpixel_cells": [[[list(pair) for pair in cell] for cell in row] for row in cells]}
 
     @property
     def _convergence(self) -> float:

@@ -19,6 +19,8 @@ A file holds the keys of :class:`Display`, with the tables ``[panel]`` and ``[le
     slant = 9.46                        # degrees
 
 A file without a ``name`` has its own, less the ending.
+
+A JSON file is the calibration of a Looking Glass, see :mod:`lippmann.display.looking_glass`.
 """
 
 from __future__ import annotations
@@ -33,6 +35,7 @@ from typing import Any
 
 from lippmann.display.checks import positive, suggestion
 from lippmann.display.display import INFINITE, Display, check_tables
+from lippmann.display.looking_glass import display_of_calibration, is_calibration
 from lippmann.errors import DisplayError
 
 if sys.version_info >= (3, 11):
@@ -54,7 +57,7 @@ _LENGTHS: dict[str, dict[str, tuple[tuple[str, ...], bool]]] = {
 
 
 def load_display(name_or_path: str | os.PathLike[str]) -> Display:
-    """The preset of that name, or the display of a TOML file.
+    """The preset of that name, or the display of a TOML file or of a Looking Glass's ``visual.json``.
 
     Raises
     ------
@@ -66,10 +69,13 @@ def load_display(name_or_path: str | os.PathLike[str]) -> Display:
     if name in presets:
         return _from_toml(presets[name], where=f"{name}.toml", stem=name)
     path = Path(name)
-    if path.suffix != ".toml" and not path.exists():
-        rule = f"the displays are {', '.join(presets)}, or a .toml file"
+    if path.suffix not in (".toml", ".json") and not path.exists():
+        rule = f"the displays are {', '.join(presets)}, or a .toml file, or a Looking Glass's visual.json"
         raise DisplayError(f"unknown display {name!r}", rule=rule, fix=suggestion(name, presets))
-    return _from_toml(_read(path), where=name, stem=path.stem)
+    text = _read(path)
+    if is_calibration(text):
+        return display_of_calibration(text, where=name)
+    return _from_toml(text, where=name, stem=path.stem)
 
 
 def list_displays() -> list[Display]:
@@ -84,7 +90,7 @@ def _preset_texts() -> dict[str, str]:
 
 
 def _read(path: Path) -> str:
-    rule = "a display is a preset's name or a TOML file"
+    rule = "a display is a preset's name, a TOML file or a Looking Glass's visual.json"
     try:
         with path.open("rb") as file:
             content = file.read(_MAXIMUM_BYTES + 1)

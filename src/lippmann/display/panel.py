@@ -14,6 +14,12 @@ SubpixelOffsets = tuple[Offset, Offset, Offset]
 #: A plain RGB stripe: three sub-pixels side by side, each a third of a pixel wide.
 RGB_STRIPE: SubpixelOffsets = ((-1 / 3, 0.0), (0.0, 0.0), (1 / 3, 0.0))
 
+#: Pixels of several kinds: rows of a pattern that repeats over the panel, from its top left pixel.
+SubpixelCells = tuple[tuple[SubpixelOffsets, ...], ...]
+
+#: Rows and columns of such a pattern; panels have up to 4, and every kind costs time at every sub-pixel.
+MAXIMUM_CELLS = 8
+
 
 @dataclass(frozen=True)
 class Panel:
@@ -28,6 +34,10 @@ class Panel:
     subpixel_offsets:
         Place of the centres of R, G and B within the pixel, ``(right, down)`` from the pixel's centre in pixels,
         each within one pixel.
+    subpixel_cells:
+        For panels whose pixels are of several kinds: rows of such offsets, up to 8 x 8, a pattern that repeats over
+        the panel from its top left pixel. ``subpixel_offsets`` is then their mean, whatever was given. None where all
+        pixels are alike.
 
     Raises
     ------
@@ -39,12 +49,17 @@ class Panel:
     height: int
     pixel_pitch: float
     subpixel_offsets: SubpixelOffsets = RGB_STRIPE
+    subpixel_cells: SubpixelCells | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "width", whole_count(self.width, "panel.width"))
         object.__setattr__(self, "height", whole_count(self.height, "panel.height"))
         object.__setattr__(self, "pixel_pitch", positive(self.pixel_pitch, "panel.pixel_pitch"))
         object.__setattr__(self, "subpixel_offsets", _checked_offsets(self.subpixel_offsets))
+        if self.subpixel_cells is not None:
+            cells = _checked_cells(self.subpixel_cells)
+            object.__setattr__(self, "subpixel_cells", cells)
+            object.__setattr__(self, "subpixel_offsets", _mean_offsets(cells))
 
     @property
     def size_mm(self) -> tuple[float, float]:
@@ -65,30 +80,78 @@ class Panel:
 
     def subpixel_point(self, u: Array, v: Array, c: Array, ops: ArrayOps) -> tuple[Array, Array]:
         """:meth:`point` displaced by the offset of the sub-pixel ``c``: 0 (R), 1 (G), 2 (B); an int or an array."""
-        red, green, blue = self.subpixel_offsets
-        if isinstance(c, int):
-            right, down = self.subpixel_offsets[c]
-            return self.point(u + right, v + down, ops)
-        # Sums inside `where`, since a choice between two plain numbers has no precision of its own.
-        is_red, is_green = c < 0.5, c < 1.5
-        u = ops.where(is_red, u + red[0], ops.where(is_green, u + green[0], u + blue[0]))
-        v = ops.where(is_red, v + red[1], ops.where(is_green, v + green[1], v + blue[1]))
-        return self.point(u, v, ops)
+        right, down = self.subpixel_offset(u, v, c, ops)
+        return self.point(u + right, v + down, ops)
+
+    def subpixel_offset(self, u: Array, v: Array, c: Array, ops: ArrayOps) -> tuple[Array, Array]:
+        """Place ``(right, down)`` of the sub-pixel ``c`` from the centre of its pixel, in pixels.
+
+        The pixel is the one that holds the continuous pixel coordinates ``(u, v)``; they matter only where pixels are
+        of several kinds.
+        """
+        if self.subpixel_cells is None:
+            return _offset_of(self.subpixel_offsets, u * 0.0, c, ops)
+        rows, columns = len(self.subpixel_cells), len(self.subpixel_cells[0])
+        row, column = _remainder(ops.floor(v), rows, ops), _remainder(ops.floor(u), columns, ops)
+        zero = (u + v) * 0.0
+        right, down = zero, zero
+        for j, cells in enumerate(self.subpixel_cells):
+            for i, offsets in enumerate(cells):
+                here = _offset_of(offsets, zero, c, ops)
+                is_here = ops.abs(row - j) + ops.abs(column - i) < 0.5
+                right, down = ops.where(is_here, here[0], right), ops.where(is_here, here[1], down)
+        return right, down
 
 
-def _checked_offsets(offsets: object) -> SubpixelOffsets:
-    key = "panel.subpixel_offsets"
+def _remainder(value: Array, count: int, ops: ArrayOps) -> Array:
+    return value - count * ops.floor(value / count)
+
+
+def _offset_of(offsets: SubpixelOffsets, zero: Array, c: Array, ops: ArrayOps) -> tuple[Array, Array]:
+    """The offset of sub-pixel ``c``, an int or an array; ``zero`` is an array, so that the result is one."""
+    red, green, blue = offsets
+    if isinstance(c, int):
+        return zero + offsets[c][0], zero + offsets[c][1]
+    # Sums inside `where`, since a choice between two plain numbers has no precision of its own.
+    is_red, is_green = c < 0.5, c < 1.5
+    right = ops.where(is_red, zero + red[0], ops.where(is_green, zero + green[0], zero + blue[0]))
+    down = ops.where(is_red, zero + red[1], ops.where(is_green, zero + green[1], zero + blue[1]))
+    return right, down
+
+
+def _checked_cells(cells: object) -> SubpixelCells:
+    key = "panel.subpixel_cells"
+    most = MAXIMUM_CELLS
+    rule = f"it must be 1 to {most} rows of 1 to {most} cells each, all rows alike; a cell is three pairs (right, down)"
+    try:
+        rows = [list(row) for row in cells]  # type: ignore[attr-defined]
+    except TypeError:
+        rows = []
+    if not 1 <= len(rows) <= most or not 1 <= len(rows[0]) <= most or any(len(row) != len(rows[0]) for row in rows):
+        raise DisplayError(f"subpixel_cells is {cells!r}", where=key, rule=rule)
+    return tuple(tuple(_checked_offsets(cell, key) for cell in row) for row in rows)
+
+
+def _mean_offsets(cells: SubpixelCells) -> SubpixelOffsets:
+    every = [offsets for row in cells for offsets in row]
+    red, green, blue = (
+        (sum(o[c][0] for o in every) / len(every), sum(o[c][1] for o in every) / len(every)) for c in range(3)
+    )
+    return red, green, blue
+
+
+def _checked_offsets(offsets: object, key: str = "panel.subpixel_offsets") -> SubpixelOffsets:
     rule = "it must be three pairs (right, down) for R, G and B, in pixels, each number between -1 and 1"
     try:
         pairs = [tuple(pair) for pair in offsets]  # type: ignore[attr-defined]
     except TypeError:
         pairs = []
     if len(pairs) != 3 or any(len(pair) != 2 for pair in pairs):
-        raise DisplayError(f"subpixel_offsets is {offsets!r}", where=key, rule=rule)
+        raise DisplayError(f"{key.rpartition('.')[2]} holds {offsets!r}", where=key, rule=rule)
     checked = []
     for pair in pairs:
         right, down = (finite(value, key, rule=rule) for value in pair)
         if abs(right) > 1 or abs(down) > 1:
-            raise DisplayError(f"subpixel_offsets holds {pair!r}", where=key, rule=rule)
+            raise DisplayError(f"{key.rpartition('.')[2]} holds {pair!r}", where=key, rule=rule)
         checked.append((right, down))
     return checked[0], checked[1], checked[2]

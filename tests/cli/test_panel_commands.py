@@ -1,0 +1,113 @@
+"""``lippmann quilt`` and ``lippmann weave``, and what they say of bad input."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from lippmann.image import read_picture
+
+NAME = "x_qs8x6a0.75.png"
+
+
+@pytest.fixture
+def views(tmp_path):
+    """48 views of 48x64 pixels, each of its own grey."""
+    folder = tmp_path / "views"
+    folder.mkdir()
+    for number in range(48):
+        Image.new("RGB", (48, 64), (number * 5,) * 3).save(folder / f"view_{number:02}.png")
+    return folder
+
+
+@pytest.fixture
+def calibration(tmp_path):
+    """A small panel as a calibration file."""
+    numbers = {
+        "pitch": 52.58,
+        "slope": -7.145,
+        "center": 0.42,
+        "viewCone": 40,
+        "invView": 1,
+        "DPI": 324,
+        "screenW": 150,
+        "screenH": 200,
+    }
+    path = tmp_path / "visual.json"
+    path.write_text(json.dumps({key: {"value": value} for key, value in numbers.items()} | {"serial": "LKG-P1"}))
+    return path
+
+
+def test_pack_and_unpack(lippmann, views, tmp_path):
+    packed = lippmann("quilt", "pack", views, "-o", tmp_path / NAME, "--json")
+    assert packed.json == {"output": str(tmp_path / NAME), "size": [384, 384], "views": 48}
+    unpacked = lippmann("quilt", "unpack", tmp_path / NAME, "-o", tmp_path / "again", "--json")
+    assert unpacked.json == {"output": str(tmp_path / "again"), "size": [48, 64], "views": 48}
+    for path in sorted(views.iterdir()):
+        np.testing.assert_array_equal(Image.open(tmp_path / "again" / path.name), Image.open(path))
+
+
+def test_sizes(lippmann):
+    assert "looking-glass-portrait           3360x3360  48 views  _qs8x6a0.75\n" in lippmann("quilt", "sizes").out
+    assert len(lippmann("quilt", "sizes", "--json").json["quilts"]) == 15
+
+
+@pytest.mark.parametrize("choice", ["nearest", "linear"])
+def test_a_quilt_and_its_views_weave_alike(lippmann, views, calibration, tmp_path, choice):
+    assert lippmann("quilt", "pack", views, "-o", tmp_path / NAME).code == 0
+    pictures = []
+    for number, source in enumerate((tmp_path / NAME, views)):
+        path = tmp_path / f"native{number}.png"
+        outcome = lippmann("weave", source, "--display", calibration, "--views", choice, "-o", path, "--json")
+        assert outcome.json["size"] == [150, 200]
+        assert outcome.json["views"] == 48
+        pictures.append(read_picture(path))
+    np.testing.assert_array_equal(pictures[0].pixels, pictures[1].pixels)
+    assert pictures[0].display.name == "LKG-P1"
+    assert pictures[0].provenance.subpixels
+    if choice == "nearest":
+        assert set(np.unique(np.asarray(Image.open(tmp_path / "native0.png")))) <= set(range(0, 240, 5))
+
+
+def test_the_woven_picture_is_replayed(lippmann, views, calibration, tmp_path):
+    path, seen = tmp_path / "native.png", tmp_path / "seen.png"
+    assert lippmann("weave", views, "-d", calibration, "-o", path).code == 0
+    levels = []
+    for x in (-18, 0, 18):
+        eye = f"{x},0,{read_picture(path).display.viewing_distance}"
+        assert lippmann("replay", path, f"--eye={eye}", "-o", seen).code == 0
+        levels.append(np.asarray(Image.open(seen))[20:-20, 20:-20].mean())
+    # Views brighten to the right; the cone is 46 mm wide.
+    assert levels[0] < 40
+    assert 105 < levels[1] < 130
+    assert levels[2] > 200
+
+
+def test_bad_input_is_one_line_and_code_2(lippmann, views, calibration, tmp_path):
+    def refused(*words):
+        outcome = lippmann(*words)
+        assert outcome.code == 2
+        assert outcome.out == ""
+        assert outcome.err.startswith("lippmann: ")
+        assert outcome.err.count("\n") == 1
+        return outcome.err
+
+    native = tmp_path / "native.png"
+    assert "does not say how many views" in refused("quilt", "pack", views, "-o", native)
+    assert "it holds 48 views; 5x9 are 45" in refused("quilt", "pack", views, "-o", tmp_path / "x_qs5x9a1.6.png")
+    assert "No such file" in refused("quilt", "pack", tmp_path / "no", "-o", tmp_path / NAME)
+    assert "is not there" in refused("quilt", "unpack", tmp_path / NAME, "-o", tmp_path / "out")
+    assert "--display" in refused("weave", views, "-o", native)
+    assert "unknown display" in refused("weave", views, "-d", "lkg", "-o", native)
+    assert "square lenses" in refused("weave", views, "-d", "mla-square", "-o", native, "--quiet")
+    assert "'cubic' is not known" in refused("weave", views, "-d", calibration, "-o", native, "--views=cubic", "-q")
+    assert "the ending '.jpg'" in refused("weave", views, "-d", calibration, "-o", tmp_path / "native.jpg")
+    broken = calibration.read_text().replace('{"value": 52.58}', "52.58")
+    calibration.write_text(broken)
+    assert "pitch is 52.58; it must be wrapped" in refused("weave", views, "-d", calibration, "-o", native)
+    (views / "view_03.png").unlink()
+    assert "view 3 is absent" in refused("weave", views, "-d", "looking-glass-portrait", "-o", native, "-q")
+    assert not native.exists()
