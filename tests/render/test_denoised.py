@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from lippmann.image.color import encode_srgb
-from lippmann.render.denoised import Denoised, coding_slope
+from lippmann.render.coding import coding_slope
+from lippmann.render.denoised import Denoised
 from lippmann.render.estimate import CROSS_NOISE
 
 SHAPE = (256, 256, 3)

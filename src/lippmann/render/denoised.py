@@ -14,16 +14,13 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.image.color import encode_srgb
 from lippmann.image.provenance import Transfer
 from lippmann.progress import ProgressCallback, silent
+from lippmann.render.coding import coding_slope
 from lippmann.render.estimate import CROSS_NOISE, PixelErrors
 
 Floats = NDArray[np.float32]
 Denoise = Callable[[Floats], Floats]
-
-#: Difference by which the slope of the coding curve is taken.
-_STEP = 1e-4
 
 
 class Halved(Protocol):
@@ -78,13 +75,3 @@ class Denoised:
             first, second = (self._denoise(half) for half in self._renderer.halves())
             self._cleaned = first, second
         return self._cleaned
-
-
-def coding_slope(linear: Floats, transfer: Transfer) -> Floats:
-    """By how much a code changes with its linear value; 0 where it is cut off at 0 or 1."""
-    if transfer == "linear":
-        return ((linear >= 0) & (linear <= 1)).astype(np.float32)
-    upper, lower = (encode_srgb(np.maximum(linear.astype(np.float64) + side, 0)) for side in (_STEP, -_STEP))
-    # Below the first step the curve is a straight line; a difference that is cut off there would halve its slope.
-    width = np.minimum(linear, _STEP) + _STEP
-    return np.asarray(np.maximum(upper - lower, 0) / np.maximum(width, _STEP), dtype=np.float32)

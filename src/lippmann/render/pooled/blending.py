@@ -6,10 +6,10 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
+
+from lippmann.render.coding import coding_slope
 
 Picture = NDArray[np.float32]
 
@@ -17,15 +17,6 @@ Picture = NDArray[np.float32]
 REACH = 2
 #: Blocks that the whole picture counts for in the weight of each.
 WHOLE = 1.0
-#: Values that count as equally bright for the slope of the coding curve.
-DARKEST = 1e-3
-
-
-def coding_slope(picture: NDArray[Any]) -> Picture:
-    """Slope of the sRGB coding curve at linear values (IEC 61966-2-1), 0 outside [0, 1]."""
-    x = np.clip(picture, DARKEST, 1)
-    slope = np.where(x <= 0.0031308, 12.92, (1.055 / 2.4) * x ** (1 / 2.4 - 1))
-    return np.where(picture > 1, 0, slope).astype(np.float32)
 
 
 def blended(x: Picture, y: Picture, judge: Picture, block: int) -> tuple[Picture, Picture]:

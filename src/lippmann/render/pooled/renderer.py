@@ -13,10 +13,11 @@ from numpy.typing import NDArray
 
 from lippmann.errors import UsageError
 from lippmann.progress import Progress, ProgressCallback, silent
+from lippmann.render.coding import coding_slope
 from lippmann.render.full import PIXEL_DIMENSION, RayTotals, divide, lane_total
 from lippmann.render.integrators.path import PathIntegrator
 from lippmann.render.pooled import surfaces
-from lippmann.render.pooled.blending import blended, coding_slope
+from lippmann.render.pooled.blending import blended
 from lippmann.render.pooled.following import Follower
 from lippmann.render.pooled.gathering import Gatherer
 from lippmann.render.pooled.keys import NOWHERE
