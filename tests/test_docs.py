@@ -57,10 +57,10 @@ def workplace(tmp_path, monkeypatch):
     numbers |= {"screenW": 150, "screenH": 200}
     calibration = {"serial": "LKG-P00001"} | {key: {"value": value} for key, value in numbers.items()}
     (tmp_path / "visual.json").write_text(json.dumps(calibration))
-    (tmp_path / "views").mkdir()
+    (tmp_path / "pinholes").mkdir()
     for number in range(48):
         view = np.full((64, 48, 3), number / 48, dtype=np.float32)
-        write_plain_picture(view, tmp_path / "views" / f"view_{number:02}.png")
+        write_plain_picture(view, tmp_path / "pinholes" / f"view_{number:02}.png")
     monkeypatch.chdir(tmp_path)
     return tmp_path
 
