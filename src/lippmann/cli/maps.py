@@ -62,8 +62,9 @@ def _origins(image: IntegralImage) -> dict[str, Any]:
 def _errors(image: IntegralImage) -> dict[str, Any]:
     from lippmann.image.color import quantize
     from lippmann.quality.error_picture import BRIGHTEST, in_false_color
+    from lippmann.render.estimate import ERROR_LAYER
 
-    if "error" not in image.maps:
+    if ERROR_LAYER not in image.maps:
         return {}
-    shown = in_false_color(np.sqrt(image.maps["error"]) / BRIGHTEST)
+    shown = in_false_color(np.sqrt(image.maps[ERROR_LAYER]) / BRIGHTEST)
     return {"error": quantize(shown, 8, "linear").astype(np.uint8)}

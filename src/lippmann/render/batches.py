@@ -23,7 +23,7 @@ from lippmann.image.provenance import Transfer
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.render.batch_error import error_of_batches
 from lippmann.render.estimate import OWN_NOISE, PixelErrors
-from lippmann.render.full import PIXEL_DIMENSION, Frame, RayTotals, compile_seconds, divide, lane_total
+from lippmann.render.full import PIXEL_DIMENSION, Frame, RayTotals, compile_seconds, divide, evaluated
 from lippmann.render.integrators.base import Integrator
 from lippmann.render.plan import BYTES_PER_LANE, BYTES_PER_PIXEL, PREFERRED_LANES, SMALLEST_LANES
 from lippmann.render.rays import RaySource
@@ -223,14 +223,7 @@ class FullInBatches:
         jitter = stream.next_2d(PIXEL_DIMENSION) if self._box_filter else mi.Point2f(0.5)
         ray = self._source.rays(column, row, channel, jitter)
         radiance, counts = self._integrator.sample(ray, stream, mi.Bool(True))
-        finite = dr.isfinite(radiance.x) & dr.isfinite(radiance.y) & dr.isfinite(radiance.z)
-        radiance = dr.select(finite, radiance, mi.Color3f(0))
-        # All at once: a sum of an unevaluated radiance would run the path loop anew.
-        dr.eval(radiance, counts.secondary, counts.shadow, finite)
-        self.rays.primary += lanes
-        self.rays.secondary += lane_total(counts.secondary)
-        self.rays.shadow += lane_total(counts.shadow)
-        self.rays.discarded += lanes - int(dr.count(finite)[0])
+        radiance = evaluated(radiance, counts, lanes, self.rays)
         return _sums(radiance, channels, number, run.count)
 
 

@@ -31,6 +31,9 @@ from lippmann.render.settings import RenderSettings
 Real = NDArray[np.float64]
 Floats = NDArray[np.float32]
 
+#: The layer of a picture with the estimated squared error of each pixel's code.
+ERROR_LAYER = "error"
+
 
 @dataclass(frozen=True)
 class NoiseShares:

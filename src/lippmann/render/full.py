@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.progress import Progress, ProgressCallback, silent
-from lippmann.render.integrators.base import Integrator
+from lippmann.render.integrators.base import Integrator, RayCounts
 from lippmann.render.plan import Pass, Plan, Tile
 from lippmann.render.rays import RaySource
 from lippmann.render.sampling import SampleStream
@@ -99,28 +99,41 @@ class _Tracer:
     def trace(self, tile: Tile, run: Pass, totals: RayTotals) -> NDArray[np.float32]:
         """Sums over the samples of one pass, ``(pixels of the tile, 3)``; ``totals`` grows by the rays it took."""
         plan = self._plan
-        lanes = tile.rows * plan.width * plan.channels * run.count
-        per_channel, sample = divide(dr.arange(mi.UInt32, lanes), dr.opaque(mi.UInt32, run.count))
-        pixel, channel = divide(per_channel, plan.channels)
-        row, column = divide(pixel, plan.width)
-        row += dr.opaque(mi.UInt32, tile.first_row)
-        sample += dr.opaque(mi.UInt32, run.first)
-        # The stream of a sub-pixel is its own; a picture has fewer than 2^32 sub-pixels.
-        number = (row * plan.width + column) * plan.channels + channel
-        stream = SampleStream.of_pixels(number, sample, dr.opaque(mi.UInt32, self._seed))
-        jitter = stream.next_2d(PIXEL_DIMENSION) if self._box_filter else mi.Point2f(0.5)
-        ray = self._source.rays(column, row, channel, jitter)
+        ray, stream = rays_of_tile(self._source, plan, tile, run, self._seed, self._box_filter)
         radiance, counts = self._integrator.sample(ray, stream, mi.Bool(True))
-
-        finite = dr.isfinite(radiance.x) & dr.isfinite(radiance.y) & dr.isfinite(radiance.z)
-        radiance = dr.select(finite, radiance, mi.Color3f(0))
-        # All at once: a sum of an unevaluated radiance would run the path loop anew.
-        dr.eval(radiance, counts.secondary, counts.shadow, finite)
-        totals.primary += lanes
-        totals.secondary += lane_total(counts.secondary)
-        totals.shadow += lane_total(counts.shadow)
-        totals.discarded += lanes - int(dr.count(finite)[0])
+        lanes = tile.rows * plan.width * plan.channels * run.count
+        radiance = evaluated(radiance, counts, lanes, totals)
         return _channel_sums(radiance, plan.channels, run.count)
+
+
+def rays_of_tile(
+    source: RaySource, plan: Plan, tile: Tile, run: Pass, seed: int, box_filter: bool
+) -> tuple[Any, SampleStream]:
+    """The rays and sample streams of one wavefront, lanes ordered pixel, then channel, then sample."""
+    lanes = tile.rows * plan.width * plan.channels * run.count
+    per_channel, sample = divide(dr.arange(mi.UInt32, lanes), dr.opaque(mi.UInt32, run.count))
+    pixel, channel = divide(per_channel, plan.channels)
+    row, column = divide(pixel, plan.width)
+    row += dr.opaque(mi.UInt32, tile.first_row)
+    sample += dr.opaque(mi.UInt32, run.first)
+    # The stream of a sub-pixel is its own; a picture has fewer than 2^32 sub-pixels.
+    number = (row * plan.width + column) * plan.channels + channel
+    stream = SampleStream.of_pixels(number, sample, dr.opaque(mi.UInt32, seed))
+    jitter = stream.next_2d(PIXEL_DIMENSION) if box_filter else mi.Point2f(0.5)
+    return source.rays(column, row, channel, jitter), stream
+
+
+def evaluated(radiance: Any, counts: RayCounts, lanes: int, totals: RayTotals) -> Any:
+    """The radiance of a wavefront, evaluated, black where it is not finite; ``totals`` grows by the rays it took."""
+    finite = dr.isfinite(radiance.x) & dr.isfinite(radiance.y) & dr.isfinite(radiance.z)
+    radiance = dr.select(finite, radiance, mi.Color3f(0))
+    # All at once: a sum of an unevaluated radiance would run the path loop anew.
+    dr.eval(radiance, counts.secondary, counts.shadow, finite)
+    totals.primary += lanes
+    totals.secondary += lane_total(counts.secondary)
+    totals.shadow += lane_total(counts.shadow)
+    totals.discarded += lanes - int(dr.count(finite)[0])
+    return radiance
 
 
 def divide(number: Any, by: Any) -> tuple[Any, Any]:

@@ -146,12 +146,16 @@ class Round:
 
 @dataclass(frozen=True)
 class Outcome:
-    """How the rendering ended: ``quality`` reached, ``time`` up, or ``samples`` spent; with the last estimate."""
+    """How the rendering ended: ``quality`` reached, ``time`` up, or ``samples`` spent.
+
+    ``estimate`` is the last one, ``errors`` are those of the pixels that it stands on.
+    """
 
     end: End
     estimate: Estimate
     samples: int
     rounds: tuple[Round, ...]
+    errors: PixelErrors
 
 
 def reach(
@@ -185,14 +189,15 @@ class _Climb:
         while True:
             self.renderer.add(samples, self._report(samples))
             self.spent += samples
-            estimate = self.estimator.estimate(self.renderer.squared_error())
+            errors = self.renderer.squared_error()
+            estimate = self.estimator.estimate(errors)
             self.rounds.append(Round(self.spent, self._seconds(), estimate))
             end = self._end(estimate)
             if end is None:
                 samples = self._next_round(estimate)
                 end = "time" if samples < 1 else None
             if end is not None:
-                return Outcome(end, estimate, self.spent, tuple(self.rounds))
+                return Outcome(end, estimate, self.spent, tuple(self.rounds), errors)
 
     def _seconds(self) -> float:
         return self.clock() - self._began

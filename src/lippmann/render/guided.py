@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,6 +59,7 @@ class GuidedDenoiser:
         self._threads = threads
         self._progress = progress
         self._guides: Guides | None = None
+        self._form: Literal["raw", "views"] | None = None
         self.seconds = 0.0
 
     def __call__(self, pixels: Floats) -> Floats:
@@ -85,6 +86,8 @@ class GuidedDenoiser:
             )
         return self._guides
 
-    def form(self) -> Any:
+    def form(self) -> Literal["raw", "views"]:
         """In which order the pixels are shown to the network, see :mod:`lippmann.render.denoise_views`."""
-        return best_form(self._source.display, self.guides())
+        if self._form is None:
+            self._form = best_form(self._source.display, self.guides())
+        return self._form

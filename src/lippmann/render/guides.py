@@ -11,11 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.progress import Progress, ProgressCallback, silent
-from lippmann.render.full import PIXEL_DIMENSION, divide
+from lippmann.render.full import rays_of_tile
 from lippmann.render.layers import to_numpy
 from lippmann.render.plan import Pass, Plan, Tile, make_plan
 from lippmann.render.rays import RaySource
-from lippmann.render.sampling import SampleStream
 from lippmann.render.surfaces import Surfaces, surfaces_of
 
 if TYPE_CHECKING:
@@ -94,15 +93,8 @@ def _trace_tile(
     """Sums over the samples of one pass, for every pixel and channel: colours and world-space normals."""
     lanes = tile.rows * plan.width * plan.channels * run.count
     # Lanes and streams are those of the picture, so that the guides show the places that its samples hit.
-    per_channel, sample = divide(dr.arange(mi.UInt32, lanes), dr.opaque(mi.UInt32, run.count))
-    pixel, channel = divide(per_channel, plan.channels)
-    row, column = divide(pixel, plan.width)
-    row += dr.opaque(mi.UInt32, tile.first_row)
-    sample += dr.opaque(mi.UInt32, run.first)
-    number = (row * plan.width + column) * plan.channels + channel
-    stream = SampleStream.of_pixels(number, sample, dr.opaque(mi.UInt32, seed))
-    jitter = stream.next_2d(PIXEL_DIMENSION) if box_filter else mi.Point2f(0.5)
-    albedo, normal = surfaces.guide(source.rays(column, row, channel, jitter), mi.Bool(True))
+    ray, _ = rays_of_tile(source, plan, tile, run, seed, box_filter)
+    albedo, normal = surfaces.guide(ray, mi.Bool(True))
     values = [mi.Float(part) + dr.zeros(mi.Float, lanes) for part in (*albedo, *normal)]
     # All at once: sums one by one would follow the rays six times.
     dr.eval(values)

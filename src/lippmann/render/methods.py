@@ -15,7 +15,7 @@ from lippmann.progress import ProgressCallback, silent
 from lippmann.render.batches import FullInBatches, trace_in_batches
 from lippmann.render.denoise_views import denoise_views
 from lippmann.render.denoised import Denoised
-from lippmann.render.estimate import Estimate, PictureEstimator, why_no_estimate
+from lippmann.render.estimate import ERROR_LAYER, Estimate, PictureEstimator, why_no_estimate
 from lippmann.render.full import Frame, trace_frame
 from lippmann.render.goal import Goal, Outcome, goal_of, reach
 from lippmann.render.guided import GuidedDenoiser
@@ -30,9 +30,6 @@ if TYPE_CHECKING:
     from lippmann.scene.build import BuiltScene
 
 Floats = NDArray[np.float32]
-
-#: The layer with the estimated squared error of each pixel's code.
-ERROR = "error"
 
 
 @dataclass(frozen=True)
@@ -126,7 +123,7 @@ def _full(job: Job) -> Traced:
         memory=job.memory,
         progress=job.progress,
     )
-    frame.maps[ERROR] = np.maximum(errors.values, 0)
+    frame.maps[ERROR_LAYER] = np.maximum(errors.values, 0)
     return Traced(frame, job.settings.samples, PictureEstimator(job.source.display).estimate(errors))
 
 
@@ -144,7 +141,7 @@ def _full_until(job: Job, goal: Goal) -> Traced:
     renderer = batches if denoiser is None else Denoised(batches, denoiser, job.transfer)
     outcome = reach(goal, renderer, PictureEstimator(job.source.display), job.progress)
     frame = Frame(renderer.picture(), batches.rays, batches.seconds_compile, batches.seconds_trace)
-    frame.maps[ERROR] = np.maximum(renderer.squared_error().values, 0)
+    frame.maps[ERROR_LAYER] = np.maximum(outcome.errors.values, 0)
     return Traced(
         frame, outcome.samples, outcome.estimate, _how_it_ended(goal, outcome), *_what_was_cleaned(job, denoiser)
     )

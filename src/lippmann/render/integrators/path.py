@@ -26,7 +26,7 @@ MAX_CROSSINGS = 64
 DIMENSIONS_PER_VERTEX = 4
 
 
-def _mis_weight(pdf_a: Any, pdf_b: Any) -> Any:
+def mis_weight(pdf_a: Any, pdf_b: Any) -> Any:
     """Power heuristic (Veach 1997, eq. 9.16 with exponent 2); 0 where both densities vanish."""
     a2, b2 = dr.square(pdf_a), dr.square(pdf_b)
     weight = a2 / (a2 + b2)
@@ -102,7 +102,7 @@ class PathIntegrator:
 
             # ---- emission ----
             ds = mi.DirectionSample3f(scene, si=si, ref=vertex)
-            weight = _mis_weight(vertex_pdf, scene.pdf_emitter_direction(vertex, ds, ~vertex_delta))
+            weight = mis_weight(vertex_pdf, scene.pdf_emitter_direction(vertex, ds, ~vertex_delta))
             emission = ds.emitter.eval(si) * weight
             if dr.hint(background is not None, mode="scalar"):
                 emission = dr.select((depth == 0) & ~si.is_valid(), mi.Spectrum(background), emission)
@@ -118,10 +118,10 @@ class PathIntegrator:
             value, pdf, bs, bsdf_weight = bsdf.eval_pdf_sample(
                 context, si, wo, stream.next_1d(dimension + 1), stream.next_2d(dimension + 2), going_on
             )
-            weight = dr.select(ds.delta, 1, _mis_weight(ds.pdf, pdf))
+            weight = dr.select(ds.delta, 1, mis_weight(ds.pdf, pdf))
             contribution = throughput * value * light * weight
             lit &= dr.max(contribution) > 0
-            visible, tests = self._visibility(si, ds, lit)
+            visible, tests = self.visibility(si, ds, lit)
             radiance += dr.select(lit, contribution * visible, 0)
             shadow += tests
 
@@ -156,7 +156,7 @@ class PathIntegrator:
         return radiance, RayCounts(secondary, shadow), FirstHit(distance_of_first, view_dependent)
 
     @dr.syntax
-    def _visibility(self, si: Any, ds: Any, active: Any) -> tuple[Any, Any]:
+    def visibility(self, si: Any, ds: Any, active: Any) -> tuple[Any, Any]:
         """Share of light that passes from the emitter sample to the surface, and the rays that finding out took."""
         scene = self.scene
         ray = si.spawn_ray_to(ds.p)

@@ -8,7 +8,7 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from lippmann.render.integrators.path import MAX_CROSSINGS, PathIntegrator, _mis_weight
+from lippmann.render.integrators.path import MAX_CROSSINGS, PathIntegrator, mis_weight
 from lippmann.render.pooled.surfaces import Kinds, Split
 from lippmann.render.sampling import SampleStream
 
@@ -82,7 +82,7 @@ class Follower:
             way.throughput = way.throughput * dr.exp(-way.absorption * dr.select(si.is_valid(), si.t, 0))
         ds = mi.DirectionSample3f(path.scene, si=si, ref=way.vertex)
         density = path.scene.pdf_emitter_direction(way.vertex, ds, ~way.vertex_delta)
-        emitted = ds.emitter.eval(si) * _mis_weight(way.vertex_pdf, density)
+        emitted = ds.emitter.eval(si) * mis_weight(way.vertex_pdf, density)
         if path.traits.background is not None:
             emitted = dr.select((way.depth == 0) & ~si.is_valid(), mi.Color3f(path.traits.background), emitted)
         return way.throughput * emitted
@@ -94,10 +94,10 @@ class Follower:
         ds, light = path.scene.sample_emitter_direction(si, stream.next_2d(way.dimension()), False, lit)
         value, pdf = bsdf.eval_pdf(mi.BSDFContext(), si, si.to_local(ds.d), lit)
         rest = value / split.opacity - split.diffuse * self.cosine(si, split, ds.d)
-        weight = dr.select(ds.delta, 1, _mis_weight(ds.pdf, pdf / split.opacity))
+        weight = dr.select(ds.delta, 1, mis_weight(ds.pdf, pdf / split.opacity))
         arriving = way.throughput * rest * light * weight
         lit &= (ds.pdf != 0) & (dr.max(dr.abs(arriving)) > 1e-4)
-        visible, tests = path._visibility(si, ds, lit)
+        visible, tests = path.visibility(si, ds, lit)
         way.shadow = way.shadow + tests
         return dr.select(lit, arriving * visible, 0)
 

@@ -12,7 +12,7 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from lippmann.render.integrators.path import DIMENSIONS_PER_VERTEX, MAX_CROSSINGS, PathIntegrator, _mis_weight
+from lippmann.render.integrators.path import DIMENSIONS_PER_VERTEX, MAX_CROSSINGS, PathIntegrator, mis_weight
 from lippmann.render.pooled.following import Follower
 from lippmann.render.pooled.surfaces import split
 from lippmann.render.sampling import SampleStream
@@ -112,9 +112,9 @@ class Gatherer:
         )
         cosine = self._follower.cosine(si, s, ds.d)
         rest = value / s.opacity - s.diffuse * cosine
-        weight = dr.select(ds.delta, 1, _mis_weight(ds.pdf, pdf / s.opacity))
+        weight = dr.select(ds.delta, 1, mis_weight(ds.pdf, pdf / s.opacity))
         lit &= (cosine > 0) | (dr.max(value) > 0)
-        visible, tests = path._visibility(si, ds, lit)
+        visible, tests = path.visibility(si, ds, lit)
         arriving = dr.select(lit, light * weight * visible, 0)
         shadow += tests
         diffuse = arriving * cosine
@@ -170,7 +170,7 @@ class Gatherer:
             if dr.hint(path.traits.has_absorption, mode="scalar"):
                 throughput *= dr.exp(-absorption * dr.select(si.is_valid(), si.t, 0))
             ds = mi.DirectionSample3f(scene, si=si, ref=vertex)
-            weight = _mis_weight(vertex_pdf, scene.pdf_emitter_direction(vertex, ds, ~vertex_delta))
+            weight = mis_weight(vertex_pdf, scene.pdf_emitter_direction(vertex, ds, ~vertex_delta))
             radiance += dr.select(active, throughput * ds.emitter.eval(si) * weight, 0)
 
             going_on = active & si.is_valid() & (depth < path.depth)
@@ -186,10 +186,10 @@ class Gatherer:
                 stream.next_2d(dimension + 2),
                 going_on,
             )
-            weight = dr.select(ds.delta, 1, _mis_weight(ds.pdf, pdf))
+            weight = dr.select(ds.delta, 1, mis_weight(ds.pdf, pdf))
             contribution = throughput * value * light * weight
             lit &= dr.max(contribution) > 0
-            visible, tests = path._visibility(si, ds, lit)
+            visible, tests = path.visibility(si, ds, lit)
             radiance += dr.select(lit, contribution * visible, 0)
             shadow += tests
 
