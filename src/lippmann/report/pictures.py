@@ -12,14 +12,11 @@ from lippmann.image.color import quantize
 from lippmann.image.png import encode_png
 from lippmann.quality import Comparison
 from lippmann.quality.error_picture import BRIGHTEST, in_false_color
-from lippmann.render.reuse.points import INTERPOLATED, REPROJECTED, TRACED
+from lippmann.render.reuse.points import INTERPOLATED, REPROJECTED, STATUS_LAYER, TRACED
 from lippmann.replay import default_size, replay
 
 Codes = NDArray[np.uint8]
 Flags = NDArray[np.bool_]
-
-#: The layer in which the renderers that reuse points keep the status of each pixel.
-STATUS_LAYER = "status"
 
 #: Codes of the map of missed pixels: reprojected ones are dark, missed ones light by how they were filled.
 REPROJECTED_CODE = (28, 32, 40)

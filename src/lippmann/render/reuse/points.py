@@ -13,6 +13,9 @@ MISSED, TRACED, REPROJECTED, INTERPOLATED = -1, 0, 1, 2
 #: A missed pixel that is about to be traced.
 WANTED = -2
 
+#: The layer of a picture that holds the status of its pixels.
+STATUS_LAYER = "status"
+
 #: Disparity of what a ray meets that meets nothing: infinitely far away, behind everything else. Not zero, because the
 #: sign says on which side of the lens plane a point lies; and just as single precision keeps it, to be known again.
 BACKGROUND = float(np.float32(-1e-30))

@@ -19,16 +19,13 @@ from lippmann.render.integrators.base import ReusableIntegrator
 from lippmann.render.rays import DisplayRays
 from lippmann.render.reuse.bands import Bands
 from lippmann.render.reuse.gaps import Settled
-from lippmann.render.reuse.points import BYTES_PER_PIXEL, INTERPOLATED, REPROJECTED, TRACED, PointImage
+from lippmann.render.reuse.points import BYTES_PER_PIXEL, INTERPOLATED, REPROJECTED, STATUS_LAYER, TRACED, PointImage
 from lippmann.render.reuse.rules import Rules, choose_rules
 from lippmann.render.reuse.search import choose_looks, search
 from lippmann.render.reuse.tracing import Pixels, PixelTracer
 
 ReuseMethod = Literal["lens-view", "interpolated"]
 ReuseOrder = Literal["default", "paper"]
-
-#: The layer of a frame that holds the status of its pixels, see :mod:`lippmann.render.reuse.points`.
-STATUS = "status"
 
 
 class Maker(Protocol):
@@ -138,7 +135,7 @@ def trace_reused(
         seconds_compile=seconds_compile,
         seconds_trace=tracer.seconds_trace,
         seconds_reuse=max(0.0, time.perf_counter() - started - tracer.seconds_trace - seconds_compile),
-        maps={STATUS: points.status},
+        maps={STATUS_LAYER: points.status},
         shares={
             "traced": points.share(TRACED),
             "reprojected": points.share(REPROJECTED),
