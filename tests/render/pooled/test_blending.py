@@ -32,17 +32,13 @@ def test_opposite_errors_cancel():
     assert abs(float((best - truth).mean())) < 0.003
 
 
-def test_leverage_makes_up_for_what_the_judge_has_chosen():
+def test_weight_tells_how_much_of_the_second_there_is():
     from lippmann.render.pooled.blending import blended
 
-    truth = flat()
-    measured, true = [], []
-    for seed in range(40):
-        x, y = noisy(truth, 0.02, 3 * seed), noisy(truth, 0.02, 3 * seed + 1)
-        noise = noisy(np.zeros_like(truth), 0.2, 1000 + seed)
-        best, leverage = blended(x, y, truth + noise, 8)
-        against_noise = -2 * (best - truth) * noise
-        measured.append(float((against_noise + 2 * leverage * 0.2**2).mean()))
-        true.append(float((against_noise).mean()))
-    assert np.mean(true) < 0
-    assert abs(np.mean(measured)) < 0.5 * abs(np.mean(true))
+    truth = flat(size=(90, 50))
+    for share in (0.0, 0.3, 1.0):
+        x, y = truth - share * 0.1, truth + (1 - share) * 0.1
+        best, weight = blended(x, y, noisy(truth, 0.02, 5), 16)
+        assert weight.shape == (90, 50)
+        np.testing.assert_allclose(weight, share, atol=0.03)
+        np.testing.assert_allclose(best, x + weight[..., None] * (y - x), atol=1e-6)

@@ -157,19 +157,46 @@ def test_two_sides_of_a_sheet_do_not_share_light(make_pooled):
 @pytest.mark.parametrize("fault", ["none", "shift", "albedo"])
 def test_error_estimate_tells_good_pictures_from_faulty_ones(make_pooled, monkeypatch, fault):
     pooled, full = make_pooled(studio(), seed=9)
-    pooled.add(16)
+    pooled.add(18)
     see = pooled.see
     if fault == "shift":  # everything shows one lens to the right
         monkeypatch.setattr(pooled, "see", lambda: tuple(np.roll(part, 8, axis=1) for part in see()))
     if fault == "albedo":
         monkeypatch.setattr(pooled, "see", lambda: (see()[0] * 2, see()[1] * 2, *see()[2:]))
     # Unpooled samples would make up for the fault: here they only judge.
-    monkeypatch.setattr("lippmann.render.pooled.renderer.blended", lambda x, y, judge, block: (x, np.zeros_like(x)))
+    weightless = np.zeros((32, 128), np.float32)
+    monkeypatch.setattr("lippmann.render.pooled.renderer.blended", lambda x, y, judge, block: (x, weightless))
     true = squared_error(pooled.picture(), full(512))
-    estimated = float(pooled.squared_error().mean())
+    estimated = float(pooled.squared_error().values.mean())
     # The slope of the coding curve stands for the curve: large errors in the dark come out too large.
     assert (true > 1e-2) == (fault != "none")
     assert (estimated > 5e-3) == (fault != "none")
+
+
+def test_error_estimate_is_right_in_the_mean(make_pooled):
+    # What was chosen must not be judged by what chose it: the estimate would be too good.
+    _, full = make_pooled(studio())
+    reference = full(512)
+    true, estimated = [], []
+    for seed in range(6):
+        pooled, _ = make_pooled(studio(), seed=20 + seed, looks=16)
+        pooled.add(12)
+        true.append(squared_error(pooled.picture(), reference))
+        estimated.append(float(pooled.squared_error().values.mean()))
+    spread = np.std(estimated) / np.sqrt(len(estimated))
+    assert abs(np.mean(estimated) - np.mean(true)) < 3 * spread + 0.1 * np.mean(true)
+
+
+def test_share_of_pooled_light_falls_as_samples_grow(make_pooled):
+    pooled, _ = make_pooled(studio(), seed=4)
+    pooled.add(1)
+    assert (pooled.pooled_share() == 1).all()
+    pooled.add(11)
+    few = pooled.pooled_share()
+    pooled.add(84)
+    many = pooled.pooled_share()
+    assert few.shape == (32, 128)
+    assert 0 <= many.min() <= many.mean() < few.mean() <= few.max() <= 1
 
 
 def test_error_needs_samples(make_pooled):
@@ -177,7 +204,7 @@ def test_error_needs_samples(make_pooled):
 
     pooled, _ = make_pooled(studio())
     pooled.add(2)
-    with pytest.raises(UsageError, match="at least 4"):
+    with pytest.raises(UsageError, match="at least 6"):
         pooled.squared_error()
 
 

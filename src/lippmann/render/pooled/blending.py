@@ -26,9 +26,7 @@ def blended(x: Picture, y: Picture, judge: Picture, block: int) -> tuple[Picture
 
     Returns
     -------
-    The picture, and its leverage: how much each value moves with the judge's own noise there, ``(H, W, 3)``. An error
-    that is measured against the same judge comes out too small by twice the leverage times that noise's variance
-    (Stein's lemma).
+    The picture, and the weight of ``y`` in it, ``(H, W)`` in [0, 1].
     """
     slope2 = coding_slope((x + y) / 2) ** 2
     difference = y - x
@@ -36,29 +34,27 @@ def blended(x: Picture, y: Picture, judge: Picture, block: int) -> tuple[Picture
     bound = 2 * np.maximum(x, y) + 0.5
     toward = (np.minimum(judge, bound) - x) * difference * slope2
     own = difference**2 * slope2
-    weight, lever = _weights(_block_sums(toward.sum(-1), block), _block_sums(own.sum(-1), block))
-    weight, lever = (np.repeat(np.repeat(part, block, 0), block, 1) for part in (weight, lever))
-    cut = (slice(x.shape[0]), slice(x.shape[1]), None)
-    return (x + weight[cut] * difference).astype(np.float32), (lever[cut] * own).astype(np.float32)
+    weight = _weights(_block_sums(toward.sum(-1), block), _block_sums(own.sum(-1), block))
+    weight = _spread_out(weight, block, x.shape)
+    return (x + weight[..., None] * difference).astype(np.float32), weight
 
 
-def _weights(toward: NDArray[np.float64], length: NDArray[np.float64]) -> tuple[Picture, Picture]:
-    """Weight of each block, and how it moves with the sums of the block itself."""
-    toward_all, length_all = toward.mean(), length.mean()
-    share = 1 / _neighbourhood_size(toward.shape) + WHOLE / toward.size
-    toward = _neighbourhood(toward) + WHOLE * toward_all
-    length = np.maximum(_neighbourhood(length) + WHOLE * length_all, 1e-20)
-    weight = toward / length
-    lever = np.where((weight > 0) & (weight < 1), share / length, 0)
-    return np.clip(weight, 0, 1).astype(np.float32), lever.astype(np.float32)
+def local_mean(picture: Picture, block: int) -> Picture:
+    """Means of ``(H, W, 3)`` over each block and those around it, colour by colour, spread out to the same shape."""
+    ones = _neighbourhood(_block_sums(np.ones(picture.shape[:2], np.float32), block))
+    means = [_neighbourhood(_block_sums(picture[..., c], block)) / ones for c in range(3)]
+    return np.stack([_spread_out(mean.astype(np.float32), block, picture.shape) for mean in means], axis=-1)
 
 
-def _neighbourhood_size(shape: tuple[int, ...]) -> NDArray[np.float64]:
-    counts = []
-    for length in shape:
-        at = np.arange(length)
-        counts.append(np.minimum(at + REACH + 1, length) - np.maximum(at - REACH, 0))
-    return np.asarray(np.multiply.outer(counts[0], counts[1]), np.float64)
+def _spread_out(blocks: Picture, block: int, shape: tuple[int, ...]) -> Picture:
+    return np.repeat(np.repeat(blocks, block, 0), block, 1)[: shape[0], : shape[1]]
+
+
+def _weights(toward: NDArray[np.float64], length: NDArray[np.float64]) -> Picture:
+    """Weight of each block, by what it and those around it say."""
+    toward = _neighbourhood(toward) + WHOLE * toward.mean()
+    length = np.maximum(_neighbourhood(length) + WHOLE * length.mean(), 1e-20)
+    return np.clip(toward / length, 0, 1).astype(np.float32)
 
 
 def _block_sums(values: Picture, block: int) -> NDArray[np.float64]:

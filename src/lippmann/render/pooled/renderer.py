@@ -1,4 +1,11 @@
-"""Pooled rendering: light is gathered once, in the scene, and every micro-image takes its own from there."""
+"""Pooled rendering: light is gathered once, in the scene, and every micro-image takes its own from there.
+
+Samples are kept in two halves that know nothing of each other, and the picture is the mean of what either half makes of
+its own. Each half has three groups of unpooled samples. The first of the other half chooses among a half's candidates;
+the second and third, b and c, judge what was chosen: the mean of (p - b)(p - c) is the squared error of p, for neither
+has anything to do with p or with the other. From the errors of the halves p and q follows that of their mean,
+|(p + q)/2 - t|^2 = (|p - t|^2 + |q - t|^2) / 2 - |p - q|^2 / 4.
+"""
 
 from __future__ import annotations
 
@@ -14,10 +21,11 @@ from numpy.typing import NDArray
 from lippmann.errors import UsageError
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.render.coding import coding_slope
+from lippmann.render.estimate import CROSS_NOISE, PixelErrors
 from lippmann.render.full import PIXEL_DIMENSION, RayTotals, divide, lane_total
 from lippmann.render.integrators.path import PathIntegrator
 from lippmann.render.pooled import surfaces
-from lippmann.render.pooled.blending import blended
+from lippmann.render.pooled.blending import blended, local_mean
 from lippmann.render.pooled.following import Follower
 from lippmann.render.pooled.gathering import Gatherer
 from lippmann.render.pooled.keys import NOWHERE
@@ -34,10 +42,11 @@ Picture = NDArray[np.float32]
 #: hold next to no noise.
 Denoiser = Callable[[Picture, Picture, Picture], Picture]
 
-#: Unpooled estimates that are kept apart; even ones belong to the first half, odd ones to the second.
-GROUPS = 4
+#: Unpooled estimates that are kept apart; even ones belong to the first half, odd ones to the second. One of each half
+#: chooses, two judge.
+GROUPS = 6
 #: Memory: pictures held, bytes of a lane at its widest moment, and of a cell in sums and tables.
-PICTURES, BYTES_PER_LANE, BYTES_PER_CELL = 16, 512, 320
+PICTURES, BYTES_PER_LANE, BYTES_PER_CELL = 18, 512, 320
 #: Cells of a pool, however little memory there is.
 LEAST_CELLS = 1 << 14
 #: Lanes of one wavefront.
@@ -48,18 +57,18 @@ MOST_BLOCK = 16
 LEAST_ALBEDO = 1e-2
 #: Finest cells along a lens pitch.
 FINEST_PER_PITCH = 32
-#: Samples that look at a pixel, by the paths spent on it: at least, and per path.
-LEAST_LOOKS, LOOKS_PER_PATH = 8, 4
+#: Samples that look at a pixel: at least, fewer where a denoiser smooths edges; and for every path spent on it.
+LEAST_LOOKS, LEAST_SMOOTHED_LOOKS, LOOKS_PER_PATH = 8, 4, 4
 #: Looks of one wavefront, per pixel.
 MOST_LOOKS = 16
 
 
 @dataclass(frozen=True)
-class _Judged:
-    """A picture, and its leverage: see :func:`~lippmann.render.pooled.blending.blended`."""
+class _Chosen:
+    """A half's picture, and the share of pooled light in it, ``(H, W)``."""
 
     picture: Picture
-    leverage: Picture
+    share: Picture
 
 
 class Pooled:
@@ -127,8 +136,9 @@ class Pooled:
         self._scale = Scale(dr.opaque(mi.Float, pitch / FINEST_PER_PITCH), dr.opaque(mi.Float, pitch / spread))
         self._looker = Looker(self._follower, self._scale)
         self._seen: tuple[Picture, Picture, Picture, Picture] | None = None
-        self._best: tuple[_Judged, _Judged] | None = None
+        self._best: tuple[_Chosen, _Chosen] | None = None
         self._denoiser = denoiser
+        self._least_looks = LEAST_LOOKS if denoiser is None else LEAST_SMOOTHED_LOOKS
         self._block = max(4, round(min(MOST_BLOCK, display.pixels_per_lens[0])))
         self._board = np.add.outer(np.arange(source.height), np.arange(source.width))[:, :, None] & 1
 
@@ -233,7 +243,7 @@ class Pooled:
         source = self._source
         diffuse = self._diffuse.table()
         gloss = self._gloss.table() if self._has_gloss else None
-        looks = self._looks or max(LEAST_LOOKS, LOOKS_PER_PATH * self.samples)
+        looks = self._looks or max(self._least_looks, LOOKS_PER_PATH * self.samples)
         result = np.zeros((4, source.height, source.width, 3), np.float32)
         for first, rows in self._bands(min(looks, MOST_LOOKS)):
             for begin in range(0, looks, MOST_LOOKS):
@@ -252,15 +262,16 @@ class Pooled:
 
     def picture(self) -> Picture:
         """The picture so far, ``(H, W, 3)`` float32 linear."""
-        a, b = self._judged()
+        a, b = self._chosen()
         return np.asarray((a.picture + b.picture) / 2, np.float32)
 
-    def squared_error(self) -> Picture:
-        """An estimate of the picture's own squared error, ``(H, W)``: the mean over its colours, in sRGB-coded values.
+    def pooled_share(self) -> Picture:
+        """Share of pooled light in each pixel, ``(H, W)`` float32 in [0, 1]; the rest are its own samples."""
+        a, b = self._chosen()
+        return np.asarray((a.share + b.share) / 2, np.float32)
 
-        It is right in the mean over regions, not pixel by pixel, where it may be negative. Each half's picture is
-        judged by the unpooled samples of the other, in two groups whose noise has nothing in common; from the error of
-        the halves follows that of their mean, for how far they differ is known.
+    def squared_error(self) -> PixelErrors:
+        """The squared error of every pixel's code: right in the mean over regions, pixel by pixel it may be negative.
 
         Raises
         ------
@@ -271,54 +282,50 @@ class Pooled:
             raise UsageError(
                 f"{self.samples} sample(s) per pixel do not tell the error", rule=f"at least {GROUPS} are needed"
             )
-        a, b = self._judged()
-        slope2 = coding_slope((a.picture + b.picture) / 2) ** 2
-        total = -((a.picture - b.picture) ** 2) / 4
-        for half, judged in enumerate((a, b)):
-            one, two = self._judges(1 - half)
-            noise = (one - two) ** 2 / 4
-            error = (judged.picture - one) * (judged.picture - two) + 2 * judged.leverage * noise
-            total = total + error / 2
-        return np.asarray((total * slope2).mean(-1), np.float32)
+        a, b = self._chosen()
+        # Codes end at white. Where the samples around say that white is right, what is above it is no error; elsewhere
+        # a picture that is too bright is wrong by as much as white is.
+        white = local_mean(self.raw(), self._block) >= 1
+        first, second = (np.where(white, chosen.picture, np.minimum(chosen.picture, 1)) for chosen in (a, b))
+        total = -np.square(first - second) / 4
+        for half, picture in enumerate((first, second)):
+            one, two = self._groups_of(1 - half)[1:]
+            total += (picture - one) * (picture - two) / 2
+        total *= np.square(coding_slope((first + second) / 2))
+        return PixelErrors(np.asarray(total.mean(-1), np.float32), None, CROSS_NOISE)
 
-    def _judged(self) -> tuple[_Judged, _Judged]:
+    def _chosen(self) -> tuple[_Chosen, _Chosen]:
         """The pictures of the two halves, each the best of what can be made of it as the other sees it."""
         if self._best is None:
             a, b, albedo, normal = self.see()
             raw = self._halves()
+            # With fewer samples nothing is left to judge by, and all of the other half may choose.
+            judges = [raw[1], raw[0]] if self.samples < GROUPS else [self._groups_of(1)[0], self._groups_of(0)[0]]
             self._best = (
-                self._choose(a, raw[0], raw[1], albedo, normal),
-                self._choose(b, raw[1], raw[0], albedo, normal),
+                self._choose(a, raw[0], judges[0], albedo, normal),
+                self._choose(b, raw[1], judges[1], albedo, normal),
             )
         return self._best
 
-    def _choose(self, pooled: Picture, raw: Picture, judge: Picture, albedo: Picture, normal: Picture) -> _Judged:
-        if self._denoiser is None:
-            candidates = [pooled]
-        else:
+    def _choose(self, pooled: Picture, raw: Picture, judge: Picture, albedo: Picture, normal: Picture) -> _Chosen:
+        best = pooled
+        share = np.ones(pooled.shape[:2], np.float32)
+        if self._denoiser is not None:
             # The light alone is smoothed: textures are known as exactly as the samples that looked.
             under = albedo + LEAST_ALBEDO
-            guide = np.clip(albedo, 0, 1)
-            candidates = [
-                pooled,
-                self._denoiser(pooled / under, guide, normal) * under,
-                self._denoiser(raw, guide, normal),
-            ]
-        if self.samples < 2:  # nothing is left to judge by
-            return _Judged(candidates[min(1, len(candidates) - 1)], np.zeros_like(pooled))
-        best, *others = candidates
-        leverage = np.zeros_like(best)
+            smooth = self._denoiser(pooled / under, np.clip(albedo, 0, 1), normal) * under
+            best = smooth if self.samples < 2 else blended(pooled, smooth, judge, self._block)[0]
+        if self.samples < 2:
+            return _Chosen(best, share)
         # The unpooled samples themselves come last: enough of them are nearer to the truth than anything else.
-        for other in (*others, raw):
-            best, lever = blended(best, other, judge, self._block)
-            leverage += lever
-        return _Judged(best, leverage)
+        best, weight = blended(best, raw, judge, self._block)
+        return _Chosen(best, share - weight)
 
-    def _judges(self, half: int) -> tuple[Picture, Picture]:
-        """Unpooled pictures of one half by its two groups."""
-        first = [self._raw[g] / max(1, self._counts[g]) for g in range(GROUPS)]
+    def _groups_of(self, half: int) -> list[Picture]:
+        """Unpooled pictures of one half, group by group."""
+        pictures = [self._raw[g] / max(1, self._counts[g]) for g in range(GROUPS)]
         swap = (self._board + half) % 2 == 1
-        return np.where(swap, first[1], first[0]), np.where(swap, first[3], first[2])
+        return [np.where(swap, pictures[g + 1], pictures[g]) for g in range(0, GROUPS, 2)]
 
 
 def _rgb(color: Any) -> Picture:
