@@ -108,3 +108,14 @@ def test_srgb_decoding():
     # IEC 61966-2-1: the linear toe, and the code of middle grey.
     assert linear_from_srgb(np.array([0.0, 0.04045, 1.0])) == pytest.approx([0.0, 0.04045 / 12.92, 1.0], abs=1e-7)
     assert linear_from_srgb(np.array([0.735356983])) == pytest.approx([0.5], abs=1e-6)
+
+
+def test_links_lead_outside_no_more_than_names_do(folder):
+    (folder / "link.txt").symlink_to(folder.parent / "secret.txt")
+    (folder / "circle").symlink_to(folder / "circle")
+    for name in ("link.txt", "../secret/link.txt", "/elsewhere/link.txt"):
+        with pytest.raises(SceneError, match=r"lies outside|is not there"):
+            find(folder, name)
+    with pytest.raises(SceneError, match="is not there"):
+        find(folder, "circle")
+    assert find(folder, "link.txt", allow_outside=True).samefile(folder.parent / "secret.txt")

@@ -78,20 +78,28 @@ def resolve(folder: Path, name: str, *, where: str, what: str, allow_outside: bo
     plain = name.replace("\\", "/")
     absolute = PurePosixPath(plain).is_absolute() or PureWindowsPath(name).is_absolute()
     candidate = Path(plain) if absolute else folder / plain
-    outside = absolute or not candidate.resolve().is_relative_to(folder.resolve())
+    outside = absolute or not _is_below(candidate, folder)
     if (allow_outside or not outside) and _is_file(candidate):
         return candidate
     beside = folder / PurePosixPath(plain).name
-    if outside and _is_file(beside):
+    if outside and _is_file(beside) and (allow_outside or _is_below(beside, folder)):
         return beside
     if outside and not allow_outside and _is_file(candidate):
         raise SceneError(
             f"{what} '{name}' lies outside the scene's folder",
             where=where,
             rule="a scene file may name only files in its own folder and below",
-            fix="move it there, or allow outside files (allow_outside=True)",
+            fix="move it there, or trust the scene file with --allow-outside",
         )
     raise SceneError(f"{what} '{name}' is not there", where=where, fix=_near_miss(candidate))
+
+
+def _is_below(path: Path, folder: Path) -> bool:
+    """Whether a file lies in ``folder`` or deeper, wherever links lead."""
+    try:
+        return path.resolve().is_relative_to(folder.resolve())
+    except (OSError, ValueError, RuntimeError):  # a NUL, a name too long, links that run in a circle
+        return False
 
 
 def _is_file(path: Path) -> bool:
