@@ -215,3 +215,16 @@ def test_little_memory_makes_cells_larger_and_says_so(make_pooled, monkeypatch):
     error = squared_error(pooled.picture(), full(256))
     assert "memory" in pooled.notes[0]
     assert error < 0.01
+
+
+def test_errors_flicker_less_than_those_of_full(make_pooled, lens_display):
+    from lippmann.image import IntegralImage
+    from lippmann.quality import view_flicker
+
+    pooled, full = make_pooled(studio(), seed=12)
+    pooled.add(8)
+    reference, noisy, shared = (
+        IntegralImage(pixels, lens_display, np.eye(4)) for pixels in (full(1024), full(8, seed=5), pooled.picture())
+    )
+    # At an equal error its share says how much of it changes from view to view.
+    assert view_flicker(reference, shared).share < view_flicker(reference, noisy).share
