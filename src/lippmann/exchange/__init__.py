@@ -1,0 +1,7 @@
+"""Light fields in other tools' layouts: the folders of the 4D Light Field Benchmark, LFToolbox, ESLF, Zarr, views."""
+
+from lippmann.exchange.cameras import Cameras
+from lippmann.exchange.layouts import LAYOUTS, Exported, export_image, import_image
+from lippmann.exchange.light_field import LightField, light_field_of
+
+__all__ = ["LAYOUTS", "Cameras", "Exported", "LightField", "export_image", "import_image", "light_field_of"]

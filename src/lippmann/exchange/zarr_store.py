@@ -1,0 +1,177 @@
+"""Light fields in Zarr (format 2), for programs that read parts of a large one: no convention exists, this is ours.
+
+A group with the array ``LF[t, s, v, u, c]``, one row of lenses a chunk (of a lenticular sheet as many rows of pixels as
+make about a megabyte), so that a chunk holds all views of what it shows; maps of the picture in the group ``maps``, on
+the same first four axes; and ``mask[t, s, v, u]`` where some values stand for no pixel. Every array names its axes in
+``_ARRAY_DIMENSIONS``, as xarray wants them. The attributes of the group are the text of our picture files, see
+``docs/light-fields.md``. All values come back bit by bit, of every display.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lippmann.atomic import replacing_folder
+from lippmann.errors import PictureError
+from lippmann.exchange.extras import optional
+from lippmann.exchange.light_field import LightField, check_shape
+from lippmann.exchange.notes import from_note, to_note
+from lippmann.image.metadata import KEY, Metadata
+from lippmann.progress import Progress, ProgressCallback, silent
+
+LAYOUT = "zarr"
+
+AXES = ("t", "s", "v", "u", "c")
+
+_VIEWS, _MASK, _MAPS = "LF", "mask", "maps"
+_DIMENSIONS = "_ARRAY_DIMENSIONS"
+
+#: Bytes of a chunk of a lenticular sheet, before packing.
+_CHUNK = 1 << 20
+
+_TYPES = (np.bool_, np.uint8, np.uint16, np.uint32, np.float16, np.float32)
+
+
+def write_zarr(light_field: LightField, folder: Path, *, progress: ProgressCallback = silent) -> None:
+    """Write a Zarr group, losslessly compressed; appears whole or not at all.
+
+    Raises
+    ------
+    UsageError, OutputError
+        If zarr is not installed, or the folder cannot be written.
+    """
+    zarr = optional("zarr")
+    arrays: dict[str, NDArray[Any]] = {_VIEWS: light_field.values}
+    arrays |= {f"{_MAPS}/{name}": values for name, values in light_field.maps.items()}
+    if light_field.mask is not None:
+        arrays[_MASK] = light_field.mask
+    with replacing_folder(folder) as temporary:
+        group = zarr.open_group(str(temporary), mode="w", **_format(zarr))
+        if note := to_note(light_field.metadata, LAYOUT):
+            group.attrs.put(json.loads(note))
+        if light_field.maps:
+            zarr.open_group(str(temporary), path=_MAPS, mode="a", **_format(zarr))
+        for done, (name, values) in enumerate(arrays.items(), start=1):
+            _write_array(zarr, temporary, name, values)
+            progress(Progress("write", done, len(arrays)))
+        # Readers then need not list the folder, where the list of its files would make them wonder.
+        zarr.consolidate_metadata(str(temporary))
+
+
+def read_zarr(folder: Path, *, progress: ProgressCallback = silent) -> LightField:
+    """Read a Zarr group.
+
+    Of a group of our own making every chunk has to be there; one of another program is read as Zarr has it, where
+    absent chunks are constant.
+
+    Raises
+    ------
+    UsageError, PictureError
+        If zarr is not installed, or the folder is missing, no Zarr group, incomplete, damaged, or has no light field.
+    """
+    zarr = optional("zarr")
+    try:
+        group = zarr.open_group(str(folder), mode="r")
+        attributes = dict(group.attrs)
+        names = sorted(group.array_keys())
+        maps_group = group.get(_MAPS)
+        map_names = [] if maps_group is None else sorted(maps_group.array_keys())
+    except Exception as error:  # the library stumbles over damaged stores in every way there is
+        raise PictureError("is no Zarr group", where=str(folder), rule=f"it holds the array {_VIEWS}") from error
+    metadata = _metadata(attributes, folder)
+    if _VIEWS not in names:
+        held = ", ".join(names) or "nothing"
+        raise PictureError(f"has no array {_VIEWS}; it holds {held}", where=str(folder))
+    wanted = [_VIEWS, *(f"{_MAPS}/{name}" for name in map_names), *([_MASK] if _MASK in names else [])]
+    arrays: dict[str, NDArray[Any]] = {}
+    for done, name in enumerate(wanted, start=1):
+        shape = arrays[_VIEWS].shape if arrays else None
+        arrays[name] = _read_array(group, name, folder, shape, whole=metadata is not None)
+        progress(Progress("read", done, len(wanted)))
+    maps = {name: arrays[f"{_MAPS}/{name}"] for name in map_names}
+    try:
+        return LightField(arrays[_VIEWS], metadata, maps, mask=arrays.get(_MASK))
+    except PictureError as error:
+        raise PictureError(error.what, where=str(folder), rule=error.rule) from None
+
+
+def _format(zarr: Any) -> dict[str, Any]:
+    """How format 2 is asked for: the library changed the word, and by itself leaves out chunks of zeros since."""
+    if int(zarr.__version__.partition(".")[0]) < 3:
+        return {"zarr_version": 2}
+    return {"zarr_format": 2}
+
+
+def _write_array(zarr: Any, folder: Path, name: str, values: NDArray[Any]) -> None:
+    import numcodecs
+
+    down, across, height, width = values.shape[:4]
+    rows = 1
+    if down == 1:
+        rows = min(height, max(1, _CHUNK // (values.nbytes // height)))
+    chunks = (down, across, rows, width, *values.shape[4:])
+    options = _format(zarr)
+    if "zarr_format" in options:
+        options["config"] = {"write_empty_chunks": True}
+    array = zarr.open_array(
+        str(folder),
+        path=name,
+        mode="w",
+        shape=values.shape,
+        chunks=chunks,
+        dtype=values.dtype,
+        fill_value=0,
+        compressor=numcodecs.Blosc("zstd", clevel=5, shuffle=numcodecs.Blosc.SHUFFLE),
+        **options,
+    )
+    array[...] = values
+    array.attrs[_DIMENSIONS] = list(AXES[: values.ndim])
+
+
+def _read_array(
+    group: Any, name: str, folder: Path, views_shape: tuple[int, ...] | None, *, whole: bool
+) -> NDArray[Any]:
+    where = str(folder / name)
+    try:
+        array = group[name]
+        shape, dtype = tuple(array.shape), np.dtype(array.dtype)
+    except Exception as error:  # as above
+        raise PictureError(f"is damaged: {error}", where=where) from error
+    if views_shape is None:
+        check_shape(shape, where)
+    elif shape[:4] != views_shape[:4]:
+        rule = f"{_VIEWS} has {views_shape[:4]}"
+        raise PictureError(f"has the shape {shape}", where=where, rule=rule)
+    if dtype not in _TYPES:
+        raise PictureError(
+            f"holds {dtype}", where=where, rule=f"{', '.join(kind.__name__ for kind in _TYPES)} are read"
+        )
+    if whole:
+        _check_whole(folder / name, array)
+    try:
+        values: NDArray[Any] = np.asarray(array[...])
+    except Exception as error:  # as above
+        raise PictureError(f"is damaged: {error}", where=where, fix="make or fetch it anew") from error
+    return values
+
+
+def _check_whole(folder: Path, array: Any) -> None:
+    """Raise :class:`PictureError` if the file of a chunk is not there."""
+    counts = [-(-size // step) for size, step in zip(array.shape, array.chunks, strict=True)]
+    there = {path.name for path in folder.iterdir()} if folder.is_dir() else set()
+    absent = [name for place in np.ndindex(*counts) if (name := ".".join(map(str, place))) not in there]
+    if absent:
+        what = f"{len(absent)} of its {math.prod(counts)} chunks are absent, the first {absent[0]}"
+        raise PictureError(what, where=str(folder))
+
+
+def _metadata(attributes: dict[str, Any], folder: Path) -> Metadata | None:
+    if KEY not in attributes:
+        return None
+    return from_note(json.dumps(attributes), LAYOUT, str(folder))
