@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import difflib
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from numbers import Integral, Real
 
 from lippmann.errors import DisplayError
@@ -64,13 +64,18 @@ def check_keys(values: object, kind: type, where: str) -> None:
     if not isinstance(values, Mapping):
         raise DisplayError(f"{where or 'the display'} is {values!r}", where=where, rule="it must be a table of keys")
     fields = {field.name: field for field in dataclasses.fields(kind)}
-    for key in values:
-        if key not in fields:
-            rule = f"the keys are {', '.join(fields)}"
-            raise DisplayError(f"unknown key {key!r}", where=_join(where, key), rule=rule, fix=suggestion(key, fields))
+    refuse_unknown(values, fields, where)
     for name, field in fields.items():
         if field.default is dataclasses.MISSING and name not in values:
             raise DisplayError(f"the key {name!r} is missing", where=where, rule="it has no default", fix="add it")
+
+
+def refuse_unknown(given: Iterable[object], known: Collection[str], where: str = "") -> None:
+    """Refuses a key that is not known, in the table ``where``."""
+    for key in given:
+        if key not in known:
+            rule = f"the keys are {', '.join(known)}"
+            raise DisplayError(f"unknown key {key!r}", where=_join(where, key), rule=rule, fix=suggestion(key, known))
 
 
 def suggestion(word: object, known: Iterable[str]) -> str:

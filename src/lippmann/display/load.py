@@ -4,7 +4,7 @@ A file holds the keys of :class:`Display`, with the tables ``[panel]`` and ``[le
 
     title = "A 15.6-inch panel behind a slanted sheet"
     gap = 0.885                         # a number is millimetres
-    viewing_distance = "60 cm"          # or a string with a unit: um, mm, cm, m, in; "infinite" is allowed here
+    viewing_distance = "60 cm"          # or a string with a unit: um, mm, cm, m, mil, in; "infinite" is allowed here
     aperture_distance = 10
 
     [panel]
@@ -20,7 +20,9 @@ A file holds the keys of :class:`Display`, with the tables ``[panel]`` and ``[le
 
 A file without a ``name`` has its own, less the ending.
 
-A JSON file is the calibration of a Looking Glass, see :mod:`lippmann.display.looking_glass`.
+A slanted monitor may be said by pitch, slope and centre instead, see :mod:`lippmann.display.monitor_file`. A JSON file
+is the calibration of a Looking Glass, see :mod:`lippmann.display.looking_glass`. Prints and monitors can also be said
+in one word, see :mod:`lippmann.display.short_form`.
 """
 
 from __future__ import annotations
@@ -36,6 +38,10 @@ from typing import Any
 from lippmann.display.checks import positive, suggestion
 from lippmann.display.display import INFINITE, Display, check_tables
 from lippmann.display.looking_glass import display_of_calibration, is_calibration
+from lippmann.display.monitor_file import TABLE as MONITOR
+from lippmann.display.monitor_file import monitor_of_tables
+from lippmann.display.short_form import display_of_short_form, is_short_form
+from lippmann.display.units import MILLIMETRES, length, stripe
 from lippmann.errors import DisplayError
 
 if sys.version_info >= (3, 11):
@@ -43,10 +49,7 @@ if sys.version_info >= (3, 11):
 else:
     import tomli as tomllib
 
-_MILLIMETRES = {"um": 1e-3, "µm": 1e-3, "mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4, "inch": 25.4}
-_INCH = 25.4
 _MAXIMUM_BYTES = 1_000_000  # a picture given by mistake is not read to its end
-_QUANTITY = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([^\d\s.+-]\S*)?")
 
 #: Lengths of a file by table; beside plain lengths, the units per inch and whether the panel's pixel may be the unit.
 _LENGTHS: dict[str, dict[str, tuple[tuple[str, ...], bool]]] = {
@@ -57,7 +60,7 @@ _LENGTHS: dict[str, dict[str, tuple[tuple[str, ...], bool]]] = {
 
 
 def load_display(name_or_path: str | os.PathLike[str]) -> Display:
-    """The preset of that name, or the display of a TOML file or of a Looking Glass's ``visual.json``.
+    """The preset of that name, the display of a TOML file or a Looking Glass's ``visual.json``, or of a short form.
 
     Raises
     ------
@@ -68,6 +71,8 @@ def load_display(name_or_path: str | os.PathLike[str]) -> Display:
     name = os.fspath(name_or_path)
     if name in presets:
         return _from_toml(presets[name], where=f"{name}.toml", stem=name)
+    if is_short_form(name):
+        return display_of_short_form(name)
     path = Path(name)
     if path.suffix not in (".toml", ".json") and not path.exists():
         rule = f"the displays are {', '.join(presets)}, or a .toml file, or a Looking Glass's visual.json"
@@ -106,10 +111,12 @@ def _read(path: Path) -> str:
 def _from_toml(text: str, *, where: str, stem: str) -> Display:
     try:
         values = tomllib.loads(text)
-    except ValueError as error:
-        raise DisplayError(f"not valid TOML: {error}", where=where) from None  # also numbers of absurd length
+    except (ValueError, RecursionError) as error:  # also numbers of absurd length, lists in lists in lists
+        raise DisplayError(f"not valid TOML: {error}", where=where) from None
     try:
         values = {"name": stem, **values}
+        if MONITOR in values:
+            return monitor_of_tables(values).display()
         check_tables(values)
         return Display.from_dict(_in_millimetres(values))
     except DisplayError as error:
@@ -135,7 +142,7 @@ def _in_millimetres(values: Mapping[str, Any]) -> dict[str, Any]:
     """The same tables with all lengths in millimetres and sub-pixels as offsets; what is no text stays as it is."""
     panel = _converted(values["panel"], "panel", None)
     if isinstance(panel.get("subpixel_offsets"), str):
-        panel["subpixel_offsets"] = _stripe(panel["subpixel_offsets"])
+        panel["subpixel_offsets"] = stripe(panel["subpixel_offsets"], "panel.subpixel_offsets")
     pixel = positive(panel["pixel_pitch"], "panel.pixel_pitch")
     lenses = _converted(values["lens_array"], "lens_array", pixel)
     return {**_converted(values, "", None), "panel": panel, "lens_array": lenses}
@@ -145,7 +152,7 @@ def _converted(values: Mapping[str, Any], table: str, pixel: float | None) -> di
     converted = dict(values)
     for name, (per_inch, in_pixels) in _LENGTHS[table].items():
         value, key = values.get(name), f"{table}.{name}" if table else name
-        scales = {**_MILLIMETRES, "px": pixel} if in_pixels and pixel is not None else _MILLIMETRES
+        scales = {**MILLIMETRES, "px": pixel} if in_pixels and pixel is not None else MILLIMETRES
         if isinstance(value, list):
             converted[name] = [_length(item, key, scales, per_inch) for item in value]
         elif isinstance(value, str) and not (name == "viewing_distance" and value == INFINITE):
@@ -155,29 +162,4 @@ def _converted(values: Mapping[str, Any], table: str, pixel: float | None) -> di
 
 def _length(value: object, key: str, scales: Mapping[str, float], per_inch: tuple[str, ...]) -> object:
     """Millimetres of ``"6.8 mm"``; what is no string stays as it is."""
-    if not isinstance(value, str):
-        return value
-    units = ", ".join([*scales, *per_inch])
-    match = _QUANTITY.fullmatch(value.strip())
-    if match is None:
-        rule = 'a length is a number of millimetres or a string with a unit such as "6.8 mm"'
-        raise DisplayError(f"{value!r} is not a length", where=key, rule=rule)
-    amount, unit = float(match[1]), match[2] or "mm"
-    if unit in scales:
-        return amount * scales[unit]
-    if unit in per_inch:
-        return _INCH / amount if amount else 0.0
-    known = suggestion(unit, [*scales, *per_inch])
-    raise DisplayError(
-        f"{value!r} has the unknown unit {unit!r}", where=key, rule=f"the units here are {units}", fix=known
-    )
-
-
-def _stripe(order: str) -> list[list[float]]:
-    """Offsets of sub-pixels that stand side by side in this order, such as ``"rgb"``; ``"none"`` if they do not."""
-    if order == "none":
-        return [[0.0, 0.0]] * 3
-    if sorted(order) != sorted("rgb"):
-        rule = 'it must be an order of sub-pixels such as "rgb", "none", or three pairs [right, down] in pixels'
-        raise DisplayError(f"subpixel_offsets is {order!r}", where="panel.subpixel_offsets", rule=rule)
-    return [[(order.index(color) - 1) / 3, 0.0] for color in "rgb"]
+    return length(value, key, scales, per_inch) if isinstance(value, str) else value

@@ -22,11 +22,12 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 from lippmann.display.checks import finite, whole_count
 from lippmann.display.display import Display
-from lippmann.display.lens_array import LensArray
+from lippmann.display.monitor import CONES, PITCHES, Monitor
 from lippmann.display.panel import Offset, Panel, SubpixelCells, SubpixelOffsets
 from lippmann.errors import DisplayError
 
@@ -34,9 +35,6 @@ _INCH = 25.4
 
 #: Height of the documented camera's picture, in degrees.
 CAMERA_FIELD = 14.0
-
-#: How far in front of the lens plane rays begin, as a part of the viewing distance.
-_APERTURE_PART = 0.1
 
 #: Beginnings of serials whose sub-pixels lie in no plain stripe: without their cells up to 6 of 48 views are wrong.
 _NEEDS_CELLS = ("LKG-H", "LKG-J", "LKG-K")
@@ -90,12 +88,9 @@ def _display(values: Mapping[str, Any]) -> Display:
         raise DisplayError(f"serial is {serial!r}", where="serial", rule="it must be a text")
     width, height = _count(values, "screenW"), _count(values, "screenH")
     dpi = _within(values, "DPI", 10, 10_000)
-    pitch = _within(values, "pitch", 1, 1000)
-    cone = _within(values, "viewCone", 1, 150)
+    pitch = _within(values, "pitch", *PITCHES)
+    cone = _within(values, "viewCone", *CONES)
     slope = _wrapped(values, "slope")
-    # A lens may lean by less than 80 degrees from the vertical.
-    if abs(slope) < 0.18:
-        raise DisplayError(f"slope is {slope:g}", where="slope", rule="it must be at least 0.18 in size")
     is_mirrored = _flag(values, "flipImageX", optional=True)
     _check_orientation(values)
     if is_mirrored:
@@ -104,25 +99,19 @@ def _display(values: Mapping[str, Any]) -> Display:
     stripe, shift = _stripe(is_mirrored, _flag(values, "flipSubp", optional=True))
 
     pixel = _INCH / dpi
-    seen_pitch = _INCH / pitch
-    slant = -math.atan(1 / slope)
-    gap = seen_pitch / (math.cos(slant) * 2 * math.tan(math.radians(cone) / 2))
-    distance = height * pixel / (2 * math.tan(math.radians(CAMERA_FIELD) / 2))
-    magnification = (distance + gap) / distance
-    # The phase of the panel's middle, in lenses; with a plain stripe the file's x is that of red, ours that of green.
-    lenses = width * pixel * math.cos(slant) / seen_pitch
-    tilt = height / (width * slope)
-    phase = (0.5 + 0.5 * tilt + (0.0 if cells else shift / width)) * lenses - _wrapped(values, "center")
-    axis = (0.5 - phase % 1.0) * seen_pitch / (math.cos(slant) * magnification)
-    return Display(
+    monitor = Monitor(
         name=serial or "looking-glass",
         title=f"Looking Glass {serial}".strip(),
         panel=Panel(width, height, pixel, stripe, cells),
-        lens_array=LensArray("lenticular", seen_pitch / magnification, math.degrees(slant), (axis, 0.0)),
-        gap=gap,
-        viewing_distance=distance,
-        aperture_distance=_APERTURE_PART * distance,
+        pitch=pitch,
+        slope=slope,
+        center=_wrapped(values, "center"),
+        view_cone=cone,
+        viewing_distance=height * pixel / (2 * math.tan(math.radians(CAMERA_FIELD) / 2)),
     )
+    # With a plain stripe the file's x is that of red, ours that of green.
+    to_green = 0.0 if cells else shift * monitor.lenses_right
+    return replace(monitor, center=monitor.center - to_green).display()
 
 
 def _check_orientation(values: Mapping[str, Any]) -> None:
