@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from lippmann.image import read_info, read_picture
@@ -41,12 +42,14 @@ def test_samples_alone_are_judged_too_and_the_error_is_a_layer(lippmann, engine,
     done = lippmann("render", "teapot", "--display", small, "--spp", 4, "--maps", tmp_path / "maps", "-o", out)
     assert done.code == 0
     assert "estimated PSNR" in done.err
-    assert [path.name for path in (tmp_path / "maps").glob("*.png")] == ["error.png"]
-    assert read_picture(out).maps["error"].mean() > 0
+    assert sorted(path.name for path in (tmp_path / "maps").glob("*.png")) == ["error.png", "samples.png"]
+    image = read_picture(out)
+    assert image.maps["error"].mean() > 0
+    assert set(np.unique(image.maps["samples"])) == {4}
 
 
 def test_time_ends_it_and_the_quality_reached_is_said(lippmann, engine, tmp_path, small):
-    words = ("--quality", 60, "--max-time", 0.5)
+    words = ("--quality", 60, "--max-time", 4, "--denoise", "none")
     done = lippmann("render", "teapot", "--display", small, *words, "--json", "-o", tmp_path / "a.png")
     assert done.code == 0
     assert "the time is up before the quality asked for was reached" in done.err
@@ -89,9 +92,63 @@ def test_goals_that_cannot_be_are_refused(lippmann, engine, tmp_path, words, com
     assert list(tmp_path.iterdir()) == []
 
 
-def test_maps_of_nothing_are_refused(lippmann, engine, tmp_path, small):
-    words = ("--spp", 1, "--maps", tmp_path / "maps")
-    done = lippmann("render", "teapot", "--display", small, *words, "-o", tmp_path / "a.png")
-    assert done.code == 2
-    assert "--maps" in done.err
-    assert not (tmp_path / "a.png").exists()
+def test_pixels_that_were_carried_over_have_had_no_samples(lippmann, engine, tmp_path, small):
+    out = tmp_path / "a.exr"
+    words = ("--method", "lens-view", "--spp", 2, "--maps", tmp_path / "maps")
+    assert lippmann("render", "teapot", "--display", small, *words, "-o", out).code == 0
+    maps = read_picture(out).maps
+    assert set(np.unique(maps["samples"])) == {0, 2}
+    assert np.array_equal(maps["samples"] > 0, maps["status"] == 0)
+    assert (tmp_path / "maps" / "samples.png").exists()
+
+
+# ---- auto -----------------------------------------------------------------------------------------------------------
+
+
+def test_auto_is_the_default_and_says_what_it_took(lippmann, engine, tmp_path, small):
+    out = tmp_path / "a.png"
+    done = lippmann("render", "teapot", "--display", small, "--spp", 2, "--json", "-o", out)
+    assert done.json["method"] == "full"
+    assert "auto: full: no quality is asked for" in done.err
+    assert done.json["options"]["auto"].startswith("full: no quality")
+    assert "denoise" not in done.json["options"]
+    assert "auto        full: no quality" in lippmann("info", out).out
+    plain = tmp_path / "b.png"
+    named = lippmann("render", "teapot", "--display", small, "--spp", 2, "--method", "full", "--json", "-o", plain)
+    assert "auto" not in named.json["options"]
+    assert np.array_equal(read_picture(out).pixels, read_picture(plain).pixels)
+
+
+def test_auto_takes_the_noise_out_where_that_reaches_the_quality_sooner(lippmann, engine, tmp_path, small):
+    pytest.importorskip("pyoidn", reason="Open Image Denoise is not installed")
+    words = ("render", "teapot", "--display", small, "--quality", 28, "--json", "-o")
+    done = lippmann(*words, tmp_path / "a.png")
+    assert done.code == 0, done.err
+    options, plain = done.json["options"], lippmann(*words, tmp_path / "b.png", "--denoise", "none").json
+    assert options["denoise"] == "oidn"
+    assert options["denoise_effort"] in ("fast", "high")
+    assert "auto: full with --denoise oidn: after" in done.err
+    assert done.json["estimate"]["worst"] >= 28
+    assert done.json["spp"] < plain["spp"]
+    assert "as asked for" in plain["options"]["auto"]
+    again = lippmann(*words, tmp_path / "c.png")
+    assert again.json["options"]["auto"] == options["auto"]
+    assert np.array_equal(read_picture(tmp_path / "a.png").pixels, read_picture(tmp_path / "c.png").pixels)
+
+
+def test_auto_without_a_denoiser_says_so(lippmann, engine, tmp_path, small, monkeypatch):
+    from lippmann.render import choice
+
+    monkeypatch.setattr(choice, "find_spec", lambda name: None)
+    done = lippmann("render", "teapot", "--display", small, "--quality", 20, "--json", "-o", tmp_path / "a.png")
+    assert done.code == 0
+    assert "auto: full: Open Image Denoise is not installed" in done.err
+    assert "denoise" not in done.json["options"]
+
+
+def test_a_time_too_short_for_two_samples_gives_one_and_says_so(lippmann, engine, tmp_path, small):
+    words = ("--max-time", 0.001, "--denoise", "none", "--json", "-o", tmp_path / "a.png")
+    done = lippmann("render", "teapot", "--display", small, *words)
+    assert done.code == 0
+    assert (done.json["spp"], done.json["estimate"]) == (1, None)
+    assert "there was time for one sample per pixel only" in done.err

@@ -11,7 +11,7 @@ def test_it_comes_nearer_to_a_long_picture_with_as_many_paths(lippmann, engine, 
     words = ("render", "teapot", "--display", "mla-square")
     for name, more in {"long": ("--spp", 64, "--seed", 9), "full": ("--spp", 2), "pooled": ("--spp", 2)}.items():
         method = ("--method", "pooled") if name == "pooled" else ()
-        done = lippmann(*words, *more, *method, "--json", "-o", tmp_path / f"{name}.exr")
+        done = lippmann(*words, *more, *method, "--json", "--maps", tmp_path / name, "-o", tmp_path / f"{name}.exr")
         assert done.code == 0, done.err
     assert done.json["method"] == "pooled"
     assert done.json["estimate"] is None
@@ -22,7 +22,11 @@ def test_it_comes_nearer_to_a_long_picture_with_as_many_paths(lippmann, engine, 
         for name in ("full", "pooled")
     }
     assert found["pooled"] > found["full"] + 5
-    assert read_picture(tmp_path / "pooled.exr").provenance.method == "pooled"
+    pooled = read_picture(tmp_path / "pooled.exr")
+    assert pooled.provenance.method == "pooled"
+    assert (tmp_path / "pooled" / "pooled.png").exists()
+    assert not (tmp_path / "full" / "pooled.png").exists()
+    assert 0.5 < pooled.maps["pooled"].mean() < 1
 
 
 @pytest.mark.parametrize(

@@ -42,6 +42,7 @@ def test_maps_show_parts_of_the_frame(lippmann, engine, tmp_path):
         "interpolated.png",
         "missed.png",
         "reprojected.png",
+        "samples.png",
         "traced.png",
     ]
     frame = np.asarray(Image.open(out).convert("RGB"))

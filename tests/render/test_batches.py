@@ -104,7 +104,8 @@ class SampleNumbers:
 
 
 @pytest.mark.parametrize(
-    ("rounds", "shares"), [((16,), (8, 8)), ((8, 8), (8, 8)), ((2, 3, 4, 7), (9, 7)), ((13, 3), (9, 7))]
+    ("rounds", "shares"),
+    [((16,), (8, 8)), ((8, 8), (8, 8)), ((2, 3, 4, 7), (8, 8)), ((13, 2), (8, 7)), ((1, 1), (1, 1))],
 )
 @pytest.mark.parametrize("memory", [2**30, TIGHT])
 def test_every_sample_of_both_streams_is_taken_once(engine, rounds, shares, memory):
@@ -176,3 +177,15 @@ def test_fewer_batches_are_kept_where_memory_is_short_and_none_where_it_is_too_s
     assert small.squared_error().values.mean() == pytest.approx(plenty.squared_error().values.mean(), rel=0.5)
     with pytest.raises(MemoryLimitError, match="its own error"):
         batches(integrator, memory=100_000)
+
+
+def test_a_probe_tells_the_time_and_leaves_no_trace(integrator):
+    renderer, untouched = batches(integrator), batches(integrator)
+    seconds = renderer.probe()
+    assert 0 < seconds < 5
+    assert (renderer.samples, renderer.rays.primary) == (0, 0)
+    for one in (renderer, untouched):
+        one.add(4)
+    assert np.array_equal(renderer.picture(), untouched.picture())
+    assert renderer.rays == untouched.rays
+    assert renderer.seconds_trace > 0

@@ -70,6 +70,34 @@ def test_time_ends_it_with_the_best_so_far():
     assert 8.0 <= renderer.now <= 10.0
 
 
+@pytest.mark.parametrize(("seconds", "samples"), [(0.5, 19), (1.5, 6), (4.0, 2), (9.5, 1), (40.0, 1)])
+def test_the_first_round_fits_the_time(seconds, samples):
+    """A probe tells how many samples there is time for; one of every pixel is the least that is a picture."""
+    renderer = Noise(seconds=seconds)
+    goal = Goal(max_time=10.0)
+    outcome = reach(goal, renderer, PictureEstimator(SHOWN), clock=renderer.clock, probe=lambda: seconds)
+    assert renderer.now <= max(10.0, seconds)
+    assert (outcome.end, outcome.samples) == ("time", samples)
+    assert (outcome.estimate is None) == (outcome.samples == 1)
+
+
+def test_a_probe_that_promised_too_much_is_not_believed_twice():
+    renderer = Noise(seconds=1.0)
+    outcome = reach(Goal(max_time=10.0), renderer, PictureEstimator(SHOWN), clock=renderer.clock, probe=lambda: 1.2)
+    assert (outcome.samples, renderer.now <= 10.0) == (9, True)
+    slow = Noise(seconds=30.0)
+    outcome = reach(Goal(max_time=40.0), slow, PictureEstimator(SHOWN), clock=slow.clock, probe=lambda: 25.0)
+    assert (outcome.samples, outcome.estimate) == (1, None)
+
+
+def test_without_a_limit_of_time_nothing_is_probed():
+    def never():
+        raise AssertionError("no probe is wanted")
+
+    renderer = Noise()
+    assert reach(Goal(spp=8), renderer, PictureEstimator(SHOWN), clock=renderer.clock, probe=never).samples == 8
+
+
 def test_samples_end_it():
     renderer = Noise()
     outcome = run(Goal(quality=60, spp=100), renderer)

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from lippmann.atomic import replacing_folder
-from lippmann.errors import UsageError
 
 if TYPE_CHECKING:
     from lippmann.image import IntegralImage
@@ -17,28 +16,22 @@ if TYPE_CHECKING:
 def write_maps(image: IntegralImage, folder: Path) -> None:
     """Write what the picture knows of itself.
 
-    Of methods that reuse points: ``missed.png`` (dark pixels were reprojected, light ones missed and traced, orange
-    ones missed and interpolated), and ``reprojected.png``, ``traced.png`` and, where any were, ``interpolated.png``:
-    the pixels of one origin alone, the rest in violet. Of methods that know their noise: ``error.png``, the estimated
-    error of each pixel, in the false colours of ``lippmann compare --map``.
+    - Of methods that reuse points: ``missed.png`` (dark pixels were reprojected, light ones missed and traced, orange
+      ones missed and interpolated), and ``reprojected.png``, ``traced.png`` and, where any were, ``interpolated.png``:
+      the pixels of one origin alone, the rest in violet.
+    - Of methods that know their noise: ``error.png``, the estimated error of each pixel, in the false colours of
+      ``lippmann compare --map``.
+    - Of all methods: ``samples.png``, the samples of each pixel from none (dark) to the most of any pixel (bright).
+    - Of pooled pictures: ``pooled.png``, the share of pooled light in each pixel, from none (dark) to all (bright).
 
     Raises
     ------
-    UsageError
-        If the picture knows nothing of itself.
     OutputError
         If the folder cannot be written.
     """
     from lippmann.image.png import encode_png
 
-    pictures = {**_origins(image), **_errors(image)}
-    if not pictures:
-        raise UsageError(
-            "this picture has nothing to map",
-            where="--maps",
-            rule="maps show how points were reused, or the estimated error of two or more samples per pixel",
-            fix="leave it out",
-        )
+    pictures = {**_origins(image), **_errors(image), **_samples(image), **_pooled(image)}
     with replacing_folder(folder) as temporary:
         for name, codes in pictures.items():
             png = encode_png(codes, text={}, pixel_pitch=image.display.panel.pixel_pitch)
@@ -60,11 +53,29 @@ def _origins(image: IntegralImage) -> dict[str, Any]:
 
 
 def _errors(image: IntegralImage) -> dict[str, Any]:
-    from lippmann.image.color import quantize
-    from lippmann.quality.error_picture import BRIGHTEST, in_false_color
+    from lippmann.quality.error_picture import BRIGHTEST
     from lippmann.render.estimate import ERROR_LAYER
 
     if ERROR_LAYER not in image.maps:
         return {}
-    shown = in_false_color(np.sqrt(image.maps[ERROR_LAYER]) / BRIGHTEST)
-    return {"error": quantize(shown, 8, "linear").astype(np.uint8)}
+    return {"error": _in_false_color(np.sqrt(image.maps[ERROR_LAYER]) / BRIGHTEST)}
+
+
+def _samples(image: IntegralImage) -> dict[str, Any]:
+    from lippmann.render.methods import SAMPLES_LAYER
+
+    samples = image.maps[SAMPLES_LAYER]
+    return {"samples": _in_false_color(samples / max(1, int(samples.max())))}
+
+
+def _pooled(image: IntegralImage) -> dict[str, Any]:
+    from lippmann.render.methods import POOLED_LAYER
+
+    return {"pooled": _in_false_color(image.maps[POOLED_LAYER])} if POOLED_LAYER in image.maps else {}
+
+
+def _in_false_color(values: Any) -> Any:
+    from lippmann.image.color import quantize
+    from lippmann.quality.error_picture import in_false_color
+
+    return quantize(in_false_color(values), 8, "linear").astype(np.uint8)

@@ -11,13 +11,14 @@ import typer
 
 from lippmann.cli import options
 from lippmann.cli.console import Console
+from lippmann.errors import UsageError
 
 if TYPE_CHECKING:
     from lippmann.quality import Comparison, MicroImage
 
 
 def compare(
-    reference: Annotated[Path, typer.Argument(help="The picture to measure against (PNG, EXR or TIFF).")],
+    reference: Annotated[Path, typer.Argument(help="The picture to measure against (PNG, EXR, TIFF or Zarr).")],
     test: Annotated[Path, typer.Argument(help="The picture to judge: of the same display.")],
     table: Annotated[
         Path | None, typer.Option("--csv", help="Write the figures of every micro-image to this CSV file.")
@@ -33,10 +34,12 @@ def compare(
     """Say how far a picture is from a reference: PSNR, its worst micro-images, SSIM of views, the paper's figures."""
     from lippmann.atomic import check_writable
     from lippmann.display import load_display
-    from lippmann.image import read_picture
+    from lippmann.image import IntegralImage
     from lippmann.image.formats import format_for
+    from lippmann.image.large import open_picture
     from lippmann.quality import compare as compare_pictures
     from lippmann.quality import error_map
+    from lippmann.quality.large import compare_large
 
     console = Console(quiet, as_json)
     if picture is not None:
@@ -45,9 +48,14 @@ def compare(
         if path is not None:
             check_writable(path)
     given = None if display is None else load_display(display)
-    first, second = (read_picture(path, display=given) for path in (reference, test))
+    first, second = (open_picture(path, display=given) for path in (reference, test))
     with console.progress() as progress:
-        comparison = compare_pictures(first, second, progress)
+        if isinstance(first, IntegralImage) and isinstance(second, IntegralImage):
+            comparison = compare_pictures(first, second, progress)
+        else:
+            if picture is not None:
+                raise UsageError("needs the whole picture in memory", where="--map", fix="leave it out")
+            comparison = compare_large(first, second, progress)
     if table is not None:
         _write_table(comparison, table)
     if picture is not None:
@@ -111,11 +119,19 @@ def _lines(comparison: Comparison) -> list[str]:
         f"worst micro-image   {_decibels(comparison.worst.psnr)} ({_lens(comparison.worst)} of {lenses})",
         f"1st percentile      {_decibels(comparison.percentile_1.psnr)} ({_lens(comparison.percentile_1)})",
         f"SSIM of views       {views.mean:.4f}, worst {views.values[ky, kx]:.4f} (view {kx}, {ky})",
+        _flicker_line(comparison),
         f"the paper's PSNR    {_decibels(paper.mean_psnr)}, mean of micro-images"
         + (f" ({paper.unchanged} without error left out)" if paper.unchanged else ""),
         f'the paper\'s "RMSE"  {paper.mean_rmse:.4f}, mean of micro-images (a mean squared error of 8-bit codes)',
     ]
     return lines
+
+
+def _flicker_line(comparison: Comparison) -> str:
+    found = comparison.flicker
+    if found is None:
+        return "flicker of views    one view only"
+    return f"flicker of views    {_decibels(found.psnr)} ({found.share:.2f} of the error changes from view to view)"
 
 
 def _decibels(value: float) -> str:

@@ -14,7 +14,9 @@ from numpy.typing import NDArray
 from lippmann.display import Display
 from lippmann.errors import PictureError
 from lippmann.image import IntegralImage
+from lippmann.image.large import LargePicture
 from lippmann.progress import ProgressCallback, silent
+from lippmann.quality.flicker import Flicker, view_flicker
 from lippmann.quality.metrics import (
     LOW_PERCENTILE,
     MicroImage,
@@ -45,17 +47,20 @@ class Comparison:
         Where the reference has outlines.
     views:
         SSIM of the views.
+    flicker:
+        How the errors change from view to view; None if there is one view only.
     paper:
         The figures of the 2014 paper.
     """
 
-    reference: IntegralImage
-    test: IntegralImage
+    reference: IntegralImage | LargePicture
+    test: IntegralImage | LargePicture
     errors: Real
     micro_image_errors: Real
     micro_image_pixels: NDArray[np.intp]
     silhouettes: Silhouettes
     views: ViewSimilarity
+    flicker: Flicker | None
     paper: PaperFigures
 
     @cached_property
@@ -116,6 +121,9 @@ class Comparison:
                 "views": [[_finite(value) for value in row] for row in self.views.values.tolist()],
                 "views_are_exact": self.views.exact,
             },
+            "flicker": None
+            if self.flicker is None
+            else {"psnr": _finite(self.flicker.psnr), "share": self.flicker.share},
             "paper": {
                 "paper_mean_psnr": _finite(self.paper.mean_psnr),
                 "paper_mean_rmse": self.paper.mean_rmse,
@@ -161,11 +169,12 @@ def compare(reference: IntegralImage, test: IntegralImage, progress: ProgressCal
         pixels,
         find_silhouettes(reference),
         view_similarity(reference, test, progress),
+        view_flicker(reference, test),
         paper_figures(reference, test),
     )
 
 
-def check_comparable(reference: IntegralImage, test: IntegralImage) -> None:
+def check_comparable(reference: IntegralImage | LargePicture, test: IntegralImage | LargePicture) -> None:
     """Raise :class:`PictureError` if two pictures have different sizes or displays; a display's name does not count."""
     a, b = (picture.display.panel for picture in (reference, test))
     if (a.width, a.height) != (b.width, b.height):
@@ -196,7 +205,7 @@ def _difference(a: Display, b: Display) -> str:
     return f"{key} is {one} in one and {other} in the other"
 
 
-def _notes(reference: IntegralImage, test: IntegralImage) -> Iterator[str]:
+def _notes(reference: IntegralImage | LargePicture, test: IntegralImage | LargePicture) -> Iterator[str]:
     first, second = reference.provenance, test.provenance
     if first.transfer != second.transfer:
         yield f"the codes of the pictures are compared, though one is {first.transfer} and the other {second.transfer}"

@@ -16,7 +16,9 @@ from numpy.typing import ArrayLike, NDArray
 from lippmann.display import Display
 from lippmann.image import IntegralImage
 from lippmann.image.color import encode_srgb
+from lippmann.image.large import LargePicture
 from lippmann.image.permutation import lens_indices, row_blocks
+from lippmann.image.provenance import Transfer
 
 Real = NDArray[np.float64]
 
@@ -29,11 +31,16 @@ def psnr(mean_squared_error: float, peak: float = 1.0) -> float:
     return math.inf if mean_squared_error == 0 else 10 * math.log10(peak * peak / mean_squared_error)
 
 
-def coded(image: IntegralImage, rows: tuple[int, int] | None = None) -> Real:
+def coded(image: IntegralImage | LargePicture, rows: tuple[int, int] | None = None) -> Real:
     """Coded values in [0, 1] of the rows ``first`` to before ``last`` (all if None), ``(rows, W, 3)`` float64."""
-    first, last = rows or (0, image.pixels.shape[0])
-    linear = image.pixels[first:last].astype(np.float64)
-    values = encode_srgb(linear) if image.provenance.transfer == "srgb" else np.clip(linear, 0, 1)
+    first, last = rows or (0, image.display.panel.height)
+    return coded_values(image.rows(first, last), image.provenance.transfer)
+
+
+def coded_values(linear: NDArray[np.float32], transfer: Transfer) -> Real:
+    """Coded values in [0, 1] of linear ones, float64; same shape."""
+    doubles = linear.astype(np.float64)
+    values = encode_srgb(doubles) if transfer == "srgb" else np.clip(doubles, 0, 1)
     return np.asarray(values, dtype=np.float64)
 
 

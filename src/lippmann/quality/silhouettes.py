@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,11 +61,32 @@ def find_silhouettes(image: IntegralImage) -> Silhouettes:
         limit = DEPTH_JUMP * image.display.lens_array.pitch
         marks = _between_neighbours(permutation, depth.astype(np.float64), lambda a, b: _is_apart(a, b, limit))
         return Silhouettes(marks, "depth")
-    colors = coded(image)
-    return Silhouettes(_between_neighbours(permutation, colors, _is_edge), "edges")
+    return Silhouettes(edges_between_neighbours(permutation, coded(image)), "edges")
 
 
-def _between_neighbours(permutation: Permutation, values: Real, differ: Callable[[Real, Real], Flags]) -> Flags:
+class Cutting(Protocol):
+    """What cuts ``(H, W, ...)`` values into micro-images ``(lens_rows, lens_cols, ny, nx, ...)`` and joins them."""
+
+    @property
+    def mask(self) -> Flags:
+        """Which places of the micro-images hold a pixel."""
+        ...
+
+    def split(self, values: NDArray[Any]) -> NDArray[Any]:
+        """The micro-images."""
+        ...
+
+    def join(self, micro_images: NDArray[Any]) -> NDArray[Any]:
+        """The values again."""
+        ...
+
+
+def edges_between_neighbours(cutting: Cutting, colors: Real) -> Flags:
+    """``(H, W)``: which pixels of coded ``(H, W, 3)`` differ strongly from a neighbour."""
+    return _between_neighbours(cutting, colors, _is_edge)
+
+
+def _between_neighbours(permutation: Cutting, values: Real, differ: Callable[[Real, Real], Flags]) -> Flags:
     """``(H, W)``: which pixels differ from a neighbour, along all four axes of the micro-images."""
     split, present = permutation.split(values), permutation.mask
     marks = np.zeros(present.shape, dtype=np.bool_)

@@ -51,19 +51,19 @@ def ssim(reference: ArrayLike, test: ArrayLike, mask: NDArray[np.bool_] | None =
     a, b = (np.atleast_3d(np.asarray(picture)) for picture in (reference, test))
     present = None if mask is None or mask.all() else mask
     height, width = a.shape[:2]
-    windows = _window(height), _window(width)
+    windows = window_weights(height), window_weights(width)
     # Rows are taken a few at a time, so that what is computed of them stays in the processor's cache.
     step = max(3 * WINDOW, _BLOCK // a[0].size)
     total, count = 0.0, 0
     for first in range(0, height - len(windows[0]) + 1, step):
         rows = slice(first, first + step + len(windows[0]) - 1)
-        values = _similarities(a[rows], b[rows], None if present is None else present[rows], windows)
+        values = similarities(a[rows], b[rows], None if present is None else present[rows], windows)
         total, count = total + float(values.sum()), count + values.size
     return total / count if count else float("nan")
 
 
-def _similarities(a: Real, b: Real, mask: NDArray[np.bool_] | None, windows: tuple[Real, Real]) -> Real:
-    """SSIM of every window, in any order; with a mask of those that are centred on a pixel that exists."""
+def similarities(a: Real, b: Real, mask: NDArray[np.bool_] | None, windows: tuple[Real, Real]) -> Real:
+    """SSIM of every window of ``(H, W, channels)``; with a mask of those that are centred on a pixel that exists."""
     a, b = a.astype(np.float64), b.astype(np.float64)
     weights: Real | float = 1.0
     if mask is not None:
@@ -123,7 +123,7 @@ def view_similarity(
     return ViewSimilarity(values, reference.views_are_exact)
 
 
-def _window(length: int) -> Real:
+def window_weights(length: int) -> Real:
     """Gaussian weights that sum to one, as many as fit ``length`` pixels."""
     size = min(WINDOW, length - 1 + length % 2)
     places = np.arange(size) - size // 2

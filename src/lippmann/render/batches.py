@@ -9,7 +9,7 @@ What the batches tell is worked out in :mod:`lippmann.render.batch_error`.
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -28,6 +28,7 @@ from lippmann.render.integrators.base import Integrator
 from lippmann.render.plan import BYTES_PER_LANE, BYTES_PER_PIXEL, PREFERRED_LANES, SMALLEST_LANES
 from lippmann.render.rays import RaySource
 from lippmann.render.sampling import SampleStream
+from lippmann.store.grid import Window
 
 Floats = NDArray[np.float32]
 
@@ -35,6 +36,11 @@ Floats = NDArray[np.float32]
 STREAMS = 2
 #: Batches where the memory allows: their number limits how well rare bright light is told from steady noise.
 MOST_BATCHES = 8
+#: Samples of a first look at how long they take, spread over the picture; enough are those that take as long as this in
+#: seconds, a launch's own time left out.
+_PROBE_SIZES, _PROBE_SECONDS = (1 << 14, 1 << 16, 1 << 18), 0.05
+#: Samples of a launch that takes hardly more than launches do; a single one would have a kernel of its own.
+_LAUNCH_SIZE = 64
 #: Seeds of the streams: the user's, each changed by another odd multiple of the golden ratio's 32 bits.
 SEED_STEP = 0x9E3779B9
 
@@ -43,7 +49,7 @@ SEED_STEP = 0x9E3779B9
 class _Run:
     """One wavefront: ``count`` samples in each of ``batches`` for the pixels ``first`` to ``last``.
 
-    ``starts``: the number of the first sample of each batch in its stream.
+    ``starts``: the number of the first sample of each batch in its stream. ``step``: from pixel to pixel.
     """
 
     first: int
@@ -51,6 +57,7 @@ class _Run:
     batches: tuple[int, ...]
     starts: tuple[int, ...]
     count: int
+    step: int = 1
 
 
 class FullInBatches:
@@ -68,9 +75,8 @@ class FullInBatches:
         How values become codes; errors are measured between codes.
     memory:
         Bytes that may be used, the picture's own included; the fewer, the fewer batches are kept apart.
-    rows:
-        The rows of the picture that are rendered, first and past the last; None for all. Rows rendered apart are the
-        same as in one piece.
+    window:
+        The part of the picture that is rendered; None for all of it. Parts rendered apart are the same as in one piece.
 
     Attributes
     ----------
@@ -92,7 +98,7 @@ class FullInBatches:
         box_filter: bool = True,
         transfer: Transfer = "srgb",
         memory: int,
-        rows: tuple[int, int] | None = None,
+        window: Window | None = None,
     ) -> None:
         self._integrator = integrator
         self._source = source
@@ -102,8 +108,8 @@ class FullInBatches:
         self.rays = RayTotals()
         self.seconds_compile = 0.0
         self.seconds_trace = 0.0
-        self._first_row, last_row = rows or (0, source.height)
-        self._shape = last_row - self._first_row, source.width
+        self._window = window or Window(0, 0, source.height, source.width)
+        self._shape = self._window.shape
         pixels = self._shape[0] * self._shape[1]
         batches, self._lanes = _sizes(pixels, source.channels, memory)
         self._sums = np.zeros((batches, pixels, 3), dtype=np.float32)
@@ -111,7 +117,7 @@ class FullInBatches:
 
     @property
     def shape(self) -> tuple[int, int]:
-        """Height and width of the rows that are rendered."""
+        """Height and width of what is rendered."""
         return self._shape
 
     @property
@@ -138,6 +144,38 @@ class FullInBatches:
         self._taken = taken
         self.seconds_compile += compiled
         self.seconds_trace += time.perf_counter() - started - compiled
+
+    def probe(self) -> float:
+        """Seconds that one sample of every pixel takes, by a few samples that are not kept."""
+        rays, self.rays = self.rays, RayTotals()
+        started = time.perf_counter()
+        try:
+            with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
+                self._seconds_of(_LAUNCH_SIZE)
+                compiled = compile_seconds()
+            seconds = self._probed()
+        finally:
+            self.rays = rays
+        self.seconds_compile += compiled
+        self.seconds_trace += time.perf_counter() - started - compiled
+        return seconds
+
+    def _probed(self) -> float:
+        launch = min(self._seconds_of(_LAUNCH_SIZE) for _ in range(3))
+        most = min(self._sums.shape[1], max(1, self._lanes // self._source.channels))
+        for pixels in (min(size, most) for size in _PROBE_SIZES):
+            spent = self._seconds_of(pixels)
+            if spent >= launch + _PROBE_SECONDS:
+                break
+        # However it is measured, the launch takes its part of a small picture's time.
+        return max(spent - launch, 0.1 * spent) * self._sums.shape[1] / pixels
+
+    def _seconds_of(self, pixels: int) -> float:
+        """Of one sample of each of so many pixels, if the picture has them."""
+        pixels = min(pixels, self._sums.shape[1])
+        started = time.perf_counter()
+        self._trace(_Run(0, pixels, (0,), (0,), 1, self._sums.shape[1] // pixels))
+        return time.perf_counter() - started
 
     def picture(self) -> Floats:
         """``(H, W, 3)`` float32: the mean of all samples, linear; black where there are none."""
@@ -175,7 +213,9 @@ class FullInBatches:
         each, rest = divmod(samples, number)
         # Where the streams go on; their batches take one stretch after the other.
         had = [sum(self._taken[s * per_stream : (s + 1) * per_stream]) for s in range(STREAMS)]
-        for batches, count in ((tuple(range(number)), each), (tuple(sorted(_alternate(number)[:rest])), 1)):
+        # The rest goes to the batches that have the fewest, in turn of their streams.
+        fewest = sorted(_alternate(number), key=lambda batch: self._taken[batch])
+        for batches, count in ((tuple(range(number)), each), (tuple(sorted(fewest[:rest])), 1)):
             starts = []
             for batch in batches:
                 starts.append(had[batch // per_stream])
@@ -207,16 +247,19 @@ class FullInBatches:
         Lanes are ordered pixel, then channel, then batch, then sample. What differs from run to run is opaque to the
         compiler, so that all share a kernel.
         """
-        channels, width = self._source.channels, self._source.width
+        channels, window = self._source.channels, self._window
         number, per_stream = len(run.batches), len(self._sums) // STREAMS
         lanes = (run.last - run.first) * channels * number * run.count
         rest, sample = divide(dr.arange(mi.UInt32, lanes), dr.opaque(mi.UInt32, run.count))
         rest, place = divide(rest, dr.opaque(mi.UInt32, number))
         pixel, channel = divide(rest, channels)
-        pixel += dr.opaque(mi.UInt32, self._first_row * width + run.first)
-        row, column = divide(pixel, width)
-        sample += dr.gather(mi.UInt32, mi.UInt32(list(run.starts)), place)
-        stream_of = dr.gather(mi.UInt32, mi.UInt32([batch // per_stream for batch in run.batches]), place)
+        pixel = dr.opaque(mi.UInt32, run.first) + pixel * dr.opaque(mi.UInt32, run.step)
+        row, column = divide(pixel, window.columns)
+        row += dr.opaque(mi.UInt32, window.row)
+        column += dr.opaque(mi.UInt32, window.column)
+        pixel = row * self._source.width + column
+        sample += dr.gather(mi.UInt32, _table(run.starts), place)
+        stream_of = dr.gather(mi.UInt32, _table([batch // per_stream for batch in run.batches]), place)
         seed = dr.opaque(mi.UInt32, self._seed) + stream_of * SEED_STEP
 
         stream = SampleStream.of_pixels(pixel * channels + channel, sample, seed)
@@ -255,7 +298,7 @@ def trace_in_batches(
     frame = Frame(whole)
     left = memory - height * width * (BYTES_PER_PIXEL + 8)
     # Half of what is left for the batches, half for the wavefronts.
-    most = max(1, left // 2 // (width * _bytes_per_pixel(MOST_BATCHES)))
+    most = max(1, left // 2 // (width * bytes_per_pixel(MOST_BATCHES)))
     bands = -(-height // most)
     rows = -(-height // bands)
     for first in range(0, height, rows):
@@ -267,7 +310,7 @@ def trace_in_batches(
             box_filter=box_filter,
             transfer=transfer,
             memory=left,
-            rows=(first, last),
+            window=Window(first, 0, last - first, width),
         )
         band.add(samples, _of_band(progress, first / height, (last - first) / height, samples * height * width))
         whole[first:last] = band.picture()
@@ -295,7 +338,7 @@ def _alternate(number: int) -> tuple[int, ...]:
 def _sizes(pixels: int, channels: int, memory: int) -> tuple[int, int]:
     """How many batches are kept, and the lanes of a wavefront."""
     for batches in (MOST_BATCHES, MOST_BATCHES // 2, STREAMS):
-        kept = pixels * _bytes_per_pixel(batches)
+        kept = pixels * bytes_per_pixel(batches)
         lanes = min(PREFERRED_LANES, (memory - kept) // BYTES_PER_LANE)
         if lanes >= min(SMALLEST_LANES, pixels * channels * batches):
             return batches, lanes
@@ -308,9 +351,14 @@ def _sizes(pixels: int, channels: int, memory: int) -> tuple[int, int]:
     )
 
 
-def _bytes_per_pixel(batches: int) -> int:
+def bytes_per_pixel(batches: int) -> int:
     """Per batch the sums (float32 RGB); beside them the picture and its error."""
     return batches * 12 + BYTES_PER_PIXEL + 12
+
+
+def _table(numbers: Sequence[int]) -> Any:
+    """``numbers`` on the device, and one more: a single number would become a constant of the kernel."""
+    return mi.UInt32([*numbers, 0])
 
 
 def _sums(radiance: Any, channels: int, batches: int, count: int) -> Floats:

@@ -26,9 +26,16 @@ Denoise = Callable[[Floats], Floats]
 class Halved(Protocol):
     """A renderer whose samples come from two streams that know nothing of each other."""
 
+    @property
+    def samples(self) -> int: ...
+
     def add(self, samples: int, progress: ProgressCallback = silent) -> None: ...
 
+    def picture(self) -> Floats: ...
+
     def halves(self) -> tuple[Floats, Floats]: ...
+
+    def squared_error(self) -> PixelErrors: ...
 
 
 class Denoised:
@@ -49,14 +56,17 @@ class Denoised:
         self._denoise = denoise
         self._transfer: Transfer = transfer
         self._cleaned: tuple[Floats, Floats] | None = None
+        self._cleaned_samples = 0
 
     def add(self, samples: int, progress: ProgressCallback = silent) -> None:
         """Take ``samples`` more of every pixel."""
-        self._cleaned = None
         self._renderer.add(samples, progress)
 
     def picture(self) -> Floats:
         """``(H, W, 3)`` float32 linear RGB."""
+        if self._renderer.samples < 2:
+            # There are no halves, and nothing is known of the error.
+            return self._denoise(self._renderer.picture())
         first, second = self._clean_halves()
         mean: Floats = np.float32(0.5) * (first + second)
         return mean
@@ -68,10 +78,12 @@ class Denoised:
         error += np.square(clean[1] - noisy[0])
         error -= np.square(noisy[0] - noisy[1])
         error *= np.float32(0.5) * np.square(coding_slope(self.picture(), self._transfer))
-        return PixelErrors(error.mean(axis=2), None, CROSS_NOISE)
+        return PixelErrors(error.mean(axis=2), None, CROSS_NOISE, self._renderer.squared_error())
 
     def _clean_halves(self) -> tuple[Floats, Floats]:
-        if self._cleaned is None:
+        # The samples may have come by another way than through :meth:`add`.
+        if self._cleaned is None or self._cleaned_samples != self._renderer.samples:
+            self._cleaned_samples = self._renderer.samples
             first, second = (self._denoise(half) for half in self._renderer.halves())
             self._cleaned = first, second
         return self._cleaned

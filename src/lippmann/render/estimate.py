@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 
 from lippmann.display import Display
 from lippmann.image.permutation import lens_indices, row_blocks
+from lippmann.render.outline import PixelWindow
 from lippmann.render.settings import RenderSettings
 
 Real = NDArray[np.float64]
@@ -69,11 +70,14 @@ class PixelErrors:
         such thing.
     noise:
         How uncertain ``values`` are.
+    samples:
+        Of a denoised picture: the errors of the samples that it was made of.
     """
 
     values: Floats
     lone: Floats | None = None
     noise: NoiseShares = CROSS_NOISE
+    samples: PixelErrors | None = None
 
 
 def why_no_estimate(settings: RenderSettings) -> str | None:
@@ -118,11 +122,15 @@ class Estimate:
         values = {field.name: plain[field.name] for field in fields(cls)}
         return cls(**values | {"worst_lens": tuple(values["worst_lens"])})
 
-    def __str__(self) -> str:
+    def in_words(self, part: str = "micro-image") -> str:
+        """One line for people; ``part`` is what a part of the picture that is judged by itself is called."""
         return (
             f"{self.psnr:.1f} dB ({self.psnr_low:.1f} to {self.psnr_high:.1f}), "
-            f"worst micro-image {self.worst:.1f} dB ({self.worst_low:.1f} to {self.worst_high:.1f})"
+            f"worst {part} {self.worst:.1f} dB ({self.worst_low:.1f} to {self.worst_high:.1f})"
         )
+
+    def __str__(self) -> str:
+        return self.in_words()
 
 
 #: PSNR in dB beyond which nothing is told apart: a tenth of the step of 16-bit codes.
@@ -134,78 +142,131 @@ LONE_DOUBT = 0.8
 #: The share of a lone hit's estimate that is no estimate but the error itself.
 LONE_CERTAIN = 0.7
 #: Micro-images that may be the worst are drawn this many times.
-_DRAWS = 2000
+DRAWS = 2000
 #: Of very many micro-images only so many can be the worst.
 _CANDIDATES = 1024
 #: Pixels' worth of belief that a lens is as noisy as its neighbours.
-_LEAN = 64.0
-_NORMAL_95 = 1.96
+LEAN = 64.0
+NORMAL_95 = 1.96
 #: Of the draws of the worst error: lenses that are worse pull their neighbours, so the better side goes farther.
-_LOW_QUANTILE = 0.01
+LOW_QUANTILE = 0.01
 _FLOOR = 10 ** (-CEILING / 10)
 
 
-class PictureEstimator:
-    """Estimates for pictures of one display; which lens a pixel belongs to is found once."""
+@dataclass(frozen=True, eq=False)
+class Parts:
+    """What a picture is judged by, part by part: its micro-images, or the views of a quilt.
 
-    def __init__(self, display: Display) -> None:
+    ``owner`` ``(H, W)`` holds the flat index of every pixel's part in a grid of ``rows`` x ``columns`` of them, in
+    which neighbours are alike. Every part has ``known`` more pixels (a number for all, or one each), that are not here
+    and hold no error.
+    """
+
+    owner: NDArray[Any]
+    rows: int
+    columns: int
+    known: int | NDArray[np.intp] = 0
+
+    @classmethod
+    def micro_images(cls, display: Display, window: PixelWindow | None = None) -> Parts:
+        """The micro-images of a display, of which only the pixels in ``window`` may hold an error."""
         grid = display.lens_grid
-        self._rows, self._columns = grid.rows, grid.columns
-        self._owner = lens_indices(display).ravel()
-        self._pixels = np.bincount(self._owner, minlength=grid.rows * grid.columns)
+        owner = lens_indices(display)
+        if window is None:
+            return cls(owner, grid.rows, grid.columns)
+        left, top, width, height = window
+        inside = owner[top : top + height, left : left + width]
+        whole, part = (np.bincount(each.ravel(), minlength=grid.rows * grid.columns) for each in (owner, inside))
+        return cls(inside, grid.rows, grid.columns, whole - part)
+
+    @classmethod
+    def views(cls, columns: int, rows: int, size: tuple[int, int], known: int = 0) -> Parts:
+        """The views of a quilt, which lie in a row from the leftmost camera to the rightmost; ``size`` in pixels."""
+        numbers = np.arange(columns * rows, dtype=np.int32).reshape(rows, columns)[::-1]
+        width, height = size
+        return cls(np.repeat(np.repeat(numbers, height, axis=0), width, axis=1), 1, columns * rows, known)
+
+
+class PictureEstimator:
+    """Estimates for pictures of one display, or of whatever has these parts; whose a pixel is is found once."""
+
+    def __init__(self, of: Display | Parts) -> None:
+        parts = Parts.micro_images(of) if isinstance(of, Display) else of
+        self._rows, self._columns = parts.rows, parts.columns
+        self._owner = parts.owner.ravel()
+        self._pixels = np.bincount(self._owner, minlength=parts.rows * parts.columns) + parts.known
 
     def estimate(self, errors: PixelErrors) -> Estimate:
         """PSNR of the whole and of the worst micro-image."""
-        sums = self._sums(errors)
-        psnr = _whole(sums, errors.noise)
-        lenses = self._lenses(sums, errors.noise)
-        draws = lenses.draws()
-        worst = _psnr(np.quantile(draws.max(axis=0), (0.5, 0.975, _LOW_QUANTILE)))
-        model = 10 * math.log10(1 + MODEL_UNCERTAINTY)
-        row, column = divmod(int(lenses.index[np.argmax(lenses.expected)]), self._columns)
-        return Estimate(
-            *psnr,
-            worst=float(worst[0]),
-            worst_low=float(worst[1]) - model,
-            worst_high=float(worst[2]) + model,
-            worst_lens=(column, row),
-        )
+        return estimate_of_sums(self._sums(errors), (self._rows, self._columns), errors.noise)
 
-    def _sums(self, errors: PixelErrors) -> _Sums:
+    def _sums(self, errors: PixelErrors) -> ErrorSums:
         lenses = len(self._pixels)
-        sums = _Sums(self._pixels.astype(np.float64), *np.zeros((3, lenses)))
+        sums = ErrorSums(self._pixels.astype(np.float64), *np.zeros((3, lenses)))
         height, width = errors.values.shape
         # Block by block: double precision of a whole panel would take gigabytes.
         for first, last in row_blocks(height, width):
             owner = self._owner[first * width : last * width]
-            values = errors.values[first:last].astype(np.float64).ravel()
-            if errors.lone is not None:
-                lone = errors.lone[first:last].astype(np.float64).ravel()
-                sums.lone[:] += np.bincount(owner, weights=lone, minlength=lenses)
-            sums.values[:] += np.bincount(owner, weights=values, minlength=lenses)
-            # A lone hit shows in the picture as it does in the estimate.
-            uncertain = values if errors.lone is None else values - LONE_CERTAIN * lone
-            sums.squares[:] += np.bincount(owner, weights=np.square(uncertain), minlength=lenses)
+            lone = None if errors.lone is None else errors.lone[first:last]
+            sums.add(owner, errors.values[first:last], lone)
         return sums
-
-    def _lenses(self, sums: _Sums, noise: NoiseShares) -> _Lenses:
-        index = np.flatnonzero(sums.pixels)
-        of_lenses = _Sums(*(getattr(sums, field.name)[index] for field in fields(_Sums)))
-        return _shrunk(of_lenses, index, (self._rows, self._columns), noise)
 
 
 @dataclass(frozen=True, eq=False)
-class _Sums:
-    """Sums over the pixels of each lens: their number, estimates, squares of what is uncertain of them, lone parts."""
+class ErrorSums:
+    """Sums over the pixels of each part, ``(parts,)`` each: their number, their estimates, the squares of what is
+    uncertain of those, their lone parts."""
 
     pixels: Real
     values: Real
     squares: Real
     lone: Real
 
+    def add(self, owner: NDArray[Any], values: Floats, lone: Floats | None) -> None:
+        """Add the estimates of some pixels, any shape, to the parts that ``owner`` names; not to their number."""
+        parts = len(self.pixels)
+        owner = owner.ravel()
+        doubles = values.astype(np.float64).ravel()
+        # A lone hit shows in the picture as it does in the estimate.
+        uncertain = doubles
+        if lone is not None:
+            lone_doubles = lone.astype(np.float64).ravel()
+            self.lone[:] += np.bincount(owner, weights=lone_doubles, minlength=parts)
+            uncertain = doubles - LONE_CERTAIN * lone_doubles
+        self.values[:] += np.bincount(owner, weights=doubles, minlength=parts)
+        self.squares[:] += np.bincount(owner, weights=np.square(uncertain), minlength=parts)
+
+
+def estimate_of_sums(sums: ErrorSums, grid: tuple[int, int], noise: NoiseShares) -> Estimate:
+    """PSNR of the whole and of the worst of the parts, which lie in a ``grid`` of rows and columns."""
+    psnr = _whole(sums, noise)
+    lenses = _lenses(sums, grid, noise)
+    draws = lenses.draws()
+    worst = psnr_of(np.quantile(draws.max(axis=0), (0.5, 0.975, LOW_QUANTILE)))
+    model = 10 * math.log10(1 + MODEL_UNCERTAINTY)
+    row, column = divmod(int(lenses.index[np.argmax(lenses.expected)]), grid[1])
+    return Estimate(
+        *psnr,
+        worst=float(worst[0]),
+        worst_low=float(worst[1]) - model,
+        worst_high=float(worst[2]) + model,
+        worst_lens=(column, row),
+    )
+
+
+def _lenses(sums: ErrorSums, grid: tuple[int, int], noise: NoiseShares) -> PartErrors:
+    index, known = parts_with_pixels(sums)
+    return errors_of_parts(known, index, grid, noise)
+
+
+def parts_with_pixels(sums: ErrorSums) -> tuple[NDArray[np.intp], ErrorSums]:
+    """The flat indices of the parts that have pixels, and their sums."""
+    index = np.flatnonzero(sums.pixels)
+    return index, ErrorSums(*(getattr(sums, field.name)[index] for field in fields(ErrorSums)))
+
 
 @dataclass(frozen=True, eq=False)
-class _Lenses:
+class PartErrors:
     """Micro-images with pixels: their flat ``index``, the ``expected`` squared error, that ``doubted``, log variances.
 
     ``variance`` is that of the logarithm of the expected error, ``fluctuation`` that of the true about the expected.
@@ -222,23 +283,23 @@ class _Lenses:
         reach = np.log(self.doubted) + 2.5 * np.sqrt(self.variance + self.fluctuation)
         best = np.argsort(-reach)[:_CANDIDATES]
         random = np.random.default_rng(1)
-        shape = (len(best), _DRAWS)
+        shape = (len(best), DRAWS)
         spread = np.sqrt(self.variance[best] + self.fluctuation[best])[:, None]
         # The logarithm of a lognormal's mean lies above its median's by half the variance.
         middle = np.log(self.expected)[best][:, None] - 0.5 * np.square(spread)
         doubt = (np.log(self.doubted) - np.log(self.expected))[best][:, None]
-        drawn: Real = np.exp(middle + spread * random.standard_normal(shape) + doubt * np.square(random.random(_DRAWS)))
+        drawn: Real = np.exp(middle + spread * random.standard_normal(shape) + doubt * np.square(random.random(DRAWS)))
         return drawn
 
 
-def _shrunk(sums: _Sums, index: NDArray[np.intp], grid: tuple[int, int], noise: NoiseShares) -> _Lenses:
+def errors_of_parts(sums: ErrorSums, index: NDArray[np.intp], grid: tuple[int, int], noise: NoiseShares) -> PartErrors:
     """Micro-images whose noisy means are drawn towards their neighbours', and those towards the mean of all."""
     count = sums.pixels
     mean, lone = sums.values / count, sums.lone / count
-    average = max(_FLOOR, float(sums.values.sum() / count.sum()))
+    average = likely_mean(sums, noise)
     # The mean square of one lens is noisy itself, so it leans on that of its neighbours.
     nearby, neighbours = _neighbourhood(np.stack([mean, sums.squares / count]), index, grid)
-    square = (sums.squares + _LEAN * nearby[1]) / (count + _LEAN)
+    square = (sums.squares + LEAN * nearby[1]) / (count + LEAN)
     of_estimate, of_picture = noise.estimate * square / count, noise.picture * square / count
 
     of_nearby = of_estimate / np.maximum(neighbours, 1)
@@ -257,7 +318,7 @@ def _shrunk(sums: _Sums, index: NDArray[np.intp], grid: tuple[int, int], noise: 
     expected = np.maximum(around + trust * (mean - around), 1e-3 * average)
     doubted = expected + LONE_DOUBT * np.clip(lone, 0, expected)
     variance, fluctuation = (np.log1p(v / np.square(expected)) for v in (trust * of_estimate, of_picture))
-    return _Lenses(index, expected, doubted, variance, fluctuation)
+    return PartErrors(index, expected, doubted, variance, fluctuation)
 
 
 def _spread(values: Real, about: Real, noise: Real, default: float) -> float:
@@ -287,18 +348,34 @@ def _neighbourhood(values: Real, index: NDArray[np.intp], grid: tuple[int, int])
     return np.where(number > 0, of_lenses[:-1] / np.maximum(number, 1), values), number
 
 
-def _whole(sums: _Sums, noise: NoiseShares) -> tuple[float, float, float]:
+def likely_mean(sums: ErrorSums, noise: NoiseShares) -> float:
+    """Mean squared error of all pixels, as likely as any that is not negative: the mean of a normal law cut at 0.
+
+    That differs from the plain mean only where it is hardly larger than its own deviation, or below zero.
+    """
+    pixels = float(sums.pixels.sum())
+    mean = float(sums.values.sum()) / pixels
+    deviation = max(math.sqrt(noise.estimate * float(sums.squares.sum())) / pixels, 1e-30)
+    z = mean / deviation
+    if z > -20:
+        above = 0.5 * math.erfc(-z / math.sqrt(2))
+        mean += deviation * math.exp(-0.5 * z * z) / (math.sqrt(2 * math.pi) * above)
+    else:  # far below zero the law's tail falls like an exponential
+        mean = deviation / -z
+    return max(mean, _FLOOR)
+
+
+def _whole(sums: ErrorSums, noise: NoiseShares) -> tuple[float, float, float]:
     """PSNR of all pixels and the ends of its interval."""
-    pixels, total = float(sums.pixels.sum()), float(sums.values.sum())
-    mean = max(total / pixels, _FLOOR)
+    pixels, mean = float(sums.pixels.sum()), likely_mean(sums, noise)
     deviation = math.sqrt((noise.estimate + noise.picture) * float(sums.squares.sum()))
     relative = deviation / (mean * pixels)
-    spread = _NORMAL_95 * math.sqrt(math.log1p(relative**2) + MODEL_UNCERTAINTY**2)
+    spread = NORMAL_95 * math.sqrt(math.log1p(relative**2) + MODEL_UNCERTAINTY**2)
     doubt = 1 + LONE_DOUBT * min(1.0, float(sums.lone.sum()) / (mean * pixels))
     ends = mean * math.exp(spread) * doubt, mean * math.exp(-spread)
-    low, high = (float(end) for end in _psnr(np.array(ends)))
-    return float(_psnr(np.array(mean))), low, high
+    low, high = (float(end) for end in psnr_of(np.array(ends)))
+    return float(psnr_of(np.array(mean))), low, high
 
 
-def _psnr(squared_error: Real) -> Real:
+def psnr_of(squared_error: Real) -> Real:
     return np.asarray(-10 * np.log10(np.maximum(squared_error, _FLOOR)))

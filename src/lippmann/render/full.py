@@ -61,11 +61,16 @@ def trace_frame(
     *,
     seed: int = 0,
     box_filter: bool = True,
+    corner: tuple[int, int] = (0, 0),
     progress: ProgressCallback = silent,
 ) -> Frame:
-    """Trace all samples of ``plan`` and average them per pixel."""
+    """Trace all samples of ``plan`` and average them per pixel.
+
+    Where ``plan`` is of a part of the picture, ``corner`` is the row and column of that part's first pixel; its pixels
+    are then the same as those of the whole.
+    """
     frame = Frame(np.zeros((plan.height, plan.width, 3), dtype=np.float32))
-    tracer = _Tracer(integrator, source, plan, seed, box_filter)
+    tracer = _Tracer(integrator, source, plan, seed, box_filter, corner)
     started = time.perf_counter()
     done = 0
     for tile, run in plan:
@@ -89,17 +94,26 @@ class _Tracer:
     that all tiles run the same kernel.
     """
 
-    def __init__(self, integrator: Integrator, source: RaySource, plan: Plan, seed: int, box_filter: bool) -> None:
+    def __init__(
+        self,
+        integrator: Integrator,
+        source: RaySource,
+        plan: Plan,
+        seed: int,
+        box_filter: bool,
+        corner: tuple[int, int],
+    ) -> None:
         self._integrator = integrator
         self._source = source
         self._plan = plan
         self._seed = seed
         self._box_filter = box_filter
+        self._corner = corner
 
     def trace(self, tile: Tile, run: Pass, totals: RayTotals) -> NDArray[np.float32]:
         """Sums over the samples of one pass, ``(pixels of the tile, 3)``; ``totals`` grows by the rays it took."""
         plan = self._plan
-        ray, stream = rays_of_tile(self._source, plan, tile, run, self._seed, self._box_filter)
+        ray, stream = rays_of_tile(self._source, plan, tile, run, self._seed, self._box_filter, self._corner)
         radiance, counts = self._integrator.sample(ray, stream, mi.Bool(True))
         lanes = tile.rows * plan.width * plan.channels * run.count
         radiance = evaluated(radiance, counts, lanes, totals)
@@ -107,17 +121,27 @@ class _Tracer:
 
 
 def rays_of_tile(
-    source: RaySource, plan: Plan, tile: Tile, run: Pass, seed: int, box_filter: bool
+    source: RaySource,
+    plan: Plan,
+    tile: Tile,
+    run: Pass,
+    seed: int,
+    box_filter: bool,
+    corner: tuple[int, int] = (0, 0),
 ) -> tuple[Any, SampleStream]:
-    """The rays and sample streams of one wavefront, lanes ordered pixel, then channel, then sample."""
+    """The rays and sample streams of one wavefront, lanes ordered pixel, then channel, then sample.
+
+    ``corner``: row and column at which the part of the picture begins that ``plan`` is of.
+    """
     lanes = tile.rows * plan.width * plan.channels * run.count
     per_channel, sample = divide(dr.arange(mi.UInt32, lanes), dr.opaque(mi.UInt32, run.count))
     pixel, channel = divide(per_channel, plan.channels)
     row, column = divide(pixel, plan.width)
-    row += dr.opaque(mi.UInt32, tile.first_row)
+    row += dr.opaque(mi.UInt32, tile.first_row + corner[0])
+    column += dr.opaque(mi.UInt32, corner[1])
     sample += dr.opaque(mi.UInt32, run.first)
     # The stream of a sub-pixel is its own; a picture has fewer than 2^32 sub-pixels.
-    number = (row * plan.width + column) * plan.channels + channel
+    number = (row * source.width + column) * plan.channels + channel
     stream = SampleStream.of_pixels(number, sample, dr.opaque(mi.UInt32, seed))
     jitter = stream.next_2d(PIXEL_DIMENSION) if box_filter else mi.Point2f(0.5)
     return source.rays(column, row, channel, jitter), stream

@@ -16,14 +16,15 @@ from typing import Literal, Protocol
 from lippmann.errors import UsageError
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.render.estimate import Estimate, PictureEstimator, PixelErrors, why_no_estimate
+from lippmann.render.judging import Judge, Judgement, Track
 from lippmann.render.settings import RenderSettings
 
 End = Literal["quality", "time", "samples"]
 
 #: Samples of the first round: with fewer the estimate is too rough to be believed.
 FIRST_ROUND = 16
-#: The first round where time is short: the fewest that tell an error.
-FIRST_PROBE = 2
+#: The fewest samples that tell an error.
+FEWEST = 2
 #: Samples add up to multiples of this, so that all batches get the same.
 STEP = 8
 #: The most by which one round multiplies the samples of a pixel, and the least.
@@ -50,6 +51,8 @@ class Goal:
         Seconds.
     spp:
         Samples per pixel; at least two, fewer tell no error.
+    part:
+        What a part of the picture that is judged by itself is called.
 
     Raises
     ------
@@ -61,6 +64,7 @@ class Goal:
     quality_mean: float | None = None
     max_time: float | None = None
     spp: int | None = None
+    part: str = "micro-image"
 
     def __post_init__(self) -> None:
         for name, value in (("quality", self.quality), ("quality-mean", self.quality_mean)):
@@ -68,7 +72,7 @@ class Goal:
                 raise UsageError(f"{value:g} dB will not do", where=f"--{name}", rule="above 0 and at most 80 dB")
         if self.max_time is not None and not (self.max_time > 0 and math.isfinite(self.max_time)):
             raise UsageError(f"{self.max_time:g} s will not do", where="--max-time", rule="seconds above 0")
-        if self.spp is not None and self.spp < FIRST_PROBE:
+        if self.spp is not None and self.spp < FEWEST:
             raise UsageError(f"{self.spp} will not do", where="--spp", rule="two samples or more tell their error")
         if self.quality is self.quality_mean is self.max_time is self.spp is None:
             raise UsageError("nothing says when to stop", fix="give --quality, --quality-mean, --max-time or --spp")
@@ -91,12 +95,21 @@ class Goal:
             short += [self.quality_mean - estimate.psnr, self.quality_mean - TOLERANCE - estimate.psnr_low]
         return max(short)
 
+    def likely_missing(self, estimate: Estimate) -> float:
+        """How many dB the likely PSNR is short, whatever its interval: that gets narrower as samples grow."""
+        short = [-math.inf]
+        if self.quality is not None:
+            short.append(self.quality - estimate.worst)
+        if self.quality_mean is not None:
+            short.append(self.quality_mean - estimate.psnr)
+        return max(short)
+
     def describe(self, estimate: Estimate) -> str:
         """Where the picture stands, for a progress report."""
         parts = []
         if self.quality is not None or self.quality_mean is None:
             wanted = f" of {self.quality:g}" if self.quality is not None else ""
-            parts.append(f"worst micro-image {estimate.worst:.1f}{wanted} dB")
+            parts.append(f"worst {self.part} {estimate.worst:.1f}{wanted} dB")
         if self.quality_mean is not None:
             parts.append(f"{estimate.psnr:.1f} of {self.quality_mean:g} dB")
         return ", ".join(parts)
@@ -148,14 +161,15 @@ class Round:
 class Outcome:
     """How the rendering ended: ``quality`` reached, ``time`` up, or ``samples`` spent.
 
-    ``estimate`` is the last one, ``errors`` are those of the pixels that it stands on.
+    ``estimate`` is the last one, ``errors`` are those of the pixels that it stands on; both are None where the time was
+    up after a single sample, which tells no error.
     """
 
     end: End
-    estimate: Estimate
+    estimate: Estimate | None
     samples: int
     rounds: tuple[Round, ...]
-    errors: PixelErrors
+    errors: PixelErrors | None
 
 
 def reach(
@@ -164,40 +178,73 @@ def reach(
     estimator: PictureEstimator,
     progress: ProgressCallback = silent,
     clock: Callable[[], float] = time.perf_counter,
+    probe: Callable[[], float] | None = None,
 ) -> Outcome:
-    """Give ``renderer`` rounds of samples until ``goal`` is reached; ``estimator`` is that of its display."""
-    return _Climb(goal, renderer, estimator, progress, clock).run()
+    """Give ``renderer`` rounds of samples until ``goal`` is reached; ``estimator`` is that of its display.
+
+    ``probe`` measures the seconds of a sample per pixel by a few of them. It is asked where time is limited: without
+    it the first round has two samples, however long they take.
+    """
+    return reach_judged(goal, renderer.add, Track(renderer, estimator), progress, clock, probe)
+
+
+def reach_judged(
+    goal: Goal,
+    add: Callable[[int, ProgressCallback], None],
+    judge: Judge,
+    progress: ProgressCallback = silent,
+    clock: Callable[[], float] = time.perf_counter,
+    probe: Callable[[], float] | None = None,
+) -> Outcome:
+    """As :func:`reach`, with samples from ``add`` and ``judge`` to say how good the picture is."""
+    return _Climb(goal, add, judge, progress, clock, probe).run()
 
 
 @dataclass
 class _Climb:
-    """One rendering on its way; ``spent`` is in samples per pixel."""
+    """One rendering on its way; ``spent`` is in samples per pixel, ``rate`` what of them a second brings."""
 
     goal: Goal
-    renderer: ProgressiveRenderer
-    estimator: PictureEstimator
+    add: Callable[[int, ProgressCallback], None]
+    judge: Judge
     progress: ProgressCallback
     clock: Callable[[], float]
+    probe: Callable[[], float] | None
     rounds: list[Round] = field(default_factory=list)
     spent: int = 0
+    rate: float = 0.0
 
     def __post_init__(self) -> None:
         self._began = self.clock()
+        self._most = min(self.goal.spp or MOST_SAMPLES, MOST_SAMPLES)
+        self._slope = 1.0
 
     def run(self) -> Outcome:
         samples = self._first_round()
         while True:
-            self.renderer.add(samples, self._report(samples))
-            self.spent += samples
-            errors = self.renderer.squared_error()
-            estimate = self.estimator.estimate(errors)
-            self.rounds.append(Round(self.spent, self._seconds(), estimate))
-            end = self._end(estimate)
+            self._take(samples)
+            if self.spent < FEWEST and not self._time_for(FEWEST - self.spent):
+                return Outcome("time", None, self.spent, (), None)
+            if self.spent < FEWEST:
+                self._take(FEWEST - self.spent)
+            judged = self.judge.judge(self.spent, self._room())
+            self._slope = judged.slope
+            self.rounds.append(Round(self.spent, self._seconds(), judged.estimate))
+            end = self._end(judged.estimate)
             if end is None:
-                samples = self._next_round(estimate)
+                samples = self._next_round(judged.estimate)
                 end = "time" if samples < 1 else None
             if end is not None:
-                return Outcome(end, estimate, self.spent, tuple(self.rounds), errors)
+                return self._outcome(end, judged)
+
+    def _take(self, samples: int) -> None:
+        started = self.clock()
+        self.add(samples, self._report(samples))
+        self.spent += samples
+        self.rate = samples / max(self.clock() - started, 1e-6)
+
+    def _outcome(self, end: End, judged: Judgement) -> Outcome:
+        return Outcome(end, judged.estimate, self.spent, tuple(self.rounds), judged.errors)
 
     def _seconds(self) -> float:
         return self.clock() - self._began
@@ -207,46 +254,46 @@ class _Climb:
             return "quality"
         if self.goal.max_time is not None and self._seconds() >= self.goal.max_time:
             return "time"
-        return "samples" if self.spent >= min(self.goal.spp or MOST_SAMPLES, MOST_SAMPLES) else None
+        return "samples" if self.spent >= self._most else None
 
     def _first_round(self) -> int:
-        most = self.goal.spp or MOST_SAMPLES
-        if self.goal.max_time is not None:
-            return min(most, FIRST_PROBE)
-        return min(most, FIRST_ROUND) if self.goal.has_quality else most
+        if self.goal.max_time is None:
+            return min(self._most, FIRST_ROUND) if self.goal.has_quality else self._most
+        if self.probe is None:
+            return min(self._most, FEWEST)
+        self.rate = 1 / max(self.probe(), 1e-9)
+        # A picture has one sample of every pixel at least, whatever the time.
+        return min(self._most, FIRST_ROUND, max(1, self._affordable()))
 
     def _next_round(self, estimate: Estimate) -> int:
         """Samples of the next round; fewer than one if there is no time for any."""
         wanted = max(self.spent * self._growth(estimate), FIRST_ROUND)
         samples = max(STEP * round(wanted / STEP) - self.spent, STEP)
-        samples = min(samples, (self.goal.spp or MOST_SAMPLES) - self.spent)
-        if self.goal.max_time is not None:
-            left = self.goal.max_time - self._seconds()
-            samples = min(samples, math.floor(_TIME_SHARE * left * self._rate()))
-        return samples
+        samples = min(samples, self._most - self.spent)
+        return samples if self.goal.max_time is None else min(samples, self._affordable())
 
-    def _rate(self) -> float:
-        """Samples per pixel that a second brings, by the last round."""
-        last = self.rounds[-1]
-        samples, seconds = (self.rounds[-2].samples, self.rounds[-2].seconds) if len(self.rounds) > 1 else (0, 0.0)
-        return (last.samples - samples) / max(last.seconds - seconds, 1e-6)
+    def _affordable(self) -> int:
+        """Samples that there is time for, with what judging them takes."""
+        assert self.goal.max_time is not None
+        left = self.goal.max_time - self._seconds() - self.judge.seconds()
+        return math.floor(_TIME_SHARE * max(0.0, left) * self.rate)
+
+    def _time_for(self, samples: int) -> bool:
+        return self.goal.max_time is None or self._affordable() >= samples
+
+    def _room(self) -> float:
+        """By how much samples can still be multiplied."""
+        most = float(self._most)
+        if self.goal.max_time is not None:
+            most = min(most, self.spent + self._affordable())
+        return max(1.0, most / self.spent)
 
     def _growth(self, estimate: Estimate) -> float:
         """By how much samples must be multiplied, as far as one round may."""
         if not self.goal.has_quality:
             return MOST_GROWTH
-        needed = 10 ** (self.goal.missing(estimate) / (10 * self._slope()))
+        needed = 10 ** (self.goal.missing(estimate) / (10 * self._slope))
         return min(MOST_GROWTH, max(LEAST_GROWTH, needed))
-
-    def _slope(self) -> float:
-        """The power of the number of samples by which the error falls, by the rounds so far: 1 for plain noise."""
-        if len(self.rounds) < 2:
-            return 1.0
-        before, last = self.rounds[-2:]
-        gained = last.estimate.psnr - before.estimate.psnr
-        slope = gained / (10 * math.log10(last.samples / before.samples))
-        # Half belief in what two noisy estimates say; a renderer with bias may gain much less than noise would.
-        return min(1.2, max(0.3, 0.5 + 0.5 * slope))
 
     def _report(self, coming: int) -> ProgressCallback:
         """Reports of one round as reports of all the work, as far as it can be foreseen."""
@@ -255,9 +302,9 @@ class _Climb:
             estimate = self.rounds[-1].estimate
             note = self.goal.describe(estimate)
             if self.goal.has_quality:
-                total = max(total, self.spent * 10 ** (max(0.0, self.goal.missing(estimate)) / (10 * self._slope())))
-            total = min(total, float(self.goal.spp or MOST_SAMPLES))
-            left = (total - self.spent) / self._rate()
+                total = max(total, self.spent * 10 ** (max(0.0, self.goal.missing(estimate)) / (10 * self._slope)))
+            total = min(total, float(self._most))
+            left = (total - self.spent) / self.rate
             if self.goal.max_time is not None:
                 left = min(left, self.goal.max_time - self._seconds())
             note += f", about {max(0.0, left):.0f} s left"

@@ -1,17 +1,20 @@
-"""Open Image Denoise for one display's picture of one scene: guides are traced once, pictures cleaned as they come."""
+"""Open Image Denoise for one picture of one scene: guides are traced once, pictures cleaned as they come."""
 
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.progress import Progress, ProgressCallback, silent
+from lippmann.render.denoise import Effort, denoise
 from lippmann.render.denoise_views import best_form, denoise_views
-from lippmann.render.guides import MOST_SAMPLES, Guides, plan_guides, trace_guides
-from lippmann.render.rays import DisplayRays
+from lippmann.render.effort import GUIDE_SAMPLES, RUN_COST, denoising_cost
+from lippmann.render.guides import Guides, plan_guides, trace_guides
+from lippmann.render.rays import DisplayRays, QuiltRays, WindowRays
 
 if TYPE_CHECKING:
     from lippmann.render.classic.build import BuiltClassic
@@ -19,9 +22,14 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float32]
 
+#: What the seed of the guides is more than the picture's.
+GUIDE_SEED_STEP = 0x85EBCA6B
+#: Width and height of the picture by which the time of denoising is measured.
+_PROBE_SIDE = 128
+
 
 class GuidedDenoiser:
-    """Takes the noise out of pictures; called with ``(H, W, 3)`` linear pixels of the display of ``source``.
+    """Takes the noise out of pictures; called with ``(H, W, 3)`` linear pixels, one for each of ``source``.
 
     Parameters
     ----------
@@ -31,23 +39,28 @@ class GuidedDenoiser:
         Bytes that may be used.
     threads:
         Of the denoiser.
+    effort:
+        Asked before every picture.
 
     Attributes
     ----------
     seconds:
         Spent so far, guides included.
+    used:
+        The effort of the last picture.
     """
 
     def __init__(
         self,
         built: BuiltScene | BuiltClassic,
-        source: DisplayRays,
+        source: DisplayRays | WindowRays | QuiltRays,
         display_from_world: NDArray[np.float64],
         *,
         seed: int,
         box_filter: bool,
         memory: int,
         threads: int,
+        effort: Callable[[], Effort],
         progress: ProgressCallback = silent,
     ) -> None:
         self._built = built
@@ -57,30 +70,59 @@ class GuidedDenoiser:
         self._box_filter = box_filter
         self._memory = memory
         self._threads = threads
+        self._effort = effort
         self._progress = progress
         self._guides: Guides | None = None
+        self._guide_samples = 0
         self._form: Literal["raw", "views"] | None = None
         self.seconds = 0.0
+        self.used: Effort = "fast"
 
     def __call__(self, pixels: Floats) -> Floats:
         started = time.perf_counter()
         self._progress(Progress("denoise", 0, 1))
+        self.used = self._effort()
         guides = self.guides()
-        cleaned = denoise_views(pixels, self._source.display, guides, form=self.form(), threads=self._threads)
+        cleaned = self._cleaned(pixels, guides)
         self._progress(Progress("denoise", 1, 1))
         self.seconds += time.perf_counter() - started
         # The network overshoots below black beside bright edges.
         return np.maximum(cleaned, np.float32(0))
 
+    def probe(self) -> float:
+        """Seconds that a picture cleaned by halves takes, guides included, by a small one."""
+        small = np.zeros((_PROBE_SIDE, _PROBE_SIDE, 3), dtype=np.float32)
+        denoise(small, small, small, clean_guides=True, effort="fast", threads=self._threads)  # starts its threads
+        started = time.perf_counter()
+        denoise(small, small, small, clean_guides=True, effort="fast", threads=self._threads)
+        spent = (time.perf_counter() - started) / RUN_COST["fast"] * denoising_cost(self._effort())
+        return spent * self._source.width * self._source.height / _PROBE_SIDE**2
+
+    def _cleaned(self, pixels: Floats, guides: Guides) -> Floats:
+        source = self._source
+        if isinstance(source, DisplayRays):
+            return denoise_views(
+                pixels, source.display, guides, form=self.form(), effort=self.used, threads=self._threads
+            )
+        result = np.empty_like(pixels)
+        for tile in source.tiles():
+            guide = guides.albedo[tile], guides.normal[tile]
+            result[tile] = denoise(pixels[tile], *guide, clean_guides=True, effort=self.used, threads=self._threads)
+        return result
+
     def guides(self) -> Guides:
-        """Albedo and normal of what the pixels see."""
-        if self._guides is None:
+        """Albedo and normal of what the pixels see, of as many samples as the effort is worth."""
+        samples = GUIDE_SAMPLES[self.used]
+        if self._guides is None or samples > self._guide_samples:
+            self._guide_samples = samples
             self._guides = trace_guides(
                 self._built,
                 self._source,
-                plan_guides(self._source, MOST_SAMPLES, self._memory),
+                plan_guides(self._source, samples, self._memory),
                 self._display_from_world,
-                seed=self._seed,
+                # Samples of their own: with those of one half of the picture the guides would show its noise, and the
+                # denoised other half would agree with it.
+                seed=(self._seed + GUIDE_SEED_STEP) % 2**32,
                 box_filter=self._box_filter,
                 progress=self._progress,
             )
@@ -89,5 +131,9 @@ class GuidedDenoiser:
     def form(self) -> Literal["raw", "views"]:
         """In which order the pixels are shown to the network, see :mod:`lippmann.render.denoise_views`."""
         if self._form is None:
-            self._form = best_form(self._source.display, self.guides())
+            if isinstance(self._source, DisplayRays):
+                self._form = best_form(self._source.display, self.guides())
+            else:
+                # A quilt is made of views; a window of a panel is no whole number of them.
+                self._form = "views" if isinstance(self._source, QuiltRays) else "raw"
         return self._form

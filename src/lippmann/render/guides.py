@@ -63,9 +63,9 @@ def trace_guides(
 ) -> Guides:
     """Albedo and normal of the first surface that is neither mirror nor clear glass, as the pixel's samples see it.
 
-    ``plan`` comes from :func:`plan_guides`; ``seed`` and ``box_filter`` are those of the picture. The samples are the
-    picture's first ones, and where those fall is all the noise that the guides hold. A sub-pixel that has rays of its
-    own gets its own channel of the albedo from them; the normal is the mean of all three.
+    ``plan`` comes from :func:`plan_guides`; ``box_filter`` is that of the picture, ``seed`` should be another one:
+    where samples fall is all the noise that guides hold, and it would be the picture's own. A sub-pixel that has rays
+    of its own gets its own channel of the albedo from them; the normal is the mean of all three.
     """
     surfaces = surfaces_of(built)
     linear = np.asarray(display_from_world, dtype=np.float64)[:3, :3]
@@ -92,7 +92,7 @@ def _trace_tile(
 ) -> tuple[Any, Any]:
     """Sums over the samples of one pass, for every pixel and channel: colours and world-space normals."""
     lanes = tile.rows * plan.width * plan.channels * run.count
-    # Lanes and streams are those of the picture, so that the guides show the places that its samples hit.
+    # Lanes are those of a picture.
     ray, _ = rays_of_tile(source, plan, tile, run, seed, box_filter)
     albedo, normal = surfaces.guide(ray, mi.Bool(True))
     values = [mi.Float(part) + dr.zeros(mi.Float, lanes) for part in (*albedo, *normal)]

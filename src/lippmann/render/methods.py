@@ -13,23 +13,34 @@ from numpy.typing import NDArray
 from lippmann.image.provenance import Transfer
 from lippmann.progress import ProgressCallback, silent
 from lippmann.render.batches import FullInBatches, trace_in_batches
+from lippmann.render.contest import DENOISED_SLOPE, Contest
+from lippmann.render.denoise import Effort
 from lippmann.render.denoise_views import denoise_views
 from lippmann.render.denoised import Denoised
-from lippmann.render.estimate import ERROR_LAYER, Estimate, PictureEstimator, why_no_estimate
-from lippmann.render.full import Frame, trace_frame
-from lippmann.render.goal import Goal, Outcome, goal_of, reach
+from lippmann.render.denoised_estimate import DenoisedEstimator
+from lippmann.render.effort import effort_of
+from lippmann.render.estimate import ERROR_LAYER, Estimate, Parts, PictureEstimator, why_no_estimate
+from lippmann.render.full import Frame, RayTotals, trace_frame
+from lippmann.render.goal import Goal, Outcome, goal_of, reach_judged
 from lippmann.render.guided import GuidedDenoiser
 from lippmann.render.guides import Guides
+from lippmann.render.judging import Judge, Track
 from lippmann.render.plan import make_plan
-from lippmann.render.rays import DisplayRays
+from lippmann.render.rays import DisplayRays, QuiltRays, WindowRays
+from lippmann.render.reuse.points import STATUS_LAYER, TRACED
 from lippmann.render.reuse.renderer import trace_reused
-from lippmann.render.settings import REUSING, RenderSettings
+from lippmann.render.settings import REUSING, Denoiser, RenderSettings
 
 if TYPE_CHECKING:
     from lippmann.render.classic.build import BuiltClassic
     from lippmann.scene.build import BuiltScene
 
 Floats = NDArray[np.float32]
+
+#: The layer of a picture with the number of samples that each pixel had.
+SAMPLES_LAYER = "samples"
+#: That with the share of pooled light in each pixel, from 0 to 1.
+POOLED_LAYER = "pooled"
 
 
 @dataclass(frozen=True)
@@ -50,7 +61,7 @@ class Job:
 
     built: BuiltScene | BuiltClassic
     integrator: Any
-    source: DisplayRays
+    source: DisplayRays | WindowRays | QuiltRays
     settings: RenderSettings
     display_from_world: NDArray[np.float64]
     transfer: Transfer
@@ -87,7 +98,22 @@ class Traced:
 
 
 def trace(job: Job) -> Traced:
-    """The picture by the method of ``job.settings``."""
+    """The picture by the method of ``job.settings``, with the samples of each pixel among its maps."""
+    traced = _traced(job)
+    traced.frame.maps.setdefault(SAMPLES_LAYER, _samples_of_pixels(traced))
+    return traced
+
+
+def _samples_of_pixels(traced: Traced) -> NDArray[np.uint32]:
+    """``(H, W)``; pixels that were filled from others have had none."""
+    status = traced.frame.maps.get(STATUS_LAYER)
+    if status is None:
+        # One number for all takes no memory, however large the picture is.
+        return np.broadcast_to(np.uint32(traced.samples), traced.frame.pixels.shape[:2])
+    return np.where(status == TRACED, np.uint32(traced.samples), np.uint32(0))
+
+
+def _traced(job: Job) -> Traced:
     goal = goal_of(job.settings)
     why = why_no_estimate(job.settings)
     if job.settings.method in REUSING:
@@ -98,7 +124,8 @@ def trace(job: Job) -> Traced:
         return _cleaned(job, _plain(job, why))
     if goal is None and job.settings.denoise == "none":
         return _full(job)
-    return _full_until(job, goal or Goal(spp=job.settings.samples))
+    goal = goal or Goal(spp=job.settings.samples)
+    return _full_until(job, replace(goal, part="view") if isinstance(job.source, QuiltRays) else goal)
 
 
 def _plain(job: Job, why: str) -> Traced:
@@ -124,11 +151,11 @@ def _full(job: Job) -> Traced:
         progress=job.progress,
     )
     frame.maps[ERROR_LAYER] = np.maximum(errors.values, 0)
-    return Traced(frame, job.settings.samples, PictureEstimator(job.source.display).estimate(errors))
+    return Traced(frame, job.settings.samples, _estimator(job).estimate(errors))
 
 
 def _full_until(job: Job, goal: Goal) -> Traced:
-    """As many samples as the goal takes, the noise taken out of them where that is asked for."""
+    """As many samples as the goal takes, the noise taken out of them where that is asked for or proves better."""
     batches = FullInBatches(
         job.integrator,
         job.source,
@@ -137,19 +164,78 @@ def _full_until(job: Job, goal: Goal) -> Traced:
         transfer=job.transfer,
         memory=job.memory,
     )
-    denoiser = _denoiser(job)
-    renderer = batches if denoiser is None else Denoised(batches, denoiser, job.transfer)
-    outcome = reach(goal, renderer, PictureEstimator(job.source.display), job.progress)
-    frame = Frame(renderer.picture(), batches.rays, batches.seconds_compile, batches.seconds_trace)
-    frame.maps[ERROR_LAYER] = np.maximum(outcome.errors.values, 0)
+    estimator = _estimator(job)
+
+    def rays() -> float:
+        return _rays_per_pixel(job, batches.rays)
+
+    plain = _Way(batches, Track(batches, estimator))
+    denoised = None if job.settings.denoise == "none" else _denoised_way(job, goal, batches, rays)
+    if denoised is None:
+        judge: Judge = plain.track
+    elif job.settings.denoise == "auto":
+        judge = Contest(goal, plain.track, denoised.track, rays)
+    else:
+        judge = denoised.track
+    outcome = reach_judged(goal, batches.add, judge, job.progress, probe=batches.probe)
+    options: dict[str, Any] = {}
+    if isinstance(judge, Contest):
+        won = denoised if judge.leader == "denoised" else plain
+        options["auto"] = f"full {'with' if won is denoised else 'without'} --denoise oidn: {judge.why}"
+    else:
+        won = denoised or plain
+    assert won is not None
+    frame = Frame(won.renderer.picture(), batches.rays, batches.seconds_compile, batches.seconds_trace)
+    if outcome.errors is not None:
+        frame.maps[ERROR_LAYER] = np.maximum(outcome.errors.values, 0)
+    seconds = {} if denoised is None or denoised.denoiser is None else {"denoise": denoised.denoiser.seconds}
     return Traced(
-        frame, outcome.samples, outcome.estimate, _how_it_ended(goal, outcome), *_what_was_cleaned(job, denoiser)
+        frame,
+        outcome.samples,
+        outcome.estimate,
+        _how_it_ended(goal, outcome),
+        options | _how_cleaned(job, won.denoiser),
+        seconds,
     )
+
+
+@dataclass(frozen=True)
+class _Way:
+    """A picture that grows, who judges it, and what takes its noise out."""
+
+    renderer: FullInBatches | Denoised
+    track: Track
+    denoiser: GuidedDenoiser | None = None
+
+
+def _denoised_way(job: Job, goal: Goal, batches: FullInBatches, rays: Callable[[], float]) -> _Way:
+    denoiser = _denoiser(job, rays)
+    assert denoiser is not None
+    renderer = Denoised(batches, denoiser, job.transfer)
+    seconds = 0.0 if goal.max_time is None else denoiser.probe()
+    return _Way(renderer, Track(renderer, _estimator(job, DenoisedEstimator), DENOISED_SLOPE, seconds), denoiser)
+
+
+def _rays_per_pixel(job: Job, rays: RayTotals) -> float:
+    return (rays.primary + rays.shadow + rays.secondary) / (job.source.width * job.source.height)
+
+
+def _estimator(job: Job, kind: type[PictureEstimator] = PictureEstimator) -> PictureEstimator:
+    """Judges a display's picture by its micro-images, a quilt by its views."""
+    source = job.source
+    if isinstance(source, QuiltRays):
+        (_, _, width, height), (whole_width, whole_height) = source.window, source.view_size
+        known = whole_width * whole_height - width * height
+        return kind(Parts.views(source.columns, source.rows, (width, height), known))
+    if isinstance(source, WindowRays):
+        return kind(Parts.micro_images(source.display, source.window))
+    return kind(source.display)
 
 
 def _reused(job: Job) -> Traced:
     settings = job.settings
     assert settings.method in ("lens-view", "interpolated")
+    assert isinstance(job.source, DisplayRays)
     frame = trace_reused(
         job.integrator,
         job.source,
@@ -173,6 +259,7 @@ def _pooled(job: Job) -> Traced:
     from lippmann.render.pooled.renderer import Pooled
 
     settings, integrator = job.settings, job.integrator
+    assert isinstance(job.source, DisplayRays)
     denoiser = None if settings.denoise == "none" else _light_denoiser(job)
     pooled = Pooled(
         integrator.scene,
@@ -187,7 +274,7 @@ def _pooled(job: Job) -> Traced:
     started = time.perf_counter()
     pooled.add(settings.samples, job.progress)
     gathered = time.perf_counter()
-    frame = Frame(pooled.picture(), pooled.rays)
+    frame = Frame(pooled.picture(), pooled.rays, maps={POOLED_LAYER: pooled.pooled_share()})
     frame.seconds_trace = gathered - started
     frame.seconds_reuse = time.perf_counter() - gathered
     options = {} if denoiser is None else {"denoise": settings.denoise}
@@ -199,7 +286,11 @@ def _light_denoiser(job: Job) -> Callable[[Floats, Floats, Floats], Floats]:
     """Takes the noise out of pictures of light, guided by what pooled rendering has seen of the surfaces."""
 
     def clean(color: Floats, albedo: Floats, normal: Floats) -> Floats:
-        cleaned = denoise_views(color, job.source.display, Guides(albedo, normal), threads=job.threads)
+        assert isinstance(job.source, DisplayRays)
+        # Pooled light is smooth already: the high effort gains less than 0.2 dB over the fast one.
+        effort: Effort = "high" if job.settings.denoise == "oidn-high" else "fast"
+        guides = Guides(albedo, normal)
+        cleaned = denoise_views(color, job.source.display, guides, effort=effort, threads=job.threads)
         return np.maximum(cleaned, np.float32(0))
 
     return clean
@@ -207,16 +298,16 @@ def _light_denoiser(job: Job) -> Callable[[Floats, Floats, Floats], Floats]:
 
 def _cleaned(job: Job, traced: Traced) -> Traced:
     """What was traced without its noise, where that is asked for and nothing is known of the error anyway."""
-    denoiser = _denoiser(job)
+    denoiser = _denoiser(job, lambda: _rays_per_pixel(job, traced.frame.rays))
     if denoiser is None:
         return traced
     traced.frame.pixels = denoiser(traced.frame.pixels)
-    options, seconds = _what_was_cleaned(job, denoiser)
-    return replace(traced, options=options, seconds=seconds)
+    return replace(traced, options=_how_cleaned(job, denoiser), seconds={"denoise": denoiser.seconds})
 
 
-def _denoiser(job: Job) -> GuidedDenoiser | None:
-    if job.settings.denoise == "none":
+def _denoiser(job: Job, rays_per_pixel: Callable[[], float]) -> GuidedDenoiser | None:
+    asked: Denoiser = "oidn" if job.settings.denoise == "auto" else job.settings.denoise
+    if asked == "none":
         return None
     return GuidedDenoiser(
         job.built,
@@ -226,17 +317,20 @@ def _denoiser(job: Job) -> GuidedDenoiser | None:
         box_filter=job.box_filter,
         memory=job.memory,
         threads=job.threads,
+        effort=lambda: effort_of(asked, rays_per_pixel()),
         progress=job.progress,
     )
 
 
-def _what_was_cleaned(job: Job, denoiser: GuidedDenoiser | None) -> tuple[dict[str, Any], dict[str, float]]:
+def _how_cleaned(job: Job, denoiser: GuidedDenoiser | None) -> dict[str, Any]:
     if denoiser is None:
-        return {}, {}
-    return {"denoise": job.settings.denoise, "denoise_form": denoiser.form()}, {"denoise": denoiser.seconds}
+        return {}
+    return {"denoise": "oidn", "denoise_effort": denoiser.used, "denoise_form": denoiser.form()}
 
 
 def _how_it_ended(goal: Goal, outcome: Outcome) -> tuple[str, ...]:
+    if outcome.estimate is None:
+        return ("no estimate of the error: there was time for one sample per pixel only",)
     if outcome.end == "quality" or not goal.has_quality:
         return ()
     what = "the time is up" if outcome.end == "time" else "the samples are spent"

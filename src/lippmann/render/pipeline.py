@@ -18,13 +18,15 @@ from lippmann.errors import UsageError
 from lippmann.image import IntegralImage, Provenance
 from lippmann.image.provenance import Transfer
 from lippmann.progress import Progress, ProgressCallback, silent
+from lippmann.render.choice import decide
 from lippmann.render.denoise import load_denoiser
 from lippmann.render.estimate import Estimate
 from lippmann.render.goal import goal_of
+from lippmann.render.outline import PixelWindow, even_background, panel_window, scene_corners
 from lippmann.render.plan import make_plan
 from lippmann.render.settings import REUSING, RenderSettings
-from lippmann.scene.description import Camera
-from lippmann.scene.placement import PlacementOptions, place
+from lippmann.scene.description import Camera, Color
+from lippmann.scene.placement import Placement, PlacementOptions, place
 from lippmann.scene.scene import Scene
 
 if TYPE_CHECKING:
@@ -66,8 +68,9 @@ def render_integral_image(
     settings: RenderSettings,
     placement_options: PlacementOptions,
     progress: ProgressCallback = silent,
+    placed: Placement | None = None,
 ) -> IntegralImage:
-    """Render ``scene`` for ``display``.
+    """Render ``scene`` for ``display``, where ``placed`` says or, without it, where ``placement_options`` lead to.
 
     Raises
     ------
@@ -78,12 +81,14 @@ def render_integral_image(
     memory = settings.memory or default_memory()
     # What cannot be done is found before anything is loaded.
     make_plan(display.panel.width, display.panel.height, 1, channels=3 if settings.subpixels else 1, memory=memory)
+    choice = decide(settings)
+    settings = choice.settings
     goal_of(settings)
-    if settings.denoise == "oidn":
+    if settings.denoises:
         load_denoiser()
     engine = watch.stage("load", lambda: engines.start(settings.device, settings.threads))
     built = watch.stage("build", lambda: build_for(scene, settings))
-    placement = place(
+    placement = placed or place(
         scene.bounds,
         display,
         cameras=scene.cameras,
@@ -94,14 +99,15 @@ def render_integral_image(
 
     from lippmann.render.layers import plan_layers, trace_layers
     from lippmann.render.methods import Job, trace
-    from lippmann.render.rays import DisplayRays
+    from lippmann.render.rays import DisplayRays, WindowRays
 
     source = DisplayRays(display, placement.world_from_display, settings.subpixels)
     integrator = make_integrator(built, settings, placement.display_from_world)
+    window = traced_window(built, display, settings, placement)
     job = Job(
         built,
         integrator,
-        source,
+        source if window is None else WindowRays(source, window),
         settings,
         placement.display_from_world,
         transfer_of(settings),
@@ -111,13 +117,15 @@ def render_integral_image(
     )
     traced = trace(job)
     frame = traced.frame
+    if window is not None:
+        _widen(frame, window, display, even_background(built, settings))
     watch.seconds |= traced.seconds
     if settings.layers:
         frame.maps |= watch.stage(
             "layers",
             lambda: trace_layers(built, source, plan_layers(source, memory), placement.display_from_world, progress),
         )
-    provenance = _provenance(
+    provenance = provenance_of(
         scene,
         built,
         settings,
@@ -127,16 +135,55 @@ def render_integral_image(
         samples=traced.samples,
         estimate=traced.estimate,
         options={
+            **({"auto": choice.why} if choice.why else {}),
             **_reuse_options(settings),
             **traced.options,
-            "pixel_filter": settings.pixel_filter,
-            "placement": placement.mode,
-            "depth_range": list(placement.depth_range),
-            "resolvable_range": list(placement.resolvable_range),
+            **placed_options(settings, placement),
         },
         notes=(*placement.warnings, *traced.notes),
     )
     return IntegralImage(frame.pixels, display, placement.world_from_display, provenance, _layers(frame))
+
+
+def traced_window(
+    built: BuiltScene | BuiltClassic, display: Display, settings: RenderSettings, placement: Placement
+) -> PixelWindow | None:
+    """The pixels that can see the scene, where the others are known without rays; None where all are traced.
+
+    Denoised pictures alone: of others every pixel has the samples that tiles rendered apart have. None, too, where the
+    denoiser may want to see whole views.
+    """
+    from lippmann.render.denoise_views import has_exact_views
+    from lippmann.scene.build import BuiltScene
+
+    if settings.method != "full" or not settings.denoises or not isinstance(built, BuiltScene):
+        return None
+    return (
+        None if has_exact_views(display) else panel_window(scene_corners(built, placement.display_from_world), display)
+    )
+
+
+def _widen(frame: Frame, window: PixelWindow, display: Display, background: Color | None) -> None:
+    """Put the background about what was traced; maps are 0 there."""
+    rows, columns = slice(window.top, window.top + window.height), slice(window.left, window.left + window.width)
+    size = display.panel.height, display.panel.width
+    pixels = np.empty((*size, 3), dtype=np.float32)
+    pixels[...] = background
+    pixels[rows, columns] = frame.pixels
+    frame.pixels = pixels
+    for name, values in frame.maps.items():
+        frame.maps[name] = np.zeros((*size, *values.shape[2:]), dtype=values.dtype)
+        frame.maps[name][rows, columns] = values
+
+
+def placed_options(settings: RenderSettings, placement: Placement) -> dict[str, Any]:
+    """What a picture's file says of its samples' places and of the display's."""
+    return {
+        "pixel_filter": settings.pixel_filter,
+        "placement": placement.mode,
+        "depth_range": list(placement.depth_range),
+        "resolvable_range": list(placement.resolvable_range),
+    }
 
 
 def _layers(frame: Frame) -> dict[str, NDArray[Any]]:
@@ -152,7 +199,7 @@ def _reuse_options(settings: RenderSettings) -> dict[str, Any]:
     return {"order": settings.order or "default", "respect_gloss": settings.careful}
 
 
-def _provenance(
+def provenance_of(
     scene: Scene,
     built: BuiltScene | BuiltClassic,
     settings: RenderSettings,
@@ -165,6 +212,7 @@ def _provenance(
     estimate: Estimate | None = None,
     notes: tuple[str, ...] = (),
 ) -> Provenance:
+    """How a picture of ``frame`` was made, for its file."""
     height, width = frame.pixels.shape[:2]
     all_rays = height * width * samples * (3 if settings.subpixels else 1)
     return Provenance(
@@ -177,7 +225,7 @@ def _provenance(
         scene=scene.name,
         transfer=transfer_of(settings),
         version=VERSION,
-        device=engine.gpu_name or f"cpu, {engine.threads} threads",
+        device=engine.gpu_name or "cpu",
         traced_fraction=frame.rays.primary / all_rays,
         pixel_shares=frame.shares,
         rays=ray_counts(frame),
@@ -218,7 +266,7 @@ def render_preview(
         integrator, source, plan, seed=settings.seed, box_filter=settings.pixel_filter == "box", progress=progress
     )
     options = {"pixel_filter": settings.pixel_filter, "camera": pose.name}
-    provenance = _provenance(scene, built, settings, engine, frame, watch, samples=settings.samples, options=options)
+    provenance = provenance_of(scene, built, settings, engine, frame, watch, samples=settings.samples, options=options)
     return Preview(frame.pixels, provenance)
 
 

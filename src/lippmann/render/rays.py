@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any, Protocol
 
 import drjit as dr
@@ -10,7 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.display import Display
+from lippmann.display.cone import cone_tangent
 from lippmann.render.device_ops import DEVICE
+from lippmann.render.outline import PixelWindow
 from lippmann.scene.description import Camera
 
 Matrix = NDArray[np.float64]
@@ -53,7 +56,87 @@ class DisplayRays:
         else:
             x, y = self.display.panel_point(u, v, DEVICE)
         origin, direction = self.display.light_ray(x, y, DEVICE)
-        return _world_ray(self.world_from_display, origin, direction)
+        return world_ray(self.world_from_display, origin, direction)
+
+
+class WindowRays:
+    """A window of a display's pixels, as a picture of its own."""
+
+    def __init__(self, source: DisplayRays, window: PixelWindow) -> None:
+        self.display = source.display
+        self.window = window
+        self.width, self.height, self.channels = window.width, window.height, source.channels
+        self._source = source
+
+    def rays(self, column: Any, row: Any, channel: Any, jitter: Any) -> Any:
+        return self._source.rays(column + self.window.left, row + self.window.top, channel, jitter)
+
+    def tiles(self) -> Iterator[tuple[slice, slice]]:
+        """Rows and columns of what shows one picture: all of it."""
+        yield slice(0, self.height), slice(0, self.width)
+
+
+class QuiltRays:
+    """Cameras side by side before a lenticular display, each one's picture a tile of ``view_size`` pixels.
+
+    Of N = ``columns * rows`` cameras number k stands at the viewing distance, level with the display's middle, at
+    ``D tan(cone / 2) (2 (k + 0.5) / N - 1)`` to the right of it: in even steps over the whole cone. All see the panel's
+    rectangle in the lens plane, off-axis, never turned; where the viewing distance is infinite they are parallel
+    cameras. Tile 0 is at the bottom left, tiles follow to the right and then upwards. Rays begin where the display's
+    own begin, at the aperture distance.
+
+    With a ``window`` tiles hold that part of the pictures alone.
+    """
+
+    channels = 1
+
+    def __init__(
+        self,
+        display: Display,
+        world_from_display: Matrix,
+        columns: int,
+        rows: int,
+        view_size: tuple[int, int],
+        window: PixelWindow | None = None,
+    ) -> None:
+        self.display = display
+        self.columns = columns
+        self.rows = rows
+        self.view_size = view_size
+        self.window = window or PixelWindow(0, 0, *view_size)
+        self.width = columns * self.window.width
+        self.height = rows * self.window.height
+        self.world_from_display = np.asarray(world_from_display, dtype=np.float64)
+
+    @property
+    def views(self) -> int:
+        """Number of cameras."""
+        return self.columns * self.rows
+
+    def tiles(self) -> Iterator[tuple[slice, slice]]:
+        """Rows and columns of every camera's tile, the leftmost camera's first."""
+        width, height = self.window.width, self.window.height
+        for number in range(self.views):
+            below, right = divmod(number, self.columns)
+            top = (self.rows - 1 - below) * height
+            yield slice(top, top + height), slice(right * width, (right + 1) * width)
+
+    def rays(self, column: Any, row: Any, channel: Any, jitter: Any) -> Any:
+        del channel
+        left, top, width, height = self.window
+        right, above = column // width, self.rows - 1 - row // height
+        view = mi.Float64(above * self.columns + right)
+        panel_width, panel_height = self.display.size_mm
+        u = mi.Float64(column - right * width) + mi.Float64(jitter.x)
+        v = mi.Float64(row - row // height * height) + mi.Float64(jitter.y)
+        x = ((left + u) / self.view_size[0] - 0.5) * panel_width
+        y = (0.5 - (top + v) / self.view_size[1]) * panel_height
+        convergence = 1 / self.display.viewing_distance
+        side = ((2 * view + 1) / self.views - 1) * cone_tangent(self.display)
+        slope_x, slope_y = x * convergence - side, y * convergence
+        aperture = self.display.aperture_distance
+        origin = (x - slope_x * aperture, y - slope_y * aperture, dr.full(mi.Float64, aperture, dr.width(x)))
+        return world_ray(self.world_from_display, origin, (slope_x, slope_y, dr.full(mi.Float64, -1, dr.width(x))))
 
 
 class CameraRays:
@@ -76,11 +159,13 @@ class CameraRays:
         else:
             half = (self.camera.height or 2.0) / 2
             origin, direction = (x * half, y * half, zero), (zero, zero, zero - 1)
-        return _world_ray(np.asarray(self.camera.world_from_camera, dtype=np.float64), origin, direction)
+        return world_ray(np.asarray(self.camera.world_from_camera, dtype=np.float64), origin, direction)
 
 
-def _world_ray(matrix: Matrix, origin: tuple[Any, Any, Any], direction: tuple[Any, Any, Any]) -> Any:
-    o = [sum((m * a for m, a in zip(row[:3], origin, strict=True)), mi.Float64(row[3])) for row in matrix[:3].tolist()]
-    d = [sum((m * a for m, a in zip(row[:3], direction, strict=True)), mi.Float64(0)) for row in matrix[:3].tolist()]
+def world_ray(matrix: Matrix, origin: tuple[Any, Any, Any], direction: tuple[Any, Any, Any]) -> Any:
+    # Opaque to the compiler, so that a display that moves from frame to frame keeps its kernel.
+    rows = [[dr.opaque(mi.Float64, value) for value in row] for row in matrix[:3].tolist()]
+    o = [sum((m * a for m, a in zip(row[:3], origin, strict=True)), row[3]) for row in rows]
+    d = [sum((m * a for m, a in zip(row[:3], direction, strict=True)), mi.Float64(0)) for row in rows]
     length = dr.rsqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2])
     return mi.Ray3f(mi.Point3f(*(mi.Float(a) for a in o)), mi.Vector3f(*(mi.Float(a * length) for a in d)))

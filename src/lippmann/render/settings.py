@@ -7,12 +7,12 @@ from typing import Literal, get_args
 
 from lippmann.errors import UsageError
 
-Method = Literal["full", "lens-view", "interpolated", "pooled"]
+Method = Literal["auto", "full", "lens-view", "interpolated", "pooled"]
 Order = Literal["default", "paper"]
 IntegratorName = Literal["classic", "path", "direct", "normal", "depth", "position", "albedo"]
 PixelFilter = Literal["box", "point"]
 Device = Literal["auto", "cpu", "gpu"]
-Denoiser = Literal["none", "oidn"]
+Denoiser = Literal["auto", "none", "oidn", "oidn-fast", "oidn-high"]
 
 #: The methods that reuse points of one micro-image in others.
 REUSING: tuple[Method, ...] = ("lens-view", "interpolated")
@@ -36,7 +36,8 @@ class RenderSettings:
     method:
         The renderer: ``full`` traces every ray; ``lens-view`` carries points from micro-image to micro-image and traces
         the pixels that none reached; ``interpolated`` averages those of every other micro-image from its neighbours;
-        ``pooled`` gathers light in the scene and lets every micro-image take it from there.
+        ``pooled`` gathers light in the scene and lets every micro-image take it from there; ``auto`` leaves the choice
+        to :func:`~lippmann.render.choice.decide`.
     order:
         For the last two: ``paper`` goes lens by lens as the paper does; ``default`` (None is the same) in the order
         that traces fewer pixels.
@@ -63,7 +64,9 @@ class RenderSettings:
     pixel_filter:
         ``box`` spreads the samples over the pixel, ``point`` takes its centre.
     denoise:
-        What takes the noise out of the finished picture: ``oidn`` is Intel's Open Image Denoise.
+        What takes the noise out of the finished picture: ``oidn`` is Intel's Open Image Denoise with the effort that
+        the traced rays deserve (:mod:`~lippmann.render.effort`), ``oidn-fast`` and ``oidn-high`` name one; ``auto``
+        leaves it to the method.
     layers:
         Add depth, position, normal, albedo and shape of what each pixel sees to the picture's maps.
     device, threads, memory:
@@ -109,7 +112,7 @@ class RenderSettings:
         _check_whole("seed", self.seed, 0, 2**32 - 1)
         _check_whole("threads", self.threads, 1, 4096)
         _check_whole("memory", self.memory, 1, 2**63)
-        if self.denoise != "none" and self.integrator not in LIGHT:
+        if self.denoises and self.integrator not in LIGHT:
             raise UsageError(
                 f"{self.integrator} has no noise",
                 where="--denoise",
@@ -158,6 +161,11 @@ class RenderSettings:
                 rule=f"it works with {', '.join(LIGHT)}",
                 fix="use --method full",
             )
+
+    @property
+    def denoises(self) -> bool:
+        """Whether noise is taken out whatever comes."""
+        return self.denoise not in ("none", "auto")
 
     @property
     def careful(self) -> bool:

@@ -1,0 +1,111 @@
+"""Full rendering, plain or denoised: the two live off the same samples, and what reaches the goal for less goes on.
+
+Which that will be is reckoned from where both stand and how their errors fall. Plain noise falls with the number of
+samples; what a denoised picture is wrong by falls more slowly, and where the scene is smooth or the quality high it may
+be behind. Work is counted in rays (:mod:`lippmann.render.effort`), so that the same seed gives the same picture.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+from lippmann.render.effort import denoising_cost, effort_of
+from lippmann.render.estimate import Estimate
+from lippmann.render.goal import LEAST_GROWTH, Goal
+from lippmann.render.judging import Judgement, Track
+
+Way = Literal["plain", "denoised"]
+
+#: The power of the number of samples by which the error of denoised pictures falls: 0.5 to 0.8 where it was measured.
+DENOISED_SLOPE = 0.6
+
+
+@dataclass(frozen=True, order=True)
+class _Outlook:
+    """What a way promises, the better the smaller: to reach the goal, for how many rays or else how short of it."""
+
+    misses: bool
+    value: float
+
+
+class Contest:
+    """Judges both ways, see :class:`~lippmann.render.judging.Judge`.
+
+    Parameters
+    ----------
+    goal:
+        What is to be reached.
+    plain, denoised:
+        The tracks of both.
+    rays_per_pixel:
+        What the samples so far took.
+
+    Attributes
+    ----------
+    leader:
+        Whose picture is the better one for the goal.
+    why:
+        What that rests on, as a sentence.
+    """
+
+    def __init__(self, goal: Goal, plain: Track, denoised: Track, rays_per_pixel: Callable[[], float]) -> None:
+        self._goal = goal
+        self._plain = plain
+        self._denoised = denoised
+        self._rays_per_pixel = rays_per_pixel
+        self._open = True
+        self.leader: Way = "plain"
+        self.why = "there was no time to look at a denoised picture"
+
+    def judge(self, samples: int, room: float) -> Judgement:
+        """The leader's judgement; the denoised picture is looked at only while it may win."""
+        plain = self._plain.judge(samples)
+        if not self._open:
+            return plain
+        rays = self._rays_per_pixel()
+        look = denoising_cost(effort_of("oidn", rays))
+        outlook = self._outlook(plain, rays, room)
+        if not outlook.misses and outlook.value <= look:
+            self._lead("plain", "the quality is within reach of plain samples for less than denoising takes")
+            return plain
+        denoised = self._denoised.judge(samples)
+        there = self._missing(denoised.estimate) <= 0
+        with_noise_out = self._outlook(denoised, rays, room, 0.0 if there else look)
+        stand = f"after {samples} samples {self._value(denoised)} denoised and {self._value(plain)} plain"
+        if with_noise_out < outlook:
+            self._lead("denoised", stand)
+            return denoised
+        # Plain noise is surer to fall than what denoising leaves: it is not asked again.
+        self._open = False
+        self._lead("plain", f"{stand}, which reaches the goal sooner" if self._goal.has_quality else stand)
+        return plain
+
+    def seconds(self) -> float:
+        """What the next judgement will take, as far as that is known."""
+        return self._plain.seconds() + (self._denoised.seconds() if self._open else 0.0)
+
+    def _lead(self, way: Way, why: str) -> None:
+        self.leader, self.why = way, why
+
+    def _outlook(self, judged: Judgement, rays: float, room: float, look: float = 0.0) -> _Outlook:
+        """Rays per pixel still to be spent, or dB short of the goal when there is no room for more."""
+        missing = self._missing(judged.estimate)
+        needed = 1.0
+        if self._goal.has_quality and missing > 0:
+            likely = min(600.0, self._goal.likely_missing(judged.estimate))
+            needed = max(LEAST_GROWTH, 10 ** (likely / (10 * judged.slope)))
+        if self._goal.has_quality and needed <= room:
+            return _Outlook(False, (needed - 1) * rays + look)
+        return _Outlook(True, missing - 10 * judged.slope * math.log10(room))
+
+    def _missing(self, estimate: Estimate) -> float:
+        # Where only a time is set, the better picture is wanted.
+        return self._goal.missing(estimate) if self._goal.has_quality else -estimate.psnr
+
+    def _value(self, judged: Judgement) -> str:
+        if self._goal.quality is not None:
+            return f"{judged.estimate.worst:.1f} dB"
+        return f"{judged.estimate.psnr:.1f} dB"

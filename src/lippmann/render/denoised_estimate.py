@@ -1,0 +1,120 @@
+"""How good a denoised picture is by its own account.
+
+Its halves judge each other (:mod:`lippmann.render.denoised`), which is right on the average but far noisier than what
+it measures: strong single hits of the one half meet the smooth other half. Three things keep the statement honest:
+
+- An error cannot be negative. From a measured mean and its uncertainty follows the mean of a normal distribution that
+  is cut at zero, which is never below what the uncertainty alone would allow.
+- Where a micro-image's own measurement says little, its error is taken to be in proportion to that of the samples which
+  the picture was made of: that is known far better, and says where the scene is hard.
+- Light that only lone hits have found is as unknown to the denoiser as to anybody. Of the error that those make up in
+  the samples, a part is taken to be left, and a larger one is doubted.
+
+The constants were chosen on ``benchmarks/hard_scenes.py``.
+"""
+
+from __future__ import annotations
+
+import math
+from statistics import NormalDist
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lippmann.render.estimate import (
+    CROSS_NOISE,
+    DRAWS,
+    LEAN,
+    LOW_QUANTILE,
+    MODEL_UNCERTAINTY,
+    NORMAL_95,
+    OWN_NOISE,
+    ErrorSums,
+    Estimate,
+    PartErrors,
+    PictureEstimator,
+    PixelErrors,
+    errors_of_parts,
+    parts_with_pixels,
+    psnr_of,
+)
+
+Real = NDArray[np.float64]
+
+#: Of the error that lone hits make up in the samples: what denoising leaves, and what of it is doubted.
+LONE_LEFT, LONE_DOUBTED = 0.1, 0.5
+#: How far micro-images are from the proportion to their samples, as a relative variance, where nothing tells; and by
+#: how much that is itself uncertain.
+USUAL_SPREAD, SPREAD_DOUBT = 0.5, 0.4
+#: By how much the mean of two halves may be better than they are.
+BEST_OF_HALVES = 0.5
+
+
+class DenoisedEstimator(PictureEstimator):
+    """Estimates for denoised pictures; their errors carry those of the samples."""
+
+    def estimate(self, errors: PixelErrors) -> Estimate:
+        """PSNR of the whole and of the worst micro-image."""
+        assert errors.samples is not None
+        return estimate_denoised(self._sums(errors), self._sums(errors.samples), (self._rows, self._columns))
+
+
+def estimate_denoised(judged: ErrorSums, samples: ErrorSums, grid: tuple[int, int]) -> Estimate:
+    """PSNR of the whole and of the worst part, from what the halves say of each other and from the samples' errors."""
+    index, judged = parts_with_pixels(judged)
+    _, samples = parts_with_pixels(samples)
+    pixels = float(judged.pixels.sum())
+    deviation = math.sqrt(CROSS_NOISE.estimate * float(judged.squares.sum())) / pixels
+    lone = float(samples.lone.sum()) / pixels
+    mean = max(_positive(float(judged.values.sum()) / pixels, deviation), LONE_LEFT * lone)
+    common = math.log1p((deviation / mean) ** 2)
+    spread = NORMAL_95 * math.sqrt(common + MODEL_UNCERTAINTY**2)
+    ends = mean * math.exp(spread) + LONE_DOUBTED * lone, BEST_OF_HALVES * mean * math.exp(-spread)
+
+    parts = _parts(judged, samples, index, grid, mean)
+    draws = parts.draws().max(axis=0) * np.exp(math.sqrt(common) * np.random.default_rng(2).standard_normal(DRAWS))
+    worst = np.quantile(draws, (0.5, 0.975, LOW_QUANTILE))
+    worst *= (1, 1 + MODEL_UNCERTAINTY, BEST_OF_HALVES / (1 + MODEL_UNCERTAINTY))
+    row, column = divmod(int(index[np.argmax(parts.expected)]), grid[1])
+    psnr, psnr_low, psnr_high = (float(value) for value in psnr_of(np.array([mean, *ends])))
+    of_worst, worst_low, worst_high = (float(value) for value in psnr_of(worst))
+    return Estimate(psnr, psnr_low, psnr_high, of_worst, worst_low, worst_high, (column, row))
+
+
+def _parts(
+    judged: ErrorSums, samples: ErrorSums, index: NDArray[np.intp], grid: tuple[int, int], mean: float
+) -> PartErrors:
+    """Each part's error: in proportion to its samples' error, drawn from there to its own measurement."""
+    count = judged.pixels
+    measured = judged.values / count
+    of_samples = errors_of_parts(samples, index, grid, OWN_NOISE).expected
+    around = of_samples * mean / float((of_samples * count).sum() / count.sum())
+    # The mean square of one part is noisy itself: it leans on what all have, in proportion.
+    overall = float(judged.squares.sum()) / float((np.square(around) * count).sum())
+    noise = CROSS_NOISE.estimate * (judged.squares + LEAN * overall * np.square(around)) / (count + LEAN) / count
+
+    relative = noise / np.square(around)
+    # By the median, as a few parts differ from all: that of squared normal values is 0.455 of their variance.
+    shown = float(np.median(np.square(measured / around - 1) / 0.455 - relative))
+    doubt = 2.3 * (float(np.median(relative)) + USUAL_SPREAD) * math.sqrt(2 / len(count))
+    weight = SPREAD_DOUBT**2 / (SPREAD_DOUBT**2 + doubt**2)
+    usual = max(0.02, weight * shown + (1 - weight) * USUAL_SPREAD)
+    # A part that is worse by more than three deviations is no accident.
+    other = np.where(measured > around, np.square(measured - around) - 9 * noise, 0.0)
+    between = np.maximum(usual * np.square(around), other)
+    trust = between / (between + noise)
+    lone = samples.lone / count
+    expected = np.maximum(around + trust * (measured - around), np.maximum(0.1 * around, LONE_LEFT * lone))
+    variance = np.log1p(trust * noise / np.square(expected))
+    return PartErrors(index, expected, expected + LONE_DOUBTED * lone, variance, np.zeros_like(variance))
+
+
+def _positive(mean: float, deviation: float) -> float:
+    """The mean of what is measured as ``mean`` with a normal ``deviation`` and cannot be negative."""
+    if deviation <= 0:
+        return max(mean, 1e-12)
+    normal, z = NormalDist(), mean / deviation
+    if z < -5:
+        # There the quotient below is 0 / 0; its limit is -z + 1 / -z.
+        return deviation / -z
+    return mean + deviation * normal.pdf(z) / normal.cdf(z)

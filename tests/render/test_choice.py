@@ -1,0 +1,63 @@
+"""What ``auto`` takes, and that it takes nothing where the user has chosen."""
+
+from __future__ import annotations
+
+import pytest
+
+from lippmann.render import choice
+from lippmann.render.choice import decide
+from lippmann.render.effort import HIGH_FROM, denoising_cost, effort_of
+from lippmann.render.settings import RenderSettings
+
+
+@pytest.fixture(params=[True, False], ids=["with pyoidn", "without"])
+def installed(request, monkeypatch):
+    monkeypatch.setattr(choice, "find_spec", lambda name: object() if request.param else None)
+    return request.param
+
+
+def decided(**values):
+    return decide(RenderSettings(**{"method": "auto", "denoise": "auto"} | values))
+
+
+@pytest.mark.parametrize("values", [{}, {"spp": 4}, {"integrator": "classic"}, {"layers": True}])
+def test_samples_stay_as_they_are(installed, values):
+    found = decided(**values)
+    assert (found.settings.method, found.settings.denoise) == ("full", "none")
+    assert "no quality is asked for" in found.why
+
+
+@pytest.mark.parametrize("goal", [{"quality": 30.0}, {"quality_mean": 30.0}, {"max_time": 5.0}])
+def test_a_goal_opens_the_contest_where_there_is_a_denoiser(installed, goal):
+    found = decided(**goal)
+    assert found.settings.method == "full"
+    assert found.settings.denoise == ("auto" if installed else "none")
+    assert installed or "not installed" in found.why
+
+
+@pytest.mark.parametrize("denoise", ["none", "oidn", "oidn-fast", "oidn-high"])
+def test_what_is_asked_for_wins(installed, denoise):
+    found = decided(quality=30.0, denoise=denoise)
+    assert (found.settings.method, found.settings.denoise) == ("full", denoise)
+    assert "as asked for" in found.why
+
+
+@pytest.mark.parametrize("method", ["full", "lens-view", "interpolated", "pooled"])
+def test_a_named_method_is_left_alone(installed, method):
+    found = decided(method=method)
+    assert (found.settings.method, found.settings.denoise, found.why) == (method, "none", "")
+    named = decided(method=method, denoise="oidn")
+    assert named.settings.denoise == "oidn"
+
+
+def test_what_has_no_noise_is_not_denoised(installed):
+    found = decided(integrator="normal", spp=4)
+    assert found.settings.denoise == "none"
+    assert "no noise" in found.why
+
+
+def test_effort_follows_the_rays_unless_it_is_named():
+    assert [effort_of("oidn", rays) for rays in (HIGH_FROM - 1, HIGH_FROM)] == ["fast", "high"]
+    assert [effort_of(name, 1e6) for name in ("oidn-fast", "oidn-high")] == ["fast", "high"]
+    assert effort_of("oidn-high", 0) == "high"
+    assert denoising_cost("fast") < denoising_cost("high") < HIGH_FROM

@@ -1,0 +1,98 @@
+"""Plain against denoised: who wins, with pictures whose errors are known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from lippmann.display import Display
+from lippmann.display.lens_array import LensArray
+from lippmann.display.panel import Panel
+from lippmann.progress import silent
+from lippmann.render.contest import Contest
+from lippmann.render.estimate import CROSS_NOISE, OWN_NOISE, PictureEstimator, PixelErrors
+from lippmann.render.goal import Goal, reach_judged
+from lippmann.render.judging import Track
+
+SHOWN = Display("test", Panel(64, 64, 0.25), LensArray("square", 2.0), gap=6.8)
+RAYS = 3.0
+
+
+class Samples:
+    """Samples of a scene in which a sample takes ``RAYS`` rays and ``seconds``."""
+
+    def __init__(self, seconds=0.01):
+        self.taken, self.seconds, self.now = 0, seconds, 0.0
+
+    def add(self, samples, progress=silent):
+        self.taken += samples
+        self.now += samples * self.seconds
+
+
+class Picture:
+    """Its squared error is ``error * samples**-slope + floor``; it counts how often it was looked at."""
+
+    def __init__(self, samples, error, slope=1.0, floor=0.0, noise=OWN_NOISE):
+        self.samples, self.error, self.slope, self.floor, self.noise = samples, error, slope, floor, noise
+        self.looks = 0
+        self.random = np.random.default_rng(1)
+
+    def squared_error(self):
+        self.looks += 1
+        expected = self.error * self.samples.taken**-self.slope + self.floor
+        return PixelErrors((expected * self.random.chisquare(1, (64, 64))).astype(np.float32), None, self.noise)
+
+
+def run(goal, *, plain=0.5, denoised=0.005, slope=0.6, floor=0.0, seconds=0.01):
+    """The contest, its outcome and the denoised picture."""
+    samples = Samples(seconds)
+    noisy, clean = Picture(samples, plain), Picture(samples, denoised, slope, floor, CROSS_NOISE)
+    estimator = PictureEstimator(SHOWN)
+    contest = Contest(goal, Track(noisy, estimator), Track(clean, estimator, 0.6), lambda: RAYS * samples.taken)
+    outcome = reach_judged(goal, samples.add, contest, clock=lambda: samples.now, probe=lambda: seconds)
+    return contest, outcome, clean
+
+
+def test_denoising_wins_where_noise_is_strong():
+    contest, outcome, _ = run(Goal(quality=25))
+    assert (contest.leader, outcome.end) == ("denoised", "quality")
+    assert outcome.samples < 100  # plain samples would have taken 300
+    assert "denoised and" in contest.why
+
+
+def test_plain_samples_win_where_the_quality_is_near():
+    contest, outcome, clean = run(Goal(quality_mean=24.8), plain=0.05)
+    assert (contest.leader, outcome.end) == ("plain", "quality")
+    assert clean.looks == 0
+    assert "less than denoising takes" in contest.why
+
+
+def test_a_denoised_picture_that_stays_wrong_is_left():
+    """It is better at first, but its bias keeps it from the goal."""
+    contest, outcome, clean = run(Goal(quality=33), plain=0.2, denoised=0.005, floor=1e-3)
+    assert (contest.leader, outcome.end) == ("plain", "quality")
+    assert clean.looks < len(outcome.rounds)
+    assert "which reaches the goal sooner" in contest.why
+
+
+def test_a_denoised_picture_that_is_worse_is_looked_at_once():
+    contest, _, clean = run(Goal(quality=40), plain=0.2, denoised=0.5)
+    assert contest.leader == "plain"
+    assert clean.looks == 1
+
+
+@pytest.mark.parametrize(("seconds", "leader"), [(0.5, "denoised"), (0.0005, "plain")])
+def test_with_a_time_the_better_picture_at_its_end_wins(seconds, leader):
+    """Few samples are better denoised; many are better left alone, for denoising then does more harm than good."""
+    contest, outcome, _ = run(Goal(max_time=20.0), floor=2e-3, slope=0.9, seconds=seconds)
+    assert (contest.leader, outcome.end) == (leader, "time")
+
+
+def test_samples_bound_both():
+    contest, outcome, _ = run(Goal(quality=60, spp=32))
+    assert (outcome.end, outcome.samples, contest.leader) == ("samples", 32, "denoised")
+
+
+def test_the_same_samples_give_the_same_winner_whatever_they_take():
+    slow, fast = (run(Goal(quality=30), seconds=seconds)[1].samples for seconds in (1.0, 1e-6))
+    assert slow == fast
