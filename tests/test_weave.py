@@ -12,7 +12,7 @@ from lippmann.display import NUMPY, Display, LensArray, Panel, load_display
 from lippmann.errors import PictureError, UsageError
 from lippmann.quilt import Quilt, QuiltLayout
 from lippmann.replay import replay
-from lippmann.weave import weave
+from lippmann.weave import weave, weave_to_file
 
 WIDTH, HEIGHT, DPI, PITCH, SLOPE, CENTER = 90, 70, 300.0, 48.3, -6.4, 0.37
 CELLS = [
@@ -160,3 +160,17 @@ def test_what_cannot_be_woven_is_refused():
     with pytest.raises(PictureError, match=r"the aspect 0\.75; the display straight has 1\.6"):
         weave(other, SHEETS[1])
     weave(Quilt(quilt.pixels, QuiltLayout(2, 1, 1.61)), SHEETS[1])
+
+
+def test_a_file_woven_in_bands_holds_the_same(calibrated, tmp_path, monkeypatch):
+    from lippmann.image import read_picture, tiff
+
+    monkeypatch.setattr(tiff, "TILE", 16)
+    display, _ = calibrated
+    quilt = solid(np.linspace(0, 1, 6), 3, 2)
+    weave_to_file(quilt, display, tmp_path / "a.tif", bits=32, scene="x")
+    written, whole = read_picture(tmp_path / "a.tif"), weave(quilt, display, scene="x")
+    assert np.array_equal(written.pixels, whole.pixels)
+    assert (written.provenance, written.display) == (whole.provenance, whole.display)
+    with pytest.raises(UsageError, match="not known"):
+        weave_to_file(quilt, display, tmp_path / "b.tif", choice="best")

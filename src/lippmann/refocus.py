@@ -11,6 +11,7 @@ plenoptic camera, 2005). In the lens plane itself, z = 0, it is the mean of each
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,15 +19,19 @@ from numpy.typing import NDArray
 from lippmann.display import NUMPY, Display
 from lippmann.errors import UsageError
 from lippmann.image.integral_image import FloatArray, IntegralImage
+from lippmann.image.large import LargePicture
+from lippmann.image.views import pixels_of_view, view_grid
 from lippmann.replay import Eye, Real, checked_size, default_size, eye_of_view, lens_plane_points, pixel_at
 
 Index = NDArray[np.intp]
+Flags = NDArray[np.bool_]
+View = tuple[int, int]
 
 #: Widest picture that is made where nothing is said, in pixels: every view is looked up for every one of them.
 DEFAULT_WIDTH = 1024
 
 
-def refocus(image: IntegralImage, plane: float, *, size: tuple[int, int] | None = None) -> FloatArray:
+def refocus(image: IntegralImage | LargePicture, plane: float, *, size: tuple[int, int] | None = None) -> FloatArray:
     """The picture focused on the plane at z = ``plane``.
 
     Parameters
@@ -53,18 +58,34 @@ def refocus(image: IntegralImage, plane: float, *, size: tuple[int, int] | None 
         rule = f"it must be finite and below the viewing distance of {display.viewing_distance:g} mm"
         raise UsageError(f"the plane is at {plane:g} mm", rule=rule)
     width, height = checked_size(default_size(display, DEFAULT_WIDTH) if size is None else size)
-    views, masks = image.views_and_mask()
-    eyes = {(ky, kx): eye_of_view(display, ky, kx) for ky, kx in np.argwhere(masks.any(axis=(2, 3))).tolist()}
+    looked_up = _of_views(image)
+    grid = view_grid(display)
+    eyes = {(ky, kx): eye_of_view(display, ky, kx) for ky, kx in np.ndindex(len(grid.down), len(grid.right))}
     picture = np.zeros((height, width, 3), dtype=np.float32)
     for rows, x, y in lens_plane_points(display, width, height):
         total, count = np.zeros((*x.shape, 3), dtype=np.float32), np.zeros(x.shape, dtype=np.float32)
         for view, eye in eyes.items():
             row, column, inside = _line_of_sight(display, eye, (x, y, plane))
-            inside &= masks[view][row, column]
-            total += views[view][row, column] * inside[..., None]
+            colors, found = looked_up(view, row, column)
+            inside &= found
+            total += colors * inside[..., None]
             count += inside
         picture[rows] = total / np.maximum(count, 1)[..., None]
     return picture
+
+
+def _of_views(image: IntegralImage | LargePicture) -> Callable[[View, Index, Index], tuple[FloatArray, Flags]]:
+    """What looks up views: their values ``(..., 3)`` at rows and columns, and where there are such pixels."""
+    if isinstance(image, IntegralImage):
+        views, masks = image.views_and_mask()
+        return lambda view, row, column: (views[view][row, column], masks[view][row, column])
+    display, grid = image.display, view_grid(image.display)
+
+    def worked_out(view: View, row: Index, column: Index) -> tuple[FloatArray, Flags]:
+        found, at_row, at_column = pixels_of_view(display, grid, view, row, column)
+        return image.take(np.where(found, at_row, 0), np.where(found, at_column, 0)), found
+
+    return worked_out
 
 
 def _line_of_sight(

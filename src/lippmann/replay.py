@@ -21,7 +21,8 @@ from numpy.typing import NDArray
 
 from lippmann.display import NUMPY, Display
 from lippmann.errors import UsageError
-from lippmann.image.integral_image import FloatArray, IntegralImage
+from lippmann.image.integral_image import FloatArray
+from lippmann.image.large import Picture
 from lippmann.image.views import view_grid
 
 Eye = tuple[float, float, float]
@@ -71,7 +72,7 @@ class LensSamples:
 
 
 def replay(
-    image: IntegralImage,
+    image: Picture,
     eye: Eye | None = None,
     *,
     size: tuple[int, int] | None = None,
@@ -116,7 +117,7 @@ def replay(
     return seen
 
 
-def replay_at_lens_centers(image: IntegralImage, eye: Eye) -> LensSamples:
+def replay_at_lens_centers(image: Picture, eye: Eye) -> LensSamples:
     """One sample per lens, unfiltered: for measuring, and for comparing with a picture taken at the same points.
 
     Raises
@@ -133,7 +134,7 @@ def replay_at_lens_centers(image: IntegralImage, eye: Eye) -> LensSamples:
     owner_i, owner_j = display.lens_of(*display.panel_point(column + 0.5, row + 0.5, NUMPY), NUMPY)
     inside = is_on_panel(display, column, row)
     colors = np.zeros((*x.shape, 3), dtype=np.float32)
-    colors[inside] = image.pixels[row[inside], column[inside]]
+    colors[inside] = image.take(row[inside], column[inside])
     return LensSamples(
         points=np.stack([x, y], axis=-1),
         pixels=np.stack([column, row], axis=-1),
@@ -144,7 +145,7 @@ def replay_at_lens_centers(image: IntegralImage, eye: Eye) -> LensSamples:
 
 
 def sweep(
-    image: IntegralImage,
+    image: Picture,
     start: Eye,
     stop: Eye,
     frames: int,
@@ -242,7 +243,7 @@ def is_on_panel(display: Display, column: NDArray[np.int64], row: NDArray[np.int
     return inside & (row >= 0) & (row < display.panel.height)
 
 
-def _panel_colors(image: IntegralImage, x: Real, y: Real, filter_: Filter, subpixels: bool) -> FloatArray:
+def _panel_colors(image: Picture, x: Real, y: Real, filter_: Filter, subpixels: bool) -> FloatArray:
     """``(..., 3)`` colours of panel points (mm); zero off the panel."""
     colors = np.empty((*x.shape, 3), dtype=np.float32)
     take = _nearest if filter_ == "nearest" else _linear
@@ -259,17 +260,16 @@ def _panel_colors(image: IntegralImage, x: Real, y: Real, filter_: Filter, subpi
     return colors
 
 
-def _nearest(image: IntegralImage, x: Real, y: Real, channels: slice, offset: tuple[float, float]) -> FloatArray:
+def _nearest(image: Picture, x: Real, y: Real, channels: slice, offset: tuple[float, float]) -> FloatArray:
     """Values of the (sub-)pixels that hold the points; ``offset`` is the sub-pixel's place, right and down."""
     u, v = image.display.pixel_coordinates(x, y, NUMPY)
     column, row = pixel_at(u - offset[0]), pixel_at(v - offset[1])
     inside = is_on_panel(image.display, column, row)
-    pixels = image.pixels[..., channels]
-    values: FloatArray = pixels[np.where(inside, row, 0), np.where(inside, column, 0)]
+    values = image.take(np.where(inside, row, 0), np.where(inside, column, 0), channels)
     return np.where(inside[..., None], values, np.float32(0))
 
 
-def _linear(image: IntegralImage, x: Real, y: Real, channels: slice, offset: tuple[float, float]) -> FloatArray:
+def _linear(image: Picture, x: Real, y: Real, channels: slice, offset: tuple[float, float]) -> FloatArray:
     """Values interpolated between those (sub-)pixels about the points that belong to the points' own lens."""
     display = image.display
     lens = display.lens_of(x, y, NUMPY)
@@ -277,8 +277,7 @@ def _linear(image: IntegralImage, x: Real, y: Real, channels: slice, offset: tup
     u, v = u - offset[0] - 0.5, v - offset[1] - 0.5
     first_column, first_row = pixel_at(u), pixel_at(v)
     right, down = np.clip(u - first_column, 0, 1), np.clip(v - first_row, 0, 1)
-    pixels = image.pixels[..., channels]
-    total, weights = np.zeros((*x.shape, pixels.shape[2])), np.zeros(x.shape)
+    total, weights = np.zeros((*x.shape, channels.stop - channels.start)), np.zeros(x.shape)
     for dv, weight_v in ((0, 1 - down), (1, down)):
         for du, weight_u in ((0, 1 - right), (1, right)):
             column, row = first_column + du, first_row + dv
@@ -286,7 +285,8 @@ def _linear(image: IntegralImage, x: Real, y: Real, channels: slice, offset: tup
             owner = display.lens_of(*place, NUMPY)
             usable = is_on_panel(display, column, row) & (owner[0] == lens[0]) & (owner[1] == lens[1])
             weight = np.where(usable, weight_u * weight_v, 0.0)
-            total += weight[..., None] * pixels[np.where(usable, row, 0), np.where(usable, column, 0)]
+            values = image.take(np.where(usable, row, 0), np.where(usable, column, 0), channels)
+            total += weight[..., None] * values
             weights += weight
     alone = _nearest(image, x, y, channels, offset)
     # Next to the edge of a micro-image all pixels about a point may belong to neighbours.
@@ -294,7 +294,7 @@ def _linear(image: IntegralImage, x: Real, y: Real, channels: slice, offset: tup
     return np.where(usable[..., None], total / np.where(usable, weights, 1.0)[..., None], alone).astype(np.float32)
 
 
-def _of_cells(image: IntegralImage, x: Real, y: Real, channel: int, filter_: Filter) -> FloatArray:
+def _of_cells(image: Picture, x: Real, y: Real, channel: int, filter_: Filter) -> FloatArray:
     """Values of one colour's sub-pixels at the points, ``(..., 1)``, where pixels are of several kinds.
 
     The grid of such sub-pixels is uneven: ``nearest`` takes the one whose centre is nearest, ``linear`` weighs those
@@ -318,9 +318,9 @@ def _of_cells(image: IntegralImage, x: Real, y: Real, channel: int, filter_: Fil
             right, down = display.panel.subpixel_offset(*center, channel, NUMPY)
             right, down = np.abs(center[0] + right - u), np.abs(center[1] + down - v)
             inside = is_on_panel(display, column, row)
-            values = np.where(
-                inside, image.pixels[np.where(inside, row, 0), np.where(inside, column, 0), channel], np.float32(0)
-            )
+            part = slice(channel, channel + 1)
+            values = image.take(np.where(inside, row, 0), np.where(inside, column, 0), part)[..., 0]
+            values = np.where(inside, values, np.float32(0))
             distance = right * right + down * down
             is_nearer = distance < best
             nearest, best = np.where(is_nearer, values, nearest), np.where(is_nearer, distance, best)

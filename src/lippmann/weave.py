@@ -8,6 +8,7 @@ panel's rectangle in the lens plane, as an off-axis camera focused there sees it
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Literal, get_args
 
 import numpy as np
@@ -17,6 +18,9 @@ from lippmann._version import VERSION
 from lippmann.display import NUMPY, Display
 from lippmann.errors import PictureError, UsageError
 from lippmann.image import IntegralImage, Provenance
+from lippmann.image.banded import write_in_bands
+from lippmann.image.integral_image import FloatArray
+from lippmann.image.metadata import Metadata
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.quilt import Quilt
 
@@ -59,28 +63,65 @@ def weave(
     PictureError
         If the display is not lenticular, or the quilt was made for another shape of panel.
     """
-    if choice not in get_args(ViewChoice):
-        raise UsageError(f"the choice {choice!r} is not known", rule=f"known are {', '.join(get_args(ViewChoice))}")
-    _check_fit(quilt, display)
+    _check(quilt, display, choice)
     width, height = display.panel.width, display.panel.height
     pixels = np.empty((height, width, 3), dtype=np.float32)
     step = max(1, _BLOCK // width)
     for first in range(0, height, step):
         last = min(first + step, height)
-        u, v = np.meshgrid(np.arange(width) + 0.5, np.arange(first, last) + 0.5)
-        for channel in range(3):
-            x, y = display.subpixel_point(u, v, channel, NUMPY)
-            place_x, place_y = _place_in_view(quilt, display, x, y)
-            number, share = _views(view_fraction(display, x, y), quilt.layout.views, choice)
-            colors = _sampled(quilt, channel, number, place_x, place_y)
-            if choice == "linear":
-                following = np.minimum(number + 1, quilt.layout.views - 1)
-                colors += share * (_sampled(quilt, channel, following, place_x, place_y) - colors)
-            pixels[first:last, :, channel] = colors
+        pixels[first:last] = _woven(quilt, display, choice, first, last)
         progress(Progress("weave", last, height))
+    return IntegralImage(pixels, display, provenance=_made(quilt, choice, scene))
+
+
+def weave_to_file(
+    quilt: Quilt,
+    display: Display,
+    path: Path,
+    *,
+    choice: ViewChoice = "linear",
+    scene: str = "",
+    bits: int | None = None,
+    progress: ProgressCallback = silent,
+) -> None:
+    """Write what :func:`weave` gives to a TIFF or Zarr file, in memory that does not grow with the panel.
+
+    Parameters and errors as there; of the file as for :func:`lippmann.image.banded.write_in_bands`.
+    """
+    _check(quilt, display, choice)
+    step = max(1, _BLOCK // display.panel.width)
+
+    def rows(first: int, last: int) -> FloatArray:
+        band = np.empty((last - first, display.panel.width, 3), dtype=np.float32)
+        for start in range(first, last, step):
+            stop = min(start + step, last)
+            band[start - first : stop - first] = _woven(quilt, display, choice, start, stop)
+            progress(Progress("weave", stop, display.panel.height))
+        return band
+
+    write_in_bands(rows, Metadata(display, np.eye(4), _made(quilt, choice, scene)), path, bits=bits)
+
+
+def _made(quilt: Quilt, choice: ViewChoice, scene: str) -> Provenance:
     options = {"views": quilt.layout.views, "view_choice": choice, "direction": "even in the tangent"}
-    made = Provenance(method="weave", subpixels=True, scene=scene, version=VERSION, options=options)
-    return IntegralImage(pixels, display, provenance=made)
+    return Provenance(method="weave", subpixels=True, scene=scene, version=VERSION, options=options)
+
+
+def _woven(quilt: Quilt, display: Display, choice: ViewChoice, first: int, last: int) -> FloatArray:
+    """Some rows of the picture, ``(last - first, W, 3)``."""
+    width = display.panel.width
+    u, v = np.meshgrid(np.arange(width) + 0.5, np.arange(first, last) + 0.5)
+    woven = np.empty((last - first, width, 3), dtype=np.float32)
+    for channel in range(3):
+        x, y = display.subpixel_point(u, v, channel, NUMPY)
+        place_x, place_y = _place_in_view(quilt, display, x, y)
+        number, share = _views(view_fraction(display, x, y), quilt.layout.views, choice)
+        colors = _sampled(quilt, channel, number, place_x, place_y)
+        if choice == "linear":
+            following = np.minimum(number + 1, quilt.layout.views - 1)
+            colors += share * (_sampled(quilt, channel, following, place_x, place_y) - colors)
+        woven[..., channel] = colors
+    return woven
 
 
 def view_fraction(display: Display, x: Real, y: Real) -> Real:
@@ -91,6 +132,12 @@ def view_fraction(display: Display, x: Real, y: Real) -> Real:
     place = (lattice.across(x, y) - axis) / (lattice.pitch * scale)
     fraction: Real = np.clip(0.5 - place, 0.0, 1.0)
     return fraction
+
+
+def _check(quilt: Quilt, display: Display, choice: str) -> None:
+    if choice not in get_args(ViewChoice):
+        raise UsageError(f"the choice {choice!r} is not known", rule=f"known are {', '.join(get_args(ViewChoice))}")
+    _check_fit(quilt, display)
 
 
 def _check_fit(quilt: Quilt, display: Display) -> None:

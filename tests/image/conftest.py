@@ -26,7 +26,6 @@ PROVENANCE = Provenance(
     device="cpu",
     traced_fraction=0.19,
     rays={"primary": 16777216, "shadow": 2**40},
-    seconds={"trace": 0.1, "total": 1 / 3},
     options={"filter": "box", "nested": [1, [2.5, None, True]]},
     notes=("a scene without lights", "größer"),
 )

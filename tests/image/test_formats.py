@@ -203,7 +203,7 @@ def test_a_missing_empty_or_foreign_file(tmp_path):
         ("missing.png", None, "missing.png: is not there"),
         ("empty.png", b"", "empty.png: is empty"),
         ("text.png", b"hello", "text.png: is no picture that is known here"),
-        ("jpeg.png", b"\xff\xd8\xff\xe0" + bytes(100), "PNG, OpenEXR and TIFF are read"),
+        ("jpeg.png", b"\xff\xd8\xff\xe0" + bytes(100), "PNG, OpenEXR, TIFF and Zarr are read"),
     ):
         if content is not None:
             (tmp_path / name).write_bytes(content)

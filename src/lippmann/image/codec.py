@@ -16,28 +16,32 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.errors import PictureError
-from lippmann.image import exr, png, tiff
+from lippmann.image import exr, png, tiff, zarr_file
 from lippmann.image.color import dequantize, quantize
 from lippmann.image.integral_image import Stored
 from lippmann.image.provenance import Transfer
+from lippmann.store.grid import TileGrid
 
-FormatName = Literal["png", "exr", "tiff"]
+FormatName = Literal["png", "exr", "tiff", "zarr"]
 
 #: Formats by the endings of file names.
-FORMATS: dict[str, FormatName] = {".png": "png", ".exr": "exr", ".tif": "tiff", ".tiff": "tiff"}
+FORMATS: dict[str, FormatName] = {".png": "png", ".exr": "exr", ".tif": "tiff", ".tiff": "tiff", ".zarr": "zarr"}
 
 #: Type of the stored values by format and bits per channel; each format's first is its default.
 STORED: dict[FormatName, dict[int, Stored]] = {
     "png": {8: "uint8", 16: "uint16"},
     "exr": {32: "float32", 16: "float16"},
     "tiff": {8: "uint8", 16: "uint16", 32: "float32"},
+    "zarr": {8: "uint8", 16: "uint16", 32: "float32"},
 }
 
 #: Keyword of the PNG text and name of the EXR attribute that carry a picture's metadata.
 TEXT_KEY = "lippmann"
 
-#: More pixels than any panel or print has; a file that claims more is damaged or meant to fill the memory.
+#: More pixels than are read at once; a file that claims more is damaged, or meant to fill the memory.
 MOST_PIXELS = 1 << 29
+#: The same for formats that are read piece by piece: more than any panel or print has.
+MOST_IN_PIECES = 1 << 32
 
 #: Deflate, the tightest packing of all formats here, makes at most 1032 bytes of one: as many grey pixels of 8 bits.
 _MOST_PIXELS_PER_BYTE = 1100
@@ -70,21 +74,51 @@ def encode_file(
     text: str = "",
     pixel_pitch: float | None = None,
 ) -> None:
-    """Write the layer ``""`` (linear RGB, finite), and in OpenEXR the others; an OSError if the file cannot be."""
-    pixels = np.asarray(layers[""], dtype=np.float32)
-    is_integer = stored in ("uint8", "uint16")
-    values: NDArray[Any] = pixels
-    if is_integer:
-        values = quantize(pixels, 8 if stored == "uint8" else 16, transfer)
-    elif stored == "float16":
-        values = np.clip(pixels, -_FLOAT16_MAX, _FLOAT16_MAX).astype(np.float16)
+    """Write the layer ``""`` (linear RGB, finite), and in OpenEXR the others; an OSError if the file cannot be.
+
+    A Zarr "file" is a folder, which may exist if it is empty.
+    """
+    values = stored_values(np.asarray(layers[""], dtype=np.float32), stored, transfer)
+    encode_values(path, name, {**layers, "": values}, transfer=transfer, text=text, pixel_pitch=pixel_pitch)
+
+
+def encode_values(
+    path: Path,
+    name: FormatName,
+    layers: Mapping[str, NDArray[Any]],
+    *,
+    transfer: Transfer,
+    text: str = "",
+    pixel_pitch: float | None = None,
+) -> None:
+    """:func:`encode_file` of a layer ``""`` that is made of :func:`stored_values` already."""
+    values = layers[""]
     texts = {TEXT_KEY: text} if text else {}
     if name == "png":
         path.write_bytes(png.encode_png(values, text=texts, pixel_pitch=pixel_pitch, srgb=transfer == "srgb"))
     elif name == "tiff":
         tiff.write_tiff(path, values, description=text, pixel_pitch=pixel_pitch)
+    elif name == "zarr":
+        height, width = values.shape[:2]
+        cuts = [window.slices for window in TileGrid(width, height, tiff.TILE)]
+        tiles = ((place, values[place]) for place in cuts)
+        zarr_file.write_zarr(path, tiles, size=(width, height), side=tiff.TILE, dtype=values.dtype, text=text)
     else:
-        exr.write_exr(path, _channels({**layers, "": values}), text=texts, pixel_pitch=pixel_pitch)
+        exr.write_exr(path, _channels(layers), text=texts, pixel_pitch=pixel_pitch)
+
+
+def stored_values(linear: NDArray[np.float32], stored: Stored, transfer: Transfer) -> NDArray[Any]:
+    """Linear float32 values as files hold them; same shape."""
+    if stored in ("uint8", "uint16"):
+        return quantize(linear, 8 if stored == "uint8" else 16, transfer)
+    if stored == "float16":
+        return np.clip(linear, -_FLOAT16_MAX, _FLOAT16_MAX).astype(np.float16)
+    return linear
+
+
+def linear_values(values: NDArray[Any], transfer: Transfer) -> NDArray[np.float32]:
+    """Linear float32 values of what files hold: the inverse of :func:`stored_values`, but for its rounding."""
+    return dequantize(values, transfer) if values.dtype.kind == "u" else values.astype(np.float32)
 
 
 def decode_file(path: Path, name: FormatName, transfer: Transfer) -> tuple[dict[str, NDArray[Any]], Stored]:
@@ -96,18 +130,38 @@ def decode_file(path: Path, name: FormatName, transfer: Transfer) -> tuple[dict[
         If the pixels cannot be decoded or are no opaque colours of a known depth.
     """
     layers: dict[str, NDArray[Any]] = {}
+    if name in ("tiff", "zarr"):
+        _check_not_too_large(path)
     if name == "exr":
         layers = _layers(exr.read_exr(path), path)
         values = layers[""]
+    elif name == "zarr":
+        values = zarr_file.read_part(zarr_file.open_zarr(path), (slice(None), slice(None)), path)
     else:
         values = png.read_png(path) if name == "png" else tiff.read_tiff(path)
     stored = values.dtype.name
+    check_stored(stored, name, path)
+    colors = opaque_colors(values, path)
+    layers[""] = linear_values(colors, transfer)
+    return layers, cast(Stored, stored)
+
+
+def _check_not_too_large(path: Path) -> None:
+    header = read_header(path)
+    if header.width * header.height > MOST_PIXELS:
+        raise PictureError(
+            f"has {header.width} x {header.height} pixels",
+            where=str(path),
+            rule=f"at most {MOST_PIXELS} are read at once",
+            fix="use what reads it piece by piece: info, replay, views, refocus, compare",
+        )
+
+
+def check_stored(stored: str, name: FormatName, path: Path) -> None:
+    """Raise :class:`PictureError` if a format's values of this type are not read."""
     if stored not in STORED[name].values():
         rule = f"{name} is read with {', '.join(STORED[name].values())}"
         raise PictureError(f"holds values of the type {stored}", where=str(path), rule=rule)
-    colors = _opaque_colors(values, path)
-    layers[""] = dequantize(colors, transfer) if colors.dtype.kind == "u" else colors.astype(np.float32)
-    return layers, cast(Stored, stored)
 
 
 def read_header(path: Path) -> FileHeader:
@@ -129,15 +183,20 @@ def read_header(path: Path) -> FileHeader:
         width, height, text = exr_header.width, exr_header.height, exr_header.text.get(TEXT_KEY, "")
         stored = exr_header.channels.get("R", "none")
         layers = tuple(sorted({layer for layer, dot, _ in (c.rpartition(".") for c in exr_header.channels) if dot}))
+    elif name == "zarr":
+        array = zarr_file.open_zarr(path)
+        (height, width), text, stored = array.shape[:2], zarr_file.zarr_text(array), array.dtype.name
     else:
         tiff_header = tiff.read_tiff_header(path)
         width, height, text = tiff_header.width, tiff_header.height, tiff_header.description
         stored = tiff_header.dtype
-    _check_plausible(path, width, height)
+    _check_plausible(path, name, width, height)
     return FileHeader(name, width, height, stored, layers, text)
 
 
 def _recognized(path: Path) -> FormatName:
+    if zarr_file.is_zarr(path):
+        return "zarr"
     try:
         with path.open("rb") as file:
             start = file.read(8)
@@ -153,22 +212,25 @@ def _recognized(path: Path) -> FormatName:
         return "exr"
     if start.startswith(tiff.SIGNATURES):
         return "tiff"
-    raise PictureError("is no picture that is known here", where=str(path), rule="PNG, OpenEXR and TIFF are read")
+    raise PictureError("is no picture that is known here", where=str(path), rule="PNG, OpenEXR, TIFF and Zarr are read")
 
 
-def _check_plausible(path: Path, width: int, height: int) -> None:
+def _check_plausible(path: Path, name: FormatName, width: int, height: int) -> None:
     """Refuse sizes that the file cannot hold before memory is given to them."""
-    if width * height > MOST_PIXELS:
-        rule = f"at most {MOST_PIXELS} pixels are read"
+    most = MOST_IN_PIECES if name in ("tiff", "zarr") else MOST_PIXELS
+    if width * height > most:
+        rule = f"at most {most} pixels are read"
         raise PictureError(f"claims {width} x {height} pixels", where=str(path), rule=rule)
+    if path.is_dir():  # chunks that hold nothing need no files
+        return
     size = path.stat().st_size
     if width * height > size * _MOST_PIXELS_PER_BYTE:
         what = f"claims {width} x {height} pixels but has only {size} bytes"
         raise PictureError(what, where=str(path), fix="make or fetch it anew")
 
 
-def _opaque_colors(values: NDArray[Any], path: Path) -> NDArray[Any]:
-    """``(H, W, 3)`` of grey, grey and alpha, RGB, or RGB and alpha, where alpha hides nothing."""
+def opaque_colors(values: NDArray[Any], path: Path) -> NDArray[Any]:
+    """``(H, W, 3)`` values as stored, of grey, grey and alpha, RGB, or RGB and alpha, where alpha hides nothing."""
     if values.ndim == 2:
         values = values[..., None]
     channels = values.shape[2] if values.ndim == 3 else 0

@@ -7,6 +7,7 @@ the identity for both bit depths and both transfers.
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -46,8 +47,12 @@ def quantize(linear: FloatArray, bits: int, transfer: Transfer) -> NDArray[np.ui
 
 def dequantize(codes: NDArray[np.uint8] | NDArray[np.uint16], transfer: Transfer) -> FloatArray:
     """Linear float32 values of uint8 or uint16 codes; same shape."""
-    top = np.iinfo(codes.dtype).max
     # One table look-up per value: exact in double precision, and quicker than the curve itself.
+    return _levels(np.iinfo(codes.dtype).max, transfer)[codes]
+
+
+@lru_cache(maxsize=4)
+def _levels(top: int, transfer: Transfer) -> FloatArray:
+    """The linear values of all codes up to ``top``."""
     levels = np.arange(top + 1, dtype=np.float64) / top
-    table = (decode_srgb(levels) if transfer == "srgb" else levels).astype(np.float32)
-    return table[codes]
+    return (decode_srgb(levels) if transfer == "srgb" else levels).astype(np.float32)

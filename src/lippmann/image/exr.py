@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.errors import PictureError
+from lippmann.image.silence import libraries_silenced
 
 SIGNATURE = b"\x76\x2f\x31\x01"
 
@@ -110,7 +111,7 @@ def read_exr(path: Path) -> dict[str, NDArray[Any]]:
     import OpenEXR
 
     # The binding prints a warning where it should raise; what it read then has no parts.
-    with contextlib.redirect_stdout(io.StringIO()):
+    with contextlib.redirect_stdout(io.StringIO()), libraries_silenced():
         try:
             file = OpenEXR.File(str(path), separate_channels=True)
         except (RuntimeError, ValueError) as error:

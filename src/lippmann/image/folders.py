@@ -21,6 +21,7 @@ from lippmann.errors import OutputError, PictureError
 from lippmann.image.codec import STORED, FormatName, decode_file, encode_file, read_header
 from lippmann.image.formats import stored_as
 from lippmann.image.integral_image import IntegralImage, Stored
+from lippmann.image.large import LargePicture
 from lippmann.image.metadata import KEY, Metadata, from_dict, metadata_of, parse_json
 from lippmann.image.permutation import Permutation, micro_images_as_views
 from lippmann.image.views import exact_view_shape
@@ -81,7 +82,7 @@ def write_views(
     OutputError
         If the format is unknown or has no such bits, or the folder cannot be written.
     """
-    name, stored = _storage(image, folder, format, bits)
+    name, stored = storage_of(image, folder, format, bits)
     views, mask = image.views_and_mask()
     parts: dict[str, NDArray[Any]] = {"": views}
     if name == "exr" and image.views_are_exact:
@@ -103,7 +104,7 @@ def write_micro_images(
     Exact on every display. Places of a micro-image's box that hold no pixel of the lens are black. Returns the number
     of micro-images written.
     """
-    name, stored = _storage(image, folder, format, bits)
+    name, stored = storage_of(image, folder, format, bits)
     permutation = Permutation(image.display)
     layers = {"": image.pixels, **image.maps} if name == "exr" else {"": image.pixels}
     parts = {k: permutation.split(v) for k, v in layers.items()}
@@ -142,9 +143,10 @@ def compose(folder: Path, *, progress: ProgressCallback = silent) -> IntegralIma
     )
 
 
-def _storage(
-    image: IntegralImage, folder: Path, name: FormatName | None, bits: int | None
+def storage_of(
+    image: IntegralImage | LargePicture, folder: Path, name: FormatName | None, bits: int | None
 ) -> tuple[FormatName, Stored]:
+    """The format and the type of the values of a folder's files: as asked for, else as the picture is stored."""
     if name is None:
         name = "png" if image.stored in STORED["png"].values() else "exr"
     if name not in STORED:
@@ -169,27 +171,46 @@ def _write_parts(
     present = np.any(mask, axis=(2, 3))
     count = int(present.sum())
     rows, columns = present.shape
-    digits = len(str(max(rows, columns) - 1))
-    ending = {"png": ".png", "exr": ".exr", "tiff": ".tif"}[name]
     files: list[list[str | None]] = [[None] * columns for _ in range(rows)]
     with replacing_folder(folder) as temporary:
         for done, (row, column) in enumerate(np.argwhere(present).tolist(), start=1):
-            file = f"{_PREFIX[kind]}_{row:0{digits}}_{column:0{digits}}{ending}"
+            file = part_name(kind, name, (rows, columns), (row, column))
             files[row][column] = file
             layers = {key: values[row, column] for key, values in parts.items()}
             encode_file(temporary / file, name, layers, stored=stored, transfer=image.provenance.transfer)
             progress(Progress("write", done, count))
-        manifest = {
-            **metadata_of(image).to_dict(),
-            "kind": kind,
-            "stored": stored,
-            "order": _ORDER[kind],
-            "exact": kind == "micro-images" or image.views_are_exact,
-            "files": files,
-        }
-        text = json.dumps(manifest, allow_nan=False, indent=1)
-        (temporary / MANIFEST).write_text(text + "\n", encoding="ascii")
+        exact = kind == "micro-images" or image.views_are_exact
+        write_manifest(temporary, metadata_of(image), kind, stored, files, exact=exact)
     return count
+
+
+def part_name(kind: Kind, name: FormatName, shape: tuple[int, int], place: tuple[int, int]) -> str:
+    """The file of the part in row and column ``place`` of ``shape`` rows and columns."""
+    digits = len(str(max(shape) - 1))
+    ending = {"png": ".png", "exr": ".exr", "tiff": ".tif", "zarr": ".zarr"}[name]
+    return f"{_PREFIX[kind]}_{place[0]:0{digits}}_{place[1]:0{digits}}{ending}"
+
+
+def write_manifest(
+    folder: Path,
+    metadata: Metadata,
+    kind: Kind,
+    stored: Stored,
+    files: list[list[str | None]],
+    *,
+    exact: bool,
+) -> None:
+    """Write what says what the parts in ``folder`` are."""
+    manifest = {
+        **metadata.to_dict(),
+        "kind": kind,
+        "stored": stored,
+        "order": _ORDER[kind],
+        "exact": exact,
+        "files": files,
+    }
+    text = json.dumps(manifest, allow_nan=False, indent=1)
+    (folder / MANIFEST).write_text(text + "\n", encoding="ascii")
 
 
 def _read_manifest(folder: Path) -> _Manifest:
@@ -222,7 +243,10 @@ def _read_manifest(folder: Path) -> _Manifest:
 
 def _is_name(value: object) -> bool:
     """Whether this is None or the name of a file in the folder itself: no path may lead out of it."""
-    return value is None or (isinstance(value, str) and Path(value).name == value and "\0" not in value)
+    if not isinstance(value, str):
+        return value is None
+    is_text = not any(sign == "\0" or "\ud800" <= sign <= "\udfff" for sign in value)
+    return is_text and Path(value).name == value
 
 
 def _part_shape(manifest: _Manifest, folder: Path) -> tuple[int, int, int, int]:

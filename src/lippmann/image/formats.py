@@ -7,13 +7,14 @@ the values is told in :mod:`lippmann.image.codec`.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from lippmann.atomic import replacing
+from lippmann.atomic import check_folder_writable, check_writable, replacing, replacing_folder
 from lippmann.display import Display
 from lippmann.errors import OutputError, PictureError
 from lippmann.image.codec import FORMATS, STORED, FormatName, decode_file, encode_file, read_header
@@ -40,9 +41,9 @@ class PictureInfo:
 def format_for(path: Path, bits: int | None = None, *, source: Stored = "float32") -> tuple[FormatName, Stored]:
     """The format that a file name stands for and the type of the values that would be stored in it.
 
-    ``bits`` per channel: 8 or 16 for PNG, 16 or 32 for EXR (float), 8, 16 or 32 (float) for TIFF. None takes those of
-    ``source`` where the format has them, so that a picture is written as exactly as it was read, except that computed
-    values (``float32``) go to 8 bits unless the format is OpenEXR.
+    ``bits`` per channel: 8 or 16 for PNG, 16 or 32 for EXR (float), 8, 16 or 32 (float) for TIFF and Zarr. None takes
+    those of ``source`` where the format has them, so that a picture is written as exactly as it was read, except that
+    computed values (``float32``) go to 8 bits unless the format is OpenEXR.
 
     Raises
     ------
@@ -80,7 +81,7 @@ def write_picture(image: IntegralImage, path: Path, *, bits: int | None = None) 
     """
     name, stored = format_for(path, bits, source=image.stored)
     layers = {"": image.pixels, **image.maps} if name == "exr" else {"": image.pixels}
-    with replacing(path) as temporary:
+    with replacing_output(path, name) as temporary:
         encode_file(
             temporary,
             name,
@@ -113,8 +114,21 @@ def write_plain_picture(
     if not np.isfinite(pixels).all():
         raise PictureError("the picture holds values that are not finite", where=str(path))
     layers = {"": pixels, **(maps or {})} if name == "exr" else {"": pixels}
-    with replacing(path) as temporary:
+    with replacing_output(path, name) as temporary:
         encode_file(temporary, name, layers, stored=stored, transfer=transfer)
+
+
+def replacing_output(path: Path, name: FormatName) -> AbstractContextManager[Path]:
+    """:func:`lippmann.atomic.replacing`, or what does the same for the formats that are folders."""
+    return replacing_folder(path) if name == "zarr" else replacing(path)
+
+
+def check_output(path: Path, name: FormatName) -> None:
+    """Raise :class:`OutputError` now if a picture of this format could not be written to ``path`` later."""
+    if name == "zarr":
+        check_folder_writable(path)
+    else:
+        check_writable(path)
 
 
 def read_picture(path: Path, *, display: Display | None = None) -> IntegralImage:
@@ -133,7 +147,7 @@ def read_picture(path: Path, *, display: Display | None = None) -> IntegralImage
         If the file is missing, empty, foreign or damaged, has no display, or a size other than the display's.
     """
     info = read_info(path)
-    metadata = _metadata_for(info, path, display)
+    metadata = metadata_for(info, path, display)
     layers, stored = decode_file(path, info.format, metadata.provenance.transfer)
     pixels = layers.pop("")
     try:
@@ -146,7 +160,7 @@ def read_picture(path: Path, *, display: Display | None = None) -> IntegralImage
 
 def read_metadata(path: Path, *, display: Display | None = None) -> Metadata:
     """Display, placement and provenance of a picture, without decoding its pixels; raises as :func:`read_picture`."""
-    return _metadata_for(read_info(path), path, display)
+    return metadata_for(read_info(path), path, display)
 
 
 def read_info(path: Path) -> PictureInfo:
@@ -162,7 +176,8 @@ def read_info(path: Path) -> PictureInfo:
     return PictureInfo(header.format, header.width, header.height, header.stored, header.layers, metadata)
 
 
-def _metadata_for(info: PictureInfo, path: Path, display: Display | None) -> Metadata:
+def metadata_for(info: PictureInfo, path: Path, display: Display | None) -> Metadata:
+    """The metadata of a picture file, for ``display`` if one is given; raises as :func:`read_picture`."""
     metadata = info.metadata
     if metadata is None:
         if display is None:

@@ -149,6 +149,15 @@ class IntegralImage:
         """
         return cls(_joined_views(np.asarray(views, dtype=np.float32), display), display, **parts)
 
+    def take(self, row: NDArray[Any], column: NDArray[Any], channels: slice = slice(0, 3)) -> FloatArray:
+        """Values of single pixels, ``(..., channels)``: what reads piece by piece asks a picture for."""
+        values: FloatArray = self.pixels[..., channels][row, column]
+        return values
+
+    def rows(self, first: int, last: int) -> FloatArray:
+        """``(last - first, W, 3)``: whole rows."""
+        return self.pixels[first:last]
+
     # ---- What an eye sees, and files ------------------------------------------------------------------------------
 
     def replay(self, eye: tuple[float, float, float] | None = None, **options: Any) -> FloatArray:
@@ -190,6 +199,12 @@ class IntegralImage:
         grid, panel = self.display.lens_grid, self.display.panel
         lenses = f"{grid.columns} x {grid.rows} lenses"
         return f"<IntegralImage {panel.width} x {panel.height} pixels, {lenses}, display {self.display.name}>"
+
+    def _repr_mimebundle_(self, **_: Any) -> Any:
+        """The viewer's page as a widget, where it can be shown; see :mod:`lippmann.viewer.notebook`."""
+        from lippmann.viewer.notebook import mimebundle
+
+        return mimebundle(self)
 
     def _repr_png_(self) -> bytes:
         """A PNG of what an eye in the middle sees, at most 512 pixels wide."""
@@ -253,9 +268,11 @@ def checked_similarity(matrix: object) -> Matrix:
     if values.shape != (4, 4) or not np.isfinite(values).all() or list(values[3]) != [0, 0, 0, 1]:
         raise PictureError(f"world_from_display is {values.tolist()}", rule=rule)
     linear = values[:3, :3]
-    volume = float(np.linalg.det(linear))
-    scale = np.cbrt(volume)
-    if not volume > 0 or np.abs(linear.T @ linear / scale**2 - np.eye(3)).max() > _SIMILARITY_TOLERANCE:
+    with np.errstate(all="ignore"):  # what overflows is no similarity either: NaN is within no tolerance
+        volume = float(np.linalg.det(linear))
+        scale = np.cbrt(volume)
+        error = np.abs(linear.T @ linear / scale**2 - np.eye(3)).max()
+    if not (volume > 0 and error <= _SIMILARITY_TOLERANCE):
         raise PictureError(f"world_from_display is {values.tolist()}", rule=rule)
     values.flags.writeable = False
     return values

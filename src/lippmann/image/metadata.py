@@ -30,12 +30,17 @@ class Metadata:
     provenance: Provenance
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain values for JSON, with the version."""
+        """Plain values for JSON, with the version.
+
+        Seconds are left out: the same picture rendered again is the same file.
+        """
+        made = self.provenance.to_dict()
+        del made["seconds"]
         return {
             KEY: VERSION,
             "display": self.display.to_dict(),
             "world_from_display": self.world_from_display.tolist(),
-            "provenance": self.provenance.to_dict(),
+            "provenance": made,
         }
 
 

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.errors import PictureError
+from lippmann.image.silence import libraries_silenced
 
 SIGNATURE = b"\x89PNG\r\n\x1a\n"
 
@@ -106,7 +107,8 @@ def read_png(path: Path) -> NDArray[Any]:
     for _ in _chunks(io.BytesIO(data), path, all_bodies=True):
         pass
     try:
-        codes: NDArray[Any] = imagecodecs.png_decode(data)
+        with libraries_silenced():
+            codes: NDArray[Any] = imagecodecs.png_decode(data)
     except (RuntimeError, ValueError) as error:
         raise _damaged(path, str(error)) from error
     return codes

@@ -33,7 +33,7 @@ class Provenance:
     version:
         The Lippmann version that rendered it.
     device:
-        ``cpu`` or ``gpu`` and its name.
+        ``cpu``, or the GPU's name.
     traced_fraction:
         Primary rays traced divided by the rays that a full rendering traces, in [0, 1] for one sample per pixel and
         method.
@@ -43,7 +43,8 @@ class Provenance:
     rays:
         Rays traced by kind (``primary``, ``shadow``, ``secondary``).
     seconds:
-        Seconds spent by stage (``load``, ``build``, ``compile``, ``trace``, ``reuse``, ``total``).
+        Seconds spent by stage (``load``, ``build``, ``compile``, ``trace``, ``reuse``, ``total``). Files do not carry
+        them, so that the same picture gives the same file.
     estimate:
         What the picture says of its own error, dB with the ends of their 95 % intervals: ``psnr``, ``psnr_low``,
         ``psnr_high`` of the whole, ``worst``, ``worst_low``, ``worst_high`` of the worst micro-image, which is probably

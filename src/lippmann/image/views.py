@@ -16,8 +16,9 @@ further up.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +26,7 @@ from numpy.typing import NDArray
 from lippmann.display import NUMPY, Display, micro_image_extent, micro_image_shape
 from lippmann.display.display import BOUNDARY_TOLERANCE, WHOLE_TOLERANCE
 from lippmann.errors import PictureError
-from lippmann.image.permutation import Permutation, lens_indices
+from lippmann.image.permutation import Permutation, lens_indices, row_blocks
 
 FloatArray = NDArray[np.float32]
 Real = NDArray[np.float64]
@@ -106,7 +107,7 @@ def resampled_views(
     """
     grid = view_grid(display)
     u_center, v_center, lens = micro_image_centers(display)
-    owners = lens_indices(display)
+    owners = _owner_table(display)
     shape = (len(grid.down), len(grid.right), *u_center.shape)
     views, mask = np.zeros((*shape, 3), dtype=np.float32), np.zeros(shape, dtype=np.bool_)
     reach = (0,) if display.lens_array.layout == "lenticular" else (-1, 0, 1)
@@ -124,19 +125,26 @@ def resampled_views(
     return views, mask
 
 
-def micro_image_centers(display: Display) -> tuple[Real, Real, NDArray[np.int32]]:
+def micro_image_centers(display: Display, rows: tuple[int, int] | None = None) -> tuple[Real, Real, NDArray[np.int32]]:
     """Centres ``(u, v)`` of the micro-images in pixel coordinates, and the flat index of their lenses.
 
-    All are ``(lens_rows, lens_cols)``. Those of a lenticular sheet are ``(H, lens_cols)``: where the lens's axis, seen
-    from the viewing distance, crosses the middle of each pixel row.
+    All are ``(lens_rows, lens_cols)``, or only the lens ``rows`` from the first up to the last. The rows of a
+    lenticular sheet are the panel's: the centre is where the lens's axis, seen from the viewing distance, crosses the
+    middle of the row.
     """
-    grid, panel, lattice = display.lens_grid, display.panel, display.lattice
+    first, last = rows or (0, lens_rows(display))
+    row, i = np.indices((last - first, display.lens_grid.columns))
+    return centers_of_lenses(display, row + first, i)
+
+
+def centers_of_lenses(display: Display, row: NDArray[Any], i: NDArray[Any]) -> tuple[Real, Real, NDArray[np.int32]]:
+    """:func:`micro_image_centers` of single lenses, by their rows and columns."""
+    row, i = row.astype(np.float64), i.astype(np.float64)
+    grid, lattice = display.lens_grid, display.lattice
     if lattice.layout != "lenticular":
-        j, i = np.indices((grid.rows, grid.columns)).astype(np.float64)
-        x, y = lattice.center(i, j, 0.0 * i, 0.0 * j, NUMPY)
+        x, y = lattice.center(i, row, 0.0 * i, 0.0 * row, NUMPY)
         u, v = display.pixel_coordinates(x * display.magnification, y * display.magnification, NUMPY)
-        return u, v, (j * grid.columns + i).astype(np.int32)
-    row, i = np.indices((panel.height, grid.columns)).astype(np.float64)
+        return u, v, (row * grid.columns + i).astype(np.int32)
     _, y = display.panel_point(0.0 * row, row + 0.5, NUMPY)
     slant = math.radians(lattice.slant)
     across = (lattice.origin_x + i * lattice.pitch) * display.magnification
@@ -144,30 +152,89 @@ def micro_image_centers(display: Display) -> tuple[Real, Real, NDArray[np.int32]
     return u, v, i.astype(np.int32)
 
 
+def lens_rows(display: Display) -> int:
+    """Rows of a view: those of the lenses; of a lenticular sheet the panel's."""
+    return display.panel.height if display.lens_array.layout == "lenticular" else display.lens_grid.rows
+
+
+def pixels_of_view(
+    display: Display, grid: ViewGrid, view: tuple[int, int], row: NDArray[Any], i: NDArray[Any]
+) -> tuple[NDArray[np.bool_], NDArray[np.intp], NDArray[np.intp]]:
+    """Which pixels a view shows at some of its places, without any table of the whole panel.
+
+    Parameters
+    ----------
+    grid:
+        :func:`view_grid` of the display.
+    view:
+        ``(ky, kx)``.
+    row, i:
+        Rows and columns in the view, alike in shape.
+
+    Returns
+    -------
+    Whether there is such a pixel, its row and its column on the panel; those of :meth:`IntegralImage.views` with the
+    nearest pixel where views are resampled.
+    """
+    ky, kx = view
+    u, v, lens = centers_of_lenses(display, row, i)
+    owners = _owner_by_geometry(display)
+    is_lenticular = display.lens_array.layout == "lenticular"
+    if not grid.exact:
+        u, v = u + grid.right[kx], v + grid.down[ky]
+        owner_i, owner_j = display.lens_of(*display.panel_point(u, v, NUMPY), NUMPY)
+        own = owner_j * display.lens_grid.columns + owner_i == lens
+        found, at_row, at_column = _nearest_own_pixel(owners, lens, u, v, (0,) if is_lenticular else (-1, 0, 1))
+        return found & own, at_row, at_column
+    # The inverse of :func:`lippmann.display.pixel_indices_under_lens`.
+    width, height = micro_image_extent(display)
+    at_column = np.ceil(u - 0.5 * width + kx - 0.5 - BOUNDARY_TOLERANCE).astype(np.intp)
+    at_row = row.astype(np.intp)
+    if not is_lenticular:
+        at_row = np.ceil(v - 0.5 * height + ky - 0.5 - BOUNDARY_TOLERANCE).astype(np.intp)
+    return _is_own(owners, lens, at_row, at_column), at_row, at_column
+
+
 def _pixel_views(display: Display) -> ViewGrid:
     """The views of a display with whole pixels from lens to lens: one per place of a micro-image's box."""
-    u, v, _ = micro_image_centers(display)
     width, height = micro_image_extent(display)
     ny, nx = micro_image_shape(display)
-    right, spread = _first_pixel(u, width)
+    across, down = _Offsets(), _Offsets()
+    # Some rows at a time: a sheet a metre high has sixty million centres.
+    for rows in row_blocks(lens_rows(display), display.lens_grid.columns):
+        u, v, _ = micro_image_centers(display, rows)
+        across.add(u, width)
+        down.add(v, height)
+    right = tuple(across.middle + k for k in range(nx))
     if display.lens_array.layout == "lenticular":
-        return ViewGrid(tuple(right + k for k in range(nx)), (0.0,), exact=True, spread=spread)
-    first, spread_down = _first_pixel(v, height)
+        return ViewGrid(right, (0.0,), exact=True, spread=across.spread)
     return ViewGrid(
-        right=tuple(right + k for k in range(nx)),
-        down=tuple(first + k for k in range(ny)),
+        right=right,
+        down=tuple(down.middle + k for k in range(ny)),
         exact=True,
-        spread=max(spread, spread_down),
+        spread=max(across.spread, down.spread),
     )
 
 
-def _first_pixel(center: Real, size: float) -> tuple[float, float]:
-    """Where the first pixel of boxes of ``size`` pixels about these centres stands from them: mean and spread."""
-    # Pixel centres lie at whole numbers and a half. A centre within rounding noise of the box's edge is inside.
-    edge = center - 0.5 * size
-    offset = np.ceil(edge - 0.5 - BOUNDARY_TOLERANCE) + 0.5 - center
-    low, high = float(offset.min()), float(offset.max())
-    return 0.5 * (low + high), 0.5 * (high - low)
+class _Offsets:
+    """Where the first pixel of boxes of some size stands from their centres."""
+
+    def __init__(self) -> None:
+        self._low, self._high = math.inf, -math.inf
+
+    def add(self, center: Real, size: float) -> None:
+        # Pixel centres lie at whole numbers and a half. A centre within rounding noise of the box's edge is inside.
+        edge = center - 0.5 * size
+        offset = np.ceil(edge - 0.5 - BOUNDARY_TOLERANCE) + 0.5 - center
+        self._low, self._high = min(self._low, float(offset.min())), max(self._high, float(offset.max()))
+
+    @property
+    def middle(self) -> float:
+        return 0.5 * (self._low + self._high)
+
+    @property
+    def spread(self) -> float:
+        return 0.5 * (self._high - self._low)
 
 
 def _evenly(size: float) -> tuple[float, ...]:
@@ -181,7 +248,7 @@ def _is_whole(count: float) -> bool:
 
 
 def _nearest_own_pixel(
-    owners: NDArray[np.int32], lens: NDArray[np.int32], u: Real, v: Real, reach: tuple[int, ...]
+    owners: _Owners, lens: NDArray[np.int32], u: Real, v: Real, reach: tuple[int, ...]
 ) -> tuple[NDArray[np.bool_], NDArray[np.intp], NDArray[np.intp]]:
     """Whether a lens has a pixel at or next to a place, and the row and column of the nearest one."""
     # A place on the line between two pixels goes to the right or lower one, whatever the rounding noise.
@@ -203,19 +270,44 @@ def _nearest_own_pixel(
 
 
 def _is_own(
-    owners: NDArray[np.int32], lens: NDArray[np.int32], row: NDArray[np.intp], column: NDArray[np.intp]
+    owners: _Owners, lens: NDArray[np.int32], row: NDArray[np.intp], column: NDArray[np.intp]
 ) -> NDArray[np.bool_]:
     """Whether a pixel is on the panel and belongs to the lens."""
     height, width = owners.shape
     inside = (row >= 0) & (row < height) & (column >= 0) & (column < width)
-    own: NDArray[np.bool_] = inside & (owners[row.clip(0, height - 1), column.clip(0, width - 1)] == lens)
+    own: NDArray[np.bool_] = inside & (owners.lens(row.clip(0, height - 1), column.clip(0, width - 1)) == lens)
     return own
+
+
+@dataclass(frozen=True)
+class _Owners:
+    """The flat index of the lens of pixels by row and column, on a panel of ``shape``."""
+
+    shape: tuple[int, int]
+    lens: Callable[[NDArray[np.intp], NDArray[np.intp]], NDArray[Any]]
+
+
+def _owner_table(display: Display) -> _Owners:
+    """Looked up: quick where many are asked for, at four bytes for every pixel."""
+    table = lens_indices(display)
+    return _Owners(table.shape, lambda row, column: table[row, column])
+
+
+def _owner_by_geometry(display: Display) -> _Owners:
+    """Worked out anew each time."""
+
+    def lens(row: NDArray[np.intp], column: NDArray[np.intp]) -> NDArray[Any]:
+        i, j = display.lens_of(*display.panel_point(column + 0.5, row + 0.5, NUMPY), NUMPY)
+        flat: NDArray[Any] = j * display.lens_grid.columns + i
+        return flat
+
+    return _Owners((display.panel.height, display.panel.width), lens)
 
 
 def _interpolate(
     view: FloatArray,
     pixels: FloatArray,
-    owners: NDArray[np.int32],
+    owners: _Owners,
     lens: NDArray[np.int32],
     u: Real,
     v: Real,

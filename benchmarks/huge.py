@@ -1,0 +1,123 @@
+"""A poster larger than memory: peak resident memory, and time per pixel against that of a picture of 8 megapixels.
+
+python benchmarks/huge.py [--size 34000x22000] [--small 3520x2272] [--folder FOLDER] [--no-commands]
+
+The print preset's optics (60 lenses per inch at 720 pixels per inch), the teapot, direct light, 1 sample per pixel,
+into a tiled BigTIFF and into Zarr; then every command that reads a picture, on what was written. Each step is a process
+of its own, whose peak memory and processor time the system tells. The small picture is rendered before and after each
+large one, so that both see the same machine; the scene grows with the panel, and with it the viewing distance and that
+at which rays begin, so that both see the same scene.
+
+Targets: at most 3 GB; time per pixel within 15 % of the small picture's.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+from harness import save
+
+MEMORY = 2 * 10**9
+LIPPMANN = "from lippmann.cli import main; main()"
+TARGET_BYTES, TARGET_RELATIVE = 3e9, 1.15
+
+
+def main() -> None:
+    options = _options()
+    large, small = (tuple(int(side) for side in size.split("x")) for size in (options.size, options.small))
+    with tempfile.TemporaryDirectory(dir=options.folder) as name:
+        folder = Path(name)
+        results: dict[str, Any] = {
+            "size": large,
+            "small": small,
+            "memory_limit": MEMORY,
+            "target_peak_bytes": TARGET_BYTES,
+            "target_relative": TARGET_RELATIVE,
+            "renders": {ending: _compared(folder, ending, large, small) for ending in ("tif", "zarr")},
+        }
+        if options.commands:
+            results["commands"] = _commands(folder)
+        save("huge", results)
+
+
+def _options() -> argparse.Namespace:
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--size", default="34000x22000")
+    parser.add_argument("--small", default="3520x2272")
+    parser.add_argument("--folder", default=None, help="where there is room for twice the picture")
+    parser.add_argument("--no-commands", dest="commands", action="store_false")
+    return parser.parse_args()
+
+
+def _compared(folder: Path, ending: str, large: tuple[int, ...], small: tuple[int, ...]) -> dict[str, Any]:
+    before = _rendered(folder / f"small.{ending}", small, small)
+    found = _rendered(folder / f"large.{ending}", large, small)
+    after = _rendered(folder / f"small2.{ending}", small, small)
+    path = folder / f"large.{ending}"
+    files = [path] if path.is_file() else [part for part in path.rglob("*") if part.is_file()]
+    ratios = {
+        kind: 2 * found[kind] / (before[kind] + after[kind])
+        for kind in ("nanoseconds_per_pixel", "cpu_nanoseconds_per_pixel")
+    }
+    return {
+        **found,
+        "bytes": sum(part.stat().st_size for part in files),
+        "small": [before, after],
+        "relative_to_small": ratios["nanoseconds_per_pixel"],
+        "cpu_relative_to_small": ratios["cpu_nanoseconds_per_pixel"],
+    }
+
+
+def _rendered(output: Path, size: tuple[int, ...], small: tuple[int, ...]) -> dict[str, Any]:
+    figures = output.with_name("figures.json")
+    numbers = [str(number) for number in (*size, small[0], MEMORY)]
+    usage = _run([sys.executable, str(Path(__file__).with_name("huge_render.py")), *numbers, str(output), str(figures)])
+    return {**json.loads(figures.read_text()), **usage}
+
+
+def _commands(folder: Path) -> dict[str, Any]:
+    """Every command that reads a picture, on the TIFF and, for one, on the Zarr folder."""
+    picture, other = folder / "large.tif", folder / "large.zarr"
+    calls = {
+        "info": ["info", picture],
+        "info (Zarr)": ["info", other],
+        "replay": ["replay", picture, "-o", folder / "seen.png"],
+        "replay (Zarr)": ["replay", other, "-o", folder / "seen.png"],
+        "refocus": ["refocus", picture, "--plane", "1", "-o", folder / "focused.png"],
+        "views": ["views", picture, "--format", "tiff", "-o", folder / "views"],
+        "compare": ["compare", picture, other],
+    }
+    found = {}
+    for name, words in calls.items():
+        found[name] = _run([sys.executable, "-c", LIPPMANN, *(str(word) for word in words)])
+        print(name, found[name], file=sys.stderr)
+    shutil.rmtree(folder / "views", ignore_errors=True)
+    return found
+
+
+def _run(words: list[str]) -> dict[str, float]:
+    """Seconds, processor seconds and peak resident memory of a process."""
+    started = time.perf_counter()
+    process = subprocess.Popen(words, stdout=subprocess.DEVNULL)
+    _, status, usage = os.wait4(process.pid, 0)
+    process.returncode = os.waitstatus_to_exitcode(status)
+    if process.returncode:
+        raise SystemExit(f"{' '.join(words)} left with {process.returncode}")
+    return {
+        "seconds": time.perf_counter() - started,
+        "cpu_seconds": usage.ru_utime + usage.ru_stime,
+        "peak_resident_bytes": usage.ru_maxrss * 1024,
+    }
+
+
+if __name__ == "__main__":
+    main()

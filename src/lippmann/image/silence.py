@@ -1,0 +1,53 @@
+"""Libraries that print what is wrong with a file on standard error, beside saying it where they were called."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import threading
+from collections.abc import Iterator
+
+_STANDARD_ERROR = 2
+
+_lock = threading.Lock()
+#: How many threads want silence, and a copy of the descriptor that they took away.
+_users = 0
+_kept: int | None = None
+
+
+@contextlib.contextmanager
+def libraries_silenced() -> Iterator[None]:
+    """Nothing that is printed on standard error inside the ``with`` is seen.
+
+    The descriptor belongs to the whole process: it is turned away by the first thread that comes and given back by the
+    last that goes.
+    """
+    _begin()
+    try:
+        yield
+    finally:
+        _end()
+
+
+def _begin() -> None:
+    global _users, _kept
+    with _lock:
+        _users += 1
+        if _users > 1:
+            return
+        try:
+            _kept = os.dup(_STANDARD_ERROR)
+        except OSError:  # there is none
+            return
+        with open(os.devnull, "wb") as nowhere:
+            os.dup2(nowhere.fileno(), _STANDARD_ERROR)
+
+
+def _end() -> None:
+    global _users, _kept
+    with _lock:
+        _users -= 1
+        if _users == 0 and _kept is not None:
+            os.dup2(_kept, _STANDARD_ERROR)
+            os.close(_kept)
+            _kept = None
