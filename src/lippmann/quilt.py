@@ -10,7 +10,7 @@ from __future__ import annotations
 import re
 import warnings
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -18,12 +18,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.atomic import replacing_folder
-from lippmann.errors import OutputError, PictureError
+from lippmann.display import Display, load_display
+from lippmann.errors import OutputError, PictureError, UsageError
 from lippmann.image.codec import FORMATS, STORED, FormatName, decode_file, encode_file, read_header
 from lippmann.image.color import dequantize
 from lippmann.image.folders import MANIFEST
 from lippmann.image.formats import format_for, write_plain_picture
 from lippmann.image.integral_image import FloatArray, Stored
+from lippmann.image.provenance import Provenance
 from lippmann.progress import Progress, ProgressCallback, silent
 
 #: Pixels of a quilt's sides, and its columns and rows, within which displays take them.
@@ -56,35 +58,45 @@ class QuiltLayout(NamedTuple):
 
 
 class DeviceQuilt(NamedTuple):
-    """The quilt that a display is given: its preset's name, width and height in pixels, and layout."""
+    """The quilt that a display is given: its preset's name, width and height in pixels, and layout.
+
+    ``serial`` is how the serial numbers of such devices begin; empty where that is not known.
+    """
 
     display: str
     width: int
     height: int
     layout: QuiltLayout
+    serial: str = ""
 
 
-def _device(display: str, width: int, height: int, columns: int, rows: int, aspect: float) -> DeviceQuilt:
-    return DeviceQuilt(f"looking-glass-{display}", width, height, QuiltLayout(columns, rows, aspect))
+#: What the names of the devices' presets begin with.
+_FAMILY = "looking-glass-"
+
+
+def _device(
+    display: str, width: int, height: int, columns: int, rows: int, aspect: float, serial: str = ""
+) -> DeviceQuilt:
+    return DeviceQuilt(_FAMILY + display, width, height, QuiltLayout(columns, rows, aspect), serial)
 
 
 #: Recommended quilts, by device. The 16" landscape of the third generation has two: published, and as devices report.
 DEVICE_QUILTS: tuple[DeviceQuilt, ...] = (
-    _device("8.9-gen1", 4096, 4096, 5, 9, 1.6),
-    _device("15.6-gen1", 4096, 4096, 5, 9, 1.77778),
-    _device("8k-gen1", 8192, 8192, 5, 9, 1.77778),
-    _device("portrait", 3360, 3360, 8, 6, 0.75),
-    _device("go", 4092, 4092, 11, 6, 0.5625),
-    _device("16-gen2", 4096, 4096, 5, 9, 1.77778),
-    _device("32-gen2", 8192, 8192, 5, 9, 1.77778),
-    _device("65", 8192, 8192, 8, 9, 1.77778),
-    _device("16-gen3-portrait", 5995, 6000, 11, 6, 0.5625),
-    _device("16-gen3-landscape", 5999, 5999, 7, 7, 1.77778),
-    _device("16-gen3-landscape", 7680, 4320, 8, 6, 1.77778),
+    _device("8.9-gen1", 4096, 4096, 5, 9, 1.6, "LKG-2K"),
+    _device("15.6-gen1", 4096, 4096, 5, 9, 1.77778, "LKG-4K"),
+    _device("8k-gen1", 8192, 8192, 5, 9, 1.77778, "LKG-8K"),
+    _device("portrait", 3360, 3360, 8, 6, 0.75, "LKG-P"),
+    _device("go", 4092, 4092, 11, 6, 0.5625, "LKG-E"),
+    _device("16-gen2", 4096, 4096, 5, 9, 1.77778, "LKG-A"),
+    _device("32-gen2", 8192, 8192, 5, 9, 1.77778, "LKG-B"),
+    _device("65", 8192, 8192, 8, 9, 1.77778, "LKG-D"),
+    _device("16-gen3-portrait", 5995, 6000, 11, 6, 0.5625, "LKG-H"),
+    _device("16-gen3-landscape", 5999, 5999, 7, 7, 1.77778, "LKG-J"),
+    _device("16-gen3-landscape", 7680, 4320, 8, 6, 1.77778, "LKG-J"),
     _device("27-landscape", 7680, 4320, 8, 6, 1.77778),
     _device("27-portrait", 7680, 4320, 12, 4, 0.5625),
-    _device("32-gen3-portrait", 8184, 8184, 11, 6, 0.5625),
-    _device("32-gen3-landscape", 8190, 8190, 7, 7, 1.77778),
+    _device("32-gen3-portrait", 8184, 8184, 11, 6, 0.5625, "LKG-K"),
+    _device("32-gen3-landscape", 8190, 8190, 7, 7, 1.77778, "LKG-L"),
 )
 
 
@@ -100,11 +112,14 @@ class Quilt:
         Columns, rows and the aspect of the picture shown.
     stored:
         How the values were stored in the file that they came from.
+    provenance:
+        How it was made, as far as that is known: files do not say it.
     """
 
     pixels: FloatArray
     layout: QuiltLayout
     stored: Stored = "float32"
+    provenance: Provenance = field(default_factory=Provenance)
 
     @property
     def view_size(self) -> tuple[int, int]:
@@ -123,6 +138,61 @@ class Quilt:
         column, row = self.corner(number)
         view: FloatArray = self.pixels[row : row + height, column : column + width]
         return view
+
+
+def load_device(name: str) -> Display:
+    """The display of a device by the last part of its preset's name, such as ``portrait``; or any other display.
+
+    Raises
+    ------
+    DisplayError
+        As :func:`~lippmann.display.load_display`.
+    """
+    known = {device.display for device in DEVICE_QUILTS}
+    return load_display(_FAMILY + name if _FAMILY + name in known else name)
+
+
+def quilt_of_display(
+    display: Display, grid: tuple[int, int] | None = None, size: tuple[int, int] | None = None
+) -> DeviceQuilt:
+    """The quilt that a display is given, known by its preset's name or the beginning of its serial.
+
+    ``grid`` (columns, rows) and ``size`` (width, height in pixels) say otherwise; for displays of no known kind both
+    are needed. The aspect is that of the display's panel.
+
+    Raises
+    ------
+    UsageError, PictureError
+        If there is no such quilt.
+    """
+    layout = None if grid is None else _checked_grid(grid)
+    known = [
+        device
+        for device in DEVICE_QUILTS
+        if device.display == display.name or (device.serial and display.name.startswith(device.serial))
+    ]
+    fitting = [device for device in known if layout is None or device.layout[:2] == layout]
+    if size is None and not fitting:
+        what = "no quilt of it is known" if layout is None else f"no quilt of {layout[0]}x{layout[1]} views is known"
+        rule = f"known are those of {', '.join(sorted({device.display for device in DEVICE_QUILTS}))}"
+        fix = "say --views and --size" if layout is None else "say --size, too"
+        raise UsageError(what, where=display.name, rule=rule, fix=fix)
+    if layout is None:
+        if not known:
+            raise UsageError("how many views it takes is not known", where=display.name, fix="say --views, too")
+        layout = known[0].layout[:2]
+    width, height = size or fitting[0][1:3]
+    aspect = float(f"{display.panel.width / display.panel.height:.6g}")
+    quilt = DeviceQuilt(display.name, width, height, QuiltLayout(*layout, aspect))
+    check_size(width, height, quilt.layout, "quilt")
+    return quilt
+
+
+def _checked_grid(grid: tuple[int, int]) -> tuple[int, int]:
+    if not (1 <= grid[0] <= MOST_TILES and 1 <= grid[1] <= MOST_TILES):
+        rule = f"there are 1 to {MOST_TILES} columns and rows"
+        raise UsageError(f"{grid[0]}x{grid[1]} views will not do", where="--views", rule=rule)
+    return grid
 
 
 def layout_of_name(path: Path) -> QuiltLayout:
@@ -226,7 +296,7 @@ def write_quilt(quilt: Quilt, path: Path, *, bits: int | None = None) -> None:
     check_size(quilt.pixels.shape[1], quilt.pixels.shape[0], named, str(path))
     name, stored = format_for(path, bits, source=quilt.stored)
     depth = next(depth for depth, kind in STORED[name].items() if kind == stored)
-    write_plain_picture(quilt.pixels, path, bits=depth)
+    write_plain_picture(quilt.pixels, path, bits=depth, transfer=quilt.provenance.transfer)
 
 
 def write_views(

@@ -1,0 +1,335 @@
+"""A quilt and a native frame against the way it is done today: Blender's Cycles, view by view, with its denoiser.
+
+The glTF teapot in the studio light that Lippmann gives to scenes without any, before a nominal Looking Glass Portrait:
+48 views of 420 x 560 pixels by Cycles at 16 samples with Open Image Denoise, against Lippmann's quilt of the same size
+and its native frame of 1536 x 2048 x 3 sub-pixels, two threads each. Every picture is judged by a long rendering of its
+own program, the quilts on a few views, the frame on every 16th row: PSNR of sRGB-coded values in [0, 1]. Lippmann is
+tried with several numbers of samples; the fastest that reaches Cycles' PSNR is what counts.
+
+Seconds are those of rendering and denoising all views or the whole frame, after a warm-up: Cycles' are its own
+``render`` calls with the scene kept between views, Lippmann's are the whole call, building the scene included. With
+``--sampled`` only the judged views are rendered by Cycles, and their mean time stands for all.
+
+python benchmarks/cycles.py --python PYTHON [--small] [--sampled] [--scale FACTOR]
+
+``PYTHON`` is an interpreter with the package ``bpy`` (``pip install bpy``), which wants a Python version of its own.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import statistics
+import subprocess
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from harness import save
+
+Picture = NDArray[np.float32]
+
+SCENE = Path(__file__).resolve().parents[2] / "shared" / "scenes" / "gltf" / "fancy_teapot" / "scene.gltf"
+DEVICE = "looking-glass-portrait"
+COLUMNS, ROWS = 8, 6
+THREADS, DEPTH = 2, 8
+CYCLES_SPP = 16
+SAMPLES = (2, 4, 8, 16, 32)
+#: Views that are judged; references of all would take hours.
+JUDGED = (3, 20, 27, 44)
+TARGET = 10.0
+
+
+@dataclass(frozen=True)
+class Size:
+    """Sizes of one comparison."""
+
+    view: tuple[int, int]
+    panel: tuple[int, int]
+    reference_spp: int
+
+
+FULL = Size((420, 560), (1536, 2048), 1024)
+SMALL = Size((105, 140), (384, 512), 128)
+#: The rows of the frame that are judged: every 16th.
+JUDGED_ROWS = slice(8, None, 16)
+
+
+@dataclass(frozen=True)
+class Stage:
+    """The scene before the device."""
+
+    scene: Any
+    display: Any
+    options: Any
+    placement: Any
+
+
+def main() -> None:
+    words = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    words.add_argument("--python", required=True, help="an interpreter with bpy")
+    words.add_argument("--small", action="store_true", help="a quarter of every side: shows that everything works")
+    words.add_argument("--sampled", action="store_true", help="only the judged views by Cycles, and their mean time")
+    words.add_argument("--scale", type=float, default=1.0, help="of the teapot; 1 fits it as Lippmann does by itself")
+    given = words.parse_args()
+    size = SMALL if given.small else FULL
+    stage = _stage(size, given.scale)
+    views = JUDGED if given.sampled or given.small else tuple(range(COLUMNS * ROWS))
+    with tempfile.TemporaryDirectory() as folder:
+        rival = _cycles(stage, size, Path(folder), given.python, views)
+    print(json.dumps({"cycles": rival}), flush=True)
+    ours = {
+        "quilt": _best(_quilt_tries(stage, size), rival["psnr"]),
+        "native": _best(_native_tries(stage, size), rival["psnr"]),
+    }
+    result = {
+        "scene": "glTF teapot",
+        "device": DEVICE,
+        "view": size.view,
+        "panel": size.panel,
+        "views_timed": len(views),
+        "scale": given.scale,
+        "reference_spp": size.reference_spp,
+        "target": TARGET,
+        "cycles": rival,
+        **ours,
+        "times_faster": {
+            name: rival["seconds"] / found["chosen"]["seconds"] for name, found in ours.items() if found["chosen"]
+        },
+        # Of processor time, which other work on the machine does not stretch.
+        "times_less_cpu": {
+            name: rival["cpu_seconds"] / found["chosen"]["cpu_seconds"]
+            for name, found in ours.items()
+            if found["chosen"]
+        },
+    }
+    if given.small:
+        print(json.dumps(result, indent=2))
+    else:
+        save("cycles", result)
+
+
+def _stage(size: Size, scale: float) -> Stage:
+    import lippmann
+    from lippmann import engine
+    from lippmann.scene.placement import PlacementOptions, place
+
+    engine.start("cpu", THREADS)
+    display = lippmann.load_display(DEVICE)
+    # The same panel with fewer, larger pixels behind the same lenses would be another display: a cut of it is not.
+    display = display.resized(*size.panel)
+    scene = lippmann.load_scene(SCENE)
+    options = PlacementOptions(scale=scale)
+    at = place(scene.bounds, display, cameras=scene.cameras, options=options, bounds_in=scene.bounds_in)
+    return Stage(scene, display, options, at)
+
+
+# ---- Cycles ----------------------------------------------------------------------------------------------------------
+
+
+def _cycles(stage: Stage, size: Size, folder: Path, python: str, views: tuple[int, ...]) -> dict[str, Any]:
+    """Seconds of all views and PSNR of the judged ones."""
+    from lippmann.image.formats import write_plain_picture
+    from lippmann.scene.studio import studio
+
+    write_plain_picture(studio().pixels, folder / "studio.exr", bits=32)
+    job = _job(stage, size, folder)
+    # The first view of a run pays for the scene's loading.
+    timed = _run(job | {"views": [views[0], *views], "spp": CYCLES_SPP, "denoise": True, "seed": 1}, folder, python)
+    seconds = timed["views"][1:]
+    shown = _views(folder)
+    plain = _run(job | {"views": [views[0], *JUDGED], "spp": CYCLES_SPP, "denoise": False, "seed": 1}, folder, python)
+    noisy = _views(folder)
+    _run(job | {"views": list(JUDGED), "spp": size.reference_spp, "denoise": False, "seed": 2}, folder, python)
+    reference = _views(folder)
+    return {
+        "blender": timed["blender"],
+        "spp": CYCLES_SPP,
+        "seconds_per_view": statistics.mean(seconds),
+        "seconds_per_view_without_denoising": statistics.mean(plain["views"][1:]),
+        "seconds": statistics.mean(seconds) * COLUMNS * ROWS,
+        "cpu_seconds": statistics.mean(timed["cpu_views"][1:]) * COLUMNS * ROWS,
+        "psnr": _psnr(shown, reference),
+        "psnr_without_denoising": _psnr(noisy, reference),
+    }
+
+
+def _job(stage: Stage, size: Size, folder: Path) -> dict[str, Any]:
+    """What ``cycles_views.py`` is told: cameras as those of :class:`lippmann.render.rays.QuiltRays`."""
+    from lippmann.display.cone import cone_tangent
+    from lippmann.scene.studio import BACKDROP
+
+    display, matrix = stage.display, stage.placement.world_from_display
+    distance, (_, height) = display.viewing_distance, display.size_mm
+    unit = float(np.cbrt(np.linalg.det(matrix[:3, :3])))
+    cameras = []
+    for number in range(COLUMNS * ROWS):
+        x = distance * cone_tangent(display) * (2 * (number + 0.5) / (COLUMNS * ROWS) - 1)
+        pose = np.eye(4)
+        pose[:3, :3] = matrix[:3, :3] / unit
+        pose[:3, 3] = (matrix @ np.array([x, 0.0, distance, 1.0]))[:3]
+        cameras.append({"world_from_camera": pose.tolist(), "shift": -x / height})
+    return {
+        "folder": str(folder),
+        "scene": str(SCENE),
+        "environment": str(folder / "studio.exr"),
+        "background": BACKDROP,
+        "cameras": cameras,
+        "size": size.view,
+        "field": 2 * math.atan(height / 2 / distance),
+        "clip": [unit * (distance - display.aperture_distance), unit * 10 * distance],
+        "threads": THREADS,
+        "depth": DEPTH,
+        "adaptive": False,
+    }
+
+
+def _run(job: dict[str, Any], folder: Path, python: str) -> dict[str, Any]:
+    path = folder / "job.json"
+    path.write_text(json.dumps(job))
+    # -P: this folder holds a module of the name of Blender's add-on.
+    command = [python, "-P", str(Path(__file__).with_name("cycles_views.py")), str(path)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if done.returncode:
+        raise SystemExit(f"Blender failed:\n{done.stdout[-2000:]}\n{done.stderr[-2000:]}")
+    found: dict[str, Any] = json.loads((folder / "seconds.json").read_text())
+    return found
+
+
+def _views(folder: Path) -> Picture:
+    """``(4, H, W, 3)`` judged views."""
+    from lippmann.image.codec import decode_file
+
+    return np.stack([decode_file(folder / f"view_{number:02}.exr", "exr", "srgb")[0][""] for number in JUDGED])
+
+
+# ---- Lippmann --------------------------------------------------------------------------------------------------------
+
+#: Samples, seconds and what is judged of one try after the other.
+Tries = tuple[Picture, Callable[[int, str], Picture]]
+
+
+def _quilt_tries(stage: Stage, size: Size) -> Tries:
+    import lippmann
+
+    width, height = size.view
+
+    def views(samples: int, denoise: str, seed: int = 1) -> Picture:
+        quilt = lippmann.render_quilt(
+            stage.scene,
+            stage.display,
+            views=(COLUMNS, ROWS),
+            size=(COLUMNS * width, ROWS * height),
+            placement=stage.options,
+            spp=samples,
+            depth=DEPTH,
+            seed=seed,
+            denoise=denoise,
+            device="cpu",
+            threads=THREADS,
+        )
+        return np.stack([quilt.view(number) for number in JUDGED])
+
+    return _reference_views(stage, size), views
+
+
+def _reference_views(stage: Stage, size: Size) -> Picture:
+    """The judged views, one by one, without what a whole quilt's pixels would take."""
+    from lippmann.render.rays import QuiltRays
+
+    source = QuiltRays(stage.display, stage.placement.world_from_display, COLUMNS, ROWS, size.view)
+    width, height = size.view
+    tiles = list(source.tiles())
+    parts = [_Cut(source, tiles[n][1].start, tiles[n][0].start, width, height) for n in JUDGED]
+    return np.stack([_traced(stage, part, size.reference_spp) for part in parts])
+
+
+def _native_tries(stage: Stage, size: Size) -> Tries:
+    import lippmann
+    from lippmann.render.rays import DisplayRays
+
+    def rows(samples: int, denoise: str) -> Picture:
+        image = lippmann.render(
+            stage.scene,
+            stage.display,
+            method="full",
+            subpixels=True,
+            scale=stage.options.scale,
+            spp=samples,
+            depth=DEPTH,
+            seed=1,
+            denoise=denoise,
+            device="cpu",
+            threads=THREADS,
+        )
+        return image.pixels[JUDGED_ROWS]
+
+    source = DisplayRays(stage.display, stage.placement.world_from_display, subpixels=True)
+    first, _, step = JUDGED_ROWS.indices(source.height)
+    cut = _Cut(source, 0, first, source.width, len(range(first, source.height, step)), step)
+    return _traced(stage, cut, size.reference_spp), rows
+
+
+class _Cut:
+    """A rectangle of another source's pixels, or every so many rows of it."""
+
+    def __init__(self, source: Any, left: int, top: int, width: int, height: int, step: int = 1) -> None:
+        self._source, self._left, self._top, self._step = source, left, top, step
+        self.width, self.height, self.channels = width, height, source.channels
+
+    def rays(self, column: Any, row: Any, channel: Any, jitter: Any) -> Any:
+        return self._source.rays(column + self._left, row * self._step + self._top, channel, jitter)
+
+
+def _traced(stage: Stage, source: Any, samples: int) -> Picture:
+    from lippmann.render.full import trace_frame
+    from lippmann.render.pipeline import build_for, make_integrator
+    from lippmann.render.plan import make_plan
+    from lippmann.render.settings import RenderSettings
+
+    settings = RenderSettings(integrator="path", depth=DEPTH)
+    integrator = make_integrator(build_for(stage.scene, settings), settings, stage.placement.display_from_world)
+    plan = make_plan(source.width, source.height, samples, channels=source.channels, memory=2 << 30)
+    return trace_frame(integrator, source, plan, seed=2).pixels
+
+
+def _best(tries: Tries, psnr: float) -> dict[str, Any]:
+    """All tries, of ever more samples until one reaches the PSNR, and the fastest of those that do."""
+    reference, rendered = tries
+    found = []
+    for denoise in ("oidn-fast", "oidn-high"):
+        for samples in SAMPLES:
+            rendered(samples, denoise)  # warm
+            started, used = time.perf_counter(), time.process_time()
+            picture = rendered(samples, denoise)
+            one = {
+                "spp": samples,
+                "denoise": denoise,
+                "seconds": time.perf_counter() - started,
+                "cpu_seconds": time.process_time() - used,
+                "psnr": _psnr(picture, reference),
+            }
+            print(json.dumps(one), flush=True)
+            found.append(one)
+            if one["psnr"] >= psnr:
+                break
+    good = [one for one in found if one["psnr"] >= psnr]
+    return {"tries": found, "chosen": min(good, key=lambda one: one["seconds"]) if good else None}
+
+
+def _psnr(picture: Picture, reference: Picture) -> float:
+    from lippmann.image.color import encode_srgb
+
+    first, second = (encode_srgb(np.clip(values, 0, 1).astype(np.float64)) for values in (picture, reference))
+    return -10 * math.log10(float(np.square(first - second).mean()))
+
+
+if __name__ == "__main__":
+    main()
