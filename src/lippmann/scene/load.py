@@ -89,6 +89,20 @@ def known_suffixes() -> tuple[str, ...]:
     return tuple(_READERS)
 
 
+def kind_of_file(source: str | Path) -> str | None:
+    """The ending that goes with a scene file's content, or else its own; None for the name of a bundled scene.
+
+    Raises
+    ------
+    SceneError
+        The file is missing or cannot be read.
+    """
+    path = Path(source)
+    if isinstance(source, str) and not path.suffix and path.name == source and not path.exists():
+        return None
+    return _suffix_by_content(path) or path.suffix.lower()
+
+
 def _from_name(source: str | Path, allow_outside: bool) -> Scene:
     path = Path(source)
     suffix = path.suffix.lower()

@@ -151,13 +151,30 @@ def place(
     else:
         display_from_world = _resized(np.eye(4), options)
     display_from_world = _translation(options.shift) @ display_from_world
+    return stand(_inverse(display_from_world), bounds, display, mode=mode, bounds_in=bounds_in, warnings=warnings)
+
+
+def stand(
+    world_from_display: Matrix,
+    bounds: Bounds,
+    display: Display,
+    *,
+    mode: Mode,
+    bounds_in: Callable[[Matrix], Bounds] | None = None,
+    warnings: Sequence[str] = (),
+) -> Placement:
+    """The placement of a display whose place is known already: how deep the scene lies there, and what to warn of.
+
+    Parameters as of :func:`place`; ``warnings`` come first among those of the placement.
+    """
+    display_from_world = _inverse(world_from_display)
     corners = _carried(display_from_world, _corners(bounds))
     if bounds_in is not None:
         corners = _corners(bounds_in(display_from_world))
     back, front = float(corners[:, 2].min()), float(corners[:, 2].max())
     near, far = display.resolvable_depth
-    warnings += _warnings(corners, display)
-    return Placement(_inverse(display_from_world), (back, front), (far, near), mode, tuple(warnings))
+    said = (*warnings, *_warnings(corners, display))
+    return Placement(world_from_display, (back, front), (far, near), mode, said)
 
 
 def _chosen(cameras: Sequence[Camera], name: str | None) -> Camera:

@@ -67,6 +67,10 @@ COLOR_CHANGE = Storage(("VEC3", "VEC4"), normalized=_UNSIGNED | _SIGNED, always_
 TRANSLATION = Storage(("VEC3",))
 ROTATION = Storage(("VEC4",), normalized=_SIGNED)
 SCALE = Storage(("VEC3",))
+# Of animations.
+KEY_TIMES = Storage(("SCALAR",))
+KEY_ROTATION = Storage(("VEC4",), normalized=_SIGNED | _UNSIGNED)
+KEY_WEIGHTS = Storage(("SCALAR",), normalized=_SIGNED | _UNSIGNED)
 
 
 @dataclass(frozen=True, eq=False)

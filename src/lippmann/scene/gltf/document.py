@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import struct
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
 
@@ -78,6 +78,10 @@ class Document:
         if kind not in self._lists:
             self._lists[kind] = self.root.children(kind)
         return self._lists[kind]
+
+    def with_nodes(self, nodes: list[Fields]) -> Document:
+        """The same file with other nodes, as an animation moves them; notes are shared."""
+        return replace(self, _lists={**self._lists, "nodes": nodes})
 
     def reference(self, source: Fields, key: str, kind: Kind) -> int | None:
         """The index that member ``key`` holds, within the list ``kind``; None where absent.

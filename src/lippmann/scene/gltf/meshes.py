@@ -31,6 +31,11 @@ class Meshes:
     _by_mesh: dict[_Key, list[int]] = field(default_factory=dict)
     _geometries: dict[_Key, Geometry | None] = field(default_factory=dict)
 
+    def posed(self, document: Document, primitives: Primitives) -> Meshes:
+        """To read the meshes of the same file as other nodes show them; what keeps its shape is kept."""
+        kept = {key: geometry for key, geometry in self._geometries.items() if key[2:] == ((), None)}
+        return Meshes(document, primitives, self.materials, _geometries=kept)
+
     def places(self, index: int, node: Fields, skin: Skin | None) -> list[int]:
         """The places in :attr:`read` of the primitives of ``meshes[index]``, as ``node`` shows it.
 
@@ -83,7 +88,7 @@ def _weights(fields: Fields) -> tuple[float, ...]:
 
 
 def _key(primitive: Fields, weights: tuple[float, ...], skin: Skin | None) -> _Key:
-    """Equal for primitives of equal geometry."""
+    """Equal for primitives of equal geometry: their data, their kind, morph weights, and the skin that holds them."""
     attributes = primitive.child("attributes")
     vertices = [attributes] if attributes is not None else []
     if any(weights):

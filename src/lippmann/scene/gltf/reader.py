@@ -44,22 +44,8 @@ def read_gltf(path: Path, *, allow_outside: bool = False) -> SceneDescription:
     document = open_document(path, allow_outside=allow_outside)
     check_extensions(document)
     if document.root.children("animations"):
-        document.notes.add("animations are not played; the scene is shown at rest")
-    contents = _Contents.of(document)
-    for index, visible in contents.nodes.shown():
-        contents.add(index, visible=visible)
-    meshes, instances = _placed(contents.meshes.read, contents.placements, document)
-    if not instances:
-        raise document.error("the file shows no triangles", rule="a scene needs a mesh on a node of its default scene")
-    return SceneDescription(
-        name=path.stem,
-        meshes=meshes,
-        materials=tuple(contents.meshes.materials.read),
-        instances=instances,
-        lights=tuple(contents.lights),
-        cameras=tuple(contents.cameras),
-        notes=document.notes.lines(),
-    )
+        document.notes.add("animations are not played without --frames; the scene is shown at rest")
+    return Contents.of(document).description(path.stem)
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,8 +58,8 @@ class _Placements:
 
 
 @dataclass(frozen=True, eq=False)
-class _Contents:
-    """What the nodes walked so far carry."""
+class Contents:
+    """A file taken apart: what is read once (bytes, materials), and what its nodes bring into the scene."""
 
     document: Document
     accessors: Accessors
@@ -84,14 +70,46 @@ class _Contents:
     cameras: list[Camera] = field(default_factory=list)
 
     @classmethod
-    def of(cls, document: Document) -> _Contents:
+    def of(cls, document: Document) -> Contents:
+        """Of a file as it stands at rest."""
         buffers = Buffers(document)
         accessors = Accessors(document, buffers)
         materials = Materials(document, Textures(document, buffers))
         meshes = Meshes(document, Primitives(document, accessors), materials)
         return cls(document, accessors, Nodes(document), meshes)
 
-    def add(self, index: int, *, visible: bool) -> None:
+    def posed(self, nodes: list[Fields]) -> Contents:
+        """Of the same file with other ``nodes``; bytes, materials and meshes that no joint holds are not read again."""
+        document = self.document.with_nodes(nodes)
+        meshes = self.meshes.posed(document, Primitives(document, self.accessors))
+        return Contents(document, self.accessors, Nodes(document), meshes)
+
+    def description(self, name: str) -> SceneDescription:
+        """The scene that the nodes make; to be asked for once.
+
+        Raises
+        ------
+        SceneError
+            See :func:`read_gltf`.
+        """
+        for index, visible in self.nodes.shown():
+            self._add(index, visible=visible)
+        meshes, instances = _placed(self.meshes.read, self.placements, self.document)
+        if not instances:
+            raise self.document.error(
+                "the file shows no triangles", rule="a scene needs a mesh on a node of its default scene"
+            )
+        return SceneDescription(
+            name=name,
+            meshes=meshes,
+            materials=tuple(self.meshes.materials.read),
+            instances=instances,
+            lights=tuple(self.lights),
+            cameras=tuple(self.cameras),
+            notes=self.document.notes.lines(),
+        )
+
+    def _add(self, index: int, *, visible: bool) -> None:
         """Take over what ``nodes[index]`` carries; of an invisible node, its camera alone."""
         node = self.document.all("nodes")[index]
         world = self.nodes.world(index)
