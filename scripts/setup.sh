@@ -117,6 +117,31 @@ install_tachyon() {
   say "setup: 'tachyon' is not installed; the tests that compare with it will be skipped"
 }
 
+browser_works() {
+  have chromium || have chromium-browser || have google-chrome-stable || have google-chrome ||
+    .venv/bin/python -c '
+from os.path import exists
+from playwright.sync_api import sync_playwright
+with sync_playwright() as playwright:
+    raise SystemExit(not exists(playwright.chromium.executable_path))' 2>/dev/null
+}
+
+# The browser that tests of pages drive; they are skipped without one. Where the system has chromium only as a snap
+# (Ubuntu) or not at all, Playwright fetches its own; that is tried once.
+install_browser() {
+  local options=() tried=.venv/.browser-tried
+  { browser_works || [ -f $tried ]; } && return
+  if have apt-get && can_be_root && { candidate chromium || { update_lists && candidate chromium; }; } &&
+    install_packages chromium; then
+    return
+  fi
+  ! have apt-get || ! can_be_root || options=(--with-deps)
+  say "setup: fetching a browser for the tests of pages"
+  touch $tried
+  .venv/bin/python -m playwright install ${options[@]+"${options[@]}"} chromium >/dev/null 2>&1 ||
+    say "setup: no browser could be had; the tests of pages will be skipped. Install chromium to run them"
+}
+
 stamp=.venv/.set-up
 python=$(find_python)
 find_missing
@@ -124,3 +149,4 @@ find_missing
 [ -z "$extras" ] || install_tachyon
 make_environment
 install_package
+[ -z "$extras" ] || install_browser

@@ -1,0 +1,1 @@
+"""A page that shows a picture as its display would: served on this machine, as one file, or in a notebook."""

@@ -1,0 +1,221 @@
+/** A picture on the graphics card: its tiles, its layers, and the programs that draw what an eye sees of it. */
+
+import { setExact } from "./fixed.js";
+import { LAYOUTS, channelPlaces, microImages, sightline } from "./optics.js";
+import { VERTEX, fragmentSource } from "./shaders.js";
+import { TileTexture, capacityOf, tilesOf } from "./tiles.js";
+
+export class Picture {
+  /**
+   * @param manifest the picture's description, see `checked`
+   * @param memory bytes of the graphics card that the picture, and each of its layers, may take
+   */
+  constructor(gl, manifest, source, memory) {
+    this.gl = gl;
+    this.manifest = manifest;
+    this.source = source;
+    this.stopped = new AbortController();
+    this.programs = new Map();
+    this.capacity = capacityOf(gl, manifest.tiles, memory);
+    this.tiles = new TileTexture(gl, manifest.tiles, this.capacity);
+    this.overlays = new Map();
+    this.variant = { ...variantOf(manifest.panel), ...lensesOf(manifest.lenses), tiled: this.tiles.isTiled };
+    this.isReady = false;
+  }
+
+  /** Fetches the tiles of the picture, and of its layers at hand, behind a part of the panel's rectangle. */
+  async load(frame, onTile) {
+    const places = this.#behind(frame);
+    const textures = [["picture", this.tiles], ...this.overlays];
+    const { signal } = this.stopped;
+    await Promise.all(textures.map(([name, texture]) => texture.load(this.source, name, places, onTile, signal)));
+    this.isReady = !signal.aborted;
+  }
+
+  /** Fetches a layer's tiles behind a part of the panel, unless it is there already. */
+  async loadOverlay(name, frame, onTile) {
+    const { layers } = this.manifest.tiles;
+    if (this.overlays.has(name) || !layers.some((layer) => layer.name === name)) return;
+    const texture = new TileTexture(this.gl, this.manifest.tiles, this.capacity);
+    this.overlays.set(name, texture);
+    await texture.load(this.source, name, this.#behind(frame), onTile, this.stopped.signal);
+  }
+
+  /** The widest part of the panel, 0 to 1, whose tiles the card can hold at a time. */
+  get widest() {
+    const { size, columns, rows, width, height } = this.manifest.tiles;
+    if (this.capacity >= columns * rows) return 1;
+    const margin = 2 * this.#margin();
+    const fits = (share) => {
+      const across = Math.min(columns, Math.floor((share * width + margin) / size) + 2);
+      return across * Math.min(rows, Math.floor((share * height + margin) / size) + 2) <= this.capacity;
+    };
+    let [low, high] = [0, 1];
+    for (let step = 0; step < 20; step += 1) {
+      const middle = (low + high) / 2;
+      if (fits(middle)) low = middle;
+      else high = middle;
+    }
+    return Math.max(low, size / (4 * Math.max(width, height)));
+  }
+
+  #behind(frame) {
+    const { width, height } = this.manifest.panel;
+    const margin = this.capacity < this.tiles.layerOf.length ? this.#margin() : Infinity;
+    return tilesOf(this.manifest.tiles, {
+      left: frame.x * width - margin,
+      top: frame.y * height - margin,
+      right: (frame.x + frame.width) * width + margin,
+      bottom: (frame.y + frame.height) * height + margin,
+    });
+  }
+
+  /** By how many pixels what the lenses show lies beside them at most, from where the eye usually is. */
+  #margin() {
+    const { panel, micro_image_pitch: pitch, gap, eye } = this.manifest;
+    return (12 * pitch) / panel.pixel_pitch + (2 * Math.max(panel.width, panel.height) * gap) / eye[2];
+  }
+
+  /**
+   * Draws what an eye sees into the viewport.
+   *
+   * @param pane {x, y, width, height} in canvas pixels, y from below
+   * @param overlay {name, share} or null
+   */
+  drawEye(eye, frame, pane, overlay) {
+    const { gl } = this;
+    const layer = overlay && this.overlays.get(overlay.name);
+    const program = this.#use(layer ? "overlaid" : "eye");
+    this.#setSightline(program, sightline(this.manifest, eye, 0, frame, pane.width, pane.height), pane);
+    if (layer) {
+      gl.uniform1f(program.at("overlayShare"), overlay.share);
+      layer.bind(program, 2, "overlay");
+    }
+    gl.drawArrays(gl.TRIANGLES, 0, 3);
+  }
+
+  /** Draws what an eye sees of the points of a plane, in linear light with a count of 1 as alpha, to be added up. */
+  drawSummand(eye, plane, frame, pane) {
+    const { gl } = this;
+    const program = this.#use("summand");
+    this.#setSightline(program, sightline(this.manifest, eye, plane, frame, pane.width, pane.height), pane);
+    this.#setOwners(program, microImages(this.manifest, eye));
+    gl.uniform1i(program.at("isCoded"), this.isCoded);
+    gl.drawArrays(gl.TRIANGLES, 0, 3);
+  }
+
+  /** Draws the raw panel in a round glass; see the program for the parameters. */
+  drawMagnifier(eye, glass) {
+    const { gl } = this;
+    const program = this.#use("magnifier");
+    const parts = microImages(this.manifest, eye);
+    this.#setOwners(program, parts);
+    for (const name of ["seenU", "seenV"]) setExact(gl, program, name, parts[name]);
+    gl.uniform2f(program.at("middle"), glass.x, glass.y);
+    gl.uniform1f(program.at("radius"), glass.radius);
+    gl.uniform1f(program.at("scale"), glass.scale);
+    const [column, row] = [Math.floor(glass.u), Math.floor(glass.v)];
+    gl.uniform2f(program.at("centerPixel"), column, row);
+    gl.uniform2f(program.at("centerPart"), glass.u - column, glass.v - row);
+    gl.uniform3fv(program.at("rimColor"), glass.color);
+    gl.drawArrays(gl.TRIANGLES, 0, 3);
+  }
+
+  /** Whether display codes follow the sRGB curve. */
+  get isCoded() {
+    return this.manifest.transfer === "srgb";
+  }
+
+  /** Stops loading and frees the card's memory. */
+  destroy() {
+    this.stopped.abort();
+    this.tiles.destroy();
+    for (const texture of this.overlays.values()) texture.destroy();
+    for (const program of this.programs.values()) this.gl.deleteProgram(program.handle);
+  }
+
+  #use(kind) {
+    const { gl } = this;
+    if (!this.programs.has(kind)) this.programs.set(kind, new Program(gl, fragmentSource(kind, this.variant)));
+    const program = this.programs.get(kind);
+    gl.useProgram(program.handle);
+    const { panel, lenses, tiles } = this.manifest;
+    gl.uniform2f(program.at("panel"), panel.width, panel.height);
+    gl.uniform1i(program.at("tileShift"), Math.log2(tiles.size));
+    gl.uniform1f(program.at("rowsPerPitch"), (lenses.row_pitch ?? 0) / lenses.pitch);
+    this.tiles.bind(program, 0, "picture");
+    return program;
+  }
+
+  #setOwners(program, parts) {
+    for (const name of ["acrossOf", "downOf"]) setExact(this.gl, program, name, parts[name]);
+    this.gl.uniform4fv(program.at("gradients"), parts.gradients);
+  }
+
+  #setSightline(program, coefficients, pane) {
+    const { gl } = this;
+    const { panel } = this.manifest;
+    const { slide, ...forms } = coefficients;
+    for (const [name, form] of Object.entries(forms)) setExact(gl, program, name, form);
+    gl.uniform1f(program.at("slide"), slide);
+    for (const [name, places] of Object.entries(channelPlaces(this.manifest))) gl.uniform3fv(program.at(name), places);
+    gl.uniform2f(program.at("corner"), pane.x + 0.5, pane.y + pane.height - 0.5);
+    if (!panel.uneven) return;
+    gl.uniform2i(program.at("cellCount"), panel.cells[0].length, panel.cells.length);
+    gl.uniform2fv(program.at("cells"), panel.cells.flat(3));
+  }
+}
+
+/** A linked program; the places of its uniforms are looked up once. */
+export class Program {
+  constructor(gl, fragment) {
+    this.gl = gl;
+    this.places = new Map();
+    this.handle = gl.createProgram();
+    const shaders = [
+      [gl.VERTEX_SHADER, VERTEX],
+      [gl.FRAGMENT_SHADER, fragment],
+    ].map(([type, text]) => {
+      const shader = gl.createShader(type);
+      gl.shaderSource(shader, text);
+      gl.compileShader(shader);
+      gl.attachShader(this.handle, shader);
+      return shader;
+    });
+    gl.linkProgram(this.handle);
+    const isLinked = gl.getProgramParameter(this.handle, gl.LINK_STATUS);
+    const reasons = shaders.map((shader) => gl.getShaderInfoLog(shader)).join(" ");
+    for (const shader of shaders) gl.deleteShader(shader);
+    // A lost context links nothing; the picture is made anew once it is back.
+    if (!isLinked && !gl.isContextLost())
+      throw new Error(`this browser's graphics refuse the page's program: ${reasons}`);
+  }
+
+  at(name) {
+    if (!this.places.has(name)) this.places.set(name, this.gl.getUniformLocation(this.handle, name));
+    return this.places.get(name);
+  }
+}
+
+/** The manifest itself, if this page understands it. */
+export function checked(manifest) {
+  if (manifest?.lippmann !== 1) throw new Error("the picture's description is of another version than this page");
+  return manifest;
+}
+
+function lensesOf(lenses) {
+  return { layout: LAYOUTS[lenses.layout], slanted: lenses.slant !== 0 };
+}
+
+/** How the panel's sub-pixels lie, in the words of `fragmentSource`. */
+function variantOf(panel) {
+  if (!panel.subpixels) return { cells: 0, reach: 0 };
+  if (panel.uneven) {
+    const farthest = Math.max(...panel.cells.flat(3).map(Math.abs));
+    return { cells: 3, reach: farthest <= 0.5 ? 1 : 2 };
+  }
+  const offsets = panel.cells[0][0];
+  const right = offsets.map(([amount]) => amount);
+  const isRow = offsets.every(([, below]) => below === offsets[0][1]);
+  return { cells: isRow && Math.max(...right) - Math.min(...right) < 1 ? 1 : 2, reach: 0 };
+}

@@ -1,0 +1,367 @@
+/** The shading programs: what an eye sees, the mean of what many see, and the magnifier. */
+
+/** One triangle that covers the viewport. */
+export const VERTEX = `#version 300 es
+void main() {
+  gl_Position = vec4(gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0, 0.0, 1.0);
+}`;
+
+// What runs for every pixel is written with as few operations as can be: software renderers do them all as they stand.
+
+const HEAD = `#version 300 es
+precision highp float;
+precision highp int;
+precision highp sampler2D;
+precision highp sampler2DArray;
+`;
+
+// Numbers with exact fractions, see fixed.js.
+const EXACT = `
+struct Place {
+  float whole;
+  float part;  // 0 to 1
+};
+
+// The number that is about \`rough\` less a half and has the fraction \`parts\` / 2^32.
+Place placed(float rough, uint parts) {
+  float part = float(int(parts >> 8)) * (1.0 / 16777216.0);
+  return Place(floor(rough - part), part);
+}
+`;
+
+// The lens that contains a point given in units of the pitches; Lattice.lens_at of display/lattice.py. Half a pitch is
+// in the numbers already where the nearest centre is wanted: lens c contains c <= place < c + 1.
+const LENSES = `
+#define LENTICULAR 0
+#define SQUARE 1
+#define HEXAGONAL 2
+
+uniform float rowsPerPitch;  // row pitch over pitch, of a hexagonal array
+
+// 1 for every other row of a hexagonal array, which is shifted by half a pitch.
+float shiftOf(float row) {
+#if LAYOUT == HEXAGONAL
+  return fract(0.5 * row) * 2.0;
+#else
+  return 0.0;
+#endif
+}
+
+#if LAYOUT != LENTICULAR
+vec2 lensAt(float across, uint acrossParts, float down, uint downParts) {
+#if LAYOUT == SQUARE
+  return vec2(placed(across, acrossParts).whole, placed(down, downParts).whole);
+#else
+  Place row = placed(down, downParts);
+  float shift = shiftOf(row.whole);
+  uint shiftParts = uint(shift) << 31;
+  Place upper = placed(across - 0.5 * shift, acrossParts - shiftParts);
+  Place lower = placed(across - 0.5 + 0.5 * shift, acrossParts - 0x80000000u + shiftParts);
+  float besideUpper = upper.part - 0.5, besideLower = lower.part - 0.5;
+  float excess = besideLower * besideLower - besideUpper * besideUpper;
+  excess += (1.0 - 2.0 * row.part) * rowsPerPitch * rowsPerPitch;
+  // Ties go to the lower row; single precision tells them to a millionth.
+  return excess <= 1e-6 ? vec2(lower.whole, row.whole + 1.0) : vec2(upper.whole, row.whole);
+#endif
+}
+#endif
+`;
+
+// A texture that holds the panel has a black edge of one pixel, so that what is seen past the panel needs no question.
+// Where none can be as large, the tiles are layers of an array, and an index says which; those not there yet are grey.
+const TILES = `
+uniform vec2 panel;
+
+bool isOnPanel(vec2 pixel) {
+  return pixel.x >= 0.0 && pixel.x < panel.x && pixel.y >= 0.0 && pixel.y < panel.y;
+}
+
+#if TILED
+precision highp isampler2D;
+uniform int tileShift;
+uniform sampler2DArray picture;
+uniform isampler2D pictureLayers;
+uniform sampler2DArray overlay;
+uniform isampler2D overlayLayers;
+
+vec3 tileCode(sampler2DArray tiles, isampler2D layers, vec2 pixel) {
+  if (!isOnPanel(pixel)) return vec3(0.0);
+  ivec2 place = ivec2(pixel);
+  int layer = texelFetch(layers, place >> tileShift, 0).r;
+  if (layer < 0) return vec3(0.25);
+  return texelFetch(tiles, ivec3(place & ((1 << tileShift) - 1), layer), 0).rgb;
+}
+
+vec3 codeOf(vec2 pixel) {
+  return tileCode(picture, pictureLayers, pixel);
+}
+
+vec3 overlayOf(vec2 pixel) {
+  return tileCode(overlay, overlayLayers, pixel);
+}
+#else
+uniform sampler2D picture;
+uniform sampler2D overlay;
+
+ivec2 placeOf(vec2 pixel) {
+  return ivec2(clamp(pixel + 1.0, vec2(0.0), panel + 1.0));
+}
+
+vec3 codeOf(vec2 pixel) {
+  return texelFetch(picture, placeOf(pixel), 0).rgb;
+}
+
+vec3 overlayOf(vec2 pixel) {
+  return texelFetch(overlay, placeOf(pixel), 0).rgb;
+}
+#endif
+`;
+
+// The panel point that the eye sees: Display.panel_point_seen_by and replay.py. Coordinates (u, v) are pixels of the
+// panel, from its upper left corner; those of the pane likewise.
+const SEEN = `
+uniform vec2 corner;  // middle of the pane's upper left pixel in the canvas
+uniform float across[3];  // lens coordinate: per column and row of the pane, and at (0, 0)
+uniform uint acrossParts[3];
+uniform float down[2];  // per row of the pane
+uniform uint downParts[2];
+uniform float panelU[4];  // panel coordinate: per lens, column (or shifted row of lenses) and row of the pane
+uniform uint panelUParts[4];
+uniform float panelV[2];  // per row of the pane; of arrays, per row of lenses
+uniform uint panelVParts[2];
+uniform float slide;  // what a slanted axis moves v by from one edge of a lens to the other
+uniform vec3 channelRight;  // what places the grid of each colour's sub-pixels
+uniform vec3 channelDown;
+
+vec2 lensSeen;  // of arrays: the lens that is looked through
+
+void seen(out Place u, out Place v) {
+  float x = gl_FragCoord.x - corner.x, y = corner.y - gl_FragCoord.y;
+  uint column = uint(int(x)), row = uint(int(y));
+#if LAYOUT == LENTICULAR
+#if SLANTED
+  float roughLens = across[0] * x + across[1] * y + across[2];
+  uint lensParts = acrossParts[0] * column + acrossParts[1] * row + acrossParts[2];
+  Place lens = placed(roughLens, lensParts);
+  uint i = uint(int(lens.whole));
+  float roughU = panelU[0] * lens.whole + panelU[1] * x + panelU[2] * y + panelU[3];
+  u = placed(roughU, panelUParts[0] * i + panelUParts[1] * column + panelUParts[2] * row + panelUParts[3]);
+  v = placed(panelV[0] * y + panelV[1], panelVParts[0] * row + panelVParts[1]);
+  v.part -= slide * lens.part;
+#else
+  Place lens = placed(across[0] * x + across[2], acrossParts[0] * column + acrossParts[2]);
+  u = placed(panelU[0] * lens.whole + panelU[3], panelUParts[0] * uint(int(lens.whole)) + panelUParts[3]);
+  v = placed(panelV[0] * y + panelV[1], panelVParts[0] * row + panelVParts[1]);
+#endif
+#else
+  uint acrossAt = acrossParts[0] * column + acrossParts[2], downAt = downParts[0] * row + downParts[1];
+  vec2 lens = lensAt(across[0] * x + across[2], acrossAt, down[0] * y + down[1], downAt);
+  lensSeen = lens;
+  float shift = shiftOf(lens.y);
+  uvec3 whole = uvec3(ivec3(vec3(lens, shift)));
+  float roughU = panelU[0] * lens.x + panelU[1] * shift + panelU[3];
+  u = placed(roughU, panelUParts[0] * whole.x + panelUParts[1] * whole.z + panelUParts[3]);
+  v = placed(panelV[0] * lens.y + panelV[1], panelVParts[0] * whole.y + panelVParts[1]);
+#endif
+}
+
+// The pixel seen in green, which stands for the whole one.
+vec2 pixelOf(Place u, Place v) {
+  return vec2(u.whole + floor(u.part + channelRight.y), v.whole + floor(v.part + channelDown.y));
+}
+
+#if CELLS == 0
+vec3 codeSeen(Place u, Place v) {
+  return codeOf(pixelOf(u, v));
+}
+#elif CELLS == 1
+// Sub-pixels side by side in one row: no two lie farther apart than one pixel and the next.
+vec3 codeSeen(Place u, Place v) {
+  vec3 columns = floor(u.part + channelRight);
+  float first = min(columns.x, min(columns.y, columns.z));
+  vec2 pixel = vec2(u.whole + first, v.whole + floor(v.part + channelDown.y));
+  return mix(codeOf(pixel), codeOf(vec2(pixel.x + 1.0, pixel.y)), greaterThan(columns, vec3(first)));
+}
+#elif CELLS == 2
+vec3 codeSeen(Place u, Place v) {
+  vec3 columns = u.whole + floor(u.part + channelRight), rows = v.whole + floor(v.part + channelDown);
+  vec3 red = codeOf(vec2(columns.x, rows.x)), green = codeOf(vec2(columns.y, rows.y));
+  return vec3(red.r, green.g, codeOf(vec2(columns.z, rows.z)).b);
+}
+#else
+uniform ivec2 cellCount;  // columns and rows of the pattern
+uniform vec2 cells[192];  // place of R, G, B in each cell, right and down of its centre, row after row
+
+// The sub-pixels of uneven grids whose centres are nearest to the point.
+vec3 codeSeen(Place u, Place v) {
+  vec2 middle = pixelOf(u, v);
+  vec2 place = vec2(u.part, v.part) + (vec2(u.whole, v.whole) - middle);
+  ivec2 firstCell = ivec2(middle);
+  vec3 best = vec3(1e9);
+  vec2 nearest[3] = vec2[3](middle, middle, middle);
+  for (int row = -REACH; row <= REACH; row += 1) {
+    for (int column = -REACH; column <= REACH; column += 1) {
+      ivec2 cell = ((firstCell + ivec2(column, row)) % cellCount + cellCount) % cellCount;
+      int first = 3 * (cell.y * cellCount.x + cell.x);
+      for (int c = 0; c < 3; c += 1) {
+        vec2 offset = vec2(column, row) + 0.5 + cells[first + c] - place;
+        float distance = dot(offset, offset);
+        if (distance < best[c]) {
+          best[c] = distance;
+          nearest[c] = middle + vec2(column, row);
+        }
+      }
+    }
+  }
+  return vec3(codeOf(nearest[0]).r, codeOf(nearest[1]).g, codeOf(nearest[2]).b);
+}
+#endif
+`;
+
+const EYE = `
+out vec4 color;
+
+void main() {
+  Place u, v;
+  seen(u, v);
+  color = vec4(codeSeen(u, v), 1.0);
+}`;
+
+// The same with a layer over it.
+const OVERLAID = `
+uniform float overlayShare;
+out vec4 color;
+
+void main() {
+  Place u, v;
+  seen(u, v);
+  vec3 code = codeSeen(u, v);
+  vec2 pixel = pixelOf(u, v);
+  if (isOnPanel(pixel)) code = mix(code, overlayOf(pixel), overlayShare);
+  color = vec4(code, 1.0);
+}`;
+
+// What one of many eyes sees, in linear light, to be added up; alpha counts.
+const SUMMAND = `
+uniform bool isCoded;
+out vec4 color;
+
+void main() {
+  Place u, v;
+  seen(u, v);
+  vec2 pixel = pixelOf(u, v);
+  if (!isOnPanel(pixel)) discard;
+#if LAYOUT == HEXAGONAL
+  // The views of a hexagonal array fill the box around a micro-image; its corners belong to the neighbours.
+  if (lensOfPoint(pixel, vec2(0.5)) != lensSeen) discard;
+#endif
+  vec3 code = codeOf(pixel);
+  vec3 linear = mix(code / 12.92, pow((code + 0.055) / 1.055, vec3(2.4)), greaterThan(code, vec3(0.04045)));
+  color = vec4(isCoded ? linear : code, 1.0);
+}`;
+
+/** The mean of what was added up, as display codes. */
+export const MEAN = `${HEAD}
+uniform sampler2D sum;
+uniform ivec2 corner;
+uniform bool isCoded;
+out vec4 color;
+
+void main() {
+  vec4 total = texelFetch(sum, ivec2(gl_FragCoord.xy) - corner, 0);
+  vec3 mean = clamp(total.rgb / max(total.a, 1.0), 0.0, 1.0);
+  vec3 code = mix(12.92 * mean, 1.055 * pow(mean, vec3(1.0 / 2.4)) - 0.055, greaterThan(mean, vec3(0.0031308)));
+  color = vec4(isCoded ? code : mean, 1.0);
+}`;
+
+// The lens that shows a panel point: Display.lens_of.
+const OWNERS = `
+uniform float acrossOf[3];  // lens coordinate of a panel point: per column and row, and at (0, 0)
+uniform uint acrossOfParts[3];
+uniform float downOf[3];
+uniform uint downOfParts[3];
+uniform vec4 gradients;  // of the lens coordinates (across by u, across by v, down by u, down by v)
+
+vec2 lensOfPoint(vec2 pixel, vec2 within) {
+  vec2 step = vec2(dot(gradients.xy, within), dot(gradients.zw, within));
+  uvec2 k = uvec2(ivec2(pixel)), steps = uvec2(fract(step) * 16777216.0) << 8;
+  float a = acrossOf[0] * pixel.x + acrossOf[1] * pixel.y + acrossOf[2] + step.x;
+  uint aParts = acrossOfParts[0] * k.x + acrossOfParts[1] * k.y + acrossOfParts[2] + steps.x;
+#if LAYOUT == LENTICULAR
+  return vec2(placed(a, aParts).whole, 0.0);
+#else
+  float d = downOf[0] * pixel.x + downOf[1] * pixel.y + downOf[2] + step.y;
+  return lensAt(a, aParts, d, downOfParts[0] * k.x + downOfParts[1] * k.y + downOfParts[2] + steps.y);
+#endif
+}
+`;
+
+// The raw panel in a round glass: its pixels, the outlines of the micro-images, and in each the pixel that is seen.
+const MAGNIFIER = `
+uniform vec2 middle;  // of the glass in the canvas
+uniform float radius;
+uniform float scale;  // canvas pixels per panel pixel
+uniform vec2 centerPixel;  // the panel pixel in the middle of the glass
+uniform vec2 centerPart;
+uniform float seenU[3];  // the column seen through a lens: per lens and row (or shifted row), and at (0, 0)
+uniform uint seenUParts[3];
+uniform float seenV[2];  // the row, per row of lenses
+uniform uint seenVParts[2];
+uniform vec3 rimColor;
+out vec4 color;
+
+bool isSeen(vec2 pixel) {
+  vec2 lens = lensOfPoint(pixel, vec2(0.5));
+#if LAYOUT == LENTICULAR
+  float second = pixel.y;
+#else
+  float second = shiftOf(lens.y);
+  float v = seenV[0] * lens.y + seenV[1];
+  if (placed(v, seenVParts[0] * uint(int(lens.y)) + seenVParts[1]).whole != pixel.y) return false;
+#endif
+  float u = seenU[0] * lens.x + seenU[1] * second + seenU[2];
+  uint uParts = seenUParts[0] * uint(int(lens.x)) + seenUParts[1] * uint(int(second)) + seenUParts[2];
+  return placed(u, uParts).whole == pixel.x;
+}
+
+void main() {
+  vec2 beside = gl_FragCoord.xy - middle;
+  float distance = length(beside);
+  if (distance > radius + 2.0) discard;
+  vec2 place = centerPart + vec2(beside.x, -beside.y) / scale;
+  vec2 pixel = centerPixel + floor(place);
+  vec2 within = fract(place);
+  vec3 shown = codeOf(pixel);
+  vec2 fromEdge = min(within, 1.0 - within) * scale;
+  float edge = min(fromEdge.x, fromEdge.y);
+  if (isOnPanel(pixel)) {
+    if (scale >= 8.0 && edge < 0.5) shown *= 0.82;
+    if (isSeen(pixel)) shown = edge < max(1.5, 0.12 * scale) ? rimColor : shown;
+    else shown *= 0.72;
+    // Where the next pixel of the glass, or half the one after it, belongs to another lens there is an outline.
+    vec2 step = vec2(1.5) / scale;
+    vec2 here = lensOfPoint(pixel, within);
+    bool isOutline = lensOfPoint(pixel, within + vec2(step.x, 0.0)) != here
+      || lensOfPoint(pixel, within + vec2(0.0, step.y)) != here;
+    if (isOutline) shown = vec3(1.0);
+  }
+  float rim = smoothstep(radius - 1.5, radius - 0.5, distance);
+  color = vec4(mix(shown, vec3(0.95), rim), 1.0 - smoothstep(radius, radius + 1.5, distance));
+}`;
+
+/**
+ * Source of a program for a picture. What differs between pictures is compiled in: layout and slant of the lenses, how
+ * sub-pixels lie (`cells`: 0 not at their own places, 1 in a row, 2 anyhow, 3 in cells of several kinds, the nearest of
+ * which lie within `reach` pixels), and whether the picture is in one texture or in tiles (`tiled`).
+ */
+export function fragmentSource(kind, { layout, slanted, cells, reach, tiled }) {
+  const values = { LAYOUT: layout, SLANTED: slanted, CELLS: cells, REACH: reach, TILED: tiled };
+  const defines = Object.entries(values).map(([name, value]) => `#define ${name} ${Number(value)}\n`);
+  const bodies = {
+    eye: SEEN + EYE,
+    overlaid: SEEN + OVERLAID,
+    summand: OWNERS + SEEN + SUMMAND,
+    magnifier: OWNERS + MAGNIFIER,
+  };
+  return HEAD + defines.join("") + EXACT + LENSES + TILES + bodies[kind];
+}

@@ -1,0 +1,56 @@
+"""One file that shows a picture anywhere a browser is: page, description and tiles in one, no network needed."""
+
+from __future__ import annotations
+
+import base64
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from lippmann.atomic import replacing
+from lippmann.errors import UsageError
+from lippmann.image import IntegralImage
+from lippmann.viewer.manifest import manifest, tile_size
+from lippmann.viewer.page import whole_page
+from lippmann.viewer.tiles import Tiles
+
+#: The most pictures that a page shows: two, with a divider between them.
+MOST_PICTURES = 2
+
+
+def export_page(pictures: Sequence[tuple[str, IntegralImage]], path: Path) -> None:
+    """Write a page that shows one picture, or two with a divider between them.
+
+    Parameters
+    ----------
+    pictures:
+        What the page calls each picture, and the picture.
+    path:
+        The HTML file to write; about a third larger than the pictures as PNG.
+
+    Raises
+    ------
+    UsageError
+        If there is no picture, or there are more than two.
+    OutputError
+        If the place cannot be written.
+    """
+    if not 1 <= len(pictures) <= MOST_PICTURES:
+        raise UsageError(f"{len(pictures)} pictures will not do", rule="a page shows one or two")
+    data = json.dumps([_embedded(name, image) for name, image in pictures], allow_nan=False, separators=(",", ":"))
+    title = " | ".join(name for name, _ in pictures)
+    with replacing(path) as temporary:
+        temporary.write_text(whole_page(title, data, len(pictures)), encoding="utf-8")
+
+
+def _embedded(name: str, image: IntegralImage) -> dict[str, Any]:
+    tiles = Tiles(image, tile_size(image.display))
+    described = manifest(image, tiles, name=name, tile_format="png")
+    layers = [layer["name"] for layer in described["tiles"]["layers"]]
+    return {"manifest": described, "tiles": {layer: _all(tiles, layer) for layer in layers}}
+
+
+def _all(tiles: Tiles, layer: str) -> dict[str, str]:
+    places = ((column, row) for row in range(tiles.rows) for column in range(tiles.columns))
+    return {f"{c}_{r}": base64.b64encode(tiles.png(layer, c, r)).decode("ascii") for c, r in places}

@@ -1,0 +1,74 @@
+"""What the viewer's server answers: the page, its files, and manifests and tiles of the opened pictures. Nothing else.
+
+    GET /                                     the page
+    GET /assets/viewer.js, .css, icon.svg     what the page is made of
+    GET /pictures/N/manifest.json             what the page needs to know of a picture; the ETag names its state
+    GET /pictures/N/tiles/LAYER/COLUMN_ROW    a tile in the format of the manifest; If-Match asks for that of a state
+
+Errors are answered as {"error": "a line for people"}.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from http import HTTPStatus
+
+from lippmann.errors import UsageError
+from lippmann.viewer import page
+from lippmann.viewer.shown import PictureFile
+from lippmann.viewer.web import Answer, RefusedError, Request, json_answer, text_answer
+
+_MANIFEST = re.compile(r"/pictures/([0-9]{1,3})/manifest\.json")
+_TILE = re.compile(r"/pictures/([0-9]{1,3})/tiles/([A-Za-z_][A-Za-z0-9_-]{0,99})/([0-9]{1,6})_([0-9]{1,6})")
+
+
+class ViewerSite:
+    """The viewer's pages for one or more pictures; a :class:`~lippmann.viewer.web.Site`."""
+
+    def __init__(self, pictures: Sequence[PictureFile]) -> None:
+        self._pictures = tuple(pictures)
+        self._page = {
+            "/": text_answer(page.page_html(len(self._pictures)), "text/html"),
+            "/assets/viewer.js": text_answer(page.script(), "text/javascript"),
+            "/assets/viewer.css": text_answer(page.style(), "text/css"),
+            "/assets/icon.svg": text_answer(page.icon(), "image/svg+xml"),
+        }
+
+    def get(self, request: Request) -> Answer:
+        path = request.path
+        if path in self._page:
+            return self._page[path]
+        if match := _MANIFEST.fullmatch(path):
+            return self._manifest(int(match[1]))
+        if match := _TILE.fullmatch(path):
+            number, layer, column, row = match.groups()
+            return self._tile(int(number), layer, int(column), int(row), request.headers.get("If-Match"))
+        raise _not_here()
+
+    def post(self, request: Request, body: bytes) -> Answer:
+        raise RefusedError(HTTPStatus.METHOD_NOT_ALLOWED, "nothing is taken here")
+
+    def _picture(self, number: int) -> PictureFile:
+        if number >= len(self._pictures):
+            raise _not_here()
+        return self._pictures[number]
+
+    def _manifest(self, number: int) -> Answer:
+        shown = self._picture(number).current()
+        return json_answer(shown.manifest, headers={"ETag": f'"{shown.version}"'})
+
+    def _tile(self, number: int, layer: str, column: int, row: int, version: str | None) -> Answer:
+        shown = self._picture(number).loaded()
+        if version is not None and version != f'"{shown.version}"':
+            raise RefusedError(HTTPStatus.PRECONDITION_FAILED, "the file was written anew; reload the page")
+        try:
+            if shown.manifest["tiles"]["format"] == "png":
+                return Answer(shown.tiles.png(layer, column, row), "image/png")
+            return Answer(shown.tiles.rgb(layer, column, row), "application/octet-stream")
+        except UsageError as error:
+            raise RefusedError(HTTPStatus.NOT_FOUND, str(error)) from None
+
+
+def _not_here() -> RefusedError:
+    return RefusedError(HTTPStatus.NOT_FOUND, "there is nothing here")
