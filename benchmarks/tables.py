@@ -6,6 +6,7 @@ python benchmarks/tables.py
 from __future__ import annotations
 
 import json
+import statistics
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +33,8 @@ def main() -> None:
             sections.append(describe(result) + "\n" + _machine(result["machine"]))
             if name == "methods":
                 _into_readme(result)
+            if name in QUILTS_PAGE_TABLES:
+                _into_page(QUILTS_PAGE, name, QUILTS_PAGE_TABLES[name](result))
     PAGE.write_text("\n".join(sections))
 
 
@@ -107,6 +110,82 @@ def _into_readme(result: dict[str, Any]) -> None:
     before, _, rest = page.partition(BEGIN)
     _, _, after = rest.partition(END)
     README.write_text("\n".join([before + BEGIN, *_method_rows(result), END]) + after)
+
+
+def _into_page(page: Path, name: str, rows: list[str]) -> None:
+    """A table stands in a page between two marks of its name."""
+    begin, end = f"<!-- {name} -->", f"<!-- /{name} -->"
+    before, _, rest = page.read_text().partition(begin)
+    _, _, after = rest.partition(end)
+    page.write_text("\n".join([before + begin, *rows, end]) + after)
+
+
+def _weave(result: dict[str, Any]) -> str:
+    width, height = result["panel"]
+    return "\n".join(
+        [
+            "## A direct rendering against a weave (`weave.py`)",
+            "",
+            f"{width}x{height} pixels of a nominal Looking Glass Portrait with sub-pixels of their own, and a quilt of "
+            f"{result['views']} views of {result['view'][0]}x{result['view'][1]} pixels. "
+            "[Looking Glass](looking-glass.md) says what they are judged by.",
+            "",
+            *_weave_rows(result),
+            "",
+        ]
+    )
+
+
+def _weave_rows(result: dict[str, Any]) -> list[str]:
+    rows = ["| scene | way | samples per pixel | PSNR |", "|---|---|---|---|"]
+    for scene, found in result["results"].items():
+        rows += [f"| {scene} | {row['way']} | {row['spp']} | {row['psnr']:.1f} dB |" for row in found["rows"]]
+    return rows
+
+
+def _weave_with_picture(result: dict[str, Any]) -> list[str]:
+    return [
+        "![What an eye sees: direct, woven with linear and with nearest views](images/weave.png)",
+        "",
+        "*What an eye on the right of the cone sees of the panel's middle: rendered directly, woven with "
+        "`--views linear`, and with `--views nearest`.*",
+        "",
+        *_weave_rows(result),
+    ]
+
+
+def _cycles(result: dict[str, Any]) -> str:
+    width, height = result["panel"]
+    rows = "\n".join(_cycles_rows(result))
+    return f"""## Against Blender's Cycles (`cycles.py`)
+
+The glTF teapot before a nominal Looking Glass Portrait: 48 views of {result["view"][0]}x{result["view"][1]} pixels, or
+the native frame of {width}x{height}x3 sub-pixels; two threads each. Every program is judged by its own long rendering
+({result["reference_spp"]} samples). Target: at no lower PSNR {result["target"]:g} times faster.
+
+{rows}
+"""
+
+
+def _cycles_rows(result: dict[str, Any]) -> list[str]:
+    cycles = result["cycles"]
+    rows = [
+        "| | samples | time | PSNR | times faster |",
+        "|---|---|---|---|---|",
+        f"| Cycles {cycles['blender']}, 48 views, with its denoiser | {cycles['spp']} | {cycles['seconds']:.0f} s "
+        f"| {cycles['psnr']:.1f} dB | 1 |",
+    ]
+    for name, title in (("quilt", "Lippmann's quilt"), ("native", "Lippmann's native frame")):
+        found = result[name]["chosen"]
+        if found is None:
+            best = max(result[name]["tries"], key=lambda one: one["psnr"])
+            rows.append(f"| {title} | {best['spp']} | {best['seconds']:.1f} s | {best['psnr']:.1f} dB | not reached |")
+            continue
+        rows.append(
+            f"| {title}, `--denoise {found['denoise']}` | {found['spp']} | {found['seconds']:.1f} s "
+            f"| {found['psnr']:.1f} dB | {result['times_faster'][name]:.1f} |"
+        )
+    return rows
 
 
 def _seconds(value: float | None) -> str:
@@ -204,15 +283,98 @@ stated less true PSNR is {found["psnr_stated_minus_true"]:+.2f} dB overall and
     return "\n".join([head, *lines]) + "\n"
 
 
+QUILTS_PAGE = Path(__file__).parent.parent / "docs" / "looking-glass.md"
+QUILTS_PAGE_TABLES = {"weave": _weave_with_picture, "cycles": _cycles_rows}
+
+
+def _cluster(result: dict[str, Any]) -> str:
+    width, height = result["size"]
+    rows = "\n".join(
+        f"| {name} | {statistics.median(clock):.1f} s | {statistics.median(result['processor_seconds'][name]):.1f} s |"
+        for name, clock in result["seconds"].items()
+    )
+    return f"""## Clusters on one machine (`cluster.py`)
+
+{width}x{height} pixels, path light, {result["spp"]} samples per pixel, written as TIFF; workers warm. Workers have one
+thread each.
+
+| | clock | processors |
+|---|---|---|
+{rows}
+
+Two workers are {result["speed_up"]:.2f} times as fast as one (target: {result["targets"]["speed_up"]:g}), and take
+{result["overhead"]:.2f} of the time of two threads in one process (target: at most {result["targets"]["overhead"]:g});
+of the processors' time, {result["processor_overhead"]:.2f}.
+"""
+
+
+def _huge(result: dict[str, Any]) -> str:
+    width, height = result["size"]
+    target = f"{result['target_peak_bytes'] / 1e9:.0f} GB"
+    rows = []
+    for ending, run in result["renders"].items():
+        small = sum(one["nanoseconds_per_pixel"] for one in run["small"]) / 2
+        rows.append(
+            f"| `{ending}` | {run['peak_resident_bytes'] / 1e9:.2f} GB | {run['bytes'] / 1e9:.2f} GB "
+            f"| {run['seconds']:.0f} s | {run['nanoseconds_per_pixel']:.0f} ns | {small:.0f} ns "
+            f"| {run['relative_to_small']:.2f} | {run['cpu_relative_to_small']:.2f} |"
+        )
+    table = "\n".join(rows)
+    commands = "\n".join(
+        f"| {name} | {run['seconds']:.0f} s | {run['peak_resident_bytes'] / 1e9:.2f} GB |"
+        for name, run in result.get("commands", {}).items()
+    )
+    reading = f"""
+Commands on that file, each a process of its own (target of the peak: {target}):
+
+| command | time | peak |
+|---|---|---|
+{commands}
+"""
+    return f"""## A picture larger than memory (`huge.py`)
+
+{width}x{height} pixels of a 60-lpi print, direct light, 1 sample per pixel, `--memory`
+{result["memory_limit"] / 1e9:.0f} GB; beside it a picture of {result["small"][0]}x{result["small"][1]} pixels.
+Targets: a peak of at most {target}, time per pixel at most {result["target_relative"]} of the small picture's.
+
+| file | peak | size | time | per pixel | small, per pixel | ratio | ratio of processor time |
+|---|---|---|---|---|---|---|---|
+{table}
+""" + (reading if commands else "")
+
+
+def _fuzz(result: dict[str, Any]) -> str:
+    rows = []
+    for name, runs in result["targets"].items():
+        inputs, seconds, finds = (sum(run[key] for run in runs) for key in ("inputs", "cpu_seconds", "finds"))
+        rows.append(f"| {name} | {inputs:,} | {seconds:.0f} | {finds} |".replace(",", " "))
+    limits = result["limits"]
+    return f"""## Damaged inputs (`fuzz.py`)
+
+Every input has to end in a result or in an error of one line within {limits["seconds"]:g} s of CPU time and
+{limits["bytes"] >> 20} MiB, and nothing may be printed. Finds are inputs that did not; what they showed has been mended
+since, and the plain suite replays them.
+
+| reader | inputs | CPU seconds | finds |
+|---|---|---|---|
+{chr(10).join(rows)}
+"""
+
+
 SECTIONS = {
     "methods": _methods,
     "equal_error": _equal_error,
     "estimate_coverage": _estimate_coverage,
     "reuse": _reuse,
+    "weave": _weave,
+    "cycles": _cycles,
     "tachyon": _tachyon,
     "full_rate": _full_rate,
     "large_frame": _large_frame,
+    "huge": _huge,
     "command": _command,
+    "cluster": _cluster,
+    "fuzz": _fuzz,
 }
 
 if __name__ == "__main__":

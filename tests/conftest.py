@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import base64
+import json
 from pathlib import Path
 
 import pytest
@@ -24,3 +26,51 @@ def shared_scenes() -> Path:
     if not SHARED_SCENES.is_dir():
         pytest.skip("the folder ../shared/scenes with real scenes is not there")
     return SHARED_SCENES
+
+
+@pytest.fixture(scope="session")
+def moving_ball(tmp_path_factory) -> Path:
+    """A glTF file of one second: a ball rises and comes down again 1 to the right, and a camera goes along."""
+    import numpy as np
+    import trimesh
+
+    scene = trimesh.Scene(trimesh.creation.icosphere(subdivisions=2, radius=0.5))
+    path = tmp_path_factory.mktemp("moving") / "ball.gltf"
+    times = np.array([0.0, 0.5, 1.0], "<f4")
+    places = np.array([[0, 0, 0], [0.5, 1, -0.5], [1, 0, 0]], "<f4")
+    along = np.array([[0, 0, 5], [0.5, 0, 5], [1, 0, 5]], "<f4")
+    files = trimesh.exchange.gltf.export_gltf(scene)
+    tree = json.loads(files.pop("model.gltf"))
+    for name, data in files.items():
+        (path.parent / name).write_bytes(data)
+    ball = next(number for number, node in enumerate(tree["nodes"]) if "mesh" in node)
+    tree["cameras"] = [{"type": "perspective", "perspective": {"yfov": 0.6, "znear": 0.1}}]
+    tree["nodes"].append({"name": "eye", "camera": 0})
+    eye = len(tree["nodes"]) - 1
+    for one in tree.get("scenes", []):
+        one["nodes"].append(eye)
+    first, buffer = len(tree["accessors"]), len(tree["buffers"])
+    data = b"".join(array.tobytes() for array in (times, places, along))
+    uri = "data:application/octet-stream;base64," + base64.b64encode(data).decode()
+    tree["buffers"].append({"byteLength": len(data), "uri": uri})
+    offset = 0
+    for array, kind in ((times, "SCALAR"), (places, "VEC3"), (along, "VEC3")):
+        tree["accessors"].append(
+            {"bufferView": len(tree["bufferViews"]), "componentType": 5126, "count": 3, "type": kind}
+        )
+        tree["bufferViews"].append({"buffer": buffer, "byteOffset": offset, "byteLength": array.nbytes})
+        offset += array.nbytes
+    tree["animations"] = [
+        {
+            "name": "hop",
+            "samplers": [{"input": first, "output": first + 1}, {"input": first, "output": first + 2}],
+            "channels": [
+                {"sampler": 0, "target": {"node": ball, "path": "translation"}},
+                {"sampler": 1, "target": {"node": eye, "path": "translation"}},
+            ],
+        }
+    ]
+    for node in (ball, eye):
+        tree["nodes"][node].pop("matrix", None)
+    path.write_text(json.dumps(tree))
+    return path

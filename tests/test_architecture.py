@@ -24,6 +24,7 @@ ORDER = (
     "llvm",
     "gpu",
     "engine",
+    "store",
     "display",
     "scene",
     "image",
@@ -31,20 +32,26 @@ ORDER = (
     "replay",
     "refocus",
     "quilt",
+    "film",
     "weave",
+    "calibration",
+    "printing",
+    "exchange",
     "quality",
     "report",
     "viewer",
     "cluster",
     "api",
+    "sequence",
     "",
     "cli",
     "__main__",
 )
 
 #: Conveniences of a part that reach up, each only from inside a function, so that using the part alone loads nothing
-#: more: ``IntegralImage.replay`` and ``.refocus``, and the package ``lippmann.render`` answering as the call.
-REACHES_UP = {("image", "replay"), ("image", "refocus"), ("render", "api")}
+#: more: ``IntegralImage.replay``, ``.refocus`` and its widget, and the package ``lippmann.render`` answering as the
+#: call.
+REACHES_UP = {("image", "replay"), ("image", "refocus"), ("image", "viewer"), ("render", "api")}
 
 #: The only modules that may use Mitsuba or Dr.Jit; of the scene those that build it on the device, never its readers.
 USES_ENGINE = (
@@ -65,6 +72,7 @@ ENTRANCES = (
     "api",
     "cli",
     "engine",
+    "store",
     "display",
     "image",
     "scene",
@@ -72,8 +80,15 @@ ENTRANCES = (
     "replay",
     "refocus",
     "quilt",
+    "film",
+    "sequence",
     "weave",
+    "calibration",
+    "printing",
+    "exchange",
     "quality",
+    "viewer.server",
+    "viewer.notebook",
 )
 
 
@@ -239,6 +254,8 @@ def test_import_is_light(module):
         "av",
         "imagecodecs",
         "tifffile",
+        "h5py",
+        "zarr",
     }
     assert set(run.stdout.split()) & heavy == set()
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from lippmann import _version
 
 if TYPE_CHECKING:
-    from lippmann.api import load_scene, preview, render
+    from lippmann.api import load_scene, plan, preview, render, render_quilt, render_to_file
     from lippmann.display import Display, LensArray, Panel, list_displays, load_display
     from lippmann.errors import LippmannError
     from lippmann.image import IntegralImage, read_picture
@@ -22,8 +22,11 @@ __version__ = _version.VERSION
 
 _HOME = {
     "load_scene": "lippmann.api",
+    "plan": "lippmann.api",
     "preview": "lippmann.api",
     "render": "lippmann.api",
+    "render_quilt": "lippmann.api",
+    "render_to_file": "lippmann.api",
     "Display": "lippmann.display",
     "LensArray": "lippmann.display",
     "Panel": "lippmann.display",
@@ -48,9 +51,12 @@ __all__ = [
     "list_displays",
     "load_display",
     "load_scene",
+    "plan",
     "preview",
     "read_picture",
     "render",
+    "render_quilt",
+    "render_to_file",
 ]
 
 

@@ -1,4 +1,6 @@
-"""The library by its few calls: ``load_scene``, ``render``, ``preview``; everything else hangs on what they return.
+"""The library by its few calls: ``load_scene``, ``render``, ``render_quilt``, ``preview``.
+
+Everything else hangs on what they return.
 
 ::
 
@@ -17,14 +19,17 @@ from typing import TYPE_CHECKING, Any, cast
 from lippmann.display import Display, load_display
 from lippmann.progress import ProgressCallback, silent
 from lippmann.render.defaults import AUTO, choose
-from lippmann.render.settings import Denoiser, Device, Method, Order, RenderSettings
+from lippmann.render.settings import Device, RenderSettings
 from lippmann.scene.load import load_scene as _load_scene
-from lippmann.scene.placement import Mode, PlacementOptions
+from lippmann.scene.placement import Mode, Placement, PlacementOptions
 from lippmann.scene.scene import Scene
 
 if TYPE_CHECKING:
     from lippmann.image import IntegralImage
+    from lippmann.quilt import Quilt
+    from lippmann.render.forecast import Forecast
     from lippmann.render.pipeline import Preview
+    from lippmann.render.tiled_picture import Rendered, Runner
 
 
 def load_scene(
@@ -62,7 +67,7 @@ def render(
     scene: Scene | object,
     display: Display | str | Path = "seed-lenticular",
     *,
-    method: str = "full",
+    method: str = AUTO,
     order: str | None = None,
     respect_gloss: bool | None = None,
     integrator: str = AUTO,
@@ -74,7 +79,7 @@ def render(
     seed: int = 0,
     subpixels: bool = False,
     pixel_filter: str = AUTO,
-    denoise: str = "none",
+    denoise: str = AUTO,
     layers: bool = False,
     camera: str | None = None,
     place: str | None = None,
@@ -82,6 +87,7 @@ def render(
     shift: tuple[float, float, float] = (0.0, 0.0, 0.0),
     scale: float = 1.0,
     pop_out: float | None = None,
+    placed: Placement | None = None,
     device: str = "auto",
     threads: int | None = None,
     memory: int | None = None,
@@ -97,13 +103,16 @@ def render(
         A :class:`~lippmann.display.Display`, a preset's name, or a TOML file.
     method, order, respect_gloss, integrator, depth, spp, seed, subpixels, pixel_filter:
         See :class:`~lippmann.render.settings.RenderSettings`; what is "auto" or None follows from the scene, see
-        :func:`~lippmann.render.defaults.choose`.
+        :func:`~lippmann.render.defaults.choose`, and the method from what is asked for, see
+        :func:`~lippmann.render.choice.decide`.
     quality, quality_mean, max_time, denoise, layers, device, threads, memory:
         See there, too.
     camera, place, turn, shift, scale, pop_out:
         Where the display stands in the scene, see :class:`~lippmann.scene.placement.PlacementOptions`: by a camera,
         fitted to the display's depth (``place="fit"``), or with scene units taken for millimetres of the display
         (``place="display"``); then turned (yaw, pitch, roll in degrees), moved (mm) and scaled.
+    placed:
+        Where it stands, found before; the six above do not count then.
     progress:
         Called with :class:`~lippmann.progress.Progress` as the work goes on.
 
@@ -120,23 +129,23 @@ def render(
     from lippmann.render.pipeline import render_integral_image
 
     loaded = _scene(scene)
-    open_ended = not (quality is quality_mean is max_time is None)
-    choice = choose(
-        loaded, integrator=integrator, depth=depth, spp=spp, pixel_filter=pixel_filter, open_ended=open_ended
-    )
-    settings = RenderSettings(
-        method=cast(Method, method),
-        order=cast("Order | None", order),
+    settings = _settings(
+        loaded,
+        integrator=integrator,
+        depth=depth,
+        spp=spp,
+        pixel_filter=pixel_filter,
+        method=method,
+        order=order,
         respect_gloss=respect_gloss,
-        **vars(choice),
         quality=quality,
         quality_mean=quality_mean,
         max_time=max_time,
         seed=seed,
         subpixels=subpixels,
-        denoise=cast("Denoiser", denoise),
+        denoise=denoise,
         layers=layers,
-        device=cast(Device, device),
+        device=device,
         threads=threads,
         memory=memory,
     )
@@ -149,7 +158,86 @@ def render(
         pop_out=pop_out,
     )
     shown = display if isinstance(display, Display) else load_display(display)
-    return render_integral_image(loaded, shown, settings, options, progress)
+    return render_integral_image(loaded, shown, settings, options, progress, placed)
+
+
+def render_to_file(
+    scene: Scene | object,
+    output: str | Path,
+    display: Display | str | Path = "seed-lenticular",
+    *,
+    bits: int | None = None,
+    resume: bool = False,
+    placement: PlacementOptions | Placement | None = None,
+    runner: Runner | None = None,
+    progress: ProgressCallback = silent,
+    **options: Any,
+) -> Rendered:
+    """Render a scene into a file tile by tile: for pictures larger than memory, and runs that may be interrupted.
+
+    Parameters
+    ----------
+    scene, display, progress:
+        As for :func:`render`.
+    output:
+        The file; ``.tif`` and ``.zarr`` are written in memory that does not grow with the picture.
+    bits:
+        Bits per value: PNG 8, 16; EXR 16, 32; TIFF and Zarr 8, 16, 32.
+    resume:
+        Go on with what an interrupted run left beside ``output``, if there is anything.
+    placement:
+        Where the display stands in the scene.
+    runner:
+        Who renders the tiles, see :mod:`lippmann.render.tiled_picture`; by default this process.
+    options:
+        ``integrator``, ``depth``, ``spp``, ``seed``, ``subpixels``, ``pixel_filter``, ``device``, ``threads`` and
+        ``memory`` as for :func:`render`. Others are refused: they need the whole picture at once.
+
+    Returns
+    -------
+    Rendered
+        With ``.provenance`` and the numbers of tiles made and found.
+
+    Raises
+    ------
+    LippmannError
+        Of the kind that says what was wrong.
+    """
+    from lippmann.render.tiled_picture import render_to_file as rendered
+
+    loaded = _scene(scene)
+    shown = display if isinstance(display, Display) else load_display(display)
+    return rendered(
+        loaded,
+        shown,
+        _settings(loaded, **{"method": AUTO, "denoise": AUTO, **options}),
+        placement or PlacementOptions(),
+        Path(output),
+        bits=bits,
+        resume=resume,
+        runner=runner,
+        progress=progress,
+    )
+
+
+def _settings(
+    scene: Scene,
+    *,
+    integrator: str = AUTO,
+    depth: int | None = None,
+    spp: int | None = None,
+    pixel_filter: str = AUTO,
+    quality: float | None = None,
+    quality_mean: float | None = None,
+    max_time: float | None = None,
+    **others: Any,
+) -> RenderSettings:
+    """The settings of :func:`render`, what is left open filled in from the scene."""
+    open_ended = not (quality is quality_mean is max_time is None)
+    choice = choose(
+        scene, integrator=integrator, depth=depth, spp=spp, pixel_filter=pixel_filter, open_ended=open_ended
+    )
+    return RenderSettings(**vars(choice), quality=quality, quality_mean=quality_mean, max_time=max_time, **others)
 
 
 def preview(
@@ -195,8 +283,102 @@ def preview(
     return render_preview(loaded, camera, size, settings, progress)
 
 
+def render_quilt(
+    scene: Scene | object,
+    display: Display | str | Path = "portrait",
+    *,
+    views: tuple[int, int] | None = None,
+    size: tuple[int, int] | None = None,
+    placement: PlacementOptions | None = None,
+    progress: ProgressCallback = silent,
+    **options: Any,
+) -> Quilt:
+    """Render the views that cameras before a display see, side by side in one picture.
+
+    Parameters
+    ----------
+    scene:
+        What :func:`load_scene` returned, or anything that it takes.
+    display:
+        A device's name (``portrait``), or any lenticular display as :func:`render` takes it.
+    views, size:
+        Columns and rows of views, width and height in pixels; by default those that the device is given, see
+        :data:`lippmann.quilt.DEVICE_QUILTS`.
+    placement:
+        Where the display stands in the scene; the same as for :func:`render` gives the same place.
+    options:
+        ``integrator``, ``depth``, ``spp``, ``quality``, ``quality_mean``, ``max_time``, ``seed``, ``pixel_filter``,
+        ``denoise``, ``device``, ``threads`` and ``memory`` as for :func:`render`; every view counts as a micro-image
+        does there.
+
+    Returns
+    -------
+    Quilt
+        With ``.pixels`` ``(height, width, 3)`` float32 linear RGB, ``.layout``, ``.view(k)`` and ``.provenance``.
+
+    Raises
+    ------
+    LippmannError
+        Of the kind that says what was wrong.
+    """
+    from lippmann.quilt import Quilt, load_device, quilt_of_display
+    from lippmann.render.quilt import render_quilt as rendered
+
+    shown = display if isinstance(display, Display) else load_device(str(display))
+    wanted = quilt_of_display(shown, views, size)
+    loaded = _scene(scene)
+    frame = rendered(
+        loaded,
+        shown,
+        (wanted.layout.columns, wanted.layout.rows),
+        (wanted.width, wanted.height),
+        _settings(loaded, **{"method": AUTO, "denoise": AUTO, **options}),
+        placement or PlacementOptions(),
+        progress,
+    )
+    return Quilt(frame.pixels, wanted.layout, provenance=frame.provenance)
+
+
+def plan(
+    scene: Scene | object,
+    display: Display | str | Path = "seed-lenticular",
+    *,
+    placement: PlacementOptions | None = None,
+    progress: ProgressCallback = silent,
+    **options: Any,
+) -> Forecast:
+    """Say what rendering a scene for a display will show and take, without rendering more than a few pixels.
+
+    Parameters
+    ----------
+    scene, display:
+        As for :func:`render`.
+    placement:
+        Where the display stands in the scene.
+    options:
+        ``integrator``, ``depth``, ``spp``, ``seed``, ``subpixels``, ``pixel_filter``, ``denoise``, ``device``,
+        ``threads`` and ``memory`` as for :func:`render`, of the method ``full``.
+
+    Returns
+    -------
+    Forecast
+        Depth range and what of it will be blurred, rays, memory and seconds.
+
+    Raises
+    ------
+    LippmannError
+        Of the kind that says what was wrong, as :func:`render` would find it before its first ray.
+    """
+    from lippmann.render.forecast import forecast
+
+    loaded = _scene(scene)
+    shown = display if isinstance(display, Display) else load_display(display)
+    settings = _settings(loaded, **{"method": AUTO, "denoise": AUTO, **options})
+    return forecast(loaded, shown, settings, placement or PlacementOptions(), progress)
+
+
 def _scene(source: Scene | object) -> Scene:
     return source if isinstance(source, Scene) else load_scene(source)
 
 
-__all__ = ["load_scene", "preview", "render"]
+__all__ = ["load_scene", "plan", "preview", "render", "render_quilt", "render_to_file"]

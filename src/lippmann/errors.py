@@ -73,3 +73,9 @@ class EngineError(LippmannError):
     """The rendering engine cannot run on this machine as it is."""
 
     exit_code = 1
+
+
+class ClusterError(LippmannError):
+    """A cluster that cannot be reached, was lost, or could not render all tiles."""
+
+    exit_code = 1

@@ -19,13 +19,17 @@ STAGE_NAMES = {
     "load": "loading",
     "build": "building the scene",
     "compile": "compiling",
+    "probe": "trying a few pixels",
     "trace": "tracing",
+    "tiles": "rendering tiles",
     "reuse": "reusing",
     "guides": "looking for guides",
     "denoise": "denoising",
     "layers": "adding layers",
     "read": "reading",
     "weave": "weaving",
+    "draw": "drawing",
+    "sequence": "rendering frames",
     "write": "writing",
 }
 
@@ -94,11 +98,11 @@ def _bar() -> Iterator[ProgressCallback]:
         yield report
 
 
-def estimate_in_words(estimate: Mapping[str, Any]) -> str:
-    """What a picture says of its own error, as :attr:`Provenance.estimate` holds it."""
+def estimate_in_words(estimate: Mapping[str, Any], part: str = "micro-image") -> str:
+    """What a picture says of its own error, as :attr:`Provenance.estimate` holds it; a quilt's parts are views."""
     from lippmann.render.estimate import Estimate
 
-    return str(Estimate.from_dict(estimate))
+    return Estimate.from_dict(estimate).in_words(part)
 
 
 class _PlainProgress:

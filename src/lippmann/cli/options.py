@@ -11,10 +11,14 @@ Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on sta
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Say nothing but errors.")]
 Output = Annotated[Path, typer.Option("--output", "-o", help="The file to write; its ending names the format.")]
 Folder = Annotated[Path, typer.Option("--output", "-o", help="The folder to write; it appears whole or not at all.")]
-Picture = Annotated[Path, typer.Argument(help="A picture that Lippmann wrote (PNG, EXR or TIFF).")]
+Picture = Annotated[Path, typer.Argument(help="A picture that Lippmann wrote (PNG, EXR, TIFF or Zarr).")]
 DisplayName = Annotated[
     str,
-    typer.Option("--display", "-d", help="A name (see 'lippmann displays'), a TOML file or a device's visual.json."),
+    typer.Option(
+        "--display",
+        "-d",
+        help="A name (see 'lippmann displays'), a TOML file, a device's visual.json, or print:... or monitor:...",
+    ),
 ]
 PictureDisplay = Annotated[
     str | None, typer.Option("--display", "-d", help="The display of a picture that does not carry its own.")
@@ -54,5 +58,7 @@ Background = Annotated[
 AllowOutside = Annotated[
     bool, typer.Option("--allow-outside", help="Let a scene file refer to files outside its own folder.")
 ]
-Bits = Annotated[int | None, typer.Option("--bits", help="Bits per value: PNG 8, 16; EXR 16, 32; TIFF 8, 16, 32.")]
+Bits = Annotated[
+    int | None, typer.Option("--bits", help="Bits per value: PNG 8, 16; EXR 16, 32; TIFF and Zarr 8, 16, 32.")
+]
 Eye = Annotated[str, typer.Option("--eye", help="The eye's place: X,Y,Z in mm, z toward the viewer.")]

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from lippmann.cli import options
+from lippmann.cli import options, quilts
 from lippmann.cli.console import Console
 
 if TYPE_CHECKING:
@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from lippmann.quilt import Quilt
 
 quilt = typer.Typer(help="Quilts: all views side by side in one picture.", no_args_is_help=True, rich_markup_mode=None)
+
+quilt.command("render")(quilts.render)
 
 Format = Annotated[str | None, typer.Option("--format", help="png, exr or tiff; by default as the quilt is stored.")]
 
@@ -104,20 +106,25 @@ def weave(
     quiet: options.Quiet = False,
 ) -> None:
     """Make a display's native picture from a quilt or a folder of views."""
-    from lippmann.atomic import check_writable
     from lippmann.display import load_display
-    from lippmann.image.formats import format_for
+    from lippmann.image.banded import can_be_banded
+    from lippmann.image.formats import check_output, format_for
+    from lippmann.image.large import LARGE
     from lippmann.weave import weave as weave_views
+    from lippmann.weave import weave_to_file
 
     console = Console(quiet, as_json)
-    format_for(output, bits)
-    check_writable(output)
+    name, _ = format_for(output, bits)
+    check_output(output, name)
     target = load_display(display)
+    width, height = target.panel.width, target.panel.height
     with console.progress() as progress:
         views = _views(source, progress)
-        image = weave_views(views, target, choice=choice, scene=source.stem, progress=progress)  # type: ignore[arg-type]
-    image.save(output, bits=bits)
-    width, height = target.panel.width, target.panel.height
+        asked: dict[str, Any] = {"choice": choice, "scene": source.stem, "progress": progress}
+        if width * height > LARGE and can_be_banded(name):
+            weave_to_file(views, target, output, bits=bits, **asked)
+        else:
+            weave_views(views, target, **asked).save(output, bits=bits)
     result = {
         "output": str(output),
         "size": [width, height],

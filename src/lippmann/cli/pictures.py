@@ -42,13 +42,19 @@ def views(
     quiet: options.Quiet = False,
 ) -> None:
     """Write each view (one direction, one pixel of every lens) as a picture of its own."""
-    from lippmann.image import read_picture, write_views
+    from lippmann.image import IntegralImage, write_views
+    from lippmann.image.large import open_picture
+    from lippmann.image.large_folders import write_large_views
     from lippmann.image.views import view_grid
 
     console = Console(quiet, as_json)
-    image = read_picture(picture, display=_display(display))
+    image = open_picture(picture, display=_display(display))
     with console.progress() as progress:
-        count = write_views(image, output, format=format, bits=bits, progress=progress)  # type: ignore[arg-type]
+        asked: dict[str, Any] = {"format": format, "bits": bits, "progress": progress}
+        if isinstance(image, IntegralImage):
+            count = write_views(image, output, **asked)
+        else:
+            count = write_large_views(image, output, **asked)
     if image.views_note:
         console.remark(image.views_note)
     grid = view_grid(image.display)
@@ -67,12 +73,18 @@ def micro_images(
     quiet: options.Quiet = False,
 ) -> None:
     """Write the micro-image of each lens as a picture of its own."""
-    from lippmann.image import read_picture, write_micro_images
+    from lippmann.image import IntegralImage, write_micro_images
+    from lippmann.image.large import open_picture
+    from lippmann.image.large_folders import write_large_micro_images
 
     console = Console(quiet, as_json)
-    image = read_picture(picture, display=_display(display))
+    image = open_picture(picture, display=_display(display))
     with console.progress() as progress:
-        count = write_micro_images(image, output, format=format, bits=bits, progress=progress)  # type: ignore[arg-type]
+        asked: dict[str, Any] = {"format": format, "bits": bits, "progress": progress}
+        if isinstance(image, IntegralImage):
+            count = write_micro_images(image, output, **asked)
+        else:
+            count = write_large_micro_images(image, output, **asked)
     grid = image.display.lens_grid
     result = {"output": str(output), "lenses": [grid.rows, grid.columns], "written": count}
     console.result(result, f"{output}: {count} micro-images")
@@ -123,9 +135,9 @@ def replay(
 ) -> None:
     """Show what an eye in front of the display sees."""
     from lippmann.atomic import check_writable
-    from lippmann.image import read_picture
     from lippmann.image.animation import check_animation_path, write_animation
     from lippmann.image.formats import format_for, write_plain_picture
+    from lippmann.image.large import open_picture
     from lippmann.replay import default_eye
     from lippmann.replay import replay as replay_picture
     from lippmann.replay import sweep as sweep_picture
@@ -139,7 +151,7 @@ def replay(
             if value is not None:
                 raise UsageError("has no meaning for a single picture", where=option, fix="add --sweep")
     check_writable(output)
-    image = read_picture(picture, display=_display(display))
+    image = open_picture(picture, display=_display(display))
     place = default_eye(image.display) if eye is None else parse.triple(eye, "--eye")
     pixels = None if size is None else parse.size(size, "--size")
     transfer = image.provenance.transfer
@@ -169,14 +181,14 @@ def refocus(
 ) -> None:
     """Focus on a plane, as a camera with an aperture as wide as the field would."""
     from lippmann.atomic import check_writable
-    from lippmann.image import read_picture
     from lippmann.image.formats import format_for, write_plain_picture
+    from lippmann.image.large import open_picture
     from lippmann.refocus import refocus as refocus_picture
 
     console = Console(quiet, as_json)
     format_for(output, bits)
     check_writable(output)
-    image = read_picture(picture, display=_display(display))
+    image = open_picture(picture, display=_display(display))
     seen = refocus_picture(image, plane, size=None if size is None else parse.size(size, "--size"))
     write_plain_picture(seen, output, bits=bits, transfer=image.provenance.transfer)
     console.result({"output": str(output), "plane": plane}, f"{output}: focused at {plane:g} mm")

@@ -4,24 +4,28 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from lippmann.cli import options, parse
+from lippmann.cli import clusters, options, parse, printing, sequences, tiled
 from lippmann.cli.console import Console, estimate_in_words
+from lippmann.errors import UsageError
 from lippmann.progress import Progress
 
 if TYPE_CHECKING:
     from lippmann.image import IntegralImage, Provenance
+    from lippmann.scene.placement import PlacementOptions
 
 Method = Annotated[
     str,
     typer.Option(
         "--method",
-        help="full: every ray is traced; lens-view: points are carried from lens to lens and missed pixels traced; "
+        help="auto: what is fastest for the quality asked for; full: every ray is traced; "
+        "lens-view: points are carried from lens to lens and missed pixels traced; "
         "interpolated: those of every other lens are averaged; pooled: light is gathered in the scene and shared.",
     ),
 ]
@@ -72,7 +76,12 @@ MaxTime = Annotated[
     float | None, typer.Option("--max-time", help="Stop tracing after so many seconds, with the best so far.")
 ]
 Denoise = Annotated[
-    str, typer.Option("--denoise", help="none, or oidn: take the noise out with Open Image Denoise (extra 'denoise').")
+    str,
+    typer.Option(
+        "--denoise",
+        help="none, or oidn: take the noise out with Open Image Denoise (extra 'denoise'), with the effort that the "
+        "rays deserve; oidn-fast and oidn-high name it. auto: only where --method auto finds it better.",
+    ),
 ]
 Layers = Annotated[
     bool,
@@ -87,7 +96,7 @@ def render(
     scene: options.Scene,
     output: options.Output,
     display: options.DisplayName = "seed-lenticular",
-    method: Method = "full",
+    method: Method = "auto",
     order: Order = None,
     respect_gloss: RespectGloss = None,
     maps: Maps = None,
@@ -100,7 +109,7 @@ def render(
     seed: options.Seed = 0,
     subpixels: Subpixels = False,
     pixel_filter: options.PixelFilter = "auto",
-    denoise: Denoise = "none",
+    denoise: Denoise = "auto",
     layers: Layers = False,
     camera: Camera = None,
     place: Place = None,
@@ -111,7 +120,27 @@ def render(
     environment: options.Environment = None,
     background: options.Background = None,
     allow_outside: options.AllowOutside = False,
+    lpi: printing.Lpi = None,
+    print_lpi: printing.PrintLpi = None,
+    ppi: printing.Ppi = None,
+    size: printing.Size = None,
+    viewing_distance: printing.Distance = None,
+    thickness: printing.Thickness = None,
+    index: printing.Index = None,
+    field: printing.Field = None,
+    marks: printing.MarksMargin = None,
     bits: options.Bits = None,
+    resume: tiled.Resume = False,
+    cluster: clusters.ClusterName = None,
+    tls_ca: clusters.TlsCa = None,
+    tls_cert: clusters.TlsCert = None,
+    tls_key: clusters.TlsKey = None,
+    frames: sequences.Frames = None,
+    fps: sequences.Fps = None,
+    animation: sequences.Animation = None,
+    camera_path: sequences.CameraPath = None,
+    video: sequences.Video = None,
+    eye: sequences.Eye = None,
     device: options.Device = "auto",
     threads: options.Threads = None,
     memory: options.Memory = None,
@@ -125,56 +154,78 @@ def render(
     from lippmann.image.formats import format_for
 
     console = Console(quiet, as_json)
+    target = printing.display_of(
+        display,
+        lpi=lpi,
+        print_lpi=print_lpi,
+        ppi=ppi,
+        size=size,
+        viewing_distance=viewing_distance,
+        thickness=thickness,
+        index=index,
+        field=field,
+    )
+    margin = printing.margin_of(marks, target, in_frames=frames is not None)
+    asked: dict[str, Any] = {
+        "display": target,
+        "method": method,
+        "order": order,
+        "respect_gloss": respect_gloss,
+        "integrator": integrator,
+        "depth": depth,
+        "spp": spp,
+        "quality": quality,
+        "quality_mean": quality_mean,
+        "max_time": max_time,
+        "seed": seed,
+        "subpixels": subpixels,
+        "pixel_filter": pixel_filter,
+        "denoise": denoise,
+        "layers": layers,
+        "camera": camera,
+        "place": place,
+        "turn": angles(turn),
+        "shift": (0.0, 0.0, 0.0) if shift is None else parse.triple(shift, "--shift"),
+        "scale": scale,
+        "pop_out": pop_out,
+        "device": device,
+        "threads": threads,
+        "memory": parse.memory(memory),
+    }
+    load: dict[str, Any] = {"environment": environment, "background": color(background), "allow_outside": allow_outside}
+    wanted = sequences.Wanted(frames, fps, animation, camera_path, video, eye)
+    on_cluster = clusters.Asked(cluster, tls_ca, tls_cert, tls_key)
+    if wanted:
+        if resume:
+            raise UsageError("is for single pictures", where="--resume", fix="leave it out")
+        with on_cluster.runner(console, threads) as runner:
+            sequences.render_frames(
+                scene, output, wanted, console, bits=bits, maps=maps, load=load, runner=runner, **asked
+            )
+        return
     _check_layers(layers, format_for(output, bits)[0], output)
+    if on_cluster or tiled.is_tiled(output, bits, target, resume=resume, memory=asked["memory"]):
+        _check_whole({"--maps": maps, "--marks": margin})
+        with on_cluster.runner(console, threads) as runner:
+            tiled.render_tiled(scene, output, console, bits=bits, resume=resume, load=load, runner=runner, **asked)
+        return
     check_writable(output)
     if maps is not None:
         check_folder_writable(maps)
     with console.progress() as progress:
         started = time.perf_counter()
-        loaded = api.load_scene(
-            scene, environment=environment, background=_color(background), allow_outside=allow_outside
-        )
+        loaded = api.load_scene(scene, **load)
         load_seconds = time.perf_counter() - started
-        image = api.render(
-            loaded,
-            display=display,
-            method=method,
-            order=order,
-            respect_gloss=respect_gloss,
-            integrator=integrator,
-            depth=depth,
-            spp=spp,
-            quality=quality,
-            quality_mean=quality_mean,
-            max_time=max_time,
-            seed=seed,
-            subpixels=subpixels,
-            pixel_filter=pixel_filter,
-            denoise=denoise,
-            layers=layers,
-            camera=camera,
-            place=place,
-            turn=_angles(turn),
-            shift=(0.0, 0.0, 0.0) if shift is None else parse.triple(shift, "--shift"),
-            scale=scale,
-            pop_out=pop_out,
-            device=device,
-            threads=threads,
-            memory=parse.memory(memory),
-            progress=progress,
-        )
+        image = api.render(loaded, **asked, progress=progress)
         progress(Progress("write", 0, 1))
         writing = time.perf_counter()
         image = _with_seconds(image, load=load_seconds)
         if maps is not None:
             write_maps(image, maps)
+        image = printing.marked(image, margin)
         image.save(output, bits=bits)
     written = _with_seconds(image, write=time.perf_counter() - writing)
-    console.remark(_depth_line(image))
-    for note in image.provenance.notes:
-        console.remark(note)
-    if image.provenance.estimate is not None:
-        console.remark(f"estimated PSNR {estimate_in_words(image.provenance.estimate)}")
+    remarks(console, image.provenance)
     height, width = image.pixels.shape[:2]
     console.result(report(output, (width, height), written.provenance), _sentence(output, written))
 
@@ -210,7 +261,7 @@ def preview(
     with console.progress() as progress:
         started = time.perf_counter()
         loaded = api.load_scene(
-            scene, environment=environment, background=_color(background), allow_outside=allow_outside
+            scene, environment=environment, background=color(background), allow_outside=allow_outside
         )
         load_seconds = time.perf_counter() - started
         plain = api.preview(
@@ -228,9 +279,9 @@ def preview(
             progress=progress,
         )
         writing = time.perf_counter()
-        provenance = _add_seconds(plain.provenance, load=load_seconds)
+        provenance = add_seconds(plain.provenance, load=load_seconds)
         write_plain_picture(plain.pixels, output, bits=bits, transfer=provenance.transfer)
-        provenance = _add_seconds(provenance, write=time.perf_counter() - writing)
+        provenance = add_seconds(provenance, write=time.perf_counter() - writing)
     for note in provenance.notes:
         console.remark(note)
     height, width = plain.pixels.shape[:2]
@@ -241,8 +292,6 @@ def preview(
 
 
 def _check_layers(layers: bool, name: str, output: Path) -> None:
-    from lippmann.errors import UsageError
-
     if layers and name != "exr":
         raise UsageError(
             f"{output.name} cannot hold layers",
@@ -250,6 +299,29 @@ def _check_layers(layers: bool, name: str, output: Path) -> None:
             rule="OpenEXR can",
             fix="give the output the ending .exr",
         )
+
+
+def _check_whole(asked: Mapping[str, object]) -> None:
+    """Refuse what can only be done to a picture in one piece."""
+    for option, value in asked.items():
+        if value:
+            raise UsageError(
+                "needs the whole picture at once",
+                where=option,
+                rule="with --resume, to Zarr and beyond the memory pictures are rendered in tiles",
+                fix="leave it out",
+            )
+
+
+def remarks(console: Console, made: Provenance) -> None:
+    """What is to be known of a picture beside its figures."""
+    console.remark(depth_line(made))
+    if "auto" in made.options:
+        console.remark(f"auto: {made.options['auto']}")
+    for note in made.notes:
+        console.remark(note)
+    if made.estimate is not None:
+        console.remark(f"estimated PSNR {estimate_in_words(made.estimate)}")
 
 
 def report(output: Path, size: tuple[int, int], provenance: Provenance) -> dict[str, Any]:
@@ -283,21 +355,22 @@ def _sentence(output: Path, image: IntegralImage) -> str:
     )
 
 
-def _depth_line(image: IntegralImage) -> str:
+def depth_line(made: Provenance) -> str:
     """Where the scene lies, beside what the display can resolve."""
-    (back, front), (far, near) = (image.provenance.options[key] for key in ("depth_range", "resolvable_range"))
-    return f"scene {_depths(back, front)}; the display resolves {_depths(far, near)}"
+    (back, front), (far, near) = (made.options[key] for key in ("depth_range", "resolvable_range"))
+    return f"scene {depths(back, front)}; the display resolves {depths(far, near)}"
 
 
-def _depths(back: float, front: float) -> str:
+def depths(back: float, front: float) -> str:
+    """A range of depth in words."""
     return f"from {-back:.1f} mm behind to {front:.1f} mm before the lens plane"
 
 
 def _with_seconds(image: IntegralImage, **seconds: float) -> IntegralImage:
-    return replace(image, provenance=_add_seconds(image.provenance, **seconds))
+    return replace(image, provenance=add_seconds(image.provenance, **seconds))
 
 
-def _add_seconds(provenance: Provenance, **seconds: float) -> Provenance:
+def add_seconds(provenance: Provenance, **seconds: float) -> Provenance:
     """Time spent outside the renderer belongs to its stage and to the total."""
     added = dict(provenance.seconds)
     for stage, value in seconds.items():
@@ -306,11 +379,29 @@ def _add_seconds(provenance: Provenance, **seconds: float) -> Provenance:
     return replace(provenance, seconds=added)
 
 
-def _color(text: str | None) -> tuple[float, float, float] | None:
+def color(text: str | None) -> tuple[float, float, float] | None:
+    """A background colour from what was typed."""
     return None if text is None else parse.triple(text, "--background")
 
 
-def _angles(text: str | None) -> tuple[float, float, float]:
+def placement(
+    camera: str | None, place: str | None, turn: str | None, shift: str | None, scale: float, pop_out: float | None
+) -> PlacementOptions:
+    """Where the display is to stand, from the options of those names."""
+    from lippmann.scene.placement import PlacementOptions
+
+    return PlacementOptions(
+        mode=place,  # type: ignore[arg-type]  # it is checked there
+        camera=camera,
+        turn=angles(turn),
+        shift=(0.0, 0.0, 0.0) if shift is None else parse.triple(shift, "--shift"),
+        scale=scale,
+        pop_out=pop_out,
+    )
+
+
+def angles(text: str | None) -> tuple[float, float, float]:
+    """Yaw, pitch and roll in degrees from what was typed."""
     if text is None:
         return 0.0, 0.0, 0.0
     values = parse.numbers(text, "--turn", (1, 2, 3))

@@ -36,6 +36,9 @@ TABLE = "monitor"
 _NEEDED = ("width", "height", "pixel_pitch", "pitch", "slope", "center")
 _KEYS = (*_NEEDED, "view_cone", "viewing_distance", "subpixel_offsets", "subpixel_cells")
 
+#: Of a number of pixels; more are not even read.
+_MOST_DIGITS = 9
+
 #: Keys of the short form, as people write them, with those of the table.
 SHORT_KEYS = {
     "dpi": "pixel_pitch",
@@ -85,7 +88,7 @@ def monitor_of_texts(texts: Mapping[str, str]) -> Monitor:
         if key not in texts:
             raise DisplayError(f"{key} is missing", where=key, rule="it has no default", fix="add it")
     width, times, height = texts["size"].strip().lower().partition("x")
-    if not (times and width.isdecimal() and height.isdecimal()):
+    if not (times and _is_count(width) and _is_count(height)):
         rule = "width x height in pixels, such as 3840x2160"
         raise DisplayError(f"{texts['size']!r} is no number of pixels", where="size", rule=rule)
     table: dict[str, Any] = {"width": int(width), "height": int(height)}
@@ -102,6 +105,10 @@ def monitor_of_texts(texts: Mapping[str, str]) -> Monitor:
         last = error.where.rpartition(".")[2]
         where = {"width": "size", "height": "size", **{there: here for here, there in SHORT_KEYS.items()}}[last]
         raise DisplayError(error.what, where=where, rule=error.rule, fix=error.fix) from None
+
+
+def _is_count(text: str) -> bool:
+    return text.isdecimal() and len(text) <= _MOST_DIGITS
 
 
 def text_of_monitor(monitor: Monitor) -> str:

@@ -23,7 +23,8 @@ MILLIMETRES = {
     "inch": 25.4,
 }
 
-_NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
+# Digits can be matched in one way only: a long row of them must not take time that grows with its square.
+_NUMBER = r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?"
 _UNIT = r"[^\d\s.+-]\S*"
 _QUANTITY = re.compile(rf"({_NUMBER})\s*({_UNIT})?")
 _SIZE = re.compile(rf"({_NUMBER})\s*([^\W\d]+?)?\s*[xX]\s*({_NUMBER})\s*([^\W\d]+)?")
