@@ -55,13 +55,14 @@ def serve(
     from lippmann.viewer.web import WebServer, is_loopback
 
     with WebServer(site, host, port) as server:
-        console.result({"address": server.address}, f"{what}: {server.address}")
-        sys.stdout.flush()
+        # The address comes last: who reads it may send Ctrl-C at once.
         if not is_loopback(host):
             console.remark("everyone who can reach this machine can open the page")
         elif is_remote():
             console.remark(f"from your own machine: {tunnel(server.port)}, then open the address there")
         console.remark("Ctrl-C ends it")
+        console.result({"address": server.address}, f"{what}: {server.address}")
+        sys.stdout.flush()
         started()
         if browser and has_screen():
             webbrowser.open(server.address)

@@ -283,15 +283,16 @@ class Pooled:
                 f"{self.samples} sample(s) per pixel do not tell the error", rule=f"at least {GROUPS} are needed"
             )
         a, b = self._chosen()
-        # Codes end at white. Where the samples around say that white is right, what is above it is no error; elsewhere
-        # a picture that is too bright is wrong by as much as white is.
-        white = local_mean(self.raw(), self._block) >= 1
-        first, second = (np.where(white, chosen.picture, np.minimum(chosen.picture, 1)) for chosen in (a, b))
-        total = -np.square(first - second) / 4
-        for half, picture in enumerate((first, second)):
+        picture = (a.picture + b.picture) / 2
+        total = -np.square(a.picture - b.picture) / 4
+        for half, chosen in enumerate((a, b)):
             one, two = self._groups_of(1 - half)[1:]
-            total += (picture - one) * (picture - two) / 2
-        total *= np.square(coding_slope((first + second) / 2))
+            total += (chosen.picture - one) * (chosen.picture - two) / 2
+        total *= np.square(coding_slope(picture))
+        # Codes end at white, where the slope tells nothing any more: a picture that is white is wrong by what the
+        # samples around fall short of it.
+        short = np.square(1 - np.minimum(local_mean(self.raw(), 1), 1)) * np.square(coding_slope(np.ones(1)))
+        total = np.where(picture > 1, short, total)
         return PixelErrors(np.asarray(total.mean(-1), np.float32), None, CROSS_NOISE)
 
     def _chosen(self) -> tuple[_Chosen, _Chosen]:
