@@ -41,7 +41,7 @@ def memory(text: str | None, option: str = "--memory") -> int | None:
     """Bytes of an amount such as ``2G``, ``512M`` or a plain number of bytes."""
     if text is None:
         return None
-    match = re.fullmatch(r"(\d+(?:\.\d+)?)\s*([kmgt]?)(?:i?b)?", text.strip().lower())
+    match = re.fullmatch(r"(\d{1,20}(?:\.\d{1,20})?)\s*([kmgt]?)(?:i?b)?", text.strip().lower())
     amount = 0 if match is None else int(float(match[1]) * _MEMORY_UNITS[match[2]])
     if amount <= 0:
         raise UsageError(f"'{text}' is no amount of memory", where=option, rule="a number with K, M or G, such as 2G")

@@ -118,7 +118,7 @@ def _read_hdf5(path: Path) -> tuple[NDArray[Any], str]:
     h5py = optional("h5py")
     try:
         with h5py.File(path, "r") as file:
-            names = [name for name in file if not name.startswith("#")]
+            names = [name for name in map(str, file) if not name.startswith("#")]  # bytes that are no text stay bytes
             found = file.get(_VARIABLE)
             is_array = isinstance(found, h5py.Dataset)
             _check_variable(found.shape[::-1] if is_array else (), names, path)

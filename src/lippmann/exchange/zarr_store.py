@@ -11,6 +11,9 @@ from __future__ import annotations
 
 import json
 import math
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +25,7 @@ from lippmann.errors import PictureError
 from lippmann.exchange.extras import optional
 from lippmann.exchange.light_field import LightField, check_shape
 from lippmann.exchange.notes import from_note, to_note
-from lippmann.image.metadata import KEY, Metadata
+from lippmann.image.metadata import KEY, Metadata, parse_json
 from lippmann.progress import Progress, ProgressCallback, silent
 
 LAYOUT = "zarr"
@@ -77,13 +80,12 @@ def read_zarr(folder: Path, *, progress: ProgressCallback = silent) -> LightFiel
     """
     zarr = optional("zarr")
     try:
-        group = zarr.open_group(str(folder), mode="r")
-        attributes = dict(group.attrs)
-        names = sorted(group.array_keys())
-        maps_group = group.get(_MAPS)
-        map_names = [] if maps_group is None else sorted(maps_group.array_keys())
+        with _without_warnings():
+            group = zarr.open_group(str(folder), mode="r")
+            attributes = dict(group.attrs)
     except Exception as error:  # the library stumbles over damaged stores in every way there is
         raise PictureError("is no Zarr group", where=str(folder), rule=f"it holds the array {_VIEWS}") from error
+    names, map_names = _array_names(folder), _array_names(folder / _MAPS)
     metadata = _metadata(attributes, folder)
     if _VIEWS not in names:
         held = ", ".join(names) or "nothing"
@@ -99,6 +101,30 @@ def read_zarr(folder: Path, *, progress: ProgressCallback = silent) -> LightFiel
         return LightField(arrays[_VIEWS], metadata, maps, mask=arrays.get(_MASK))
     except PictureError as error:
         raise PictureError(error.what, where=str(folder), rule=error.rule) from None
+
+
+def _array_names(folder: Path) -> list[str]:
+    """The arrays of a group, in both versions of the format.
+
+    The library's own list comes from tasks that complain of damage on standard error when nobody listens any more.
+    """
+    if not folder.is_dir():
+        return []
+    names = []
+    for entry in folder.iterdir():
+        mark = entry / "zarr.json"
+        values = parse_json(mark.read_text(encoding="utf-8", errors="replace")) if mark.is_file() else None
+        if (entry / ".zarray").is_file() or (isinstance(values, dict) and values.get("node_type") == "array"):
+            names.append(entry.name)
+    return sorted(names)
+
+
+@contextmanager
+def _without_warnings() -> Iterator[None]:
+    """Without what the library warns of: files that it does not know, and versions of its format."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        yield
 
 
 def _format(zarr: Any) -> dict[str, Any]:
@@ -139,7 +165,8 @@ def _read_array(
 ) -> NDArray[Any]:
     where = str(folder / name)
     try:
-        array = group[name]
+        with _without_warnings():
+            array = group[name]
         shape, dtype = tuple(array.shape), np.dtype(array.dtype)
     except Exception as error:  # as above
         raise PictureError(f"is damaged: {error}", where=where) from error
@@ -155,7 +182,8 @@ def _read_array(
     if whole:
         _check_whole(folder / name, array)
     try:
-        values: NDArray[Any] = np.asarray(array[...])
+        with _without_warnings():
+            values: NDArray[Any] = np.asarray(array[...])
     except Exception as error:  # as above
         raise PictureError(f"is damaged: {error}", where=where, fix="make or fetch it anew") from error
     return values

@@ -217,10 +217,13 @@ class TiffSegments:
             self._file = tifffile.TiffFile(path)
             weakref.finalize(self, self._file.close)
             self._page = self._file.pages[0]
+            _check_segments(self._page, path)
             if self._page.is_tiled:
                 self.chunk = int(self._page.tilelength), int(self._page.tilewidth)
             else:
                 self.chunk = min(int(self._page.rowsperstrip), header.height), header.width
+            if min(self.chunk) < 1:
+                raise ValueError(f"its pieces have {self.chunk[1]} x {self.chunk[0]} pixels")
         self._columns = -(-header.width // self.chunk[1])
 
     def read(self, row: int, column: int) -> NDArray[Any]:

@@ -31,6 +31,8 @@ _UNSUPPORTED = {
     "surf": "free-form surfaces",
     "call": "calls of other files",
 }
+#: Digits of a smoothing group that fits into 64 bits; longer ones count as odd values.
+_LONGEST_NUMBER = 18
 _SILENT = {"g", "o", "vp", "cstype", "deg", "parm", "trim", "hole", "scrv", "sp", "end", "con", "bmat", "step", "mg"}
 _SILENT |= {"bevel", "c_interp", "d_interp", "lod", "maplib", "usemap", "shadow_obj", "trace_obj", "ctech", "stech"}
 
@@ -165,7 +167,7 @@ def _smoothing_group(body: str) -> int:
     word = body.strip().lower()
     if word in ("off", "", "0"):
         return 0
-    return int(word) if word.isdecimal() else 1
+    return int(word) if word.isdecimal() and len(word) <= _LONGEST_NUMBER else 1
 
 
 def _absolute(body: str, counts: tuple[int, int, int], where: str) -> str:

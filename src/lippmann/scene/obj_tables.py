@@ -37,6 +37,8 @@ def read_table(lines: Lines, what: str, least: int, where: str) -> Points:
     """
     if not lines.bodies:
         return np.zeros((0, least))
+    if not any(map(str.strip, lines.bodies)):  # loadtxt would only warn
+        _ragged_table(lines, what, least, where)
     try:
         table = np.loadtxt(lines.bodies, np.float64, ndmin=2, comments=None)
         if len(table) != len(lines.bodies):  # loadtxt skips blank bodies

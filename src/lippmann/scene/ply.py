@@ -33,6 +33,11 @@ _TYPES = {
 _UV_NAMES = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"))
 _BYTE_ORDERS = {"binary_little_endian": "<", "binary_big_endian": ">"}
 
+#: Digits of a number of entries; no file has room for more.
+_LONGEST_COUNT = 18
+#: More vertices than any file has.
+_MOST_VERTICES = 1 << 53
+
 Numbers = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
@@ -132,15 +137,20 @@ def _read_header(data: bytes, where: str) -> _Header:
             _read_declaration(header, words, f"{where}:{number}")
     if form != "ascii" and form not in _BYTE_ORDERS:
         raise SceneError(f"format '{form}'", where=where, rule=f"known are ascii, {', '.join(_BYTE_ORDERS)}")
+    for element in header.elements:
+        if len({each.name for each in element.properties}) < len(element.properties):
+            raise SceneError(f"'{element.name[:40]}' has a property twice", where=where, rule="names tell them apart")
     header.order, header.end, header.lines = _BYTE_ORDERS.get(form), position, number
     return header
 
 
 def _read_declaration(header: _Header, words: list[str], where: str) -> None:
     match words:
-        case ["element", name, count] if count.isdecimal():
+        case ["element", name, count] if count.isdecimal() and len(count) <= _LONGEST_COUNT:
             header.elements.append(_Element(name, int(count)))
-        case ["property", "list", count, kind, name] if header.elements and {count, kind} <= _TYPES.keys():
+        case ["property", "list", count, kind, name] if (
+            header.elements and {count, kind} <= _TYPES.keys() and _TYPES[count][0] in "iu"
+        ):
             header.elements[-1].properties.append(_Property(name, _TYPES[kind], _TYPES[count]))
         case ["property", kind, name] if header.elements and kind in _TYPES:
             header.elements[-1].properties.append(_Property(name, _TYPES[kind], None))
@@ -209,6 +219,7 @@ def _short_row(element: _Element, number: int, where: str) -> SceneError:
     )
 
 
+@np.errstate(invalid="ignore")  # of damaged floats, which are looked at where they are used
 def _binary_columns(element: _Element, data: bytes, start: int, order: str, where: str) -> tuple[Columns, int]:
     """The element's columns and where the next element begins."""
     if not element.properties or element.count == 0:
@@ -307,19 +318,23 @@ def _outline(columns: Mapping[str, Columns], where: str) -> _Lists:
     return _Lists(np.zeros(0), np.zeros(0, np.int64))
 
 
+@np.errstate(over="ignore")  # a number too large for a float is an infinite one, which is refused
 def _mesh(columns: Mapping[str, Columns], elements: Mapping[str, _Element], name: str, where: str) -> Mesh:
     vertex = {key: column for key, column in columns["vertex"].items() if isinstance(column, np.ndarray)}
     positions = np.stack([vertex[axis] for axis in "xyz"], axis=-1)
     outline = _outline(columns, where)
     keep = outline.sizes >= 3
-    corners = outline.values[np.repeat(keep, outline.sizes)].astype(np.int64)
+    numbers = outline.values[np.repeat(keep, outline.sizes)]
+    if not (np.abs(numbers) < _MOST_VERTICES).all():
+        raise SceneError("a face uses a vertex whose number is none", where=where, rule="vertices are counted from 0")
+    corners = numbers.astype(np.int64)
     if len(corners) == 0:
         raise SceneError("holds no faces with three corners", where=where)
     if corners.min() < 0 or corners.max() >= len(positions):
         bad = corners.min() if corners.min() < 0 else corners.max()
         raise SceneError(f"a face uses vertex {bad}", where=where, rule=f"the file has 0 to {len(positions) - 1}")
-    if not np.isfinite(positions).all():
-        bad = int(np.argmax(~np.isfinite(positions).all(axis=1)))
+    if not (finite := np.isfinite(positions.astype(np.float32)).all(axis=1)).all():
+        bad = int(np.argmin(finite))
         raise SceneError(
             f"vertex {bad} is {positions[bad].tolist()}", where=where, rule="coordinates must be finite numbers"
         )

@@ -12,7 +12,7 @@ import numpy as np
 from lippmann.errors import SceneError
 from lippmann.scene.description import Instance, Material, Mesh, SceneDescription
 from lippmann.scene.ply import UP_NOTE
-from lippmann.scene.resources import read_bytes
+from lippmann.scene.resources import decode_text, read_bytes
 
 _HEADER, _FACET = 84, 50  # bytes
 
@@ -31,9 +31,11 @@ def read_stl(path: Path, *, allow_outside: bool = False) -> SceneDescription:
     notes = [UP_NOTE]
     if _is_binary(data):
         _check_binary(data, where)
+        positions = _positions(data, "stl", where)
     else:
         _check_text(data, where)
-    positions = _positions(data, where)
+        # In one encoding: trimesh guesses with libraries that need not be there.
+        positions = _positions(decode_text(data, where).encode("utf-8"), "stl_ascii", where)
     if len(positions) == 0:
         raise SceneError("holds no facets", where=where)
     material = Material(path.stem, base_color=(0.7, 0.7, 0.7), roughness=0.6, double_sided=True)
@@ -71,14 +73,19 @@ def _check_text(data: bytes, where: str) -> None:
         raise SceneError(f"has {vertices} vertices in {facets} facets", where=where, rule="a facet has three")
 
 
-def _positions(data: bytes, where: str) -> np.ndarray:
+def _positions(data: bytes, kind: str, where: str) -> np.ndarray:
     import trimesh
 
+    log = trimesh.util.log
+    before, log.disabled = log.disabled, True  # it logs what it makes of damaged normals, which nobody uses
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error")  # NumPy only warns of a word that is no number
-            loaded = trimesh.load_scene(io.BytesIO(data), file_type="stl", process=False)
-    except (ValueError, TypeError, KeyError, IndexError, DeprecationWarning, trimesh.exchange.stl.HeaderError) as error:
+            loaded = trimesh.load_scene(io.BytesIO(data), file_type=kind, process=False)
+    except (ValueError, TypeError, KeyError, IndexError, Warning, trimesh.exchange.stl.HeaderError) as error:
         raise SceneError(f"cannot be read ({error})", where=where) from None
+    finally:
+        log.disabled = before
     pieces = [np.asarray(mesh.triangles).reshape(-1, 3) for mesh in loaded.geometry.values()]
-    return np.concatenate([np.zeros((0, 3)), *pieces]).astype(np.float32)
+    with np.errstate(over="ignore"):  # infinite places are refused with those of all formats
+        return np.concatenate([np.zeros((0, 3)), *pieces]).astype(np.float32)

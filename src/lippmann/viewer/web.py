@@ -254,6 +254,8 @@ class _Handler(BaseHTTPRequestHandler):
         return self.rfile.read(int(length))
 
     def _check_host(self) -> None:
+        if self.request_version == "HTTP/0.9":  # whose answers have no headers, so nothing guards them
+            raise RefusedError(HTTPStatus.HTTP_VERSION_NOT_SUPPORTED, "HTTP/1.1 is spoken here")
         hosts = self.headers.get_all("Host") or []
         if len(hosts) != 1 or not _is_expected(hosts[0], self.server.host):
             raise RefusedError(HTTPStatus.FORBIDDEN, "this address is not served; use the one that was printed")

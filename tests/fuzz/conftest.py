@@ -1,0 +1,6 @@
+"""The modules beside the tests, which the benchmark uses too, can be imported."""
+
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent))

@@ -1,0 +1,228 @@
+"""Writes the sound inputs of the corpus that are no plain text, ``corpus/TARGET/seed-NAME``; the others are by hand.
+
+python tests/fuzz/seeds.py
+"""
+
+from __future__ import annotations
+
+import base64
+import io
+import json
+import shutil
+import struct
+import tempfile
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lippmann.display import Display, LensArray, Panel
+from lippmann.exchange.layouts import export_image
+from lippmann.exchange.pfm import write_pfm
+from lippmann.image import IntegralImage, Provenance, write_micro_images, write_views
+from lippmann.image.formats import write_picture
+from lippmann.image.metadata import metadata_of, to_text
+
+from parcels import packed  # isort: skip
+
+CORPUS = Path(__file__).parent / "corpus"
+
+DISPLAY = Display("tiny", Panel(6, 4, 0.25), LensArray("square", 0.5), gap=2.0)
+
+
+def image(stored: str = "uint8", **maps: Any) -> IntegralImage:
+    """A small picture."""
+    codes = np.random.default_rng(1).integers(0, 256, (4, 6, 3)).astype(np.float32) / 255
+    provenance = Provenance(method="full", spp=4, scene="x", transfer="linear", rays={"primary": 24})
+    return IntegralImage(codes, DISPLAY, provenance=provenance, maps=maps, stored=stored)  # type: ignore[arg-type]
+
+
+def main() -> None:
+    for target, name, data in _all():
+        path = CORPUS / target / f"seed-{name}"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(data)
+
+
+def _all() -> Iterator[tuple[str, str, bytes]]:
+    yield from _gltf()
+    yield "ply", "binary", _ply()
+    yield "stl", "binary", b"made by hand".ljust(80) + struct.pack("<I", 1) + struct.pack("<12fH", *range(12), 0)
+    depth = {"depth": np.arange(24, dtype=np.float32).reshape(4, 6), "normal": np.ones((4, 6, 3), np.float32)}
+    for target, name, stored, maps in (
+        ("png", "8.png", "uint8", {}),
+        ("png", "16.png", "uint16", {}),
+        ("tiff", "8.tif", "uint8", {}),
+        ("tiff", "float.tif", "float32", {}),
+        ("exr", "float.exr", "float32", depth),
+        ("exr", "half.exr", "float16", {}),
+        ("zarr", "8.zarr", "uint8", {}),
+    ):
+        picture = image(stored, **maps)
+        bits = {"uint8": 8, "uint16": 16, "float16": 16, "float32": 32}[stored]
+        yield f"picture-{target}", name, _written(lambda path, p=picture, b=bits: write_picture(p, path, bits=b), name)
+    for target, name in (("tiff", "8.tif"), ("zarr", "8.zarr")):
+        yield f"pieces-{target}", name, _written(lambda path: write_picture(image("uint8"), path), name)
+    yield "metadata", "full", to_text(metadata_of(image())).encode()
+    yield "quilt-name", "modern", b"a_qs8x6a0.75.png"
+    yield "quilt-name", "older", b"b_qs5x9.jpg"
+    yield "views-folder", "views", _written(lambda path: write_views(image(), path), "views")
+    yield "views-folder", "micro", _written(lambda path: write_micro_images(image(), path), "micro")
+    maps = {"depth": depth["depth"]}
+    for layout, name, given in (
+        ("hci", "folder", image(**maps)),
+        ("views", "folder", image()),
+        ("zarr", "8", image(**maps)),
+        ("lftoolbox", "8.mat", image()),
+        ("eslf", "8.png", image()),
+    ):
+        yield (
+            f"layout-{layout}",
+            name.partition(".")[0],
+            _written(lambda path, g=given, kind=layout: export_image(g, path, kind, bits=8), name),
+        )
+    yield "layout-lftoolbox", "5", _matlab_5()
+    yield "pfm", "plain", _written(lambda path: write_pfm(path, depth["depth"]), "a.pfm")
+
+
+def _written(write: Callable[[Path], object], name: str) -> bytes:
+    folder = Path(tempfile.mkdtemp())
+    try:
+        write(folder / name)
+        return packed(folder / name) if (folder / name).is_dir() else (folder / name).read_bytes()
+    finally:
+        shutil.rmtree(folder)
+
+
+def _matlab_5() -> bytes:
+    from scipy import io as matlab
+
+    stream = io.BytesIO()
+    matlab.savemat(stream, {"LF": np.zeros((1, 2, 2, 2, 3), np.uint8)}, do_compression=True)
+    return stream.getvalue()
+
+
+def _ply() -> bytes:
+    head = """ply
+format binary_little_endian 1.0
+comment by hand
+element vertex 3
+property float x
+property float y
+property float z
+property uchar red
+property uchar green
+property uchar blue
+element face 1
+property list uchar int vertex_indices
+end_header
+"""
+    corners = ((0, 0, 0, 255, 0, 0), (1, 0, 0, 0, 255, 0), (0, 1, 0, 0, 0, 255))
+    return head.encode() + b"".join(struct.pack("<3f3B", *c) for c in corners) + struct.pack("<B3i", 3, 0, 1, 2)
+
+
+def _gltf() -> Iterator[tuple[str, str, bytes]]:
+    tree, data = _scene()
+    text = json.dumps(tree).encode()
+    text += b" " * (-len(text) % 4)
+    data += bytes(-len(data) % 4)
+    body = struct.pack("<II", len(text), 0x4E4F534A) + text + struct.pack("<II", len(data), 0x004E4942) + data
+    yield "glb", "scene", struct.pack("<4sII", b"glTF", 2, 12 + len(body)) + body
+    tree["buffers"][0]["uri"] = "data:application/octet-stream;base64," + base64.b64encode(data).decode()
+    yield "gltf", "scene", json.dumps(tree, separators=(",", ":")).encode()
+
+
+def _texture() -> bytes:
+    from PIL import Image as Pillow
+
+    picture = io.BytesIO()
+    Pillow.fromarray(np.full((2, 2, 4), 200, np.uint8)).save(picture, "PNG")
+    return picture.getvalue()
+
+
+def _scene() -> tuple[dict[str, Any], bytes]:
+    """A skinned, morphed, animated triangle with texture, a sparse accessor, a lamp and a camera."""
+    corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], "<f4")
+    parts: list[tuple[Any, str | None]] = [
+        (corners, "VEC3"),
+        (np.tile(np.array([0, 0, 1], "<f4"), (3, 1)), "VEC3"),
+        (corners[:, :2].copy(), "VEC2"),
+        (np.array([0, 1, 2], "<u2"), "SCALAR"),
+        (np.zeros((3, 4), "u1"), "VEC4"),
+        (np.tile(np.array([1, 0, 0, 0], "<f4"), (3, 1)), "VEC4"),
+        (np.eye(4, dtype="<f4").reshape(1, 16), "MAT4"),
+        (np.array([0, 1], "<f4"), "SCALAR"),
+        (np.array([[0, 0, 0], [0, 0, 1]], "<f4"), "VEC3"),
+        (np.array([0, 1], "<f4"), "SCALAR"),
+        (np.array([2], "<u2"), None),
+        (np.array([[0, 2, 0]], "<f4"), None),
+        (np.frombuffer(_texture(), "u1"), None),
+    ]
+    component = {"f": 5126, "u2": 5123, "u1": 5121}
+    data, views, accessors = b"", [], []
+    for values, kind in parts:
+        data += bytes(-len(data) % 4)
+        views.append({"buffer": 0, "byteOffset": len(data), "byteLength": values.nbytes})
+        data += values.tobytes()
+        if kind is not None:
+            code = component["f" if values.dtype.kind == "f" else f"u{values.dtype.itemsize}"]
+            accessors.append({"bufferView": len(views) - 1, "componentType": code, "count": len(values), "type": kind})
+    sparse = {"count": 1, "indices": {"bufferView": 10, "componentType": 5123}, "values": {"bufferView": 11}}
+    accessors.append({"componentType": 5126, "count": 3, "type": "VEC3", "sparse": sparse})
+    attributes = {"POSITION": 0, "NORMAL": 1, "TEXCOORD_0": 2, "JOINTS_0": 4, "WEIGHTS_0": 5}
+    rough = {"baseColorTexture": {"index": 0, "texCoord": 0}, "metallicFactor": 0.5, "roughnessFactor": 0.3}
+    material = {
+        "pbrMetallicRoughness": rough,
+        "emissiveFactor": [0.1, 0, 0],
+        "alphaMode": "MASK",
+        "alphaCutoff": 0.4,
+        "extensions": {
+            "KHR_materials_clearcoat": {"clearcoatFactor": 0.5},
+            "KHR_materials_ior": {"ior": 1.4},
+            "KHR_texture_transform": {},
+        },
+    }
+    lamp = {"type": "spot", "color": [1, 1, 1], "intensity": 10, "spot": {"outerConeAngle": 0.5}}
+    return {
+        "asset": {"version": "2.0"},
+        "scene": 0,
+        "scenes": [{"nodes": [0, 2, 3]}],
+        "extensionsUsed": ["KHR_lights_punctual", "KHR_materials_clearcoat", "KHR_materials_ior"],
+        "extensions": {"KHR_lights_punctual": {"lights": [lamp]}},
+        "nodes": [
+            {"mesh": 0, "skin": 0, "children": [1], "weights": [0.5]},
+            {"translation": [0, 0, 1], "rotation": [0, 0, 0, 1], "scale": [1, 1, 1]},
+            {"camera": 0, "matrix": [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 5, 1]},
+            {"extensions": {"KHR_lights_punctual": {"light": 0}}},
+        ],
+        "cameras": [{"type": "perspective", "perspective": {"yfov": 0.6, "znear": 0.1, "aspectRatio": 1.5}}],
+        "skins": [{"joints": [1], "inverseBindMatrices": 6}],
+        "meshes": [
+            {
+                "primitives": [
+                    {"attributes": attributes, "indices": 3, "material": 0, "mode": 4, "targets": [{"POSITION": 10}]}
+                ]
+            }
+        ],
+        "materials": [material],
+        "textures": [{"source": 0, "sampler": 0}],
+        "samplers": [{"wrapS": 33071, "magFilter": 9728}],
+        "images": [{"bufferView": 12, "mimeType": "image/png"}],
+        "animations": [
+            {
+                "samplers": [{"input": 7, "output": 8, "interpolation": "LINEAR"}, {"input": 7, "output": 9}],
+                "channels": [
+                    {"sampler": 0, "target": {"node": 1, "path": "translation"}},
+                    {"sampler": 1, "target": {"node": 0, "path": "weights"}},
+                ],
+            }
+        ],
+        "accessors": accessors,
+        "bufferViews": views,
+        "buffers": [{"byteLength": len(data)}],
+    }, data
+
+
+if __name__ == "__main__":
+    main()

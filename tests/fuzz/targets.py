@@ -1,0 +1,330 @@
+"""Every reader of what others wrote, as a function of bytes; see ``docs/file-formats.md``.
+
+Formats whose reader follows references (materials, chunks, views) take whole folders, packed by :mod:`parcels`.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import re
+import shutil
+import struct
+import zlib
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+from unittest import mock
+
+from lippmann.display import load_display
+from lippmann.display.looking_glass import display_of_calibration
+from lippmann.display.monitor_file import monitor_of_tables
+from lippmann.display.short_form import display_of_short_form
+from lippmann.errors import LippmannError
+from lippmann.exchange.hci_parameters import read_parameters
+from lippmann.exchange.layouts import import_image
+from lippmann.exchange.pfm import read_pfm
+from lippmann.image import compose, large, read_picture
+from lippmann.image.metadata import from_text
+from lippmann.quilt import layout_of_name
+from lippmann.scene.gltf.moving import MovingGltf
+from lippmann.scene.load import load_scene
+from lippmann.scene.tachyon import read_cam
+from lippmann.viewer.calibrate.site import CalibrationSite
+from lippmann.viewer.server import ViewerSite
+from lippmann.viewer.shown import PictureFile
+from lippmann.viewer.web import _Handler
+
+from guard import Read  # isort: skip
+from mutation import json_tree  # isort: skip
+from parcels import unpack  # isort: skip
+from vocabulary import VOCABULARY  # isort: skip
+
+CORPUS = Path(__file__).parent / "corpus"
+
+
+@dataclass(frozen=True)
+class Target:
+    """A reader.
+
+    Attributes
+    ----------
+    read:
+        Gives it an input, in a folder of its own that is empty; returns, or raises what the reader raises.
+    words, tree, repair:
+        As of :class:`mutation.Mutator`.
+    """
+
+    read: Read
+    words: tuple[bytes, ...] = ()
+    tree: Callable[[bytes], Any] | None = None
+    repair: Callable[[bytes], bytes] | None = None
+
+
+def seeds(name: str) -> list[bytes]:
+    """The sound inputs of a target."""
+    return [path.read_bytes() for path in sorted((CORPUS / name).glob("seed-*"))]
+
+
+def found(name: str) -> list[Path]:
+    """Inputs of a target that broke the rule once, or led somewhere odd."""
+    return sorted((CORPUS / name).glob("found-*"))
+
+
+def _scene(name: str) -> Read:
+    def read(data: bytes, folder: Path) -> object:
+        (folder / name).write_bytes(data)
+        return load_scene(folder / name).bounds
+
+    return read
+
+
+def _gltf(name: str) -> Read:
+    still = _scene(name)
+
+    def read(data: bytes, folder: Path) -> object:
+        still(data, folder)
+        moving = MovingGltf(folder / name)
+        return moving.at(moving.duration / 2)
+
+    return read
+
+
+def _obj(data: bytes, folder: Path) -> object:
+    unpack(data, folder)
+    return load_scene(folder / "s.obj").bounds
+
+
+def _cam(data: bytes, folder: Path) -> object:
+    (folder / "s.cam").write_bytes(data)
+    return read_cam(folder / "s.cam")
+
+
+def _toml(data: bytes, folder: Path) -> object:
+    (folder / "d.toml").write_bytes(data)
+    return load_display(folder / "d.toml").to_dict()
+
+
+def _visual(data: bytes, folder: Path) -> object:
+    (folder / "visual.json").write_bytes(data)
+    return display_of_calibration(data.decode("utf-8", "replace"), where="visual.json"), load_display(
+        folder / "visual.json"
+    )
+
+
+def _short(data: bytes, folder: Path) -> object:
+    return display_of_short_form(data.decode("utf-8", "surrogateescape"))
+
+
+def _quilt_name(data: bytes, folder: Path) -> object:
+    return layout_of_name(Path(data.decode("utf-8", "surrogateescape")))
+
+
+def _metadata(data: bytes, folder: Path) -> object:
+    found = from_text(data.decode("utf-8", "replace"), "picture.png")
+    return None if found is None else json.dumps(found.to_dict())
+
+
+def _picture(name: str) -> Read:
+    def read(data: bytes, folder: Path) -> object:
+        (folder / name).write_bytes(data)
+        return read_picture(folder / name)
+
+    return read
+
+
+def _in_pieces(path: Path) -> object:
+    """A picture read as those are that are larger than memory."""
+    with mock.patch.object(large, "LARGE", 0):
+        picture = large.open_picture(path)
+    assert isinstance(picture, large.LargePicture)
+    return picture.rows(0, picture.display.panel.height)
+
+
+def _pieces(data: bytes, folder: Path) -> object:
+    (folder / "p.tif").write_bytes(data)
+    if not data.startswith((b"II", b"MM")):
+        return None  # another format, which is never read in pieces
+    return _in_pieces(folder / "p.tif")
+
+
+def _folder(reader: Callable[[Path], object]) -> Read:
+    def read(data: bytes, folder: Path) -> object:
+        unpack(data, folder)
+        return reader(folder)
+
+    return read
+
+
+def _layout_folder(layout: str) -> Read:
+    return _folder(lambda folder: import_image(folder, layout))
+
+
+def _layout_file(name: str, layout: str) -> Read:
+    def read(data: bytes, folder: Path) -> object:
+        (folder / name).write_bytes(data)
+        return import_image(folder / name, layout)
+
+    return read
+
+
+def _parameters(data: bytes, folder: Path) -> object:
+    (folder / "parameters.cfg").write_bytes(data)
+    return read_parameters(folder / "parameters.cfg")
+
+
+def _pfm(data: bytes, folder: Path) -> object:
+    (folder / "a.pfm").write_bytes(data)
+    return read_pfm(folder / "a.pfm")
+
+
+class _Connection:
+    """A socket whose other side has said all that it will."""
+
+    def __init__(self, said: bytes) -> None:
+        self._said = said
+        self.answered = b""
+
+    def makefile(self, *_: Any) -> io.BytesIO:
+        return io.BytesIO(self._said)
+
+    def sendall(self, data: bytes) -> None:
+        self.answered += bytes(data)
+
+    def settimeout(self, seconds: float) -> None:
+        pass
+
+
+class _Server:
+    host = "127.0.0.1"
+
+    def __init__(self, site: object) -> None:
+        self.site = site
+
+
+def _asked(site: object, data: bytes) -> bytes:
+    """What is answered to a connection; a ValueError if that is no answer of a sound server."""
+    connection = _Connection(data)
+    _Handler(connection, ("127.0.0.1", 1), _Server(site))  # type: ignore[arg-type]
+    answer = connection.answered
+    if answer and not re.match(rb"HTTP/1\.[01] [1-4]\d\d |HTTP/1\.[01] 50[57] |\{", answer):
+        raise ValueError(f"the answer begins with {answer[:60]!r}")
+    return answer
+
+
+@cache
+def _viewer_site() -> ViewerSite:
+    return ViewerSite([PictureFile(CORPUS / "picture-png" / "seed-8.png")])
+
+
+def _viewer(data: bytes, folder: Path) -> object:
+    return _asked(_viewer_site(), data)
+
+
+def _calibration(data: bytes, folder: Path) -> object:
+    table = {"width": 384, "height": 216, "pixel_pitch": 0.3175, "pitch": 12.9, "slope": -6.0, "center": 0.37}
+    site = CalibrationSite(
+        monitor_of_tables({"name": "m", "monitor": table}), folder / "out.toml", lambda monitor: None
+    )
+    start = _asked(site, b"GET /calibration.json HTTP/1.1\r\nHost: localhost\r\n\r\n")
+    token = json.loads(start.partition(b"\r\n\r\n")[2])["token"].encode()
+    body = data.partition(b"\r\n\r\n")[2]
+    answer = _asked(site, data.replace(b"TOKEN", token).replace(b"LENGTH", str(len(body)).encode()))
+    try:
+        if (folder / "out.toml").exists():
+            load_display(folder / "out.toml")
+    except LippmannError as error:
+        raise ValueError(f"what was written is not read: {error}") from error
+    return answer
+
+
+def _png_repaired(data: bytes) -> bytes:
+    """Every chunk with its own length, as far as there are bytes, and check sum."""
+    place, parts = 8, [data[:8]]
+    while place + 12 <= len(data):
+        length = min(struct.unpack(">I", data[place : place + 4])[0], len(data) - place - 12)
+        body = data[place + 4 : place + 8 + length]
+        parts.append(struct.pack(">I", length) + body + struct.pack(">I", zlib.crc32(body)))
+        place += 12 + length
+    return b"".join(parts)
+
+
+def _glb_tree(data: bytes) -> tuple[Any, Callable[[bytes], bytes]]:
+    (length,) = struct.unpack("<I", data[12:16].ljust(4, b"\0"))
+    after = data[20 + length :]
+
+    def rebuilt(text: bytes) -> bytes:
+        text += b" " * (-len(text) % 4)
+        return data[:12] + struct.pack("<I", len(text)) + data[16:20] + text + after
+
+    return json.loads(data[20 : 20 + length]), rebuilt
+
+
+def _glb_repaired(data: bytes) -> bytes:
+    return data[:8] + struct.pack("<I", len(data)) + data[12:]
+
+
+def _part_tree(name: bytes) -> Callable[[bytes], Any]:
+    """The JSON tree of a file of a packed folder."""
+    head = b"=== " + name + b"\n"
+
+    def tree(data: bytes) -> tuple[Any, Callable[[bytes], bytes]]:
+        before, _, rest = data.partition(head)
+        text, mark, after = rest.partition(b"\n=== ")
+        return json.loads(text), lambda changed: before + head + changed + mark + after
+
+    return tree
+
+
+def _body_tree(data: bytes) -> tuple[Any, Callable[[bytes], bytes]]:
+    """The JSON tree that a request carries."""
+    head, mark, body = data.partition(b"\r\n\r\n")
+    return json.loads(body), lambda changed: head + mark + changed
+
+
+_READERS: dict[str, Target] = {
+    "gltf": Target(_gltf("s.gltf"), tree=json_tree),
+    "glb": Target(_gltf("s.glb"), tree=_glb_tree, repair=_glb_repaired),
+    "obj": Target(_obj),
+    "ply": Target(_scene("s.ply")),
+    "stl": Target(_scene("s.stl")),
+    "tachyon": Target(_scene("s.dat")),
+    "cam": Target(_cam),
+    "nff": Target(_scene("s.nff")),
+    "display-toml": Target(_toml),
+    "short-form": Target(_short),
+    "visual-json": Target(_visual, tree=json_tree),
+    "quilt-name": Target(_quilt_name),
+    "metadata": Target(_metadata, tree=json_tree),
+    "picture-png": Target(_picture("p.png"), repair=_png_repaired),
+    "picture-tiff": Target(_picture("p.tif")),
+    "picture-exr": Target(_picture("p.exr")),
+    "picture-zarr": Target(_folder(read_picture), tree=_part_tree(b"zarr.json")),
+    "pieces-tiff": Target(_pieces),
+    "pieces-zarr": Target(_folder(_in_pieces), tree=_part_tree(b"zarr.json")),
+    "views-folder": Target(_folder(compose), tree=_part_tree(b"lippmann.json")),
+    "layout-hci": Target(_layout_folder("hci"), tree=_part_tree(b"lippmann.json")),
+    "layout-views": Target(_layout_folder("views"), tree=_part_tree(b"lippmann.json")),
+    "layout-zarr": Target(_layout_folder("zarr"), tree=_part_tree(b"LF/.zarray")),
+    "layout-lftoolbox": Target(_layout_file("l.mat", "lftoolbox")),
+    "layout-eslf": Target(_layout_file("l.png", "eslf"), repair=_png_repaired),
+    "parameters-cfg": Target(_parameters),
+    "pfm": Target(_pfm),
+    "viewer-request": Target(_viewer),
+    "calibration-request": Target(_calibration, tree=_body_tree),
+}
+TARGETS: dict[str, Target] = {
+    name: replace(target, words=VOCABULARY.get(name, ())) for name, target in _READERS.items()
+}
+
+
+def emptied(folder: Path) -> Path:
+    """The folder with nothing in it."""
+    for entry in folder.iterdir():
+        if entry.is_dir() and not entry.is_symlink():
+            shutil.rmtree(entry)
+        else:
+            entry.unlink()
+    return folder

@@ -1,0 +1,80 @@
+"""Every input that ever broke a reader, and every sound one, ends as it should."""
+
+from __future__ import annotations
+
+import tempfile
+from contextlib import suppress
+from functools import cache
+from pathlib import Path
+
+import pytest
+from guard import judge, quiet
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from mutation import Mutator
+from targets import CORPUS, TARGETS, emptied, found, seeds
+
+from lippmann.errors import LippmannError
+
+#: Sound inputs that are refused for what they lack.
+REFUSED = {("layout-lftoolbox", "seed-5"): "has no display in it"}
+
+
+@cache
+def warmed(name: str) -> bool:
+    """Loads the libraries of a reader, which is not to count as an input's time."""
+    with tempfile.TemporaryDirectory() as folder, suppress(LippmannError):
+        TARGETS[name].read(seeds(name)[0], Path(folder))
+    return True
+
+
+@pytest.fixture
+def looked_at(tmp_path):
+    """What is wrong with an input's end, printed lines included; empty if nothing is."""
+
+    def look(name: str, data: bytes) -> str:
+        assert warmed(name)
+        with quiet() as said:
+            broken = judge(TARGETS[name].read, data, emptied(tmp_path)).broken
+            return broken + said()
+
+    return look
+
+
+def test_the_corpus_is_that_of_the_targets():
+    assert {path.name for path in CORPUS.iterdir()} == set(TARGETS)
+    size = sum(path.stat().st_size for path in CORPUS.rglob("*") if path.is_file())
+    assert size < 400_000
+
+
+@pytest.mark.parametrize("name", TARGETS)
+def test_sound_inputs_are_read(name, tmp_path):
+    paths = sorted((CORPUS / name).glob("seed-*"))
+    assert paths
+    for path in paths:
+        try:
+            TARGETS[name].read(path.read_bytes(), emptied(tmp_path))
+        except Exception as error:
+            if REFUSED.get((name, path.name), "nothing") not in str(error):
+                raise
+
+
+@pytest.mark.parametrize("name", TARGETS)
+def test_what_broke_a_reader_once_does_so_no_more(name, looked_at):
+    assert {path.name: broken for path in found(name) if (broken := looked_at(name, path.read_bytes()))} == {}
+
+
+@pytest.mark.parametrize("name", TARGETS)
+def test_damaged_inputs_end_in_a_result_or_an_error(name, looked_at):
+    target = TARGETS[name]
+    mutator = Mutator(seeds(name), target.words, tree=target.tree, repair=target.repair, seed=20)
+    for _ in range(25):
+        data = mutator.next()
+        assert looked_at(name, data) == "", data
+
+
+@pytest.mark.parametrize("name", TARGETS)
+@settings(deadline=None, max_examples=8, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(data=st.binary(max_size=120) | st.text(max_size=60).map(lambda text: text.encode("utf-8", "surrogatepass")))
+def test_foreign_inputs_end_in_a_result_or_an_error(name, looked_at, data):
+    assert looked_at(name, data) == ""

@@ -1,0 +1,47 @@
+"""Words that mean something to a reader: damage made of them reaches further than that of bytes."""
+
+from __future__ import annotations
+
+_DISPLAY = """
+name title gap viewing_distance aperture_distance panel width height pixel_pitch subpixel_offsets subpixel_cells
+lens_array layout pitch slant row_pitch offset infinite lenticular square hexagonal monitor slope center view_cone
+rgb bgr none mm cm m in mil lpi dpi px print: monitor: size= dpi= pitch= lpi= ppi= cone= thickness= index= field=
+[[ ]] [[[[ 1979-05-27
+"""
+
+_REQUEST = """
+GET HEAD POST PUT OPTIONS HTTP/1.1 HTTP/1.0 HTTP/0.9 HTTP/9.9 Host: Origin: http://[ http://[::1 Content-Length: -1
+Transfer-Encoding: chunked Expect: 100-continue If-Match: /pictures/0/manifest.json /pictures/0/tiles/picture/0_0
+/pictures/999/manifest.json ../ %2e%2e /assets/viewer.js TOKEN
+"""
+
+_WORDS = {
+    "obj": """
+v vt vn f l p o g s usemtl mtllib newmtl map_Kd map_Ks map_d bump refl Kd Ks d Tr illum Ns Pr Pm -s -o -mm -bm -clamp on
+t.png s.mtl 1/2/3 1//2 -1
+""",
+    "ply": """
+ply format ascii binary_little_endian binary_big_endian 1.0 element vertex face property list char uchar short ushort
+int uint float double end_header comment obj_info tristrips TextureFile t.png
+""",
+    "stl": "solid facet normal outer loop vertex endloop endfacet endsolid",
+    "tachyon": """
+BEGIN_SCENE END_SCENE CAMERA END_CAMERA TEXTURE TEXDEF TEXALIAS INCLUDE IMAGEDEF s.dat red # SPHERE CYLINDER FCYLINDER
+PLANE RING TRI STRI BOX SCAPE VERTEXARRAY POLYCYLINDER EXTBOX SCALARVOL
+""",
+    "nff": "v b l f s c p pp from at up angle hither resolution #",
+    "display-toml": _DISPLAY,
+    "short-form": _DISPLAY,
+    "quilt-name": "_qs 8x6 a0.75 .png .jpg x a",
+    "picture-png": "IHDR iTXt IDAT IEND sRGB pHYs tRNS PLTE",
+    "picture-exr": "channels compression dataWindow displayWindow lineOrder tiles string box2i chlist",
+    "picture-zarr": "=== c/0/0/0 zarr.json",
+    "pieces-zarr": "=== c/0/0/0 zarr.json",
+    "pfm": "Pf PF -1.0",
+    "viewer-request": _REQUEST,
+    "calibration-request": _REQUEST,
+}
+
+VOCABULARY: dict[str, tuple[bytes, ...]] = {
+    name: tuple(word.encode("ascii") for word in text.split()) for name, text in _WORDS.items()
+}

@@ -1,0 +1,70 @@
+"""What libraries print on standard error is kept from the terminal, and the terminal is given back."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import threading
+
+import pytest
+
+from lippmann.image.silence import libraries_silenced
+
+
+def test_what_is_printed_inside_is_not_seen_and_what_follows_is(capfd):
+    os.write(2, b"before ")
+    with libraries_silenced():
+        os.write(2, b"inside ")
+    os.write(2, b"after")
+    assert capfd.readouterr().err == "before after"
+
+
+def test_an_error_gives_the_terminal_back(capfd):
+    with pytest.raises(KeyError), libraries_silenced():
+        raise KeyError
+    os.write(2, b"seen")
+    assert capfd.readouterr().err == "seen"
+
+
+def test_it_is_silent_until_the_last_thread_is_done(capfd):
+    begun, leave = threading.Event(), threading.Event()
+
+    def first() -> None:
+        with libraries_silenced():
+            begun.set()
+            leave.wait(10)
+
+    thread = threading.Thread(target=first)
+    thread.start()
+    begun.wait(10)
+    with libraries_silenced():
+        os.write(2, b"two ")
+    os.write(2, b"one ")
+    leave.set()
+    thread.join()
+    os.write(2, b"none")
+    assert capfd.readouterr().err == "none"
+
+
+def test_descriptors_are_not_used_up():
+    with libraries_silenced():
+        pass
+    before = len(os.listdir("/proc/self/fd")) if os.path.isdir("/proc/self/fd") else 0
+    for _ in range(50):
+        with libraries_silenced():
+            pass
+    assert (len(os.listdir("/proc/self/fd")) if os.path.isdir("/proc/self/fd") else 0) == before
+
+
+def test_a_process_without_standard_error_can_read_pictures():
+    code = """
+import os
+os.close(2)
+from lippmann.image.silence import libraries_silenced
+with libraries_silenced():
+    print("read")
+print(os.path.exists("/dev/fd/2"))
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["read", "False"]
