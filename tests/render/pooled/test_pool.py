@@ -117,3 +117,25 @@ def test_giving_up_levels_keeps_all_light():
     values, found = read(pool.table(), points)
     assert found.all()
     np.testing.assert_allclose(values, 1, rtol=1e-5)
+
+
+def test_a_single_bright_hit_is_held_back():
+    # A path in a thousand that meets a small lamp by chance: its cell would show as a blob under every lens.
+    random = np.random.default_rng(3)
+    points = random.uniform(0, 6, (40000, 3)) * [1, 1, 0]
+    color = np.ones((40000, 3)) + 0.1 * random.standard_normal((40000, 1))
+    color[::1000] = 200.0
+    values, _ = read(filled(points, color, random.random(40000) < 0.5).table(), points)
+    plain = color.mean()
+    # By its own mean a cell with a hit, of some 5 samples in each half, would hold 40 or more.
+    assert values.max() < 5 * plain
+
+
+def test_true_differences_are_not_held_back():
+    random = np.random.default_rng(4)
+    points = random.uniform(0, 6, (40000, 3)) * [1, 1, 0]
+    spot = np.hypot(points[:, 0] - 3, points[:, 1] - 3) < 0.5
+    color = np.where(spot, 30.0, 1.0)[:, None] * np.ones(3) + 0.1 * random.standard_normal((40000, 1))
+    values, _ = read(filled(points, color, random.random(40000) < 0.5).table(), points)
+    inside = np.hypot(points[:, 0] - 3, points[:, 1] - 3) < 0.3
+    assert values[inside].mean() > 27

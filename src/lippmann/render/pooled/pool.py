@@ -4,7 +4,7 @@ Two halves of the samples are kept apart in all sums. Whether a cell's children 
 covariance of their deviations between the halves, which noise does not enter; a child's own mean then counts for
 ``k = t / (t + s)`` and its parent's estimate for the rest, ``t`` being that variance of the children and ``s`` that of
 the child's own mean (empirical Bayes; James and Stein 1961). With few samples light is shared widely, with many each
-cell stands on its own; nothing has to be set.
+cell stands on its own. A mean that is much farther from its parent's than both can explain is held back.
 """
 
 from __future__ import annotations
@@ -29,6 +29,9 @@ LEAST_SAMPLES = 4
 PRIOR = 32.0
 #: Relative variance of a cell's children that is expected at least: without it smooth light would be held for flat.
 LEAST_VARIATION = 1e-2
+#: A cell's mean counts up to so many times as far from its parent's as it is expected to be, by how cells differ and by
+#: the noise of the other half: beyond that it rests on a single bright hit, which every lens would show.
+MOST_AWAY = 2.0
 TINY = 1e-12
 #: Samples that wait to be summed up, at least.
 LEAST_BATCH = 1 << 20
@@ -117,8 +120,10 @@ class Pool:
                 here = np.where(sums[:, :, 1:2] > 0, means, both[:, None])
                 width = np.full(len(keys), sizes[0], np.float32)
             else:
-                k, varies = _shrinkage(sums, means, parent, levels[level - 1][1], varies)
-                here = estimate[parent] + k[:, :, None] * (means - estimate[parent])
+                k, varies, expected = _shrinkage(sums, means, parent, levels[level - 1][1], varies)
+                away = means - estimate[parent]
+                k *= np.minimum(1, MOST_AWAY * expected / np.maximum(np.abs(luminance(away)), TINY))
+                here = estimate[parent] + k[:, :, None] * away
                 width = size[parent] + k.mean(1) * (sizes[level] - size[parent])
             kept = sums[:, :, 0].sum(1) >= LEAST_SAMPLES if level else np.ones(len(keys), bool)
             tags.append(tag_of(keys[kept], np.full(1, level, np.uint64)))
@@ -131,8 +136,9 @@ class Pool:
 
 def _shrinkage(
     sums: Sums, means: Sums, parent: NDArray[np.intp], above: Sums, prior: NDArray[np.float64] | None
-) -> tuple[Sums, NDArray[np.float64]]:
-    """How much each child's own mean counts, ``(children, 2)``, and what its own children are expected to vary by."""
+) -> tuple[Sums, NDArray[np.float64], Sums]:
+    """How much each child's own mean counts, ``(children, 2)``, what its own children are expected to vary by, and how
+    far its mean is expected to be from its parent's, ``(children, 2)``."""
     count = len(above)
     parents = above[:, :, 2:5] / np.maximum(above[:, :, 1:2], TINY)
     deviation = luminance(means - parents[parent])
@@ -150,7 +156,7 @@ def _shrinkage(
     noise = variance[parent] * sums[:, :, 6] / np.maximum(sums[:, :, 1], TINY) ** 2
     expected = varies[parent][:, None]
     k = np.where(sums[:, :, 1] > 0, expected / np.maximum(expected + noise, TINY), 0)
-    return k.astype(np.float32), varies[parent] / 2
+    return k.astype(np.float32), varies[parent] / 2, np.sqrt(expected + noise).astype(np.float32)
 
 
 def _starts(keys: Keys) -> NDArray[np.intp]:
