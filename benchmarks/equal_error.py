@@ -201,7 +201,7 @@ def _pooled(stage: Stage, denoised: bool = False) -> Iterator[tuple[int, float, 
     from lippmann.render.pooled.renderer import Pooled
 
     def clean(color: Picture, albedo: Picture, normal: Picture) -> Picture:
-        return np.maximum(denoise_views(color, stage.display, Guides(albedo, normal)), 0)
+        return np.maximum(denoise_views(color, stage.display, Guides(albedo, normal), effort="fast"), 0)
 
     def made(samples: int) -> tuple[float, Picture]:
         started = time.perf_counter()

@@ -361,6 +361,22 @@ mended, and damaged `.mat` files for which SciPy reserves gigabytes that it neve
 """
 
 
+def _viewer(result: dict[str, Any]) -> str:
+    found = result["median"]
+    width, height = result["pixels"]
+    return f"""## The viewer's page (`viewer.py`)
+
+A picture of {width} x {height} pixels in Chromium with a software renderer, shown {result["canvas"]} pixels wide;
+medians of {result["runs"]} runs.
+
+| | measured | target |
+|---|---|---|
+| from asking for the page to the whole picture, file not yet read | {found["open_s"]:.2f} s | 3 s |
+| from one eye to the next | {found["eye_ms"]:.1f} ms | |
+| pictures a second while it sways | {found["sway_fps"]:.1f} | 30 |
+"""
+
+
 SECTIONS = {
     "methods": _methods,
     "equal_error": _equal_error,
@@ -373,6 +389,7 @@ SECTIONS = {
     "large_frame": _large_frame,
     "huge": _huge,
     "command": _command,
+    "viewer": _viewer,
     "cluster": _cluster,
     "fuzz": _fuzz,
 }
