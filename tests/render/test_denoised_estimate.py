@@ -14,8 +14,8 @@ from lippmann.display.lens_array import LensArray
 from lippmann.display.panel import Panel
 from lippmann.image.permutation import lens_indices
 from lippmann.quality.metrics import micro_image_means, psnr
-from lippmann.render.denoised_estimate import DenoisedEstimator, _positive
-from lippmann.render.estimate import CROSS_NOISE, OWN_NOISE, PixelErrors
+from lippmann.render.denoised_estimate import DenoisedEstimator
+from lippmann.render.estimate import CROSS_NOISE, OWN_NOISE, PixelErrors, cut_at_zero
 
 SHOWN = Display("test", Panel(64, 64, 0.25), LensArray("square", 2.0), gap=6.8)
 
@@ -81,7 +81,7 @@ def test_what_lone_hits_show_is_left_in_part_and_doubted():
 
 @given(st.floats(-50, 50), st.floats(1e-6, 10))
 def test_what_cannot_be_negative_is_not(mean, deviation):
-    found = _positive(mean, deviation)
+    found = cut_at_zero(mean, deviation)
     assert found > 0
     assert found >= mean
     if mean > 6 * deviation:

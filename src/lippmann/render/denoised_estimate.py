@@ -16,7 +16,6 @@ The constants were chosen on ``benchmarks/hard_scenes.py``.
 from __future__ import annotations
 
 import math
-from statistics import NormalDist
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +33,7 @@ from lippmann.render.estimate import (
     PartErrors,
     PictureEstimator,
     PixelErrors,
+    cut_at_zero,
     errors_of_parts,
     parts_with_pixels,
     psnr_of,
@@ -48,6 +48,8 @@ LONE_LEFT, LONE_DOUBTED = 0.1, 0.5
 USUAL_SPREAD, SPREAD_DOUBT = 0.5, 0.4
 #: By how much the mean of two halves may be better than they are.
 BEST_OF_HALVES = 0.5
+#: A picture without any error still has this mean squared one, so that its logarithm exists.
+_FLOOR = 1e-12
 
 
 class DenoisedEstimator(PictureEstimator):
@@ -66,7 +68,7 @@ def estimate_denoised(judged: ErrorSums, samples: ErrorSums, grid: tuple[int, in
     pixels = float(judged.pixels.sum())
     deviation = math.sqrt(CROSS_NOISE.estimate * float(judged.squares.sum())) / pixels
     lone = float(samples.lone.sum()) / pixels
-    mean = max(_positive(float(judged.values.sum()) / pixels, deviation), LONE_LEFT * lone)
+    mean = max(cut_at_zero(float(judged.values.sum()) / pixels, deviation), LONE_LEFT * lone, _FLOOR)
     common = math.log1p((deviation / mean) ** 2)
     spread = NORMAL_95 * math.sqrt(common + MODEL_UNCERTAINTY**2)
     ends = mean * math.exp(spread) + LONE_DOUBTED * lone, BEST_OF_HALVES * mean * math.exp(-spread)
@@ -107,14 +109,3 @@ def _parts(
     expected = np.maximum(around + trust * (measured - around), np.maximum(0.1 * around, LONE_LEFT * lone))
     variance = np.log1p(trust * noise / np.square(expected))
     return PartErrors(index, expected, expected + LONE_DOUBTED * lone, variance, np.zeros_like(variance))
-
-
-def _positive(mean: float, deviation: float) -> float:
-    """The mean of what is measured as ``mean`` with a normal ``deviation`` and cannot be negative."""
-    if deviation <= 0:
-        return max(mean, 1e-12)
-    normal, z = NormalDist(), mean / deviation
-    if z < -5:
-        # There the quotient below is 0 / 0; its limit is -z + 1 / -z.
-        return deviation / -z
-    return mean + deviation * normal.pdf(z) / normal.cdf(z)

@@ -354,15 +354,20 @@ def likely_mean(sums: ErrorSums, noise: NoiseShares) -> float:
     That differs from the plain mean only where it is hardly larger than its own deviation, or below zero.
     """
     pixels = float(sums.pixels.sum())
-    mean = float(sums.values.sum()) / pixels
-    deviation = max(math.sqrt(noise.estimate * float(sums.squares.sum())) / pixels, 1e-30)
+    deviation = math.sqrt(noise.estimate * float(sums.squares.sum())) / pixels
+    return max(cut_at_zero(float(sums.values.sum()) / pixels, deviation), _FLOOR)
+
+
+def cut_at_zero(mean: float, deviation: float) -> float:
+    """The mean of what is measured as ``mean`` with a normal ``deviation`` and cannot be negative."""
+    if deviation <= 0:
+        return max(mean, 0.0)
     z = mean / deviation
-    if z > -20:
-        above = 0.5 * math.erfc(-z / math.sqrt(2))
-        mean += deviation * math.exp(-0.5 * z * z) / (math.sqrt(2 * math.pi) * above)
-    else:  # far below zero the law's tail falls like an exponential
-        mean = deviation / -z
-    return max(mean, _FLOOR)
+    if z < -20:
+        # There the quotient below is 0 / 0; its limit is -z + 1 / -z.
+        return deviation / -z
+    above = 0.5 * math.erfc(-z / math.sqrt(2))
+    return mean + deviation * math.exp(-0.5 * z * z) / (math.sqrt(2 * math.pi) * above)
 
 
 def _whole(sums: ErrorSums, noise: NoiseShares) -> tuple[float, float, float]:
