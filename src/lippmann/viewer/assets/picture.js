@@ -2,7 +2,7 @@
 
 import { setExact } from "./fixed.js";
 import { LAYOUTS, channelPlaces, microImages, sightline } from "./optics.js";
-import { VERTEX, fragmentSource } from "./shaders.js";
+import { SIGHT_VERTEX, fragmentSource } from "./shaders.js";
 import { TileTexture, capacityOf, tilesOf } from "./tiles.js";
 
 export class Picture {
@@ -136,7 +136,7 @@ export class Picture {
 
   #use(kind) {
     const { gl } = this;
-    if (!this.programs.has(kind)) this.programs.set(kind, new Program(gl, fragmentSource(kind, this.variant)));
+    if (!this.programs.has(kind)) this.programs.set(kind, new Program(gl, fragmentSource(kind, this.variant), SIGHT_VERTEX));
     const program = this.programs.get(kind);
     gl.useProgram(program.handle);
     const { panel, lenses, tiles } = this.manifest;
@@ -168,12 +168,12 @@ export class Picture {
 
 /** A linked program; the places of its uniforms are looked up once. */
 export class Program {
-  constructor(gl, fragment) {
+  constructor(gl, fragment, vertex) {
     this.gl = gl;
     this.places = new Map();
     this.handle = gl.createProgram();
     const shaders = [
-      [gl.VERTEX_SHADER, VERTEX],
+      [gl.VERTEX_SHADER, vertex],
       [gl.FRAGMENT_SHADER, fragment],
     ].map(([type, text]) => {
       const shader = gl.createShader(type);

@@ -7,6 +7,55 @@ void main() {
 }`;
 
 // What runs for every pixel is written with as few operations as can be: software renderers do them all as they stand.
+// Reading a uniform is dear there, for its bounds are checked anew at every pixel: a fifth of a frame went into that. So
+// the numbers of the sightline come to the pixels as outputs of the vertices, flat, that is exactly as they are.
+
+/** The same triangle, with what {@link fragmentSource} asks of it. */
+export const SIGHT_VERTEX = `#version 300 es
+uniform vec2 panel;
+uniform vec2 corner;  // middle of the pane's upper left pixel in the canvas
+uniform float across[3];  // lens coordinate: per column and row of the pane, and at (0, 0)
+uniform uint acrossParts[3];
+uniform float down[2];  // per row of the pane
+uniform uint downParts[2];
+uniform float panelU[4];  // panel coordinate: per lens, column (or shifted row of lenses) and row of the pane
+uniform uint panelUParts[4];
+uniform float panelV[2];  // per row of the pane; of arrays, per row of lenses
+uniform uint panelVParts[2];
+uniform float slide;  // what a slanted axis moves v by from one edge of a lens to the other
+uniform vec3 channelRight;  // what places the grid of each colour's sub-pixels
+uniform vec3 channelDown;
+
+flat out vec2 flatPanel;
+flat out vec2 flatCorner;
+flat out vec3 flatAcross;
+flat out uvec3 flatAcrossParts;
+flat out vec2 flatDown;
+flat out uvec2 flatDownParts;
+flat out vec4 flatPanelU;
+flat out uvec4 flatPanelUParts;
+flat out vec2 flatPanelV;
+flat out uvec2 flatPanelVParts;
+flat out float flatSlide;
+flat out vec3 flatRight;
+flat out vec3 flatDownward;
+
+void main() {
+  gl_Position = vec4(gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0, 0.0, 1.0);
+  flatPanel = panel;
+  flatCorner = corner;
+  flatAcross = vec3(across[0], across[1], across[2]);
+  flatAcrossParts = uvec3(acrossParts[0], acrossParts[1], acrossParts[2]);
+  flatDown = vec2(down[0], down[1]);
+  flatDownParts = uvec2(downParts[0], downParts[1]);
+  flatPanelU = vec4(panelU[0], panelU[1], panelU[2], panelU[3]);
+  flatPanelUParts = uvec4(panelUParts[0], panelUParts[1], panelUParts[2], panelUParts[3]);
+  flatPanelV = vec2(panelV[0], panelV[1]);
+  flatPanelVParts = uvec2(panelVParts[0], panelVParts[1]);
+  flatSlide = slide;
+  flatRight = channelRight;
+  flatDownward = channelDown;
+}`;
 
 const HEAD = `#version 300 es
 precision highp float;
@@ -70,10 +119,10 @@ vec2 lensAt(float across, uint acrossParts, float down, uint downParts) {
 // A texture that holds the panel has a black edge of one pixel, so that what is seen past the panel needs no question.
 // Where none can be as large, the tiles are layers of an array, and an index says which; those not there yet are grey.
 const TILES = `
-uniform vec2 panel;
+flat in vec2 flatPanel;
 
 bool isOnPanel(vec2 pixel) {
-  return pixel.x >= 0.0 && pixel.x < panel.x && pixel.y >= 0.0 && pixel.y < panel.y;
+  return pixel.x >= 0.0 && pixel.x < flatPanel.x && pixel.y >= 0.0 && pixel.y < flatPanel.y;
 }
 
 #if TILED
@@ -104,7 +153,7 @@ uniform sampler2D picture;
 uniform sampler2D overlay;
 
 ivec2 placeOf(vec2 pixel) {
-  return ivec2(clamp(pixel + 1.0, vec2(0.0), panel + 1.0));
+  return ivec2(clamp(pixel + 1.0, vec2(0.0), flatPanel + 1.0));
 }
 
 vec3 codeOf(vec2 pixel) {
@@ -120,54 +169,54 @@ vec3 overlayOf(vec2 pixel) {
 // The panel point that the eye sees: Display.panel_point_seen_by and replay.py. Coordinates (u, v) are pixels of the
 // panel, from its upper left corner; those of the pane likewise.
 const SEEN = `
-uniform vec2 corner;  // middle of the pane's upper left pixel in the canvas
-uniform float across[3];  // lens coordinate: per column and row of the pane, and at (0, 0)
-uniform uint acrossParts[3];
-uniform float down[2];  // per row of the pane
-uniform uint downParts[2];
-uniform float panelU[4];  // panel coordinate: per lens, column (or shifted row of lenses) and row of the pane
-uniform uint panelUParts[4];
-uniform float panelV[2];  // per row of the pane; of arrays, per row of lenses
-uniform uint panelVParts[2];
-uniform float slide;  // what a slanted axis moves v by from one edge of a lens to the other
-uniform vec3 channelRight;  // what places the grid of each colour's sub-pixels
-uniform vec3 channelDown;
+flat in vec2 flatCorner;
+flat in vec3 flatAcross;
+flat in uvec3 flatAcrossParts;
+flat in vec2 flatDown;
+flat in uvec2 flatDownParts;
+flat in vec4 flatPanelU;
+flat in uvec4 flatPanelUParts;
+flat in vec2 flatPanelV;
+flat in uvec2 flatPanelVParts;
+flat in float flatSlide;
+flat in vec3 flatRight;
+flat in vec3 flatDownward;
 
 vec2 lensSeen;  // of arrays: the lens that is looked through
 
 void seen(out Place u, out Place v) {
-  float x = gl_FragCoord.x - corner.x, y = corner.y - gl_FragCoord.y;
+  float x = gl_FragCoord.x - flatCorner.x, y = flatCorner.y - gl_FragCoord.y;
   uint column = uint(int(x)), row = uint(int(y));
 #if LAYOUT == LENTICULAR
 #if SLANTED
-  float roughLens = across[0] * x + across[1] * y + across[2];
-  uint lensParts = acrossParts[0] * column + acrossParts[1] * row + acrossParts[2];
+  float roughLens = flatAcross[0] * x + flatAcross[1] * y + flatAcross[2];
+  uint lensParts = flatAcrossParts[0] * column + flatAcrossParts[1] * row + flatAcrossParts[2];
   Place lens = placed(roughLens, lensParts);
   uint i = uint(int(lens.whole));
-  float roughU = panelU[0] * lens.whole + panelU[1] * x + panelU[2] * y + panelU[3];
-  u = placed(roughU, panelUParts[0] * i + panelUParts[1] * column + panelUParts[2] * row + panelUParts[3]);
-  v = placed(panelV[0] * y + panelV[1], panelVParts[0] * row + panelVParts[1]);
-  v.part -= slide * lens.part;
+  float roughU = flatPanelU[0] * lens.whole + flatPanelU[1] * x + flatPanelU[2] * y + flatPanelU[3];
+  u = placed(roughU, flatPanelUParts[0] * i + flatPanelUParts[1] * column + flatPanelUParts[2] * row + flatPanelUParts[3]);
+  v = placed(flatPanelV[0] * y + flatPanelV[1], flatPanelVParts[0] * row + flatPanelVParts[1]);
+  v.part -= flatSlide * lens.part;
 #else
-  Place lens = placed(across[0] * x + across[2], acrossParts[0] * column + acrossParts[2]);
-  u = placed(panelU[0] * lens.whole + panelU[3], panelUParts[0] * uint(int(lens.whole)) + panelUParts[3]);
-  v = placed(panelV[0] * y + panelV[1], panelVParts[0] * row + panelVParts[1]);
+  Place lens = placed(flatAcross[0] * x + flatAcross[2], flatAcrossParts[0] * column + flatAcrossParts[2]);
+  u = placed(flatPanelU[0] * lens.whole + flatPanelU[3], flatPanelUParts[0] * uint(int(lens.whole)) + flatPanelUParts[3]);
+  v = placed(flatPanelV[0] * y + flatPanelV[1], flatPanelVParts[0] * row + flatPanelVParts[1]);
 #endif
 #else
-  uint acrossAt = acrossParts[0] * column + acrossParts[2], downAt = downParts[0] * row + downParts[1];
-  vec2 lens = lensAt(across[0] * x + across[2], acrossAt, down[0] * y + down[1], downAt);
+  uint acrossAt = flatAcrossParts[0] * column + flatAcrossParts[2], downAt = flatDownParts[0] * row + flatDownParts[1];
+  vec2 lens = lensAt(flatAcross[0] * x + flatAcross[2], acrossAt, flatDown[0] * y + flatDown[1], downAt);
   lensSeen = lens;
   float shift = shiftOf(lens.y);
   uvec3 whole = uvec3(ivec3(vec3(lens, shift)));
-  float roughU = panelU[0] * lens.x + panelU[1] * shift + panelU[3];
-  u = placed(roughU, panelUParts[0] * whole.x + panelUParts[1] * whole.z + panelUParts[3]);
-  v = placed(panelV[0] * lens.y + panelV[1], panelVParts[0] * whole.y + panelVParts[1]);
+  float roughU = flatPanelU[0] * lens.x + flatPanelU[1] * shift + flatPanelU[3];
+  u = placed(roughU, flatPanelUParts[0] * whole.x + flatPanelUParts[1] * whole.z + flatPanelUParts[3]);
+  v = placed(flatPanelV[0] * lens.y + flatPanelV[1], flatPanelVParts[0] * whole.y + flatPanelVParts[1]);
 #endif
 }
 
 // The pixel seen in green, which stands for the whole one.
 vec2 pixelOf(Place u, Place v) {
-  return vec2(u.whole + floor(u.part + channelRight.y), v.whole + floor(v.part + channelDown.y));
+  return vec2(u.whole + floor(u.part + flatRight.y), v.whole + floor(v.part + flatDownward.y));
 }
 
 #if CELLS == 0
@@ -177,14 +226,14 @@ vec3 codeSeen(Place u, Place v) {
 #elif CELLS == 1
 // Sub-pixels side by side in one row: no two lie farther apart than one pixel and the next.
 vec3 codeSeen(Place u, Place v) {
-  vec3 columns = floor(u.part + channelRight);
+  vec3 columns = floor(u.part + flatRight);
   float first = min(columns.x, min(columns.y, columns.z));
-  vec2 pixel = vec2(u.whole + first, v.whole + floor(v.part + channelDown.y));
+  vec2 pixel = vec2(u.whole + first, v.whole + floor(v.part + flatDownward.y));
   return mix(codeOf(pixel), codeOf(vec2(pixel.x + 1.0, pixel.y)), greaterThan(columns, vec3(first)));
 }
 #elif CELLS == 2
 vec3 codeSeen(Place u, Place v) {
-  vec3 columns = u.whole + floor(u.part + channelRight), rows = v.whole + floor(v.part + channelDown);
+  vec3 columns = u.whole + floor(u.part + flatRight), rows = v.whole + floor(v.part + flatDownward);
   vec3 red = codeOf(vec2(columns.x, rows.x)), green = codeOf(vec2(columns.y, rows.y));
   return vec3(red.r, green.g, codeOf(vec2(columns.z, rows.z)).b);
 }

@@ -2,7 +2,7 @@
 
 import { eyesOfViews } from "./optics.js";
 import { Program } from "./picture.js";
-import { MEAN } from "./shaders.js";
+import { MEAN, VERTEX } from "./shaders.js";
 
 /** Width of the line between two panes, in canvas pixels. */
 const SEAM = 2;
@@ -141,7 +141,7 @@ export class Stage {
     gl.bindFramebuffer(gl.FRAMEBUFFER, null);
     gl.enable(gl.SCISSOR_TEST);
     gl.viewport(pane.x, pane.y, pane.width, pane.height);
-    this.mean ??= new Program(gl, MEAN);
+    this.mean ??= new Program(gl, MEAN, VERTEX);
     gl.useProgram(this.mean.handle);
     gl.activeTexture(gl.TEXTURE0);
     gl.bindTexture(gl.TEXTURE_2D, sum.texture);
