@@ -1,12 +1,14 @@
 """A poster larger than memory: peak resident memory, and time per pixel against that of a picture of 8 megapixels.
 
 python benchmarks/huge.py [--size 34000x22000] [--small 3520x2272] [--folder FOLDER] [--no-commands]
+                          [--method full|pooled] [--denoise none|oidn|oidn-fast|oidn-high] [--formats tif zarr]
 
 The print preset's optics (60 lenses per inch at 720 pixels per inch), the teapot, direct light, 1 sample per pixel,
-into a tiled BigTIFF and into Zarr; then every command that reads a picture, on what was written. Each step is a process
-of its own, whose peak memory and processor time the system tells. The small picture is rendered before and after each
-large one, so that both see the same machine; the scene grows with the panel, and with it the viewing distance and that
-at which rays begin, so that both see the same scene.
+into a tiled BigTIFF and into Zarr, by ``full`` or with pooled or denoised light, whose tiles overlap
+(``results/huge.json``, or ``huge_METHOD_DENOISE.json``); then every command that reads a picture, on what was written.
+Each step is a process of its own, whose peak memory and processor time the system tells. The small picture is rendered
+before and after each large one, so that both see the same machine; the scene grows with the panel, and with it the
+viewing distance and that at which rays begin, so that both see the same scene.
 
 Targets: at most 3 GB; time per pixel within 15 % of the small picture's.
 """
@@ -42,11 +44,17 @@ def main() -> None:
             "memory_limit": MEMORY,
             "target_peak_bytes": TARGET_BYTES,
             "target_relative": TARGET_RELATIVE,
-            "renders": {ending: _compared(folder, ending, large, small) for ending in ("tif", "zarr")},
+            "method": options.method,
+            "denoise": options.denoise,
+            "renders": {
+                ending: _compared(folder, ending, large, small, (options.method, options.denoise))
+                for ending in options.formats
+            },
         }
         if options.commands:
             results["commands"] = _commands(folder)
-        save("huge", results)
+        plain = (options.method, options.denoise) == ("full", "none")
+        save("huge" if plain else f"huge_{options.method}_{options.denoise}", results)
 
 
 def _options() -> argparse.Namespace:
@@ -55,13 +63,21 @@ def _options() -> argparse.Namespace:
     parser.add_argument("--small", default="3520x2272")
     parser.add_argument("--folder", default=None, help="where there is room for twice the picture")
     parser.add_argument("--no-commands", dest="commands", action="store_false")
-    return parser.parse_args()
+    parser.add_argument("--method", default="full", choices=("full", "pooled"))
+    parser.add_argument("--denoise", default="none", choices=("none", "oidn", "oidn-fast", "oidn-high"))
+    parser.add_argument("--formats", nargs="+", default=["tif", "zarr"], choices=("tif", "zarr"))
+    found = parser.parse_args()
+    if found.commands and len(found.formats) < 2:
+        parser.error("the commands read both formats: add --no-commands")
+    return found
 
 
-def _compared(folder: Path, ending: str, large: tuple[int, ...], small: tuple[int, ...]) -> dict[str, Any]:
-    before = _rendered(folder / f"small.{ending}", small, small)
-    found = _rendered(folder / f"large.{ending}", large, small)
-    after = _rendered(folder / f"small2.{ending}", small, small)
+def _compared(
+    folder: Path, ending: str, large: tuple[int, ...], small: tuple[int, ...], method: tuple[str, str]
+) -> dict[str, Any]:
+    before = _rendered(folder / f"small.{ending}", small, small, method)
+    found = _rendered(folder / f"large.{ending}", large, small, method)
+    after = _rendered(folder / f"small2.{ending}", small, small, method)
     path = folder / f"large.{ending}"
     files = [path] if path.is_file() else [part for part in path.rglob("*") if part.is_file()]
     ratios = {
@@ -77,10 +93,11 @@ def _compared(folder: Path, ending: str, large: tuple[int, ...], small: tuple[in
     }
 
 
-def _rendered(output: Path, size: tuple[int, ...], small: tuple[int, ...]) -> dict[str, Any]:
+def _rendered(output: Path, size: tuple[int, ...], small: tuple[int, ...], method: tuple[str, str]) -> dict[str, Any]:
     figures = output.with_name("figures.json")
     numbers = [str(number) for number in (*size, small[0], MEMORY)]
-    usage = _run([sys.executable, str(Path(__file__).with_name("huge_render.py")), *numbers, str(output), str(figures)])
+    script = str(Path(__file__).with_name("huge_render.py"))
+    usage = _run([sys.executable, script, *numbers, str(output), str(figures), *method])
     return {**json.loads(figures.read_text()), **usage}
 
 

@@ -1,4 +1,7 @@
-"""One picture of ``huge.py``, in a process of its own: WIDTH HEIGHT SMALL_WIDTH MEMORY OUTPUT FIGURES."""
+"""One picture of ``huge.py``, in a process of its own.
+
+Arguments: WIDTH HEIGHT SMALL_WIDTH MEMORY OUTPUT FIGURES METHOD DENOISE.
+"""
 
 from __future__ import annotations
 
@@ -24,8 +27,17 @@ def main() -> None:
     )
     scene = lippmann.load_scene("teapot")
     started = time.process_time()
+    method, denoise = sys.argv[7:9]
     rendered = lippmann.render_to_file(
-        scene, Path(sys.argv[5]), display, integrator="direct", depth=1, spp=1, memory=memory
+        scene,
+        Path(sys.argv[5]),
+        display,
+        method=method,
+        denoise=denoise,
+        integrator="direct",
+        depth=1,
+        spp=1,
+        memory=memory,
     )
     # Loading and building take as long whatever the size is.
     seconds = {name: rendered.provenance.seconds[name] for name in ("trace", "write")}
@@ -36,6 +48,9 @@ def main() -> None:
         "nanoseconds_per_pixel": sum(seconds.values()) / pixels * 1e9,
         "cpu_nanoseconds_per_pixel": (time.process_time() - started) / pixels * 1e9,
         "rays_per_pixel": sum(rendered.provenance.rays.values()) / pixels,
+        "tiles": rendered.tiles,
+        "options": dict(rendered.provenance.options),
+        "notes": list(rendered.provenance.notes),
     }
     Path(sys.argv[6]).write_text(json.dumps(figures))
 

@@ -190,8 +190,9 @@ def render_to_file(
     runner:
         Who renders the tiles, see :mod:`lippmann.render.tiled_picture`; by default this process.
     options:
-        ``integrator``, ``depth``, ``spp``, ``seed``, ``subpixels``, ``pixel_filter``, ``device``, ``threads`` and
-        ``memory`` as for :func:`render`. Others are refused: they need the whole picture at once.
+        ``method`` (``full``, ``pooled``), ``denoise``, ``integrator``, ``depth``, ``spp``, ``seed``, ``subpixels``,
+        ``pixel_filter``, ``device``, ``threads`` and ``memory`` as for :func:`render`. Others are refused: they need
+        the whole picture at once.
 
     Returns
     -------
@@ -309,7 +310,8 @@ def render_quilt(
     options:
         ``integrator``, ``depth``, ``spp``, ``quality``, ``quality_mean``, ``max_time``, ``seed``, ``pixel_filter``,
         ``denoise``, ``device``, ``threads`` and ``memory`` as for :func:`render`; every view counts as a micro-image
-        does there.
+        does there. ``method``: ``auto``, ``full``, or ``pooled``, with which neighbouring views share their light
+        before it is denoised.
 
     Returns
     -------

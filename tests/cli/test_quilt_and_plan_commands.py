@@ -40,6 +40,15 @@ def test_a_quilt_gets_its_name_from_scene_and_device(lippmann, tmp_path, monkeyp
 
 
 @pytest.mark.usefixtures("engine")
+def test_views_share_their_light_where_that_is_asked_for(lippmann, tmp_path):
+    words = ("quilt", "render", "teapot", *SMALL, "--method", "pooled", "--json", "-o", tmp_path / f"x{ENDING}")
+    outcome = lippmann(*words, "--denoise", "oidn-fast")
+    assert outcome.code == 0, outcome.err
+    assert outcome.json["method"] == "pooled"
+    assert outcome.json["estimate"]["worst"] > 5
+
+
+@pytest.mark.usefixtures("engine")
 def test_a_calibration_names_its_quilt_and_takes_it_back(lippmann, calibration, tmp_path):
     quilt, native = tmp_path / f"x{ENDING}", tmp_path / "native.png"
     made = lippmann("quilt", "render", "teapot", "-d", calibration, *SMALL, "-o", quilt, "--quiet")
@@ -86,6 +95,8 @@ def test_bad_input_is_one_line_and_code_2(lippmann, tmp_path):
     assert "columns x rows, such as 8x6" in refused(*render, "--views", "48")
     assert "such as 512x512" in refused(*render, "--size", "3360")
     assert "no multiple of 8" in refused(*render, "--size", "3361x3360")
+    assert "pooled without denoising will not do" in refused(*render, "--method", "pooled", "--denoise", "none")
+    assert "lens-view will not do" in refused(*render, "--method", "lens-view")
     out = tmp_path / "x_qs4x4a1.png"
     square = refused(*render, "-d", "mla-square", "--views", "4x4", "--size", "400x400", "-o", out, "--quiet")
     assert "square lenses" in square

@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from dataclasses import dataclass, field
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -133,6 +134,25 @@ def test_two_hundred_random_kills_harm_nothing(harness):
     assert len(set(harness.tiles)) > 10
 
 
+@pytest.mark.long
+@pytest.mark.parametrize(
+    "denoise",
+    ["none", pytest.param("oidn-fast", marks=pytest.mark.skipif(find_spec("pyoidn") is None, reason="needs pyoidn"))],
+)
+def test_tiles_that_overlap_are_resumed_to_the_same_file(display, tmp_path, denoise):
+    one, two = tmp_path / "one.tif", tmp_path / "two.tif"
+    asked = ("--method", "pooled", "--denoise", denoise)
+    subprocess.run(command(display, one, *asked), check=True)
+    process = subprocess.Popen(command(display, two, *asked, "--memory", "1G"))
+    while process.poll() is None and len(list(journal_of(two).glob("r*.tile"))) < 2:
+        time.sleep(0.02)
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+    assert not two.exists()
+    subprocess.run(command(display, two, *asked, "--memory", "300M"), check=True)
+    assert one.read_bytes() == two.read_bytes()
+
+
 def test_an_interrupted_run_says_what_is_kept(display, tmp_path):
     output = tmp_path / "a.tif"
     words = [word for word in command(display, output, "--integrator", "path", "--spp", "64") if word != "--quiet"]
@@ -166,10 +186,22 @@ def test_pictures_beyond_the_memory_go_to_tiles(lippmann, engine, display, tmp_p
     assert done.json["tiles"]["made"] == 32
 
 
+def test_what_is_made_from_neighbours_goes_to_tiles_sooner():
+    from lippmann.cli.tiled import is_tiled
+    from lippmann.display import load_display
+
+    def asked(**more):
+        return is_tiled(Path("a.tif"), None, load_display("panel-4k"), resume=False, memory=1 << 30, **more)
+
+    assert not asked()
+    assert asked(method="pooled", denoise="auto")
+    assert asked(denoise="oidn")
+    assert not asked(method="auto", denoise="auto")
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (("--denoise", "oidn"), "--denoise: oidn needs the whole picture"),
         (("--method", "lens-view"), "--method: lens-view needs the whole picture"),
         (("--maps", "m"), "--maps: needs the whole picture at once"),
         (("--layers",), "--layers"),

@@ -55,9 +55,9 @@ def run(goal, *, plain=0.5, denoised=0.005, slope=0.6, floor=0.0, seconds=0.01):
 
 def test_denoising_wins_where_noise_is_strong():
     contest, outcome, _ = run(Goal(quality=25))
-    assert (contest.leader, outcome.end) == ("denoised", "quality")
+    assert (contest.leader, outcome.end) == ("pooled", "quality")
     assert outcome.samples < 100  # plain samples would have taken 300
-    assert "denoised and" in contest.why
+    assert "pooled and" in contest.why
 
 
 def test_plain_samples_win_where_the_quality_is_near():
@@ -81,7 +81,7 @@ def test_a_denoised_picture_that_is_worse_is_looked_at_once():
     assert clean.looks == 1
 
 
-@pytest.mark.parametrize(("seconds", "leader"), [(0.5, "denoised"), (0.0005, "plain")])
+@pytest.mark.parametrize(("seconds", "leader"), [(0.5, "pooled"), (0.0005, "plain")])
 def test_with_a_time_the_better_picture_at_its_end_wins(seconds, leader):
     """Few samples are better denoised; many are better left alone, for denoising then does more harm than good."""
     contest, outcome, _ = run(Goal(max_time=20.0), floor=2e-3, slope=0.9, seconds=seconds)
@@ -90,7 +90,7 @@ def test_with_a_time_the_better_picture_at_its_end_wins(seconds, leader):
 
 def test_samples_bound_both():
     contest, outcome, _ = run(Goal(quality=60, spp=32))
-    assert (outcome.end, outcome.samples, contest.leader) == ("samples", 32, "denoised")
+    assert (outcome.end, outcome.samples, contest.leader) == ("samples", 32, "pooled")
 
 
 def test_the_same_samples_give_the_same_winner_whatever_they_take():

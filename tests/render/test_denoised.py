@@ -122,3 +122,30 @@ def test_the_stated_interval_holds_for_open_image_denoise(engine, samples):
     assert stated["psnr_low"] < psnr(float(errors.mean())) < stated["psnr_high"]
     worst = low_percentile(*micro_image_means(errors, display), 0.0).psnr
     assert stated["worst_low"] < worst < stated["worst_high"]
+
+
+@pytest.mark.parametrize("transfer", ["srgb", "linear"])
+def test_light_spread_beyond_white_is_not_lost_where_codes_are_cut_off(transfer):
+    """Beside a lamp a denoiser may make pixels brighter than white: the whole step from the truth to white counts."""
+    truth = np.full(SHAPE, 0.35, dtype=np.float32)
+    random = np.random.default_rng(4)
+    renderer = Noise()
+    renderer._halves = [truth + random.normal(0, 0.02, SHAPE).astype(np.float32) for _ in range(2)]
+    told = Denoised(renderer, lambda p: np.full_like(p, 1.2), transfer).squared_error()
+    code = encode_srgb(np.float64(0.35)) if transfer == "srgb" else 0.35
+    assert float(told.values.mean()) == pytest.approx((1 - code) ** 2, rel=0.05)
+    # White beyond white is as white.
+    renderer._halves = [half + np.float32(2) for half in renderer._halves]
+    assert float(np.abs(Denoised(renderer, lambda p: p + 1, transfer).squared_error().values).max()) < 1e-12
+
+
+def test_where_codes_are_steep_the_whole_step_counts():
+    """A black corner that a denoiser makes dark grey: the slope there is that of the grey, the step far more."""
+    truth = np.full(SHAPE, 0.001, dtype=np.float32)
+    random = np.random.default_rng(5)
+    renderer = Noise()
+    renderer._halves = [truth + random.normal(0, 0.0005, SHAPE).astype(np.float32) for _ in range(2)]
+    told = Denoised(renderer, lambda p: np.full_like(p, 0.02), "srgb").squared_error()
+    step = float(encode_srgb(np.float64(0.02)) - encode_srgb(np.float64(0.001)))
+    assert step**2 < 1.5 * float(told.values.mean())
+    assert float(told.values.mean()) < step**2

@@ -186,7 +186,6 @@ def test_an_object_of_mitsubas_has_no_content_to_compare(engine):
         ({"quality": 40.0, "spp": None}, "--quality"),
         ({"quality_mean": 40.0, "spp": None}, "--quality-mean"),
         ({"max_time": 1.0, "spp": None}, "--max-time"),
-        ({"denoise": "oidn"}, "--denoise"),
         ({"layers": True}, "--layers"),
     ],
 )

@@ -39,6 +39,14 @@ Views = Annotated[
 Size = Annotated[
     str | None, typer.Option("--size", help="Width x height of the quilt in pixels; by default the device's.")
 ]
+Method = Annotated[
+    str,
+    typer.Option(
+        "--method",
+        help="auto: what is fastest for the quality asked for; full: every ray is traced; "
+        "pooled: neighbouring views share their light before it is denoised.",
+    ),
+]
 
 
 def render(
@@ -47,6 +55,7 @@ def render(
     display: Device = "portrait",
     views: Views = None,
     size: Size = None,
+    method: Method = "auto",
     integrator: options.Integrator = "auto",
     depth: options.Depth = None,
     spp: options.Spp = None,
@@ -99,6 +108,7 @@ def render(
             target,
             views=(wanted.layout.columns, wanted.layout.rows),
             size=(wanted.width, wanted.height),
+            method=method,
             integrator=integrator,
             depth=depth,
             spp=spp,

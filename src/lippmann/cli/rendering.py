@@ -26,7 +26,8 @@ Method = Annotated[
         "--method",
         help="auto: what is fastest for the quality asked for; full: every ray is traced; "
         "lens-view: points are carried from lens to lens and missed pixels traced; "
-        "interpolated: those of every other lens are averaged; pooled: light is gathered in the scene and shared.",
+        "interpolated: those of every other lens are averaged; "
+        "pooled: noise is taken out, and all lenses that see a point share its light.",
     ),
 ]
 Order = Annotated[
@@ -80,7 +81,8 @@ Denoise = Annotated[
     typer.Option(
         "--denoise",
         help="none, or oidn: take the noise out with Open Image Denoise (extra 'denoise'), with the effort that the "
-        "rays deserve; oidn-fast and oidn-high name it. auto: only where --method auto finds it better.",
+        "rays deserve; oidn-fast and oidn-high name it. auto: with --method pooled, and where --method auto finds that "
+        "better.",
     ),
 ]
 Layers = Annotated[
@@ -196,15 +198,14 @@ def render(
     wanted = sequences.Wanted(frames, fps, animation, camera_path, video, eye)
     on_cluster = clusters.Asked(cluster, tls_ca, tls_cert, tls_key)
     if wanted:
-        if resume:
-            raise UsageError("is for single pictures", where="--resume", fix="leave it out")
+        files: dict[str, Any] = {"bits": bits, "maps": maps, "resume": resume}
         with on_cluster.runner(console, threads) as runner:
-            sequences.render_frames(
-                scene, output, wanted, console, bits=bits, maps=maps, load=load, runner=runner, **asked
-            )
+            sequences.render_frames(scene, output, wanted, console, load=load, runner=runner, **files, **asked)
         return
     _check_layers(layers, format_for(output, bits)[0], output)
-    if on_cluster or tiled.is_tiled(output, bits, target, resume=resume, memory=asked["memory"]):
+    if on_cluster or tiled.is_tiled(
+        output, bits, target, resume=resume, memory=asked["memory"], method=method, denoise=denoise
+    ):
         _check_whole({"--maps": maps, "--marks": margin})
         with on_cluster.runner(console, threads) as runner:
             tiled.render_tiled(scene, output, console, bits=bits, resume=resume, load=load, runner=runner, **asked)

@@ -22,8 +22,8 @@ Resume = Annotated[
     bool,
     typer.Option(
         "--resume",
-        help="Keep finished tiles beside the output, and go on with those that an interrupted run left. "
-        "See docs/large-pictures.md.",
+        help="Keep finished tiles beside the output, and go on with those (of a sequence: with the frames) that an "
+        "interrupted run left. See docs/large-pictures.md.",
     ),
 ]
 
@@ -40,7 +40,16 @@ _PLACEMENT = {
 _WHOLE = {"order": "--order", "respect_gloss": "--respect-gloss"}
 
 
-def is_tiled(output: Path, bits: int | None, display: Display, *, resume: bool, memory: int | None) -> bool:
+def is_tiled(
+    output: Path,
+    bits: int | None,
+    display: Display,
+    *,
+    resume: bool,
+    memory: int | None,
+    method: str = "full",
+    denoise: str = "none",
+) -> bool:
     """Whether a picture has to be rendered in tiles: where that is asked for, or is the only way."""
     from lippmann.image.formats import format_for
     from lippmann.render.pipeline import default_memory
@@ -49,7 +58,8 @@ def is_tiled(output: Path, bits: int | None, display: Display, *, resume: bool, 
     name, _ = format_for(output, bits)
     if resume or name == "zarr":
         return True
-    return name == "tiff" and not fits_whole(display, memory or default_memory())
+    with_neighbours = method == "pooled" or denoise.startswith("oidn")
+    return name == "tiff" and not fits_whole(display, memory or default_memory(), with_neighbours=with_neighbours)
 
 
 @contextmanager

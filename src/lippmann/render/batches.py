@@ -26,7 +26,7 @@ from lippmann.render.estimate import OWN_NOISE, PixelErrors
 from lippmann.render.full import PIXEL_DIMENSION, Frame, RayTotals, compile_seconds, divide, evaluated
 from lippmann.render.integrators.base import Integrator
 from lippmann.render.plan import BYTES_PER_LANE, BYTES_PER_PIXEL, PREFERRED_LANES, SMALLEST_LANES
-from lippmann.render.rays import RaySource
+from lippmann.render.rays import RaySource, pixel_number
 from lippmann.render.sampling import SampleStream
 from lippmann.store.grid import Window
 
@@ -257,7 +257,7 @@ class FullInBatches:
         row, column = divide(pixel, window.columns)
         row += dr.opaque(mi.UInt32, window.row)
         column += dr.opaque(mi.UInt32, window.column)
-        pixel = row * self._source.width + column
+        pixel = pixel_number(self._source, column, row)
         sample += dr.gather(mi.UInt32, _table(run.starts), place)
         stream_of = dr.gather(mi.UInt32, _table([batch // per_stream for batch in run.batches]), place)
         seed = dr.opaque(mi.UInt32, self._seed) + stream_of * SEED_STEP

@@ -27,6 +27,8 @@ class Choice:
 
 def decide(settings: RenderSettings) -> Choice:
     """Fill in the method and what takes the noise out, as far as that can be known before the first sample."""
+    if settings.method == "pooled" and settings.denoise == "auto":
+        return Choice(_with(settings, "oidn" if find_spec("pyoidn") else "none"))
     if settings.method != "auto":
         return Choice(_with(settings, "none") if settings.denoise == "auto" else settings)
     chosen = replace(settings, method="full")

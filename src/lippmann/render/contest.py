@@ -1,8 +1,9 @@
-"""Full rendering, plain or denoised: the two live off the same samples, and what reaches the goal for less goes on.
+"""Full rendering against pooled light: both live off the same samples, and what reaches the goal for less goes on.
 
 Which that will be is reckoned from where both stand and how their errors fall. Plain noise falls with the number of
-samples; what a denoised picture is wrong by falls more slowly, and where the scene is smooth or the quality high it may
-be behind. Work is counted in rays (:mod:`lippmann.render.effort`), so that the same seed gives the same picture.
+samples; what a picture of denoised, pooled light is wrong by falls more slowly, and where the scene is smooth or the
+quality high it may be behind. Work is counted in rays (:mod:`lippmann.render.effort`), so that the same seed gives the
+same picture.
 """
 
 from __future__ import annotations
@@ -12,12 +13,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
-from lippmann.render.effort import denoising_cost, effort_of
+from lippmann.render.effort import effort_of, pooling_cost
 from lippmann.render.estimate import Estimate
 from lippmann.render.goal import LEAST_GROWTH, Goal
 from lippmann.render.judging import Judgement, Track
 
-Way = Literal["plain", "denoised"]
+Way = Literal["plain", "pooled"]
 
 #: The power of the number of samples by which the error of denoised pictures falls: 0.5 to 0.8 where it was measured.
 DENOISED_SLOPE = 0.6
@@ -38,7 +39,7 @@ class Contest:
     ----------
     goal:
         What is to be reached.
-    plain, denoised:
+    plain, pooled:
         The tracks of both.
     rays_per_pixel:
         What the samples so far took.
@@ -51,33 +52,33 @@ class Contest:
         What that rests on, as a sentence.
     """
 
-    def __init__(self, goal: Goal, plain: Track, denoised: Track, rays_per_pixel: Callable[[], float]) -> None:
+    def __init__(self, goal: Goal, plain: Track, pooled: Track, rays_per_pixel: Callable[[], float]) -> None:
         self._goal = goal
         self._plain = plain
-        self._denoised = denoised
+        self._pooled = pooled
         self._rays_per_pixel = rays_per_pixel
         self._open = True
         self.leader: Way = "plain"
-        self.why = "there was no time to look at a denoised picture"
+        self.why = "there was no time to look at pooled light"
 
     def judge(self, samples: int, room: float) -> Judgement:
-        """The leader's judgement; the denoised picture is looked at only while it may win."""
+        """The leader's judgement; the pooled picture is looked at only while it may win."""
         plain = self._plain.judge(samples)
         if not self._open:
             return plain
         rays = self._rays_per_pixel()
-        look = denoising_cost(effort_of("oidn", rays))
+        look = pooling_cost(effort_of("oidn", rays))
         outlook = self._outlook(plain, rays, room)
         if not outlook.misses and outlook.value <= look:
-            self._lead("plain", "the quality is within reach of plain samples for less than denoising takes")
+            self._lead("plain", "the quality is within reach of plain samples for less than pooling takes")
             return plain
-        denoised = self._denoised.judge(samples)
-        there = self._missing(denoised.estimate) <= 0
-        with_noise_out = self._outlook(denoised, rays, room, 0.0 if there else look)
-        stand = f"after {samples} samples {self._value(denoised)} denoised and {self._value(plain)} plain"
+        pooled = self._pooled.judge(samples)
+        there = self._missing(pooled.estimate) <= 0
+        with_noise_out = self._outlook(pooled, rays, room, 0.0 if there else look)
+        stand = f"after {samples} samples {self._value(pooled)} pooled and {self._value(plain)} plain"
         if with_noise_out < outlook:
-            self._lead("denoised", stand)
-            return denoised
+            self._lead("pooled", stand)
+            return pooled
         # Plain noise is surer to fall than what denoising leaves: it is not asked again.
         self._open = False
         self._lead("plain", f"{stand}, which reaches the goal sooner" if self._goal.has_quality else stand)
@@ -85,7 +86,7 @@ class Contest:
 
     def seconds(self) -> float:
         """What the next judgement will take, as far as that is known."""
-        return self._plain.seconds() + (self._denoised.seconds() if self._open else 0.0)
+        return self._plain.seconds() + (self._pooled.seconds() if self._open else 0.0)
 
     def _lead(self, way: Way, why: str) -> None:
         self.leader, self.why = way, why

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.render.integrators.base import Integrator, RayCounts
 from lippmann.render.plan import Pass, Plan, Tile
-from lippmann.render.rays import RaySource
+from lippmann.render.rays import RaySource, pixel_number
 from lippmann.render.sampling import SampleStream
 
 #: Sample dimension that places a sample in its pixel; integrators use those above.
@@ -141,7 +141,7 @@ def rays_of_tile(
     column += dr.opaque(mi.UInt32, corner[1])
     sample += dr.opaque(mi.UInt32, run.first)
     # The stream of a sub-pixel is its own; a picture has fewer than 2^32 sub-pixels.
-    number = (row * source.width + column) * plan.channels + channel
+    number = pixel_number(source, column, row) * plan.channels + channel
     stream = SampleStream.of_pixels(number, sample, dr.opaque(mi.UInt32, seed))
     jitter = stream.next_2d(PIXEL_DIMENSION) if box_filter else mi.Point2f(0.5)
     return source.rays(column, row, channel, jitter), stream

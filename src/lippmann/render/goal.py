@@ -127,11 +127,11 @@ def goal_of(settings: RenderSettings) -> Goal | None:
         return None
     goal = Goal(settings.quality, settings.quality_mean, settings.max_time, settings.spp)
     given = "--max-time" if settings.max_time is not None else "--quality"
-    if settings.method != "full":
+    if settings.method != "full" and not settings.shares_light:
         raise UsageError(
-            f"{settings.method} does not know its own error",
+            f"{settings.method}{' without denoising' if settings.pools_cells else ''} does not know its own error",
             where=given,
-            rule="full does, denoised or not",
+            rule="full does, and pooled with --denoise oidn",
             fix="use --method full",
         )
     why = why_no_estimate(settings)

@@ -12,9 +12,11 @@ from numpy.typing import NDArray
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.render.denoise import Effort, denoise
 from lippmann.render.denoise_views import best_form, denoise_views
-from lippmann.render.effort import GUIDE_SAMPLES, RUN_COST, denoising_cost
+from lippmann.render.effort import GUIDE_SAMPLES, RUN_COST, SHARING_STOP, denoising_cost
 from lippmann.render.guides import Guides, plan_guides, trace_guides
+from lippmann.render.quilt_sharing import share_views
 from lippmann.render.rays import DisplayRays, QuiltRays, WindowRays
+from lippmann.render.sharing import lens_numbers, share_light
 
 if TYPE_CHECKING:
     from lippmann.render.classic.build import BuiltClassic
@@ -41,6 +43,11 @@ class GuidedDenoiser:
         Of the denoiser.
     effort:
         Asked before every picture.
+    exposure:
+        As of :func:`~lippmann.render.denoise.denoise`, for windows.
+    shares:
+        Micro-images share their light, see :mod:`lippmann.render.sharing`, and so do the views of a quilt, see
+        :mod:`lippmann.render.quilt_sharing`.
 
     Attributes
     ----------
@@ -61,6 +68,8 @@ class GuidedDenoiser:
         memory: int,
         threads: int,
         effort: Callable[[], Effort],
+        exposure: float | None = None,
+        shares: bool = False,
         progress: ProgressCallback = silent,
     ) -> None:
         self._built = built
@@ -71,6 +80,9 @@ class GuidedDenoiser:
         self._memory = memory
         self._threads = threads
         self._effort = effort
+        self._exposure = exposure
+        self._shares = shares
+        self._lenses: NDArray[np.int32] | None = None
         self._progress = progress
         self._guides: Guides | None = None
         self._guide_samples = 0
@@ -83,11 +95,28 @@ class GuidedDenoiser:
         self._progress(Progress("denoise", 0, 1))
         self.used = self._effort()
         guides = self.guides()
-        cleaned = self._cleaned(pixels, guides)
+        if self._shares and isinstance(self._source, QuiltRays):
+            pixels = share_views(pixels, self._source, guides, threads=self._threads)
+        # The network overshoots below black beside bright edges.
+        cleaned = np.maximum(self._cleaned(pixels, guides), np.float32(0))
+        if self._shares and not isinstance(self._source, QuiltRays):
+            cleaned = self._shared(cleaned, guides, self._source)
         self._progress(Progress("denoise", 1, 1))
         self.seconds += time.perf_counter() - started
-        # The network overshoots below black beside bright edges.
-        return np.maximum(cleaned, np.float32(0))
+        return cleaned
+
+    def _shared(self, pixels: Floats, guides: Guides, source: DisplayRays | WindowRays) -> Floats:
+        if self._lenses is None:
+            window = source.window if isinstance(source, WindowRays) else None
+            self._lenses = lens_numbers(source.display, window, subpixels=source.channels == 3)
+        return share_light(
+            pixels,
+            source.display,
+            guides,
+            stop=SHARING_STOP[self.used],
+            threads=self._threads,
+            lenses=self._lenses,
+        )
 
     def probe(self) -> float:
         """Seconds that a picture cleaned by halves takes, guides included, by a small one."""
@@ -106,8 +135,15 @@ class GuidedDenoiser:
             )
         result = np.empty_like(pixels)
         for tile in source.tiles():
-            guide = guides.albedo[tile], guides.normal[tile]
-            result[tile] = denoise(pixels[tile], *guide, clean_guides=True, effort=self.used, threads=self._threads)
+            result[tile] = denoise(
+                pixels[tile],
+                guides.albedo[tile],
+                guides.normal[tile],
+                clean_guides=True,
+                exposure=self._exposure,
+                effort=self.used,
+                threads=self._threads,
+            )
         return result
 
     def guides(self) -> Guides:

@@ -26,16 +26,24 @@ FloatArray = NDArray[np.float32]
 #: Samples of a pixel: fewer leave steps in the guides where edges cross it, more gain nothing.
 LEAST_SAMPLES, MOST_SAMPLES = 8, 16
 
-#: Albedo and normal, and what a tile adds to them.
-_BYTES_PER_PIXEL = 48
+#: Albedo, normal and height, and what a tile adds to them.
+_BYTES_PER_PIXEL = 56
+
+#: Heights beyond this many millimetres count as lying there: light lines of all lenses are parallel for them.
+_FARTHEST = 1e5
 
 
 @dataclass(frozen=True, eq=False)
 class Guides:
-    """``albedo`` and ``normal``, ``(H, W, 3)`` float32 each; components in [0, 1] and in [-1, 1] (display frame)."""
+    """``albedo`` and ``normal``, ``(H, W, 3)`` float32 each; components in [0, 1] and in [-1, 1] (display frame).
+
+    ``height`` is ``(H, W)`` float32: the z (mm) at which things seem to lie, those in mirrors behind them. None where
+    it is not known.
+    """
 
     albedo: FloatArray
     normal: FloatArray
+    height: FloatArray | None = None
 
 
 def plan_guides(source: RaySource, samples: int, memory: int) -> Plan:
@@ -61,43 +69,56 @@ def trace_guides(
     box_filter: bool = True,
     progress: ProgressCallback = silent,
 ) -> Guides:
-    """Albedo and normal of the first surface that is neither mirror nor clear glass, as the pixel's samples see it.
+    """Albedo, normal, height of the first surface that is neither mirror nor clear glass, as a pixel's samples see it.
 
     ``plan`` comes from :func:`plan_guides`; ``box_filter`` is that of the picture, ``seed`` should be another one:
     where samples fall is all the noise that guides hold, and it would be the picture's own. A sub-pixel that has rays
-    of its own gets its own channel of the albedo from them; the normal is the mean of all three.
+    of its own gets its own channel of the albedo from them; normal and height are the means of all three.
     """
     surfaces = surfaces_of(built)
-    linear = np.asarray(display_from_world, dtype=np.float64)[:3, :3]
+    matrix = np.asarray(display_from_world, dtype=np.float64)
+    linear = matrix[:3, :3]
     rotation = (linear / np.cbrt(np.linalg.det(linear))).astype(np.float32)
     albedo = np.zeros((plan.height, plan.width, 3), dtype=np.float32)
     normal = np.zeros_like(albedo)
+    height = np.zeros((plan.height, plan.width), dtype=np.float32)
     done = 0
     for tile, run in plan:
         rows = slice(tile.first_row, tile.first_row + tile.rows)
-        found = _trace_tile(surfaces, source, plan, tile, run, seed, box_filter)
+        *found, heights = _trace_tile(surfaces, source, plan, tile, run, seed, box_filter, matrix[2])
         shape = (tile.rows, plan.width, plan.channels, 3)
         colors, normals = (to_numpy(part, shape[0] * shape[1] * shape[2]).reshape(shape) for part in found)
+        height[rows] += np.array(heights, dtype=np.float32).reshape(shape[:3]).mean(axis=2) / plan.samples
         if plan.channels == 3:
             colors = np.diagonal(colors, axis1=2, axis2=3)[:, :, None]
         albedo[rows] += colors[:, :, 0] / plan.samples
         normal[rows] += normals.mean(axis=2) @ rotation.T / plan.samples
         done += tile.rows * plan.width * plan.channels * run.count
         progress(Progress("guides", done, plan.work))
-    return Guides(albedo, normal)
+    return Guides(albedo, normal, height)
 
 
 def _trace_tile(
-    surfaces: Surfaces, source: RaySource, plan: Plan, tile: Tile, run: Pass, seed: int, box_filter: bool
-) -> tuple[Any, Any]:
-    """Sums over the samples of one pass, for every pixel and channel: colours and world-space normals."""
+    surfaces: Surfaces,
+    source: RaySource,
+    plan: Plan,
+    tile: Tile,
+    run: Pass,
+    seed: int,
+    box_filter: bool,
+    z_from_world: NDArray[np.float64],
+) -> tuple[Any, Any, Any]:
+    """Sums over the samples of one pass, for every pixel and channel: colours, world-space normals, and heights."""
     lanes = tile.rows * plan.width * plan.channels * run.count
     # Lanes are those of a picture.
     ray, _ = rays_of_tile(source, plan, tile, run, seed, box_filter)
-    albedo, normal = surfaces.guide(ray, mi.Bool(True))
-    values = [mi.Float(part) + dr.zeros(mi.Float, lanes) for part in (*albedo, *normal)]
-    # All at once: sums one by one would follow the rays six times.
+    albedo, normal, distance = surfaces.guide(ray, mi.Bool(True))
+    x, y, z = mi.Point3f(ray.o) + mi.Vector3f(ray.d) * distance
+    weights = [dr.opaque(mi.Float, float(weight)) for weight in z_from_world]
+    height = dr.clip(x * weights[0] + y * weights[1] + z * weights[2] + weights[3], -_FARTHEST, _FARTHEST)
+    values = [mi.Float(part) + dr.zeros(mi.Float, lanes) for part in (*albedo, *normal, height)]
+    # All at once: sums one by one would follow the rays seven times.
     dr.eval(values)
     if run.count > 1:
         values = [dr.block_sum(part, run.count) for part in values]
-    return mi.Color3f(*values[:3]), mi.Vector3f(*values[3:])
+    return mi.Color3f(*values[:3]), mi.Vector3f(*values[3:6]), values[6]

@@ -14,25 +14,23 @@ from lippmann.image.provenance import Transfer
 from lippmann.progress import ProgressCallback, silent
 from lippmann.render.batches import FullInBatches, trace_in_batches
 from lippmann.render.contest import DENOISED_SLOPE, Contest
-from lippmann.render.denoise import Effort
-from lippmann.render.denoise_views import denoise_views
 from lippmann.render.denoised import Denoised
 from lippmann.render.denoised_estimate import DenoisedEstimator
 from lippmann.render.effort import effort_of
-from lippmann.render.estimate import ERROR_LAYER, Estimate, Parts, PictureEstimator, why_no_estimate
+from lippmann.render.estimate import ERROR_LAYER, Estimate, Parts, PictureEstimator, PixelErrors, why_no_estimate
 from lippmann.render.full import Frame, RayTotals, trace_frame
 from lippmann.render.goal import Goal, Outcome, goal_of, reach_judged
 from lippmann.render.guided import GuidedDenoiser
-from lippmann.render.guides import Guides
 from lippmann.render.judging import Judge, Track
 from lippmann.render.plan import make_plan
 from lippmann.render.rays import DisplayRays, QuiltRays, WindowRays
 from lippmann.render.reuse.points import STATUS_LAYER, TRACED
 from lippmann.render.reuse.renderer import trace_reused
-from lippmann.render.settings import REUSING, Denoiser, RenderSettings
+from lippmann.render.settings import REUSING, Denoiser, Method, RenderSettings
 
 if TYPE_CHECKING:
     from lippmann.render.classic.build import BuiltClassic
+    from lippmann.render.survey import Treatment
     from lippmann.scene.build import BuiltScene
 
 Floats = NDArray[np.float32]
@@ -41,6 +39,8 @@ Floats = NDArray[np.float32]
 SAMPLES_LAYER = "samples"
 #: That with the share of pooled light in each pixel, from 0 to 1.
 POOLED_LAYER = "pooled"
+#: Why pictures of light that is pooled in cells do not tell their error.
+NOT_PROVEN = "no estimate of the error: that of light pooled in cells is not proven"
 
 
 @dataclass(frozen=True)
@@ -57,6 +57,8 @@ class Job:
         How values become codes.
     memory:
         Bytes that may be used.
+    treatment:
+        Of a part of a picture that is denoised: how all its parts are.
     """
 
     built: BuiltScene | BuiltClassic
@@ -68,6 +70,7 @@ class Job:
     memory: int
     threads: int
     progress: ProgressCallback = silent
+    treatment: Treatment | None = None
 
     @property
     def box_filter(self) -> bool:
@@ -87,6 +90,10 @@ class Traced:
         How good the picture is by its own account; where it is None, ``notes`` say why.
     options, seconds:
         How it was done, and what stages of its own that took.
+    errors:
+        Those of the pixels, where they are known.
+    method:
+        What won, where methods competed.
     """
 
     frame: Frame
@@ -95,6 +102,8 @@ class Traced:
     notes: tuple[str, ...] = ()
     options: dict[str, Any] = field(default_factory=dict)
     seconds: dict[str, float] = field(default_factory=dict)
+    errors: PixelErrors | None = None
+    method: Method | None = None
 
 
 def trace(job: Job) -> Traced:
@@ -118,12 +127,14 @@ def _traced(job: Job) -> Traced:
     why = why_no_estimate(job.settings)
     if job.settings.method in REUSING:
         return _cleaned(job, _reused(job))
-    if job.settings.method == "pooled":
+    if job.settings.pools_cells:
         return _pooled(job)
     if why is not None:
         return _cleaned(job, _plain(job, why))
     if goal is None and job.settings.denoise == "none":
         return _full(job)
+    if job.treatment is not None:
+        return _denoised_part(job)
     goal = goal or Goal(spp=job.settings.samples)
     return _full_until(job, replace(goal, part="view") if isinstance(job.source, QuiltRays) else goal)
 
@@ -156,14 +167,7 @@ def _full(job: Job) -> Traced:
 
 def _full_until(job: Job, goal: Goal) -> Traced:
     """As many samples as the goal takes, the noise taken out of them where that is asked for or proves better."""
-    batches = FullInBatches(
-        job.integrator,
-        job.source,
-        seed=job.settings.seed,
-        box_filter=job.box_filter,
-        transfer=job.transfer,
-        memory=job.memory,
-    )
+    batches = _batches(job)
     estimator = _estimator(job)
 
     def rays() -> float:
@@ -179,12 +183,13 @@ def _full_until(job: Job, goal: Goal) -> Traced:
         judge = denoised.track
     outcome = reach_judged(goal, batches.add, judge, job.progress, probe=batches.probe)
     options: dict[str, Any] = {}
+    method = job.settings.method
+    won = denoised or plain
     if isinstance(judge, Contest):
-        won = denoised if judge.leader == "denoised" else plain
-        options["auto"] = f"full {'with' if won is denoised else 'without'} --denoise oidn: {judge.why}"
-    else:
-        won = denoised or plain
-    assert won is not None
+        if judge.leader == "plain":
+            won = plain
+        method = "full" if won is plain else "pooled"
+        options["auto"] = f"{method}: {judge.why}"
     frame = Frame(won.renderer.picture(), batches.rays, batches.seconds_compile, batches.seconds_trace)
     if outcome.errors is not None:
         frame.maps[ERROR_LAYER] = np.maximum(outcome.errors.values, 0)
@@ -196,7 +201,33 @@ def _full_until(job: Job, goal: Goal) -> Traced:
         _how_it_ended(goal, outcome),
         options | _how_cleaned(job, won.denoiser),
         seconds,
+        method=method,
     )
+
+
+def _batches(job: Job) -> FullInBatches:
+    return FullInBatches(
+        job.integrator,
+        job.source,
+        seed=job.settings.seed,
+        box_filter=job.box_filter,
+        transfer=job.transfer,
+        memory=job.memory,
+    )
+
+
+def _denoised_part(job: Job) -> Traced:
+    """So many samples without their noise, for a picture that is put together and judged elsewhere."""
+    batches = _batches(job)
+    batches.add(job.settings.samples, job.progress)
+    denoiser = _denoiser(job, lambda: _rays_per_pixel(job, batches.rays))
+    assert denoiser is not None
+    denoised = Denoised(batches, denoiser, job.transfer)
+    errors = denoised.squared_error()
+    frame = Frame(denoised.picture(), batches.rays, batches.seconds_compile, batches.seconds_trace)
+    frame.maps[ERROR_LAYER] = np.maximum(errors.values, 0)
+    seconds = {"denoise": denoiser.seconds}
+    return Traced(frame, batches.samples, options=_how_cleaned(job, denoiser), seconds=seconds, errors=errors)
 
 
 @dataclass(frozen=True)
@@ -259,8 +290,7 @@ def _pooled(job: Job) -> Traced:
     from lippmann.render.pooled.renderer import Pooled
 
     settings, integrator = job.settings, job.integrator
-    assert isinstance(job.source, DisplayRays)
-    denoiser = None if settings.denoise == "none" else _light_denoiser(job)
+    assert isinstance(job.source, DisplayRays | WindowRays)
     pooled = Pooled(
         integrator.scene,
         integrator.traits,
@@ -269,7 +299,6 @@ def _pooled(job: Job) -> Traced:
         seed=settings.seed,
         box_filter=job.box_filter,
         memory=job.memory,
-        denoiser=denoiser,
     )
     started = time.perf_counter()
     pooled.add(settings.samples, job.progress)
@@ -277,23 +306,7 @@ def _pooled(job: Job) -> Traced:
     frame = Frame(pooled.picture(), pooled.rays, maps={POOLED_LAYER: pooled.pooled_share()})
     frame.seconds_trace = gathered - started
     frame.seconds_reuse = time.perf_counter() - gathered
-    options = {} if denoiser is None else {"denoise": settings.denoise}
-    notes = (*pooled.notes, "no estimate of the error: that of pooled light is not proven")
-    return Traced(frame, settings.samples, notes=notes, options=options)
-
-
-def _light_denoiser(job: Job) -> Callable[[Floats, Floats, Floats], Floats]:
-    """Takes the noise out of pictures of light, guided by what pooled rendering has seen of the surfaces."""
-
-    def clean(color: Floats, albedo: Floats, normal: Floats) -> Floats:
-        assert isinstance(job.source, DisplayRays)
-        # Pooled light is smooth already: the high effort gains less than 0.2 dB over the fast one.
-        effort: Effort = "high" if job.settings.denoise == "oidn-high" else "fast"
-        guides = Guides(albedo, normal)
-        cleaned = denoise_views(color, job.source.display, guides, effort=effort, threads=job.threads)
-        return np.maximum(cleaned, np.float32(0))
-
-    return clean
+    return Traced(frame, settings.samples, notes=(*pooled.notes, NOT_PROVEN))
 
 
 def _cleaned(job: Job, traced: Traced) -> Traced:
@@ -309,6 +322,7 @@ def _denoiser(job: Job, rays_per_pixel: Callable[[], float]) -> GuidedDenoiser |
     asked: Denoiser = "oidn" if job.settings.denoise == "auto" else job.settings.denoise
     if asked == "none":
         return None
+    common = job.treatment
     return GuidedDenoiser(
         job.built,
         job.source,
@@ -317,7 +331,10 @@ def _denoiser(job: Job, rays_per_pixel: Callable[[], float]) -> GuidedDenoiser |
         box_filter=job.box_filter,
         memory=job.memory,
         threads=job.threads,
-        effort=lambda: effort_of(asked, rays_per_pixel()),
+        effort=(lambda: effort_of(asked, rays_per_pixel())) if common is None else (lambda: common.effort),
+        exposure=None if common is None else common.exposure,
+        # Where a denoised picture is free to be the best one, it shares its light.
+        shares=job.settings.shares_light or job.settings.denoise == "auto",
         progress=job.progress,
     )
 

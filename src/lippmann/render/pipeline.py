@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import numpy as np
@@ -117,6 +117,8 @@ def render_integral_image(
     )
     traced = trace(job)
     frame = traced.frame
+    if traced.method is not None:
+        settings = replace(settings, method=traced.method)
     if window is not None:
         _widen(frame, window, display, even_background(built, settings))
     watch.seconds |= traced.seconds
@@ -156,7 +158,7 @@ def traced_window(
     from lippmann.render.denoise_views import has_exact_views
     from lippmann.scene.build import BuiltScene
 
-    if settings.method != "full" or not settings.denoises or not isinstance(built, BuiltScene):
+    if settings.method not in ("full", "pooled") or not settings.denoises or not isinstance(built, BuiltScene):
         return None
     return (
         None if has_exact_views(display) else panel_window(scene_corners(built, placement.display_from_world), display)

@@ -63,7 +63,8 @@ def render_quilt(
     size:
         Width and height of the quilt in pixels. What whole views leave over, on the right and on top, is black.
     settings:
-        Those of the methods ``full`` and ``auto``, without layers and sub-pixels.
+        Those of the methods ``full`` and ``auto``, and of ``pooled`` with denoising, whose views share their light (see
+        :mod:`lippmann.render.quilt_sharing`); without layers and sub-pixels.
 
     Raises
     ------
@@ -142,7 +143,8 @@ def _check(display: Display, settings: RenderSettings) -> None:
         rule = "a quilt's views lie side by side, for cylindrical lenses"
         raise PictureError(f"the display {display.name} has {display.lens_array.layout} lenses", rule=rule)
     for given, what in (
-        (settings.method != "full", f"the method {settings.method}"),
+        (settings.pools_cells, "the method pooled without denoising"),
+        (settings.method not in ("full", "pooled"), f"the method {settings.method}"),
         (settings.subpixels, "sub-pixels"),
         (settings.layers, "layers"),
     ):

@@ -34,6 +34,14 @@ class RaySource(Protocol):
         ...
 
 
+def pixel_number(source: RaySource, column: Any, row: Any) -> Any:
+    """The numbers (UInt32) of pixels by which their random numbers are drawn: row by row, of a window as in its whole.
+
+    So a pixel has the same samples whichever part of the picture it is rendered with.
+    """
+    return source.number(column, row) if isinstance(source, WindowRays) else row * source.width + column
+
+
 class DisplayRays:
     """The light lines of a display's pixels, or of its sub-pixels, placed into a scene.
 
@@ -60,16 +68,23 @@ class DisplayRays:
 
 
 class WindowRays:
-    """A window of a display's pixels, as a picture of its own."""
+    """A window of a display's pixels, as a picture of its own; its pixels keep the random numbers of the whole's."""
 
     def __init__(self, source: DisplayRays, window: PixelWindow) -> None:
         self.display = source.display
+        self.world_from_display = source.world_from_display
         self.window = window
         self.width, self.height, self.channels = window.width, window.height, source.channels
         self._source = source
+        # Opaque to the compiler, so that windows of one size share their kernels.
+        self._left, self._top = (dr.opaque(mi.UInt32, first) for first in (window.left, window.top))
 
     def rays(self, column: Any, row: Any, channel: Any, jitter: Any) -> Any:
-        return self._source.rays(column + self.window.left, row + self.window.top, channel, jitter)
+        return self._source.rays(column + self._left, row + self._top, channel, jitter)
+
+    def number(self, column: Any, row: Any) -> Any:
+        """Numbers (UInt32) of pixels in the whole picture."""
+        return (row + self._top) * self._source.width + (column + self._left)
 
     def tiles(self) -> Iterator[tuple[slice, slice]]:
         """Rows and columns of what shows one picture: all of it."""

@@ -36,11 +36,11 @@ class RenderSettings:
     method:
         The renderer: ``full`` traces every ray; ``lens-view`` carries points from micro-image to micro-image and traces
         the pixels that none reached; ``interpolated`` averages those of every other micro-image from its neighbours;
-        ``pooled`` gathers light in the scene and lets every micro-image take it from there; ``auto`` leaves the choice
-        to :func:`~lippmann.render.choice.decide`.
+        ``pooled`` lets all micro-images that show a point share its denoised light, or without a denoiser pools light
+        in cells of the scene; ``auto`` leaves the choice to :func:`~lippmann.render.choice.decide`.
     order:
-        For the last two: ``paper`` goes lens by lens as the paper does; ``default`` (None is the same) in the order
-        that traces fewer pixels.
+        For ``lens-view`` and ``interpolated``: ``paper`` goes lens by lens as the paper does; ``default`` (None is the
+        same) in the order that traces fewer pixels.
     respect_gloss:
         For them, too: trace what reprojection would falsify, such as mirrors, glass and highlights. None: in the
         default order, not in the paper's, which does not know how.
@@ -166,6 +166,16 @@ class RenderSettings:
     def denoises(self) -> bool:
         """Whether noise is taken out whatever comes."""
         return self.denoise not in ("none", "auto")
+
+    @property
+    def pools_cells(self) -> bool:
+        """Whether light is pooled in cells of the scene."""
+        return self.method == "pooled" and not self.denoises
+
+    @property
+    def shares_light(self) -> bool:
+        """Whether denoised light is shared between the micro-images."""
+        return self.method == "pooled" and self.denoises
 
     @property
     def careful(self) -> bool:

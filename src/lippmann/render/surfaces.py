@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 SEEN_THROUGH = 0.5
 #: Mirrors and panes that one ray is followed along.
 MOST_FOLLOWED = 8
+#: How far away (in units of the scene) the sky is.
+FAR_AWAY = 1e6
 #: Sample that draws the middle of a lobe, on the near side of the half at which partly opaque surfaces count as there.
 _MIDDLE = 0.49
 
@@ -51,8 +53,11 @@ class Surfaces(Protocol):
         """What the ray meets first."""
         ...
 
-    def guide(self, ray: Any, active: Any) -> tuple[Any, Any]:
-        """Albedo (or, of what glows, colour) in [0, 1] and normal of what a denoiser should know the pixel by."""
+    def guide(self, ray: Any, active: Any) -> tuple[Any, Any, Any]:
+        """Albedo (or, of what glows, colour) in [0, 1] and normal of what a denoiser should know the pixel by.
+
+        And how far light has come from there, as multiples of the ray's direction: :data:`FAR_AWAY` from nowhere.
+        """
         ...
 
 
@@ -108,10 +113,11 @@ class PhysicalSurfaces:
         return ray, pi
 
     @dr.syntax
-    def guide(self, ray: Any, active: Any) -> tuple[Any, Any]:
+    def guide(self, ray: Any, active: Any) -> tuple[Any, Any, Any]:
         ray = mi.Ray3f(ray)  # current ray
         active = mi.Bool(active)
         albedo, normal = mi.Color3f(0), mi.Vector3f(0)
+        distance = mi.Float(0)  # along the way so far
         tint = mi.Color3f(1)  # of the mirrors and panes on the way
         steps = mi.UInt32(0)  # mirrors and panes met so far
         pi = self._scene.ray_intersect_preliminary(ray, coherent=True, active=active)
@@ -129,12 +135,13 @@ class PhysicalSurfaces:
             goes_on = hit & shows & (steps < MOST_FOLLOWED) & (dr.max(weight) > 0)
             albedo = dr.select(active & ~goes_on, found, albedo)
             normal = dr.select(active & ~goes_on & hit, mi.Vector3f(_normal(si, bsdf, hit)), normal)
+            distance += dr.select(active, dr.select(hit, si.t, FAR_AWAY), 0)
             tint *= weight
             steps += 1
             ray = si.spawn_ray(si.to_world(bs.wo))
             active &= goes_on
             pi = self._scene.ray_intersect_preliminary(ray, coherent=False, active=active)
-        return albedo, normal
+        return albedo, normal, distance
 
 
 def _likeliest(si: Any, bsdf: Any, active: Any) -> tuple[Any, Any]:
@@ -185,11 +192,12 @@ class ClassicSurfaces:
         o, d = self._turned(mi.Vector3f(ray.o)), self._turned(mi.Vector3f(ray.d))
         return self._first(o, d, mi.Bool(active))
 
-    def guide(self, ray: Any, active: Any) -> tuple[Any, Any]:
+    def guide(self, ray: Any, active: Any) -> tuple[Any, Any, Any]:
         o, d = self._turned(mi.Vector3f(ray.o)), self._turned(mi.Vector3f(ray.d))
         seen = self._first(o, d, mi.Bool(active))
         behind = dr.clip(background_color(self._built.scene.background, o, d), 0, 1)
-        return dr.select(seen.hit, seen.albedo, behind), seen.n
+        distance = dr.select(seen.hit, dr.norm(mi.Point3f(seen.p) - mi.Point3f(ray.o)), FAR_AWAY)
+        return dr.select(seen.hit, seen.albedo, behind), seen.n, distance
 
     def _first(self, o: Any, d: Any, active: Any) -> Seen:
         built = self._built

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -15,24 +16,29 @@ from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.render.batches import FullInBatches
 from lippmann.render.estimate import ERROR_LAYER, ErrorSums, PixelErrors, why_no_estimate
 from lippmann.render.full import RayTotals, trace_frame
+from lippmann.render.methods import NOT_PROVEN, SAMPLES_LAYER, Job, trace
+from lippmann.render.outline import PixelWindow
 from lippmann.render.pipeline import build_for, make_integrator
 from lippmann.render.plan import make_plan
-from lippmann.render.rays import DisplayRays
+from lippmann.render.rays import DisplayRays, WindowRays
+from lippmann.render.survey import Treatment, survey
 from lippmann.render.tiles import TileJob
 from lippmann.scene.placement import Placement, place
 from lippmann.store.grid import Window
 from lippmann.store.tile_file import TileResult
 
-#: The arrays of :attr:`TileResult.sums`: flat indices of the lenses that have pixels in the tile, and their sums.
+#: The arrays of :attr:`TileResult.sums`: flat indices of the lenses that have pixels in the tile, and their sums; those
+#: of the samples' errors, where denoised pixels have others.
 LENSES = "lenses"
 SUMS = ("pixels", "values", "squares", "lone")
+OF_SAMPLES = "samples "
 
 
 @dataclass(frozen=True, eq=False)
 class Prepared:
     """A job with its scene on the device. Make one with :func:`prepare`, once in a process.
 
-    ``no_estimate`` says why tiles have no ``sums``, None if they have.
+    ``no_estimate`` says why tiles have no ``sums``, None if they have; ``treatment`` how all tiles are denoised.
     """
 
     job: TileJob
@@ -42,16 +48,33 @@ class Prepared:
     no_estimate: str | None
     integrator: Any
     source: DisplayRays
+    treatment: Treatment | None
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """What the picture's file says of how it was made in tiles."""
+        job = self.job
+        if job.surroundings is None:
+            return {}
+        cut = {"tile_side": job.side, "tile_margin": job.surroundings.margin}
+        if self.treatment is None:
+            return cut
+        return {**cut, "denoise": "oidn", "denoise_effort": self.treatment.effort, "denoise_form": "raw"}
 
 
 @dataclass(frozen=True, eq=False)
 class TracedTile:
-    """A tile in linear light: ``(rows, columns, 3)`` float32, with the errors where it knows them."""
+    """A tile in linear light: ``(rows, columns, 3)`` float32, with the errors where it knows them.
+
+    ``maps``: further layers ``(rows, columns)`` of its method; ``rays``: those of its surroundings count, too.
+    """
 
     index: int
     pixels: NDArray[np.float32]
     errors: PixelErrors | None
     rays: RayTotals
+    maps: Mapping[str, NDArray[Any]] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
 
 
 def prepare(job: TileJob, progress: ProgressCallback = silent) -> Prepared:
@@ -77,14 +100,17 @@ def prepare(job: TileJob, progress: ProgressCallback = silent) -> Prepared:
             home_camera=scene.home_camera,
             bounds_in=scene.bounds_in,
         )
+    integrator = make_integrator(built, settings, placement.display_from_world)
+    source = DisplayRays(job.display, placement.world_from_display, settings.subpixels)
     return Prepared(
         job,
         built,
         placement,
         engine,
-        why_no_estimate(settings),
-        make_integrator(built, settings, placement.display_from_world),
-        DisplayRays(job.display, placement.world_from_display, settings.subpixels),
+        NOT_PROVEN if settings.pools_cells else why_no_estimate(settings),
+        integrator,
+        source,
+        survey(integrator, source, settings) if settings.denoises else None,
     )
 
 
@@ -96,6 +122,8 @@ def render_tile(prepared: Prepared, index: int) -> TileResult:
 def trace_tile(prepared: Prepared, index: int) -> TracedTile:
     """The part of :func:`render_tile` that the engine does."""
     job, settings = prepared.job, prepared.job.settings
+    if job.surroundings is not None:
+        return _trace_window(prepared, index)
     window = job.grid[index]
     is_box = settings.pixel_filter == "box"
     if prepared.no_estimate is not None:
@@ -125,7 +153,39 @@ def trace_tile(prepared: Prepared, index: int) -> TracedTile:
         window=window,
     )
     batches.add(settings.samples)
-    return TracedTile(index, batches.picture(), batches.squared_error(), batches.rays)
+    errors = batches.squared_error()
+    maps = {ERROR_LAYER: np.maximum(errors.values, 0)}
+    return TracedTile(index, batches.picture(), errors, batches.rays, maps)
+
+
+def _trace_window(prepared: Prepared, index: int) -> TracedTile:
+    """A tile as the middle of a larger picture, which is rendered as any other is."""
+    job = prepared.job
+    tile, window = job.grid[index], job.window(index)
+    place = PixelWindow(window.column, window.row, window.columns, window.rows)
+    traced = trace(
+        Job(
+            prepared.built,
+            prepared.integrator,
+            WindowRays(prepared.source, place),
+            job.settings,
+            prepared.placement.display_from_world,
+            job.transfer,
+            job.tile_memory,
+            prepared.engine.threads,
+            treatment=prepared.treatment,
+        )
+    )
+    inside = replace(tile, row=tile.row - window.row, column=tile.column - window.column).slices
+    maps = {name: values[inside] for name, values in traced.frame.maps.items() if name != SAMPLES_LAYER}
+    errors = None if traced.errors is None else _part(traced.errors, inside)
+    return TracedTile(index, traced.frame.pixels[inside], errors, traced.frame.rays, maps, traced.notes)
+
+
+def _part(errors: PixelErrors, inside: tuple[slice, slice]) -> PixelErrors:
+    lone = None if errors.lone is None else errors.lone[inside]
+    samples = None if errors.samples is None else _part(errors.samples, inside)
+    return PixelErrors(errors.values[inside], lone, errors.noise, samples)
 
 
 def packed(prepared: Prepared, traced: TracedTile) -> TileResult:
@@ -134,18 +194,22 @@ def packed(prepared: Prepared, traced: TracedTile) -> TileResult:
     sums, maps = {}, {}
     if traced.errors is not None:
         sums = lens_sums(job.display, job.grid[traced.index], traced.errors)
-        if job.keeps_maps:
-            maps = {ERROR_LAYER: np.maximum(traced.errors.values, 0)}
+    if job.keeps_maps:
+        maps = dict(traced.maps)
     values = stored_values(traced.pixels, job.stored, job.transfer)
-    return TileResult(traced.index, values, maps, sums, dict(vars(traced.rays)))
+    return TileResult(traced.index, values, maps, sums, dict(vars(traced.rays)), traced.notes)
 
 
 def lens_sums(display: Display, window: Window, errors: PixelErrors) -> dict[str, NDArray[Any]]:
     """Sums over the part of each micro-image that lies in the tile."""
     lenses, owner, pixels = np.unique(_owners(display, window), return_inverse=True, return_counts=True)
-    sums = ErrorSums(pixels.astype(np.float64), *np.zeros((3, len(lenses))))
-    sums.add(owner, errors.values, errors.lone)
-    return {LENSES: lenses, **{name: getattr(sums, name) for name in SUMS}}
+    found: dict[str, NDArray[Any]] = {LENSES: lenses}
+    for before, each in (("", errors), (OF_SAMPLES, errors.samples)):
+        if each is not None:
+            sums = ErrorSums(pixels.astype(np.float64), *np.zeros((3, len(lenses))))
+            sums.add(owner, each.values, each.lone)
+            found |= {before + name: getattr(sums, name) for name in SUMS}
+    return found
 
 
 def _owners(display: Display, window: Window) -> NDArray[np.int64]:

@@ -21,6 +21,8 @@ from lippmann.image.formats import check_output, format_for, replacing_output
 from lippmann.image.metadata import Metadata, to_text
 from lippmann.image.provenance import Provenance
 from lippmann.progress import Progress, ProgressCallback, silent
+from lippmann.render.denoise import load_denoiser
+from lippmann.render.denoised_estimate import estimate_denoised
 from lippmann.render.estimate import OWN_NOISE, ErrorSums, Estimate, estimate_of_sums
 from lippmann.render.settings import RenderSettings
 from lippmann.render.tiles import SIDES, TileJob, make_job
@@ -42,8 +44,9 @@ Runner = Callable[["Prepared", Sequence[int], Put], None]
 #: Threads that pack and write while the next tile is traced, and tiles that may wait for them.
 _WRITERS, _WAITING = 2, 3
 
-#: What a picture rendered in one piece takes: float32 RGB and the copies that methods and writers make of it, errors.
-_WHOLE_BYTES_PER_PIXEL = 48
+#: What a picture rendered in one piece takes: float32 RGB and the copies that methods and writers make of it, errors;
+#: and where pixels are made from their neighbours, the batches or halves of all samples, which are kept to the end.
+_WHOLE_BYTES_PER_PIXEL, _WHOLE_BYTES_WITH_NEIGHBOURS = 48, 256
 
 #: How often tiles that turn out damaged are made anew before the disk is blamed.
 _MOST_REPAIRS = 3
@@ -120,6 +123,8 @@ def render_to_file(
         side=_side_of(output) if resume else None,
     )
     _check_fits(job, name)
+    if job.settings.denoises:
+        load_denoiser()
     progress(Progress("load", 0, 1))
     engine = engines.start(settings.device, settings.threads)
     fingerprint = {"the format": name, **job.fingerprint(engine.gpu_name or "cpu")}
@@ -200,23 +205,33 @@ def _summed(prepared: Prepared, store: TileStore) -> Provenance:
     """Rays and the estimate from all tiles, in their order; each is checked on the way."""
     from lippmann.render.full import Frame, RayTotals
     from lippmann.render.pipeline import Stopwatch, placed_options, provenance_of
-    from lippmann.render.tile_tracer import LENSES, SUMS
+    from lippmann.render.tile_tracer import LENSES, OF_SAMPLES, SUMS
 
     job, grid = prepared.job, prepared.job.display.lens_grid
     rays = RayTotals()
-    sums = ErrorSums(*np.zeros((4, grid.rows * grid.columns)))
+    size = grid.rows, grid.columns
+    # Of denoised pictures the samples' errors, too.
+    sums = {
+        before: ErrorSums(*np.zeros((4, size[0] * size[1])))
+        for before in (("",) if prepared.treatment is None else ("", OF_SAMPLES))
+    }
+    # By their first places, each once.
+    notes = dict.fromkeys(prepared.placement.warnings)
     for tile in store.results():
         for kind, count in tile.rays.items():
             setattr(rays, kind, getattr(rays, kind) + count)
-        for name in SUMS if tile.sums else ():
-            # Each lens has one entry in a tile.
-            getattr(sums, name)[tile.sums[LENSES]] += tile.sums[name]
-    notes: tuple[str, ...] = prepared.placement.warnings
+        for before, each in sums.items() if tile.sums else ():
+            for name in SUMS:
+                # Each lens has one entry in a tile.
+                getattr(each, name)[tile.sums[LENSES]] += tile.sums[before + name]
+        notes |= dict.fromkeys(tile.notes)
     estimate: Estimate | None = None
-    if prepared.no_estimate is None:
-        estimate = estimate_of_sums(sums, (grid.rows, grid.columns), OWN_NOISE)
+    if prepared.no_estimate is not None:
+        notes |= {prepared.no_estimate: None}
+    elif prepared.treatment is None:
+        estimate = estimate_of_sums(sums[""], size, OWN_NOISE)
     else:
-        notes += (prepared.no_estimate,)
+        estimate = estimate_denoised(sums[""], sums[OF_SAMPLES], size)
     # Only the size of these pixels is asked for; they take no memory.
     frame = Frame(np.broadcast_to(np.float32(0), (job.grid.height, job.grid.width, 3)), rays)
     return provenance_of(
@@ -228,8 +243,12 @@ def _summed(prepared: Prepared, store: TileStore) -> Provenance:
         Stopwatch(),
         samples=job.settings.samples,
         estimate=estimate,
-        options={**({"auto": job.why} if job.why else {}), **placed_options(job.settings, prepared.placement)},
-        notes=notes,
+        options={
+            **({"auto": job.why} if job.why else {}),
+            **prepared.options,
+            **placed_options(job.settings, prepared.placement),
+        },
+        notes=tuple(notes),
     )
 
 
@@ -302,12 +321,14 @@ def _is_streamed(job: TileJob, name: FormatName) -> bool:
     return name == "zarr" or (name == "tiff" and job.grid.width * job.grid.height >= tiff.TILED_FROM)
 
 
-def fits_whole(display: Display, memory: int) -> bool:
+def fits_whole(display: Display, memory: int, *, with_neighbours: bool = False) -> bool:
     """Whether a picture can be rendered in one piece within so many bytes; see :func:`lippmann.render.plan.make_plan`.
 
-    Beside its own pixels that takes their errors and the codes of its file.
+    Beside its own pixels that takes their errors and the codes of its file. ``with_neighbours``: it is pooled or
+    denoised.
     """
-    return display.panel.width * display.panel.height * _WHOLE_BYTES_PER_PIXEL <= memory
+    per_pixel = _WHOLE_BYTES_WITH_NEIGHBOURS if with_neighbours else _WHOLE_BYTES_PER_PIXEL
+    return display.panel.width * display.panel.height * per_pixel <= memory
 
 
 def _check_fits(job: TileJob, name: FormatName) -> None:

@@ -8,13 +8,12 @@ free.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from importlib.metadata import version as version_of
 from os.path import relpath
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 from xml.etree import ElementTree
 
 import numpy as np
@@ -24,13 +23,14 @@ from lippmann.display import Display
 from lippmann.errors import MemoryLimitError, UsageError
 from lippmann.image.provenance import Transfer
 from lippmann.render.choice import decide
-from lippmann.render.pipeline import transfer_of
+from lippmann.render.pipeline import default_memory, transfer_of
 from lippmann.render.settings import RenderSettings
+from lippmann.render.surroundings import Surroundings, surroundings_of
 from lippmann.scene.mitsuba_source import MitsubaSource
 from lippmann.scene.placement import Placement, PlacementOptions
 from lippmann.scene.scene import Scene
-from lippmann.store.fingerprint import content_hash
-from lippmann.store.grid import TileGrid
+from lippmann.store.fingerprint import content_hash, in_words
+from lippmann.store.grid import TileGrid, Window
 
 if TYPE_CHECKING:
     from lippmann.image.integral_image import Stored
@@ -43,6 +43,13 @@ MOST_SAMPLES = 1 << 24
 FEWEST_TILES = 32
 #: What rendering a pixel of a tile takes in memory: sums of eight batches, the picture, its errors, and a wavefront.
 BYTES_PER_PIXEL = 8 * 12 + 24 + 12 + 96
+#: The same for a pixel of a window whose tile needs its surroundings: pictures, and what the cells of pooled light may
+#: take beside them; batches, guides and what Open Image Denoise works with.
+BYTES_POOLED, BYTES_DENOISED = 1280, 768
+#: Fewer tiles than this do where each is rendered with its surroundings: small ones are mostly those.
+FEWEST_WINDOWS = 4
+#: The most memory that tiles with surroundings are planned for where no limit is given.
+MOST_MEMORY = 4 << 30
 #: Pictures number their sub-pixels in 32 bits.
 MOST_SUBPIXELS = 1 << 32
 
@@ -89,8 +96,20 @@ class TileJob:
 
     @property
     def tile_memory(self) -> int:
-        """Bytes that a tile may use, whatever is free: how it is cut into wavefronts must not depend on that."""
-        return bytes_of_tile(self.side)
+        """Bytes that a tile may use, whatever is free: how it is cut into wavefronts, and how finely its light is
+        pooled, must not depend on that."""
+        return bytes_of_tile(self.side, self.display, self.settings)
+
+    @property
+    def surroundings(self) -> Surroundings | None:
+        """What is rendered around tiles; None where each pixel stands for itself."""
+        return surroundings_of(self.display, self.settings)
+
+    def window(self, index: int) -> Window:
+        """The pixels that are rendered for a tile: its own and, where it needs any, those around."""
+        tile = self.grid[index]
+        around = self.surroundings
+        return tile if around is None else around.window(tile, self.side, (self.grid.width, self.grid.height))
 
     @cached_property
     def scene_hash(self) -> str:
@@ -126,17 +145,23 @@ class TileJob:
             for f in dataclasses.fields(self.placement)
         }
         return {
-            "Lippmann's version": VERSION,
-            "the engine": f"Mitsuba {version_of('mitsuba')}, Dr.Jit {version_of('drjit')}",
-            "the device": device,
+            **made_by(device),
             "the scene's name": self.scene.name,
             "the scene": self.scene_hash,
-            **{f"the display's {name}": text for name, text in _flat(self.display.to_dict())},
+            **in_words(self.display.to_dict(), "the display's "),
             **settings,
             **placement,
             "values": self.stored,
             "maps": str(self.keeps_maps),
+            **self._cut(),
         }
+
+    def _cut(self) -> dict[str, str]:
+        """How the picture is cut, where that shows in its pixels."""
+        around = self.surroundings
+        if around is None:
+            return {}
+        return {"the tiles": f"{self.side} pixels and {around.margin} around, each with {self.tile_memory} bytes"}
 
 
 def make_job(
@@ -166,23 +191,40 @@ def make_job(
     return TileJob(scene, display, settings, placement, side, stored, keeps_maps, choice.why)
 
 
-def bytes_of_tile(side: int) -> int:
+def made_by(device: str) -> dict[str, str]:
+    """The programs, and the ``device`` (``cpu`` or a GPU's name), that a picture's bytes hang on."""
+    return {
+        "Lippmann's version": VERSION,
+        "the engine": f"Mitsuba {version_of('mitsuba')}, Dr.Jit {version_of('drjit')}",
+        "the device": device,
+    }
+
+
+def bytes_of_tile(side: int, display: Display, settings: RenderSettings) -> int:
     """What rendering a tile takes in memory; small ones are given enough for wavefronts that are worth starting."""
-    return max(side, 256) ** 2 * BYTES_PER_PIXEL
+    around = surroundings_of(display, settings)
+    if around is None:
+        return max(side, 256) ** 2 * BYTES_PER_PIXEL
+    pooled = BYTES_POOLED if settings.pools_cells else 0
+    return max(around.longest(side), 256) ** 2 * max(pooled, BYTES_DENOISED if settings.denoises else 0)
 
 
 def _best_side(display: Display, settings: RenderSettings) -> int:
     panel, channels = display.panel, 3 if settings.subpixels else 1
+    memory, fewest = settings.memory, FEWEST_TILES
+    if surroundings_of(display, settings) is not None:
+        fewest = FEWEST_WINDOWS
+        memory = memory or min(MOST_MEMORY, default_memory())
     for side in SIDES:
-        fits = settings.memory is None or bytes_of_tile(side) <= settings.memory
+        fits = memory is None or bytes_of_tile(side, display, settings) <= memory
         is_light = side * side * settings.samples * channels <= MOST_SAMPLES
-        if fits and is_light and len(TileGrid(panel.width, panel.height, side)) >= FEWEST_TILES:
+        if fits and is_light and len(TileGrid(panel.width, panel.height, side)) >= fewest:
             return side
     smallest = SIDES[-1]
-    required = bytes_of_tile(smallest)
-    if settings.memory is not None and settings.memory < required:
+    required = bytes_of_tile(smallest, display, settings)
+    if memory is not None and memory < required:
         raise MemoryLimitError(
-            f"{settings.memory / 2**20:.0f} MiB are too small for a tile",
+            f"{memory / 2**20:.0f} MiB are too small for a tile",
             where="--memory",
             rule=f"{required / 2**20:.0f} MiB are needed beside the scene",
             fix="raise the limit",
@@ -192,11 +234,10 @@ def _best_side(display: Display, settings: RenderSettings) -> int:
 
 def _check_possible(display: Display, settings: RenderSettings) -> None:
     whole = {
-        "--method": None if settings.method == "full" else settings.method,
+        "--method": None if settings.method in ("full", "pooled") else settings.method,
         "--quality": settings.quality,
         "--quality-mean": settings.quality_mean,
         "--max-time": settings.max_time,
-        "--denoise": None if settings.denoise == "none" else settings.denoise,
         "--layers": True if settings.layers else None,
     }
     for option, value in whole.items():
@@ -205,7 +246,7 @@ def _check_possible(display: Display, settings: RenderSettings) -> None:
                 "needs the whole picture" if value is True else f"{value} needs the whole picture",
                 where=option,
                 rule="with --resume, to Zarr and beyond the memory pictures are rendered in tiles",
-                fix="leave it out" if option != "--method" else "use --method full",
+                fix="leave it out" if option != "--method" else "use --method full or pooled",
             )
     panel = display.panel
     subpixels = panel.width * panel.height * (3 if settings.subpixels else 1)
@@ -221,17 +262,6 @@ def _check_possible(display: Display, settings: RenderSettings) -> None:
 def _text(value: object) -> str:
     """A value as text, without loss."""
     return repr(value.tolist() if isinstance(value, np.ndarray) else value)
-
-
-def _flat(values: Mapping[str, Any], before: str = "") -> list[tuple[str, str]]:
-    """Names and texts of nested plain values."""
-    found = []
-    for name, value in values.items():
-        if isinstance(value, Mapping):
-            found += _flat(value, f"{before}{name} ")
-        else:
-            found.append((f"{before}{name.replace('_', ' ')}", repr(value)))
-    return found
 
 
 def files_of(xml: Path, seen: frozenset[Path] = frozenset()) -> list[Path]:

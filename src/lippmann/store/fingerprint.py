@@ -48,6 +48,17 @@ def differences(old: Mapping[str, str], new: Mapping[str, str]) -> list[str]:
     return found
 
 
+def in_words(values: Mapping[str, Any], before: str = "") -> dict[str, str]:
+    """Names and texts of nested plain values, for a fingerprint."""
+    found: dict[str, str] = {}
+    for name, value in values.items():
+        if isinstance(value, Mapping):
+            found |= in_words(value, f"{before}{name} ")
+        else:
+            found[f"{before}{name.replace('_', ' ')}"] = repr(value)
+    return found
+
+
 def _is_sum(text: str) -> bool:
     return len(text) == 64 and all(letter in "0123456789abcdef" for letter in text)
 

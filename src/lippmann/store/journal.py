@@ -23,6 +23,7 @@ from lippmann.atomic import replacing
 from lippmann.errors import OutputError, PictureError
 from lippmann.store.fingerprint import differences
 from lippmann.store.grid import TileGrid
+from lippmann.store.lock import locked
 from lippmann.store.tile_file import MARK, DamagedTile, TileResult, decode, encode, whole_length
 
 #: Added to the picture's name.
@@ -79,7 +80,8 @@ class TileStore:
             _check_same(folder, job)
         with _reported(folder):
             folder.mkdir(exist_ok=True)
-        lock = _locked(folder)
+        with _reported(folder):
+            lock = locked(folder / _LOCK, folder)
         try:
             _sweep(folder)
             if not _holds_tiles(folder):
@@ -193,7 +195,10 @@ def read_job(output: Path) -> dict[str, Any] | None:
         job = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError) as error:
         raise _no_journal(folder, "it has no readable job.json") from error
-    if not isinstance(job, dict) or not isinstance(job.get("fingerprint"), dict):
+    if not isinstance(job, dict):
+        raise _no_journal(folder, "its job.json is none of ours")
+    fingerprint = job.get("fingerprint")
+    if not isinstance(fingerprint, dict) or not all(isinstance(value, str) for value in fingerprint.values()):
         raise _no_journal(folder, "its job.json is none of ours")
     if job.get(_KEY) != _VERSION:
         raise _no_journal(folder, f"its version is {job.get(_KEY)!r}, this program writes {_VERSION}")
@@ -249,26 +254,6 @@ def _is_whole(path: Path, size: int) -> bool:
             return whole_length(file.read(len(MARK) + 12)) == size
     except OSError:
         return False
-
-
-def _locked(folder: Path) -> IO[bytes]:
-    """The open file that says: a process is at work here. The system lets go of it when the process ends, however."""
-    with _reported(folder):
-        lock = (folder / _LOCK).open("ab")
-    try:
-        import fcntl
-    except ImportError:  # no such locks on this system: two processes would do the same work twice, to the same end
-        return lock
-    try:
-        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        lock.close()
-        raise OutputError(
-            "another process is rendering this picture", where=str(folder), fix="wait for it, or end it"
-        ) from None
-    except OSError:  # a file system without locks
-        return lock
-    return lock
 
 
 def _sweep(folder: Path) -> None:

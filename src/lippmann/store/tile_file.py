@@ -1,14 +1,15 @@
 """One tile as bytes: what lies in a journal, and what travels between machines.
 
-A file is the mark, the length of a head (4 bytes, little endian), the head (JSON: the tile's number, its rays, names,
-types and shapes of its arrays and the lengths of what follows), the arrays one after the other, packed, and the SHA-256
-of all that. Whatever was cut short, mixed up or changed is found by length or by that sum.
+A file is the mark, the length of a head (4 bytes, little endian), the head (JSON: the tile's number, its rays, its
+notes, names, types and shapes of its arrays and the lengths of what follows), the arrays one after the other, packed,
+and the SHA-256 of all that. Whatever was cut short, mixed up or changed is found by length or by that sum.
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
+import math
 import struct
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -18,10 +19,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 #: Begins every tile; its last letter is the version of the form.
-MARK = b"LpTile1\n"
+MARK = b"LpTile2\n"
 
 _SUM = hashlib.sha256
 _SUM_BYTES = _SUM().digest_size
+
+#: Zstandard packs a block of at most 128 KB into no less than 4 bytes.
+_MOST_PER_BYTE = 1 << 15
 
 #: Journals are read once: a quick packing (Zstandard, level 1) is the right one.
 _LEVEL = 1
@@ -47,6 +51,8 @@ class TileResult:
         Arrays from which the whole picture's estimate of its error is made; empty without one.
     rays:
         Rays by kind, and samples ``discarded`` for not being finite.
+    notes:
+        What is to be known of it, a sentence each.
     """
 
     index: int
@@ -54,6 +60,7 @@ class TileResult:
     maps: Mapping[str, NDArray[Any]] = field(default_factory=dict)
     sums: Mapping[str, NDArray[Any]] = field(default_factory=dict)
     rays: Mapping[str, int] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
 
 
 def encode(result: TileResult) -> bytes:
@@ -67,7 +74,8 @@ def encode(result: TileResult) -> bytes:
             body = bytes(imagecodecs.zstd_encode(array.tobytes(), level=_LEVEL))
             entries.append([kind, name, array.dtype.str, list(array.shape), len(body)])
             bodies.append(body)
-    head = json.dumps({"index": result.index, "rays": dict(result.rays), "arrays": entries}, sort_keys=True).encode()
+    said = {"index": result.index, "rays": dict(result.rays), "notes": list(result.notes), "arrays": entries}
+    head = json.dumps(said, sort_keys=True).encode()
     data = b"".join((MARK, struct.pack("<IQ", len(head), sum(map(len, bodies))), head, *bodies))
     return data + _SUM(data).digest()
 
@@ -80,24 +88,35 @@ def decode(data: bytes) -> TileResult:
     DamagedTile
         If these are not exactly such bytes.
     """
-    import imagecodecs
-
     if whole_length(data[: len(MARK) + 12]) != len(data):
         raise DamagedTile("its length is wrong")
     body, found = data[:-_SUM_BYTES], data[-_SUM_BYTES:]
     if _SUM(body).digest() != found:
         raise DamagedTile("its check sum is wrong")
-    # What follows was written by encode(), or the sum would not agree.
+    try:
+        return _taken_apart(data)
+    except (ArithmeticError, AttributeError, LookupError, RuntimeError, TypeError, ValueError) as error:
+        raise DamagedTile("its sum agrees with a head that makes no sense") from error
+
+
+def _taken_apart(data: bytes) -> TileResult:
+    """The tile; any error if the head is not one of :func:`encode`."""
+    import imagecodecs
+
     start = len(MARK) + 12
     (length,) = struct.unpack("<I", data[len(MARK) : len(MARK) + 4])
     head = json.loads(data[start : start + length])
     place = start + length
     arrays: dict[str, dict[str, NDArray[Any]]] = {"pixels": {}, "maps": {}, "sums": {}}
     for kind, name, dtype, shape, size in head["arrays"]:
-        raw = imagecodecs.zstd_decode(data[place : place + size])
+        unpacked = math.prod(shape) * np.dtype(dtype).itemsize
+        if not 0 <= unpacked <= _MOST_PER_BYTE * size:
+            raise ValueError(f"{size} bytes cannot be {unpacked}")
+        raw = imagecodecs.zstd_decode(data[place : place + size], out=unpacked)
         arrays[kind][name] = np.frombuffer(raw, dtype=dtype).reshape(shape)
         place += size
-    return TileResult(head["index"], arrays["pixels"][""], arrays["maps"], arrays["sums"], head["rays"])
+    notes = tuple(str(note) for note in head["notes"])
+    return TileResult(head["index"], arrays["pixels"][""], arrays["maps"], arrays["sums"], head["rays"], notes)
 
 
 def whole_length(beginning: bytes) -> int | None:

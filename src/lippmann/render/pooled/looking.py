@@ -17,12 +17,10 @@ from lippmann.render.sampling import SampleStream
 
 @dataclass
 class Seen:
-    """Of every lane: ``a``, ``b`` its colour by the light of each half; ``albedo`` and ``normal`` of what it saw."""
+    """Of every lane: ``a``, ``b`` its colour by the light of each half."""
 
     a: Any
     b: Any
-    albedo: Any
-    normal: Any
 
 
 class Looker:
@@ -40,8 +38,6 @@ class Looker:
         path, follow = self._path, self._follower
         way = follow.start(ray)
         a, b = mi.Color3f(0), mi.Color3f(0)
-        albedo, normal = mi.Color3f(0), mi.Vector3f(0)
-        mixed = mi.Bool(False)  # what follows is the reflection in a surface that is diffuse as well
         active = mi.Bool(True)
         while dr.hint(active, label="looks"):
             si = way.pi.compute_surface_interaction(way.ray, ray_flags=mi.RayFlags.All)
@@ -58,25 +54,19 @@ class Looker:
             reflected = way.throughput * s.diffuse
             a += emitted + dr.select(shared, reflected * light[0], 0)
             b += emitted + dr.select(shared, reflected * light[1], 0)
-            seen = dr.select(shared, reflected, 0) + dr.select(way.vertex_delta, dr.clip(emitted, 0, 1), 0)
             if dr.hint(gloss is not None, mode="scalar"):
                 shared = going_on & opaque & s.shares_rest
                 light = self._pooled(gloss, si, s, distance, stream.next_2d(dimension + 5), shared, way.ray.d)
                 reflected = way.throughput * s.gloss
                 a += dr.select(shared, reflected * light[0], 0)
                 b += dr.select(shared, reflected * light[1], 0)
-                seen += dr.select(shared, reflected, 0)
-            albedo += dr.select(active & ~mixed, seen, 0)
-            normal += dr.select(active & ~mixed & si.is_valid(), s.normal * dr.max(seen), 0)
-
             follows = going_on & opaque & s.follows_rest
-            mixed |= follows & s.shares_diffuse
             lamps = follow.direct(way, si, bsdf, s, stream, follows)
             a += lamps
             b += lamps
             follow.step(way, si, bsdf, s, stream, opaque, going_on, mi.Bool(False))
             active = going_on & way.alive
-        return Seen(a, b, albedo, normal), way.secondary, way.shadow
+        return Seen(a, b), way.secondary, way.shadow
 
     def _pooled(
         self, table: Any, si: Any, s: Any, distance: Any, jitter: Any, active: Any, ray_d: Any

@@ -9,7 +9,6 @@ has anything to do with p or with the other. From the errors of the halves p and
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -32,15 +31,11 @@ from lippmann.render.pooled.keys import NOWHERE
 from lippmann.render.pooled.looking import Looker
 from lippmann.render.pooled.pool import Pool
 from lippmann.render.pooled.vertices import Scale, diffuse_key, gloss_key, scaled
-from lippmann.render.rays import DisplayRays
+from lippmann.render.rays import DisplayRays, WindowRays, pixel_number
 from lippmann.render.sampling import SampleStream
 from lippmann.render.traits import SceneTraits
 
 Picture = NDArray[np.float32]
-
-#: Takes the noise out of a picture: ``(color, albedo, normal) -> color``, each ``(H, W, 3)`` on the panel; the guides
-#: hold next to no noise.
-Denoiser = Callable[[Picture, Picture, Picture], Picture]
 
 #: Unpooled estimates that are kept apart; even ones belong to the first half, odd ones to the second. One of each half
 #: chooses, two judge.
@@ -53,12 +48,10 @@ LEAST_CELLS = 1 << 14
 LANES = 1 << 19
 #: Blocks of the picture that are weighed are a lens wide, or so many pixels.
 MOST_BLOCK = 16
-#: Keeps light finite where nothing is sent back.
-LEAST_ALBEDO = 1e-2
 #: Finest cells along a lens pitch.
 FINEST_PER_PITCH = 32
-#: Samples that look at a pixel: at least, fewer where a denoiser smooths edges; and for every path spent on it.
-LEAST_LOOKS, LEAST_SMOOTHED_LOOKS, LOOKS_PER_PATH = 8, 4, 4
+#: Samples that look at a pixel: at least, and for every path spent on it.
+LEAST_LOOKS, LOOKS_PER_PATH = 8, 4
 #: Looks of one wavefront, per pixel.
 MOST_LOOKS = 16
 
@@ -81,15 +74,13 @@ class Pooled:
     depth:
         Surfaces per path, at least 1.
     source:
-        The display's rays; its pixels or sub-pixels.
+        The display's rays, or those of a window of it; its pixels or sub-pixels.
     seed:
         Of all random choices.
     box_filter:
         Samples fill the pixel; else they all go through its middle.
     memory:
         Bytes that may be used.
-    denoiser:
-        Makes further candidates for the picture; None does without.
     looks:
         Samples that look at each pixel; None for as many as suit the paths.
 
@@ -106,12 +97,11 @@ class Pooled:
         scene: Any,
         traits: SceneTraits,
         depth: int,
-        source: DisplayRays,
+        source: DisplayRays | WindowRays,
         *,
         seed: int = 0,
         box_filter: bool = True,
         memory: int = 4 << 30,
-        denoiser: Denoiser | None = None,
         looks: int | None = None,
     ) -> None:
         surfaces.prepare()
@@ -135,10 +125,8 @@ class Pooled:
         spread = display.panel.pixel_pitch / display.gap
         self._scale = Scale(dr.opaque(mi.Float, pitch / FINEST_PER_PITCH), dr.opaque(mi.Float, pitch / spread))
         self._looker = Looker(self._follower, self._scale)
-        self._seen: tuple[Picture, Picture, Picture, Picture] | None = None
+        self._seen: tuple[Picture, Picture] | None = None
         self._best: tuple[_Chosen, _Chosen] | None = None
-        self._denoiser = denoiser
-        self._least_looks = LEAST_LOOKS if denoiser is None else LEAST_SMOOTHED_LOOKS
         self._block = max(4, round(min(MOST_BLOCK, display.pixels_per_lens[0])))
         self._board = np.add.outer(np.arange(source.height), np.arange(source.width))[:, :, None] & 1
 
@@ -171,7 +159,7 @@ class Pooled:
         row, column = divide(pixel, source.width)
         row += dr.opaque(mi.UInt32, first)
         sample += dr.opaque(mi.UInt32, begin)
-        number = (row * source.width + column) * source.channels + channel
+        number = pixel_number(source, column, row) * source.channels + channel
         stream = SampleStream.of_pixels(number, sample, dr.opaque(mi.UInt32, seed))
         jitter = stream.next_2d(PIXEL_DIMENSION) if self._box else mi.Point2f(0.5)
         return source.rays(column, row, channel, jitter), stream, row, column, lanes
@@ -236,28 +224,28 @@ class Pooled:
         """The unpooled picture: all samples, each for its own pixel alone."""
         return np.asarray(self._raw.sum(0) / max(1, self.samples), np.float32)
 
-    def see(self) -> tuple[Picture, Picture, Picture, Picture]:
-        """Pictures by the light of each half, albedo and normal, each ``(H, W, 3)``."""
+    def see(self) -> tuple[Picture, Picture]:
+        """Pictures by the light of each half, each ``(H, W, 3)``."""
         if self._seen is not None:
             return self._seen
         source = self._source
         diffuse = self._diffuse.table()
         gloss = self._gloss.table() if self._has_gloss else None
-        looks = self._looks or max(self._least_looks, LOOKS_PER_PATH * self.samples)
-        result = np.zeros((4, source.height, source.width, 3), np.float32)
+        looks = self._looks or max(LEAST_LOOKS, LOOKS_PER_PATH * self.samples)
+        result = np.zeros((2, source.height, source.width, 3), np.float32)
         for first, rows in self._bands(min(looks, MOST_LOOKS)):
             for begin in range(0, looks, MOST_LOOKS):
                 count = min(MOST_LOOKS, looks - begin)
                 ray, stream, _, _, _ = self._lanes(first, rows, count, begin, self._seed * 8 + 7)
                 seen, secondary, shadow = self._looker.look(ray, stream, diffuse, gloss)
-                parts = [mi.Color3f(part) for part in (seen.a, seen.b, seen.albedo, seen.normal)]
+                parts = [seen.a, seen.b]
                 finite = dr.isfinite(dr.sum(parts[0] + parts[1]))
                 parts = [dr.select(finite, part, 0) for part in parts]
                 dr.eval(parts, secondary, shadow)
                 for number, part in enumerate(parts):
                     summed = mi.Color3f(*(dr.block_sum(c, count) for c in part))
                     result[number, first : first + rows] += self._pixels(_rgb(summed), rows) / looks
-        self._seen = (result[0], result[1], result[2], result[3])
+        self._seen = (result[0], result[1])
         return self._seen
 
     def picture(self) -> Picture:
@@ -298,28 +286,22 @@ class Pooled:
     def _chosen(self) -> tuple[_Chosen, _Chosen]:
         """The pictures of the two halves, each the best of what can be made of it as the other sees it."""
         if self._best is None:
-            a, b, albedo, normal = self.see()
+            a, b = self.see()
             raw = self._halves()
             # With fewer samples nothing is left to judge by, and all of the other half may choose.
             judges = [raw[1], raw[0]] if self.samples < GROUPS else [self._groups_of(1)[0], self._groups_of(0)[0]]
             self._best = (
-                self._choose(a, raw[0], judges[0], albedo, normal),
-                self._choose(b, raw[1], judges[1], albedo, normal),
+                self._choose(a, raw[0], judges[0]),
+                self._choose(b, raw[1], judges[1]),
             )
         return self._best
 
-    def _choose(self, pooled: Picture, raw: Picture, judge: Picture, albedo: Picture, normal: Picture) -> _Chosen:
-        best = pooled
+    def _choose(self, pooled: Picture, raw: Picture, judge: Picture) -> _Chosen:
         share = np.ones(pooled.shape[:2], np.float32)
-        if self._denoiser is not None:
-            # The light alone is smoothed: textures are known as exactly as the samples that looked.
-            under = albedo + LEAST_ALBEDO
-            smooth = self._denoiser(pooled / under, np.clip(albedo, 0, 1), normal) * under
-            best = smooth if self.samples < 2 else blended(pooled, smooth, judge, self._block)[0]
         if self.samples < 2:
-            return _Chosen(best, share)
-        # The unpooled samples themselves come last: enough of them are nearer to the truth than anything else.
-        best, weight = blended(best, raw, judge, self._block)
+            return _Chosen(pooled, share)
+        # Enough unpooled samples are nearer to the truth than anything else.
+        best, weight = blended(pooled, raw, judge, self._block)
         return _Chosen(best, share - weight)
 
     def _groups_of(self, half: int) -> list[Picture]:

@@ -31,6 +31,10 @@ class Bands:
         """Call the kernel for all rows of a picture and wait: ``kernel(first_row, last_row, points, *arguments)``."""
         self._run(kernel, len(points.status), SMALLEST_BAND_OF_ROWS, (points, *arguments))
 
+    def lines(self, kernel: Callable[..., Any], count: int, *arguments: Any) -> None:
+        """Call the kernel for all rows of arrays and wait: ``kernel(first_row, last_row, *arguments)``."""
+        self._run(kernel, count, SMALLEST_BAND_OF_ROWS, arguments)
+
     def pixels(self, kernel: Callable[..., Any], count: int, *arguments: Any) -> None:
         """Call the kernel for all entries of a list of pixels and wait: ``kernel(first, last, *arguments)``."""
         self._run(kernel, count, SMALLEST_BAND_OF_PIXELS, arguments)
