@@ -57,13 +57,14 @@ def main() -> None:
     parser.add_argument("--minutes", type=float, default=float("inf"), help="of the clock, for all targets together")
     options = parser.parse_args()
     names = options.targets or list(TARGETS)
-    results: dict[str, Any] = saved("fuzz").get("targets", {})
     end = time.monotonic() + 60 * options.minutes
     for left, name in zip(range(len(names), 0, -1), names, strict=True):
         # Time that a target leaves over goes to those after it.
         share = max(1.0, (end - time.monotonic()) / left)
         found = fuzz(name, options.inputs, options.seed, share)
         print(f"{name}: {found}", file=sys.stderr, flush=True)
+        # Read anew each time: another process may have written of other targets meanwhile.
+        results: dict[str, Any] = saved("fuzz").get("targets", {})
         results[name] = [run for run in results.get(name, []) if run["seed"] != options.seed] + [found]
         limits = {"seconds": SECONDS, "bytes": MEMORY}
         save("fuzz", {"limits": limits, "targets": {key: results[key] for key in TARGETS if key in results}})

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import json
+import math
 from pathlib import Path
 
 import pytest
@@ -26,6 +27,37 @@ def shared_scenes() -> Path:
     if not SHARED_SCENES.is_dir():
         pytest.skip("the folder ../shared/scenes with real scenes is not there")
     return SHARED_SCENES
+
+
+def _display_of_whole_lenses(
+    layout="lenticular", lenses=(4, 3), pixels=3, *, pixel_pitch=0.25, distance=math.inf, gap=6.8, **lens_array
+):
+    from lippmann.display import Display, LensArray, Panel
+
+    magnification = 1.0 + gap / distance
+    height = lenses[1] * pixels
+    if layout == "hexagonal":
+        row_pixels = max(1, round(0.866 * pixels))
+        height = row_pixels * lenses[1]
+        lens_array.setdefault("row_pitch", row_pixels * pixel_pitch / magnification)
+    pitch = lens_array.pop("pitch", pixels * pixel_pitch / magnification)
+    return Display(
+        name=f"test-{layout}",
+        panel=Panel(lenses[0] * pixels, height, pixel_pitch),
+        lens_array=LensArray(layout, pitch, **lens_array),
+        gap=gap,
+        viewing_distance=distance,
+        aperture_distance=min(5.0, distance / 2),
+    )
+
+
+@pytest.fixture(scope="session")
+def make_display():
+    """``make_display(layout, lenses, pixels, ...)``: ``lenses`` (across, down) of ``pixels`` whole pixels each.
+
+    A lenticular sheet has as many rows as a square array.
+    """
+    return _display_of_whole_lenses
 
 
 @pytest.fixture(scope="session")

@@ -162,7 +162,7 @@ def render_sequence(
     """
     placed = PlacementOptions(cast("Mode | None", place), camera, turn, shift, scale, pop_out)
     shown, wanted, where = _begun(motion, display, frames, placed)
-    return _rendered(motion, shown, wanted, where, progress, options)
+    return rendered(motion, shown, wanted, where, progress, options)
 
 
 def sequence_to_files(
@@ -207,7 +207,7 @@ def sequence_to_files(
     """
     placed = PlacementOptions(cast("Mode | None", place), camera, turn, shift, scale, pop_out)
     shown, wanted, where = _begun(motion, display, frames, placed)
-    return _filed(motion, shown, wanted, where, path_of, runner, bits, progress, options)
+    return filed(motion, shown, wanted, where, path_of, runner, bits, progress, options)
 
 
 def _begun(
@@ -218,7 +218,7 @@ def _begun(
     return shown, wanted, find_stand(motion, shown, options)
 
 
-def _rendered(
+def rendered(
     motion: Motion,
     display: Display,
     frames: Sequence[int],
@@ -226,6 +226,7 @@ def _rendered(
     progress: ProgressCallback,
     options: dict[str, Any],
 ) -> Iterator[tuple[int, IntegralImage]]:
+    """The frames of :func:`render_sequence`, once it is known where the display stands."""
     for position, frame in enumerate(frames):
         report = _of_frame(progress, position, len(frames))
         image = render(motion.scene(frame), display, placed=where(frame), progress=report, **options)
@@ -237,7 +238,7 @@ def _rendered(
         yield frame, replace(image, provenance=provenance)
 
 
-def _filed(
+def filed(
     motion: Motion,
     display: Display,
     frames: Sequence[int],
@@ -248,6 +249,7 @@ def _filed(
     progress: ProgressCallback,
     options: dict[str, Any],
 ) -> Iterator[tuple[int, Rendered]]:
+    """The files of :func:`sequence_to_files`, once it is known where the display stands."""
     for name in ("order", "respect_gloss"):
         if options.pop(name, None) is not None:
             raise UsageError("is for methods that need the whole picture", where=f"--{name.replace('_', '-')}")

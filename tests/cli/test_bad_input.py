@@ -48,13 +48,15 @@ def kept(tmp_path):
         ("truncated.stl", bytes(80) + b"\x05\x00\x00\x00" + bytes(20)),
         ("foreign.xml", b"<html></html>"),
         ("unknown.blend", b"BLENDER"),
+        ("n" * 300 + ".obj", None),
+        ("n" * 300, None),
     ],
 )
 def test_scene_files_that_will_not_do(lippmann, tmp_path, kept, name, content):
     path = tmp_path / name
     if content is not None:
         path.write_bytes(content)
-    refuse(lippmann("render", path, *FAST, "-o", kept), name)
+    refuse(lippmann("render", path, *FAST, "-o", kept), "" if len(name) > 255 else name)
 
 
 def test_absent_texture_names_the_texture(lippmann, tmp_path, kept):
@@ -122,6 +124,7 @@ def test_an_unknown_display_suggests_a_known_one(lippmann, kept):
         (("--camera", "nobody"), "nobody"),
         (("--device", "abacus"), "abacus"),
         (("--environment", "gone.exr"), "gone.exr"),
+        (("--display", "d" * 300 + ".toml"), "dddd"),
         (("--frobnicate",), "--frobnicate"),
     ],
 )

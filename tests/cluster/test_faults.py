@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import signal
 import subprocess
 import time
+from urllib.request import urlopen
 
 import psutil
 import pytest
@@ -32,6 +34,28 @@ def test_a_killed_worker_and_a_poisoned_tile(lab, render, here, until):
     assert second.error is None
     assert second.result.resumed == TILES - 1
     assert second.output.read_bytes() == here
+
+
+def test_the_dashboard_shows_tiles_by_name(lab, render, until):
+    """The page of a worker, as people and programs get it, lists the tile that it holds: row 1, column 2."""
+    pytest.importorskip("bokeh")
+    lab.start()
+    lab.fail("hold", 6)
+    begun = render(lab.address)
+    until(lambda: 6 in lab.begun())
+    (link,) = (line.split()[-1] for line in begun.remarks if "dashboard" in line)
+    assert link.startswith("http://127.0.0.1:")
+    home = link.removesuffix("/status")
+    (worker,) = re.findall(r'href="\.\./(worker/[^"]+\.html)"', _page(f"{home}/info/main/workers.html"))
+    assert "tile-r0001_c0002-" in _page(f"{home}/info/{worker}")
+    assert "Dask: TaskStream" in _page(f"{home}/individual-task-stream")
+    lab.heal("hold", 6)
+    assert begun.finish().error is None
+
+
+def _page(address: str) -> str:
+    with urlopen(address, timeout=20) as answer:
+        return answer.read().decode()
 
 
 @pytest.mark.long

@@ -8,43 +8,9 @@ import numpy as np
 import pytest
 from hypothesis import strategies as st
 
-from lippmann.display import Display, LensArray, Panel
 from lippmann.image import IntegralImage, Provenance
 
 PLACEMENT = np.array([[0.0, 0.0, 2.0, 0.1], [0.0, 2.0, 0.0, -1 / 3], [-2.0, 0.0, 0.0, 7.0], [0.0, 0.0, 0.0, 1.0]])
-
-
-def make_display(
-    layout="square", lenses=(4, 3), pixels=3, *, distance=math.inf, gap=6.0, pixel_pitch=0.25, **lens_array
-):
-    """``lenses`` (across, down) of ``pixels`` whole pixels; a lenticular sheet has as many rows as a square array."""
-    magnification = 1.0 + gap / distance
-    height = lenses[1] * pixels
-    if layout == "hexagonal":
-        row_pixels = max(1, round(0.866 * pixels))
-        height = row_pixels * lenses[1]
-        lens_array["row_pitch"] = row_pixels * pixel_pitch / magnification
-    return Display(
-        name=f"test-{layout}",
-        panel=Panel(lenses[0] * pixels, height, pixel_pitch),
-        lens_array=LensArray(layout, pixels * pixel_pitch / magnification, **lens_array),
-        gap=gap,
-        viewing_distance=distance,
-        aperture_distance=min(5.0, distance / 2),
-    )
-
-
-@st.composite
-def make_random_display(draw, layouts=("square", "lenticular")):
-    """A small display of whole lenses, or of any lenses that cover whole pixels if other layouts are asked for."""
-    return make_display(
-        draw(st.sampled_from(layouts)),
-        (draw(st.integers(1, 5)), draw(st.integers(1, 4))),
-        draw(st.integers(1, 5)),
-        distance=draw(st.sampled_from([math.inf, 500.0]) | st.floats(60, 3000)),
-        gap=draw(st.floats(0.5, 9)),
-        pixel_pitch=draw(st.sampled_from([0.25, 25.4 / 96]) | st.floats(0.02, 0.4)),
-    )
 
 
 def make_image(display, seed=0, *, stored="float32", depth=False, **parts):
@@ -85,15 +51,32 @@ def assert_same(one, other, *, maps=True):
 
 
 @pytest.fixture(scope="session")
-def display():
-    """``display(layout, lenses, pixels, distance=..., ...)``: a small display."""
-    return make_display
+def display(make_display):
+    """``display(layout, lenses, pixels, distance=..., ...)``: a small display, a square array unless told."""
+
+    def make(layout="square", *sizes, **options):
+        return make_display(layout, *sizes, **{"gap": 6.0, **options})
+
+    return make
 
 
 @pytest.fixture(scope="session")
-def random_displays():
+def random_displays(make_display):
     """The Hypothesis strategy maker ``random_displays(layouts)``."""
-    return make_random_display
+
+    @st.composite
+    def make(draw, layouts=("square", "lenticular")):
+        """A small display of whole lenses, or of any lenses that cover whole pixels if other layouts are asked for."""
+        return make_display(
+            draw(st.sampled_from(layouts)),
+            (draw(st.integers(1, 5)), draw(st.integers(1, 4))),
+            draw(st.integers(1, 5)),
+            distance=draw(st.sampled_from([math.inf, 500.0]) | st.floats(60, 3000)),
+            gap=draw(st.floats(0.5, 9)),
+            pixel_pitch=draw(st.sampled_from([0.25, 25.4 / 96]) | st.floats(0.02, 0.4)),
+        )
+
+    return make
 
 
 @pytest.fixture(scope="session")

@@ -12,6 +12,9 @@ from typing import Any
 #: Inputs are cut at this length: what is long is slow to read without being odder.
 LONGEST = 1 << 16
 
+#: Words are looked for in so many bytes, somewhere: in all of a long input that would take longer than reading it.
+_PART = 2048
+
 _WORD = re.compile(rb'[-+]?[0-9][0-9.]*(?:[eE][-+]?[0-9]+)?|[A-Za-z_][A-Za-z_0-9]*|"[^"\n]*"|[^\s]')
 
 _NUMBERS = [
@@ -121,7 +124,8 @@ class Mutator:
 
     def _in_words(self, data: bytes) -> bytes:
         pick = self._random
-        places = [match.span() for match in _WORD.finditer(data)]
+        first = pick.randrange(max(1, len(data) - _PART))
+        places = [match.span() for match in _WORD.finditer(data, first, first + _PART)]
         if not places:
             return data + pick.choice(self._words)
         start, stop = pick.choice(places)

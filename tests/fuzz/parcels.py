@@ -18,13 +18,16 @@ def packed(folder: Path) -> bytes:
 def unpack(data: bytes, folder: Path) -> None:
     """Write the files into ``folder``; what a file system cannot hold, and what would lie outside, is left out."""
     heads = list(_HEAD.finditer(data))
+    made = {folder}
     for head, after in zip_longest(heads, heads[1:]):
         path = folder / head[1].decode("ascii")
         if ".." in path.parts:
             continue
         end = len(data) if after is None else after.start()
         try:
-            path.parent.mkdir(parents=True, exist_ok=True)
+            if path.parent not in made:
+                path.parent.mkdir(parents=True, exist_ok=True)
+                made.add(path.parent)
             path.write_bytes(data[head.end() : end].removesuffix(b"\n"))
         except OSError:  # a file where a folder should be, or the other way round
             continue

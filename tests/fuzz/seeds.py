@@ -23,8 +23,10 @@ from lippmann.exchange.pfm import write_pfm
 from lippmann.image import IntegralImage, Provenance, write_micro_images, write_views
 from lippmann.image.formats import write_picture
 from lippmann.image.metadata import metadata_of, to_text
+from lippmann.store import FrameJournal, TileResult, TileStore, encode
 
 from parcels import packed  # isort: skip
+from targets import GRID  # isort: skip
 
 CORPUS = Path(__file__).parent / "corpus"
 
@@ -83,6 +85,15 @@ def _all() -> Iterator[tuple[str, str, bytes]]:
             _written(lambda path, g=given, kind=layout: export_image(g, path, kind, bits=8), name),
         )
     yield "layout-lftoolbox", "5", _matlab_5()
+    yield from _scene_pictures()
+    yield (
+        "quilt-picture",
+        "small",
+        _encoded(np.random.default_rng(3).integers(0, 256, (32, 48, 3)).astype(np.uint8), "JPEG"),
+    )
+    yield "tile", "maps", encode(_tile(1))
+    yield "journal", "half", _journal()
+    yield "frame-journal", "two", _frame_journal()
     yield "pfm", "plain", _written(lambda path: write_pfm(path, depth["depth"]), "a.pfm")
 
 
@@ -95,12 +106,72 @@ def _written(write: Callable[[Path], object], name: str) -> bytes:
         shutil.rmtree(folder)
 
 
+def _scene_pictures() -> Iterator[tuple[str, str, bytes]]:
+    """What scenes take along: surroundings and textures."""
+    import OpenEXR
+
+    light = np.linspace(0.1, 2.0, 24, dtype=np.float32).reshape(2, 4, 3)
+    planes = {name: np.ascontiguousarray(light[..., number]) for number, name in enumerate("RGB")}
+    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    yield "environment", "exr", _written(lambda path: OpenEXR.File(header, planes).write(str(path)), "a.exr")
+    texels = b"".join(bytes((value, 100, 50, 128)) for value in range(8))
+    yield "environment", "hdr", b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 2 +X 4\n" + texels
+    codes = np.random.default_rng(2).integers(0, 256, (4, 4, 4)).astype(np.uint8)
+    yield "texture", "rgba.png", _encoded(codes, "PNG")
+    yield "texture", "grey16.png", _encoded(codes[..., 0].astype(np.uint16) * 200, "PNG")
+    for kind in ("JPEG", "BMP", "TGA", "GIF", "PPM", "WEBP"):
+        yield "texture", kind.lower(), _encoded(codes[..., :3], kind)
+
+
+def _encoded(pixels: Any, kind: str) -> bytes:
+    from PIL import Image as Pillow
+
+    stream = io.BytesIO()
+    Pillow.fromarray(pixels).save(stream, kind)
+    return stream.getvalue()
+
+
+def _tile(index: int) -> TileResult:
+    shape = GRID[index].shape
+    codes = np.random.default_rng(index).integers(0, 256, (*shape, 3)).astype(np.uint8)
+    return TileResult(
+        index,
+        codes,
+        {"depth": np.ones(shape, np.float32)},
+        {"error": np.zeros((2, 3))},
+        {"primary": 32, "discarded": 0},
+    )
+
+
+def _journal() -> bytes:
+    folder = Path(tempfile.mkdtemp())
+    try:
+        with TileStore.open(folder / "p.tif", {"version": "1", "spp": "4"}, GRID, resume=True) as store:
+            for index in range(len(GRID)):
+                store.put(_tile(index))
+        return packed(folder / "p.tif.parts")
+    finally:
+        shutil.rmtree(folder)
+
+
+def _frame_journal() -> bytes:
+    folder = Path(tempfile.mkdtemp())
+    try:
+        (folder / "0.png").write_bytes(b"frame")
+        with FrameJournal.open(folder / "j", {"version": "1", "spp": "4"}, resume=False) as journal:
+            for number in range(2):
+                journal.add(number, folder / "0.png", {"method": "full", "denoise": "none"})
+        return (folder / "j").read_bytes()
+    finally:
+        shutil.rmtree(folder)
+
+
 def _matlab_5() -> bytes:
     from scipy import io as matlab
 
     stream = io.BytesIO()
     matlab.savemat(stream, {"LF": np.zeros((1, 2, 2, 2, 3), np.uint8)}, do_compression=True)
-    return stream.getvalue()
+    return b"MATLAB 5.0 MAT-file".ljust(116) + stream.getvalue()[116:]  # without the date
 
 
 def _ply() -> bytes:

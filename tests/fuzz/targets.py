@@ -9,8 +9,6 @@ import io
 import json
 import re
 import shutil
-import struct
-import zlib
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache
@@ -18,25 +16,40 @@ from pathlib import Path
 from typing import Any
 from unittest import mock
 
+from lippmann import quilt
+from lippmann.cli import parse
+from lippmann.cli.sequences import frame_range, numbered
+from lippmann.cluster.address import parse_target
 from lippmann.display import load_display
 from lippmann.display.looking_glass import display_of_calibration
 from lippmann.display.monitor_file import monitor_of_tables
 from lippmann.display.short_form import display_of_short_form
-from lippmann.errors import LippmannError
+from lippmann.errors import LippmannError, PictureError
 from lippmann.exchange.hci_parameters import read_parameters
 from lippmann.exchange.layouts import import_image
 from lippmann.exchange.pfm import read_pfm
 from lippmann.image import compose, large, read_picture
 from lippmann.image.metadata import from_text
-from lippmann.quilt import layout_of_name
+from lippmann.scene.environment import read_environment
 from lippmann.scene.gltf.moving import MovingGltf
 from lippmann.scene.load import load_scene
+from lippmann.scene.resources import decode_image
 from lippmann.scene.tachyon import read_cam
+from lippmann.store import DamagedTile, FrameJournal, TileGrid, TileStore, decode
 from lippmann.viewer.calibrate.site import CalibrationSite
 from lippmann.viewer.server import ViewerSite
 from lippmann.viewer.shown import PictureFile
 from lippmann.viewer.web import _Handler
 
+from forms import (  # isort: skip
+    body_tree,
+    glb_repaired,
+    glb_tree,
+    part_tree,
+    png_repaired,
+    tile_repaired,
+    tile_tree,
+)
 from guard import Read  # isort: skip
 from mutation import json_tree  # isort: skip
 from parcels import unpack  # isort: skip
@@ -97,6 +110,31 @@ def _obj(data: bytes, folder: Path) -> object:
     return load_scene(folder / "s.obj").bounds
 
 
+def _mitsuba(data: bytes, folder: Path) -> object:
+    import mitsuba
+
+    # Mitsuba reads its scenes alike in all variants; in this one it then compiles nothing.
+    before = mitsuba.variant()
+    mitsuba.set_variant("scalar_rgb")
+    mitsuba.set_log_level(mitsuba.LogLevel.Error)
+    try:
+        unpack(data, folder)
+        scene = load_scene(folder / "s.xml")
+        return scene.bounds, scene.cameras, scene.has_lights
+    finally:
+        if before is not None:
+            mitsuba.set_variant(before)
+
+
+def _environment(data: bytes, folder: Path) -> object:
+    (folder / "sky").write_bytes(data)
+    return read_environment(folder / "sky")
+
+
+def _texture(data: bytes, folder: Path) -> object:
+    return decode_image(data, "t.png", where="s.obj")
+
+
 def _cam(data: bytes, folder: Path) -> object:
     (folder / "s.cam").write_bytes(data)
     return read_cam(folder / "s.cam")
@@ -119,7 +157,72 @@ def _short(data: bytes, folder: Path) -> object:
 
 
 def _quilt_name(data: bytes, folder: Path) -> object:
-    return layout_of_name(Path(data.decode("utf-8", "surrogateescape")))
+    return quilt.layout_of_name(Path(data.decode("utf-8", "surrogateescape")))
+
+
+def _quilt(data: bytes, folder: Path) -> object:
+    (folder / "q_qs3x2a0.75.jpg").write_bytes(data)
+    with mock.patch.object(quilt, "LEAST_SIDE", 1):  # small ones are decoded sooner
+        return quilt.read_quilt(folder / "q_qs3x2a0.75.jpg").pixels.sum()
+
+
+def _words(data: bytes, folder: Path) -> object:
+    """What is typed after options."""
+    text = data.decode("utf-8", "surrogateescape")
+    readers: tuple[Callable[[], object], ...] = (
+        lambda: frame_range(text),
+        lambda: numbered(folder / text.replace("/", "_").replace("\0", "_")[:80], 2)(7),
+        lambda: parse.numbers(text, "--eye", (1, 3)),
+        lambda: parse.size(text, "--resolution"),
+        lambda: parse.memory(text),
+        lambda: parse_target(text),
+    )
+    refused: list[LippmannError] = []
+    for reader in readers:
+        try:
+            reader()
+        except LippmannError as error:
+            refused.append(error)
+    if len(refused) == len(readers):
+        raise refused[0]
+    return None
+
+
+#: Of the pictures whose journals are read.
+GRID = TileGrid(6, 4, 4)
+
+
+def _tile(data: bytes, folder: Path) -> object:
+    try:
+        return decode(data).pixels.sum()
+    except DamagedTile as error:  # whoever reads tiles expects that, and makes it anew
+        raise PictureError(str(error)).with_traceback(error.__traceback__) from None
+
+
+def _journal(data: bytes, folder: Path) -> object:
+    """Go on with a picture as far as what lies there allows, and make the rest anew."""
+    (folder / "p.tif.parts").mkdir()
+    unpack(data, folder / "p.tif.parts")
+    with TileStore.open(folder / "p.tif", {"version": "1", "spp": "4"}, GRID, resume=True) as store:
+        missing = store.missing()
+        for index in set(range(len(GRID))) - set(missing):
+            try:
+                store.get(index)
+            except DamagedTile:
+                missing.append(index)
+        if not missing:
+            store.finish()
+        return missing
+
+
+def _frames(data: bytes, folder: Path) -> object:
+    """Go on with a sequence as far as its journal allows."""
+    (folder / "0.png").write_bytes(b"frame")
+    (folder / "j").write_bytes(data)
+    with FrameJournal.open(folder / "j", {"version": "1", "spp": "4"}, resume=True) as journal:
+        found = [number for number in range(3) if journal.holds(number, folder / "0.png")]
+        journal.add(2, folder / "0.png", journal.chosen)
+    return found
 
 
 def _metadata(data: bytes, folder: Path) -> object:
@@ -240,80 +343,44 @@ def _calibration(data: bytes, folder: Path) -> object:
     return answer
 
 
-def _png_repaired(data: bytes) -> bytes:
-    """Every chunk with its own length, as far as there are bytes, and check sum."""
-    place, parts = 8, [data[:8]]
-    while place + 12 <= len(data):
-        length = min(struct.unpack(">I", data[place : place + 4])[0], len(data) - place - 12)
-        body = data[place + 4 : place + 8 + length]
-        parts.append(struct.pack(">I", length) + body + struct.pack(">I", zlib.crc32(body)))
-        place += 12 + length
-    return b"".join(parts)
-
-
-def _glb_tree(data: bytes) -> tuple[Any, Callable[[bytes], bytes]]:
-    (length,) = struct.unpack("<I", data[12:16].ljust(4, b"\0"))
-    after = data[20 + length :]
-
-    def rebuilt(text: bytes) -> bytes:
-        text += b" " * (-len(text) % 4)
-        return data[:12] + struct.pack("<I", len(text)) + data[16:20] + text + after
-
-    return json.loads(data[20 : 20 + length]), rebuilt
-
-
-def _glb_repaired(data: bytes) -> bytes:
-    return data[:8] + struct.pack("<I", len(data)) + data[12:]
-
-
-def _part_tree(name: bytes) -> Callable[[bytes], Any]:
-    """The JSON tree of a file of a packed folder."""
-    head = b"=== " + name + b"\n"
-
-    def tree(data: bytes) -> tuple[Any, Callable[[bytes], bytes]]:
-        before, _, rest = data.partition(head)
-        text, mark, after = rest.partition(b"\n=== ")
-        return json.loads(text), lambda changed: before + head + changed + mark + after
-
-    return tree
-
-
-def _body_tree(data: bytes) -> tuple[Any, Callable[[bytes], bytes]]:
-    """The JSON tree that a request carries."""
-    head, mark, body = data.partition(b"\r\n\r\n")
-    return json.loads(body), lambda changed: head + mark + changed
-
-
 _READERS: dict[str, Target] = {
     "gltf": Target(_gltf("s.gltf"), tree=json_tree),
-    "glb": Target(_gltf("s.glb"), tree=_glb_tree, repair=_glb_repaired),
+    "glb": Target(_gltf("s.glb"), tree=glb_tree, repair=glb_repaired),
     "obj": Target(_obj),
     "ply": Target(_scene("s.ply")),
     "stl": Target(_scene("s.stl")),
     "tachyon": Target(_scene("s.dat")),
     "cam": Target(_cam),
     "nff": Target(_scene("s.nff")),
+    "mitsuba-xml": Target(_mitsuba),
+    "environment": Target(_environment),
+    "texture": Target(_texture, repair=png_repaired),
     "display-toml": Target(_toml),
     "short-form": Target(_short),
     "visual-json": Target(_visual, tree=json_tree),
     "quilt-name": Target(_quilt_name),
+    "quilt-picture": Target(_quilt),
+    "words": Target(_words),
     "metadata": Target(_metadata, tree=json_tree),
-    "picture-png": Target(_picture("p.png"), repair=_png_repaired),
+    "picture-png": Target(_picture("p.png"), repair=png_repaired),
     "picture-tiff": Target(_picture("p.tif")),
     "picture-exr": Target(_picture("p.exr")),
-    "picture-zarr": Target(_folder(read_picture), tree=_part_tree(b"zarr.json")),
+    "picture-zarr": Target(_folder(read_picture), tree=part_tree(b"zarr.json")),
     "pieces-tiff": Target(_pieces),
-    "pieces-zarr": Target(_folder(_in_pieces), tree=_part_tree(b"zarr.json")),
-    "views-folder": Target(_folder(compose), tree=_part_tree(b"lippmann.json")),
-    "layout-hci": Target(_layout_folder("hci"), tree=_part_tree(b"lippmann.json")),
-    "layout-views": Target(_layout_folder("views"), tree=_part_tree(b"lippmann.json")),
-    "layout-zarr": Target(_layout_folder("zarr"), tree=_part_tree(b"LF/.zarray")),
+    "pieces-zarr": Target(_folder(_in_pieces), tree=part_tree(b"zarr.json")),
+    "journal": Target(_journal, tree=part_tree(b"job.json")),
+    "frame-journal": Target(_frames),
+    "tile": Target(_tile, tree=tile_tree, repair=tile_repaired),
+    "views-folder": Target(_folder(compose), tree=part_tree(b"lippmann.json")),
+    "layout-hci": Target(_layout_folder("hci"), tree=part_tree(b"lippmann.json")),
+    "layout-views": Target(_layout_folder("views"), tree=part_tree(b"lippmann.json")),
+    "layout-zarr": Target(_layout_folder("zarr"), tree=part_tree(b"LF/.zarray")),
     "layout-lftoolbox": Target(_layout_file("l.mat", "lftoolbox")),
-    "layout-eslf": Target(_layout_file("l.png", "eslf"), repair=_png_repaired),
+    "layout-eslf": Target(_layout_file("l.png", "eslf"), repair=png_repaired),
     "parameters-cfg": Target(_parameters),
     "pfm": Target(_pfm),
     "viewer-request": Target(_viewer),
-    "calibration-request": Target(_calibration, tree=_body_tree),
+    "calibration-request": Target(_calibration, tree=body_tree),
 }
 TARGETS: dict[str, Target] = {
     name: replace(target, words=VOCABULARY.get(name, ())) for name, target in _READERS.items()

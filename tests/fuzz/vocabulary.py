@@ -29,9 +29,22 @@ int uint float double end_header comment obj_info tristrips TextureFile t.png
 BEGIN_SCENE END_SCENE CAMERA END_CAMERA TEXTURE TEXDEF TEXALIAS INCLUDE IMAGEDEF s.dat red # SPHERE CYLINDER FCYLINDER
 PLANE RING TRI STRI BOX SCAPE VERTEXARRAY POLYCYLINDER EXTBOX SCALARVOL
 """,
+    "mitsuba-xml": """
+scene version include filename default path integrator sensor film sampler texture bsdf shape emitter medium phase
+volume spectrum rgb float integer boolean string point vector transform matrix lookat rotate scale translate ref id
+alias name value type $spp m.ply s.xml lamps.xml ../s.xml /etc/passwd obj cube bitmap envmap instance shapegroup
+homogeneous hdrfilm specfilm width height batch plugin <!-- --> <!DOCTYPE <!ENTITY CDATA &amp; &x; <?xml encoding
+""",
+    "environment": "#?RADIANCE #?RGBE FORMAT= 32-bit_rle_rgbe EXPOSURE= -Y +X +Y 2 4 channels dataWindow tiles box2i",
+    "texture": "IHDR PLTE tRNS IDAT IEND iCCP JFIF Exif RIFF WEBP VP8 VP8L VP8X BM GIF89a P3 P6 P7",
     "nff": "v b l f s c p pp from at up angle hither resolution #",
     "display-toml": _DISPLAY,
     "short-form": _DISPLAY,
+    "words": ": 0:48 :: , x 1e9 g GiB %d %04d %% tcp:// tls:// local:2 [::1] :8786 @ ? frame_ .png",
+    "quilt-picture": "JFIF Exif",
+    "journal": "=== r0000_c0000.tile r0000_c0001.tile r-001_c0000.tile job.json lock grid fingerprint LpTile2",
+    "frame-journal": "lippmann-frames fingerprint frame sum chosen method denoise version spp 4 0 true null",
+    "tile": "LpTile2 pixels maps sums depth error primary |u1 <f4 <f8 |O <U9999999 <M8[s] V0",
     "quilt-name": "_qs 8x6 a0.75 .png .jpg x a",
     "picture-png": "IHDR iTXt IDAT IEND sRGB pHYs tRNS PLTE",
     "picture-exr": "channels compression dataWindow displayWindow lineOrder tiles string box2i chlist",

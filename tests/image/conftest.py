@@ -31,26 +31,6 @@ PROVENANCE = Provenance(
 )
 
 
-def make_display(layout="lenticular", lenses=(4, 3), pixels=3, *, pixel_pitch=0.25, distance=math.inf, **lens_array):
-    """``lenses`` (across, down) of ``pixels`` whole pixels; a lenticular sheet is as high as a square array."""
-    gap = 6.8
-    magnification = (distance + gap) / distance if math.isfinite(distance) else 1.0
-    width, height = lenses[0] * pixels, lenses[1] * pixels
-    if layout == "hexagonal":
-        row_pixels = max(1, round(0.866 * pixels))
-        height = row_pixels * lenses[1]
-        lens_array.setdefault("row_pitch", row_pixels * pixel_pitch / magnification)
-    pitch = lens_array.pop("pitch", pixels * pixel_pitch / magnification)
-    return Display(
-        name=f"test-{layout}",
-        panel=Panel(width, height, pixel_pitch),
-        lens_array=LensArray(layout, pitch, **lens_array),
-        gap=gap,
-        viewing_distance=distance,
-        aperture_distance=5.0,
-    )
-
-
 @st.composite
 def make_random_display(draw, *, whole=None):
     """A display of at most 24 x 16 pixels; with ``whole`` a whole number of pixels lies from lens to lens."""
@@ -94,7 +74,7 @@ def make_picture(display, seed=0, **parts):
 
 
 @pytest.fixture(scope="session")
-def display():
+def display(make_display):
     """``display(layout, lenses, pixels, ...)``: a small display of whole lenses."""
     return make_display
 

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import errno
 import sys
 
 from typer import BadParameter
@@ -39,6 +40,8 @@ def run(words: list[str], *, debug: bool = False) -> int:
             return _leave(_usage(error), 2)
         if isinstance(error, MemoryError):
             return _leave("out of memory; lower --memory or close other programs", 1)
+        if isinstance(error, OSError) and error.errno == errno.ENAMETOOLONG:
+            return _leave(f"{str(error.filename)[:60]}...: no file can have a name that long", 2)
         if isinstance(error, Exception):
             what = " ".join(f"{type(error).__name__}: {error}".split())
             return _leave(f"internal error: {what}; run again with --debug and report it", 1)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections import deque
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
@@ -14,13 +15,13 @@ import typer
 
 from lippmann.cli import parse
 from lippmann.cli.console import Console
-from lippmann.errors import OutputError, UsageError
+from lippmann.errors import OutputError, PictureError, UsageError
 
 if TYPE_CHECKING:
-    from lippmann.image import IntegralImage, Provenance
     from lippmann.progress import ProgressCallback
     from lippmann.render.tiled_picture import Runner
     from lippmann.sequence import FrameRange
+    from lippmann.sequence_files import SavedFrame
 
 Frames = Annotated[
     str | None,
@@ -91,6 +92,7 @@ def render_frames(
     bits: int | None,
     maps: Path | None,
     load: dict[str, Any],
+    resume: bool,
     runner: Runner | None,
     **asked: Any,
 ) -> None:
@@ -100,7 +102,9 @@ def render_frames(
     from lippmann.image.animation import write_animation
     from lippmann.image.formats import format_for
     from lippmann.scene.motion import FRAMES_PER_SECOND
-    from lippmann.sequence import open_motion, render_sequence, sequence_to_files
+    from lippmann.sequence import open_motion
+    from lippmann.sequence_files import saved_sequence
+    from lippmann.store.journal import sweep_beside
 
     flying = wanted.camera_path is not None
     if flying and wanted.fps is not None and wanted.video is None:
@@ -132,36 +136,39 @@ def render_frames(
     done: list[dict[str, Any]] = []
     notes: dict[str, list[str]] = {}
 
-    def noted(number: int, made: Provenance) -> None:
-        seconds = made.seconds["total"]
-        done.append({"frame": number, "output": str(path_of(number)), "seconds": seconds, "spp": made.spp})
+    def noted(frame: SavedFrame) -> SavedFrame:
+        made = frame.provenance
+        seconds = made.seconds.get("total", 0.0)
+        done.append(
+            {
+                "frame": frame.number,
+                "output": str(frame.path),
+                "seconds": seconds,
+                "spp": made.spp,
+                "found": frame.found,
+            }
+        )
         for note in made.notes:
             # The same remark of several frames differs in its numbers at most.
             notes.setdefault(_NUMERAL.sub("", note), []).append(note)
+        return frame
 
-    def written(progress: ProgressCallback) -> Iterator[IntegralImage | None]:
-        """Each frame's picture, once it is in its file; None where nobody looks at it."""
-        if runner is not None:
-            for number, rendered in sequence_to_files(
-                motion, path_of, frames=frames, runner=runner, bits=bits, progress=progress, **asked
-            ):
-                noted(number, rendered.provenance)
-                yield None if projection is None else read_picture(path_of(number))
-            return
-        for number, image in render_sequence(motion, frames=frames, progress=progress, **asked):
-            image.save(path_of(number), bits=bits)
-            noted(number, image.provenance)
-            yield image
-
-    with console.progress() as progress:
-        images = written(progress)
+    with (
+        _kept(output, path_of(frames[0]), console) as progress,
+        saved_sequence(
+            motion, output, path_of, frames=frames, resume=resume, runner=runner, bits=bits, progress=progress, **asked
+        ) as saved,
+    ):
+        files = map(noted, saved)
         if projection is None or wanted.video is None:
-            deque(images, maxlen=0)
+            deque(files, maxlen=0)
         else:
-            looked_at = (image for image in images if image is not None)
-            first = next(looked_at)
+            sweep_beside(wanted.video)
+            # The film shows what the files hold, whether they were rendered now or before an interruption.
+            images = (read_picture(frame.path) for frame in files)
+            first = next(images)
             write_animation(
-                map(projection, chain([first], looked_at)),
+                map(projection, chain([first], images)),
                 wanted.video,
                 frames_per_second=wanted.fps or FRAMES_PER_SECOND,
                 transfer=first.provenance.transfer,
@@ -170,11 +177,29 @@ def render_frames(
         only = f" ({len(alike)} of {len(done)} frames)" if len(alike) < len(done) else ""
         console.remark(f"{alike[0]}{' and the like' if len(set(alike)) > 1 else ''}{only}")
     film = "" if wanted.video is None else f", {wanted.video}"
-    seconds = sum(one["seconds"] for one in done)
+    seconds, found = sum(one["seconds"] for one in done), sum(one["found"] for one in done)
+    before = f", {found} of them found" if found else ""
     console.result(
         {"output": str(output), "frames": done, "video": None if wanted.video is None else str(wanted.video)},
-        f"{done[0]['output']} to {Path(done[-1]['output']).name}{film}: {len(done)} frames, {seconds:.1f} s",
+        f"{done[0]['output']} to {Path(done[-1]['output']).name}{film}: {len(done)} frames{before}, {seconds:.1f} s",
     )
+
+
+@contextmanager
+def _kept(output: Path, first: Path, console: Console) -> Iterator[ProgressCallback]:
+    """The console's progress; if the work ends early, say what is left of it."""
+    from lippmann.sequence_files import journal_of
+
+    journal = journal_of(output, first)
+    try:
+        with console.progress() as progress:
+            yield progress
+    except PictureError:
+        raise  # it says what to do about the journal
+    except BaseException:
+        if journal.exists():
+            console.remark(f"finished frames are listed in {journal.name}: with --resume the command goes on")
+        raise
 
 
 def frame_range(text: str) -> FrameRange:

@@ -38,6 +38,9 @@ _PLACES = (
 )
 _MOST_COUNT = 1 << 20
 
+#: The parser takes time by the square of a line's length.
+_LONGEST_LINE = 1000
+
 
 @dataclass(frozen=True, eq=False)
 class Parameters:
@@ -97,7 +100,10 @@ def read_parameters(path: Path) -> Parameters:
     """
     parser = configparser.ConfigParser(delimiters="=", interpolation=None)
     try:
-        parser.read_string(path.read_text(encoding="utf-8"))
+        text = path.read_text(encoding="utf-8")
+        if max(map(len, text.splitlines()), default=0) > _LONGEST_LINE:
+            raise PictureError("is no list of parameters", where=str(path), rule="its lines are short")
+        parser.read_string(text)
     except FileNotFoundError:
         raise PictureError("is not there", where=str(path)) from None
     except OSError as error:

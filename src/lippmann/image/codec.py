@@ -15,8 +15,9 @@ from typing import Any, Literal, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from lippmann import exr
 from lippmann.errors import PictureError
-from lippmann.image import exr, png, tiff, zarr_file
+from lippmann.image import png, tiff, zarr_file
 from lippmann.image.color import dequantize, quantize
 from lippmann.image.integral_image import Stored
 from lippmann.image.provenance import Transfer
@@ -202,6 +203,8 @@ def _recognized(path: Path) -> FormatName:
             start = file.read(8)
     except FileNotFoundError:
         raise PictureError("is not there", where=str(path)) from None
+    except ValueError:
+        raise PictureError("is no name of a file", where=repr(str(path))) from None
     except OSError as error:
         raise PictureError(f"cannot be read: {error.strerror}", where=str(path)) from error
     if not start:

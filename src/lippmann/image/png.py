@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.errors import PictureError
-from lippmann.image.silence import libraries_silenced
+from lippmann.silence import libraries_silenced
 
 SIGNATURE = b"\x89PNG\r\n\x1a\n"
 

@@ -77,7 +77,10 @@ def _created(zarr: Any, folder: str, shape: dict[str, Any]) -> Any:
 
 def is_zarr(path: Path) -> bool:
     """Whether this is a folder with a Zarr array."""
-    return any((path / mark).is_file() for mark in MARKS)
+    try:
+        return any((path / mark).is_file() for mark in MARKS)
+    except (OSError, ValueError):  # no file can have such a name
+        return False
 
 
 def open_zarr(folder: Path) -> Any:

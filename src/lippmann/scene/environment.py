@@ -2,17 +2,26 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.errors import SceneError
+from lippmann.errors import PictureError, SceneError
+from lippmann.exr import SIGNATURE, read_exr, read_exr_header
 from lippmann.scene.description import Environment
 from lippmann.scene.resources import read_bytes
 
-_EXR_MAGIC = b"\x76\x2f\x31\x01"
 _HDR_MAGICS = (b"#?RADIANCE", b"#?RGBE")
+#: What follows the header's first empty line.
+_HDR_SIZE = re.compile(rb"[-+]Y +([0-9]{1,9}) +[-+]X +([0-9]{1,9})\s")
+
+#: Channels of red, green and blue: luminance alone is grey.
+_COLORS = (("R", "G", "B"), ("Y", "Y", "Y"))
+
+#: A byte of an HDR file holds less than so many pixels: at best two bytes stand for 127 values of four channels.
+_HDR_PIXELS_PER_BYTE = 16
 
 
 def read_environment(path: Path) -> Environment:
@@ -26,7 +35,7 @@ def read_environment(path: Path) -> Environment:
     """
     data = read_bytes(path)
     where = path.name
-    if data.startswith(_EXR_MAGIC):
+    if data.startswith(SIGNATURE):
         pixels = _read_exr(path, where)
     elif data.startswith(_HDR_MAGICS):
         pixels = _read_hdr(data, where)
@@ -37,30 +46,42 @@ def read_environment(path: Path) -> Environment:
 
 
 def _read_exr(path: Path, where: str) -> NDArray[np.float32]:
-    import OpenEXR
-
     try:
-        with OpenEXR.File(str(path), separate_channels=True) as file:
-            channels = {name: channel.pixels for name, channel in file.channels().items()}
-    except (RuntimeError, ValueError, TypeError, OSError) as error:
-        raise SceneError(f"cannot be decoded ({error})", where=where, fix="is it cut short?") from None
-    names = next((names for names in (("R", "G", "B"), ("Y", "Y", "Y")) if set(names) <= channels.keys()), None)
-    if names is None:
-        raise SceneError(f"has the channels {', '.join(sorted(channels))}", where=where, rule="R, G and B are needed")
+        header = read_exr_header(path)
+        names = next(
+            (names for names in (("R", "G", "B"), ("Y", "Y", "Y")) if set(names) <= header.channels.keys()), None
+        )
+        if names is None:
+            held = ", ".join(sorted(header.channels))
+            raise SceneError(f"has the channels {held}", where=where, rule="R, G and B are needed")
+        _check_size(header.height, header.width, where)
+        channels = read_exr(path)
+    except PictureError as error:
+        raise _undecodable(error.what, where) from None
     return np.stack([np.asarray(channels[name], np.float32) for name in names], axis=-1)
 
 
 def _read_hdr(data: bytes, where: str) -> NDArray[np.float32]:
     import imagecodecs
 
+    size = _HDR_SIZE.match(data, data.find(b"\n\n") + 2)
+    if size is None:
+        raise _undecodable("it does not say its size", where)
+    height, width = int(size[1]), int(size[2])
+    _check_size(height, width, where)
+    if height * width > _HDR_PIXELS_PER_BYTE * len(data):
+        raise _undecodable(f"{len(data)} bytes hold no {width}x{height} pixels", where)
     try:
         return np.asarray(imagecodecs.rgbe_decode(data), np.float32)
     except (RuntimeError, ValueError) as error:
-        raise SceneError(f"cannot be decoded ({error})", where=where, fix="is it cut short?") from None
+        raise _undecodable(str(error), where) from None
 
 
-def _check(pixels: NDArray[np.float32], where: str) -> None:
-    height, width = pixels.shape[:2]
+def _undecodable(why: str, where: str) -> SceneError:
+    return SceneError(f"cannot be decoded ({why})", where=where, fix="is it cut short?")
+
+
+def _check_size(height: int, width: int, where: str) -> None:
     if min(height, width) < 2 or not 1.8 < width / height < 2.2:
         raise SceneError(
             f"is {width}x{height} pixels",
@@ -68,6 +89,10 @@ def _check(pixels: NDArray[np.float32], where: str) -> None:
             rule="an equirectangular picture is twice as wide as high",
             fix="convert cube maps and mirror balls first",
         )
+
+
+def _check(pixels: NDArray[np.float32], where: str) -> None:
+    _check_size(pixels.shape[0], pixels.shape[1], where)
     bad = ~np.isfinite(pixels).all(axis=-1) | (pixels < 0.0).any(axis=-1)
     if bad.any():
         row, column = (int(value) for value in np.argwhere(bad)[0])

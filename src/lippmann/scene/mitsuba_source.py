@@ -148,6 +148,8 @@ def _check_xml(path: Path, allow_outside: bool, seen: set[Path]) -> None:
         raise SceneError(
             f"is no well-formed XML ({error})", where=f"{path.name}:{error.position[0]}", fix="is the file cut short?"
         ) from None
+    except (LookupError, ValueError) as error:  # of the encoding that it names
+        raise SceneError(f"cannot be decoded ({error})", where=path.name, rule="XML is UTF-8") from None
     if root.tag != "scene":
         raise SceneError(f"is XML of a '{root.tag[:40]}'", where=path.name, rule="a Mitsuba file holds a 'scene'")
     if root.find(".//path") is not None:

@@ -37,6 +37,11 @@ class Motion(ABC):
     def count(self) -> int:
         """How many frames there are; at least 1."""
 
+    @property
+    @abstractmethod
+    def content(self) -> object:
+        """All that any frame is made of, as plain values: what :func:`lippmann.store.content_hash` takes."""
+
     @abstractmethod
     def scene(self, frame: int) -> Scene:
         """The scene as it is in a frame."""
@@ -92,6 +97,10 @@ class GltfMotion(Motion):
     def count(self) -> int:
         return int(self._moving.duration * self._fps + _ROUNDING) + 1
 
+    @property
+    def content(self) -> object:
+        return self._first, self._moving.content, self._fps
+
     def scene(self, frame: int) -> Scene:
         return self._at(frame / self._fps)
 
@@ -131,6 +140,10 @@ class Flight(Motion):
     @property
     def count(self) -> int:
         return len(self._poses)
+
+    @property
+    def content(self) -> object:
+        return self._scene, self._poses
 
     def scene(self, frame: int) -> Scene:
         return self._scene

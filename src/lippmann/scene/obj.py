@@ -20,7 +20,7 @@ from lippmann.scene.mtl import MtlRecord, parse_mtl
 from lippmann.scene.mtl_material import MaterialMapper
 from lippmann.scene.obj_tables import Integers, Lines, Points, check_range, read_corners, read_table
 from lippmann.scene.polygons import triangulate
-from lippmann.scene.resources import decode_text, linear_from_srgb, read_bytes, resolve
+from lippmann.scene.resources import decode_text, is_file, linear_from_srgb, read_bytes, resolve
 
 # Curves, surfaces and display hints: drawn by no renderer of triangles.
 _UNSUPPORTED = {
@@ -306,7 +306,7 @@ def _read_libraries(libraries: Lines, path: Path, allow_outside: bool) -> dict[s
             continue
         where = f"{path.name}:{number}"
         # One name with spaces, or several names: only the folder can tell.
-        names = [body] if len(body.split()) == 1 or (path.parent / body).is_file() else body.split()
+        names = [body] if len(body.split()) == 1 or is_file(path.parent / body) else body.split()
         for name in names:
             library = resolve(path.parent, name, where=where, what="material library", allow_outside=allow_outside)
             for key, record in parse_mtl(library).items():

@@ -27,9 +27,9 @@ def read_bytes(path: Path, most: int = -1) -> bytes:
         The file is missing, a folder, unreadable or empty.
     """
     where = path.name
-    if path.is_dir():
-        raise SceneError("is a folder, not a scene file", where=str(path), fix="name the file inside it")
     try:
+        if path.is_dir():
+            raise SceneError("is a folder, not a scene file", where=str(path), fix="name the file inside it")
         with path.open("rb") as file:
             data = file.read(most)
     except FileNotFoundError:
@@ -79,12 +79,12 @@ def resolve(folder: Path, name: str, *, where: str, what: str, allow_outside: bo
     absolute = PurePosixPath(plain).is_absolute() or PureWindowsPath(name).is_absolute()
     candidate = Path(plain) if absolute else folder / plain
     outside = absolute or not _is_below(candidate, folder)
-    if (allow_outside or not outside) and _is_file(candidate):
+    if (allow_outside or not outside) and is_file(candidate):
         return candidate
     beside = folder / PurePosixPath(plain).name
-    if outside and _is_file(beside) and (allow_outside or _is_below(beside, folder)):
+    if outside and is_file(beside) and (allow_outside or _is_below(beside, folder)):
         return beside
-    if outside and not allow_outside and _is_file(candidate):
+    if outside and not allow_outside and is_file(candidate):
         raise SceneError(
             f"{what} '{name}' lies outside the scene's folder",
             where=where,
@@ -102,7 +102,8 @@ def _is_below(path: Path, folder: Path) -> bool:
         return False
 
 
-def _is_file(path: Path) -> bool:
+def is_file(path: Path) -> bool:
+    """Whether there is such a file; of a name that no file can have, there is none."""
     try:
         return path.is_file()
     except (OSError, ValueError):  # a name too long, or with a NUL

@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from lippmann.errors import SceneError
 from lippmann.scene.resources import decode_text, read_bytes
 
-_NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?").fullmatch
+# One way to read any word: two ways to split digits would take time by the square of their number.
+_NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?").fullmatch
 _INTEGER = re.compile(r"[+-]?[0-9]{1,18}").fullmatch
 _FOREIGN = re.compile(r"[^-+.0-9eE]").search  # what no number holds
 _WORD = re.compile(r"\S+")

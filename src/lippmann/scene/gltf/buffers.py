@@ -59,6 +59,10 @@ class Buffers:
         self._document = document
         self._loaded: dict[int, memoryview] = {}
 
+    def all(self) -> list[bytes]:
+        """Every buffer; raises as :meth:`view`."""
+        return [bytes(self._buffer(index)) for index in range(len(self._document.all("buffers")))]
+
     def view(self, index: int) -> tuple[memoryview, int | None]:
         """The bytes of ``bufferViews[index]`` and its stride in bytes, if it has one.
 

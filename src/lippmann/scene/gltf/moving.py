@@ -47,6 +47,11 @@ class MovingGltf:
             document.notes.add(f"of {known} animations '{self.animation.name}' is played")
 
     @property
+    def content(self) -> object:
+        """All that the animation is made of, as plain values; pictures beside the file are in the scene itself."""
+        return self._contents.document.root.values, self._contents.accessors.buffers.all(), self.animation.name
+
+    @property
     def duration(self) -> float:
         """Seconds from time 0 to the animation's last key."""
         return self.animation.duration

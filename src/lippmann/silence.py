@@ -3,23 +3,28 @@
 from __future__ import annotations
 
 import contextlib
+import io
 import os
+import sys
 import threading
 from collections.abc import Iterator
+from typing import TextIO
 
 _STANDARD_ERROR = 2
 
 _lock = threading.Lock()
-#: How many threads want silence, and a copy of the descriptor that they took away.
+#: How many threads want silence, and what they took away: a copy of the descriptor, and Python's stream, which leads
+#: elsewhere in notebooks.
 _users = 0
 _kept: int | None = None
+_stream: TextIO | None = None
 
 
 @contextlib.contextmanager
 def libraries_silenced() -> Iterator[None]:
     """Nothing that is printed on standard error inside the ``with`` is seen.
 
-    The descriptor belongs to the whole process: it is turned away by the first thread that comes and given back by the
+    Standard error belongs to the whole process: it is turned away by the first thread that comes and given back by the
     last that goes.
     """
     _begin()
@@ -30,11 +35,12 @@ def libraries_silenced() -> Iterator[None]:
 
 
 def _begin() -> None:
-    global _users, _kept
+    global _users, _kept, _stream
     with _lock:
         _users += 1
         if _users > 1:
             return
+        _stream, sys.stderr = sys.stderr, io.StringIO()
         try:
             _kept = os.dup(_STANDARD_ERROR)
         except OSError:  # there is none
@@ -44,10 +50,13 @@ def _begin() -> None:
 
 
 def _end() -> None:
-    global _users, _kept
+    global _users, _kept, _stream
     with _lock:
         _users -= 1
-        if _users == 0 and _kept is not None:
+        if _users > 0:
+            return
+        sys.stderr, _stream = _stream, None
+        if _kept is not None:
             os.dup2(_kept, _STANDARD_ERROR)
             os.close(_kept)
             _kept = None

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
 import os
 import subprocess
 import sys
@@ -9,7 +11,7 @@ import threading
 
 import pytest
 
-from lippmann.image.silence import libraries_silenced
+from lippmann.silence import libraries_silenced
 
 
 def test_what_is_printed_inside_is_not_seen_and_what_follows_is(capfd):
@@ -18,6 +20,15 @@ def test_what_is_printed_inside_is_not_seen_and_what_follows_is(capfd):
         os.write(2, b"inside ")
     os.write(2, b"after")
     assert capfd.readouterr().err == "before after"
+
+
+def test_the_stream_of_a_notebook_is_silent_too():
+    stream = io.StringIO()
+    with contextlib.redirect_stderr(stream):
+        with libraries_silenced():
+            print("inside", file=sys.stderr)
+        print("after", file=sys.stderr)
+    assert stream.getvalue() == "after\n"
 
 
 def test_an_error_gives_the_terminal_back(capfd):
@@ -61,7 +72,7 @@ def test_a_process_without_standard_error_can_read_pictures():
     code = """
 import os
 os.close(2)
-from lippmann.image.silence import libraries_silenced
+from lippmann.silence import libraries_silenced
 with libraries_silenced():
     print("read")
 print(os.path.exists("/dev/fd/2"))

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.errors import PictureError
-from lippmann.image.silence import libraries_silenced
+from lippmann.silence import libraries_silenced
 
 SIGNATURE = b"\x76\x2f\x31\x01"
 
