@@ -42,7 +42,12 @@ def test_what_is_asked_for_wins(installed, denoise):
     assert "as asked for" in found.why
 
 
-@pytest.mark.parametrize("method", ["full", "lens-view", "interpolated", "pooled"])
+def test_pooled_light_is_denoised_where_it_can_be(installed):
+    assert decided(method="pooled").settings.denoise == ("oidn" if installed else "none")
+    assert decided(method="pooled", denoise="none").settings.denoise == "none"
+
+
+@pytest.mark.parametrize("method", ["full", "lens-view", "interpolated"])
 def test_a_named_method_is_left_alone(installed, method):
     found = decided(method=method)
     assert (found.settings.method, found.settings.denoise, found.why) == (method, "none", "")

@@ -64,7 +64,7 @@ def test_plain_samples_win_where_the_quality_is_near():
     contest, outcome, clean = run(Goal(quality_mean=24.8), plain=0.05)
     assert (contest.leader, outcome.end) == ("plain", "quality")
     assert clean.looks == 0
-    assert "less than denoising takes" in contest.why
+    assert "less than pooling takes" in contest.why
 
 
 def test_a_denoised_picture_that_stays_wrong_is_left():

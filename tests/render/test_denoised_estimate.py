@@ -88,3 +88,16 @@ def test_what_cannot_be_negative_is_not(mean, deviation):
         assert found == pytest.approx(mean)
     if mean == 0:
         assert found == pytest.approx(deviation * math.sqrt(2 / math.pi))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_few_pixels_that_are_badly_wrong_make_a_worst_micro_image(seed):
+    """As beside a lamp whose light the denoiser spreads: the samples there are as good as anywhere."""
+    errors, true = made(seed, noise=0.01, spread=0.1)
+    errors.values[10, 20:23] += 0.15
+    true[10, 20:23] += 0.15
+    worst = psnr(float(np.nanmax(micro_image_means(true, SHOWN)[0])))
+    found = DenoisedEstimator(SHOWN).estimate(errors)
+    assert found.worst_lens == (2, 1)
+    assert found.worst_low < worst < found.worst_high
+    assert found.worst < worst + 6

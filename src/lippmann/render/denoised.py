@@ -4,6 +4,10 @@ Each half of the samples is denoised by itself, and the picture is the mean of t
 the other, noisy half, which therefore can judge it: for a denoised half D(a), the noisy halves a and b and the truth t,
 the mean of (D(a) - b)^2 is that of (D(a) - t)^2 and the noise of b, and half the mean of (a - b)^2 is that noise. What
 is told is the mean error of the halves; that of their mean is never larger.
+
+Errors are small and the curve of the codes is taken as straight, but for pixels that the denoiser made far brighter
+than the samples show, as it does beside lamps: where that is beyond white, the curve is cut off, and in the dark it is
+steep. There the step of the code from what the samples show counts.
 """
 
 from __future__ import annotations
@@ -14,12 +18,17 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from lippmann.image.color import encode_srgb
 from lippmann.image.provenance import Transfer
 from lippmann.progress import ProgressCallback, silent
 from lippmann.render.coding import coding_slope
 from lippmann.render.estimate import CROSS_NOISE, PixelErrors
 
 Floats = NDArray[np.float32]
+#: Of the halves' mean difference nearby: a pixel that is brighter than its samples by more is so by no accident.
+FAR_ABOVE = 4.0
+#: Linear steps below this are as good as a slope, and hold rounding.
+_LEAST_STEP = 1e-4
 Denoise = Callable[[Floats], Floats]
 
 
@@ -77,7 +86,7 @@ class Denoised:
         error = np.square(clean[0] - noisy[1])
         error += np.square(clean[1] - noisy[0])
         error -= np.square(noisy[0] - noisy[1])
-        error *= np.float32(0.5) * np.square(coding_slope(self.picture(), self._transfer))
+        error *= np.float32(0.5) * np.square(_slope(self.picture(), noisy, self._transfer))
         return PixelErrors(error.mean(axis=2), None, CROSS_NOISE, self._renderer.squared_error())
 
     def _clean_halves(self) -> tuple[Floats, Floats]:
@@ -87,3 +96,29 @@ class Denoised:
             first, second = (self._denoise(half) for half in self._renderer.halves())
             self._cleaned = first, second
         return self._cleaned
+
+
+def _slope(picture: Floats, noisy: tuple[Floats, Floats], transfer: Transfer) -> Floats:
+    """By how much a pixel's code differs from that of the truth, per linear difference between the two."""
+    slope = coding_slope(picture, transfer)
+    shown = np.float32(0.5) * (noisy[0] + noisy[1])
+    apart = shown + np.float32(FAR_ABOVE) * _local_mean(np.abs(noisy[0] - noisy[1]))
+    truth = np.where(picture > 1, np.minimum(shown, 1), apart)
+    far = picture - truth > _LEAST_STEP
+    low, high = truth[far], picture[far]
+    slope[far] = (_code(high, transfer) - _code(low, transfer)) / (high - low)
+    return slope
+
+
+def _code(linear: Floats, transfer: Transfer) -> Floats:
+    coded: Floats = np.clip(linear, 0, 1) if transfer == "linear" else encode_srgb(linear)
+    return coded
+
+
+def _local_mean(values: Floats) -> Floats:
+    """Means over each pixel and the eight around it."""
+    height, width = values.shape[:2]
+    wide = np.pad(values, ((1, 1), (1, 1), (0, 0)), mode="edge")
+    rows = wide[:height] + wide[1:-1] + wide[2:]
+    total: Floats = rows[:, :width] + rows[:, 1:-1] + rows[:, 2:]
+    return total * np.float32(1 / 9)

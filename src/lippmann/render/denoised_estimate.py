@@ -46,6 +46,8 @@ LONE_LEFT, LONE_DOUBTED = 0.1, 0.5
 #: How far micro-images are from the proportion to their samples, as a relative variance, where nothing tells; and by
 #: how much that is itself uncertain.
 USUAL_SPREAD, SPREAD_DOUBT = 0.5, 0.4
+#: Squared deviations from which on a micro-image that seems worse than in proportion is taken to be so.
+OTHER_FROM = 2.0
 #: By how much the mean of two halves may be better than they are.
 BEST_OF_HALVES = 0.5
 #: A picture without any error still has this mean squared one, so that its logarithm exists.
@@ -101,8 +103,9 @@ def _parts(
     doubt = 2.3 * (float(np.median(relative)) + USUAL_SPREAD) * math.sqrt(2 / len(count))
     weight = SPREAD_DOUBT**2 / (SPREAD_DOUBT**2 + doubt**2)
     usual = max(0.02, weight * shown + (1 - weight) * USUAL_SPREAD)
-    # A part that is worse by more than three deviations is no accident.
-    other = np.where(measured > around, np.square(measured - around) - 9 * noise, 0.0)
+    # Where a part seems worse, that is believed early: what a denoiser is wrong by where it meets an edge or a lamp is
+    # not in proportion to the samples, and looks like noise, as it is large in few pixels.
+    other = np.where(measured > around, np.square(measured - around) - OTHER_FROM * noise, 0.0)
     between = np.maximum(usual * np.square(around), other)
     trust = between / (between + noise)
     lone = samples.lone / count
