@@ -1,13 +1,14 @@
-"""Error against time: full, full denoised, pooled, pooled denoised; and the time that each takes to the same error.
+"""Error against time: full, full denoised, pooled, pooled in cells; and the time that each takes to the same error.
 
 Eight scenes with path light of the default depth (the bundled six, and two glTF scenes where they are at hand) on three
-displays: the paper's 64 lenses of 8 pixels, 64 lenses of 48 pixels, and 34 x 34 lenses of 15 x 15. Of the lenticular
-displays a band of rows is rendered, about the middle: references would take hours otherwise.
+displays: the paper's 64 lenses of 8 pixels, 64 lenses of 48 pixels, and 34 x 34 lenses of 15 x 15. A band of rows is
+rendered, about the middle: references would take hours otherwise.
 
 A picture p is judged by two independent references a, b of the full renderer: the mean of (p - a)(p - b), in codes,
-is its squared error, free of the references' own noise; what noise remains in that mean is stated. Methods that gather
-samples are asked again and again for more, and each picture on the way counts with the seconds spent so far, denoising
-and guides added where they belong. Kernels are warm.
+is its squared error, free of the references' own noise. Time is that of the processors over their number, so that
+what else runs on the machine does not count; medians of three, warm. Denoised pictures are made with either effort of
+Open Image Denoise, guides included, and every way counts with the better one. Where full rendering does not come to a
+PSNR, its time is drawn out by the law of its noise, error times time being constant, and the scene is named.
 
 python benchmarks/equal_error.py [DISPLAY ...] [--scenes NAME,...]
 """
@@ -16,12 +17,13 @@ from __future__ import annotations
 
 import argparse
 import math
+import os
 import statistics
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,16 +41,19 @@ GLTF = {
 DISPLAYS: dict[str, tuple[str, dict[str, Any], int | None]] = {
     "lenticular-8": ("seed-lenticular", {"size": (512, 512)}, 160),
     "lenticular-48": ("seed-lenticular", {"size": (3072, 384), "finer": 6}, 48),
-    "array-15": ("mla-square", {"size": (510, 510)}, None),
+    "array-15": ("mla-square", {"size": (510, 510)}, 150),
 }
-#: Samples per pixel of either reference, and on which the others are stopped.
-REFERENCE = 256
-FULL = (1, 4, 16, 64)
-DENOISED = (1, 4, 16, 64)
-POOLED = (1, 4, 16)
-#: No method spends more than this on one picture, in seconds.
-MOST_SECONDS = 60.0
+#: Samples per pixel of either reference, and of the pictures that are judged.
+REFERENCE = 128
+SAMPLES = (1, 4, 16, 64)
+CELLS = (1, 4, 16)
+#: Runs of which the median counts, where they are shorter than this many seconds; longer ones are run once.
+RUNS, SHORT = 3, 1.0
 TARGETS = (35.0, 40.0)
+CORES = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+T = TypeVar("T")
+Point = dict[str, Any]
 
 
 @dataclass
@@ -73,8 +78,8 @@ def main() -> None:
     known = [*library.names(), *(name for name, path in GLTF.items() if path.exists())]
     names = given.scenes.split(",") if given.scenes else known
     results = saved("equal_error").get("results", {})
-    for display in given.displays:
-        for name in names:
+    for name in names:
+        for display in given.displays:
             results.setdefault(display, {})[name] = _measure(prepare(name, display))
             summary = {kind: _summary(scenes) for kind, scenes in results.items()}
             save("equal_error", {"reference_spp": 2 * REFERENCE, "results": results, "summary": summary})
@@ -110,8 +115,53 @@ def prepare(name: str, display_name: str) -> Stage:
 
 def _measure(stage: Stage) -> dict[str, Any]:
     judge = Judge(stage)
-    curves = {name: list(_limited(curve(stage), judge)) for name, curve in CURVES.items()}
-    return {"judge_psnr": judge.own_psnr, "curves": curves, "seconds_to": _times(curves)}
+    curves: dict[str, list[Point]] = {"full": [], "full + oidn": [], "pooled": [], "pooled in cells": []}
+    for samples in SAMPLES:
+        traced, picture = timed(lambda samples=samples: _trace(stage, samples, 3))
+        curves["full"].append({"spp": samples, "seconds": traced, **judge(picture)})
+        for effort in ("fast", "high"):
+            _denoised(stage, judge, curves, (samples, effort), traced, picture)
+    for samples in CELLS:
+        seconds, picture = timed(lambda samples=samples: _in_cells(stage, samples))
+        curves["pooled in cells"].append({"spp": samples, "seconds": seconds, **judge(picture)})
+    return {"judge_psnr": judge.own_psnr, "curves": curves, "to": _costs(curves)}
+
+
+def _denoised(
+    stage: Stage, judge: Judge, curves: dict[str, list[Point]], how: tuple[int, Any], traced: float, picture: Picture
+) -> None:
+    """One picture's noise taken out, and its light shared on top of that."""
+    from lippmann.render.denoise_views import denoise_views
+    from lippmann.render.effort import GUIDE_SAMPLES, SHARING_STOP
+    from lippmann.render.guides import plan_guides, trace_guides
+    from lippmann.render.sharing import share_light
+
+    samples, effort = how
+    plan = plan_guides(stage.source, GUIDE_SAMPLES[effort], 4 << 30)
+    looked, guides = timed(lambda: trace_guides(stage.built, stage.source, plan, stage.display_from_world, seed=77))
+    cleaning, clean = timed(lambda: np.maximum(denoise_views(picture, stage.display, guides, effort=effort), 0))
+    stop = SHARING_STOP[effort]
+    sharing, shared = timed(lambda: share_light(clean, stage.display, guides, stop=stop, threads=CORES))
+    parts = {"trace": traced, "guides": looked, "denoise": cleaning, "share": sharing}
+    for way, result, used in (("full + oidn", clean, 3), ("pooled", shared, 4)):
+        seconds = sum(list(parts.values())[:used])
+        curves[way].append({"spp": samples, "effort": effort, "seconds": seconds, **judge(result)})
+    curves["pooled"][-1]["parts"] = parts
+
+
+def timed(call: Callable[[], T]) -> tuple[float, T]:
+    """Seconds of the processors over their number, by the median of warm runs, and the result."""
+    seconds, result = _once(call)
+    if seconds > 3 * SHORT:
+        return seconds, result
+    runs = [_once(call)[0] for _ in range(RUNS if seconds < SHORT else 1)]
+    return statistics.median(runs), result
+
+
+def _once(call: Callable[[], T]) -> tuple[float, T]:
+    started = time.process_time()
+    result = call()
+    return (time.process_time() - started) / CORES, result
 
 
 class Judge:
@@ -155,122 +205,75 @@ def _trace(stage: Stage, samples: int, seed: int) -> Picture:
     return trace_frame(stage.integrator, stage.source, plan, seed=seed).pixels
 
 
-def _full(stage: Stage) -> Iterator[tuple[int, float, float, Picture]]:
-    """Samples, seconds, share of paths traced, picture."""
-    _trace(stage, FULL[0], 0)
-    for samples in FULL:
-        _trace(stage, samples, 7)  # a new length of run has a kernel of its own
-        started = time.perf_counter()
-        picture = _trace(stage, samples, 3)
-        yield samples, time.perf_counter() - started, 1.0, picture
-
-
-def _full_denoised(stage: Stage) -> Iterator[tuple[int, float, float, Picture]]:
-    """The better form of the two is the rival: raw, unless views are asked for and better."""
-    denoise = _denoiser(stage)
-    for samples, seconds, share, picture in _full(stage):
-        if samples in DENOISED:
-            started = time.perf_counter()
-            cleaned = denoise(picture, samples)
-            yield samples, seconds + time.perf_counter() - started, share, cleaned
-
-
-def _denoiser(stage: Stage) -> Callable[[Picture, int], Picture]:
-    from lippmann.render.denoise_views import denoise_views
-    from lippmann.render.guides import plan_guides, trace_guides
-
-    def clean(picture: Picture, samples: int) -> Picture:
-        plan = plan_guides(stage.source, samples, 4 << 30)
-        guides = trace_guides(stage.built, stage.source, plan, stage.display_from_world)
-        return np.maximum(denoise_views(picture, stage.display, guides), 0)
-
-    clean(np.zeros((stage.source.height, stage.source.width, 3), np.float32), 1)
-    return clean
-
-
-def _limited(curve: Iterator[tuple[int, float, float, Picture]], judge: Judge) -> Iterator[dict[str, float]]:
-    for samples, seconds, share, picture in curve:
-        yield {"spp": samples, "seconds": seconds, "traced": share, **judge(picture)}
-        if seconds > MOST_SECONDS:
-            return
-
-
-def _pooled(stage: Stage, denoised: bool = False) -> Iterator[tuple[int, float, float, Picture]]:
-    from lippmann.render.denoise_views import denoise_views
-    from lippmann.render.guides import Guides
+def _in_cells(stage: Stage, samples: int) -> Picture:
     from lippmann.render.pooled.renderer import Pooled
 
-    def clean(color: Picture, albedo: Picture, normal: Picture) -> Picture:
-        return np.maximum(denoise_views(color, stage.display, Guides(albedo, normal), effort="fast"), 0)
-
-    def made(samples: int) -> tuple[float, Picture]:
-        started = time.perf_counter()
-        path = stage.integrator
-        denoiser = clean if denoised else None
-        pooled = Pooled(path.scene, path.traits, path.depth, stage.source, seed=3, denoiser=denoiser)
-        pooled.add(samples)
-        picture = pooled.picture()
-        return time.perf_counter() - started, picture
-
-    made(1)
-    for samples in POOLED:
-        seconds, picture = made(samples)
-        yield samples, seconds, 1.0, picture
+    path = stage.integrator
+    pooled = Pooled(path.scene, path.traits, path.depth, stage.source, seed=3)
+    pooled.add(samples)
+    return pooled.picture()
 
 
-def _pooled_denoised(stage: Stage) -> Iterator[tuple[int, float, float, Picture]]:
-    yield from _pooled(stage, denoised=True)
+def cost_to(curve: list[Point], psnr: float, cost: str = "seconds", *, drawn_out: bool = False) -> float | None:
+    """What a PSNR costs, by a straight line between points in dB and the logarithm of the cost; None if too much.
 
-
-CURVES: dict[str, Callable[[Stage], Iterator[tuple[int, float, float, Picture]]]] = {
-    "full": _full,
-    "full + oidn": _full_denoised,
-    "pooled": _pooled,
-    "pooled + oidn": _pooled_denoised,
-}
-
-
-def seconds_to(curve: list[dict[str, float]], psnr: float) -> float | None:
-    """Seconds to a PSNR, by a straight line between points in dB and log seconds; None if it is not reached.
-
-    Where even the first point is better, its own seconds: fewer cannot be spent.
+    Where even the first point is better, its own cost: less cannot be spent. ``drawn_out`` goes on from the last point
+    as noise does.
     """
     best = -math.inf
-    before = None
+    before: Point | None = None
     for point in curve:
         if point["psnr"] >= psnr:
             if before is None:
-                return point["seconds"]
+                return float(point[cost])
             along = (psnr - before["psnr"]) / (point["psnr"] - before["psnr"])
-            return math.exp((1 - along) * math.log(before["seconds"]) + along * math.log(point["seconds"]))
+            return math.exp((1 - along) * math.log(before[cost]) + along * math.log(point[cost]))
         if point["psnr"] > best:
             best, before = point["psnr"], point
+    if drawn_out and before is not None:
+        return float(before[cost]) * 10 ** ((psnr - before["psnr"]) / 10)
     return None
 
 
-def _times(curves: dict[str, list[dict[str, float]]]) -> dict[str, dict[str, float | None]]:
-    found = {f"{psnr:g}": {name: seconds_to(curve, psnr) for name, curve in curves.items()} for psnr in TARGETS}
-    best = max(point["psnr"] for point in curves["full + oidn"])
-    found["best of full + oidn"] = {name: seconds_to(curve, best) for name, curve in curves.items()}
-    return found
+def _costs(curves: dict[str, list[Point]]) -> dict[str, Any]:
+    """Per goal and way: seconds and samples to it."""
+    goals = {f"{psnr:g}": psnr for psnr in TARGETS}
+    goals["best of full + oidn"] = max(point["psnr"] for point in curves["full + oidn"])
+    return {goal: {way: _cheapest(way, curve, psnr) for way, curve in curves.items()} for goal, psnr in goals.items()}
+
+
+def _cheapest(way: str, curve: list[Point], psnr: float) -> dict[str, Any] | None:
+    """With the better of the efforts."""
+    found = []
+    for effort in dict.fromkeys(point.get("effort") for point in curve):
+        points = [point for point in curve if point.get("effort") == effort]
+        seconds, samples = (cost_to(points, psnr, cost, drawn_out=way == "full") for cost in ("seconds", "spp"))
+        if seconds is not None:
+            reached = max(point["psnr"] for point in points) >= psnr
+            found.append({"seconds": seconds, "spp": samples, "effort": effort, "drawn_out": not reached})
+    return min(found, key=lambda cost: cost["seconds"]) if found else None
 
 
 def _summary(scenes: dict[str, Any]) -> dict[str, Any]:
-    """Geometric means over the scenes of how many times faster the pooled ways are."""
+    """Geometric means over the scenes: how many times faster pooled ways are, and their share of the paths."""
     summary: dict[str, Any] = {}
-    for goal in next(iter(scenes.values()))["seconds_to"]:
+    for goal in next(iter(scenes.values()))["to"]:
         for rival in ("full", "full + oidn"):
-            for ours in ("pooled", "pooled + oidn"):
-                ratios = []
-                for scene in scenes.values():
-                    times = scene["seconds_to"][goal]
-                    if times.get(ours) and times.get(rival):
-                        ratios.append(times[rival] / times[ours])
-                if ratios:
+            for ours in ("pooled", "pooled in cells"):
+                both = {
+                    name: (costs[rival], costs[ours])
+                    for name, scene in scenes.items()
+                    if (costs := scene["to"][goal])[rival] and costs[ours]
+                }
+                if both:
+                    times = [theirs["seconds"] / own["seconds"] for theirs, own in both.values()]
                     summary[f"{ours} against {rival} to {goal}"] = {
-                        "times_faster": statistics.geometric_mean(ratios),
-                        "least": min(ratios),
-                        "scenes": len(ratios),
+                        "times_faster": statistics.geometric_mean(times),
+                        "least": min(times),
+                        "share_of_paths": statistics.geometric_mean(own["spp"] / t["spp"] for t, own in both.values()),
+                        "scenes": len(both),
+                        "drawn_out": [name for name, (theirs, _) in both.items() if theirs["drawn_out"]],
+                        "never": [name for name, scene in scenes.items() if not scene["to"][goal][ours]],
                     }
     return summary
 

@@ -22,7 +22,7 @@ def write_maps(image: IntegralImage, folder: Path) -> None:
     - Of methods that know their noise: ``error.png``, the estimated error of each pixel, in the false colours of
       ``lippmann compare --map``.
     - Of all methods: ``samples.png``, the samples of each pixel from none (dark) to the most of any pixel (bright).
-    - Of pooled pictures: ``pooled.png``, the share of pooled light in each pixel, from none (dark) to all (bright).
+    - Of light pooled in cells of the scene: ``pooled.png``, its share in each pixel, from none (dark) to all (bright).
 
     Raises
     ------

@@ -1,7 +1,7 @@
 """``--method auto``: which method makes a picture where the user leaves that open.
 
 A number of samples is an order: so many are traced for every pixel, and nothing is taken away from what they show. A
-quality or a time is a goal: full rendering goes for it, with or without Open Image Denoise, see
+quality or a time is a goal: full rendering and pooled light, made of the same samples, compete for it, see
 :mod:`lippmann.render.contest`. Methods that reuse points have errors that no estimate knows of, and are taken only by
 name.
 """
@@ -18,7 +18,7 @@ from lippmann.render.settings import LIGHT, Denoiser, RenderSettings
 class Choice:
     """Settings with a method, and why it is this one; ``why`` is empty where the user named it.
 
-    Where ``settings.denoise`` still is ``auto``, plain and denoised pictures compete for the goal.
+    Where ``settings.denoise`` still is ``auto``, plain pictures and pooled light compete for the goal.
     """
 
     settings: RenderSettings
