@@ -21,7 +21,7 @@ MOST_SAMPLES = 512
 WAYS: dict[str, dict[str, str]] = {
     "auto": {},
     "plain": {"denoise": "none"},
-    "denoised": {"denoise": "oidn"},
+    "pooled": {"method": "pooled", "denoise": "oidn"},
 }
 
 
@@ -56,7 +56,7 @@ def _goal(name: str, quality: float) -> dict[str, Any]:
             "seconds": seconds,
             "spp": made.spp,
             "psnr": made.estimate["psnr"],
-            "denoised": "denoise" in made.options,
+            "method": made.method,
             "why": made.options.get("auto", ""),
         }
     return found
