@@ -127,7 +127,8 @@ def test_auto_takes_the_noise_out_where_that_reaches_the_quality_sooner(lippmann
     options, plain = done.json["options"], lippmann(*words, tmp_path / "b.png", "--denoise", "none").json
     assert options["denoise"] == "oidn"
     assert options["denoise_effort"] in ("fast", "high")
-    assert "auto: full with --denoise oidn: after" in done.err
+    assert "auto: pooled: after" in done.err
+    assert done.json["method"] == "pooled"
     assert done.json["estimate"]["worst"] >= 28
     assert done.json["spp"] < plain["spp"]
     assert "as asked for" in plain["options"]["auto"]
