@@ -5,12 +5,18 @@ from __future__ import annotations
 import base64
 import json
 import math
+import signal
 from pathlib import Path
 
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
 SHARED_SCENES = ROOT.parent / "shared" / "scenes"
+
+
+def pytest_configure():
+    # A shell lets what it starts in the background ignore Ctrl-C, and so would all programs that tests start.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @pytest.fixture(scope="session")
