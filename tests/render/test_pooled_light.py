@@ -1,23 +1,18 @@
 """Denoised light shared between micro-images, by the whole program: it converges to ``full`` and says where it stands.
 
-One small scene for each way in which light moves over a surface from lens to lens, or does not. Pictures are judged by
-two long ones that know nothing of each other: the mean of (p - a)(p - b) is a picture's squared error, free of the
-noise of a and b.
+One small scene for each way in which light moves over a surface from lens to lens, or does not.
 """
 
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass, field, replace
-from pathlib import Path
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from lippmann.display import Display, LensArray, Panel
-from lippmann.image.color import encode_srgb
 from lippmann.quality import view_flicker
-from lippmann.quality.metrics import micro_image_means, psnr
 
 pytest.importorskip("pyoidn", reason="Open Image Denoise is not installed")
 pytestmark = pytest.mark.usefixtures("engine")
@@ -110,69 +105,34 @@ SCENES = {
 }
 
 
-@dataclass
-class Case:
-    """A scene before a display, its references, and the pictures that were made of it."""
-
-    name: str
-    scene: object
-    display: Display
-    references: list = field(default_factory=list)
-    pictures: dict = field(default_factory=dict)
-
-    def render(self, seed=7, **options):
-        import lippmann
-
-        scale = self.display.size_mm[0] / 2
-        return lippmann.render(self.scene, self.display, place="display", scale=scale, seed=seed, **options)
-
-    def pooled(self, samples):
-        if samples not in self.pictures:
-            self.pictures[samples] = self.render(method="pooled", denoise="oidn", spp=samples)
-        return self.pictures[samples]
-
-    @property
-    def mean(self):
-        """The references together, linear."""
-        return np.mean([reference.pixels for reference in self.references], axis=0)
-
-    def errors(self, image):
-        """Mean squared error, and that of the worst micro-image."""
-        code = encode_srgb(image.pixels.astype(np.float64))
-        first, second = (code - encode_srgb(reference.pixels.astype(np.float64)) for reference in self.references)
-        product = (first * second).mean(axis=2)
-        return product.mean(), np.nanmax(micro_image_means(product, self.display)[0])
-
-    def bias(self, image):
-        """How far the mean of a picture's light is off, relative."""
-        return float(image.pixels.mean(dtype=np.float64) / self.mean.mean(dtype=np.float64)) - 1
-
-
-def made(name, scene, kind):
+@pytest.fixture(scope="module")
+def made(judged_scene):
     import lippmann
 
-    case = Case(name, lippmann.load_scene(scene), DISPLAYS[kind])
-    case.references = [case.render(method="full", spp=REFERENCE, seed=seed) for seed in (1001, 2002)]
-    return case
+    return lambda name, scene, kind: judged_scene(name, lippmann.load_scene(scene), DISPLAYS[kind], REFERENCE)
+
+
+def pooled(case, samples):
+    return case.picture(samples, "pooled", "oidn")
 
 
 @pytest.fixture(scope="module", params=list(SCENES))
-def case(request, engine):
+def case(request, made):
     make, kind = SCENES[request.param]
     return made(request.param, make(), kind)
 
 
 def test_the_error_falls_with_samples_and_the_mean_comes_right(case):
-    few, some, many = (case.errors(case.pooled(samples))[0] for samples in SAMPLES)
+    few, some, many = (case.errors(pooled(case, samples))[0] for samples in SAMPLES)
     assert some < 0.8 * few
     assert many < 0.5 * some
     # Light that few paths find is missing at first, and never made up.
-    assert abs(case.bias(case.pooled(4))) < 0.06
-    assert abs(case.bias(case.pooled(64))) < 0.015
+    assert abs(case.bias(pooled(case, 4))) < 0.06
+    assert abs(case.bias(pooled(case, 64))) < 0.015
 
 
 def test_no_micro_image_is_given_up_for_the_others(case):
-    whole, worst = (psnr(error) for error in case.errors(case.pooled(64)))
+    whole, worst = case.psnr(pooled(case, 64))
     # Caustics are seen by few lenses; elsewhere the target is 4 dB, and highlights on a small ball take most.
     allowed = {"glass": 14, "glossy": 8, "surroundings": 8}
     assert 0 < whole - worst < allowed.get(case.name, 4)
@@ -180,8 +140,8 @@ def test_no_micro_image_is_given_up_for_the_others(case):
 
 def test_what_a_picture_says_of_itself_does_not_flatter(case):
     for samples in SAMPLES[1:]:
-        stated = case.pooled(samples).provenance.estimate
-        whole, worst = (psnr(error) for error in case.errors(case.pooled(samples)))
+        stated = pooled(case, samples).provenance.estimate
+        whole, worst = case.psnr(pooled(case, samples))
         assert whole >= stated["psnr_low"] - 0.5
         assert worst >= stated["worst_low"] - 0.5
         # Where few paths find the light, caution may go far.
@@ -192,7 +152,7 @@ def test_errors_flicker_less_from_view_to_view_than_those_of_full(case):
     """At equal PSNR, the flicker is to that of ``full`` as the shares of the error are that change between views."""
     reference = case.references[0].with_pixels(case.mean)
     plain = case.render(method="full", denoise="none", spp=16)
-    noisy, clean = (view_flicker(reference, picture) for picture in (plain, case.pooled(16)))
+    noisy, clean = (view_flicker(reference, picture) for picture in (plain, pooled(case, 16)))
     assert noisy.share > 0.6
     assert clean.share < 0.85 * noisy.share
 
@@ -213,7 +173,7 @@ def lamps_by_a_wall():
 
 
 @pytest.fixture(scope="module")
-def smooth(engine):
+def smooth(made):
     return made("smooth", lamps_by_a_wall(), "lenticular")
 
 
@@ -229,7 +189,7 @@ def smooth(engine):
 def test_light_that_is_shared_wrongly_is_seen_by_the_picture_itself(smooth, monkeypatch, fault, dearer):
     import lippmann.render.guided as guided
 
-    right = smooth.pooled(64)
+    right = pooled(smooth, 64)
     share = guided.share_light
 
     def wrongly(pixels, display, guides, **options):
@@ -238,7 +198,7 @@ def test_light_that_is_shared_wrongly_is_seen_by_the_picture_itself(smooth, monk
 
     monkeypatch.setattr(guided, "share_light", wrongly)
     wrong = smooth.render(method="pooled", denoise="oidn", spp=64)
-    true = psnr(smooth.errors(right)[0]) - psnr(smooth.errors(wrong)[0])
+    true = smooth.psnr(right)[0] - smooth.psnr(wrong)[0]
     stated = right.provenance.estimate["psnr"] - wrong.provenance.estimate["psnr"]
     assert min(true, stated) > 10 * np.log10(dearer)
     assert smooth.errors(wrong)[0] < 10 ** (-0.1 * (wrong.provenance.estimate["psnr_low"] - 0.5))
@@ -246,18 +206,7 @@ def test_light_that_is_shared_wrongly_is_seen_by_the_picture_itself(smooth, monk
 
 def test_sharing_is_worth_it_where_light_is_smooth(smooth):
     alone = smooth.render(method="full", denoise="oidn", spp=16)
-    assert smooth.errors(smooth.pooled(16))[0] < 0.9 * smooth.errors(alone)[0]
-
-
-@pytest.fixture
-def small(tmp_path):
-    """The paper's display with fewer pixels, as a file."""
-    import lippmann.display.presets as presets
-
-    text = (Path(presets.__path__[0]) / "seed-lenticular.toml").read_text()
-    path = tmp_path / "small.toml"
-    path.write_text(text.replace("width = 512", "width = 64").replace("height = 512", "height = 32"))
-    return path
+    assert smooth.errors(pooled(smooth, 16))[0] < 0.9 * smooth.errors(alone)[0]
 
 
 def command(*words):

@@ -27,6 +27,11 @@ def encode_srgb(linear: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
     return np.where(value <= 0.0031308, 12.92 * value, 1.055 * value ** (1 / 2.4) - 0.055)
 
 
+def encode(linear: NDArray[np.floating[Any]], transfer: Transfer) -> NDArray[np.floating[Any]]:
+    """Coded values in [0, 1] of linear values by ``transfer``; same shape and precision."""
+    return encode_srgb(linear) if transfer == "srgb" else np.clip(linear, 0, 1)
+
+
 def decode_srgb(coded: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
     """Linear values of sRGB-coded values in [0, 1]; same shape and precision."""
     value: NDArray[Any] = coded
@@ -40,7 +45,7 @@ def quantize(linear: FloatArray, bits: int, transfer: Transfer) -> NDArray[np.ui
     source, target = np.ascontiguousarray(linear).reshape(-1), codes.reshape(-1)
     for start in range(0, source.size, _BLOCK):
         block = source[start : start + _BLOCK]
-        coded = encode_srgb(block) if transfer == "srgb" else np.clip(block, 0, 1)
+        coded = encode(block, transfer)
         target[start : start + _BLOCK] = np.floor(coded * top + np.float32(0.5))
     return codes
 

@@ -18,7 +18,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.image.color import encode_srgb
+from lippmann.image.color import encode
 from lippmann.image.provenance import Transfer
 from lippmann.progress import ProgressCallback, silent
 from lippmann.render.coding import coding_slope
@@ -106,13 +106,8 @@ def _slope(picture: Floats, noisy: tuple[Floats, Floats], transfer: Transfer) ->
     truth = np.where(picture > 1, np.minimum(shown, 1), apart)
     far = picture - truth > _LEAST_STEP
     low, high = truth[far], picture[far]
-    slope[far] = (_code(high, transfer) - _code(low, transfer)) / (high - low)
+    slope[far] = (encode(high, transfer) - encode(low, transfer)) / (high - low)
     return slope
-
-
-def _code(linear: Floats, transfer: Transfer) -> Floats:
-    coded: Floats = np.clip(linear, 0, 1) if transfer == "linear" else encode_srgb(linear)
-    return coded
 
 
 def _local_mean(values: Floats) -> Floats:

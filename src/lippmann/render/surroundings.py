@@ -6,8 +6,8 @@ larger window, and what lies around it is thrown away. How much that must be fol
 - Light that is pooled in cells is shared by the lenses that see the same place, and weighed against unpooled samples in
   blocks of up to a lens by what two blocks each way say. With ``LENSES`` whole lenses around it a pixel at the tile's
   edge has both.
-- Light that is shared after denoising comes from up to seven lenses away. But it is smooth already: with more than
-  ``SHARED_LENSES`` around them tiles come no nearer to the picture rendered whole.
+- Light that is shared after denoising comes from some lenses away, see :mod:`lippmann.render.sharing`. But it is smooth
+  already: with more than ``SHARED_LENSES`` around them tiles come no nearer to the picture rendered whole.
 - The network of Open Image Denoise sees pixels up to 87 away, and heeds the farther ones less and less: with
   ``DENOISER_REACH`` pixels around them tiles differ from the picture rendered whole by a twentieth of a code of 8 bits.
 
