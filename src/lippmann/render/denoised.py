@@ -2,8 +2,12 @@
 
 Each half of the samples is denoised by itself, and the picture is the mean of the two. A denoised half knows nothing of
 the other, noisy half, which therefore can judge it: for a denoised half D(a), the noisy halves a and b and the truth t,
-the mean of (D(a) - b)^2 is that of (D(a) - t)^2 and the noise of b, and half the mean of (a - b)^2 is that noise. What
-is told is the mean error of the halves; that of their mean is never larger.
+the mean of (D(a) - b)^2 is that of (D(a) - t)^2 and the noise of b, and half the mean of (a - b)^2 is that noise. The
+error of the mean of D(a) and D(b) is the mean of theirs less a quarter of the mean of (D(a) - D(b))^2.
+
+Where a denoised half is judged to be worse than its samples, they take its place (:mod:`lippmann.render.own_samples`),
+so that with ever more samples the picture comes to be what they show, whatever a denoiser does. The other half has a
+say in that, but each of its pixels among many: its judgement stays next to free of its own noise.
 
 Errors are small and the curve of the codes is taken as straight, but for pixels that the denoiser made far brighter
 than the samples show, as it does beside lamps: where that is beyond white, the curve is cut off, and in the dark it is
@@ -23,6 +27,7 @@ from lippmann.image.provenance import Transfer
 from lippmann.progress import ProgressCallback, silent
 from lippmann.render.coding import coding_slope
 from lippmann.render.estimate import CROSS_NOISE, PixelErrors
+from lippmann.render.own_samples import mean_around, own_share
 
 Floats = NDArray[np.float32]
 #: Of the halves' mean difference nearby: a pixel that is brighter than its samples by more is so by no accident.
@@ -58,12 +63,15 @@ class Denoised:
         From a noisy ``(H, W, 3)`` linear picture to a clean one.
     transfer:
         How values become codes; errors are measured between codes.
+    threads:
+        CPU threads.
     """
 
-    def __init__(self, renderer: Halved, denoise: Denoise, transfer: Transfer) -> None:
+    def __init__(self, renderer: Halved, denoise: Denoise, transfer: Transfer, threads: int = 1) -> None:
         self._renderer = renderer
         self._denoise = denoise
         self._transfer: Transfer = transfer
+        self._threads = threads
         self._cleaned: tuple[Floats, Floats] | None = None
         self._cleaned_samples = 0
 
@@ -86,34 +94,29 @@ class Denoised:
         error = np.square(clean[0] - noisy[1])
         error += np.square(clean[1] - noisy[0])
         error -= np.square(noisy[0] - noisy[1])
-        error *= np.float32(0.5) * np.square(_slope(self.picture(), noisy, self._transfer))
+        error -= np.float32(0.5) * np.square(clean[0] - clean[1])
+        error *= np.float32(0.5) * np.square(self._slope(noisy))
         return PixelErrors(error.mean(axis=2), None, CROSS_NOISE, self._renderer.squared_error())
 
     def _clean_halves(self) -> tuple[Floats, Floats]:
         # The samples may have come by another way than through :meth:`add`.
         if self._cleaned is None or self._cleaned_samples != self._renderer.samples:
             self._cleaned_samples = self._renderer.samples
-            first, second = (self._denoise(half) for half in self._renderer.halves())
-            self._cleaned = first, second
+            noisy = self._renderer.halves()
+            clean = self._denoise(noisy[0]), self._denoise(noisy[1])
+            own = own_share(noisy, clean, self._transfer, threads=self._threads)
+            self._cleaned = clean[0] + own * (noisy[0] - clean[0]), clean[1] + own * (noisy[1] - clean[1])
         return self._cleaned
 
-
-def _slope(picture: Floats, noisy: tuple[Floats, Floats], transfer: Transfer) -> Floats:
-    """By how much a pixel's code differs from that of the truth, per linear difference between the two."""
-    slope = coding_slope(picture, transfer)
-    shown = np.float32(0.5) * (noisy[0] + noisy[1])
-    apart = shown + np.float32(FAR_ABOVE) * _local_mean(np.abs(noisy[0] - noisy[1]))
-    truth = np.where(picture > 1, np.minimum(shown, 1), apart)
-    far = picture - truth > _LEAST_STEP
-    low, high = truth[far], picture[far]
-    slope[far] = (encode(high, transfer) - encode(low, transfer)) / (high - low)
-    return slope
-
-
-def _local_mean(values: Floats) -> Floats:
-    """Means over each pixel and the eight around it."""
-    height, width = values.shape[:2]
-    wide = np.pad(values, ((1, 1), (1, 1), (0, 0)), mode="edge")
-    rows = wide[:height] + wide[1:-1] + wide[2:]
-    total: Floats = rows[:, :width] + rows[:, 1:-1] + rows[:, 2:]
-    return total * np.float32(1 / 9)
+    def _slope(self, noisy: tuple[Floats, Floats]) -> Floats:
+        """By how much a pixel's code differs from that of the truth, per linear difference between the two."""
+        picture, transfer = self.picture(), self._transfer
+        slope = coding_slope(picture, transfer)
+        shown = np.float32(0.5) * (noisy[0] + noisy[1])
+        scatter = np.abs(noisy[0] - noisy[1]).mean(axis=2)
+        apart = shown + np.float32(FAR_ABOVE) * mean_around(scatter, 1, threads=self._threads)[..., None]
+        truth = np.where(picture > 1, np.minimum(shown, 1), apart)
+        far = picture - truth > _LEAST_STEP
+        low, high = truth[far], picture[far]
+        slope[far] = (encode(high, transfer) - encode(low, transfer)) / (high - low)
+        return slope

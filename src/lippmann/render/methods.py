@@ -222,7 +222,7 @@ def _denoised_part(job: Job) -> Traced:
     batches.add(job.settings.samples, job.progress)
     denoiser = _denoiser(job, lambda: _rays_per_pixel(job, batches.rays))
     assert denoiser is not None
-    denoised = Denoised(batches, denoiser, job.transfer)
+    denoised = Denoised(batches, denoiser, job.transfer, job.threads)
     errors = denoised.squared_error()
     frame = Frame(denoised.picture(), batches.rays, batches.seconds_compile, batches.seconds_trace)
     frame.maps[ERROR_LAYER] = np.maximum(errors.values, 0)
@@ -242,7 +242,7 @@ class _Way:
 def _denoised_way(job: Job, goal: Goal, batches: FullInBatches, rays: Callable[[], float]) -> _Way:
     denoiser = _denoiser(job, rays)
     assert denoiser is not None
-    renderer = Denoised(batches, denoiser, job.transfer)
+    renderer = Denoised(batches, denoiser, job.transfer, job.threads)
     seconds = 0.0 if goal.max_time is None else denoiser.probe()
     return _Way(renderer, Track(renderer, _estimator(job, DenoisedEstimator), DENOISED_SLOPE, seconds), denoiser)
 

@@ -1,0 +1,76 @@
+"""How much of a denoised pixel its own samples should make up, by what the halves of a picture say of each other.
+
+A denoiser knows pictures, not this scene: it wipes out stripes that it takes for noise, and what is seen through water.
+Such errors stay, however many samples there are, while the samples' own noise falls. So where a clean half lies farther
+from the truth than its noisy samples scatter, it gives way to them: of two pictures with squared errors E and V that
+know nothing of each other the best mean has E / (E + V) of the second. Both are measured, E by the other half. That
+such means converge was shown by A. Firmino, J. R. Frisvad, H. W. Jensen, *Progressive Denoising of Monte Carlo Rendered
+Images*, Computer Graphics Forum 41(2), 2022, where a network chooses; here the measurement does, over the pixels
+around.
+
+Single pixels tell nothing. E counts as far as it exceeds its own standard deviation, so that few and noisy samples
+change nothing, and over small and large neighbourhoods: in a small one a bright hit may be missing by chance, in a
+large one what is wrong with an edge is lost. The geometric mean of what both say is zero where either says nothing.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lippmann.image.provenance import Transfer
+from lippmann.render.coding import coding_slope
+from lippmann.render.reuse.bands import Bands
+from lippmann.render.reuse.neighbourhood import column_mean_rows, judged_rows, row_mean_rows
+
+Floats = NDArray[np.float32]
+Halves = tuple[Floats, Floats]
+
+#: How far the two neighbourhoods reach, in pixels to each side.
+NEAR, FAR = 2, 8
+#: Standard deviations that the error of clean pixels must exceed.
+_DEVIATIONS = 1.0
+#: No noise and no error: then there is nothing to choose.
+_NOTHING = 1e-12
+
+
+def own_share(noisy: Halves, clean: Halves, transfer: Transfer, *, threads: int) -> Floats:
+    """The weight of each pixel's own samples against its clean value, ``(H, W, 1)`` in [0, 1].
+
+    Parameters
+    ----------
+    noisy, clean:
+        Two halves of the samples that know nothing of each other, and what a denoiser made of each; ``(H, W, 3)``
+        linear.
+    transfer:
+        How values become codes; errors are measured between codes.
+    threads:
+        CPU threads; the result does not depend on them.
+    """
+    # Beyond white the codes are cut off, but what is wrong there is wrong around, too.
+    slope = coding_slope(np.clip(np.float32(0.5) * (clean[0] + clean[1]), 0, 1), transfer)
+    noise, error = np.empty(slope.shape[:2], dtype=np.float32), np.empty(slope.shape[:2], dtype=np.float32)
+    with Bands(threads) as bands:
+        bands.lines(judged_rows, len(slope), *noisy, *clean, slope, noise, error)
+        share = np.ones_like(noise)
+        for reach in (NEAR, FAR):
+            of_noise, of_error, squared = (
+                _mean_around(values, reach, bands) for values in (noise, error, np.square(error))
+            )
+            deviation = np.sqrt(squared) / np.float32(2 * reach + 1)
+            known = np.maximum(of_error - np.float32(_DEVIATIONS) * deviation, 0)
+            share *= known / (known + np.maximum(of_noise, 0) + np.float32(_NOTHING))
+    return np.sqrt(share)[..., None]
+
+
+def mean_around(values: Floats, reach: int, *, threads: int) -> Floats:
+    """Means of ``(H, W)`` over the square of pixels up to ``reach`` away, cut at the edges."""
+    with Bands(threads) as bands:
+        return _mean_around(values, reach, bands)
+
+
+def _mean_around(values: Floats, reach: int, bands: Bands) -> Floats:
+    along, mean = np.empty_like(values), np.empty_like(values)
+    bands.lines(row_mean_rows, len(values), values, reach, along)
+    bands.lines(column_mean_rows, len(values), along, reach, mean)
+    return mean

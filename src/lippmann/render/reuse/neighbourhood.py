@@ -1,0 +1,72 @@
+"""Means over the pixels around each: the compiled part."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from lippmann.render.reuse.compiled import compiled
+
+
+@compiled
+def row_mean_rows(first: int, last: int, values: Any, radius: int, mean: Any) -> None:
+    """Rows ``[first, last)`` of ``mean``: that of the ``radius`` pixels to either side in ``values``, both ``(H, W)``.
+
+    Cut at the edges.
+    """
+    width = values.shape[1]
+    for row in range(first, last):
+        total = 0.0
+        for column in range(min(radius, width)):
+            total += values[row, column]
+        for column in range(width):
+            if column + radius < width:
+                total += values[row, column + radius]
+            if column > radius:
+                total -= values[row, column - radius - 1]
+            mean[row, column] = total / (min(column + radius, width - 1) - max(column - radius, 0) + 1)
+
+
+@compiled
+def column_mean_rows(first: int, last: int, values: Any, radius: int, mean: Any) -> None:
+    """Rows ``[first, last)`` of ``mean``: that of the ``radius`` pixels above and below in ``values``, cut likewise."""
+    height, width = values.shape
+    totals = np.zeros(width, dtype=np.float64)
+    for row in range(max(0, first - radius), min(first + radius, height)):
+        for column in range(width):
+            totals[column] += values[row, column]
+    for row in range(first, last):
+        low, high = max(row - radius, 0), min(row + radius, height - 1)
+        if row + radius < height:
+            for column in range(width):
+                totals[column] += values[row + radius, column]
+        # The first row of a band begins where its totals do.
+        if row > first and row > radius:
+            for column in range(width):
+                totals[column] -= values[row - radius - 1, column]
+        for column in range(width):
+            mean[row, column] = totals[column] / (high - low + 1)
+
+
+@compiled
+def judged_rows(
+    first: int, last: int, noisy: Any, other: Any, clean: Any, other_clean: Any, slope: Any, noise: Any, error: Any
+) -> None:
+    """Rows ``[first, last)`` of what is measured of a picture's halves, ``(H, W)``, between codes.
+
+    ``noisy``, ``other`` and their denoised ``clean``, ``other_clean`` are ``(H, W, 3)``, ``slope`` is the code's.
+    ``noise`` is the squared error of a noisy half, ``error`` that of a clean one; both are right on the average.
+    """
+    for row in range(first, last):
+        for column in range(noisy.shape[1]):
+            of_noise, of_error = 0.0, 0.0
+            for c in range(3):
+                weight = slope[row, column, c] * slope[row, column, c] / 6.0
+                a, b = noisy[row, column, c], other[row, column, c]
+                apart = (a - b) * (a - b)
+                to_other, to_own = clean[row, column, c] - b, other_clean[row, column, c] - a
+                of_noise += weight * apart
+                of_error += weight * (to_other * to_other + to_own * to_own - apart)
+            noise[row, column] = of_noise
+            error[row, column] = of_error
