@@ -7,7 +7,7 @@ error of the mean of D(a) and D(b) is the mean of theirs less a quarter of the m
 
 Where a denoised half is judged to be worse than its samples, they take its place (:mod:`lippmann.render.own_samples`),
 so that with ever more samples the picture comes to be what they show, whatever a denoiser does. The other half has a
-say in that, but each of its pixels among many: its judgement stays next to free of its own noise.
+say in that, but none of its pixels in its own place, so that it can still judge.
 
 Errors are small and the curve of the codes is taken as straight, but for pixels that the denoiser made far brighter
 than the samples show, as it does beside lamps: where that is beyond white, the curve is cut off, and in the dark it is

@@ -11,6 +11,9 @@ around.
 Single pixels tell nothing. E counts as far as it exceeds its own standard deviation, so that few and noisy samples
 change nothing, and over small and large neighbourhoods: in a small one a bright hit may be missing by chance, in a
 large one what is wrong with an edge is lost. The geometric mean of what both say is zero where either says nothing.
+
+A pixel's own difference to the other half has no say in its weight: where that half happens to agree with the noise of
+the samples, these would seem to be right, and the other half could not judge the picture any more.
 """
 
 from __future__ import annotations
@@ -54,10 +57,9 @@ def own_share(noisy: Halves, clean: Halves, transfer: Transfer, *, threads: int)
         bands.lines(judged_rows, len(slope), *noisy, *clean, slope, noise, error)
         share = np.ones_like(noise)
         for reach in (NEAR, FAR):
-            of_noise, of_error, squared = (
-                _mean_around(values, reach, bands) for values in (noise, error, np.square(error))
-            )
-            deviation = np.sqrt(squared) / np.float32(2 * reach + 1)
+            of_noise = _mean_around(noise, reach, bands)
+            of_error, squared = (_of_others(values, reach, bands) for values in (error, np.square(error)))
+            deviation = np.sqrt(np.maximum(squared, 0)) / np.float32(2 * reach + 1)
             known = np.maximum(of_error - np.float32(_DEVIATIONS) * deviation, 0)
             share *= known / (known + np.maximum(of_noise, 0) + np.float32(_NOTHING))
     return np.sqrt(share)[..., None]
@@ -67,6 +69,17 @@ def mean_around(values: Floats, reach: int, *, threads: int) -> Floats:
     """Means of ``(H, W)`` over the square of pixels up to ``reach`` away, cut at the edges."""
     with Bands(threads) as bands:
         return _mean_around(values, reach, bands)
+
+
+def _of_others(values: Floats, reach: int, bands: Bands) -> Floats:
+    """Means over the pixels around each but without itself."""
+    count = np.ones((1, 1))
+    for axis, length in enumerate(values.shape):
+        place = np.arange(length)
+        along = np.minimum(place + reach, length - 1) - np.maximum(place - reach, 0) + 1
+        count = count * np.expand_dims(along, 1 - axis)
+    found: Floats = ((_mean_around(values, reach, bands) * count - values) / (count - 1)).astype(np.float32)
+    return found
 
 
 def _mean_around(values: Floats, reach: int, bands: Bands) -> Floats:
