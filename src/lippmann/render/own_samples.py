@@ -78,8 +78,8 @@ def _of_others(values: Floats, reach: int, bands: Bands) -> Floats:
         place = np.arange(length)
         along = np.minimum(place + reach, length - 1) - np.maximum(place - reach, 0) + 1
         count = count * np.expand_dims(along, 1 - axis)
-    found: Floats = ((_mean_around(values, reach, bands) * count - values) / (count - 1)).astype(np.float32)
-    return found
+    others = _mean_around(values, reach, bands) * count - values
+    return np.asarray(others / np.maximum(count - 1, 1), dtype=np.float32)
 
 
 def _mean_around(values: Floats, reach: int, bands: Bands) -> Floats:

@@ -8,6 +8,9 @@ import numpy as np
 
 from lippmann.render.reuse.compiled import compiled
 
+#: Sums that run down a picture begin anew after so many rows, wherever bands begin: all round alike.
+_BLOCK = 64
+
 
 @compiled
 def row_mean_rows(first: int, last: int, values: Any, radius: int, mean: Any) -> None:
@@ -33,20 +36,23 @@ def column_mean_rows(first: int, last: int, values: Any, radius: int, mean: Any)
     """Rows ``[first, last)`` of ``mean``: that of the ``radius`` pixels above and below in ``values``, cut likewise."""
     height, width = values.shape
     totals = np.zeros(width, dtype=np.float64)
-    for row in range(max(0, first - radius), min(first + radius, height)):
-        for column in range(width):
-            totals[column] += values[row, column]
-    for row in range(first, last):
-        low, high = max(row - radius, 0), min(row + radius, height - 1)
-        if row + radius < height:
+    for row in range(first // _BLOCK * _BLOCK, last):
+        if row % _BLOCK == 0:
+            totals[:] = 0
+            for other in range(max(0, row - radius), min(row + radius + 1, height)):
+                for column in range(width):
+                    totals[column] += values[other, column]
+        else:
+            if row + radius < height:
+                for column in range(width):
+                    totals[column] += values[row + radius, column]
+            if row > radius:
+                for column in range(width):
+                    totals[column] -= values[row - radius - 1, column]
+        if row >= first:
+            count = min(row + radius, height - 1) - max(row - radius, 0) + 1
             for column in range(width):
-                totals[column] += values[row + radius, column]
-        # The first row of a band begins where its totals do.
-        if row > first and row > radius:
-            for column in range(width):
-                totals[column] -= values[row - radius - 1, column]
-        for column in range(width):
-            mean[row, column] = totals[column] / (high - low + 1)
+                mean[row, column] = totals[column] / count
 
 
 @compiled
