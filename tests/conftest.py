@@ -66,6 +66,20 @@ def make_display():
     return _display_of_whole_lenses
 
 
+@pytest.fixture
+def cut_display(tmp_path):
+    """``cut_display(width, height)``: the paper's display with fewer pixels, as a file."""
+    import lippmann.display.presets as presets
+
+    def cut(width, height):
+        text = (Path(presets.__path__[0]) / "seed-lenticular.toml").read_text()
+        path = tmp_path / "small.toml"
+        path.write_text(text.replace("width = 512", f"width = {width}").replace("height = 512", f"height = {height}"))
+        return path
+
+    return cut
+
+
 @pytest.fixture(scope="session")
 def moving_ball(tmp_path_factory) -> Path:
     """A glTF file of one second: a ball rises and comes down again 1 to the right, and a camera goes along."""

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -11,14 +9,8 @@ from lippmann.image import read_info, read_picture
 
 
 @pytest.fixture
-def small(tmp_path):
-    """The paper's display with fewer pixels, as a file."""
-    import lippmann.display.presets as presets
-
-    text = (Path(presets.__path__[0]) / "seed-lenticular.toml").read_text()
-    path = tmp_path / "small.toml"
-    path.write_text(text.replace("width = 512", "width = 128").replace("height = 512", "height = 48"))
-    return path
+def small(cut_display):
+    return cut_display(128, 48)
 
 
 def test_a_quality_is_worked_for_and_stated(lippmann, engine, tmp_path, small):

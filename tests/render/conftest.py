@@ -69,3 +69,11 @@ class JudgedScene:
 def judged_scene(engine):
     """:class:`JudgedScene`."""
     return JudgedScene
+
+
+@pytest.fixture
+def as_denoised(monkeypatch):
+    """Pictures stay as the denoiser leaves them, however wrong they are."""
+    monkeypatch.setattr(
+        "lippmann.render.denoised.own_share", lambda noisy, clean, transfer, threads: np.zeros((1, 1, 1), np.float32)
+    )

@@ -50,14 +50,6 @@ def true_error(picture, truth):
     return float(np.square(encode_srgb(picture.astype(float)) - encode_srgb(truth.astype(float))).mean())
 
 
-@pytest.fixture
-def as_denoised(monkeypatch):
-    """Pictures stay as the denoiser leaves them, however wrong they are."""
-    monkeypatch.setattr(
-        "lippmann.render.denoised.own_share", lambda noisy, clean, transfer, threads: np.zeros((1, 1, 1), np.float32)
-    )
-
-
 def told_and_true(renderer, denoise):
     denoised = Denoised(renderer, denoise, "srgb")
     told = denoised.squared_error()

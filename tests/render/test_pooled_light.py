@@ -186,10 +186,10 @@ def smooth(made):
     ],
     ids=["mirrored heights", "doubled heights", "light that is made up"],
 )
-def test_light_that_is_shared_wrongly_is_seen_by_the_picture_itself(smooth, monkeypatch, fault, dearer):
+def test_light_that_is_shared_wrongly_is_seen_by_the_picture_itself(smooth, monkeypatch, as_denoised, fault, dearer):
     import lippmann.render.guided as guided
 
-    right = pooled(smooth, 64)
+    right = smooth.render(method="pooled", denoise="oidn", spp=64)
     share = guided.share_light
 
     def wrongly(pixels, display, guides, **options):
@@ -204,9 +204,20 @@ def test_light_that_is_shared_wrongly_is_seen_by_the_picture_itself(smooth, monk
     assert smooth.errors(wrong)[0] < 10 ** (-0.1 * (wrong.provenance.estimate["psnr_low"] - 0.5))
 
 
-def test_sharing_is_worth_it_where_light_is_smooth(smooth):
-    alone = smooth.render(method="full", denoise="oidn", spp=16)
-    assert smooth.errors(pooled(smooth, 16))[0] < 0.9 * smooth.errors(alone)[0]
+def test_light_that_is_shared_wrongly_gives_way_to_samples(smooth, monkeypatch):
+    monkeypatch.setattr("lippmann.render.guided.share_light", lambda pixels, *_, **__: 1.1 * pixels)
+    wrong = smooth.render(method="pooled", denoise="oidn", spp=64)
+    assert smooth.psnr(wrong)[0] > smooth.psnr(pooled(smooth, 64))[0] - 3
+
+
+def test_sharing_is_worth_it_where_light_is_smooth(smooth, as_denoised):
+    alone, shared = (smooth.render(method=method, denoise="oidn", spp=16) for method in ("full", "pooled"))
+    assert smooth.errors(shared)[0] < 0.9 * smooth.errors(alone)[0]
+
+
+@pytest.fixture
+def small(cut_display):
+    return cut_display(64, 32)
 
 
 def command(*words):
