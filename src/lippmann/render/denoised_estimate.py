@@ -48,8 +48,8 @@ LONE_LEFT, LONE_DOUBTED = 0.1, 0.5
 USUAL_SPREAD, SPREAD_DOUBT = 0.5, 0.4
 #: Squared deviations from which on a micro-image that seems worse than in proportion is taken to be so.
 OTHER_FROM = 2.0
-#: By how much the mean of two halves may be better than they are.
-BEST_OF_HALVES = 0.5
+#: As a part of the error stated: pictures that are hard to judge are often better than that by so much.
+OFTEN_BETTER = 0.5
 #: A picture without any error still has this mean squared one, so that its logarithm exists.
 _FLOOR = 1e-12
 
@@ -73,12 +73,12 @@ def estimate_denoised(judged: ErrorSums, samples: ErrorSums, grid: tuple[int, in
     mean = max(cut_at_zero(float(judged.values.sum()) / pixels, deviation), LONE_LEFT * lone, _FLOOR)
     common = math.log1p((deviation / mean) ** 2)
     spread = NORMAL_95 * math.sqrt(common + MODEL_UNCERTAINTY**2)
-    ends = mean * math.exp(spread) + LONE_DOUBTED * lone, BEST_OF_HALVES * mean * math.exp(-spread)
+    ends = mean * math.exp(spread) + LONE_DOUBTED * lone, OFTEN_BETTER * mean * math.exp(-spread)
 
     parts = _parts(judged, samples, index, grid, mean)
     draws = parts.draws().max(axis=0) * np.exp(math.sqrt(common) * np.random.default_rng(2).standard_normal(DRAWS))
     worst = np.quantile(draws, (0.5, 0.975, LOW_QUANTILE))
-    worst *= (1, 1 + MODEL_UNCERTAINTY, BEST_OF_HALVES / (1 + MODEL_UNCERTAINTY))
+    worst *= (1, 1 + MODEL_UNCERTAINTY, OFTEN_BETTER / (1 + MODEL_UNCERTAINTY))
     row, column = divmod(int(index[np.argmax(parts.expected)]), grid[1])
     psnr, psnr_low, psnr_high = (float(value) for value in psnr_of(np.array([mean, *ends])))
     of_worst, worst_low, worst_high = (float(value) for value in psnr_of(worst))
