@@ -130,8 +130,10 @@ def _measure(stage: Stage) -> dict[str, Any]:
 def _denoised(
     stage: Stage, judge: Judge, curves: dict[str, list[Point]], how: tuple[int, Any], traced: float, picture: Picture
 ) -> None:
-    """One picture's noise taken out, and its light shared on top of that."""
+    """One picture's noise taken out; and pooled light, as the program makes it: by halves, shared, beside samples."""
+    from lippmann.render.batches import FullInBatches
     from lippmann.render.denoise_views import denoise_views
+    from lippmann.render.denoised import Denoised
     from lippmann.render.effort import GUIDE_SAMPLES, SHARING_STOP
     from lippmann.render.guides import plan_guides, trace_guides
     from lippmann.render.sharing import share_light
@@ -139,14 +141,23 @@ def _denoised(
     samples, effort = how
     plan = plan_guides(stage.source, GUIDE_SAMPLES[effort], 4 << 30)
     looked, guides = timed(lambda: trace_guides(stage.built, stage.source, plan, stage.display_from_world, seed=77))
-    cleaning, clean = timed(lambda: np.maximum(denoise_views(picture, stage.display, guides, effort=effort), 0))
-    stop = SHARING_STOP[effort]
-    sharing, shared = timed(lambda: share_light(clean, stage.display, guides, stop=stop, threads=CORES))
-    parts = {"trace": traced, "guides": looked, "denoise": cleaning, "share": sharing}
-    for way, result, used in (("full + oidn", clean, 3), ("pooled", shared, 4)):
-        seconds = sum(list(parts.values())[:used])
-        curves[way].append({"spp": samples, "effort": effort, "seconds": seconds, **judge(result)})
-    curves["pooled"][-1]["parts"] = parts
+
+    def clean(noisy: Picture) -> Picture:
+        return np.maximum(denoise_views(noisy, stage.display, guides, effort=effort), 0)
+
+    def share(noisy: Picture) -> Picture:
+        return share_light(clean(noisy), stage.display, guides, stop=SHARING_STOP[effort], threads=CORES)
+
+    batches = FullInBatches(stage.integrator, stage.source, seed=3, memory=4 << 30)
+    batches.add(samples)
+    for way, call in (
+        ("full + oidn", lambda: clean(picture)),
+        ("pooled", lambda: Denoised(batches, share, "srgb", CORES).picture()),
+    ):
+        seconds, result = timed(call)
+        parts = {"trace": traced, "guides": looked, "clean": seconds}
+        found = {"spp": samples, "effort": effort, "seconds": sum(parts.values()), "parts": parts}
+        curves[way].append({**found, **judge(result)})
 
 
 def timed(call: Callable[[], T]) -> tuple[float, T]:

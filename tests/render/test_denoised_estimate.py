@@ -101,3 +101,29 @@ def test_a_few_pixels_that_are_badly_wrong_make_a_worst_micro_image(seed):
     assert found.worst_lens == (2, 1)
     assert found.worst_low < worst < found.worst_high
     assert found.worst < worst + 6
+
+
+def test_micro_images_of_few_pixels_may_be_worse_than_expected():
+    """A corner that a slanted lens cuts off: what single pixels do there is most of its error."""
+    panel = Panel(64, 64, 0.25)
+    cut = Display("cut", panel, LensArray("lenticular", 5.3 * 0.25, slant=9.46), gap=6.8)
+    counts = np.bincount(lens_indices(cut).ravel())
+    assert counts.min() < 0.1 * np.median(counts)
+    low = {}
+    for name, display in (("cut", cut), ("whole", SHOWN)):
+        random = np.random.default_rng(4)
+        even = PixelErrors(np.full((64, 64), 2.5e-3, np.float32), None, OWN_NOISE)
+        judged = np.float32(1e-4) * (1 + 0.1 * random.standard_normal((64, 64)).astype(np.float32))
+        found = DenoisedEstimator(display).estimate(PixelErrors(judged, None, CROSS_NOISE, even))
+        low[name] = found.worst_low
+    assert low["cut"] < low["whole"] - 3
+
+
+def test_doubt_of_lone_hits_leaves_the_better_end_where_it_was_measured():
+    errors, _ = made(2)
+    lone = PixelErrors(errors.samples.values, errors.samples.values, OWN_NOISE)
+    found = DenoisedEstimator(SHOWN).estimate(PixelErrors(errors.values, None, CROSS_NOISE, lone))
+    calm = DenoisedEstimator(SHOWN).estimate(errors)
+    assert found.psnr < calm.psnr - 1
+    assert found.psnr_high == pytest.approx(calm.psnr_high, abs=0.1)
+    assert found.worst_high == pytest.approx(calm.worst_high, abs=0.5)

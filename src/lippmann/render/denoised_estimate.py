@@ -8,7 +8,8 @@ it measures: strong single hits of the one half meet the smooth other half. Thre
 - Where a micro-image's own measurement says little, its error is taken to be in proportion to that of the samples which
   the picture was made of: that is known far better, and says where the scene is hard.
 - Light that only lone hits have found is as unknown to the denoiser as to anybody. Of the error that those make up in
-  the samples, a part is taken to be left, and a larger one is doubted.
+  the samples, a part is taken to be left, and a larger one is doubted; the better end of an interval is without it.
+- A micro-image of few pixels, in a corner of the panel, may differ by chance from what its samples let expect.
 
 The constants were chosen on ``benchmarks/hard_scenes.py``.
 """
@@ -48,6 +49,8 @@ LONE_LEFT, LONE_DOUBTED = 0.1, 0.5
 USUAL_SPREAD, SPREAD_DOUBT = 0.5, 0.4
 #: Squared deviations from which on a micro-image that seems worse than in proportion is taken to be so.
 OTHER_FROM = 2.0
+#: Pixels that one micro-image has fewer than the usual one count so many times, for its error to be another one.
+FEW = 16.0
 #: As a part of the error stated: pictures that are hard to judge are often better than that by so much.
 OFTEN_BETTER = 0.5
 #: A picture without any error still has this mean squared one, so that its logarithm exists.
@@ -70,25 +73,39 @@ def estimate_denoised(judged: ErrorSums, samples: ErrorSums, grid: tuple[int, in
     pixels = float(judged.pixels.sum())
     deviation = math.sqrt(CROSS_NOISE.estimate * float(judged.squares.sum())) / pixels
     lone = float(samples.lone.sum()) / pixels
-    mean = max(cut_at_zero(float(judged.values.sum()) / pixels, deviation), LONE_LEFT * lone, _FLOOR)
-    common = math.log1p((deviation / mean) ** 2)
-    spread = NORMAL_95 * math.sqrt(common + MODEL_UNCERTAINTY**2)
-    ends = mean * math.exp(spread) + LONE_DOUBTED * lone, OFTEN_BETTER * mean * math.exp(-spread)
+    measured = max(cut_at_zero(float(judged.values.sum()) / pixels, deviation), _FLOOR)
+    mean = max(measured, LONE_LEFT * lone)
+    worse, better = (math.log1p((deviation / value) ** 2) for value in (mean, measured))
+    spreads = [NORMAL_95 * math.sqrt(variance + MODEL_UNCERTAINTY**2) for variance in (worse, better)]
+    ends = mean * math.exp(spreads[0]) + LONE_DOUBTED * lone, OFTEN_BETTER * measured * math.exp(-spreads[1])
 
-    parts = _parts(judged, samples, index, grid, mean)
-    draws = parts.draws().max(axis=0) * np.exp(math.sqrt(common) * np.random.default_rng(2).standard_normal(DRAWS))
-    worst = np.quantile(draws, (0.5, 0.975, LOW_QUANTILE))
-    worst *= (1, 1 + MODEL_UNCERTAINTY, OFTEN_BETTER / (1 + MODEL_UNCERTAINTY))
+    parts = _parts(judged, samples, index, grid, mean, samples.lone)
+    at_best = _parts(judged, samples, index, grid, measured, np.zeros_like(samples.lone))
+    worst = np.array(
+        [
+            *np.quantile(_worst_drawn(parts, worse), (0.5, 0.975)) * (1, 1 + MODEL_UNCERTAINTY),
+            np.quantile(_worst_drawn(at_best, better), LOW_QUANTILE) * OFTEN_BETTER / (1 + MODEL_UNCERTAINTY),
+        ]
+    )
     row, column = divmod(int(index[np.argmax(parts.expected)]), grid[1])
     psnr, psnr_low, psnr_high = (float(value) for value in psnr_of(np.array([mean, *ends])))
     of_worst, worst_low, worst_high = (float(value) for value in psnr_of(worst))
     return Estimate(psnr, psnr_low, psnr_high, of_worst, worst_low, worst_high, (column, row))
 
 
+def _worst_drawn(parts: PartErrors, common: float) -> Real:
+    """Errors of the worst part, as often as is drawn, where all are uncertain by the log variance ``common`` alike."""
+    drawn: Real = parts.draws().max(axis=0)
+    return drawn * np.exp(math.sqrt(common) * np.random.default_rng(2).standard_normal(DRAWS))
+
+
 def _parts(
-    judged: ErrorSums, samples: ErrorSums, index: NDArray[np.intp], grid: tuple[int, int], mean: float
+    judged: ErrorSums, samples: ErrorSums, index: NDArray[np.intp], grid: tuple[int, int], mean: float, lone: Real
 ) -> PartErrors:
-    """Each part's error: in proportion to its samples' error, drawn from there to its own measurement."""
+    """Each part's error: in proportion to its samples' error, drawn from there to its own measurement.
+
+    ``mean`` is that of all; ``lone`` what lone hits make up of the sums of the samples' errors.
+    """
     count = judged.pixels
     measured = judged.values / count
     of_samples = errors_of_parts(samples, index, grid, OWN_NOISE).expected
@@ -108,7 +125,8 @@ def _parts(
     other = np.where(measured > around, np.square(measured - around) - OTHER_FROM * noise, 0.0)
     between = np.maximum(usual * np.square(around), other)
     trust = between / (between + noise)
-    lone = samples.lone / count
+    lone = lone / count
     expected = np.maximum(around + trust * (measured - around), np.maximum(0.1 * around, LONE_LEFT * lone))
     variance = np.log1p(trust * noise / np.square(expected))
-    return PartErrors(index, expected, expected + LONE_DOUBTED * lone, variance, np.zeros_like(variance))
+    fewer = np.maximum(1 / count - 1 / np.median(count), 0)
+    return PartErrors(index, expected, expected + LONE_DOUBTED * lone, variance, np.log1p(FEW * fewer))
