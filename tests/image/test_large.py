@@ -16,7 +16,7 @@ from lippmann.image import IntegralImage, large, large_folders, read_picture, ti
 from lippmann.image.large import LargePicture, open_picture
 from lippmann.image.large_folders import write_large_micro_images, write_large_views
 from lippmann.image.pixel_source import ChunkedPixels, open_pixels
-from lippmann.image.views import pixels_of_view, view_grid
+from lippmann.image.views import panel_rows_of_view_rows, pixels_of_view, pixels_of_view_rows, view_grid
 from lippmann.refocus import refocus
 from lippmann.replay import replay
 from lippmann.store import Window
@@ -95,26 +95,42 @@ def test_windows_and_single_pixels_of_any_cut(data):
     assert np.array_equal(source.take(rows, columns), values[rows, columns])
 
 
-def test_pieces_are_decoded_once_while_they_are_kept():
-    loads = []
+@pytest.fixture
+def counted():
+    """``counted(width, height)``: pieces of 4 x 4 pixels with no room for more than has to be kept, and their loads."""
 
-    def load(row, column):
-        loads.append((row, column))
-        return np.zeros((4, 4, 3), dtype=np.uint8)
+    def make(width, height):
+        loads = []
 
-    source = ChunkedPixels((16, 4), (4, 4), np.dtype(np.uint8), load, cache_bytes=2 * 48)
-    column = np.array([0, 1, 4, 5, 0, 2])
-    source.take(np.zeros(6, dtype=int), column)
-    source.take(np.zeros(6, dtype=int), column)
-    assert loads == [(0, 0), (0, 1)]
-    source.window(Window(0, 0, 4, 16))
-    source.window(Window(0, 12, 1, 1))
-    assert loads == [(0, 0), (0, 1), (0, 2), (0, 3)]
+        def load(row, column):
+            loads.append((row, column))
+            return np.zeros((4, 4, 3), dtype=np.uint8)
+
+        return ChunkedPixels((width, height), (4, 4), np.dtype(np.uint8), load, cache_bytes=0), loads
+
+    return make
+
+
+def test_pieces_are_decoded_once_while_they_are_kept(counted):
+    source, loads = counted(4, 16)
+    row = np.array([0, 1, 4, 5, 8, 2])
+    source.take(row, np.zeros(6, dtype=int))
+    source.take(row, np.zeros(6, dtype=int))
+    assert loads == [(0, 0), (1, 0), (2, 0)]
     # What was not looked at for longest goes first.
-    source.window(Window(0, 8, 1, 1))
     source.window(Window(0, 0, 1, 1))
-    source.window(Window(0, 8, 1, 1))
-    assert loads[4:] == [(0, 0)]
+    source.window(Window(12, 0, 1, 1))
+    source.window(Window(0, 0, 1, 1))
+    assert loads[3:] == [(3, 0)]
+    source.window(Window(4, 0, 1, 1))
+    assert loads[4:] == [(1, 0)]
+
+
+def test_rows_from_the_top_down_decode_each_piece_once(counted):
+    source, loads = counted(40, 32)
+    for top in range(0, 29, 2):
+        source.window(Window(top, 0, 4, 40))
+    assert len(loads) == len(set(loads)) == 10 * 8
 
 
 @given(data=st.data())
@@ -130,6 +146,15 @@ def test_every_view_shows_the_same_pixels_without_a_table(random_displays, data)
         found, at_row, at_column = pixels_of_view(display, grid, view, row, i)
         assert np.array_equal(found, mask[view])
         assert np.array_equal((at_row * width + at_column)[found], views[view][found][:, 0])
+        first, last = sorted((data.draw(st.integers(0, len(row) - 1)), data.draw(st.integers(1, len(row)))))
+        last = max(last, first + 1)
+        parts = pixels_of_view_rows(display, grid, view, first, last)
+        some = [np.broadcast_to(part, row[first:last].shape) for part in parts]
+        assert np.array_equal(some[0], found[first:last])
+        assert np.array_equal((some[1] * width + some[2])[some[0]], (at_row * width + at_column)[first:last][some[0]])
+        top, bottom = panel_rows_of_view_rows(display, first, last)
+        assert 0 <= top < bottom <= height
+        assert ((some[1] >= top) & (some[1] < bottom))[some[0]].all()
 
 
 @pytest.mark.parametrize("layout", LAYOUTS, ids=range(len(LAYOUTS)))

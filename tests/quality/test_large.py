@@ -13,6 +13,7 @@ from lippmann.image import IntegralImage, large, tiff
 from lippmann.image.large import LargePicture, open_picture
 from lippmann.quality import compare
 from lippmann.quality import large as quality_large
+from lippmann.quality import views as quality_views
 from lippmann.quality.large import compare_large
 
 DISPLAYS = {
@@ -39,7 +40,7 @@ def pair(display, tmp_path, monkeypatch):
     monkeypatch.setattr(tiff, "TILE", 16)
     # Little at a time, so that there are many bands and lots.
     monkeypatch.setattr(quality_large, "_BLOCK", 500)
-    monkeypatch.setattr(quality_large, "_VIEW_BLOCK", 100)
+    monkeypatch.setattr(quality_views, "_BLOCK", 600)
     rng = np.random.default_rng(5)
     shape = (display.panel.height, display.panel.width, 3)
     waves = 0.4 + 0.2 * np.sin(np.arange(shape[0])[:, None, None] / 5 + np.arange(shape[1])[None, :, None] / 9)

@@ -90,7 +90,10 @@ def _block_by_block(
     row_range: tuple[int, int] | None,
     of_block: Callable[[Display, int, int], tuple[Indices, Indices]],
 ) -> tuple[Indices, Indices]:
-    """Runs ``of_block`` on a few rows at a time: its double-precision arrays would take gigabytes for a whole panel."""
+    """Runs ``of_block`` on a few rows at a time: its double-precision arrays would take gigabytes for a whole panel.
+
+    It may return one row, or one column, that stands for all.
+    """
     first, last = row_range or (0, display.panel.height)
     shape = (last - first, display.panel.width)
     whole = np.empty(shape, dtype=np.int32), np.empty(shape, dtype=np.int32)
@@ -115,7 +118,7 @@ def _indices_of_block(display: Display, first: int, last: int) -> tuple[Indices,
     width, height = micro_image_extent(display)
     if lattice.layout == "lenticular":
         center_x = lattice.axis_at(i, y / scale) * scale
-        k_y = np.broadcast_to(np.arange(first, last, dtype=np.int32)[:, None], x.shape)
+        k_y = np.arange(first, last, dtype=np.int32)[:, None]
     else:
         center_x, center_y = (c * scale for c in lattice.center(i, j, x, y, NUMPY))
         k_y = np.floor((center_y - y) / pixel_pitch + (0.5 * height + BOUNDARY_TOLERANCE)).astype(np.int32)
@@ -124,6 +127,9 @@ def _indices_of_block(display: Display, first: int, last: int) -> tuple[Indices,
 
 
 def _pixel_centers(display: Display, first: int, last: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Panel points of the pixels of some rows; of the first of them alone under upright cylinders, which see no row."""
+    if display.lattice.layout == "lenticular" and display.lattice.slant == 0.0:
+        last = first + 1
     u, v = np.meshgrid(np.arange(display.panel.width) + 0.5, np.arange(first, last) + 0.5)
     x, y = display.panel_point(u, v, NUMPY)
     return x, y

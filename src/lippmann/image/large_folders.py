@@ -17,8 +17,9 @@ from lippmann.image.integral_image import Stored
 from lippmann.image.large import LargePicture
 from lippmann.image.metadata import Metadata
 from lippmann.image.permutation import row_blocks
-from lippmann.image.views import ViewGrid, lens_rows, micro_image_centers, pixels_of_view, view_grid
+from lippmann.image.views import ViewGrid, lens_rows, panel_rows_of_view_rows, pixels_of_view_rows, view_grid
 from lippmann.progress import Progress, ProgressCallback, silent
+from lippmann.store.grid import Window
 
 #: Bytes of views that are gathered at a time; the picture is read once for each such lot.
 LOT_BYTES = 1 << 29
@@ -101,13 +102,17 @@ def _gathered(picture: LargePicture, grid: ViewGrid, lot: list[View]) -> Iterato
     rows, columns = lens_rows(display), display.lens_grid.columns
     views = np.zeros((len(lot), rows, columns, 3), dtype=source.dtype)
     has_any = [False] * len(lot)
-    for first, last in row_blocks(rows, columns * 4):
-        row, i = np.indices((last - first, columns))
-        row += first
+    panel_rows = max(1, display.panel.height // rows)
+    for first, last in row_blocks(rows, display.panel.width * panel_rows):
+        top, bottom = panel_rows_of_view_rows(display, first, last)
+        values = source.window(Window(top, 0, bottom - top, display.panel.width))
         for number, view in enumerate(lot):
-            found, at_row, at_column = pixels_of_view(display, grid, view, row, i)
-            views[number, first:last][found] = source.take(at_row[found], at_column[found])
-            has_any[number] |= bool(found.any())
+            found, at_row, at_column = pixels_of_view_rows(display, grid, view, first, last)
+            if not found.any():
+                continue
+            has_any[number] = True
+            part = values[np.where(found, at_row - top, 0), np.where(found, at_column, 0)]
+            views[number, first:last] = np.where(found[..., None], part, 0)
     return zip(views, has_any, strict=True)
 
 
@@ -116,9 +121,10 @@ def _lenses(picture: LargePicture) -> Iterator[tuple[int, int, NDArray[Any], NDA
     display, source = picture.display, picture.source
     ny, nx = micro_image_shape(display)
     grid, panel = display.lens_grid, display.panel
+    is_sheet = display.lens_array.layout == "lenticular"
     together = max(1, LOT_BYTES // (ny * nx * 3 * source.dtype.itemsize))
     for row in range(grid.rows):
-        reach = _rows_of_lens_row(picture, row)
+        reach = (0, panel.height) if is_sheet else panel_rows_of_view_rows(display, row, row + 1)
         for first in range(0, grid.columns, together):
             count = min(together, grid.columns - first)
             values = np.zeros((count * ny * nx, 3), dtype=source.dtype)
@@ -132,19 +138,6 @@ def _lenses(picture: LargePicture) -> Iterator[tuple[int, int, NDArray[Any], NDA
                 values[(lens * ny + k_y[v, u]) * nx + k_x[v, u]] = source.take(v + span[0], u)
                 present[lens] = True
             yield row, first, values.reshape(count, ny, nx, 3), present
-
-
-def _rows_of_lens_row(picture: LargePicture, row: int) -> tuple[int, int]:
-    """First and past-the-last panel row that the lenses of a row may have pixels in."""
-    display = picture.display
-    height = display.panel.height
-    if display.lens_array.layout == "lenticular":
-        return 0, height
-
-    ny, _ = micro_image_shape(display)
-    _, v, _ = micro_image_centers(display, (row, row + 1))
-    first = max(0, int(np.floor(v.min() - 0.5 * ny)) - 1)
-    return first, min(height, int(np.ceil(v.max() + 0.5 * ny)) + 1)
 
 
 def _stored(values: NDArray[Any], picture: LargePicture, stored: Stored) -> NDArray[Any]:

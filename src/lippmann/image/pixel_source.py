@@ -15,7 +15,8 @@ from lippmann.image import tiff, zarr_file
 from lippmann.image.codec import FormatName, opaque_colors
 from lippmann.store.grid import Window
 
-#: Decoded pieces that are kept, in bytes: two rows of tiles of a picture 40 000 pixels wide, at 8 bits.
+#: Decoded pieces that are kept, in bytes: two rows of tiles of a picture 40 000 pixels wide, at 8 bits. Two rows of
+#: pieces are kept in any case, so that what reads some rows after others decodes each piece once.
 CACHE_BYTES = 1 << 28
 
 Values = NDArray[Any]
@@ -35,7 +36,7 @@ class ChunkedPixels:
     load:
         ``load(row, column)`` decodes the piece in that row and column of pieces.
     cache_bytes:
-        What may be kept of them; at least one is.
+        What may be kept of them; at least two rows of pieces and one piece are.
     """
 
     def __init__(
@@ -51,7 +52,7 @@ class ChunkedPixels:
         self.dtype = dtype
         self._load = load
         self._columns = -(-self.width // chunk[1])
-        self._most = max(1, cache_bytes // (chunk[0] * chunk[1] * 3 * dtype.itemsize))
+        self._most = max(2 * self._columns + 1, cache_bytes // (chunk[0] * chunk[1] * 3 * dtype.itemsize))
         self._kept: OrderedDict[tuple[int, int], Values] = OrderedDict()
 
     def window(self, window: Window) -> Values:

@@ -195,13 +195,46 @@ def pixels_of_view(
     return _is_own(owners, lens, at_row, at_column), at_row, at_column
 
 
+def pixels_of_view_rows(
+    display: Display, grid: ViewGrid, view: tuple[int, int], first: int, last: int
+) -> tuple[NDArray[np.bool_], NDArray[np.intp], NDArray[np.intp]]:
+    """:func:`pixels_of_view` of the rows ``first`` to before ``last`` of a view.
+
+    The three broadcast to ``(last - first, lens columns)``; under upright cylinders, where all rows are alike, they are
+    single rows and columns.
+    """
+    columns = display.lens_grid.columns
+    if _rows_are_alike(display):
+        row, i = np.indices((1, columns))
+        found, _, at_column = pixels_of_view(display, grid, view, row + first, i)
+        return found, np.arange(first, last)[:, None], at_column
+    row, i = np.indices((last - first, columns))
+    return pixels_of_view(display, grid, view, row + first, i)
+
+
+def panel_rows_of_view_rows(display: Display, first: int, last: int) -> tuple[int, int]:
+    """First and past-the-last row of the panel in which the views' rows ``first`` to before ``last`` have pixels."""
+    if display.lens_array.layout == "lenticular":
+        return first, last
+    ny, _ = micro_image_shape(display)
+    columns = np.zeros((2, 1))
+    _, v, _ = centers_of_lenses(display, np.array([[first], [last - 1]]), columns)
+    top, bottom = float(v.min() - 0.5 * ny) - 1, float(v.max() + 0.5 * ny) + 1
+    return max(0, math.floor(top)), min(display.panel.height, math.ceil(bottom))
+
+
+def _rows_are_alike(display: Display) -> bool:
+    return display.lens_array.layout == "lenticular" and display.lattice.slant == 0.0
+
+
 def _pixel_views(display: Display) -> ViewGrid:
     """The views of a display with whole pixels from lens to lens: one per place of a micro-image's box."""
     width, height = micro_image_extent(display)
     ny, nx = micro_image_shape(display)
     across, down = _Offsets(), _Offsets()
-    # Some rows at a time: a sheet a metre high has sixty million centres.
-    for rows in row_blocks(lens_rows(display), display.lens_grid.columns):
+    # Some rows at a time: a slanted sheet a metre high has sixty million centres.
+    different = 1 if _rows_are_alike(display) else lens_rows(display)
+    for rows in row_blocks(different, display.lens_grid.columns):
         u, v, _ = micro_image_centers(display, rows)
         across.add(u, width)
         down.add(v, height)

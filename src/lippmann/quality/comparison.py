@@ -16,7 +16,7 @@ from lippmann.errors import PictureError
 from lippmann.image import IntegralImage
 from lippmann.image.large import LargePicture
 from lippmann.progress import ProgressCallback, silent
-from lippmann.quality.flicker import Flicker, view_flicker
+from lippmann.quality.flicker import Flicker
 from lippmann.quality.metrics import (
     LOW_PERCENTILE,
     MicroImage,
@@ -27,7 +27,8 @@ from lippmann.quality.metrics import (
 )
 from lippmann.quality.paper import PaperFigures, paper_figures
 from lippmann.quality.silhouettes import Silhouettes, find_silhouettes
-from lippmann.quality.similarity import ViewSimilarity, view_similarity
+from lippmann.quality.similarity import ViewSimilarity
+from lippmann.quality.views import view_figures
 
 Real = NDArray[np.float64]
 
@@ -161,6 +162,7 @@ def compare(reference: IntegralImage, test: IntegralImage, progress: ProgressCal
     check_comparable(reference, test)
     errors = squared_errors(reference, test)
     means, pixels = micro_image_means(errors, reference.display)
+    similarity, flicker = view_figures(reference, test, progress)
     return Comparison(
         reference,
         test,
@@ -168,8 +170,8 @@ def compare(reference: IntegralImage, test: IntegralImage, progress: ProgressCal
         means,
         pixels,
         find_silhouettes(reference),
-        view_similarity(reference, test, progress),
-        view_flicker(reference, test),
+        similarity,
+        flicker,
         paper_figures(reference, test),
     )
 

@@ -17,9 +17,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
-from lippmann.image import IntegralImage
-from lippmann.quality.metrics import coded, psnr
+from lippmann.quality.metrics import psnr
+
+Real = NDArray[np.float64]
+Flags = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -40,20 +43,40 @@ class Flicker:
         return 0.5 * self.squared / self.error if self.error else 0.0
 
 
-def view_flicker(reference: IntegralImage, test: IntegralImage) -> Flicker | None:
-    """The flicker of ``test`` against a reference of the same display; None if there is one view only.
+class FlickerSums:
+    """Sums for the flicker of views that come in the order of their rows, ``columns`` of them to a row.
 
-    Neighbours are views side by side and, where there are rows of views, one above the other. Where lenses do not cover
-    whole pixels the views are resampled (nearest pixel).
+    Neighbours are views side by side and, where there are rows of views, one above the other.
     """
-    error = coded(reference) - coded(test)
-    views, mask = test.with_pixels(error).views_and_mask()
-    squared = own = 0.0
-    pairs = 0
-    for low, high in ((np.s_[:-1], np.s_[1:]), (np.s_[:, :-1], np.s_[:, 1:])):
-        both = mask[low] & mask[high]
-        before, after = (views[part][both].astype(np.float64) for part in (low, high))
-        squared += float(np.square(after - before).sum())
-        own += 0.5 * float(np.square(before).sum() + np.square(after).sum())
-        pairs += before.size
-    return Flicker(squared / pairs, own / pairs) if pairs else None
+
+    def __init__(self, columns: int) -> None:
+        self._columns = columns
+        self._sums = np.zeros(2)
+        self._values = 0
+        self._last: list[tuple[Real, Flags]] = []
+        self._count = 0
+
+    def begin(self) -> None:
+        """The views begin anew, at other places."""
+        self._last, self._count = [], 0
+
+    def add(self, error: Real, found: Flags) -> None:
+        """The next view's errors ``(H, W, 3)`` and where there are any ``(H, W)``."""
+        if self._last and self._count % self._columns:
+            self._pair(self._last[-1], (error, found))
+        if len(self._last) == self._columns:
+            self._pair(self._last.pop(0), (error, found))
+        self._last.append((error, found))
+        self._count += 1
+
+    def _pair(self, before: tuple[Real, Flags], after: tuple[Real, Flags]) -> None:
+        from lippmann.quality import kernels
+
+        self._values += kernels.add_changes(*before, *after, self._sums)
+
+    def flicker(self) -> Flicker | None:
+        """The flicker; None without neighbours."""
+        if not self._values:
+            return None
+        squared, own = (float(total) / self._values for total in self._sums)
+        return Flicker(squared, own)

@@ -6,7 +6,8 @@ errors.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -16,24 +17,19 @@ from numpy.typing import NDArray
 
 from lippmann.display import Display, micro_image_shape, pixel_indices_under_lens, pixel_lenses
 from lippmann.image import IntegralImage
-from lippmann.image.color import quantize
 from lippmann.image.large import LargePicture
-from lippmann.image.views import lens_rows, pixels_of_view, view_grid
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.quality.comparison import Comparison, check_comparable
-from lippmann.quality.flicker import Flicker
-from lippmann.quality.metrics import coded, coded_values, psnr
-from lippmann.quality.paper import PaperFigures
+from lippmann.quality.metrics import coded_values, psnr, squared_differences, stored_rows
+from lippmann.quality.paper import PaperFigures, paper_codes
 from lippmann.quality.silhouettes import Silhouettes, edges_between_neighbours
-from lippmann.quality.similarity import WINDOW, ViewSimilarity, similarities, window_weights
+from lippmann.quality.views import ViewSums
 
 Real = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 AnyPicture = IntegralImage | LargePicture
-_Report = Callable[[float], None]
 
-#: Pixels of the panel, and of each view, worked on at a time.
-_BLOCK, _VIEW_BLOCK = 1 << 20, 1 << 18
+#: Pixels of the panel that are worked on at a time.
+_BLOCK = 1 << 20
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,54 +75,94 @@ class LargeComparison(Comparison):
 def compare_large(reference: AnyPicture, test: AnyPicture, progress: ProgressCallback = silent) -> LargeComparison:
     """:func:`lippmann.quality.compare` for pictures that are read piece by piece."""
     check_comparable(reference, test)
-    display = reference.display
-    width, height = display.panel.width, display.panel.height
-    grid = display.lens_grid
-    lenses = grid.rows * grid.columns
-    pixels = np.zeros(lenses, dtype=np.intp)
-    sums, paper_sums = np.zeros(lenses), np.zeros(lenses)
-    total = off_error = 0.0
-    off_pixels = 0
-    views = view_grid(display)
-    stages = height + lens_rows(display) * len(views.right) * len(views.down)
-    for band in _bands(display):
-        rows = band.first, band.last
-        seen = coded(reference, (band.top, band.bottom))
-        own = seen[band.inner]
-        errors = np.square(own - coded(test, rows)).mean(axis=2)
-        codes = [quantize(picture.rows(*rows), 8, picture.provenance.transfer) for picture in (reference, test)]
-        paper = np.square(codes[0].astype(np.float64) - codes[1]).mean(axis=2)
-        owner = band.owner[band.inner].ravel()
-        pixels += np.bincount(owner, minlength=lenses)
-        sums += np.bincount(owner, weights=errors.ravel(), minlength=lenses)
-        paper_sums += np.bincount(owner, weights=paper.ravel(), minlength=lenses)
-        off = ~edges_between_neighbours(band, seen)[band.inner]
-        total += float(errors.sum())
-        off_error += float(errors[off].sum())
-        off_pixels += int(off.sum())
-        progress(Progress("compare", band.last, stages))
-    means, paper_means = np.full(lenses, np.nan), np.full(lenses, np.nan)
-    for summed, mean in ((sums, means), (paper_sums, paper_means)):
-        np.divide(summed, pixels, out=mean, where=pixels > 0)
+    panel, grid = reference.display.panel, reference.display.lens_grid
+    sums, views = _PanelSums(reference, test), ViewSums(reference, test)
+    for rows in _in_step(sums.work(), views.work()):
+        progress(Progress("compare", rows, 2 * panel.height))
     shape = grid.rows, grid.columns
-    similarity, flicker = _views_compared(
-        reference, test, lambda done: progress(Progress("compare", height + done, stages))
+    means, paper_means = (
+        np.divide(summed, sums.pixels, out=np.full(summed.shape, np.nan), where=sums.pixels > 0).reshape(shape)
+        for summed in (sums.errors, sums.paper_errors)
     )
-    share = 1 - off_pixels / (width * height)
+    share = 1 - sums.off_pixels / (panel.width * panel.height)
     return LargeComparison(
         reference,
         test,
         np.empty((0, 0)),
-        means.reshape(shape),
-        pixels.reshape(shape),
+        means,
+        sums.pixels.reshape(shape),
         CountedSilhouettes(np.empty((0, 0), dtype=np.bool_), "edges", share),
-        similarity,
-        flicker,
-        PaperFigures(paper_means.reshape(shape)),
-        total_error=total,
-        off_error=off_error,
-        off_pixels=off_pixels,
+        views.similarity,
+        views.flicker,
+        PaperFigures(paper_means),
+        total_error=float(sums.errors.sum()),
+        off_error=sums.off_error,
+        off_pixels=sums.off_pixels,
     )
+
+
+def _in_step(*parts: Iterator[int]) -> Iterator[int]:
+    """Lets the part go on that is furthest behind, so that pieces of a file which all need are decoded once.
+
+    Parts say up to which row they are; so does this, as the sum of all.
+    """
+    reached = dict.fromkeys(parts, 0)
+    going = set(parts)
+    while going:
+        part = min(going, key=lambda one: reached[one])
+        row = next(part, None)
+        if row is None:
+            going.remove(part)
+        else:
+            reached[part] = row
+            yield sum(reached.values())
+
+
+class _PanelSums:
+    """Sums over the pixels of two pictures of one display, by lens and off silhouettes, which grow with :meth:`work`.
+
+    Attributes
+    ----------
+    pixels, errors, paper_errors:
+        By lens: its pixels, and their squared errors, of coded values and of the paper's 8-bit codes.
+    off_error, off_pixels:
+        Squared errors of the pixels that lie on no silhouette, and how many these are.
+    """
+
+    def __init__(self, reference: AnyPicture, test: AnyPicture) -> None:
+        self._reference, self._test = reference, test
+        grid = reference.display.lens_grid
+        lenses = grid.rows * grid.columns
+        self.pixels = np.zeros(lenses, dtype=np.intp)
+        self.errors, self.paper_errors = np.zeros(lenses), np.zeros(lenses)
+        self.off_error, self.off_pixels = 0.0, 0
+
+    def work(self) -> Iterator[int]:
+        """Work through all rows of the panel; says now and then up to which that was."""
+        for band in _bands(self._reference.display):
+            self._add(band)
+            yield band.last
+
+    def _add(self, band: _Band) -> None:
+        transfers = self._reference.provenance.transfer, self._test.provenance.transfer
+        around = stored_rows(self._reference, band.top, band.bottom)
+        own = around[band.inner], stored_rows(self._test, band.first, band.last)
+        seen = coded_values(around, transfers[0])
+        errors = squared_differences(seen[band.inner], coded_values(own[1], transfers[1]))
+        codes = (paper_codes(values, transfer) for values, transfer in zip(own, transfers, strict=True))
+        self._add_to_lenses(band.owner[band.inner].ravel(), errors.ravel(), squared_differences(*codes).ravel())
+        off = ~edges_between_neighbours(band, seen)[band.inner]
+        self.off_error += float(errors[off].sum())
+        self.off_pixels += int(off.sum())
+
+    def _add_to_lenses(self, owner: NDArray[np.int64], errors: Real, paper_errors: Real) -> None:
+        low = int(owner.min())
+        owner = owner - low
+        counts = np.bincount(owner)
+        lenses = slice(low, low + len(counts))
+        self.pixels[lenses] += counts
+        self.errors[lenses] += np.bincount(owner, weights=errors)
+        self.paper_errors[lenses] += np.bincount(owner, weights=paper_errors)
 
 
 class _Band:
@@ -149,7 +185,6 @@ class _Band:
         j = j - j.min()
         self._shape = int(j.max()) + 1, columns, ny, nx
         self._places = ((j * columns + i) * ny + k_y) * nx + k_x
-        self.mask: Flags = self.split(np.ones(self.owner.shape, dtype=np.bool_))
 
     @property
     def inner(self) -> slice:
@@ -159,14 +194,9 @@ class _Band:
     def split(self, values: NDArray[Any]) -> NDArray[Any]:
         """Micro-images of the rows looked at; places without a pixel are zero."""
         trailing = values.shape[2:]
-        found = np.zeros((int(np.prod(self._shape)), *trailing), dtype=values.dtype)
+        found = np.zeros((math.prod(self._shape), *trailing), dtype=values.dtype)
         found[self._places] = values
         return found.reshape(*self._shape, *trailing)
-
-    def join(self, micro_images: NDArray[Any]) -> NDArray[Any]:
-        """The inverse of :meth:`split`."""
-        joined: NDArray[Any] = micro_images.reshape(-1, *micro_images.shape[4:])[self._places]
-        return joined
 
 
 def _bands(display: Display) -> Iterator[_Band]:
@@ -176,73 +206,3 @@ def _bands(display: Display) -> Iterator[_Band]:
     margin = 1 if display.lens_array.layout == "lenticular" else micro_image_shape(display)[0] + 1
     step = max(2 * margin, _BLOCK // width)
     return (_Band(display, first, min(first + step, height), margin) for first in range(0, height, step))
-
-
-def _views_compared(
-    reference: AnyPicture, test: AnyPicture, progress: _Report
-) -> tuple[ViewSimilarity, Flicker | None]:
-    """SSIM and flicker of the views, some rows of all views at a time."""
-    display = reference.display
-    grid = view_grid(display)
-    rows, columns = lens_rows(display), display.lens_grid.columns
-    windows = window_weights(rows), window_weights(columns)
-    places = rows - len(windows[0]) + 1
-    step = max(3 * WINDOW, _VIEW_BLOCK // columns)
-    shape = len(grid.down), len(grid.right)
-    totals, counts = np.zeros(shape), np.zeros(shape)
-    flicker = _FlickerSums(shape[1])
-    for first in range(0, places, step):
-        last = min(first + step, places) + len(windows[0]) - 1
-        row, i = np.indices((last - first, columns))
-        # Windows overlap from one lot of rows to the next, the rows that flicker is summed over do not.
-        once = slice(0, last - first if last == rows else step)
-        flicker.begin()
-        for view in np.ndindex(shape):
-            found, at_row, at_column = pixels_of_view(display, grid, view, row + first, i)
-            at = np.where(found, at_row, 0), np.where(found, at_column, 0)
-            a, b = (
-                np.where(found[..., None], coded_values(picture.take(*at), picture.provenance.transfer), 0.0)
-                for picture in (reference, test)
-            )
-            values = similarities(a, b, None if found.all() else found, windows)
-            totals[view] += float(values.sum())
-            counts[view] += values.size
-            flicker.add((a - b)[once], found[once])
-            progress(first * totals.size + (last - first) * (view[0] * shape[1] + view[1] + 1))
-    with np.errstate(invalid="ignore"):
-        return ViewSimilarity(totals / counts, grid.exact), flicker.flicker()
-
-
-class _FlickerSums:
-    """Sums for :func:`lippmann.quality.flicker.view_flicker`, from views that come row by row, ``columns`` to a row."""
-
-    def __init__(self, columns: int) -> None:
-        self._columns = columns
-        self._squared = self._own = 0.0
-        self._pairs = 0
-        self._last: list[tuple[Real, Flags]] = []
-        self._count = 0
-
-    def begin(self) -> None:
-        """The views begin anew, at other places."""
-        self._last, self._count = [], 0
-
-    def add(self, error: Real, found: Flags) -> None:
-        """The next view's errors ``(..., 3)`` and where there are any."""
-        if self._last and self._count % self._columns:
-            self._pair(self._last[-1], (error, found))
-        if len(self._last) == self._columns:
-            self._pair(self._last.pop(0), (error, found))
-        self._last.append((error, found))
-        self._count += 1
-
-    def _pair(self, before: tuple[Real, Flags], after: tuple[Real, Flags]) -> None:
-        both = before[1] & after[1]
-        one, other = before[0][both], after[0][both]
-        self._squared += float(np.square(other - one).sum())
-        self._own += 0.5 * float(np.square(one).sum() + np.square(other).sum())
-        self._pairs += one.size
-
-    def flicker(self) -> Flicker | None:
-        """The flicker; None without neighbours."""
-        return Flicker(self._squared / self._pairs, self._own / self._pairs) if self._pairs else None

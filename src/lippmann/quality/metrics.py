@@ -9,18 +9,22 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lippmann.display import Display
 from lippmann.image import IntegralImage
-from lippmann.image.color import encode_srgb
+from lippmann.image.color import dequantize, encode_srgb
 from lippmann.image.large import LargePicture
 from lippmann.image.permutation import lens_indices, row_blocks
 from lippmann.image.provenance import Transfer
+from lippmann.store.grid import Window
 
 Real = NDArray[np.float64]
+Scalar = TypeVar("Scalar", bound=np.generic)
 
 #: The share of micro-images that may be worse than the low percentile that is reported.
 LOW_PERCENTILE = 0.01
@@ -34,14 +38,46 @@ def psnr(mean_squared_error: float, peak: float = 1.0) -> float:
 def coded(image: IntegralImage | LargePicture, rows: tuple[int, int] | None = None) -> Real:
     """Coded values in [0, 1] of the rows ``first`` to before ``last`` (all if None), ``(rows, W, 3)`` float64."""
     first, last = rows or (0, image.display.panel.height)
-    return coded_values(image.rows(first, last), image.provenance.transfer)
+    return coded_values(stored_rows(image, first, last), image.provenance.transfer)
 
 
-def coded_values(linear: NDArray[np.float32], transfer: Transfer) -> Real:
-    """Coded values in [0, 1] of linear ones, float64; same shape."""
-    doubles = linear.astype(np.float64)
-    values = encode_srgb(doubles) if transfer == "srgb" else np.clip(doubles, 0, 1)
-    return np.asarray(values, dtype=np.float64)
+def stored_rows(image: IntegralImage | LargePicture, first: int, last: int) -> NDArray[Any]:
+    """``(last - first, W, 3)`` values of whole rows: codes of a picture that is read piece by piece, else linear."""
+    if isinstance(image, IntegralImage):
+        return image.rows(first, last)
+    return image.source.window(Window(first, 0, last - first, image.source.width))
+
+
+def coded_values(values: NDArray[Any], transfer: Transfer) -> Real:
+    """Coded values in [0, 1] of linear ones, or of codes of 8 or 16 bits, float64; same shape."""
+    if values.dtype.kind == "u":
+        return looked_up(values, _coded_levels(values.dtype, transfer))
+    doubles = values.astype(np.float64)
+    found = encode_srgb(doubles) if transfer == "srgb" else np.clip(doubles, 0, 1)
+    return np.asarray(found, dtype=np.float64)
+
+
+@lru_cache(maxsize=4)
+def _coded_levels(dtype: np.dtype[Any], transfer: Transfer) -> Real:
+    """The coded values of all codes of a type."""
+    return coded_values(dequantize(np.arange(np.iinfo(dtype).max + 1).astype(dtype), transfer), transfer)
+
+
+def looked_up(codes: NDArray[Any], levels: NDArray[Scalar]) -> NDArray[Scalar]:
+    """``levels[codes]``: for pictures of codes a small part of the time that the curve takes."""
+    from lippmann.quality import kernels
+
+    values = np.empty(codes.shape, dtype=levels.dtype)
+    kernels.look_up(np.ascontiguousarray(codes).reshape(-1), levels, values.reshape(-1))
+    return values
+
+
+def squared_differences(a: NDArray[Any], b: NDArray[Any]) -> Real:
+    """``(...)``: squared differences of ``(..., channels)`` values, averaged over the channels."""
+    difference = a - b
+    sums: Real = np.einsum("...c,...c->...", difference, difference).astype(np.float64)
+    sums /= difference.shape[-1]
+    return sums
 
 
 def squared_errors(reference: IntegralImage, test: IntegralImage) -> Real:
@@ -49,8 +85,7 @@ def squared_errors(reference: IntegralImage, test: IntegralImage) -> Real:
     height, width = reference.pixels.shape[:2]
     errors = np.empty((height, width))
     for rows in row_blocks(height, width):
-        difference = coded(reference, rows) - coded(test, rows)
-        errors[slice(*rows)] = np.square(difference).mean(axis=2)
+        errors[slice(*rows)] = squared_differences(coded(reference, rows), coded(test, rows))
     return errors
 
 

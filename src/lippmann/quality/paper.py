@@ -17,14 +17,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lippmann.image import IntegralImage
-from lippmann.image.color import quantize
+from lippmann.image.color import dequantize, quantize
 from lippmann.image.permutation import row_blocks
-from lippmann.quality.metrics import micro_image_means, psnr
+from lippmann.image.provenance import Transfer
+from lippmann.quality.metrics import looked_up, micro_image_means, psnr, squared_differences
 
 Real = NDArray[np.float64]
 
@@ -84,9 +87,19 @@ def paper_figures(reference: IntegralImage, test: IntegralImage) -> PaperFigures
     height, width = reference.pixels.shape[:2]
     errors = np.empty((height, width))
     for first, last in row_blocks(height, width):
-        a, b = (
-            quantize(picture.pixels[first:last], 8, picture.provenance.transfer).astype(np.float64)
-            for picture in (reference, test)
-        )
-        errors[first:last] = np.square(a - b).mean(axis=2)
+        a, b = (paper_codes(picture.rows(first, last), picture.provenance.transfer) for picture in (reference, test))
+        errors[first:last] = squared_differences(a, b)
     return PaperFigures(micro_image_means(errors, reference.display)[0])
+
+
+def paper_codes(values: NDArray[Any], transfer: Transfer) -> NDArray[np.float32]:
+    """8-bit codes of linear values, or of codes of 8 or 16 bits, as numbers that can be subtracted; same shape."""
+    if values.dtype.kind == "u":
+        return looked_up(values, _paper_levels(values.dtype, transfer))
+    return quantize(values, 8, transfer).astype(np.float32)
+
+
+@lru_cache(maxsize=4)
+def _paper_levels(dtype: np.dtype[Any], transfer: Transfer) -> NDArray[np.float32]:
+    """The 8-bit codes of all codes of a type."""
+    return paper_codes(dequantize(np.arange(np.iinfo(dtype).max + 1).astype(dtype), transfer), transfer)

@@ -16,7 +16,7 @@ neighbouring micro-images (neighbouring points of one view); both of a pair are 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
 from dataclasses import dataclass
 from typing import Any, Literal, Protocol
 
@@ -58,53 +58,32 @@ def find_silhouettes(image: IntegralImage) -> Silhouettes:
     permutation = Permutation(image.display)
     depth = image.maps.get(DEPTH_LAYER)
     if depth is not None and depth.ndim == 2:
+        seen = np.where(np.isfinite(depth), depth, np.nan).astype(np.float64)
         limit = DEPTH_JUMP * image.display.lens_array.pitch
-        marks = _between_neighbours(permutation, depth.astype(np.float64), lambda a, b: _is_apart(a, b, limit))
-        return Silhouettes(marks, "depth")
+        return Silhouettes(_jumps_between_neighbours(permutation, seen[..., None], limit), "depth")
     return Silhouettes(edges_between_neighbours(permutation, coded(image)), "edges")
 
 
 class Cutting(Protocol):
-    """What cuts ``(H, W, ...)`` values into micro-images ``(lens_rows, lens_cols, ny, nx, ...)`` and joins them."""
-
-    @property
-    def mask(self) -> Flags:
-        """Which places of the micro-images hold a pixel."""
-        ...
+    """What cuts ``(H, W, ...)`` values into micro-images ``(lens_rows, lens_cols, ny, nx, ...)``."""
 
     def split(self, values: NDArray[Any]) -> NDArray[Any]:
-        """The micro-images."""
-        ...
-
-    def join(self, micro_images: NDArray[Any]) -> NDArray[Any]:
-        """The values again."""
+        """The micro-images; places without a pixel are zero."""
         ...
 
 
 def edges_between_neighbours(cutting: Cutting, colors: Real) -> Flags:
     """``(H, W)``: which pixels of coded ``(H, W, 3)`` differ strongly from a neighbour."""
-    return _between_neighbours(cutting, colors, _is_edge)
+    return _jumps_between_neighbours(cutting, colors, EDGE_JUMP)
 
 
-def _between_neighbours(permutation: Cutting, values: Real, differ: Callable[[Real, Real], Flags]) -> Flags:
-    """``(H, W)``: which pixels differ from a neighbour, along all four axes of the micro-images."""
-    split, present = permutation.split(values), permutation.mask
-    marks = np.zeros(present.shape, dtype=np.bool_)
-    for axis, length in enumerate(present.shape):
-        low = (slice(None),) * axis + (slice(0, length - 1),)
-        high = (slice(None),) * axis + (slice(1, length),)
-        both = present[low] & present[high] & differ(split[low], split[high])
-        marks[low] |= both
-        marks[high] |= both
-    return permutation.join(marks)
+def _jumps_between_neighbours(cutting: Cutting, values: Real, limit: float) -> Flags:
+    """``(H, W)``: which pixels of ``(H, W, channels)`` differ from a neighbour by more, see :func:`.mark_jumps`."""
+    from lippmann.quality import kernels
 
-
-def _is_apart(a: Real, b: Real, limit: float) -> Flags:
-    seen_a, seen_b = np.isfinite(a), np.isfinite(b)
-    step = np.abs(np.where(seen_a, a, 0.0) - np.where(seen_b, b, 0.0))
-    apart: Flags = (seen_a != seen_b) | (seen_a & seen_b & (step > limit))
-    return apart
-
-
-def _is_edge(a: Real, b: Real) -> Flags:
-    return np.asarray((np.abs(a - b) > EDGE_JUMP).any(axis=-1))
+    shape = values.shape[:2]
+    numbers = np.arange(1, math.prod(shape) + 1, dtype=np.int32).reshape(shape)
+    marks = np.zeros(shape, dtype=np.bool_)
+    flat = np.ascontiguousarray(values).reshape(-1, values.shape[2])
+    kernels.mark_jumps(flat, np.ascontiguousarray(cutting.split(numbers)), limit, marks.reshape(-1))
+    return marks

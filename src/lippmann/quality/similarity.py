@@ -12,25 +12,20 @@ the views (one pixel of every lens) that are judged, one by one.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from lippmann.image import IntegralImage
-from lippmann.progress import Progress, ProgressCallback, silent
-from lippmann.quality.metrics import coded
-
 Real = NDArray[np.float64]
+Flags = NDArray[np.bool_]
 
 WINDOW = 11
 SIGMA = 1.5
 K1, K2 = 0.01, 0.03
 
-#: Values of one picture that are worked on at a time.
-_BLOCK = 1 << 15
 
-
-def ssim(reference: ArrayLike, test: ArrayLike, mask: NDArray[np.bool_] | None = None) -> float:
+def ssim(reference: ArrayLike, test: ArrayLike, mask: Flags | None = None) -> float:
     """Mean SSIM of two pictures ``(H, W)`` or ``(H, W, channels)`` with values in [0, 1]; 1 for equal ones.
 
     Parameters
@@ -49,37 +44,35 @@ def ssim(reference: ArrayLike, test: ArrayLike, mask: NDArray[np.bool_] | None =
         In [-1, 1]; NaN if ``mask`` leaves no window.
     """
     a, b = (np.atleast_3d(np.asarray(picture)) for picture in (reference, test))
-    present = None if mask is None or mask.all() else mask
     height, width = a.shape[:2]
-    windows = window_weights(height), window_weights(width)
-    # Rows are taken a few at a time, so that what is computed of them stays in the processor's cache.
-    step = max(3 * WINDOW, _BLOCK // a[0].size)
-    total, count = 0.0, 0
-    for first in range(0, height - len(windows[0]) + 1, step):
-        rows = slice(first, first + step + len(windows[0]) - 1)
-        values = similarities(a[rows], b[rows], None if present is None else present[rows], windows)
-        total, count = total + float(values.sum()), count + values.size
+    if mask is not None:
+        a, b = (np.where(mask[..., None], picture, 0.0) for picture in (a, b))
+    total, count = similarity_sum(a, b, mask, (window_weights(height), window_weights(width)))
     return total / count if count else float("nan")
 
 
-def similarities(a: Real, b: Real, mask: NDArray[np.bool_] | None, windows: tuple[Real, Real]) -> Real:
-    """SSIM of every window of ``(H, W, channels)``; with a mask of those that are centred on a pixel that exists."""
-    a, b = a.astype(np.float64), b.astype(np.float64)
-    weights: Real | float = 1.0
+def similarity_sum(
+    a: NDArray[Any], b: NDArray[Any], mask: Flags | None, windows: tuple[Real, Real]
+) -> tuple[float, int]:
+    """The sum of SSIM over the windows of pictures ``(H, W, channels)``, and of how many values: see :func:`ssim`.
+
+    Pictures are zero where nothing exists. ``windows`` are the weights of a window's rows and columns, see
+    :func:`window_weights`.
+    """
+    from lippmann.quality import kernels
+
+    height, width, channels = a.shape
+    present = np.zeros((0, 0))
+    count = (height - len(windows[0]) + 1) * (width - len(windows[1]) + 1)
     if mask is not None:
-        present = mask[..., None].astype(np.float64)
-        a, b, weights = a * present, b * present, _filtered(present, windows)
-    # Where no pixel of a window exists its weight is 0; such a window is not centred on a pixel and drops out below.
-    with np.errstate(invalid="ignore", divide="ignore"):
-        mean_a, mean_b = _filtered(a, windows) / weights, _filtered(b, windows) / weights
-        # Both variances are needed as a sum only.
-        variances = _filtered(a * a + b * b, windows) / weights - mean_a * mean_a - mean_b * mean_b
-        covariance = _filtered(a * b, windows) / weights - mean_a * mean_b
-        c1, c2 = K1 * K1, K2 * K2
-        similarity = ((2 * mean_a * mean_b + c1) * (2 * covariance + c2)) / (
-            (mean_a * mean_a + mean_b * mean_b + c1) * (variances + c2)
-        )
-    return similarity if mask is None else similarity[_centres(mask, windows)]
+        count = int(np.count_nonzero(mask[_centres(mask, windows)]))
+        present = np.repeat(mask.astype(np.float64), channels, axis=1)
+    first, second = (np.ascontiguousarray(picture, np.float64).reshape(height, width * channels) for picture in (a, b))
+    room = np.empty((kernels.SIMILARITY_ROOM, kernels.COLUMNS + (len(windows[1]) - 1) * channels))
+    total = kernels.add_similarities(
+        first, second, present, mask is not None, channels, *windows, K1 * K1, K2 * K2, room
+    )
+    return total, count * channels
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,20 +102,6 @@ class ViewSimilarity:
         return ky, kx
 
 
-def view_similarity(
-    reference: IntegralImage, test: IntegralImage, progress: ProgressCallback = silent
-) -> ViewSimilarity:
-    """SSIM of the views of two pictures of one display, on coded values."""
-    (a, mask), (b, _) = (picture.with_pixels(coded(picture)).views_and_mask() for picture in (reference, test))
-    ny, nx = a.shape[:2]
-    values = np.empty((ny, nx))
-    for k in range(ny * nx):
-        view = divmod(k, nx)
-        progress(Progress("compare", k, ny * nx))
-        values[view] = ssim(a[view], b[view], mask[view])
-    return ViewSimilarity(values, reference.views_are_exact)
-
-
 def window_weights(length: int) -> Real:
     """Gaussian weights that sum to one, as many as fit ``length`` pixels."""
     size = min(WINDOW, length - 1 + length % 2)
@@ -132,22 +111,7 @@ def window_weights(length: int) -> Real:
     return weights
 
 
-def _filtered(picture: Real, windows: tuple[Real, Real]) -> Real:
-    """Weighted means over all windows that lie inside ``(H, W, channels)``."""
-    for axis, weights in enumerate(windows):
-        last = len(weights) - 1
-        places = picture.shape[axis] - last
-        parts = [slice(shift, shift + places) for shift in range(last + 1)]
-        at = [picture[part] if axis == 0 else picture[:, part] for part in parts]
-        total = at[last // 2] * weights[last // 2]
-        # The weights are the same on both sides of the middle.
-        for shift in range(last // 2):
-            total += (at[shift] + at[last - shift]) * weights[shift]
-        picture = total
-    return picture
-
-
-def _centres(mask: NDArray[np.bool_], windows: tuple[Real, Real]) -> NDArray[np.bool_]:
+def _centres(mask: Flags, windows: tuple[Real, Real]) -> tuple[slice, ...]:
     """The part of ``(H, W)`` that the centres of those windows cover."""
     margins = [len(weights) // 2 for weights in windows]
-    return mask[tuple(slice(margin, length - margin) for margin, length in zip(margins, mask.shape, strict=True))]
+    return tuple(slice(margin, length - margin) for margin, length in zip(margins, mask.shape, strict=True))

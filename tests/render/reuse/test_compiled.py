@@ -10,7 +10,7 @@ import pytest
 
 KERNEL = """
 from lippmann.render.reuse import compiled
-compiled.source_stamp = lambda: STAMP
+compiled.source_stamp = lambda folder: STAMP
 
 @compiled.uncounted
 def double(x):
@@ -26,7 +26,7 @@ def run(tmp_path, stamp, cache):
     source = KERNEL.replace("STAMP", repr(stamp))
     if not path.exists() or path.read_text() != source:
         path.write_text(source)
-    # Another stamp of the package alone makes a kernel old: its own file looks as it did.
+    # Another stamp of the folder alone makes a kernel old: its own file looks as it did.
     os.utime(path, (1e9, 1e9))
     environment = {**os.environ, "NUMBA_CACHE_DIR": str(cache)}
     command = [sys.executable, str(path)]
@@ -53,28 +53,29 @@ def test_kernels_run_where_nothing_can_be_kept(monkeypatch):
     assert compiled(triple)(5) == 15
 
 
-def test_the_stamp_covers_all_modules_of_the_package(tmp_path, monkeypatch):
+def test_the_stamp_covers_all_modules_of_the_folder(tmp_path):
     from lippmann.render.reuse import compiled
 
     stamps = []
     for name, text in (("compiled.py", "a"), ("rules.py", "b"), ("rules.py", "c"), ("notes.txt", "d")):
         (tmp_path / name).write_text(text)
-        monkeypatch.setattr(compiled, "__file__", str(tmp_path / "compiled.py"))
-        stamps.append(compiled.source_stamp.__wrapped__())
+        stamps.append(compiled.source_stamp.__wrapped__(tmp_path))
     assert len(set(stamps)) == 3
     assert stamps[2] == stamps[3]
 
 
-@pytest.mark.parametrize(
-    "module",
-    ["bridging", "carrying", "drawing", "following", "gathering", "growth", "places", "plain", "tracing", "walking"],
-)
+REUSE = ["bridging", "carrying", "drawing", "following", "gathering", "growth", "places", "plain", "tracing", "walking"]
+
+
+@pytest.mark.parametrize("module", [*(f"render.reuse.{name}" for name in REUSE), "quality.kernels"])
 def test_no_kernel_is_left_out(module):
     import importlib
+    from pathlib import Path
 
     from lippmann.render.reuse.compiled import source_stamp
 
-    names = vars(importlib.import_module(f"lippmann.render.reuse.{module}"))
+    loaded = importlib.import_module(f"lippmann.{module}")
+    names, folder = vars(loaded), Path(loaded.__file__).parent
     kept = [value._cache for value in names.values() if hasattr(getattr(value, "_cache", None), "_cache_file")]
     assert kept
-    assert {cache._cache_file._source_stamp for cache in kept} == {source_stamp()}
+    assert {cache._cache_file._source_stamp for cache in kept} == {source_stamp(folder)}

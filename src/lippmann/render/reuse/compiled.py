@@ -1,8 +1,8 @@
-"""How the kernels of this package are compiled, and kept on disk.
+"""How kernels are compiled, and kept on disk.
 
 Numba keeps compiled code beside the source, or in the user's cache folder where that cannot be written. It looks for
-changes in the file of a kernel only; here a kernel also grows old when any module of this package changes, since parts
-of kernels come from other modules.
+changes in the file of a kernel only; here a kernel also grows old when any module in the folder of its own changes,
+since parts of kernels come from other modules.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ def _kept(kernel: Kernel, options: dict[str, Any]) -> Kernel:
     try:
         dispatcher.enable_caching()
         file = dispatcher._cache._cache_file
-        file._source_stamp = source_stamp()
+        file._source_stamp = source_stamp(Path(kernel.__code__.co_filename).parent)
         file._data_name_pattern = file._data_name_pattern.replace("{number", f"{_PROCESS}.{{number")
     except RuntimeError:
         pass  # neither the package nor the user's folder can be written: compiled anew by each process
@@ -58,9 +58,9 @@ def _kept(kernel: Kernel, options: dict[str, Any]) -> Kernel:
 
 
 @cache
-def source_stamp() -> str:
-    """Stands for the sources of all modules of this package."""
-    digest = hashlib.sha256()
-    for path in sorted(Path(__file__).parent.glob("*.py")):
+def source_stamp(folder: Path) -> str:
+    """Stands for the sources of all modules in a folder, and for how they are compiled."""
+    digest = hashlib.sha256(Path(__file__).read_bytes())
+    for path in sorted(folder.glob("*.py")):
         digest.update(path.read_bytes())
     return digest.hexdigest()
