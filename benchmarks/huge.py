@@ -2,6 +2,7 @@
 
 python benchmarks/huge.py [--size 34000x22000] [--small 3520x2272] [--folder FOLDER] [--no-commands]
                           [--method full|pooled] [--denoise none|oidn|oidn-fast|oidn-high] [--formats tif zarr]
+                          [--commands-only]
 
 The print preset's optics (60 lenses per inch at 720 pixels per inch), the teapot, direct light, 1 sample per pixel,
 into a tiled BigTIFF and into Zarr, by ``full`` or with pooled or denoised light, whose tiles overlap
@@ -10,6 +11,9 @@ Each step is a process of its own, whose peak memory and processor time the syst
 before and after each large one, so that both see the same machine; the scene grows with the panel, and with it the
 viewing distance and that at which rays begin, so that both see the same scene.
 
+With ``--commands-only`` the commands alone, on the small picture's pixels again and again
+(``results/huge_commands.json``).
+
 Targets: at most 3 GB; time per pixel within 15 % of the small picture's.
 """
 
@@ -17,19 +21,15 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
-import shutil
-import subprocess
 import sys
 import tempfile
-import time
 from pathlib import Path
 from typing import Any
 
+import huge_commands
 from harness import save
 
 MEMORY = 2 * 10**9
-LIPPMANN = "from lippmann.cli import main; main()"
 TARGET_BYTES, TARGET_RELATIVE = 3e9, 1.15
 
 
@@ -38,6 +38,9 @@ def main() -> None:
     large, small = (tuple(int(side) for side in size.split("x")) for size in (options.size, options.small))
     with tempfile.TemporaryDirectory(dir=options.folder) as name:
         folder = Path(name)
+        if options.commands_only:
+            save("huge_commands", _commands_only(folder, large, small))
+            return
         results: dict[str, Any] = {
             "size": large,
             "small": small,
@@ -52,7 +55,7 @@ def main() -> None:
             },
         }
         if options.commands:
-            results["commands"] = _commands(folder)
+            results["commands"] = huge_commands.measured(folder)
         plain = (options.method, options.denoise) == ("full", "none")
         save("huge" if plain else f"huge_{options.method}_{options.denoise}", results)
 
@@ -63,6 +66,7 @@ def _options() -> argparse.Namespace:
     parser.add_argument("--small", default="3520x2272")
     parser.add_argument("--folder", default=None, help="where there is room for twice the picture")
     parser.add_argument("--no-commands", dest="commands", action="store_false")
+    parser.add_argument("--commands-only", action="store_true")
     parser.add_argument("--method", default="full", choices=("full", "pooled"))
     parser.add_argument("--denoise", default="none", choices=("none", "oidn", "oidn-fast", "oidn-high"))
     parser.add_argument("--formats", nargs="+", default=["tif", "zarr"], choices=("tif", "zarr"))
@@ -70,6 +74,18 @@ def _options() -> argparse.Namespace:
     if found.commands and len(found.formats) < 2:
         parser.error("the commands read both formats: add --no-commands")
     return found
+
+
+def _commands_only(folder: Path, large: tuple[int, ...], small: tuple[int, ...]) -> dict[str, Any]:
+    for ending in ("tif", "zarr"):
+        _rendered(folder / f"small.{ending}", small, small, ("full", "none"))
+    huge_commands.repeated(folder, (large[0], large[1]))
+    return {
+        "size": large,
+        "repeated": small,
+        "target_peak_bytes": TARGET_BYTES,
+        "commands": huge_commands.measured(folder),
+    }
 
 
 def _compared(
@@ -97,43 +113,8 @@ def _rendered(output: Path, size: tuple[int, ...], small: tuple[int, ...], metho
     figures = output.with_name("figures.json")
     numbers = [str(number) for number in (*size, small[0], MEMORY)]
     script = str(Path(__file__).with_name("huge_render.py"))
-    usage = _run([sys.executable, script, *numbers, str(output), str(figures), *method])
+    usage = huge_commands.run([sys.executable, script, *numbers, str(output), str(figures), *method])
     return {**json.loads(figures.read_text()), **usage}
-
-
-def _commands(folder: Path) -> dict[str, Any]:
-    """Every command that reads a picture, on the TIFF and, for one, on the Zarr folder."""
-    picture, other = folder / "large.tif", folder / "large.zarr"
-    calls = {
-        "info": ["info", picture],
-        "info (Zarr)": ["info", other],
-        "replay": ["replay", picture, "-o", folder / "seen.png"],
-        "replay (Zarr)": ["replay", other, "-o", folder / "seen.png"],
-        "refocus": ["refocus", picture, "--plane", "1", "-o", folder / "focused.png"],
-        "views": ["views", picture, "--format", "tiff", "-o", folder / "views"],
-        "compare": ["compare", picture, other],
-    }
-    found = {}
-    for name, words in calls.items():
-        found[name] = _run([sys.executable, "-c", LIPPMANN, *(str(word) for word in words)])
-        print(name, found[name], file=sys.stderr)
-    shutil.rmtree(folder / "views", ignore_errors=True)
-    return found
-
-
-def _run(words: list[str]) -> dict[str, float]:
-    """Seconds, processor seconds and peak resident memory of a process."""
-    started = time.perf_counter()
-    process = subprocess.Popen(words, stdout=subprocess.DEVNULL)
-    _, status, usage = os.wait4(process.pid, 0)
-    process.returncode = os.waitstatus_to_exitcode(status)
-    if process.returncode:
-        raise SystemExit(f"{' '.join(words)} left with {process.returncode}")
-    return {
-        "seconds": time.perf_counter() - started,
-        "cpu_seconds": usage.ru_utime + usage.ru_stime,
-        "peak_resident_bytes": usage.ru_maxrss * 1024,
-    }
 
 
 if __name__ == "__main__":

@@ -55,5 +55,5 @@ def quilt_of(image: IntegralImage, layout: QuiltLayout, eye: Eye | None = None) 
     quilt = Quilt(np.empty((height * layout.rows, width * layout.columns, 3), dtype=np.float32), layout)
     for number in range(layout.views):
         across = x + reach * ((number + 0.5) / layout.views - 0.5)
-        quilt.view(number)[...] = replay(image, (across, y, z), size=(width, height))
+        quilt.view_values(number)[...] = replay(image, (across, y, z), size=(width, height))
     return quilt

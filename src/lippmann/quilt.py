@@ -8,8 +8,6 @@ the sides of the file are no multiples of columns and rows (4096 / 5) the rest l
 from __future__ import annotations
 
 import re
-import warnings
-from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -17,23 +15,14 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.atomic import replacing_folder
 from lippmann.display import Display, load_display
-from lippmann.errors import OutputError, PictureError, UsageError
-from lippmann.image.codec import FORMATS, STORED, FormatName, decode_file, encode_file, read_header
-from lippmann.image.color import dequantize
-from lippmann.image.folders import MANIFEST
-from lippmann.image.formats import format_for, write_plain_picture
+from lippmann.errors import PictureError, UsageError
+from lippmann.image.codec import linear_values
 from lippmann.image.integral_image import FloatArray, Stored
 from lippmann.image.provenance import Provenance
-from lippmann.progress import Progress, ProgressCallback, silent
 
 #: Pixels of a quilt's sides, and its columns and rows, within which displays take them.
 LEAST_SIDE, MOST_SIDE, MOST_TILES = 256, 16384, 32
-
-#: Endings of the pictures that are read; JPEG is never written.
-_JPEG = (".jpg", ".jpeg")
-_READ = (*FORMATS, *_JPEG)
 
 _NAME = re.compile(r"_qs(\d{1,4})x(\d{1,4})(?:a(\d{1,4}(?:\.\d{1,12})?))?$")
 _CONVENTION = "a quilt's name ends in columns x rows and the picture's aspect, such as _qs8x6a0.75.png"
@@ -106,8 +95,9 @@ class Quilt:
 
     Parameters
     ----------
-    pixels:
-        ``(height, width, 3)`` float32 linear RGB, row 0 on top.
+    values:
+        ``(height, width, 3)``, row 0 on top: float32 linear RGB or, so that the largest quilts take less, codes of 8 or
+        16 bits or half floats as files hold them.
     layout:
         Columns, rows and the aspect of the picture shown.
     stored:
@@ -116,28 +106,49 @@ class Quilt:
         How it was made, as far as that is known: files do not say it.
     """
 
-    pixels: FloatArray
+    values: NDArray[Any]
     layout: QuiltLayout
     stored: Stored = "float32"
     provenance: Provenance = field(default_factory=Provenance)
 
     @property
+    def size(self) -> tuple[int, int]:
+        """Width and height in pixels."""
+        return self.values.shape[1], self.values.shape[0]
+
+    @property
+    def pixels(self) -> FloatArray:
+        """``(height, width, 3)`` float32 linear RGB, row 0 on top."""
+        return linear_values(self.values, self.provenance.transfer)
+
+    @property
     def view_size(self) -> tuple[int, int]:
         """Width and height of a view in pixels."""
-        return self.pixels.shape[1] // self.layout.columns, self.pixels.shape[0] // self.layout.rows
+        return self.size[0] // self.layout.columns, self.size[1] // self.layout.rows
 
-    def corner(self, number: NDArray[np.intp] | int) -> tuple[Any, Any]:
-        """Column and row of the top left pixel of view ``number``, an int or an array."""
+    def corner(self, number: int) -> tuple[int, int]:
+        """Column and row of the top left pixel of view ``number``."""
         width, height = self.view_size
         right, up = number % self.layout.columns, number // self.layout.columns
-        return right * width, self.pixels.shape[0] - (up + 1) * height
+        return right * width, self.size[1] - (up + 1) * height
 
     def view(self, number: int) -> FloatArray:
-        """``(height, width, 3)`` pixels of a view, 0 the leftmost camera's; shares the quilt's memory."""
+        """``(height, width, 3)`` linear RGB of a view, 0 the leftmost camera's; shares memory with linear values."""
+        return linear_values(self.view_values(number), self.provenance.transfer)
+
+    def view_values(self, number: int) -> NDArray[Any]:
+        """``(height, width, 3)`` values of a view; shares the quilt's memory."""
         width, height = self.view_size
         column, row = self.corner(number)
-        view: FloatArray = self.pixels[row : row + height, column : column + width]
-        return view
+        return self.values[row : row + height, column : column + width]
+
+    def view_rows(self, first: int, last: int) -> FloatArray:
+        """``(views, last - first, width, 3)`` linear RGB of some rows of all views."""
+        width, _ = self.view_size
+        rows = np.empty((self.layout.views, last - first, width, 3), dtype=np.float32)
+        for number in range(self.layout.views):
+            rows[number] = linear_values(self.view_values(number)[first:last], self.provenance.transfer)
+        return rows
 
 
 def load_device(name: str) -> Display:
@@ -228,166 +239,3 @@ def check_size(width: int, height: int, layout: QuiltLayout, where: str) -> None
         if side % count and side & (side - 1):
             rule = f"its name says {layout.columns}x{layout.rows} views, and {side} is no multiple of {count}"
             raise PictureError(f"it is {side} pixels {what}", where=where, rule=rule)
-
-
-def read_quilt(path: Path) -> Quilt:
-    """Read a quilt: PNG, OpenEXR, TIFF or JPEG.
-
-    Raises
-    ------
-    PictureError
-        If the file is missing or damaged, or its name and its size disagree.
-    """
-    layout = layout_of_name(path)
-    _check_ending(path)
-    pixels, stored = _read(path)
-    check_size(pixels.shape[1], pixels.shape[0], layout, str(path))
-    return Quilt(pixels, layout, stored)
-
-
-def read_views(folder: Path, layout: QuiltLayout | None = None, *, progress: ProgressCallback = silent) -> Quilt:
-    """The quilt of a folder with one picture per view.
-
-    Views are numbered by the last number in their files' names, from 0 or 1, the leftmost camera first. ``layout`` says
-    how many there have to be; without it they stand in one row.
-
-    Raises
-    ------
-    PictureError
-        If a view is absent, damaged or of another size than the first.
-    """
-    paths = _numbered(folder)
-    if layout is None:
-        layout = QuiltLayout(len(paths), 1, None)
-    if len(paths) != layout.views:
-        rule = f"{layout.columns}x{layout.rows} are {layout.views}"
-        raise PictureError(f"it holds {len(paths)} views", where=str(folder), rule=rule)
-    quilt: Quilt | None = None
-    depths = set()
-    for number, path in enumerate(paths):
-        pixels, stored = _read(path)
-        height, width = pixels.shape[:2]
-        if quilt is None:
-            whole = np.empty((height * layout.rows, width * layout.columns, 3), dtype=np.float32)
-            quilt = Quilt(whole, layout)
-        if quilt.view_size != (width, height):
-            wide, high = quilt.view_size
-            rule = f"the first view, {paths[0].name}, has {wide} x {high}"
-            raise PictureError(f"has {width} x {height} pixels", where=str(path), rule=rule)
-        quilt.view(number)[...] = pixels
-        depths.add(stored)
-        progress(Progress("read", number + 1, layout.views))
-    assert quilt is not None
-    return Quilt(quilt.pixels, layout, depths.pop() if len(depths) == 1 else "float32")
-
-
-def write_quilt(quilt: Quilt, path: Path, *, bits: int | None = None) -> None:
-    """Write a quilt, with as many bits as it was stored with unless told otherwise.
-
-    Raises
-    ------
-    PictureError, OutputError
-        If the name does not say the quilt's layout or the size is impossible, or the file cannot be written.
-    """
-    named = layout_of_name(path)
-    if named[:2] != quilt.layout[:2]:
-        rule = f"the quilt has {quilt.layout.columns}x{quilt.layout.rows} views"
-        raise PictureError(f"the name says {named.columns}x{named.rows}", where=str(path), rule=rule)
-    check_size(quilt.pixels.shape[1], quilt.pixels.shape[0], named, str(path))
-    name, stored = format_for(path, bits, source=quilt.stored)
-    depth = next(depth for depth, kind in STORED[name].items() if kind == stored)
-    write_plain_picture(quilt.pixels, path, bits=depth, transfer=quilt.provenance.transfer)
-
-
-def write_views(
-    quilt: Quilt,
-    folder: Path,
-    *,
-    format: FormatName | None = None,
-    bits: int | None = None,
-    progress: ProgressCallback = silent,
-) -> None:
-    """Write one picture per view, ``view_00`` the leftmost camera's.
-
-    ``format`` is ``png``, ``exr`` or ``tiff``, by default what holds the quilt's values exactly.
-
-    Raises
-    ------
-    OutputError
-        If the format is unknown or has no such bits, or the folder cannot be written.
-    """
-    if format is None:
-        format = "png" if quilt.stored in STORED["png"].values() else "exr"
-    if format not in STORED:
-        raise OutputError(f"the format {format!r} is unknown", where=str(folder), rule=f"known are {', '.join(STORED)}")
-    ending = next(ending for ending, name in FORMATS.items() if name == format)
-    _, stored = format_for(folder / f"view{ending}", bits, source=quilt.stored)
-    digits = len(str(quilt.layout.views - 1))
-    with replacing_folder(folder) as temporary:
-        for number in range(quilt.layout.views):
-            path = temporary / f"view_{number:0{digits}}{ending}"
-            encode_file(path, format, {"": quilt.view(number)}, stored=stored, transfer="srgb")
-            progress(Progress("write", number + 1, quilt.layout.views))
-
-
-def _numbered(folder: Path) -> Sequence[Path]:
-    """The views of a folder in order; refuses gaps, doubles and names without a number."""
-    try:
-        paths = sorted(path for path in folder.iterdir() if path.suffix.lower() in _READ and path.name[0] != ".")
-    except OSError as error:
-        raise PictureError(f"cannot be read: {error.strerror}", where=str(folder)) from None
-    if (folder / MANIFEST).exists():
-        rule = "its pictures have one pixel for every lens"
-        raise PictureError("this is a folder of 'lippmann views'", where=str(folder), rule=rule, fix="compose it")
-    if not paths:
-        raise PictureError("there are no views", where=str(folder), rule=f"they end in {', '.join(_READ)}")
-    by_number: dict[int, Path] = {}
-    for path in paths:
-        digits = re.findall(r"[0-9]+", path.stem)
-        if not digits:
-            raise PictureError("the name has no number", where=str(path), rule="views are numbered from the left")
-        if (number := int(digits[-1])) in by_number:
-            raise PictureError(f"is view {number}, as {by_number[number].name} is", where=str(path))
-        by_number[number] = path
-    first = min(by_number)
-    if first > 1:
-        raise PictureError(f"the first view is {first}", where=str(folder), rule="views are numbered from 0 or 1")
-    if absent := _first_absent(by_number, first):
-        raise PictureError(f"view {absent} is absent", where=str(folder), rule=f"views run to {max(by_number)}")
-    return [by_number[number] for number in sorted(by_number)]
-
-
-def _first_absent(numbers: Iterable[int], first: int) -> int | None:
-    for expected, number in enumerate(sorted(numbers), start=first):
-        if number != expected:
-            return expected
-    return None
-
-
-def _check_ending(path: Path) -> None:
-    if path.suffix.lower() not in _READ:
-        raise PictureError(f"the ending '{path.suffix}' is unknown", where=str(path), rule=f"known: {', '.join(_READ)}")
-
-
-def _read(path: Path) -> tuple[FloatArray, Stored]:
-    if path.suffix.lower() in _JPEG:
-        return _read_jpeg(path), "uint8"
-    layers, stored = decode_file(path, read_header(path).format, "srgb")
-    return layers[""], stored
-
-
-def _read_jpeg(path: Path) -> FloatArray:
-    from PIL import Image
-
-    try:
-        # Pillow warns of pictures from 90 million pixels on; quilts may have 268.
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", Image.DecompressionBombWarning)
-            picture = Image.open(path, formats=("JPEG",))
-        with picture:
-            if max(picture.size) > MOST_SIDE:
-                raise PictureError(f"it has {picture.width} x {picture.height} pixels", where=str(path))
-            codes = np.asarray(picture.convert("RGB"))
-    except (OSError, SyntaxError, Image.DecompressionBombError) as error:
-        raise PictureError(f"cannot be read: {error}", where=str(path)) from None
-    return dequantize(codes, "srgb")

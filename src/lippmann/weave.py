@@ -9,7 +9,7 @@ panel's rectangle in the lens plane, as an off-axis camera focused there sees it
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Literal, get_args
+from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,8 +27,8 @@ from lippmann.quilt import Quilt
 Real = NDArray[np.float64]
 ViewChoice = Literal["nearest", "linear"]
 
-#: Sub-pixels woven at a time: some 50 arrays of as many numbers.
-_BLOCK = 1 << 18
+#: Pixels woven at a time, with some 50 arrays of as many numbers, and pixels of the views that are linear for that.
+_BLOCK, _VIEW_BLOCK = 1 << 18, 1 << 24
 
 #: Relative difference of aspects that rounding in names and displays' shapes leaves.
 _ASPECT_TOLERANCE = 0.02
@@ -66,7 +66,7 @@ def weave(
     _check(quilt, display, choice)
     width, height = display.panel.width, display.panel.height
     pixels = np.empty((height, width, 3), dtype=np.float32)
-    step = max(1, _BLOCK // width)
+    step = _rows_at_a_time(quilt, display)
     for first in range(0, height, step):
         last = min(first + step, height)
         pixels[first:last] = _woven(quilt, display, choice, first, last)
@@ -89,7 +89,7 @@ def weave_to_file(
     Parameters and errors as there; of the file as for :func:`lippmann.image.banded.write_in_bands`.
     """
     _check(quilt, display, choice)
-    step = max(1, _BLOCK // display.panel.width)
+    step = _rows_at_a_time(quilt, display)
 
     def rows(first: int, last: int) -> FloatArray:
         band = np.empty((last - first, display.panel.width, 3), dtype=np.float32)
@@ -107,21 +107,68 @@ def _made(quilt: Quilt, choice: ViewChoice, scene: str) -> Provenance:
     return Provenance(method="weave", subpixels=True, scene=scene, version=VERSION, options=options)
 
 
+def _rows_at_a_time(quilt: Quilt, display: Display) -> int:
+    width, height = quilt.size
+    return max(1, min(_BLOCK // display.panel.width, _VIEW_BLOCK * display.panel.height // (width * height)))
+
+
 def _woven(quilt: Quilt, display: Display, choice: ViewChoice, first: int, last: int) -> FloatArray:
     """Some rows of the picture, ``(last - first, W, 3)``."""
-    width = display.panel.width
-    u, v = np.meshgrid(np.arange(width) + 0.5, np.arange(first, last) + 0.5)
-    woven = np.empty((last - first, width, 3), dtype=np.float32)
-    for channel in range(3):
-        x, y = display.subpixel_point(u, v, channel, NUMPY)
-        place_x, place_y = _place_in_view(quilt, display, x, y)
-        number, share = _views(view_fraction(display, x, y), quilt.layout.views, choice)
-        colors = _sampled(quilt, channel, number, place_x, place_y)
-        if choice == "linear":
-            following = np.minimum(number + 1, quilt.layout.views - 1)
-            colors += share * (_sampled(quilt, channel, following, place_x, place_y) - colors)
-        woven[..., channel] = colors
+    from lippmann.weave_kernel import weave_channel
+
+    shape = last - first, display.panel.width
+    woven = np.empty((*shape, 3), dtype=np.float32)
+    channels = _places(quilt, display, choice, first, last)
+    # Only these rows of the views are looked at.
+    top = min(int(places.down.min()) for places in channels)
+    bottom = max(int(places.down.max()) for places in channels) + 2
+    views = quilt.view_rows(top, min(bottom, quilt.view_size[1]))
+    for channel, (number, share, across, down) in enumerate(channels):
+        weave_channel(
+            views,
+            channel,
+            np.broadcast_to(number, shape),
+            np.broadcast_to(share, shape),
+            np.broadcast_to(across, shape),
+            np.broadcast_to(down - top, shape),
+            woven,
+        )
     return woven
+
+
+class _Places(NamedTuple):
+    """What sub-pixels show, as arrays that broadcast to the pixels: a view, the share of the next one, and where in
+    them, in pixels from the middle of the first."""
+
+    number: NDArray[np.intp]
+    share: Real
+    across: Real
+    down: Real
+
+
+def _places(quilt: Quilt, display: Display, choice: ViewChoice, first: int, last: int) -> list[_Places]:
+    """What the sub-pixels of some rows show, by channel."""
+    panel = display.panel
+    u: Real = np.arange(panel.width, dtype=np.float64)[None] + 0.5
+    v: Real = np.arange(first, last, dtype=np.float64)[:, None] + 0.5
+    found: list[_Places] = []
+    for channel in range(3):
+        offset, before = panel.subpixel_offsets[channel], panel.subpixel_offsets[:channel]
+        if panel.subpixel_cells is None and offset in before:
+            found.append(found[before.index(offset)])
+        elif panel.subpixel_cells is None and display.lattice.slant == 0.0:
+            # Under upright cylinders rows are alike, and columns show the same heights.
+            column = _places_of(quilt, display, choice, channel, u[:, :1], v)
+            found.append(_places_of(quilt, display, choice, channel, u, v[:1])._replace(down=column.down))
+        else:
+            found.append(_places_of(quilt, display, choice, channel, *np.meshgrid(u, v)))
+    return found
+
+
+def _places_of(quilt: Quilt, display: Display, choice: ViewChoice, channel: int, u: Real, v: Real) -> _Places:
+    x, y = display.subpixel_point(u, v, channel, NUMPY)
+    number, share = _views(view_fraction(display, x, y), quilt.layout.views, choice)
+    return _Places(number, share, *_place_in_view(quilt, display, x, y))
 
 
 def view_fraction(display: Display, x: Real, y: Real) -> Real:
@@ -170,17 +217,3 @@ def _place_in_view(quilt: Quilt, display: Display, x: Real, y: Real) -> tuple[Re
     across = (lens_x / panel_width + 0.5) * width - 0.5
     down = (0.5 - lens_y / panel_height) * height - 0.5
     return np.clip(across, 0.0, width - 1.0), np.clip(down, 0.0, height - 1.0)
-
-
-def _sampled(quilt: Quilt, channel: int, number: NDArray[np.intp], across: Real, down: Real) -> Real:
-    """Values of views at places in them, interpolated between their pixels; never from a neighbouring tile."""
-    width, height = quilt.view_size
-    left, top = across.astype(np.intp), down.astype(np.intp)
-    right, bottom = np.minimum(left + 1, width - 1), np.minimum(top + 1, height - 1)
-    column, row = quilt.corner(number)
-    values = quilt.pixels[..., channel]
-    part_x, part_y = across - left, down - top
-    upper = values[row + top, column + left] * (1 - part_x) + values[row + top, column + right] * part_x
-    lower = values[row + bottom, column + left] * (1 - part_x) + values[row + bottom, column + right] * part_x
-    mixed: Real = upper * (1 - part_y) + lower * part_y
-    return mixed

@@ -7,7 +7,7 @@ import json
 import pytest
 
 from lippmann.image import read_picture
-from lippmann.quilt import read_quilt
+from lippmann.quilt_files import read_quilt
 from lippmann.render import forecast
 
 ENDING = "_qs8x6a0.75.png"

@@ -64,6 +64,18 @@ def test_two_pictures_at_most(tmp_path):
     assert not (tmp_path / "page.html").exists()
 
 
+def test_a_picture_too_large_for_a_page_is_refused(tmp_path, monkeypatch):
+    image = noise(DISPLAYS["square"])
+    pixels = image.pixels.shape[0] * image.pixels.shape[1]
+    monkeypatch.setattr("lippmann.viewer.export.MOST_PIXELS", pixels)
+    page_of(tmp_path / "page.html", image)
+    monkeypatch.setattr("lippmann.viewer.export.MOST_PIXELS", pixels - 1)
+    with pytest.raises(UsageError, match="a page in one file shows at most") as caught:
+        export_page([("large", image)], tmp_path / "other.html")
+    assert "96 x 80 pixels" in str(caught.value)
+    assert not (tmp_path / "other.html").exists()
+
+
 def test_place_that_cannot_be_written_is_named(tmp_path):
     with pytest.raises(OutputError, match="nowhere"):
         export_page([("a", noise(DISPLAYS["square"]))], tmp_path / "nowhere" / "page.html")

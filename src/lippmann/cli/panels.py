@@ -34,7 +34,8 @@ def pack(
     """Put a folder of views into a quilt, the leftmost at the bottom left."""
     from lippmann.atomic import check_writable
     from lippmann.image.formats import format_for
-    from lippmann.quilt import layout_of_name, read_views, write_quilt
+    from lippmann.quilt import layout_of_name
+    from lippmann.quilt_files import read_views, write_quilt
 
     console = Console(quiet, as_json)
     layout = layout_of_name(output)
@@ -43,7 +44,7 @@ def pack(
     with console.progress() as progress:
         packed = read_views(folder, layout, progress=progress)
     write_quilt(packed, output, bits=bits)
-    height, width = packed.pixels.shape[:2]
+    width, height = packed.size
     result = {"output": str(output), "size": [width, height], "views": layout.views}
     console.result(result, f"{output}: {layout.columns}x{layout.rows} views, {width}x{height} pixels")
 
@@ -59,7 +60,7 @@ def unpack(
 ) -> None:
     """Write each view of a quilt as a picture of its own, view 0 the leftmost camera's."""
     from lippmann.atomic import check_folder_writable
-    from lippmann.quilt import read_quilt, write_views
+    from lippmann.quilt_files import read_quilt, write_views
 
     console = Console(quiet, as_json)
     check_folder_writable(output)
@@ -136,6 +137,6 @@ def weave(
 
 
 def _views(source: Path, progress: ProgressCallback) -> Quilt:
-    from lippmann.quilt import read_quilt, read_views
+    from lippmann.quilt_files import read_quilt, read_views
 
     return read_views(source, progress=progress) if source.is_dir() else read_quilt(source)

@@ -87,7 +87,8 @@ def render(
     from lippmann import api
     from lippmann.atomic import check_writable
     from lippmann.image.formats import format_for
-    from lippmann.quilt import load_device, quilt_of_display, write_quilt
+    from lippmann.quilt import load_device, quilt_of_display
+    from lippmann.quilt_files import write_quilt
 
     console = Console(quiet, as_json)
     target = load_device(display)
@@ -148,7 +149,7 @@ def _check_name(path: Path, ending: str) -> None:
 
 
 def _sentence(path: Path, made: Quilt, seconds: float) -> str:
-    height, width = made.pixels.shape[:2]
+    width, height = made.size
     millions = sum(made.provenance.rays.values()) / 1e6
     return (
         f"{path}: {made.layout.columns}x{made.layout.rows} views, {width}x{height} pixels, "

@@ -78,13 +78,14 @@ def _read_ahead(files: list[PictureFile], console: Console) -> None:
 
 def _export(paths: list[Path], display: Display | None, output: Path, console: Console) -> None:
     from lippmann.atomic import check_writable
-    from lippmann.image import read_metadata, read_picture
-    from lippmann.viewer.export import export_page
+    from lippmann.image import read_metadata
+    from lippmann.viewer.export import check_exportable, export_page
+    from lippmann.viewer.shown import open_shown
 
     for path in paths:
-        read_metadata(path, display=display)
+        check_exportable(read_metadata(path, display=display).display)
     check_writable(output)
-    export_page([(path.name, read_picture(path, display=display)) for path in paths], output)
+    export_page([(path.name, open_shown(path, display)) for path in paths], output)
     size = output.stat().st_size
     names = " and ".join(str(path) for path in paths)
     console.result({"output": str(output), "bytes": size}, f"{output}: {names}, {size / 1e6:.1f} MB")

@@ -20,6 +20,7 @@ from lippmann.errors import PictureError
 from lippmann.image import png, tiff, zarr_file
 from lippmann.image.color import dequantize, quantize
 from lippmann.image.integral_image import Stored
+from lippmann.image.permutation import row_blocks
 from lippmann.image.provenance import Transfer
 from lippmann.store.grid import TileGrid
 
@@ -118,8 +119,21 @@ def stored_values(linear: NDArray[np.float32], stored: Stored, transfer: Transfe
 
 
 def linear_values(values: NDArray[Any], transfer: Transfer) -> NDArray[np.float32]:
-    """Linear float32 values of what files hold: the inverse of :func:`stored_values`, but for its rounding."""
-    return dequantize(values, transfer) if values.dtype.kind == "u" else values.astype(np.float32)
+    """Linear float32 values of what files hold: the inverse of :func:`stored_values`, but for its rounding.
+
+    Values that are such already are not copied.
+    """
+    return dequantize(values, transfer) if values.dtype.kind == "u" else values.astype(np.float32, copy=False)
+
+
+def converted_values(values: NDArray[Any], stored: Stored, transfer: Transfer) -> NDArray[Any]:
+    """Values as files of one type hold them as those of another, without all of them being linear at once."""
+    if values.dtype.name == stored:
+        return values
+    converted = np.empty(values.shape, dtype=stored)
+    for first, last in row_blocks(*values.shape[:2]):
+        converted[first:last] = stored_values(linear_values(values[first:last], transfer), stored, transfer)
+    return converted
 
 
 def decode_file(path: Path, name: FormatName, transfer: Transfer) -> tuple[dict[str, NDArray[Any]], Stored]:
@@ -130,6 +144,13 @@ def decode_file(path: Path, name: FormatName, transfer: Transfer) -> tuple[dict[
     PictureError
         If the pixels cannot be decoded or are no opaque colours of a known depth.
     """
+    layers, stored = decode_stored(path, name)
+    layers[""] = linear_values(layers[""], transfer)
+    return layers, stored
+
+
+def decode_stored(path: Path, name: FormatName) -> tuple[dict[str, NDArray[Any]], Stored]:
+    """As :func:`decode_file`, but with the RGB as stored."""
     layers: dict[str, NDArray[Any]] = {}
     if name in ("tiff", "zarr"):
         _check_not_too_large(path)
@@ -142,8 +163,7 @@ def decode_file(path: Path, name: FormatName, transfer: Transfer) -> tuple[dict[
         values = png.read_png(path) if name == "png" else tiff.read_tiff(path)
     stored = values.dtype.name
     check_stored(stored, name, path)
-    colors = opaque_colors(values, path)
-    layers[""] = linear_values(colors, transfer)
+    layers[""] = opaque_colors(values, path)
     return layers, cast(Stored, stored)
 
 

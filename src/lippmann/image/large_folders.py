@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 
 from lippmann.atomic import replacing_folder
 from lippmann.display import micro_image_shape, pixel_indices_under_lens, pixel_lenses
-from lippmann.image.codec import FormatName, encode_values, linear_values, stored_values
+from lippmann.image.codec import FormatName, converted_values, encode_values
 from lippmann.image.folders import part_name, storage_of, write_manifest
-from lippmann.image.integral_image import Stored
 from lippmann.image.large import LargePicture
 from lippmann.image.metadata import Metadata
 from lippmann.image.permutation import row_blocks
@@ -50,7 +49,7 @@ def write_large_views(
                     continue
                 files[view[0]][view[1]] = part_name("views", name, shape, view)
                 place = temporary / str(files[view[0]][view[1]])
-                encode_values(place, name, {"": _stored(values, picture, stored)}, transfer=transfer)
+                encode_values(place, name, {"": converted_values(values, stored, transfer)}, transfer=transfer)
                 progress(Progress("write", view[0] * shape[1] + view[1] + 1, shape[0] * shape[1]))
         write_manifest(temporary, _metadata(picture), "views", stored, files, exact=grid.exact)
     return written
@@ -80,7 +79,7 @@ def write_large_micro_images(
                 column = first + number
                 files[row][column] = part_name("micro-images", name, shape, (row, column))
                 place = temporary / str(files[row][column])
-                encode_values(place, name, {"": _stored(values[number], picture, stored)}, transfer=transfer)
+                encode_values(place, name, {"": converted_values(values[number], stored, transfer)}, transfer=transfer)
                 written += 1
             progress(Progress("write", row * shape[1] + first + len(values), shape[0] * shape[1]))
         write_manifest(temporary, _metadata(picture), "micro-images", stored, files, exact=True)
@@ -138,14 +137,6 @@ def _lenses(picture: LargePicture) -> Iterator[tuple[int, int, NDArray[Any], NDA
                 values[(lens * ny + k_y[v, u]) * nx + k_x[v, u]] = source.take(v + span[0], u)
                 present[lens] = True
             yield row, first, values.reshape(count, ny, nx, 3), present
-
-
-def _stored(values: NDArray[Any], picture: LargePicture, stored: Stored) -> NDArray[Any]:
-    """Values of the picture's file as those of another."""
-    if values.dtype.name == stored:
-        return values
-    transfer = picture.provenance.transfer
-    return stored_values(linear_values(values, transfer), stored, transfer)
 
 
 def _metadata(picture: LargePicture) -> Metadata:

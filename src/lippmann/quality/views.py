@@ -121,10 +121,9 @@ class ViewSums:
         from lippmann.quality import kernels
 
         shape = lot.last - lot.first, self._columns
-        found, row, column = (
-            np.broadcast_to(part, shape)
-            for part in pixels_of_view_rows(self._display, self._grid, view, lot.first, lot.last)
-        )
+        places = pixels_of_view_rows(self._display, self._grid, view, lot.first, lot.last)
+        found = np.broadcast_to(places[0], shape)
+        row, column = (np.broadcast_to(part, shape) for part in places[1:])
         coded = []
         for picture, values in zip(self._pictures, lot.values, strict=True):
             gathered = np.empty((*shape, 3), dtype=values.dtype)

@@ -67,7 +67,7 @@ def test_the_stamp_covers_all_modules_of_the_folder(tmp_path):
 REUSE = ["bridging", "carrying", "drawing", "following", "gathering", "growth", "places", "plain", "tracing", "walking"]
 
 
-@pytest.mark.parametrize("module", [*(f"render.reuse.{name}" for name in REUSE), "quality.kernels"])
+@pytest.mark.parametrize("module", [*(f"render.reuse.{name}" for name in REUSE), "quality.kernels", "weave_kernel"])
 def test_no_kernel_is_left_out(module):
     import importlib
     from pathlib import Path
