@@ -6,13 +6,13 @@ python benchmarks/huge.py [--size 34000x22000] [--small 3520x2272] [--folder FOL
 
 The print preset's optics (60 lenses per inch at 720 pixels per inch), the teapot, direct light, 1 sample per pixel,
 into a tiled BigTIFF and into Zarr, by ``full`` or with pooled or denoised light, whose tiles overlap
-(``results/huge.json``, or ``huge_METHOD_DENOISE.json``); then every command that reads a picture, on what was written.
+(``results/huge.json``, or ``huge_METHOD_DENOISE.json``); then every command that reads a picture, on what was written
+(``results/huge_commands.json``).
 Each step is a process of its own, whose peak memory and processor time the system tells. The small picture is rendered
 before and after each large one, so that both see the same machine; the scene grows with the panel, and with it the
 viewing distance and that at which rays begin, so that both see the same scene.
 
-With ``--commands-only`` the commands alone, on the small picture's pixels again and again
-(``results/huge_commands.json``).
+With ``--commands-only`` the commands alone, on the small picture's pixels again and again.
 
 Targets: at most 3 GB; time per pixel within 15 % of the small picture's.
 """
@@ -39,7 +39,10 @@ def main() -> None:
     with tempfile.TemporaryDirectory(dir=options.folder) as name:
         folder = Path(name)
         if options.commands_only:
-            save("huge_commands", _commands_only(folder, large, small))
+            for ending in ("tif", "zarr"):
+                _rendered(folder / f"small.{ending}", small, small, ("full", "none"))
+            huge_commands.repeat(folder, (large[0], large[1]))
+            _save_commands(folder, large, small)
             return
         results: dict[str, Any] = {
             "size": large,
@@ -54,10 +57,10 @@ def main() -> None:
                 for ending in options.formats
             },
         }
-        if options.commands:
-            results["commands"] = huge_commands.measured(folder)
         plain = (options.method, options.denoise) == ("full", "none")
         save("huge" if plain else f"huge_{options.method}_{options.denoise}", results)
+        if options.commands:
+            _save_commands(folder, large, None)
 
 
 def _options() -> argparse.Namespace:
@@ -76,16 +79,9 @@ def _options() -> argparse.Namespace:
     return found
 
 
-def _commands_only(folder: Path, large: tuple[int, ...], small: tuple[int, ...]) -> dict[str, Any]:
-    for ending in ("tif", "zarr"):
-        _rendered(folder / f"small.{ending}", small, small, ("full", "none"))
-    huge_commands.repeated(folder, (large[0], large[1]))
-    return {
-        "size": large,
-        "repeated": small,
-        "target_peak_bytes": TARGET_BYTES,
-        "commands": huge_commands.measured(folder),
-    }
+def _save_commands(folder: Path, large: tuple[int, ...], repeated: tuple[int, ...] | None) -> None:
+    found = huge_commands.measured(folder)
+    save("huge_commands", {"size": large, "repeated": repeated, "target_peak_bytes": TARGET_BYTES, "commands": found})
 
 
 def _compared(

@@ -1,7 +1,10 @@
 """Every command that reads a picture, on pictures larger than memory: the second half of ``huge.py``.
 
-Commands are processes of their own, whose peak memory and processor time the system tells. ``repeated`` makes pictures
-for them without hours of rendering.
+Commands are processes of their own, whose peak memory and processor time the system tells. A process begins with the
+memory of the one that starts it, so what these commands read is made by processes of their own, too:
+
+python benchmarks/huge_commands.py repeated FOLDER WIDTH HEIGHT
+python benchmarks/huge_commands.py quilt FILE
 """
 
 from __future__ import annotations
@@ -29,7 +32,12 @@ QUILT_SIDE, QUILT_VIEWS = 16384, (4, 3)
 TILES = 40
 
 
-def repeated(folder: Path, size: tuple[int, int]) -> None:
+def repeat(folder: Path, size: tuple[int, int]) -> None:
+    """Make ``large.tif`` and ``large.zarr`` in a folder that holds ``small.tif`` and ``small.zarr``."""
+    run([sys.executable, __file__, "repeated", str(folder), *(str(side) for side in size)])
+
+
+def _repeated(folder: Path, size: tuple[int, int]) -> None:
     """``large.tif`` and ``large.zarr`` of this size: ``small.tif`` and ``small.zarr``, rendered, again and again.
 
     The lenses go on, so that an eye sees nothing sensible; for reading, decoding and judging that is all the same.
@@ -60,7 +68,8 @@ def repeated(folder: Path, size: tuple[int, int]) -> None:
 def measured(folder: Path) -> dict[str, dict[str, Any]]:
     """Seconds, processor seconds and peak memory of each command on ``large.tif``, and of some on ``large.zarr``."""
     picture, other = folder / "large.tif", folder / "large.zarr"
-    quilt, woven = _quilt(folder), folder / "woven.tif"
+    quilt, woven = folder / f"waves_qs{QUILT_VIEWS[0]}x{QUILT_VIEWS[1]}.png", folder / "woven.tif"
+    run([sys.executable, __file__, "quilt", str(quilt)])
     display = _display_file(picture, folder / "print.toml")
     calls: dict[str, list[Any]] = {
         "info": ["info", picture],
@@ -134,20 +143,15 @@ def _asked(address: str) -> bytes:
     return body
 
 
-def _quilt(folder: Path) -> Path:
-    """A quilt as large as they come, of waves that differ from view to view."""
+def _quilt(path: Path) -> None:
+    """A quilt as large as they come, of waves."""
     from lippmann.image.png import encode_png
 
-    path = folder / f"waves_qs{QUILT_VIEWS[0]}x{QUILT_VIEWS[1]}.png"
-    v, u = (np.arange(QUILT_SIDE, dtype=np.float32) for _ in range(2))
+    line = np.arange(QUILT_SIDE, dtype=np.float32)
     codes = np.empty((QUILT_SIDE, QUILT_SIDE, 3), dtype=np.uint8)
     for channel, (down, across) in enumerate(((91.0, 57.0), (40.0, 73.0), (63.0, 29.0))):
-        waves = np.sin(v / down)[:, None] * np.cos(u / across)
-        waves *= 120
-        waves += 128
-        codes[..., channel] = waves
+        codes[..., channel] = 128 + 120 * np.sin(line / down)[:, None] * np.cos(line / across)
     path.write_bytes(encode_png(codes, text={}, srgb=True))
-    return path
 
 
 def _display_file(picture: Path, path: Path) -> Path:
@@ -164,3 +168,11 @@ def _display_file(picture: Path, path: Path) -> Path:
         f'[lens_array]\nlayout = "{lenses.layout}"\npitch = {lenses.pitch!r}\n'
     )
     return path
+
+
+if __name__ == "__main__":
+    what, place, *numbers = sys.argv[1:]
+    if what == "repeated":
+        _repeated(Path(place), (int(numbers[0]), int(numbers[1])))
+    else:
+        _quilt(Path(place))

@@ -303,17 +303,6 @@ def _huge(result: dict[str, Any]) -> str:
             f"| {run['relative_to_small']:.2f} | {run['cpu_relative_to_small']:.2f} |"
         )
     table = "\n".join(rows)
-    commands = "\n".join(
-        f"| {name} | {run['seconds']:.0f} s | {run['peak_resident_bytes'] / 1e9:.2f} GB |"
-        for name, run in result.get("commands", {}).items()
-    )
-    reading = f"""
-Commands on that file, each a process of its own (target of the peak: {target}):
-
-| command | time | peak |
-|---|---|---|
-{commands}
-"""
     return f"""## A picture larger than memory (`huge.py`)
 
 {width}x{height} pixels of a 60-lpi print, direct light, 1 sample per pixel, `--memory`
@@ -323,7 +312,28 @@ Targets: a peak of at most {target}, time per pixel at most {result["target_rela
 | file | peak | size | time | per pixel | small, per pixel | ratio | ratio of processor time |
 |---|---|---|---|---|---|---|---|
 {table}
-""" + (reading if commands else "")
+"""
+
+
+def _huge_commands(result: dict[str, Any]) -> str:
+    width, height = result["size"]
+    rows = "\n".join(
+        f"| {name} | {run['seconds']:.0f} s | {run['cpu_seconds']:.0f} s | {run['peak_resident_bytes'] / 1e9:.2f} GB |"
+        for name, run in result["commands"].items()
+    )
+    pictures = "the pictures of `huge.py`"
+    if result["repeated"] is not None:
+        pictures = "a rendered picture of {}x{} again and again".format(*result["repeated"])
+    return f"""## Commands on a picture larger than memory (`huge.py`, `huge_commands.py`)
+
+{width}x{height} pixels of a 60-lpi print with 8 bits per channel, {pictures}; each command is a process of its own.
+`quilt` and `weave` go by the largest quilt there is, 16384x16384 pixels, and `weave` writes the print; `view` sends its
+page and 40 tiles of 2048x2048 pixels. Target: a peak of at most {result["target_peak_bytes"] / 1e9:.0f} GB.
+
+| command | time | processor time | peak |
+|---|---|---|---|
+{rows}
+"""
 
 
 def _fuzz(result: dict[str, Any]) -> str:
@@ -371,6 +381,7 @@ SECTIONS = {
     "full_rate": _full_rate,
     "large_frame": _large_frame,
     "huge": _huge,
+    "huge_commands": _huge_commands,
     "command": _command,
     "viewer": _viewer,
     "cluster": _cluster,

@@ -8,6 +8,7 @@ import math
 import numpy as np
 import pytest
 
+import lippmann.weave as weave_module
 from lippmann.display import NUMPY, Display, LensArray, Panel, load_display
 from lippmann.errors import PictureError, UsageError
 from lippmann.quilt import Quilt, QuiltLayout
@@ -133,6 +134,21 @@ def test_neighbouring_tiles_do_not_leak_in():
     assert set(np.unique(weave(quilt, display, choice="nearest").pixels)) == {0.0, 1.0}
 
 
+@pytest.mark.parametrize("offsets", ["none", "rgb-stripe"])
+@pytest.mark.parametrize("slant", [0.0, 7.0])
+@pytest.mark.parametrize("distance", [math.inf, 300.0])
+def test_what_holds_for_all_rows_or_channels_is_found_once(offsets, slant, distance):
+    panel = Panel(61, 40, 0.25) if offsets == "rgb-stripe" else Panel(61, 40, 0.25, ((0.0, 0.0),) * 3)
+    lenses = LensArray("lenticular", 1.3, slant=slant)
+    display = Display("d", panel, lenses, gap=6.8, viewing_distance=distance, aperture_distance=5.0)
+    quilt = solid(np.linspace(0, 1, 6), 3, 2)
+    u, v = np.meshgrid(np.arange(61) + 0.5, np.arange(9, 20) + 0.5)
+    for channel, found in enumerate(weave_module._places(quilt, display, "linear", 9, 20)):
+        expected = weave_module._places_of(quilt, display, "linear", channel, u, v)
+        for one, other in zip(found, expected, strict=True):
+            np.testing.assert_array_equal(np.broadcast_to(one, u.shape), other)
+
+
 def test_the_picture_says_what_it_is(tmp_path):
     image = weave(solid([0.2, 0.7], 2, 1), SHEETS[0], choice="nearest", scene="pair")
     assert image.display == SHEETS[0]
@@ -148,6 +164,11 @@ def test_blocks_of_rows_change_nothing(monkeypatch):
     steps = []
     np.testing.assert_array_equal(weave(quilt, SHEETS[0], progress=steps.append).pixels, whole)
     assert [step.done for step in steps] == [7, 14, 21, 28, 35, 42, 49, 56, 60]
+    # The quilt has 720 pixels for 60 rows of the panel: 24 for two.
+    monkeypatch.setattr("lippmann.weave._VIEW_BLOCK", 24)
+    steps.clear()
+    np.testing.assert_array_equal(weave(quilt, SHEETS[0], progress=steps.append).pixels, whole)
+    assert [step.done for step in steps] == list(range(2, 61, 2))
 
 
 def test_what_cannot_be_woven_is_refused():

@@ -174,7 +174,7 @@ def _check_not_too_large(path: Path) -> None:
             f"has {header.width} x {header.height} pixels",
             where=str(path),
             rule=f"at most {MOST_PIXELS} are read at once",
-            fix="use what reads it piece by piece: info, replay, views, refocus, compare",
+            fix="use what reads it piece by piece: info, replay, views, refocus, compare, view",
         )
 
 
