@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from lippmann.image.permutation import Permutation
 from lippmann.quality import find_silhouettes
+from lippmann.quality.silhouettes import DEPTH_JUMP
 
 
 def test_a_plain_picture_has_none(any_display, picture):
@@ -56,3 +58,43 @@ def test_an_outline_is_found_under_every_layout(any_display, picture):
     mask = find_silhouettes(picture(any_display, codes)).mask
     assert 0 < mask.mean() < 0.75
     assert not mask[:, :8].any()
+
+
+def expected_marks(image, values, differ):
+    """Both of every pair of neighbours that differ, along the four axes of the micro-images, one after the other."""
+    permutation = Permutation(image.display)
+    split, present = permutation.split(values), permutation.mask
+    marks = np.zeros(present.shape, dtype=bool)
+    for axis in range(4):
+        low = (slice(None),) * axis + (slice(0, -1),)
+        high = (slice(None),) * axis + (slice(1, None),)
+        both = present[low] & present[high] & differ(split[low], split[high])
+        marks[low] |= both
+        marks[high] |= both
+    return permutation.join(marks)
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_every_neighbour_counts_and_no_other_pixel(any_display, picture, seed):
+    codes = np.random.default_rng(seed).uniform(0.45, 0.58, (32, 64, 3)).astype(np.float32)
+    image = picture(any_display, codes)
+    marks = expected_marks(image, codes.astype(float), lambda a, b: (np.abs(a - b) > 0.1).any(axis=-1))
+    assert 0.1 < marks.mean() < 0.9
+    np.testing.assert_array_equal(find_silhouettes(image).mask, marks)
+
+
+def test_every_neighbour_counts_by_depth(any_display, picture):
+    random = np.random.default_rng(4)
+    depth = random.uniform(0, 1.1 * DEPTH_JUMP * any_display.lens_array.pitch, (32, 64)).astype(np.float32)
+    depth[random.uniform(size=depth.shape) < 0.02] = np.inf
+    depth[random.uniform(size=depth.shape) < 0.02] = -np.inf
+
+    def differ(a, b):
+        seen = np.isfinite(a), np.isfinite(b)
+        step = np.abs(np.where(seen[0], a, 0.0) - np.where(seen[1], b, 0.0))
+        return (seen[0] != seen[1]) | (seen[0] & seen[1] & (step > DEPTH_JUMP * any_display.lens_array.pitch))
+
+    image = picture(any_display, 0.5, maps={"depth": depth})
+    marks = expected_marks(image, depth.astype(float), differ)
+    assert 0.05 < marks.mean() < 0.9
+    np.testing.assert_array_equal(find_silhouettes(image).mask, marks)
