@@ -130,9 +130,10 @@ def _viewed(picture: Path) -> dict[str, Any]:
     for number in np.linspace(0, count - 1, min(TILES, count)).astype(int).tolist():
         row, column = divmod(number, tiles["columns"])
         _asked(f"{address}pictures/0/tiles/picture/{column}_{row}")
-    process.send_signal(signal.SIGINT)
+    # What a shell runs in the background passes on that Ctrl-C is ignored; this is not.
+    process.terminate()
     found = _ended(process, started)
-    if process.returncode != 130:
+    if process.returncode != -signal.SIGTERM:
         raise SystemExit(f"the viewer left with {process.returncode}")
     return {**found, "open_seconds": opened, "tiles": min(TILES, count)}
 

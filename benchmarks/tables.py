@@ -326,9 +326,11 @@ def _huge_commands(result: dict[str, Any]) -> str:
         pictures = "a rendered picture of {}x{} again and again".format(*result["repeated"])
     return f"""## Commands on a picture larger than memory (`huge.py`, `huge_commands.py`)
 
-{width}x{height} pixels of a 60-lpi print with 8 bits per channel, {pictures}; each command is a process of its own.
+{width}x{height} pixels of a 60-lpi print with 8 bits per channel: {pictures}. Each command is a process of its own.
 `quilt` and `weave` go by the largest quilt there is, 16384x16384 pixels, and `weave` writes the print; `view` sends its
-page and 40 tiles of 2048x2048 pixels. Target: a peak of at most {result["target_peak_bytes"] / 1e9:.0f} GB.
+page and {result["commands"]["view"]["tiles"]} tiles of 2048x2048 pixels. Target: a peak of at most
+{result["target_peak_bytes"] / 1e9:.0f} GB. Processor time is that of all threads; other work on the machine makes the
+clock's longer.
 
 | command | time | processor time | peak |
 |---|---|---|---|
