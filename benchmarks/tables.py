@@ -271,23 +271,27 @@ QUILTS_PAGE_TABLES = {"weave": _weave_with_picture, "cycles": _cycles_rows}
 
 
 def _cluster(result: dict[str, Any]) -> str:
-    width, height = result["size"]
-    rows = "\n".join(
-        f"| {name} | {statistics.median(clock):.1f} s | {statistics.median(result['processor_seconds'][name]):.1f} s |"
-        for name, clock in result["seconds"].items()
-    )
+    targets = result["targets"]
+    ways = list(next(iter(result["sizes"].values()))["seconds"])
+    rows = []
+    for size, measured in result["sizes"].items():
+        times = (
+            f"{statistics.median(measured['seconds'][way]):.1f} s ({statistics.median(spent):.0f} s)"
+            for way, spent in measured["processor_seconds"].items()
+        )
+        ratios = (f"{measured[name]:.2f}" for name in ("speed_up", "overhead", "processor_overhead"))
+        rows.append(f"| {size} | {' | '.join((*times, *ratios))} |")
+    table = "\n".join(rows)
     return f"""## Clusters on one machine (`cluster.py`)
 
-{width}x{height} pixels, path light, {result["spp"]} samples per pixel, written as TIFF; workers warm. Workers have one
-thread each.
+Path light, 4 samples per pixel, written as TIFF; workers warm, with one thread each. In brackets the processors' time.
+"Speed-up" is that of two workers against one (target: {targets["speed_up"]:g}), "overhead" their time over that of two
+threads in one process (target: at most {targets["overhead"]:g}), and the same of the processors' time; medians of three
+runs in turn, each with its own ratio.
 
-| | clock | processors |
-|---|---|---|
-{rows}
-
-Two workers are {result["speed_up"]:.2f} times as fast as one (target: {result["targets"]["speed_up"]:g}), and take
-{result["overhead"]:.2f} of the time of two threads in one process (target: at most {result["targets"]["overhead"]:g});
-of the processors' time, {result["processor_overhead"]:.2f}.
+| pixels | {" | ".join(ways)} | speed-up | overhead | of processors |
+|---|{"---|" * (len(ways) + 3)}
+{table}
 """
 
 
