@@ -120,6 +120,12 @@ def test_export_writes_one_file(lippmann, shot, tmp_path):
     assert page.read_text().startswith("<!doctype html>")
 
 
+def test_a_page_in_one_file_has_its_limits(lippmann, shot, tmp_path, monkeypatch):
+    monkeypatch.setattr("lippmann.viewer.export.MOST_PIXELS", 100)
+    refuse(lippmann("view", shot, "--export", tmp_path / "a.html"), "--export", "at most 100 pixels", "leave it out")
+    assert not (tmp_path / "a.html").exists()
+
+
 @pytest.mark.parametrize("extra", [("--port", "1234"), ("--host", "localhost"), ("--no-browser",)])
 def test_options_of_the_server_mean_nothing_to_a_file(lippmann, shot, tmp_path, extra):
     refuse(lippmann("view", shot, "--export", tmp_path / "a.html", *extra), extra[0])

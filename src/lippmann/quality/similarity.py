@@ -45,6 +45,8 @@ def ssim(reference: ArrayLike, test: ArrayLike, mask: Flags | None = None) -> fl
     """
     a, b = (np.atleast_3d(np.asarray(picture)) for picture in (reference, test))
     height, width = a.shape[:2]
+    if mask is not None and mask.all():
+        mask = None
     if mask is not None:
         a, b = (np.where(mask[..., None], picture, 0.0) for picture in (a, b))
     total, count = similarity_sum(a, b, mask, (window_weights(height), window_weights(width)))
