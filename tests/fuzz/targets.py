@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 from unittest import mock
 
-from lippmann import quilt
+from lippmann import quilt, quilt_files
 from lippmann.cli import parse
 from lippmann.cli.sequences import frame_range, numbered
 from lippmann.cluster.address import parse_target
@@ -163,7 +163,7 @@ def _quilt_name(data: bytes, folder: Path) -> object:
 def _quilt(data: bytes, folder: Path) -> object:
     (folder / "q_qs3x2a0.75.jpg").write_bytes(data)
     with mock.patch.object(quilt, "LEAST_SIDE", 1):  # small ones are decoded sooner
-        return quilt.read_quilt(folder / "q_qs3x2a0.75.jpg").pixels.sum()
+        return quilt_files.read_quilt(folder / "q_qs3x2a0.75.jpg").pixels.sum()
 
 
 def _words(data: bytes, folder: Path) -> object:

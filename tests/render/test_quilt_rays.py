@@ -208,7 +208,7 @@ def test_a_woven_quilt_is_near_the_direct_picture():
     woven = weave(quilt, SHEET)
     near = np.mean(np.square(woven.pixels - direct.pixels))
     # Mirrored order, or views as seen from the other side, are far off.
-    turned = replace(quilt, pixels=np.ascontiguousarray(quilt.pixels[::-1, ::-1]).reshape(quilt.pixels.shape))
+    turned = replace(quilt, values=np.ascontiguousarray(quilt.pixels[::-1, ::-1]).reshape(quilt.pixels.shape))
     assert near < 0.01
     assert np.mean(np.square(weave(turned, SHEET).pixels - direct.pixels)) > 5 * near
 
