@@ -98,7 +98,7 @@ class Accessors:
             fields = self.document.all("accessors")[index]
             normalized = self._check(fields, storage)
             raw = self._elements(fields)
-            self._floats[key] = _normalize(raw) if normalized else raw.astype(np.float32)
+            self._floats[key] = _normalize(raw) if normalized else _quieted(raw.astype(np.float32))
         return self._floats[key]
 
     def integers(self, index: int, storage: Storage) -> NDArray[np.uint32]:
@@ -181,6 +181,12 @@ class Accessors:
         if not count:
             return np.zeros((0, width), dtype)
         return np.ndarray((count, width), dtype, buffer=data, offset=offset, strides=(step, dtype.itemsize))
+
+
+def _quieted(values: FloatArray) -> FloatArray:
+    """The same with one kind of NaN: there is another, of which the processor remarks whenever it converts one."""
+    missing = np.isnan(values)
+    return np.where(missing, np.float32(np.nan), values) if missing.any() else values
 
 
 def _normalize(raw: NDArray[np.generic]) -> FloatArray:

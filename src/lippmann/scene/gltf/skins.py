@@ -30,10 +30,9 @@ def read_skin(index: int, document: Document, accessors: Accessors, nodes: Nodes
     columns = accessors.floats(bind, storage.INVERSE_BIND_MATRICES)
     if len(columns) < len(joints):
         raise fields.error("inverseBindMatrices", f"that accessor has {len(columns)} matrices for {len(joints)} joints")
-    inverse = columns[: len(joints)].reshape(-1, 4, 4).transpose(0, 2, 1)
-    # Numbers that are none may be of a kind that the processor remarks on when it converts them.
+    inverse = columns[: len(joints)].reshape(-1, 4, 4).transpose(0, 2, 1).astype(np.float64)
     with np.errstate(over="ignore", invalid="ignore"):
-        matrices = worlds @ inverse.astype(np.float64)
+        matrices = worlds @ inverse
     if not np.isfinite(matrices).all():
         raise fields.error("inverseBindMatrices", "its matrices must be finite")
     return Skin(index, matrices)
