@@ -114,6 +114,19 @@ def test_pictures_that_are_not_denoised_are_traced_whole(ball):
     assert image.stats["traced_fraction"] == 1.0
 
 
+def test_before_a_sky_that_is_seen_denoised_frames_are_traced_whole():
+    pytest.importorskip("pyoidn")
+    scene = {
+        "type": "scene",
+        "ball": {"type": "sphere", "radius": 0.3},
+        "sky": {"type": "constant", "radiance": {"type": "rgb", "value": 0.5}},
+    }
+    display = DISPLAYS[0].resized(64, 48)
+    image = lippmann.render(scene, display, place="display", scale=9, integrator="direct", spp=2, denoise="oidn-fast")
+    assert image.stats["traced_fraction"] == 1.0
+    assert image.pixels[0, 0] == pytest.approx(0.5, abs=0.1)
+
+
 def test_where_nothing_is_saved_there_is_no_window(ball, monkeypatch):
     _, corners = placed(ball, DISPLAYS[0], PlacementOptions(scale=3.0))
     assert panel_window(corners, DISPLAYS[0]) is None

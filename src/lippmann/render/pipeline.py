@@ -160,9 +160,9 @@ def traced_window(
 
     if settings.method not in ("full", "pooled") or not settings.denoises or not isinstance(built, BuiltScene):
         return None
-    return (
-        None if has_exact_views(display) else panel_window(scene_corners(built, placement.display_from_world), display)
-    )
+    if even_background(built, settings) is None or has_exact_views(display):
+        return None
+    return panel_window(scene_corners(built, placement.display_from_world), display)
 
 
 def _widen(frame: Frame, window: PixelWindow, display: Display, background: Color | None) -> None:
