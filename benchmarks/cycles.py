@@ -4,8 +4,8 @@ The glTF teapot in the studio light that Lippmann gives to scenes without any, b
 48 views of 420 x 560 pixels by Cycles at 16 samples with Open Image Denoise, against Lippmann's quilt of the same size
 and its native frame of 1536 x 2048 x 3 sub-pixels, two threads each. Every picture is judged by a long rendering of its
 own program, the quilts on two views, the frame on every 64th row: PSNR of sRGB-coded values in [0, 1]. Lippmann
-denoises, too, the quilt with light shared between its views (``--method pooled``), and is tried with ever more samples
-until it reaches Cycles' PSNR; that is what counts.
+denoises, too, with light shared between views and micro-images (``--method pooled``), and is tried with ever more
+samples until it reaches Cycles' PSNR; that is what counts.
 
 Seconds are those of rendering and denoising all views or the whole frame, after a warm-up: Cycles' are its own
 ``render`` calls with the scene kept between views, Lippmann's are the whole call, building the scene included. With
@@ -46,8 +46,8 @@ DEVICE = "looking-glass-portrait"
 COLUMNS, ROWS = 8, 6
 THREADS, DEPTH = 2, 8
 CYCLES_SPP = 16
-QUILT_SAMPLES, NATIVE_SAMPLES = (8, 12, 16, 24, 32), (8, 32, 56, 76, 96)
-DENOISER = "oidn-fast"
+QUILT_SAMPLES, NATIVE_SAMPLES = (8, 12, 16, 24, 32), (4, 8, 11, 14, 20)
+METHOD, DENOISER = "pooled", "oidn-fast"
 #: Views that are judged, one far aside and one near the middle; references of all would take hours.
 JUDGED = (3, 27)
 TARGET = 10.0
@@ -249,7 +249,7 @@ def _quilt_tries(stage: Stage, size: Size) -> Tries:
             views=(COLUMNS, ROWS),
             size=(COLUMNS * width, ROWS * height),
             placement=stage.options,
-            method="pooled",
+            method=METHOD,
             spp=samples,
             depth=DEPTH,
             seed=1,
@@ -281,7 +281,7 @@ def _native_tries(stage: Stage, size: Size) -> Tries:
         image = lippmann.render(
             stage.scene,
             stage.display,
-            method="full",
+            method=METHOD,
             subpixels=True,
             scale=stage.options.scale,
             spp=samples,
@@ -332,6 +332,7 @@ def _best(tries: Tries, counts: tuple[int, ...], psnr: float) -> dict[str, Any]:
         picture = rendered(samples)
         one: dict[str, Any] = {
             "spp": samples,
+            "method": METHOD,
             "denoise": DENOISER,
             "seconds": time.perf_counter() - started,
             "cpu_seconds": time.process_time() - used,

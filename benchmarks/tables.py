@@ -177,13 +177,15 @@ def _cycles_rows(result: dict[str, Any]) -> list[str]:
         f"| {cycles['psnr']:.1f} dB | 1 |",
     ]
     for name, title in (
-        ("quilt", "Lippmann's quilt, `--method pooled --denoise oidn-fast`"),
-        ("native", "Lippmann's native frame, `--method full --denoise oidn-fast`"),
+        ("quilt", "Lippmann's quilt"),
+        ("native", "Lippmann's native frame"),
     ):
         # Tries with fewer samples, which fall short of Cycles' PSNR, have no ratio.
         for one in result[name]["tries"]:
             ratio = f"{result['times_less_cpu'][name]:.1f}" if one == result[name]["chosen"] else ""
-            rows.append(f"| {title} | {one['spp']} | {one['cpu_seconds']:.0f} s | {one['psnr']:.1f} dB | {ratio} |")
+            method = one.get("method", "pooled" if name == "quilt" else "full")
+            way = f"{title}, `--method {method} --denoise {one['denoise']}`"
+            rows.append(f"| {way} | {one['spp']} | {one['cpu_seconds']:.0f} s | {one['psnr']:.1f} dB | {ratio} |")
     rows += ["", _cycles_remark(result)]
     return rows
 

@@ -191,12 +191,17 @@ def test_what_is_made_from_neighbours_goes_to_tiles_sooner():
     from lippmann.display import load_display
 
     def asked(**more):
-        return is_tiled(Path("a.tif"), None, load_display("panel-4k"), resume=False, memory=1 << 30, **more)
+        given = {"memory": 1 << 30, **more}
+        return is_tiled(Path("a.tif"), None, load_display("panel-4k"), resume=False, **given)
 
     assert not asked()
     assert asked(method="pooled", denoise="auto")
     assert asked(denoise="oidn")
     assert not asked(method="auto", denoise="auto")
+    # Sub-pixels keep three times as much, where they are denoised.
+    assert not asked(memory=5 << 29, denoise="oidn")
+    assert asked(memory=5 << 29, denoise="oidn", subpixels=True)
+    assert not asked(memory=5 << 29, subpixels=True)
 
 
 @pytest.mark.parametrize(

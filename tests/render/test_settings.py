@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from lippmann.errors import UsageError
@@ -40,3 +42,11 @@ def test_what_does_not_go_together_is_refused(options, where):
 )
 def test_gloss_is_respected_by_default_but_in_the_papers_order(options, careful):
     assert RenderSettings(method="lens-view", **options).careful is careful
+
+
+def test_sub_pixels_keep_their_colours_for_a_denoiser():
+    pooled = RenderSettings(method="pooled", denoise="oidn", subpixels=True)
+    assert pooled.keeps_colors
+    assert replace(pooled, method="full", denoise="auto").keeps_colors
+    for other in ({"denoise": "none"}, {"denoise": "auto"}, {"subpixels": False}):
+        assert not replace(pooled, **other).keeps_colors

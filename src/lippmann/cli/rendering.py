@@ -204,7 +204,14 @@ def render(
         return
     _check_layers(layers, format_for(output, bits)[0], output)
     if on_cluster or tiled.is_tiled(
-        output, bits, target, resume=resume, memory=asked["memory"], method=method, denoise=denoise
+        output,
+        bits,
+        target,
+        resume=resume,
+        memory=asked["memory"],
+        method=method,
+        denoise=denoise,
+        subpixels=subpixels,
     ):
         _check_whole({"--maps": maps, "--marks": margin})
         with on_cluster.runner(console, threads) as runner:

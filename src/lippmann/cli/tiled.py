@@ -49,6 +49,7 @@ def is_tiled(
     memory: int | None,
     method: str = "full",
     denoise: str = "none",
+    subpixels: bool = False,
 ) -> bool:
     """Whether a picture has to be rendered in tiles: where that is asked for, or is the only way."""
     from lippmann.image.formats import format_for
@@ -59,7 +60,10 @@ def is_tiled(
     if resume or name == "zarr":
         return True
     with_neighbours = method == "pooled" or denoise.startswith("oidn")
-    return name == "tiff" and not fits_whole(display, memory or default_memory(), with_neighbours=with_neighbours)
+    limit = memory or default_memory()
+    return name == "tiff" and not fits_whole(
+        display, limit, with_neighbours=with_neighbours, subpixels=with_neighbours and subpixels
+    )
 
 
 @contextmanager

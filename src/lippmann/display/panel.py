@@ -66,6 +66,11 @@ class Panel:
         """Width and height of the pixel area in millimetres."""
         return self.width * self.pixel_pitch, self.height * self.pixel_pitch
 
+    @property
+    def subpixel_order(self) -> tuple[int, ...]:
+        """The sub-pixels (0 R, 1 G, 2 B) from left to right."""
+        return tuple(sorted(range(3), key=lambda c: self.subpixel_offsets[c][0]))
+
     def point(self, u: Array, v: Array, ops: ArrayOps) -> tuple[Array, Array]:
         """Millimetres (x right, y up, origin in the middle) of continuous pixel coordinates.
 

@@ -203,8 +203,13 @@ class FullInBatches:
         """
         if self.samples < STREAMS:
             raise UsageError("one sample per pixel does not tell its own error", rule="two or more do")
-        error, lone = error_of_batches(self._sums, self._taken, self._transfer)
-        return PixelErrors(error.reshape(self.shape), lone.reshape(self.shape), OWN_NOISE)
+        error, lone = error_of_batches(self._shown_sums(), self._taken, self._transfer)
+        shape = self.shape[0], -1
+        return PixelErrors(error.reshape(shape), lone.reshape(shape), OWN_NOISE)
+
+    def _shown_sums(self) -> Floats:
+        """``(batches, pixels, 3)``: the sums of what the picture shows."""
+        return self._sums
 
     def _runs(self, samples: int) -> Iterator[_Run]:
         """Wavefronts that take ``samples`` more of every pixel."""

@@ -259,12 +259,14 @@ def _denoise_seconds(
     from lippmann.render.denoise import load_denoiser
     from lippmann.render.effort import effort_of
     from lippmann.render.guided import GuidedDenoiser
+    from lippmann.render.rays import SubpixelRays
 
     load_denoiser()
-    rays_per_pixel = source.channels * settings.samples * (1 + sum(found.rays.values()))
+    traced = SubpixelRays(source) if settings.keeps_colors else source
+    rays_per_pixel = traced.channels * settings.samples * (1 + sum(found.rays.values()))
     denoiser = GuidedDenoiser(
         built,
-        source,
+        traced,
         at.display_from_world,
         seed=settings.seed,
         box_filter=settings.pixel_filter == "box",
@@ -279,7 +281,7 @@ def _working_bytes(source: DisplayRays | WindowRays, settings: RenderSettings, l
     """What batches, wavefront and denoiser take at the peak, see :mod:`~lippmann.render.batches`."""
     from lippmann.render.batches import MOST_BATCHES, bytes_per_pixel
 
-    pixels = source.width * source.height
+    pixels = source.width * source.height * (3 if settings.keeps_colors else 1)
     lanes = make_plan(source.width, source.height, settings.samples, channels=source.channels, memory=limit).lanes
     wave = lanes * BYTES_PER_LANE
     if why_no_estimate(settings) is not None:

@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.render.denoise import Effort, denoise
+from lippmann.render.denoise_seen import denoise_seen
 from lippmann.render.denoise_views import best_form, denoise_views
 from lippmann.render.effort import GUIDE_SAMPLES, RUN_COST, SHARING_STOP, denoising_cost
 from lippmann.render.guides import Guides, plan_guides, trace_guides
 from lippmann.render.quilt_sharing import share_views
-from lippmann.render.rays import DisplayRays, QuiltRays, WindowRays
+from lippmann.render.rays import DisplayRays, QuiltRays, SubpixelRays, WindowRays
 from lippmann.render.sharing import lens_numbers, share_light
 
 if TYPE_CHECKING:
@@ -60,7 +61,7 @@ class GuidedDenoiser:
     def __init__(
         self,
         built: BuiltScene | BuiltClassic,
-        source: DisplayRays | WindowRays | QuiltRays,
+        source: DisplayRays | WindowRays | QuiltRays | SubpixelRays,
         display_from_world: NDArray[np.float64],
         *,
         seed: int,
@@ -105,10 +106,11 @@ class GuidedDenoiser:
         self.seconds += time.perf_counter() - started
         return cleaned
 
-    def _shared(self, pixels: Floats, guides: Guides, source: DisplayRays | WindowRays) -> Floats:
+    def _shared(self, pixels: Floats, guides: Guides, source: DisplayRays | WindowRays | SubpixelRays) -> Floats:
+        subpixels = isinstance(source, SubpixelRays)
         if self._lenses is None:
-            window = source.window if isinstance(source, WindowRays) else None
-            self._lenses = lens_numbers(source.display, window, subpixels=source.channels == 3)
+            window = None if isinstance(source, DisplayRays) else source.window
+            self._lenses = lens_numbers(source.display, window, subpixels=subpixels)
         return share_light(
             pixels,
             source.display,
@@ -116,6 +118,7 @@ class GuidedDenoiser:
             stop=SHARING_STOP[self.used],
             threads=self._threads,
             lenses=self._lenses,
+            subpixels=subpixels,
         )
 
     def probe(self) -> float:
@@ -135,11 +138,10 @@ class GuidedDenoiser:
             )
         result = np.empty_like(pixels)
         for tile in source.tiles():
-            result[tile] = denoise(
+            result[tile] = denoise_seen(
                 pixels[tile],
                 guides.albedo[tile],
                 guides.normal[tile],
-                clean_guides=True,
                 exposure=self._exposure,
                 effort=self.used,
                 threads=self._threads,
@@ -170,6 +172,7 @@ class GuidedDenoiser:
             if isinstance(self._source, DisplayRays):
                 self._form = best_form(self._source.display, self.guides())
             else:
-                # A quilt is made of views; a window of a panel is no whole number of them.
+                # A quilt is made of views; a window of a panel is no whole number of them, and sub-pixels lie so close
+                # together that they are more alike than views' pixels.
                 self._form = "views" if isinstance(self._source, QuiltRays) else "raw"
         return self._form

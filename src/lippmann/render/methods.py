@@ -23,10 +23,11 @@ from lippmann.render.goal import Goal, Outcome, goal_of, reach_judged
 from lippmann.render.guided import GuidedDenoiser
 from lippmann.render.judging import Judge, Track
 from lippmann.render.plan import make_plan
-from lippmann.render.rays import DisplayRays, QuiltRays, WindowRays
+from lippmann.render.rays import DisplayRays, QuiltRays, SubpixelRays, WindowRays
 from lippmann.render.reuse.points import STATUS_LAYER, TRACED
 from lippmann.render.reuse.renderer import trace_reused
 from lippmann.render.settings import REUSING, Denoiser, Method, RenderSettings
+from lippmann.render.subpixel_batches import DenoisedSubpixels, SubpixelBatches
 
 if TYPE_CHECKING:
     from lippmann.render.classic.build import BuiltClassic
@@ -76,6 +77,14 @@ class Job:
     def box_filter(self) -> bool:
         """Samples are spread over the pixel, not all at its centre."""
         return self.settings.pixel_filter == "box"
+
+    @property
+    def traced(self) -> DisplayRays | WindowRays | QuiltRays | SubpixelRays:
+        """Whose samples are gathered: of sub-pixels that are denoised, all colours."""
+        source = self.source
+        if isinstance(source, QuiltRays) or not self.settings.keeps_colors:
+            return source
+        return SubpixelRays(source)
 
 
 @dataclass(frozen=True)
@@ -141,7 +150,7 @@ def _traced(job: Job) -> Traced:
 
 def _plain(job: Job, why: str) -> Traced:
     """All samples in one stream: nothing is known of the error."""
-    settings, source = job.settings, job.source
+    settings, source = job.settings, job.traced
     plan = make_plan(source.width, source.height, settings.samples, channels=source.channels, memory=job.memory)
     frame = trace_frame(
         job.integrator, source, plan, seed=settings.seed, box_filter=job.box_filter, progress=job.progress
@@ -206,9 +215,10 @@ def _full_until(job: Job, goal: Goal) -> Traced:
 
 
 def _batches(job: Job) -> FullInBatches:
-    return FullInBatches(
+    kind = SubpixelBatches if job.settings.keeps_colors else FullInBatches
+    return kind(
         job.integrator,
-        job.source,
+        job.traced,
         seed=job.settings.seed,
         box_filter=job.box_filter,
         transfer=job.transfer,
@@ -222,7 +232,7 @@ def _denoised_part(job: Job) -> Traced:
     batches.add(job.settings.samples, job.progress)
     denoiser = _denoiser(job, lambda: _rays_per_pixel(job, batches.rays))
     assert denoiser is not None
-    denoised = Denoised(batches, denoiser, job.transfer, job.threads)
+    denoised = _denoised(job, batches, denoiser)
     errors = denoised.squared_error()
     frame = Frame(denoised.picture(), batches.rays, batches.seconds_compile, batches.seconds_trace)
     frame.maps[ERROR_LAYER] = np.maximum(errors.values, 0)
@@ -239,16 +249,22 @@ class _Way:
     denoiser: GuidedDenoiser | None = None
 
 
+def _denoised(job: Job, batches: FullInBatches, denoiser: GuidedDenoiser) -> Denoised:
+    if isinstance(batches, SubpixelBatches):
+        return DenoisedSubpixels(batches, denoiser, job.transfer)
+    return Denoised(batches, denoiser, job.transfer)
+
+
 def _denoised_way(job: Job, goal: Goal, batches: FullInBatches, rays: Callable[[], float]) -> _Way:
     denoiser = _denoiser(job, rays)
     assert denoiser is not None
-    renderer = Denoised(batches, denoiser, job.transfer, job.threads)
+    renderer = _denoised(job, batches, denoiser)
     seconds = 0.0 if goal.max_time is None else denoiser.probe()
     return _Way(renderer, Track(renderer, _estimator(job, DenoisedEstimator), DENOISED_SLOPE, seconds), denoiser)
 
 
 def _rays_per_pixel(job: Job, rays: RayTotals) -> float:
-    return (rays.primary + rays.shadow + rays.secondary) / (job.source.width * job.source.height)
+    return (rays.primary + rays.shadow + rays.secondary) / (job.traced.width * job.traced.height)
 
 
 def _estimator(job: Job, kind: type[PictureEstimator] = PictureEstimator) -> PictureEstimator:
@@ -314,7 +330,8 @@ def _cleaned(job: Job, traced: Traced) -> Traced:
     denoiser = _denoiser(job, lambda: _rays_per_pixel(job, traced.frame.rays))
     if denoiser is None:
         return traced
-    traced.frame.pixels = denoiser(traced.frame.pixels)
+    cleaned, source = denoiser(traced.frame.pixels), job.traced
+    traced.frame.pixels = source.own_colors(cleaned) if isinstance(source, SubpixelRays) else cleaned
     return replace(traced, options=_how_cleaned(job, denoiser), seconds={"denoise": denoiser.seconds})
 
 
@@ -325,7 +342,7 @@ def _denoiser(job: Job, rays_per_pixel: Callable[[], float]) -> GuidedDenoiser |
     common = job.treatment
     return GuidedDenoiser(
         job.built,
-        job.source,
+        job.traced,
         job.display_from_world,
         seed=job.settings.seed,
         box_filter=job.box_filter,

@@ -39,7 +39,9 @@ def pixel_number(source: RaySource, column: Any, row: Any) -> Any:
 
     So a pixel has the same samples whichever part of the picture it is rendered with.
     """
-    return source.number(column, row) if isinstance(source, WindowRays) else row * source.width + column
+    if isinstance(source, WindowRays | SubpixelRays):
+        return source.number(column, row)
+    return row * source.width + column
 
 
 class DisplayRays:
@@ -89,6 +91,51 @@ class WindowRays:
     def tiles(self) -> Iterator[tuple[slice, slice]]:
         """Rows and columns of what shows one picture: all of it."""
         yield slice(0, self.height), slice(0, self.width)
+
+
+class SubpixelRays:
+    """The sub-pixels of a display or of its window, as the pixels of a picture that is three times as wide.
+
+    They have the rays and the random numbers of their pixels' sub-pixels, but keep all three colours, of which the
+    display will show one. Columns ``3 x`` to ``3 x + 2`` are the sub-pixels of the pixel in column x, from left to
+    right as they lie on the panel.
+    """
+
+    channels = 1
+
+    def __init__(self, source: DisplayRays | WindowRays) -> None:
+        self.display = source.display
+        self.window = source.window if isinstance(source, WindowRays) else None
+        self.width, self.height = 3 * source.width, source.height
+        self._source = source
+        #: Of the sub-pixels from left to right, which colour they show.
+        self._shown = self.display.panel.subpixel_order
+
+    def rays(self, column: Any, row: Any, channel: Any, jitter: Any) -> Any:
+        del channel
+        pixel, shown = self._subpixel(column)
+        return self._source.rays(pixel, row, shown, jitter)
+
+    def number(self, column: Any, row: Any) -> Any:
+        """Numbers (UInt32) of sub-pixels in the whole picture."""
+        pixel, shown = self._subpixel(column)
+        return pixel_number(self._source, pixel, row) * 3 + shown
+
+    def tiles(self) -> Iterator[tuple[slice, slice]]:
+        """Rows and columns of what shows one picture: all of it."""
+        yield slice(0, self.height), slice(0, self.width)
+
+    def own_colors(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
+        """``(..., H, 3 W, 3)`` colours of these pixels to ``(..., H, W, 3)``: each sub-pixel shows its own."""
+        apart = values.reshape(*values.shape[:-2], values.shape[-2] // 3, 3, 3)
+        return np.stack([apart[..., self._shown.index(c), c] for c in range(3)], axis=-1)
+
+    def _subpixel(self, column: Any) -> tuple[Any, Any]:
+        """Column of the pixel, and the number of its sub-pixel."""
+        pixel = column // 3
+        place = column - 3 * pixel
+        shown = dr.select(place == 0, self._shown[0], dr.select(place == 1, self._shown[1], self._shown[2]))
+        return pixel, mi.UInt32(shown)
 
 
 class QuiltRays:

@@ -178,6 +178,11 @@ class RenderSettings:
         return self.method == "pooled" and self.denoises
 
     @property
+    def keeps_colors(self) -> bool:
+        """Whether the rays of sub-pixels keep all three colours: a denoiser can use them, whichever is shown."""
+        return self.subpixels and self.denoise != "none" and not self.pools_cells
+
+    @property
     def careful(self) -> bool:
         """Whether what reprojection would falsify is traced."""
         return self.order != "paper" if self.respect_gloss is None else self.respect_gloss

@@ -63,7 +63,9 @@ def survey(integrator: Any, source: DisplayRays, settings: RenderSettings) -> Tr
     plan = make_plan(few.width, few.height, samples, channels=few.channels, memory=MEMORY)
     frame = trace_frame(integrator, few, plan, seed=settings.seed, box_filter=box)
     rays = frame.rays.primary + frame.rays.shadow + frame.rays.secondary
-    effort = effort_of(settings.denoise, rays / (few.width * few.height) * settings.samples / samples)
+    # What is denoised: pixels, or sub-pixels.
+    places = few.width * few.height * (3 if settings.keeps_colors else 1)
+    effort = effort_of(settings.denoise, rays / places * settings.samples / samples)
     return Treatment(effort, exposure_of(frame.pixels))
 
 

@@ -321,13 +321,14 @@ def _is_streamed(job: TileJob, name: FormatName) -> bool:
     return name == "zarr" or (name == "tiff" and job.grid.width * job.grid.height >= tiff.TILED_FROM)
 
 
-def fits_whole(display: Display, memory: int, *, with_neighbours: bool = False) -> bool:
+def fits_whole(display: Display, memory: int, *, with_neighbours: bool = False, subpixels: bool = False) -> bool:
     """Whether a picture can be rendered in one piece within so many bytes; see :func:`lippmann.render.plan.make_plan`.
 
     Beside its own pixels that takes their errors and the codes of its file. ``with_neighbours``: it is pooled or
-    denoised.
+    denoised; ``subpixels``: so are sub-pixels, each with all colours.
     """
     per_pixel = _WHOLE_BYTES_WITH_NEIGHBOURS if with_neighbours else _WHOLE_BYTES_PER_PIXEL
+    per_pixel *= 3 if subpixels else 1
     return display.panel.width * display.panel.height * per_pixel <= memory
 
 

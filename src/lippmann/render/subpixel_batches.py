@@ -1,0 +1,69 @@
+"""Sub-pixels whose rays keep all three colours, for a picture that shows one of them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lippmann.render.batches import FullInBatches
+from lippmann.render.denoised import Denoised
+
+if TYPE_CHECKING:
+    from lippmann.render.rays import SubpixelRays
+
+Floats = NDArray[np.float32]
+
+
+class SubpixelBatches(FullInBatches):
+    """:class:`~lippmann.render.batches.FullInBatches` over :class:`~lippmann.render.rays.SubpixelRays`.
+
+    Picture, halves and errors are ``(H, W)`` pixels of sub-pixels that show their own colour.
+    """
+
+    _source: SubpixelRays
+
+    def picture(self) -> Floats:
+        """``(H, W, 3)`` float32: the mean of all samples, linear."""
+        return self.own_colors(super().picture())
+
+    def halves(self) -> tuple[Floats, Floats]:
+        """The means of either stream's samples, ``(H, W, 3)`` each."""
+        first, second = super().halves()
+        return self.own_colors(first), self.own_colors(second)
+
+    def picture_of_all(self) -> Floats:
+        """``(H, 3 W, 3)``: :meth:`picture` with all colours of all sub-pixels."""
+        return super().picture()
+
+    def halves_of_all(self) -> tuple[Floats, Floats]:
+        """``(H, 3 W, 3)`` each: :meth:`halves` with all colours of all sub-pixels."""
+        return super().halves()
+
+    def own_colors(self, values: Floats) -> Floats:
+        """Of all colours, see :meth:`halves_of_all`, those that the sub-pixels show."""
+        return self._source.own_colors(values)
+
+    def _shown_sums(self) -> Floats:
+        return self.own_colors(self._sums)
+
+
+class DenoisedSubpixels(Denoised):
+    """:class:`~lippmann.render.denoised.Denoised` where the denoiser takes and gives all colours of all sub-pixels."""
+
+    _renderer: SubpixelBatches
+
+    def picture(self) -> Floats:
+        """``(H, W, 3)`` float32 linear RGB."""
+        if self._renderer.samples < 2:
+            return self._renderer.own_colors(self._denoise(self._renderer.picture_of_all()))
+        return super().picture()
+
+    def _clean_halves(self) -> tuple[Floats, Floats]:
+        if self._cleaned is None or self._cleaned_samples != self._renderer.samples:
+            self._cleaned_samples = self._renderer.samples
+            own = self._renderer.own_colors
+            first, second = (own(self._denoise(half)) for half in self._renderer.halves_of_all())
+            self._cleaned = first, second
+        return self._cleaned
