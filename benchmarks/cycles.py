@@ -46,7 +46,7 @@ DEVICE = "looking-glass-portrait"
 COLUMNS, ROWS = 8, 6
 THREADS, DEPTH = 2, 8
 CYCLES_SPP = 16
-QUILT_SAMPLES, NATIVE_SAMPLES = (8, 12, 16, 24, 32), (4, 8, 11, 14, 20)
+QUILT_SAMPLES, NATIVE_SAMPLES = (8, 12, 16, 24, 32), (4, 8, 12, 16, 24)
 METHOD, DENOISER = "pooled", "oidn-fast"
 #: Views that are judged, one far aside and one near the middle; references of all would take hours.
 JUDGED = (3, 27)

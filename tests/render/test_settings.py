@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import pytest
 
+from lippmann.display import load_display
 from lippmann.errors import UsageError
 from lippmann.render.settings import RenderSettings
 
@@ -45,8 +46,9 @@ def test_gloss_is_respected_by_default_but_in_the_papers_order(options, careful)
 
 
 def test_sub_pixels_keep_their_colours_for_a_denoiser():
-    pooled = RenderSettings(method="pooled", denoise="oidn", subpixels=True)
-    assert pooled.keeps_colors
-    assert replace(pooled, method="full", denoise="auto").keeps_colors
+    pooled, sheet = RenderSettings(method="pooled", denoise="oidn", subpixels=True), load_display("seed-lenticular")
+    assert pooled.keeps_colors(sheet)
+    assert replace(pooled, method="full", denoise="auto").keeps_colors(sheet)
     for other in ({"denoise": "none"}, {"denoise": "auto"}, {"subpixels": False}):
-        assert not replace(pooled, **other).keeps_colors
+        assert not replace(pooled, **other).keeps_colors(sheet)
+    assert not pooled.keeps_colors(load_display("mla-square"))

@@ -10,7 +10,7 @@ import pytest
 from lippmann.display import Display, LensArray, Panel
 from lippmann.render.guides import Guides
 from lippmann.render.outline import PixelWindow
-from lippmann.render.sharing import lens_numbers, share_light
+from lippmann.render.sharing import lens_numbers, lens_numbers_in_full_color, share_light
 
 RGB_STRIPE = ((-1 / 3, 0.0), (0.0, 0.0), (1 / 3, 0.0))
 SIZE = (144, 60)
@@ -119,8 +119,22 @@ def test_in_the_lens_plane_every_lens_stands_for_itself():
     assert shared[..., 0] == pytest.approx(light, rel=1e-5)
 
 
+def test_sub_pixels_take_from_sub_pixels_of_their_own_colour_and_lens():
+    display = replace(DISPLAYS["slanted"], panel=Panel(*SIZE, 0.25, subpixel_offsets=RGB_STRIPE))
+    light = np.stack([waves(*on_plane(display, -24.0, channel)) for channel in range(3)], axis=2)
+    light *= [0.5, 1.0, 2.0]
+    guides = plain_guides(display, -24.0)
+    shared = share_light(
+        light.astype(np.float32), display, guides, stop=0.0, threads=1, lenses=lens_numbers(display, subpixels=True)
+    )
+    assert (np.abs(inner(shared) - inner(light)) / [0.5, 1.0, 2.0]).max() < 0.06
+    together = share_light(light.astype(np.float32), display, guides, stop=0.0, threads=1)
+    wrong = (np.abs(inner(together) - inner(light)) / [0.5, 1.0, 2.0]).mean()
+    assert wrong > 1.5 * (np.abs(inner(shared) - inner(light)) / [0.5, 1.0, 2.0]).mean()
+
+
 @pytest.mark.parametrize("order", ["rgb", "brg"])
-def test_sub_pixels_take_from_where_sub_pixels_lie(order):
+def test_sub_pixels_in_full_colour_take_from_where_sub_pixels_lie(order):
     offsets = tuple((order.index(color) / 3 - 1 / 3, 0.0) for color in "rgb")
     display = replace(DISPLAYS["slanted"], panel=Panel(*SIZE, 0.25, subpixel_offsets=offsets))
     places = [on_plane(display, -24.0, "rgb".index(color)) for color in order]
@@ -131,7 +145,9 @@ def test_sub_pixels_take_from_where_sub_pixels_lie(order):
     noise = np.random.default_rng(6).normal(0, 0.02, light.shape)
 
     def shared(values, **options):
-        clean = share_light(gray(values * 0.5), display, guides, stop=0.0, threads=2, subpixels=True, **options)
+        lenses = lens_numbers_in_full_color(display)
+        given = {"lenses": lenses, "columns": 3, **options}
+        clean = share_light(gray(values * 0.5), display, guides, stop=0.0, threads=2, **given)
         return clean[8:-8, 72:-72, 0] / 0.5
 
     exact = light[8:-8, 72:-72]
@@ -139,7 +155,7 @@ def test_sub_pixels_take_from_where_sub_pixels_lie(order):
     assert (shared(light + noise) - shared(light)).std() < 0.02 / 3.5
     # By the lenses of a panel with another order of its sub-pixels it would be worse: what is above can fail.
     other = replace(display, panel=replace(display.panel, subpixel_offsets=offsets[::-1]))
-    moved = np.roll(lens_numbers(other, subpixels=True), 8, axis=1)
+    moved = np.roll(lens_numbers_in_full_color(other), 8, axis=2)
     assert np.abs(shared(light, lenses=moved) - exact).max() > 0.1
 
 

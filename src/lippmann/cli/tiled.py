@@ -61,9 +61,8 @@ def is_tiled(
         return True
     with_neighbours = method == "pooled" or denoise.startswith("oidn")
     limit = memory or default_memory()
-    return name == "tiff" and not fits_whole(
-        display, limit, with_neighbours=with_neighbours, subpixels=with_neighbours and subpixels
-    )
+    in_color = subpixels and with_neighbours and display.lens_array.layout == "lenticular"
+    return name == "tiff" and not fits_whole(display, limit, with_neighbours=with_neighbours, subpixels=in_color)
 
 
 @contextmanager

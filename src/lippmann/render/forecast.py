@@ -262,7 +262,7 @@ def _denoise_seconds(
     from lippmann.render.rays import SubpixelRays
 
     load_denoiser()
-    traced = SubpixelRays(source) if settings.keeps_colors else source
+    traced = SubpixelRays(source) if settings.keeps_colors(source.display) else source
     rays_per_pixel = traced.channels * settings.samples * (1 + sum(found.rays.values()))
     denoiser = GuidedDenoiser(
         built,
@@ -281,7 +281,7 @@ def _working_bytes(source: DisplayRays | WindowRays, settings: RenderSettings, l
     """What batches, wavefront and denoiser take at the peak, see :mod:`~lippmann.render.batches`."""
     from lippmann.render.batches import MOST_BATCHES, bytes_per_pixel
 
-    pixels = source.width * source.height * (3 if settings.keeps_colors else 1)
+    pixels = source.width * source.height * (3 if settings.keeps_colors(source.display) else 1)
     lanes = make_plan(source.width, source.height, settings.samples, channels=source.channels, memory=limit).lanes
     wave = lanes * BYTES_PER_LANE
     if why_no_estimate(settings) is not None:

@@ -17,7 +17,7 @@ from lippmann.render.effort import GUIDE_SAMPLES, RUN_COST, SHARING_STOP, denois
 from lippmann.render.guides import Guides, plan_guides, trace_guides
 from lippmann.render.quilt_sharing import share_views
 from lippmann.render.rays import DisplayRays, QuiltRays, SubpixelRays, WindowRays
-from lippmann.render.sharing import lens_numbers, share_light
+from lippmann.render.sharing import lens_numbers, lens_numbers_in_full_color, share_light
 
 if TYPE_CHECKING:
     from lippmann.render.classic.build import BuiltClassic
@@ -107,10 +107,12 @@ class GuidedDenoiser:
         return cleaned
 
     def _shared(self, pixels: Floats, guides: Guides, source: DisplayRays | WindowRays | SubpixelRays) -> Floats:
-        subpixels = isinstance(source, SubpixelRays)
         if self._lenses is None:
             window = None if isinstance(source, DisplayRays) else source.window
-            self._lenses = lens_numbers(source.display, window, subpixels=subpixels)
+            if isinstance(source, SubpixelRays):
+                self._lenses = lens_numbers_in_full_color(source.display, window)
+            else:
+                self._lenses = lens_numbers(source.display, window, subpixels=source.channels == 3)
         return share_light(
             pixels,
             source.display,
@@ -118,7 +120,7 @@ class GuidedDenoiser:
             stop=SHARING_STOP[self.used],
             threads=self._threads,
             lenses=self._lenses,
-            subpixels=subpixels,
+            columns=3 if isinstance(source, SubpixelRays) else 1,
         )
 
     def probe(self) -> float:

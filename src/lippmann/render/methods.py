@@ -82,7 +82,7 @@ class Job:
     def traced(self) -> DisplayRays | WindowRays | QuiltRays | SubpixelRays:
         """Whose samples are gathered: of sub-pixels that are denoised, all colours."""
         source = self.source
-        if isinstance(source, QuiltRays) or not self.settings.keeps_colors:
+        if isinstance(source, QuiltRays) or not self.settings.keeps_colors(source.display):
             return source
         return SubpixelRays(source)
 
@@ -215,10 +215,11 @@ def _full_until(job: Job, goal: Goal) -> Traced:
 
 
 def _batches(job: Job) -> FullInBatches:
-    kind = SubpixelBatches if job.settings.keeps_colors else FullInBatches
+    source = job.traced
+    kind = SubpixelBatches if isinstance(source, SubpixelRays) else FullInBatches
     return kind(
         job.integrator,
-        job.traced,
+        source,
         seed=job.settings.seed,
         box_filter=job.box_filter,
         transfer=job.transfer,

@@ -160,7 +160,7 @@ def traced_window(
 
     if settings.method not in ("full", "pooled") or not settings.denoises or not isinstance(built, BuiltScene):
         return None
-    if even_background(built, settings) is None or (has_exact_views(display) and not settings.keeps_colors):
+    if even_background(built, settings) is None or (has_exact_views(display) and not settings.keeps_colors(display)):
         return None
     return panel_window(scene_corners(built, placement.display_from_world), display)
 

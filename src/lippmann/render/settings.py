@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import TYPE_CHECKING, Literal, get_args
 
 from lippmann.errors import UsageError
+
+if TYPE_CHECKING:
+    from lippmann.display import Display
 
 Method = Literal["auto", "full", "lens-view", "interpolated", "pooled"]
 Order = Literal["default", "paper"]
@@ -177,10 +180,13 @@ class RenderSettings:
         """Whether denoised light is shared between the micro-images."""
         return self.method == "pooled" and self.denoises
 
-    @property
-    def keeps_colors(self) -> bool:
-        """Whether the rays of sub-pixels keep all three colours: a denoiser can use them, whichever is shown."""
-        return self.subpixels and self.denoise != "none" and not self.pools_cells
+    def keeps_colors(self, display: Display) -> bool:
+        """Whether the rays of sub-pixels keep all three colours, whichever is shown, for a denoiser to use.
+
+        Under cylinders; on arrays, whose micro-images are short in both directions, that was better here, worse there.
+        """
+        cleans = self.denoise != "none" and not self.pools_cells
+        return self.subpixels and cleans and display.lens_array.layout == "lenticular"
 
     @property
     def careful(self) -> bool:

@@ -44,15 +44,15 @@ def share_light(
     stop: float,
     threads: int,
     lenses: NDArray[np.int32] | None = None,
-    subpixels: bool = False,
+    columns: int = 1,
 ) -> Floats:
     """A denoised picture whose micro-images have shared their light.
 
     Parameters
     ----------
     pixels:
-        ``(H, W, 3)`` linear RGB >= 0 of the panel, or of its ``window``, without noise; or ``(H, 3 W, 3)`` of its
-        sub-pixels, see :class:`~lippmann.render.rays.SubpixelRays`.
+        ``(H, W, 3)`` linear RGB >= 0 of the panel, or of a window of it, without noise; or ``(H, 3 W, 3)`` of its
+        sub-pixels in full colour, see :class:`~lippmann.render.rays.SubpixelRays`.
     guides:
         Albedo, normal and height of the same pixels.
     stop:
@@ -60,9 +60,10 @@ def share_light(
     threads:
         CPU threads; the result does not depend on them.
     lenses:
-        From :func:`lens_numbers`, of a window; None for the whole panel.
-    subpixels:
-        The pixels are sub-pixels.
+        From :func:`lens_numbers`: of a window, or of sub-pixels that show one colour each; those of sub-pixels in full
+        colour from :func:`lens_numbers_in_full_color`. None for whole pixels of the whole panel.
+    columns:
+        How many make a pixel: 3 of sub-pixels in full colour.
 
     Returns
     -------
@@ -73,32 +74,42 @@ def share_light(
     shared = np.empty_like(light)
     is_lenticular = display.lens_array.layout == "lenticular"
     reach = (REACH, 0) if is_lenticular else (REACH_OF_ARRAYS, REACH_OF_ARRAYS)
+    centers = _lens_centers(display) * (columns, 1)
     if lenses is None:
-        lenses = lens_numbers(display, subpixels=subpixels)
-    centers = _lens_centers(display) * (3 if subpixels else 1, 1)
+        lenses = lens_numbers(display)
+    groups = [slice(0, 3)] if len(lenses) == 1 else [slice(c, c + 1) for c in range(3)]
     with Bands(threads) as bands:
-        surface = (guides.normal, guides.height, lenses, centers)
-        bands.lines(
-            share_rows, len(light), light, *surface, float(display.gap), *reach, is_lenticular, float(stop), shared
-        )
+        for lens, group in zip(lenses, groups, strict=True):
+            part = np.ascontiguousarray(light[..., group])
+            mean = np.empty_like(part)
+            surface = (guides.normal, guides.height, lens, centers)
+            bands.lines(
+                share_rows, len(light), part, *surface, float(display.gap), *reach, is_lenticular, float(stop), mean
+            )
+            shared[..., group] = mean
     return np.asarray(shared * albedo, dtype=np.float32)
 
 
 def lens_numbers(display: Display, window: PixelWindow | None = None, *, subpixels: bool = False) -> NDArray[np.int32]:
-    """``(H, W)`` number of the lens of every pixel, lenses counted row by row; ``(H, 3 W)`` of every sub-pixel."""
+    """``(1, H, W)`` number of the lens of every pixel, lenses counted row by row; ``(3, H, W)`` of every sub-pixel."""
     panel, grid = display.panel, display.lens_grid
     left, top, columns, rows = window or (0, 0, panel.width, panel.height)
-    order = panel.subpixel_order if subpixels else (0,)
-    result = np.empty((rows, columns, len(order)), dtype=np.int32)
+    result = np.empty((3 if subpixels else 1, rows, columns), dtype=np.int32)
     for first in range(0, rows, _BLOCK):
         last = min(first + _BLOCK, rows)
         v, u = (index + 0.5 for index in np.mgrid[top + first : top + last, left : left + columns].astype(np.float64))
-        for place, channel in enumerate(order):
+        for channel, part in enumerate(result):
             x, y = display.subpixel_point(u, v, np.full_like(u, channel)) if subpixels else display.panel_point(u, v)
             i, j = display.lens_of(x, y)
             i, j = np.clip(i, 0, grid.columns - 1), np.clip(j, 0, grid.rows - 1)
-            result[first:last, :, place] = j * grid.columns + i
-    return result.reshape(rows, -1)
+            part[first:last] = j * grid.columns + i
+    return result
+
+
+def lens_numbers_in_full_color(display: Display, window: PixelWindow | None = None) -> NDArray[np.int32]:
+    """``(1, H, 3 W)``: :func:`lens_numbers` of the sub-pixels, in their order from left to right."""
+    numbers = lens_numbers(display, window, subpixels=True)[list(display.panel.subpixel_order)]
+    return np.ascontiguousarray(np.moveaxis(numbers, 0, 2)).reshape(1, numbers.shape[1], -1)
 
 
 def _lens_centers(display: Display) -> NDArray[np.float64]:

@@ -64,7 +64,7 @@ def survey(integrator: Any, source: DisplayRays, settings: RenderSettings) -> Tr
     frame = trace_frame(integrator, few, plan, seed=settings.seed, box_filter=box)
     rays = frame.rays.primary + frame.rays.shadow + frame.rays.secondary
     # What is denoised: pixels, or sub-pixels.
-    places = few.width * few.height * (3 if settings.keeps_colors else 1)
+    places = few.width * few.height * (3 if settings.keeps_colors(source.display) else 1)
     effort = effort_of(settings.denoise, rays / places * settings.samples / samples)
     return Treatment(effort, exposure_of(frame.pixels))
 

@@ -206,7 +206,7 @@ def bytes_of_tile(side: int, display: Display, settings: RenderSettings) -> int:
     if around is None:
         return max(side, 256) ** 2 * BYTES_PER_PIXEL
     pooled = BYTES_POOLED if settings.pools_cells else 0
-    denoised = BYTES_DENOISED * (3 if settings.keeps_colors else 1) if settings.denoises else 0
+    denoised = BYTES_DENOISED * (3 if settings.keeps_colors(display) else 1) if settings.denoises else 0
     return max(around.longest(side), 256) ** 2 * max(pooled, denoised)
 
 
