@@ -29,10 +29,12 @@ DISPLAY, SIDE = load_display("seed-lenticular").resized(128, 128), 64
 POOLED = RenderSettings(method="pooled", denoise="none", integrator="direct", spp=1, threads=2)
 SHARED = replace(POOLED, denoise="oidn-fast", spp=2)
 DENOISED = replace(SHARED, method="full")
+SUBPIXELS = replace(SHARED, subpixels=True)
 WAYS = [
     pytest.param(POOLED, id="pooled"),
     pytest.param(SHARED, id="shared", marks=needs_oidn),
     pytest.param(DENOISED, id="denoised", marks=needs_oidn),
+    pytest.param(SUBPIXELS, id="sub-pixels", marks=needs_oidn),
 ]
 
 
@@ -58,7 +60,8 @@ def in_tiles(settings):
 
 
 def in_one_piece(settings):
-    options = {name: getattr(settings, name) for name in ("method", "denoise", "integrator", "spp", "seed", "threads")}
+    asked = ("method", "denoise", "integrator", "spp", "seed", "threads", "subpixels")
+    options = {name: getattr(settings, name) for name in asked}
     return coded(api.render("teapot", DISPLAY, memory=1 << 30, **options).pixels)
 
 
@@ -237,7 +240,7 @@ def test_the_file_says_how_it_was_made(tmp_path):
 # ---- How it is cut -----------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("settings", WAYS)
+@pytest.mark.parametrize("settings", WAYS[:3])
 def test_memory_chooses_the_side(settings):
     wide = DISPLAY.resized(34_000, 22_000)
     sides = [
@@ -250,6 +253,14 @@ def test_memory_chooses_the_side(settings):
         assert tiles.bytes_of_tile(side, wide, settings) <= memory << 20
     with pytest.raises(MemoryLimitError, match="too small for a tile"):
         job(replace(settings, memory=4 << 20), display=wide, side=None)
+
+
+@needs_oidn
+def test_sub_pixels_take_thrice_the_memory_under_cylinders():
+    array = load_display("mla-square").resized(128, 128)
+    under = [tiles.bytes_of_tile(SIDE, display, SUBPIXELS) for display in (DISPLAY, array)]
+    assert under[0] == 3 * tiles.bytes_of_tile(SIDE, DISPLAY, SHARED)
+    assert under[1] == tiles.bytes_of_tile(SIDE, array, SHARED)
 
 
 def test_without_a_limit_free_memory_does_not_matter(monkeypatch):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -26,21 +28,23 @@ def integrator(engine):
     return make_integrator(build_for(lippmann.load_scene("teapot"), settings), settings, np.eye(4))
 
 
-def rays(window=None):
+def rays(window=None, display=SHEET):
     from lippmann.render.rays import DisplayRays, WindowRays
 
-    whole = DisplayRays(SHEET, np.diag([0.08, 0.08, 0.08, 1.0]), subpixels=True)
+    whole = DisplayRays(display, np.diag([0.08, 0.08, 0.08, 1.0]), subpixels=True)
     return whole if window is None else WindowRays(whole, window)
 
 
-@pytest.mark.parametrize("window", [None, PixelWindow(20, 10, 40, 30)])
-def test_own_colours_are_those_that_sub_pixels_have_alone(integrator, window):
+@pytest.mark.parametrize(("order", "window"), [("rgb", None), ("brg", PixelWindow(20, 10, 40, 30))])
+def test_own_colours_are_those_that_sub_pixels_have_alone(integrator, order, window):
     from lippmann.render.batches import FullInBatches
     from lippmann.render.rays import SubpixelRays
     from lippmann.render.subpixel_batches import SubpixelBatches
 
-    alone = FullInBatches(integrator, rays(window), seed=3, memory=1 << 28)
-    together = SubpixelBatches(integrator, SubpixelRays(rays(window)), seed=3, memory=1 << 28)
+    offsets = tuple((order.index(color) / 3 - 1 / 3, 0.0) for color in "rgb")
+    source = rays(window, replace(SHEET, panel=replace(SHEET.panel, subpixel_offsets=offsets)))
+    alone = FullInBatches(integrator, source, seed=3, memory=1 << 28)
+    together = SubpixelBatches(integrator, SubpixelRays(source), seed=3, memory=1 << 28)
     for batches in (alone, together):
         batches.add(5)
     assert alone.picture().std() > 0.05

@@ -23,7 +23,6 @@ from lippmann.errors import UsageError
 from lippmann.image.permutation import Permutation, micro_images_as_views
 from lippmann.image.views import view_grid
 from lippmann.render.denoise import Effort, denoise
-from lippmann.render.denoise_seen import denoise_seen
 from lippmann.render.guides import Guides
 
 FloatArray = NDArray[np.float32]
@@ -144,4 +143,5 @@ def _denoised(layers: list[NDArray[Any]], effort: Effort, threads: int | None) -
     color, *guides = layers
     if not guides:
         return denoise(color, effort=effort, threads=threads)
-    return denoise_seen(color, *guides, effort=effort, threads=threads)
+    # The guides follow mirrors and glass without chance, so what noise they have lies along edges alone.
+    return denoise(color, *guides, clean_guides=True, effort=effort, threads=threads)
