@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from lippmann.render import denoise_seen as module
-from lippmann.render.denoise_seen import MARGIN, denoise_seen
+from lippmann.render.denoise_seen import EDGE, MARGIN, denoise_seen
 
 SHAPE = (200, 260)
 
@@ -33,25 +33,26 @@ def layers(*surfaces):
     return color, albedo, normal
 
 
-def test_the_rectangle_of_all_surfaces_is_cleaned(calls):
+def test_the_rectangle_of_all_surfaces_is_shown_and_they_are_cleaned(calls):
     color, albedo, normal = layers((70, 100), (90, 47))
     result = denoise_seen(color, albedo, normal, effort="fast", exposure=2.0, threads=1)
-    cleaned = result[..., 0] == -1
-    rows, columns = (np.flatnonzero(cleaned.any(axis=axis)) for axis in (1, 0))
-    # Both begin where the network's steps do.
-    assert (rows[0], rows[-1]) == (48, 90 + MARGIN)
-    assert (columns[0], columns[-1]) == (16, 100 + MARGIN)
-    assert cleaned[48 : 91 + MARGIN, 16 : 101 + MARGIN].all()
+    cleaned = np.zeros(SHAPE, bool)
+    for row, column in ((70, 100), (90, 47)):
+        cleaned[row - EDGE : row + EDGE + 1, column - EDGE : column + EDGE + 1] = True
+    assert (result[cleaned] == -1).all()
     np.testing.assert_array_equal(result[~cleaned], color[~cleaned])
     ((*shown, options),) = calls
     for part, whole in zip(shown, (color, albedo, normal), strict=True):
-        np.testing.assert_array_equal(part, whole[cleaned].reshape(part.shape))
+        # It begins where the network's steps do.
+        np.testing.assert_array_equal(part, whole[48 : 91 + MARGIN, 16 : 101 + MARGIN])
     assert options == {"effort": "fast", "exposure": 2.0, "threads": 1, "clean_guides": True}
 
 
 def test_at_the_edge_the_picture_ends(calls):
     color, albedo, normal = layers((0, 259), (199, 3))
-    assert (denoise_seen(color, albedo, normal) == -1).all()
+    result = denoise_seen(color, albedo, normal)
+    assert (result[: EDGE + 1, -EDGE - 1 :] == -1).all()
+    assert calls[0][0].shape == color.shape
 
 
 def test_where_nothing_is_seen_nothing_is_done(calls):
