@@ -134,10 +134,8 @@ class GuidedDenoiser:
 
     def _cleaned(self, pixels: Floats, guides: Guides) -> Floats:
         source = self._source
-        if isinstance(source, DisplayRays):
-            return denoise_views(
-                pixels, source.display, guides, form=self.form(), effort=self.used, threads=self._threads
-            )
+        if isinstance(source, DisplayRays) and self.form() == "views":
+            return denoise_views(pixels, source.display, guides, form="views", effort=self.used, threads=self._threads)
         result = np.empty_like(pixels)
         for tile in source.tiles():
             result[tile] = denoise_seen(

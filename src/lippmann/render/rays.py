@@ -68,6 +68,10 @@ class DisplayRays:
         origin, direction = self.display.light_ray(x, y, DEVICE)
         return world_ray(self.world_from_display, origin, direction)
 
+    def tiles(self) -> Iterator[tuple[slice, slice]]:
+        """Rows and columns of what shows one picture: all of it."""
+        yield slice(0, self.height), slice(0, self.width)
+
 
 class WindowRays:
     """A window of a display's pixels, as a picture of its own; its pixels keep the random numbers of the whole's."""
