@@ -83,7 +83,7 @@ class Denoised:
         """``(H, W, 3)`` float32 linear RGB."""
         if self._renderer.samples < 2:
             # There are no halves, and nothing is known of the error.
-            return self._denoise(self._renderer.picture())
+            return self._clean_picture()
         first, second = self._clean_halves()
         mean: Floats = np.float32(0.5) * (first + second)
         return mean
@@ -103,10 +103,16 @@ class Denoised:
         if self._cleaned is None or self._cleaned_samples != self._renderer.samples:
             self._cleaned_samples = self._renderer.samples
             noisy = self._renderer.halves()
-            clean = self._denoise(noisy[0]), self._denoise(noisy[1])
+            clean = self._denoised_halves(noisy)
             own = own_share(noisy, clean, self._transfer, threads=self._threads)
             self._cleaned = clean[0] + own * (noisy[0] - clean[0]), clean[1] + own * (noisy[1] - clean[1])
         return self._cleaned
+
+    def _clean_picture(self) -> Floats:
+        return self._denoise(self._renderer.picture())
+
+    def _denoised_halves(self, noisy: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
+        return self._denoise(noisy[0]), self._denoise(noisy[1])
 
     def _slope(self, noisy: tuple[Floats, Floats]) -> Floats:
         """By how much a pixel's code differs from that of the truth, per linear difference between the two."""

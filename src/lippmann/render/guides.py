@@ -33,6 +33,10 @@ _BYTES_PER_PIXEL = 56
 _FARTHEST = 1e5
 
 
+#: Added to the albedo.
+_LEAST_ALBEDO = 0.02
+
+
 @dataclass(frozen=True, eq=False)
 class Guides:
     """``albedo`` and ``normal``, ``(H, W, 3)`` float32 each; components in [0, 1] and in [-1, 1] (display frame).
@@ -44,6 +48,13 @@ class Guides:
     albedo: FloatArray
     normal: FloatArray
     height: FloatArray | None = None
+
+    def reflected(self) -> FloatArray:
+        """``(H, W, 3)``: what colour is divided by for light that can be shared, and light multiplied by for colour.
+
+        The albedo, and a little more: black surfaces that shine have light, too.
+        """
+        return np.asarray(np.clip(self.albedo, 0, 1) + np.float32(_LEAST_ALBEDO), dtype=np.float32)
 
 
 def plan_guides(source: RaySource, samples: int, memory: int) -> Plan:

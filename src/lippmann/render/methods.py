@@ -252,8 +252,8 @@ class _Way:
 
 def _denoised(job: Job, batches: FullInBatches, denoiser: GuidedDenoiser) -> Denoised:
     if isinstance(batches, SubpixelBatches):
-        return DenoisedSubpixels(batches, denoiser, job.transfer)
-    return Denoised(batches, denoiser, job.transfer)
+        return DenoisedSubpixels(batches, denoiser, job.transfer, job.threads)
+    return Denoised(batches, denoiser, job.transfer, job.threads)
 
 
 def _denoised_way(job: Job, goal: Goal, batches: FullInBatches, rays: Callable[[], float]) -> _Way:

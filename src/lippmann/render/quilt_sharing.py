@@ -31,8 +31,6 @@ Floats = NDArray[np.float32]
 
 #: How far light is fetched to either side, as a part of a radian between cameras; farther, highlights are smeared.
 REACH = 0.07
-#: Added to the albedo that colour is divided by: black surfaces that shine have light, too.
-_LEAST_ALBEDO = np.float32(0.02)
 
 
 def share_views(pixels: Floats, source: QuiltRays, guides: Guides, *, threads: int) -> Floats:
@@ -49,7 +47,7 @@ def share_views(pixels: Floats, source: QuiltRays, guides: Guides, *, threads: i
     """
     assert guides.height is not None
     slopes = ((2 * np.arange(source.views) + 1) / source.views - 1) * cone_tangent(source.display)
-    albedo = np.clip(guides.albedo, 0, 1) + _LEAST_ALBEDO
+    albedo = guides.reflected()
     light = np.ascontiguousarray(pixels / albedo, dtype=np.float32)
     shared = np.empty_like(light)
     step = 2 * cone_tangent(source.display) / source.views

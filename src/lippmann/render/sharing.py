@@ -30,8 +30,6 @@ Floats = NDArray[np.float32]
 
 #: How far light is fetched, in lenses to either side: of a lenticular sheet, and of an array in each direction.
 REACH, REACH_OF_ARRAYS = 4, 3
-#: Added to the albedo that colour is divided by: black surfaces that shine have light, too.
-_LEAST_ALBEDO = 0.02
 #: Rows whose lenses are found at a time.
 _BLOCK = 64
 
@@ -69,7 +67,7 @@ def share_light(
     -------
     float32 of the same shape.
     """
-    albedo = np.clip(guides.albedo, 0, 1) + np.float32(_LEAST_ALBEDO)
+    albedo = guides.reflected()
     light = np.ascontiguousarray(pixels / albedo, dtype=np.float32)
     shared = np.empty_like(light)
     is_lenticular = display.lens_array.layout == "lenticular"

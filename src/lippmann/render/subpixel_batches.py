@@ -54,16 +54,9 @@ class DenoisedSubpixels(Denoised):
 
     _renderer: SubpixelBatches
 
-    def picture(self) -> Floats:
-        """``(H, W, 3)`` float32 linear RGB."""
-        if self._renderer.samples < 2:
-            return self._renderer.own_colors(self._denoise(self._renderer.picture_of_all()))
-        return super().picture()
+    def _clean_picture(self) -> Floats:
+        return self._renderer.own_colors(self._denoise(self._renderer.picture_of_all()))
 
-    def _clean_halves(self) -> tuple[Floats, Floats]:
-        if self._cleaned is None or self._cleaned_samples != self._renderer.samples:
-            self._cleaned_samples = self._renderer.samples
-            own = self._renderer.own_colors
-            first, second = (own(self._denoise(half)) for half in self._renderer.halves_of_all())
-            self._cleaned = first, second
-        return self._cleaned
+    def _denoised_halves(self, noisy: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
+        first, second = (self._renderer.own_colors(self._denoise(half)) for half in self._renderer.halves_of_all())
+        return first, second
