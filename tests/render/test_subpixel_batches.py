@@ -55,7 +55,7 @@ def test_own_colours_are_those_that_sub_pixels_have_alone(integrator, order, win
     assert together.rays == alone.rays
 
 
-def test_a_denoiser_is_given_all_colours(integrator):
+def test_a_denoiser_is_given_all_colours(integrator, as_denoised):
     from lippmann.render.rays import SubpixelRays
     from lippmann.render.subpixel_batches import DenoisedSubpixels, SubpixelBatches
 
