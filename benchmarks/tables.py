@@ -354,8 +354,8 @@ def _fuzz(result: dict[str, Any]) -> str:
 
 Every input has to end in a result or in an error of one line within {limits["seconds"]:g} s of CPU time and
 {limits["bytes"] >> 20} MiB, and nothing may be printed. Finds are inputs that did not, before what they showed was
-mended, and damaged `.mat` files and Zarr chunks for which SciPy and zstd reserve gigabytes that they never use; the plain
-suite replays them.
+mended, and damaged `.mat` files and Zarr chunks for which SciPy and zstd reserve gigabytes that they never use; the
+plain suite replays them.
 
 | reader | inputs | CPU seconds | finds |
 |---|---|---|---|

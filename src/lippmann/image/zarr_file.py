@@ -100,6 +100,8 @@ def open_zarr(folder: Path) -> Any:
         raise PictureError(
             f"holds an array of shape {array.shape}", where=str(folder), rule="it must be (height, width, 3)"
         )
+    if min(array.chunks) < 1:
+        raise PictureError(f"is stored in pieces of {array.chunks} values", where=str(folder), fix="make it anew")
     return array
 
 
