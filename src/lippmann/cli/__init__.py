@@ -6,7 +6,11 @@
 from __future__ import annotations
 
 import errno
+import multiprocessing
+import os
 import sys
+from contextlib import suppress
+from typing import NoReturn
 
 from typer import BadParameter
 
@@ -16,11 +20,18 @@ from lippmann.errors import LippmannError
 _ComplaintError = BadParameter.__mro__[2]
 
 
+#: The exit code after Ctrl-C.
+INTERRUPTED = 130
+
+
 def main(arguments: list[str] | None = None) -> None:
     """Run one command and leave the process with its exit code."""
     words = list(sys.argv[1:] if arguments is None else arguments)
     debug = "--debug" in words
-    sys.exit(run([word for word in words if word != "--debug"], debug=debug))
+    code = run([word for word in words if word != "--debug"], debug=debug)
+    if code == INTERRUPTED:
+        _end_at_once(code)
+    sys.exit(code)
 
 
 def run(words: list[str], *, debug: bool = False) -> int:
@@ -29,9 +40,11 @@ def run(words: list[str], *, debug: bool = False) -> int:
 
     try:
         code = app(words, prog_name="lippmann", standalone_mode=False)
+    except SystemExit:
+        raise
     except BaseException as error:
         if _is_interrupt(error):
-            return _leave("stopped; nothing was written", 130)
+            return _stopped()
         if debug:
             raise
         if isinstance(error, LippmannError):
@@ -46,7 +59,28 @@ def run(words: list[str], *, debug: bool = False) -> int:
             what = " ".join(f"{type(error).__name__}: {error}".split())
             return _leave(f"internal error: {what}; run again with --debug and report it", 1)
         raise
+    # Typer makes an exit code of most Ctrl-C.
+    if code == INTERRUPTED:
+        return _stopped()
     return code if isinstance(code, int) else 0
+
+
+def _stopped() -> int:
+    return _leave("stopped; nothing was written", INTERRUPTED)
+
+
+def _end_at_once(code: int) -> NoReturn:
+    """Leave the process without taking the interpreter down.
+
+    Wherever Ctrl-C struck, files and folders are in order again by now; but an engine that was stopped in the middle of
+    loading or compiling may still be at work in threads of its own, and breaks an interpreter that ends under it.
+    """
+    for child in multiprocessing.active_children():
+        child.terminate()
+    for stream in (sys.stdout, sys.stderr):
+        with suppress(OSError, ValueError):
+            stream.flush()
+    os._exit(code)
 
 
 def _is_interrupt(error: BaseException | None) -> bool:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from lippmann.cli import INTERRUPTED
 from lippmann.cli.console import Console
 
 if TYPE_CHECKING:
@@ -20,9 +21,6 @@ Host = Annotated[
 ]
 Port = Annotated[int, typer.Option("--port", help="The port to listen on; 0 takes a free one.")]
 NoBrowser = Annotated[bool, typer.Option("--no-browser", help="Only print the address.")]
-
-#: How the program ends that was stopped by Ctrl-C.
-_INTERRUPTED = 130
 
 
 def serve(
@@ -69,7 +67,7 @@ def serve(
         try:
             threading.Event().wait()
         except KeyboardInterrupt:
-            raise typer.Exit(_INTERRUPTED) from None
+            raise SystemExit(INTERRUPTED) from None  # that is how a page ends; no other word is needed
 
 
 def is_remote() -> bool:
