@@ -156,8 +156,8 @@ def _places(quilt: Quilt, display: Display, choice: ViewChoice, first: int, last
         offset, before = panel.subpixel_offsets[channel], panel.subpixel_offsets[:channel]
         if panel.subpixel_cells is None and offset in before:
             found.append(found[before.index(offset)])
-        elif panel.subpixel_cells is None and display.lattice.slant == 0.0:
-            # Under upright cylinders rows are alike, and columns show the same heights.
+        elif panel.subpixel_cells is None and display.lattice.rows_are_alike:
+            # Columns show the same heights, too.
             column = _places_of(quilt, display, choice, channel, u[:, :1], v)
             found.append(_places_of(quilt, display, choice, channel, u, v[:1])._replace(down=column.down))
         else:

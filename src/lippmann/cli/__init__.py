@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 import errno
-import multiprocessing
 import os
 import sys
 from contextlib import suppress
@@ -18,7 +17,6 @@ from lippmann.errors import LippmannError
 
 #: The base of all complaints about the command line itself; its home moved between releases of typer.
 _ComplaintError = BadParameter.__mro__[2]
-
 
 #: The exit code after Ctrl-C.
 INTERRUPTED = 130
@@ -75,6 +73,8 @@ def _end_at_once(code: int) -> NoReturn:
     Wherever Ctrl-C struck, files and folders are in order again by now; but an engine that was stopped in the middle of
     loading or compiling may still be at work in threads of its own, and breaks an interpreter that ends under it.
     """
+    import multiprocessing
+
     for child in multiprocessing.active_children():
         child.terminate()
     for stream in (sys.stdout, sys.stderr):

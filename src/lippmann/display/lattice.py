@@ -34,6 +34,11 @@ class Lattice:
     tolerance: float
 
     @property
+    def rows_are_alike(self) -> bool:
+        """Whether nothing differs from one row of pixels to the next: so it is under upright cylinders."""
+        return self.layout == "lenticular" and self.slant == 0.0
+
+    @property
     def _axis(self) -> tuple[float, float]:
         angle = math.radians(self.slant)
         return math.sin(angle), math.cos(angle)

@@ -128,7 +128,7 @@ def _indices_of_block(display: Display, first: int, last: int) -> tuple[Indices,
 
 def _pixel_centers(display: Display, first: int, last: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Panel points of the pixels of some rows; of the first of them alone under upright cylinders, which see no row."""
-    if display.lattice.layout == "lenticular" and display.lattice.slant == 0.0:
+    if display.lattice.rows_are_alike:
         last = first + 1
     u, v = np.meshgrid(np.arange(display.panel.width) + 0.5, np.arange(first, last) + 0.5)
     x, y = display.panel_point(u, v, NUMPY)

@@ -53,11 +53,12 @@ def quantize(linear: FloatArray, bits: int, transfer: Transfer) -> NDArray[np.ui
 def dequantize(codes: NDArray[np.uint8] | NDArray[np.uint16], transfer: Transfer) -> FloatArray:
     """Linear float32 values of uint8 or uint16 codes; same shape."""
     # One table look-up per value: exact in double precision, and quicker than the curve itself.
-    return _levels(np.iinfo(codes.dtype).max, transfer)[codes]
+    return linear_levels(codes.dtype, transfer)[codes]
 
 
 @lru_cache(maxsize=4)
-def _levels(top: int, transfer: Transfer) -> FloatArray:
-    """The linear values of all codes up to ``top``."""
+def linear_levels(dtype: np.dtype[Any], transfer: Transfer) -> FloatArray:
+    """The linear values of all codes of a type, uint8 or uint16, in their order; not to be changed."""
+    top = np.iinfo(dtype).max
     levels = np.arange(top + 1, dtype=np.float64) / top
     return (decode_srgb(levels) if transfer == "srgb" else levels).astype(np.float32)

@@ -204,7 +204,7 @@ def pixels_of_view_rows(
     single rows and columns.
     """
     columns = display.lens_grid.columns
-    if _rows_are_alike(display):
+    if display.lattice.rows_are_alike:
         row, i = np.indices((1, columns))
         found, _, at_column = pixels_of_view(display, grid, view, row + first, i)
         return found, np.arange(first, last)[:, None], at_column
@@ -223,17 +223,13 @@ def panel_rows_of_view_rows(display: Display, first: int, last: int) -> tuple[in
     return max(0, math.floor(top)), min(display.panel.height, math.ceil(bottom))
 
 
-def _rows_are_alike(display: Display) -> bool:
-    return display.lens_array.layout == "lenticular" and display.lattice.slant == 0.0
-
-
 def _pixel_views(display: Display) -> ViewGrid:
     """The views of a display with whole pixels from lens to lens: one per place of a micro-image's box."""
     width, height = micro_image_extent(display)
     ny, nx = micro_image_shape(display)
     across, down = _Offsets(), _Offsets()
     # Some rows at a time: a slanted sheet a metre high has sixty million centres.
-    different = 1 if _rows_are_alike(display) else lens_rows(display)
+    different = 1 if display.lattice.rows_are_alike else lens_rows(display)
     for rows in row_blocks(different, display.lens_grid.columns):
         u, v, _ = micro_image_centers(display, rows)
         across.add(u, width)

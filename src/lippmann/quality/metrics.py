@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from lippmann.display import Display
 from lippmann.image import IntegralImage
-from lippmann.image.color import dequantize, encode_srgb
+from lippmann.image.color import encode, linear_levels
 from lippmann.image.large import LargePicture
 from lippmann.image.permutation import lens_indices, row_blocks
 from lippmann.image.provenance import Transfer
@@ -52,15 +52,13 @@ def coded_values(values: NDArray[Any], transfer: Transfer) -> Real:
     """Coded values in [0, 1] of linear ones, or of codes of 8 or 16 bits, float64; same shape."""
     if values.dtype.kind == "u":
         return looked_up(values, _coded_levels(values.dtype, transfer))
-    doubles = values.astype(np.float64)
-    found = encode_srgb(doubles) if transfer == "srgb" else np.clip(doubles, 0, 1)
-    return np.asarray(found, dtype=np.float64)
+    return np.asarray(encode(values.astype(np.float64), transfer))
 
 
 @lru_cache(maxsize=4)
 def _coded_levels(dtype: np.dtype[Any], transfer: Transfer) -> Real:
     """The coded values of all codes of a type."""
-    return coded_values(dequantize(np.arange(np.iinfo(dtype).max + 1).astype(dtype), transfer), transfer)
+    return coded_values(linear_levels(dtype, transfer), transfer)
 
 
 def looked_up(codes: NDArray[Any], levels: NDArray[Scalar]) -> NDArray[Scalar]:

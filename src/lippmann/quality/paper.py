@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lippmann.image import IntegralImage
-from lippmann.image.color import dequantize, quantize
+from lippmann.image.color import linear_levels, quantize
 from lippmann.image.permutation import row_blocks
 from lippmann.image.provenance import Transfer
 from lippmann.quality.metrics import looked_up, micro_image_means, psnr, squared_differences
@@ -102,4 +102,4 @@ def paper_codes(values: NDArray[Any], transfer: Transfer) -> NDArray[np.float32]
 @lru_cache(maxsize=4)
 def _paper_levels(dtype: np.dtype[Any], transfer: Transfer) -> NDArray[np.float32]:
     """The 8-bit codes of all codes of a type."""
-    return paper_codes(dequantize(np.arange(np.iinfo(dtype).max + 1).astype(dtype), transfer), transfer)
+    return paper_codes(linear_levels(dtype, transfer), transfer)

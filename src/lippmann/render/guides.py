@@ -32,7 +32,6 @@ _BYTES_PER_PIXEL = 56
 #: Heights beyond this many millimetres count as lying there: light lines of all lenses are parallel for them.
 _FARTHEST = 1e5
 
-
 #: Added to the albedo.
 _LEAST_ALBEDO = 0.02
 

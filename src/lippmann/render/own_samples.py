@@ -57,8 +57,9 @@ def own_share(noisy: Halves, clean: Halves, transfer: Transfer, *, threads: int)
         bands.lines(judged_rows, len(slope), *noisy, *clean, slope, noise, error)
         share = np.ones_like(noise)
         for reach in (NEAR, FAR):
+            count = _pixels_around(noise.shape, reach)
             of_noise = _mean_around(noise, reach, bands)
-            of_error, squared = (_of_others(values, reach, bands) for values in (error, np.square(error)))
+            of_error, squared = (_of_others(values, count, reach, bands) for values in (error, np.square(error)))
             deviation = np.sqrt(np.maximum(squared, 0)) / np.float32(2 * reach + 1)
             known = np.maximum(of_error - np.float32(_DEVIATIONS) * deviation, 0)
             share *= known / (known + np.maximum(of_noise, 0) + np.float32(_NOTHING))
@@ -71,13 +72,18 @@ def mean_around(values: Floats, reach: int, *, threads: int) -> Floats:
         return _mean_around(values, reach, bands)
 
 
-def _of_others(values: Floats, reach: int, bands: Bands) -> Floats:
-    """Means over the pixels around each but without itself."""
+def _pixels_around(shape: tuple[int, ...], reach: int) -> NDArray[np.float64]:
+    """``(H, W)``: how many pixels each mean is of, the pixel itself included."""
     count = np.ones((1, 1))
-    for axis, length in enumerate(values.shape):
+    for axis, length in enumerate(shape):
         place = np.arange(length)
         along = np.minimum(place + reach, length - 1) - np.maximum(place - reach, 0) + 1
         count = count * np.expand_dims(along, 1 - axis)
+    return count
+
+
+def _of_others(values: Floats, count: NDArray[np.float64], reach: int, bands: Bands) -> Floats:
+    """Means over the pixels around each but without itself; ``count`` from :func:`_pixels_around`."""
     others = _mean_around(values, reach, bands) * count - values
     return np.asarray(others / np.maximum(count - 1, 1), dtype=np.float32)
 

@@ -44,7 +44,18 @@ def pixel_number(source: RaySource, column: Any, row: Any) -> Any:
     return row * source.width + column
 
 
-class DisplayRays:
+class _OnePicture:
+    """A source whose pixels all show one picture."""
+
+    width: int
+    height: int
+
+    def tiles(self) -> Iterator[tuple[slice, slice]]:
+        """Rows and columns of what shows one picture: all of it."""
+        yield slice(0, self.height), slice(0, self.width)
+
+
+class DisplayRays(_OnePicture):
     """The light lines of a display's pixels, or of its sub-pixels, placed into a scene.
 
     A pixel's samples fill its square; a sub-pixel's fill a third of its width about the sub-pixel's own place.
@@ -68,12 +79,8 @@ class DisplayRays:
         origin, direction = self.display.light_ray(x, y, DEVICE)
         return world_ray(self.world_from_display, origin, direction)
 
-    def tiles(self) -> Iterator[tuple[slice, slice]]:
-        """Rows and columns of what shows one picture: all of it."""
-        yield slice(0, self.height), slice(0, self.width)
 
-
-class WindowRays:
+class WindowRays(_OnePicture):
     """A window of a display's pixels, as a picture of its own; its pixels keep the random numbers of the whole's."""
 
     def __init__(self, source: DisplayRays, window: PixelWindow) -> None:
@@ -92,12 +99,8 @@ class WindowRays:
         """Numbers (UInt32) of pixels in the whole picture."""
         return (row + self._top) * self._source.width + (column + self._left)
 
-    def tiles(self) -> Iterator[tuple[slice, slice]]:
-        """Rows and columns of what shows one picture: all of it."""
-        yield slice(0, self.height), slice(0, self.width)
 
-
-class SubpixelRays:
+class SubpixelRays(_OnePicture):
     """The sub-pixels of a display or of its window, as the pixels of a picture that is three times as wide.
 
     They have the rays and the random numbers of their pixels' sub-pixels, but keep all three colours, of which the
@@ -124,10 +127,6 @@ class SubpixelRays:
         """Numbers (UInt32) of sub-pixels in the whole picture."""
         pixel, shown = self._subpixel(column)
         return pixel_number(self._source, pixel, row) * 3 + shown
-
-    def tiles(self) -> Iterator[tuple[slice, slice]]:
-        """Rows and columns of what shows one picture: all of it."""
-        yield slice(0, self.height), slice(0, self.width)
 
     def own_colors(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
         """``(..., H, 3 W, 3)`` colours of these pixels to ``(..., H, W, 3)``: each sub-pixel shows its own."""

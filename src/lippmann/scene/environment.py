@@ -48,9 +48,7 @@ def read_environment(path: Path) -> Environment:
 def _read_exr(path: Path, where: str) -> NDArray[np.float32]:
     try:
         header = read_exr_header(path)
-        names = next(
-            (names for names in (("R", "G", "B"), ("Y", "Y", "Y")) if set(names) <= header.channels.keys()), None
-        )
+        names = next((names for names in _COLORS if set(names) <= header.channels.keys()), None)
         if names is None:
             held = ", ".join(sorted(header.channels))
             raise SceneError(f"has the channels {held}", where=where, rule="R, G and B are needed")

@@ -175,7 +175,7 @@ def _make(maker: Maker, method: ReuseMethod) -> None:
 def _default_maker(
     display: Display, points: PointImage, tracer: PixelTracer, bands: Bands, rules: Rules, settled: Settled
 ) -> SearchedMaker:
-    if display.lens_array.layout == "lenticular" and display.lens_array.slant == 0:
+    if display.lattice.rows_are_alike:
         from lippmann.render.reuse.straight import StraightRenderer
 
         return StraightRenderer(display, points, tracer, bands, rules, settled)
