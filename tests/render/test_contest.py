@@ -43,12 +43,20 @@ class Picture:
         return PixelErrors((expected * self.random.chisquare(1, (64, 64))).astype(np.float32), None, self.noise)
 
 
-def run(goal, *, plain=0.5, denoised=0.005, slope=0.6, floor=0.0, seconds=0.01):
+class Sooner(PictureEstimator):
+    fewest = 8
+
+
+def run(goal, *, plain=0.5, denoised=0.005, slope=0.6, floor=0.0, seconds=0.01, rays=RAYS):
     """The contest, its outcome and the denoised picture."""
     samples = Samples(seconds)
     noisy, clean = Picture(samples, plain), Picture(samples, denoised, slope, floor, CROSS_NOISE)
-    estimator = PictureEstimator(SHOWN)
-    contest = Contest(goal, Track(noisy, estimator), Track(clean, estimator, 0.6), lambda: RAYS * samples.taken)
+    contest = Contest(
+        goal,
+        Track(noisy, PictureEstimator(SHOWN)),
+        Track(clean, Sooner(SHOWN), 0.6),
+        lambda: rays * samples.taken,
+    )
     outcome = reach_judged(goal, samples.add, contest, clock=lambda: samples.now, probe=lambda: seconds)
     return contest, outcome, clean
 
@@ -60,8 +68,22 @@ def test_denoising_wins_where_noise_is_strong():
     assert "pooled and" in contest.why
 
 
+def test_pooled_light_is_believed_sooner():
+    contest, outcome, _ = run(Goal(quality_mean=25), plain=0.5, denoised=1e-3)
+    assert (contest.leader, outcome.end, outcome.samples) == ("pooled", "quality", Sooner.fewest)
+
+
+def test_plain_samples_are_not_believed_as_soon_as_pooled_light():
+    """They would be there with 8; what 16 cost is set against pooling."""
+    contest, outcome, clean = run(Goal(quality_mean=25), plain=1e-3, denoised=1e-3, rays=0.5)
+    assert (contest.leader, outcome.end, outcome.samples) == ("plain", "quality", PictureEstimator.fewest)
+    assert clean.looks == 0
+    dear, outcome, _ = run(Goal(quality_mean=25), plain=1e-3, denoised=1e-3, rays=30.0)
+    assert (dear.leader, outcome.samples) == ("pooled", Sooner.fewest)
+
+
 def test_plain_samples_win_where_the_quality_is_near():
-    contest, outcome, clean = run(Goal(quality_mean=24.8), plain=0.05)
+    contest, outcome, clean = run(Goal(quality_mean=24.8), plain=0.05, rays=1.0)
     assert (contest.leader, outcome.end) == ("plain", "quality")
     assert clean.looks == 0
     assert "less than pooling takes" in contest.why

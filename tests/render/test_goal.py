@@ -11,7 +11,7 @@ from lippmann.display.panel import Panel
 from lippmann.errors import UsageError
 from lippmann.progress import Progress
 from lippmann.render.estimate import OWN_NOISE, Estimate, PictureEstimator, PixelErrors
-from lippmann.render.goal import FIRST_ROUND, TOLERANCE, Goal, reach
+from lippmann.render.goal import TOLERANCE, Goal, reach
 
 SHOWN = Display("test", Panel(64, 64, 0.25), LensArray("square", 2.0), gap=6.8)
 
@@ -121,7 +121,7 @@ def test_a_few_samples_are_not_believed():
 
     outcome = run(Goal(quality=30, max_time=100.0), Lucky())
     assert outcome.end == "quality"
-    assert outcome.samples >= FIRST_ROUND
+    assert outcome.samples >= PictureEstimator.fewest
 
 
 def test_reports_climb_to_the_end_and_say_where_the_picture_stands():

@@ -58,8 +58,14 @@ class Contest:
         self._pooled = pooled
         self._rays_per_pixel = rays_per_pixel
         self._open = True
+        self._last: Track = pooled
         self.leader: Way = "plain"
         self.why = "there was no time to look at pooled light"
+
+    @property
+    def fewest(self) -> int:
+        """The leader's; at first that of pooled light, which is believed sooner."""
+        return self._last.fewest
 
     def judge(self, samples: int, room: float) -> Judgement:
         """The leader's judgement; the pooled picture is looked at only while it may win."""
@@ -68,7 +74,7 @@ class Contest:
             return plain
         rays = self._rays_per_pixel()
         look = pooling_cost(effort_of("oidn", rays))
-        outlook = self._outlook(plain, rays, room)
+        outlook = self._outlook(plain, rays, room, least=self._plain.fewest / samples)
         if not outlook.misses and outlook.value <= look:
             self._lead("plain", "the quality is within reach of plain samples for less than pooling takes")
             return plain
@@ -90,14 +96,18 @@ class Contest:
 
     def _lead(self, way: Way, why: str) -> None:
         self.leader, self.why = way, why
+        self._last = self._plain if way == "plain" else self._pooled
 
-    def _outlook(self, judged: Judgement, rays: float, room: float, look: float = 0.0) -> _Outlook:
-        """Rays per pixel still to be spent, or dB short of the goal when there is no room for more."""
+    def _outlook(self, judged: Judgement, rays: float, room: float, look: float = 0.0, least: float = 1.0) -> _Outlook:
+        """Rays per pixel still to be spent, or dB short of the goal when there is no room for more.
+
+        ``least``: by how much samples have to be multiplied for the judgement to be believed.
+        """
         missing = self._missing(judged.estimate)
-        needed = 1.0
+        needed = max(1.0, least)
         if self._goal.has_quality and missing > 0:
             likely = min(600.0, self._goal.likely_missing(judged.estimate))
-            needed = max(LEAST_GROWTH, 10 ** (likely / (10 * judged.slope)))
+            needed = max(LEAST_GROWTH, least, 10 ** (likely / (10 * judged.slope)))
         if self._goal.has_quality and needed <= room:
             return _Outlook(False, (needed - 1) * rays + look)
         return _Outlook(True, missing - 10 * judged.slope * math.log10(room))

@@ -1,7 +1,7 @@
 """How good a denoised picture is by its own account.
 
 Its halves judge each other (:mod:`lippmann.render.denoised`), which is right on the average but far noisier than what
-it measures: strong single hits of the one half meet the smooth other half. Three things keep the statement honest:
+it measures: strong single hits of the one half meet the smooth other half. Four things keep the statement honest:
 
 - An error cannot be negative. From a measured mean and its uncertainty follows the mean of a normal distribution that
   is cut at zero, which is never below what the uncertainty alone would allow.
@@ -60,6 +60,9 @@ _FLOOR = 1e-12
 class DenoisedEstimator(PictureEstimator):
     """Estimates for denoised pictures; their errors carry those of the samples."""
 
+    #: Intervals are wide where samples are few: with 8 none flattered, on scenes that are hard to judge.
+    fewest = 8
+
     def estimate(self, errors: PixelErrors) -> Estimate:
         """PSNR of the whole and of the worst micro-image."""
         assert errors.samples is not None
@@ -79,8 +82,9 @@ def estimate_denoised(judged: ErrorSums, samples: ErrorSums, grid: tuple[int, in
     spreads = [NORMAL_95 * math.sqrt(variance + MODEL_UNCERTAINTY**2) for variance in (worse, better)]
     ends = mean * math.exp(spreads[0]) + LONE_DOUBTED * lone, OFTEN_BETTER * measured * math.exp(-spreads[1])
 
-    parts = _parts(judged, samples, index, grid, mean, samples.lone)
-    at_best = _parts(judged, samples, index, grid, measured, np.zeros_like(samples.lone))
+    of_samples = errors_of_parts(samples, index, grid, OWN_NOISE).expected
+    parts = _parts(judged, of_samples, index, mean, samples.lone)
+    at_best = _parts(judged, of_samples, index, measured, np.zeros_like(samples.lone))
     worst = np.array(
         [
             *np.quantile(_worst_drawn(parts, worse), (0.5, 0.975)) * (1, 1 + MODEL_UNCERTAINTY),
@@ -99,16 +103,13 @@ def _worst_drawn(parts: PartErrors, common: float) -> Real:
     return drawn * np.exp(math.sqrt(common) * np.random.default_rng(2).standard_normal(DRAWS))
 
 
-def _parts(
-    judged: ErrorSums, samples: ErrorSums, index: NDArray[np.intp], grid: tuple[int, int], mean: float, lone: Real
-) -> PartErrors:
+def _parts(judged: ErrorSums, of_samples: Real, index: NDArray[np.intp], mean: float, lone: Real) -> PartErrors:
     """Each part's error: in proportion to its samples' error, drawn from there to its own measurement.
 
     ``mean`` is that of all; ``lone`` what lone hits make up of the sums of the samples' errors.
     """
     count = judged.pixels
     measured = judged.values / count
-    of_samples = errors_of_parts(samples, index, grid, OWN_NOISE).expected
     around = of_samples * mean / float((of_samples * count).sum() / count.sum())
     # The mean square of one part is noisy itself: it leans on what all have, in proportion.
     overall = float(judged.squares.sum()) / float((np.square(around) * count).sum())

@@ -188,7 +188,15 @@ class Parts:
 
 
 class PictureEstimator:
-    """Estimates for pictures of one display, or of whatever has these parts; whose a pixel is is found once."""
+    """Estimates for pictures of one display, or of whatever has these parts; whose a pixel is is found once.
+
+    Attributes
+    ----------
+    fewest:
+        Samples of a pixel with fewer of which an estimate is too rough to be believed by one who asks for a quality.
+    """
+
+    fewest = 16
 
     def __init__(self, of: Display | Parts) -> None:
         parts = Parts.micro_images(of) if isinstance(of, Display) else of

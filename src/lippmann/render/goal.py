@@ -21,8 +21,6 @@ from lippmann.render.settings import RenderSettings
 
 End = Literal["quality", "time", "samples"]
 
-#: Samples of the first round: with fewer the estimate is too rough to be believed.
-FIRST_ROUND = 16
 #: The fewest samples that tell an error.
 FEWEST = 2
 #: Samples add up to multiples of this, so that all batches get the same.
@@ -250,7 +248,7 @@ class _Climb:
         return self.clock() - self._began
 
     def _end(self, estimate: Estimate) -> End | None:
-        if self.goal.has_quality and self.goal.missing(estimate) <= 0 and self.spent >= FIRST_ROUND:
+        if self.goal.has_quality and self.goal.missing(estimate) <= 0 and self.spent >= self.judge.fewest:
             return "quality"
         if self.goal.max_time is not None and self._seconds() >= self.goal.max_time:
             return "time"
@@ -258,16 +256,16 @@ class _Climb:
 
     def _first_round(self) -> int:
         if self.goal.max_time is None:
-            return min(self._most, FIRST_ROUND) if self.goal.has_quality else self._most
+            return min(self._most, self.judge.fewest) if self.goal.has_quality else self._most
         if self.probe is None:
             return min(self._most, FEWEST)
         self.rate = 1 / max(self.probe(), 1e-9)
         # A picture has one sample of every pixel at least, whatever the time.
-        return min(self._most, FIRST_ROUND, max(1, self._affordable()))
+        return min(self._most, self.judge.fewest, max(1, self._affordable()))
 
     def _next_round(self, estimate: Estimate) -> int:
         """Samples of the next round; fewer than one if there is no time for any."""
-        wanted = max(self.spent * self._growth(estimate), FIRST_ROUND)
+        wanted = max(self.spent * self._growth(estimate), self.judge.fewest)
         samples = max(STEP * round(wanted / STEP) - self.spent, STEP)
         samples = min(samples, self._most - self.spent)
         return samples if self.goal.max_time is None else min(samples, self._affordable())

@@ -27,6 +27,11 @@ class Judgement:
 class Judge(Protocol):
     """Says after every round how good the picture is."""
 
+    @property
+    def fewest(self) -> int:
+        """Samples of a pixel with fewer of which its last word, or its first, is not to be believed."""
+        ...
+
     def judge(self, samples: int, room: float) -> Judgement:
         """The picture after ``samples`` per pixel, which may yet grow to ``room`` times as many."""
         ...
@@ -63,6 +68,11 @@ class Track:
         self._expected = slope
         self._seconds = seconds
         self._rounds: list[tuple[int, Estimate]] = []
+
+    @property
+    def fewest(self) -> int:
+        """As the estimator says."""
+        return self._estimator.fewest
 
     def judge(self, samples: int, room: float = 1.0) -> Judgement:
         """See :class:`Judge`; whatever room there is, this is the picture."""
