@@ -47,6 +47,18 @@ def test_pooled_light_is_denoised_where_it_can_be(installed):
     assert decided(method="pooled", denoise="none").settings.denoise == "none"
 
 
+@pytest.mark.parametrize("goal", [{"quality": 30.0}, {"quality_mean": 30.0}])
+def test_a_quality_opens_the_contest_for_pooled_light_too(installed, goal):
+    found = decided(method="pooled", **goal).settings
+    assert (found.method, found.denoise) == ("pooled", "auto" if installed else "none")
+    assert (found.shares_light, found.pools_cells) == (installed, not installed)
+    assert decided(method="pooled", denoise="oidn-fast", **goal).settings.denoise == "oidn-fast"
+
+
+def test_the_best_pooled_light_of_a_time_is_pooled(installed):
+    assert decided(method="pooled", max_time=5.0).settings.denoise == ("oidn" if installed else "none")
+
+
 @pytest.mark.parametrize("method", ["full", "lens-view", "interpolated"])
 def test_a_named_method_is_left_alone(installed, method):
     found = decided(method=method)

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from lippmann.display import Display, LensArray, Panel
+from lippmann.image import read_picture
 from lippmann.quality import view_flicker
 
 pytest.importorskip("pyoidn", reason="Open Image Denoise is not installed")
@@ -236,6 +237,23 @@ def test_a_promised_quality_is_reached_by_the_whole_command(tmp_path, small, cap
     capfd.readouterr()
     assert command("compare", tmp_path / "long.exr", tmp_path / "pooled.exr", "--json") == 0
     assert json.loads(capfd.readouterr().out)["micro_images"]["worst"]["psnr"] >= 33
+
+
+def test_a_quality_that_samples_reach_by_themselves_takes_no_pooling(tmp_path, small, capfd):
+    words = ("render", "teapot", "--display", small, "--json")
+    pictures = {}
+    for name, more in (("pooled", ()), ("full", ()), ("obeyed", ("--denoise", "oidn-fast"))):
+        method = "full" if name == "full" else "pooled"
+        path = tmp_path / f"{name}.exr"
+        assert command(*words, "--method", method, "--quality-mean", 24, *more, "-o", path) == 0
+        pictures[name] = json.loads(capfd.readouterr().out), read_picture(path)
+    told = pictures["pooled"][0]
+    assert told["method"] == "pooled"
+    assert "denoise" not in told["options"]
+    assert told["seconds"]["denoise"] == 0
+    assert any(note.startswith("the light is not pooled: the quality is within reach") for note in told["notes"])
+    np.testing.assert_array_equal(pictures["pooled"][1].pixels, pictures["full"][1].pixels)
+    assert pictures["obeyed"][0]["options"]["denoise_effort"] == "fast"
 
 
 def test_a_quality_of_light_pooled_in_cells_is_refused(tmp_path, small, capfd):

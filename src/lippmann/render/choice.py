@@ -2,8 +2,8 @@
 
 A number of samples is an order: so many are traced for every pixel, and nothing is taken away from what they show. A
 quality or a time is a goal: full rendering and pooled light, made of the same samples, compete for it, see
-:mod:`lippmann.render.contest`. Methods that reuse points have errors that no estimate knows of, and are taken only by
-name.
+:mod:`lippmann.render.contest`; for a quality they do so where pooled light is asked for, too. Methods that reuse points
+have errors that no estimate knows of, and are taken only by name.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ class Choice:
 def decide(settings: RenderSettings) -> Choice:
     """Fill in the method and what takes the noise out, as far as that can be known before the first sample."""
     if settings.method == "pooled" and settings.denoise == "auto":
-        return Choice(_with(settings, "oidn" if find_spec("pyoidn") else "none"))
+        return Choice(_pooled(settings))
     if settings.method != "auto":
         return Choice(_with(settings, "none") if settings.denoise == "auto" else settings)
     chosen = replace(settings, method="full")
@@ -43,6 +43,14 @@ def decide(settings: RenderSettings) -> Choice:
         missing = 'Open Image Denoise is not installed (pip install "lippmann[denoise]")'
         return Choice(_with(chosen, "none"), f"full: {missing}")
     return Choice(chosen, "full")
+
+
+def _pooled(settings: RenderSettings) -> RenderSettings:
+    if find_spec("pyoidn") is None:
+        return _with(settings, "none")
+    has_quality = settings.quality is not None or settings.quality_mean is not None
+    # Where the samples themselves come to the quality first, no light needs to be pooled.
+    return settings if has_quality else _with(settings, "oidn")
 
 
 def _with(settings: RenderSettings, denoise: Denoiser) -> RenderSettings:

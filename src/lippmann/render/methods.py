@@ -192,26 +192,23 @@ def _full_until(job: Job, goal: Goal) -> Traced:
         judge = denoised.track
     outcome = reach_judged(goal, batches.add, judge, job.progress, probe=batches.probe)
     options: dict[str, Any] = {}
+    notes = _how_it_ended(goal, outcome)
     method = job.settings.method
     won = denoised or plain
     if isinstance(judge, Contest):
         if judge.leader == "plain":
             won = plain
-        method = "full" if won is plain else "pooled"
-        options["auto"] = f"{method}: {judge.why}"
+        if method == "full":
+            method = "full" if won is plain else "pooled"
+            options["auto"] = f"{method}: {judge.why}"
+        elif won is plain:
+            notes = (*notes, f"the light is not pooled: {judge.why}")
     frame = Frame(won.renderer.picture(), batches.rays, batches.seconds_compile, batches.seconds_trace)
     if outcome.errors is not None:
         frame.maps[ERROR_LAYER] = np.maximum(outcome.errors.values, 0)
     seconds = {} if denoised is None or denoised.denoiser is None else {"denoise": denoised.denoiser.seconds}
-    return Traced(
-        frame,
-        outcome.samples,
-        outcome.estimate,
-        _how_it_ended(goal, outcome),
-        options | _how_cleaned(job, won.denoiser),
-        seconds,
-        method=method,
-    )
+    options |= _how_cleaned(job, won.denoiser)
+    return Traced(frame, outcome.samples, outcome.estimate, notes, options, seconds, method=method)
 
 
 def _batches(job: Job) -> FullInBatches:

@@ -152,13 +152,13 @@ def traced_window(
 ) -> PixelWindow | None:
     """The pixels that can see the scene, where the others are known without rays; None where all are traced.
 
-    Denoised pictures alone: of others every pixel has the samples that tiles rendered apart have. None, too, where the
-    denoiser may want to see whole views.
+    Pictures that may be denoised alone: of others every pixel has the samples that tiles rendered apart have. None,
+    too, where the denoiser may want to see whole views.
     """
     from lippmann.render.denoise_views import has_exact_views
     from lippmann.scene.build import BuiltScene
 
-    if settings.method not in ("full", "pooled") or not settings.denoises or not isinstance(built, BuiltScene):
+    if settings.method not in ("full", "pooled") or settings.denoise == "none" or not isinstance(built, BuiltScene):
         return None
     if even_background(built, settings) is None or (has_exact_views(display) and not settings.keeps_colors(display)):
         return None

@@ -173,12 +173,12 @@ class RenderSettings:
     @property
     def pools_cells(self) -> bool:
         """Whether light is pooled in cells of the scene."""
-        return self.method == "pooled" and not self.denoises
+        return self.method == "pooled" and self.denoise == "none"
 
     @property
     def shares_light(self) -> bool:
         """Whether denoised light is shared between the micro-images."""
-        return self.method == "pooled" and self.denoises
+        return self.method == "pooled" and self.denoise != "none"
 
     def keeps_colors(self, display: Display) -> bool:
         """Whether the rays of sub-pixels keep all three colours, whichever is shown, for a denoiser to use.
