@@ -27,6 +27,8 @@ FEWEST = 2
 STEP = 8
 #: The most by which one round multiplies the samples of a pixel, and the least.
 MOST_GROWTH, LEAST_GROWTH = 4.0, 1.2
+#: The most where the quality is likely there, but not surely.
+SURER_GROWTH = 2.0
 #: The promise: the worst micro-image may miss the quality asked for by this much, in dB.
 TOLERANCE = 1.0
 #: Samples per pixel at which it is given up: the noise of single precision sums comes near.
@@ -290,8 +292,12 @@ class _Climb:
         """By how much samples must be multiplied, as far as one round may."""
         if not self.goal.has_quality:
             return MOST_GROWTH
-        needed = 10 ** (self.goal.missing(estimate) / (10 * self._slope))
-        return min(MOST_GROWTH, max(LEAST_GROWTH, needed))
+        likely, sure = (
+            10 ** (short / (10 * self._slope))
+            for short in (self.goal.likely_missing(estimate), self.goal.missing(estimate))
+        )
+        # What only is not sure yet: intervals get narrower faster than pictures better.
+        return min(MOST_GROWTH, max(LEAST_GROWTH, likely, min(sure, SURER_GROWTH)))
 
     def _report(self, coming: int) -> ProgressCallback:
         """Reports of one round as reports of all the work, as far as it can be foreseen."""
