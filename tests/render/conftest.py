@@ -73,7 +73,6 @@ def judged_scene(engine):
 
 @pytest.fixture
 def as_denoised(monkeypatch):
-    """Pictures stay as the denoiser leaves them, however wrong they are."""
-    monkeypatch.setattr(
-        "lippmann.render.denoised.own_share", lambda noisy, clean, transfer, threads: np.zeros((1, 1, 1), np.float32)
-    )
+    """Pictures stay as the denoiser and sharing leave them, however wrong they are."""
+    for weight in ("own_share", "own_light"):
+        monkeypatch.setattr(f"lippmann.render.denoised.{weight}", lambda *_, threads: np.zeros((1, 1, 1), np.float32))

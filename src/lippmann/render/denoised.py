@@ -5,9 +5,10 @@ the other, noisy half, which therefore can judge it: for a denoised half D(a), t
 the mean of (D(a) - b)^2 is that of (D(a) - t)^2 and the noise of b, and half the mean of (a - b)^2 is that noise. The
 error of the mean of D(a) and D(b) is the mean of theirs less a quarter of the mean of (D(a) - D(b))^2.
 
-Where a denoised half is judged to be worse than its samples, they take its place (:mod:`lippmann.render.own_samples`),
-so that with ever more samples the picture comes to be what they show, whatever a denoiser does. The other half has a
-say in that, but none of its pixels in its own place, so that it can still judge.
+Micro-images may share the light of a denoised half, and it keeps its own where that is judged to be better
+(:mod:`lippmann.render.own_light`). Where what comes of that is judged to be worse than its samples, they take its place
+(:mod:`lippmann.render.own_samples`), so that with ever more samples the picture comes to be what they show, whatever a
+denoiser does. The other half has a say in both, but none of its pixels in its own place, so that it can still judge.
 
 Errors are small and the curve of the codes is taken as straight, but for pixels that the denoiser made far brighter
 than the samples show, as it does beside lamps: where that is beyond white, the curve is cut off, and in the dark it is
@@ -27,7 +28,10 @@ from lippmann.image.provenance import Transfer
 from lippmann.progress import ProgressCallback, silent
 from lippmann.render.coding import coding_slope
 from lippmann.render.estimate import CROSS_NOISE, PixelErrors
-from lippmann.render.own_samples import mean_around, own_share
+from lippmann.render.nearby import mean_around
+from lippmann.render.own_light import own_light
+from lippmann.render.own_samples import own_share
+from lippmann.render.reuse.bands import Bands
 
 Floats = NDArray[np.float32]
 #: Of the halves' mean difference nearby: a pixel that is brighter than its samples by more is so by no accident.
@@ -65,11 +69,21 @@ class Denoised:
         How values become codes; errors are measured between codes.
     threads:
         CPU threads.
+    share:
+        From a clean picture to one whose parts share their light; None where they do not.
     """
 
-    def __init__(self, renderer: Halved, denoise: Denoise, transfer: Transfer, threads: int = 1) -> None:
+    def __init__(
+        self,
+        renderer: Halved,
+        denoise: Denoise,
+        transfer: Transfer,
+        threads: int = 1,
+        share: Denoise | None = None,
+    ) -> None:
         self._renderer = renderer
         self._denoise = denoise
+        self._share = share
         self._transfer: Transfer = transfer
         self._threads = threads
         self._cleaned: tuple[Floats, Floats] | None = None
@@ -103,16 +117,31 @@ class Denoised:
         if self._cleaned is None or self._cleaned_samples != self._renderer.samples:
             self._cleaned_samples = self._renderer.samples
             noisy = self._renderer.halves()
-            clean = self._denoised_halves(noisy)
+            clean = self._best_of_halves(noisy)
             own = own_share(noisy, clean, self._transfer, threads=self._threads)
             self._cleaned = clean[0] + own * (noisy[0] - clean[0]), clean[1] + own * (noisy[1] - clean[1])
         return self._cleaned
 
     def _clean_picture(self) -> Floats:
-        return self._denoise(self._renderer.picture())
+        return self._cleaned_and_shared(self._renderer.picture())[-1]
 
-    def _denoised_halves(self, noisy: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
-        return self._denoise(noisy[0]), self._denoise(noisy[1])
+    def _best_of_halves(self, noisy: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
+        """The halves without their noise, shared where that is better."""
+        first, second = self._versions(noisy)
+        if self._share is None:
+            return first[0], second[0]
+        clean, shared = (first[0], second[0]), (first[1], second[1])
+        own = own_light(noisy, clean, shared, self._transfer, threads=self._threads)
+        return shared[0] + own * (clean[0] - shared[0]), shared[1] + own * (clean[1] - shared[1])
+
+    def _versions(self, noisy: tuple[Floats, Floats]) -> tuple[list[Floats], list[Floats]]:
+        """Of each half what :meth:`_cleaned_and_shared` gives."""
+        return self._cleaned_and_shared(noisy[0]), self._cleaned_and_shared(noisy[1])
+
+    def _cleaned_and_shared(self, noisy: Floats) -> list[Floats]:
+        """A picture without its noise; and, where light is shared, that with shared light."""
+        clean = self._denoise(noisy)
+        return [clean] if self._share is None else [clean, self._share(clean)]
 
     def _slope(self, noisy: tuple[Floats, Floats]) -> Floats:
         """By how much a pixel's code differs from that of the truth, per linear difference between the two."""
@@ -120,7 +149,9 @@ class Denoised:
         slope = coding_slope(picture, transfer)
         shown = np.float32(0.5) * (noisy[0] + noisy[1])
         scatter = np.abs(noisy[0] - noisy[1]).mean(axis=2)
-        apart = shown + np.float32(FAR_ABOVE) * mean_around(scatter, 1, threads=self._threads)[..., None]
+        with Bands(self._threads) as bands:
+            nearby = mean_around(scatter, 1, bands)[..., None]
+        apart = shown + np.float32(FAR_ABOVE) * nearby
         truth = np.where(picture > 1, np.minimum(shown, 1), apart)
         far = picture - truth > _LEAST_STEP
         low, high = truth[far], picture[far]

@@ -91,7 +91,18 @@ class GuidedDenoiser:
         self.seconds = 0.0
         self.used: Effort = "fast"
 
+    @property
+    def shares_afterwards(self) -> bool:
+        """Whether clean light is shared; views of a quilt share it before it is clean."""
+        return self._shares and not isinstance(self._source, QuiltRays)
+
     def __call__(self, pixels: Floats) -> Floats:
+        """A picture without its noise, which has shared its light."""
+        clean = self.denoise(pixels)
+        return self.share(clean) if self.shares_afterwards else clean
+
+    def denoise(self, pixels: Floats) -> Floats:
+        """A picture without its noise."""
         started = time.perf_counter()
         self._progress(Progress("denoise", 0, 1))
         self.used = self._effort()
@@ -100,28 +111,31 @@ class GuidedDenoiser:
             pixels = share_views(pixels, self._source, guides, threads=self._threads)
         # The network overshoots below black beside bright edges.
         cleaned = np.maximum(self._cleaned(pixels, guides), np.float32(0))
-        if self._shares and not isinstance(self._source, QuiltRays):
-            cleaned = self._shared(cleaned, guides, self._source)
         self._progress(Progress("denoise", 1, 1))
         self.seconds += time.perf_counter() - started
         return cleaned
 
-    def _shared(self, pixels: Floats, guides: Guides, source: DisplayRays | WindowRays | SubpixelRays) -> Floats:
+    def share(self, clean: Floats) -> Floats:
+        """A clean picture that has shared its light."""
+        started, source = time.perf_counter(), self._source
+        assert not isinstance(source, QuiltRays)
         if self._lenses is None:
             window = None if isinstance(source, DisplayRays) else source.window
             if isinstance(source, SubpixelRays):
                 self._lenses = lens_numbers_in_full_color(source.display, window)
             else:
                 self._lenses = lens_numbers(source.display, window, subpixels=source.channels == 3)
-        return share_light(
-            pixels,
+        shared = share_light(
+            clean,
             source.display,
-            guides,
+            self.guides(),
             stop=SHARING_STOP[self.used],
             threads=self._threads,
             lenses=self._lenses,
             columns=3 if isinstance(source, SubpixelRays) else 1,
         )
+        self.seconds += time.perf_counter() - started
+        return shared
 
     def probe(self) -> float:
         """Seconds that a picture cleaned by halves takes, guides included, by a small one."""

@@ -248,9 +248,10 @@ class _Way:
 
 
 def _denoised(job: Job, batches: FullInBatches, denoiser: GuidedDenoiser) -> Denoised:
+    share = denoiser.share if denoiser.shares_afterwards else None
     if isinstance(batches, SubpixelBatches):
-        return DenoisedSubpixels(batches, denoiser, job.transfer, job.threads)
-    return Denoised(batches, denoiser, job.transfer, job.threads)
+        return DenoisedSubpixels(batches, denoiser.denoise, job.transfer, job.threads, share)
+    return Denoised(batches, denoiser.denoise, job.transfer, job.threads, share)
 
 
 def _denoised_way(job: Job, goal: Goal, batches: FullInBatches, rays: Callable[[], float]) -> _Way:

@@ -23,8 +23,9 @@ from numpy.typing import NDArray
 
 from lippmann.image.provenance import Transfer
 from lippmann.render.coding import coding_slope
+from lippmann.render.nearby import known_mean_of_others, mean_around
 from lippmann.render.reuse.bands import Bands
-from lippmann.render.reuse.neighbourhood import column_mean_rows, judged_rows, row_mean_rows
+from lippmann.render.reuse.neighbourhood import judged_rows
 
 Floats = NDArray[np.float32]
 Halves = tuple[Floats, Floats]
@@ -57,39 +58,7 @@ def own_share(noisy: Halves, clean: Halves, transfer: Transfer, *, threads: int)
         bands.lines(judged_rows, len(slope), *noisy, *clean, slope, noise, error)
         share = np.ones_like(noise)
         for reach in (NEAR, FAR):
-            count = _pixels_around(noise.shape, reach)
-            of_noise = _mean_around(noise, reach, bands)
-            of_error, squared = (_of_others(values, count, reach, bands) for values in (error, np.square(error)))
-            deviation = np.sqrt(np.maximum(squared, 0)) / np.float32(2 * reach + 1)
-            known = np.maximum(of_error - np.float32(_DEVIATIONS) * deviation, 0)
-            share *= known / (known + np.maximum(of_noise, 0) + np.float32(_NOTHING))
+            of_noise = np.maximum(mean_around(noise, reach, bands), 0)
+            known = known_mean_of_others(error, reach, _DEVIATIONS, bands)
+            share *= known / (known + of_noise + np.float32(_NOTHING))
     return np.sqrt(share)[..., None]
-
-
-def mean_around(values: Floats, reach: int, *, threads: int) -> Floats:
-    """Means of ``(H, W)`` over the square of pixels up to ``reach`` away, cut at the edges."""
-    with Bands(threads) as bands:
-        return _mean_around(values, reach, bands)
-
-
-def _pixels_around(shape: tuple[int, ...], reach: int) -> NDArray[np.float64]:
-    """``(H, W)``: how many pixels each mean is of, the pixel itself included."""
-    count = np.ones((1, 1))
-    for axis, length in enumerate(shape):
-        place = np.arange(length)
-        along = np.minimum(place + reach, length - 1) - np.maximum(place - reach, 0) + 1
-        count = count * np.expand_dims(along, 1 - axis)
-    return count
-
-
-def _of_others(values: Floats, count: NDArray[np.float64], reach: int, bands: Bands) -> Floats:
-    """Means over the pixels around each but without itself; ``count`` from :func:`_pixels_around`."""
-    others = _mean_around(values, reach, bands) * count - values
-    return np.asarray(others / np.maximum(count - 1, 1), dtype=np.float32)
-
-
-def _mean_around(values: Floats, reach: int, bands: Bands) -> Floats:
-    along, mean = np.empty_like(values), np.empty_like(values)
-    bands.lines(row_mean_rows, len(values), values, reach, along)
-    bands.lines(column_mean_rows, len(values), along, reach, mean)
-    return mean

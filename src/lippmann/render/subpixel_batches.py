@@ -55,8 +55,11 @@ class DenoisedSubpixels(Denoised):
     _renderer: SubpixelBatches
 
     def _clean_picture(self) -> Floats:
-        return self._renderer.own_colors(self._denoise(self._renderer.picture_of_all()))
+        return self._renderer.own_colors(self._cleaned_and_shared(self._renderer.picture_of_all())[-1])
 
-    def _denoised_halves(self, noisy: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
-        first, second = (self._renderer.own_colors(self._denoise(half)) for half in self._renderer.halves_of_all())
+    def _versions(self, noisy: tuple[Floats, Floats]) -> tuple[list[Floats], list[Floats]]:
+        first, second = (
+            [self._renderer.own_colors(version) for version in self._cleaned_and_shared(half)]
+            for half in self._renderer.halves_of_all()
+        )
         return first, second

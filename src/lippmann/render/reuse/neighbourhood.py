@@ -76,3 +76,37 @@ def judged_rows(
                 of_error += weight * (to_other * to_other + to_own * to_own - apart)
             noise[row, column] = of_noise
             error[row, column] = of_error
+
+
+@compiled
+def compared_rows(
+    first: int,
+    last: int,
+    noisy: Any,
+    other: Any,
+    clean: Any,
+    other_clean: Any,
+    shared: Any,
+    other_shared: Any,
+    slope: Any,
+    gain: Any,
+    apart: Any,
+) -> None:
+    """Rows ``[first, last)`` of how a picture's ``clean`` halves compare with its ``shared`` ones, ``(H, W)``.
+
+    Pictures are as for :func:`judged_rows`. ``gain`` is, right on the average, the product of what a shared half is
+    wrong by and of its difference to the clean one; ``apart`` is the square of that.
+    """
+    for row in range(first, last):
+        for column in range(noisy.shape[1]):
+            of_gain, of_apart = 0.0, 0.0
+            for c in range(3):
+                weight = slope[row, column, c] * slope[row, column, c]
+                mine, theirs = shared[row, column, c], other_shared[row, column, c]
+                my_step, their_step = mine - clean[row, column, c], theirs - other_clean[row, column, c]
+                of_gain += weight * (
+                    (mine - other[row, column, c]) * my_step + (theirs - noisy[row, column, c]) * their_step
+                )
+                of_apart += weight * (my_step * my_step + their_step * their_step)
+            gain[row, column] = of_gain
+            apart[row, column] = of_apart

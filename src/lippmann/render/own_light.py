@@ -1,0 +1,54 @@
+"""How much of a pixel's shared light its own, as the denoiser left it, should make up.
+
+Micro-images share their denoised light (:mod:`lippmann.render.sharing`), for what is left of its noise is another in
+each. Where none is left, after many samples or on plain surfaces, sharing only blurs what differs from lens to lens. Of
+two pictures S and D of which neither is the truth t, the best mix S + w (D - S) over some pixels has w = sum (S - t)
+(S - D) / sum (S - D)^2, the coefficient of a linear regression. The other half of the samples stands for t: it knows
+nothing of S and D, so the upper sum is right on the average, and the lower one holds no chance at all.
+
+That sum counts as far as it exceeds its own standard deviation, and a pixel has no say in its own weight, for the
+reasons that :mod:`lippmann.render.own_samples` gives.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lippmann.image.provenance import Transfer
+from lippmann.render.coding import coding_slope
+from lippmann.render.nearby import known_mean_of_others, mean_around
+from lippmann.render.reuse.bands import Bands
+from lippmann.render.reuse.neighbourhood import compared_rows
+
+Floats = NDArray[np.float32]
+Halves = tuple[Floats, Floats]
+
+#: How far the neighbourhood reaches, in pixels to each side: in a smaller one the sum rarely says anything for sure.
+REACH = 32
+#: Standard deviations that the sum must exceed. With one a room in which few paths find the lamp lost up to 1 dB: where
+#: none has found it, what is too dark seems to be right.
+_DEVIATIONS = 3.0
+#: Both are alike: then there is nothing to choose.
+_NOTHING = 1e-12
+
+
+def own_light(noisy: Halves, clean: Halves, shared: Halves, transfer: Transfer, *, threads: int) -> Floats:
+    """The weight of each pixel's own clean light against the shared one, ``(H, W, 1)`` in [0, 1].
+
+    Parameters
+    ----------
+    noisy, clean, shared:
+        Two halves of the samples that know nothing of each other, what a denoiser made of each, and what sharing made
+        of that; ``(H, W, 3)`` linear.
+    transfer:
+        How values become codes; differences are measured between codes.
+    threads:
+        CPU threads; the result does not depend on them.
+    """
+    slope = coding_slope(np.clip(np.float32(0.5) * (shared[0] + shared[1]), 0, 1), transfer)
+    gain, apart = np.empty(slope.shape[:2], dtype=np.float32), np.empty(slope.shape[:2], dtype=np.float32)
+    with Bands(threads) as bands:
+        bands.lines(compared_rows, len(slope), *noisy, *clean, *shared, slope, gain, apart)
+        known = known_mean_of_others(gain, REACH, _DEVIATIONS, bands)
+        return np.minimum(known / (mean_around(apart, REACH, bands) + np.float32(_NOTHING)), 1)[..., None]
