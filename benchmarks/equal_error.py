@@ -145,14 +145,14 @@ def _denoised(
     def clean(noisy: Picture) -> Picture:
         return np.maximum(denoise_views(noisy, stage.display, guides, effort=effort), 0)
 
-    def share(noisy: Picture) -> Picture:
-        return share_light(clean(noisy), stage.display, guides, stop=SHARING_STOP[effort], threads=CORES)
+    def share(cleaned: Picture) -> Picture:
+        return share_light(cleaned, stage.display, guides, stop=SHARING_STOP[effort], threads=CORES)
 
     batches = FullInBatches(stage.integrator, stage.source, seed=3, memory=4 << 30)
     batches.add(samples)
     for way, call in (
         ("full + oidn", lambda: clean(picture)),
-        ("pooled", lambda: Denoised(batches, share, "srgb", CORES).picture()),
+        ("pooled", lambda: Denoised(batches, clean, "srgb", CORES, share).picture()),
     ):
         seconds, result = timed(call)
         parts = {"trace": traced, "guides": looked, "clean": seconds}
@@ -162,14 +162,14 @@ def _denoised(
 
 def timed(call: Callable[[], T]) -> tuple[float, T]:
     """Seconds of the processors over their number, by the median of warm runs, and the result."""
-    seconds, result = _once(call)
+    seconds, result = once(call)
     if seconds > 3 * SHORT:
         return seconds, result
-    runs = [_once(call)[0] for _ in range(RUNS if seconds < SHORT else 1)]
+    runs = [once(call)[0] for _ in range(RUNS if seconds < SHORT else 1)]
     return statistics.median(runs), result
 
 
-def _once(call: Callable[[], T]) -> tuple[float, T]:
+def once(call: Callable[[], T]) -> tuple[float, T]:
     started = time.process_time()
     result = call()
     return (time.process_time() - started) / CORES, result

@@ -7,7 +7,7 @@ from typing import Any
 
 #: Of the displays of equal_error.py: a title, pixels per lens on which the bound on paths rests, and how many times
 #: faster than full, and than full with Open Image Denoise, pooled light is to be.
-_DISPLAYS = {
+DISPLAYS = {
     "lenticular-8": ("64 lenses of 8 pixels, 160 rows", "1/8", 10, 1),
     "lenticular-48": ("64 lenses of 48 pixels, 48 rows", "1/48", 20, 3),
     "array-15": ("34x34 lenses of 15x15 pixels, 150 rows", "1/225", 20, 3),
@@ -25,15 +25,16 @@ def describe(result: dict[str, Any]) -> str:
         f"""## Error against time (`equal_error.py`)
 
 Path light of depth 8, two cores, warm. Every way counts with the better effort of Open Image Denoise; guides, denoising
-and sharing are in its time. Pictures are denoised as a whole here: one that states its own error is denoised in two
-halves, for twice the time of denoising and sharing. They are judged by two references of {result["reference_spp"] // 2}
-samples each, whose own noise is left out of the figures. Where full rendering does not come to a PSNR, its time is
-drawn out by the law of its noise, which flatters it where few paths find much light. "Best" is the highest PSNR that
-full + OIDN comes to with up to 64 samples. "In cells" is `--method pooled --denoise none`.
+and sharing are in its time. Pooled pictures are made in two halves, as the program makes them: each is denoised and
+shared, and gives way to samples that are nearer. Full + OIDN is denoised once, as a whole. Pictures are judged by two
+references of {result["reference_spp"] // 2} samples each, whose own noise is left out of the figures. Where full
+rendering does not come to a PSNR, its time is drawn out by the law of its noise, which flatters it where few paths find
+much light. "Best" is the highest PSNR that full + OIDN comes to with up to 64 samples. "In cells" is
+`--method pooled --denoise none`.
 
 ![PSNR against seconds for every scene and display](images/equal-error.png)"""
     ]
-    for name, (title, *rest) in _DISPLAYS.items():
+    for name, (title, *rest) in DISPLAYS.items():
         if scenes := result["results"].get(name):
             parts += [f"### {title}", *_pooled_gains(scenes, result["summary"][name], *rest)]
             parts += ["\n".join(_times_to(scenes)), "\n".join(_curve_rows(scenes))]

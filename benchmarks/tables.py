@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import equal_error_tables
+import goals_tables
 from harness import RESULTS
 
 README = Path(__file__).parent.parent / "README.md"
@@ -382,6 +383,7 @@ medians of {result["runs"]} runs.
 SECTIONS = {
     "methods": _methods,
     "equal_error": equal_error_tables.describe,
+    "goals": goals_tables.describe,
     "estimate_coverage": _estimate_coverage,
     "reuse": _reuse,
     "weave": _weave,

@@ -1,0 +1,57 @@
+"""The section of ``docs/measurements.md`` on qualities that are asked for, from the results of ``goals.py``."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from equal_error_tables import DISPLAYS
+
+_WAYS = ("full", "full + oidn", "pooled")
+
+
+def describe(result: dict[str, Any]) -> str:
+    """All of the section, in Markdown."""
+    parts = [
+        f"""## A quality that is asked for (`goals.py`)
+
+Seconds, judging included, until a picture says of itself that it has the PSNR (`--quality-mean`), and the samples per
+pixel that it took: by `full`, by `full --denoise oidn`, and by `pooled`, which stops at plain samples where these are
+there sooner (then in italics), as `auto` does. Plain samples are believed from 16 on, denoised ones from 8; no picture
+has more than {result["most_samples"]}. Where full does not get there with these, its time is drawn out by the law of
+its noise (*); where a denoised picture does not, its cell is empty. Scenes, rows and clock are those above."""
+    ]
+    for name, (title, *_) in DISPLAYS.items():
+        if scenes := result["results"].get(name):
+            parts += [f"### {title}, asked for", _gains(result["summary"][name]), "\n".join(_rows(scenes))]
+    return "\n\n".join(parts) + "\n"
+
+
+def _gains(summary: dict[str, Any]) -> str:
+    rows = ["| to | against | times as fast | least | scenes |", "|---|---|---|---|---|"]
+    for goal, found in summary.items():
+        rival, quality = goal.split(" to ")
+        mean, least = found["times_faster"], found["least"]
+        rows.append(f"| {quality} dB | {_name(rival)} | {mean:.1f} | {least:.2f} | {len(found['scenes'])} |")
+    return "\n".join(rows)
+
+
+def _rows(scenes: dict[str, Any]) -> list[str]:
+    qualities = list(next(iter(scenes.values())))
+    ways = " | ".join(_name(way) for way in _WAYS)
+    rows = [f"| scene | {' | '.join(f'{quality} dB: {ways}' for quality in qualities)} |"]
+    rows.append("|" + "---|" * (1 + len(qualities) * len(_WAYS)))
+    for name, goals in scenes.items():
+        cells = [_cell(goals[quality][way], way) for quality in qualities for way in _WAYS]
+        rows.append(f"| {name} | {' | '.join(cells)} |")
+    return rows
+
+
+def _cell(found: dict[str, Any], way: str) -> str:
+    if found["short"] and way != "full":
+        return ""
+    told = f"{found['seconds']:.2f} s{' *' if found['short'] else ''} ({found['spp']})"
+    return f"*{told}*" if way == "pooled" and not found["denoised"] else told
+
+
+def _name(way: str) -> str:
+    return way.replace("oidn", "OIDN")
