@@ -300,6 +300,8 @@ runs in turn, each with its own ratio.
 
 def _huge(result: dict[str, Any]) -> str:
     width, height = result["size"]
+    method, denoise = result.get("method", "full"), result.get("denoise", "none")
+    option = "" if denoise == "none" else f" --denoise {denoise}"
     target = f"{result['target_peak_bytes'] / 1e9:.0f} GB"
     rows = []
     for ending, run in result["renders"].items():
@@ -310,11 +312,12 @@ def _huge(result: dict[str, Any]) -> str:
             f"| {run['relative_to_small']:.2f} | {run['cpu_relative_to_small']:.2f} |"
         )
     table = "\n".join(rows)
-    return f"""## A picture larger than memory (`huge.py`)
+    return f"""## A picture larger than memory, `{method}{option}` (`huge.py`)
 
 {width}x{height} pixels of a 60-lpi print, direct light, 1 sample per pixel, `--memory`
 {result["memory_limit"] / 1e9:.0f} GB; beside it a picture of {result["small"][0]}x{result["small"][1]} pixels.
-Targets: a peak of at most {target}, time per pixel at most {result["target_relative"]} of the small picture's.
+Targets: a peak of at most {target}, time per pixel at most {result["target_relative"]} of the small picture's. The
+clock counts what else ran on the machine, processor time does not.
 
 | file | peak | size | time | per pixel | small, per pixel | ratio | ratio of processor time |
 |---|---|---|---|---|---|---|---|
@@ -392,6 +395,7 @@ SECTIONS = {
     "full_rate": _full_rate,
     "large_frame": _large_frame,
     "huge": _huge,
+    "huge_pooled_oidn-fast": _huge,
     "huge_commands": _huge_commands,
     "command": _command,
     "viewer": _viewer,
