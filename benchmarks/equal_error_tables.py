@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import statistics
 import textwrap
 from typing import Any
 
@@ -68,7 +69,7 @@ def _pooled_gains(scenes: dict[str, Any], summary: dict[str, Any], bound: str, *
             f"does not depend on direction, is {bound} of full's. (A denoiser goes below it where light is smooth: it "
             "shares between pixels, too.)"
         ),
-        "\n".join(_wrapped(f"- {line}") for line in (*short, *_reach(scenes), _worst_behind(scenes))),
+        "\n".join(_wrapped(f"- {line}") for line in (*short, _ceiling(scenes), *_reach(scenes), _worst_behind(scenes))),
     ]
 
 
@@ -94,6 +95,22 @@ def _short_of(scenes: dict[str, Any], goal: str, rival: str, target: int) -> str
     fast = f"Less than {target} times as fast as" if target > 1 else "Slower than"
     head = f"{fast} {_name(rival)} to {_goal(goal)}: "
     return head + (", ".join(f"{name} ({gain:.1f})" for gain, name in less) or "none") + "."
+
+
+def _ceiling(scenes: dict[str, Any]) -> str:
+    """How fast pooled light could be if nothing had to be done to its paths."""
+    parts = {name: scene["curves"]["pooled"][0]["parts"] for name, scene in scenes.items()}
+    least = {name: part["trace"] + part["guides"] for name, part in parts.items()}
+    gains = {
+        goal: statistics.geometric_mean(
+            scene["to"][goal]["full"]["seconds"] / least[name] for name, scene in scenes.items()
+        )
+        for goal in ("35", "40")
+    }
+    return (
+        "One path per pixel and the guides alone, with denoising and sharing for nothing, would be "
+        f"{gains['35']:.1f} times as fast as full to 35 dB, and {gains['40']:.1f} times to 40 dB."
+    )
 
 
 def _gains(scenes: dict[str, Any], goal: str, rival: str) -> dict[str, float]:
