@@ -28,9 +28,9 @@ def describe(result: dict[str, Any]) -> str:
 Path light of depth 8, two cores, warm. Every way counts with the better effort of Open Image Denoise; guides, denoising
 and sharing are in its time. Pooled pictures are made in two halves, as the program makes them: each is denoised and
 shared, and gives way to samples that are nearer. Full + OIDN is denoised once, as a whole. Pictures are judged by two
-references of {result["reference_spp"] // 2} samples each, whose own noise is left out of the figures. Where full
-rendering does not come to a PSNR, its time is drawn out by the law of its noise, which flatters it where few paths find
-much light. "Best" is the highest PSNR that full + OIDN comes to with up to 64 samples. "In cells" is
+references of {result["reference_spp"] // 2} samples each, whose own noise is left out of the figures. Where full does
+not come to a PSNR, its time is drawn out by the law of its noise, which flatters it where few paths find much light.
+"Best" is the highest PSNR that full + OIDN comes to with up to 64 samples. "In cells" is
 `--method pooled --denoise none`.
 
 ![PSNR against seconds for every scene and display](images/equal-error.png)"""
@@ -186,4 +186,4 @@ def _name(way: str) -> str:
 
 
 def _percent(share: float) -> str:
-    return f"{100 * share:.2g} %"
+    return f"{100 * share:.{0 if share >= 0.1 else 1}f} %"
