@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
@@ -9,7 +11,7 @@ from lippmann.display import Display
 from lippmann.display.lens_array import LensArray
 from lippmann.display.panel import Panel
 from lippmann.progress import silent
-from lippmann.render.contest import Contest
+from lippmann.render.contest import ASKED_AGAIN, Contest
 from lippmann.render.estimate import CROSS_NOISE, OWN_NOISE, PictureEstimator, PixelErrors
 from lippmann.render.goal import Goal, reach_judged
 from lippmann.render.judging import Track
@@ -32,14 +34,16 @@ class Samples:
 class Picture:
     """Its squared error is ``error * samples**-slope + floor``; it counts how often it was looked at."""
 
-    def __init__(self, samples, error, slope=1.0, floor=0.0, noise=OWN_NOISE):
+    def __init__(self, samples, error, slope=1.0, floor=0.0, noise=OWN_NOISE, shaken_to=0):
         self.samples, self.error, self.slope, self.floor, self.noise = samples, error, slope, floor, noise
+        self.shaken_to = shaken_to
         self.looks = 0
         self.random = np.random.default_rng(1)
 
     def squared_error(self):
         self.looks += 1
         expected = self.error * self.samples.taken**-self.slope + self.floor
+        expected *= 1000 if self.samples.taken < self.shaken_to else 1
         return PixelErrors((expected * self.random.chisquare(1, (64, 64))).astype(np.float32), None, self.noise)
 
 
@@ -47,10 +51,22 @@ class Sooner(PictureEstimator):
     fewest = 8
 
 
-def run(goal, *, plain=0.5, denoised=0.005, slope=0.6, floor=0.0, seconds=0.01, rays=RAYS):
+def run(
+    goal,
+    *,
+    plain=0.5,
+    denoised=0.005,
+    slope=0.6,
+    floor=0.0,
+    seconds=0.01,
+    rays=RAYS,
+    floor_of_plain=0.0,
+    shaken_to=0,
+):
     """The contest, its outcome and the denoised picture."""
     samples = Samples(seconds)
-    noisy, clean = Picture(samples, plain), Picture(samples, denoised, slope, floor, CROSS_NOISE)
+    noisy = Picture(samples, plain, floor=floor_of_plain)
+    clean = Picture(samples, denoised, slope, floor, CROSS_NOISE, shaken_to)
     contest = Contest(
         goal,
         Track(noisy, PictureEstimator(SHOWN)),
@@ -97,10 +113,20 @@ def test_a_denoised_picture_that_stays_wrong_is_left():
     assert "which reaches the goal sooner" in contest.why
 
 
-def test_a_denoised_picture_that_is_worse_is_looked_at_once():
-    contest, _, clean = run(Goal(quality=40), plain=0.2, denoised=0.5)
+def test_a_denoised_picture_that_is_worse_is_seldom_looked_at():
+    contest, outcome, clean = run(Goal(quality=40), plain=0.2, denoised=0.5)
     assert contest.leader == "plain"
-    assert clean.looks == 1
+    assert 1 < clean.looks <= 1 + math.log(outcome.samples / 8, ASKED_AGAIN)
+    assert clean.looks < len(outcome.rounds)
+    timed, _, clean = run(Goal(quality=40, max_time=1000.0), plain=0.2, denoised=0.5)
+    assert (timed.leader, clean.looks) == ("plain", 1)
+
+
+def test_a_denoised_picture_gets_another_chance_where_plain_samples_do_not_keep_their_promise():
+    """So it is where the first single hits of strong light shake both, and plain noise then never falls."""
+    contest, outcome, clean = run(Goal(quality=30, spp=4096), plain=0.05, floor_of_plain=2e-3, shaken_to=24)
+    assert (contest.leader, outcome.end) == ("pooled", "quality")
+    assert clean.looks > 1
 
 
 @pytest.mark.parametrize(("seconds", "leader"), [(0.5, "pooled"), (0.0005, "plain")])

@@ -22,6 +22,8 @@ Way = Literal["plain", "pooled"]
 
 #: The power of the number of samples by which the error of denoised pictures falls: 0.5 to 0.8 where it was measured.
 DENOISED_SLOPE = 0.6
+#: A pooled picture that lost is looked at again when samples are so many times more: a look is cheap beside them then.
+ASKED_AGAIN = 4
 
 
 @dataclass(frozen=True, order=True)
@@ -57,7 +59,7 @@ class Contest:
         self._plain = plain
         self._pooled = pooled
         self._rays_per_pixel = rays_per_pixel
-        self._open = True
+        self._closed_to = 0.0
         self._last: Track = pooled
         self.leader: Way = "plain"
         self.why = "there was no time to look at pooled light"
@@ -70,7 +72,7 @@ class Contest:
     def judge(self, samples: int, room: float) -> Judgement:
         """The leader's judgement; the pooled picture is looked at only while it may win."""
         plain = self._plain.judge(samples)
-        if not self._open:
+        if samples < self._closed_to:
             return plain
         rays = self._rays_per_pixel()
         look = pooling_cost(effort_of("oidn", rays))
@@ -85,14 +87,15 @@ class Contest:
         if with_noise_out < outlook:
             self._lead("pooled", stand)
             return pooled
-        # Plain noise is surer to fall than what denoising leaves: it is not asked again.
-        self._open = False
+        # Plain noise is surer to fall than what denoising leaves, unless few paths find the light; and where time is
+        # short, none is spent on looks.
+        self._closed_to = math.inf if self._goal.max_time is not None else ASKED_AGAIN * samples
         self._lead("plain", f"{stand}, which reaches the goal sooner" if self._goal.has_quality else stand)
         return plain
 
     def seconds(self) -> float:
         """What the next judgement will take, as far as that is known."""
-        return self._plain.seconds() + (self._pooled.seconds() if self._open else 0.0)
+        return self._plain.seconds() + (self._pooled.seconds() if self._closed_to < math.inf else 0.0)
 
     def _lead(self, way: Way, why: str) -> None:
         self.leader, self.why = way, why
