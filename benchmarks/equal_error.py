@@ -69,20 +69,24 @@ class Stage:
 
 
 def main() -> None:
-    words = argparse.ArgumentParser(description=__doc__)
+    results = saved("equal_error").get("results", {})
+    for name, displays in asked(__doc__):
+        for display in displays:
+            results.setdefault(display, {})[name] = _measure(prepare(name, display))
+            summary = {kind: _summary(scenes) for kind, scenes in results.items()}
+            save("equal_error", {"reference_spp": 2 * REFERENCE, "results": results, "summary": summary})
+
+
+def asked(description: str) -> list[tuple[str, list[str]]]:
+    """The scenes that the command line names, or all that are at hand, each with the displays to measure it on."""
+    words = argparse.ArgumentParser(description=description)
     words.add_argument("displays", nargs="*", default=list(DISPLAYS))
     words.add_argument("--scenes", default="")
     given = words.parse_args()
     from lippmann.scene import library
 
     known = [*library.names(), *(name for name, path in GLTF.items() if path.exists())]
-    names = given.scenes.split(",") if given.scenes else known
-    results = saved("equal_error").get("results", {})
-    for name in names:
-        for display in given.displays:
-            results.setdefault(display, {})[name] = _measure(prepare(name, display))
-            summary = {kind: _summary(scenes) for kind, scenes in results.items()}
-            save("equal_error", {"reference_spp": 2 * REFERENCE, "results": results, "summary": summary})
+    return [(name, given.displays) for name in (given.scenes.split(",") if given.scenes else known)]
 
 
 def prepare(name: str, display_name: str) -> Stage:

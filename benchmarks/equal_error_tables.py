@@ -56,7 +56,7 @@ def _pooled_gains(scenes: dict[str, Any], summary: dict[str, Any], bound: str, *
             in_cells = summary.get(f"pooled in cells against {rival} to {goal}")
             cells = f"{in_cells['times_faster']:.1f} | {in_cells['scenes']}" if in_cells else "| 0"
             rows.append(
-                f"| {_goal(goal)} | {_name(rival)} | {found['times_faster']:.1f} | {found['least']:.1f} "
+                f"| {_goal(goal)} | {name_of(rival)} | {found['times_faster']:.1f} | {found['least']:.1f} "
                 f"| {target if is_aim else ''} | {_percent(found['share_of_paths'])} | {found['scenes']} | {cells} |"
             )
             if is_aim:
@@ -93,7 +93,7 @@ def _short_of(scenes: dict[str, Any], goal: str, rival: str, target: int) -> str
     """Which scenes have less than the target's gain, the least first."""
     less = sorted((gain, name) for name, gain in _gains(scenes, goal, rival).items() if gain < target)
     fast = f"Less than {target} times as fast as" if target > 1 else "Slower than"
-    head = f"{fast} {_name(rival)} to {_goal(goal)}: "
+    head = f"{fast} {name_of(rival)} to {_goal(goal)}: "
     return head + (", ".join(f"{name} ({gain:.1f})" for gain, name in less) or "none") + "."
 
 
@@ -162,7 +162,7 @@ def _curve_rows(scenes: dict[str, Any]) -> list[str]:
                     f"{p['seconds']:.2f} / {p['psnr']:.1f} / {p['worst_psnr']:.1f}" if (p := points.get(spp)) else ""
                     for spp in (1, 4, 16, 64)
                 ]
-                told = f"{_name(way)}, {effort}" if effort else way
+                told = f"{name_of(way)}, {effort}" if effort else way
                 rows.append(f"| {name} | {told} | {' | '.join(cells)} |")
     return rows
 
@@ -181,7 +181,7 @@ def _goal(goal: str) -> str:
     return "best" if goal == _BEST else f"{goal} dB"
 
 
-def _name(way: str) -> str:
+def name_of(way: str) -> str:
     return way.replace("oidn", "OIDN")
 
 

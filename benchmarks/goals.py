@@ -1,21 +1,20 @@
 """What a quality takes that is asked for: by full, by full with Open Image Denoise, by pooled.
 
 The scenes, displays and rows of equal_error.py. Each way is asked for a PSNR of the whole picture (``--quality-mean``)
-and works until its own estimate says that it is there, judging included; at least 16 samples a pixel, as the program
-does, and at most 256. Where full does not come to the PSNR with these, its time is drawn out by the law of its noise.
-Time is that of the processors over their number; each way has run before, for a low quality.
+and works until its own estimate says that it is there, judging included, with at most 256 samples a pixel. Where full
+does not come to the PSNR with these, its time is drawn out by the law of its noise. Time is that of the processors over
+their number; each way has run before, for a low quality.
 
 python benchmarks/goals.py [DISPLAY ...] [--scenes NAME,...]
 """
 
 from __future__ import annotations
 
-import argparse
 import statistics
 from dataclasses import replace
 from typing import Any
 
-from equal_error import CORES, DISPLAYS, GLTF, Stage, once, prepare
+from equal_error import CORES, Stage, asked, once, prepare
 from harness import save, saved
 
 QUALITIES = (35.0, 40.0)
@@ -30,16 +29,9 @@ WAYS: dict[str, dict[str, Any]] = {
 
 
 def main() -> None:
-    words = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    words.add_argument("displays", nargs="*", default=list(DISPLAYS))
-    words.add_argument("--scenes", default="")
-    given = words.parse_args()
-    from lippmann.scene import library
-
-    known = [*library.names(), *(name for name, path in GLTF.items() if path.exists())]
     results = saved("goals").get("results", {})
-    for name in given.scenes.split(",") if given.scenes else known:
-        for display in given.displays:
+    for name, displays in asked(__doc__):
+        for display in displays:
             results.setdefault(display, {})[name] = _measured(prepare(name, display))
             summary = {kind: _summary(scenes) for kind, scenes in results.items()}
             save("goals", {"most_samples": MOST_SAMPLES, "results": results, "summary": summary})
@@ -59,12 +51,12 @@ def _reached(stage: Stage, quality: float, options: dict[str, Any]) -> dict[str,
     from lippmann.render.choice import decide
     from lippmann.render.methods import Job, trace
 
-    asked = replace(stage.settings, quality_mean=quality, spp=MOST_SAMPLES, **options)
+    settings = replace(stage.settings, quality_mean=quality, spp=MOST_SAMPLES, **options)
     job = Job(
         stage.built,
         stage.integrator,
         stage.source,
-        decide(asked).settings,
+        decide(settings).settings,
         stage.display_from_world,
         "srgb",
         memory=4 << 30,

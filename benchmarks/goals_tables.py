@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from equal_error_tables import DISPLAYS
+from equal_error_tables import DISPLAYS, name_of
 
 _WAYS = ("full", "full + oidn", "pooled")
 
@@ -32,13 +32,13 @@ def _gains(summary: dict[str, Any]) -> str:
     for goal, found in summary.items():
         rival, quality = goal.split(" to ")
         mean, least = found["times_faster"], found["least"]
-        rows.append(f"| {quality} dB | {_name(rival)} | {mean:.1f} | {least:.2f} | {len(found['scenes'])} |")
+        rows.append(f"| {quality} dB | {name_of(rival)} | {mean:.1f} | {least:.2f} | {len(found['scenes'])} |")
     return "\n".join(rows)
 
 
 def _rows(scenes: dict[str, Any]) -> list[str]:
     qualities = list(next(iter(scenes.values())))
-    ways = " | ".join(_name(way) for way in _WAYS)
+    ways = " | ".join(name_of(way) for way in _WAYS)
     rows = [f"| scene | {' | '.join(f'{quality} dB: {ways}' for quality in qualities)} |"]
     rows.append("|" + "---|" * (1 + len(qualities) * len(_WAYS)))
     for name, goals in scenes.items():
@@ -52,7 +52,3 @@ def _cell(found: dict[str, Any], way: str) -> str:
         return ""
     told = f"{found['seconds']:.2f} s{' *' if found['short'] else ''} ({found['spp']})"
     return f"*{told}*" if way == "pooled" and not found["denoised"] else told
-
-
-def _name(way: str) -> str:
-    return way.replace("oidn", "OIDN")

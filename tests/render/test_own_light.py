@@ -11,13 +11,13 @@ SHAPE = (96, 96, 3)
 TRUTH = np.float32(0.3)
 
 
-def around(noise, seed, value=TRUTH):
+def around(noise, seed):
     random = np.random.default_rng(seed)
-    return tuple(np.float32(value) + random.normal(0, noise, SHAPE).astype(np.float32) for _ in range(2))
+    return tuple(TRUTH + random.normal(0, noise, SHAPE).astype(np.float32) for _ in range(2))
 
 
-def off(first, second=None):
-    return tuple(np.full(SHAPE, TRUTH + np.float32(each), np.float32) for each in (first, second or first))
+def off(by):
+    return (np.full(SHAPE, TRUTH + np.float32(by), np.float32),) * 2
 
 
 def weight(noisy, clean, shared, transfer="linear", threads=1):

@@ -48,8 +48,6 @@ class Contest:
 
     Attributes
     ----------
-    leader:
-        Whose picture is the better one for the goal.
     why:
         What that rests on, as a sentence.
     """
@@ -60,14 +58,18 @@ class Contest:
         self._pooled = pooled
         self._rays_per_pixel = rays_per_pixel
         self._closed_to = 0.0
-        self._last: Track = pooled
-        self.leader: Way = "plain"
+        self._leading: Track | None = None
         self.why = "there was no time to look at pooled light"
+
+    @property
+    def leader(self) -> Way:
+        """Whose picture is the better one for the goal."""
+        return "pooled" if self._leading is self._pooled else "plain"
 
     @property
     def fewest(self) -> int:
         """The leader's; at first that of pooled light, which is believed sooner."""
-        return self._last.fewest
+        return (self._leading or self._pooled).fewest
 
     def judge(self, samples: int, room: float) -> Judgement:
         """The leader's judgement; the pooled picture is looked at only while it may win."""
@@ -78,28 +80,27 @@ class Contest:
         look = pooling_cost(effort_of("oidn", rays))
         outlook = self._outlook(plain, rays, room, least=self._plain.fewest / samples)
         if not outlook.misses and outlook.value <= look:
-            self._lead("plain", "the quality is within reach of plain samples for less than pooling takes")
+            self._lead(self._plain, "the quality is within reach of plain samples for less than pooling takes")
             return plain
         pooled = self._pooled.judge(samples)
         there = self._missing(pooled.estimate) <= 0
         with_noise_out = self._outlook(pooled, rays, room, 0.0 if there else look)
         stand = f"after {samples} samples {self._value(pooled)} pooled and {self._value(plain)} plain"
         if with_noise_out < outlook:
-            self._lead("pooled", stand)
+            self._lead(self._pooled, stand)
             return pooled
         # Plain noise is surer to fall than what denoising leaves, unless few paths find the light; and where time is
         # short, none is spent on looks.
         self._closed_to = math.inf if self._goal.max_time is not None else ASKED_AGAIN * samples
-        self._lead("plain", f"{stand}, which reaches the goal sooner" if self._goal.has_quality else stand)
+        self._lead(self._plain, f"{stand}, which reaches the goal sooner" if self._goal.has_quality else stand)
         return plain
 
     def seconds(self) -> float:
         """What the next judgement will take, as far as that is known."""
         return self._plain.seconds() + (self._pooled.seconds() if self._closed_to < math.inf else 0.0)
 
-    def _lead(self, way: Way, why: str) -> None:
-        self.leader, self.why = way, why
-        self._last = self._plain if way == "plain" else self._pooled
+    def _lead(self, track: Track, why: str) -> None:
+        self._leading, self.why = track, why
 
     def _outlook(self, judged: Judgement, rays: float, room: float, look: float = 0.0, least: float = 1.0) -> _Outlook:
         """Rays per pixel still to be spent, or dB short of the goal when there is no room for more.

@@ -1,14 +1,32 @@
-"""Means over the pixels around each."""
+"""What is measured of the halves of a picture, pixel by pixel, and its means over the pixels around each."""
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from lippmann.image.provenance import Transfer
+from lippmann.render.coding import coding_slope
 from lippmann.render.reuse.bands import Bands
 from lippmann.render.reuse.neighbourhood import column_mean_rows, row_mean_rows
 
 Floats = NDArray[np.float32]
+Halves = tuple[Floats, Floats]
+
+
+def measured(rows: Any, *pictures: Halves, transfer: Transfer, bands: Bands) -> tuple[Floats, Floats]:
+    """The two measures, ``(H, W)`` each, that compiled ``rows`` take of pictures, between codes.
+
+    Each picture is two halves, ``(H, W, 3)`` linear; the slope of the code is that of the last one's mean. Beyond white
+    the codes are cut off, but what is wrong there is wrong around, too.
+    """
+    first, second = pictures[-1]
+    slope = coding_slope(np.clip(np.float32(0.5) * (first + second), 0, 1), transfer)
+    found = np.empty(slope.shape[:2], dtype=np.float32), np.empty(slope.shape[:2], dtype=np.float32)
+    bands.lines(rows, len(slope), *(half for halves in pictures for half in halves), slope, *found)
+    return found
 
 
 def mean_around(values: Floats, reach: int, bands: Bands) -> Floats:

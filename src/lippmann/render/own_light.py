@@ -16,13 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.image.provenance import Transfer
-from lippmann.render.coding import coding_slope
-from lippmann.render.nearby import known_mean_of_others, mean_around
+from lippmann.render.nearby import Halves, known_mean_of_others, mean_around, measured
 from lippmann.render.reuse.bands import Bands
 from lippmann.render.reuse.neighbourhood import compared_rows
 
 Floats = NDArray[np.float32]
-Halves = tuple[Floats, Floats]
 
 #: How far the neighbourhood reaches, in pixels to each side: in a smaller one the sum rarely says anything for sure.
 REACH = 32
@@ -46,9 +44,7 @@ def own_light(noisy: Halves, clean: Halves, shared: Halves, transfer: Transfer, 
     threads:
         CPU threads; the result does not depend on them.
     """
-    slope = coding_slope(np.clip(np.float32(0.5) * (shared[0] + shared[1]), 0, 1), transfer)
-    gain, apart = np.empty(slope.shape[:2], dtype=np.float32), np.empty(slope.shape[:2], dtype=np.float32)
     with Bands(threads) as bands:
-        bands.lines(compared_rows, len(slope), *noisy, *clean, *shared, slope, gain, apart)
+        gain, apart = measured(compared_rows, noisy, clean, shared, transfer=transfer, bands=bands)
         known = known_mean_of_others(gain, REACH, _DEVIATIONS, bands)
         return np.minimum(known / (mean_around(apart, REACH, bands) + np.float32(_NOTHING)), 1)[..., None]

@@ -22,13 +22,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.image.provenance import Transfer
-from lippmann.render.coding import coding_slope
-from lippmann.render.nearby import known_mean_of_others, mean_around
+from lippmann.render.nearby import Halves, known_mean_of_others, mean_around, measured
 from lippmann.render.reuse.bands import Bands
 from lippmann.render.reuse.neighbourhood import judged_rows
 
 Floats = NDArray[np.float32]
-Halves = tuple[Floats, Floats]
 
 #: How far the two neighbourhoods reach, in pixels to each side.
 NEAR, FAR = 2, 8
@@ -51,11 +49,8 @@ def own_share(noisy: Halves, clean: Halves, transfer: Transfer, *, threads: int)
     threads:
         CPU threads; the result does not depend on them.
     """
-    # Beyond white the codes are cut off, but what is wrong there is wrong around, too.
-    slope = coding_slope(np.clip(np.float32(0.5) * (clean[0] + clean[1]), 0, 1), transfer)
-    noise, error = np.empty(slope.shape[:2], dtype=np.float32), np.empty(slope.shape[:2], dtype=np.float32)
     with Bands(threads) as bands:
-        bands.lines(judged_rows, len(slope), *noisy, *clean, slope, noise, error)
+        noise, error = measured(judged_rows, noisy, clean, transfer=transfer, bands=bands)
         share = np.ones_like(noise)
         for reach in (NEAR, FAR):
             of_noise = np.maximum(mean_around(noise, reach, bands), 0)
