@@ -106,6 +106,12 @@ def monitors(draw):
     )
 
 
+def test_numbers_at_a_limit_are_given_back_though_they_are_rounded():
+    panel = Panel(60, 10, 0.0625)
+    at_limit = Monitor("fine", panel, pitch=1000.0, slope=0.2, center=0.0, view_cone=5.0, viewing_distance=120.0)
+    assert Monitor.of_display(at_limit.display()).pitch == 1000.0
+
+
 @given(monitor=monitors())
 @settings(deadline=None, max_examples=100)
 def test_a_display_gives_its_numbers_back(monitor):

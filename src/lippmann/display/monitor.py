@@ -53,6 +53,8 @@ _APERTURE_PART = 0.1
 
 #: Of the centre that is computed from a display; beyond lies rounding noise.
 _DIGITS = 12
+#: By so much, relatively, numbers that are computed from a display may miss a limit.
+_ROUNDING = 1e-12
 
 Real = NDArray[np.float64]
 
@@ -181,15 +183,15 @@ class Monitor:
 
 def _within(value: object, key: str, limits: tuple[float, float], unit: str) -> float:
     checked = finite(value, key)
-    if not limits[0] <= checked <= limits[1]:
+    if not limits[0] * (1 - _ROUNDING) <= checked <= limits[1] * (1 + _ROUNDING):
         rule = f"it must lie between {limits[0]:g} and {limits[1]:g} {unit}"
         raise DisplayError(f"{key} is {checked:g}", where=key, rule=rule)
-    return checked
+    return min(max(checked, limits[0]), limits[1])
 
 
 def _checked_slope(value: object) -> float:
     rule = f"it must be at least {STEEPEST_SLOPE:g} in size"
     slope = number(value, "slope", rule=rule)
-    if abs(slope) < STEEPEST_SLOPE:
+    if abs(slope) < STEEPEST_SLOPE * (1 - _ROUNDING):
         raise DisplayError(f"slope is {slope:g}", where="slope", rule=rule, fix="upright lenses have an infinite one")
     return abs(slope) if math.isinf(slope) else slope
