@@ -122,6 +122,12 @@ def test_a_denoised_picture_that_is_worse_is_seldom_looked_at():
     assert (timed.leader, clean.looks) == ("plain", 1)
 
 
+def test_when_no_more_samples_may_be_taken_the_denoised_picture_is_looked_at_again():
+    """It lost at first; plain samples did not get there."""
+    contest, outcome, clean = run(Goal(quality=30, spp=24), plain=0.05, floor_of_plain=4e-3, shaken_to=12)
+    assert (contest.leader, outcome.end, outcome.samples, clean.looks) == ("pooled", "quality", 24, 2)
+
+
 def test_a_denoised_picture_gets_another_chance_where_plain_samples_do_not_keep_their_promise():
     """So it is where the first single hits of strong light shake both, and plain noise then never falls."""
     contest, outcome, clean = run(Goal(quality=30, spp=4096), plain=0.05, floor_of_plain=2e-3, shaken_to=24)

@@ -74,7 +74,7 @@ class Contest:
     def judge(self, samples: int, room: float) -> Judgement:
         """The leader's judgement; the pooled picture is looked at only while it may win."""
         plain = self._plain.judge(samples)
-        if samples < self._closed_to:
+        if samples < self._closed_to and not self._is_last_chance(plain, room):
             return plain
         rays = self._rays_per_pixel()
         look = pooling_cost(effort_of("oidn", rays))
@@ -98,6 +98,10 @@ class Contest:
     def seconds(self) -> float:
         """What the next judgement will take, as far as that is known."""
         return self._plain.seconds() + (self._pooled.seconds() if self._closed_to < math.inf else 0.0)
+
+    def _is_last_chance(self, plain: Judgement, room: float) -> bool:
+        """No more samples may be taken, and plain ones are not there: the better picture is wanted, whichever it is."""
+        return self._goal.max_time is None and room <= 1 and self._missing(plain.estimate) > 0
 
     def _lead(self, track: Track, why: str) -> None:
         self._leading, self.why = track, why
