@@ -82,6 +82,27 @@ def test_noise_that_both_halves_share_would_not_be_seen_but_theirs_is_their_own(
     assert float(told.values.mean()) == pytest.approx(noise, rel=0.2)
 
 
+def test_what_the_halves_differ_by_is_known():
+    renderer = Noise()
+    told = Denoised(renderer, lambda picture: picture, "srgb").squared_error()
+    # Halves that are their samples have nothing wrong in common.
+    assert float(told.apart.mean()) == pytest.approx(float(told.values.mean()), rel=0.2)
+    assert told.apart.min() >= 0
+    # With a blur they agree better than its samples do, but not wholly.
+    blurred = Denoised(renderer, blur, "srgb").squared_error()
+    assert 0.01 < float(blurred.apart.mean()) / float(told.apart.mean()) < 0.3
+
+
+@pytest.mark.parametrize(("samples", "all_may_be"), [(2, True), (5, True), (6, False), (64, False)])
+def test_of_few_samples_any_hit_may_be_lone(samples, all_may_be):
+    renderer = Noise()
+    renderer.samples = samples
+    told = Denoised(renderer, blur, "srgb").squared_error().samples
+    assert (told.lone is not None) == all_may_be
+    if all_may_be:
+        assert np.array_equal(told.lone, told.values)
+
+
 def test_more_samples_are_cleaned_anew():
     renderer = Noise()
     calls = []

@@ -11,7 +11,8 @@ from lippmann.display.panel import Panel
 from lippmann.errors import UsageError
 from lippmann.progress import Progress
 from lippmann.render.estimate import OWN_NOISE, Estimate, PictureEstimator, PixelErrors
-from lippmann.render.goal import TOLERANCE, Goal, reach
+from lippmann.render.goal import STEP, TOLERANCE, Goal, reach, reach_judged
+from lippmann.render.judging import Track
 
 SHOWN = Display("test", Panel(64, 64, 0.25), LensArray("square", 2.0), gap=6.8)
 
@@ -53,6 +54,30 @@ def test_the_quality_is_reached_without_wasting_samples(slope):
     assert outcome.estimate.worst < 42
     assert len(outcome.rounds) <= 9
     assert outcome.samples == renderer.samples
+
+
+class Sooner(PictureEstimator):
+    fewest = 4
+
+
+@pytest.mark.parametrize(("dear_until", "first"), [(0, 4), (5, 8), (100, 8)])
+def test_the_first_look_waits_while_it_takes_more_than_samples(dear_until, first):
+    """Not longer than for twice the fewest samples; whatever comes then is a multiple of the batches again."""
+    renderer = Noise(error=0.2)
+    track = Track(renderer, Sooner(SHOWN), dear=lambda: 0 < renderer.samples < dear_until)
+    outcome = reach_judged(Goal(quality_mean=40), renderer.add, track, clock=renderer.clock)
+    found = [each.samples for each in outcome.rounds]
+    assert found[0] == first
+    assert all(samples % STEP == 0 for samples in found[1:])
+
+
+def test_where_time_is_short_no_look_waits():
+    renderer = Noise(error=0.2, seconds=1.0)
+    track = Track(renderer, Sooner(SHOWN), dear=lambda: True)
+    goal = Goal(quality_mean=40, max_time=5.5)
+    outcome = reach_judged(goal, renderer.add, track, clock=renderer.clock, probe=lambda: 1.0)
+    assert renderer.now <= 5.5
+    assert outcome.rounds[0].samples == 4
 
 
 def test_the_mean_asks_for_less_than_the_worst():

@@ -198,15 +198,15 @@ def test_an_interrupted_run_gives_the_same_file(settings, ending, tmp_path, monk
 def test_the_sums_of_tiles_give_the_estimate_of_the_whole():
     from lippmann.render.denoised_estimate import DenoisedEstimator, estimate_denoised
     from lippmann.render.estimate import CROSS_NOISE, OWN_NOISE, ErrorSums, PixelErrors
-    from lippmann.render.tile_tracer import LENSES, OF_SAMPLES, SUMS, _part, lens_sums
+    from lippmann.render.tile_tracer import LENSES, OF_SAMPLES, SUMS, lens_sums
 
     random = np.random.default_rng(0)
     values, noisy, lone = (random.exponential(0.01, (128, 128)).astype(np.float32) for _ in range(3))
     errors = PixelErrors(values - 0.005, None, CROSS_NOISE, PixelErrors(noisy, lone * 0.1, OWN_NOISE))
     made, lenses = job(DENOISED), DISPLAY.lens_grid
-    sums = {before: ErrorSums(*np.zeros((4, lenses.columns))) for before in ("", OF_SAMPLES)}
+    sums = {before: ErrorSums.none(lenses.columns) for before in ("", OF_SAMPLES)}
     for window in made.grid:
-        found = lens_sums(DISPLAY, window, _part(errors, window.slices))
+        found = lens_sums(DISPLAY, window, errors.part(window.slices))
         for before, each in sums.items():
             for name in SUMS:
                 getattr(each, name)[found[LENSES]] += found[before + name]

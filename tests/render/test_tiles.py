@@ -104,7 +104,7 @@ def test_the_sums_of_tiles_give_the_estimate_of_the_whole(engine, layout):
     rng = np.random.default_rng(0)
     values, lone = (rng.exponential(0.01, (70, 90)).astype(np.float32) for _ in range(2))
     grid = display.lens_grid
-    sums = ErrorSums(*np.zeros((4, grid.rows * grid.columns)))
+    sums = ErrorSums.none(grid.rows * grid.columns)
     for window in TileGrid(90, 70, 32):
         errors = PixelErrors(values[window.slices], lone[window.slices] * 0.5, OWN_NOISE)
         found = lens_sums(display, window, errors)

@@ -35,6 +35,8 @@ _CHUNK = 1 << 18
 LONE_SHARE = 0.8
 #: ... this: below it the curve is nearly straight, and what is missing elsewhere is small as well.
 LONE_STEP = 0.15
+#: Of fewer batches a hit in one is never that large a share, ``(batches - 1) / batches``.
+LONE_TOLD_FROM = 6
 
 
 def error_of_batches(sums: Floats, taken: Sequence[int], transfer: Transfer) -> tuple[Floats, Floats]:

@@ -1,9 +1,9 @@
 """A picture whose noise is taken out, and that still knows how good it is.
 
 Each half of the samples is denoised by itself, and the picture is the mean of the two. A denoised half knows nothing of
-the other, noisy half, which therefore can judge it: for a denoised half D(a), the noisy halves a and b and the truth t,
-the mean of (D(a) - b)^2 is that of (D(a) - t)^2 and the noise of b, and half the mean of (a - b)^2 is that noise. The
-error of the mean of D(a) and D(b) is the mean of theirs less a quarter of the mean of (D(a) - D(b))^2.
+the other, noisy half, which therefore can judge it: for denoised halves D(a) and D(b) of noisy ones a and b, the mean
+of (a - D(a)) (b - D(b)) is that of the product of the errors of D(a) and D(b), what they have wrong in common. The
+squared error of their mean is that and a quarter of (D(a) - D(b))^2, what they differ by.
 
 Micro-images may share the light of a denoised half, and it keeps its own where that is judged to be better
 (:mod:`lippmann.render.own_light`). Where what comes of that is judged to be worse than its samples, they take its place
@@ -18,6 +18,7 @@ steep. There the step of the code from what the samples show counts.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Protocol
 
 import numpy as np
@@ -26,6 +27,7 @@ from numpy.typing import NDArray
 from lippmann.image.color import encode
 from lippmann.image.provenance import Transfer
 from lippmann.progress import ProgressCallback, silent
+from lippmann.render.batch_error import LONE_TOLD_FROM
 from lippmann.render.coding import coding_slope
 from lippmann.render.estimate import CROSS_NOISE, PixelErrors
 from lippmann.render.nearby import mean_around
@@ -105,12 +107,14 @@ class Denoised:
     def squared_error(self) -> PixelErrors:
         """Squared error of every pixel's code, as the halves judge each other."""
         noisy, clean = self._renderer.halves(), self._clean_halves()
-        error = np.square(clean[0] - noisy[1])
-        error += np.square(clean[1] - noisy[0])
-        error -= np.square(noisy[0] - noisy[1])
-        error -= np.float32(0.5) * np.square(clean[0] - clean[1])
-        error *= np.float32(0.5) * np.square(self._slope(noisy))
-        return PixelErrors(error.mean(axis=2), None, CROSS_NOISE, self._renderer.squared_error())
+        scale = np.square(self._slope(noisy))
+        apart = (np.float32(0.25) * scale * np.square(clean[0] - clean[1])).mean(axis=2)
+        common = (scale * (noisy[0] - clean[0]) * (noisy[1] - clean[1])).mean(axis=2)
+        samples = self._renderer.squared_error()
+        if self._renderer.samples < LONE_TOLD_FROM:
+            # Any hit may be.
+            samples = replace(samples, lone=np.maximum(samples.values, 0))
+        return PixelErrors(common + apart, None, CROSS_NOISE, samples, apart)
 
     def _clean_halves(self) -> tuple[Floats, Floats]:
         # The samples may have come by another way than through :meth:`add`.

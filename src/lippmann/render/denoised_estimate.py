@@ -1,15 +1,14 @@
 """How good a denoised picture is by its own account.
 
-Its halves judge each other (:mod:`lippmann.render.denoised`), which is right on the average but far noisier than what
-it measures: strong single hits of the one half meet the smooth other half. Four things keep the statement honest:
+Its halves judge each other (:mod:`lippmann.render.denoised`). What they differ by is known exactly; what they have
+wrong in common is measured, right on the average but often far noisier than what it measures. How the one follows from
+the other, and how both are weighed, is in :mod:`lippmann.render.common_error`; that is the whole picture's error.
 
-- An error cannot be negative. From a measured mean and its uncertainty follows the mean of a normal distribution that
-  is cut at zero, which is never below what the uncertainty alone would allow.
-- Where a micro-image's own measurement says little, its error is taken to be in proportion to that of the samples which
-  the picture was made of: that is known far better, and says where the scene is hard.
-- Light that only lone hits have found is as unknown to the denoiser as to anybody. Of the error that those make up in
-  the samples, a part is taken to be left, and a larger one is doubted; the better end of an interval is without it.
-- A micro-image of few pixels, in a corner of the panel, may differ by chance from what its samples let expect.
+A micro-image's share of it is in proportion to what the halves differ by there, drawn a little towards its neighbours:
+that tells micro-images apart far better than the samples' errors do, and the worst of all lies within a few dB of where
+it says. Its own measurement corrects it as far as that can be believed. Where a micro-image seems worse by what noise
+does not explain, it is: what a denoiser is wrong by where it meets an edge or a lamp is large in few pixels, where the
+samples themselves are good. One of few pixels, in a corner of the panel, may differ by chance.
 
 The constants were chosen on ``benchmarks/hard_scenes.py``.
 """
@@ -21,47 +20,49 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from lippmann.render.common_error import likely_error
 from lippmann.render.estimate import (
     CROSS_NOISE,
     DRAWS,
     LEAN,
-    LOW_QUANTILE,
     MODEL_UNCERTAINTY,
     NORMAL_95,
-    OWN_NOISE,
     ErrorSums,
     Estimate,
     PartErrors,
     PictureEstimator,
     PixelErrors,
-    cut_at_zero,
-    errors_of_parts,
+    neighbourhood,
     parts_with_pixels,
     psnr_of,
 )
 
 Real = NDArray[np.float64]
 
-#: Of the error that lone hits make up in the samples: what denoising leaves, and what of it is doubted.
-LONE_LEFT, LONE_DOUBTED = 0.1, 0.5
-#: How far micro-images are from the proportion to their samples, as a relative variance, where nothing tells; and by
-#: how much that is itself uncertain.
-USUAL_SPREAD, SPREAD_DOUBT = 0.5, 0.4
-#: Squared deviations from which on a micro-image that seems worse than in proportion is taken to be so.
-OTHER_FROM = 2.0
+#: How far a micro-image's difference between the halves is drawn to its neighbours', as a power.
+TOWARDS_NEIGHBOURS = 0.25
+#: How far micro-images are from the proportion to that, as a relative variance.
+SPREAD = 0.5
+#: A micro-image seems worse than in proportion from so many squared deviations of its measurement on, and ...
+WORSE_FROM = 2.0
+#: ... so many times the squares of its samples' errors: hits that are rare and strong show in these, too.
+EXPLAINED = 400.0
+#: As parts of what is expected, and of the mean: no micro-image is taken to be better.
+LEAST_EXPECTED, LEAST_OF_MEAN = 0.2, 1e-3
+#: Halves that differ by less than this part of their samples' errors do so for another reason than that noise is gone.
+LEAST_OF_SAMPLES = 1e-4
 #: Pixels that one micro-image has fewer than the usual one count so many times, for its error to be another one.
-FEW = 16.0
-#: As a part of the error stated: pictures that are hard to judge are often better than that by so much.
-OFTEN_BETTER = 0.5
-#: A picture without any error still has this mean squared one, so that its logarithm exists.
-_FLOOR = 1e-12
+FEW = 40.0
+#: As parts of the error stated for all and for the worst: pictures that are hard to judge are often better by that.
+OFTEN_BETTER, WORST_OFTEN_BETTER = 0.8, 0.6
+_NOTHING = 1e-30
 
 
 class DenoisedEstimator(PictureEstimator):
-    """Estimates for denoised pictures; their errors carry those of the samples."""
+    """Estimates for denoised pictures; their errors carry those of the samples, and what the halves differ by."""
 
-    #: Intervals are wide where samples are few: with 8 none flattered, on scenes that are hard to judge.
-    fewest = 8
+    #: With these intervals are honest on scenes that are hard to judge.
+    fewest = 4
 
     def estimate(self, errors: PixelErrors) -> Estimate:
         """PSNR of the whole and of the worst micro-image."""
@@ -74,60 +75,56 @@ def estimate_denoised(judged: ErrorSums, samples: ErrorSums, grid: tuple[int, in
     index, judged = parts_with_pixels(judged)
     _, samples = parts_with_pixels(samples)
     pixels = float(judged.pixels.sum())
+    by_chance, error = float(judged.apart.sum()) / pixels, float(judged.values.sum()) / pixels
     deviation = math.sqrt(CROSS_NOISE.estimate * float(judged.squares.sum())) / pixels
-    lone = float(samples.lone.sum()) / pixels
-    measured = max(cut_at_zero(float(judged.values.sum()) / pixels, deviation), _FLOOR)
-    mean = max(measured, LONE_LEFT * lone)
-    worse, better = (math.log1p((deviation / value) ** 2) for value in (mean, measured))
-    spreads = [NORMAL_95 * math.sqrt(variance + MODEL_UNCERTAINTY**2) for variance in (worse, better)]
-    ends = mean * math.exp(spreads[0]) + LONE_DOUBTED * lone, OFTEN_BETTER * measured * math.exp(-spreads[1])
+    of_samples = max(float(samples.values.sum()), _NOTHING)
+    lone = min(1.0, float(samples.lone.sum()) / of_samples)
+    likely = likely_error(max(by_chance, LEAST_OF_SAMPLES * of_samples / pixels), error - by_chance, deviation, lone)
+    middle = float(likely.quantiles(0.5))
+    model = math.exp(NORMAL_95 * MODEL_UNCERTAINTY)
+    worse, better = likely.quantiles(np.array([0.975, 0.025])) * (model, OFTEN_BETTER / model)
 
-    of_samples = errors_of_parts(samples, index, grid, OWN_NOISE).expected
-    parts = _parts(judged, of_samples, index, mean, samples.lone)
-    at_best = _parts(judged, of_samples, index, measured, np.zeros_like(samples.lone))
-    worst = np.array(
-        [
-            *np.quantile(_worst_drawn(parts, worse), (0.5, 0.975)) * (1, 1 + MODEL_UNCERTAINTY),
-            np.quantile(_worst_drawn(at_best, better), LOW_QUANTILE) * OFTEN_BETTER / (1 + MODEL_UNCERTAINTY),
-        ]
-    )
+    parts = _parts(judged, samples.squares, index, grid, middle)
+    worst = np.quantile(_worst_drawn(parts, likely.quantiles((np.arange(DRAWS) + 0.5) / DRAWS) / middle), _OF_WORST)
     row, column = divmod(int(index[np.argmax(parts.expected)]), grid[1])
-    psnr, psnr_low, psnr_high = (float(value) for value in psnr_of(np.array([mean, *ends])))
-    of_worst, worst_low, worst_high = (float(value) for value in psnr_of(worst))
+    psnr, psnr_low, psnr_high = (float(value) for value in psnr_of(np.array([middle, worse, better])))
+    of_worst, worst_low, worst_high = (float(value) for value in psnr_of(worst * (1, 1, WORST_OFTEN_BETTER)))
     return Estimate(psnr, psnr_low, psnr_high, of_worst, worst_low, worst_high, (column, row))
 
 
-def _worst_drawn(parts: PartErrors, common: float) -> Real:
-    """Errors of the worst part, as often as is drawn, where all are uncertain by the log variance ``common`` alike."""
-    drawn: Real = parts.draws().max(axis=0)
-    return drawn * np.exp(math.sqrt(common) * np.random.default_rng(2).standard_normal(DRAWS))
+_OF_WORST = (0.5, 0.975, 0.025)
 
 
-def _parts(judged: ErrorSums, of_samples: Real, index: NDArray[np.intp], mean: float, lone: Real) -> PartErrors:
-    """Each part's error: in proportion to its samples' error, drawn from there to its own measurement.
+def _worst_drawn(parts: PartErrors, common: Real) -> Real:
+    """Errors of the worst part, as often as is drawn; ``common`` are the factors that all parts may have alike."""
+    random = np.random.default_rng(2)
+    model = np.exp(MODEL_UNCERTAINTY * random.standard_normal(DRAWS))
+    drawn: Real = parts.draws().max(axis=0) * common[random.permutation(DRAWS)] * model
+    return drawn
 
-    ``mean`` is that of all; ``lone`` what lone hits make up of the sums of the samples' errors.
+
+def _parts(
+    judged: ErrorSums, of_samples: Real, index: NDArray[np.intp], grid: tuple[int, int], mean: float
+) -> PartErrors:
+    """Each part's error: in proportion to what its halves differ by, drawn from there to its own measurement.
+
+    ``mean`` is that of all; ``of_samples`` are the sums of the squares of the samples' errors.
     """
     count = judged.pixels
-    measured = judged.values / count
-    around = of_samples * mean / float((of_samples * count).sum() / count.sum())
+    measured, apart = judged.values / count, judged.apart / count
+    (near,), _ = neighbourhood(apart[None], index, grid)
+    least = LEAST_OF_MEAN * float(judged.apart.sum() / count.sum()) + _NOTHING
+    around = np.maximum(apart, least) ** (1 - TOWARDS_NEIGHBOURS) * np.maximum(near, least) ** TOWARDS_NEIGHBOURS
+    around *= mean / float((around * count).sum() / count.sum())
     # The mean square of one part is noisy itself: it leans on what all have, in proportion.
     overall = float(judged.squares.sum()) / float((np.square(around) * count).sum())
     noise = CROSS_NOISE.estimate * (judged.squares + LEAN * overall * np.square(around)) / (count + LEAN) / count
 
-    relative = noise / np.square(around)
-    # By the median, as a few parts differ from all: that of squared normal values is 0.455 of their variance.
-    shown = float(np.median(np.square(measured / around - 1) / 0.455 - relative))
-    doubt = 2.3 * (float(np.median(relative)) + USUAL_SPREAD) * math.sqrt(2 / len(count))
-    weight = SPREAD_DOUBT**2 / (SPREAD_DOUBT**2 + doubt**2)
-    usual = max(0.02, weight * shown + (1 - weight) * USUAL_SPREAD)
-    # Where a part seems worse, that is believed early: what a denoiser is wrong by where it meets an edge or a lamp is
-    # not in proportion to the samples, and looks like noise, as it is large in few pixels.
-    other = np.where(measured > around, np.square(measured - around) - OTHER_FROM * noise, 0.0)
-    between = np.maximum(usual * np.square(around), other)
+    explained = WORSE_FROM * noise + EXPLAINED * of_samples / np.square(count)
+    other = np.where(measured > around, np.square(measured - around) - explained, 0.0)
+    between = np.maximum(SPREAD * np.square(around), other)
     trust = between / (between + noise)
-    lone = lone / count
-    expected = np.maximum(around + trust * (measured - around), np.maximum(0.1 * around, LONE_LEFT * lone))
+    expected = np.maximum(around + trust * (measured - around), LEAST_EXPECTED * around)
     variance = np.log1p(trust * noise / np.square(expected))
     fewer = np.maximum(1 / count - 1 / np.median(count), 0)
-    return PartErrors(index, expected, expected + LONE_DOUBTED * lone, variance, np.log1p(FEW * fewer))
+    return PartErrors(index, expected, expected, variance, np.log1p(FEW * fewer))

@@ -72,12 +72,22 @@ class PixelErrors:
         How uncertain ``values`` are.
     samples:
         Of a denoised picture: the errors of the samples that it was made of.
+    apart:
+        Of a denoised picture, ``(H, W)`` float32 of at least 0: the part of ``values`` that is no estimate, which is
+        what its halves differ by.
     """
 
     values: Floats
     lone: Floats | None = None
     noise: NoiseShares = CROSS_NOISE
     samples: PixelErrors | None = None
+    apart: Floats | None = None
+
+    def part(self, inside: slice | tuple[slice, slice]) -> PixelErrors:
+        """Those of some pixels."""
+        lone, apart = (None if values is None else values[inside] for values in (self.lone, self.apart))
+        samples = None if self.samples is None else self.samples.part(inside)
+        return PixelErrors(self.values[inside], lone, self.noise, samples, apart)
 
 
 def why_no_estimate(settings: RenderSettings) -> str | None:
@@ -210,39 +220,48 @@ class PictureEstimator:
 
     def _sums(self, errors: PixelErrors) -> ErrorSums:
         lenses = len(self._pixels)
-        sums = ErrorSums(self._pixels.astype(np.float64), *np.zeros((3, lenses)))
+        sums = ErrorSums.none(lenses, self._pixels)
         height, width = errors.values.shape
         # Block by block: double precision of a whole panel would take gigabytes.
         for first, last in row_blocks(height, width):
-            owner = self._owner[first * width : last * width]
-            lone = None if errors.lone is None else errors.lone[first:last]
-            sums.add(owner, errors.values[first:last], lone)
+            sums.add(self._owner[first * width : last * width], errors.part(slice(first, last)))
         return sums
 
 
 @dataclass(frozen=True, eq=False)
 class ErrorSums:
     """Sums over the pixels of each part, ``(parts,)`` each: their number, their estimates, the squares of what is
-    uncertain of those, their lone parts."""
+    uncertain of those, their lone parts, and what halves differ by."""
 
     pixels: Real
     values: Real
     squares: Real
     lone: Real
+    apart: Real
 
-    def add(self, owner: NDArray[Any], values: Floats, lone: Floats | None) -> None:
+    @classmethod
+    def none(cls, parts: int, pixels: NDArray[Any] | int = 0) -> ErrorSums:
+        """Sums of so many parts to which nothing was added yet, with ``pixels`` in each."""
+        return cls(np.full(parts, pixels, dtype=np.float64), *np.zeros((4, parts)))
+
+    def add(self, owner: NDArray[Any], errors: PixelErrors) -> None:
         """Add the estimates of some pixels, any shape, to the parts that ``owner`` names; not to their number."""
-        parts = len(self.pixels)
         owner = owner.ravel()
-        doubles = values.astype(np.float64).ravel()
-        # A lone hit shows in the picture as it does in the estimate.
-        uncertain = doubles
-        if lone is not None:
-            lone_doubles = lone.astype(np.float64).ravel()
-            self.lone[:] += np.bincount(owner, weights=lone_doubles, minlength=parts)
-            uncertain = doubles - LONE_CERTAIN * lone_doubles
-        self.values[:] += np.bincount(owner, weights=doubles, minlength=parts)
-        self.squares[:] += np.bincount(owner, weights=np.square(uncertain), minlength=parts)
+        uncertain = values = errors.values.astype(np.float64).ravel()
+        self.values[:] += self._sum(owner, values)
+        if errors.lone is not None:
+            lone = errors.lone.astype(np.float64).ravel()
+            self.lone[:] += self._sum(owner, lone)
+            # A lone hit shows in the picture as it does in the estimate.
+            uncertain = values - LONE_CERTAIN * lone
+        if errors.apart is not None:
+            apart = errors.apart.astype(np.float64).ravel()
+            self.apart[:] += self._sum(owner, apart)
+            uncertain = uncertain - apart
+        self.squares[:] += self._sum(owner, np.square(uncertain))
+
+    def _sum(self, owner: NDArray[Any], values: Real) -> Real:
+        return np.asarray(np.bincount(owner, weights=values, minlength=len(self.pixels)), dtype=np.float64)
 
 
 def estimate_of_sums(sums: ErrorSums, grid: tuple[int, int], noise: NoiseShares) -> Estimate:
@@ -306,7 +325,7 @@ def errors_of_parts(sums: ErrorSums, index: NDArray[np.intp], grid: tuple[int, i
     mean, lone = sums.values / count, sums.lone / count
     average = likely_mean(sums, noise)
     # The mean square of one lens is noisy itself, so it leans on that of its neighbours.
-    nearby, neighbours = _neighbourhood(np.stack([mean, sums.squares / count]), index, grid)
+    nearby, neighbours = neighbourhood(np.stack([mean, sums.squares / count]), index, grid)
     square = (sums.squares + LEAN * nearby[1]) / (count + LEAN)
     of_estimate, of_picture = noise.estimate * square / count, noise.picture * square / count
 
@@ -339,7 +358,7 @@ def _spread(values: Real, about: Real, noise: Real, default: float) -> float:
     return max(0.02, float(np.median((np.square(values - about) / 0.455 - noise) / np.square(about))))
 
 
-def _neighbourhood(values: Real, index: NDArray[np.intp], grid: tuple[int, int]) -> tuple[Real, Real]:
+def neighbourhood(values: Real, index: NDArray[np.intp], grid: tuple[int, int]) -> tuple[Real, Real]:
     """Means of ``(n, lenses)`` values over the up to eight lenses around each, and how many these are.
 
     A lens without neighbours is its own.

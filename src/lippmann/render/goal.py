@@ -227,6 +227,7 @@ class _Climb:
                 return Outcome("time", None, self.spent, (), None)
             if self.spent < FEWEST:
                 self._take(FEWEST - self.spent)
+            self._take_up_to(self.judge.fewest)
             judged = self.judge.judge(self.spent, self._room())
             self._slope = judged.slope
             self.rounds.append(Round(self.spent, self._seconds(), judged.estimate))
@@ -242,6 +243,12 @@ class _Climb:
         self.add(samples, self._report(samples))
         self.spent += samples
         self.rate = samples / max(self.clock() - started, 1e-6)
+
+    def _take_up_to(self, samples: int) -> None:
+        """What the judge turns out to want, where a quality is asked for and there is time."""
+        more = min(samples, self._most) - self.spent
+        if self.goal.has_quality and more > 0 and self._time_for(more):
+            self._take(more)
 
     def _outcome(self, end: End, judged: Judgement) -> Outcome:
         return Outcome(end, judged.estimate, self.spent, tuple(self.rounds), judged.errors)
@@ -268,8 +275,8 @@ class _Climb:
     def _next_round(self, estimate: Estimate) -> int:
         """Samples of the next round; fewer than one if there is no time for any."""
         wanted = max(self.spent * self._growth(estimate), self.judge.fewest)
-        samples = max(STEP * round(wanted / STEP) - self.spent, STEP)
-        samples = min(samples, self._most - self.spent)
+        total = max(STEP * round(wanted / STEP), STEP * (self.spent // STEP + 1))
+        samples = min(total, self._most) - self.spent
         return samples if self.goal.max_time is None else min(samples, self._affordable())
 
     def _affordable(self) -> int:

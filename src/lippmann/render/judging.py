@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -29,7 +30,10 @@ class Judge(Protocol):
 
     @property
     def fewest(self) -> int:
-        """Samples of a pixel with fewer of which its last word, or its first, is not to be believed."""
+        """Samples of a pixel with fewer of which its word is not to be believed, or not worth what it takes.
+
+        That may come to be known only when there are some.
+        """
         ...
 
     def judge(self, samples: int, room: float) -> Judgement:
@@ -58,21 +62,29 @@ class Track:
         The power of the number of samples by which its error is expected to fall.
     seconds:
         What a judgement takes before any was made.
+    dear:
+        Says whether a judgement takes more than all samples so far; then the first one waits.
     """
 
     def __init__(
-        self, picture: SelfJudging, estimator: PictureEstimator, slope: float = PLAIN_SLOPE, seconds: float = 0.0
+        self,
+        picture: SelfJudging,
+        estimator: PictureEstimator,
+        slope: float = PLAIN_SLOPE,
+        seconds: float = 0.0,
+        dear: Callable[[], bool] = lambda: False,
     ) -> None:
         self._picture = picture
         self._estimator = estimator
         self._expected = slope
         self._seconds = seconds
+        self._dear = dear
         self._rounds: list[tuple[int, Estimate]] = []
 
     @property
     def fewest(self) -> int:
-        """As the estimator says."""
-        return self._estimator.fewest
+        """As the estimator says; twice as many while judging is dear, as it may have to be done again."""
+        return self._estimator.fewest * (2 if self._dear() else 1)
 
     def judge(self, samples: int, room: float = 1.0) -> Judgement:
         """See :class:`Judge`; whatever room there is, this is the picture."""

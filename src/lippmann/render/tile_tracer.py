@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
@@ -30,7 +30,7 @@ from lippmann.store.tile_file import TileResult
 #: The arrays of :attr:`TileResult.sums`: flat indices of the lenses that have pixels in the tile, and their sums; those
 #: of the samples' errors, where denoised pixels have others.
 LENSES = "lenses"
-SUMS = ("pixels", "values", "squares", "lone")
+SUMS = tuple(each.name for each in fields(ErrorSums))
 OF_SAMPLES = "samples "
 
 
@@ -178,14 +178,8 @@ def _trace_window(prepared: Prepared, index: int) -> TracedTile:
     )
     inside = replace(tile, row=tile.row - window.row, column=tile.column - window.column).slices
     maps = {name: values[inside] for name, values in traced.frame.maps.items() if name != SAMPLES_LAYER}
-    errors = None if traced.errors is None else _part(traced.errors, inside)
+    errors = None if traced.errors is None else traced.errors.part(inside)
     return TracedTile(index, traced.frame.pixels[inside], errors, traced.frame.rays, maps, traced.notes)
-
-
-def _part(errors: PixelErrors, inside: tuple[slice, slice]) -> PixelErrors:
-    lone = None if errors.lone is None else errors.lone[inside]
-    samples = None if errors.samples is None else _part(errors.samples, inside)
-    return PixelErrors(errors.values[inside], lone, errors.noise, samples)
 
 
 def packed(prepared: Prepared, traced: TracedTile) -> TileResult:
@@ -206,8 +200,8 @@ def lens_sums(display: Display, window: Window, errors: PixelErrors) -> dict[str
     found: dict[str, NDArray[Any]] = {LENSES: lenses}
     for before, each in (("", errors), (OF_SAMPLES, errors.samples)):
         if each is not None:
-            sums = ErrorSums(pixels.astype(np.float64), *np.zeros((3, len(lenses))))
-            sums.add(owner, each.values, each.lone)
+            sums = ErrorSums.none(len(lenses), pixels)
+            sums.add(owner, each)
             found |= {before + name: getattr(sums, name) for name in SUMS}
     return found
 

@@ -212,7 +212,7 @@ def _summed(prepared: Prepared, store: TileStore) -> Provenance:
     size = grid.rows, grid.columns
     # Of denoised pictures the samples' errors, too.
     sums = {
-        before: ErrorSums(*np.zeros((4, size[0] * size[1])))
+        before: ErrorSums.none(size[0] * size[1])
         for before in (("",) if prepared.treatment is None else ("", OF_SAMPLES))
     }
     # By their first places, each once.
