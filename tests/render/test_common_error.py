@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lippmann.render.common_error import LONE_MORE, USUAL, likely_error
+from lippmann.render.common_error import LONE_RATIO, USUAL_RATIO, likely_error
 
 ENDS = np.array([0.025, 0.5, 0.975])
 chances = st.floats(1e-8, 1e-2)
@@ -28,7 +28,9 @@ def test_what_is_measured_well_is_the_error(by_chance, ratio, lone):
 @given(chances, st.floats(0, 1))
 def test_where_nothing_is_measured_the_usual_ratio_stands(by_chance, lone):
     found = likely_error(by_chance, 0.0, 1e6 * by_chance, lone)
-    assert found.quantiles(0.5) == pytest.approx((1 + np.exp(USUAL + LONE_MORE * lone)) * by_chance, rel=0.02)
+    assert found.quantiles(0.5) == pytest.approx(
+        (1 + USUAL_RATIO ** (1 - lone) * LONE_RATIO**lone) * by_chance, rel=0.02
+    )
 
 
 @given(chances, st.floats(-3, 30), st.floats(0.1, 10), st.floats(0, 1), st.floats(1e-2, 1e2))

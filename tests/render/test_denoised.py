@@ -93,6 +93,18 @@ def test_what_the_halves_differ_by_is_known():
     assert 0.01 < float(blurred.apart.mean()) / float(told.apart.mean()) < 0.3
 
 
+@pytest.mark.parametrize(("samples", "hidden"), [(4, True), (64, False)])
+def test_a_pixel_that_both_halves_hit_hard_does_not_hide_what_is_wrong_elsewhere(samples, hidden, as_denoised):
+    """A caustic's rare light: the product of two hits is larger than any error of a code. Of few samples it counts."""
+    renderer = Noise()
+    renderer.samples = samples
+    clear = float(Denoised(renderer, lambda p: blur(np.minimum(p, 1)), "srgb").squared_error().values.mean())
+    for half in renderer.halves():
+        half[100, 100] += 15
+    told = float(Denoised(renderer, lambda p: blur(np.minimum(p, 1)), "srgb").squared_error().values.mean())
+    assert (told > 2 * clear) == hidden
+
+
 @pytest.mark.parametrize(("samples", "all_may_be"), [(2, True), (5, True), (6, False), (64, False)])
 def test_of_few_samples_any_hit_may_be_lone(samples, all_may_be):
     renderer = Noise()

@@ -25,9 +25,10 @@ from numpy.typing import NDArray
 
 Real = NDArray[np.float64]
 
-#: The prior of the ratio's logarithm, a t distribution: its middle where no hit is lone, by how much more it is where
-#: all are, its scale and its degrees of freedom.
-USUAL, LONE_MORE, SCALE, FREEDOM = math.log(3.0), 1.2, 0.6, 4.0
+#: The usual ratio where no hit is lone, and where all are.
+USUAL_RATIO, LONE_RATIO = 3.0, 10.0
+#: The prior of its logarithm, a t distribution, has this scale and so many degrees of freedom.
+SCALE, FREEDOM = 0.6, 4.0
 #: Degrees of freedom of the measurement: single hits decide what it says and how uncertain it seems.
 MEASURED_FREEDOM = 4.0
 #: As a part of D: no measurement of C is better than that.
@@ -68,7 +69,7 @@ def likely_error(by_chance: float, common: float, deviation: float, lone: float)
         The share of the samples' error that rests on lone hits, 0 to 1.
     """
     by_chance = max(by_chance, _BEYOND * (common - 3 * deviation), _FLOOR)
-    middle = USUAL + LONE_MORE * lone
+    middle = (1 - lone) * math.log(USUAL_RATIO) + lone * math.log(LONE_RATIO)
     prior = _log_t((np.log(_RATIOS) - middle) / SCALE, FREEDOM)
     off = (common - _RATIOS * by_chance) / max(deviation, LEAST_DEVIATION * by_chance)
     weights = prior + _log_t(off, MEASURED_FREEDOM)

@@ -14,7 +14,6 @@ from dataclasses import dataclass
 from typing import Literal
 
 from lippmann.render.effort import effort_of, pooling_cost
-from lippmann.render.estimate import Estimate
 from lippmann.render.goal import LEAST_GROWTH, Goal
 from lippmann.render.judging import Judgement, Track
 
@@ -83,7 +82,7 @@ class Contest:
             self._lead(self._plain, "the quality is within reach of plain samples for less than pooling takes")
             return plain
         pooled = self._pooled.judge(samples)
-        there = self._missing(pooled.estimate) <= 0
+        there = self._goal.has_quality and self._goal.missing(pooled.estimate) <= 0
         with_noise_out = self._outlook(pooled, rays, room, 0.0 if there else look)
         stand = f"after {samples} samples {self._value(pooled)} pooled and {self._value(plain)} plain"
         if with_noise_out < outlook:
@@ -101,7 +100,7 @@ class Contest:
 
     def _is_last_chance(self, plain: Judgement, room: float) -> bool:
         """No more samples may be taken, and plain ones are not there: the better picture is wanted, whichever it is."""
-        return self._goal.max_time is None and room <= 1 and self._missing(plain.estimate) > 0
+        return self._goal.max_time is None and room <= 1 and self._goal.missing(plain.estimate) > 0
 
     def _lead(self, track: Track, why: str) -> None:
         self._leading, self.why = track, why
@@ -111,18 +110,17 @@ class Contest:
 
         ``least``: by how much samples have to be multiplied for the judgement to be believed.
         """
-        missing = self._missing(judged.estimate)
+        if not self._goal.has_quality:
+            # Where only a time is set, the better picture is wanted.
+            return _Outlook(True, -judged.estimate.psnr - 10 * judged.slope * math.log10(room))
+        likely = min(600.0, self._goal.likely_missing(judged.estimate))
         needed = max(1.0, least)
-        if self._goal.has_quality and missing > 0:
-            likely = min(600.0, self._goal.likely_missing(judged.estimate))
+        if self._goal.missing(judged.estimate) > 0:
             needed = max(LEAST_GROWTH, least, 10 ** (likely / (10 * judged.slope)))
-        if self._goal.has_quality and needed <= room:
+        if needed <= room:
             return _Outlook(False, (needed - 1) * rays + look)
-        return _Outlook(True, missing - 10 * judged.slope * math.log10(room))
-
-    def _missing(self, estimate: Estimate) -> float:
-        # Where only a time is set, the better picture is wanted.
-        return self._goal.missing(estimate) if self._goal.has_quality else -estimate.psnr
+        # The likely PSNR, for a picture is no worse because it knows less of its error.
+        return _Outlook(True, likely - 10 * judged.slope * math.log10(room))
 
     def _value(self, judged: Judgement) -> str:
         if self._goal.quality is not None:
