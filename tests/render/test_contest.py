@@ -12,9 +12,10 @@ from lippmann.display.lens_array import LensArray
 from lippmann.display.panel import Panel
 from lippmann.progress import silent
 from lippmann.render.contest import ASKED_AGAIN, Contest
-from lippmann.render.estimate import CROSS_NOISE, OWN_NOISE, PictureEstimator, PixelErrors
+from lippmann.render.estimate import PictureEstimator
 from lippmann.render.goal import Goal, reach_judged
 from lippmann.render.judging import Track
+from lippmann.render.pixel_errors import CROSS_NOISE, OWN_NOISE, PixelErrors
 
 SHOWN = Display("test", Panel(64, 64, 0.25), LensArray("square", 2.0), gap=6.8)
 RAYS = 3.0

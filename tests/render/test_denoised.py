@@ -8,7 +8,7 @@ import pytest
 from lippmann.image.color import encode_srgb
 from lippmann.render.coding import coding_slope
 from lippmann.render.denoised import Denoised
-from lippmann.render.estimate import CROSS_NOISE, OWN_NOISE, PixelErrors
+from lippmann.render.pixel_errors import CROSS_NOISE, OWN_NOISE, PixelErrors
 
 SHAPE = (256, 256, 3)
 

@@ -16,7 +16,8 @@ from lippmann.display.panel import Panel
 from lippmann.image.permutation import lens_indices
 from lippmann.quality.metrics import micro_image_means, psnr
 from lippmann.render.denoised_estimate import DenoisedEstimator
-from lippmann.render.estimate import CROSS_NOISE, OWN_NOISE, PixelErrors, cut_at_zero
+from lippmann.render.estimate import cut_at_zero
+from lippmann.render.pixel_errors import CROSS_NOISE, OWN_NOISE, PixelErrors
 
 SHOWN = Display("test", Panel(64, 64, 0.25), LensArray("square", 2.0), gap=6.8)
 

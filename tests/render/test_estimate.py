@@ -12,16 +12,8 @@ from lippmann.display.lens_array import LensArray
 from lippmann.display.panel import Panel
 from lippmann.image.permutation import lens_indices
 from lippmann.quality.metrics import micro_image_means, psnr
-from lippmann.render.estimate import (
-    CEILING,
-    CROSS_NOISE,
-    OWN_NOISE,
-    Estimate,
-    PictureEstimator,
-    PixelErrors,
-    _lenses,
-    why_no_estimate,
-)
+from lippmann.render.estimate import CEILING, Estimate, PictureEstimator, _lenses, why_no_estimate
+from lippmann.render.pixel_errors import CROSS_NOISE, OWN_NOISE, PixelErrors
 from lippmann.render.settings import RenderSettings
 
 ARRAYS = {

@@ -10,9 +10,10 @@ from lippmann.display.lens_array import LensArray
 from lippmann.display.panel import Panel
 from lippmann.errors import UsageError
 from lippmann.progress import Progress
-from lippmann.render.estimate import OWN_NOISE, Estimate, PictureEstimator, PixelErrors
+from lippmann.render.estimate import Estimate, PictureEstimator
 from lippmann.render.goal import STEP, TOLERANCE, Goal, reach, reach_judged
 from lippmann.render.judging import Track
+from lippmann.render.pixel_errors import OWN_NOISE, PixelErrors
 
 SHOWN = Display("test", Panel(64, 64, 0.25), LensArray("square", 2.0), gap=6.8)
 

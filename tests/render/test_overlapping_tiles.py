@@ -197,7 +197,7 @@ def test_an_interrupted_run_gives_the_same_file(settings, ending, tmp_path, monk
 @pytest.mark.usefixtures("engine")
 def test_the_sums_of_tiles_give_the_estimate_of_the_whole():
     from lippmann.render.denoised_estimate import DenoisedEstimator, estimate_denoised
-    from lippmann.render.estimate import CROSS_NOISE, OWN_NOISE, ErrorSums, PixelErrors
+    from lippmann.render.pixel_errors import CROSS_NOISE, OWN_NOISE, ErrorSums, PixelErrors
     from lippmann.render.tile_tracer import LENSES, OF_SAMPLES, SUMS, lens_sums
 
     random = np.random.default_rng(0)

@@ -170,7 +170,8 @@ def test_the_rest_of_the_sides_is_black_and_the_views_tell_their_error():
 
 def test_estimates_are_those_of_the_views():
     """One view is far noisier than the others, and is named."""
-    from lippmann.render.estimate import OWN_NOISE, Parts, PictureEstimator, PixelErrors
+    from lippmann.render.estimate import Parts, PictureEstimator
+    from lippmann.render.pixel_errors import OWN_NOISE, PixelErrors
 
     parts = Parts.views(3, 4, (20, 10))
     assert parts.owner[-1, 0] == 0

@@ -97,7 +97,8 @@ def test_tiles_hold_what_the_file_will(engine):
 
 @pytest.mark.parametrize("layout", ["lenticular", "square", "hexagonal"])
 def test_the_sums_of_tiles_give_the_estimate_of_the_whole(engine, layout):
-    from lippmann.render.estimate import OWN_NOISE, ErrorSums, PictureEstimator, PixelErrors, estimate_of_sums
+    from lippmann.render.estimate import PictureEstimator, estimate_of_sums
+    from lippmann.render.pixel_errors import OWN_NOISE, ErrorSums, PixelErrors
     from lippmann.render.tile_tracer import LENSES, SUMS, lens_sums
 
     display = Display("test", Panel(90, 70, 0.25), LensArray(layout, 1.9), gap=6.8, aperture_distance=5.0)

@@ -22,9 +22,9 @@ from lippmann.errors import MemoryLimitError, UsageError
 from lippmann.image.provenance import Transfer
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.render.batch_error import error_of_batches
-from lippmann.render.estimate import OWN_NOISE, PixelErrors
 from lippmann.render.full import PIXEL_DIMENSION, Frame, RayTotals, compile_seconds, divide, evaluated
 from lippmann.render.integrators.base import Integrator
+from lippmann.render.pixel_errors import OWN_NOISE, PixelErrors
 from lippmann.render.plan import BYTES_PER_LANE, BYTES_PER_PIXEL, PREFERRED_LANES, SMALLEST_LANES
 from lippmann.render.rays import RaySource, pixel_number
 from lippmann.render.sampling import SampleStream

@@ -30,10 +30,10 @@ from lippmann.progress import ProgressCallback, silent
 from lippmann.render.batch_error import LONE_TOLD_FROM
 from lippmann.render.coding import coding_slope
 from lippmann.render.common_error import LONE_RATIO
-from lippmann.render.estimate import CROSS_NOISE, PixelErrors
 from lippmann.render.nearby import mean_around
 from lippmann.render.own_light import own_light
 from lippmann.render.own_samples import own_share
+from lippmann.render.pixel_errors import CROSS_NOISE, PixelErrors
 from lippmann.render.reuse.bands import Bands
 
 Floats = NDArray[np.float32]

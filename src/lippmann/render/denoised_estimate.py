@@ -22,20 +22,17 @@ from numpy.typing import NDArray
 
 from lippmann.render.common_error import likely_error
 from lippmann.render.estimate import (
-    CROSS_NOISE,
     DRAWS,
     LEAN,
     MODEL_UNCERTAINTY,
     NORMAL_95,
-    ErrorSums,
     Estimate,
     PartErrors,
     PictureEstimator,
-    PixelErrors,
     neighbourhood,
-    parts_with_pixels,
     psnr_of,
 )
+from lippmann.render.pixel_errors import CROSS_NOISE, ErrorSums, PixelErrors, parts_with_pixels
 
 Real = NDArray[np.float64]
 
@@ -55,6 +52,8 @@ LEAST_OF_SAMPLES = 1e-4
 FEW = 40.0
 #: As parts of the error stated for all and for the worst: pictures that are hard to judge are often better by that.
 OFTEN_BETTER, WORST_OFTEN_BETTER = 0.8, 0.6
+#: Of the draws of the worst error: what is stated, and the ends of its interval.
+_OF_WORST = (0.5, 0.975, 0.025)
 _NOTHING = 1e-30
 
 
@@ -90,9 +89,6 @@ def estimate_denoised(judged: ErrorSums, samples: ErrorSums, grid: tuple[int, in
     psnr, psnr_low, psnr_high = (float(value) for value in psnr_of(np.array([middle, worse, better])))
     of_worst, worst_low, worst_high = (float(value) for value in psnr_of(worst * (1, 1, WORST_OFTEN_BETTER)))
     return Estimate(psnr, psnr_low, psnr_high, of_worst, worst_low, worst_high, (column, row))
-
-
-_OF_WORST = (0.5, 0.975, 0.025)
 
 
 def _worst_drawn(parts: PartErrors, common: Real) -> Real:

@@ -15,8 +15,9 @@ from typing import Literal, Protocol
 
 from lippmann.errors import UsageError
 from lippmann.progress import Progress, ProgressCallback, silent
-from lippmann.render.estimate import Estimate, PictureEstimator, PixelErrors, why_no_estimate
+from lippmann.render.estimate import Estimate, PictureEstimator, why_no_estimate
 from lippmann.render.judging import Judge, Judgement, Track
+from lippmann.render.pixel_errors import PixelErrors
 from lippmann.render.settings import RenderSettings
 
 End = Literal["quality", "time", "samples"]

@@ -8,7 +8,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
-from lippmann.render.estimate import Estimate, PictureEstimator, PixelErrors
+from lippmann.render.estimate import Estimate, PictureEstimator
+from lippmann.render.pixel_errors import PixelErrors
 
 #: The power of the number of samples by which plain noise falls.
 PLAIN_SLOPE = 1.0

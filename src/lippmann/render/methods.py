@@ -17,11 +17,12 @@ from lippmann.render.contest import DENOISED_SLOPE, Contest
 from lippmann.render.denoised import Denoised
 from lippmann.render.denoised_estimate import DenoisedEstimator
 from lippmann.render.effort import effort_of, pooling_cost
-from lippmann.render.estimate import ERROR_LAYER, Estimate, Parts, PictureEstimator, PixelErrors, why_no_estimate
+from lippmann.render.estimate import ERROR_LAYER, Estimate, Parts, PictureEstimator, why_no_estimate
 from lippmann.render.full import Frame, RayTotals, trace_frame
 from lippmann.render.goal import Goal, Outcome, goal_of, reach_judged
 from lippmann.render.guided import GuidedDenoiser
 from lippmann.render.judging import Judge, Track
+from lippmann.render.pixel_errors import PixelErrors
 from lippmann.render.plan import make_plan
 from lippmann.render.rays import DisplayRays, QuiltRays, SubpixelRays, WindowRays
 from lippmann.render.reuse.points import STATUS_LAYER, TRACED

@@ -14,11 +14,12 @@ from lippmann.display import NUMPY, Display
 from lippmann.image.codec import stored_values
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.render.batches import FullInBatches
-from lippmann.render.estimate import ERROR_LAYER, ErrorSums, PixelErrors, why_no_estimate
+from lippmann.render.estimate import ERROR_LAYER, why_no_estimate
 from lippmann.render.full import RayTotals, trace_frame
 from lippmann.render.methods import NOT_PROVEN, SAMPLES_LAYER, Job, trace
 from lippmann.render.outline import PixelWindow
 from lippmann.render.pipeline import build_for, make_integrator
+from lippmann.render.pixel_errors import ErrorSums, PixelErrors
 from lippmann.render.plan import make_plan
 from lippmann.render.rays import DisplayRays, WindowRays
 from lippmann.render.survey import Treatment, survey

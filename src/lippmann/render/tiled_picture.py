@@ -23,7 +23,8 @@ from lippmann.image.provenance import Provenance
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.render.denoise import load_denoiser
 from lippmann.render.denoised_estimate import estimate_denoised
-from lippmann.render.estimate import OWN_NOISE, ErrorSums, Estimate, estimate_of_sums
+from lippmann.render.estimate import Estimate, estimate_of_sums
+from lippmann.render.pixel_errors import OWN_NOISE, ErrorSums
 from lippmann.render.settings import RenderSettings
 from lippmann.render.tiles import SIDES, TileJob, make_job
 from lippmann.scene.placement import Placement, PlacementOptions

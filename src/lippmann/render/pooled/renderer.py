@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 from lippmann.errors import UsageError
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.render.coding import coding_slope
-from lippmann.render.estimate import CROSS_NOISE, PixelErrors
 from lippmann.render.full import PIXEL_DIMENSION, RayTotals, divide, lane_total
 from lippmann.render.integrators.path import PathIntegrator
+from lippmann.render.pixel_errors import CROSS_NOISE, PixelErrors
 from lippmann.render.pooled import surfaces
 from lippmann.render.pooled.blending import blended, local_mean
 from lippmann.render.pooled.following import Follower
