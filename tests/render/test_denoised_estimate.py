@@ -7,8 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from lippmann.display import Display
 from lippmann.display.lens_array import LensArray
@@ -16,7 +14,6 @@ from lippmann.display.panel import Panel
 from lippmann.image.permutation import lens_indices
 from lippmann.quality.metrics import micro_image_means, psnr
 from lippmann.render.denoised_estimate import DenoisedEstimator
-from lippmann.render.estimate import cut_at_zero
 from lippmann.render.pixel_errors import CROSS_NOISE, OWN_NOISE, PixelErrors
 
 SHOWN = Display("test", Panel(64, 64, 0.25), LensArray("square", 2.0), gap=6.8)
@@ -99,17 +96,6 @@ def test_lone_hits_are_doubted_where_nothing_else_is_known(noise, least, most):
     found = DenoisedEstimator(SHOWN).estimate(replace(errors, samples=alone))
     for name in ("psnr", "psnr_low", "worst", "worst_low"):
         assert least < getattr(calm, name) - getattr(found, name) < most
-
-
-@given(st.floats(-50, 50), st.floats(1e-6, 10))
-def test_what_cannot_be_negative_is_not(mean, deviation):
-    found = cut_at_zero(mean, deviation)
-    assert found > 0
-    assert found >= mean
-    if mean > 6 * deviation:
-        assert found == pytest.approx(mean)
-    if mean == 0:
-        assert found == pytest.approx(deviation * math.sqrt(2 / math.pi))
 
 
 @pytest.mark.parametrize("seed", range(3))

@@ -6,13 +6,15 @@ import math
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from lippmann.display import Display
 from lippmann.display.lens_array import LensArray
 from lippmann.display.panel import Panel
 from lippmann.image.permutation import lens_indices
 from lippmann.quality.metrics import micro_image_means, psnr
-from lippmann.render.estimate import CEILING, Estimate, PictureEstimator, _lenses, why_no_estimate
+from lippmann.render.estimate import CEILING, Estimate, PictureEstimator, _lenses, cut_at_zero, why_no_estimate
 from lippmann.render.pixel_errors import CROSS_NOISE, OWN_NOISE, PixelErrors
 from lippmann.render.settings import RenderSettings
 
@@ -176,3 +178,14 @@ def test_noise_that_hides_the_error_widens_the_interval_and_promises_nothing():
         inside += found.psnr_low <= psnr(true) <= found.psnr_high or psnr(true) > found.psnr_high
         assert found.psnr_low < psnr(true)
     assert inside == 40
+
+
+@given(st.floats(-50, 50), st.floats(1e-6, 10))
+def test_what_cannot_be_negative_is_not(mean, deviation):
+    found = cut_at_zero(mean, deviation)
+    assert found > 0
+    assert found >= mean
+    if mean > 6 * deviation:
+        assert found == pytest.approx(mean)
+    if mean == 0:
+        assert found == pytest.approx(deviation * math.sqrt(2 / math.pi))

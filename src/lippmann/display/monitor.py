@@ -170,10 +170,10 @@ class Monitor:
             name=display.name,
             title=display.title,
             panel=panel,
-            pitch=_INCH / seen_pitch,
-            slope=-1 / math.tan(slant) if slant else math.inf,
+            pitch=_at_limit(_INCH / seen_pitch, *PITCHES),
+            slope=_at_limit(-1 / math.tan(slant), -STEEPEST_SLOPE, STEEPEST_SLOPE) if slant else math.inf,
             center=0.0,
-            view_cone=math.degrees(2 * math.atan(seen_pitch / (math.cos(slant) * 2 * display.gap))),
+            view_cone=_at_limit(math.degrees(2 * math.atan(seen_pitch / (math.cos(slant) * 2 * display.gap))), *CONES),
             viewing_distance=display.viewing_distance,
         )
         middle = panel.width / 2 * monitor.lenses_right + panel.height / 2 * monitor.lenses_up
@@ -181,17 +181,22 @@ class Monitor:
         return replace(monitor, center=round(center, _DIGITS) % 1.0)
 
 
+def _at_limit(value: float, *limits: float) -> float:
+    """A number computed from a display; where only rounding keeps it from a limit, that."""
+    return next((limit for limit in limits if math.isclose(value, limit, rel_tol=_ROUNDING)), value)
+
+
 def _within(value: object, key: str, limits: tuple[float, float], unit: str) -> float:
     checked = finite(value, key)
-    if not limits[0] * (1 - _ROUNDING) <= checked <= limits[1] * (1 + _ROUNDING):
+    if not limits[0] <= checked <= limits[1]:
         rule = f"it must lie between {limits[0]:g} and {limits[1]:g} {unit}"
         raise DisplayError(f"{key} is {checked:g}", where=key, rule=rule)
-    return min(max(checked, limits[0]), limits[1])
+    return checked
 
 
 def _checked_slope(value: object) -> float:
     rule = f"it must be at least {STEEPEST_SLOPE:g} in size"
     slope = number(value, "slope", rule=rule)
-    if abs(slope) < STEEPEST_SLOPE * (1 - _ROUNDING):
+    if abs(slope) < STEEPEST_SLOPE:
         raise DisplayError(f"slope is {slope:g}", where="slope", rule=rule, fix="upright lenses have an infinite one")
     return abs(slope) if math.isinf(slope) else slope

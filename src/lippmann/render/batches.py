@@ -114,6 +114,8 @@ class FullInBatches:
         batches, self._lanes = _sizes(pixels, source.channels, memory)
         self._sums = np.zeros((batches, pixels, 3), dtype=np.float32)
         self._taken = [0] * batches
+        # Plain and denoised pictures of the same samples both ask for their errors.
+        self._errors: PixelErrors | None = None
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -129,6 +131,7 @@ class FullInBatches:
         """Take ``samples`` more of every pixel."""
         channels, pixels = self._source.channels, self._sums.shape[1]
         started, done, compiled = time.perf_counter(), 0, 0.0
+        self._errors = None
         taken = list(self._taken)
         for run in self._runs(samples):
             with dr.scoped_set_flag(dr.JitFlag.KernelHistory, done == 0):
@@ -203,9 +206,11 @@ class FullInBatches:
         """
         if self.samples < STREAMS:
             raise UsageError("one sample per pixel does not tell its own error", rule="two or more do")
-        error, lone = error_of_batches(self._shown_sums(), self._taken, self._transfer)
-        shape = self.shape[0], -1
-        return PixelErrors(error.reshape(shape), lone.reshape(shape), OWN_NOISE)
+        if self._errors is None:
+            error, lone = error_of_batches(self._shown_sums(), self._taken, self._transfer)
+            shape = self.shape[0], -1
+            self._errors = PixelErrors(error.reshape(shape), lone.reshape(shape), OWN_NOISE)
+        return self._errors
 
     def _shown_sums(self) -> Floats:
         """``(batches, pixels, 3)``: the sums of what the picture shows."""

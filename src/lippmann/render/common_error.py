@@ -33,7 +33,8 @@ SCALE, FREEDOM = 0.6, 4.0
 MEASURED_FREEDOM = 4.0
 #: As a part of D: no measurement of C is better than that.
 LEAST_DEVIATION = 1e-3
-_RATIOS = np.exp(np.linspace(math.log(1e-2), math.log(1e4), 600))
+_LOGARITHMS = np.linspace(math.log(1e-2), math.log(1e4), 600)
+_RATIOS = np.exp(_LOGARITHMS)
 #: D is taken to be this part of a C that is measured beyond all the ratios above.
 _BEYOND = 1e-3
 #: A picture without any error still has this mean squared one, so that its logarithm exists.
@@ -53,7 +54,7 @@ class LikelyError:
     def quantiles(self, shares: Real | float) -> Real:
         """The errors below which the true one lies with these probabilities."""
         below = np.cumsum(self.weights) - 0.5 * self.weights
-        return np.asarray(self.by_chance * (1 + np.exp(np.interp(shares, below, np.log(_RATIOS)))))
+        return np.asarray(self.by_chance * (1 + np.exp(np.interp(shares, below, _LOGARITHMS))))
 
 
 def likely_error(by_chance: float, common: float, deviation: float, lone: float) -> LikelyError:
@@ -70,7 +71,7 @@ def likely_error(by_chance: float, common: float, deviation: float, lone: float)
     """
     by_chance = max(by_chance, _BEYOND * (common - 3 * deviation), _FLOOR)
     middle = (1 - lone) * math.log(USUAL_RATIO) + lone * math.log(LONE_RATIO)
-    prior = _log_t((np.log(_RATIOS) - middle) / SCALE, FREEDOM)
+    prior = _log_t((_LOGARITHMS - middle) / SCALE, FREEDOM)
     off = (common - _RATIOS * by_chance) / max(deviation, LEAST_DEVIATION * by_chance)
     weights = prior + _log_t(off, MEASURED_FREEDOM)
     weights = np.exp(weights - weights.max())

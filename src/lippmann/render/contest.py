@@ -13,7 +13,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
-from lippmann.render.effort import effort_of, pooling_cost
+from lippmann.render.effort import look_cost
 from lippmann.render.goal import LEAST_GROWTH, Goal
 from lippmann.render.judging import Judgement, Track
 
@@ -76,7 +76,7 @@ class Contest:
         if samples < self._closed_to and not self._is_last_chance(plain, room):
             return plain
         rays = self._rays_per_pixel()
-        look = pooling_cost(effort_of("oidn", rays))
+        look = look_cost(rays)
         outlook = self._outlook(plain, rays, room, least=self._plain.fewest / samples)
         if not outlook.misses and outlook.value <= look:
             self._lead(self._plain, "the quality is within reach of plain samples for less than pooling takes")

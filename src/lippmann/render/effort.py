@@ -43,3 +43,8 @@ def denoising_cost(effort: Effort) -> float:
 def pooling_cost(effort: Effort) -> float:
     """The same where micro-images share the light of each half."""
     return denoising_cost(effort) + 2 * SHARING_COST
+
+
+def look_cost(rays_per_pixel: float) -> float:
+    """The same with the effort that so many traced rays deserve: what it takes to see what pooling makes of them."""
+    return pooling_cost(effort_of("oidn", rays_per_pixel))

@@ -190,11 +190,6 @@ def estimate_of_sums(sums: ErrorSums, grid: tuple[int, int], noise: NoiseShares)
     )
 
 
-def _lenses(sums: ErrorSums, grid: tuple[int, int], noise: NoiseShares) -> PartErrors:
-    index, known = parts_with_pixels(sums)
-    return errors_of_parts(known, index, grid, noise)
-
-
 @dataclass(frozen=True, eq=False)
 class PartErrors:
     """Micro-images with pixels: their flat ``index``, the ``expected`` squared error, that ``doubted``, log variances.
@@ -222,8 +217,9 @@ class PartErrors:
         return drawn
 
 
-def errors_of_parts(sums: ErrorSums, index: NDArray[np.intp], grid: tuple[int, int], noise: NoiseShares) -> PartErrors:
+def _lenses(sums: ErrorSums, grid: tuple[int, int], noise: NoiseShares) -> PartErrors:
     """Micro-images whose noisy means are drawn towards their neighbours', and those towards the mean of all."""
+    index, sums = parts_with_pixels(sums)
     count = sums.pixels
     mean, lone = sums.values / count, sums.lone / count
     average = likely_mean(sums, noise)

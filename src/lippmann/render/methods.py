@@ -16,7 +16,7 @@ from lippmann.render.batches import FullInBatches, trace_in_batches
 from lippmann.render.contest import DENOISED_SLOPE, Contest
 from lippmann.render.denoised import Denoised
 from lippmann.render.denoised_estimate import DenoisedEstimator
-from lippmann.render.effort import effort_of, pooling_cost
+from lippmann.render.effort import effort_of, look_cost
 from lippmann.render.estimate import ERROR_LAYER, Estimate, Parts, PictureEstimator, why_no_estimate
 from lippmann.render.full import Frame, RayTotals, trace_frame
 from lippmann.render.goal import Goal, Outcome, goal_of, reach_judged
@@ -262,7 +262,8 @@ def _denoised_way(job: Job, goal: Goal, batches: FullInBatches, rays: Callable[[
     seconds = 0.0 if goal.max_time is None else denoiser.probe()
 
     def dear() -> bool:
-        return 0 < rays() < pooling_cost(effort_of("oidn", rays()))
+        spent = rays()
+        return 0 < spent < look_cost(spent)
 
     return _Way(renderer, Track(renderer, _estimator(job, DenoisedEstimator), DENOISED_SLOPE, seconds, dear), denoiser)
 
