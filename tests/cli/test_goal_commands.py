@@ -7,6 +7,9 @@ import pytest
 
 from lippmann.image import read_info, read_picture
 
+#: Bundled scenes that were made for the classic light models.
+CLASSIC = ("gears", "primitives", "room", "small-balls", "tree")
+
 
 @pytest.fixture
 def small(cut_display):
@@ -27,6 +30,21 @@ def test_a_quality_is_worked_for_and_stated(lippmann, engine, tmp_path, small):
     assert "estimated PSNR" in done.err
     more = lippmann("render", "teapot", "--display", small, "--quality-mean", 36, "--json", "-o", out)
     assert more.json["estimate"]["psnr"] >= 36
+
+
+@pytest.mark.parametrize("scene", ["gears", "primitives", "room", "small-balls", "teapot", "tree"])
+@pytest.mark.parametrize(
+    "goal", [("--quality", 20), ("--quality-mean", 20), ("--max-time", 1)], ids=lambda goal: goal[0]
+)
+def test_every_bundled_scene_has_a_goal_with_the_light_it_was_made_for(lippmann, engine, tmp_path, small, scene, goal):
+    """Some were made for classic light, which is not pooled."""
+    done = lippmann("render", scene, "--display", small, *goal, "--json", "-o", tmp_path / "a.png")
+    assert done.code == 0, done.err
+    classic = done.json["integrator"] == "classic"
+    assert classic == (scene in CLASSIC)
+    assert (done.json["options"]["auto"] == "full: the light of classic is not pooled") == classic
+    # In a second there may be time for a single sample.
+    assert goal[0] == "--max-time" or done.json["estimate"]["psnr"] > 19
 
 
 def test_samples_alone_are_judged_too_and_the_error_is_a_layer(lippmann, engine, tmp_path, small):

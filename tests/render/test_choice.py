@@ -35,6 +35,13 @@ def test_a_goal_opens_the_contest_where_there_is_a_denoiser(installed, goal):
     assert installed or "not installed" in found.why
 
 
+@pytest.mark.parametrize("goal", [{"quality": 30.0}, {"quality_mean": 30.0}, {"max_time": 5.0}])
+def test_light_that_cannot_be_pooled_has_no_contest(installed, goal):
+    found = decided(integrator="classic", **goal)
+    assert (found.settings.method, found.settings.denoise) == ("full", "none")
+    assert "the light of classic is not pooled" in found.why
+
+
 @pytest.mark.parametrize("denoise", ["none", "oidn", "oidn-fast", "oidn-high"])
 def test_what_is_asked_for_wins(installed, denoise):
     found = decided(quality=30.0, denoise=denoise)

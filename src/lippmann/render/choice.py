@@ -11,7 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from importlib.util import find_spec
 
-from lippmann.render.settings import LIGHT, Denoiser, RenderSettings
+from lippmann.render.settings import LIGHT, POOLED_LIGHT, Denoiser, RenderSettings
 
 
 @dataclass(frozen=True)
@@ -39,6 +39,8 @@ def decide(settings: RenderSettings) -> Choice:
         return Choice(_with(chosen, "none"), f"full: {settings.integrator} has no noise")
     if settings.quality is settings.quality_mean is settings.max_time is None:
         return Choice(_with(chosen, "none"), "full: no quality is asked for, so samples stay as they are")
+    if settings.integrator not in POOLED_LIGHT:
+        return Choice(_with(chosen, "none"), f"full: the light of {settings.integrator} is not pooled")
     if find_spec("pyoidn") is None:
         missing = 'Open Image Denoise is not installed (pip install "lippmann[denoise]")'
         return Choice(_with(chosen, "none"), f"full: {missing}")
