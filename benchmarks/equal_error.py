@@ -10,7 +10,9 @@ what else runs on the machine does not count; medians of three, warm. Denoised p
 Open Image Denoise, guides included, and every way counts with the better one. Where full rendering does not come to a
 PSNR, its time is drawn out by the law of its noise, error times time being constant, and the scene is named.
 
-python benchmarks/equal_error.py [DISPLAY ...] [--scenes NAME,...]
+python benchmarks/equal_error.py [DISPLAY ...] [--scenes NAME,...] [--references FOLDER]
+
+References are kept in FOLDER, where one is given: they take most of the time.
 """
 
 from __future__ import annotations
@@ -44,7 +46,7 @@ DISPLAYS: dict[str, tuple[str, dict[str, Any], int | None]] = {
     "array-15": ("mla-square", {"size": (510, 510)}, 150),
 }
 #: Samples per pixel of either reference, and of the pictures that are judged.
-REFERENCE = 128
+REFERENCE = 256
 SAMPLES = (1, 4, 16, 64)
 CELLS = (1, 4, 16)
 #: Runs of which the median counts, where they are shorter than this many seconds; longer ones are run once.
@@ -70,23 +72,26 @@ class Stage:
 
 def main() -> None:
     results = saved("equal_error").get("results", {})
-    for name, displays in asked(__doc__):
+    words = argparse.ArgumentParser(description=__doc__)
+    words.add_argument("--references")
+    given, scenes = asked(words)
+    for name, displays in scenes:
         for display in displays:
-            results.setdefault(display, {})[name] = _measure(prepare(name, display))
+            kept = given.references and Path(given.references) / f"{display}-{name}.npy"
+            results.setdefault(display, {})[name] = _measure(prepare(name, display), kept)
             summary = {kind: _summary(scenes) for kind, scenes in results.items()}
             save("equal_error", {"reference_spp": 2 * REFERENCE, "results": results, "summary": summary})
 
 
-def asked(description: str) -> list[tuple[str, list[str]]]:
-    """The scenes that the command line names, or all that are at hand, each with the displays to measure it on."""
-    words = argparse.ArgumentParser(description=description)
+def asked(words: argparse.ArgumentParser) -> tuple[argparse.Namespace, list[tuple[str, list[str]]]]:
+    """The command line; and the scenes that it names, or all that are at hand, each with the displays to measure on."""
     words.add_argument("displays", nargs="*", default=list(DISPLAYS))
     words.add_argument("--scenes", default="")
     given = words.parse_args()
     from lippmann.scene import library
 
     known = [*library.names(), *(name for name, path in GLTF.items() if path.exists())]
-    return [(name, given.displays) for name in (given.scenes.split(",") if given.scenes else known)]
+    return given, [(name, given.displays) for name in (given.scenes.split(",") if given.scenes else known)]
 
 
 def prepare(name: str, display_name: str) -> Stage:
@@ -117,8 +122,8 @@ def prepare(name: str, display_name: str) -> Stage:
     return Stage(built, integrator, source, display, at.display_from_world, settings)
 
 
-def _measure(stage: Stage) -> dict[str, Any]:
-    judge = Judge(stage)
+def _measure(stage: Stage, kept: Path | None) -> dict[str, Any]:
+    judge = Judge(stage, kept)
     curves: dict[str, list[Point]] = {"full": [], "full + oidn": [], "pooled": [], "pooled in cells": []}
     for samples in SAMPLES:
         traced, picture = timed(lambda samples=samples: _trace(stage, samples, 3))
@@ -146,8 +151,8 @@ def _denoised(
     plan = plan_guides(stage.source, GUIDE_SAMPLES[effort], 4 << 30)
     looked, guides = timed(lambda: trace_guides(stage.built, stage.source, plan, stage.display_from_world, seed=77))
 
-    def clean(noisy: Picture) -> Picture:
-        return np.maximum(denoise_views(noisy, stage.display, guides, effort=effort), 0)
+    def clean(noisy: Picture, turned: bool = False) -> Picture:
+        return np.maximum(denoise_views(noisy, stage.display, guides, effort=effort, turned=turned), 0)
 
     def share(cleaned: Picture) -> Picture:
         return share_light(cleaned, stage.display, guides, stop=SHARING_STOP[effort], threads=CORES)
@@ -182,11 +187,11 @@ def once(call: Callable[[], T]) -> tuple[float, T]:
 class Judge:
     """Squared errors by two references that know nothing of each other."""
 
-    def __init__(self, stage: Stage) -> None:
+    def __init__(self, stage: Stage, kept: Path | None = None) -> None:
         from lippmann.quality.metrics import micro_image_means
 
         self._display, self._means = stage.display, micro_image_means
-        self._references = [coded(_reference(stage, seed)) for seed in (1001, 2002)]
+        self._references = [coded(picture) for picture in _references(stage, kept)]
         own = ((self._references[0] - self._references[1]) ** 2).mean() / 2
         #: PSNR of a single reference.
         self.own_psnr = _psnr(own)
@@ -208,8 +213,15 @@ def _psnr(error: float) -> float:
     return -10 * math.log10(max(error, 1e-9))
 
 
-def _reference(stage: Stage, seed: int) -> Picture:
-    return _trace(stage, REFERENCE, seed)
+def _references(stage: Stage, kept: Path | None) -> NDArray[np.float32]:
+    """Two pictures, linear; as they lie in the file ``kept`` if it is there."""
+    if kept is not None and kept.exists():
+        return np.asarray(np.load(kept))
+    references = np.stack([_trace(stage, REFERENCE, seed) for seed in (1001, 2002)])
+    if kept is not None:
+        kept.parent.mkdir(parents=True, exist_ok=True)
+        np.save(kept, references)
+    return references
 
 
 def _trace(stage: Stage, samples: int, seed: int) -> Picture:

@@ -10,6 +10,7 @@ python benchmarks/goals.py [DISPLAY ...] [--scenes NAME,...]
 
 from __future__ import annotations
 
+import argparse
 import statistics
 from dataclasses import replace
 from typing import Any
@@ -30,7 +31,8 @@ WAYS: dict[str, dict[str, Any]] = {
 
 def main() -> None:
     results = saved("goals").get("results", {})
-    for name, displays in asked(__doc__):
+    _, scenes = asked(argparse.ArgumentParser(description=__doc__))
+    for name, displays in scenes:
         for display in displays:
             results.setdefault(display, {})[name] = _measured(prepare(name, display))
             summary = {kind: _summary(scenes) for kind, scenes in results.items()}

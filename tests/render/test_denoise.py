@@ -92,6 +92,35 @@ def test_equal_input_gives_equal_output_whatever_the_threads():
 
 
 @needs_oidn
+@pytest.mark.parametrize("height", [96, 101])
+def test_turned_the_network_sees_the_whole_picture_and_errs_another_way(height):
+    """Nothing moves, also where the sides are no whole steps of the network."""
+    color, albedo, normal = known(height, 155)
+    halves = noisy(color, 1), noisy(color, 2)
+    upright = [denoise(half, albedo, normal, clean_guides=True, effort="fast") for half in halves]
+    turned = denoise(halves[1], albedo, normal, clean_guides=True, effort="fast", turned=True)
+    assert turned.shape == color.shape
+    assert turned.flags.c_contiguous
+    assert error(turned, color) < 1.2 * error(upright[1], color)
+    assert not np.array_equal(turned, upright[1])
+    mean_of_turned, mean_of_upright = 0.5 * (upright[0] + turned), 0.5 * (upright[0] + upright[1])
+    assert error(mean_of_turned, color) < error(mean_of_upright, color)
+
+
+@needs_oidn
+@pytest.mark.parametrize("width", [256, 250])
+def test_a_turned_window_is_what_the_whole_shows_there(width):
+    """Windows begin with a step of the network; where the picture ends must not matter."""
+    color, albedo, normal = known(64, width)
+    layers = noisy(color), albedo, normal
+    options = {"clean_guides": True, "exposure": 1.0, "effort": "fast", "turned": True}
+    whole = denoise(*layers, **options)
+    window = denoise(*(layer[:, :192] for layer in layers), **options)
+    # What lies 87 pixels beyond is seen by none.
+    assert np.abs(window - whole[:, :192])[:, :100].max() < 1e-4
+
+
+@needs_oidn
 def test_noise_of_guides_falls():
     _, albedo, _ = known()
     seen = (albedo + np.random.default_rng(2).normal(0, 0.1, albedo.shape)).astype(np.float32)

@@ -60,10 +60,11 @@ def test_a_denoiser_is_given_all_colours(integrator, as_denoised):
     from lippmann.render.subpixel_batches import DenoisedSubpixels, SubpixelBatches
 
     batches = SubpixelBatches(integrator, SubpixelRays(rays()), seed=3, memory=1 << 28)
-    given = []
+    given, turns = [], []
 
-    def keep(pixels):
+    def keep(pixels, turned):
         given.append(pixels)
+        turns.append(turned)
         return pixels + np.float32(0.5)
 
     denoised = DenoisedSubpixels(batches, keep, "srgb")
@@ -71,6 +72,7 @@ def test_a_denoiser_is_given_all_colours(integrator, as_denoised):
         batches.add(samples)
         assert denoised.picture() == pytest.approx(batches.picture() + 0.5, abs=1e-5)
     one, *halves = given
+    assert turns == [False, False, True]
     assert one.shape == halves[0].shape == (64, 288, 3)
     for half, shown in zip(halves, batches.halves(), strict=True):
         assert batches.own_colors(half) == pytest.approx(shown)

@@ -7,8 +7,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lippmann.display import Display, LensArray, Panel, load_display
+from lippmann.render.denoise import NETWORK_STEP
 from lippmann.render.settings import RenderSettings
-from lippmann.render.surroundings import DENOISER_REACH, LENSES, NETWORK_STEP, SHARED_LENSES, surroundings_of
+from lippmann.render.surroundings import DENOISER_REACH, LENSES, SHARED_LENSES, surroundings_of
 from lippmann.store import TileGrid
 
 POOLED = RenderSettings(method="pooled", denoise="none")

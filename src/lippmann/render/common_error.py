@@ -7,8 +7,8 @@ without bias, (a - D(a)) (b - D(b)) pixel by pixel, but where samples are noisy 
 two noises, which is far larger than any error left.
 
 Yet whatever the scene, C keeps to D. The scenes of ``benchmarks/hard_scenes.py``, made to mislead denoisers, and the
-bundled ones, on four kinds of displays with 8 to 128 samples, have ratios C / D of 0.1 to 18, two thirds of them within
-1 and 6: a denoiser balances what it blurs against the noise it leaves. It is larger where much of the samples' error
+bundled ones, on four kinds of displays with 8 to 128 samples, have ratios C / D of 0.05 to 18, half of them within 1.3
+and 4.6: a denoiser balances what it blurs against the noise it leaves. It is larger where much of the samples' error
 rests on lone hits, for what one half has not met the other has most likely not met either.
 
 So the ratio has a prior with heavy tails about these values, and the measurement speaks as loud as its own uncertainty

@@ -22,6 +22,9 @@ Effort = Literal["high", "fast"]
 #: twice its time, without them the same as "high".
 _QUALITY = {"high": "OIDN_QUALITY_HIGH", "fast": "OIDN_QUALITY_FAST"}
 
+#: The network halves pictures four times: the pixels of such squares are seen together.
+NETWORK_STEP = 16
+
 _lock = threading.Lock()
 _devices: dict[int, Any] = {}
 
@@ -35,6 +38,7 @@ def denoise(
     clean_guides: bool = False,
     exposure: float | None = None,
     effort: Effort = "high",
+    turned: bool = False,
     threads: int | None = None,
 ) -> FloatArray:
     """The picture without its noise.
@@ -56,6 +60,9 @@ def denoise(
         suits it to the picture's brightness.
     effort:
         ``fast`` takes half the time of ``high``, a fifth with clean guides, for about 1 dB.
+    turned:
+        The network is shown all upside down and from right to left. What it gets wrong it gets wrong another way then,
+        so that the mean of two pictures of which one was turned is nearer to the truth.
     threads:
         CPU threads; None for all cores that the process may use.
 
@@ -84,7 +91,23 @@ def denoise(
                 rule = f"that of the picture is {images['color'].shape}"
                 raise UsageError(f"the {name} has the shape {images[name].shape}", where="denoise", rule=rule)
     options = {"hdr": hdr, "cleanAux": clean_guides and albedo is not None}
-    return _filtered(images, options, effort, threads, exposure)
+    if not turned:
+        return _filtered(images, options, effort, threads, exposure)
+    shown = {name: _turned(image) for name, image in images.items()}
+    height, width = images["color"].shape[:2]
+    result = _filtered(shown, options, effort, threads, exposure)[-height:, -width:]
+    return np.ascontiguousarray(result[::-1, ::-1])
+
+
+def _turned(image: FloatArray) -> FloatArray:
+    """Upside down and from right to left.
+
+    It is filled up to whole steps, so that the network sees the same pixels together as else; mirrored, for it would
+    take pixels that are repeated for something that is there.
+    """
+    height, width = image.shape[:2]
+    before = (-height % NETWORK_STEP, 0), (-width % NETWORK_STEP, 0), (0, 0)
+    return np.pad(image[::-1, ::-1], before, mode="reflect")
 
 
 def clean_guide(guide: NDArray[Any], kind: Literal["albedo", "normal"], *, threads: int | None = None) -> FloatArray:

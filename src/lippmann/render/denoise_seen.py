@@ -8,13 +8,12 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from lippmann.render.denoise import Effort, denoise
+from lippmann.render.denoise import NETWORK_STEP, Effort, denoise
 
 FloatArray = NDArray[np.float32]
 
-#: Pixels around the surfaces, so that the network sees what they stand before; also the pixels that it sees together,
-#: see :data:`lippmann.render.surroundings.NETWORK_STEP`.
-MARGIN = 16
+#: Pixels around the surfaces, so that the network sees what they stand before; whole steps of the network.
+MARGIN = NETWORK_STEP
 #: Pixels around the surfaces that are cleaned, too: guides of a few samples miss edges that barely reach into one.
 EDGE = 2
 
@@ -26,6 +25,7 @@ def denoise_seen(
     *,
     exposure: float | None = None,
     effort: Effort = "high",
+    turned: bool = False,
     threads: int | None = None,
 ) -> FloatArray:
     """The picture without its noise; arguments as those of :func:`~lippmann.render.denoise.denoise`.
@@ -45,6 +45,7 @@ def denoise_seen(
             clean_guides=True,
             exposure=exposure,
             effort=effort,
+            turned=turned,
             threads=threads,
         )
         near = _widened(is_surface[part])

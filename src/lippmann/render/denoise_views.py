@@ -42,6 +42,7 @@ def denoise_views(
     *,
     form: Form = "auto",
     effort: Effort = "high",
+    turned: bool = False,
     threads: int | None = None,
 ) -> FloatArray:
     """An integral image without its noise.
@@ -55,7 +56,7 @@ def denoise_views(
         the price of one to four dB.
     form:
         ``raw``, ``views`` (where these are exact), or what :func:`best_form` says.
-    effort, threads:
+    effort, turned, threads:
         As those of :func:`~lippmann.render.denoise.denoise`.
 
     Raises
@@ -73,8 +74,8 @@ def denoise_views(
         raise UsageError(f"the pixels have the shape {pixels.shape}", where="denoise", rule=rule)
     layers = [pixels, *(() if guides is None else (guides.albedo, guides.normal))]
     if (best_form(display, guides) if form == "auto" else form) == "raw":
-        return _denoised(layers, effort, threads)
-    return _by_views(layers, display, effort, threads)
+        return _denoised(layers, effort, turned, threads)
+    return _by_views(layers, display, effort, turned, threads)
 
 
 def best_form(display: Display, guides: Guides | None) -> Literal["raw", "views"]:
@@ -123,7 +124,9 @@ def _view_shape(display: Display) -> tuple[int, ...]:
     return (1, nx, ny, columns) if display.lens_array.layout == "lenticular" else (ny, nx, rows, columns)
 
 
-def _by_views(layers: list[NDArray[Any]], display: Display, effort: Effort, threads: int | None) -> FloatArray:
+def _by_views(
+    layers: list[NDArray[Any]], display: Display, effort: Effort, turned: bool, threads: int | None
+) -> FloatArray:
     if not has_exact_views(display):
         raise UsageError(
             f"the lenses of the display {display.name} do not cover whole pixels",
@@ -135,13 +138,13 @@ def _by_views(layers: list[NDArray[Any]], display: Display, effort: Effort, thre
     views = [micro_images_as_views(permutation.split(layer), display) for layer in layers]
     result = np.empty(views[0].shape, dtype=np.float32)
     for place in np.ndindex(result.shape[:2]):
-        result[place] = _denoised([layer[place] for layer in views], effort, threads)
+        result[place] = _denoised([layer[place] for layer in views], effort, turned, threads)
     return permutation.join(micro_images_as_views(result, display))
 
 
-def _denoised(layers: list[NDArray[Any]], effort: Effort, threads: int | None) -> FloatArray:
+def _denoised(layers: list[NDArray[Any]], effort: Effort, turned: bool, threads: int | None) -> FloatArray:
     color, *guides = layers
     if not guides:
-        return denoise(color, effort=effort, threads=threads)
+        return denoise(color, effort=effort, turned=turned, threads=threads)
     # The guides follow mirrors and glass without chance, so what noise they have lies along edges alone.
-    return denoise(color, *guides, clean_guides=True, effort=effort, threads=threads)
+    return denoise(color, *guides, clean_guides=True, effort=effort, turned=turned, threads=threads)

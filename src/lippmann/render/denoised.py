@@ -1,9 +1,12 @@
 """A picture whose noise is taken out, and that still knows how good it is.
 
-Each half of the samples is denoised by itself, and the picture is the mean of the two. A denoised half knows nothing of
-the other, noisy half, which therefore can judge it: for denoised halves D(a) and D(b) of noisy ones a and b, the mean
-of (a - D(a)) (b - D(b)) is that of the product of the errors of D(a) and D(b), what they have wrong in common. The
-squared error of their mean is that and a quarter of (D(a) - D(b))^2, what they differ by.
+Each half of the samples is denoised by itself, and the picture is the mean of the two. The network is shown the second
+one upside down: what it gets wrong of itself is not the same in both then, and the mean is nearer to the truth.
+
+A denoised half knows nothing of the other, noisy half, which therefore can judge it: for denoised halves D(a) and D(b)
+of noisy ones a and b, the mean of (a - D(a)) (b - D(b)) is that of the product of the errors of D(a) and D(b), what
+they have wrong in common. The squared error of their mean is that and a quarter of (D(a) - D(b))^2, what they differ
+by.
 
 Micro-images may share the light of a denoised half, and it keeps its own where that is judged to be better
 (:mod:`lippmann.render.own_light`). Where what comes of that is judged to be worse than its samples, they take its place
@@ -46,7 +49,9 @@ DROWNED = 8.0
 MANY = 16
 #: Linear steps below this are as good as a slope, and hold rounding.
 _LEAST_STEP = 1e-4
-Denoise = Callable[[Floats], Floats]
+#: A clean picture from a noisy one; and whether that is to be turned, see :func:`~lippmann.render.denoise.denoise`.
+Denoise = Callable[[Floats, bool], Floats]
+Share = Callable[[Floats], Floats]
 
 
 class Halved(Protocol):
@@ -72,7 +77,7 @@ class Denoised:
     renderer:
         Gathers the samples.
     denoise:
-        From a noisy ``(H, W, 3)`` linear picture to a clean one.
+        From a noisy ``(H, W, 3)`` linear picture to a clean one, turned for the second half.
     transfer:
         How values become codes; errors are measured between codes.
     threads:
@@ -87,7 +92,7 @@ class Denoised:
         denoise: Denoise,
         transfer: Transfer,
         threads: int = 1,
-        share: Denoise | None = None,
+        share: Share | None = None,
     ) -> None:
         self._renderer = renderer
         self._denoise = denoise
@@ -150,11 +155,11 @@ class Denoised:
 
     def _versions(self, noisy: tuple[Floats, Floats]) -> tuple[list[Floats], list[Floats]]:
         """Of each half what :meth:`_cleaned_and_shared` gives."""
-        return self._cleaned_and_shared(noisy[0]), self._cleaned_and_shared(noisy[1])
+        return self._cleaned_and_shared(noisy[0]), self._cleaned_and_shared(noisy[1], turned=True)
 
-    def _cleaned_and_shared(self, noisy: Floats) -> list[Floats]:
+    def _cleaned_and_shared(self, noisy: Floats, turned: bool = False) -> list[Floats]:
         """A picture without its noise; and, where light is shared, that with shared light."""
-        clean = self._denoise(noisy)
+        clean = self._denoise(noisy, turned)
         return [clean] if self._share is None else [clean, self._share(clean)]
 
     def _slope(self, noisy: tuple[Floats, Floats]) -> Floats:

@@ -101,8 +101,8 @@ class GuidedDenoiser:
         clean = self.denoise(pixels)
         return self.share(clean) if self.shares_afterwards else clean
 
-    def denoise(self, pixels: Floats) -> Floats:
-        """A picture without its noise."""
+    def denoise(self, pixels: Floats, turned: bool = False) -> Floats:
+        """A picture without its noise; ``turned`` is that of :func:`~lippmann.render.denoise.denoise`."""
         started = time.perf_counter()
         self._progress(Progress("denoise", 0, 1))
         self.used = self._effort()
@@ -110,7 +110,7 @@ class GuidedDenoiser:
         if self._shares and isinstance(self._source, QuiltRays):
             pixels = share_views(pixels, self._source, guides, threads=self._threads)
         # The network overshoots below black beside bright edges.
-        cleaned = np.maximum(self._cleaned(pixels, guides), np.float32(0))
+        cleaned = np.maximum(self._cleaned(pixels, guides, turned), np.float32(0))
         self._progress(Progress("denoise", 1, 1))
         self.seconds += time.perf_counter() - started
         return cleaned
@@ -146,10 +146,12 @@ class GuidedDenoiser:
         spent = (time.perf_counter() - started) / RUN_COST["fast"] * denoising_cost(self._effort())
         return spent * self._source.width * self._source.height / _PROBE_SIDE**2
 
-    def _cleaned(self, pixels: Floats, guides: Guides) -> Floats:
+    def _cleaned(self, pixels: Floats, guides: Guides, turned: bool) -> Floats:
         source = self._source
         if isinstance(source, DisplayRays) and self.form() == "views":
-            return denoise_views(pixels, source.display, guides, form="views", effort=self.used, threads=self._threads)
+            return denoise_views(
+                pixels, source.display, guides, form="views", effort=self.used, turned=turned, threads=self._threads
+            )
         result = np.empty_like(pixels)
         for tile in source.tiles():
             result[tile] = denoise_seen(
@@ -158,6 +160,7 @@ class GuidedDenoiser:
                 guides.normal[tile],
                 exposure=self._exposure,
                 effort=self.used,
+                turned=turned,
                 threads=self._threads,
             )
         return result

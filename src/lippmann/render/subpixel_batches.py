@@ -59,7 +59,7 @@ class DenoisedSubpixels(Denoised):
 
     def _versions(self, noisy: tuple[Floats, Floats]) -> tuple[list[Floats], list[Floats]]:
         first, second = (
-            [self._renderer.own_colors(version) for version in self._cleaned_and_shared(half)]
-            for half in self._renderer.halves_of_all()
+            [self._renderer.own_colors(version) for version in self._cleaned_and_shared(half, turned)]
+            for half, turned in zip(self._renderer.halves_of_all(), (False, True), strict=True)
         )
         return first, second

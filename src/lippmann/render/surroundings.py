@@ -21,6 +21,7 @@ import math
 from dataclasses import dataclass
 
 from lippmann.display import Display
+from lippmann.render.denoise import NETWORK_STEP
 from lippmann.render.settings import RenderSettings
 from lippmann.store.grid import Window
 
@@ -30,8 +31,6 @@ LENSES, SHARED_LENSES = 4, 2
 LEAST_POOLED = 48
 #: Pixels around a tile that is denoised.
 DENOISER_REACH = 64
-#: Windows that are denoised begin at multiples of so many pixels.
-NETWORK_STEP = 16
 
 
 @dataclass(frozen=True)
