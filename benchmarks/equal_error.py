@@ -30,7 +30,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from harness import save, saved
+from harness import kept, save, saved
 
 Picture = NDArray[np.float32]
 
@@ -73,13 +73,13 @@ class Stage:
 def main() -> None:
     results = saved("equal_error").get("results", {})
     words = argparse.ArgumentParser(description=__doc__)
-    words.add_argument("--references")
+    words.add_argument("--references", type=Path)
     given, scenes = asked(words)
     for name, displays in scenes:
         for display in displays:
-            kept = given.references and Path(given.references) / f"{display}-{name}.npy"
-            results.setdefault(display, {})[name] = _measure(prepare(name, display), kept)
-            summary = {kind: _summary(scenes) for kind, scenes in results.items()}
+            file = given.references and given.references / f"{display}-{name}-{REFERENCE}.npz"
+            results.setdefault(display, {})[name] = _measure(prepare(name, display), file)
+            summary = {kind: _summary(measured) for kind, measured in results.items()}
             save("equal_error", {"reference_spp": 2 * REFERENCE, "results": results, "summary": summary})
 
 
@@ -122,8 +122,8 @@ def prepare(name: str, display_name: str) -> Stage:
     return Stage(built, integrator, source, display, at.display_from_world, settings)
 
 
-def _measure(stage: Stage, kept: Path | None) -> dict[str, Any]:
-    judge = Judge(stage, kept)
+def _measure(stage: Stage, references: Path | None) -> dict[str, Any]:
+    judge = Judge(stage, references)
     curves: dict[str, list[Point]] = {"full": [], "full + oidn": [], "pooled": [], "pooled in cells": []}
     for samples in SAMPLES:
         traced, picture = timed(lambda samples=samples: _trace(stage, samples, 3))
@@ -187,11 +187,12 @@ def once(call: Callable[[], T]) -> tuple[float, T]:
 class Judge:
     """Squared errors by two references that know nothing of each other."""
 
-    def __init__(self, stage: Stage, kept: Path | None = None) -> None:
+    def __init__(self, stage: Stage, file: Path | None) -> None:
         from lippmann.quality.metrics import micro_image_means
 
         self._display, self._means = stage.display, micro_image_means
-        self._references = [coded(picture) for picture in _references(stage, kept)]
+        found = kept(file, lambda: {"pictures": [_trace(stage, REFERENCE, seed) for seed in (1001, 2002)]})
+        self._references = [coded(picture) for picture in found["pictures"]]
         own = ((self._references[0] - self._references[1]) ** 2).mean() / 2
         #: PSNR of a single reference.
         self.own_psnr = _psnr(own)
@@ -211,17 +212,6 @@ def coded(picture: Picture) -> NDArray[np.float64]:
 
 def _psnr(error: float) -> float:
     return -10 * math.log10(max(error, 1e-9))
-
-
-def _references(stage: Stage, kept: Path | None) -> NDArray[np.float32]:
-    """Two pictures, linear; as they lie in the file ``kept`` if it is there."""
-    if kept is not None and kept.exists():
-        return np.asarray(np.load(kept))
-    references = np.stack([_trace(stage, REFERENCE, seed) for seed in (1001, 2002)])
-    if kept is not None:
-        kept.parent.mkdir(parents=True, exist_ok=True)
-        np.save(kept, references)
-    return references
 
 
 def _trace(stage: Stage, samples: int, seed: int) -> Picture:

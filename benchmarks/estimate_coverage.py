@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hard_scenes import HARD_SCENES
-from harness import save, saved
+from harness import kept, save, saved
 
 PIXEL = 0.25
 PANEL = 64
@@ -69,7 +69,7 @@ def displays() -> dict[str, Any]:
 class Case:
     """A scene before a display, with its long render, which ``kept`` holds for the next time."""
 
-    def __init__(self, scene: str, display: Any, seconds: float, kept: Path | None) -> None:
+    def __init__(self, scene: str, display: Any, seconds: float, folder: Path | None) -> None:
         from lippmann.api import load_scene
         from lippmann.render.integrators.path import PathIntegrator
         from lippmann.render.rays import DisplayRays
@@ -81,14 +81,9 @@ class Case:
         self.display = display
         self.integrator = PathIntegrator(self.built.mitsuba, make_traits(self.built.mitsuba, has_null=False), 8)
         self.source = DisplayRays(display, self.world_from_display)
-        file = None if kept is None else kept / f"{scene}-{display.name}.npz"
-        if file is not None and file.exists():
-            found = np.load(file)
-            self.reference, self.reference_samples = found["parts"], int(found["samples"])
-        else:
-            self.reference, self.reference_samples = self._long(seconds)
-            if file is not None:
-                np.savez(file, parts=self.reference, samples=self.reference_samples)
+        file = folder and folder / f"{scene}-{display.name}.npz"
+        found = kept(file, lambda: dict(zip(("parts", "samples"), self._long(seconds), strict=True)))
+        self.reference, self.reference_samples = found["parts"], int(found["samples"])
 
     def _long(self, seconds: float) -> tuple[NDArray[np.float64], int]:
         from lippmann.render.full import trace_frame

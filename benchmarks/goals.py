@@ -35,7 +35,7 @@ def main() -> None:
     for name, displays in scenes:
         for display in displays:
             results.setdefault(display, {})[name] = _measured(prepare(name, display))
-            summary = {kind: _summary(scenes) for kind, scenes in results.items()}
+            summary = {kind: _summary(measured) for kind, measured in results.items()}
             save("goals", {"most_samples": MOST_SAMPLES, "results": results, "summary": summary})
 
 

@@ -17,7 +17,21 @@ from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 RESULTS = Path(__file__).parent / "results"
+
+
+def kept(file: Path | None, make: Callable[[], dict[str, Any]]) -> dict[str, Any]:
+    """Named arrays that take long to make: those in ``file`` if it is there; else they are made, and kept there."""
+    if file is not None and file.exists():
+        with np.load(file) as found:
+            return dict(found)
+    made = make()
+    if file is not None:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        np.savez(file, **made)
+    return made
 
 
 def interleaved(
