@@ -191,6 +191,67 @@ def test_rays_are_counted():
     assert (rays.primary, rays.shadow, rays.secondary, rays.discarded) == (256, 256, 256, 0)
 
 
+def four_lamps():
+    """A grey floor under four lamps of which each lights a part of it best."""
+    import mitsuba as mi
+
+    transform = mi.ScalarTransform4f
+    lamps = {
+        f"lamp{i}": {
+            "type": "sphere",
+            "center": [x, y, 0.5],
+            "radius": 0.05,
+            "emitter": {"type": "area", "radiance": {"type": "rgb", "value": [40.0, 30.0, 20.0]}},
+        }
+        for i, (x, y) in enumerate([(-2, -2), (2, -2), (-2, 2), (2, 2)])
+    }
+    floor = {"type": "rectangle", "to_world": transform().scale(3), "bsdf": {"type": "diffuse", "reflectance": 0.5}}
+    return {"type": "scene", "floor": floor} | lamps
+
+
+def test_first_samples_draw_several_lamps_each(monkeypatch):
+    from lippmann.render.integrators import path
+
+    def noise():
+        runs = np.stack([trace(four_lamps(), camera(4, 50), 16, 1, 1, seed).pixels for seed in range(8)])
+        return runs.var(axis=0, ddof=1).mean(), runs.mean()
+
+    several, mean = noise()
+    rays = trace(four_lamps(), camera(4, 50), 16, 1, 1).rays
+    monkeypatch.setattr(path, "FIRST_LAMPS", 1)
+    one, same_mean = noise()
+    fewer = trace(four_lamps(), camera(4, 50), 16, 1, 1).rays
+    assert (rays.shadow, fewer.shadow) == (4 * 256, 256)
+    # One of four by chance has three times its mean's square for variance; all four in turn leave the lamps' own edges.
+    assert several < 0.05 * one
+    assert mean == pytest.approx(same_mean, rel=0.02)
+
+
+def test_later_surfaces_draw_one_lamp():
+    """Inside a hollow ball every surface sees the lamp, but for scattered rays that meet the lamp itself."""
+    paint = {"type": "twosided", "bsdf": {"type": "diffuse", "reflectance": 0.5}}
+    lamp = {"type": "sphere", "center": [0, 0.5, 0], "radius": 0.02, "emitter": {"type": "area", "radiance": 5.0}}
+    scene = {"type": "scene", "ball": {"type": "sphere", "bsdf": paint}, "lamp": lamp}
+    rays = trace(scene, camera(0.9, 20), 16, 1, 2).rays
+    assert rays.primary == 256
+    assert 0.98 * (4 + 1) * 256 < rays.shadow <= (4 + 1) * 256
+
+
+def test_lamps_of_all_samples_are_one_stratified_sequence():
+    import drjit as dr
+    import mitsuba as mi
+
+    from lippmann.render.integrators.path import lamps_at_first
+    from lippmann.render.sampling import SampleStream
+
+    count, first = (np.array(part) for part in lamps_at_first(dr.arange(mi.UInt32, 12)))
+    assert count.tolist() == [4] * 4 + [2] * 8
+    assert np.array_equal(first, np.cumsum(count) - count)
+    stream = SampleStream.of_pixels(mi.UInt32(3), mi.UInt32(5), mi.UInt32(1))
+    drawn = np.array(stream.at(dr.arange(mi.UInt32, 32)).next_2d(1)[0])
+    assert sorted(np.floor(drawn * 32)) == list(range(32))
+
+
 def test_tiles_and_passes_do_not_change_the_picture():
     import mitsuba as mi
 

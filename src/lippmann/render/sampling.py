@@ -57,6 +57,10 @@ class SampleStream:
         """Streams for linear pixel numbers ``pixel`` and sample numbers ``index`` (UInt32), under one ``seed``."""
         return SampleStream(hash32(pixel ^ hash32(seed ^ mi.UInt32(0x9E3779B9))), mi.UInt32(index))
 
+    def at(self, index: Any) -> SampleStream:
+        """The same pixels' points of the samples with the numbers ``index`` (UInt32)."""
+        return SampleStream(self.key, index)
+
     def _shuffled(self, dimension: Any) -> tuple[Any, Any]:
         seed = hash32(self.key + mi.UInt32(dimension) * 0x9E3779B9)
         return dr.brev(_permute_low_to_high(dr.brev(self.index), seed)), seed

@@ -24,6 +24,9 @@ from lippmann.render.traits import SceneTraits
 MAX_CROSSINGS = 64
 #: Sample dimensions used at one vertex.
 DIMENSIONS_PER_VERTEX = 4
+#: Lamps drawn at the first surface of a path that they can light: many for a pixel's first samples, which know little
+#: else, and fewer for those that follow. Powers of two, so that the points of all samples together stay stratified.
+FIRST_LAMPS, LATER_LAMPS, FIRST_SAMPLES = 4, 2, 4
 
 
 def mis_weight(pdf_a: Any, pdf_b: Any) -> Any:
@@ -31,6 +34,17 @@ def mis_weight(pdf_a: Any, pdf_b: Any) -> Any:
     a2, b2 = dr.square(pdf_a), dr.square(pdf_b)
     weight = a2 / (a2 + b2)
     return dr.select(dr.isfinite(weight), weight, 0)
+
+
+def lamps_at_first(sample: Any) -> tuple[Any, Any]:
+    """How many lamps sample number ``sample`` (UInt32) draws where its path is first lit, and the first one's number.
+
+    Numbers count on from sample to sample: they are places in one sequence of points.
+    """
+    early = sample < FIRST_SAMPLES
+    before = FIRST_LAMPS * FIRST_SAMPLES
+    first = dr.select(early, FIRST_LAMPS * sample, before + LATER_LAMPS * (sample - FIRST_SAMPLES))
+    return dr.select(early, mi.UInt32(FIRST_LAMPS), LATER_LAMPS), first
 
 
 class PathIntegrator:
@@ -57,6 +71,9 @@ class PathIntegrator:
         self.depth = depth
         self.roulette_depth = roulette_depth
         self.name = name
+        emitters = scene.emitters()
+        # A single point of light is always drawn alike.
+        self._all_alike = len(emitters) == 1 and bool(mi.has_flag(emitters[0].flags(), mi.EmitterFlags.Delta))
 
     def sample(self, ray: Any, stream: SampleStream, active: Any) -> tuple[Any, RayCounts]:
         """Radiance along ``ray`` and the rays it took."""
@@ -83,6 +100,9 @@ class PathIntegrator:
         vertex = dr.zeros(mi.Interaction3f)  # last scattering vertex, for the density of emitter sampling there
         vertex_pdf = mi.Float(1)
         vertex_delta = mi.Bool(True)
+        vertex_lamps = mi.UInt32(1)  # lamps that were drawn there
+        unlit = mi.Bool(True)  # no surface has drawn lamps yet
+        lamps_at_start, start = lamps_at_first(stream.index)
 
         pi = scene.ray_intersect_preliminary(ray, coherent=True, active=active)
         distance_of_first = mi.Float(pi.t)
@@ -102,7 +122,8 @@ class PathIntegrator:
 
             # ---- emission ----
             ds = mi.DirectionSample3f(scene, si=si, ref=vertex)
-            weight = mis_weight(vertex_pdf, scene.pdf_emitter_direction(vertex, ds, ~vertex_delta))
+            drawn_pdf = scene.pdf_emitter_direction(vertex, ds, ~vertex_delta) * mi.Float(vertex_lamps)
+            weight = mis_weight(vertex_pdf, drawn_pdf)
             emission = ds.emitter.eval(si) * weight
             if dr.hint(background is not None, mode="scalar"):
                 emission = dr.select((depth == 0) & ~si.is_valid(), mi.Spectrum(background), emission)
@@ -111,21 +132,28 @@ class PathIntegrator:
             # ---- light sampled at this vertex ----
             going_on = si.is_valid() & (depth < self.depth)
             dimension = (depth * 2 + crossings) * DIMENSIONS_PER_VERTEX + 1
-            lit = going_on & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
-            ds, light = scene.sample_emitter_direction(si, stream.next_2d(dimension), False, lit)
-            lit &= (ds.pdf != 0) & (dr.max(light) > 0)
-            wo = si.to_local(ds.d)
-            value, pdf, bs, bsdf_weight = bsdf.eval_pdf_sample(
-                context, si, wo, stream.next_1d(dimension + 1), stream.next_2d(dimension + 2), going_on
-            )
-            weight = dr.select(ds.delta, 1, mis_weight(ds.pdf, pdf))
-            contribution = throughput * value * light * weight
-            lit &= dr.max(contribution) > 0
-            visible, tests = self.visibility(si, ds, lit)
-            radiance += dr.select(lit, contribution * visible, 0)
-            shadow += tests
+            drawing = going_on & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
+            lamps, number = mi.UInt32(1), mi.UInt32(stream.index)
+            if dr.hint(not self._all_alike, mode="scalar"):
+                lamps, number = dr.select(unlit, lamps_at_start, lamps), dr.select(unlit, start, number)
+            last = number + lamps
+            while dr.hint(drawing, label="lamps"):
+                ds, light = scene.sample_emitter_direction(si, stream.at(number).next_2d(dimension), False, drawing)
+                lit = drawing & (ds.pdf != 0) & (dr.max(light) > 0)
+                value, pdf = bsdf.eval_pdf(context, si, si.to_local(ds.d), lit)
+                weight = dr.select(ds.delta, 1, mis_weight(ds.pdf * mi.Float(lamps), pdf))
+                contribution = throughput * value * light * (weight / mi.Float(lamps))
+                lit &= dr.max(contribution) > 0
+                visible, tests = self.visibility(si, ds, lit)
+                radiance += dr.select(lit, contribution * visible, 0)
+                shadow += tests
+                number += 1
+                drawing &= number != last
 
             # ---- the next direction ----
+            bs, bsdf_weight = bsdf.sample(
+                context, si, stream.next_1d(dimension + 1), stream.next_2d(dimension + 2), going_on
+            )
             passes = mi.has_flag(bs.sampled_type, mi.BSDFFlags.Null)
             throughput *= bsdf_weight
             eta *= bs.eta
@@ -138,6 +166,8 @@ class PathIntegrator:
                 vertex = mi.Interaction3f(si)
                 vertex_pdf = bs.pdf
                 vertex_delta = mi.has_flag(bs.sampled_type, mi.BSDFFlags.Delta)
+                vertex_lamps = lamps
+                unlit &= ~mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
                 depth += 1
             else:
                 crossings += 1
