@@ -317,7 +317,8 @@ def _traced(stage: Stage, source: Any, samples: int) -> Picture:
     from lippmann.render.settings import RenderSettings
 
     settings = RenderSettings(integrator="path", depth=DEPTH)
-    integrator = make_integrator(build_for(stage.scene, settings), settings, stage.placement.display_from_world)
+    built = build_for(stage.scene, settings)
+    integrator = make_integrator(built, settings, stage.placement.display_from_world, source)
     plan = make_plan(source.width, source.height, samples, channels=source.channels, memory=2 << 30)
     return trace_frame(integrator, source, plan, seed=2).pixels
 

@@ -117,8 +117,8 @@ def prepare(name: str, display_name: str) -> Stage:
     display = whole if rows is None else whole.resized(whole.panel.width, rows)
     settings = RenderSettings(integrator="path")
     built = build_for(scene, settings)
-    integrator = make_integrator(built, settings, at.display_from_world)
     source = DisplayRays(display, at.world_from_display)
+    integrator = make_integrator(built, settings, at.display_from_world, source)
     return Stage(built, integrator, source, display, at.display_from_world, settings)
 
 

@@ -49,7 +49,7 @@ def main() -> None:
     for name, shown in (("large", display), ("small", optics.resized(*SMALL))):
         at = place(scene.bounds, shown, cameras=scene.cameras, home_camera=scene.home_camera)
         source = DisplayRays(shown, at.world_from_display)
-        integrator = make_integrator(built, RenderSettings(spp=SPP), at.display_from_world)
+        integrator = make_integrator(built, RenderSettings(spp=SPP), at.display_from_world, source)
         frames[name] = (integrator, source, make_plan(source.width, source.height, SPP, memory=MEMORY))
 
     for seed in range(5):

@@ -78,8 +78,8 @@ def _measure(name: str, reference: int) -> tuple[dict[str, Any], list[Picture]]:
     scene = lippmann.load_scene(SCENES[name])
     at = place(scene.bounds, whole, cameras=scene.cameras, home_camera=scene.home_camera, bounds_in=scene.bounds_in)
     settings = RenderSettings(integrator="path")
-    integrator = make_integrator(build_for(scene, settings), settings, at.display_from_world)
     direct = DisplayRays(display, at.world_from_display, subpixels=True)
+    integrator = make_integrator(build_for(scene, settings), settings, at.display_from_world, direct)
     cameras = QuiltRays(display, at.world_from_display, COLUMNS, ROWS, VIEW)
 
     def traced(source: Any, samples: int, seed: int) -> tuple[Picture, float]:

@@ -25,7 +25,7 @@ def integrator(engine):
     from lippmann.render.settings import RenderSettings
 
     settings = RenderSettings(integrator="direct")
-    return make_integrator(build_for(lippmann.load_scene("teapot"), settings), settings, np.eye(4))
+    return make_integrator(build_for(lippmann.load_scene("teapot"), settings), settings, np.eye(4), rays())
 
 
 def rays(window=None, display=SHEET):

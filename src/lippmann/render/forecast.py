@@ -136,7 +136,8 @@ def forecast(
     source = whole if window is None else WindowRays(whole, window)
     probe = _Probe(source, settings.seed)
     samples = source.width * source.height * channels * settings.samples
-    found = probe.trace(make_integrator(built, settings, at.display_from_world), settings, limit, progress)
+    integrator = make_integrator(built, settings, at.display_from_world, whole)
+    found = probe.trace(integrator, settings, limit, progress)
     seconds = {
         "load": watch.seconds["load"],
         "build": watch.seconds["build"],

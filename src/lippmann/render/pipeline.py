@@ -102,7 +102,7 @@ def render_integral_image(
     from lippmann.render.rays import DisplayRays, WindowRays
 
     source = DisplayRays(display, placement.world_from_display, settings.subpixels)
-    integrator = make_integrator(built, settings, placement.display_from_world)
+    integrator = make_integrator(built, settings, placement.display_from_world, source)
     window = traced_window(built, display, settings, placement)
     job = Job(
         built,
@@ -262,8 +262,9 @@ def render_preview(
 
     from lippmann.render.full import trace_frame
 
-    integrator = make_integrator(built, settings, np.linalg.inv(np.asarray(pose.world_from_camera, dtype=np.float64)))
     source = _camera_rays(scene, settings, pose, size)
+    camera_from_world = np.linalg.inv(np.asarray(pose.world_from_camera, dtype=np.float64))
+    integrator = make_integrator(built, settings, camera_from_world, source)
     frame = trace_frame(
         integrator, source, plan, seed=settings.seed, box_filter=settings.pixel_filter == "box", progress=progress
     )
@@ -284,13 +285,21 @@ def _camera_rays(scene: Scene, settings: RenderSettings, pose: Camera, size: tup
 
 
 def make_integrator(
-    built: BuiltScene | BuiltClassic, settings: RenderSettings, display_from_world: NDArray[np.float64]
+    built: BuiltScene | BuiltClassic,
+    settings: RenderSettings,
+    display_from_world: NDArray[np.float64],
+    source: RaySource,
 ) -> Any:
-    """The integrator that ``settings`` name, for a built scene."""
+    """The integrator that ``settings`` name, for a built scene.
+
+    The scene's lamps are drawn by the light that they shed on the whole picture, whose rays are ``source``: those who
+    render parts of one picture must give the same.
+    """
     from lippmann.render.classic.build import BuiltClassic
     from lippmann.render.integrators.classic import ClassicIntegrator
     from lippmann.render.integrators.path import PathIntegrator
     from lippmann.render.integrators.surface import SurfaceIntegrator, SurfaceProperty
+    from lippmann.render.lamps import weigh_lamps
     from lippmann.render.traits import make_traits
 
     if isinstance(built, BuiltClassic):
@@ -299,7 +308,10 @@ def make_integrator(
         traits = make_traits(
             built.mitsuba, background=built.background, has_null=built.has_null, absorption=built.absorption
         )
-        return PathIntegrator(built.mitsuba, traits, settings.surfaces, name=settings.integrator)
+        integrator = PathIntegrator(built.mitsuba, traits, settings.surfaces, name=settings.integrator)
+        if not built.borrowed:
+            weigh_lamps(integrator, source)
+        return integrator
     return SurfaceIntegrator(built.mitsuba, cast(SurfaceProperty, settings.integrator), display_from_world)
 
 

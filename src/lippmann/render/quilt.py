@@ -103,7 +103,7 @@ def render_quilt(
     traced = trace(
         Job(
             built,
-            make_integrator(built, settings, placement.display_from_world),
+            make_integrator(built, settings, placement.display_from_world, source),
             source,
             settings,
             placement.display_from_world,

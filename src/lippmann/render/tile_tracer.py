@@ -101,8 +101,8 @@ def prepare(job: TileJob, progress: ProgressCallback = silent) -> Prepared:
             home_camera=scene.home_camera,
             bounds_in=scene.bounds_in,
         )
-    integrator = make_integrator(built, settings, placement.display_from_world)
     source = DisplayRays(job.display, placement.world_from_display, settings.subpixels)
+    integrator = make_integrator(built, settings, placement.display_from_world, source)
     return Prepared(
         job,
         built,

@@ -53,6 +53,11 @@ class MitsubaSource:
             self._loaded[variant] = self._load(variant)
         return self._loaded[variant]
 
+    @property
+    def is_borrowed(self) -> bool:
+        """Whether the scene was loaded by whoever passed it here, and stays theirs."""
+        return not isinstance(self.content, Path | Mapping)
+
     def bounds(self) -> NDArray[np.float64]:
         """Lowest and highest corner ``(2, 3)`` of the box around all shapes.
 
@@ -79,7 +84,7 @@ class MitsubaSource:
     def _load(self, variant: str) -> Any:
         import mitsuba as mi
 
-        if not isinstance(self.content, Path | Mapping):
+        if self.is_borrowed:
             if self.content.variant_name() != variant:
                 raise SceneError(
                     f"the Mitsuba scene was loaded under '{self.content.variant_name()}'",

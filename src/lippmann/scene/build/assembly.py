@@ -38,6 +38,8 @@ class BuiltScene:
         shape in ``mitsuba.shapes()``.
     has_null:
         Whether some surface lets rays straight through: a cut-out, a blended surface, a thin pane.
+    borrowed:
+        Whether the ``mi.Scene`` is the caller's own, which nothing may change.
     notes:
         What could not be honoured, one line each.
     seconds:
@@ -51,6 +53,7 @@ class BuiltScene:
     has_null: bool
     notes: tuple[str, ...]
     seconds: Mapping[str, float]
+    borrowed: bool = False
 
 
 def build(scene: Scene, engine: engines.Engine | None = None) -> BuiltScene:
@@ -116,7 +119,7 @@ def _build_source(source: MitsubaSource, scene: Scene) -> BuiltScene:
     surfaces = [shape.bsdf() for shape in loaded.shapes()]
     # Shapes inside instanced groups are out of sight: they count as letting rays through, which only costs time.
     has_null = any(surface is None or _is_null(surface) for surface in surfaces)
-    return BuiltScene(loaded, scene.background, {}, has_null, (), seconds)
+    return BuiltScene(loaded, scene.background, {}, has_null, (), seconds, source.is_borrowed)
 
 
 @contextmanager
