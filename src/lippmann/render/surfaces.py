@@ -130,7 +130,8 @@ class PhysicalSurfaces:
                 glow = dr.select((steps == 0) & ~hit, mi.Color3f(self._background), glow)
             found = dr.clip(tint * (_albedo(si, bsdf, hit) + glow), 0, 1)
 
-            bs, weight = _likeliest(si, bsdf, hit)
+            may_show = mi.has_flag(bsdf.flags(), mi.BSDFFlags.Delta) | mi.has_flag(bsdf.flags(), mi.BSDFFlags.Null)
+            bs, weight = _likeliest(si, bsdf, hit & may_show)
             shows = mi.has_flag(bs.sampled_type, mi.BSDFFlags.Delta) | mi.has_flag(bs.sampled_type, mi.BSDFFlags.Null)
             goes_on = hit & shows & (steps < MOST_FOLLOWED) & (dr.max(weight) > 0)
             albedo = dr.select(active & ~goes_on, found, albedo)
