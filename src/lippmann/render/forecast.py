@@ -136,7 +136,7 @@ def forecast(
     source = whole if window is None else WindowRays(whole, window)
     probe = _Probe(source, settings.seed)
     samples = source.width * source.height * channels * settings.samples
-    integrator = make_integrator(built, settings, at.display_from_world, whole)
+    integrator = watch.stage("build", lambda: make_integrator(built, settings, at.display_from_world, whole))
     found = probe.trace(integrator, settings, limit, progress)
     seconds = {
         "load": watch.seconds["load"],

@@ -102,7 +102,7 @@ def render_integral_image(
     from lippmann.render.rays import DisplayRays, WindowRays
 
     source = DisplayRays(display, placement.world_from_display, settings.subpixels)
-    integrator = make_integrator(built, settings, placement.display_from_world, source)
+    integrator = watch.stage("build", lambda: make_integrator(built, settings, placement.display_from_world, source))
     window = traced_window(built, display, settings, placement)
     job = Job(
         built,
@@ -264,7 +264,7 @@ def render_preview(
 
     source = _camera_rays(scene, settings, pose, size)
     camera_from_world = np.linalg.inv(np.asarray(pose.world_from_camera, dtype=np.float64))
-    integrator = make_integrator(built, settings, camera_from_world, source)
+    integrator = watch.stage("build", lambda: make_integrator(built, settings, camera_from_world, source))
     frame = trace_frame(
         integrator, source, plan, seed=settings.seed, box_filter=settings.pixel_filter == "box", progress=progress
     )

@@ -100,10 +100,11 @@ def render_quilt(
     if background is not None and isinstance(built, BuiltScene):
         window = view_window(scene_corners(built, placement.display_from_world), display, view_size)
     source = QuiltRays(display, placement.world_from_display, columns, rows, view_size, window)
+    integrator = watch.stage("build", lambda: make_integrator(built, settings, placement.display_from_world, source))
     traced = trace(
         Job(
             built,
-            make_integrator(built, settings, placement.display_from_world, source),
+            integrator,
             source,
             settings,
             placement.display_from_world,
