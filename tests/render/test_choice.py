@@ -6,7 +6,7 @@ import pytest
 
 from lippmann.render import choice
 from lippmann.render.choice import decide
-from lippmann.render.effort import HIGH_FROM, denoising_cost, effort_of
+from lippmann.render.effort import HIGH_FROM, denoising_cost, effort_of, traced_work
 from lippmann.render.settings import RenderSettings
 
 
@@ -85,3 +85,8 @@ def test_effort_follows_the_rays_unless_it_is_named():
     assert [effort_of(name, 1e6) for name in ("oidn-fast", "oidn-high")] == ["fast", "high"]
     assert effort_of("oidn-high", 0) == "high"
     assert denoising_cost("fast") < denoising_cost("high") < HIGH_FROM
+
+
+def test_shadow_rays_are_less_work_than_those_that_are_shaded():
+    assert traced_work(4, 0, 6) == 10
+    assert traced_work(4, 0, 6) < traced_work(4, 6, 6) < traced_work(4, 0, 12)

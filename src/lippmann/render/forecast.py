@@ -258,13 +258,13 @@ def _denoise_seconds(
     memory: int,
 ) -> float:
     from lippmann.render.denoise import load_denoiser
-    from lippmann.render.effort import effort_of
+    from lippmann.render.effort import effort_of, traced_work
     from lippmann.render.guided import GuidedDenoiser
     from lippmann.render.rays import SubpixelRays
 
     load_denoiser()
     traced = SubpixelRays(source) if settings.keeps_colors(source.display) else source
-    rays_per_pixel = traced.channels * settings.samples * (1 + sum(found.rays.values()))
+    rays_per_pixel = traced.channels * settings.samples * traced_work(1, found.rays["shadow"], found.rays["secondary"])
     denoiser = GuidedDenoiser(
         built,
         traced,

@@ -16,7 +16,7 @@ from lippmann.render.batches import FullInBatches, trace_in_batches
 from lippmann.render.contest import DENOISED_SLOPE, Contest
 from lippmann.render.denoised import Denoised
 from lippmann.render.denoised_estimate import DenoisedEstimator
-from lippmann.render.effort import effort_of, look_cost
+from lippmann.render.effort import effort_of, look_cost, traced_work
 from lippmann.render.estimate import ERROR_LAYER, Estimate, Parts, PictureEstimator, why_no_estimate
 from lippmann.render.full import Frame, RayTotals, trace_frame
 from lippmann.render.goal import Goal, Outcome, goal_of, reach_judged
@@ -269,7 +269,7 @@ def _denoised_way(job: Job, goal: Goal, batches: FullInBatches, rays: Callable[[
 
 
 def _rays_per_pixel(job: Job, rays: RayTotals) -> float:
-    return (rays.primary + rays.shadow + rays.secondary) / (job.traced.width * job.traced.height)
+    return traced_work(rays.primary, rays.shadow, rays.secondary) / (job.traced.width * job.traced.height)
 
 
 def _estimator(job: Job, kind: type[PictureEstimator] = PictureEstimator) -> PictureEstimator:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.render.denoise import Effort
-from lippmann.render.effort import effort_of
+from lippmann.render.effort import effort_of, traced_work
 from lippmann.render.full import trace_frame
 from lippmann.render.plan import make_plan
 from lippmann.render.rays import DisplayRays
@@ -62,7 +62,7 @@ def survey(integrator: Any, source: DisplayRays, settings: RenderSettings) -> Tr
     samples = min(settings.samples, SAMPLES) if box else 1
     plan = make_plan(few.width, few.height, samples, channels=few.channels, memory=MEMORY)
     frame = trace_frame(integrator, few, plan, seed=settings.seed, box_filter=box)
-    rays = frame.rays.primary + frame.rays.shadow + frame.rays.secondary
+    rays = traced_work(frame.rays.primary, frame.rays.shadow, frame.rays.secondary)
     # What is denoised: pixels, or sub-pixels.
     places = few.width * few.height * (3 if settings.keeps_colors(source.display) else 1)
     effort = effort_of(settings.denoise, rays / places * settings.samples / samples)
