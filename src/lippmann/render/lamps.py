@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.render.full import PIXEL_DIMENSION
-from lippmann.render.integrators.path import DIMENSIONS_PER_VERTEX, PathIntegrator, mis_weight
+from lippmann.render.integrators.path import DIMENSIONS_PER_VERTEX, PathIntegrator
 from lippmann.render.rays import RaySource
 from lippmann.render.sampling import SampleStream
 
@@ -97,14 +97,8 @@ def _squares_along(integrator: PathIntegrator, ray: Any, stream: SampleStream, l
         point = stream.next_2d(dimension)
         point.x = (mi.Float(lamp) + point.x) / lamps
         lit = active & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
-        ds, light = scene.sample_emitter_direction(si, point, False, lit)
-        lit &= (ds.pdf != 0) & (dr.max(light) > 0)
-        value, pdf = bsdf.eval_pdf(context, si, si.to_local(ds.d), lit)
-        weight = dr.select(ds.delta, 1, mis_weight(ds.pdf, pdf))
-        found = throughput * value * light * (weight / lamps)
-        lit &= dr.max(found) > 0
-        visible, _ = integrator.visibility(si, ds, lit)
-        squares += dr.select(lit, dr.square(dr.minimum(dr.mean(found * visible), 1)), 0)
+        light, _ = integrator.drawn_light(si, bsdf, point, lit)
+        squares += dr.square(dr.minimum(dr.mean(throughput * light / lamps), 1))
 
         bs, weight = bsdf.sample(context, si, stream.next_1d(dimension + 1), stream.next_2d(dimension + 2), active)
         throughput *= weight

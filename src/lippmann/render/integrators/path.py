@@ -138,14 +138,9 @@ class PathIntegrator:
                 lamps, number = dr.select(unlit, lamps_at_start, lamps), dr.select(unlit, start, number)
             last = number + lamps
             while dr.hint(drawing, label="lamps"):
-                ds, light = scene.sample_emitter_direction(si, stream.at(number).next_2d(dimension), False, drawing)
-                lit = drawing & (ds.pdf != 0) & (dr.max(light) > 0)
-                value, pdf = bsdf.eval_pdf(context, si, si.to_local(ds.d), lit)
-                weight = dr.select(ds.delta, 1, mis_weight(ds.pdf * mi.Float(lamps), pdf))
-                contribution = throughput * value * light * (weight / mi.Float(lamps))
-                lit &= dr.max(contribution) > 0
-                visible, tests = self.visibility(si, ds, lit)
-                radiance += dr.select(lit, contribution * visible, 0)
+                point = stream.at(number).next_2d(dimension)
+                light, tests = self.drawn_light(si, bsdf, point, drawing, draws=mi.Float(lamps))
+                radiance += throughput * light / mi.Float(lamps)
                 shadow += tests
                 number += 1
                 drawing &= number != last
@@ -184,6 +179,20 @@ class PathIntegrator:
             secondary += dr.select(active, mi.UInt32(1), mi.UInt32(0))
 
         return radiance, RayCounts(secondary, shadow), FirstHit(distance_of_first, view_dependent)
+
+    def drawn_light(self, si: Any, bsdf: Any, point: Any, active: Any, draws: Any = 1) -> tuple[Any, Any]:
+        """Light of the lamp that ``point`` draws, as the surface sends it on to ``si.wi``, and the rays it took.
+
+        It is divided by the draw's density and weighed against scattered rays that find the lamp, as one of ``draws``.
+        """
+        ds, light = self.scene.sample_emitter_direction(si, point, False, active)
+        lit = active & (ds.pdf != 0) & (dr.max(light) > 0)
+        value, pdf = bsdf.eval_pdf(mi.BSDFContext(), si, si.to_local(ds.d), lit)
+        weight = dr.select(ds.delta, 1, mis_weight(ds.pdf * draws, pdf))
+        found = value * light * weight
+        lit &= dr.max(found) > 0
+        visible, tests = self.visibility(si, ds, lit)
+        return dr.select(lit, found * visible, 0), tests
 
     @dr.syntax
     def visibility(self, si: Any, ds: Any, active: Any) -> tuple[Any, Any]:
