@@ -128,6 +128,24 @@ def test_lamps_that_nobody_sees_are_drawn_alike():
     assert weigh_lamps(integrator, source) == pytest.approx(np.full(3, 1 / 3))
 
 
+def test_paths_without_a_value_do_not_count(monkeypatch):
+    from lippmann.render import lamps
+
+    integrator, source = stage(room())
+    whole = lamps.weigh_lamps(integrator, source)
+    along = lamps._squares_along
+
+    def some_lost(*given):
+        import drjit as dr
+        import mitsuba as mi
+
+        found = along(*given)
+        return dr.select(dr.arange(mi.UInt32, dr.width(found)) % 64 == 0, dr.nan, found)
+
+    monkeypatch.setattr(lamps, "_squares_along", some_lost)
+    assert lamps.weigh_lamps(integrator, source) == pytest.approx(whole, rel=0.05)
+
+
 def test_one_lamp_or_very_many_are_left_alone(monkeypatch):
     from lippmann.render import lamps
 

@@ -74,7 +74,9 @@ def _second_moments(integrator: PathIntegrator, source: RaySource, lamps: int) -
     jitter = mi.Point2f(x - mi.Float(column), y - mi.Float(row))
     ray = source.rays(column, row, mi.UInt32(0), jitter)
     found = _squares_along(integrator, ray, stream, lamp, dr.opaque(mi.Float, lamps))
-    means: NDArray[np.float64] = np.array(found, dtype=np.float64).reshape(lamps, paths).mean(axis=1)
+    # A path may meet what has no value, such as a normal of no length: there it has found nothing.
+    squares = np.nan_to_num(np.array(found, dtype=np.float64), nan=0.0)
+    means: NDArray[np.float64] = squares.reshape(lamps, paths).mean(axis=1)
     return means
 
 
