@@ -155,8 +155,10 @@ def _gather_pixel(
             share[k] = 0.0
         if share[k] > 0.0 and doubted >> k & 1:
             return False
-        total += share[k]
-        mean += share[k] * depth[k]
+        # What no source gave is no number, perhaps: even nothing of it would count.
+        if share[k] > 0.0:
+            total += share[k]
+            mean += share[k] * depth[k]
     mean /= total
     limit = probed_limit(points, field, row, column, gathering)
     if limit != 0.0 and nearer(limit, mean) and not alike(limit, mean, ONE_PROBED_SURFACE):
