@@ -44,6 +44,7 @@ QUALITIES = {
 }
 #: Samples per pixel at which a quality is given up.
 MOST = 1024
+DEPTH = 8
 MEMORY = 2**31
 THREADS = 2
 
@@ -67,20 +68,22 @@ def displays() -> dict[str, Any]:
 
 
 class Case:
-    """A scene before a display, with its long render, which ``kept`` holds for the next time."""
+    """A scene before a display, with its long render, which a file in ``folder`` keeps for the next time."""
 
     def __init__(self, scene: str, display: Any, seconds: float, folder: Path | None) -> None:
         from lippmann.api import load_scene
-        from lippmann.render.integrators.path import PathIntegrator
+        from lippmann.render.pipeline import make_integrator
         from lippmann.render.rays import DisplayRays
-        from lippmann.render.traits import make_traits
+        from lippmann.render.settings import RenderSettings
         from lippmann.scene.build import build
 
         self.built = build(load_scene(HARD_SCENES[scene]()))
         self.world_from_display = np.diag([2 / display.size_mm[0]] * 3 + [1.0])
         self.display = display
-        self.integrator = PathIntegrator(self.built.mitsuba, make_traits(self.built.mitsuba, has_null=False), 8)
         self.source = DisplayRays(display, self.world_from_display)
+        settings = RenderSettings(depth=DEPTH)
+        display_from_world = np.linalg.inv(self.world_from_display)
+        self.integrator = make_integrator(self.built, settings, display_from_world, self.source)
         file = folder and folder / f"{scene}-{display.name}.npz"
         found = kept(file, lambda: dict(zip(("parts", "samples"), self._long(seconds), strict=True)))
         self.reference, self.reference_samples = found["parts"], int(found["samples"])
@@ -105,7 +108,7 @@ class Case:
         from lippmann.render.settings import RenderSettings
 
         method, denoise = WAYS[way]
-        settings = RenderSettings(method=method, denoise=denoise, seed=seed, **asked)
+        settings = RenderSettings(method=method, denoise=denoise, seed=seed, depth=DEPTH, **asked)
         display_from_world = np.linalg.inv(self.world_from_display)
         return trace(
             Job(self.built, self.integrator, self.source, settings, display_from_world, "srgb", MEMORY, THREADS)

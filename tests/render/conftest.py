@@ -37,11 +37,11 @@ class JudgedScene:
         scale = self.display.size_mm[0] / 2
         return lippmann.render(self.scene, self.display, place="display", scale=scale, seed=seed, **options)
 
-    def picture(self, samples, method="full", denoise="none"):
+    def picture(self, samples, method="full", denoise="none", seed=7):
         """Made once."""
-        key = samples, method, denoise
+        key = samples, method, denoise, seed
         if key not in self.pictures:
-            self.pictures[key] = self.render(spp=samples, method=method, denoise=denoise)
+            self.pictures[key] = self.render(spp=samples, method=method, denoise=denoise, seed=seed)
         return self.pictures[key]
 
     @property

@@ -29,6 +29,8 @@ DISPLAYS = {
 }
 SAMPLES = (4, 16, 64)
 REFERENCE = 512
+# Of the few pixels that mirrors in a small picture take, one seed's error is off by a fifth.
+SEEDS = (7, 12, 13)
 
 
 def rgb(*values):
@@ -113,8 +115,8 @@ def made(judged_scene):
     return lambda name, scene, kind: judged_scene(name, lippmann.load_scene(scene), DISPLAYS[kind], REFERENCE)
 
 
-def pooled(case, samples):
-    return case.picture(samples, "pooled", "oidn")
+def pooled(case, samples, seed=7):
+    return case.picture(samples, "pooled", "oidn", seed)
 
 
 @pytest.fixture(scope="module", params=list(SCENES))
@@ -124,9 +126,10 @@ def case(request, made):
 
 
 def test_the_error_falls_with_samples_and_the_mean_comes_right(case):
-    few, some, many = (case.errors(pooled(case, samples))[0] for samples in SAMPLES)
+    few, some, many = (np.mean([case.errors(pooled(case, samples, seed))[0] for seed in SEEDS]) for samples in SAMPLES)
     assert some < 0.8 * few
-    assert many < 0.6 * some
+    # In mirrors each time four times the samples halve the error, the more so the better few are: 0.51 over ten seeds.
+    assert many < (0.55 if case.name == "mirror" else 0.5) * some
     # Light that few paths find is missing at first, and never made up.
     assert abs(case.bias(pooled(case, 4))) < 0.06
     assert abs(case.bias(pooled(case, 64))) < 0.015
@@ -239,16 +242,8 @@ def test_a_promised_quality_is_reached_by_the_whole_command(tmp_path, small, cap
     assert json.loads(capfd.readouterr().out)["micro_images"]["worst"]["psnr"] >= 33
 
 
-LITTLE_TO_SEE = """<scene version="3.0.0">
-    <emitter type="constant"/>
-    <shape type="sphere"><point name="center" x="-1" y="0" z="0"/><float name="radius" value="0.1"/></shape>
-    <shape type="sphere"><point name="center" x="1" y="0" z="0"/><float name="radius" value="0.1"/></shape>
-</scene>"""
-
-
 def test_a_quality_that_samples_reach_by_themselves_takes_no_pooling(tmp_path, small, capfd):
-    (tmp_path / "balls.xml").write_text(LITTLE_TO_SEE)
-    words = ("render", tmp_path / "balls.xml", "--display", small, "--json")
+    words = ("render", "tree", "--integrator", "path", "--display", small, "--json")
     pictures = {}
     for name, more in (("pooled", ()), ("full", ()), ("obeyed", ("--denoise", "oidn-fast"))):
         method = "full" if name == "full" else "pooled"
