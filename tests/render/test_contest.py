@@ -49,7 +49,7 @@ class Picture:
 
 
 class Sooner(PictureEstimator):
-    fewest = 8
+    first = fewest = 8
 
 
 def run(
@@ -91,12 +91,20 @@ def test_pooled_light_is_believed_sooner():
 
 
 def test_plain_samples_are_not_believed_as_soon_as_pooled_light():
-    """They would be there with 8; what 16 cost is set against pooling."""
-    contest, outcome, clean = run(Goal(quality_mean=25), plain=1e-3, denoised=1e-3, rays=0.5)
+    """They are there with 8; what 16 cost is set against pooling."""
+    contest, outcome, clean = run(Goal(quality_mean=25), plain=0.02, denoised=1e-3, rays=0.5)
     assert (contest.leader, outcome.end, outcome.samples) == ("plain", "quality", PictureEstimator.fewest)
     assert clean.looks == 0
-    dear, outcome, _ = run(Goal(quality_mean=25), plain=1e-3, denoised=1e-3, rays=30.0)
+    dear, outcome, _ = run(Goal(quality_mean=25), plain=0.02, denoised=1e-3, rays=30.0)
     assert (dear.leader, outcome.samples) == ("pooled", Sooner.fewest)
+
+
+def test_a_few_plain_samples_end_it_where_they_are_far_better():
+    """Nobody looks at pooled light, whatever samples take."""
+    for rays in (0.5, 300.0):
+        contest, outcome, clean = run(Goal(quality_mean=25), plain=1e-3, denoised=1e-3, rays=rays)
+        assert (contest.leader, outcome.end, outcome.samples) == ("plain", "quality", PictureEstimator.first)
+        assert clean.looks == 0
 
 
 def test_plain_samples_win_where_the_quality_is_near():

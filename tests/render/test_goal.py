@@ -58,7 +58,7 @@ def test_the_quality_is_reached_without_wasting_samples(slope):
 
 
 class Sooner(PictureEstimator):
-    fewest = 4
+    first = fewest = 4
 
 
 @pytest.mark.parametrize(("dear_until", "first"), [(0, 4), (5, 8), (100, 8)])
@@ -140,14 +140,22 @@ def test_a_renderer_that_stops_getting_better_is_not_followed_for_ever():
     assert outcome.end == "samples"
 
 
-def test_a_few_samples_are_not_believed():
-    class Lucky(Noise):
-        def squared_error(self):
-            return PixelErrors(np.full((64, 64), 1e-9, np.float32), None, OWN_NOISE)
+@pytest.mark.parametrize(("seems", "samples"), [(30.5, 16), (33.0, 16), (35.5, 8), (37.0, 8), (38.5, 4), (90.0, 4)])
+def test_a_few_samples_are_believed_where_they_are_far_better_than_what_is_asked_for(seems, samples):
+    class Still(Noise):
+        """It does not get better."""
 
-    outcome = run(Goal(quality=30, max_time=100.0), Lucky())
-    assert outcome.end == "quality"
-    assert outcome.samples >= PictureEstimator.fewest
+        def squared_error(self):
+            return PixelErrors(np.full((64, 64), 10 ** (-seems / 10), np.float32), None, OWN_NOISE)
+
+    outcome = run(Goal(quality_mean=30), Still())
+    assert (outcome.end, outcome.samples) == ("quality", samples)
+    assert len(outcome.rounds) <= 3
+
+
+def test_no_look_is_lost_on_a_picture_that_will_not_be_believed():
+    outcome = run(Goal(quality_mean=30, spp=1000), Noise(error=0.5))
+    assert [each.samples for each in outcome.rounds][:2] == [4, PictureEstimator.fewest]
 
 
 def test_reports_climb_to_the_end_and_say_where_the_picture_stands():

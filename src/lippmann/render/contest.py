@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from lippmann.render.effort import look_cost
-from lippmann.render.goal import LEAST_GROWTH, Goal
+from lippmann.render.goal import LEAST_GROWTH, Goal, believed_from
 from lippmann.render.judging import Judgement, Track
 
 Way = Literal["plain", "pooled"]
@@ -66,20 +66,32 @@ class Contest:
         return "pooled" if self._leading is self._pooled else "plain"
 
     @property
+    def first(self) -> int:
+        """The leader's; at first that of plain samples, which are looked at for little."""
+        return (self._leading or self._plain).first
+
+    @property
     def fewest(self) -> int:
         """The leader's; at first that of pooled light, which is believed sooner."""
         return (self._leading or self._pooled).fewest
 
+    def margin(self, samples: int) -> float:
+        """The leader's; at first that of plain samples."""
+        return (self._leading or self._plain).margin(samples)
+
     def judge(self, samples: int, room: float) -> Judgement:
         """The leader's judgement; the pooled picture is looked at only while it may win."""
         plain = self._plain.judge(samples)
-        if samples < self._closed_to and not self._is_last_chance(plain, room):
+        if samples < self._closed_to and not self._is_last_chance(plain, samples, room):
             return plain
         rays = self._rays_per_pixel()
         look = look_cost(rays)
-        outlook = self._outlook(plain, rays, room, least=self._plain.fewest / samples)
+        least = believed_from(self._goal, plain, samples, self._plain)
+        outlook = self._outlook(plain, rays, room, least=least / samples)
         if not outlook.misses and outlook.value <= look:
             self._lead(self._plain, "the quality is within reach of plain samples for less than pooling takes")
+            return plain
+        if self._goal.has_quality and samples < self._pooled.first and room > 1:
             return plain
         pooled = self._pooled.judge(samples)
         there = self._goal.has_quality and self._goal.missing(pooled.estimate) <= 0
@@ -98,9 +110,10 @@ class Contest:
         """What the next judgement will take, as far as that is known."""
         return self._plain.seconds() + (self._pooled.seconds() if self._closed_to < math.inf else 0.0)
 
-    def _is_last_chance(self, plain: Judgement, room: float) -> bool:
+    def _is_last_chance(self, plain: Judgement, samples: int, room: float) -> bool:
         """No more samples may be taken, and plain ones are not there: the better picture is wanted, whichever it is."""
-        return self._goal.max_time is None and room <= 1 and self._goal.missing(plain.estimate) > 0
+        missing = self._goal.missing(plain.estimate) + self._plain.margin(samples)
+        return self._goal.max_time is None and room <= 1 and missing > 0
 
     def _lead(self, track: Track, why: str) -> None:
         self._leading, self.why = track, why

@@ -61,7 +61,7 @@ class DenoisedEstimator(PictureEstimator):
     """Estimates for denoised pictures; their errors carry those of the samples, and what the halves differ by."""
 
     #: With these intervals are honest on scenes that are hard to judge.
-    fewest = 4
+    first = fewest = 4
 
     def estimate(self, errors: PixelErrors) -> Estimate:
         """PSNR of the whole and of the worst micro-image."""

@@ -1,7 +1,8 @@
 """Rendering until a picture is good enough: rounds of samples, each judged by the picture's own estimate.
 
 A round is as large as the estimates so far say that it must be, but never more than a few times what has gone before:
-early estimates are rough, and what is overshot is lost. All micro-images get the same samples: one that seems good
+early estimates are rough, and what is overshot is lost. What few samples say ends it only where it is far better than
+what is asked for, as of a plain scene. All micro-images get the same samples: one that seems good
 already may only not have met the light that few paths find, and would stay wrong.
 """
 
@@ -201,6 +202,20 @@ def reach_judged(
     return _Climb(goal, add, judge, progress, clock, probe).run()
 
 
+def believed_from(goal: Goal, judged: Judgement, samples: int, judge: Judge) -> int:
+    """With how many samples ``judge`` will be believed of a picture that was ``judged`` after ``samples``.
+
+    That many, or doubled until the picture should be better than ``goal`` by the margin, or samples are enough anyway.
+    """
+    needed = samples
+    while needed < judge.fewest:
+        gained = 10 * judged.slope * math.log10(needed / samples)
+        if goal.missing(judged.estimate) + judge.margin(needed) <= gained:
+            break
+        needed *= 2
+    return needed
+
+
 @dataclass
 class _Climb:
     """One rendering on its way; ``spent`` is in samples per pixel, ``rate`` what of them a second brings."""
@@ -228,13 +243,13 @@ class _Climb:
                 return Outcome("time", None, self.spent, (), None)
             if self.spent < FEWEST:
                 self._take(FEWEST - self.spent)
-            self._take_up_to(self.judge.fewest)
+            self._take_up_to(self.judge.first)
             judged = self.judge.judge(self.spent, self._room())
             self._slope = judged.slope
             self.rounds.append(Round(self.spent, self._seconds(), judged.estimate))
             end = self._end(judged.estimate)
             if end is None:
-                samples = self._next_round(judged.estimate)
+                samples = self._next_round(judged)
                 end = "time" if samples < 1 else None
             if end is not None:
                 return self._outcome(end, judged)
@@ -258,7 +273,8 @@ class _Climb:
         return self.clock() - self._began
 
     def _end(self, estimate: Estimate) -> End | None:
-        if self.goal.has_quality and self.goal.missing(estimate) <= 0 and self.spent >= self.judge.fewest:
+        short = self.goal.missing(estimate) + self.judge.margin(self.spent)
+        if self.goal.has_quality and short <= 0 and self.spent >= self.judge.first:
             return "quality"
         if self.goal.max_time is not None and self._seconds() >= self.goal.max_time:
             return "time"
@@ -266,16 +282,20 @@ class _Climb:
 
     def _first_round(self) -> int:
         if self.goal.max_time is None:
-            return min(self._most, self.judge.fewest) if self.goal.has_quality else self._most
+            return min(self._most, self.judge.first) if self.goal.has_quality else self._most
         if self.probe is None:
             return min(self._most, FEWEST)
         self.rate = 1 / max(self.probe(), 1e-9)
         # A picture has one sample of every pixel at least, whatever the time.
         return min(self._most, self.judge.fewest, max(1, self._affordable()))
 
-    def _next_round(self, estimate: Estimate) -> int:
+    def _next_round(self, judged: Judgement) -> int:
         """Samples of the next round; fewer than one if there is no time for any."""
-        wanted = max(self.spent * self._growth(estimate), self.judge.fewest)
+        if self.goal.has_quality and self.spent < self.judge.fewest:
+            # What is not believed yet says little of how far the goal is.
+            wanted = float(believed_from(self.goal, judged, self.spent, self.judge))
+        else:
+            wanted = self.spent * self._growth(judged.estimate)
         total = max(STEP * round(wanted / STEP), STEP * (self.spent // STEP + 1))
         samples = min(total, self._most) - self.spent
         return samples if self.goal.max_time is None else min(samples, self._affordable())

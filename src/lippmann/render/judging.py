@@ -30,11 +30,20 @@ class Judge(Protocol):
     """Says after every round how good the picture is."""
 
     @property
-    def fewest(self) -> int:
-        """Samples of a pixel with fewer of which its word is not to be believed, or not worth what it takes.
+    def first(self) -> int:
+        """Samples of a pixel with fewer of which its word tells nothing, or is not worth what it takes.
 
         That may come to be known only when there are some.
         """
+        ...
+
+    @property
+    def fewest(self) -> int:
+        """Samples of a pixel with fewer of which its word is believed only beyond :meth:`margin`."""
+        ...
+
+    def margin(self, samples: int) -> float:
+        """By how many dB a picture of ``samples`` must seem better than what is asked for, to be believed."""
         ...
 
     def judge(self, samples: int, room: float) -> Judgement:
@@ -83,9 +92,18 @@ class Track:
         self._rounds: list[tuple[int, Estimate]] = []
 
     @property
-    def fewest(self) -> int:
+    def first(self) -> int:
         """As the estimator says; twice as many while judging is dear, as it may have to be done again."""
-        return self._estimator.fewest * (2 if self._dear() else 1)
+        return self._estimator.first * (2 if self._dear() else 1)
+
+    @property
+    def fewest(self) -> int:
+        """As the estimator says, but at least the first."""
+        return max(self._estimator.fewest, self.first)
+
+    def margin(self, samples: int) -> float:
+        """As the estimator says."""
+        return self._estimator.margin(samples)
 
     def judge(self, samples: int, room: float = 1.0) -> Judgement:
         """See :class:`Judge`; whatever room there is, this is the picture."""
