@@ -134,7 +134,7 @@ def test_without_subpixels(write):
         ("512", "0", 7, "width is 0"),
         ("256", "-3", 8, "height is -3"),
         ("256", "2.5", 8, "height is 2.5"),
-        ('"96 dpi"', '"0 dpi"', 9, "pixel_pitch is 0.0"),
+        ('"96 dpi"', '"0 dpi"', 9, "'0 dpi' is no length; dpi must be above zero"),
         (
             '"96 dpi"',
             '"96 lpi"',
@@ -143,7 +143,7 @@ def test_without_subpixels(write):
         ),
         ('"bgr"', '"rgbw"', 10, "subpixel_offsets is 'rgbw'"),
         ('"lenticular"', '"lentil"', 13, "the layouts are lenticular, square, hexagonal"),
-        ('"12 lpi"', '"-12 lpi"', 14, "pitch is -2.1"),
+        ('"12 lpi"', '"-12 lpi"', 14, "'-12 lpi' is no length; lpi must be above zero"),
         ('"12 lpi"', '"600 px"', 14, "a lens covers 6"),
         ("slant", "slnat", 15, "unknown key 'slnat'"),
         ("slant = 5", "slant = 80", 15, "slant is 80"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping
 
@@ -49,7 +50,7 @@ def length(
     Raises
     ------
     DisplayError
-        If the text is no length, or its unit is unknown.
+        If the text is no length, its unit is unknown, or a count per inch is not above zero.
     """
     match = _QUANTITY.fullmatch(text.strip())
     if match is None:
@@ -59,7 +60,10 @@ def length(
     if found in scales:
         return amount * scales[found]
     if found in per_inch:
-        return INCH / amount if amount else 0.0
+        apart = INCH / amount if amount > 0 else 0.0
+        if not 0 < apart < math.inf:
+            raise DisplayError(f"{text!r} is no length", where=key, rule=f"{found} must be above zero")
+        return apart
     raise _unknown(text, found, key, [*scales, *per_inch])
 
 
