@@ -3,7 +3,8 @@
 Each case is a scene, a display, a way of making the picture (plain, denoised, pooled), a number of samples and a seed;
 the truth is a long render. Counted are the cases in which the stated 95 % interval holds the true PSNR, of the picture
 and of its worst micro-image (wanted: 90 %), and in which a quality asked for is kept by the true worst micro-image to
-within 1 dB (wanted: 95 %). Ways that are not rendered anew keep the results that they have.
+within 1 dB (wanted: 95 %). How far off the estimates of very few plain samples are, is what their margins rest on.
+Ways that are not rendered anew keep the results that they have.
 
 A reference has noise of its own. It is made in parts that know nothing of each other, and the true squared error is
 taken as the mean product of the picture's differences to two of them, from which their noise cancels.
@@ -29,6 +30,9 @@ PANEL = 64
 REFERENCE_PARTS = 2
 SAMPLES = (8, 32, 128)
 SEEDS = (1, 2)
+#: So few samples that more is asked of plain pictures, and their seeds.
+FEW_SAMPLES = (4, 8)
+FEW_SEEDS = range(301, 309)
 #: Ways of making pictures, each as a method and what takes the noise out.
 WAYS = {"plain": ("full", "none"), "denoised": ("full", "oidn"), "pooled": ("pooled", "oidn")}
 #: What is asked for, in dB: so little that the first look may do, then more; within reach of plain samples, and 8 dB or
@@ -159,6 +163,13 @@ def promised(case: Case, way: str, qualities: tuple[int, ...]) -> Iterator[dict[
             yield {"quality": quality, "seed": seed, "end": end} | found | {"kept": kept}
 
 
+def few(case: Case) -> Iterator[dict[str, Any]]:
+    """What plain pictures of very few samples say of themselves, beside the truth."""
+    for samples in FEW_SAMPLES:
+        for seed in FEW_SEEDS:
+            yield {"seed": seed} | case.beside_the_truth(case.trace("plain", seed, spp=samples))
+
+
 def main() -> None:
     options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     options.add_argument("--seconds", type=float, default=60.0, help="of the processors, for each reference")
@@ -178,6 +189,7 @@ def main() -> None:
         part: [{"way": "plain"} | one for one in before.get(part, []) if one.get("way", "plain") not in chosen.ways]
         for part in ("cases", "promises")
     }
+    of_few: list[dict[str, Any]] = [] if "plain" in chosen.ways else before["few"]["cases"]
     for place in range(chosen.displays):
         for number, scene in enumerate(chosen.scenes):
             name = list(kinds)[(number + place) % len(kinds)]
@@ -186,14 +198,31 @@ def main() -> None:
                 head = {"way": way, "scene": scene, "display": name, "reference_samples": case.reference_samples}
                 found["cases"] += [head | one for one in stated(case, way)]
                 found["promises"] += [head | one for one in promised(case, way, QUALITIES[scene])]
+            if "plain" in chosen.ways:
+                head = {"scene": scene, "display": name, "reference_samples": case.reference_samples}
+                of_few += [head | one for one in few(case)]
             # After every case: it takes long, and what is known stands by itself.
-            save("estimate_coverage", {"summary": summaries(**found), **found})
+            about_few = {"summary": summary_of_few(of_few), "cases": of_few}
+            save("estimate_coverage", {"summary": summaries(**found), **found, "few": about_few})
 
 
 def summaries(cases: list[dict[str, Any]], promises: list[dict[str, Any]]) -> dict[str, Any]:
     """The summary of each way that has results."""
     of = {way: [[one for one in part if one["way"] == way] for part in (cases, promises)] for way in WAYS}
     return {way: summary(*parts) for way, parts in of.items() if all(parts)}
+
+
+def summary_of_few(cases: list[dict[str, Any]]) -> dict[str, Any]:
+    """By the number of samples: the most by which estimates were too good, in dB, and the margin."""
+    from lippmann.render.estimate import PictureEstimator
+
+    estimator = PictureEstimator(displays()["square"])
+    found: dict[str, Any] = {}
+    for samples in FEW_SAMPLES:
+        some = [one for one in cases if one["samples"] == samples]
+        too_good = {key: max(one["stated"][key] - one[key] for one in some) for key in ("psnr", "worst")}
+        found[str(samples)] = too_good | {"margin": estimator.margin(samples), "pictures": len(some)}
+    return found
 
 
 def summary(cases: list[dict[str, Any]], promises: list[dict[str, Any]]) -> dict[str, Any]:

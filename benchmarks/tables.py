@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import equal_error_tables
+import estimate_coverage_tables
 import goals_tables
 from harness import RESULTS
 
@@ -242,33 +243,6 @@ micro-images. [Reusing points](reuse.md) says what the ways mean."""
     return "\n\n".join(parts) + "\n"
 
 
-def _estimate_coverage(result: dict[str, Any]) -> str:
-    found = result["summary"]
-    targets = next(iter(found.values()))["targets"]
-    rows = [
-        ("true PSNR inside the stated interval", "psnr_inside"),
-        ("true worst micro-image inside its interval", "worst_inside"),
-        ("promises (`--quality`) kept to within 1 dB", "promises_kept"),
-    ]
-    lines = [
-        f"| {text} | {' | '.join(f'{one[key]:.1%}' for one in found.values())} | {targets[key]:.0%} |"
-        for text, key in rows
-    ]
-    for text, key in (("PSNR", "psnr"), ("worst micro-image", "worst")):
-        middles = (f"{one[f'{key}_stated_minus_true']:+.2f} dB" for one in found.values())
-        lines.append(f"| median of stated less true {text} | {' | '.join(middles)} | |")
-    for text, key in (("pictures", "cases"), ("promises", "promises"), ("of these reached", "promises_reached")):
-        lines.append(f"| {text} | {' | '.join(str(one[key]) for one in found.values())} | |")
-    head = f"""## Stated intervals against the truth (`estimate_coverage.py`)
-
-Scenes that are hard to judge on four lens layouts, 8 to 128 samples per pixel. *Denoised* is `full` with Open Image
-Denoise, *pooled* shares its light as well.
-
-| | {" | ".join(found)} | target |
-|---|{"---|" * len(found)}---|"""
-    return "\n".join([head, *lines]) + "\n"
-
-
 QUILTS_PAGE = Path(__file__).parent.parent / "docs" / "looking-glass.md"
 QUILTS_PAGE_TABLES = {"weave": _weave_with_picture, "cycles": _cycles_rows}
 
@@ -387,7 +361,7 @@ SECTIONS = {
     "methods": _methods,
     "equal_error": equal_error_tables.describe,
     "goals": goals_tables.describe,
-    "estimate_coverage": _estimate_coverage,
+    "estimate_coverage": estimate_coverage_tables.describe,
     "reuse": _reuse,
     "weave": _weave,
     "cycles": _cycles,
