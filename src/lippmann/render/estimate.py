@@ -97,7 +97,7 @@ MODEL_UNCERTAINTY = 0.08
 #: By how much more than what lone hits show the error may be: measured where they are most of it.
 LONE_DOUBT = 0.8
 #: In dB, for half the samples of which estimates are believed. On scenes that are hard to judge, those of 4 were up to
-#: 7.2 dB too good, those of 8 up to 3.6.
+#: 6.7 dB too good, those of 8 up to 3.6.
 MARGIN_OF_HALF = 4.0
 #: Micro-images that may be the worst are drawn this many times.
 DRAWS = 2000
