@@ -1,9 +1,9 @@
 """Rendering until a picture is good enough: rounds of samples, each judged by the picture's own estimate.
 
 A round is as large as the estimates so far say that it must be, but never more than a few times what has gone before:
-early estimates are rough, and what is overshot is lost. What few samples say ends it only where it is far better than
-what is asked for, as of a plain scene. All micro-images get the same samples: one that seems good
-already may only not have met the light that few paths find, and would stay wrong.
+early estimates are rough, and what is overshot is lost. Very few samples end it only where they seem far better than
+what is asked for, as those of a plain scene do. All micro-images get the same samples: one that seems good already may
+only not have met the light that few paths find, and would stay wrong.
 """
 
 from __future__ import annotations
@@ -295,7 +295,7 @@ class _Climb:
             # What is not believed yet says little of how far the goal is.
             wanted = float(believed_from(self.goal, judged, self.spent, self.judge))
         else:
-            wanted = self.spent * self._growth(judged.estimate)
+            wanted = max(self.spent * self._growth(judged.estimate), self.judge.fewest)
         total = max(STEP * round(wanted / STEP), STEP * (self.spent // STEP + 1))
         samples = min(total, self._most) - self.spent
         return samples if self.goal.max_time is None else min(samples, self._affordable())
