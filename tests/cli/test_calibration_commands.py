@@ -99,7 +99,7 @@ def test_what_an_eye_sees_of_the_pattern(lippmann, monitor_file, tmp_path):
         (("stripes",), "--display"),
         (("stripes", "-d", "mla-square"), "mla-square has square lenses"),
         (("stripes", "-d", "monitor"), "monitor: size: size is missing"),
-        (("stripes", "-d", SHORT.replace("7.1", "0")), "monitor: pitch: pitch is '0'; it must be above zero"),
+        (("stripes", "-d", SHORT.replace("7.1", "0")), "monitor: pitch: '0' is no length; lpi must be above zero"),
         (("stripes", "-d", SHORT.replace("-4.7", "0")), "slope is 0; it must be at least 0.18"),
         (("stripes", "-d", SHORT, "--slope", "0"), "slope is 0"),
         (("stripes", "-d", SHORT, "--pitch", "-1"), "pitch is -1"),
