@@ -203,16 +203,8 @@ def render(
             sequences.render_frames(scene, output, wanted, console, load=load, runner=runner, **files, **asked)
         return
     _check_layers(layers, format_for(output, bits)[0], output)
-    if on_cluster or tiled.is_tiled(
-        output,
-        bits,
-        target,
-        resume=resume,
-        memory=asked["memory"],
-        method=method,
-        denoise=denoise,
-        subpixels=subpixels,
-    ):
+    sizing = {name: asked[name] for name in ("method", "denoise", "subpixels", "memory")}
+    if on_cluster or tiled.is_tiled(output, bits, target, resume=resume, **sizing):
         _check_whole({"--maps": maps, "--marks": margin})
         with on_cluster.runner(console, threads) as runner:
             tiled.render_tiled(scene, output, console, bits=bits, resume=resume, load=load, runner=runner, **asked)

@@ -40,29 +40,21 @@ _PLACEMENT = {
 _WHOLE = {"order": "--order", "respect_gloss": "--respect-gloss"}
 
 
-def is_tiled(
-    output: Path,
-    bits: int | None,
-    display: Display,
-    *,
-    resume: bool,
-    memory: int | None,
-    method: str = "full",
-    denoise: str = "none",
-    subpixels: bool = False,
-) -> bool:
-    """Whether a picture has to be rendered in tiles: where that is asked for, or is the only way."""
+def is_tiled(output: Path, bits: int | None, display: Display, *, resume: bool, **asked: Any) -> bool:
+    """Whether a picture has to be rendered in tiles: where that is asked for, or is the only way.
+
+    ``asked``: method, denoise, subpixels and memory, as those of :class:`~lippmann.render.settings.RenderSettings`.
+    """
     from lippmann.image.formats import format_for
     from lippmann.render.pipeline import default_memory
+    from lippmann.render.settings import RenderSettings
     from lippmann.render.tiled_picture import fits_whole
 
     name, _ = format_for(output, bits)
     if resume or name == "zarr":
         return True
-    with_neighbours = method == "pooled" or denoise.startswith("oidn")
-    limit = memory or default_memory()
-    in_color = subpixels and with_neighbours and display.lens_array.layout == "lenticular"
-    return name == "tiff" and not fits_whole(display, limit, with_neighbours=with_neighbours, subpixels=in_color)
+    settings = RenderSettings(**asked)
+    return name == "tiff" and not fits_whole(display, settings, settings.memory or default_memory())
 
 
 @contextmanager

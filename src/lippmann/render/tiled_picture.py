@@ -322,14 +322,15 @@ def _is_streamed(job: TileJob, name: FormatName) -> bool:
     return name == "zarr" or (name == "tiff" and job.grid.width * job.grid.height >= tiff.TILED_FROM)
 
 
-def fits_whole(display: Display, memory: int, *, with_neighbours: bool = False, subpixels: bool = False) -> bool:
+def fits_whole(display: Display, settings: RenderSettings, memory: int) -> bool:
     """Whether a picture can be rendered in one piece within so many bytes; see :func:`lippmann.render.plan.make_plan`.
 
-    Beside its own pixels that takes their errors and the codes of its file. ``with_neighbours``: it is pooled or
-    denoised; ``subpixels``: so are sub-pixels, each with all colours.
+    Beside its own pixels that takes their errors and the codes of its file; more where it is pooled or denoised, and
+    thrice as much where so are sub-pixels that keep all colours.
     """
+    with_neighbours = settings.method == "pooled" or settings.denoises
     per_pixel = _WHOLE_BYTES_WITH_NEIGHBOURS if with_neighbours else _WHOLE_BYTES_PER_PIXEL
-    per_pixel *= 3 if subpixels else 1
+    per_pixel *= 3 if with_neighbours and settings.keeps_colors(display) else 1
     return display.panel.width * display.panel.height * per_pixel <= memory
 
 
