@@ -86,8 +86,8 @@ class Case:
         self.display = display
         self.source = DisplayRays(display, self.world_from_display)
         settings = RenderSettings(depth=DEPTH)
-        display_from_world = np.linalg.inv(self.world_from_display)
-        self.integrator = make_integrator(self.built, settings, display_from_world, self.source)
+        self.display_from_world = np.linalg.inv(self.world_from_display)
+        self.integrator = make_integrator(self.built, settings, self.display_from_world, self.source)
         file = folder and folder / f"{scene}-{display.name}.npz"
         found = kept(file, lambda: dict(zip(("parts", "samples"), self._long(seconds), strict=True)))
         self.reference, self.reference_samples = found["parts"], int(found["samples"])
@@ -113,10 +113,8 @@ class Case:
 
         method, denoise = WAYS[way]
         settings = RenderSettings(method=method, denoise=denoise, seed=seed, depth=DEPTH, **asked)
-        display_from_world = np.linalg.inv(self.world_from_display)
-        return trace(
-            Job(self.built, self.integrator, self.source, settings, display_from_world, "srgb", MEMORY, THREADS)
-        )
+        job = Job(self.built, self.integrator, self.source, settings, self.display_from_world, "srgb", MEMORY, THREADS)
+        return trace(job)
 
     def truth(self, picture: NDArray[np.float32]) -> tuple[float, float]:
         """True PSNR of a picture and of its worst micro-image."""
@@ -184,23 +182,21 @@ def main() -> None:
     engine.start("cpu", THREADS)
     kinds = displays()
     before = saved("estimate_coverage")
-    # Older results are those of plain pictures.
     found: dict[str, list[dict[str, Any]]] = {
-        part: [{"way": "plain"} | one for one in before.get(part, []) if one.get("way", "plain") not in chosen.ways]
-        for part in ("cases", "promises")
+        part: [one for one in before.get(part, []) if one["way"] not in chosen.ways] for part in ("cases", "promises")
     }
     of_few: list[dict[str, Any]] = [] if "plain" in chosen.ways else before["few"]["cases"]
     for place in range(chosen.displays):
         for number, scene in enumerate(chosen.scenes):
             name = list(kinds)[(number + place) % len(kinds)]
             case = Case(scene, kinds[name], chosen.seconds, chosen.references)
+            told = {"scene": scene, "display": name, "reference_samples": case.reference_samples}
             for way in chosen.ways:
-                head = {"way": way, "scene": scene, "display": name, "reference_samples": case.reference_samples}
+                head = {"way": way, **told}
                 found["cases"] += [head | one for one in stated(case, way)]
                 found["promises"] += [head | one for one in promised(case, way, QUALITIES[scene])]
             if "plain" in chosen.ways:
-                head = {"scene": scene, "display": name, "reference_samples": case.reference_samples}
-                of_few += [head | one for one in few(case)]
+                of_few += [told | one for one in few(case)]
             # After every case: it takes long, and what is known stands by itself.
             about_few = {"summary": summary_of_few(of_few), "cases": of_few}
             save("estimate_coverage", {"summary": summaries(**found), **found, "few": about_few})
@@ -216,12 +212,11 @@ def summary_of_few(cases: list[dict[str, Any]]) -> dict[str, Any]:
     """By the number of samples: the most by which estimates were too good, in dB, and the margin."""
     from lippmann.render.estimate import PictureEstimator
 
-    estimator = PictureEstimator(displays()["square"])
     found: dict[str, Any] = {}
     for samples in FEW_SAMPLES:
         some = [one for one in cases if one["samples"] == samples]
         too_good = {key: max(one["stated"][key] - one[key] for one in some) for key in ("psnr", "worst")}
-        found[str(samples)] = too_good | {"margin": estimator.margin(samples), "pictures": len(some)}
+        found[str(samples)] = too_good | {"margin": PictureEstimator.margin(samples), "pictures": len(some)}
     return found
 
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from lippmann.render.effort import look_cost
-from lippmann.render.goal import LEAST_GROWTH, Goal, believed_from
+from lippmann.render.goal import LEAST_GROWTH, Goal, believed_from, short_of_belief
 from lippmann.render.judging import Judgement, Track
 
 Way = Literal["plain", "pooled"]
@@ -112,8 +112,8 @@ class Contest:
 
     def _is_last_chance(self, plain: Judgement, samples: int, room: float) -> bool:
         """No more samples may be taken, and plain ones are not there: the better picture is wanted, whichever it is."""
-        missing = self._goal.missing(plain.estimate) + self._plain.margin(samples)
-        return self._goal.max_time is None and room <= 1 and missing > 0
+        short = short_of_belief(self._goal, plain.estimate, samples, self._plain)
+        return self._goal.max_time is None and room <= 1 and short > 0
 
     def _lead(self, track: Track, why: str) -> None:
         self._leading, self.why = track, why

@@ -163,9 +163,10 @@ class PictureEstimator:
         self._owner = parts.owner.ravel()
         self._pixels = np.bincount(self._owner, minlength=parts.rows * parts.columns) + parts.known
 
-    def margin(self, samples: int) -> float:
+    @classmethod
+    def margin(cls, samples: int) -> float:
         """By how many dB the estimate of a picture of ``samples`` must be better than what is asked for."""
-        return MARGIN_OF_HALF * max(0.0, math.log2(self.fewest / samples))
+        return MARGIN_OF_HALF * max(0.0, math.log2(cls.fewest / samples))
 
     def estimate(self, errors: PixelErrors) -> Estimate:
         """PSNR of the whole and of the worst micro-image."""

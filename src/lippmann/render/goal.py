@@ -202,6 +202,11 @@ def reach_judged(
     return _Climb(goal, add, judge, progress, clock, probe).run()
 
 
+def short_of_belief(goal: Goal, estimate: Estimate, samples: int, judge: Judge) -> float:
+    """How many dB ``estimate`` is short of what ``judge`` must say of so many samples to be believed of ``goal``."""
+    return goal.missing(estimate) + judge.margin(samples)
+
+
 def believed_from(goal: Goal, judged: Judgement, samples: int, judge: Judge) -> int:
     """With how many samples ``judge`` will be believed of a picture that was ``judged`` after ``samples``.
 
@@ -210,7 +215,7 @@ def believed_from(goal: Goal, judged: Judgement, samples: int, judge: Judge) -> 
     needed = samples
     while needed < judge.fewest:
         gained = 10 * judged.slope * math.log10(needed / samples)
-        if goal.missing(judged.estimate) + judge.margin(needed) <= gained:
+        if short_of_belief(goal, judged.estimate, needed, judge) <= gained:
             break
         needed *= 2
     return needed
@@ -273,7 +278,7 @@ class _Climb:
         return self.clock() - self._began
 
     def _end(self, estimate: Estimate) -> End | None:
-        short = self.goal.missing(estimate) + self.judge.margin(self.spent)
+        short = short_of_belief(self.goal, estimate, self.spent, self.judge)
         if self.goal.has_quality and short <= 0 and self.spent >= self.judge.first:
             return "quality"
         if self.goal.max_time is not None and self._seconds() >= self.goal.max_time:

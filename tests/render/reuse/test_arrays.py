@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import FunctionType, SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -187,22 +189,10 @@ def test_probes_come_to_every_row_and_column():
 def test_what_memory_held_before_counts_for_nothing(flat_tracer, sheet, monkeypatch):
     """Depths that no source gives are not set; they may be no numbers."""
     from lippmann.render.reuse import arrays
-    from lippmann.render.reuse.gathering import _gather_pixel
-    from lippmann.render.reuse.points import TRACED
 
-    def gather(first, last, points, field, gathering, the_rules, nearest, unsettled):
-        sources = gathering.source.shape[1]
-        for row in range(first, last):
-            for run in range(unsettled.shape[1]):
-                begin, end = field.first[row, run], field.first[row, run + 1]
-                if begin == end or not gathering.target[field.lens[row, begin]]:
-                    continue
-                for column in range(begin, end):
-                    if points.status[row, column] != TRACED:
-                        unset = np.full(sources, np.nan), np.full(sources, np.nan), np.full((sources, 3), np.nan)
-                        got = _gather_pixel(points, field, gathering, the_rules, nearest, row, column, *unset)
-                        unsettled[row, run] |= not got
-
+    gather = arrays.gather.py_func
+    memory = SimpleNamespace(empty=lambda shape: np.full(shape, np.nan))
+    gather = FunctionType(gather.__code__, {**gather.__globals__, "np": memory})
     display = DISPLAYS["slanted"]
     sheets = [sheet(-40.0, checks), sheet(12.0, soft, disc(5, 3, 20))]
     usual = make(display, flat_tracer(display, sheets), rules())

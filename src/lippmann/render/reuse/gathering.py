@@ -153,12 +153,13 @@ def _gather_pixel(
     for k in range(len(depth)):
         if share[k] > 0.0 and not alike(depth[k], front, ONE_POINT):
             share[k] = 0.0
-        if share[k] > 0.0 and doubted >> k & 1:
+        if share[k] == 0.0:
+            # What no source gave is no number, perhaps: even nothing of it would count.
+            continue
+        if doubted >> k & 1:
             return False
-        # What no source gave is no number, perhaps: even nothing of it would count.
-        if share[k] > 0.0:
-            total += share[k]
-            mean += share[k] * depth[k]
+        total += share[k]
+        mean += share[k] * depth[k]
     mean /= total
     limit = probed_limit(points, field, row, column, gathering)
     if limit != 0.0 and nearer(limit, mean) and not alike(limit, mean, ONE_PROBED_SURFACE):
