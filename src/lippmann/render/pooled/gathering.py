@@ -176,21 +176,11 @@ class Gatherer:
             going_on = active & si.is_valid() & (depth < path.depth)
             dimension = LIGHT_DIMENSION + (bounces * 2 + crossings + 1) * DIMENSIONS_PER_VERTEX
             lit = going_on & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
-            ds, light = scene.sample_emitter_direction(si, stream.next_2d(dimension), False, lit)
-            lit &= (ds.pdf != 0) & (dr.max(light) > 0)
-            value, pdf, bs, bsdf_weight = bsdf.eval_pdf_sample(
-                context,
-                si,
-                si.to_local(ds.d),
-                stream.next_1d(dimension + 1),
-                stream.next_2d(dimension + 2),
-                going_on,
+            light, tests = path.drawn_light(si, bsdf, stream.next_2d(dimension), lit)
+            radiance += throughput * light
+            bs, bsdf_weight = bsdf.sample(
+                context, si, stream.next_1d(dimension + 1), stream.next_2d(dimension + 2), going_on
             )
-            weight = dr.select(ds.delta, 1, mis_weight(ds.pdf, pdf))
-            contribution = throughput * value * light * weight
-            lit &= dr.max(contribution) > 0
-            visible, tests = path.visibility(si, ds, lit)
-            radiance += dr.select(lit, contribution * visible, 0)
             shadow += tests
 
             passes = mi.has_flag(bs.sampled_type, mi.BSDFFlags.Null)
