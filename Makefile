@@ -3,16 +3,21 @@
 PICTURE := out/teapot.png
 # Processes that run tests side by side; each renders with all cores.
 JOBS ?= 2
+# How often a search runs each property test, with other examples each time.
+ROUNDS ?= 20
 OPEN := $(if $(filter Darwin,$(shell uname -s)),open,xdg-open)
 
 .DEFAULT_GOAL := help
-.PHONY: help setup setup-dev demo test lint clean
+.PHONY: audit help setup setup-dev demo test test-oldest search lint clean
 
 help:
 	@echo 'make demo    set up and render a teapot for a lenticular display into $(PICTURE)'
 	@echo 'make setup   set up only: virtual environment, package, LLVM runtime'
 	@echo 'make test    set up, lint and run the tests (JOBS=2 PYTEST="-k replay")'
+	@echo 'make search  look for random examples that break a property test (ROUNDS=20)'
+	@echo 'make test-oldest  run the tests of picture files with the oldest libraries that are allowed'
 	@echo 'make lint    set up, check style and types'
+	@echo 'make audit   set up, look installed packages up in the list of known vulnerabilities'
 	@echo 'make clean   remove what set-up and tests made; pictures in out/ stay'
 
 setup:
@@ -27,6 +32,9 @@ demo: setup
 	@echo 'The picture lies in $(CURDIR)/$(PICTURE). Look at it with:'
 	@echo '  $(OPEN) $(PICTURE)'
 
+audit: setup-dev
+	.venv/bin/python scripts/audit.py
+
 lint: setup-dev
 	.venv/bin/ruff check
 	.venv/bin/ruff format --check
@@ -34,6 +42,12 @@ lint: setup-dev
 
 test: lint
 	.venv/bin/python -m pytest -n $(JOBS) -m 'not long' $(PYTEST)
+
+search: setup-dev
+	.venv/bin/python -m pytest -n auto -m hypothesis --hypothesis-profile search --rounds $(ROUNDS) $(PYTEST)
+
+test-oldest:
+	@scripts/test-oldest.sh -q $(PYTEST)
 
 clean:
 	rm -rf .venv build dist src/*.egg-info .pytest_cache .ruff_cache .mypy_cache .hypothesis .coverage

@@ -127,7 +127,7 @@ def main() -> None:
 
 def _stage(size: Size, scale: float) -> Stage:
     import lippmann
-    from lippmann import engine
+    from lippmann.runtime import engine
     from lippmann.scene.placement import PlacementOptions, place
 
     engine.start("cpu", THREADS)
@@ -145,8 +145,8 @@ def _stage(size: Size, scale: float) -> Stage:
 
 def _cycles(stage: Stage, size: Size, folder: Path, python: str, views: tuple[int, ...], keep: Path) -> dict[str, Any]:
     """Seconds of all views and PSNR of the judged ones."""
-    from lippmann.image.formats import write_plain_picture
-    from lippmann.scene.studio import studio
+    from lippmann.image.write import write_plain_picture
+    from lippmann.scene.studio_light import studio
 
     write_plain_picture(studio().pixels, folder / "studio.exr", bits=32)
     job = _job(stage, size, folder)
@@ -170,9 +170,10 @@ def _cycles(stage: Stage, size: Size, folder: Path, python: str, views: tuple[in
 
 
 def _job(stage: Stage, size: Size, folder: Path) -> dict[str, Any]:
-    """What ``cycles_views.py`` is told: cameras as those of :class:`lippmann.render.rays.QuiltRays`."""
-    from lippmann.display.cone import cone_tangent
-    from lippmann.scene.studio import BACKDROP
+    """What ``cycles_views.py`` is told: cameras as those of
+    :class:`lippmann.rendering.transport.ray_source.QuiltRays`."""
+    from lippmann.display.view_cone import cone_tangent
+    from lippmann.scene.studio_light import BACKDROP
 
     display, matrix = stage.display, stage.placement.world_from_display
     distance, (_, height) = display.viewing_distance, display.size_mm
@@ -226,7 +227,7 @@ def _references(job: dict[str, Any], folder: Path, python: str, keep: Path) -> P
 
 def _views(folder: Path) -> Picture:
     """``(N, H, W, 3)`` judged views."""
-    from lippmann.image.codec import decode_file
+    from lippmann.image.encoding import decode_file
 
     return np.stack([decode_file(folder / f"view_{number:02}.exr", "exr", "srgb")[0][""] for number in JUDGED])
 
@@ -264,7 +265,7 @@ def _quilt_tries(stage: Stage, size: Size) -> Tries:
 
 def _reference_views(stage: Stage, size: Size) -> Picture:
     """The judged views, one by one, without what a whole quilt's pixels would take."""
-    from lippmann.render.rays import QuiltRays
+    from lippmann.rendering.transport.ray_source import QuiltRays
 
     source = QuiltRays(stage.display, stage.placement.world_from_display, COLUMNS, ROWS, size.view)
     width, height = size.view
@@ -275,7 +276,7 @@ def _reference_views(stage: Stage, size: Size) -> Picture:
 
 def _native_tries(stage: Stage, size: Size) -> Tries:
     import lippmann
-    from lippmann.render.rays import DisplayRays
+    from lippmann.rendering.transport.ray_source import DisplayRays
 
     def rows(samples: int) -> Picture:
         image = lippmann.render(
@@ -311,10 +312,10 @@ class _Cut:
 
 
 def _traced(stage: Stage, source: Any, samples: int) -> Picture:
-    from lippmann.render.full import trace_frame
-    from lippmann.render.pipeline import build_for, make_integrator
-    from lippmann.render.plan import make_plan
-    from lippmann.render.settings import RenderSettings
+    from lippmann.rendering.film.wavefront import trace_frame
+    from lippmann.rendering.film.wavefront_plan import make_plan
+    from lippmann.rendering.picture import build_for, make_integrator
+    from lippmann.rendering.request.settings import RenderSettings
 
     settings = RenderSettings(integrator="path", depth=DEPTH)
     built = build_for(stage.scene, settings)
@@ -347,7 +348,7 @@ def _best(tries: Tries, counts: tuple[int, ...], psnr: float) -> dict[str, Any]:
 
 
 def _psnr(picture: Picture, reference: Picture) -> float:
-    from lippmann.image.color import encode_srgb
+    from lippmann.color.transfer import encode_srgb
 
     first, second = (encode_srgb(np.clip(values, 0, 1).astype(np.float64)) for values in (picture, reference))
     return -10 * math.log10(float(np.square(first - second).mean()))

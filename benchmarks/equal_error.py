@@ -1,4 +1,4 @@
-"""Error against time: full, full denoised, pooled, pooled in cells; and the time that each takes to the same error.
+"""Error against time: full, full denoised, pooled; and the time that each takes to the same error.
 
 Eight scenes with path light of the default depth (the bundled six, and two glTF scenes where they are at hand) on three
 displays: the paper's 64 lenses of 8 pixels, 64 lenses of 48 pixels, and 34 x 34 lenses of 15 x 15. A band of rows is
@@ -48,7 +48,6 @@ DISPLAYS: dict[str, tuple[str, dict[str, Any], int | None]] = {
 #: Samples per pixel of either reference, and of the pictures that are judged.
 REFERENCE = 256
 SAMPLES = (1, 4, 16, 64)
-CELLS = (1, 4, 16)
 #: Runs of which the median counts, where they are shorter than this many seconds; longer ones are run once.
 RUNS, SHORT = 3, 1.0
 TARGETS = (35.0, 40.0)
@@ -88,9 +87,9 @@ def asked(words: argparse.ArgumentParser) -> tuple[argparse.Namespace, list[tupl
     words.add_argument("displays", nargs="*", default=list(DISPLAYS))
     words.add_argument("--scenes", default="")
     given = words.parse_args()
-    from lippmann.scene import library
+    from lippmann.scene import bundled
 
-    known = [*library.names(), *(name for name, path in GLTF.items() if path.exists())]
+    known = [*bundled.names(), *(name for name, path in GLTF.items() if path.exists())]
     return given, [(name, given.displays) for name in (given.scenes.split(",") if given.scenes else known)]
 
 
@@ -99,10 +98,10 @@ def prepare(name: str, display_name: str) -> Stage:
     from dataclasses import replace
 
     import lippmann
-    from lippmann import engine
-    from lippmann.render.pipeline import build_for, make_integrator
-    from lippmann.render.rays import DisplayRays
-    from lippmann.render.settings import RenderSettings
+    from lippmann.rendering.picture import build_for, make_integrator
+    from lippmann.rendering.request.settings import RenderSettings
+    from lippmann.rendering.transport.ray_source import DisplayRays
+    from lippmann.runtime import engine
     from lippmann.scene.placement import place
 
     engine.start("auto")
@@ -124,15 +123,12 @@ def prepare(name: str, display_name: str) -> Stage:
 
 def _measure(stage: Stage, references: Path | None) -> dict[str, Any]:
     judge = Judge(stage, references)
-    curves: dict[str, list[Point]] = {"full": [], "full + oidn": [], "pooled": [], "pooled in cells": []}
+    curves: dict[str, list[Point]] = {"full": [], "full + oidn": [], "pooled": []}
     for samples in SAMPLES:
         traced, picture = timed(lambda samples=samples: _trace(stage, samples, 3))
         curves["full"].append({"spp": samples, "seconds": traced, **judge(picture)})
         for effort in ("fast", "high"):
             _denoised(stage, judge, curves, (samples, effort), traced, picture)
-    for samples in CELLS:
-        seconds, picture = timed(lambda samples=samples: _in_cells(stage, samples))
-        curves["pooled in cells"].append({"spp": samples, "seconds": seconds, **judge(picture)})
     return {"judge_psnr": judge.own_psnr, "curves": curves, "to": _costs(curves)}
 
 
@@ -140,12 +136,12 @@ def _denoised(
     stage: Stage, judge: Judge, curves: dict[str, list[Point]], how: tuple[int, Any], traced: float, picture: Picture
 ) -> None:
     """One picture's noise taken out; and pooled light, as the program makes it: by halves, shared, beside samples."""
-    from lippmann.render.batches import FullInBatches
-    from lippmann.render.denoise_views import denoise_views
-    from lippmann.render.denoised import Denoised
-    from lippmann.render.effort import GUIDE_SAMPLES, SHARING_STOP
-    from lippmann.render.guides import plan_guides, trace_guides
-    from lippmann.render.sharing import share_light
+    from lippmann.rendering.denoise.cost_model import GUIDE_SAMPLES, SHARING_STOP
+    from lippmann.rendering.denoise.dual_buffer import Denoised
+    from lippmann.rendering.denoise.pixel_order import denoise_views
+    from lippmann.rendering.film.feature_buffers import plan_guides, trace_guides
+    from lippmann.rendering.film.sample_batches import FullInBatches
+    from lippmann.rendering.sharing.cross_lens import share_light
 
     samples, effort = how
     plan = plan_guides(stage.source, GUIDE_SAMPLES[effort], 4 << 30)
@@ -188,7 +184,7 @@ class Judge:
     """Squared errors by two references that know nothing of each other."""
 
     def __init__(self, stage: Stage, file: Path | None) -> None:
-        from lippmann.quality.metrics import micro_image_means
+        from lippmann.metrics.mse_psnr import micro_image_means
 
         self._display, self._means = stage.display, micro_image_means
         found = kept(file, lambda: {"pictures": [_trace(stage, REFERENCE, seed) for seed in (1001, 2002)]})
@@ -205,7 +201,7 @@ class Judge:
 
 
 def coded(picture: Picture) -> NDArray[np.float64]:
-    from lippmann.image.color import encode_srgb
+    from lippmann.color.transfer import encode_srgb
 
     return np.asarray(encode_srgb(picture.astype(np.float64)))
 
@@ -215,20 +211,11 @@ def _psnr(error: float) -> float:
 
 
 def _trace(stage: Stage, samples: int, seed: int) -> Picture:
-    from lippmann.render.full import trace_frame
-    from lippmann.render.plan import make_plan
+    from lippmann.rendering.film.wavefront import trace_frame
+    from lippmann.rendering.film.wavefront_plan import make_plan
 
     plan = make_plan(stage.source.width, stage.source.height, samples, memory=4 << 30)
     return trace_frame(stage.integrator, stage.source, plan, seed=seed).pixels
-
-
-def _in_cells(stage: Stage, samples: int) -> Picture:
-    from lippmann.render.pooled.renderer import Pooled
-
-    path = stage.integrator
-    pooled = Pooled(path.scene, path.traits, path.depth, stage.source, seed=3)
-    pooled.add(samples)
-    return pooled.picture()
 
 
 def cost_to(curve: list[Point], psnr: float, cost: str = "seconds", *, drawn_out: bool = False) -> float | None:
@@ -272,26 +259,25 @@ def _cheapest(way: str, curve: list[Point], psnr: float) -> dict[str, Any] | Non
 
 
 def _summary(scenes: dict[str, Any]) -> dict[str, Any]:
-    """Geometric means over the scenes: how many times faster pooled ways are, and their share of the paths."""
+    """Geometric means over the scenes: how many times faster pooled light is, and its share of the paths."""
     summary: dict[str, Any] = {}
     for goal in next(iter(scenes.values()))["to"]:
         for rival in ("full", "full + oidn"):
-            for ours in ("pooled", "pooled in cells"):
-                both = {
-                    name: (costs[rival], costs[ours])
-                    for name, scene in scenes.items()
-                    if (costs := scene["to"][goal])[rival] and costs[ours]
+            both = {
+                name: (costs[rival], costs["pooled"])
+                for name, scene in scenes.items()
+                if (costs := scene["to"][goal])[rival] and costs["pooled"]
+            }
+            if both:
+                times = [theirs["seconds"] / own["seconds"] for theirs, own in both.values()]
+                summary[f"pooled against {rival} to {goal}"] = {
+                    "times_faster": statistics.geometric_mean(times),
+                    "least": min(times),
+                    "share_of_paths": statistics.geometric_mean(own["spp"] / t["spp"] for t, own in both.values()),
+                    "scenes": len(both),
+                    "drawn_out": [name for name, (theirs, _) in both.items() if theirs["drawn_out"]],
+                    "never": [name for name, scene in scenes.items() if not scene["to"][goal]["pooled"]],
                 }
-                if both:
-                    times = [theirs["seconds"] / own["seconds"] for theirs, own in both.values()]
-                    summary[f"{ours} against {rival} to {goal}"] = {
-                        "times_faster": statistics.geometric_mean(times),
-                        "least": min(times),
-                        "share_of_paths": statistics.geometric_mean(own["spp"] / t["spp"] for t, own in both.values()),
-                        "scenes": len(both),
-                        "drawn_out": [name for name, (theirs, _) in both.items() if theirs["drawn_out"]],
-                        "never": [name for name, scene in scenes.items() if not scene["to"][goal][ours]],
-                    }
     return summary
 
 

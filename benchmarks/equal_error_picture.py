@@ -29,7 +29,6 @@ WAYS = {
     "full": ("#8a8f98", "o"),
     "full + oidn": ("#d98b2b", "s"),
     "pooled": ("#1f6fb2", "D"),
-    "pooled in cells": ("#7fb3a2", "^"),
 }
 TARGETS = (35, 40)
 INK, FAINT = "#30343a", "#d9dce0"

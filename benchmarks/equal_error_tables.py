@@ -30,8 +30,7 @@ and sharing are in its time. Pooled pictures are made in two halves, as the prog
 shared, and gives way to samples that are nearer. Full + OIDN is denoised once, as a whole. Pictures are judged by two
 references of {result["reference_spp"] // 2} samples each, whose own noise is left out of the figures. Where full does
 not come to a PSNR, its time is drawn out by the law of its noise, which flatters it where few paths find much light.
-"Best" is the highest PSNR that full + OIDN comes to with up to 64 samples. "In cells" is
-`--method pooled --denoise none`.
+"Best" is the highest PSNR that full + OIDN comes to with up to 64 samples.
 
 Small balls and primitives have small lamps and glass, and few paths find the caustics. What a reference lacks of them
 is not missed in a picture: on the display with 8 pixels small balls, pooled from 64 samples with the fast effort, have
@@ -49,8 +48,8 @@ bright pixels. There all figures are too good, and more samples seem worse.
 
 def _pooled_gains(scenes: dict[str, Any], summary: dict[str, Any], bound: str, *targets: int) -> list[str]:
     """How much faster than its rivals pooled light is, as a table, and what is behind its figures."""
-    rows = ["| to | against | times as fast | least | target | paths | scenes | in cells: times as fast | scenes |"]
-    rows.append("|---|---|---|---|---|---|---|---|---|")
+    rows = ["| to | against | times as fast | least | target | paths | scenes |"]
+    rows.append("|---|---|---|---|---|---|---|")
     short = []
     for rival, target in zip(_TARGETS, targets, strict=True):
         for goal in ("35", "40", _BEST):
@@ -58,11 +57,9 @@ def _pooled_gains(scenes: dict[str, Any], summary: dict[str, Any], bound: str, *
             if found is None:
                 continue
             is_aim = goal in _TARGETS[rival]
-            in_cells = summary.get(f"pooled in cells against {rival} to {goal}")
-            cells = f"{in_cells['times_faster']:.1f} | {in_cells['scenes']}" if in_cells else "| 0"
             rows.append(
                 f"| {_goal(goal)} | {name_of(rival)} | {found['times_faster']:.1f} | {found['least']:.1f} "
-                f"| {target if is_aim else ''} | {_percent(found['share_of_paths'])} | {found['scenes']} | {cells} |"
+                f"| {target if is_aim else ''} | {_percent(found['share_of_paths'])} | {found['scenes']} |"
             )
             if is_aim:
                 short.append(_short_of(scenes, goal, rival, target))
@@ -70,7 +67,7 @@ def _pooled_gains(scenes: dict[str, Any], summary: dict[str, Any], bound: str, *
         "\n".join(rows),
         _wrapped(
             '"Paths" are those traced, as a share of the rival\'s. They and times are geometric means over the scenes '
-            "in which both ways reach the PSNR; how many, the columns beside say. The bound on paths, for light that "
+            "in which both ways reach the PSNR; how many, the column beside says. The bound on paths, for light that "
             f"does not depend on direction, is {bound} of full's. (A denoiser goes below it where light is smooth: it "
             "shares between pixels, too.)"
         ),

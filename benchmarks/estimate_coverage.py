@@ -76,10 +76,10 @@ class Case:
 
     def __init__(self, scene: str, display: Any, seconds: float, folder: Path | None) -> None:
         from lippmann.api import load_scene
-        from lippmann.render.pipeline import make_integrator
-        from lippmann.render.rays import DisplayRays
-        from lippmann.render.settings import RenderSettings
-        from lippmann.scene.build import build
+        from lippmann.device.pbr import build
+        from lippmann.rendering.picture import make_integrator
+        from lippmann.rendering.request.settings import RenderSettings
+        from lippmann.rendering.transport.ray_source import DisplayRays
 
         self.built = build(load_scene(HARD_SCENES[scene]()))
         self.world_from_display = np.diag([2 / display.size_mm[0]] * 3 + [1.0])
@@ -93,8 +93,8 @@ class Case:
         self.reference, self.reference_samples = found["parts"], int(found["samples"])
 
     def _long(self, seconds: float) -> tuple[NDArray[np.float64], int]:
-        from lippmann.render.full import trace_frame
-        from lippmann.render.plan import make_plan
+        from lippmann.rendering.film.wavefront import trace_frame
+        from lippmann.rendering.film.wavefront_plan import make_plan
 
         plan = make_plan(self.source.width, self.source.height, 128, memory=MEMORY)
         parts = np.zeros((REFERENCE_PARTS, self.source.height, self.source.width, 3))
@@ -108,8 +108,8 @@ class Case:
 
     def trace(self, way: str, seed: int, **asked: Any) -> Any:
         """A picture made that way, as the whole program makes it."""
-        from lippmann.render.methods import Job, trace
-        from lippmann.render.settings import RenderSettings
+        from lippmann.rendering.methods import Job, trace
+        from lippmann.rendering.request.settings import RenderSettings
 
         method, denoise = WAYS[way]
         settings = RenderSettings(method=method, denoise=denoise, seed=seed, depth=DEPTH, **asked)
@@ -118,8 +118,8 @@ class Case:
 
     def truth(self, picture: NDArray[np.float32]) -> tuple[float, float]:
         """True PSNR of a picture and of its worst micro-image."""
-        from lippmann.image.color import encode_srgb
-        from lippmann.quality.metrics import micro_image_means
+        from lippmann.color.transfer import encode_srgb
+        from lippmann.metrics.mse_psnr import micro_image_means
 
         difference = encode_srgb(picture.astype(np.float64)) - encode_srgb(self.reference)
         # Products of different parts: the square of the sum less the squares.
@@ -151,7 +151,7 @@ def stated(case: Case, way: str) -> Iterator[dict[str, Any]]:
 
 def promised(case: Case, way: str, qualities: tuple[int, ...]) -> Iterator[dict[str, Any]]:
     """What comes of asking for a quality."""
-    from lippmann.render.goal import TOLERANCE
+    from lippmann.rendering.adaptive.stopping import TOLERANCE
 
     for quality in qualities:
         for seed in SEEDS:
@@ -177,7 +177,7 @@ def main() -> None:
     options.add_argument("--references", type=Path, help="a folder that keeps the references")
     chosen = options.parse_args()
 
-    from lippmann import engine
+    from lippmann.runtime import engine
 
     engine.start("cpu", THREADS)
     kinds = displays()
@@ -210,7 +210,7 @@ def summaries(cases: list[dict[str, Any]], promises: list[dict[str, Any]]) -> di
 
 def summary_of_few(cases: list[dict[str, Any]]) -> dict[str, Any]:
     """By the number of samples: the most by which estimates were too good, in dB, and the margin."""
-    from lippmann.render.estimate import PictureEstimator
+    from lippmann.rendering.estimate.psnr import PictureEstimator
 
     found: dict[str, Any] = {}
     for samples in FEW_SAMPLES:

@@ -13,20 +13,20 @@ from harness import interleaved, median_ratio, save, summary
 
 
 def main() -> None:
-    from lippmann import engine
+    from lippmann.runtime import engine
 
     engine.start("cpu")
     import drjit as dr
     import mitsuba as mi
 
     from lippmann.api import load_scene
+    from lippmann.device.pbr import build
     from lippmann.display import load_display
-    from lippmann.render.full import trace_frame
-    from lippmann.render.integrators.path import PathIntegrator
-    from lippmann.render.plan import make_plan
-    from lippmann.render.rays import DisplayRays
-    from lippmann.render.traits import make_traits
-    from lippmann.scene.build import build
+    from lippmann.rendering.film.wavefront import trace_frame
+    from lippmann.rendering.film.wavefront_plan import make_plan
+    from lippmann.rendering.transport.path import PathIntegrator
+    from lippmann.rendering.transport.ray_source import DisplayRays
+    from lippmann.rendering.transport.scene_flags import make_traits
     from lippmann.scene.placement import place
 
     scene = load_scene("teapot")

@@ -50,8 +50,8 @@ def _measured(stage: Stage) -> dict[str, Any]:
 
 def _reached(stage: Stage, quality: float, options: dict[str, Any]) -> dict[str, Any]:
     """Seconds and samples, and where it ended."""
-    from lippmann.render.choice import decide
-    from lippmann.render.methods import Job, trace
+    from lippmann.rendering.methods import Job, trace
+    from lippmann.rendering.request.resolve import decide
 
     settings = replace(stage.settings, quality_mean=quality, spp=MOST_SAMPLES, **options)
     job = Job(

@@ -44,8 +44,8 @@ def _repeated(folder: Path, size: tuple[int, int]) -> None:
     """
     from lippmann.display import Display
     from lippmann.image import read_picture
-    from lippmann.image.banded import write_in_bands
     from lippmann.image.metadata import Metadata
+    from lippmann.image.streamed_write import write_in_bands
 
     for ending in ("tif", "zarr"):
         small = read_picture(folder / f"small.{ending}")
@@ -146,7 +146,7 @@ def _asked(address: str) -> bytes:
 
 def _quilt(path: Path) -> None:
     """A quilt as large as they come, of waves."""
-    from lippmann.image.png import encode_png
+    from lippmann.codecs.png import encode_png
 
     line = np.arange(QUILT_SIDE, dtype=np.float32)
     codes = np.empty((QUILT_SIDE, QUILT_SIDE, 3), dtype=np.uint8)

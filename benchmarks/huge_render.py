@@ -14,7 +14,7 @@ from pathlib import Path
 
 def main() -> None:
     import lippmann
-    from lippmann.display.prints import Print
+    from lippmann.display.formats.print_sheet import Print
 
     width, height, small, memory = (int(word) for word in sys.argv[1:5])
     sheet = Print(lpi=60.0, ppi=720.0, size=(200.0, 130.0)).display()

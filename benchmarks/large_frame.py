@@ -27,12 +27,12 @@ TILES_BETWEEN = 8
 
 def main() -> None:
     import lippmann
-    from lippmann.render.full import trace_frame
-    from lippmann.render.pipeline import make_integrator
-    from lippmann.render.plan import make_plan
-    from lippmann.render.rays import DisplayRays
-    from lippmann.render.settings import RenderSettings
-    from lippmann.scene.build import build
+    from lippmann.device.pbr import build
+    from lippmann.rendering.film.wavefront import trace_frame
+    from lippmann.rendering.film.wavefront_plan import make_plan
+    from lippmann.rendering.picture import make_integrator
+    from lippmann.rendering.request.settings import RenderSettings
+    from lippmann.rendering.transport.ray_source import DisplayRays
     from lippmann.scene.placement import place
 
     scene = lippmann.load_scene("teapot")

@@ -18,7 +18,6 @@ CASES = [
     *(("full", "", {"spp": spp}) for spp in (1, 4, 16, 64)),
     *(("full", " `--denoise oidn`", {"spp": spp, "denoise": "oidn"}) for spp in (1, 4, 16)),
     *(("pooled", "", {"spp": spp}) for spp in (1, 4, 16)),
-    *(("pooled", " `--denoise none`", {"spp": spp, "denoise": "none"}) for spp in (1, 4)),
     ("lens-view", "", {"spp": 16}),
     ("interpolated", "", {"spp": 16}),
 ]
@@ -26,7 +25,7 @@ CASES = [
 
 def main() -> None:
     import lippmann
-    from lippmann.image.color import encode_srgb
+    from lippmann.color.transfer import encode_srgb
 
     scene = lippmann.load_scene("teapot")
 

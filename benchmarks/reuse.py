@@ -60,11 +60,11 @@ def main(cases: list[str]) -> None:
 
 def _measure(case: Case, name: str) -> Iterator[dict[str, Any]]:
     import lippmann
-    from lippmann.scene import library
+    from lippmann.scene import bundled
 
     display = lippmann.load_display("seed-lenticular").resized(*case.size)
     ways = {"small": list(WAYS), "large": WAYS_OF_LARGE, "dear": WAYS_OF_DEAR}[name]
-    for scene_name in library.names():
+    for scene_name in bundled.names():
         scene = lippmann.load_scene(scene_name)
         images: dict[str, Any] = {}
         seconds: dict[str, list[float]] = {way: [] for way in ways}
@@ -90,8 +90,8 @@ def _measure(case: Case, name: str) -> Iterator[dict[str, Any]]:
 
 def _quality(full: Any, image: Any) -> dict[str, float]:
     """The paper's average, and the worst micro-image, against full tracing."""
-    from lippmann.quality.metrics import low_percentile, micro_image_means, psnr, squared_errors
-    from lippmann.quality.paper import paper_figures
+    from lippmann.metrics.mse_psnr import low_percentile, micro_image_means, psnr, squared_errors
+    from lippmann.metrics.paper import paper_figures
 
     errors = squared_errors(full, image)
     worst = low_percentile(*micro_image_means(errors, full.display), 0.0)

@@ -24,10 +24,10 @@ from typing import Any
 import numpy as np
 
 from harness import median_ratio, save, summary
-from lippmann import engine
-from lippmann.scene.classic import ClassicScene
-from lippmann.scene.nff import read_nff
-from lippmann.scene.tachyon import read_tachyon
+from lippmann.runtime import engine
+from lippmann.scene.readers.nff import read_nff
+from lippmann.scene.readers.tachyon.reader import read_tachyon
+from lippmann.scene.values.whitted_scene import ClassicScene
 
 SCENES = Path(__file__).resolve().parent.parent.parent / "shared" / "scenes"
 TARGETS = {"teapot": 2.0, "room": 2.0, "smallballs": 2.0, "gears": 4.0, "tree_fcyl": 8.0}
@@ -76,11 +76,11 @@ def tachyon_seconds(path: Path, size: int, out: Path) -> float:
 
 def tracer(path: Path, size: int) -> Callable[[], Any]:
     """Our picture of the scene, everything but the tracing done."""
-    from lippmann.render.classic.build import build_classic
-    from lippmann.render.classic.camera import ClassicCameraRays
-    from lippmann.render.full import trace_frame
-    from lippmann.render.integrators.classic import ClassicIntegrator
-    from lippmann.render.plan import make_plan
+    from lippmann.device.whitted.scene import build_classic
+    from lippmann.rendering.film.wavefront import trace_frame
+    from lippmann.rendering.film.wavefront_plan import make_plan
+    from lippmann.rendering.transport.whitted import ClassicIntegrator
+    from lippmann.rendering.transport.whitted_camera import ClassicCameraRays
 
     scene = read_tachyon(path)
     integrator = ClassicIntegrator(build_classic(scene), DEPTH)

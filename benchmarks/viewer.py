@@ -88,9 +88,9 @@ def main() -> None:
 def _run(browser: Any, path: Path) -> dict[str, float]:
     from browser import tab
 
+    from lippmann.viewer.http_server import WebServer
+    from lippmann.viewer.served_picture import PictureFile
     from lippmann.viewer.server import ViewerSite
-    from lippmann.viewer.shown import PictureFile
-    from lippmann.viewer.web import WebServer
 
     server = WebServer(ViewerSite([PictureFile(path)]))
     try:

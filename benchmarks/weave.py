@@ -61,16 +61,16 @@ def main() -> None:
 
 def _measure(name: str, reference: int) -> tuple[dict[str, Any], list[Picture]]:
     import lippmann
-    from lippmann import engine
-    from lippmann.display.cone import cone_tangent
+    from lippmann.display.view_cone import cone_tangent
     from lippmann.image import IntegralImage
-    from lippmann.quilt import Quilt, QuiltLayout
-    from lippmann.render.pipeline import build_for, make_integrator
-    from lippmann.render.rays import DisplayRays, QuiltRays
-    from lippmann.render.settings import RenderSettings
-    from lippmann.replay import replay
+    from lippmann.quilts.quilt import Quilt, QuiltLayout
+    from lippmann.quilts.weave import weave
+    from lippmann.rendering.picture import build_for, make_integrator
+    from lippmann.rendering.request.settings import RenderSettings
+    from lippmann.rendering.transport.ray_source import DisplayRays, QuiltRays
+    from lippmann.runtime import engine
     from lippmann.scene.placement import place
-    from lippmann.weave import weave
+    from lippmann.viewing.replay import replay
 
     engine.start("auto")
     whole = lippmann.load_display(DEVICE)
@@ -83,8 +83,8 @@ def _measure(name: str, reference: int) -> tuple[dict[str, Any], list[Picture]]:
     cameras = QuiltRays(display, at.world_from_display, COLUMNS, ROWS, VIEW)
 
     def traced(source: Any, samples: int, seed: int) -> tuple[Picture, float]:
-        from lippmann.render.full import trace_frame
-        from lippmann.render.plan import make_plan
+        from lippmann.rendering.film.wavefront import trace_frame
+        from lippmann.rendering.film.wavefront_plan import make_plan
 
         plan = make_plan(source.width, source.height, samples, channels=source.channels, memory=4 << 30)
         started = time.perf_counter()
@@ -131,9 +131,9 @@ def _level_rays(direct: Any, world_from_display: NDArray[np.float64]) -> Any:
     import drjit as dr
     import mitsuba as mi
 
-    from lippmann.display.cone import cone_tangent
-    from lippmann.render.device_ops import DEVICE as OPS
-    from lippmann.render.rays import world_ray
+    from lippmann.device.drjit_ops import DEVICE as OPS
+    from lippmann.display.view_cone import cone_tangent
+    from lippmann.rendering.transport.ray_source import world_ray
 
     display = direct.display
     lattice, scale, tangent = display.lattice, display.magnification, cone_tangent(display)
@@ -171,14 +171,14 @@ class _Judge:
 
 
 def _coded(picture: Picture) -> NDArray[np.float64]:
-    from lippmann.image.color import encode_srgb
+    from lippmann.color.transfer import encode_srgb
 
     return np.asarray(encode_srgb(np.clip(picture, 0, 1).astype(np.float64)))
 
 
 def _draw(rows: list[list[Picture]]) -> None:
     """What the eye sees of the middle, side by side: direct, linear, nearest; a scene below the other."""
-    from lippmann.image.formats import write_plain_picture
+    from lippmann.image.write import write_plain_picture
 
     cut = [[picture[96:-192, 72:-72] for picture in row] for row in rows]
     gap = np.ones((cut[0][0].shape[0], 6, 3), np.float32)

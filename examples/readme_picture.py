@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 import lippmann
-from lippmann.image.formats import write_plain_picture
+from lippmann.image.write import write_plain_picture
 
 
 def main(path: Path) -> None:

@@ -43,7 +43,7 @@ can_load() {
 # Prints the package with the LLVM runtime: the newest that was tried and that apt can install.
 llvm_package() {
   # shellcheck disable=SC2046
-  newest_package '^libllvm[0-9]+(t64)?$' $(ask_package 'from lippmann import llvm; print(llvm.OLDEST, llvm.NEWEST_TRIED)')
+  newest_package '^libllvm[0-9]+(t64)?$' $(ask_package 'from lippmann.runtime import llvm; print(llvm.OLDEST, llvm.NEWEST_TRIED)')
 }
 
 # Fills `missing` with the packages of the system that are not there.
@@ -56,7 +56,7 @@ find_missing() {
     can_load libatomic.so.1 || missing+=(libatomic1)
     can_load libstdc++.so.6 || missing+=(libstdc++6)
   fi
-  ask_package 'from lippmann import llvm; llvm.choose()' || find_llvm_package
+  ask_package 'from lippmann.runtime import llvm; llvm.choose()' || find_llvm_package
 }
 
 # Adds the package with the LLVM runtime to `missing`, or says where to get it and ends.
@@ -67,11 +67,11 @@ find_llvm_package() {
     exit 1
   fi
   if ! have apt-get; then
-    say "setup: no LLVM library that would do is installed; $(ask_package 'from lippmann import llvm; print(llvm.install_command())')"
+    say "setup: no LLVM library that would do is installed; $(ask_package 'from lippmann.runtime import llvm; print(llvm.install_command())')"
     exit 1
   fi
   # A GPU needs no LLVM.
-  if ! can_be_root && ask_package 'from lippmann import gpu; raise SystemExit(gpu.find() is None)'; then return; fi
+  if ! can_be_root && ask_package 'from lippmann.runtime import gpu; raise SystemExit(gpu.find() is None)'; then return; fi
   if package=$(llvm_package) || { update_lists && package=$(llvm_package); }; then
     missing+=("$package")
   elif [ -z "$(apt-cache search --names-only '^libllvm[0-9]+')" ]; then

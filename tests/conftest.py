@@ -9,9 +9,32 @@ import signal
 from pathlib import Path
 
 import pytest
+from hypothesis import HealthCheck, settings
 
 ROOT = Path(__file__).resolve().parent.parent
 SHARED_SCENES = ROOT.parent / "shared" / "scenes"
+
+# The suite passes or fails the same way each time, however busy the machine is: examples follow from the test's code,
+# and no check is by the clock. Random ones are searched by `make search`, which keeps what it finds in .hypothesis/.
+BY_CLOCK = [HealthCheck.too_slow]
+# Each round of a search has its own instance of a test's class.
+OF_ROUNDS = [HealthCheck.differing_executors]
+PATIENT = settings(settings.get_profile("default"), deadline=None, print_blob=True, suppress_health_check=BY_CLOCK)
+settings.register_profile("ci", PATIENT, derandomize=True, database=None)
+settings.register_profile("search", PATIENT, suppress_health_check=[*BY_CLOCK, *OF_ROUNDS])
+settings.load_profile("ci")
+
+
+def pytest_addoption(parser):
+    # Tests state how many examples they take; a search takes more of them by further rounds.
+    parser.addoption("--rounds", type=int, default=1, help="run each property test so many times")
+
+
+def pytest_generate_tests(metafunc):
+    rounds = metafunc.config.getoption("--rounds")
+    if rounds > 1 and getattr(metafunc.function, "is_hypothesis_test", False):
+        metafunc.fixturenames.append("search_round")
+        metafunc.parametrize("search_round", range(1, rounds + 1))
 
 
 def pytest_configure():
@@ -22,7 +45,7 @@ def pytest_configure():
 @pytest.fixture(scope="session")
 def engine():
     """The rendering engine on the CPU."""
-    from lippmann.engine import start
+    from lippmann.runtime.engine import start
 
     return start("cpu")
 

@@ -4,7 +4,7 @@ import ast
 import re
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Set
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -14,85 +14,100 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 SOURCE = ROOT / "src" / "lippmann"
 
-#: From the ground up: a part imports only from parts before it. The package itself offers the API, so it comes after.
+#: From the ground up: a package imports only from packages before it. Modules of the root are parts of their own; the
+#: package itself offers the API, so it comes after.
 ORDER = (
     "_version",
     "errors",
-    "atomic",
-    "silence",
-    "exr",
     "progress",
-    "machine",
-    "llvm",
-    "gpu",
-    "engine",
-    "store",
+    "color",
+    "runtime",
     "display",
+    "display.formats",
+    "codecs",
+    "scene.values",
+    "scene.parsing",
+    "scene.whitted",
     "scene",
+    "scene.bundled",
+    "scene.readers.gltf",
+    "scene.readers.gltf_animation",
+    "scene.readers.tachyon",
+    "scene.readers",
+    "journal",
     "image",
-    "render",
-    "replay",
-    "refocus",
-    "quilt",
-    "quilt_files",
-    "film",
-    "weave_kernel",
-    "weave",
+    "device",
+    "device.whitted",
+    "device.pbr",
     "calibration",
-    "printing",
+    "quilts",
     "exchange",
-    "quality",
-    "report",
-    "viewer",
+    "metrics",
+    "rendering.request",
+    "rendering.estimate",
+    "rendering.transport",
+    "rendering.film",
+    "rendering.sharing",
+    "rendering.denoise",
+    "rendering.adaptive",
+    "rendering.reprojection.common",
+    "rendering.reprojection.retrace",
+    "rendering.reprojection.arrays",
+    "rendering.reprojection.lenticular",
+    "rendering.reprojection",
+    "rendering",
+    "viewing",
+    "tiles",
     "cluster",
+    "reproduce",
+    "viewer",
+    "viewer.calibrate",
     "api",
-    "sequence",
-    "sequence_files",
+    "sequences",
     "",
+    "cli.shared",
+    "cli.commands",
     "cli",
     "__main__",
 )
 
-#: Conveniences of a part that reach up, each only from inside a function, so that using the part alone loads nothing
-#: more: ``IntegralImage.replay``, ``.refocus`` and its widget, and the package ``lippmann.render`` answering as the
-#: call.
-REACHES_UP = {("image", "replay"), ("image", "refocus"), ("image", "viewer"), ("render", "api")}
+#: Conveniences that reach up, each only from inside a function, so that using the part alone loads nothing more:
+#: ``IntegralImage.replay``, ``.refocus`` and its widget.
+REACHES_UP = {("image", "viewing"), ("image", "viewer")}
+
+#: The same between modules of one package: ``IntegralImage.save``.
+REACHES_BACK = {("image.integral_image", "image.write")}
+
+#: Packages whose ``__init__`` offers what packages below it in the tree define: it ranks after those.
+FACADES = {"display": "display.formats"}
 
 #: The only modules that may use Mitsuba or Dr.Jit; of the scene those that build it on the device, never its readers.
-USES_ENGINE = (
-    "engine",
-    "render",
-    "scene.build",
-    "scene.microfacet",
-    "scene.mitsuba_source",
-    "scene.surface",
-    "scene.textures",
-)
+USES_ENGINE = ("runtime.engine", "scene.mitsuba_source", "device", "rendering")
 #: Of those, the ones that may load it by being imported.
-LOADS_ENGINE = ("render", "scene.build")
+LOADS_ENGINE = ("device", "rendering")
 
 #: What a user imports; none of it may load the engine, which has to choose its library first.
 ENTRANCES = (
     "",
     "api",
     "cli",
-    "engine",
-    "store",
+    "runtime.engine",
+    "journal",
     "display",
     "image",
-    "scene",
-    "render",
-    "replay",
-    "refocus",
-    "quilt",
-    "quilt_files",
-    "film",
-    "sequence",
-    "weave",
+    "scene.scene",
+    "scene.readers.load",
+    "rendering",
+    "viewing.replay",
+    "viewing.refocus",
+    "viewing.video_frames",
+    "quilts.quilt",
+    "quilts.files",
+    "quilts.weave",
+    "sequences.frames",
     "calibration",
-    "printing",
     "exchange",
-    "quality",
+    "metrics",
     "viewer.server",
     "viewer.notebook",
 )
@@ -117,7 +132,10 @@ class Import:
 
 
 def part(module: str) -> str:
-    return module.partition(".")[0]
+    """The package that a module lies in, of those that have a rank."""
+    while module not in ORDER and "." in module:
+        module = module.rpartition(".")[0]
+    return module
 
 
 def inside(module: str, parts: tuple[str, ...]) -> bool:
@@ -149,7 +167,8 @@ def imports_of(module: str, source: str) -> Iterator[Import]:
                 above = above[: len(above) + is_package - node.level]
                 base = ".".join([*above, base] if base else above)
             for alias in node.names:
-                # "from lippmann import engine" names a module, "from lippmann import Display" what the package offers.
+                # "from lippmann.runtime import engine" names a module, "from lippmann import Display" what the package
+                # offers.
                 whole = f"{base}.{alias.name}"
                 imported = whole if whole.removeprefix("lippmann.") in modules() else base
                 yield Import(module, imported, node.lineno, in_function, for_annotations)
@@ -178,8 +197,38 @@ def breaks_order(found: Import) -> bool:
     importer, imported = part(found.importer), part(found.ours)
     if importer == imported or ((importer, imported) in REACHES_UP and found.inside_function):
         return False
+    if found.importer in FACADES and imported == FACADES[found.importer]:
+        return False
     rank = {name: position for position, name in enumerate(ORDER)}
     return rank.get(imported, len(ORDER)) > rank.get(importer, -1)
+
+
+def imports_inside_packages() -> dict[str, set[str]]:
+    """What every module imports of its own package, inside functions too, but for :data:`REACHES_BACK`."""
+    graph: dict[str, set[str]] = {}
+    for found in imports():
+        if found.ours is None or found.importer == found.ours or part(found.importer) != part(found.ours):
+            continue
+        if not ((found.importer, found.ours) in REACHES_BACK and found.inside_function):
+            graph.setdefault(found.importer, set()).add(found.ours)
+    return graph
+
+
+def cycles(graph: Mapping[str, Set[str]]) -> list[list[str]]:
+    """Groups of modules of which each imports every other, directly or through others."""
+    reached: dict[str, set[str]] = {}
+    for module in graph:
+        waiting, reached[module] = [module], set()
+        while waiting:
+            new = graph.get(waiting.pop(), set()) - reached[module]
+            reached[module] |= new
+            waiting += new
+    groups = {
+        frozenset(other for other in found if module in reached.get(other, ()))
+        for module, found in reached.items()
+        if module in found
+    }
+    return sorted(sorted(group) for group in groups)
 
 
 def places(found: list[Import]) -> list[str]:
@@ -200,18 +249,36 @@ def test_parts_import_only_from_parts_before_them():
         ("display.display", "from lippmann.errors import DisplayError", False),
         ("display.display", "from lippmann.display.panel import Panel", False),
         ("display.display", "from .panel import Panel", False),
-        ("display.display", "import lippmann.scene.load", True),
+        ("display.display", "import lippmann.scene.readers.load", True),
         ("display.display", "from lippmann import scene", True),
         ("display.display", "from lippmann import Display", True),
         ("display.display", "from ..scene.load import load_scene", True),
         ("display.display", "def f():\n    import lippmann.cli", True),
-        ("image.picture", "def f():\n    from lippmann.replay import replay", False),
-        ("image.picture", "from lippmann.replay import replay", True),
+        ("image.views", "def f():\n    from lippmann.viewing.replay import replay", False),
+        ("image.views", "from lippmann.viewing.replay import replay", True),
         ("cli", "import lippmann", False),
     ],
 )
 def test_the_order_is_read_rightly(module, source, broken):
     assert any(breaks_order(found) for found in imports_of(module, source)) == broken
+
+
+def test_modules_of_a_package_do_not_import_each_other_in_a_circle():
+    assert cycles(imports_inside_packages()) == []
+
+
+@pytest.mark.parametrize(
+    ("graph", "expected"),
+    [
+        ({}, []),
+        ({"a": {"b", "c"}, "b": {"c"}}, []),
+        ({"a": {"b"}, "b": {"a"}}, [["a", "b"]]),
+        ({"a": {"b"}, "b": {"c"}, "c": {"b", "d"}}, [["b", "c"]]),
+        ({"a": {"b"}, "b": {"c"}, "c": {"a"}, "x": {"a", "y"}, "y": {"x"}}, [["a", "b", "c"], ["x", "y"]]),
+    ],
+)
+def test_a_circle_is_found(graph, expected):
+    assert cycles(graph) == expected
 
 
 def test_only_the_modules_that_render_use_the_engine():

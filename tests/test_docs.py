@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
-PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
 
 
 def blocks(page: Path, language: str) -> list[str]:
@@ -41,7 +41,7 @@ def workplace(tmp_path, monkeypatch, moving_ball):
     """A folder with the files that the pages speak of."""
     import trimesh
 
-    from lippmann.image.formats import write_plain_picture
+    from lippmann.image.write import write_plain_picture
 
     scene = trimesh.Scene(trimesh.creation.icosphere(subdivisions=2))
     (tmp_path / "model.glb").write_bytes(trimesh.exchange.gltf.export_glb(scene))

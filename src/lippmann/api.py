@@ -18,18 +18,18 @@ from typing import TYPE_CHECKING, Any, cast
 
 from lippmann.display import Display, load_display
 from lippmann.progress import ProgressCallback, silent
-from lippmann.render.defaults import AUTO, choose
-from lippmann.render.settings import Device, RenderSettings
-from lippmann.scene.load import load_scene as _load_scene
+from lippmann.rendering.request.defaults import AUTO, choose
+from lippmann.rendering.request.settings import Device, RenderSettings
 from lippmann.scene.placement import Mode, Placement, PlacementOptions
+from lippmann.scene.readers.load import load_scene as _load_scene
 from lippmann.scene.scene import Scene
 
 if TYPE_CHECKING:
     from lippmann.image import IntegralImage
-    from lippmann.quilt import Quilt
-    from lippmann.render.forecast import Forecast
-    from lippmann.render.pipeline import Preview
-    from lippmann.render.tiled_picture import Rendered, Runner
+    from lippmann.quilts.quilt import Quilt
+    from lippmann.rendering.forecast import Forecast
+    from lippmann.rendering.picture import Preview
+    from lippmann.tiles.tiled_render import Rendered, Runner
 
 
 def load_scene(
@@ -47,7 +47,7 @@ def load_scene(
         Path of a ``.glb``, ``.gltf``, ``.obj``, ``.ply``, ``.stl``, Mitsuba ``.xml``, Tachyon ``.dat`` or ``.nff``
         file; name of a bundled scene; a
         ``mi.Scene`` or Mitsuba dict; a trimesh scene or mesh; a PyVista mesh; a
-        :class:`~lippmann.scene.description.SceneDescription`.
+        :class:`~lippmann.scene.values.description.SceneDescription`.
     environment:
         An equirectangular EXR or HDR file (or an ``Environment``) that lights the scene in place of its own.
     background:
@@ -95,6 +95,9 @@ def render(
 ) -> IntegralImage:
     """Render a scene into the native pixels of a display.
 
+    One picture at a time is rendered in a process; calls of other threads wait, see
+    :mod:`lippmann.runtime.engine_lock`.
+
     Parameters
     ----------
     scene:
@@ -102,9 +105,9 @@ def render(
     display:
         A :class:`~lippmann.display.Display`, a preset's name, or a TOML file.
     method, order, respect_gloss, integrator, depth, spp, seed, subpixels, pixel_filter:
-        See :class:`~lippmann.render.settings.RenderSettings`; what is "auto" or None follows from the scene, see
-        :func:`~lippmann.render.defaults.choose`, and the method from what is asked for, see
-        :func:`~lippmann.render.choice.decide`.
+        See :class:`~lippmann.rendering.request.settings.RenderSettings`; what is "auto" or None follows from the scene,
+        see :func:`~lippmann.rendering.request.defaults.choose`, and the method from what is asked for, see
+        :func:`~lippmann.rendering.request.resolve.decide`.
     quality, quality_mean, max_time, denoise, layers, device, threads, memory:
         See there, too.
     camera, place, turn, shift, scale, pop_out:
@@ -126,7 +129,7 @@ def render(
     LippmannError
         Of the kind that says what was wrong; see ``lippmann.errors``.
     """
-    from lippmann.render.pipeline import render_integral_image
+    from lippmann.rendering.picture import render_integral_image
 
     loaded = _scene(scene)
     settings = _settings(
@@ -175,6 +178,8 @@ def render_to_file(
 ) -> Rendered:
     """Render a scene into a file tile by tile: for pictures larger than memory, and runs that may be interrupted.
 
+    One tile at a time is rendered in a process; calls of other threads wait, see :mod:`lippmann.runtime.engine_lock`.
+
     Parameters
     ----------
     scene, display, progress:
@@ -188,7 +193,7 @@ def render_to_file(
     placement:
         Where the display stands in the scene.
     runner:
-        Who renders the tiles, see :mod:`lippmann.render.tiled_picture`; by default this process.
+        Who renders the tiles, see :mod:`lippmann.tiles.tiled_render`; by default this process.
     options:
         ``method`` (``full``, ``pooled``), ``denoise``, ``integrator``, ``depth``, ``spp``, ``seed``, ``subpixels``,
         ``pixel_filter``, ``device``, ``threads`` and ``memory`` as for :func:`render`. Others are refused: they need
@@ -204,7 +209,7 @@ def render_to_file(
     LippmannError
         Of the kind that says what was wrong.
     """
-    from lippmann.render.tiled_picture import render_to_file as rendered
+    from lippmann.tiles.tiled_render import render_to_file as rendered
 
     loaded = _scene(scene)
     shown = display if isinstance(display, Display) else load_display(display)
@@ -256,7 +261,7 @@ def preview(
     memory: int | None = None,
     progress: ProgressCallback = silent,
 ) -> Preview:
-    """The plain picture that a camera of the scene sees.
+    """The plain picture that a camera of the scene sees. Calls of other threads wait, as of :func:`render`.
 
     Parameters
     ----------
@@ -270,7 +275,7 @@ def preview(
     Preview
         With ``.pixels`` ``(height, width, 3)`` float32 linear RGB and ``.provenance``.
     """
-    from lippmann.render.pipeline import render_preview
+    from lippmann.rendering.picture import render_preview
 
     loaded = _scene(scene)
     choice = choose(loaded, integrator=integrator, depth=depth, spp=spp, pixel_filter=pixel_filter, own_camera=True)
@@ -296,6 +301,8 @@ def render_quilt(
 ) -> Quilt:
     """Render the views that cameras before a display see, side by side in one picture.
 
+    Calls of other threads wait, as of :func:`render`.
+
     Parameters
     ----------
     scene:
@@ -304,7 +311,7 @@ def render_quilt(
         A device's name (``portrait``), or any lenticular display as :func:`render` takes it.
     views, size:
         Columns and rows of views, width and height in pixels; by default those that the device is given, see
-        :data:`lippmann.quilt.DEVICE_QUILTS`.
+        :data:`lippmann.quilts.quilt.DEVICE_QUILTS`.
     placement:
         Where the display stands in the scene; the same as for :func:`render` gives the same place.
     options:
@@ -323,8 +330,8 @@ def render_quilt(
     LippmannError
         Of the kind that says what was wrong.
     """
-    from lippmann.quilt import Quilt, load_device, quilt_of_display
-    from lippmann.render.quilt import render_quilt as rendered
+    from lippmann.quilts.quilt import Quilt, load_device, quilt_of_display
+    from lippmann.rendering.quilt import render_quilt as rendered
 
     shown = display if isinstance(display, Display) else load_device(str(display))
     wanted = quilt_of_display(shown, views, size)
@@ -351,6 +358,8 @@ def plan(
 ) -> Forecast:
     """Say what rendering a scene for a display will show and take, without rendering more than a few pixels.
 
+    Calls of other threads wait, as of :func:`render`.
+
     Parameters
     ----------
     scene, display:
@@ -371,7 +380,7 @@ def plan(
     LippmannError
         Of the kind that says what was wrong, as :func:`render` would find it before its first ray.
     """
-    from lippmann.render.forecast import forecast
+    from lippmann.rendering.forecast import forecast
 
     loaded = _scene(scene)
     shown = display if isinstance(display, Display) else load_display(display)

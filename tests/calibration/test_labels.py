@@ -7,9 +7,9 @@ import pytest
 
 from lippmann.calibration import Pattern, Window, draw, fields
 from lippmann.calibration.labels import label_window, paint_label
-from lippmann.calibration.pictures import draw_labelled, pattern_picture
+from lippmann.calibration.pattern_files import draw_labelled, pattern_picture
 from lippmann.display import Panel
-from lippmann.display.monitor import Monitor
+from lippmann.display.formats.monitor import Monitor
 
 MONITOR = Monitor("small", Panel(1200, 800, 0.3), pitch=14.0, slope=-4.7, center=0.31, viewing_distance=700.0)
 

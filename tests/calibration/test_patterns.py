@@ -13,10 +13,10 @@ from hypothesis import strategies as st
 from lippmann.calibration import NAMES, Pattern, Window, draw, fields, whole
 from lippmann.calibration.patterns import COLORS, LIT, step_of
 from lippmann.display import Panel
-from lippmann.display.monitor import Monitor
+from lippmann.display.formats.monitor import Monitor
 from lippmann.errors import UsageError
 from lippmann.image import IntegralImage, Provenance
-from lippmann.replay import replay
+from lippmann.viewing.replay import replay
 
 #: Some 12 pixels to a lens, so that each of three views has four pixels of its own.
 MONITOR = Monitor("small", Panel(480, 264, 0.3), pitch=7.1, slope=-4.7, center=0.31, viewing_distance=700.0)

@@ -7,7 +7,7 @@ import pytest
 
 from lippmann.calibration import Pattern, draw
 from lippmann.display import Panel
-from lippmann.display.monitor import Monitor
+from lippmann.display.formats.monitor import Monitor
 from lippmann.image import read_picture
 
 SHORT = "monitor:size=480x264,dpi=84.667,pitch=7.1,slope=-4.7,center=0.31,viewing-distance=700"

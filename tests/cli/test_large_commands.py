@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from lippmann.codecs import tiff
 from lippmann.display import load_display
-from lippmann.image import IntegralImage, large, tiff
-from lippmann.image.formats import write_plain_picture
+from lippmann.image import IntegralImage, streamed
+from lippmann.image.write import write_plain_picture
 
 
 @pytest.fixture
@@ -40,7 +41,7 @@ def test_the_outcome_is_the_same(lippmann, pair, tmp_path, monkeypatch, words):
     ending = "" if command in ("views", "micro-images") else ".png"
     outcomes = []
     for limit, name in ((0, "pieces"), (1 << 25, "whole")):
-        monkeypatch.setattr(large, "LARGE", limit)
+        monkeypatch.setattr(streamed, "LARGE", limit)
         done = lippmann(command, pair[0], *others, "--json", "-o", tmp_path / f"{name}{ending}")
         assert done.code == 0, done.err
         outcomes.append({key: value for key, value in done.json.items() if key != "output"})
@@ -51,7 +52,7 @@ def test_the_outcome_is_the_same(lippmann, pair, tmp_path, monkeypatch, words):
 def test_figures_are_the_same(lippmann, pair, tmp_path, monkeypatch):
     found = []
     for limit in (0, 1 << 25):
-        monkeypatch.setattr(large, "LARGE", limit)
+        monkeypatch.setattr(streamed, "LARGE", limit)
         done = lippmann("compare", *pair, "--json", "--csv", tmp_path / "a.csv")
         assert done.code == 0, done.err
         found.append(done.json)
@@ -61,7 +62,7 @@ def test_figures_are_the_same(lippmann, pair, tmp_path, monkeypatch):
 
 
 def test_an_error_map_needs_the_whole_picture(lippmann, pair, tmp_path, monkeypatch):
-    monkeypatch.setattr(large, "LARGE", 0)
+    monkeypatch.setattr(streamed, "LARGE", 0)
     done = lippmann("compare", *pair, "--map", tmp_path / "map.png")
     assert done.code == 2
     assert "--map: needs the whole picture" in done.err
@@ -74,6 +75,6 @@ def test_weaving_for_a_large_panel(lippmann, tmp_path, monkeypatch):
     text = "[panel]\nwidth = 60\nheight = 40\npixel_pitch = 0.25\n[lens_array]\nlayout = 'lenticular'\npitch = 2.5\n"
     display.write_text('name = "d"\ngap = 6.8\naperture_distance = 10.0\n' + text)
     for limit, name in ((0, "pieces.tif"), (1 << 25, "whole.tif")):
-        monkeypatch.setattr(large, "LARGE", limit)
+        monkeypatch.setattr(streamed, "LARGE", limit)
         assert lippmann("weave", tmp_path / "q_qs4x2.png", "-d", display, "-o", tmp_path / name).code == 0
     assert content(tmp_path / "pieces.tif") == content(tmp_path / "whole.tif")

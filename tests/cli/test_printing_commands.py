@@ -7,10 +7,10 @@ import pytest
 import tifffile
 from PIL import Image
 
+from lippmann.calibration.pitch_strips import PitchTest
 from lippmann.display import load_display
-from lippmann.display.prints import print_of_texts
+from lippmann.display.formats.print_sheet import print_of_texts
 from lippmann.image import read_picture
-from lippmann.printing import PitchTest
 
 SHEET = ("--lpi", "20", "--ppi", "200", "--size", "40x20mm", "--viewing-distance", "30cm")
 SHORT = "print:lpi=20,ppi=200,size=40x20mm,viewing-distance=30cm"

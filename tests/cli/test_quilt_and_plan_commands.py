@@ -7,8 +7,8 @@ import json
 import pytest
 
 from lippmann.image import read_picture
-from lippmann.quilt_files import read_quilt
-from lippmann.render import forecast
+from lippmann.quilts.files import read_quilt
+from lippmann.rendering import forecast
 
 ENDING = "_qs8x6a0.75.png"
 SMALL = ("--size", "384x384", "--spp", "2", "--integrator", "direct")
@@ -95,7 +95,7 @@ def test_bad_input_is_one_line_and_code_2(lippmann, tmp_path):
     assert "columns x rows, such as 8x6" in refused(*render, "--views", "48")
     assert "such as 512x512" in refused(*render, "--size", "3360")
     assert "no multiple of 8" in refused(*render, "--size", "3361x3360")
-    assert "pooled without denoising will not do" in refused(*render, "--method", "pooled", "--denoise", "none")
+    assert "pooled shares denoised light" in refused(*render, "--method", "pooled", "--denoise", "none")
     assert "lens-view will not do" in refused(*render, "--method", "lens-view")
     out = tmp_path / "x_qs4x4a1.png"
     square = refused(*render, "-d", "mla-square", "--views", "4x4", "--size", "400x400", "-o", out, "--quiet")

@@ -9,14 +9,13 @@ import subprocess
 import sys
 import time
 from dataclasses import dataclass, field
-from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from lippmann.image import read_picture
-from lippmann.store import TileGrid, TileResult, TileStore, journal_of
+from lippmann.journal import TileGrid, TileResult, TileStore, journal_of
 
 #: 32 tiles of 128 x 128 pixels; a run takes a few seconds, most of them for starting.
 WORDS = ("--integrator", "direct", "--spp", "1", "--resume", "--quiet", "--threads", "1")
@@ -135,13 +134,9 @@ def test_two_hundred_random_kills_harm_nothing(harness):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(
-    "denoise",
-    ["none", pytest.param("oidn-fast", marks=pytest.mark.skipif(find_spec("pyoidn") is None, reason="needs pyoidn"))],
-)
-def test_tiles_that_overlap_are_resumed_to_the_same_file(display, tmp_path, denoise):
+def test_tiles_that_overlap_are_resumed_to_the_same_file(display, tmp_path):
     one, two = tmp_path / "one.tif", tmp_path / "two.tif"
-    asked = ("--method", "pooled", "--denoise", denoise)
+    asked = ("--method", "pooled", "--denoise", "oidn-fast")
     subprocess.run(command(display, one, *asked), check=True)
     process = subprocess.Popen(command(display, two, *asked, "--memory", "1G"))
     while process.poll() is None and len(list(journal_of(two).glob("r*.tile"))) < 2:
@@ -187,7 +182,7 @@ def test_pictures_beyond_the_memory_go_to_tiles(lippmann, engine, display, tmp_p
 
 
 def test_what_is_made_from_neighbours_goes_to_tiles_sooner():
-    from lippmann.cli.tiled import is_tiled
+    from lippmann.cli.commands.render import is_tiled
     from lippmann.display import load_display
 
     def asked(**more):
@@ -231,3 +226,85 @@ def test_a_changed_command_is_refused_by_what_differs(lippmann, engine, tmp_path
     assert "the unfinished picture is another one" in done.err
     assert "spp (was 9, is 1)" in done.err
     assert lippmann("render", "small-balls", "--spp", 1, "--memory", "10M", "-o", output).code == 2
+
+
+# ---- Links and foreign files beside the output -------------------------------------------------------------------
+
+
+@pytest.fixture
+def small(cut_display):
+    """The words of a quick command, but for its output: two tiles."""
+    words = ("render", "small-balls", "-d", cut_display(160, 128), "--integrator", "normal", "--spp", 1)
+    return (*words, "--device", "cpu", "--resume", "-o")
+
+
+@pytest.fixture
+def begun(lippmann, engine, small, tmp_path, monkeypatch):
+    """The output of a command that was interrupted after the first of its two tiles."""
+    from lippmann.tiles import tiled_render
+
+    render_here, output = tiled_render.render_here, tmp_path / "out" / "a.png"
+    output.parent.mkdir()
+
+    def stop(prepared, missing, put):
+        render_here(prepared, missing[:1], put)
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(tiled_render, "render_here", stop)
+        assert lippmann(*small, output).code == 130
+    assert sorted(os.listdir(journal_of(output))) == ["job.json", "lock", "r0000_c0000.tile"]
+    return output
+
+
+def test_a_tile_is_not_written_through_a_link(lippmann, begun, small, tmp_path):
+    (tmp_path / "precious.txt").write_text("mine")
+    (journal_of(begun) / "r0000_c0001.tile").symlink_to(tmp_path / "precious.txt")
+    assert lippmann(*small, begun).code == 0
+    assert (tmp_path / "precious.txt").read_text() == "mine"
+    assert lippmann(*small, tmp_path / "unbroken.png").code == 0
+    assert begun.read_bytes() == (tmp_path / "unbroken.png").read_bytes()
+    assert os.listdir(begun.parent) == ["a.png"]
+
+
+def test_a_journal_that_is_a_link_is_refused_in_one_line(lippmann, begun, small):
+    journal_of(begun).rename(begun.parent / "elsewhere")
+    journal_of(begun).symlink_to(begun.parent / "elsewhere")
+    done = lippmann(*small, begun)
+    assert done.code == 2
+    (line,) = done.err.splitlines()
+    assert "this is no journal of an unfinished picture: it is a symbolic link; " in line
+    assert sorted(os.listdir(begun.parent / "elsewhere")) == ["job.json", "lock", "r0000_c0000.tile"]
+
+
+def test_a_folder_of_the_users_is_refused_before_anything_is_rendered(lippmann, small, tmp_path):
+    folder = journal_of(tmp_path / "a.png")
+    folder.mkdir(mode=0o755)
+    (folder / "notes.txt").write_text("mine")
+    done = lippmann(*small, tmp_path / "a.png")
+    assert done.code == 2
+    (line,) = done.err.splitlines()
+    assert "it holds 'notes.txt' and no job.json; " in line
+    assert "choose another name for the picture, or move what lies there" in line
+    assert (folder / "notes.txt").read_text() == "mine"
+    assert not (tmp_path / "a.png").exists()
+
+
+def test_what_the_user_puts_into_a_journal_stays(lippmann, begun, small):
+    (journal_of(begun) / "notes.txt").write_text("mine")
+    done = lippmann(*small, begun)
+    assert done.code == 0
+    assert "the folder a.png.parts stays: it holds 'notes.txt', which is no part of the journal" in done.err
+    assert os.listdir(journal_of(begun)) == ["notes.txt"]
+    assert begun.exists()
+
+
+def test_a_sequences_journal_that_is_a_link_is_refused_in_one_line(lippmann, engine, moving_ball, small, tmp_path):
+    (tmp_path / "precious.txt").write_text("mine")
+    (tmp_path / "f_%d.png.journal").symlink_to(tmp_path / "precious.txt")
+    words = [moving_ball if word == "small-balls" else word for word in small if word != "--resume"]
+    done = lippmann(*words, tmp_path / "f_%d.png", "--frames", "0:2")
+    assert done.code == 2
+    (line,) = done.err.splitlines()
+    assert "this is no journal of an unfinished sequence: it is a symbolic link; " in line
+    assert (tmp_path / "precious.txt").read_text() == "mine"

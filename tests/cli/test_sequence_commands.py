@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from lippmann.image import read_picture
-from lippmann.replay import replay
+from lippmann.viewing.replay import replay
 
 QUICK = ("--integrator", "direct", "--spp", "1", "--device", "cpu")
 
@@ -34,7 +34,7 @@ def test_frames_into_a_folder_with_a_film(engine, lippmann, moving_ball, tmp_pat
     for name, frame in zip(names, shown, strict=True):
         image = read_picture(tmp_path / "out" / name)
         seen = replay(image)
-        from lippmann.image.color import quantize
+        from lippmann.color.transfer import quantize
 
         error = np.mean((quantize(seen, 8, "srgb").astype(float) - frame) ** 2)
         assert 10 * np.log10(255**2 / error) > 30

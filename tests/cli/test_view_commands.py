@@ -17,7 +17,7 @@ import pytest
 
 from lippmann.display import Display, LensArray, Panel, load_display
 from lippmann.image import IntegralImage
-from lippmann.image.formats import write_plain_picture
+from lippmann.image.write import write_plain_picture
 
 DISPLAY = Display(
     "d", Panel(32, 24, 0.1), LensArray("lenticular", 0.4), gap=1.0, viewing_distance=500.0, aperture_distance=5.0
@@ -56,7 +56,7 @@ def fetch(address):
 def interrupted(process):
     """Code and standard error of a process after Ctrl-C."""
     process.send_signal(signal.SIGINT)
-    _, err = process.communicate(timeout=20)
+    _, err = process.communicate(timeout=60)
     return process.returncode, err
 
 
@@ -105,7 +105,7 @@ def test_view_opens_the_browser_where_there_is_a_screen(shot, tmp_path):
     browser = f"{sys.executable} -c \"open(r'{opened}', 'w').write(__import__('sys').argv[1])\" %s"
     with serving("view", shot, BROWSER=browser, DISPLAY=":9") as (process, address):
         fetch(address)
-        for _ in range(100):
+        for _ in range(1200):
             if opened.exists() and opened.read_text():
                 break
             time.sleep(0.05)

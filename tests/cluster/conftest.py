@@ -25,7 +25,7 @@ import os, signal, time
 from pathlib import Path
 
 import lippmann._version
-from lippmann.cluster import work
+from lippmann.cluster import tasks as work
 
 if os.environ.get("OTHER_VERSION"):
     lippmann._version.VERSION = os.environ["OTHER_VERSION"]
@@ -106,6 +106,10 @@ class Lab:
             words = ["-c", "from lippmann.cli import main; main()", "worker", "--threads", threads]
         return self._run(*words, *options, address or self.address, more=more)
 
+    def start_program(self, script: Path, *words: str, folder: Path, **more: str) -> subprocess.Popen[bytes]:
+        """A script of Python's, in a working directory of its own."""
+        return self._run(str(script), *words, more=more, folder=folder)
+
     def processes(self) -> list[psutil.Process]:
         """Those that were started here; what they have started are their children."""
         return [psutil.Process(process.pid) for process in self._processes]
@@ -135,15 +139,18 @@ class Lab:
     def log(self) -> str:
         return (self._folder / "log.txt").read_text(errors="replace")
 
-    def _run(self, *words: str, more: dict[str, str] | None = None) -> subprocess.Popen[bytes]:
+    def _run(
+        self, *words: str, more: dict[str, str] | None = None, folder: Path | None = None
+    ) -> subprocess.Popen[bytes]:
         with (self._folder / "log.txt").open("ab") as log:
             process = subprocess.Popen(
                 [sys.executable, *words],
                 stdout=log,
                 stderr=log,
-                env={**os.environ, "PYTHONWARNINGS": "ignore", **(more or {})},
+                # Killed workers leave their scratch files.
+                env={**os.environ, "PYTHONWARNINGS": "ignore", "TMPDIR": str(self._folder), **(more or {})},
                 start_new_session=True,
-                cwd=self._folder,
+                cwd=folder or self._folder,
             )
         self._processes.append(process)
         return process

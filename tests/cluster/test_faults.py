@@ -278,7 +278,7 @@ def test_a_scene_goes_to_each_worker_once(lab, tmp_path):
     """Of two pictures of one scene, too."""
     from lippmann import api
     from lippmann.cluster import connect, parse_target
-    from lippmann.cluster.parcel import pack
+    from lippmann.cluster.job_pickle import pack
     from lippmann.cluster.runner import run_on
 
     lab.start(2)

@@ -15,7 +15,7 @@ PLACEMENT = np.array([[0.0, 0.0, 2.0, 0.1], [0.0, 2.0, 0.0, -1 / 3], [-2.0, 0.0,
 
 def make_image(display, seed=0, *, stored="float32", depth=False, **parts):
     """Random values of that type, some above 1 where it has them, with depth that knows empty places if asked."""
-    from lippmann.image.color import dequantize
+    from lippmann.color.transfer import dequantize
 
     random = np.random.default_rng(seed)
     shape = (display.panel.height, display.panel.width)

@@ -13,7 +13,7 @@ from lippmann.display import NUMPY
 from lippmann.errors import PictureError, UsageError
 from lippmann.exchange.cameras import Cameras
 from lippmann.image.views import view_grid
-from lippmann.replay import eye_of_view
+from lippmann.viewing.replay import eye_of_view
 
 
 def pixel_of(display, point, ky, kx):

@@ -10,12 +10,12 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from PIL import Image
 
+from lippmann.codecs.pfm import read_pfm, write_pfm
 from lippmann.errors import LippmannError, PictureError
 from lippmann.exchange.cameras import Cameras
 from lippmann.exchange.hci import read_hci, write_hci
 from lippmann.exchange.hci_parameters import read_parameters
 from lippmann.exchange.light_field import light_field_of
-from lippmann.exchange.pfm import read_pfm, write_pfm
 
 FOLDERS = settings(max_examples=12, suppress_health_check=[HealthCheck.too_slow], deadline=None)
 

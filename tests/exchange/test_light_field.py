@@ -11,7 +11,7 @@ from lippmann.errors import PictureError
 from lippmann.exchange.cameras import Cameras
 from lippmann.exchange.light_field import LightField, check_rectangular, light_field_of, view_shape
 from lippmann.image import IntegralImage
-from lippmann.replay import eye_of_view
+from lippmann.viewing.replay import eye_of_view
 
 TYPES = st.sampled_from(["uint8", "uint16", "float16", "float32"])
 

@@ -17,13 +17,13 @@ from typing import Any
 
 import numpy as np
 
+from lippmann.codecs.pfm import write_pfm
 from lippmann.display import Display, LensArray, Panel
 from lippmann.exchange.layouts import export_image
-from lippmann.exchange.pfm import write_pfm
 from lippmann.image import IntegralImage, Provenance, write_micro_images, write_views
-from lippmann.image.formats import write_picture
 from lippmann.image.metadata import metadata_of, to_text
-from lippmann.store import FrameJournal, TileResult, TileStore, encode
+from lippmann.image.write import write_picture
+from lippmann.journal import FrameJournal, TileResult, TileStore, encode
 
 from parcels import packed  # isort: skip
 from targets import GRID  # isort: skip

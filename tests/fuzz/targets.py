@@ -16,30 +16,31 @@ from pathlib import Path
 from typing import Any
 from unittest import mock
 
-from lippmann import quilt, quilt_files
-from lippmann.cli import parse
-from lippmann.cli.sequences import frame_range, numbered
+from lippmann.cli.commands.sequence import frame_range, numbered
+from lippmann.cli.shared import parse
 from lippmann.cluster.address import parse_target
+from lippmann.codecs.pfm import read_pfm
 from lippmann.display import load_display
-from lippmann.display.looking_glass import display_of_calibration
-from lippmann.display.monitor_file import monitor_of_tables
-from lippmann.display.short_form import display_of_short_form
+from lippmann.display.formats.inline_spec import display_of_short_form
+from lippmann.display.formats.looking_glass import display_of_calibration
+from lippmann.display.formats.monitor_toml import monitor_of_tables
 from lippmann.errors import LippmannError, PictureError
 from lippmann.exchange.hci_parameters import read_parameters
 from lippmann.exchange.layouts import import_image
-from lippmann.exchange.pfm import read_pfm
-from lippmann.image import compose, large, read_picture
+from lippmann.image import compose, read_picture, streamed
 from lippmann.image.metadata import from_text
-from lippmann.scene.environment import read_environment
-from lippmann.scene.gltf.moving import MovingGltf
-from lippmann.scene.load import load_scene
-from lippmann.scene.resources import decode_image
-from lippmann.scene.tachyon import read_cam
-from lippmann.store import DamagedTile, FrameJournal, TileGrid, TileStore, decode
+from lippmann.journal import DamagedTile, FrameJournal, TileGrid, TileStore, decode
+from lippmann.quilts import files as quilt_files
+from lippmann.quilts import quilt
+from lippmann.scene.parsing.files import decode_image
+from lippmann.scene.readers.environment_map import read_environment
+from lippmann.scene.readers.gltf_animation.animated_file import MovingGltf
+from lippmann.scene.readers.load import load_scene
+from lippmann.scene.readers.tachyon.reader import read_cam
 from lippmann.viewer.calibrate.site import CalibrationSite
+from lippmann.viewer.http_server import _Handler
+from lippmann.viewer.served_picture import PictureFile
 from lippmann.viewer.server import ViewerSite
-from lippmann.viewer.shown import PictureFile
-from lippmann.viewer.web import _Handler
 
 from forms import (  # isort: skip
     body_tree,
@@ -201,7 +202,7 @@ def _tile(data: bytes, folder: Path) -> object:
 
 def _journal(data: bytes, folder: Path) -> object:
     """Go on with a picture as far as what lies there allows, and make the rest anew."""
-    (folder / "p.tif.parts").mkdir()
+    (folder / "p.tif.parts").mkdir(mode=0o700)
     unpack(data, folder / "p.tif.parts")
     with TileStore.open(folder / "p.tif", {"version": "1", "spp": "4"}, GRID, resume=True) as store:
         missing = store.missing()
@@ -240,9 +241,9 @@ def _picture(name: str) -> Read:
 
 def _in_pieces(path: Path) -> object:
     """A picture read as those are that are larger than memory."""
-    with mock.patch.object(large, "LARGE", 0):
-        picture = large.open_picture(path)
-    assert isinstance(picture, large.LargePicture)
+    with mock.patch.object(streamed, "LARGE", 0):
+        picture = streamed.open_picture(path)
+    assert isinstance(picture, streamed.LargePicture)
     return picture.rows(0, picture.display.panel.height)
 
 

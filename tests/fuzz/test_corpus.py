@@ -74,7 +74,9 @@ def test_damaged_inputs_end_in_a_result_or_an_error(name, looked_at):
 
 
 @pytest.mark.parametrize("name", TARGETS)
-@settings(deadline=None, max_examples=8, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(
+    deadline=None, max_examples=8, suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow]
+)
 @given(data=st.binary(max_size=120) | st.text(max_size=60).map(lambda text: text.encode("utf-8", "surrogatepass")))
 def test_foreign_inputs_end_in_a_result_or_an_error(name, looked_at, data):
     assert looked_at(name, data) == ""

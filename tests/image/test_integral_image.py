@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from lippmann.codecs.png import read_png_header
 from lippmann.errors import OutputError, PictureError
 from lippmann.image import IntegralImage, Provenance
-from lippmann.image.png import read_png_header
 
 ANGLE = math.radians(30)
 SIMILARITY = 3e-4 * np.array([[math.cos(ANGLE), -math.sin(ANGLE), 0], [math.sin(ANGLE), math.cos(ANGLE), 0], [0, 0, 1]])

@@ -45,14 +45,14 @@ def _built_scenes():
 @pytest.fixture
 def build_once(monkeypatch, _built_scenes):
     """``build_once(scene)``: the built scene, kept from test to test; renders take it from there too."""
-    import lippmann.scene.build
+    import lippmann.device.pbr
 
-    build = lippmann.scene.build.build
+    build = lippmann.device.pbr.build
 
     def kept(scene, engine=None):
         if id(scene) not in _built_scenes:
             _built_scenes[id(scene)] = (scene, build(scene, engine))
         return _built_scenes[id(scene)][1]
 
-    monkeypatch.setattr(lippmann.scene.build, "build", kept)
+    monkeypatch.setattr(lippmann.device.pbr, "build", kept)
     return kept

@@ -307,7 +307,7 @@ def test_the_replayed_scene_is_orthoscopic(name, distance):
 def test_no_ray_slips_through_between_triangles():
     """The rays of a straight sheet are level; here each row of them runs along the edges of a mesh."""
     from lippmann.api import load_scene, render
-    from lippmann.scene.description import Instance, Material, Mesh, SceneDescription
+    from lippmann.scene.values.description import Instance, Material, Mesh, SceneDescription
 
     grid = np.arange(-80, 81) * STRAIGHT.pixel
     x, y = np.meshgrid(grid, grid + STRAIGHT.pixel / 2)

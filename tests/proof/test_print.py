@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from mitsuba_cameras import camera_rays, in_display, intersect
 
-from lippmann.display.prints import Print
-from lippmann.printing import with_marks
-from lippmann.replay import replay
+from lippmann.calibration.alignment_marks import with_marks
+from lippmann.display.formats.print_sheet import Print
+from lippmann.viewing.replay import replay
 
 pytestmark = pytest.mark.usefixtures("engine")
 

@@ -4,13 +4,13 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
 from lippmann.display import Display, LensArray, Panel, list_displays, load_display
 from lippmann.errors import SceneError, UsageError
-from lippmann.scene.description import Camera
 from lippmann.scene.placement import FILL, LEAST_FILL, POP_OUT, PlacementOptions, place
+from lippmann.scene.values.description import Camera
 
 
 def display(viewing_distance=math.inf, aperture=20.0, width=400, height=300, gap=5.0):
@@ -146,6 +146,27 @@ class TestFit:
         back, front = place(box(0, 0, 3), display(aperture=0.0)).depth_range
         assert (back, front) == (pytest.approx(-50), pytest.approx(0, abs=1e-9))
 
+    @pytest.mark.parametrize(
+        ("size", "turn"),
+        [
+            ((0, 0, 3), (0, 180, 0)),  # sine and cosine of 180 degrees leave 4e-16 of height
+            ((0, 0, 3), (180, 0, 0)),
+            ((3, 0, 0), (90, 0, 0)),
+            ((0, 3, 0), (0, 90, 0)),
+            ((0, 1e-7, 3), (0, 0, 0)),  # as a file's single precision has it
+        ],
+    )
+    def test_rounding_noise_across_a_line_toward_the_viewer_is_no_width(self, size, turn):
+        bounds = box(*size, center=(3, -2, 1))
+        placed = place(bounds, display(aperture=0.0), options=options(turn=turn))
+        assert placed.depth_range == pytest.approx((-50, 0), abs=1e-9)
+        assert 3 / scale_of(placed) == pytest.approx(50)
+        assert placed.warnings == ()
+
+    def test_a_small_scene_far_from_the_origin_has_a_size(self):
+        placed = place(box(0.1, 0.1, 0, center=(1e6, 2e6, 0)), display())
+        assert 0.1 / scale_of(placed) == pytest.approx(FILL * 75, rel=1e-6)
+
     def test_a_scene_moved_off_the_panel(self):
         placed = place(box(1, 1, 0), display(), options=options(shift=(500, 0, 0)))
         assert any("beside the panel" in warning for warning in placed.warnings)
@@ -167,6 +188,9 @@ class TestFit:
         st.tuples(*[st.floats(-180, 180)] * 3),
         st.none() | st.floats(0, 1),
     )
+    @example(
+        (0.0, 1.0, 0.0), 60.0, 27.0, (0.0, 102.0, 0.0), None
+    )  # the lens plane's share in front depends on the size
     def test_a_fitted_scene_is_inside(self, size, distance, aperture, turn, pop_out):
         assume(max(size) > 1e-3)
         found = display(distance, aperture)
@@ -284,6 +308,17 @@ class TestCamera:
         with pytest.raises(SceneError, match=message):
             place(self.BOUNDS, display(), cameras=[self.camera(**fields)], options=options(camera="eye"))
 
+    @pytest.mark.parametrize(
+        "fields", [{"focus_distance": 1e-300}, {"fov_y": 1e-308}, {"fov_y": None, "height": 1e300}]
+    )
+    def test_cameras_that_see_next_to_nothing_or_all(self, fields):
+        eye = self.camera(**fields)
+        shown = display(500.0 if eye.focus_distance else math.inf)
+        with pytest.raises(
+            SceneError, match=r"camera 'eye' makes 1 mm of the display .* long; between 1e-30 and 1e\+30"
+        ):
+            place(self.BOUNDS, shown, cameras=[eye], options=options(camera="eye"))
+
     def test_no_camera_at_all(self):
         with pytest.raises(SceneError, match="the scene has no cameras; fit it"):
             place(self.BOUNDS, display(), options=options(mode="camera"))
@@ -334,7 +369,12 @@ def test_options_that_cannot_be(fields, message):
 @pytest.mark.parametrize("mode", ["fit", "display"])
 @pytest.mark.parametrize(
     ("bounds", "message"),
-    [(box(0, 0, 0, center=(1, 2, 3)), "a single point"), (np.full((2, 3), np.nan), "no extent")],
+    [
+        (box(0, 0, 0, center=(1, 2, 3)), "a single point"),
+        (np.array([[0, 1, 0], [1e-45, 1, 0]]), "a single point"),  # once it is turned
+        (np.array([[0.1 + 0.2, 1, 0], [0.3, 1, 0]])[::-1], "a single point"),
+        (np.full((2, 3), np.nan), "no extent"),
+    ],
 )
 def test_scenes_without_extent(mode, bounds, message):
     with pytest.raises(SceneError, match=message):

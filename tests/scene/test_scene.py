@@ -7,9 +7,9 @@ import pytest
 
 from lippmann.errors import SceneError
 from lippmann.scene import scene as scene_module
-from lippmann.scene.description import Camera, Environment, Instance, Light, Material, Mesh, SceneDescription
 from lippmann.scene.scene import STUDIO_NOTE, Scene, bounds_of, checked, find_camera, framing_camera, lit
-from lippmann.scene.studio import BACKDROP, studio
+from lippmann.scene.studio_light import BACKDROP, studio
+from lippmann.scene.values.description import Camera, Environment, Instance, Light, Material, Mesh, SceneDescription
 
 
 def triangle(positions=((0, 0, 0), (2, 0, 0), (0, 1, 0)), **fields):

@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 import shutil
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -60,13 +60,17 @@ class Tab:
         """The value of a JavaScript expression or function; promises are waited for."""
         return self.page.evaluate(script, argument)
 
-    def wait_for(self, script: str, seconds: float = 20.0) -> Any:
+    def wait_for(self, script: str, seconds: float = 60.0) -> Any:
         """Waits until the expression is true, and returns its value; a TimeoutError if it does not become so."""
         # Playwright's own waiting evaluates text inside the page, which pages of ours forbid.
+        return self.wait_until(lambda: self.evaluate(script), seconds, script)
+
+    def wait_until(self, holds: Callable[[], Any], seconds: float = 60.0, what: str = "the condition") -> Any:
+        """Waits until the function's value is true, and returns that; a TimeoutError if it does not become so."""
         until = time.monotonic() + seconds
-        while not (value := self.evaluate(script)):
+        while not (value := holds()):
             if time.monotonic() > until:
-                raise TimeoutError(f"{script} is {value!r} after {seconds:g} s; said: {self.said}, {self.faults}")
+                raise TimeoutError(f"{what} is {value!r} after {seconds:g} s; said: {self.said}, {self.faults}")
             self.page.wait_for_timeout(50)
         return value
 

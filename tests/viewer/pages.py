@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from lippmann.color.transfer import quantize
 from lippmann.display import Display, LensArray, Panel
 from lippmann.image import IntegralImage, Provenance
-from lippmann.image.color import quantize
-from lippmann.replay import replay
 from lippmann.viewer.export import export_page
+from lippmann.viewing.replay import replay
 
 VIEWER = "window.lippmann.viewer"
 

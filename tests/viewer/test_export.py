@@ -12,9 +12,9 @@ from pages import DISPLAYS, VIEWER, noise, opened, page_of, seen, shown
 from PIL import Image
 
 from lippmann.errors import OutputError, UsageError
-from lippmann.replay import default_eye
 from lippmann.viewer.export import export_page
 from lippmann.viewer.overlays import overlays
+from lippmann.viewing.replay import default_eye
 
 
 def data_of(page):

@@ -12,9 +12,9 @@ from pages import CELLS, DISPLAYS, lenticular, noise
 
 from lippmann.display import Display, LensArray, Panel, list_displays
 from lippmann.image import IntegralImage, Provenance
-from lippmann.replay import default_eye
 from lippmann.viewer.manifest import MOST_TILES, VERSION, facts, manifest, optics, tile_size
 from lippmann.viewer.tiles import Tiles
+from lippmann.viewing.replay import default_eye
 
 
 def described(image, **options):

@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from lippmann.color.transfer import quantize
 from lippmann.display import Display, LensArray, Panel
 from lippmann.image import IntegralImage, Provenance
-from lippmann.image.color import quantize
 from lippmann.viewer import notebook
 
 pytest.importorskip("anywidget")

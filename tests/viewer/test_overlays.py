@@ -7,11 +7,11 @@ import pytest
 
 from lippmann.display import Display, LensArray, Panel
 from lippmann.image import IntegralImage, Provenance
-from lippmann.quality.error_picture import BRIGHTEST, SCALE, in_false_color
-from lippmann.render.reuse.points import INTERPOLATED, REPROJECTED, TRACED
-from lippmann.report.pictures import EMPTY_CODE
+from lippmann.metrics.error_image import BRIGHTEST, SCALE, in_false_color
+from lippmann.rendering.reprojection.common.point_image import INTERPOLATED, REPROJECTED, TRACED
 from lippmann.viewer.overlays import overlays
 from lippmann.viewer.tiles import Tiles
+from lippmann.viewing.diagnostic_maps import EMPTY_CODE
 
 SHAPE = (6, 10)
 ALL = (slice(None), slice(None))
@@ -85,7 +85,7 @@ def test_counts_begin_at_zero():
     assert overlays(picture({"samples": plain(8)}))["samples"].description["range"] == [0.0, 8.0]
 
 
-@pytest.mark.parametrize("value", [3.0, np.nan, -np.inf])
+@pytest.mark.parametrize("value", [3.0, 1e20, np.nan, -np.inf])
 def test_scales_have_a_length(value):
     overlay = overlays(picture({"depth": plain(value)}))["depth"]
     low, high = overlay.description["range"]

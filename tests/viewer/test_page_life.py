@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from pages import DISPLAYS, VIEWER, noise, opened, page_of, put_eye, seen, shown
 
-from lippmann.image.formats import write_picture
+from lippmann.image.write import write_picture
 
 
 @pytest.fixture(scope="module")
@@ -338,9 +338,9 @@ def test_browser_without_webgl_is_told(open_tab, page):
 
 @pytest.mark.parametrize("damage", ["gone", "cut"])
 def test_file_that_is_gone_or_cut_is_named_on_the_page(open_tab, tmp_path, damage):
+    from lippmann.viewer.http_server import WebServer
+    from lippmann.viewer.served_picture import PictureFile
     from lippmann.viewer.server import ViewerSite
-    from lippmann.viewer.shown import PictureFile
-    from lippmann.viewer.web import WebServer
 
     path = tmp_path / "teapot.png"
     write_picture(noise(DISPLAYS["square"]), path)
@@ -358,9 +358,9 @@ def test_file_that_is_gone_or_cut_is_named_on_the_page(open_tab, tmp_path, damag
 
 
 def test_served_page_shows_the_picture(open_tab, tmp_path):
+    from lippmann.viewer.http_server import WebServer
+    from lippmann.viewer.served_picture import PictureFile
     from lippmann.viewer.server import ViewerSite
-    from lippmann.viewer.shown import PictureFile
-    from lippmann.viewer.web import WebServer
 
     image = noise(DISPLAYS["hexagonal"])
     path = tmp_path / "picture.png"

@@ -20,11 +20,11 @@ from pages import (
 )
 from PIL import Image
 
+from lippmann.color.transfer import encode_srgb
 from lippmann.display import NUMPY
 from lippmann.image import IntegralImage, Provenance
-from lippmann.image.color import encode_srgb
-from lippmann.refocus import refocus
-from lippmann.replay import default_eye, eye_of_view
+from lippmann.viewing.refocus import refocus
+from lippmann.viewing.replay import default_eye, eye_of_view
 
 #: In the middle, aside within the field, far beyond it and high.
 EYES = ((0.0, 0.0, 300.0), (17.3, -9.0, 260.0), (-171.0, 60.0, 410.0))
@@ -228,7 +228,7 @@ def test_layer_lies_over_the_picture_through_the_lenses(open_tab, tmp_path):
     put_eye(tab, EYES[1])
     tab.evaluate(f"{VIEWER}.setOverlay('status')")
     tab.evaluate(f"{VIEWER}.setOverlayShare(1)")
-    from lippmann.report.pictures import missed_codes
+    from lippmann.viewing.diagnostic_maps import missed_codes
 
     layer = missed_codes(image)
     assert layer is not None

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from pages import lenticular, noise
 
+from lippmann.viewer.http_server import WebServer
+from lippmann.viewer.served_picture import PictureFile
 from lippmann.viewer.server import ViewerSite
-from lippmann.viewer.shown import PictureFile
-from lippmann.viewer.web import WebServer
 
 READY = "window.lippmann?.viewer?.ready.then(() => true)"
 ALERT = "(a => a && !a.hidden && a.innerText)(document.querySelector('[role=alert]'))"
@@ -46,8 +46,7 @@ def test_layers_come_when_they_are_asked_for(served):
     assert not any("tiles/depth" in asked for asked in tab.asked_for)
     choose_layer(tab)
     tab.wait_for("performance.getEntriesByType('resource').some(({ name }) => name.includes('tiles/depth'))")
-    tab.page.wait_for_timeout(300)
-    assert drawn(tab) != before
+    tab.wait_until(lambda: drawn(tab) != before)
     tab.assert_clean()
 
 

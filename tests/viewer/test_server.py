@@ -14,13 +14,13 @@ import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
+from lippmann.color.transfer import quantize
 from lippmann.display import Display, LensArray, Panel
 from lippmann.errors import PictureError
 from lippmann.image import IntegralImage, read_picture
-from lippmann.image.color import quantize
+from lippmann.viewer.http_server import RefusedError, Request
+from lippmann.viewer.served_picture import PictureFile
 from lippmann.viewer.server import ViewerSite
-from lippmann.viewer.shown import PictureFile
-from lippmann.viewer.web import RefusedError, Request
 
 SECRET = b"not for the page"
 DISPLAY = Display(
@@ -225,7 +225,9 @@ WORDS = (
 PATHS = st.lists(st.sampled_from(WORDS) | st.text(max_size=4), max_size=8).map(lambda words: "/" + "/".join(words))
 
 
-@settings(max_examples=200, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(
+    max_examples=200, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow]
+)
 @given(path=PATHS | st.text())
 @example(path="/pictures/0/tiles/__class__/0_0")
 @example(path="/pictures/0/tiles/codes/0_0")

@@ -11,11 +11,11 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 from PIL import Image
 
+from lippmann.color.transfer import dequantize, quantize
 from lippmann.display import Display, LensArray, Panel
 from lippmann.errors import UsageError
 from lippmann.image import IntegralImage, Provenance, read_picture
-from lippmann.image.color import dequantize, quantize
-from lippmann.viewer.shown import open_shown
+from lippmann.viewer.served_picture import open_shown
 from lippmann.viewer.tiles import PICTURE, TILE_SIZE, Tiles
 
 LENSES = LensArray("lenticular", 0.4)
@@ -78,7 +78,9 @@ def test_what_is_not_there_is_said(noise, layer, column, row):
         Tiles(picture(noise), 16).codes(layer, column, row)
 
 
-@settings(max_examples=20, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(
+    max_examples=20, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow]
+)
 @given(
     codes=arrays.arrays(np.uint8, st.tuples(st.integers(1, 9), st.integers(5, 9), st.just(3))),
     transfer=st.sampled_from(["srgb", "linear"]),

@@ -1,8 +1,8 @@
 """Native test patterns of a slanted monitor, as functions of the lens phase of each sub-pixel.
 
-Everything follows from one number per sub-pixel, its phase (:mod:`lippmann.display.monitor`). The sub-pixel c (0 R, 1
-G, 2 B) of the pixel in column i and row j (row 0 on top) of a panel of W x H pixels, whose place in its pixel is
-(right_c, down_c) in pixels, (-1/3, 0), (0, 0), (1/3, 0) for a plain RGB stripe, has ::
+Everything follows from one number per sub-pixel, its phase (:mod:`lippmann.display.formats.monitor`). The sub-pixel c
+(0 R, 1 G, 2 B) of the pixel in column i and row j (row 0 on top) of a panel of W x H pixels, whose place in its pixel
+is (right_c, down_c) in pixels, (-1/3, 0), (0, 0), (1/3, 0) for a plain RGB stripe, has ::
 
     A = (pitch / DPI) cos(atan(1 / slope))    lenses per pixel to the right; slope infinite: A = pitch / DPI
     B = A / slope                             lenses per pixel upwards;      slope infinite: B = 0
@@ -45,7 +45,7 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.display.monitor import Monitor
+from lippmann.display.formats.monitor import Monitor
 from lippmann.errors import LippmannError, UsageError
 
 FloatArray = NDArray[np.float32]

@@ -13,13 +13,11 @@ from typing import NoReturn
 
 from typer import BadParameter
 
+from lippmann.cli.shared.exit_codes import INTERRUPTED
 from lippmann.errors import LippmannError
 
 #: The base of all complaints about the command line itself; its home moved between releases of typer.
 _ComplaintError = BadParameter.__mro__[2]
-
-#: The exit code after Ctrl-C.
-INTERRUPTED = 130
 
 
 def main(arguments: list[str] | None = None) -> None:

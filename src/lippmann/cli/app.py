@@ -7,20 +7,20 @@ from typing import Annotated
 import typer
 
 from lippmann._version import VERSION
-from lippmann.cli import (
-    calibrate_page,
-    calibration,
-    clusters,
+from lippmann.cli.commands import (
+    calibrate,
+    cluster,
+    compare,
     exchange,
-    panels,
-    pictures,
-    planning,
-    printing,
-    quality,
-    rendering,
+    picture,
+    plan,
+    preview,
+    quilt,
+    render,
     system,
-    viewing,
+    view,
 )
+from lippmann.cli.commands import print as printing
 
 app = typer.Typer(
     help="Render 3D scenes into the native pixels of integral-imaging displays.",
@@ -29,29 +29,28 @@ app = typer.Typer(
     rich_markup_mode=None,
 )
 
-app.command("render")(rendering.render)
-app.command("preview")(rendering.preview)
-app.command("plan")(planning.plan)
-app.command("worker")(clusters.worker)
+app.command("render")(render.render)
+app.command("preview")(preview.preview)
+app.command("plan")(plan.plan)
+app.command("worker")(cluster.worker)
 app.command("displays")(system.displays)
 app.command("doctor")(system.doctor)
-app.command("info")(pictures.info)
-app.command("views")(pictures.views)
-app.command("micro-images")(pictures.micro_images)
-app.command("compose")(pictures.compose)
-app.command("replay")(pictures.replay)
-app.command("refocus")(pictures.refocus)
+app.command("info")(picture.info)
+app.command("views")(picture.views)
+app.command("micro-images")(picture.micro_images)
+app.command("compose")(picture.compose)
+app.command("replay")(picture.replay)
+app.command("refocus")(picture.refocus)
 app.command("export")(exchange.export)
 app.command("import")(exchange.import_)
-app.command("view")(viewing.view)
-app.add_typer(panels.quilt, name="quilt")
-app.command("weave")(panels.weave)
-calibration.calibrate.command("page")(calibrate_page.page)
-app.add_typer(calibration.calibrate, name="calibrate")
+app.command("view")(view.view)
+app.add_typer(quilt.quilt, name="quilt")
+app.command("weave")(quilt.weave)
+app.add_typer(calibrate.calibrate, name="calibrate")
 app.command("pitch-test")(printing.pitch_test)
 app.command("marks")(printing.marks)
-app.command("compare")(quality.compare)
-app.command("reproduce")(quality.reproduce)
+app.command("compare")(compare.compare)
+app.command("reproduce")(compare.reproduce)
 
 
 @app.callback(invoke_without_command=True)

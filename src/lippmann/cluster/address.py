@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ipaddress
 import re
+from collections.abc import Callable
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
@@ -36,6 +37,10 @@ class TlsFiles:
     certificate: Path | None = None
     key: Path | None = None
 
+    def options(self) -> dict[str, Path | None]:
+        """The three by the names of the command line's options."""
+        return {"--tls-ca": self.ca, "--tls-cert": self.certificate, "--tls-key": self.key}
+
     def security(self) -> Any:
         """``distributed.Security`` with these files, or with what Dask is configured to use.
 
@@ -44,7 +49,7 @@ class TlsFiles:
         UsageError
             Some of the three are missing, or a file is.
         """
-        given = {"--tls-ca": self.ca, "--tls-cert": self.certificate, "--tls-key": self.key}
+        given = self.options()
         distributed = import_distributed()
         if not any(given.values()):
             return distributed.Security()
@@ -58,6 +63,40 @@ class TlsFiles:
 
 
 _ROLES = ("client", "worker", "scheduler")
+
+#: Schemes whose two ends ask each other for certificates.
+_AUTHENTICATED = ("tls", "wss")
+
+
+def temporary_security() -> Any:
+    """``distributed.Security`` with a certificate that is made for one cluster, kept in memory and trusted by no other.
+
+    All roles of the cluster have this certificate and accept nobody who has not.
+
+    Raises
+    ------
+    ClusterError
+        The package that makes certificates is not installed.
+    """
+    try:
+        return import_distributed().Security.temporary()
+    except ImportError as error:
+        raise ClusterError(f"no certificate can be made ({error})", fix="pip install 'lippmann[cluster]'") from None
+
+
+def warn_of_exposure(address: str, security: Any, remark: Callable[[str], None]) -> None:
+    """Call ``remark`` with one line on who can run code through connections to ``address``, unless certificates forbid.
+
+    Dask runs whatever functions its peers send: a scheduler those of clients, a worker and a client those of all
+    whom the scheduler lets in. ``security`` is the ``distributed.Security`` of the connection.
+    """
+    if security.require_encryption or urlsplit(address).scheme in _AUTHENTICATED:
+        return  # Dask connects with certificates on both ends, or not at all
+    who = "every account of this machine" if is_loopback(address) else "everyone who can reach that port"
+    remark(
+        f"WARNING: {address} asks nobody for a certificate: {who} can run code as you, on the workers and here "
+        "(use tls:// with --tls-ca, --tls-cert and --tls-key)"
+    )
 
 
 def parse_target(text: str) -> Target:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import logging
 import sys
 from collections.abc import Callable, Iterator
@@ -10,11 +11,20 @@ from dataclasses import dataclass, field
 from importlib.util import find_spec
 from typing import Any
 
-from lippmann import machine
-from lippmann.cluster.address import LOOPBACK, Target, TlsFiles, import_distributed
-from lippmann.cluster.roster import Roster
-from lippmann.cluster.work import THREADS_VARIABLE
-from lippmann.errors import ClusterError
+from lippmann.cluster.address import (
+    LOOPBACK,
+    Target,
+    TlsFiles,
+    import_distributed,
+    temporary_security,
+    warn_of_exposure,
+)
+from lippmann.cluster.private_scratch import private_scratch
+from lippmann.cluster.tasks import THREADS_VARIABLE
+from lippmann.cluster.worker_roster import Roster
+from lippmann.errors import ClusterError, UsageError
+from lippmann.runtime import machine
+from lippmann.runtime.child_python import spawn_safely
 
 #: Seconds to wait for a scheduler to answer.
 CONNECT_SECONDS = 20
@@ -55,31 +65,40 @@ def connect(
     threads: int | None = None,
     remark: Callable[[str], None] = lambda line: None,
 ) -> Iterator[Cluster]:
-    """Connect to a scheduler, or start workers on this machine that only it can reach.
+    """Connect to a scheduler, or start workers on this machine that only this process can use.
 
     Parameters
     ----------
+    tls:
+        Certificates for a scheduler's ``tls://`` address. Workers that are started here have a certificate of their
+        own, made for the occasion.
     threads:
         Of workers that are started here, all together; by default all cores.
     remark:
-        Called with one line about what happens on the way.
+        Called with one line about what happens on the way, and with a warning of connections that are not
+        authenticated.
 
     Raises
     ------
     ClusterError
         Dask is not installed, or the scheduler does not answer.
     UsageError
-        Files for encryption are missing.
+        Files for encryption are missing, or are given for workers that are started here.
     """
     distributed = import_distributed()
     _hush()
-    security = (tls or TlsFiles()).security()
+    tls = tls or TlsFiles()
     if target.local is not None:
+        for option, path in tls.options().items():
+            if path is not None:
+                raise UsageError("is for tls://HOST:8786", where=option, rule="local:N makes its own certificate")
         with _started_here(distributed, target.local, threads) as client, _watched(client) as roster:
-            _say_dashboard(client, remark)
             yield Cluster(client, roster, f"local:{target.local}", remark)
         return
     assert target.address is not None
+    security = tls.security()
+    # Before there is a connection: whoever listens there can send code as soon as it stands.
+    warn_of_exposure(target.address, security, remark)
     try:
         client = distributed.Client(
             target.address, security=security, timeout=CONNECT_SECONDS, set_as_default=False, name="lippmann"
@@ -101,25 +120,36 @@ def connect(
 
 @contextmanager
 def _started_here(distributed: Any, count: int, threads: int | None) -> Iterator[Any]:
+    """A client of workers that other accounts of this machine can neither use nor feed with files."""
+    import dask
+
     each = max(1, (threads or machine.usable_cores()) // count)
-    with (
-        distributed.LocalCluster(
-            n_workers=count,
-            threads_per_worker=1,
-            processes=True,
-            host=LOOPBACK,
-            # Without an address Dask's HTTP servers would be open to the network.
-            dashboard_address=f"{LOOPBACK}:0",
-            worker_dashboard_address=f"{LOOPBACK}:0",
-            memory_limit=machine.total_memory() // count,
-            silence_logs=logging.CRITICAL,
-            env={THREADS_VARIABLE: str(each)},
-        ) as cluster,
-        distributed.Client(cluster, set_as_default=False, name="lippmann") as client,
-    ):
-        # It would take copies of the scene away from workers between two tiles.
-        client.amm.stop()
-        yield client
+    security = temporary_security()
+    with private_scratch() as folder, spawn_safely():
+        # Dask's HTTP servers answer everyone, and cannot be left out: they have no pages.
+        pages: dict[str, Any] = {"distributed.scheduler.http.routes": [], "distributed.worker.http.routes": []}
+        with dask.config.set({"temporary-directory": folder, **pages}):
+            cluster = distributed.LocalCluster(
+                n_workers=count,
+                threads_per_worker=1,
+                processes=True,
+                host=LOOPBACK,
+                security=security,
+                # Without an address the scheduler's HTTP server would be open to the network.
+                dashboard_address=f"{LOOPBACK}:0",
+                scheduler_kwargs={"dashboard": False},
+                worker_dashboard_address=None,
+                local_directory=folder,
+                memory_limit=machine.total_memory() // count,
+                silence_logs=logging.CRITICAL,
+                env={THREADS_VARIABLE: str(each)},
+                # Workers that are started later, in place of others, are set up alike.
+                config=copy.deepcopy(dask.config.config),
+            )
+        with cluster, distributed.Client(cluster, set_as_default=False, name="lippmann") as client:
+            # It would take copies of the scene away from workers between two tiles.
+            client.amm.stop()
+            yield client
 
 
 @contextmanager

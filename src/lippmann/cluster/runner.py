@@ -14,16 +14,16 @@ from typing import TYPE_CHECKING, Any
 from numpy.typing import NDArray
 
 from lippmann.cluster.connection import Cluster
-from lippmann.cluster.parcel import Parcel, pack
-from lippmann.cluster.work import render_part
+from lippmann.cluster.job_pickle import Parcel, pack
+from lippmann.cluster.tasks import render_part
 from lippmann.errors import ClusterError
-from lippmann.store.tile_file import DamagedTile, decode
+from lippmann.journal.tile_file import DamagedTile, decode
 
 if TYPE_CHECKING:
-    from lippmann.render.settings import Device
-    from lippmann.render.tile_tracer import Prepared
-    from lippmann.render.tiled_picture import Put, Runner
-    from lippmann.render.tiles import TileJob
+    from lippmann.rendering.request.settings import Device
+    from lippmann.tiles.job import TileJob
+    from lippmann.tiles.tile_render import Prepared
+    from lippmann.tiles.tiled_render import Put, Runner
 
 #: Tiles under way for each thread of the workers: one being rendered, one waiting for its turn.
 TILES_PER_THREAD = 2
@@ -42,7 +42,7 @@ _DIED = "its workers died"
 
 
 def runner_on(cluster: Cluster) -> Runner:
-    """A runner of :func:`lippmann.render.tiled_picture.render_to_file` that renders on a cluster."""
+    """A runner of :func:`lippmann.tiles.tiled_render.render_to_file` that renders on a cluster."""
     return lambda prepared, missing, put: run_on(cluster, _sent(prepared), missing, put)
 
 

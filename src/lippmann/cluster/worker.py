@@ -5,13 +5,23 @@ from __future__ import annotations
 import asyncio
 import os
 import signal
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
-from lippmann import machine
-from lippmann.cluster.address import LOOPBACK, TlsFiles, checked_address, import_distributed, is_loopback
-from lippmann.cluster.work import THREADS_VARIABLE
+from lippmann.cluster.address import (
+    LOOPBACK,
+    TlsFiles,
+    checked_address,
+    import_distributed,
+    is_loopback,
+    warn_of_exposure,
+)
+from lippmann.cluster.private_scratch import private_scratch
+from lippmann.cluster.tasks import THREADS_VARIABLE
 from lippmann.errors import ClusterError, UsageError
+from lippmann.runtime import machine
+from lippmann.runtime.child_python import spawn_safely
 
 #: Seconds without a scheduler after which a worker gives up.
 DEATH_SECONDS = 60
@@ -61,10 +71,11 @@ class WorkerOptions:
             )
 
 
-def serve(options: WorkerOptions, *, quiet: bool = False) -> None:
+def serve(options: WorkerOptions, *, quiet: bool = False, remark: Callable[[str], None] = lambda line: None) -> None:
     """Work for a scheduler until it ends, or until SIGTERM or Ctrl-C.
 
-    Dask's own log goes to standard error; ``quiet`` leaves only errors of it.
+    Dask's own log goes to standard error; ``quiet`` leaves only errors of it. ``remark`` is called with a warning, in
+    one line, where connections are not authenticated.
 
     Raises
     ------
@@ -76,10 +87,12 @@ def serve(options: WorkerOptions, *, quiet: bool = False) -> None:
         os.environ.setdefault("DASK_DISTRIBUTED__LOGGING__DISTRIBUTED", "error")
     distributed = import_distributed()
     security = options.tls.security()
-    asyncio.run(_serve(distributed, options, security))
+    warn_of_exposure(options.address, security, remark)
+    with private_scratch() as folder, spawn_safely():
+        asyncio.run(_serve(distributed, options, security, folder))
 
 
-async def _serve(distributed: Any, options: WorkerOptions, security: Any) -> None:
+async def _serve(distributed: Any, options: WorkerOptions, security: Any, folder: str) -> None:
     import dask
 
     cores = machine.usable_cores()
@@ -96,9 +109,10 @@ async def _serve(distributed: Any, options: WorkerOptions, security: Any) -> Non
             host=options.host or LOOPBACK,
             name=options.name,
             security=security,
+            local_directory=folder,
             death_timeout=DEATH_SECONDS,
             dashboard=False,
-            preload=[*dask.config.get("distributed.worker.preload", []), "lippmann.cluster.warming"],
+            preload=[*dask.config.get("distributed.worker.preload", []), "lippmann.cluster.worker_preload"],
             env={THREADS_VARIABLE: str(threads)},
         )
     except (OSError, TimeoutError, TypeError, ValueError, RuntimeError) as error:

@@ -17,18 +17,18 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.display.checks import check_keys, check_text, number, positive
+from lippmann.display.array_ops import NUMPY, Array, ArrayOps
 from lippmann.display.lattice import Lattice
 from lippmann.display.lens_array import LensArray
-from lippmann.display.ops import NUMPY, Array, ArrayOps
 from lippmann.display.panel import Panel
+from lippmann.display.validation import check_keys, check_text, number, positive
 from lippmann.errors import DisplayError
+from lippmann.runtime.cached_property import cached_property
 
 #: How an infinite viewing distance is written in files.
 INFINITE = "infinite"

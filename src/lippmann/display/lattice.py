@@ -6,8 +6,8 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
+from lippmann.display.array_ops import NUMPY, Array, ArrayOps
 from lippmann.display.lens_array import Layout
-from lippmann.display.ops import NUMPY, Array, ArrayOps
 
 Rectangle = tuple[float, float, float, float]
 

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Literal, cast, get_args
 
-from lippmann.display.checks import finite, positive
+from lippmann.display.validation import finite, positive
 from lippmann.errors import DisplayError
 
 Layout = Literal["lenticular", "square", "hexagonal"]

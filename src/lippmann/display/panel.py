@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from lippmann.display.checks import finite, positive, whole_count
-from lippmann.display.ops import Array, ArrayOps
+from lippmann.display.array_ops import Array, ArrayOps
+from lippmann.display.validation import finite, positive, whole_count
 from lippmann.errors import DisplayError
 
 Offset = tuple[float, float]

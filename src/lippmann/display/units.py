@@ -6,8 +6,8 @@ import math
 import re
 from collections.abc import Mapping
 
-from lippmann.display.checks import suggestion
 from lippmann.display.panel import SubpixelOffsets
+from lippmann.display.validation import suggestion
 from lippmann.errors import DisplayError
 
 INCH = 25.4

@@ -14,14 +14,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.atomic import replacing
+from lippmann.codecs.png import encode_png, read_png, read_png_header
 from lippmann.display import Display
 from lippmann.errors import PictureError
 from lippmann.exchange.light_field import WEIGHT, LightField, check_rectangular, check_shape, view_shape
-from lippmann.exchange.notes import TEXT_KEY, from_note, to_note
+from lippmann.exchange.metadata_text import TEXT_KEY, from_note, to_note
 from lippmann.exchange.weights import weight_codes, weights
-from lippmann.image.codec import read_header
-from lippmann.image.png import encode_png, read_png, read_png_header
+from lippmann.image.encoding import read_header
+from lippmann.runtime.atomic_write import replacing
 
 LAYOUT = "eslf"
 

@@ -17,17 +17,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.atomic import replacing_folder
+from lippmann.codecs.pfm import read_pfm, write_pfm
 from lippmann.display import Display
 from lippmann.errors import PictureError
 from lippmann.exchange.cameras import Cameras
 from lippmann.exchange.hci_parameters import NAME, Parameters, read_parameters, write_parameters
 from lippmann.exchange.light_field import DEPTH, LightField, check_rectangular, check_shape
-from lippmann.exchange.notes import read_note_file, write_note_file
-from lippmann.exchange.pfm import read_pfm, write_pfm
+from lippmann.exchange.metadata_text import read_note_file, write_note_file
 from lippmann.exchange.view_files import read_view_files, write_view
 from lippmann.image import Provenance
 from lippmann.progress import Progress, ProgressCallback, silent
+from lippmann.runtime.atomic_write import replacing_folder
 
 LAYOUT = "hci"
 

@@ -15,12 +15,12 @@ from lippmann.errors import OutputError, PictureError, UsageError
 from lippmann.exchange.eslf import read_eslf, write_eslf
 from lippmann.exchange.hci import read_hci, write_hci
 from lippmann.exchange.hci_parameters import NAME as HCI_PARAMETERS
+from lippmann.exchange.lftoolbox_mat import read_matlab, write_matlab
 from lippmann.exchange.light_field import DEPTH, WEIGHT, LightField, light_field_of, view_shape
-from lippmann.exchange.matlab import read_matlab, write_matlab
 from lippmann.exchange.view_folder import is_composable, read_view_folder, write_view_folder
 from lippmann.exchange.zarr_store import read_zarr, write_zarr
 from lippmann.image import IntegralImage, compose
-from lippmann.image.integral_image import Stored
+from lippmann.image.stored_values import Stored
 from lippmann.progress import ProgressCallback, silent
 
 LayoutName = Literal["hci", "lftoolbox", "eslf", "zarr", "views"]

@@ -18,15 +18,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann._version import VERSION
+from lippmann.color.transfer import Transfer, dequantize, quantize
 from lippmann.display import Display
 from lippmann.errors import PictureError
 from lippmann.exchange.cameras import Cameras
 from lippmann.image import IntegralImage, Metadata, Provenance
-from lippmann.image.color import dequantize, quantize
-from lippmann.image.integral_image import Stored
 from lippmann.image.metadata import metadata_of
-from lippmann.image.permutation import Permutation, micro_images_as_views
-from lippmann.image.provenance import Transfer
+from lippmann.image.micro_images import Permutation, micro_images_as_views
+from lippmann.image.stored_values import Stored
 from lippmann.image.views import view_grid
 
 #: Cameras down and across, rows and columns of a view.

@@ -9,11 +9,10 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from lippmann.color.transfer import Transfer, dequantize, quantize
 from lippmann.errors import PictureError
-from lippmann.image.codec import FormatName, decode_file, encode_file, read_header
-from lippmann.image.color import dequantize, quantize
-from lippmann.image.integral_image import Stored
-from lippmann.image.provenance import Transfer
+from lippmann.image.encoding import FormatName, decode_file, encode_file, read_header
+from lippmann.image.stored_values import Stored
 from lippmann.progress import Progress, ProgressCallback, silent
 
 _BITS = {"uint8": 8, "uint16": 16}

@@ -13,16 +13,16 @@ from typing import get_args
 
 import numpy as np
 
-from lippmann.atomic import replacing_folder
 from lippmann.display import Display
 from lippmann.errors import PictureError
 from lippmann.exchange.light_field import LightField, check_rectangular
-from lippmann.exchange.notes import read_note_file, write_note_file
+from lippmann.exchange.metadata_text import read_note_file, write_note_file
 from lippmann.exchange.view_files import read_view_files, write_view
-from lippmann.image.codec import FormatName
-from lippmann.image.folders import MANIFEST, Kind
+from lippmann.image.encoding import FormatName
 from lippmann.image.metadata import parse_json
+from lippmann.image.part_folders import MANIFEST, Kind
 from lippmann.progress import Progress, ProgressCallback, silent
+from lippmann.runtime.atomic_write import replacing_folder
 
 LAYOUT = "views"
 

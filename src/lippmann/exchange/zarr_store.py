@@ -13,20 +13,22 @@ import json
 import math
 import warnings
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.atomic import replacing_folder
+from lippmann.codecs.zarr_metadata import ArrayMetadata
+from lippmann.codecs.zarr_reader import node_kind, open_array, read_array_metadata, read_attributes
 from lippmann.errors import PictureError
-from lippmann.exchange.extras import optional
 from lippmann.exchange.light_field import LightField, check_shape
-from lippmann.exchange.notes import from_note, to_note
-from lippmann.image.metadata import KEY, Metadata, parse_json
+from lippmann.exchange.metadata_text import from_note, to_note
+from lippmann.image.metadata import KEY, Metadata
 from lippmann.progress import Progress, ProgressCallback, silent
+from lippmann.runtime.atomic_write import replacing_folder
+from lippmann.runtime.optional_import import optional
 
 LAYOUT = "zarr"
 
@@ -79,13 +81,8 @@ def read_zarr(folder: Path, *, progress: ProgressCallback = silent) -> LightFiel
         If zarr is not installed, or the folder is missing, no Zarr group, incomplete, damaged, or has no light field.
     """
     zarr = optional("zarr")
-    try:
-        with _without_warnings():
-            group = zarr.open_group(str(folder), mode="r")
-            attributes = dict(group.attrs)
-    except Exception as error:  # the library stumbles over damaged stores in every way there is
-        raise PictureError("is no Zarr group", where=str(folder), rule=f"it holds the array {_VIEWS}") from error
-    names, map_names = _array_names(folder), _array_names(folder / _MAPS)
+    attributes = _group_attributes(folder)
+    names, map_names = _array_names(folder, folder), _array_names(folder / _MAPS, folder)
     metadata = _metadata(attributes, folder)
     if _VIEWS not in names:
         held = ", ".join(names) or "nothing"
@@ -94,7 +91,7 @@ def read_zarr(folder: Path, *, progress: ProgressCallback = silent) -> LightFiel
     arrays: dict[str, NDArray[Any]] = {}
     for done, name in enumerate(wanted, start=1):
         shape = arrays[_VIEWS].shape if arrays else None
-        arrays[name] = _read_array(group, name, folder, shape, whole=metadata is not None)
+        arrays[name] = _read_array(zarr, folder / name, folder, shape, whole=metadata is not None)
         progress(Progress("read", done, len(wanted)))
     maps = {name: arrays[f"{_MAPS}/{name}"] for name in map_names}
     try:
@@ -103,20 +100,22 @@ def read_zarr(folder: Path, *, progress: ProgressCallback = silent) -> LightFiel
         raise PictureError(error.what, where=str(folder), rule=error.rule) from None
 
 
-def _array_names(folder: Path) -> list[str]:
-    """The arrays of a group, in both versions of the format.
+def _group_attributes(folder: Path) -> dict[str, Any]:
+    """The attributes of a group; a :class:`PictureError` if it is none."""
+    try:
+        if node_kind(folder) == "group":
+            return read_attributes(folder)
+        why = ""
+    except PictureError as error:
+        why = f": {error.what}"
+    raise PictureError(f"is no Zarr group{why}", where=str(folder), rule=f"it holds the array {_VIEWS}")
 
-    The library's own list comes from tasks that complain of damage on standard error when nobody listens any more.
-    """
+
+def _array_names(folder: Path, root: Path) -> list[str]:
+    """The arrays of a group inside ``root``, in both versions of the format."""
     if not folder.is_dir():
         return []
-    names = []
-    for entry in folder.iterdir():
-        mark = entry / "zarr.json"
-        values = parse_json(mark.read_text(encoding="utf-8", errors="replace")) if mark.is_file() else None
-        if (entry / ".zarray").is_file() or (isinstance(values, dict) and values.get("node_type") == "array"):
-            names.append(entry.name)
-    return sorted(names)
+    return sorted(entry.name for entry in folder.iterdir() if entry.is_dir() and node_kind(entry, root) == "array")
 
 
 @contextmanager
@@ -128,10 +127,21 @@ def _without_warnings() -> Iterator[None]:
 
 
 def _format(zarr: Any) -> dict[str, Any]:
-    """How format 2 is asked for: the library changed the word, and by itself leaves out chunks of zeros since."""
+    """How format 2 is asked for: the library changed the word."""
     if int(zarr.__version__.partition(".")[0]) < 3:
         return {"zarr_version": 2}
     return {"zarr_format": 2}
+
+
+def _all_chunks_written(zarr: Any) -> AbstractContextManager[Any]:
+    """Chunks of zeros get files too, which the library's third version by itself leaves out.
+
+    Its option of the same name has no effect before 3.1.1.
+    """
+    if int(zarr.__version__.partition(".")[0]) < 3:
+        return nullcontext()
+    settings: AbstractContextManager[Any] = zarr.config.set({"array.write_empty_chunks": True})
+    return settings
 
 
 def _write_array(zarr: Any, folder: Path, name: str, values: NDArray[Any]) -> None:
@@ -142,56 +152,52 @@ def _write_array(zarr: Any, folder: Path, name: str, values: NDArray[Any]) -> No
     if down == 1:
         rows = min(height, max(1, _CHUNK // (values.nbytes // height)))
     chunks = (down, across, rows, width, *values.shape[4:])
-    options = _format(zarr)
-    if "zarr_format" in options:
-        options["config"] = {"write_empty_chunks": True}
-    array = zarr.open_array(
-        str(folder),
-        path=name,
-        mode="w",
-        shape=values.shape,
-        chunks=chunks,
-        dtype=values.dtype,
-        fill_value=0,
-        compressor=numcodecs.Blosc("zstd", clevel=5, shuffle=numcodecs.Blosc.SHUFFLE),
-        **options,
-    )
-    array[...] = values
+    with _all_chunks_written(zarr):
+        array = zarr.open_array(
+            str(folder),
+            path=name,
+            mode="w",
+            shape=values.shape,
+            chunks=chunks,
+            dtype=values.dtype,
+            fill_value=0,
+            compressor=numcodecs.Blosc("zstd", clevel=5, shuffle=numcodecs.Blosc.SHUFFLE),
+            **_format(zarr),
+        )
+        array[...] = values
     array.attrs[_DIMENSIONS] = list(AXES[: values.ndim])
 
 
 def _read_array(
-    group: Any, name: str, folder: Path, views_shape: tuple[int, ...] | None, *, whole: bool
+    zarr: Any, folder: Path, root: Path, views_shape: tuple[int, ...] | None, *, whole: bool
 ) -> NDArray[Any]:
-    where = str(folder / name)
-    try:
-        with _without_warnings():
-            array = group[name]
-        shape, dtype = tuple(array.shape), np.dtype(array.dtype)
-    except Exception as error:  # as above
-        raise PictureError(f"is damaged: {error}", where=where) from error
+    where = str(folder)
+    metadata = read_array_metadata(folder, root)
     if views_shape is None:
-        check_shape(shape, where)
-    elif shape[:4] != views_shape[:4]:
+        check_shape(metadata.shape, where)
+    elif metadata.shape[:4] != views_shape[:4]:
         rule = f"{_VIEWS} has {views_shape[:4]}"
-        raise PictureError(f"has the shape {shape}", where=where, rule=rule)
-    if dtype not in _TYPES:
+        raise PictureError(f"has the shape {metadata.shape}", where=where, rule=rule)
+    if metadata.dtype not in _TYPES:
         raise PictureError(
-            f"holds {dtype}", where=where, rule=f"{', '.join(kind.__name__ for kind in _TYPES)} are read"
+            f"holds {metadata.dtype}", where=where, rule=f"{', '.join(kind.__name__ for kind in _TYPES)} are read"
         )
-    if whole:
-        _check_whole(folder / name, array)
-    try:
-        with _without_warnings():
+    with _without_warnings():
+        array = open_array(zarr, folder, metadata, root)
+        if whole:
+            _check_whole(folder, metadata)
+        try:
             values: NDArray[Any] = np.asarray(array[...])
-    except Exception as error:  # as above
-        raise PictureError(f"is damaged: {error}", where=where, fix="make or fetch it anew") from error
+        except PictureError:
+            raise
+        except Exception as error:  # the library stumbles over damaged chunks in every way there is
+            raise PictureError(f"is damaged: {error}", where=where, fix="make or fetch it anew") from error
     return values
 
 
-def _check_whole(folder: Path, array: Any) -> None:
+def _check_whole(folder: Path, metadata: ArrayMetadata) -> None:
     """Raise :class:`PictureError` if the file of a chunk is not there."""
-    counts = [-(-size // step) for size, step in zip(array.shape, array.chunks, strict=True)]
+    counts = [-(-size // step) for size, step in zip(metadata.shape, metadata.chunks, strict=True)]
     there = {path.name for path in folder.iterdir()} if folder.is_dir() else set()
     absent = [name for place in np.ndindex(*counts) if (name := ".".join(map(str, place))) not in there]
     if absent:

@@ -1,11 +1,12 @@
 """The integral image, its micro-images and views, and its files; knows nothing of the renderer."""
 
-from lippmann.image.folders import compose, write_micro_images, write_views
-from lippmann.image.formats import PictureInfo, read_info, read_metadata, read_picture, write_picture
 from lippmann.image.integral_image import IntegralImage
-from lippmann.image.large import LargePicture, open_picture
 from lippmann.image.metadata import Metadata
+from lippmann.image.part_folders import compose, write_micro_images, write_views
 from lippmann.image.provenance import Provenance
+from lippmann.image.read import PictureInfo, read_info, read_metadata, read_picture
+from lippmann.image.streamed import LargePicture, open_picture
+from lippmann.image.write import write_picture
 
 __all__ = [
     "IntegralImage",

@@ -8,25 +8,17 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Any, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lippmann.display import Display
 from lippmann.errors import PictureError
-from lippmann.image.permutation import Permutation, micro_images_as_views
+from lippmann.image.micro_images import Permutation, micro_images_as_views
 from lippmann.image.provenance import Provenance
+from lippmann.image.stored_values import FloatArray, Matrix, Stored, checked_similarity
 from lippmann.image.views import Resampling, exact_view_shape, resampled_views, view_grid
-
-FloatArray = NDArray[np.float32]
-Matrix = NDArray[np.float64]
-
-#: How values were stored in the file that a picture came from; ``float32`` if it came from none.
-Stored = Literal["uint8", "uint16", "float16", "float32"]
-
-#: Deviation of ``world_from_display`` from a similarity that rounding may leave.
-_SIMILARITY_TOLERANCE = 1e-6
 
 _MAP_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_-]*")
 
@@ -161,20 +153,20 @@ class IntegralImage:
     # ---- What an eye sees, and files ------------------------------------------------------------------------------
 
     def replay(self, eye: tuple[float, float, float] | None = None, **options: Any) -> FloatArray:
-        """What an eye at ``eye`` (mm, display frame) sees; see :func:`lippmann.replay.replay`."""
-        from lippmann.replay import replay
+        """What an eye at ``eye`` (mm, display frame) sees; see :func:`lippmann.viewing.replay.replay`."""
+        from lippmann.viewing.replay import replay
 
         return replay(self, eye, **options)
 
     def refocus(self, plane: float, **options: Any) -> FloatArray:
-        """The picture focused on the plane at z = ``plane`` mm; see :func:`lippmann.refocus.refocus`."""
-        from lippmann.refocus import refocus
+        """The picture focused on the plane at z = ``plane`` mm; see :func:`lippmann.viewing.refocus.refocus`."""
+        from lippmann.viewing.refocus import refocus
 
         return refocus(self, plane, **options)
 
     def save(self, path: str | Path, bits: int | None = None) -> None:
-        """Write a PNG, OpenEXR or TIFF file; see :func:`lippmann.image.formats.write_picture`."""
-        from lippmann.image.formats import write_picture
+        """Write a PNG, OpenEXR or TIFF file; see :func:`lippmann.image.write.write_picture`."""
+        from lippmann.image.write import write_picture
 
         write_picture(self, Path(path), bits=bits)
 
@@ -208,9 +200,9 @@ class IntegralImage:
 
     def _repr_png_(self) -> bytes:
         """A PNG of what an eye in the middle sees, at most 512 pixels wide."""
-        from lippmann.image.color import quantize
-        from lippmann.image.png import encode_png
-        from lippmann.replay import default_size
+        from lippmann.codecs.png import encode_png
+        from lippmann.color.transfer import quantize
+        from lippmann.viewing.replay import default_size
 
         width, height = default_size(self.display, _NOTEBOOK_WIDTH)
         seen = self.replay(size=(width, height))
@@ -254,26 +246,6 @@ def _checked_pixels(pixels: object, display: Display) -> FloatArray:
         count = int((~finite).any(axis=2).sum())
         raise PictureError(f"{count} pixels are not finite, the first in column {column}, row {row}")
     values = values.view()
-    values.flags.writeable = False
-    return values
-
-
-def checked_similarity(matrix: object) -> Matrix:
-    """``matrix`` as a read-only (4, 4) float64 array; a :class:`PictureError` if it is no similarity."""
-    rule = "it must be a 4 x 4 similarity: a rotation times a scale, a translation, and (0, 0, 0, 1) below"
-    try:
-        values: Matrix = np.array(matrix, dtype=np.float64)
-    except (TypeError, ValueError, OverflowError):
-        raise PictureError("world_from_display is no matrix", rule=rule) from None
-    if values.shape != (4, 4) or not np.isfinite(values).all() or list(values[3]) != [0, 0, 0, 1]:
-        raise PictureError(f"world_from_display is {values.tolist()}", rule=rule)
-    linear = values[:3, :3]
-    with np.errstate(all="ignore"):  # what overflows is no similarity either: NaN is within no tolerance
-        volume = float(np.linalg.det(linear))
-        scale = np.cbrt(volume)
-        error = np.abs(linear.T @ linear / scale**2 - np.eye(3)).max()
-    if not (volume > 0 and error <= _SIMILARITY_TOLERANCE):
-        raise PictureError(f"world_from_display is {values.tolist()}", rule=rule)
     values.flags.writeable = False
     return values
 

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from lippmann.display import Display
 from lippmann.errors import LippmannError, PictureError
-from lippmann.image.integral_image import IntegralImage, checked_similarity
+from lippmann.image.integral_image import IntegralImage
 from lippmann.image.provenance import Provenance
+from lippmann.image.stored_values import checked_similarity
 
 #: The version of this text. It rises when a name that readers know changes its meaning.
 VERSION = 1

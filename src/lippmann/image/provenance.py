@@ -5,13 +5,10 @@ from __future__ import annotations
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
-from typing import Any, Literal, get_args
+from typing import Any, get_args
 
+from lippmann.color.transfer import Transfer
 from lippmann.errors import PictureError
-
-#: How linear values become the codes of integer formats: ``srgb`` by the sRGB curve, ``linear`` by scaling alone (what
-#: the papers' programs did: the value itself is the display code).
-Transfer = Literal["srgb", "linear"]
 
 
 @dataclass(frozen=True)

@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from lippmann.display import NUMPY, Display, micro_image_extent, micro_image_shape
 from lippmann.display.display import BOUNDARY_TOLERANCE, WHOLE_TOLERANCE
 from lippmann.errors import PictureError
-from lippmann.image.permutation import Permutation, lens_indices, row_blocks
+from lippmann.image.micro_images import Permutation, lens_indices, row_blocks
 
 FloatArray = NDArray[np.float32]
 Real = NDArray[np.float64]

@@ -6,29 +6,32 @@ The frame is Mitsuba's: right-handed, and +y up as far as the display is concern
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
-from xml.etree import ElementTree
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.errors import EngineError, SceneError
-from lippmann.scene.description import Camera, Color, Environment
-from lippmann.scene.resources import read_bytes, resolve
+from lippmann.runtime.engine_lock import exclusive
+from lippmann.scene.mitsuba_plugins import check_plugins_of
+from lippmann.scene.mitsuba_xml import MitsubaXml, read_mitsuba_xml
+from lippmann.scene.values.description import Camera, Color, Environment
 
 # Mitsuba's cameras look along +z with +x to the left; ours along -z with +x to the right.
 _MITSUBA_FROM_CAMERA = np.diag([-1.0, 1.0, -1.0, 1.0])
 _LONGEST_MESSAGE = 400
+_TEXT_POSITION = re.compile(r"string \(line (\d+), col \d+\)")
 
 
 @dataclass(frozen=True, eq=False)
 class MitsubaSource:
     """A scene in Mitsuba's own terms.
 
-    ``content`` is the path of an XML file, a dictionary for ``mi.load_dict`` or a ``mi.Scene``. ``environment`` takes
+    ``content`` is an XML file that was read, a dictionary for ``mi.load_dict`` or a ``mi.Scene``. ``environment`` takes
     the place of the scene's own where given; ``background`` is the colour seen where nothing is hit.
     """
 
@@ -38,6 +41,7 @@ class MitsubaSource:
     background: Color | None = None
     _loaded: dict[str, Any] = field(default_factory=dict, repr=False)
 
+    @exclusive()
     def scene(self) -> Any:
         """The ``mi.Scene`` as described, loaded once per variant. ``environment`` is not in it: see :func:`with_sky`.
 
@@ -56,8 +60,9 @@ class MitsubaSource:
     @property
     def is_borrowed(self) -> bool:
         """Whether the scene was loaded by whoever passed it here, and stays theirs."""
-        return not isinstance(self.content, Path | Mapping)
+        return not isinstance(self.content, MitsubaXml | Mapping)
 
+    @exclusive()
     def bounds(self) -> NDArray[np.float64]:
         """Lowest and highest corner ``(2, 3)`` of the box around all shapes.
 
@@ -71,12 +76,14 @@ class MitsubaSource:
             raise SceneError("the scene has no geometry", where=self.name, rule="there must be at least one shape")
         return np.stack([np.array(found.min, np.float64).ravel(), np.array(found.max, np.float64).ravel()])
 
+    @exclusive()
     def cameras(self) -> tuple[Camera, ...]:
         """The perspective (also thin-lens) and orthographic sensors; other kinds cannot place a display."""
         sensors = enumerate(self.scene().sensors())
         found = (_camera(sensor, sensor.id() or f"sensor_{number}") for number, sensor in sensors)
         return tuple(camera for camera in found if camera is not None)
 
+    @exclusive()
     def has_lights(self) -> bool:
         """Whether the scene has any emitter."""
         return bool(self.scene().emitters())
@@ -93,29 +100,37 @@ class MitsubaSource:
                     fix="load it after mitsuba.set_variant of that name",
                 )
             return self.content
+        if isinstance(self.content, Mapping):
+            check_plugins_of(self.content, self.name)
         try:
-            if isinstance(self.content, Path):
-                loaded = mi.load_file(str(self.content))
+            if isinstance(self.content, MitsubaXml):
+                loaded = mi.load_string(self.content.text())
             else:
                 loaded = mi.load_dict(dict(self.content))
         except (RuntimeError, TypeError, ValueError) as error:
-            message = " ".join(str(error).split())[:_LONGEST_MESSAGE]
+            message = " ".join(self._with_origins(str(error)).split())[:_LONGEST_MESSAGE]
             raise SceneError(f"Mitsuba refuses the scene: {message}", where=self.name) from None
         if not isinstance(loaded, mi.Scene):
             raise SceneError(f"holds a Mitsuba {type(loaded).__name__}", where=self.name, rule="it must be a scene")
         return loaded
 
+    def _with_origins(self, message: str) -> str:
+        """A message of Mitsuba's about the text that it was given, with the files and lines that it came from."""
+        if not isinstance(self.content, MitsubaXml):
+            return message
+        content = self.content
+        return _TEXT_POSITION.sub(lambda found: content.origin(int(found[1])), message)
+
 
 def read_mitsuba(path: Path, *, allow_outside: bool = False) -> MitsubaSource:
-    """A Mitsuba XML scene, looked at but not yet loaded.
+    """A Mitsuba XML scene, read and checked but not yet loaded.
 
     Raises
     ------
     SceneError
-        The file is missing, is no XML or no scene, or names a file that is not there.
+        As of :func:`~lippmann.scene.mitsuba_xml.read_mitsuba_xml`.
     """
-    _check_xml(path, allow_outside, set())
-    return MitsubaSource(path.stem, path)
+    return MitsubaSource(path.stem, read_mitsuba_xml(path, allow_outside=allow_outside))
 
 
 def with_sky(scene: Any, emitter: Any) -> Any:
@@ -140,37 +155,8 @@ def _variant() -> str:
     mitsuba = sys.modules.get("mitsuba")
     variant = mitsuba.variant() if mitsuba is not None else None
     if not isinstance(variant, str):
-        raise EngineError("the engine has not been started", fix="call lippmann.engine.start() first")
+        raise EngineError("the engine has not been started", fix="call lippmann.runtime.engine.start() first")
     return variant
-
-
-def _check_xml(path: Path, allow_outside: bool, seen: set[Path]) -> None:
-    seen.add(path.resolve())
-    data = read_bytes(path)
-    try:
-        root = ElementTree.fromstring(data)
-    except ElementTree.ParseError as error:
-        raise SceneError(
-            f"is no well-formed XML ({error})", where=f"{path.name}:{error.position[0]}", fix="is the file cut short?"
-        ) from None
-    except (LookupError, ValueError) as error:  # of the encoding that it names
-        raise SceneError(f"cannot be decoded ({error})", where=path.name, rule="XML is UTF-8") from None
-    if root.tag != "scene":
-        raise SceneError(f"is XML of a '{root.tag[:40]}'", where=path.name, rule="a Mitsuba file holds a 'scene'")
-    if root.find(".//path") is not None:
-        return  # the file brings search paths of its own, which only Mitsuba follows
-    for element in root.iter():
-        is_include = element.tag == "include"
-        if not is_include and element.get("name") != "filename":
-            continue
-        name = element.get("filename" if is_include else "value", "")
-        if not name or "$" in name:  # a parameter, filled in by Mitsuba
-            continue
-        found = resolve(path.parent, name, where=path.name, what="file", allow_outside=allow_outside)
-        if found != path.parent / name:
-            raise SceneError(f"file '{name}' is not there", where=path.name)
-        if is_include and found.resolve() not in seen:
-            _check_xml(found, allow_outside, seen)
 
 
 def _camera(sensor: Any, name: str) -> Camera | None:

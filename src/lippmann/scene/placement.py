@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from lippmann.display import Display
 from lippmann.errors import SceneError, UsageError
-from lippmann.scene.description import Camera, Matrix
 from lippmann.scene.scene import box, find_camera
+from lippmann.scene.values.description import Camera, Matrix
 
 Mode = Literal["fit", "camera", "display"]
 Bounds = NDArray[np.float64]
@@ -32,6 +32,17 @@ LEAST_FILL = 0.4
 
 #: Share of the scene's depth that a fitted scene has in front of the lens plane, where the aperture allows it.
 POP_OUT = 1.0 / 3.0
+
+#: Extents below this share of the largest coordinate are rounding noise: files and renderers hold coordinates in single
+#: precision, whose error of half a unit in the last place a rotation of the scene multiplies by a few.
+_NOISE = 4.0 * float(np.finfo(np.float32).eps)
+
+#: No extent above this share of the largest one is noise, so that a small scene far from the origin has a size.
+_LARGEST_NOISE = 1e-3
+
+#: Scene units per millimetre of the display, least and most, as cameras give them: products of matrices with larger
+#: entries, and their inverses, overflow.
+_UNITS_PER_MM = (1e-30, 1e30)
 
 
 @dataclass(frozen=True)
@@ -137,7 +148,8 @@ def place(
     Raises
     ------
     SceneError
-        The box is a single point or not finite; the camera is not there, or has the whole scene behind it.
+        The box is a single point or not finite; the camera is not there, has the whole scene behind it, or a field that
+        is no field or beyond numbers.
     """
     options = options or PlacementOptions()
     box(bounds)
@@ -193,15 +205,18 @@ def _fitted(bounds: Bounds, display: Display, options: PlacementOptions, warning
     """
     turned = _carried(_rotation(options.turn), _corners(bounds))
     low, high = turned.min(axis=0), turned.max(axis=0)
-    depth = float(high[2] - low[2])
+    width, height, depth = _extents(turned)
     pop_out = POP_OUT if options.pop_out is None else options.pop_out
-    in_window = min(
-        _largest_in_window(float(size), FILL * window, depth, pop_out, display)
-        for size, window in zip((high - low)[:2], display.size_mm, strict=True)
-    )
+
+    def largest(fill: float) -> float:
+        return min(
+            _largest_in_window(size, fill * window, depth, pop_out, display)
+            for size, window in zip((width, height), display.size_mm, strict=True)
+        )
+
     in_depth = _largest_in_depth(depth, pop_out, display)
-    least = in_window * LEAST_FILL / FILL if np.isfinite(in_window) else 0.0  # a line toward the viewer has no width
-    scale = options.scale * min(in_window, max(in_depth, least))
+    least = largest(LEAST_FILL) if width > 0.0 or height > 0.0 else 0.0  # a line toward the viewer has no width
+    scale = options.scale * min(largest(FILL), max(in_depth, least))
     wanted = pop_out * depth * scale
     front = min(wanted, display.aperture_distance)
     if options.pop_out is not None and front < wanted * (1.0 - 1e-9):
@@ -211,6 +226,14 @@ def _fitted(bounds: Bounds, display: Display, options: PlacementOptions, warning
         )
     anchor = np.array([(low[0] + high[0]) / 2.0, (low[1] + high[1]) / 2.0, high[2]])
     return _translation((0.0, 0.0, front)) @ _scaling(scale) @ _translation(-anchor) @ _rotation(options.turn)
+
+
+def _extents(points: Bounds) -> Vector:
+    """Extents along x, y and z of points ``(n, 3)``; those that are rounding noise are 0, but never all of them."""
+    extents = np.ptp(points, axis=0)
+    noise = min(_NOISE * np.abs(points).max(), _LARGEST_NOISE * extents.max())
+    x, y, z = np.where(extents > noise, extents, 0.0).tolist()
+    return x, y, z
 
 
 def _largest_in_window(size: float, window: float, depth: float, pop_out: float, display: Display) -> float:
@@ -267,8 +290,14 @@ def _seen_by(camera: Camera, bounds: Bounds, display: Display, options: Placemen
         focus = center if center > 0.0 else (nearest + farthest) / 2.0
     if not (np.isfinite(focus) and focus > 0.0):
         raise SceneError(f"camera '{camera.name}' focuses at {focus:g}", where="camera", rule="a distance above 0")
-    world_from_display = frame @ _translation((0.0, 0.0, -focus)) @ _scaling(_units_per_mm(camera, focus, display))
-    return _inverse(world_from_display)
+    units, (least, most) = _units_per_mm(camera, focus, display), _UNITS_PER_MM
+    if not least <= units <= most:
+        raise SceneError(
+            f"camera '{camera.name}' makes 1 mm of the display {units:g} scene units long",
+            where="camera",
+            rule=f"between {least:g} and {most:g}",
+        )
+    return _inverse(frame @ _translation((0.0, 0.0, -focus)) @ _scaling(units))
 
 
 def _units_per_mm(camera: Camera, focus: float, display: Display) -> float:

@@ -5,16 +5,16 @@ from __future__ import annotations
 import difflib
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.errors import SceneError
-from lippmann.scene.classic import ClassicScene
-from lippmann.scene.classic_world import world_bounds
-from lippmann.scene.description import Camera, Color, Environment, Material, Matrix, Mesh, SceneDescription
+from lippmann.runtime.cached_property import cached_property
 from lippmann.scene.mitsuba_source import MitsubaSource
+from lippmann.scene.values.description import Camera, Color, Environment, Material, Matrix, Mesh, SceneDescription
+from lippmann.scene.values.whitted_scene import ClassicScene
+from lippmann.scene.whitted.world_frame import world_bounds
 
 Bounds = NDArray[np.float64]
 
@@ -24,6 +24,10 @@ STUDIO_NOTE = "no lights in the scene: lit by the built-in studio"
 # which can only be too large.
 _EXACT_VERTICES = 20_000_000
 _FRAMING_FOV = np.radians(30.0)
+
+# A box smaller than this share of its largest coordinate is a single point: a rotation's rounding, a few units in the
+# last place of double precision, leaves nothing of its extent.
+_POINT = 2.0**-44
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +60,7 @@ class Scene:
         """The scene in the terms of physically based light."""
         if self.description is not None:
             return self.description
-        from lippmann.scene.classic_to_physical import to_physical
+        from lippmann.scene.whitted.to_pbr import to_physical
 
         assert self.classic is not None
         return to_physical(self.classic, self.views)
@@ -117,7 +121,7 @@ class Scene:
         """Light from far away: the scene's or the caller's; the studio where the scene has no light at all."""
         if not self.in_studio:
             return self.physical.environment
-        from lippmann.scene.studio import studio
+        from lippmann.scene.studio_light import studio
 
         return studio()
 
@@ -126,7 +130,7 @@ class Scene:
         """What is seen where nothing is hit; None for the environment itself (black without one)."""
         if self.physical.background is not None or not self.in_studio:
             return self.physical.background
-        from lippmann.scene.studio import BACKDROP
+        from lippmann.scene.studio_light import BACKDROP
 
         return BACKDROP
 
@@ -194,12 +198,12 @@ def box(bounds: Bounds) -> tuple[Bounds, Bounds]:
     Raises
     ------
     SceneError
-        The box is empty, not finite, or a single point.
+        The box is empty, not finite, or a single point up to rounding.
     """
     low, high = np.asarray(bounds, np.float64)
     if not (np.isfinite(low).all() and np.isfinite(high).all()) or (high < low).any():
         raise SceneError("the scene has no extent that could be measured", rule="it needs some finite geometry")
-    if not (high > low).any():
+    if not (high - low > _POINT * np.maximum(abs(low), abs(high)).max()).any():
         raise SceneError(
             f"the scene is a single point at ({low[0]:g}, {low[1]:g}, {low[2]:g})",
             rule="a scene needs some extent",

@@ -8,13 +8,13 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from lippmann.atomic import replacing
 from lippmann.display import Display
 from lippmann.errors import UsageError
 from lippmann.image import IntegralImage
-from lippmann.image.large import LargePicture
+from lippmann.image.streamed import LargePicture
+from lippmann.runtime.atomic_write import replacing
 from lippmann.viewer.manifest import manifest, tile_size
-from lippmann.viewer.page import whole_page
+from lippmann.viewer.page_bundle import whole_page
 from lippmann.viewer.tiles import Tiles
 
 #: The most pictures that a page shows: two, with a divider between them.

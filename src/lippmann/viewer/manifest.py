@@ -1,7 +1,8 @@
 """What the page has to know of a picture to behave as its display does, as plain values for JSON.
 
-The page draws with the formulas of :mod:`lippmann.replay` and :mod:`lippmann.display.lattice`; here are their numbers,
-in effect (aligned pitches, lenses counted as in :attr:`Display.lens_grid`), in millimetres, pixels and degrees.
+The page draws with the formulas of :mod:`lippmann.viewing.replay` and :mod:`lippmann.display.lattice`; here are their
+numbers, in effect (aligned pitches, lenses counted as in :attr:`Display.lens_grid`), in millimetres, pixels and
+degrees.
 """
 
 from __future__ import annotations
@@ -11,10 +12,10 @@ from typing import Any, Literal
 
 from lippmann.display import Display
 from lippmann.image import IntegralImage
-from lippmann.image.large import LargePicture
+from lippmann.image.streamed import LargePicture
 from lippmann.image.views import view_grid
-from lippmann.replay import default_eye
 from lippmann.viewer.tiles import TILE_SIZE, Tiles
+from lippmann.viewing.replay import default_eye
 
 TileFormat = Literal["png", "rgb"]
 

@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lippmann.color.transfer import quantize
 from lippmann.image import IntegralImage
-from lippmann.image.color import quantize
-from lippmann.image.large import LargePicture
-from lippmann.quality.error_picture import BRIGHTEST, SCALE, in_false_color
-from lippmann.render.estimate import ERROR_LAYER
-from lippmann.render.reuse.points import INTERPOLATED, REPROJECTED, STATUS_LAYER, TRACED
-from lippmann.report.pictures import EMPTY_CODE, INTERPOLATED_CODE, REPROJECTED_CODE, TRACED_CODE
+from lippmann.image.streamed import LargePicture
+from lippmann.metrics.error_image import BRIGHTEST, SCALE, in_false_color
+from lippmann.rendering.estimate.psnr import ERROR_LAYER
+from lippmann.rendering.reprojection.common.point_image import INTERPOLATED, REPROJECTED, STATUS_LAYER, TRACED
+from lippmann.viewing.diagnostic_maps import EMPTY_CODE, INTERPOLATED_CODE, REPROJECTED_CODE, TRACED_CODE
 
 Codes = NDArray[np.uint8]
 #: Rows and columns of the part that is wanted.
@@ -109,7 +109,8 @@ def _range(name: str, values: NDArray[Any]) -> tuple[float, float]:
     if finite.size == 0:
         return 0.0, 1.0
     low, high = 0.0 if name in _COUNTS else float(finite.min()), float(finite.max())
-    return (low, high) if high > low else (low, low + 1.0)
+    # 1 is lost in numbers of 17 digits.
+    return (low, high) if high > low else (low, low + max(1.0, float(np.spacing(abs(low)))))
 
 
 def _scaled(values: NDArray[Any], low: float, high: float) -> Codes:

@@ -15,24 +15,24 @@ from collections.abc import Sequence
 from http import HTTPStatus
 
 from lippmann.errors import UsageError
-from lippmann.viewer import page
-from lippmann.viewer.shown import PictureFile
-from lippmann.viewer.web import Answer, RefusedError, Request, json_answer, text_answer
+from lippmann.viewer import page_bundle
+from lippmann.viewer.http_server import Answer, RefusedError, Request, json_answer, text_answer
+from lippmann.viewer.served_picture import PictureFile
 
 _MANIFEST = re.compile(r"/pictures/([0-9]{1,3})/manifest\.json")
 _TILE = re.compile(r"/pictures/([0-9]{1,3})/tiles/([A-Za-z_][A-Za-z0-9_-]{0,99})/([0-9]{1,6})_([0-9]{1,6})")
 
 
 class ViewerSite:
-    """The viewer's pages for one or more pictures; a :class:`~lippmann.viewer.web.Site`."""
+    """The viewer's pages for one or more pictures; a :class:`~lippmann.viewer.http_server.Site`."""
 
     def __init__(self, pictures: Sequence[PictureFile]) -> None:
         self._pictures = tuple(pictures)
         self._page = {
-            "/": text_answer(page.page_html(len(self._pictures)), "text/html"),
-            "/assets/viewer.js": text_answer(page.script(), "text/javascript"),
-            "/assets/viewer.css": text_answer(page.style(), "text/css"),
-            "/assets/icon.svg": text_answer(page.icon(), "image/svg+xml"),
+            "/": text_answer(page_bundle.page_html(len(self._pictures)), "text/html"),
+            "/assets/viewer.js": text_answer(page_bundle.script(), "text/javascript"),
+            "/assets/viewer.css": text_answer(page_bundle.style(), "text/css"),
+            "/assets/icon.svg": text_answer(page_bundle.icon(), "image/svg+xml"),
         }
 
     def get(self, request: Request) -> Answer:

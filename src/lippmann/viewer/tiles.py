@@ -10,13 +10,13 @@ from typing import Any
 
 import numpy as np
 
+from lippmann.codecs.png import encode_png
+from lippmann.color.transfer import quantize
+from lippmann.display.pixel_window import Window
 from lippmann.errors import UsageError
 from lippmann.image import IntegralImage
-from lippmann.image.codec import linear_values
-from lippmann.image.color import quantize
-from lippmann.image.large import LargePicture
-from lippmann.image.png import encode_png
-from lippmann.store.grid import Window
+from lippmann.image.encoding import linear_values
+from lippmann.image.streamed import LargePicture
 from lippmann.viewer.overlays import Codes, overlays
 
 #: Columns and rows of a tile; those on the right and at the bottom may have fewer.

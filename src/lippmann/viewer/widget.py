@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 import anywidget
 import traitlets
 
-from lippmann.machine import usable_cores
-from lippmann.viewer import page
+from lippmann.runtime.machine import usable_cores
+from lippmann.viewer import page_bundle
 from lippmann.viewer.manifest import manifest, tile_size
 from lippmann.viewer.tiles import Tiles
 
@@ -52,8 +52,8 @@ class PictureWidget(anywidget.AnyWidget):
         What the panel shows. Its tiles are packed here, which takes a second for some ten million pixels.
     """
 
-    _esm = page.script() + _GLUE
-    _css = page.style() + _CELL
+    _esm = page_bundle.script() + _GLUE
+    _css = page_bundle.style() + _CELL
 
     description = traitlets.Dict().tag(sync=True)
     tiles = traitlets.Dict().tag(sync=True)

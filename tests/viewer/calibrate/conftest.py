@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from lippmann.display.monitor import Monitor
+from lippmann.display.formats.monitor import Monitor
 from lippmann.display.panel import RGB_STRIPE, Panel
 
 #: Two kinds of pixels, as on newer panels, and a stripe that runs the other way.

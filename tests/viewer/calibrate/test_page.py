@@ -11,9 +11,9 @@ import pytest
 
 from lippmann.calibration import Pattern, draw
 from lippmann.display import load_display
-from lippmann.display.monitor import Monitor
+from lippmann.display.formats.monitor import Monitor
 from lippmann.viewer.calibrate.site import CalibrationSite
-from lippmann.viewer.web import WebServer
+from lippmann.viewer.http_server import WebServer
 
 PIXELS = """() => {
   const canvas = document.getElementById("pattern");
@@ -189,22 +189,14 @@ def test_windows_of_the_page_follow_each_other(open_page, slanted):
     def follows():
         return other.evaluate("globalThis.lippmann?.monitor?.pitch") == turned(tab)["pitch"]
 
-    until(tab, follows)
+    tab.wait_until(follows)
     assert other.evaluate("document.getElementById('controls').hidden")
     press(tab, "Shift+ArrowLeft")
     assert turned(tab)["pitch"] != here["pitch"]
-    until(tab, follows)
+    tab.wait_until(follows)
     other.keyboard.press("Shift+ArrowRight")
-    until(tab, follows)
-    assert turned(tab)["pitch"] == pytest.approx(here["pitch"])
-
-
-def until(tab, holds):
-    for _ in range(100):
-        if holds():
-            return
-        tab.page.wait_for_timeout(50)
-    raise TimeoutError
+    tab.wait_until(lambda: turned(tab)["pitch"] == pytest.approx(here["pitch"]))
+    tab.wait_until(follows)
 
 
 def test_a_stopped_server_is_said(open_page, slanted):

@@ -13,10 +13,10 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from lippmann.display import load_display
-from lippmann.display.monitor import Monitor
+from lippmann.display.formats.monitor import Monitor
 from lippmann.errors import LippmannError, OutputError
 from lippmann.viewer.calibrate.site import CalibrationSite
-from lippmann.viewer.web import RefusedError, Request
+from lippmann.viewer.http_server import RefusedError, Request
 
 TURNED = {"pitch": 45.7, "slope": -5.5, "center": 0.25, "order": None}
 
@@ -174,7 +174,9 @@ VALUES = (
 )
 
 
-@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(
+    max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow]
+)
 @given(sent=st.fixed_dictionaries(dict.fromkeys(TURNED, VALUES)) | st.dictionaries(st.sampled_from([*TURNED]), VALUES))
 def test_whatever_is_sent_gives_a_display_or_a_refusal(desk, sent):
     desk.output.unlink(missing_ok=True)

@@ -20,13 +20,13 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from lippmann.atomic import replacing
-from lippmann.display.monitor import Monitor
-from lippmann.display.monitor_file import text_of_monitor
+from lippmann.display.formats.monitor import Monitor
+from lippmann.display.formats.monitor_toml import text_of_monitor
 from lippmann.display.panel import Panel, SubpixelOffsets
 from lippmann.display.units import stripe
 from lippmann.errors import UsageError
-from lippmann.viewer.web import Answer, RefusedError, Request, json_answer, text_answer
+from lippmann.runtime.atomic_write import replacing
+from lippmann.viewer.http_server import Answer, RefusedError, Request, json_answer, text_answer
 
 _KINDS = {"html": "text/html", "css": "text/css", "js": "text/javascript", "svg": "image/svg+xml"}
 
@@ -41,7 +41,7 @@ _SENT = {"pitch", "slope", "center", "order"}
 
 
 class CalibrationSite:
-    """The page for one monitor; a :class:`~lippmann.viewer.web.Site`.
+    """The page for one monitor; a :class:`~lippmann.viewer.http_server.Site`.
 
     Parameters
     ----------

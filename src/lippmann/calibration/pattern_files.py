@@ -1,0 +1,60 @@
+"""Test patterns as pictures for their panel, each field with its value written on it."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from lippmann._version import VERSION
+from lippmann.calibration.labels import label_window, paint_label
+from lippmann.calibration.patterns import FloatArray, Pattern, Window, draw, fields, step_of
+from lippmann.display.display import INFINITE
+from lippmann.display.formats.monitor import Monitor
+from lippmann.image import IntegralImage, Provenance
+from lippmann.progress import Progress, ProgressCallback, silent
+
+#: Height of a label, as a part of its field's (of its width, where fields stand side by side).
+_LABEL = 0.65
+
+#: Sub-pixels drawn at a time.
+_BLOCK = 1 << 20
+
+
+def draw_labelled(pattern: Pattern, monitor: Monitor, window: Window) -> FloatArray:
+    """:func:`~lippmann.calibration.patterns.draw` with the labels of the fields, white on black; raises as that."""
+    pixels = draw(pattern, monitor, window)
+    if pattern.name == "stripes":
+        return pixels
+    is_lying = pattern.name != "slope"
+    for field in fields(pattern, monitor):
+        height = round(_LABEL * (field.window.height if is_lying else field.window.width))
+        box = label_window(field.text, field.window, height, at="left" if is_lying else "bottom")
+        paint_label(pixels, window, field.text, box)
+    return pixels
+
+
+def pattern_picture(pattern: Pattern, monitor: Monitor, *, progress: ProgressCallback = silent) -> IntegralImage:
+    """The pattern on the whole panel, as a picture that carries its display, so that it can be replayed.
+
+    Raises
+    ------
+    UsageError
+        If the pattern has fields that the monitor cannot have.
+    DisplayError
+        If a lens covers less than a pixel, or more than the panel.
+    """
+    display = monitor.display()
+    width, height = monitor.panel.width, monitor.panel.height
+    pixels = np.empty((height, width, 3), dtype=np.float32)
+    step = max(1, _BLOCK // width)
+    for top in range(0, height, step):
+        band = Window(0, top, width, min(step, height - top))
+        pixels[top : top + band.height] = draw_labelled(pattern, monitor, band)
+        progress(Progress("draw", top + band.height, height))
+    options: dict[str, Any] = {"pattern": pattern.name, "pitch": monitor.pitch, "center": monitor.center}
+    options["slope"] = INFINITE if math.isinf(monitor.slope) else monitor.slope
+    options |= {"views": pattern.views} if pattern.name == "stripes" else {"step": step_of(pattern, monitor)}
+    made = Provenance(method="pattern", subpixels=True, scene=pattern.name, version=VERSION, options=options)
+    return IntegralImage(pixels, display, provenance=made)

@@ -1,0 +1,147 @@
+"""Commands that judge: how far a picture is from a reference, and how this program stands to the paper's."""
+
+from __future__ import annotations
+
+import csv
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from lippmann.cli.shared import options
+from lippmann.cli.shared.console import Console
+from lippmann.errors import UsageError
+
+if TYPE_CHECKING:
+    from lippmann.metrics import Comparison, MicroImage
+
+
+def compare(
+    reference: Annotated[Path, typer.Argument(help="The picture to measure against (PNG, EXR, TIFF or Zarr).")],
+    test: Annotated[Path, typer.Argument(help="The picture to judge: of the same display.")],
+    table: Annotated[
+        Path | None, typer.Option("--csv", help="Write the figures of every micro-image to this CSV file.")
+    ] = None,
+    picture: Annotated[
+        Path | None,
+        typer.Option("--map", help="Write a picture of the errors: .png, or .exr with layers.", show_default=False),
+    ] = None,
+    display: options.PictureDisplay = None,
+    as_json: options.Json = False,
+    quiet: options.Quiet = False,
+) -> None:
+    """Say how far a picture is from a reference: PSNR, its worst micro-images, SSIM of views, the paper's figures."""
+    from lippmann.display import load_display
+    from lippmann.image import IntegralImage
+    from lippmann.image.streamed import open_picture
+    from lippmann.image.write import format_for
+    from lippmann.metrics import compare as compare_pictures
+    from lippmann.metrics import error_map
+    from lippmann.metrics.large import compare_large
+    from lippmann.runtime.atomic_write import check_writable
+
+    console = Console(quiet, as_json)
+    if picture is not None:
+        format_for(picture, None)
+    for path in (table, picture):
+        if path is not None:
+            check_writable(path)
+    given = None if display is None else load_display(display)
+    first, second = (open_picture(path, display=given) for path in (reference, test))
+    with console.progress() as progress:
+        if isinstance(first, IntegralImage) and isinstance(second, IntegralImage):
+            comparison = compare_pictures(first, second, progress)
+        else:
+            if picture is not None:
+                raise UsageError("needs the whole picture in memory", where="--map", fix="leave it out")
+            comparison = compare_large(first, second, progress)
+    if table is not None:
+        _write_table(comparison, table)
+    if picture is not None:
+        error_map(comparison).save(picture)
+    for note in comparison.notes:
+        console.remark(note)
+    values = {"reference": str(reference), "test": str(test), **comparison.to_dict()}
+    console.result(values, "\n".join(_lines(comparison)))
+
+
+def reproduce(
+    output: options.Folder,
+    fast: Annotated[
+        bool, typer.Option("--quick", help="A minute's version: two scenes, fewer pixels, one run.")
+    ] = False,
+    device: options.Device = "auto",
+    threads: options.Threads = None,
+    as_json: options.Json = False,
+    quiet: options.Quiet = False,
+) -> None:
+    """Measure the paper's tables and figures again: its scenes, its methods, and a report of both."""
+    from lippmann.reproduce.run import PAGE
+    from lippmann.reproduce.run import reproduce as reproduce_paper
+
+    console = Console(quiet, as_json)
+    with console.progress() as progress:
+        figures = reproduce_paper(output, quick=fast, device=device, threads=threads, progress=progress)
+    page = output / PAGE
+    lines = [f"{page}: {', '.join(figures['scenes'])}"]
+    for scene, runs in figures["scenes"].items():
+        paper, gloss = runs["interpolated-paper"], runs["interpolated-gloss"]
+        lines.append(
+            f"{scene:<12} interpolated as in the paper: {paper['saved_percent']:.0f} % of the time saved, "
+            f"{_given(paper['paper_mean_psnr'])}; gloss respected: {gloss['saved_percent']:.0f} %, "
+            f"{_given(gloss['paper_mean_psnr'])}"
+        )
+    console.result({"output": str(page), **figures}, "\n".join(lines))
+
+
+def _write_table(comparison: Comparison, path: Path) -> None:
+    from lippmann.runtime.atomic_write import replacing
+
+    rows = list(comparison.rows())
+    with replacing(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, fieldnames=list(rows[0]))
+        writer.writeheader()
+        writer.writerows(rows)
+
+
+def _lines(comparison: Comparison) -> list[str]:
+    views, paper, silhouettes = comparison.views, comparison.paper, comparison.silhouettes
+    ky, kx = views.worst
+    off = comparison.psnr_off_silhouettes
+    source = "depths" if silhouettes.source == "depth" else "strong edges"
+    lenses = int((comparison.micro_image_pixels > 0).sum())
+    lines = ["the pictures show the same"] if comparison.identical else []
+    lines += [
+        f"PSNR                {_decibels(comparison.psnr)}",
+        f"off silhouettes     {'no pixel' if off is None else _decibels(off)} "
+        f"({100 * (1 - silhouettes.share):.1f} % of the pixels; silhouettes by {source})",
+        f"worst micro-image   {_decibels(comparison.worst.psnr)} ({_lens(comparison.worst)} of {lenses})",
+        f"1st percentile      {_decibels(comparison.percentile_1.psnr)} ({_lens(comparison.percentile_1)})",
+        f"SSIM of views       {views.mean:.4f}, worst {views.values[ky, kx]:.4f} (view {kx}, {ky})",
+        _flicker_line(comparison),
+        f"the paper's PSNR    {_decibels(paper.mean_psnr)}, mean of micro-images"
+        + (f" ({paper.unchanged} without error left out)" if paper.unchanged else ""),
+        f'the paper\'s "RMSE"  {paper.mean_rmse:.4f}, mean of micro-images (a mean squared error of 8-bit codes)',
+    ]
+    return lines
+
+
+def _flicker_line(comparison: Comparison) -> str:
+    found = comparison.flicker
+    if found is None:
+        return "flicker of views    one view only"
+    return f"flicker of views    {_decibels(found.psnr)} ({found.share:.2f} of the error changes from view to view)"
+
+
+def _decibels(value: float) -> str:
+    return "infinite" if math.isinf(value) else f"{value:.2f} dB"
+
+
+def _given(value: float | None) -> str:
+    """A figure of the report, where an infinite one stands as None."""
+    return _decibels(math.inf if value is None else value)
+
+
+def _lens(found: MicroImage) -> str:
+    return f"lens {found.column}, {found.row}"

@@ -1,0 +1,90 @@
+"""Commands that write pictures in other tools' layouts and read theirs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from lippmann.cli.shared import options
+from lippmann.cli.shared.console import Console
+
+_LAYOUTS = "hci (4D Light Field Benchmark), lftoolbox (.mat), eslf (.png), zarr, or views"
+
+
+def export(
+    picture: options.Picture,
+    output: Annotated[Path, typer.Option("--output", "-o", help="The file or folder to write.")],
+    layout: Annotated[str, typer.Option("--as", help=f"{_LAYOUTS}.")],
+    distance: Annotated[
+        float | None,
+        typer.Option("--distance", help="For hci, of displays of parallel views: where cameras stand for them, in mm."),
+    ] = None,
+    bits: Annotated[int | None, typer.Option("--bits", help="Bits per value: 8, 16, or 32 for floats.")] = None,
+    display: options.PictureDisplay = None,
+    as_json: options.Json = False,
+    quiet: options.Quiet = False,
+) -> None:
+    """Write a picture in another light-field tool's layout."""
+    from lippmann.display import load_display
+    from lippmann.exchange import export_image
+    from lippmann.exchange.layouts import check_target, is_folder
+    from lippmann.image import read_picture
+    from lippmann.runtime.atomic_write import check_folder_writable, check_writable
+
+    console = Console(quiet, as_json)
+    (check_folder_writable if is_folder(check_target(layout, output)) else check_writable)(output)
+    image = read_picture(picture, display=None if display is None else load_display(display))
+    with console.progress() as progress:
+        done = export_image(image, output, layout, bits=bits, distance=distance, progress=progress)
+    for note in done.notes:
+        console.remark(note)
+    down, across, height, width = done.shape
+    result = {
+        "output": str(output),
+        "layout": layout,
+        "views": [across, down],
+        "size": [width, height],
+        "stored": done.stored,
+        "notes": list(done.notes),
+    }
+    console.result(result, f"{output}: {across}x{down} views of {width}x{height} pixels, {done.stored}")
+
+
+def import_(
+    source: Annotated[Path, typer.Argument(help="A file or folder of another light-field tool.")],
+    output: options.Output,
+    layout: Annotated[str | None, typer.Option("--as", help=f"{_LAYOUTS}; by default as it looks.")] = None,
+    display: Annotated[
+        str | None,
+        typer.Option(
+            "--display", "-d", help="The display that shows it; by default as the file names or describes it."
+        ),
+    ] = None,
+    bits: options.Bits = None,
+    as_json: options.Json = False,
+    quiet: options.Quiet = False,
+) -> None:
+    """Read a light field of another tool as a picture for a display."""
+    from lippmann.display import load_display
+    from lippmann.exchange import import_image
+    from lippmann.image.write import check_output, format_for
+
+    console = Console(quiet, as_json)
+    check_output(output, format_for(output, bits)[0])
+    target = None if display is None else load_display(display)
+    with console.progress() as progress:
+        image, notes = import_image(source, layout, display=target, progress=progress)
+    image.save(output, bits=bits)
+    for note in notes:
+        console.remark(note)
+    height, width = image.pixels.shape[:2]
+    result = {
+        "output": str(output),
+        "size": [width, height],
+        "display": image.display.name,
+        "layers": sorted(image.maps),
+        "notes": list(notes),
+    }
+    console.result(result, f"{output}: {width}x{height} pixels for {image.display.name}")

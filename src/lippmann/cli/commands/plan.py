@@ -1,0 +1,98 @@
+"""``lippmann plan``: what a rendering will show and take, before it is begun."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from lippmann.cli.commands import render
+from lippmann.cli.shared import options, parse
+from lippmann.cli.shared.console import Console
+from lippmann.cli.shared.picture_report import depths
+
+if TYPE_CHECKING:
+    from lippmann.rendering.forecast import Forecast
+
+#: Seconds of a minute and of an hour, from which on times are told in them.
+_MINUTE, _HOUR = 60.0, 3600.0
+
+
+def plan(
+    scene: options.Scene,
+    display: options.DisplayName = "seed-lenticular",
+    integrator: options.Integrator = "auto",
+    depth: options.Depth = None,
+    spp: options.Spp = None,
+    seed: options.Seed = 0,
+    subpixels: render.Subpixels = False,
+    pixel_filter: options.PixelFilter = "auto",
+    denoise: render.Denoise = "auto",
+    camera: render.Camera = None,
+    place: render.Place = None,
+    turn: render.Turn = None,
+    shift: render.Shift = None,
+    scale: render.Scale = 1.0,
+    pop_out: render.PopOut = None,
+    environment: options.Environment = None,
+    background: options.Background = None,
+    allow_outside: options.AllowOutside = False,
+    device: options.Device = "auto",
+    threads: options.Threads = None,
+    memory: options.Memory = None,
+    as_json: options.Json = False,
+    quiet: options.Quiet = False,
+) -> None:
+    """Say what 'render' will show and take, without rendering: depth, blur, rays, memory and time."""
+    from lippmann import api
+
+    console = Console(quiet, as_json)
+    with console.progress() as progress:
+        loaded = api.load_scene(
+            scene, environment=environment, background=parse.color(background), allow_outside=allow_outside
+        )
+        found = api.plan(
+            loaded,
+            display,
+            integrator=integrator,
+            depth=depth,
+            spp=spp,
+            seed=seed,
+            subpixels=subpixels,
+            pixel_filter=pixel_filter,
+            denoise=denoise,
+            placement=parse.placement(camera, place, turn, shift, scale, pop_out),
+            device=device,
+            threads=threads,
+            memory=parse.memory(memory),
+            progress=progress,
+        )
+    for note in found.notes:
+        console.remark(note)
+    console.result({"scene": loaded.name, **found.to_dict()}, "\n".join(_lines(loaded.name, found)))
+
+
+def _lines(name: str, found: Forecast) -> list[str]:
+    width, height = found.size
+    of_subpixels = ", a ray for every sub-pixel" if found.subpixels else ""
+    behind, before = found.blur
+    stages = ", ".join(f"{stage} {_duration(spent)}" for stage, spent in found.seconds.items() if stage != "total")
+    others = found.rays["shadow"] + found.rays["secondary"]
+    return [
+        f"picture   {name} for {found.display}, {width}x{height} pixels{of_subpixels}",
+        f"scene     {depths(*found.depth_range)}",
+        f"resolved  {depths(*found.resolvable_range)}",
+        f"blur      {100 * found.blurred_share:.0f} % of the pixels see what lies beyond; "
+        f"a pixel's light spreads over {behind:.1f} lenses at the back, {before:.1f} at the front",
+        f"rays      {found.rays['primary'] / 1e6:.1f} M from pixels ({found.spp} samples each), "
+        f"about {others / 1e6:.1f} M more",
+        f"memory    about {found.memory['expected'] / 2**30:.1f} GiB, "
+        f"with a limit of {found.memory['limit'] / 2**30:.1f} GiB for the picture",
+        f"time      about {_duration(found.seconds['total'])} on {found.device} ({stages})",
+    ]
+
+
+def _duration(seconds: float) -> str:
+    if seconds < _MINUTE:
+        return f"{seconds:.2g} s" if seconds < 10 else f"{seconds:.0f} s"
+    if seconds < _HOUR:
+        return f"{seconds / _MINUTE:.1f} min"
+    return f"{seconds / _HOUR:.1f} h"

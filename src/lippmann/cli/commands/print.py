@@ -1,0 +1,182 @@
+"""``lippmann pitch-test`` and ``lippmann marks``, and the options of ``--display print``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from lippmann.cli.shared import options
+from lippmann.cli.shared.console import Console
+from lippmann.errors import DisplayError, OutputError, UsageError
+
+if TYPE_CHECKING:
+    from lippmann.display import Display
+    from lippmann.display.formats.print_sheet import Print
+    from lippmann.image import IntegralImage
+
+Lpi = Annotated[str | None, typer.Option("--lpi", help="Print: lenses per inch of the sheet.")]
+PrintLpi = Annotated[
+    str | None, typer.Option("--print-lpi", help="Print: in its place, the print pitch that a pitch test found.")
+]
+Ppi = Annotated[str | None, typer.Option("--ppi", help="Print: pixels per inch.")]
+Size = Annotated[str | None, typer.Option("--size", help="Print: WIDTHxHEIGHT with a unit, such as 200x300mm, 8x10in.")]
+Distance = Annotated[
+    str | None,
+    typer.Option("--viewing-distance", help="Print: from sheet to eye, 500 mm by default; or infinite."),
+]
+Thickness = Annotated[str | None, typer.Option("--thickness", help="Print: of the sheet, such as 0.66mm or 26mil.")]
+Index = Annotated[str | None, typer.Option("--index", help="Print: refractive index of the sheet, 1.57 by default.")]
+Field = Annotated[
+    str | None,
+    typer.Option("--field", help="Print: field of view in degrees, in place of a thickness; 54 by default."),
+]
+MarksMargin = Annotated[
+    str | None, typer.Option("--marks", help="Add a margin of this width with alignment marks, such as 10mm.")
+]
+
+_PRINT = "print"
+
+
+def print_of(**texts: str | None) -> Print:
+    """The print of the options above, by their names; a :class:`DisplayError` names the option."""
+    from lippmann.display.formats.print_sheet import print_of_texts
+
+    try:
+        return print_of_texts({_option(key): text for key, text in texts.items() if text is not None})
+    except DisplayError as error:
+        raise DisplayError(error.what, where=f"--{error.where}", rule=error.rule, fix=error.fix) from None
+
+
+def display_of(name: str, **texts: str | None) -> Display:
+    """The display of that name; ``print`` is said by the options above.
+
+    Raises
+    ------
+    DisplayError
+        As :func:`~lippmann.display.load_display`, or naming the option.
+    UsageError
+        If options of a print are given to another display.
+    """
+    from lippmann.display import load_display
+
+    if name == _PRINT:
+        return print_of(**texts).display()
+    for key, text in texts.items():
+        if text is not None:
+            rule = f"it belongs to --display {_PRINT}"
+            raise UsageError(f"has no meaning for the display {name}", where=f"--{_option(key)}", rule=rule)
+    return load_display(name)
+
+
+def margin_of(text: str | None, display: Display, *, in_frames: bool) -> float | None:
+    """The margin of ``--marks`` in mm, None if there is none; refuses what cannot be drawn for the display."""
+    if text is None:
+        return None
+    from lippmann.calibration.alignment_marks import Marks
+    from lippmann.display.units import length
+
+    if in_frames:
+        raise UsageError("has no meaning for moving scenes", where="--marks", fix="leave it out")
+    return Marks(display, length(text, "--marks")).margin
+
+
+def marked(image: IntegralImage, margin: float | None) -> IntegralImage:
+    """The picture with its margin, where one is wanted."""
+    if margin is None:
+        return image
+    from lippmann.calibration.alignment_marks import with_marks
+
+    return with_marks(image, margin)
+
+
+def marks(
+    picture: options.Picture,
+    output: options.Output,
+    margin: Annotated[str, typer.Option("--margin", help="Width of the margin, such as 10mm.")] = "10mm",
+    display: options.PictureDisplay = None,
+    bits: options.Bits = None,
+    as_json: options.Json = False,
+    quiet: options.Quiet = False,
+) -> None:
+    """Add a margin with alignment marks to a picture that is to be printed."""
+    from lippmann.calibration.marked_files import write_marked
+    from lippmann.display import load_display
+    from lippmann.display.units import length
+    from lippmann.image.streamed import open_picture
+    from lippmann.image.write import format_for
+    from lippmann.runtime.atomic_write import check_writable
+
+    console = Console(quiet, as_json)
+    format_for(output, bits)
+    check_writable(output)
+    width = length(margin, "--margin")
+    image = open_picture(picture, display=None if display is None else load_display(display))
+    with console.progress() as progress:
+        panel = write_marked(image, output, width, bits=bits, progress=progress).panel
+    result = {"output": str(output), "size": [panel.width, panel.height], "size_mm": list(panel.size_mm)}
+    console.result(result, f"{output}: {panel.width}x{panel.height} pixels, {_size(panel.size_mm)}")
+
+
+def pitch_test(
+    output: Annotated[Path, typer.Option("--output", "-o", help="The TIFF file to write.")],
+    lpi: Lpi = None,
+    print_lpi: PrintLpi = None,
+    ppi: Ppi = None,
+    size: Size = None,
+    viewing_distance: Distance = None,
+    thickness: Thickness = None,
+    index: Index = None,
+    field: Field = None,
+    strips: Annotated[int, typer.Option("--strips", help="How many strips.")] = 21,
+    step: Annotated[
+        float | None, typer.Option("--step", help="Lenses per inch from strip to strip; by default by the width.")
+    ] = None,
+    as_json: options.Json = False,
+    quiet: options.Quiet = False,
+) -> None:
+    """Draw strips at slightly different print pitches: the one that stands still is the sheet's."""
+    from lippmann.calibration import Window
+    from lippmann.calibration.pitch_strips import PitchTest
+    from lippmann.codecs.tiff_strips import write_tiff_bands
+    from lippmann.runtime.atomic_write import check_writable, replacing
+
+    console = Console(quiet, as_json)
+    if output.suffix.lower() not in (".tif", ".tiff"):
+        rule = "a pitch test is written as TIFF, which carries its true resolution"
+        raise OutputError(f"the ending '{output.suffix}' will not do", where=str(output), rule=rule)
+    sheet = print_of(
+        lpi=lpi,
+        print_lpi=print_lpi,
+        ppi=ppi,
+        size=size,
+        viewing_distance=viewing_distance,
+        thickness=thickness,
+        index=index,
+        field=field,
+    )
+    test = PitchTest(sheet, strips, step)
+    check_writable(output)
+    width, height = sheet.pixels
+    with console.progress() as progress, replacing(output) as temporary:
+        write_tiff_bands(
+            temporary,
+            (width, height),
+            lambda first, last: test.draw(Window(0, first, width, last - first)),
+            pixel_pitch=25.4 / sheet.ppi,
+            progress=progress,
+        )
+    values = [strip.lpi for strip in test.made_of]
+    result = {"output": str(output), "size": [width, height], "expected": sheet.pitch_on_print, "strips": values}
+    texts = [strip.text for strip in test.made_of]
+    line = f"{output}: {strips} strips from {texts[0]} to {texts[-1]} lpi, {sheet.pitch_on_print:.6g} expected"
+    console.result(result, f"{line}, {width}x{height} pixels at {sheet.ppi:g} ppi")
+
+
+def _option(parameter: str) -> str:
+    return parameter.replace("_", "-")
+
+
+def _size(size_mm: tuple[float, float]) -> str:
+    return f"{size_mm[0]:.2f}x{size_mm[1]:.2f} mm"

@@ -1,0 +1,284 @@
+"""``lippmann quilt`` and ``lippmann weave``: quilts rendered, packed and unpacked, and woven into native pictures."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from lippmann.cli.commands import render as rendering
+from lippmann.cli.shared import options, parse
+from lippmann.cli.shared.console import Console, estimate_in_words
+from lippmann.cli.shared.picture_report import add_seconds, depth_line, report
+from lippmann.progress import Progress, ProgressCallback
+
+if TYPE_CHECKING:
+    from lippmann.quilts.quilt import Quilt
+
+quilt = typer.Typer(help="Quilts: all views side by side in one picture.", no_args_is_help=True, rich_markup_mode=None)
+
+Device = Annotated[
+    str,
+    typer.Option(
+        "--display",
+        "-d",
+        help="A device (see 'lippmann quilt sizes'; 'portrait' will do), its visual.json, or any lenticular display.",
+    ),
+]
+Output = Annotated[
+    Path | None,
+    typer.Option(
+        "--output",
+        "-o",
+        help="The quilt to write: NAME_qsCOLUMNSxROWSaASPECT.png, .exr or .tif. By default the scene's name, here.",
+        show_default=False,
+    ),
+]
+Views = Annotated[
+    str | None,
+    typer.Option("--views", help="Columns x rows of views; by default those that the device is given."),
+]
+Size = Annotated[
+    str | None, typer.Option("--size", help="Width x height of the quilt in pixels; by default the device's.")
+]
+Method = Annotated[
+    str,
+    typer.Option(
+        "--method",
+        help="auto: what is fastest for the quality asked for; full: every ray is traced; "
+        "pooled: neighbouring views share their light before it is denoised.",
+    ),
+]
+Format = Annotated[str | None, typer.Option("--format", help="png, exr or tiff; by default as the quilt is stored.")]
+
+
+@quilt.command("render")
+def render(
+    scene: options.Scene,
+    output: Output = None,
+    display: Device = "portrait",
+    views: Views = None,
+    size: Size = None,
+    method: Method = "auto",
+    integrator: options.Integrator = "auto",
+    depth: options.Depth = None,
+    spp: options.Spp = None,
+    quality: Annotated[
+        float | None, typer.Option("--quality", help="Work until every view is estimated to reach this PSNR in dB.")
+    ] = None,
+    quality_mean: rendering.QualityMean = None,
+    max_time: rendering.MaxTime = None,
+    seed: options.Seed = 0,
+    pixel_filter: options.PixelFilter = "auto",
+    denoise: rendering.Denoise = "auto",
+    camera: rendering.Camera = None,
+    place: rendering.Place = None,
+    turn: rendering.Turn = None,
+    shift: rendering.Shift = None,
+    scale: rendering.Scale = 1.0,
+    pop_out: rendering.PopOut = None,
+    environment: options.Environment = None,
+    background: options.Background = None,
+    allow_outside: options.AllowOutside = False,
+    bits: options.Bits = None,
+    device: options.Device = "auto",
+    threads: options.Threads = None,
+    memory: options.Memory = None,
+    as_json: options.Json = False,
+    quiet: options.Quiet = False,
+) -> None:
+    """Render a scene as a quilt: the views of cameras side by side before the display."""
+    from lippmann import api
+    from lippmann.image.write import format_for
+    from lippmann.quilts.files import write_quilt
+    from lippmann.quilts.quilt import load_device, quilt_of_display
+    from lippmann.runtime.atomic_write import check_writable
+
+    console = Console(quiet, as_json)
+    target = load_device(display)
+    grid = None if views is None else parse.size(views, "--views", rule="columns x rows, such as 8x6")
+    wanted = quilt_of_display(target, grid, None if size is None else parse.size(size, "--size"))
+    path = output or Path(f"{Path(scene).stem}{wanted.layout.ending}.png")
+    _check_name(path, wanted.layout.ending)
+    format_for(path, bits)
+    check_writable(path)
+    with console.progress() as progress:
+        started = time.perf_counter()
+        loaded = api.load_scene(
+            scene, environment=environment, background=parse.color(background), allow_outside=allow_outside
+        )
+        load_seconds = time.perf_counter() - started
+        made = api.render_quilt(
+            loaded,
+            target,
+            views=(wanted.layout.columns, wanted.layout.rows),
+            size=(wanted.width, wanted.height),
+            method=method,
+            integrator=integrator,
+            depth=depth,
+            spp=spp,
+            quality=quality,
+            quality_mean=quality_mean,
+            max_time=max_time,
+            seed=seed,
+            pixel_filter=pixel_filter,
+            denoise=denoise,
+            placement=parse.placement(camera, place, turn, shift, scale, pop_out),
+            device=device,
+            threads=threads,
+            memory=parse.memory(memory),
+            progress=progress,
+        )
+        progress(Progress("write", 0, 1))
+        writing = time.perf_counter()
+        write_quilt(made, path, bits=bits)
+    spent = add_seconds(made.provenance, load=load_seconds, write=time.perf_counter() - writing)
+    console.remark(depth_line(spent))
+    for note in spent.notes:
+        console.remark(note)
+    if spent.estimate is not None:
+        console.remark(f"estimated PSNR {estimate_in_words(spent.estimate, 'view')}")
+    seconds = spent.seconds["total"]
+    values: dict[str, Any] = report(path, (wanted.width, wanted.height), spent)
+    console.result(values | {"display": target.name, "views": wanted.layout.views}, _sentence(path, made, seconds))
+
+
+@quilt.command("pack")
+def pack(
+    folder: Annotated[Path, typer.Argument(help="A folder with one picture per view, numbered from the left.")],
+    output: Annotated[
+        Path, typer.Option("--output", "-o", help="The quilt to write: NAME_qsCOLUMNSxROWSaASPECT.png, .exr or .tif.")
+    ],
+    bits: options.Bits = None,
+    as_json: options.Json = False,
+    quiet: options.Quiet = False,
+) -> None:
+    """Put a folder of views into a quilt, the leftmost at the bottom left."""
+    from lippmann.image.write import format_for
+    from lippmann.quilts.files import read_views, write_quilt
+    from lippmann.quilts.quilt import layout_of_name
+    from lippmann.runtime.atomic_write import check_writable
+
+    console = Console(quiet, as_json)
+    layout = layout_of_name(output)
+    format_for(output, bits)
+    check_writable(output)
+    with console.progress() as progress:
+        packed = read_views(folder, layout, progress=progress)
+    write_quilt(packed, output, bits=bits)
+    width, height = packed.size
+    result = {"output": str(output), "size": [width, height], "views": layout.views}
+    console.result(result, f"{output}: {layout.columns}x{layout.rows} views, {width}x{height} pixels")
+
+
+@quilt.command("unpack")
+def unpack(
+    picture: Annotated[Path, typer.Argument(help="A quilt (PNG, EXR, TIFF or JPEG) with its layout in the name.")],
+    output: options.Folder,
+    format: Format = None,
+    bits: options.Bits = None,
+    as_json: options.Json = False,
+    quiet: options.Quiet = False,
+) -> None:
+    """Write each view of a quilt as a picture of its own, view 0 the leftmost camera's."""
+    from lippmann.quilts.files import read_quilt, write_views
+    from lippmann.runtime.atomic_write import check_folder_writable
+
+    console = Console(quiet, as_json)
+    check_folder_writable(output)
+    found = read_quilt(picture)
+    with console.progress() as progress:
+        write_views(found, output, format=format, bits=bits, progress=progress)  # type: ignore[arg-type]
+    width, height = found.view_size
+    result = {"output": str(output), "size": [width, height], "views": found.layout.views}
+    console.result(result, f"{output}: {found.layout.views} views of {width}x{height} pixels")
+
+
+@quilt.command("sizes")
+def sizes(as_json: options.Json = False) -> None:
+    """List the quilts that devices are given."""
+    from lippmann.quilts.quilt import DEVICE_QUILTS
+
+    rows = [
+        {
+            "display": device.display,
+            "size": [device.width, device.height],
+            "columns": device.layout.columns,
+            "rows": device.layout.rows,
+            "aspect": device.layout.aspect,
+            "ending": device.layout.ending,
+        }
+        for device in DEVICE_QUILTS
+    ]
+    lines = [
+        f"{device.display:<32} {device.width}x{device.height}  {device.layout.views:>2} views  {device.layout.ending}"
+        for device in DEVICE_QUILTS
+    ]
+    Console(as_json=as_json).result({"quilts": rows}, "\n".join(lines))
+
+
+def weave(
+    source: Annotated[Path, typer.Argument(help="A quilt, or a folder with one picture per view.")],
+    output: options.Output,
+    display: options.DisplayName,
+    choice: Annotated[
+        str, typer.Option("--views", help="nearest: one view per sub-pixel; linear: a mixture of two.")
+    ] = "linear",
+    bits: options.Bits = None,
+    as_json: options.Json = False,
+    quiet: options.Quiet = False,
+) -> None:
+    """Make a display's native picture from a quilt or a folder of views."""
+    from lippmann.display import load_display
+    from lippmann.image.streamed import LARGE
+    from lippmann.image.streamed_write import can_be_banded
+    from lippmann.image.write import check_output, format_for
+    from lippmann.quilts.weave import weave as weave_views
+    from lippmann.quilts.weave import weave_to_file
+
+    console = Console(quiet, as_json)
+    name, _ = format_for(output, bits)
+    check_output(output, name)
+    target = load_display(display)
+    width, height = target.panel.width, target.panel.height
+    with console.progress() as progress:
+        views = _views(source, progress)
+        asked: dict[str, Any] = {"choice": choice, "scene": source.stem, "progress": progress}
+        if width * height > LARGE and can_be_banded(name):
+            weave_to_file(views, target, output, bits=bits, **asked)
+        else:
+            weave_views(views, target, **asked).save(output, bits=bits)
+    result = {
+        "output": str(output),
+        "size": [width, height],
+        "display": target.name,
+        "views": views.layout.views,
+        "view_choice": choice,
+    }
+    console.result(result, f"{output}: {views.layout.views} views on {width}x{height} pixels of {target.name}")
+
+
+def _check_name(path: Path, ending: str) -> None:
+    from lippmann.errors import OutputError
+    from lippmann.quilts.quilt import layout_of_name
+
+    if layout_of_name(path).ending != ending:
+        rule = f"the quilt's ends in {ending}{path.suffix}"
+        raise OutputError("the name says another quilt", where=str(path), rule=rule, fix="leave --output out")
+
+
+def _sentence(path: Path, made: Quilt, seconds: float) -> str:
+    width, height = made.size
+    millions = sum(made.provenance.rays.values()) / 1e6
+    return (
+        f"{path}: {made.layout.columns}x{made.layout.rows} views, {width}x{height} pixels, "
+        f"{made.provenance.spp} samples per pixel, {millions:.1f} M rays, {seconds:.1f} s"
+    )
+
+
+def _views(source: Path, progress: ProgressCallback) -> Quilt:
+    from lippmann.quilts.files import read_quilt, read_views
+
+    return read_views(source, progress=progress) if source.is_dir() else read_quilt(source)

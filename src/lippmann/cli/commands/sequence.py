@@ -1,0 +1,256 @@
+"""``lippmann render --frames``: a scene that moves becomes numbered pictures, and a film of them."""
+
+from __future__ import annotations
+
+import re
+from collections import deque
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from itertools import chain
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from lippmann.cli.shared import parse
+from lippmann.cli.shared.console import Console
+from lippmann.errors import OutputError, PictureError, UsageError
+
+if TYPE_CHECKING:
+    from lippmann.progress import ProgressCallback
+    from lippmann.sequences.files import SavedFrame
+    from lippmann.sequences.frames import FrameRange
+    from lippmann.tiles.tiled_render import Runner
+
+Frames = Annotated[
+    str | None,
+    typer.Option(
+        "--frames",
+        help="Render frames of a scene that moves: FIRST:STOP or FIRST:STOP:STEP, such as 0:48 for 0 to 47; 0: is all. "
+        "The output is then a folder or a name with %04d.",
+    ),
+]
+Fps = Annotated[float | None, typer.Option("--fps", help="Frames per second of an animation and of its film; 24.")]
+Animation = Annotated[
+    str | None, typer.Option("--animation", help="A glTF file's animation by name; its first by default.")
+]
+CameraPath = Annotated[
+    Path | None, typer.Option("--camera-path", help="Fly through a Tachyon or NFF scene along this .cam file.")
+]
+Video = Annotated[
+    Path | None,
+    typer.Option(
+        "--video",
+        help="Write a film (.mp4, .png) of what an eye sees of the frames, or with a name such as "
+        "film_qs8x6a0.75.mp4 of their quilts.",
+    ),
+]
+Eye = Annotated[
+    str | None, typer.Option("--eye", help="Where the film's eye is: X,Y,Z in mm, z toward the viewer; central.")
+]
+
+_NUMBER = re.compile(r"%(?:0(\d{1,2}))?d")
+_NUMERAL = re.compile(r"[\d.]+")
+_FOLDER_PATTERN = "frame_%04d.png"
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What ``--frames`` and the options beside it ask for; ``frames`` None is a single picture at rest."""
+
+    frames: str | None
+    fps: float | None
+    animation: str | None
+    camera_path: Path | None
+    video: Path | None
+    eye: str | None
+
+    def __bool__(self) -> bool:
+        """Whether a sequence is wanted.
+
+        Raises
+        ------
+        UsageError
+            An option is given that means nothing without one.
+        """
+        if self.frames is not None:
+            return True
+        for option in ("fps", "animation", "camera_path", "video", "eye"):
+            if getattr(self, option) is not None:
+                name = f"--{option.replace('_', '-')}"
+                raise UsageError("has no meaning for a single picture", where=name, fix="add --frames 0:48")
+        return False
+
+
+def render_frames(
+    scene: str,
+    output: Path,
+    wanted: Wanted,
+    console: Console,
+    *,
+    bits: int | None,
+    maps: Path | None,
+    load: dict[str, Any],
+    resume: bool,
+    runner: Runner | None,
+    **asked: Any,
+) -> None:
+    """Render and write all frames; ``load`` goes to the reader of the scene, ``asked`` to the renderer."""
+    from lippmann.image import read_picture
+    from lippmann.image.write import format_for
+    from lippmann.journal.tile_journal import sweep_beside
+    from lippmann.sequences.files import saved_sequence
+    from lippmann.sequences.frames import open_motion
+    from lippmann.sequences.motion import FRAMES_PER_SECOND
+    from lippmann.viewing.video_file import write_animation
+    from lippmann.viewing.video_frames import projection_of
+
+    flying = wanted.camera_path is not None
+    if flying and wanted.fps is not None and wanted.video is None:
+        raise UsageError("a camera path has one pose a frame", where="--fps", fix="leave it out, or add --video")
+    if wanted.fps is not None and not 0.001 <= wanted.fps <= 1000:
+        raise UsageError(f"{wanted.fps:g} frames per second", where="--fps", rule="0.001 to 1000")
+    if wanted.eye is not None and wanted.video is None:
+        raise UsageError("nobody looks", where="--eye", fix="add --video FILE.mp4, or leave it out")
+    chosen = frame_range(wanted.frames or "")
+    eye = None if wanted.eye is None else parse.triple(wanted.eye, "--eye")
+    projection = None if wanted.video is None else projection_of(wanted.video, eye)
+    motion = open_motion(
+        scene,
+        fps=None if flying else wanted.fps,
+        animation=wanted.animation,
+        camera_path=wanted.camera_path,
+        **load,
+    )
+    frames = chosen.of(motion)
+    path_of = numbered(output, len(frames))
+    name, _ = format_for(path_of(frames[0]), bits)
+    if maps is not None:
+        raise UsageError("a sequence writes no pictures of its maps", where="--maps", fix="leave it out")
+    if asked.get("layers") and name != "exr":
+        raise UsageError(
+            "the frames cannot hold layers", where="--layers", rule="OpenEXR can", fix="name them %04d.exr"
+        )
+    _check_places(output, path_of(frames[0]), wanted.video)
+    done: list[dict[str, Any]] = []
+    notes: dict[str, list[str]] = {}
+
+    def noted(frame: SavedFrame) -> SavedFrame:
+        made = frame.provenance
+        seconds = made.seconds.get("total", 0.0)
+        done.append(
+            {
+                "frame": frame.number,
+                "output": str(frame.path),
+                "seconds": seconds,
+                "spp": made.spp,
+                "found": frame.found,
+            }
+        )
+        for note in made.notes:
+            # The same remark of several frames differs in its numbers at most.
+            notes.setdefault(_NUMERAL.sub("", note), []).append(note)
+        return frame
+
+    with (
+        _kept(output, path_of(frames[0]), console) as progress,
+        saved_sequence(
+            motion, output, path_of, frames=frames, resume=resume, runner=runner, bits=bits, progress=progress, **asked
+        ) as saved,
+    ):
+        files = map(noted, saved)
+        if projection is None or wanted.video is None:
+            deque(files, maxlen=0)
+        else:
+            sweep_beside(wanted.video)
+            # The film shows what the files hold, whether they were rendered now or before an interruption.
+            images = (read_picture(frame.path) for frame in files)
+            first = next(images)
+            write_animation(
+                map(projection, chain([first], images)),
+                wanted.video,
+                frames_per_second=wanted.fps or FRAMES_PER_SECOND,
+                transfer=first.provenance.transfer,
+            )
+    for alike in notes.values():
+        only = f" ({len(alike)} of {len(done)} frames)" if len(alike) < len(done) else ""
+        console.remark(f"{alike[0]}{' and the like' if len(set(alike)) > 1 else ''}{only}")
+    film = "" if wanted.video is None else f", {wanted.video}"
+    seconds, found = sum(one["seconds"] for one in done), sum(one["found"] for one in done)
+    before = f", {found} of them found" if found else ""
+    console.result(
+        {"output": str(output), "frames": done, "video": None if wanted.video is None else str(wanted.video)},
+        f"{done[0]['output']} to {Path(done[-1]['output']).name}{film}: {len(done)} frames{before}, {seconds:.1f} s",
+    )
+
+
+@contextmanager
+def _kept(output: Path, first: Path, console: Console) -> Iterator[ProgressCallback]:
+    """The console's progress; if the work ends early, say what is left of it."""
+    from lippmann.sequences.files import journal_of
+
+    journal = journal_of(output, first)
+    try:
+        with console.progress() as progress:
+            yield progress
+    except PictureError:
+        raise  # it says what to do about the journal
+    except BaseException:
+        if journal.exists():
+            console.remark(f"finished frames are listed in {journal.name}: with --resume the command goes on")
+        raise
+
+
+def frame_range(text: str) -> FrameRange:
+    """``FIRST:STOP[:STEP]``, parts of it left out, or one number.
+
+    Raises
+    ------
+    UsageError
+        It is none, or empty.
+    """
+    from lippmann.sequences.frames import FrameRange
+
+    match = re.fullmatch(r"(\d{1,9})|(\d{0,9}):(\d{0,9})(?::(\d{1,9}))?", text.strip())
+    if match is None:
+        rule = "FIRST:STOP or FIRST:STOP:STEP, such as 0:48 for the frames 0 to 47"
+        raise UsageError(f"'{text}' will not do", where="--frames", rule=rule)
+    if match[1]:
+        return FrameRange(int(match[1]), int(match[1]) + 1)
+    return FrameRange(int(match[2] or 0), int(match[3]) if match[3] else None, int(match[4] or 1))
+
+
+def numbered(output: Path, frames: int) -> Callable[[int], Path]:
+    """Where each frame goes: ``output`` has one ``%d`` or ``%04d`` in its name, or is a folder.
+
+    Raises
+    ------
+    OutputError
+        It is neither, and there is more than one frame.
+    """
+    name = output.name
+    if "%" in name:
+        if len(_NUMBER.findall(name)) != 1 or "%" in _NUMBER.sub("", name):
+            raise OutputError("the frames' numbers have no clear place", where=str(output), rule="one %d or %04d")
+        return lambda number: output.with_name(_NUMBER.sub(lambda m: f"{number:0{m[1] or 1}}", name))
+    if output.is_dir() or not output.suffix:
+        return lambda number: output / (_FOLDER_PATTERN % number)
+    if frames == 1:
+        return lambda number: output
+    fix = f"{output.stem}_%04d{output.suffix}, or a folder"
+    raise OutputError(f"this is one name for {frames} frames", where=str(output), fix=fix)
+
+
+def _check_places(output: Path, first: Path, video: Path | None) -> None:
+    """Make the folder, and see that frames and film can be written, before anything is rendered."""
+    from lippmann.runtime.atomic_write import check_writable
+
+    if first.parent == output and not output.is_dir():
+        try:
+            output.mkdir()
+        except OSError as error:
+            raise OutputError(f"cannot be made ({error.strerror or error})", where=str(output)) from None
+    check_writable(first)
+    if video is not None:
+        check_writable(video)

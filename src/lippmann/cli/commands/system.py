@@ -1,0 +1,74 @@
+"""``lippmann doctor`` and ``lippmann displays``: what is there."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+from lippmann.cli.shared import options
+from lippmann.cli.shared.console import Console
+
+if TYPE_CHECKING:
+    from lippmann.runtime.engine import Check
+
+
+def doctor(as_json: options.Json = False) -> None:
+    """Say what a render would use here, and how to mend what is missing."""
+    from lippmann.runtime import engine
+
+    diagnosis = engine.diagnose()
+    width = max(len(check.name) for check in diagnosis.checks)
+    lines = []
+    for check in diagnosis.checks:
+        lines.append(f"{_mark(check)} {check.name:<{width}}  {check.value}")
+        if check.fix:
+            lines.append(f"{'':<{width + 4}} -> {check.fix}")
+    verdict = "a render would run" if diagnosis.ok else "a render would not run"
+    checks = [asdict(check) for check in diagnosis.checks]
+    Console(as_json=as_json).result({"ok": diagnosis.ok, "checks": checks}, "\n".join([*lines, verdict]))
+    raise typer.Exit(0 if diagnosis.ok else 1)
+
+
+def _mark(check: Check) -> str:
+    if check.ok:
+        return "ok "
+    return "!! " if check.needed else "-  "
+
+
+def displays(as_json: options.Json = False) -> None:
+    """List the displays that come with the program."""
+    from lippmann.display import list_displays
+
+    rows = [display.summary() for display in list_displays()]
+    header = {
+        "name": "name",
+        "pixels": "pixels",
+        "lenses": "lenses",
+        "pixels_per_lens": "pixels/lens",
+        "field_of_view": "field",
+        "depth": "depth behind/before",
+        "title": "",
+    }
+    table = [header, *({key: _cell(key, row) for key in header} for row in rows)]
+    widths = {key: max(len(line[key]) for line in table) for key in header}
+    lines = ["  ".join(line[key].ljust(widths[key]) for key in header).rstrip() for line in table]
+    Console(as_json=as_json).result({"displays": rows}, "\n".join(lines))
+
+
+def _cell(key: str, row: dict[str, Any]) -> str:
+    if key == "pixels":
+        return "x".join(str(count) for count in row["pixels"])
+    if key == "lenses":
+        columns, rows = row["lenses"]
+        return str(columns) if row["layout"] == "lenticular" else f"{columns}x{rows}"
+    if key == "pixels_per_lens":
+        across, down = row["pixels_per_lens"]
+        return f"{across:.3g}" if down is None else f"{across:.3g}x{down:.3g}"
+    if key == "field_of_view":
+        return f"{row['field_of_view']:.1f} deg"
+    if key == "depth":
+        front, back = row["depth_budget"]
+        return f"{-back:.0f}/{front:.0f} mm"
+    return str(row[key])

@@ -1,0 +1,167 @@
+"""``lippmann view``: a picture as its display would show it, in a browser."""
+
+from __future__ import annotations
+
+import os
+import sys
+import threading
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from lippmann.cli.shared import options
+from lippmann.cli.shared.console import Console
+from lippmann.cli.shared.exit_codes import INTERRUPTED
+from lippmann.errors import LippmannError, UsageError
+
+if TYPE_CHECKING:
+    from lippmann.display import Display
+    from lippmann.viewer.http_server import Site
+    from lippmann.viewer.manifest import TileFormat
+    from lippmann.viewer.served_picture import PictureFile
+
+Other = Annotated[Path | None, typer.Argument(help="A second picture, beside the first behind a divider.")]
+Export = Annotated[
+    Path | None, typer.Option("--export", help="Write one HTML file that needs no server instead, and leave.")
+]
+Host = Annotated[
+    str, typer.Option("--host", help="The address to listen on. By default only this machine can open the page.")
+]
+Port = Annotated[int, typer.Option("--port", help="The port to listen on; 0 takes a free one.")]
+NoBrowser = Annotated[bool, typer.Option("--no-browser", help="Only print the address.")]
+
+
+def view(
+    picture: options.Picture,
+    other: Other = None,
+    export: Export = None,
+    display: options.PictureDisplay = None,
+    host: Host = "127.0.0.1",
+    port: Port = 0,
+    no_browser: NoBrowser = False,
+    as_json: options.Json = False,
+    quiet: options.Quiet = False,
+) -> None:
+    """Show a picture in a browser as its display would show it."""
+    from lippmann.display import load_display
+
+    console = Console(quiet, as_json)
+    paths = [picture] if other is None else [picture, other]
+    shown_on = None if display is None else load_display(display)
+    if export is not None:
+        for name, given in (("--host", host != "127.0.0.1"), ("--port", port != 0), ("--no-browser", no_browser)):
+            if given:
+                raise UsageError("has no meaning for a file", where=name, fix="leave --export or this out")
+        _export(paths, shown_on, export, console)
+        return
+    from lippmann.viewer.served_picture import PictureFile
+    from lippmann.viewer.server import ViewerSite
+
+    # Bare bytes are quickest on one machine, packed ones through a tunnel.
+    tile_format: TileFormat = "png" if is_remote() else "rgb"
+    files = [PictureFile(path, shown_on, tile_format) for path in paths]
+    serve(
+        ViewerSite(files),
+        " and ".join(str(path) for path in paths),
+        console,
+        host=host,
+        port=port,
+        browser=not no_browser,
+        started=lambda: _read_ahead(files, console),
+    )
+
+
+def _read_ahead(files: list[PictureFile], console: Console) -> None:
+    """Begin to read the pictures while the browser starts; what is wrong with one is said here and on the page."""
+
+    def read() -> None:
+        for file in files:
+            try:
+                file.current()
+            except LippmannError as error:
+                console.remark(f"lippmann: {error}")
+
+    threading.Thread(target=read, daemon=True).start()
+
+
+def _export(paths: list[Path], display: Display | None, output: Path, console: Console) -> None:
+    from lippmann.image import read_metadata
+    from lippmann.runtime.atomic_write import check_writable
+    from lippmann.viewer.export import check_exportable, export_page
+    from lippmann.viewer.served_picture import open_shown
+
+    for path in paths:
+        check_exportable(read_metadata(path, display=display).display)
+    check_writable(output)
+    export_page([(path.name, open_shown(path, display)) for path in paths], output)
+    size = output.stat().st_size
+    names = " and ".join(str(path) for path in paths)
+    console.result({"output": str(output), "bytes": size}, f"{output}: {names}, {size / 1e6:.1f} MB")
+
+
+def serve(
+    site: Site,
+    what: str,
+    console: Console,
+    *,
+    host: str,
+    port: int,
+    browser: bool,
+    started: Callable[[], None] = lambda: None,
+) -> None:
+    """Serve a page until Ctrl-C, which leaves with 130.
+
+    Parameters
+    ----------
+    site:
+        What is served.
+    what:
+        What the page shows, for people.
+    host, port:
+        Where, see :class:`~lippmann.viewer.http_server.WebServer`; raises as that.
+    browser:
+        Whether to open the page, where there is a screen.
+    started:
+        Called once the page can be opened.
+    """
+    import webbrowser  # as socket below: not for --help
+
+    from lippmann.viewer.http_server import WebServer, is_loopback
+
+    with WebServer(site, host, port) as server:
+        # The address comes last: who reads it may send Ctrl-C at once.
+        if not is_loopback(host):
+            console.remark("everyone who can reach this machine can open the page")
+        elif is_remote():
+            console.remark(f"from your own machine: {tunnel(server.port)}, then open the address there")
+        console.remark("Ctrl-C ends it")
+        console.result({"address": server.address}, f"{what}: {server.address}")
+        sys.stdout.flush()
+        started()
+        if browser and has_screen():
+            webbrowser.open(server.address)
+        try:
+            threading.Event().wait()
+        except KeyboardInterrupt:
+            raise SystemExit(INTERRUPTED) from None  # that is how a page ends; no other word is needed
+
+
+def is_remote() -> bool:
+    """Whether the command is typed from another machine."""
+    return "SSH_CONNECTION" in os.environ
+
+
+def has_screen() -> bool:
+    """Whether a browser could be seen; one that draws letters into the terminal does not count."""
+    if sys.platform in ("win32", "darwin"):
+        return not is_remote()
+    return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
+
+
+def tunnel(port: int) -> str:
+    """The command that brings a port of this machine to another one."""
+    import socket
+
+    return f"ssh -L {port}:127.0.0.1:{port} {os.environ.get('USER', 'you')}@{socket.gethostname()}"

@@ -1,0 +1,1 @@
+"""Parts that the commands share: console output, options, and the parsing of values."""

@@ -1,0 +1,83 @@
+"""From what people type to values: sizes, triples, colours, placements, amounts of memory."""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import TYPE_CHECKING
+
+from lippmann.errors import UsageError
+
+if TYPE_CHECKING:
+    from lippmann.scene.placement import PlacementOptions
+
+_MEMORY_UNITS = {"": 1, "k": 2**10, "m": 2**20, "g": 2**30, "t": 2**40}
+
+
+def numbers(text: str, option: str, counts: tuple[int, ...] = (3,)) -> tuple[float, ...]:
+    """Numbers separated by commas; ``counts`` says how many there may be."""
+    parts = text.split(",")
+    expected = " or ".join(str(count) for count in counts)
+    rule = f"{expected} numbers separated by commas" if counts != (1,) else "a number"
+    try:
+        values = tuple(float(part) for part in parts)
+    except ValueError:
+        raise UsageError(f"'{text}' will not do", where=option, rule=rule) from None
+    if len(values) not in counts or not all(abs(value) < float("inf") for value in values):
+        raise UsageError(f"'{text}' will not do", where=option, rule=rule)
+    return values
+
+
+def triple(text: str, option: str) -> tuple[float, float, float]:
+    """Three numbers separated by commas."""
+    x, y, z = numbers(text, option)
+    return x, y, z
+
+
+def size(text: str, option: str, rule: str = "width x height in pixels, such as 512x512") -> tuple[int, int]:
+    """Width and height in pixels, such as ``512x512``; or columns and rows, as ``rule`` says."""
+    match = re.fullmatch(r"(\d{1,6})[xX](\d{1,6})", text.strip())
+    if match is None or "0" in (match[1].lstrip("0") or "0", match[2].lstrip("0") or "0"):
+        raise UsageError(f"'{text}' is no size", where=option, rule=rule)
+    return int(match[1]), int(match[2])
+
+
+def memory(text: str | None, option: str = "--memory") -> int | None:
+    """Bytes of an amount such as ``2G``, ``512M`` or a plain number of bytes."""
+    if text is None:
+        return None
+    match = re.fullmatch(r"(\d{1,20}(?:\.\d{1,20})?)\s*([kmgt]?)(?:i?b)?", text.strip().lower())
+    amount = 0 if match is None else int(float(match[1]) * _MEMORY_UNITS[match[2]])
+    if amount <= 0:
+        raise UsageError(f"'{text}' is no amount of memory", where=option, rule="a number with K, M or G, such as 2G")
+    return amount
+
+
+def color(text: str | None) -> tuple[float, float, float] | None:
+    """A background colour from what was typed."""
+    return None if text is None else triple(text, "--background")
+
+
+def placement(
+    camera: str | None, place: str | None, turn: str | None, shift: str | None, scale: float, pop_out: float | None
+) -> PlacementOptions:
+    """Where the display is to stand, from the options of those names."""
+    from lippmann.scene.placement import PlacementOptions
+
+    return PlacementOptions(
+        mode=place,  # type: ignore[arg-type]  # it is checked there
+        camera=camera,
+        turn=angles(turn),
+        shift=(0.0, 0.0, 0.0) if shift is None else triple(shift, "--shift"),
+        scale=scale,
+        pop_out=pop_out,
+    )
+
+
+def angles(text: str | None) -> tuple[float, float, float]:
+    """Yaw, pitch and roll in degrees from what was typed."""
+    if text is None:
+        return 0.0, 0.0, 0.0
+    values = numbers(text, "--turn", (1, 2, 3))
+    yaw, pitch, roll = (*values, *([0.0] * (3 - len(values))))
+    return math.fmod(yaw, 360.0), pitch, roll

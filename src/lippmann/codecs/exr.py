@@ -1,0 +1,183 @@
+"""OpenEXR: float layers and text attributes.
+
+Pixels go through the OpenEXR library; headers are read here (OpenEXR file layout, openexr.com, "OpenEXR File Layout"),
+because the library's Python binding reads no header alone in all its versions and says of a truncated file no more
+than a line on standard output.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import struct
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lippmann.errors import PictureError
+from lippmann.runtime.quiet_stderr import libraries_silenced
+
+SIGNATURE = b"\x76\x2f\x31\x01"
+
+_TILED, _DEEP, _MULTIPART = 0x200, 0x800, 0x1000
+_DTYPES = {0: "uint32", 1: "float16", 2: "float32"}
+#: Rows per chunk by compression: none, RLE, ZIPS, ZIP, PIZ, PXR24, B44, B44A, DWAA, DWAB.
+_ROWS_PER_CHUNK = (1, 1, 1, 16, 32, 16, 32, 32, 32, 256)
+_LONGEST_ATTRIBUTE = 1 << 24
+
+
+@dataclass(frozen=True)
+class ExrHeader:
+    """What an EXR says of itself: size, ``channels`` (name to NumPy type name) and its text attributes."""
+
+    width: int
+    height: int
+    channels: Mapping[str, str]
+    text: Mapping[str, str]
+
+
+def write_exr(
+    path: Path,
+    channels: Mapping[str, NDArray[Any]],
+    *,
+    text: Mapping[str, str],
+    pixel_pitch: float | None = None,
+) -> None:
+    """Write ``(H, W)`` channels (float16, float32 or uint32) with text attributes, losslessly compressed (ZIP).
+
+    ``pixel_pitch`` (mm) becomes the standard attribute ``xDensity`` (pixels per inch).
+
+    Raises
+    ------
+    OSError
+        If the library cannot write the file.
+    """
+    import OpenEXR
+
+    header: dict[str, Any] = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage, **text}
+    if pixel_pitch is not None:
+        header["xDensity"] = 25.4 / pixel_pitch
+    # The library replaces the values of the mapping it is given, so it gets one of its own.
+    planes = {name: np.ascontiguousarray(plane) for name, plane in channels.items()}
+    try:
+        OpenEXR.File(header, planes).write(str(path))
+    except RuntimeError as error:
+        raise OSError(str(error)) from error
+
+
+def read_exr_header(path: Path) -> ExrHeader:
+    """Size, channels and texts of an EXR, and whether all of it is there, without decoding its pixels.
+
+    Raises
+    ------
+    PictureError
+        If the file is truncated, damaged, no EXR, or of a kind that holds no plain picture (deep, several parts).
+    """
+    with path.open("rb") as file:
+        if file.read(4) != SIGNATURE:
+            raise PictureError("is no OpenEXR file", where=str(path))
+        try:
+            (version,) = struct.unpack("<I", _exactly(file, 4))
+            if version & (_DEEP | _MULTIPART):
+                raise PictureError(
+                    "is a deep or multi-part OpenEXR file", where=str(path), rule="one flat part is read"
+                )
+            attributes = _attributes(file)
+            x0, y0, x1, y1 = struct.unpack("<4i", attributes["dataWindow"][1])
+            channels = _channel_list(attributes["channels"][1])
+            width, height = x1 - x0 + 1, y1 - y0 + 1
+            if width < 1 or height < 1:
+                raise _damaged(path, f"its size is {width} x {height}")
+            if not version & _TILED:
+                _check_chunks(file, height, attributes["compression"][1][0])
+            text = {name: value.decode("utf-8") for name, (kind, value) in attributes.items() if kind == "string"}
+        except (struct.error, KeyError, IndexError, EOFError, UnicodeDecodeError) as error:
+            raise _damaged(path, "it is cut short or its header makes no sense") from error
+    return ExrHeader(width, height, channels, text)
+
+
+def read_exr(path: Path) -> dict[str, NDArray[Any]]:
+    """All channels of an EXR, ``(H, W)`` each, as stored.
+
+    Raises
+    ------
+    PictureError
+        If the pixels cannot be decoded.
+    """
+    import OpenEXR
+
+    # The binding prints a warning where it should raise; what it read then has no parts.
+    with contextlib.redirect_stdout(io.StringIO()), libraries_silenced():
+        try:
+            file = OpenEXR.File(str(path), separate_channels=True)
+        except (RuntimeError, ValueError) as error:
+            raise _damaged(path, str(error)) from error
+    if not file.parts:
+        raise _damaged(path, "its pixels cannot be decoded")
+    return {name: np.asarray(channel.pixels) for name, channel in file.channels().items()}
+
+
+def _exactly(file: BinaryIO, count: int) -> bytes:
+    data = file.read(count)
+    if len(data) < count:
+        raise EOFError
+    return data
+
+
+def _name(file: BinaryIO) -> str:
+    """A null-terminated name of at most 255 bytes (the format's own limit)."""
+    name = b""
+    while (letter := _exactly(file, 1)) != b"\0":
+        name += letter
+        if len(name) > 255:
+            raise EOFError
+    return name.decode("utf-8")
+
+
+def _attributes(file: BinaryIO) -> dict[str, tuple[str, bytes]]:
+    """Type and raw value of every header attribute by name; the file is left at the chunk table."""
+    attributes = {}
+    while name := _name(file):
+        kind = _name(file)
+        (size,) = struct.unpack("<i", _exactly(file, 4))
+        if not 0 <= size <= _LONGEST_ATTRIBUTE:
+            raise EOFError
+        attributes[name] = kind, _exactly(file, size)
+    return attributes
+
+
+def _channel_list(raw: bytes) -> dict[str, str]:
+    file, channels = io.BytesIO(raw), {}
+    while name := _name(file):
+        kind, _, x_step, y_step = struct.unpack("<iIii", _exactly(file, 16))
+        # A subsampled channel has no value of its own per pixel and is treated as absent.
+        if x_step == y_step == 1:
+            channels[name] = _DTYPES[kind]
+    return channels
+
+
+def _check_chunks(file: BinaryIO, height: int, compression: int) -> None:
+    """EOFError if a chunk of rows lies (partly) beyond the file's end; later compressions are left to the library."""
+    if compression >= len(_ROWS_PER_CHUNK):
+        return
+    count = -(-height // _ROWS_PER_CHUNK[compression])
+    table = file.tell()
+    size = file.seek(0, 2)
+    if table + 8 * count > size:
+        raise EOFError
+    file.seek(table)
+    for (start,) in struct.iter_unpack("<Q", _exactly(file, 8 * count)):
+        if start + 8 > size:
+            raise EOFError
+        file.seek(start + 4)
+        (length,) = struct.unpack("<i", _exactly(file, 4))
+        if length < 0 or start + 8 + length > size:
+            raise EOFError
+
+
+def _damaged(path: Path, what: str) -> PictureError:
+    return PictureError(f"this OpenEXR file is damaged: {what}", where=str(path), fix="make or fetch it anew")

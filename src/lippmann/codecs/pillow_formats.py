@@ -1,0 +1,72 @@
+"""Pictures that Pillow decodes: one allow list of formats, recognised by content, whatever the file's name says.
+
+Pillow itself tries dozens of formats, among them ones whose decoder starts another program (EPS starts Ghostscript).
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, BinaryIO
+
+if TYPE_CHECKING:
+    from PIL import Image
+
+#: Formats by Pillow's names, with our names for messages. TGA has no signature, so it is tried last.
+FORMATS = {
+    "PNG": "PNG",
+    "JPEG": "JPEG",
+    "GIF": "GIF",
+    "BMP": "BMP",
+    "TIFF": "TIFF",
+    "WEBP": "WebP",
+    "AVIF": "AVIF",
+    "PPM": "PPM",
+    "TGA": "TGA",
+}
+
+#: What Pillow calls a JPEG file with several pictures, of which the first is taken.
+_SEVERAL = "MPO"
+
+#: The rule that a refusal quotes.
+RULE = f"{', '.join([*FORMATS.values()][:-1])} and {[*FORMATS.values()][-1]} are read"
+
+
+@contextmanager
+def open_picture(source: Path | BinaryIO, formats: tuple[str, ...] = (*FORMATS,)) -> Iterator[Image.Image]:
+    """The picture of a file or stream, not yet decoded.
+
+    Pillow's warning of large pictures is silenced; its error at twice that size is not.
+
+    Parameters
+    ----------
+    source:
+        The file, or a binary stream that can seek.
+    formats:
+        Names of :data:`FORMATS`; those that this Pillow lacks are passed over.
+
+    Raises
+    ------
+    PIL.UnidentifiedImageError
+        If it is of none of the formats.
+    OSError, SyntaxError, PIL.Image.DecompressionBombError
+        If it is missing, damaged or too large; libraries below Pillow raise other errors too.
+    """
+    from PIL import Image
+
+    Image.init()  # loads all decoders, without which those of the list may be unknown
+    known = tuple(name for name in formats if name in Image.OPEN)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", Image.DecompressionBombWarning)
+        with Image.open(source, formats=known) as picture:
+            yield picture
+
+
+def is_allowed(picture: Image.Image) -> bool:
+    """Whether a picture in memory was made there, or opened from a file of one of :data:`FORMATS`.
+
+    Pillow decodes late: converting a picture that a file was opened as runs the decoder of its format.
+    """
+    return picture.format is None or picture.format in (*FORMATS, _SEVERAL)

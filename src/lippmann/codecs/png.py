@@ -1,0 +1,162 @@
+"""PNG with 8 or 16 bits per channel, its text and its resolution.
+
+Pillow neither writes nor reads 16-bit colour, so the pixels go through libpng (``imagecodecs``) and the chunks that
+carry text and resolution are written and read here, after the PNG specification (W3C, third edition, sections 5, 11).
+"""
+
+from __future__ import annotations
+
+import io
+import struct
+import zlib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lippmann.errors import PictureError
+from lippmann.runtime.quiet_stderr import libraries_silenced
+
+SIGNATURE = b"\x89PNG\r\n\x1a\n"
+
+#: Compression level: higher ones cost twice the time for less than 2 % of the size.
+_LEVEL = 4
+
+#: Longest text that is read, decompressed: a display's description takes a few kilobytes.
+_LONGEST_TEXT = 1 << 24
+
+_CHANNELS = {0: 1, 2: 3, 3: 3, 4: 2, 6: 4}
+
+
+@dataclass(frozen=True)
+class PngHeader:
+    """What a PNG says of itself before its pixels: size, ``bits`` per channel, channels once decoded, its texts."""
+
+    width: int
+    height: int
+    bits: int
+    channels: int
+    text: Mapping[str, str]
+
+
+def encode_png(
+    codes: NDArray[Any],
+    *,
+    text: Mapping[str, str],
+    pixel_pitch: float | None = None,
+    srgb: bool = True,
+) -> bytes:
+    """A PNG file of ``(H, W, 3)`` uint8 or uint16 codes.
+
+    ``text`` becomes one ``iTXt`` chunk per keyword (Latin-1, at most 79 letters); ``pixel_pitch`` (mm) becomes
+    ``pHYs``; ``srgb`` marks the codes as sRGB.
+    """
+    import imagecodecs
+
+    encoded = bytes(imagecodecs.png_encode(np.ascontiguousarray(codes), level=_LEVEL))
+    extra = b""
+    if srgb:
+        extra += _chunk(b"sRGB", b"\0")  # perceptual intent
+    if pixel_pitch is not None:
+        per_metre = max(1, round(1000 / pixel_pitch))
+        extra += _chunk(b"pHYs", struct.pack(">IIB", per_metre, per_metre, 1))
+    for keyword, value in text.items():
+        # keyword, no compression, no language, no translated keyword
+        extra += _chunk(b"iTXt", keyword.encode("latin-1") + b"\0\0\0\0\0" + value.encode("utf-8"))
+    after_header = len(SIGNATURE) + 12 + 13
+    return encoded[:after_header] + extra + encoded[after_header:]
+
+
+def read_png_header(path: Path) -> PngHeader:
+    """Size and texts of a PNG, without decoding its pixels.
+
+    Raises
+    ------
+    PictureError
+        If the file is truncated, damaged or no PNG.
+    """
+    with path.open("rb") as file:
+        header: tuple[int, int, int, int] | None = None
+        text: dict[str, str] = {}
+        for kind, body in _chunks(file, path):
+            if kind == b"IHDR" and len(body) == 13:
+                width, height, bits, color_type = struct.unpack(">IIBB", body[:10])
+                header = width, height, bits, _CHANNELS.get(color_type, 0)
+            elif kind == b"iTXt":
+                text.update(_international_text(body, path))
+    if header is None or not header[0] or not header[1] or not header[3]:
+        raise _damaged(path, "it has no proper header")
+    return PngHeader(*header, text=text)
+
+
+def read_png(path: Path) -> NDArray[Any]:
+    """Codes of a PNG as stored: ``(H, W)`` or ``(H, W, 2 to 4)`` uint8 or uint16.
+
+    Raises
+    ------
+    PictureError
+        If a check sum is wrong or the pixels cannot be decoded.
+    """
+    import imagecodecs
+
+    data = path.read_bytes()
+    # libpng reports a wrong check sum of most chunks on standard error and goes on; so all are looked at first.
+    for _ in _chunks(io.BytesIO(data), path, all_bodies=True):
+        pass
+    try:
+        with libraries_silenced():
+            codes: NDArray[Any] = imagecodecs.png_decode(data)
+    except (RuntimeError, ValueError) as error:
+        raise _damaged(path, str(error)) from error
+    return codes
+
+
+def _chunk(kind: bytes, body: bytes) -> bytes:
+    return struct.pack(">I", len(body)) + kind + body + struct.pack(">I", zlib.crc32(kind + body))
+
+
+def _chunks(file: BinaryIO, path: Path, *, all_bodies: bool = False) -> Iterator[tuple[bytes, bytes]]:
+    """Kind and checked body of every chunk up to ``IEND``; bodies of no interest are empty, unless ``all_bodies``."""
+    if file.read(len(SIGNATURE)) != SIGNATURE:
+        raise PictureError("is no PNG", where=str(path))
+    size = file.seek(0, 2)
+    file.seek(len(SIGNATURE))
+    while True:
+        head = file.read(8)
+        if len(head) < 8:
+            raise _damaged(path, "it ends before its end mark")
+        (length,), kind = struct.unpack(">I", head[:4]), head[4:]
+        if file.tell() + length + 4 > size:
+            raise _damaged(path, f"it ends within its {kind.decode('latin-1')!r} chunk")
+        if kind == b"IEND":
+            return
+        if not all_bodies and kind not in (b"IHDR", b"iTXt"):
+            file.seek(length + 4, 1)
+            yield kind, b""
+            continue
+        body, (crc,) = file.read(length), struct.unpack(">I", file.read(4))
+        if zlib.crc32(kind + body) != crc:
+            raise _damaged(path, f"the check sum of its {kind.decode('latin-1')} chunk is wrong")
+        yield kind, body
+
+
+def _international_text(body: bytes, path: Path) -> dict[str, str]:
+    keyword, _, rest = body.partition(b"\0")
+    compressed, value = rest[:1] == b"\1", rest[2:].split(b"\0", 2)
+    if len(rest) < 2 or len(value) < 3:
+        raise _damaged(path, "one of its texts has no proper form")
+    raw = value[2]
+    try:
+        if compressed:
+            # Rewriters of PNG files compress texts; the limit keeps a small file from filling the memory.
+            raw = zlib.decompressobj().decompress(raw, _LONGEST_TEXT)
+        return {keyword.decode("latin-1"): raw.decode("utf-8")}
+    except (zlib.error, UnicodeDecodeError) as error:
+        raise _damaged(path, f"one of its texts cannot be read ({error})") from error
+
+
+def _damaged(path: Path, what: str) -> PictureError:
+    return PictureError(f"this PNG is damaged: {what}", where=str(path), fix="make or fetch it anew")

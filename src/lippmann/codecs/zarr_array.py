@@ -1,0 +1,141 @@
+"""Zarr: a folder with one file per tile, and what the picture says of itself as an attribute.
+
+The array has the shape ``(height, width, 3)``, chunks of one tile each, the attribute ``lippmann`` with the same values
+that other formats carry as text, and the attribute ``dimensions``: row, column, color.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lippmann.codecs.zarr_reader import open_array, read_array_metadata, read_attributes
+from lippmann.errors import PictureError
+
+ENDING = ".zarr"
+
+#: The files that make a folder a Zarr array, in the third and the second version of the format.
+MARKS = ("zarr.json", ".zarray")
+
+DIMENSIONS = ["row", "column", "color"]
+
+#: Compression: higher levels save little of rendered pictures.
+_LEVEL = 1
+
+#: Name of the attribute with the metadata.
+TEXT_KEY = "lippmann"
+
+
+def write_zarr(
+    folder: Path,
+    tiles: Iterable[tuple[tuple[slice, slice], NDArray[Any]]],
+    *,
+    size: tuple[int, int],
+    side: int,
+    dtype: np.dtype[Any],
+    text: str,
+) -> None:
+    """Write the array into ``folder``, which is empty, tile by tile.
+
+    Parameters
+    ----------
+    tiles:
+        Where each tile lies, and its ``(rows, columns, 3)`` values.
+    size:
+        Width and height of the picture.
+    side:
+        Height and width of a tile.
+    text:
+        JSON of the metadata, or empty.
+
+    Raises
+    ------
+    PictureError
+        If the library is not installed.
+    """
+    zarr = load_zarr(folder)
+    shape = {"shape": (size[1], size[0], 3), "chunks": (side, side, 3), "dtype": dtype, "fill_value": 0}
+    array = _created(zarr, str(folder), shape)
+    array.attrs.update({TEXT_KEY: json.loads(text or "null"), "dimensions": DIMENSIONS})
+    for place, values in tiles:
+        array[place] = values
+
+
+def _created(zarr: Any, folder: str, shape: dict[str, Any]) -> Any:
+    """An empty array packed by Zstandard with check sums, so that a changed byte does not become a colour."""
+    if hasattr(zarr, "create_array"):
+        packing = zarr.codecs.ZstdCodec(level=_LEVEL, checksum=True)
+        return zarr.create_array(store=folder, compressors=(packing,), overwrite=True, **shape)
+    from numcodecs import Zstd  # the library's second version
+
+    return zarr.open_array(folder, mode="w", compressor=Zstd(level=_LEVEL, checksum=True), **shape)
+
+
+def is_zarr(path: Path) -> bool:
+    """Whether this is a folder with a Zarr array."""
+    try:
+        return any((path / mark).is_file() for mark in MARKS)
+    except (OSError, ValueError):  # no file can have such a name
+        return False
+
+
+def open_zarr(folder: Path) -> Any:
+    """The array of a folder, for reading.
+
+    Raises
+    ------
+    PictureError
+        If the library is not installed, or the folder holds no picture, or one whose metadata is not admitted.
+    """
+    zarr = load_zarr(folder)
+    metadata = read_array_metadata(folder)
+    if len(metadata.shape) != 3 or metadata.shape[2] != 3 or min(metadata.shape) < 1:
+        raise PictureError(
+            f"holds an array of shape {metadata.shape}", where=str(folder), rule="it must be (height, width, 3)"
+        )
+    return open_array(zarr, folder, metadata)
+
+
+def read_part(array: Any, place: tuple[slice, slice], folder: Path) -> NDArray[Any]:
+    """Some rows and columns of an array; a :class:`PictureError` if they cannot be decoded."""
+    try:
+        values: NDArray[Any] = array[place]
+    except PictureError:
+        raise
+    except Exception as error:  # whatever the library stumbles with over a damaged chunk
+        raise PictureError(f"this Zarr array is damaged: {error}", where=str(folder), fix="make it anew") from error
+    return values
+
+
+def zarr_text(folder: Path) -> str:
+    """The metadata that the array of a folder carries as JSON; empty without.
+
+    Raises
+    ------
+    PictureError
+        If its attributes are damaged.
+    """
+    found = read_attributes(folder).get(TEXT_KEY)
+    return "" if found is None else json.dumps(found)
+
+
+def load_zarr(where: Path) -> Any:
+    """The library, which is an extra.
+
+    Raises
+    ------
+    PictureError
+        If it is not installed.
+    """
+    try:
+        import zarr
+    except ImportError:
+        raise PictureError(
+            "the library 'zarr' is not installed", where=str(where), fix='install it: pip install "lippmann[exchange]"'
+        ) from None
+    return zarr

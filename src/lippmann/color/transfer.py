@@ -1,0 +1,77 @@
+"""Linear light to display codes and back, and the slope of the curve.
+
+The curve is that of IEC 61966-2-1 (sRGB). Codes of ``bits`` bits stand for coded values ``code / (2**bits - 1)``; a
+value between two codes goes to the nearer one, values outside [0, 1] to the nearest end. ``code -> linear -> code`` is
+the identity for both bit depths and both transfers.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+#: How linear values become the codes of integer formats: ``srgb`` by the sRGB curve, ``linear`` by scaling alone (what
+#: the papers' programs did: the value itself is the display code).
+Transfer = Literal["srgb", "linear"]
+
+FloatArray = NDArray[np.float32]
+
+#: Values coded at a time: keeps the temporary arrays small beside the picture.
+_BLOCK = 1 << 22
+
+
+def encode_srgb(linear: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
+    """sRGB-coded values in [0, 1] of linear values, which are clipped to [0, 1]; same shape and precision."""
+    value: NDArray[Any] = np.clip(linear, 0, 1)
+    return np.where(value <= 0.0031308, 12.92 * value, 1.055 * value ** (1 / 2.4) - 0.055)
+
+
+def encode(linear: NDArray[np.floating[Any]], transfer: Transfer) -> NDArray[np.floating[Any]]:
+    """Coded values in [0, 1] of linear values by ``transfer``; same shape and precision."""
+    return encode_srgb(linear) if transfer == "srgb" else np.clip(linear, 0, 1)
+
+
+def decode_srgb(coded: ArrayLike) -> NDArray[np.float64]:
+    """Linear values of sRGB-coded ones; same shape. The curve's line goes on below 0, its power above 1."""
+    value = np.asarray(coded, np.float64)
+    # The floor keeps the power, computed for every value, from roots of negative numbers.
+    return np.where(value <= 0.04045, value / 12.92, ((np.maximum(value, 0.0) + 0.055) / 1.055) ** 2.4)
+
+
+def coding_slope(linear: NDArray[Any], transfer: Transfer = "srgb") -> NDArray[np.float32]:
+    """Slope of the coding curve: by how much a code in [0, 1] changes with its linear value; 0 outside [0, 1]."""
+    inside = (linear >= 0) & (linear <= 1)
+    if transfer == "linear":
+        return inside.astype(np.float32)
+    x = np.clip(linear, 0.0031308, 1)
+    slope = np.where(linear <= 0.0031308, 12.92, (1.055 / 2.4) * x ** (1 / 2.4 - 1))
+    return np.where(inside, slope, 0).astype(np.float32)
+
+
+def quantize(linear: FloatArray, bits: int, transfer: Transfer) -> NDArray[np.uint8] | NDArray[np.uint16]:
+    """Codes (uint8 for 8 bits, uint16 for 16) of linear values; same shape, always C-contiguous."""
+    codes: NDArray[Any] = np.empty(linear.shape, dtype=np.uint8 if bits == 8 else np.uint16)
+    top = 2**bits - 1
+    source, target = np.ascontiguousarray(linear).reshape(-1), codes.reshape(-1)
+    for start in range(0, source.size, _BLOCK):
+        block = source[start : start + _BLOCK]
+        coded = encode(block, transfer)
+        target[start : start + _BLOCK] = np.floor(coded * top + np.float32(0.5))
+    return codes
+
+
+def dequantize(codes: NDArray[np.uint8] | NDArray[np.uint16], transfer: Transfer) -> FloatArray:
+    """Linear float32 values of uint8 or uint16 codes; same shape."""
+    # One table look-up per value: exact in double precision, and quicker than the curve itself.
+    return linear_levels(codes.dtype, transfer)[codes]
+
+
+@lru_cache(maxsize=4)
+def linear_levels(dtype: np.dtype[Any], transfer: Transfer) -> FloatArray:
+    """The linear values of all codes of a type, uint8 or uint16, in their order; not to be changed."""
+    top = np.iinfo(dtype).max
+    levels = np.arange(top + 1, dtype=np.float64) / top
+    return (decode_srgb(levels) if transfer == "srgb" else levels).astype(np.float32)

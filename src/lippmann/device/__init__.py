@@ -1,0 +1,1 @@
+"""Scenes on the device: Mitsuba scenes, Whitted scenes, the Sobol stream, and array operations of Dr.Jit."""

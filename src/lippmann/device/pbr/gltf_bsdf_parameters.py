@@ -1,0 +1,150 @@
+"""What one kind of surface evaluates at a point: glTF's material on the device, and what it comes to there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from lippmann.device.pbr.texture_lookup import Place, Signal
+
+
+@dataclass(eq=False)
+class NormalMap:
+    """A tangent-space normal map: ``lookup`` of its texels, ``scale`` of its normals' x and y."""
+
+    lookup: Any
+    scale: Signal
+
+
+@dataclass(eq=False)
+class SurfaceModel:
+    """A surface that may be metal, plastic, cloth, glass or a mixture. None switches a feature off, at no cost.
+
+    Attributes
+    ----------
+    base_color, roughness:
+        As in glTF.
+    ior:
+        Refractive index relative to the outside.
+    metallic:
+        None where ``metal`` decides for all of the surface.
+    dull:
+        The dielectric reflects nothing at its interface.
+    specular, specular_color:
+        KHR_materials_specular.
+    transmission:
+        Share of light that enters instead of being scattered diffusely; ``solid`` says that it enters a body, not a
+        sheet.
+    gloss_albedo, sheen_albedo:
+        Textures over (cosine, roughness) of the light that a microfacet lobe and white sheen send back; see
+        :mod:`~lippmann.device.pbr.microfacet`. The former is needed wherever light is scattered below an interface.
+    opacity, opacity_cutoff:
+        Share of the surface that is there; with a cutoff all or nothing.
+    tinted, faded:
+        The mesh's vertex colours multiply the base colour, their alpha the opacity.
+    """
+
+    base_color: Signal
+    roughness: Signal
+    ior: Signal
+    gloss_albedo: Any = None
+    metallic: Signal | None = None
+    metal: bool = False
+    dull: bool = False
+    specular: Signal | None = None
+    specular_color: Signal | None = None
+    transmission: Signal | None = None
+    solid: bool = False
+    normal: NormalMap | None = None
+    clearcoat: Signal | None = None
+    clearcoat_roughness: Signal | None = None
+    clearcoat_normal: NormalMap | None = None
+    sheen_color: Signal | None = None
+    sheen_roughness: Signal | None = None
+    sheen_albedo: Any = None
+    opacity: Signal | None = None
+    opacity_cutoff: Signal | None = None
+    tinted: bool = False
+    faded: bool = False
+
+    def base(self, place: Place) -> Any:
+        """Base colour at a point."""
+        color = self.base_color.eval(place)
+        return color * place.color if self.tinted else color
+
+    def coverage(self, place: Place) -> Any:
+        """Opacity at a point, in [0, 1]; only where the model has one."""
+        import drjit as dr
+        import mitsuba as mi
+
+        assert self.opacity is not None
+        alpha = self.opacity.eval(place)
+        if self.faded:
+            alpha = alpha * place.alpha
+        if self.opacity_cutoff is not None:
+            return dr.select(alpha >= self.opacity_cutoff.eval(place), mi.Float(1), 0)
+        return dr.clip(alpha, 0, 1)
+
+    def metalness(self, place: Place) -> Any:
+        """Share of metal at a point."""
+        import drjit as dr
+        import mitsuba as mi
+
+        if self.metallic is None:
+            return mi.Float(1 if self.metal else 0)
+        return dr.clip(self.metallic.eval(place), 0, 1)
+
+    def clarity(self, place: Place) -> Any:
+        """Share of light that enters rather than being scattered diffusely, at a point."""
+        import drjit as dr
+        import mitsuba as mi
+
+        return mi.Float(0) if self.transmission is None else dr.clip(self.transmission.eval(place), 0, 1)
+
+
+@dataclass(eq=False)
+class Lobe:
+    """A microfacet lobe seen from one direction: ``wi`` in the frame of its own normal (None: the surface's)."""
+
+    frame: Any
+    wi: Any
+    alpha: Any
+
+
+@dataclass(eq=False)
+class Coat:
+    """The clear coat: ``weight`` of its reflection over what lies below, ``chance`` of being drawn."""
+
+    lobe: Lobe
+    weight: Any
+    chance: Any
+
+
+@dataclass(eq=False)
+class Sheen:
+    """Cloth fibres above the body: ``albedo`` maps a cosine to the light that white ones send back."""
+
+    color: Any
+    alpha: Any
+    albedo: Any
+
+
+@dataclass(eq=False)
+class Point:
+    """All that scattering at one surface point needs, whatever the outgoing direction.
+
+    ``below`` is the share of light that the interface does not reflect.
+    """
+
+    flip: Any
+    lobe: Lobe
+    base: Any
+    metallic: Any
+    transmission: Any
+    eta: Any
+    f0: Any
+    specular: Any
+    below: Any = None
+    diffuse_chance: Any = None
+    sheen: Sheen | None = None
+    coat: Coat | None = None

@@ -1,0 +1,63 @@
+"""A surface model's values as a Mitsuba texture, for Mitsuba's own plugins to read."""
+
+from __future__ import annotations
+
+import functools
+from typing import Any, Literal
+
+from lippmann.device.pbr import microfacet
+from lippmann.device.pbr.gltf_bsdf_parameters import SurfaceModel
+from lippmann.device.pbr.texture_lookup import Place
+
+#: ``base``: base colour; ``coverage``: opacity; ``metal``: reflectance of a smooth metal of that colour.
+Quantity = Literal["base", "coverage", "metal"]
+
+
+def signal_texture(model: SurfaceModel, quantity: Quantity) -> Any:
+    """A ``mi.Texture`` of one quantity of ``model``, for the variant that is set."""
+    import mitsuba as mi
+
+    return _texture_class(mi.variant())(mi.Properties("lippmann_signal"), model, quantity)
+
+
+@functools.cache
+def _texture_class(variant: str) -> Any:
+    import drjit as dr
+    import mitsuba as mi
+
+    assert variant == mi.variant()
+
+    class SignalTexture(mi.Texture):  # type: ignore[misc, unused-ignore]
+        """See the module."""
+
+        def __init__(self, props: Any, model: SurfaceModel, quantity: Quantity) -> None:
+            super().__init__(props)
+            self.model = model
+            self.quantity = quantity
+
+        def eval_3(self, si: Any, active: Any = True) -> Any:
+            if self.quantity == "coverage":
+                return mi.Color3f(self.model.coverage(Place(si, active)))
+            base = mi.Color3f(self.model.base(Place(si, active)))
+            if self.quantity == "base":
+                return base
+            return dr.lerp(base, mi.Color3f(1), microfacet.schlick_weight(dr.abs(si.wi.z)))
+
+        def eval(self, si: Any, active: Any = True) -> Any:
+            return self.eval_3(si, active)
+
+        def eval_1(self, si: Any, active: Any = True) -> Any:
+            if self.quantity == "coverage":
+                return self.model.coverage(Place(si, active))
+            return mi.luminance(self.eval_3(si, active))
+
+        def max(self) -> float:
+            return 1.0
+
+        def is_spatially_varying(self) -> bool:
+            return True
+
+        def to_string(self) -> str:
+            return f"SignalTexture[{self.quantity}]"
+
+    return SignalTexture

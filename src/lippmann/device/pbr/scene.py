@@ -1,0 +1,208 @@
+"""From a scene to a ``mi.Scene``: materials, shapes, lights, in this order."""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from lippmann.device.pbr.emitters import environment_object, light_object
+from lippmann.device.pbr.material_groups import Variant
+from lippmann.device.pbr.materials import Finish, make_finishes
+from lippmann.device.pbr.shapes import Dress, has_volume, make_shapes
+from lippmann.device.pbr.textures import TextureStore
+from lippmann.errors import SceneError
+from lippmann.runtime import engine as engines
+from lippmann.scene.mitsuba_source import MitsubaSource, with_sky
+from lippmann.scene.scene import Scene
+from lippmann.scene.values.description import Color, Matrix, SceneDescription
+
+
+@dataclass(frozen=True, eq=False)
+class BuiltScene:
+    """A scene on the device.
+
+    Attributes
+    ----------
+    mitsuba:
+        The ``mi.Scene``.
+    background:
+        What camera rays see where nothing is hit; None for the environment itself (black without one).
+    absorption:
+        Beer-Lambert coefficients (RGB, per world unit) inside bodies of coloured glass, by the position of their
+        shape in ``mitsuba.shapes()``.
+    has_null:
+        Whether some surface lets rays straight through: a cut-out, a blended surface, a thin pane.
+    borrowed:
+        Whether the ``mi.Scene`` is the caller's own, which nothing may change.
+    notes:
+        What could not be honoured, one line each.
+    seconds:
+        Time spent on ``materials`` (with their textures), ``shapes``, ``lights`` and the ``acceleration`` structure,
+        or on ``load`` for a scene of Mitsuba's own.
+    """
+
+    mitsuba: Any
+    background: Color | None
+    absorption: Mapping[int, Color]
+    has_null: bool
+    notes: tuple[str, ...]
+    seconds: Mapping[str, float]
+    borrowed: bool = False
+
+
+def build(scene: Scene, engine: engines.Engine | None = None) -> BuiltScene:
+    """Make a Mitsuba scene under the variant of ``engine``, a running engine; None starts one.
+
+    Raises
+    ------
+    SceneError
+        Mitsuba refuses the scene, it shows nothing, or a lamp or environment has values that mean nothing.
+    EngineError
+        The engine cannot be started.
+    """
+    if engine is None:
+        engines.start()
+    if isinstance(scene.physical, MitsubaSource):
+        return _build_source(scene.physical, scene)
+    return build_description(replace(scene.physical, environment=scene.environment, background=scene.background))
+
+
+def build_description(description: SceneDescription) -> BuiltScene:
+    """Make a Mitsuba scene of a description as it stands, under the variant that runs.
+
+    Raises
+    ------
+    SceneError
+        Nothing to see, or a lamp or environment has values that mean nothing.
+    """
+    seconds: dict[str, float] = {}
+    notes: list[str] = []
+    placed = _placements(description, notes)
+    if not placed:
+        raise SceneError(
+            "the scene has no geometry", where=description.name, rule="there must be at least one triangle"
+        )
+    with _timed(seconds, "materials"):
+        finishes = _finishes(description, list(placed))
+        notes += _texture_notes(description, finishes)
+    with _timed(seconds, "shapes"):
+        dressed = [(_dress(description, mesh, finishes), matrices) for mesh, matrices in placed.items()]
+        shapes, shape_finishes = make_shapes(dressed)
+    with _timed(seconds, "lights"):
+        lamps = [light_object(light) for light in description.lights if max(light.color) > 0]
+        if description.environment is not None:
+            lamps.append(environment_object(description.environment))
+    with _timed(seconds, "acceleration"):
+        scene = _assemble(shapes, lamps)
+    return BuiltScene(
+        mitsuba=scene,
+        background=description.background,
+        absorption=_absorption(scene, shapes, shape_finishes),
+        has_null=any(_is_null(finish.bsdf) for finish in finishes.values()),
+        notes=tuple(notes),
+        seconds=seconds,
+    )
+
+
+def _build_source(source: MitsubaSource, scene: Scene) -> BuiltScene:
+    seconds: dict[str, float] = {}
+    with _timed(seconds, "load"):
+        loaded = source.scene()
+        if scene.environment is not None:
+            loaded = with_sky(loaded, environment_object(scene.environment))
+    surfaces = [shape.bsdf() for shape in loaded.shapes()]
+    # Shapes inside instanced groups are out of sight: they count as letting rays through, which only costs time.
+    has_null = any(surface is None or _is_null(surface) for surface in surfaces)
+    return BuiltScene(loaded, scene.background, {}, has_null, (), seconds, source.is_borrowed)
+
+
+@contextmanager
+def _timed(seconds: dict[str, float], stage: str) -> Iterator[None]:
+    started = time.perf_counter()
+    yield
+    seconds[stage] = time.perf_counter() - started
+
+
+def _placements(description: SceneDescription, notes: list[str]) -> dict[int, list[Matrix]]:
+    """Where each mesh that has triangles is placed."""
+    placed: dict[int, list[Matrix]] = {}
+    flat = 0
+    for instance in description.instances:
+        if len(description.meshes[instance.mesh].faces) == 0:
+            continue
+        matrix = np.asarray(instance.world_from_mesh, dtype=np.float64)
+        if has_volume(matrix):
+            placed.setdefault(instance.mesh, []).append(matrix)
+        else:
+            flat += 1
+    if flat:
+        notes.append(f"{flat} object(s) scaled to nothing along an axis are left out")
+    return placed
+
+
+def _variant(description: SceneDescription, mesh: int) -> Variant:
+    colors = description.meshes[mesh].colors
+    material = description.meshes[mesh].material
+    if colors is None:
+        return Variant(material)
+    fades = colors.shape[1] == 4 and description.materials[material].alpha_mode != "opaque"
+    return Variant(material, tinted=True, faded=fades)
+
+
+def _finishes(description: SceneDescription, meshes: Sequence[int]) -> dict[Variant, Finish]:
+    variants = [_variant(description, mesh) for mesh in meshes]
+    made = make_finishes(description.materials, variants, TextureStore())
+    return {variant: finish for finish in made for variant in finish.members}
+
+
+def _dress(description: SceneDescription, mesh: int, finishes: Mapping[Variant, Finish]) -> Dress:
+    variant = _variant(description, mesh)
+    return Dress(description.meshes[mesh], variant, finishes[variant])
+
+
+def _texture_notes(description: SceneDescription, finishes: Mapping[Variant, Finish]) -> list[str]:
+    """Textures that a mesh has no coordinates for."""
+    lacking: Counter[int] = Counter()
+    for number in {instance.mesh for instance in description.instances}:
+        finish = finishes.get(_variant(description, number))
+        mesh = description.meshes[number]
+        if finish is not None and any(uv_set >= len(mesh.uvs) for uv_set in finish.uv_sets):
+            lacking[mesh.material] += 1
+    return [
+        f"{count} mesh(es) of material '{description.materials[material].name}' have no coordinates for its textures: "
+        "their first texel is taken"
+        for material, count in sorted(lacking.items())
+    ]
+
+
+def _assemble(shapes: Sequence[Any], lamps: Sequence[Any]) -> Any:
+    import mitsuba as mi
+
+    # Embree's fast mode loses a quarter of the rays that run parallel to an axis but for rounding, along edges: as all
+    # rays of a lenticular sheet may, across its height. The robust mode costs about a tenth of the rays' rate.
+    parts: dict[str, Any] = {"type": "scene", "embree_use_robust_intersections": True}
+    parts |= {f"shape_{number}": shape for number, shape in enumerate(shapes)}
+    parts |= {f"lamp_{number}": lamp for number, lamp in enumerate(lamps)}
+    return mi.load_dict(parts, optimize=False)
+
+
+def _absorption(scene: Any, shapes: Sequence[Any], finishes: Sequence[Finish | None]) -> dict[int, Color]:
+    # Mitsuba may order its shapes as it likes; equality of its Python objects is identity.
+    positions = list(scene.shapes())
+    return {
+        positions.index(shape): finish.absorption
+        for shape, finish in zip(shapes, finishes, strict=True)
+        if finish is not None and finish.absorption is not None
+    }
+
+
+def _is_null(bsdf: Any) -> bool:
+    import mitsuba as mi
+
+    return bool(mi.has_flag(bsdf.flags(), mi.BSDFFlags.Null))

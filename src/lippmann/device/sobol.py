@@ -1,0 +1,82 @@
+"""Sample points that fill a pixel evenly and differ from pixel to pixel.
+
+Every random number is a pure function of (pixel, channel, sample index, dimension, seed): the picture does not depend
+on how it was cut into tiles, nor on the number of threads. Points are the (0, 2)-sequence of Sobol', shuffled and
+Owen-scrambled by hashing, independently for every pair of dimensions (Burley, "Practical Hash-based Owen Scrambling",
+JCGT 2020; the hash of Laine and Karras with the constants of Vegdahl). Any power-of-two run of samples is stratified in
+every elementary interval, and each single point is uniform in [0, 1)^2.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+
+#: Sample dimension that places a sample in its pixel; integrators use those above.
+PIXEL_DIMENSION = 0
+
+
+def hash32(x: Any) -> Any:
+    """A bijective mixing of 32 bits (the "lowbias32" finaliser found by Wellons)."""
+    x = x ^ (x >> 16)
+    x = x * 0x21F0AAAD
+    x = x ^ (x >> 15)
+    x = x * 0x735A2D97
+    return x ^ (x >> 15)
+
+
+def _permute_low_to_high(x: Any, seed: Any) -> Any:
+    """Owen-scramble bit-reversed values: each bit is flipped by a hash of the bits below it."""
+    x = x ^ (x * 0x3D20ADEA)
+    x = x + seed
+    x = x * ((seed >> 16) | 1)
+    x = x ^ (x * 0x05526C56)
+    return x ^ (x * 0x53A22864)
+
+
+def _second_dimension(index: Any) -> Any:
+    """Bit-reversed second Sobol' coordinate of ``index``: the Pascal matrix mod 2, one Kronecker factor at a time."""
+    for shift, mask in ((1, 0x55555555), (2, 0x33333333), (4, 0x0F0F0F0F), (8, 0x00FF00FF), (16, 0x0000FFFF)):
+        index = index ^ ((index >> shift) & mask)
+    return index
+
+
+def _unit_float(bits: Any) -> Any:
+    return mi.Float(bits >> 8) * 2.0**-24
+
+
+@dataclass
+class SampleStream:
+    """The samples of one wavefront: lane-wise pixel ``key`` (hashed with the seed) and sample ``index``."""
+
+    key: Any
+    index: Any
+
+    @staticmethod
+    def of_pixels(pixel: Any, index: Any, seed: Any) -> SampleStream:
+        """Streams for linear pixel numbers ``pixel`` and sample numbers ``index`` (UInt32), under one ``seed``."""
+        return SampleStream(hash32(pixel ^ hash32(seed ^ mi.UInt32(0x9E3779B9))), mi.UInt32(index))
+
+    def at(self, index: Any) -> SampleStream:
+        """The same pixels' points of the samples with the numbers ``index`` (UInt32)."""
+        return SampleStream(self.key, index)
+
+    def _shuffled(self, dimension: Any) -> tuple[Any, Any]:
+        seed = hash32(self.key + mi.UInt32(dimension) * 0x9E3779B9)
+        return dr.brev(_permute_low_to_high(dr.brev(self.index), seed)), seed
+
+    def next_1d(self, dimension: Any) -> Any:
+        """A number in [0, 1) for ``dimension``."""
+        index, seed = self._shuffled(dimension)
+        return _unit_float(dr.brev(_permute_low_to_high(index, hash32(seed ^ 0x68BC21EB))))
+
+    def next_2d(self, dimension: Any) -> Any:
+        """A point in [0, 1)^2 for ``dimension``."""
+        index, seed = self._shuffled(dimension)
+        return mi.Point2f(
+            _unit_float(dr.brev(_permute_low_to_high(index, hash32(seed ^ 0x68BC21EB)))),
+            _unit_float(dr.brev(_permute_low_to_high(_second_dimension(index), hash32(seed ^ 0x02E5BE93)))),
+        )

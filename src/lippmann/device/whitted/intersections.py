@@ -1,0 +1,164 @@
+"""Where rays cross exact shapes: the formulas of :mod:`lippmann.device.whitted.shape_table` on the device.
+
+A ray is an origin and a unit direction; distances are along it. A shape's numbers come either from a table on the
+device (:func:`fetch`) or are written into the kernel (:func:`literal`), which makes a handful of shapes cheaper than
+any hierarchy. Everything is written for single precision: quadrics are solved about the point of the ray nearest to
+their center, so that far origins cost no digits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from lippmann.device.whitted.shape_table import Column, Kind
+
+#: Direction components below this are taken for it: their reciprocal stays finite.
+_SMALLEST = 1e-20
+
+
+@dataclass
+class Row:
+    """One row of the shape table; each field is a number or a device array."""
+
+    center: Any
+    axis: Any
+    k0: Any
+    k1: Any
+    k2: Any
+    kind: Any
+    material: Any
+    clip: Any
+    low: Any
+    high: Any
+    inside: Any
+    passes: Any
+
+
+@dataclass
+class Crossing:
+    """A distance and whether the ray does cross the shape there."""
+
+    t: Any
+    good: Any
+
+
+def fetch(rows: Any, index: Any, active: Any) -> Row:
+    """Row ``index`` of a flat table."""
+    first = index * 4
+    a = dr.gather(mi.Vector4f, rows, first, active)
+    b = dr.gather(mi.Vector4f, rows, first + 1, active)
+    c = dr.gather(mi.Vector4f, rows, first + 2, active)
+    d = dr.gather(mi.Vector4f, rows, first + 3, active)
+    return Row(xyz(a), xyz(b), a.w, b.w, c.x, c.y, c.z, c.w, d.x, d.y, d.z, d.w)
+
+
+def literal(row: NDArray[np.float32]) -> Row:
+    """A row whose numbers become part of the kernel."""
+    n = [float(number) for number in row]
+    center, axis = mi.Vector3f(*n[:3]), mi.Vector3f(*n[Column.AXIS : Column.AXIS + 3])
+    rest = [n[Column.K0], n[Column.K1], *n[Column.K2 :]]
+    return Row(center, axis, *rest)
+
+
+def xyz(v: Any) -> Any:
+    """The first three of four."""
+    return mi.Vector3f(v.x, v.y, v.z)
+
+
+def reciprocal(d: Any) -> Any:
+    """One over each component of a direction, never infinite."""
+    return dr.rcp(dr.select(dr.abs(d) < _SMALLEST, dr.copysign(mi.Vector3f(_SMALLEST), d), d))
+
+
+def slab(low: Any, high: Any, o: Any, inverse: Any) -> tuple[Any, Any]:
+    """Distances at which a ray enters and leaves a box along the axes; it misses where the second is smaller."""
+    a, b = (low - o) * inverse, (high - o) * inverse
+    near, far = dr.minimum(a, b), dr.maximum(a, b)
+    return dr.maximum(dr.maximum(near.x, near.y), near.z), dr.minimum(dr.minimum(far.x, far.y), far.z)
+
+
+def crossings(kinds: Collection[Kind], inside_only: bool, row: Row, o: Any, d: Any) -> list[Crossing]:
+    """All crossings of a ray with a shape of one of ``kinds``, at any distance, the nearer first.
+
+    ``inside_only`` says that some shapes may be seen from within alone.
+    """
+    # A sphere is a quadric too: where both occur, one formula serves.
+    ways = set(kinds)
+    if Kind.QUADRIC in ways:
+        ways.discard(Kind.SPHERE)
+    formulas = {Kind.SPHERE: _sphere, Kind.QUADRIC: _quadric, Kind.BOX: _box, Kind.FLAT: _flat}
+    found = {kind: formulas[kind](inside_only, row, o, d) for kind in sorted(ways)}
+    merged = found.pop(max(found))
+    merged += [Crossing(mi.Float(dr.inf), mi.Bool(False))] * (max(map(len, [merged, *found.values()])) - len(merged))
+    for kind, way in found.items():
+        this = row.kind <= float(kind) if kind is Kind.QUADRIC else row.kind == float(kind)
+        for place, crossing in enumerate(way):
+            merged[place] = Crossing(
+                dr.select(this, crossing.t, merged[place].t), dr.select(this, crossing.good, merged[place].good)
+            )
+        for place in range(len(way), len(merged)):
+            merged[place] = Crossing(merged[place].t, merged[place].good & ~this)
+    return merged
+
+
+def _sphere(inside_only: bool, row: Row, o: Any, d: Any) -> list[Crossing]:
+    to_center = row.center - o
+    to_foot = dr.dot(to_center, d)
+    foot = d * to_foot - to_center
+    discriminant = row.k0 - dr.dot(foot, foot)
+    half = dr.sqrt(discriminant)
+    good = discriminant > 0
+    entering = good & (row.inside == 0) if inside_only else good
+    return [Crossing(to_foot - half, entering), Crossing(to_foot + half, good)]
+
+
+def _quadric(inside_only: bool, row: Row, o: Any, d: Any) -> list[Crossing]:
+    to_center = row.center - o
+    to_foot = dr.dot(to_center, d)
+    foot = d * to_foot - to_center
+    h, dh = dr.dot(foot, row.axis), dr.dot(d, row.axis)
+    # a s^2 + 2 b s + c = 0 with s counted from the foot; foot . d = 0.
+    a = 1 - row.k2 * dh * dh
+    b = -(row.k2 * h + row.k1) * dh
+    c = dr.dot(foot, foot) - (row.k2 * h + 2 * row.k1) * h - row.k0
+    discriminant = b * b - a * c
+    # Neither root loses digits to cancellation; a cone's a may vanish.
+    q = -(b + dr.copysign(dr.sqrt(discriminant), b))
+    s1, s2 = q / a, c / q
+    found = []
+    for s in (dr.minimum(s1, s2), dr.maximum(s1, s2)):
+        along = h + s * dh
+        good = (discriminant > 0) & (along > row.low) & (along < row.high)
+        if inside_only:
+            good &= (row.inside == 0) | (a * s + b > 0)
+        found.append(Crossing(to_foot + s, good))
+    return found
+
+
+def _box(inside_only: bool, row: Row, o: Any, d: Any) -> list[Crossing]:
+    # A ray along a face counts as inside.
+    along = dr.abs(d) < _SMALLEST
+    between = (o >= row.center) & (o <= row.axis)
+    inverse = reciprocal(d)
+    a, b = (row.center - o) * inverse, (row.axis - o) * inverse
+    near = dr.select(along, dr.select(between, -dr.inf, dr.inf), dr.minimum(a, b))
+    far = dr.select(along, dr.inf, dr.maximum(a, b))
+    enter = dr.maximum(dr.maximum(near.x, near.y), near.z)
+    leave = dr.minimum(dr.minimum(far.x, far.y), far.z)
+    return [Crossing(enter, enter <= leave), Crossing(leave, enter <= leave)]
+
+
+def _flat(inside_only: bool, row: Row, o: Any, d: Any) -> list[Crossing]:
+    t = dr.dot(row.center - o, row.axis) / dr.dot(d, row.axis)
+    if isinstance(row.k1, float) and row.k1 == np.inf:
+        return [Crossing(t, dr.isfinite(t))]
+    q = o - row.center + d * t
+    r2 = dr.dot(q, q)
+    return [Crossing(t, (r2 > row.k0) & (r2 < row.k1))]

@@ -1,0 +1,1 @@
+"""Descriptions of displays: TOML files, presets, Looking Glass calibrations, monitors, prints."""

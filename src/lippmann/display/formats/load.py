@@ -1,0 +1,165 @@
+"""Displays from files: the presets that come with Lippmann, and one's own, as TOML.
+
+A file holds the keys of :class:`Display`, with the tables ``[panel]`` and ``[lens_array]``::
+
+    title = "A 15.6-inch panel behind a slanted sheet"
+    gap = 0.885                         # a number is millimetres
+    viewing_distance = "60 cm"          # or a string with a unit: um, mm, cm, m, mil, in; "infinite" is allowed here
+    aperture_distance = 10
+
+    [panel]
+    width = 3840
+    height = 2160
+    pixel_pitch = "282.4 dpi"           # dpi and ppi for the pixel pitch
+    subpixel_offsets = "rgb"            # or "bgr" ..., "none", or three pairs [right, down] in pixels
+
+    [lens_array]
+    layout = "lenticular"
+    pitch = "45.5 lpi"                  # lpi (lenses per inch) and px (pixels of the panel) for what the lenses repeat
+    slant = 9.46                        # degrees
+
+A file without a ``name`` has its own, less the ending.
+
+A slanted monitor may be said by pitch, slope and centre instead, see :mod:`lippmann.display.formats.monitor_toml`. A
+JSON file is the calibration of a Looking Glass, see :mod:`lippmann.display.formats.looking_glass`. Prints and monitors
+can also be said in one word, see :mod:`lippmann.display.formats.inline_spec`.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import sys
+from collections.abc import Mapping
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+from lippmann.display.display import INFINITE, Display, check_tables
+from lippmann.display.formats.inline_spec import display_of_short_form, is_short_form
+from lippmann.display.formats.looking_glass import display_of_calibration, is_calibration
+from lippmann.display.formats.monitor_toml import TABLE as MONITOR
+from lippmann.display.formats.monitor_toml import monitor_of_tables
+from lippmann.display.units import MILLIMETRES, length, stripe
+from lippmann.display.validation import positive, suggestion
+from lippmann.errors import DisplayError
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
+_MAXIMUM_BYTES = 1_000_000  # a picture given by mistake is not read to its end
+
+#: Lengths of a file by table; beside plain lengths, the units per inch and whether the panel's pixel may be the unit.
+_LENGTHS: dict[str, dict[str, tuple[tuple[str, ...], bool]]] = {
+    "": {"gap": ((), False), "viewing_distance": ((), False), "aperture_distance": ((), False)},
+    "panel": {"pixel_pitch": (("dpi", "ppi"), False)},
+    "lens_array": {"pitch": (("lpi",), True), "row_pitch": (("lpi",), True), "offset": ((), True)},
+}
+
+
+def load_display(name_or_path: str | os.PathLike[str]) -> Display:
+    """The preset of that name, the display of a TOML file or a Looking Glass's ``visual.json``, or of a short form.
+
+    Raises
+    ------
+    DisplayError
+        If there is neither, or the file cannot be read or does not describe a possible display.
+    """
+    presets = _preset_texts()
+    name = os.fspath(name_or_path)
+    if name in presets:
+        return _from_toml(presets[name], where=f"{name}.toml", stem=name)
+    if is_short_form(name):
+        return display_of_short_form(name)
+    path = Path(name)
+    if path.suffix not in (".toml", ".json") and not path.exists():
+        rule = f"the displays are {', '.join(presets)}, or a .toml file, or a Looking Glass's visual.json"
+        raise DisplayError(f"unknown display {name!r}", rule=rule, fix=suggestion(name, presets))
+    text = _read(path)
+    if is_calibration(text):
+        return display_of_calibration(text, where=name)
+    return _from_toml(text, where=name, stem=path.stem)
+
+
+def list_displays() -> list[Display]:
+    """All presets, by name."""
+    return [_from_toml(text, where=f"{name}.toml", stem=name) for name, text in _preset_texts().items()]
+
+
+def _preset_texts() -> dict[str, str]:
+    folder = files("lippmann.display") / "presets"
+    found = (entry for entry in folder.iterdir() if entry.name.endswith(".toml"))
+    return {entry.name[:-5]: entry.read_text(encoding="utf-8") for entry in sorted(found, key=lambda e: e.name)}
+
+
+def _read(path: Path) -> str:
+    rule = "a display is a preset's name, a TOML file or a Looking Glass's visual.json"
+    try:
+        with path.open("rb") as file:
+            content = file.read(_MAXIMUM_BYTES + 1)
+        if len(content) > _MAXIMUM_BYTES:
+            raise DisplayError("this file is too large", where=str(path), rule=rule)
+        return content.decode("utf-8")
+    except UnicodeDecodeError:
+        raise DisplayError("this is not a text file", where=str(path), rule=rule) from None
+    except OSError as error:
+        raise DisplayError(f"cannot be read: {error.strerror}", where=str(path), rule=rule) from None
+
+
+def _from_toml(text: str, *, where: str, stem: str) -> Display:
+    try:
+        values = tomllib.loads(text)
+    except (ValueError, RecursionError) as error:  # also numbers of absurd length, lists in lists in lists
+        raise DisplayError(f"not valid TOML: {error}", where=where) from None
+    try:
+        values = {"name": stem, **values}
+        if MONITOR in values:
+            return monitor_of_tables(values).display()
+        check_tables(values)
+        return Display.from_dict(_in_millimetres(values))
+    except DisplayError as error:
+        place = _place(text, error.where, where)
+        raise DisplayError(error.what, where=place, rule=error.rule, fix=error.fix) from None
+
+
+def _place(text: str, key: str, where: str) -> str:
+    """``file:line`` of a dotted key, or the file and the table if it is not written there."""
+    table, _, name = key.rpartition(".")
+    current = ""
+    for line, content in enumerate(text.splitlines(), start=1):
+        if header := re.match(r"\s*\[\s*([\w.]+)\s*\]", content):
+            current = header[1]
+            if current == key:
+                return f"{where}:{line}"
+        elif current == table and re.match(rf"\s*[\"']?{re.escape(name)}[\"']?\s*=", content):
+            return f"{where}:{line}"
+    return f"{where} [{table or key}]" if key else where
+
+
+def _in_millimetres(values: Mapping[str, Any]) -> dict[str, Any]:
+    """The same tables with all lengths in millimetres and sub-pixels as offsets; what is no text stays as it is."""
+    panel = _converted(values["panel"], "panel", None)
+    if isinstance(panel.get("subpixel_offsets"), str):
+        panel["subpixel_offsets"] = stripe(panel["subpixel_offsets"], "panel.subpixel_offsets")
+    pixel = positive(panel["pixel_pitch"], "panel.pixel_pitch")
+    lenses = _converted(values["lens_array"], "lens_array", pixel)
+    return {**_converted(values, "", None), "panel": panel, "lens_array": lenses}
+
+
+def _converted(values: Mapping[str, Any], table: str, pixel: float | None) -> dict[str, Any]:
+    converted = dict(values)
+    for name, (per_inch, in_pixels) in _LENGTHS[table].items():
+        value, key = values.get(name), f"{table}.{name}" if table else name
+        scales = {**MILLIMETRES, "px": pixel} if in_pixels and pixel is not None else MILLIMETRES
+        if isinstance(value, list):
+            converted[name] = [_length(item, key, scales, per_inch) for item in value]
+        elif isinstance(value, str) and not (name == "viewing_distance" and value == INFINITE):
+            converted[name] = _length(value, key, scales, per_inch)
+    return converted
+
+
+def _length(value: object, key: str, scales: Mapping[str, float], per_inch: tuple[str, ...]) -> object:
+    """Millimetres of ``"6.8 mm"``; what is no string stays as it is."""
+    return length(value, key, scales, per_inch) if isinstance(value, str) else value

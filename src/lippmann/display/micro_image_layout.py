@@ -1,0 +1,135 @@
+"""Which lens and which place in its micro-image each whole pixel has: the bookkeeping of micro-images and views.
+
+Pure integers made from the display's geometry at pixel centres. The pair (lens, index) names a pixel uniquely, on any
+display, so cutting a picture into micro-images and putting it together again loses nothing.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lippmann.display.array_ops import NUMPY
+from lippmann.display.display import BOUNDARY_TOLERANCE, WHOLE_TOLERANCE, Display
+
+Indices = NDArray[np.int32]
+
+_BLOCK_PIXELS = 1 << 20
+
+
+def pixel_lenses(display: Display, row_range: tuple[int, int] | None = None) -> tuple[Indices, Indices]:
+    """The lens ``(i, j)`` of every pixel, by the pixel's centre.
+
+    ``row_range`` is (first, past the last) row, all rows by default. Both arrays are ``(rows, width)``, within the
+    display's ``lens_grid``.
+    """
+    return _block_by_block(display, row_range, _lenses_of_block)
+
+
+def pixel_indices_under_lens(display: Display, row_range: tuple[int, int] | None = None) -> tuple[Indices, Indices]:
+    """The place ``(k_x, k_y)`` of every pixel in its micro-image, both ``(rows, width)``.
+
+    ``k_x = floor((x - x_lens) / d + N / 2)`` with the pixel's centre x, the place x_lens of the lens's centre on the
+    panel (seen from the viewing distance; for a slanted lens where its axis crosses the pixel's row) and N pixels per
+    lens; ``k_y`` counts downwards likewise. A lenticular micro-image is as high as the panel: ``k_y`` is the row.
+    Both lie within :func:`micro_image_shape`.
+    """
+    return _block_by_block(display, row_range, _indices_of_block)
+
+
+def micro_image_shape(display: Display) -> tuple[int, int]:
+    """Rows and columns ``(n_y, n_x)`` of the smallest box that holds every micro-image.
+
+    Where micro-images are not whole rectangles of pixels (hexagons, slant, broken numbers) a box has places without
+    a pixel.
+    """
+    width, height = micro_image_extent(display)
+    # Pixels on the box's edge belong to its neighbour, to the tolerance at either end; those inside it need a place.
+    slack = 2 * BOUNDARY_TOLERANCE
+    return math.ceil(height - slack), math.ceil(width - slack)
+
+
+def covers_whole_pixels(display: Display) -> bool:
+    """Whether the micro-images tile the panel in whole pixels.
+
+    Lenticular: no slant, and every lens has the same whole number of pixel columns; square: the same in both
+    directions. Hexagonal: pitch and row pitch of the micro-images are whole numbers of pixels, so that all lenses of
+    a row, and of every second row, have the same pixels (lenses that the panel's edge cuts lack some).
+    """
+    across, down = display.pixels_per_lens
+    grid, panel = display.lens_grid, display.panel
+    if display.lens_array.layout == "hexagonal":
+        return _is_whole(across) and down is not None and _is_whole(down)
+    if display.lens_array.slant != 0.0 or not _is_whole(across) or round(across) * grid.columns != panel.width:
+        return False
+    return down is None or (_is_whole(down) and round(down) * grid.rows == panel.height)
+
+
+def _is_whole(count: float) -> bool:
+    return abs(count - round(count)) <= WHOLE_TOLERANCE
+
+
+def micro_image_extent(display: Display) -> tuple[float, float]:
+    """Width and height of the box around one micro-image in pixels, not rounded; for the pitches in effect."""
+    lattice, pixel_pitch = display.lattice, display.panel.pixel_pitch
+    across = lattice.pitch * display.magnification / (pixel_pitch * math.cos(math.radians(lattice.slant)))
+    if lattice.layout == "lenticular":
+        return across, float(display.panel.height)
+    down = lattice.row_pitch * display.magnification / pixel_pitch
+    if lattice.layout == "square":
+        return across, down
+    # The tips of a hexagonal cell lie where two neighbours of the next row are as near as its own centre.
+    return across, down + across * across / (4 * down)
+
+
+def _block_by_block(
+    display: Display,
+    row_range: tuple[int, int] | None,
+    of_block: Callable[[Display, int, int], tuple[Indices, Indices]],
+) -> tuple[Indices, Indices]:
+    """Runs ``of_block`` on a few rows at a time: its double-precision arrays would take gigabytes for a whole panel.
+
+    It may return one row, or one column, that stands for all.
+    """
+    first, last = row_range or (0, display.panel.height)
+    shape = (last - first, display.panel.width)
+    whole = np.empty(shape, dtype=np.int32), np.empty(shape, dtype=np.int32)
+    step = max(1, _BLOCK_PIXELS // display.panel.width)
+    for start in range(first, last, step):
+        stop = min(start + step, last)
+        for target, part in zip(whole, of_block(display, start, stop), strict=True):
+            target[start - first : stop - first] = part
+    return whole
+
+
+def _lenses_of_block(display: Display, first: int, last: int) -> tuple[Indices, Indices]:
+    x, y = _pixel_centers(display, first, last)
+    i, j = display.lens_of(x, y, NUMPY)
+    return i.astype(np.int32), j.astype(np.int32)
+
+
+def _indices_of_block(display: Display, first: int, last: int) -> tuple[Indices, Indices]:
+    x, y = _pixel_centers(display, first, last)
+    i, j = display.lens_of(x, y, NUMPY)
+    pixel_pitch, lattice, scale = display.panel.pixel_pitch, display.lattice, display.magnification
+    width, height = micro_image_extent(display)
+    if lattice.layout == "lenticular":
+        center_x = lattice.axis_at(i, y / scale) * scale
+        k_y = np.arange(first, last, dtype=np.int32)[:, None]
+    else:
+        center_x, center_y = (c * scale for c in lattice.center(i, j, x, y, NUMPY))
+        k_y = np.floor((center_y - y) / pixel_pitch + (0.5 * height + BOUNDARY_TOLERANCE)).astype(np.int32)
+    k_x = np.floor((x - center_x) / pixel_pitch + (0.5 * width + BOUNDARY_TOLERANCE)).astype(np.int32)
+    return k_x, k_y
+
+
+def _pixel_centers(display: Display, first: int, last: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Panel points of the pixels of some rows; of the first of them alone under upright cylinders, which see no row."""
+    if display.lattice.rows_are_alike:
+        last = first + 1
+    u, v = np.meshgrid(np.arange(display.panel.width) + 0.5, np.arange(first, last) + 0.5)
+    x, y = display.panel_point(u, v, NUMPY)
+    return x, y

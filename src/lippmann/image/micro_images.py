@@ -1,0 +1,134 @@
+"""Pictures cut into micro-images and put together again, losing nothing.
+
+Every pixel belongs to one lens and has one place in that lens's box of ``ny x nx`` places, so the order of a picture's
+values changes and nothing else. Where micro-images are whole rectangles of pixels every place holds a pixel; else
+(hexagons, slant, broken numbers, lenses cut by the panel's edge) some places stay empty: zero, and False in the mask.
+
+A lenticular sheet has one row of lenses, each with a box as high as the panel.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lippmann.display import Display, covers_whole_pixels, micro_image_shape, pixel_indices_under_lens, pixel_lenses
+from lippmann.errors import PictureError
+from lippmann.runtime.cached_property import cached_property
+
+Scalar = TypeVar("Scalar", bound=np.generic)
+
+#: Pixels whose geometry is computed at a time: its double-precision temporaries are far larger than the result.
+_BLOCK = 1 << 20
+
+
+@dataclass(frozen=True)
+class Permutation:
+    """The bijection between the pixels of a display and the filled places of its micro-images."""
+
+    display: Display
+
+    @property
+    def shape(self) -> tuple[int, int, int, int]:
+        """``(lens_rows, lens_cols, ny, nx)`` of the micro-images."""
+        grid = self.display.lens_grid
+        return (grid.rows, grid.columns, *micro_image_shape(self.display))
+
+    def split(self, values: NDArray[Scalar]) -> NDArray[Scalar]:
+        """Micro-images ``(lens_rows, lens_cols, ny, nx, ...)`` of ``(H, W, ...)`` values; empty places are zero.
+
+        Where micro-images are whole rectangles the result shares its memory with ``values``.
+
+        Raises
+        ------
+        PictureError
+            If the values do not have the panel's size.
+        """
+        panel = self.display.panel
+        if values.shape[:2] != (panel.height, panel.width):
+            raise PictureError(
+                f"the picture has {values.shape[1]} x {values.shape[0]} pixels",
+                rule=f"the display {self.display.name} has {panel.width} x {panel.height}",
+            )
+        rows, columns, ny, nx = self.shape
+        trailing = values.shape[2:]
+        if self._has_whole_rectangles:
+            return values.reshape(rows, ny, columns, nx, *trailing).swapaxes(1, 2)
+        micro_images = np.zeros((rows * columns * ny * nx, *trailing), dtype=values.dtype)
+        micro_images[self._places] = values
+        return micro_images.reshape(rows, columns, ny, nx, *trailing)
+
+    def join(self, micro_images: NDArray[Scalar]) -> NDArray[Scalar]:
+        """The ``(H, W, ...)`` values of :meth:`split`; what lies in empty places is passed over.
+
+        Raises
+        ------
+        PictureError
+            If the shape is not that of the display's micro-images.
+        """
+        if micro_images.shape[:4] != self.shape:
+            raise PictureError(
+                f"the micro-images have the shape {micro_images.shape[:4]}",
+                rule=f"those of {self.display.name} have {self.shape} (lens rows and columns, pixel rows and columns)",
+            )
+        trailing, panel = micro_images.shape[4:], self.display.panel
+        if self._has_whole_rectangles:
+            return micro_images.swapaxes(1, 2).reshape(panel.height, panel.width, *trailing)
+        return micro_images.reshape(-1, *trailing)[self._places]
+
+    @property
+    def mask(self) -> NDArray[np.bool_]:
+        """``(lens_rows, lens_cols, ny, nx)``: which places hold a pixel."""
+        panel = self.display.panel
+        return self.split(np.ones((panel.height, panel.width), dtype=np.bool_))
+
+    @property
+    def _has_whole_rectangles(self) -> bool:
+        if self.display.lens_array.layout == "hexagonal" or not covers_whole_pixels(self.display):
+            return False
+        # A box can be larger than the whole number of pixels that the lenses nearly cover.
+        rows, columns, ny, nx = self.shape
+        return (rows * ny, columns * nx) == (self.display.panel.height, self.display.panel.width)
+
+    @cached_property
+    def _places(self) -> NDArray[np.int64]:
+        """``(H, W)``: the flat index of every pixel's place in the micro-images."""
+        _, columns, ny, nx = self.shape
+        panel = self.display.panel
+        places = np.empty((panel.height, panel.width), dtype=np.int64)
+        for first, last in row_blocks(panel.height, panel.width):
+            i, j = pixel_lenses(self.display, (first, last))
+            k_x, k_y = pixel_indices_under_lens(self.display, (first, last))
+            places[first:last] = ((j.astype(np.int64) * columns + i) * ny + k_y) * nx + k_x
+        return places
+
+
+def micro_images_as_views(micro_images: NDArray[Scalar], display: Display) -> NDArray[Scalar]:
+    """``(lens_rows, lens_cols, ny, nx, ...)`` to ``(ny, nx, lens_rows, lens_cols, ...)``; its own inverse.
+
+    The rows of a lenticular micro-image take the place of the lens rows: there ``(1, lens_cols, H, nx, ...)`` becomes
+    ``(1, nx, H, lens_cols, ...)``.
+    """
+    if display.lens_array.layout == "lenticular":
+        return micro_images.swapaxes(1, 3)
+    return micro_images.swapaxes(0, 2).swapaxes(1, 3)
+
+
+def row_blocks(height: int, width: int) -> Iterator[tuple[int, int]]:
+    """First and past-the-last row of blocks that cover ``height`` rows, each of about a million pixels."""
+    step = max(1, _BLOCK // width)
+    return ((first, min(first + step, height)) for first in range(0, height, step))
+
+
+def lens_indices(display: Display) -> NDArray[Any]:
+    """``(H, W)`` int32: the flat index ``j * lens_cols + i`` of every pixel's lens."""
+    panel, columns = display.panel, display.lens_grid.columns
+    indices = np.empty((panel.height, panel.width), dtype=np.int32)
+    for first, last in row_blocks(panel.height, panel.width):
+        i, j = pixel_lenses(display, (first, last))
+        indices[first:last] = j * columns + i
+    return indices

@@ -1,0 +1,39 @@
+"""The types of a picture's values and of its placement, and the check of the placement's matrix."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lippmann.errors import PictureError
+
+FloatArray = NDArray[np.float32]
+Matrix = NDArray[np.float64]
+
+#: How values were stored in the file that a picture came from; ``float32`` if it came from none.
+Stored = Literal["uint8", "uint16", "float16", "float32"]
+
+#: Deviation of ``world_from_display`` from a similarity that rounding may leave.
+_SIMILARITY_TOLERANCE = 1e-6
+
+
+def checked_similarity(matrix: object) -> Matrix:
+    """``matrix`` as a read-only (4, 4) float64 array; a :class:`PictureError` if it is no similarity."""
+    rule = "it must be a 4 x 4 similarity: a rotation times a scale, a translation, and (0, 0, 0, 1) below"
+    try:
+        values: Matrix = np.array(matrix, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError):
+        raise PictureError("world_from_display is no matrix", rule=rule) from None
+    if values.shape != (4, 4) or not np.isfinite(values).all() or list(values[3]) != [0, 0, 0, 1]:
+        raise PictureError(f"world_from_display is {values.tolist()}", rule=rule)
+    linear = values[:3, :3]
+    with np.errstate(all="ignore"):  # what overflows is no similarity either: NaN is within no tolerance
+        volume = float(np.linalg.det(linear))
+        scale = np.cbrt(volume)
+        error = np.abs(linear.T @ linear / scale**2 - np.eye(3)).max()
+    if not (volume > 0 and error <= _SIMILARITY_TOLERANCE):
+        raise PictureError(f"world_from_display is {values.tolist()}", rule=rule)
+    values.flags.writeable = False
+    return values

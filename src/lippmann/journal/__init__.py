@@ -1,0 +1,22 @@
+"""Pictures in the making: tiles on the disk, safe from whatever ends a process, and what tells whether they fit."""
+
+from lippmann.display.pixel_window import TileGrid, Window
+from lippmann.journal.fingerprint import content_hash, differences, in_words
+from lippmann.journal.frame_journal import FrameJournal
+from lippmann.journal.tile_file import DamagedTile, TileResult, decode, encode
+from lippmann.journal.tile_journal import TileStore, journal_of
+
+__all__ = [
+    "DamagedTile",
+    "FrameJournal",
+    "TileGrid",
+    "TileResult",
+    "TileStore",
+    "Window",
+    "content_hash",
+    "decode",
+    "differences",
+    "encode",
+    "in_words",
+    "journal_of",
+]

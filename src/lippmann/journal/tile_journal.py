@@ -1,0 +1,332 @@
+"""A picture in the making: a folder of finished tiles beside the place where the picture will lie.
+
+``poster.tif.parts/`` holds ``job.json`` (what is being made: the fingerprint and the grid of tiles), one file per
+finished tile, and an empty file whose lock says that a process is at work. Tiles appear whole or not at all and never
+change, so that whatever happens to the process or the machine, what lies under a tile's name is that tile; a copy of
+the folder taken at any moment is a journal too. Sizes are looked at when the folder is opened, check sums when a tile
+is read: a damaged one is removed and made anew.
+
+The folder and its files belong to the user alone (:mod:`lippmann.runtime.private_files`): links in their places are not
+followed. A folder of that name which is no journal is refused, and files that are no part of a journal stay.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import stat
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
+from pathlib import Path
+from types import TracebackType
+from typing import IO, Any
+
+from lippmann.display.pixel_window import TileGrid
+from lippmann.errors import OutputError, PictureError
+from lippmann.journal.file_lock import locked
+from lippmann.journal.fingerprint import differences
+from lippmann.journal.journal_folder import JOB, LOCK, TILE, clear, foreign_names, holds_tiles, is_tile, no_tile, sweep
+from lippmann.journal.tile_file import MARK, DamagedTile, TileResult, decode, encode, whole_length
+from lippmann.runtime import private_files
+from lippmann.runtime.atomic_write import replacing
+from lippmann.runtime.private_files import ForeignFileError
+
+#: Added to the picture's name.
+ENDING = ".parts"
+
+_KEY, _VERSION = "lippmann-journal", 1
+#: A job is some kilobytes of text.
+_MOST_JOB = 1 << 24
+#: No tile takes more bytes than these, and these for each of its pixels: pixels, maps and sums are some 200.
+_MOST_BYTES, _MOST_PER_PIXEL = 1 << 20, 1 << 10
+
+
+class TileStore:
+    """The tiles of one picture on the disk. Make one with :meth:`open`; it is a context manager.
+
+    ``put`` and ``put_bytes`` may be called from several threads at once.
+
+    Attributes
+    ----------
+    folder:
+        Where the tiles lie.
+    grid:
+        Which tiles there are.
+    resumed:
+        How many of them lay there when the folder was opened.
+    """
+
+    def __init__(self, folder: Path, grid: TileGrid, lock: IO[bytes]) -> None:
+        self.folder = folder
+        self.grid = grid
+        self._lock = lock
+        self.resumed = len(grid) - len(self.missing())
+
+    @classmethod
+    def open(cls, output: Path, fingerprint: Mapping[str, str], grid: TileGrid, *, resume: bool) -> TileStore:
+        """Begin the journal of ``output``, or with ``resume`` go on with the one that is there.
+
+        Raises
+        ------
+        OutputError
+            If there is a journal and ``resume`` is not asked for, another process works on it, or it cannot be
+            written.
+        PictureError
+            If the journal is of something else, and says what differs; or the folder is no journal of the user's.
+        """
+        folder = journal_of(output)
+        job = {_KEY: _VERSION, "fingerprint": dict(fingerprint), "grid": [grid.width, grid.height, grid.side]}
+        _is_begun(output, folder, job, resume)  # nothing is made where there is something to refuse
+        with _reported(folder):
+            private_files.make_folder(folder)
+        with _reported(folder, "its lock"):
+            lock = locked(folder / LOCK, folder)
+        try:
+            with _reported(folder):
+                sweep(folder)
+            if not _is_begun(output, folder, job, resume):  # again: another process may have begun and ended meanwhile
+                text = json.dumps(job, indent=1, sort_keys=True) + "\n"
+                with replacing(folder / JOB, private=True) as temporary:
+                    temporary.write_text(text, encoding="utf-8")
+            return cls(folder, grid, lock)
+        except BaseException:
+            lock.close()
+            raise
+
+    def missing(self) -> list[int]:
+        """The numbers of the tiles that are still to be made."""
+        present = set(os.listdir(self.folder))
+        return [
+            index
+            for index in range(len(self.grid))
+            if self._name(index) not in present or not _is_whole(self._path(index), self._most_bytes(index))
+        ]
+
+    def put(self, result: TileResult) -> None:
+        """Keep a tile.
+
+        Raises
+        ------
+        OutputError
+            If it cannot be written; what was there before is unharmed.
+        """
+        self.put_bytes(result.index, encode(result))
+
+    def put_bytes(self, index: int, data: bytes) -> None:
+        """Keep a tile that is :func:`~lippmann.journal.tile_file.encode`-d already; raises as :meth:`put`."""
+        with replacing(self._path(index), private=True) as temporary:
+            temporary.write_bytes(data)
+
+    def get(self, index: int) -> TileResult:
+        """A tile, checked.
+
+        Raises
+        ------
+        DamagedTile
+            If it is not there, not whole, a link or another user's, all of which count as missing then; or it cannot be
+            read.
+        """
+        path, most = self._path(index), self._most_bytes(index)
+        try:
+            with private_files.open_to_read(path) as file:
+                if os.fstat(file.fileno()).st_size > most:
+                    raise DamagedTile("it is larger than its pixels need")
+                result = decode(file.read(), most)
+            if result.index != index or result.pixels.shape[:2] != self.grid[index].shape:
+                raise DamagedTile("it is another tile")
+        except FileNotFoundError:
+            raise DamagedTile("it is not there") from None
+        except OSError as error:
+            raise DamagedTile(f"it cannot be read: {error.strerror or error}") from error
+        except (DamagedTile, ForeignFileError) as error:
+            self.drop(index)
+            raise DamagedTile(f"it {error}" if isinstance(error, ForeignFileError) else str(error)) from error
+        return result
+
+    def drop(self, index: int) -> None:
+        """Count a tile as missing."""
+        with suppress(OSError):  # a folder in its place stays
+            self._path(index).unlink()
+
+    def results(self) -> Iterator[TileResult]:
+        """All tiles in order; raises as :meth:`get`."""
+        return (self.get(index) for index in range(len(self.grid)))
+
+    def finish(self) -> tuple[str, ...]:
+        """Remove the journal: the picture is in its place.
+
+        Returns
+        -------
+        A sentence for the user if the folder stays, for it holds files that are no part of the journal.
+        """
+        place, tiles = self.folder, {self._name(index) for index in range(len(self.grid))}
+        with _reported(self.folder):
+            if not foreign_names(self.folder, tiles.__contains__):
+                # Under another name first: a journal half removed would look like one half made.
+                place = self.folder.with_name(f".{self.folder.name}-{os.urandom(4).hex()}.old")
+                os.rename(self.folder, place)
+            left = clear(place, tiles.__contains__, self.close)
+            if not left:
+                return ()
+            if place != self.folder:  # something was put into it meanwhile
+                os.rename(place, self.folder)
+        more = f", and {len(left) - 1} more" if len(left) > 1 else ""
+        return (f"the folder {self.folder.name} stays: it holds {left[0]!r}, which is no part of the journal{more}",)
+
+    def close(self) -> None:
+        """Let others at the journal."""
+        self._lock.close()
+
+    def __enter__(self) -> TileStore:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        with suppress(OSError):  # it is the first error that counts
+            if kind is not None and not holds_tiles(self.folder):
+                clear(self.folder, no_tile, self.close)  # what failed before its first tile leaves nothing behind
+        self.close()
+
+    def _most_bytes(self, index: int) -> int:
+        rows, columns = self.grid[index].shape
+        return _MOST_BYTES + rows * columns * _MOST_PER_PIXEL
+
+    def _name(self, index: int) -> str:
+        return self.grid.name(index) + TILE
+
+    def _path(self, index: int) -> Path:
+        return self.folder / self._name(index)
+
+
+def journal_of(output: Path) -> Path:
+    """The folder in which the tiles of a picture are kept until it is finished."""
+    place = output.resolve()
+    return place.with_name(place.name + ENDING)
+
+
+def read_job(output: Path) -> dict[str, Any] | None:
+    """What the journal of ``output`` says it is of; None if there is no journal with tiles.
+
+    Raises
+    ------
+    PictureError
+        If the folder is no journal of ours, one of a later version, or not the user's alone.
+    OutputError
+        If it cannot be read.
+    """
+    folder = journal_of(output)
+    try:
+        with _reported(folder, read=True):
+            if not private_files.check_folder(folder):
+                return None
+            if not os.path.lexists(folder / JOB):
+                if foreign := foreign_names(folder, no_tile):
+                    raise _no_journal(folder, f"it holds {foreign[0]!r} and no {JOB}")
+                return None  # of a run that ended before it wrote its job
+        with _reported(folder, f"its {JOB}", read=True), private_files.open_to_read(folder / JOB) as file:
+            job = json.loads(file.read(_MOST_JOB))
+    except (ValueError, RecursionError) as error:
+        raise _no_journal(folder, f"it has no readable {JOB}") from error
+    if not isinstance(job, dict) or _KEY not in job:
+        raise _no_journal(folder, f"its {JOB} is none of ours")
+    with _reported(folder, read=True):
+        if not holds_tiles(folder):
+            return None
+    if job[_KEY] != _VERSION:
+        raise _no_journal(folder, f"its version is {job[_KEY]!r}, this program writes {_VERSION}")
+    fingerprint = job.get("fingerprint")
+    if not isinstance(fingerprint, dict) or not all(isinstance(value, str) for value in fingerprint.values()):
+        raise _no_journal(folder, f"its {JOB} is none of ours")
+    return job
+
+
+def sweep_beside(output: Path) -> None:
+    """Remove what a writer of ``output`` left half done when it was killed; only while its journal is locked.
+
+    Files of other users stay: they may be at work in the same folder.
+    """
+    place = output.resolve()
+    # The names that lippmann.runtime.atomic_write and TileStore.finish give to what is on its way.
+    file, folder = f"{place.stem[:64]}-NUMBER.part{place.suffix}", f"{place.name[:64]}-NUMBER."
+    journal = f"{place.name}{ENDING}-NUMBER.old"
+    names = [re.escape(name).replace("NUMBER", "[0-9a-f]{8}") for name in (file, folder, journal)]
+    half, old = re.compile(rf"\.({names[0]}|{names[1]}(part|old))"), re.compile(rf"\.{names[2]}")
+    with suppress(OSError):  # a folder that cannot be listed keeps them
+        for name in os.listdir(place.parent):
+            path = place.with_name(name)
+            if old.fullmatch(name) and stat.S_ISDIR(os.lstat(path).st_mode) and private_files.is_own(path):
+                clear(path, is_tile)
+            elif half.fullmatch(name) or old.fullmatch(name):
+                private_files.remove(path)
+
+
+def _is_begun(output: Path, folder: Path, job: Mapping[str, Any], resume: bool) -> bool:
+    """Whether there is a journal of this job to go on with; raises as :meth:`TileStore.open`."""
+    before = read_job(output)
+    if before is None:
+        return False
+    if not resume:
+        raise OutputError(
+            f"an unfinished picture lies in {folder.name}",
+            where=str(output),
+            fix=f"go on with --resume, or {_put_away(folder)}",
+        )
+    found = differences(before["fingerprint"], job["fingerprint"])
+    if not found and before.get("grid") != job["grid"]:
+        found = [f"the grid of tiles (was {before.get('grid')}, is {job['grid']})"]
+    if found:
+        raise PictureError(
+            f"the unfinished picture is another one: {', '.join(found)}",
+            where=str(folder),
+            rule="what was begun is finished as it was begun",
+            fix=f"put that back as it was, or {_put_away(folder)} and begin anew",
+        )
+    return True
+
+
+def _put_away(folder: Path) -> str:
+    """How to be rid of a journal; nobody is told to delete what is his own."""
+    return f"move {folder} away" if foreign_names(folder, is_tile) else f"delete {folder}"
+
+
+def _no_journal(folder: Path, why: str, fix: str = "") -> PictureError:
+    return PictureError(
+        f"this is no journal of an unfinished picture: {why}",
+        where=str(folder),
+        rule="finished tiles are kept under this name",
+        fix=fix or "choose another name for the picture, or move what lies there",
+    )
+
+
+def _is_whole(path: Path, most: int) -> bool:
+    """Whether a tile's file is as long as it says itself: an interrupted copy or a crashed disk cuts files off.
+
+    One of more than ``most`` bytes is none of ours.
+    """
+    try:
+        with private_files.open_to_read(path) as file:
+            size = os.fstat(file.fileno()).st_size
+            return size <= most and whole_length(file.read(len(MARK) + 12)) == size
+    except (OSError, ForeignFileError):
+        return False
+
+
+class _reported:  # noqa: N801 - reads as a statement
+    """Turn an :class:`OSError` about the journal into an :class:`OutputError`, a foreign file into a line about it."""
+
+    def __init__(self, folder: Path, thing: str = "it", *, read: bool = False) -> None:
+        self._folder = folder
+        self._thing = thing
+        self._done = "read" if read else "written"
+
+    def __enter__(self) -> None:
+        return None
+
+    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
+        if isinstance(error, ForeignFileError):
+            raise _no_journal(self._folder, f"{self._thing} {error}", error.fix) from error
+        if isinstance(error, OSError):
+            reason = error.strerror or str(error)
+            raise OutputError(f"cannot be {self._done}: {reason}", where=str(self._folder)) from error

@@ -1,0 +1,33 @@
+"""How far a picture is from a reference: the paper's figures and the standard ones."""
+
+from lippmann.metrics.comparison import Comparison, check_comparable, compare
+from lippmann.metrics.error_image import error_map
+from lippmann.metrics.flicker import Flicker
+from lippmann.metrics.mse_psnr import MicroImage, low_percentile, micro_image_means, psnr, squared_errors
+from lippmann.metrics.paper import PaperFigures, paper_figures, paper_psnr, paper_rmse
+from lippmann.metrics.silhouettes import Silhouettes, find_silhouettes
+from lippmann.metrics.structural_similarity import ViewSimilarity, ssim
+from lippmann.metrics.view_metrics import view_flicker, view_similarity
+
+__all__ = [
+    "Comparison",
+    "Flicker",
+    "MicroImage",
+    "PaperFigures",
+    "Silhouettes",
+    "ViewSimilarity",
+    "check_comparable",
+    "compare",
+    "error_map",
+    "find_silhouettes",
+    "low_percentile",
+    "micro_image_means",
+    "paper_figures",
+    "paper_psnr",
+    "paper_rmse",
+    "psnr",
+    "squared_errors",
+    "ssim",
+    "view_flicker",
+    "view_similarity",
+]

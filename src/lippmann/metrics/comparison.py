@@ -1,0 +1,225 @@
+"""Two pictures of one display side by side, in figures."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lippmann.display import Display
+from lippmann.errors import PictureError
+from lippmann.image import IntegralImage
+from lippmann.image.streamed import LargePicture
+from lippmann.metrics.flicker import Flicker
+from lippmann.metrics.mse_psnr import (
+    LOW_PERCENTILE,
+    MicroImage,
+    low_percentile,
+    micro_image_means,
+    psnr,
+    squared_errors,
+)
+from lippmann.metrics.paper import PaperFigures, paper_figures
+from lippmann.metrics.silhouettes import Silhouettes, find_silhouettes
+from lippmann.metrics.structural_similarity import ViewSimilarity
+from lippmann.metrics.view_metrics import view_figures
+from lippmann.progress import ProgressCallback, silent
+from lippmann.runtime.cached_property import cached_property
+
+Real = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """How far ``test`` is from ``reference``; see :func:`compare`.
+
+    Parameters
+    ----------
+    errors:
+        ``(H, W)``: squared difference of the coded values of each pixel, averaged over its channels.
+    micro_image_errors, micro_image_pixels:
+        ``(lens_rows, lens_cols)``: mean of ``errors`` over each micro-image (NaN where a lens has no pixel), and its
+        pixels.
+    silhouettes:
+        Where the reference has outlines.
+    views:
+        SSIM of the views.
+    flicker:
+        How the errors change from view to view; None if there is one view only.
+    paper:
+        The figures of the 2014 paper.
+    """
+
+    reference: IntegralImage | LargePicture
+    test: IntegralImage | LargePicture
+    errors: Real
+    micro_image_errors: Real
+    micro_image_pixels: NDArray[np.intp]
+    silhouettes: Silhouettes
+    views: ViewSimilarity
+    flicker: Flicker | None
+    paper: PaperFigures
+
+    @cached_property
+    def mean_squared_error(self) -> float:
+        """Of all pixels and channels, coded values."""
+        return float(self.errors.mean())
+
+    @property
+    def psnr(self) -> float:
+        """In dB, from :attr:`mean_squared_error`; infinite for pictures that show the same."""
+        return psnr(self.mean_squared_error)
+
+    @property
+    def identical(self) -> bool:
+        """Whether both pictures show exactly the same on the display."""
+        return self.mean_squared_error == 0
+
+    @property
+    def worst(self) -> MicroImage:
+        """The micro-image with the least PSNR."""
+        return low_percentile(self.micro_image_errors, self.micro_image_pixels, 0.0)
+
+    @property
+    def percentile_1(self) -> MicroImage:
+        """The micro-image that one in a hundred is not better than, see :func:`~lippmann.metrics.low_percentile`."""
+        return low_percentile(self.micro_image_errors, self.micro_image_pixels, LOW_PERCENTILE)
+
+    @cached_property
+    def psnr_off_silhouettes(self) -> float | None:
+        """PSNR in dB over the pixels that lie on no silhouette; None if there are none."""
+        off = ~self.silhouettes.mask
+        return psnr(float(self.errors[off].mean())) if off.any() else None
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What a reader of the figures should know, as sentences."""
+        return tuple(_notes(self.reference, self.test))
+
+    def to_dict(self) -> dict[str, Any]:
+        """All figures but those of single micro-images as JSON-able values; an infinite PSNR is None."""
+        worst_view = self.views.worst
+        lenses = int(np.count_nonzero(self.micro_image_pixels))
+        return {
+            "identical": self.identical,
+            "mean_squared_error": self.mean_squared_error,
+            "psnr": _finite(self.psnr),
+            "psnr_off_silhouettes": _finite(self.psnr_off_silhouettes),
+            "silhouettes": {"from": self.silhouettes.source, "share": self.silhouettes.share},
+            "micro_images": {
+                "count": lenses,
+                "worst": _lens(self.worst),
+                "percentile_1": _lens(self.percentile_1),
+            },
+            "ssim": {
+                "mean": _finite(self.views.mean),
+                "worst": _finite(float(self.views.values[worst_view])),
+                "worst_view": [worst_view[1], worst_view[0]],
+                "views": [[_finite(value) for value in row] for row in self.views.values.tolist()],
+                "views_are_exact": self.views.exact,
+            },
+            "flicker": None
+            if self.flicker is None
+            else {"psnr": _finite(self.flicker.psnr), "share": self.flicker.share},
+            "paper": {
+                "paper_mean_psnr": _finite(self.paper.mean_psnr),
+                "paper_mean_rmse": self.paper.mean_rmse,
+                "unchanged_micro_images": self.paper.unchanged,
+            },
+            "notes": list(self.notes),
+        }
+
+    def rows(self) -> Iterator[dict[str, Any]]:
+        """The figures of every micro-image, lens row by lens row: what a CSV file holds. PSNR in dB may be infinite."""
+        paper_psnr = self.paper.psnr
+        for row, column in zip(*np.nonzero(self.micro_image_pixels), strict=True):
+            error = float(self.micro_image_errors[row, column])
+            yield {
+                "column": int(column),
+                "row": int(row),
+                "pixels": int(self.micro_image_pixels[row, column]),
+                "mean_squared_error": error,
+                "psnr": psnr(error),
+                "paper_rmse": float(self.paper.rmse[row, column]),
+                "paper_psnr": float(paper_psnr[row, column]),
+            }
+
+
+def compare(reference: IntegralImage, test: IntegralImage, progress: ProgressCallback = silent) -> Comparison:
+    """Compare two pictures of the same display.
+
+    Coded values are compared (see :mod:`lippmann.metrics.mse_psnr`), all channels; silhouettes are the reference's.
+
+    Raises
+    ------
+    PictureError
+        If the pictures have different sizes or displays.
+    """
+    check_comparable(reference, test)
+    errors = squared_errors(reference, test)
+    means, pixels = micro_image_means(errors, reference.display)
+    similarity, flicker = view_figures(reference, test, progress)
+    return Comparison(
+        reference,
+        test,
+        errors,
+        means,
+        pixels,
+        find_silhouettes(reference),
+        similarity,
+        flicker,
+        paper_figures(reference, test),
+    )
+
+
+def check_comparable(reference: IntegralImage | LargePicture, test: IntegralImage | LargePicture) -> None:
+    """Raise :class:`PictureError` if two pictures have different sizes or displays; a display's name does not count."""
+    a, b = (picture.display.panel for picture in (reference, test))
+    if (a.width, a.height) != (b.width, b.height):
+        raise PictureError(
+            f"the pictures have {a.width} x {a.height} and {b.width} x {b.height} pixels",
+            rule="only pictures of one display can be compared",
+        )
+    if _optics(reference.display) != _optics(test.display):
+        raise PictureError(
+            f"the pictures are for different displays: {_difference(reference.display, test.display)}",
+            rule="only pictures of one display can be compared",
+        )
+
+
+def _optics(display: Display) -> Display:
+    return replace(display, name="display", title="")
+
+
+def _difference(a: Display, b: Display) -> str:
+    """The first value in which two displays differ, for an error message."""
+    if a.name != b.name:
+        return f"{a.name} and {b.name}"
+    first, second = a.to_dict(), b.to_dict()
+    pairs = [(key, first[key], second[key]) for key in first if not isinstance(first[key], dict)]
+    for part in ("panel", "lens_array"):
+        pairs += [(f"{part}.{key}", first[part][key], second[part][key]) for key in first[part]]
+    key, one, other = next(pair for pair in pairs if pair[0] != "title" and pair[1] != pair[2])
+    return f"{key} is {one} in one and {other} in the other"
+
+
+def _notes(reference: IntegralImage | LargePicture, test: IntegralImage | LargePicture) -> Iterator[str]:
+    first, second = reference.provenance, test.provenance
+    if first.transfer != second.transfer:
+        yield f"the codes of the pictures are compared, though one is {first.transfer} and the other {second.transfer}"
+    if first.scene and second.scene and first.scene != second.scene:
+        yield f"the pictures show different scenes: {first.scene} and {second.scene}"
+    elif first.method and second.method and not np.allclose(reference.world_from_display, test.world_from_display):
+        yield "the display stands at a different place in the scene"
+
+
+def _lens(found: MicroImage) -> dict[str, Any]:
+    return {"psnr": _finite(found.psnr), "lens": [found.column, found.row], "pixels": found.pixels}
+
+
+def _finite(value: float | None) -> float | None:
+    return value if value is not None and math.isfinite(value) else None

@@ -1,0 +1,119 @@
+"""Structural similarity of views.
+
+Z. Wang, A. C. Bovik, H. R. Sheikh, E. P. Simoncelli: *Image quality assessment: from error visibility to structural
+similarity*, IEEE Transactions on Image Processing 13(4), 2004. With their constants: a Gaussian window of 11 x 11
+pixels and standard deviation 1.5 with weights that sum to one, K1 = 0.01, K2 = 0.03, values in [0, 1]; window places
+that lie wholly inside the picture. Colour pictures: the mean over the three channels.
+
+SSIM judges a picture by the neighbourhood of each pixel. Neighbours on the panel are different directions, so it is
+the views (one pixel of every lens) that are judged, one by one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Real = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+WINDOW = 11
+SIGMA = 1.5
+K1, K2 = 0.01, 0.03
+
+
+def ssim(reference: ArrayLike, test: ArrayLike, mask: Flags | None = None) -> float:
+    """Mean SSIM of two pictures ``(H, W)`` or ``(H, W, channels)`` with values in [0, 1]; 1 for equal ones.
+
+    Parameters
+    ----------
+    mask:
+        ``(H, W)``: which pixels exist. The others weigh nothing in the windows that they fall into, and no window is
+        centred on them. None: all exist.
+
+    Notes
+    -----
+    Along an axis shorter than the window, the window is cut to the largest odd number of pixels that fits.
+
+    Returns
+    -------
+    float
+        In [-1, 1]; NaN if ``mask`` leaves no window.
+    """
+    a, b = (np.atleast_3d(np.asarray(picture)) for picture in (reference, test))
+    height, width = a.shape[:2]
+    if mask is not None and mask.all():
+        mask = None
+    if mask is not None:
+        a, b = (np.where(mask[..., None], picture, 0.0) for picture in (a, b))
+    total, count = similarity_sum(a, b, mask, (window_weights(height), window_weights(width)))
+    return total / count if count else float("nan")
+
+
+def similarity_sum(
+    a: NDArray[Any], b: NDArray[Any], mask: Flags | None, windows: tuple[Real, Real]
+) -> tuple[float, int]:
+    """The sum of SSIM over the windows of pictures ``(H, W, channels)``, and of how many values: see :func:`ssim`.
+
+    Pictures are zero where nothing exists. ``windows`` are the weights of a window's rows and columns, see
+    :func:`window_weights`.
+    """
+    from lippmann.metrics import kernels
+
+    height, width, channels = a.shape
+    present = np.zeros((0, 0))
+    count = (height - len(windows[0]) + 1) * (width - len(windows[1]) + 1)
+    if mask is not None:
+        count = int(np.count_nonzero(mask[_centres(mask, windows)]))
+        present = np.repeat(mask.astype(np.float64), channels, axis=1)
+    first, second = (np.ascontiguousarray(picture, np.float64).reshape(height, width * channels) for picture in (a, b))
+    room = np.empty((kernels.SIMILARITY_ROOM, kernels.COLUMNS + (len(windows[1]) - 1) * channels))
+    total = kernels.add_similarities(
+        first, second, present, mask is not None, channels, *windows, K1 * K1, K2 * K2, room
+    )
+    return total, count * channels
+
+
+@dataclass(frozen=True, eq=False)
+class ViewSimilarity:
+    """SSIM of every view.
+
+    Parameters
+    ----------
+    values:
+        ``(ny, nx)``: :func:`ssim` of view ``(ky, kx)``; NaN for a view without a window.
+    exact:
+        Whether the views are a permutation of the pixels; else they are resampled (nearest pixel).
+    """
+
+    values: Real
+    exact: bool
+
+    @property
+    def mean(self) -> float:
+        """Mean over the views."""
+        return float(np.nanmean(self.values))
+
+    @property
+    def worst(self) -> tuple[int, int]:
+        """``(ky, kx)`` of the view with the least similarity."""
+        ky, kx = divmod(int(np.nanargmin(self.values)), self.values.shape[1])
+        return ky, kx
+
+
+def window_weights(length: int) -> Real:
+    """Gaussian weights that sum to one, as many as fit ``length`` pixels."""
+    size = min(WINDOW, length - 1 + length % 2)
+    places = np.arange(size) - size // 2
+    weights: Real = np.exp(-0.5 * (places / SIGMA) ** 2)
+    weights /= weights.sum()
+    return weights
+
+
+def _centres(mask: Flags, windows: tuple[Real, Real]) -> tuple[slice, ...]:
+    """The part of ``(H, W)`` that the centres of those windows cover."""
+    margins = [len(weights) // 2 for weights in windows]
+    return tuple(slice(margin, length - margin) for margin, length in zip(margins, mask.shape, strict=True))

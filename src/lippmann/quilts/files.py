@@ -1,0 +1,221 @@
+"""Quilts as files, and as folders with one picture per view.
+
+A quilt is held as it is stored: the largest there are take 0.8 GB with 8 bits, four times that with floats. How large a
+picture is, is known before memory is given to it.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lippmann.codecs.pillow_formats import open_picture
+from lippmann.errors import OutputError, PictureError
+from lippmann.image.encoding import (
+    FORMATS,
+    MOST_PIXELS,
+    STORED,
+    FormatName,
+    check_stored,
+    converted_values,
+    decode_stored,
+    encode_values,
+    read_header,
+)
+from lippmann.image.part_folders import MANIFEST
+from lippmann.image.stored_values import Stored
+from lippmann.image.write import format_for, replacing_output
+from lippmann.progress import Progress, ProgressCallback, silent
+from lippmann.quilts.quilt import MOST_SIDE, Quilt, QuiltLayout, check_size, layout_of_name
+from lippmann.runtime.atomic_write import replacing_folder
+
+#: Endings of the pictures that are read; JPEG is never written.
+_JPEG = (".jpg", ".jpeg")
+_READ = (*FORMATS, *_JPEG)
+
+
+def read_quilt(path: Path) -> Quilt:
+    """Read a quilt: PNG, OpenEXR, TIFF or JPEG.
+
+    Raises
+    ------
+    PictureError
+        If the file is missing or damaged, or its name and its size disagree.
+    """
+    layout = layout_of_name(path)
+    _check_ending(path)
+    check_size(*_size(path), layout, str(path))
+    values, stored = _read(path)
+    return Quilt(values, layout, stored)
+
+
+def read_views(folder: Path, layout: QuiltLayout | None = None, *, progress: ProgressCallback = silent) -> Quilt:
+    """The quilt of a folder with one picture per view.
+
+    Views are numbered by the last number in their files' names, from 0 or 1, the leftmost camera first. ``layout`` says
+    how many there have to be; without it they stand in one row.
+
+    Raises
+    ------
+    PictureError
+        If a view is absent, damaged or of another size than the first.
+    """
+    paths = _numbered(folder)
+    if layout is None:
+        layout = QuiltLayout(len(paths), 1, None)
+    if len(paths) != layout.views:
+        rule = f"{layout.columns}x{layout.rows} are {layout.views}"
+        raise PictureError(f"it holds {len(paths)} views", where=str(folder), rule=rule)
+    width, height = _size(paths[0])
+    if width * height * layout.views > MOST_PIXELS:
+        rule = f"together they have at most {MOST_PIXELS} pixels"
+        raise PictureError(f"it holds {layout.views} views of {width} x {height} pixels", where=str(folder), rule=rule)
+    depths = {_stored(path) for path in paths}
+    stored = depths.pop() if len(depths) == 1 else "float32"
+    quilt = Quilt(np.empty((height * layout.rows, width * layout.columns, 3), dtype=stored), layout, stored)
+    for number, path in enumerate(paths):
+        if (found := _size(path)) != (width, height):
+            rule = f"the first view, {paths[0].name}, has {width} x {height}"
+            raise PictureError(f"has {found[0]} x {found[1]} pixels", where=str(path), rule=rule)
+        values, _ = _read(path)
+        quilt.view_values(number)[...] = converted_values(values, stored, "srgb")
+        progress(Progress("read", number + 1, layout.views))
+    return quilt
+
+
+def write_quilt(quilt: Quilt, path: Path, *, bits: int | None = None) -> None:
+    """Write a quilt, with as many bits as it was stored with unless told otherwise.
+
+    Raises
+    ------
+    PictureError, OutputError
+        If the name does not say the quilt's layout or the size is impossible, or the file cannot be written.
+    """
+    named = layout_of_name(path)
+    if named[:2] != quilt.layout[:2]:
+        rule = f"the quilt has {quilt.layout.columns}x{quilt.layout.rows} views"
+        raise PictureError(f"the name says {named.columns}x{named.rows}", where=str(path), rule=rule)
+    check_size(*quilt.size, named, str(path))
+    name, stored = format_for(path, bits, source=quilt.stored)
+    if quilt.values.dtype.kind == "f" and not np.isfinite(quilt.values).all():
+        raise PictureError("the quilt holds values that are not finite", where=str(path))
+    transfer = quilt.provenance.transfer
+    with replacing_output(path, name) as temporary:
+        encode_values(temporary, name, {"": converted_values(quilt.values, stored, transfer)}, transfer=transfer)
+
+
+def write_views(
+    quilt: Quilt,
+    folder: Path,
+    *,
+    format: FormatName | None = None,
+    bits: int | None = None,
+    progress: ProgressCallback = silent,
+) -> None:
+    """Write one picture per view, ``view_00`` the leftmost camera's.
+
+    ``format`` is ``png``, ``exr`` or ``tiff``, by default what holds the quilt's values exactly.
+
+    Raises
+    ------
+    OutputError
+        If the format is unknown or has no such bits, or the folder cannot be written.
+    """
+    if format is None:
+        format = "png" if quilt.stored in STORED["png"].values() else "exr"
+    if format not in STORED:
+        raise OutputError(f"the format {format!r} is unknown", where=str(folder), rule=f"known are {', '.join(STORED)}")
+    ending = next(ending for ending, name in FORMATS.items() if name == format)
+    _, stored = format_for(folder / f"view{ending}", bits, source=quilt.stored)
+    digits = len(str(quilt.layout.views - 1))
+    with replacing_folder(folder) as temporary:
+        for number in range(quilt.layout.views):
+            path = temporary / f"view_{number:0{digits}}{ending}"
+            values = converted_values(quilt.view_values(number), stored, "srgb")
+            encode_values(path, format, {"": values}, transfer="srgb")
+            progress(Progress("write", number + 1, quilt.layout.views))
+
+
+def _numbered(folder: Path) -> Sequence[Path]:
+    """The views of a folder in order; refuses gaps, doubles and names without a number."""
+    try:
+        paths = sorted(path for path in folder.iterdir() if path.suffix.lower() in _READ and path.name[0] != ".")
+    except OSError as error:
+        raise PictureError(f"cannot be read: {error.strerror}", where=str(folder)) from None
+    if (folder / MANIFEST).exists():
+        rule = "its pictures have one pixel for every lens"
+        raise PictureError("this is a folder of 'lippmann views'", where=str(folder), rule=rule, fix="compose it")
+    if not paths:
+        raise PictureError("there are no views", where=str(folder), rule=f"they end in {', '.join(_READ)}")
+    by_number: dict[int, Path] = {}
+    for path in paths:
+        digits = re.findall(r"[0-9]+", path.stem)
+        if not digits:
+            raise PictureError("the name has no number", where=str(path), rule="views are numbered from the left")
+        if (number := int(digits[-1])) in by_number:
+            raise PictureError(f"is view {number}, as {by_number[number].name} is", where=str(path))
+        by_number[number] = path
+    first = min(by_number)
+    if first > 1:
+        raise PictureError(f"the first view is {first}", where=str(folder), rule="views are numbered from 0 or 1")
+    if absent := _first_absent(by_number, first):
+        raise PictureError(f"view {absent} is absent", where=str(folder), rule=f"views run to {max(by_number)}")
+    return [by_number[number] for number in sorted(by_number)]
+
+
+def _first_absent(numbers: Iterable[int], first: int) -> int | None:
+    for expected, number in enumerate(sorted(numbers), start=first):
+        if number != expected:
+            return expected
+    return None
+
+
+def _check_ending(path: Path) -> None:
+    if path.suffix.lower() not in _READ:
+        raise PictureError(f"the ending '{path.suffix}' is unknown", where=str(path), rule=f"known: {', '.join(_READ)}")
+
+
+def _size(path: Path) -> tuple[int, int]:
+    """Width and height, before memory is given to the pixels."""
+    if path.suffix.lower() in _JPEG:
+        with _opened_jpeg(path) as picture:
+            return picture.width, picture.height
+    header = read_header(path)
+    return header.width, header.height
+
+
+def _stored(path: Path) -> Stored:
+    if path.suffix.lower() in _JPEG:
+        return "uint8"
+    header = read_header(path)
+    check_stored(header.stored, header.format, path)
+    return cast(Stored, header.stored)
+
+
+def _read(path: Path) -> tuple[NDArray[Any], Stored]:
+    """The values as stored, ``(H, W, 3)``, and their type."""
+    if path.suffix.lower() in _JPEG:
+        with _opened_jpeg(path) as picture:
+            return np.asarray(picture if picture.mode == "RGB" else picture.convert("RGB")), "uint8"
+    layers, stored = decode_stored(path, read_header(path).format)
+    return layers[""], stored
+
+
+@contextmanager
+def _opened_jpeg(path: Path) -> Iterator[Any]:
+    """The picture, not yet decoded; whatever its library raises about the file becomes a PictureError."""
+    from PIL import Image
+
+    try:
+        with open_picture(path, ("JPEG",)) as picture:
+            if max(picture.size) > MOST_SIDE:
+                raise PictureError(f"it has {picture.width} x {picture.height} pixels", where=str(path))
+            yield picture
+    except (OSError, SyntaxError, Image.DecompressionBombError) as error:
+        raise PictureError(f"cannot be read: {error}", where=str(path)) from None

@@ -1,0 +1,241 @@
+"""Quilts: the views of a scene side by side in one picture, as light-field displays and their programs exchange them.
+
+View 0, the leftmost camera's, is at the bottom left; views follow to the right, then row by row upwards. A quilt's
+name ends in ``_qs8x6a0.75``: columns x rows, and the aspect of the picture shown, which the tiles need not have. Where
+the sides of the file are no multiples of columns and rows (4096 / 5) the rest lies unused on the right and on top.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lippmann.display import Display, load_display
+from lippmann.errors import PictureError, UsageError
+from lippmann.image.encoding import linear_values
+from lippmann.image.provenance import Provenance
+from lippmann.image.stored_values import FloatArray, Stored
+
+#: Pixels of a quilt's sides, and its columns and rows, within which displays take them.
+LEAST_SIDE, MOST_SIDE, MOST_TILES = 256, 16384, 32
+
+_NAME = re.compile(r"_qs(\d{1,4})x(\d{1,4})(?:a(\d{1,4}(?:\.\d{1,12})?))?$")
+_CONVENTION = "a quilt's name ends in columns x rows and the picture's aspect, such as _qs8x6a0.75.png"
+
+
+class QuiltLayout(NamedTuple):
+    """What a quilt's name says; ``aspect`` (width / height of the picture shown) is None in names of older programs."""
+
+    columns: int
+    rows: int
+    aspect: float | None
+
+    @property
+    def views(self) -> int:
+        """Number of views."""
+        return self.columns * self.rows
+
+    @property
+    def ending(self) -> str:
+        """The end of the name, such as ``_qs8x6a0.75``."""
+        return f"_qs{self.columns}x{self.rows}" + ("" if self.aspect is None else f"a{self.aspect:.6g}")
+
+
+class DeviceQuilt(NamedTuple):
+    """The quilt that a display is given: its preset's name, width and height in pixels, and layout.
+
+    ``serial`` is how the serial numbers of such devices begin; empty where that is not known.
+    """
+
+    display: str
+    width: int
+    height: int
+    layout: QuiltLayout
+    serial: str = ""
+
+
+#: What the names of the devices' presets begin with.
+_FAMILY = "looking-glass-"
+
+
+def _device(
+    display: str, width: int, height: int, columns: int, rows: int, aspect: float, serial: str = ""
+) -> DeviceQuilt:
+    return DeviceQuilt(_FAMILY + display, width, height, QuiltLayout(columns, rows, aspect), serial)
+
+
+#: Recommended quilts, by device. The 16" landscape of the third generation has two: published, and as devices report.
+DEVICE_QUILTS: tuple[DeviceQuilt, ...] = (
+    _device("8.9-gen1", 4096, 4096, 5, 9, 1.6, "LKG-2K"),
+    _device("15.6-gen1", 4096, 4096, 5, 9, 1.77778, "LKG-4K"),
+    _device("8k-gen1", 8192, 8192, 5, 9, 1.77778, "LKG-8K"),
+    _device("portrait", 3360, 3360, 8, 6, 0.75, "LKG-P"),
+    _device("go", 4092, 4092, 11, 6, 0.5625, "LKG-E"),
+    _device("16-gen2", 4096, 4096, 5, 9, 1.77778, "LKG-A"),
+    _device("32-gen2", 8192, 8192, 5, 9, 1.77778, "LKG-B"),
+    _device("65", 8192, 8192, 8, 9, 1.77778, "LKG-D"),
+    _device("16-gen3-portrait", 5995, 6000, 11, 6, 0.5625, "LKG-H"),
+    _device("16-gen3-landscape", 5999, 5999, 7, 7, 1.77778, "LKG-J"),
+    _device("16-gen3-landscape", 7680, 4320, 8, 6, 1.77778, "LKG-J"),
+    _device("27-landscape", 7680, 4320, 8, 6, 1.77778),
+    _device("27-portrait", 7680, 4320, 12, 4, 0.5625),
+    _device("32-gen3-portrait", 8184, 8184, 11, 6, 0.5625, "LKG-K"),
+    _device("32-gen3-landscape", 8190, 8190, 7, 7, 1.77778, "LKG-L"),
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Quilt:
+    """Views of one size in a grid.
+
+    Parameters
+    ----------
+    values:
+        ``(height, width, 3)``, row 0 on top: float32 linear RGB or, so that the largest quilts take less, codes of 8 or
+        16 bits or half floats as files hold them.
+    layout:
+        Columns, rows and the aspect of the picture shown.
+    stored:
+        How the values were stored in the file that they came from.
+    provenance:
+        How it was made, as far as that is known: files do not say it.
+    """
+
+    values: NDArray[Any]
+    layout: QuiltLayout
+    stored: Stored = "float32"
+    provenance: Provenance = field(default_factory=Provenance)
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height in pixels."""
+        return self.values.shape[1], self.values.shape[0]
+
+    @property
+    def pixels(self) -> FloatArray:
+        """``(height, width, 3)`` float32 linear RGB, row 0 on top."""
+        return linear_values(self.values, self.provenance.transfer)
+
+    @property
+    def view_size(self) -> tuple[int, int]:
+        """Width and height of a view in pixels."""
+        return self.size[0] // self.layout.columns, self.size[1] // self.layout.rows
+
+    def corner(self, number: int) -> tuple[int, int]:
+        """Column and row of the top left pixel of view ``number``."""
+        width, height = self.view_size
+        right, up = number % self.layout.columns, number // self.layout.columns
+        return right * width, self.size[1] - (up + 1) * height
+
+    def view(self, number: int) -> FloatArray:
+        """``(height, width, 3)`` linear RGB of a view, 0 the leftmost camera's; shares memory with linear values."""
+        return linear_values(self.view_values(number), self.provenance.transfer)
+
+    def view_values(self, number: int) -> NDArray[Any]:
+        """``(height, width, 3)`` values of a view; shares the quilt's memory."""
+        width, height = self.view_size
+        column, row = self.corner(number)
+        return self.values[row : row + height, column : column + width]
+
+    def view_rows(self, first: int, last: int) -> FloatArray:
+        """``(views, last - first, width, 3)`` linear RGB of some rows of all views."""
+        width, _ = self.view_size
+        rows = np.empty((self.layout.views, last - first, width, 3), dtype=np.float32)
+        for number in range(self.layout.views):
+            rows[number] = linear_values(self.view_values(number)[first:last], self.provenance.transfer)
+        return rows
+
+
+def load_device(name: str) -> Display:
+    """The display of a device by the last part of its preset's name, such as ``portrait``; or any other display.
+
+    Raises
+    ------
+    DisplayError
+        As :func:`~lippmann.display.load_display`.
+    """
+    known = {device.display for device in DEVICE_QUILTS}
+    return load_display(_FAMILY + name if _FAMILY + name in known else name)
+
+
+def quilt_of_display(
+    display: Display, grid: tuple[int, int] | None = None, size: tuple[int, int] | None = None
+) -> DeviceQuilt:
+    """The quilt that a display is given, known by its preset's name or the beginning of its serial.
+
+    ``grid`` (columns, rows) and ``size`` (width, height in pixels) say otherwise; for displays of no known kind both
+    are needed. The aspect is that of the display's panel.
+
+    Raises
+    ------
+    UsageError, PictureError
+        If there is no such quilt.
+    """
+    layout = None if grid is None else _checked_grid(grid)
+    known = [
+        device
+        for device in DEVICE_QUILTS
+        if device.display == display.name or (device.serial and display.name.startswith(device.serial))
+    ]
+    fitting = [device for device in known if layout is None or device.layout[:2] == layout]
+    if size is None and not fitting:
+        what = "no quilt of it is known" if layout is None else f"no quilt of {layout[0]}x{layout[1]} views is known"
+        rule = f"known are those of {', '.join(sorted({device.display for device in DEVICE_QUILTS}))}"
+        fix = "say --views and --size" if layout is None else "say --size, too"
+        raise UsageError(what, where=display.name, rule=rule, fix=fix)
+    if layout is None:
+        if not known:
+            raise UsageError("how many views it takes is not known", where=display.name, fix="say --views, too")
+        layout = known[0].layout[:2]
+    width, height = size or fitting[0][1:3]
+    aspect = float(f"{display.panel.width / display.panel.height:.6g}")
+    quilt = DeviceQuilt(display.name, width, height, QuiltLayout(*layout, aspect))
+    check_size(width, height, quilt.layout, "quilt")
+    return quilt
+
+
+def _checked_grid(grid: tuple[int, int]) -> tuple[int, int]:
+    if not (1 <= grid[0] <= MOST_TILES and 1 <= grid[1] <= MOST_TILES):
+        rule = f"there are 1 to {MOST_TILES} columns and rows"
+        raise UsageError(f"{grid[0]}x{grid[1]} views will not do", where="--views", rule=rule)
+    return grid
+
+
+def layout_of_name(path: Path) -> QuiltLayout:
+    """Columns, rows and aspect from a quilt's name.
+
+    Raises
+    ------
+    PictureError
+        If the name does not say them, or they are impossible.
+    """
+    found = _NAME.search(path.stem)
+    if found is None:
+        raise PictureError("the name does not say how many views there are", where=str(path), rule=_CONVENTION)
+    columns, rows = int(found[1]), int(found[2])
+    if not (1 <= columns <= MOST_TILES and 1 <= rows <= MOST_TILES):
+        rule = f"there are 1 to {MOST_TILES} of both"
+        raise PictureError(f"the name says {columns} columns and {rows} rows", where=str(path), rule=rule)
+    aspect = None if found[3] is None else float(found[3])
+    if aspect is not None and not 0.05 <= aspect <= 20:
+        raise PictureError(f"the name says the aspect {found[3]}", where=str(path), rule=_CONVENTION)
+    return QuiltLayout(columns, rows, aspect)
+
+
+def check_size(width: int, height: int, layout: QuiltLayout, where: str) -> None:
+    """Raise :class:`PictureError` if a quilt of this layout cannot have this size.
+
+    Its sides are multiples of columns and rows, or powers of two, as the first devices' are, with a rest unused.
+    """
+    for side, count, what in ((width, layout.columns, "wide"), (height, layout.rows, "high")):
+        if not LEAST_SIDE <= side <= MOST_SIDE:
+            rule = f"a quilt's sides are {LEAST_SIDE} to {MOST_SIDE} pixels"
+            raise PictureError(f"it is {side} pixels {what}", where=where, rule=rule)
+        if side % count and side & (side - 1):
+            rule = f"its name says {layout.columns}x{layout.rows} views, and {side} is no multiple of {count}"
+            raise PictureError(f"it is {side} pixels {what}", where=where, rule=rule)

@@ -1,0 +1,1 @@
+"""Adaptive sampling: convergence, stopping rules, and the choice between methods."""

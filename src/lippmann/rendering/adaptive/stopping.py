@@ -1,0 +1,353 @@
+"""Rendering until a picture is good enough: rounds of samples, each judged by the picture's own estimate.
+
+A round is as large as the estimates so far say that it must be, but never more than a few times what has gone before:
+early estimates are rough, and what is overshot is lost. Very few samples end it only where they seem far better than
+what is asked for, as those of a plain scene do. All micro-images get the same samples: one that seems good already may
+only not have met the light that few paths find, and would stay wrong.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Literal, Protocol
+
+from lippmann.errors import UsageError
+from lippmann.progress import Progress, ProgressCallback, silent
+from lippmann.rendering.adaptive.convergence import Judge, Judgement, Track
+from lippmann.rendering.estimate.pixel_errors import PixelErrors
+from lippmann.rendering.estimate.psnr import Estimate, PictureEstimator, why_no_estimate
+from lippmann.rendering.request.settings import RenderSettings
+
+End = Literal["quality", "time", "samples"]
+
+#: The fewest samples that tell an error.
+FEWEST = 2
+#: Samples add up to multiples of this, so that all batches get the same.
+STEP = 8
+#: The most by which one round multiplies the samples of a pixel, and the least.
+MOST_GROWTH, LEAST_GROWTH = 4.0, 1.2
+#: The most where the quality is likely there, but not surely.
+SURER_GROWTH = 2.0
+#: The promise: the worst micro-image may miss the quality asked for by this much, in dB.
+TOLERANCE = 1.0
+#: Samples per pixel at which it is given up: the noise of single precision sums comes near.
+MOST_SAMPLES = 1 << 20
+#: Of the time that is left, the share that a round is planned to take: rates vary.
+_TIME_SHARE = 0.9
+
+
+@dataclass(frozen=True)
+class Goal:
+    """When to stop: at the first of what is set.
+
+    Parameters
+    ----------
+    quality:
+        PSNR in dB that every micro-image is to reach.
+    quality_mean:
+        PSNR in dB that the mean squared error of all micro-images is to reach.
+    max_time:
+        Seconds.
+    spp:
+        Samples per pixel; at least two, fewer tell no error.
+    part:
+        What a part of the picture that is judged by itself is called.
+
+    Raises
+    ------
+    UsageError
+        If nothing is set, or a value is out of its range.
+    """
+
+    quality: float | None = None
+    quality_mean: float | None = None
+    max_time: float | None = None
+    spp: int | None = None
+    part: str = "micro-image"
+
+    def __post_init__(self) -> None:
+        for name, value in (("quality", self.quality), ("quality-mean", self.quality_mean)):
+            if value is not None and not 0 < value <= 80:
+                raise UsageError(f"{value:g} dB will not do", where=f"--{name}", rule="above 0 and at most 80 dB")
+        if self.max_time is not None and not (self.max_time > 0 and math.isfinite(self.max_time)):
+            raise UsageError(f"{self.max_time:g} s will not do", where="--max-time", rule="seconds above 0")
+        if self.spp is not None and self.spp < FEWEST:
+            raise UsageError(f"{self.spp} will not do", where="--spp", rule="two samples or more tell their error")
+        if self.quality is self.quality_mean is self.max_time is self.spp is None:
+            raise UsageError("nothing says when to stop", fix="give --quality, --quality-mean, --max-time or --spp")
+
+    @property
+    def has_quality(self) -> bool:
+        """Whether some quality is asked for."""
+        return self.quality is not None or self.quality_mean is not None
+
+    def missing(self, estimate: Estimate) -> float:
+        """How many dB the picture is short of the quality; at most 0 if it has it.
+
+        It has it where the quality is the likely one, and is missed by more than ``TOLERANCE`` only with a probability
+        of 2.5 %.
+        """
+        short = [-math.inf]
+        if self.quality is not None:
+            short += [self.quality - estimate.worst, self.quality - TOLERANCE - estimate.worst_low]
+        if self.quality_mean is not None:
+            short += [self.quality_mean - estimate.psnr, self.quality_mean - TOLERANCE - estimate.psnr_low]
+        return max(short)
+
+    def likely_missing(self, estimate: Estimate) -> float:
+        """How many dB the likely PSNR is short, whatever its interval: that gets narrower as samples grow."""
+        short = [-math.inf]
+        if self.quality is not None:
+            short.append(self.quality - estimate.worst)
+        if self.quality_mean is not None:
+            short.append(self.quality_mean - estimate.psnr)
+        return max(short)
+
+    def describe(self, estimate: Estimate) -> str:
+        """Where the picture stands, for a progress report."""
+        parts = []
+        if self.quality is not None or self.quality_mean is None:
+            wanted = f" of {self.quality:g}" if self.quality is not None else ""
+            parts.append(f"worst {self.part} {estimate.worst:.1f}{wanted} dB")
+        if self.quality_mean is not None:
+            parts.append(f"{estimate.psnr:.1f} of {self.quality_mean:g} dB")
+        return ", ".join(parts)
+
+
+def goal_of(settings: RenderSettings) -> Goal | None:
+    """When to stop, where that is not a number of samples alone.
+
+    Raises
+    ------
+    UsageError
+        If a value is out of range, or the method or the light has no noise that more samples would reduce.
+    """
+    if settings.quality is settings.quality_mean is settings.max_time is None:
+        return None
+    goal = Goal(settings.quality, settings.quality_mean, settings.max_time, settings.spp)
+    given = "--max-time" if settings.max_time is not None else "--quality"
+    if settings.method not in ("full", "pooled"):
+        raise UsageError(
+            f"{settings.method} does not know its own error",
+            where=given,
+            rule="full and pooled do",
+            fix="use --method full",
+        )
+    why = why_no_estimate(settings)
+    if why is not None:
+        raise UsageError(why, where=given, fix="leave it out")
+    return goal
+
+
+class ProgressiveRenderer(Protocol):
+    """A picture that gets better with every call of :meth:`add`."""
+
+    def add(self, samples: int, progress: ProgressCallback = silent) -> None: ...
+
+    def squared_error(self) -> PixelErrors: ...
+
+
+@dataclass(frozen=True)
+class Round:
+    """After a round: samples per pixel, seconds since the start, and how good the picture then was."""
+
+    samples: int
+    seconds: float
+    estimate: Estimate
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How the rendering ended: ``quality`` reached, ``time`` up, or ``samples`` spent.
+
+    ``estimate`` is the last one, ``errors`` are those of the pixels that it stands on; both are None where the time was
+    up after a single sample, which tells no error.
+    """
+
+    end: End
+    estimate: Estimate | None
+    samples: int
+    rounds: tuple[Round, ...]
+    errors: PixelErrors | None
+
+
+def reach(
+    goal: Goal,
+    renderer: ProgressiveRenderer,
+    estimator: PictureEstimator,
+    progress: ProgressCallback = silent,
+    clock: Callable[[], float] = time.perf_counter,
+    probe: Callable[[], float] | None = None,
+) -> Outcome:
+    """Give ``renderer`` rounds of samples until ``goal`` is reached; ``estimator`` is that of its display.
+
+    ``probe`` measures the seconds of a sample per pixel by a few of them. It is asked where time is limited: without
+    it the first round has two samples, however long they take.
+    """
+    return reach_judged(goal, renderer.add, Track(renderer, estimator), progress, clock, probe)
+
+
+def reach_judged(
+    goal: Goal,
+    add: Callable[[int, ProgressCallback], None],
+    judge: Judge,
+    progress: ProgressCallback = silent,
+    clock: Callable[[], float] = time.perf_counter,
+    probe: Callable[[], float] | None = None,
+) -> Outcome:
+    """As :func:`reach`, with samples from ``add`` and ``judge`` to say how good the picture is."""
+    return _Climb(goal, add, judge, progress, clock, probe).run()
+
+
+def short_of_belief(goal: Goal, estimate: Estimate, samples: int, judge: Judge) -> float:
+    """How many dB ``estimate`` is short of what ``judge`` must say of so many samples to be believed of ``goal``."""
+    return goal.missing(estimate) + judge.margin(samples)
+
+
+def believed_from(goal: Goal, judged: Judgement, samples: int, judge: Judge) -> int:
+    """With how many samples ``judge`` will be believed of a picture that was ``judged`` after ``samples``.
+
+    That many, or doubled until the picture should be better than ``goal`` by the margin, or samples are enough anyway.
+    """
+    needed = samples
+    while needed < judge.fewest:
+        gained = 10 * judged.slope * math.log10(needed / samples)
+        if short_of_belief(goal, judged.estimate, needed, judge) <= gained:
+            break
+        needed *= 2
+    return needed
+
+
+@dataclass
+class _Climb:
+    """One rendering on its way; ``spent`` is in samples per pixel, ``rate`` what of them a second brings."""
+
+    goal: Goal
+    add: Callable[[int, ProgressCallback], None]
+    judge: Judge
+    progress: ProgressCallback
+    clock: Callable[[], float]
+    probe: Callable[[], float] | None
+    rounds: list[Round] = field(default_factory=list)
+    spent: int = 0
+    rate: float = 0.0
+
+    def __post_init__(self) -> None:
+        self._began = self.clock()
+        self._most = min(self.goal.spp or MOST_SAMPLES, MOST_SAMPLES)
+        self._slope = 1.0
+
+    def run(self) -> Outcome:
+        samples = self._first_round()
+        while True:
+            self._take(samples)
+            if self.spent < FEWEST and not self._time_for(FEWEST - self.spent):
+                return Outcome("time", None, self.spent, (), None)
+            if self.spent < FEWEST:
+                self._take(FEWEST - self.spent)
+            self._take_up_to(self.judge.first)
+            judged = self.judge.judge(self.spent, self._room())
+            self._slope = judged.slope
+            self.rounds.append(Round(self.spent, self._seconds(), judged.estimate))
+            end = self._end(judged.estimate)
+            if end is None:
+                samples = self._next_round(judged)
+                end = "time" if samples < 1 else None
+            if end is not None:
+                return self._outcome(end, judged)
+
+    def _take(self, samples: int) -> None:
+        started = self.clock()
+        self.add(samples, self._report(samples))
+        self.spent += samples
+        self.rate = samples / max(self.clock() - started, 1e-6)
+
+    def _take_up_to(self, samples: int) -> None:
+        """What the judge turns out to want, where a quality is asked for and there is time."""
+        more = min(samples, self._most) - self.spent
+        if self.goal.has_quality and more > 0 and self._time_for(more):
+            self._take(more)
+
+    def _outcome(self, end: End, judged: Judgement) -> Outcome:
+        return Outcome(end, judged.estimate, self.spent, tuple(self.rounds), judged.errors)
+
+    def _seconds(self) -> float:
+        return self.clock() - self._began
+
+    def _end(self, estimate: Estimate) -> End | None:
+        short = short_of_belief(self.goal, estimate, self.spent, self.judge)
+        if self.goal.has_quality and short <= 0 and self.spent >= self.judge.first:
+            return "quality"
+        if self.goal.max_time is not None and self._seconds() >= self.goal.max_time:
+            return "time"
+        return "samples" if self.spent >= self._most else None
+
+    def _first_round(self) -> int:
+        if self.goal.max_time is None:
+            return min(self._most, self.judge.first) if self.goal.has_quality else self._most
+        if self.probe is None:
+            return min(self._most, FEWEST)
+        self.rate = 1 / max(self.probe(), 1e-9)
+        # A picture has one sample of every pixel at least, whatever the time.
+        return min(self._most, self.judge.fewest, max(1, self._affordable()))
+
+    def _next_round(self, judged: Judgement) -> int:
+        """Samples of the next round; fewer than one if there is no time for any."""
+        if self.goal.has_quality and self.spent < self.judge.fewest:
+            # What is not believed yet says little of how far the goal is.
+            wanted = float(believed_from(self.goal, judged, self.spent, self.judge))
+        else:
+            wanted = max(self.spent * self._growth(judged.estimate), self.judge.fewest)
+        total = max(STEP * round(wanted / STEP), STEP * (self.spent // STEP + 1))
+        samples = min(total, self._most) - self.spent
+        return samples if self.goal.max_time is None else min(samples, self._affordable())
+
+    def _affordable(self) -> int:
+        """Samples that there is time for, with what judging them takes."""
+        assert self.goal.max_time is not None
+        left = self.goal.max_time - self._seconds() - self.judge.seconds()
+        return math.floor(_TIME_SHARE * max(0.0, left) * self.rate)
+
+    def _time_for(self, samples: int) -> bool:
+        return self.goal.max_time is None or self._affordable() >= samples
+
+    def _room(self) -> float:
+        """By how much samples can still be multiplied."""
+        most = float(self._most)
+        if self.goal.max_time is not None:
+            most = min(most, self.spent + self._affordable())
+        return max(1.0, most / self.spent)
+
+    def _growth(self, estimate: Estimate) -> float:
+        """By how much samples must be multiplied, as far as one round may."""
+        if not self.goal.has_quality:
+            return MOST_GROWTH
+        likely, sure = (
+            10 ** (short / (10 * self._slope))
+            for short in (self.goal.likely_missing(estimate), self.goal.missing(estimate))
+        )
+        # What only is not sure yet: intervals get narrower faster than pictures better.
+        return min(MOST_GROWTH, max(LEAST_GROWTH, likely, min(sure, SURER_GROWTH)))
+
+    def _report(self, coming: int) -> ProgressCallback:
+        """Reports of one round as reports of all the work, as far as it can be foreseen."""
+        note, total = "", float(self.spent + coming)
+        if self.rounds:
+            estimate = self.rounds[-1].estimate
+            note = self.goal.describe(estimate)
+            if self.goal.has_quality:
+                total = max(total, self.spent * 10 ** (max(0.0, self.goal.missing(estimate)) / (10 * self._slope)))
+            total = min(total, float(self._most))
+            left = (total - self.spent) / self.rate
+            if self.goal.max_time is not None:
+                left = min(left, self.goal.max_time - self._seconds())
+            note += f", about {max(0.0, left):.0f} s left"
+
+        def report(inner: Progress) -> None:
+            done = self.spent + coming * inner.done / max(inner.total, 1e-9)
+            self.progress(Progress(inner.stage, done, max(total, done), note))
+
+        return report

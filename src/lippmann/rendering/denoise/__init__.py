@@ -1,0 +1,1 @@
+"""Denoising: Open Image Denoise, dual buffers, and the blends that keep the picture unbiased."""

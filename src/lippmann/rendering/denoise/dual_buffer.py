@@ -1,0 +1,178 @@
+"""A picture whose noise is taken out, and that still knows how good it is.
+
+Each half of the samples is denoised by itself, and the picture is the mean of the two. The network is shown the second
+one upside down: what it gets wrong of itself is not the same in both then, and the mean is nearer to the truth.
+
+A denoised half knows nothing of the other, noisy half, which therefore can judge it: for denoised halves D(a) and D(b)
+of noisy ones a and b, the mean of (a - D(a)) (b - D(b)) is that of the product of the errors of D(a) and D(b), what
+they have wrong in common. The squared error of their mean is that and a quarter of (D(a) - D(b))^2, what they differ
+by.
+
+Micro-images may share the light of a denoised half, and it keeps its own where that is judged to be better
+(:mod:`lippmann.rendering.denoise.unshared_blend`). Where what comes of that is judged to be worse than its samples,
+they take its place (:mod:`lippmann.rendering.denoise.noisy_blend`), so that with ever more samples the picture comes to
+be what they show, whatever a denoiser does. The other half has a say in both, but none of its pixels in its own place,
+so that it can still judge.
+
+Errors are small and the curve of the codes is taken as straight, but for pixels that the denoiser made far brighter
+than the samples show, as it does beside lamps: where that is beyond white, the curve is cut off, and in the dark it is
+steep. There the step of the code from what the samples show counts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lippmann.color.transfer import Transfer, coding_slope, encode
+from lippmann.progress import ProgressCallback, silent
+from lippmann.rendering.denoise.local_statistics import mean_around
+from lippmann.rendering.denoise.noisy_blend import own_share
+from lippmann.rendering.denoise.unshared_blend import own_light
+from lippmann.rendering.estimate.bias_posterior import LONE_RATIO
+from lippmann.rendering.estimate.jackknife import LONE_TOLD_FROM
+from lippmann.rendering.estimate.pixel_errors import CROSS_NOISE, PixelErrors
+from lippmann.runtime.row_threads import Bands
+
+Floats = NDArray[np.float32]
+#: Of the halves' mean difference nearby: a pixel that is brighter than its samples by more is so by no accident.
+FAR_ABOVE = 4.0
+#: Samples that are farther off, in codes, than any error is by so many times hide what is wrong in their pixel, and few
+#: of them what is wrong in the picture: there the ratio of lone hits is taken. With 4 some pictures are flattered.
+DROWNED = 8.0
+#: With fewer samples a single one is farther off, and more likely all there is of its light: less is left out then.
+MANY = 16
+#: Linear steps below this are as good as a slope, and hold rounding.
+_LEAST_STEP = 1e-4
+#: A clean picture from a noisy one; and whether that is to be turned, see
+#: :func:`~lippmann.rendering.denoise.oidn.denoise`.
+Denoise = Callable[[Floats, bool], Floats]
+Share = Callable[[Floats], Floats]
+
+
+class Halved(Protocol):
+    """A renderer whose samples come from two streams that know nothing of each other."""
+
+    @property
+    def samples(self) -> int: ...
+
+    def add(self, samples: int, progress: ProgressCallback = silent) -> None: ...
+
+    def picture(self) -> Floats: ...
+
+    def halves(self) -> tuple[Floats, Floats]: ...
+
+    def squared_error(self) -> PixelErrors: ...
+
+
+class Denoised:
+    """The pictures of ``renderer`` after ``denoise``; see the head of this module.
+
+    Parameters
+    ----------
+    renderer:
+        Gathers the samples.
+    denoise:
+        From a noisy ``(H, W, 3)`` linear picture to a clean one, turned for the second half.
+    transfer:
+        How values become codes; errors are measured between codes.
+    threads:
+        CPU threads.
+    share:
+        From a clean picture to one whose parts share their light; None where they do not.
+    """
+
+    def __init__(
+        self,
+        renderer: Halved,
+        denoise: Denoise,
+        transfer: Transfer,
+        threads: int = 1,
+        share: Share | None = None,
+    ) -> None:
+        self._renderer = renderer
+        self._denoise = denoise
+        self._share = share
+        self._transfer: Transfer = transfer
+        self._threads = threads
+        self._cleaned: tuple[Floats, Floats] | None = None
+        self._cleaned_samples = 0
+
+    def add(self, samples: int, progress: ProgressCallback = silent) -> None:
+        """Take ``samples`` more of every pixel."""
+        self._renderer.add(samples, progress)
+
+    def picture(self) -> Floats:
+        """``(H, W, 3)`` float32 linear RGB."""
+        if self._renderer.samples < 2:
+            # There are no halves, and nothing is known of the error.
+            return self._clean_picture()
+        first, second = self._clean_halves()
+        mean: Floats = np.float32(0.5) * (first + second)
+        return mean
+
+    def squared_error(self) -> PixelErrors:
+        """Squared error of every pixel's code, as the halves judge each other."""
+        noisy, clean = self._renderer.halves(), self._clean_halves()
+        slope = self._slope(noisy)
+        apart = (np.float32(0.25) * np.square(slope * (clean[0] - clean[1]))).mean(axis=2)
+        left = [slope * (half - smooth) for half, smooth in zip(noisy, clean, strict=True)]
+        common = (left[0] * left[1]).mean(axis=2)
+        limit = DROWNED * max(1.0, MANY / self._renderer.samples)
+        drowned = np.maximum(np.abs(left[0]), np.abs(left[1])).max(axis=2) > limit
+        common[drowned] = np.float32(LONE_RATIO) * apart[drowned]
+        samples = self._renderer.squared_error()
+        if self._renderer.samples < LONE_TOLD_FROM:
+            # Any hit may be.
+            samples = replace(samples, lone=np.maximum(samples.values, 0))
+        return PixelErrors(common + apart, None, CROSS_NOISE, samples, apart)
+
+    def _clean_halves(self) -> tuple[Floats, Floats]:
+        # The samples may have come by another way than through :meth:`add`.
+        if self._cleaned is None or self._cleaned_samples != self._renderer.samples:
+            self._cleaned_samples = self._renderer.samples
+            noisy = self._renderer.halves()
+            clean = self._best_of_halves(noisy)
+            own = own_share(noisy, clean, self._transfer, threads=self._threads)
+            self._cleaned = clean[0] + own * (noisy[0] - clean[0]), clean[1] + own * (noisy[1] - clean[1])
+        return self._cleaned
+
+    def _clean_picture(self) -> Floats:
+        return self._cleaned_and_shared(self._renderer.picture())[-1]
+
+    def _best_of_halves(self, noisy: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
+        """The halves without their noise, shared where that is better."""
+        first, second = self._versions(noisy)
+        if self._share is None:
+            return first[0], second[0]
+        clean, shared = (first[0], second[0]), (first[1], second[1])
+        own = own_light(noisy, clean, shared, self._transfer, threads=self._threads)
+        return shared[0] + own * (clean[0] - shared[0]), shared[1] + own * (clean[1] - shared[1])
+
+    def _versions(self, noisy: tuple[Floats, Floats]) -> tuple[list[Floats], list[Floats]]:
+        """Of each half what :meth:`_cleaned_and_shared` gives."""
+        return self._cleaned_and_shared(noisy[0]), self._cleaned_and_shared(noisy[1], turned=True)
+
+    def _cleaned_and_shared(self, noisy: Floats, turned: bool = False) -> list[Floats]:
+        """A picture without its noise; and, where light is shared, that with shared light."""
+        clean = self._denoise(noisy, turned)
+        return [clean] if self._share is None else [clean, self._share(clean)]
+
+    def _slope(self, noisy: tuple[Floats, Floats]) -> Floats:
+        """By how much a pixel's code differs from that of the truth, per linear difference between the two."""
+        picture, transfer = self.picture(), self._transfer
+        slope = coding_slope(picture, transfer)
+        shown = np.float32(0.5) * (noisy[0] + noisy[1])
+        scatter = np.abs(noisy[0] - noisy[1]).mean(axis=2)
+        with Bands(self._threads) as bands:
+            nearby = mean_around(scatter, 1, bands)[..., None]
+        apart = shown + np.float32(FAR_ABOVE) * nearby
+        truth = np.where(picture > 1, np.minimum(shown, 1), apart)
+        far = picture - truth > _LEAST_STEP
+        low, high = truth[far], picture[far]
+        slope[far] = (encode(high, transfer) - encode(low, transfer)) / (high - low)
+        return slope

@@ -1,0 +1,81 @@
+"""A look over a whole picture before it is denoised part by part, so that all parts are treated alike.
+
+How bright a picture is and how many rays it takes decide how Open Image Denoise goes about it. Were each part asked by
+itself, neighbours could be treated differently, and the seam between them would show.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from lippmann.rendering.denoise.cost_model import effort_of, traced_work
+from lippmann.rendering.denoise.oidn import Effort
+from lippmann.rendering.film.wavefront import trace_frame
+from lippmann.rendering.film.wavefront_plan import make_plan
+from lippmann.rendering.request.settings import RenderSettings
+from lippmann.rendering.transport.ray_source import DisplayRays
+
+#: Pixels looked at along each side of the picture, and samples of each.
+SIDE, SAMPLES = 128, 8
+#: Pixels looked at whose mean counts as one brightness, along each side.
+BIN = 4
+#: The brightness (geometric mean) that the network is shown, and what counts as black: Open Image Denoise's own.
+KEY, BLACK = 0.18, 1e-8
+#: Bytes that the look may take.
+MEMORY = 1 << 28
+
+
+@dataclass(frozen=True)
+class Treatment:
+    """How all parts of a picture are denoised: with what effort, and by what they are multiplied for the network."""
+
+    effort: Effort
+    exposure: float
+
+
+class ScatteredRays:
+    """Pixels spread evenly over a display, as a picture of their own."""
+
+    def __init__(self, source: DisplayRays) -> None:
+        self._source = source
+        self.channels = source.channels
+        self.width, self.height = (min(SIDE, side) for side in (source.width, source.height))
+        self._columns, self._rows = (
+            mi.UInt32((2 * np.arange(count) + 1) * side // (2 * count))
+            for count, side in ((self.width, source.width), (self.height, source.height))
+        )
+
+    def rays(self, column: Any, row: Any, channel: Any, jitter: Any) -> Any:
+        column, row = dr.gather(mi.UInt32, self._columns, column), dr.gather(mi.UInt32, self._rows, row)
+        return self._source.rays(column, row, channel, jitter)
+
+
+def survey(integrator: Any, source: DisplayRays, settings: RenderSettings) -> Treatment:
+    """What suits the picture as a whole: the same for the same picture, whoever looks."""
+    few, box = ScatteredRays(source), settings.pixel_filter == "box"
+    samples = min(settings.samples, SAMPLES) if box else 1
+    plan = make_plan(few.width, few.height, samples, channels=few.channels, memory=MEMORY)
+    frame = trace_frame(integrator, few, plan, seed=settings.seed, box_filter=box)
+    rays = traced_work(frame.rays.primary, frame.rays.shadow, frame.rays.secondary)
+    # What is denoised: pixels, or sub-pixels.
+    places = few.width * few.height * (3 if settings.keeps_colors(source.display) else 1)
+    effort = effort_of(settings.denoise, rays / places * settings.samples / samples)
+    return Treatment(effort, exposure_of(frame.pixels))
+
+
+def exposure_of(picture: NDArray[np.float32]) -> float:
+    """By what linear RGB ``(H, W, 3)`` is multiplied for the network: ``KEY`` over the geometric mean of its luminance.
+
+    As Open Image Denoise does itself for a picture that it sees whole.
+    """
+    luminance = picture.astype(np.float64) @ (0.212671, 0.715160, 0.072169)
+    rows, columns = (range(0, side, BIN) for side in luminance.shape)
+    bins = np.array([luminance[r : r + BIN, c : c + BIN].mean() for r in rows for c in columns])
+    bright = bins[bins > BLACK]
+    return float(KEY / np.exp2(np.log2(bright).mean())) if bright.size else 1.0

@@ -1,0 +1,195 @@
+"""Open Image Denoise for one picture of one scene: guides are traced once, pictures cleaned as they come."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lippmann.progress import Progress, ProgressCallback, silent
+from lippmann.rendering.denoise.cost_model import GUIDE_SAMPLES, RUN_COST, SHARING_STOP, denoising_cost
+from lippmann.rendering.denoise.oidn import Effort, denoise
+from lippmann.rendering.denoise.oidn_masked import denoise_seen
+from lippmann.rendering.denoise.pixel_order import best_form, denoise_views
+from lippmann.rendering.film.feature_buffers import Guides, plan_guides, trace_guides
+from lippmann.rendering.sharing.cross_lens import lens_numbers, lens_numbers_in_full_color, share_light
+from lippmann.rendering.sharing.cross_view import share_views
+from lippmann.rendering.transport.ray_source import DisplayRays, QuiltRays, SubpixelRays, WindowRays
+
+if TYPE_CHECKING:
+    from lippmann.device.pbr import BuiltScene
+    from lippmann.device.whitted.scene import BuiltClassic
+
+Floats = NDArray[np.float32]
+
+#: What the seed of the guides is more than the picture's.
+GUIDE_SEED_STEP = 0x85EBCA6B
+#: Width and height of the picture by which the time of denoising is measured.
+_PROBE_SIDE = 128
+
+
+class GuidedDenoiser:
+    """Takes the noise out of pictures; called with ``(H, W, 3)`` linear pixels, one for each of ``source``.
+
+    Parameters
+    ----------
+    built, source, display_from_world, seed, box_filter:
+        Those of the picture, for guides that show what its pixels see.
+    memory:
+        Bytes that may be used.
+    threads:
+        Of the denoiser.
+    effort:
+        Asked before every picture.
+    exposure:
+        As of :func:`~lippmann.rendering.denoise.oidn.denoise`, for windows.
+    shares:
+        Micro-images share their light, see :mod:`lippmann.rendering.sharing.cross_lens`, and so do the views of a
+        quilt, see :mod:`lippmann.rendering.sharing.cross_view`.
+
+    Attributes
+    ----------
+    seconds:
+        Spent so far, guides included.
+    used:
+        The effort of the last picture.
+    """
+
+    def __init__(
+        self,
+        built: BuiltScene | BuiltClassic,
+        source: DisplayRays | WindowRays | QuiltRays | SubpixelRays,
+        display_from_world: NDArray[np.float64],
+        *,
+        seed: int,
+        box_filter: bool,
+        memory: int,
+        threads: int,
+        effort: Callable[[], Effort],
+        exposure: float | None = None,
+        shares: bool = False,
+        progress: ProgressCallback = silent,
+    ) -> None:
+        self._built = built
+        self._source = source
+        self._display_from_world = display_from_world
+        self._seed = seed
+        self._box_filter = box_filter
+        self._memory = memory
+        self._threads = threads
+        self._effort = effort
+        self._exposure = exposure
+        self._shares = shares
+        self._lenses: NDArray[np.int32] | None = None
+        self._progress = progress
+        self._guides: Guides | None = None
+        self._guide_samples = 0
+        self._form: Literal["raw", "views"] | None = None
+        self.seconds = 0.0
+        self.used: Effort = "fast"
+
+    @property
+    def shares_afterwards(self) -> bool:
+        """Whether clean light is shared; views of a quilt share it before it is clean."""
+        return self._shares and not isinstance(self._source, QuiltRays)
+
+    def __call__(self, pixels: Floats) -> Floats:
+        """A picture without its noise, which has shared its light."""
+        clean = self.denoise(pixels)
+        return self.share(clean) if self.shares_afterwards else clean
+
+    def denoise(self, pixels: Floats, turned: bool = False) -> Floats:
+        """A picture without its noise; ``turned`` is that of :func:`~lippmann.rendering.denoise.oidn.denoise`."""
+        started = time.perf_counter()
+        self._progress(Progress("denoise", 0, 1))
+        self.used = self._effort()
+        guides = self.guides()
+        if self._shares and isinstance(self._source, QuiltRays):
+            pixels = share_views(pixels, self._source, guides, threads=self._threads)
+        # The network overshoots below black beside bright edges.
+        cleaned = np.maximum(self._cleaned(pixels, guides, turned), np.float32(0))
+        self._progress(Progress("denoise", 1, 1))
+        self.seconds += time.perf_counter() - started
+        return cleaned
+
+    def share(self, clean: Floats) -> Floats:
+        """A clean picture that has shared its light."""
+        started, source = time.perf_counter(), self._source
+        assert not isinstance(source, QuiltRays)
+        if self._lenses is None:
+            window = None if isinstance(source, DisplayRays) else source.window
+            if isinstance(source, SubpixelRays):
+                self._lenses = lens_numbers_in_full_color(source.display, window)
+            else:
+                self._lenses = lens_numbers(source.display, window, subpixels=source.channels == 3)
+        shared = share_light(
+            clean,
+            source.display,
+            self.guides(),
+            stop=SHARING_STOP[self.used],
+            threads=self._threads,
+            lenses=self._lenses,
+            columns=3 if isinstance(source, SubpixelRays) else 1,
+        )
+        self.seconds += time.perf_counter() - started
+        return shared
+
+    def probe(self) -> float:
+        """Seconds that a picture cleaned by halves takes, guides included, by a small one."""
+        small = np.zeros((_PROBE_SIDE, _PROBE_SIDE, 3), dtype=np.float32)
+        denoise(small, small, small, clean_guides=True, effort="fast", threads=self._threads)  # starts its threads
+        started = time.perf_counter()
+        denoise(small, small, small, clean_guides=True, effort="fast", threads=self._threads)
+        spent = (time.perf_counter() - started) / RUN_COST["fast"] * denoising_cost(self._effort())
+        return spent * self._source.width * self._source.height / _PROBE_SIDE**2
+
+    def _cleaned(self, pixels: Floats, guides: Guides, turned: bool) -> Floats:
+        source = self._source
+        if isinstance(source, DisplayRays) and self.form() == "views":
+            return denoise_views(
+                pixels, source.display, guides, form="views", effort=self.used, turned=turned, threads=self._threads
+            )
+        result = np.empty_like(pixels)
+        for tile in source.tiles():
+            result[tile] = denoise_seen(
+                pixels[tile],
+                guides.albedo[tile],
+                guides.normal[tile],
+                exposure=self._exposure,
+                effort=self.used,
+                turned=turned,
+                threads=self._threads,
+            )
+        return result
+
+    def guides(self) -> Guides:
+        """Albedo and normal of what the pixels see, of as many samples as the effort is worth."""
+        samples = GUIDE_SAMPLES[self.used]
+        if self._guides is None or samples > self._guide_samples:
+            self._guide_samples = samples
+            self._guides = trace_guides(
+                self._built,
+                self._source,
+                plan_guides(self._source, samples, self._memory),
+                self._display_from_world,
+                # Samples of their own: with those of one half of the picture the guides would show its noise, and the
+                # denoised other half would agree with it.
+                seed=(self._seed + GUIDE_SEED_STEP) % 2**32,
+                box_filter=self._box_filter,
+                progress=self._progress,
+            )
+        return self._guides
+
+    def form(self) -> Literal["raw", "views"]:
+        """In which order the pixels are shown to the network, see :mod:`lippmann.rendering.denoise.pixel_order`."""
+        if self._form is None:
+            if isinstance(self._source, DisplayRays):
+                self._form = best_form(self._source.display, self.guides())
+            else:
+                # A quilt is made of views; a window of a panel is no whole number of them, and sub-pixels lie so close
+                # together that they are more alike than views' pixels.
+                self._form = "views" if isinstance(self._source, QuiltRays) else "raw"
+        return self._form

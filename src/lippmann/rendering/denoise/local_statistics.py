@@ -1,0 +1,62 @@
+"""What is measured of the halves of a picture, pixel by pixel, and its means over the pixels around each."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lippmann.color.transfer import Transfer, coding_slope
+from lippmann.rendering.denoise.local_statistics_kernels import column_mean_rows, row_mean_rows
+from lippmann.runtime.row_threads import Bands
+
+Floats = NDArray[np.float32]
+Halves = tuple[Floats, Floats]
+
+
+def measured(rows: Any, *pictures: Halves, transfer: Transfer, bands: Bands) -> tuple[Floats, Floats]:
+    """The two measures, ``(H, W)`` each, that compiled ``rows`` take of pictures, between codes.
+
+    Each picture is two halves, ``(H, W, 3)`` linear; the slope of the code is that of the last one's mean. Beyond white
+    the codes are cut off, but what is wrong there is wrong around, too.
+    """
+    first, second = pictures[-1]
+    slope = coding_slope(np.clip(np.float32(0.5) * (first + second), 0, 1), transfer)
+    found = np.empty(slope.shape[:2], dtype=np.float32), np.empty(slope.shape[:2], dtype=np.float32)
+    bands.lines(rows, len(slope), *(half for halves in pictures for half in halves), slope, *found)
+    return found
+
+
+def mean_around(values: Floats, reach: int, bands: Bands) -> Floats:
+    """Means of ``(H, W)`` over the square of pixels up to ``reach`` away, cut at the edges."""
+    along, mean = np.empty_like(values), np.empty_like(values)
+    bands.lines(row_mean_rows, len(values), values, reach, along)
+    bands.lines(column_mean_rows, len(values), along, reach, mean)
+    return mean
+
+
+def known_mean_of_others(values: Floats, reach: int, deviations: float, bands: Bands) -> Floats:
+    """As far as they exceed so many of their own standard deviations, and at least 0: means without the pixel itself.
+
+    The deviation is that of values that know nothing of each other.
+    """
+    count = _pixels_around(values.shape, reach)
+    mean, squared = (_mean_of_others(part, count, reach, bands) for part in (values, np.square(values)))
+    deviation = np.sqrt(np.maximum(squared, 0)) / np.float32(2 * reach + 1)
+    return np.maximum(mean - np.float32(deviations) * deviation, 0)
+
+
+def _mean_of_others(values: Floats, count: NDArray[np.float64], reach: int, bands: Bands) -> Floats:
+    others = mean_around(values, reach, bands) * count - values
+    return np.asarray(others / np.maximum(count - 1, 1), dtype=np.float32)
+
+
+def _pixels_around(shape: tuple[int, ...], reach: int) -> NDArray[np.float64]:
+    """``(H, W)``: how many pixels each mean is of, the pixel itself included."""
+    count = np.ones((1, 1))
+    for axis, length in enumerate(shape):
+        place = np.arange(length)
+        along = np.minimum(place + reach, length - 1) - np.maximum(place - reach, 0) + 1
+        count = count * np.expand_dims(along, 1 - axis)
+    return count

@@ -1,0 +1,112 @@
+"""Means over the pixels around each: the compiled part."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from lippmann.runtime.numba_jit import compiled
+
+#: Sums that run down a picture begin anew after so many rows, wherever bands begin: all round alike.
+_BLOCK = 64
+
+
+@compiled
+def row_mean_rows(first: int, last: int, values: Any, radius: int, mean: Any) -> None:
+    """Rows ``[first, last)`` of ``mean``: that of the ``radius`` pixels to either side in ``values``, both ``(H, W)``.
+
+    Cut at the edges.
+    """
+    width = values.shape[1]
+    for row in range(first, last):
+        total = 0.0
+        for column in range(min(radius, width)):
+            total += values[row, column]
+        for column in range(width):
+            if column + radius < width:
+                total += values[row, column + radius]
+            if column > radius:
+                total -= values[row, column - radius - 1]
+            mean[row, column] = total / (min(column + radius, width - 1) - max(column - radius, 0) + 1)
+
+
+@compiled
+def column_mean_rows(first: int, last: int, values: Any, radius: int, mean: Any) -> None:
+    """Rows ``[first, last)`` of ``mean``: that of the ``radius`` pixels above and below in ``values``, cut likewise."""
+    height, width = values.shape
+    totals = np.zeros(width, dtype=np.float64)
+    for row in range(first // _BLOCK * _BLOCK, last):
+        if row % _BLOCK == 0:
+            totals[:] = 0
+            for other in range(max(0, row - radius), min(row + radius + 1, height)):
+                for column in range(width):
+                    totals[column] += values[other, column]
+        else:
+            if row + radius < height:
+                for column in range(width):
+                    totals[column] += values[row + radius, column]
+            if row > radius:
+                for column in range(width):
+                    totals[column] -= values[row - radius - 1, column]
+        if row >= first:
+            count = min(row + radius, height - 1) - max(row - radius, 0) + 1
+            for column in range(width):
+                mean[row, column] = totals[column] / count
+
+
+@compiled
+def judged_rows(
+    first: int, last: int, noisy: Any, other: Any, clean: Any, other_clean: Any, slope: Any, noise: Any, error: Any
+) -> None:
+    """Rows ``[first, last)`` of what is measured of a picture's halves, ``(H, W)``, between codes.
+
+    ``noisy``, ``other`` and their denoised ``clean``, ``other_clean`` are ``(H, W, 3)``, ``slope`` is the code's.
+    ``noise`` is the squared error of a noisy half, ``error`` that of a clean one; both are right on the average.
+    """
+    for row in range(first, last):
+        for column in range(noisy.shape[1]):
+            of_noise, of_error = 0.0, 0.0
+            for c in range(3):
+                weight = slope[row, column, c] * slope[row, column, c] / 6.0
+                a, b = noisy[row, column, c], other[row, column, c]
+                apart = (a - b) * (a - b)
+                to_other, to_own = clean[row, column, c] - b, other_clean[row, column, c] - a
+                of_noise += weight * apart
+                of_error += weight * (to_other * to_other + to_own * to_own - apart)
+            noise[row, column] = of_noise
+            error[row, column] = of_error
+
+
+@compiled
+def compared_rows(
+    first: int,
+    last: int,
+    noisy: Any,
+    other: Any,
+    clean: Any,
+    other_clean: Any,
+    shared: Any,
+    other_shared: Any,
+    slope: Any,
+    gain: Any,
+    apart: Any,
+) -> None:
+    """Rows ``[first, last)`` of how a picture's ``clean`` halves compare with its ``shared`` ones, ``(H, W)``.
+
+    Pictures are as for :func:`judged_rows`. ``gain`` is, right on the average, the product of what a shared half is
+    wrong by and of its difference to the clean one; ``apart`` is the square of that.
+    """
+    for row in range(first, last):
+        for column in range(noisy.shape[1]):
+            of_gain, of_apart = 0.0, 0.0
+            for c in range(3):
+                weight = slope[row, column, c] * slope[row, column, c]
+                mine, theirs = shared[row, column, c], other_shared[row, column, c]
+                my_step, their_step = mine - clean[row, column, c], theirs - other_clean[row, column, c]
+                of_gain += weight * (
+                    (mine - other[row, column, c]) * my_step + (theirs - noisy[row, column, c]) * their_step
+                )
+                of_apart += weight * (my_step * my_step + their_step * their_step)
+            gain[row, column] = of_gain
+            apart[row, column] = of_apart

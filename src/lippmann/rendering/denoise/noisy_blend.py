@@ -1,0 +1,59 @@
+"""How much of a denoised pixel its own samples should make up, by what the halves of a picture say of each other.
+
+A denoiser knows pictures, not this scene: it wipes out stripes that it takes for noise, and what is seen through water.
+Such errors stay, however many samples there are, while the samples' own noise falls. So where a clean half lies farther
+from the truth than its noisy samples scatter, it gives way to them: of two pictures with squared errors E and V that
+know nothing of each other the best mean has E / (E + V) of the second. Both are measured, E by the other half. That
+such means converge was shown by A. Firmino, J. R. Frisvad, H. W. Jensen, *Progressive Denoising of Monte Carlo Rendered
+Images*, Computer Graphics Forum 41(2), 2022, where a network chooses; here the measurement does, over the pixels
+around.
+
+Single pixels tell nothing. E counts as far as it exceeds its own standard deviation, so that few and noisy samples
+change nothing, and over small and large neighbourhoods: in a small one a bright hit may be missing by chance, in a
+large one what is wrong with an edge is lost. The geometric mean of what both say is zero where either says nothing.
+
+A pixel's own difference to the other half has no say in its weight: where that half happens to agree with the noise of
+the samples, these would seem to be right, and the other half could not judge the picture any more.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lippmann.color.transfer import Transfer
+from lippmann.rendering.denoise.local_statistics import Halves, known_mean_of_others, mean_around, measured
+from lippmann.rendering.denoise.local_statistics_kernels import judged_rows
+from lippmann.runtime.row_threads import Bands
+
+Floats = NDArray[np.float32]
+
+#: How far the two neighbourhoods reach, in pixels to each side.
+NEAR, FAR = 2, 8
+#: Standard deviations that the error of clean pixels must exceed.
+_DEVIATIONS = 1.0
+#: No noise and no error: then there is nothing to choose.
+_NOTHING = 1e-12
+
+
+def own_share(noisy: Halves, clean: Halves, transfer: Transfer, *, threads: int) -> Floats:
+    """The weight of each pixel's own samples against its clean value, ``(H, W, 1)`` in [0, 1].
+
+    Parameters
+    ----------
+    noisy, clean:
+        Two halves of the samples that know nothing of each other, and what a denoiser made of each; ``(H, W, 3)``
+        linear.
+    transfer:
+        How values become codes; errors are measured between codes.
+    threads:
+        CPU threads; the result does not depend on them.
+    """
+    with Bands(threads) as bands:
+        noise, error = measured(judged_rows, noisy, clean, transfer=transfer, bands=bands)
+        share = np.ones_like(noise)
+        for reach in (NEAR, FAR):
+            of_noise = np.maximum(mean_around(noise, reach, bands), 0)
+            known = known_mean_of_others(error, reach, _DEVIATIONS, bands)
+            share *= known / (known + of_noise + np.float32(_NOTHING))
+    return np.sqrt(share)[..., None]

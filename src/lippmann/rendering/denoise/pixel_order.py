@@ -1,0 +1,150 @@
+"""Noise taken out of integral images: in which order their pixels become pictures for the denoiser.
+
+``raw``
+    The pixels as they lie on the panel. What stands near the lens plane, within a few gaps, looks there like a plain
+    picture, and no order is finer.
+``views``
+    One picture for each view: every one is a true picture of the scene, however deep that is, but a coarse one, of a
+    pixel per lens. An exact permutation there and back.
+
+Which is better follows from the scene: from whether a pixel resembles its neighbour under the same lens, or the one at
+its place under the next lens. The guides tell that before any light is denoised, see :func:`best_form`.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lippmann.display import Display
+from lippmann.errors import UsageError
+from lippmann.image.micro_images import Permutation, micro_images_as_views
+from lippmann.image.views import view_grid
+from lippmann.rendering.denoise.oidn import Effort, denoise
+from lippmann.rendering.film.feature_buffers import Guides
+
+FloatArray = NDArray[np.float32]
+Form = Literal["auto", "raw", "views"]
+
+#: Views with fewer pixels on a side are no pictures that the network knows: see ``docs/denoising.md``.
+SMALLEST_VIEW = 48
+
+#: Weight of a difference of normals (components in [-1, 1]) against one of albedo.
+_NORMAL_WEIGHT = 0.5
+
+
+def denoise_views(
+    pixels: NDArray[Any],
+    display: Display,
+    guides: Guides | None = None,
+    *,
+    form: Form = "auto",
+    effort: Effort = "high",
+    turned: bool = False,
+    threads: int | None = None,
+) -> FloatArray:
+    """An integral image without its noise.
+
+    Parameters
+    ----------
+    pixels:
+        ``(H, W, 3)`` finite linear RGB of the display's panel.
+    guides:
+        Albedo and normal of the same pixels, from :func:`~lippmann.rendering.film.feature_buffers.trace_guides`. None
+        does without, at the price of one to four dB.
+    form:
+        ``raw``, ``views`` (where these are exact), or what :func:`best_form` says.
+    effort, turned, threads:
+        As those of :func:`~lippmann.rendering.denoise.oidn.denoise`.
+
+    Raises
+    ------
+    UsageError
+        ``pyoidn`` is missing, the sizes differ, or the display has no exact views to denoise.
+    EngineError
+        Open Image Denoise fails.
+    """
+    if form not in get_args(Form):
+        raise UsageError(f"'{form}' is not known", where="form", rule=f"known are {', '.join(get_args(Form))}")
+    panel = display.panel
+    if pixels.shape != (panel.height, panel.width, 3):
+        rule = f"the display {display.name} has {panel.width} x {panel.height}"
+        raise UsageError(f"the pixels have the shape {pixels.shape}", where="denoise", rule=rule)
+    layers = [pixels, *(() if guides is None else (guides.albedo, guides.normal))]
+    if (best_form(display, guides) if form == "auto" else form) == "raw":
+        return _denoised(layers, effort, turned, threads)
+    return _by_views(layers, display, effort, turned, threads)
+
+
+def best_form(display: Display, guides: Guides | None) -> Literal["raw", "views"]:
+    """The form that leaves less error, as far as display and guides tell.
+
+    Views, where they are exact and large enough for the network, and where neighbours in a view are more alike than
+    neighbours on the panel.
+    """
+    if not has_exact_views(display) or guides is None:
+        return "raw"
+    _, _, rows, columns = _view_shape(display)
+    if min(rows, columns) < SMALLEST_VIEW:
+        return "raw"
+    on_panel, in_view = neighbour_differences(display, guides)
+    return "views" if in_view < on_panel else "raw"
+
+
+def neighbour_differences(display: Display, guides: Guides) -> tuple[float, float]:
+    """Mean absolute difference of the guides between neighbours on the panel and between those in a view.
+
+    Taken across the lenses: along a cylindrical lens both orders have the same neighbours.
+    """
+    axes = (1,) if display.lens_array.layout == "lenticular" else (0, 1)
+    on_panel, in_view = 0.0, 0.0
+    for guide, weight in ((guides.albedo, 1.0), (guides.normal, _NORMAL_WEIGHT)):
+        micro_images = Permutation(display).split(guide)
+        for axis in axes:
+            on_panel += weight * _mean_step(guide, axis)
+            in_view += weight * _mean_step(micro_images, axis)
+    return on_panel, in_view
+
+
+def has_exact_views(display: Display) -> bool:
+    """Whether the views of a display are an exact permutation of its pixels, with all places filled."""
+    return view_grid(display).exact and bool(Permutation(display).mask.all())
+
+
+def _mean_step(values: FloatArray, axis: int) -> float:
+    low = np.take(values, range(values.shape[axis] - 1), axis)
+    high = np.take(values, range(1, values.shape[axis]), axis)
+    return float(np.abs(high - low).mean()) if low.size else 0.0
+
+
+def _view_shape(display: Display) -> tuple[int, ...]:
+    rows, columns, ny, nx = Permutation(display).shape
+    return (1, nx, ny, columns) if display.lens_array.layout == "lenticular" else (ny, nx, rows, columns)
+
+
+def _by_views(
+    layers: list[NDArray[Any]], display: Display, effort: Effort, turned: bool, threads: int | None
+) -> FloatArray:
+    if not has_exact_views(display):
+        raise UsageError(
+            f"the lenses of the display {display.name} do not cover whole pixels",
+            where="form",
+            rule="its views cannot be put together again",
+            fix="use raw",
+        )
+    permutation = Permutation(display)
+    views = [micro_images_as_views(permutation.split(layer), display) for layer in layers]
+    result = np.empty(views[0].shape, dtype=np.float32)
+    for place in np.ndindex(result.shape[:2]):
+        result[place] = _denoised([layer[place] for layer in views], effort, turned, threads)
+    return permutation.join(micro_images_as_views(result, display))
+
+
+def _denoised(layers: list[NDArray[Any]], effort: Effort, turned: bool, threads: int | None) -> FloatArray:
+    color, *guides = layers
+    if not guides:
+        return denoise(color, effort=effort, turned=turned, threads=threads)
+    # The guides follow mirrors and glass without chance, so what noise they have lies along edges alone.
+    return denoise(color, *guides, clean_guides=True, effort=effort, turned=turned, threads=threads)

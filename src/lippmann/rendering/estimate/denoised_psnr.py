@@ -1,0 +1,127 @@
+"""How good a denoised picture is by its own account.
+
+Its halves judge each other (:mod:`lippmann.rendering.denoise.dual_buffer`). What they differ by is known exactly; what
+they have wrong in common is measured, right on the average but often far noisier than what it measures. How the one
+follows from the other, and how both are weighed, is in :mod:`lippmann.rendering.estimate.bias_posterior`; that is the
+whole picture's error.
+
+A micro-image's share of it is in proportion to what the halves differ by there, drawn a little towards its neighbours:
+that tells micro-images apart far better than the samples' errors do, and the worst of all lies within a few dB of where
+it says. Its own measurement corrects it as far as that can be believed. Where a micro-image seems worse by what noise
+does not explain, it is: what a denoiser is wrong by where it meets an edge or a lamp is large in few pixels, where the
+samples themselves are good. One of few pixels, in a corner of the panel, may differ by chance.
+
+The constants were chosen on ``benchmarks/hard_scenes.py``.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lippmann.rendering.estimate.bias_posterior import likely_error
+from lippmann.rendering.estimate.pixel_errors import CROSS_NOISE, ErrorSums, PixelErrors, parts_with_pixels
+from lippmann.rendering.estimate.psnr import (
+    DRAWS,
+    LEAN,
+    MODEL_UNCERTAINTY,
+    NORMAL_95,
+    Estimate,
+    PartErrors,
+    PictureEstimator,
+    neighbourhood,
+    psnr_of,
+)
+
+Real = NDArray[np.float64]
+
+#: How far a micro-image's difference between the halves is drawn to its neighbours', as a power.
+TOWARDS_NEIGHBOURS = 0.25
+#: How far micro-images are from the proportion to that, as a relative variance.
+SPREAD = 0.5
+#: A micro-image seems worse than in proportion from so many squared deviations of its measurement on, and ...
+WORSE_FROM = 2.0
+#: ... so many times the squares of its samples' errors: hits that are rare and strong show in these, too.
+EXPLAINED = 400.0
+#: As parts of what is expected, and of the mean: no micro-image is taken to be better.
+LEAST_EXPECTED, LEAST_OF_MEAN = 0.2, 1e-3
+#: Halves that differ by less than this part of their samples' errors do so for another reason than that noise is gone.
+LEAST_OF_SAMPLES = 1e-4
+#: Pixels that one micro-image has fewer than the usual one count so many times, for its error to be another one.
+FEW = 40.0
+#: As parts of the error stated for all and for the worst: pictures that are hard to judge are often better by that.
+OFTEN_BETTER, WORST_OFTEN_BETTER = 0.8, 0.6
+#: Of the draws of the worst error: what is stated, and the ends of its interval.
+_OF_WORST = (0.5, 0.975, 0.025)
+_NOTHING = 1e-30
+
+
+class DenoisedEstimator(PictureEstimator):
+    """Estimates for denoised pictures; their errors carry those of the samples, and what the halves differ by."""
+
+    #: With these intervals are honest on scenes that are hard to judge.
+    first = fewest = 4
+
+    def estimate(self, errors: PixelErrors) -> Estimate:
+        """PSNR of the whole and of the worst micro-image."""
+        assert errors.samples is not None
+        return estimate_denoised(self._sums(errors), self._sums(errors.samples), (self._rows, self._columns))
+
+
+def estimate_denoised(judged: ErrorSums, samples: ErrorSums, grid: tuple[int, int]) -> Estimate:
+    """PSNR of the whole and of the worst part, from what the halves say of each other and from the samples' errors."""
+    index, judged = parts_with_pixels(judged)
+    _, samples = parts_with_pixels(samples)
+    pixels = float(judged.pixels.sum())
+    by_chance, error = float(judged.apart.sum()) / pixels, float(judged.values.sum()) / pixels
+    deviation = math.sqrt(CROSS_NOISE.estimate * float(judged.squares.sum())) / pixels
+    of_samples = max(float(samples.values.sum()), _NOTHING)
+    lone = min(1.0, float(samples.lone.sum()) / of_samples)
+    likely = likely_error(max(by_chance, LEAST_OF_SAMPLES * of_samples / pixels), error - by_chance, deviation, lone)
+    middle = float(likely.quantiles(0.5))
+    model = math.exp(NORMAL_95 * MODEL_UNCERTAINTY)
+    worse, better = likely.quantiles(np.array([0.975, 0.025])) * (model, OFTEN_BETTER / model)
+
+    parts = _parts(judged, samples.squares, index, grid, middle)
+    worst = np.quantile(_worst_drawn(parts, likely.quantiles((np.arange(DRAWS) + 0.5) / DRAWS) / middle), _OF_WORST)
+    row, column = divmod(int(index[np.argmax(parts.expected)]), grid[1])
+    psnr, psnr_low, psnr_high = (float(value) for value in psnr_of(np.array([middle, worse, better])))
+    of_worst, worst_low, worst_high = (float(value) for value in psnr_of(worst * (1, 1, WORST_OFTEN_BETTER)))
+    return Estimate(psnr, psnr_low, psnr_high, of_worst, worst_low, worst_high, (column, row))
+
+
+def _worst_drawn(parts: PartErrors, common: Real) -> Real:
+    """Errors of the worst part, as often as is drawn; ``common`` are the factors that all parts may have alike."""
+    random = np.random.default_rng(2)
+    model = np.exp(MODEL_UNCERTAINTY * random.standard_normal(DRAWS))
+    drawn: Real = parts.draws().max(axis=0) * common[random.permutation(DRAWS)] * model
+    return drawn
+
+
+def _parts(
+    judged: ErrorSums, of_samples: Real, index: NDArray[np.intp], grid: tuple[int, int], mean: float
+) -> PartErrors:
+    """Each part's error: in proportion to what its halves differ by, drawn from there to its own measurement.
+
+    ``mean`` is that of all; ``of_samples`` are the sums of the squares of the samples' errors.
+    """
+    count = judged.pixels
+    measured, apart = judged.values / count, judged.apart / count
+    (near,), _ = neighbourhood(apart[None], index, grid)
+    least = LEAST_OF_MEAN * float(judged.apart.sum() / count.sum()) + _NOTHING
+    around = np.maximum(apart, least) ** (1 - TOWARDS_NEIGHBOURS) * np.maximum(near, least) ** TOWARDS_NEIGHBOURS
+    around *= mean / float((around * count).sum() / count.sum())
+    # The mean square of one part is noisy itself: it leans on what all have, in proportion.
+    overall = float(judged.squares.sum()) / float((np.square(around) * count).sum())
+    noise = CROSS_NOISE.estimate * (judged.squares + LEAN * overall * np.square(around)) / (count + LEAN) / count
+
+    explained = WORSE_FROM * noise + EXPLAINED * of_samples / np.square(count)
+    other = np.where(measured > around, np.square(measured - around) - explained, 0.0)
+    between = np.maximum(SPREAD * np.square(around), other)
+    trust = between / (between + noise)
+    expected = np.maximum(around + trust * (measured - around), LEAST_EXPECTED * around)
+    variance = np.log1p(trust * noise / np.square(expected))
+    fewer = np.maximum(1 / count - 1 / np.median(count), 0)
+    return PartErrors(index, expected, expected, variance, np.log1p(FEW * fewer))

@@ -1,0 +1,150 @@
+"""The squared error of a picture made of batches, pixel by pixel, from the batches alone.
+
+Errors are those between codes, as :mod:`lippmann.metrics.mse_psnr` measures them, but noise lies in linear light, and
+codes bend and clip it: a pixel that one path of a thousand makes a hundred times too bright shows white. So three
+things are summed:
+
+- The jackknife: how far the *code* of the mean moves when any one batch is left out. The mean without a batch is nearly
+  as good as the mean itself, so curve and clipping act on it as they do on the picture.
+- Less than that is true where samples are spread evenly: batches of one stream make up for each other. The difference
+  between the means of the two streams shows that, the differences between halves mixed of both do not; the former less
+  the latter is added.
+
+Where single samples decide (a batch with a bright hit that no other has), the pixels that were *not* hit are wrong,
+too, and nothing in them says so. That part of the error is told apart as *lone*, to be met with doubt.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from lippmann.color.transfer import Transfer
+
+Floats = NDArray[np.float32]
+
+#: Pixels worked on at a time.
+_CHUNK = 1 << 18
+#: A hit is lone if it makes up this share of what the batches differ by, and moves the code by as much as ...
+LONE_SHARE = 0.8
+#: ... this: below it the curve is nearly straight, and what is missing elsewhere is small as well.
+LONE_STEP = 0.15
+#: Of fewer batches a hit in one is never that large a share, ``(batches - 1) / batches``.
+LONE_TOLD_FROM = 6
+
+
+def error_of_batches(sums: Floats, taken: Sequence[int], transfer: Transfer) -> tuple[Floats, Floats]:
+    """Expected squared error of the codes of the mean of all samples, averaged over the three channels.
+
+    Parameters
+    ----------
+    sums:
+        ``(batches, pixels, 3)``: linear sums of the samples. The first half of the batches comes from one stream of
+        samples, the second half from another.
+    taken:
+        How many samples each batch has of every pixel; each stream has at least one.
+    transfer:
+        How values become codes.
+
+    Returns
+    -------
+    ``(pixels,)`` errors, unbiased (and noisy: single ones may be negative) unless bright hits are rare, and the part of
+    them that lone hits make up, at least 0.
+    """
+    pixels = sums.shape[1]
+    # Opaque to the compiler, so that every round runs the same kernel.
+    counts = [dr.opaque(mi.Float, number) for number in taken]
+    error, lone = np.empty(pixels, dtype=np.float32), np.empty(pixels, dtype=np.float32)
+    for first in range(0, pixels, _CHUNK):
+        part = slice(first, min(first + _CHUNK, pixels))
+        values = [mi.Color3f(np.ascontiguousarray(batch[part].T)) for batch in sums]
+        of_part = _Batches(values, counts, transfer)
+        jackknife, alone = of_part.jackknife()
+        result = jackknife + of_part.evenness()
+        dr.eval(result, alone)
+        error[part], lone[part] = np.array(result), np.array(alone)
+    return error, lone
+
+
+@dataclass
+class _Batches:
+    """Sums (``mi.Color3f``) and counts (``mi.Float``, one for all pixels) of all batches of some pixels."""
+
+    sums: list[Any]
+    counts: list[Any]
+    transfer: Transfer
+
+    def __post_init__(self) -> None:
+        self.total = sum(self.sums[1:], self.sums[0])
+        self.count = sum(self.counts[1:], self.counts[0])
+
+    def jackknife(self) -> tuple[Any, Any]:
+        """Squared error by leaving out one batch at a time, and what of it is lone."""
+        without = [
+            self._code((self.total - value) / dr.maximum(self.count - count, 1))
+            for value, count in zip(self.sums, self.counts, strict=True)
+        ]
+        # Batches that hold nothing change nothing: they are no witnesses.
+        present = [dr.select(count > 0, mi.Float(1), mi.Float(0)) for count in self.counts]
+        weight = sum(present[1:], present[0])
+        mean = sum((code * p for code, p in zip(without, present, strict=True)), mi.Color3f(0)) / weight
+        moves = [dr.square(code - mean) * p for code, p in zip(without, present, strict=True)]
+        error, spread, largest = mi.Float(0), mi.Float(0), mi.Float(0)
+        for move, count in zip(moves, self.counts, strict=True):
+            size = dr.sum(move) / 3
+            error += size * (self.count - count) / self.count
+            spread += size
+            largest = dr.maximum(largest, size)
+        decides = (largest > LONE_SHARE * spread) & (largest > LONE_STEP * LONE_STEP / 3)
+        return error, dr.select(decides, error, 0)
+
+    def evenness(self) -> Any:
+        """What the streams differ by less what halves mixed of both differ by."""
+        streams, _ = self._difference(range(len(self.sums) // 2))
+        mixed, number = mi.Float(0), mi.Float(0)
+        for split in _mixed_halves(len(self.sums)):
+            difference, known = self._difference(split)
+            mixed += difference
+            number += dr.select(known, mi.Float(1), mi.Float(0))
+        witnesses = sum((dr.select(count > 0, mi.Float(1), mi.Float(0)) for count in self.counts), mi.Float(0))
+        # In linear light the jackknife is the mean over all of the (batches - 1) ways to halve that do not overlap, the
+        # streams being one of them: with this weight, jackknife and evenness add up to what the streams say.
+        weight = (witnesses - 2) / dr.maximum(witnesses - 1, 1)
+        return dr.select(number > 0, weight * (streams - mixed / dr.maximum(number, 1)), 0)
+
+    def _difference(self, members: Any) -> tuple[Any, Any]:
+        """Squared error of the mean by the difference between ``members`` and the others; 0, False if one is empty."""
+        some = sum((self.sums[k] for k in members), mi.Color3f(0))
+        number = sum((self.counts[k] for k in members), mi.Float(0))
+        rest = self.count - number
+        known = (number > 0) & (rest > 0)
+        a = self._code(some / dr.maximum(number, 1))
+        b = self._code((self.total - some) / dr.maximum(rest, 1))
+        size = dr.sum(dr.square(a - b)) / 3 * number * rest / dr.square(self.count)
+        return dr.select(known, size, 0), known
+
+    def _code(self, linear: Any) -> Any:
+        value = dr.clip(linear, 0, 1)
+        if self.transfer == "linear":
+            return value
+        return dr.select(value <= 0.0031308, 12.92 * value, 1.055 * dr.power(dr.maximum(value, 1e-9), 1 / 2.4) - 0.055)
+
+
+def _mixed_halves(batches: int) -> list[tuple[int, ...]]:
+    """Halves that hold as much of one stream as of the other, uncorrelated with each other: Walsh's patterns."""
+    if batches == 2:
+        return []
+    streams = [k >= batches // 2 for k in range(batches)]
+    halves = []
+    for pattern in range(1, batches):
+        half = tuple(k for k in range(batches) if bin(pattern & k).count("1") % 2 == 0)
+        if len({streams[k] for k in half}) == 2:
+            halves.append(half)
+    # Three of them know nearly as much as all.
+    return halves[:3]

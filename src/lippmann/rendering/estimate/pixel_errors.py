@@ -1,0 +1,123 @@
+"""Estimates of the squared error of every pixel, and their sums over the parts of a picture.
+
+What is said of a picture (:mod:`lippmann.rendering.estimate.psnr`) follows from such sums alone. They add up over
+tiles.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Real = NDArray[np.float64]
+Floats = NDArray[np.float32]
+
+#: The share of a lone hit's estimate that is no estimate but the error itself.
+LONE_CERTAIN = 0.7
+
+
+@dataclass(frozen=True)
+class NoiseShares:
+    """What a pixel's estimate x says about variances, as multiples of the mean of x^2.
+
+    ``estimate``: of the estimate about the expected error; ``picture``: of the true error about the expected one. What
+    is independent from pixel to pixel adds up over a region.
+    """
+
+    estimate: float
+    picture: float
+
+
+#: Estimates by the difference of two independent halves of a picture. For normal noise of variance s its square is
+#: distributed as chi^2 with one degree of freedom: its own variance is 2 s^2, that of the true error 2 s^2 as well, and
+#: its mean square 3 s^2.
+OWN_NOISE = NoiseShares(2 / 3, 2 / 3)
+#: Products (p - a)(p - b) of a picture p with two unpooled pictures independent of it and of each other: they estimate
+#: the very error that p has, and a and b are all that is random.
+CROSS_NOISE = NoiseShares(1.0, 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class PixelErrors:
+    """Estimates of the squared error of each pixel's code, averaged over its channels.
+
+    Parameters
+    ----------
+    values:
+        ``(H, W)`` float32, unbiased; single ones may be negative.
+    lone:
+        ``(H, W)`` float32 of at least 0: the part of ``values`` that rests on single bright hits; None if there is no
+        such thing.
+    noise:
+        How uncertain ``values`` are.
+    samples:
+        Of a denoised picture: the errors of the samples that it was made of.
+    apart:
+        Of a denoised picture, ``(H, W)`` float32 of at least 0: the part of ``values`` that is no estimate, which is
+        what its halves differ by.
+    """
+
+    values: Floats
+    lone: Floats | None = None
+    noise: NoiseShares = CROSS_NOISE
+    samples: PixelErrors | None = None
+    apart: Floats | None = None
+
+    def part(self, inside: slice | tuple[slice, slice]) -> PixelErrors:
+        """Those of some pixels."""
+        lone, apart = (None if values is None else values[inside] for values in (self.lone, self.apart))
+        samples = None if self.samples is None else self.samples.part(inside)
+        return PixelErrors(self.values[inside], lone, self.noise, samples, apart)
+
+
+@dataclass(frozen=True, eq=False)
+class ErrorSums:
+    """Sums over the pixels of each part, ``(parts,)`` each: their number, their estimates, the squares of what is
+    uncertain of those, their lone parts, and what halves differ by."""
+
+    pixels: Real
+    values: Real
+    squares: Real
+    lone: Real
+    apart: Real
+
+    @classmethod
+    def none(cls, parts: int, pixels: NDArray[Any] | int = 0) -> ErrorSums:
+        """Sums of so many parts to which nothing was added yet, with ``pixels`` in each."""
+        return cls(np.full(parts, pixels, dtype=np.float64), *np.zeros((4, parts)))
+
+    def add(self, owner: NDArray[Any], errors: PixelErrors) -> None:
+        """Add the estimates of some pixels, any shape, to the parts that ``owner`` names; not to their number."""
+        owner = owner.ravel()
+        uncertain = values = errors.values.astype(np.float64).ravel()
+        self.values[:] += self._sum(owner, values)
+        if errors.lone is not None:
+            lone = errors.lone.astype(np.float64).ravel()
+            self.lone[:] += self._sum(owner, lone)
+            # A lone hit shows in the picture as it does in the estimate.
+            uncertain = values - LONE_CERTAIN * lone
+        if errors.apart is not None:
+            apart = errors.apart.astype(np.float64).ravel()
+            self.apart[:] += self._sum(owner, apart)
+            uncertain = uncertain - apart
+        self.squares[:] += self._sum(owner, np.square(uncertain))
+
+    def add_sums(self, parts: NDArray[Any], sums: ErrorSums) -> None:
+        """Add sums of the parts with these numbers, each at most once; their numbers of pixels, too."""
+        self.pixels[parts] += sums.pixels
+        self.values[parts] += sums.values
+        self.squares[parts] += sums.squares
+        self.lone[parts] += sums.lone
+        self.apart[parts] += sums.apart
+
+    def _sum(self, owner: NDArray[Any], values: Real) -> Real:
+        return np.asarray(np.bincount(owner, weights=values, minlength=len(self.pixels)), dtype=np.float64)
+
+
+def parts_with_pixels(sums: ErrorSums) -> tuple[NDArray[np.intp], ErrorSums]:
+    """The flat indices of the parts that have pixels, and their sums."""
+    index = np.flatnonzero(sums.pixels)
+    return index, ErrorSums(*(getattr(sums, field.name)[index] for field in fields(ErrorSums)))

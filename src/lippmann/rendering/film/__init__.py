@@ -1,0 +1,1 @@
+"""Wavefronts of samples, sample batches, feature buffers, and AOVs."""

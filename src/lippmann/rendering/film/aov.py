@@ -1,0 +1,127 @@
+"""What each pixel sees, in numbers: ground truth for whoever estimates it from the picture.
+
+One ray through each pixel's middle, and nothing averaged: between two surfaces there is no third. All layers speak of
+the display's frame (mm, +z toward the viewer).
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from lippmann.progress import Progress, ProgressCallback, silent
+from lippmann.rendering.film.wavefront import divide
+from lippmann.rendering.film.wavefront_plan import Plan, Tile, make_plan
+from lippmann.rendering.transport.first_surface import Surfaces, surfaces_of
+from lippmann.rendering.transport.ray_source import RaySource
+
+if TYPE_CHECKING:
+    from lippmann.device.pbr import BuiltScene
+    from lippmann.device.whitted.scene import BuiltClassic
+
+FloatArray = NDArray[np.float32]
+
+#: Layers and their channels.
+LAYERS = {"depth": 1, "normal": 3, "albedo": 3, "shape": 1, "position": 3}
+
+#: All layers of a pixel, and the copies that a file writer makes of them.
+_BYTES_PER_PIXEL = 2 * 4 * sum(LAYERS.values())
+
+#: The sub-pixel in the middle, whose place is the pixel's.
+_MIDDLE_CHANNEL = 1
+
+
+def plan_layers(source: RaySource, memory: int) -> Plan:
+    """Tiles for the layers of a picture within ``memory`` bytes, those of the layers themselves included.
+
+    Raises
+    ------
+    MemoryLimitError
+        If that is too little for one row.
+    """
+    kept = source.width * source.height * _BYTES_PER_PIXEL
+    return make_plan(source.width, source.height, 1, memory=memory - kept)
+
+
+def trace_layers(
+    built: BuiltScene | BuiltClassic,
+    source: RaySource,
+    plan: Plan,
+    display_from_world: NDArray[np.float64],
+    progress: ProgressCallback = silent,
+) -> dict[str, FloatArray]:
+    """The first surface that the middle of each pixel sees.
+
+    Parameters
+    ----------
+    built:
+        The scene on the device.
+    source:
+        Rays of the pixels. Of sub-pixels with rays of their own those in the middle count.
+    plan:
+        Tiles from :func:`plan_layers`; the result is the same whatever they are.
+    display_from_world:
+        ``(4, 4)`` similarity to the frame that the layers speak of.
+
+    Returns
+    -------
+    float32 arrays by name, ``(H, W)`` or ``(H, W, 3)``:
+
+    - ``depth``: z of the point seen in mm, positive in front of the lens plane, negative behind; minus infinity where
+      nothing is seen.
+    - ``position``: the point (x, y, z) in mm; not a number where nothing is seen.
+    - ``normal``: unit normal that light is scattered by, normal map included, on the side that is seen; 0 where nothing
+      is.
+    - ``albedo``: linear RGB reflectance in [0, 1], see ``docs/layers.md``; 0 where nothing is seen.
+    - ``shape``: whole number of the shape, see ``docs/layers.md``; -1 where nothing is seen.
+    """
+    surfaces = surfaces_of(built)
+    layers = {
+        name: np.zeros((plan.height, plan.width, channels)[: 2 if channels == 1 else 3], dtype=np.float32)
+        for name, channels in LAYERS.items()
+    }
+    for tile in plan.tiles:
+        rows = slice(tile.first_row, tile.first_row + tile.rows)
+        for name, values in _trace_tile(surfaces, source, tile, plan.width, display_from_world).items():
+            layers[name][rows] = values.reshape(layers[name][rows].shape)
+        progress(Progress("layers", tile.first_row + tile.rows, plan.height))
+    return layers
+
+
+def _trace_tile(
+    surfaces: Surfaces, source: RaySource, tile: Tile, width: int, display_from_world: NDArray[np.float64]
+) -> dict[str, FloatArray]:
+    lanes = tile.rows * width
+    row, column = divide(dr.arange(mi.UInt32, lanes), width)
+    # Opaque, so that one kernel serves all tiles.
+    row += dr.opaque(mi.UInt32, tile.first_row)
+    ray = source.rays(column, row, mi.UInt32(_MIDDLE_CHANNEL), mi.Point2f(0.5))
+    seen = surfaces.first(ray, mi.Bool(True))
+    position = to_frame(display_from_world, seen.p) + mi.Vector3f(*display_from_world[:3, 3].tolist())
+    position = dr.select(seen.hit, position, dr.nan)
+    values = {
+        "depth": dr.select(seen.hit, position.z, -dr.inf),
+        "normal": dr.select(seen.hit, dr.normalize(to_frame(display_from_world, seen.n)), 0),
+        "albedo": seen.albedo,
+        "shape": dr.select(seen.hit, mi.Float(seen.shape), -1),
+        "position": position,
+    }
+    dr.eval(values)
+    return {name: to_numpy(value, lanes) for name, value in values.items()}
+
+
+def to_frame(matrix: NDArray[np.float64], vector: Any) -> Any:
+    """The linear part of ``matrix`` on a vector of the device."""
+    rows = matrix[:3, :3].tolist()
+    return mi.Vector3f(*(row[0] * vector.x + row[1] * vector.y + row[2] * vector.z for row in rows))
+
+
+def to_numpy(value: Any, lanes: int) -> FloatArray:
+    """``(lanes,)`` or ``(lanes, channels)`` of an evaluated array; one of a single entry counts for every lane."""
+    array = np.asarray(value, dtype=np.float32).T
+    shape = (lanes,) if array.ndim == 1 else (lanes, array.shape[1])
+    return np.ascontiguousarray(np.broadcast_to(array, shape))

@@ -1,0 +1,134 @@
+"""Guides for a denoiser: what each pixel sees on the average of its samples."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from lippmann.progress import Progress, ProgressCallback, silent
+from lippmann.rendering.film.aov import to_numpy
+from lippmann.rendering.film.wavefront import rays_of_tile
+from lippmann.rendering.film.wavefront_plan import Pass, Plan, Tile, make_plan
+from lippmann.rendering.transport.first_surface import Surfaces, surfaces_of
+from lippmann.rendering.transport.ray_source import RaySource
+
+if TYPE_CHECKING:
+    from lippmann.device.pbr import BuiltScene
+    from lippmann.device.whitted.scene import BuiltClassic
+
+FloatArray = NDArray[np.float32]
+
+#: Samples of a pixel: fewer leave steps in the guides where edges cross it, more gain nothing.
+LEAST_SAMPLES, MOST_SAMPLES = 8, 16
+
+#: Albedo, normal and height, and what a tile adds to them.
+_BYTES_PER_PIXEL = 56
+
+#: Heights beyond this many millimetres count as lying there: light lines of all lenses are parallel for them.
+_FARTHEST = 1e5
+
+#: Added to the albedo.
+_LEAST_ALBEDO = 0.02
+
+
+@dataclass(frozen=True, eq=False)
+class Guides:
+    """``albedo`` and ``normal``, ``(H, W, 3)`` float32 each; components in [0, 1] and in [-1, 1] (display frame).
+
+    ``height`` is ``(H, W)`` float32: the z (mm) at which things seem to lie, those in mirrors behind them. None where
+    it is not known.
+    """
+
+    albedo: FloatArray
+    normal: FloatArray
+    height: FloatArray | None = None
+
+    def reflected(self) -> FloatArray:
+        """``(H, W, 3)``: what colour is divided by for light that can be shared, and light multiplied by for colour.
+
+        The albedo, and a little more: black surfaces that shine have light, too.
+        """
+        return np.asarray(np.clip(self.albedo, 0, 1) + np.float32(_LEAST_ALBEDO), dtype=np.float32)
+
+
+def plan_guides(source: RaySource, samples: int, memory: int) -> Plan:
+    """Tiles and passes for the guides of a picture of so many samples a pixel, within ``memory`` bytes.
+
+    Raises
+    ------
+    MemoryLimitError
+        If that is too little for one row.
+    """
+    kept = source.width * source.height * _BYTES_PER_PIXEL
+    samples = min(max(samples, LEAST_SAMPLES), MOST_SAMPLES)
+    return make_plan(source.width, source.height, samples, channels=source.channels, memory=memory - kept)
+
+
+def trace_guides(
+    built: BuiltScene | BuiltClassic,
+    source: RaySource,
+    plan: Plan,
+    display_from_world: NDArray[np.float64],
+    *,
+    seed: int = 0,
+    box_filter: bool = True,
+    progress: ProgressCallback = silent,
+) -> Guides:
+    """Albedo, normal, height of the first surface that is neither mirror nor clear glass, as a pixel's samples see it.
+
+    ``plan`` comes from :func:`plan_guides`; ``box_filter`` is that of the picture, ``seed`` should be another one:
+    where samples fall is all the noise that guides hold, and it would be the picture's own. A sub-pixel that has rays
+    of its own gets its own channel of the albedo from them; normal and height are the means of all three.
+    """
+    surfaces = surfaces_of(built)
+    matrix = np.asarray(display_from_world, dtype=np.float64)
+    linear = matrix[:3, :3]
+    rotation = (linear / np.cbrt(np.linalg.det(linear))).astype(np.float32)
+    albedo = np.zeros((plan.height, plan.width, 3), dtype=np.float32)
+    normal = np.zeros_like(albedo)
+    height = np.zeros((plan.height, plan.width), dtype=np.float32)
+    done = 0
+    for tile, run in plan:
+        rows = slice(tile.first_row, tile.first_row + tile.rows)
+        *found, heights = _trace_tile(surfaces, source, plan, tile, run, seed, box_filter, matrix[2])
+        shape = (tile.rows, plan.width, plan.channels, 3)
+        colors, normals = (to_numpy(part, shape[0] * shape[1] * shape[2]).reshape(shape) for part in found)
+        height[rows] += np.array(heights, dtype=np.float32).reshape(shape[:3]).mean(axis=2) / plan.samples
+        if plan.channels == 3:
+            colors = np.diagonal(colors, axis1=2, axis2=3)[:, :, None]
+        albedo[rows] += colors[:, :, 0] / plan.samples
+        normal[rows] += normals.mean(axis=2) @ rotation.T / plan.samples
+        done += tile.rows * plan.width * plan.channels * run.count
+        progress(Progress("guides", done, plan.work))
+    return Guides(albedo, normal, height)
+
+
+def _trace_tile(
+    surfaces: Surfaces,
+    source: RaySource,
+    plan: Plan,
+    tile: Tile,
+    run: Pass,
+    seed: int,
+    box_filter: bool,
+    z_from_world: NDArray[np.float64],
+) -> tuple[Any, Any, Any]:
+    """Sums over the samples of one pass, for every pixel and channel: colours, world-space normals, and heights."""
+    lanes = tile.rows * plan.width * plan.channels * run.count
+    # Lanes are those of a picture.
+    ray, _ = rays_of_tile(source, plan, tile, run, seed, box_filter)
+    albedo, normal, distance = surfaces.guide(ray, mi.Bool(True))
+    x, y, z = mi.Point3f(ray.o) + mi.Vector3f(ray.d) * distance
+    weights = [dr.opaque(mi.Float, float(weight)) for weight in z_from_world]
+    height = dr.clip(x * weights[0] + y * weights[1] + z * weights[2] + weights[3], -_FARTHEST, _FARTHEST)
+    values = [mi.Float(part) + dr.zeros(mi.Float, lanes) for part in (*albedo, *normal, height)]
+    # All at once: sums one by one would follow the rays seven times.
+    dr.eval(values)
+    if run.count > 1:
+        values = [dr.block_sum(part, run.count) for part in values]
+    return mi.Color3f(*values[:3]), mi.Vector3f(*values[3:6]), values[6]

@@ -1,0 +1,381 @@
+"""Every ray of every pixel, in batches: from how they differ follows the error of the picture they make together.
+
+The samples of a pixel come from ``STREAMS`` sample streams that know nothing of each other, and those of each stream
+in equally many runs, one batch each. Samples of one stream are spread evenly over the pixel and the lights together, so
+that a picture from few streams is better than one from many; the difference between streams tells how much better.
+What the batches tell is worked out in :mod:`lippmann.rendering.estimate.jackknife`.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from lippmann.color.transfer import Transfer
+from lippmann.device.sobol import PIXEL_DIMENSION, SampleStream
+from lippmann.display.pixel_window import Window
+from lippmann.errors import MemoryLimitError, UsageError
+from lippmann.progress import Progress, ProgressCallback, silent
+from lippmann.rendering.estimate.jackknife import error_of_batches
+from lippmann.rendering.estimate.pixel_errors import OWN_NOISE, PixelErrors
+from lippmann.rendering.film.wavefront import Frame, RayTotals, compile_seconds, divide, evaluated
+from lippmann.rendering.film.wavefront_plan import BYTES_PER_LANE, BYTES_PER_PIXEL, PREFERRED_LANES, SMALLEST_LANES
+from lippmann.rendering.transport.integrator import Integrator
+from lippmann.rendering.transport.ray_source import RaySource, pixel_number
+
+Floats = NDArray[np.float32]
+
+#: Independent sample streams: two are the fewest that can be compared, and cost the least evenness.
+STREAMS = 2
+#: Batches where the memory allows: their number limits how well rare bright light is told from steady noise.
+MOST_BATCHES = 8
+#: Samples of a first look at how long they take, spread over the picture; enough are those that take as long as this in
+#: seconds, a launch's own time left out.
+_PROBE_SIZES, _PROBE_SECONDS = (1 << 14, 1 << 16, 1 << 18), 0.05
+#: Samples of a launch that takes hardly more than launches do; a single one would have a kernel of its own.
+_LAUNCH_SIZE = 64
+#: Seeds of the streams: the user's, each changed by another odd multiple of the golden ratio's 32 bits.
+SEED_STEP = 0x9E3779B9
+
+
+@dataclass(frozen=True)
+class _Run:
+    """One wavefront: ``count`` samples in each of ``batches`` for the pixels ``first`` to ``last``.
+
+    ``starts``: the number of the first sample of each batch in its stream. ``step``: from pixel to pixel.
+    """
+
+    first: int
+    last: int
+    batches: tuple[int, ...]
+    starts: tuple[int, ...]
+    count: int
+    step: int = 1
+
+
+class FullInBatches:
+    """A picture that gets better with every call of :meth:`add` and knows how good it is.
+
+    Parameters
+    ----------
+    integrator, source:
+        What is gathered along which rays.
+    seed:
+        0 to 2**32 - 1. With the same calls of :meth:`add` the same seed gives the same picture.
+    box_filter:
+        Samples are spread over the pixel; else all go through its centre.
+    transfer:
+        How values become codes; errors are measured between codes.
+    memory:
+        Bytes that may be used, the picture's own included; the fewer, the fewer batches are kept apart.
+    window:
+        The part of the picture that is rendered; None for all of it. Parts rendered apart are the same as in one piece.
+
+    Attributes
+    ----------
+    rays, seconds_compile, seconds_trace:
+        What all calls of :meth:`add` took together.
+
+    Raises
+    ------
+    MemoryLimitError
+        If two batches of the picture and one wavefront do not fit into ``memory``.
+    """
+
+    def __init__(
+        self,
+        integrator: Integrator,
+        source: RaySource,
+        *,
+        seed: int = 0,
+        box_filter: bool = True,
+        transfer: Transfer = "srgb",
+        memory: int,
+        window: Window | None = None,
+    ) -> None:
+        self._integrator = integrator
+        self._source = source
+        self._seed = seed
+        self._box_filter = box_filter
+        self._transfer: Transfer = transfer
+        self.rays = RayTotals()
+        self.seconds_compile = 0.0
+        self.seconds_trace = 0.0
+        self._window = window or Window(0, 0, source.height, source.width)
+        self._shape = self._window.shape
+        pixels = self._shape[0] * self._shape[1]
+        batches, self._lanes = _sizes(pixels, source.channels, memory)
+        self._sums = np.zeros((batches, pixels, 3), dtype=np.float32)
+        self._taken = [0] * batches
+        # Plain and denoised pictures of the same samples both ask for their errors.
+        self._errors: PixelErrors | None = None
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Height and width of what is rendered."""
+        return self._shape
+
+    @property
+    def samples(self) -> int:
+        """Samples that each pixel has had."""
+        return sum(self._taken)
+
+    def add(self, samples: int, progress: ProgressCallback = silent) -> None:
+        """Take ``samples`` more of every pixel."""
+        channels, pixels = self._source.channels, self._sums.shape[1]
+        started, done, compiled = time.perf_counter(), 0, 0.0
+        self._errors = None
+        taken = list(self._taken)
+        for run in self._runs(samples):
+            with dr.scoped_set_flag(dr.JitFlag.KernelHistory, done == 0):
+                sums = self._trace(run)
+                if done == 0:
+                    compiled = compile_seconds()
+            for place, batch in enumerate(run.batches):
+                self._sums[batch, run.first : run.last] += sums[:, place]
+                if run.last == pixels:
+                    taken[batch] += run.count
+            done += (run.last - run.first) * channels * run.count * len(run.batches)
+            progress(Progress("trace", done, pixels * channels * samples))
+        self._taken = taken
+        self.seconds_compile += compiled
+        self.seconds_trace += time.perf_counter() - started - compiled
+
+    def probe(self) -> float:
+        """Seconds that one sample of every pixel takes, by a few samples that are not kept."""
+        rays, self.rays = self.rays, RayTotals()
+        started = time.perf_counter()
+        try:
+            with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
+                self._seconds_of(_LAUNCH_SIZE)
+                compiled = compile_seconds()
+            seconds = self._probed()
+        finally:
+            self.rays = rays
+        self.seconds_compile += compiled
+        self.seconds_trace += time.perf_counter() - started - compiled
+        return seconds
+
+    def _probed(self) -> float:
+        launch = min(self._seconds_of(_LAUNCH_SIZE) for _ in range(3))
+        most = min(self._sums.shape[1], max(1, self._lanes // self._source.channels))
+        for pixels in (min(size, most) for size in _PROBE_SIZES):
+            spent = self._seconds_of(pixels)
+            if spent >= launch + _PROBE_SECONDS:
+                break
+        # However it is measured, the launch takes its part of a small picture's time.
+        return max(spent - launch, 0.1 * spent) * self._sums.shape[1] / pixels
+
+    def _seconds_of(self, pixels: int) -> float:
+        """Of one sample of each of so many pixels, if the picture has them."""
+        pixels = min(pixels, self._sums.shape[1])
+        started = time.perf_counter()
+        self._trace(_Run(0, pixels, (0,), (0,), 1, self._sums.shape[1] // pixels))
+        return time.perf_counter() - started
+
+    def picture(self) -> Floats:
+        """``(H, W, 3)`` float32: the mean of all samples, linear; black where there are none."""
+        total: Floats = self._sums.sum(axis=0)
+        total *= np.float32(1 / max(1, self.samples))
+        return total.reshape(*self.shape, 3)
+
+    def halves(self) -> tuple[Floats, Floats]:
+        """The means of either stream's samples, ``(H, W, 3)`` each; they know nothing of each other."""
+        per_stream = len(self._sums) // STREAMS
+        parts = []
+        for begin in range(0, len(self._sums), per_stream):
+            taken = sum(self._taken[begin : begin + per_stream])
+            total = self._sums[begin : begin + per_stream].sum(axis=0)
+            parts.append((total * np.float32(1 / max(1, taken))).reshape(*self.shape, 3))
+        return parts[0], parts[1]
+
+    def squared_error(self) -> PixelErrors:
+        """The expected squared error of every pixel's code, see
+        :func:`lippmann.rendering.estimate.jackknife.error_of_batches`.
+
+        Raises
+        ------
+        UsageError
+            If there are fewer than two samples per pixel.
+        """
+        if self.samples < STREAMS:
+            raise UsageError("one sample per pixel does not tell its own error", rule="two or more do")
+        if self._errors is None:
+            error, lone = error_of_batches(self._shown_sums(), self._taken, self._transfer)
+            shape = self.shape[0], -1
+            self._errors = PixelErrors(error.reshape(shape), lone.reshape(shape), OWN_NOISE)
+        return self._errors
+
+    def _shown_sums(self) -> Floats:
+        """``(batches, pixels, 3)``: the sums of what the picture shows."""
+        return self._sums
+
+    def _runs(self, samples: int) -> Iterator[_Run]:
+        """Wavefronts that take ``samples`` more of every pixel."""
+        number = len(self._sums)
+        per_stream = number // STREAMS
+        each, rest = divmod(samples, number)
+        # Where the streams go on; their batches take one stretch after the other.
+        had = [sum(self._taken[s * per_stream : (s + 1) * per_stream]) for s in range(STREAMS)]
+        # The rest goes to the batches that have the fewest, in turn of their streams.
+        fewest = sorted(_alternate(number), key=lambda batch: self._taken[batch])
+        for batches, count in ((tuple(range(number)), each), (tuple(sorted(fewest[:rest])), 1)):
+            starts = []
+            for batch in batches:
+                starts.append(had[batch // per_stream])
+                had[batch // per_stream] += count
+            if batches and count:
+                yield from self._cut(batches, tuple(starts), count)
+
+    def _cut(self, batches: tuple[int, ...], starts: tuple[int, ...], count: int) -> Iterator[_Run]:
+        """The same work in wavefronts of about equally many lanes."""
+        pixels, lanes = self._sums.shape[1], self._lanes // self._source.channels
+        per_run = max(1, min(pixels, lanes // (count * len(batches)) or lanes // count or lanes))
+        per_run = -(-pixels // -(-pixels // per_run))
+        together = max(1, min(len(batches), lanes // (per_run * count)))
+        length = max(1, min(count, lanes // per_run))
+        for first in range(0, pixels, per_run):
+            for b in range(0, len(batches), together):
+                for before in range(0, count, length):
+                    yield _Run(
+                        first,
+                        min(first + per_run, pixels),
+                        batches[b : b + together],
+                        tuple(start + before for start in starts[b : b + together]),
+                        min(length, count - before),
+                    )
+
+    def _trace(self, run: _Run) -> Floats:
+        """Sums over the samples of a run, ``(pixels, batches of the run, 3)``.
+
+        Lanes are ordered pixel, then channel, then batch, then sample. What differs from run to run is opaque to the
+        compiler, so that all share a kernel.
+        """
+        channels, window = self._source.channels, self._window
+        number, per_stream = len(run.batches), len(self._sums) // STREAMS
+        lanes = (run.last - run.first) * channels * number * run.count
+        rest, sample = divide(dr.arange(mi.UInt32, lanes), dr.opaque(mi.UInt32, run.count))
+        rest, place = divide(rest, dr.opaque(mi.UInt32, number))
+        pixel, channel = divide(rest, channels)
+        pixel = dr.opaque(mi.UInt32, run.first) + pixel * dr.opaque(mi.UInt32, run.step)
+        row, column = divide(pixel, window.columns)
+        row += dr.opaque(mi.UInt32, window.row)
+        column += dr.opaque(mi.UInt32, window.column)
+        pixel = pixel_number(self._source, column, row)
+        sample += dr.gather(mi.UInt32, _table(run.starts), place)
+        stream_of = dr.gather(mi.UInt32, _table([batch // per_stream for batch in run.batches]), place)
+        seed = dr.opaque(mi.UInt32, self._seed) + stream_of * SEED_STEP
+
+        stream = SampleStream.of_pixels(pixel * channels + channel, sample, seed)
+        jitter = stream.next_2d(PIXEL_DIMENSION) if self._box_filter else mi.Point2f(0.5)
+        ray = self._source.rays(column, row, channel, jitter)
+        radiance, counts = self._integrator.sample(ray, stream, mi.Bool(True))
+        radiance = evaluated(radiance, counts, lanes, self.rays)
+        return _sums(radiance, channels, number, run.count)
+
+
+def trace_in_batches(
+    integrator: Integrator,
+    source: RaySource,
+    samples: int,
+    *,
+    seed: int = 0,
+    box_filter: bool = True,
+    transfer: Transfer = "srgb",
+    memory: int,
+    progress: ProgressCallback = silent,
+) -> tuple[Frame, PixelErrors]:
+    """The picture of ``samples`` (two or more) of every pixel and its errors, band by band of rows.
+
+    Only one band's batches are kept at a time, so that memory follows ``memory`` for pictures of any size.
+
+    Raises
+    ------
+    UsageError
+        If ``samples`` is 1: nothing can be compared then.
+    MemoryLimitError
+        If ``memory`` is too small for the picture and one row.
+    """
+    width, height = source.width, source.height
+    whole = np.zeros((height, width, 3), dtype=np.float32)
+    error, lone = np.zeros((height, width), dtype=np.float32), np.zeros((height, width), dtype=np.float32)
+    frame = Frame(whole)
+    left = memory - height * width * (BYTES_PER_PIXEL + 8)
+    # Half of what is left for the batches, half for the wavefronts.
+    most = max(1, left // 2 // (width * bytes_per_pixel(MOST_BATCHES)))
+    bands = -(-height // most)
+    rows = -(-height // bands)
+    for first in range(0, height, rows):
+        last = min(first + rows, height)
+        band = FullInBatches(
+            integrator,
+            source,
+            seed=seed,
+            box_filter=box_filter,
+            transfer=transfer,
+            memory=left,
+            window=Window(first, 0, last - first, width),
+        )
+        band.add(samples, _of_band(progress, first / height, (last - first) / height, samples * height * width))
+        whole[first:last] = band.picture()
+        found = band.squared_error()
+        error[first:last] = found.values
+        lone[first:last] = 0 if found.lone is None else found.lone
+        frame.rays += band.rays
+        frame.seconds_compile += band.seconds_compile
+        frame.seconds_trace += band.seconds_trace
+    return frame, PixelErrors(error, lone, OWN_NOISE)
+
+
+def _of_band(progress: ProgressCallback, before: float, share: float, total: int) -> ProgressCallback:
+    """Reports of one band as reports of the whole picture."""
+    return lambda inner: progress(Progress(inner.stage, total * (before + share * inner.done / inner.total), total))
+
+
+def _alternate(number: int) -> tuple[int, ...]:
+    """Batches in turn of their streams."""
+    per_stream = number // STREAMS
+    return tuple(stream * per_stream + place for place in range(per_stream) for stream in range(STREAMS))
+
+
+def _sizes(pixels: int, channels: int, memory: int) -> tuple[int, int]:
+    """How many batches are kept, and the lanes of a wavefront."""
+    for batches in (MOST_BATCHES, MOST_BATCHES // 2, STREAMS):
+        kept = pixels * bytes_per_pixel(batches)
+        lanes = min(PREFERRED_LANES, (memory - kept) // BYTES_PER_LANE)
+        if lanes >= min(SMALLEST_LANES, pixels * channels * batches):
+            return batches, lanes
+    required = kept + SMALLEST_LANES * BYTES_PER_LANE
+    raise MemoryLimitError(
+        f"{memory / 2**20:.0f} MiB are too small for {pixels} pixels",
+        where="--memory",
+        rule=f"a picture that is to know its own error needs {required / 2**20:.0f} MiB",
+        fix="raise the limit",
+    )
+
+
+def bytes_per_pixel(batches: int) -> int:
+    """Per batch the sums (float32 RGB); beside them the picture and its error."""
+    return batches * 12 + BYTES_PER_PIXEL + 12
+
+
+def _table(numbers: Sequence[int]) -> Any:
+    """``numbers`` on the device, and one more: a single number would become a constant of the kernel."""
+    return mi.UInt32([*numbers, 0])
+
+
+def _sums(radiance: Any, channels: int, batches: int, count: int) -> Floats:
+    """``(pixels, batches, 3)`` from lanes ordered pixel, channel, batch, sample."""
+    parts = [dr.block_sum(component, count) if count > 1 else component for component in radiance]
+    sums: Floats = np.array(dr.ravel(mi.Color3f(*parts))).reshape(-1, channels, batches, 3)
+    if channels == 1:
+        return sums[:, 0]
+    # A sub-pixel's rays carry all three colours; it shows its own.
+    return np.stack([sums[:, c, :, c] for c in range(3)], axis=-1)

@@ -1,0 +1,191 @@
+"""Every ray of every pixel: the reference that all other methods are judged by."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from lippmann.device.sobol import PIXEL_DIMENSION, SampleStream
+from lippmann.progress import Progress, ProgressCallback, silent
+from lippmann.rendering.film.wavefront_plan import Pass, Plan, Tile
+from lippmann.rendering.transport.integrator import Integrator, RayCounts
+from lippmann.rendering.transport.ray_source import RaySource, pixel_number
+
+
+@dataclass
+class RayTotals:
+    """Rays traced for a picture, by kind, and samples thrown away because they were not finite."""
+
+    primary: int = 0
+    shadow: int = 0
+    secondary: int = 0
+    discarded: int = 0
+
+    def __add__(self, other: RayTotals) -> RayTotals:
+        return RayTotals(
+            self.primary + other.primary,
+            self.shadow + other.shadow,
+            self.secondary + other.secondary,
+            self.discarded + other.discarded,
+        )
+
+
+@dataclass
+class Frame:
+    """A rendered picture with what it took.
+
+    Attributes
+    ----------
+    pixels:
+        ``(height, width, 3)`` float32 linear radiance.
+    maps:
+        Further layers ``(height, width)`` of the methods that have any.
+    shares:
+        How the pixels came about, as shares of all; empty where all were traced.
+    """
+
+    pixels: NDArray[np.float32]
+    rays: RayTotals = field(default_factory=RayTotals)
+    seconds_compile: float = 0.0
+    seconds_trace: float = 0.0
+    seconds_reuse: float = 0.0
+    maps: dict[str, NDArray[Any]] = field(default_factory=dict)
+    shares: dict[str, float] = field(default_factory=dict)
+
+
+def trace_frame(
+    integrator: Integrator,
+    source: RaySource,
+    plan: Plan,
+    *,
+    seed: int = 0,
+    box_filter: bool = True,
+    corner: tuple[int, int] = (0, 0),
+    progress: ProgressCallback = silent,
+) -> Frame:
+    """Trace all samples of ``plan`` and average them per pixel.
+
+    Where ``plan`` is of a part of the picture, ``corner`` is the row and column of that part's first pixel; its pixels
+    are then the same as those of the whole.
+    """
+    frame = Frame(np.zeros((plan.height, plan.width, 3), dtype=np.float32))
+    tracer = _Tracer(integrator, source, plan, seed, box_filter, corner)
+    started = time.perf_counter()
+    done = 0
+    for tile, run in plan:
+        first = done == 0
+        with dr.scoped_set_flag(dr.JitFlag.KernelHistory, first):
+            sums = tracer.trace(tile, run, frame.rays)
+            if first:
+                frame.seconds_compile = compile_seconds()
+        sums *= 1 / plan.samples
+        frame.pixels[tile.first_row : tile.first_row + tile.rows] += sums.reshape(tile.rows, plan.width, 3)
+        done += tile.rows * plan.width * plan.channels * run.count
+        progress(Progress("trace", done, plan.work))
+    frame.seconds_trace = time.perf_counter() - started - frame.seconds_compile
+    return frame
+
+
+class _Tracer:
+    """Traces the wavefronts of one plan.
+
+    Lanes are ordered pixel, then channel, then sample. Whatever differs from tile to tile is opaque to the compiler, so
+    that all tiles run the same kernel.
+    """
+
+    def __init__(
+        self,
+        integrator: Integrator,
+        source: RaySource,
+        plan: Plan,
+        seed: int,
+        box_filter: bool,
+        corner: tuple[int, int],
+    ) -> None:
+        self._integrator = integrator
+        self._source = source
+        self._plan = plan
+        self._seed = seed
+        self._box_filter = box_filter
+        self._corner = corner
+
+    def trace(self, tile: Tile, run: Pass, totals: RayTotals) -> NDArray[np.float32]:
+        """Sums over the samples of one pass, ``(pixels of the tile, 3)``; ``totals`` grows by the rays it took."""
+        plan = self._plan
+        ray, stream = rays_of_tile(self._source, plan, tile, run, self._seed, self._box_filter, self._corner)
+        radiance, counts = self._integrator.sample(ray, stream, mi.Bool(True))
+        lanes = tile.rows * plan.width * plan.channels * run.count
+        radiance = evaluated(radiance, counts, lanes, totals)
+        return _channel_sums(radiance, plan.channels, run.count)
+
+
+def rays_of_tile(
+    source: RaySource,
+    plan: Plan,
+    tile: Tile,
+    run: Pass,
+    seed: int,
+    box_filter: bool,
+    corner: tuple[int, int] = (0, 0),
+) -> tuple[Any, SampleStream]:
+    """The rays and sample streams of one wavefront, lanes ordered pixel, then channel, then sample.
+
+    ``corner``: row and column at which the part of the picture begins that ``plan`` is of.
+    """
+    lanes = tile.rows * plan.width * plan.channels * run.count
+    per_channel, sample = divide(dr.arange(mi.UInt32, lanes), dr.opaque(mi.UInt32, run.count))
+    pixel, channel = divide(per_channel, plan.channels)
+    row, column = divide(pixel, plan.width)
+    row += dr.opaque(mi.UInt32, tile.first_row + corner[0])
+    column += dr.opaque(mi.UInt32, corner[1])
+    sample += dr.opaque(mi.UInt32, run.first)
+    # The stream of a sub-pixel is its own; a picture has fewer than 2^32 sub-pixels.
+    number = pixel_number(source, column, row) * plan.channels + channel
+    stream = SampleStream.of_pixels(number, sample, dr.opaque(mi.UInt32, seed))
+    jitter = stream.next_2d(PIXEL_DIMENSION) if box_filter else mi.Point2f(0.5)
+    return source.rays(column, row, channel, jitter), stream
+
+
+def evaluated(radiance: Any, counts: RayCounts, lanes: int, totals: RayTotals) -> Any:
+    """The radiance of a wavefront, evaluated, black where it is not finite; ``totals`` grows by the rays it took."""
+    finite = dr.isfinite(radiance.x) & dr.isfinite(radiance.y) & dr.isfinite(radiance.z)
+    radiance = dr.select(finite, radiance, mi.Color3f(0))
+    # All at once: a sum of an unevaluated radiance would run the path loop anew.
+    dr.eval(radiance, counts.secondary, counts.shadow, finite)
+    totals.primary += lanes
+    totals.secondary += lane_total(counts.secondary)
+    totals.shadow += lane_total(counts.shadow)
+    totals.discarded += lanes - int(dr.count(finite)[0])
+    return radiance
+
+
+def divide(number: Any, by: Any) -> tuple[Any, Any]:
+    """Quotient and remainder of whole numbers on the device."""
+    quotient = number // by
+    return quotient, number - quotient * by
+
+
+def _channel_sums(radiance: Any, channels: int, count: int) -> NDArray[np.float32]:
+    parts = [dr.block_sum(component, count) if count > 1 else component for component in radiance]
+    if channels == 1:
+        return np.array(dr.ravel(mi.Color3f(*parts))).reshape(-1, 3)
+    sums = np.stack([np.array(component) for component in parts], axis=-1)
+    # A sub-pixel's rays carry all three colours; it shows its own.
+    return np.ascontiguousarray(np.diagonal(sums.reshape(-1, 3, 3), axis1=1, axis2=2))
+
+
+def lane_total(counts: Any) -> int:
+    """The sum of evaluated counts over all lanes."""
+    # Sums of 32-bit counts overflow beyond 2^32 rays a wavefront; 64 bits do not.
+    return int(dr.sum(mi.UInt64(counts))[0])
+
+
+def compile_seconds() -> float:
+    history = dr.kernel_history()
+    return sum(float(k.get("codegen_time", 0.0)) + float(k.get("backend_time", 0.0)) for k in history) / 1000.0

@@ -1,0 +1,345 @@
+"""From a scene before a display to a traced frame, by the method that was asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lippmann.color.transfer import Transfer
+from lippmann.progress import ProgressCallback, silent
+from lippmann.rendering.adaptive.convergence import Judge, Track
+from lippmann.rendering.adaptive.method_race import DENOISED_SLOPE, Contest
+from lippmann.rendering.adaptive.stopping import Goal, Outcome, goal_of, reach_judged
+from lippmann.rendering.denoise.cost_model import effort_of, look_cost, traced_work
+from lippmann.rendering.denoise.dual_buffer import Denoised
+from lippmann.rendering.denoise.guided_denoiser import GuidedDenoiser
+from lippmann.rendering.denoise.subpixels import DenoisedSubpixels, SubpixelBatches
+from lippmann.rendering.estimate.denoised_psnr import DenoisedEstimator
+from lippmann.rendering.estimate.pixel_errors import PixelErrors
+from lippmann.rendering.estimate.psnr import ERROR_LAYER, Estimate, Parts, PictureEstimator, why_no_estimate
+from lippmann.rendering.film.sample_batches import FullInBatches, trace_in_batches
+from lippmann.rendering.film.wavefront import Frame, RayTotals, trace_frame
+from lippmann.rendering.film.wavefront_plan import make_plan
+from lippmann.rendering.reprojection.common.point_image import STATUS_LAYER, TRACED
+from lippmann.rendering.reprojection.renderer import trace_reused
+from lippmann.rendering.request.settings import REUSING, Denoiser, Method, RenderSettings
+from lippmann.rendering.transport.ray_source import DisplayRays, QuiltRays, SubpixelRays, WindowRays
+
+if TYPE_CHECKING:
+    from lippmann.device.pbr import BuiltScene
+    from lippmann.device.whitted.scene import BuiltClassic
+    from lippmann.rendering.denoise.exposure_survey import Treatment
+
+Floats = NDArray[np.float32]
+
+#: The layer of a picture with the number of samples that each pixel had.
+SAMPLES_LAYER = "samples"
+
+
+@dataclass(frozen=True)
+class Job:
+    """What is to be traced.
+
+    Attributes
+    ----------
+    built, integrator, source:
+        The scene on the device, what is gathered in it, and along which rays.
+    display_from_world:
+        ``(4, 4)`` similarity to the display's frame (mm).
+    transfer:
+        How values become codes.
+    memory:
+        Bytes that may be used.
+    treatment:
+        Of a part of a picture that is denoised: how all its parts are.
+    """
+
+    built: BuiltScene | BuiltClassic
+    integrator: Any
+    source: DisplayRays | WindowRays | QuiltRays
+    settings: RenderSettings
+    display_from_world: NDArray[np.float64]
+    transfer: Transfer
+    memory: int
+    threads: int
+    progress: ProgressCallback = silent
+    treatment: Treatment | None = None
+
+    @property
+    def box_filter(self) -> bool:
+        """Samples are spread over the pixel, not all at its centre."""
+        return self.settings.pixel_filter == "box"
+
+    @property
+    def traced(self) -> DisplayRays | WindowRays | QuiltRays | SubpixelRays:
+        """Whose samples are gathered: of sub-pixels that are denoised, all colours."""
+        source = self.source
+        if isinstance(source, QuiltRays) or not self.settings.keeps_colors(source.display):
+            return source
+        return SubpixelRays(source)
+
+
+@dataclass(frozen=True)
+class Traced:
+    """What came of a job.
+
+    Attributes
+    ----------
+    samples:
+        How many each pixel had.
+    estimate:
+        How good the picture is by its own account; where it is None, ``notes`` say why.
+    options, seconds:
+        How it was done, and what stages of its own that took.
+    errors:
+        Those of the pixels, where they are known.
+    method:
+        What won, where methods competed.
+    """
+
+    frame: Frame
+    samples: int
+    estimate: Estimate | None = None
+    notes: tuple[str, ...] = ()
+    options: dict[str, Any] = field(default_factory=dict)
+    seconds: dict[str, float] = field(default_factory=dict)
+    errors: PixelErrors | None = None
+    method: Method | None = None
+
+
+def trace(job: Job) -> Traced:
+    """The picture by the method of ``job.settings``, with the samples of each pixel among its maps."""
+    traced = _traced(job)
+    traced.frame.maps.setdefault(SAMPLES_LAYER, _samples_of_pixels(traced))
+    return traced
+
+
+def _samples_of_pixels(traced: Traced) -> NDArray[np.uint32]:
+    """``(H, W)``; pixels that were filled from others have had none."""
+    status = traced.frame.maps.get(STATUS_LAYER)
+    if status is None:
+        # One number for all takes no memory, however large the picture is.
+        return np.broadcast_to(np.uint32(traced.samples), traced.frame.pixels.shape[:2])
+    return np.where(status == TRACED, np.uint32(traced.samples), np.uint32(0))
+
+
+def _traced(job: Job) -> Traced:
+    goal = goal_of(job.settings)
+    why = why_no_estimate(job.settings)
+    if job.settings.method in REUSING:
+        return _cleaned(job, _reused(job))
+    if why is not None:
+        return _cleaned(job, _plain(job, why))
+    if goal is None and job.settings.denoise == "none":
+        return _full(job)
+    if job.treatment is not None:
+        return _denoised_part(job)
+    goal = goal or Goal(spp=job.settings.samples)
+    return _full_until(job, replace(goal, part="view") if isinstance(job.source, QuiltRays) else goal)
+
+
+def _plain(job: Job, why: str) -> Traced:
+    """All samples in one stream: nothing is known of the error."""
+    settings, source = job.settings, job.traced
+    plan = make_plan(source.width, source.height, settings.samples, channels=source.channels, memory=job.memory)
+    frame = trace_frame(
+        job.integrator, source, plan, seed=settings.seed, box_filter=job.box_filter, progress=job.progress
+    )
+    return Traced(frame, settings.samples, notes=(why,))
+
+
+def _full(job: Job) -> Traced:
+    """So many samples, band by band."""
+    frame, errors = trace_in_batches(
+        job.integrator,
+        job.source,
+        job.settings.samples,
+        seed=job.settings.seed,
+        box_filter=job.box_filter,
+        transfer=job.transfer,
+        memory=job.memory,
+        progress=job.progress,
+    )
+    frame.maps[ERROR_LAYER] = np.maximum(errors.values, 0)
+    return Traced(frame, job.settings.samples, _estimator(job).estimate(errors))
+
+
+def _full_until(job: Job, goal: Goal) -> Traced:
+    """As many samples as the goal takes, the noise taken out of them where that is asked for or proves better."""
+    batches = _batches(job)
+    estimator = _estimator(job)
+
+    def rays() -> float:
+        return _rays_per_pixel(job, batches.rays)
+
+    plain = _Way(batches, Track(batches, estimator))
+    denoised = None if job.settings.denoise == "none" else _denoised_way(job, goal, batches, rays)
+    if denoised is None:
+        judge: Judge = plain.track
+    elif job.settings.denoise == "auto":
+        judge = Contest(goal, plain.track, denoised.track, rays)
+    else:
+        judge = denoised.track
+    outcome = reach_judged(goal, batches.add, judge, job.progress, probe=batches.probe)
+    options: dict[str, Any] = {}
+    notes = _how_it_ended(goal, outcome)
+    method = job.settings.method
+    won = denoised or plain
+    if isinstance(judge, Contest):
+        if judge.leader == "plain":
+            won = plain
+        if method == "full":
+            method = "full" if won is plain else "pooled"
+            options["auto"] = f"{method}: {judge.why}"
+        elif won is plain:
+            notes = (*notes, f"the light is not pooled: {judge.why}")
+    frame = Frame(won.renderer.picture(), batches.rays, batches.seconds_compile, batches.seconds_trace)
+    if outcome.errors is not None:
+        frame.maps[ERROR_LAYER] = np.maximum(outcome.errors.values, 0)
+    seconds = {} if denoised is None or denoised.denoiser is None else {"denoise": denoised.denoiser.seconds}
+    options |= _how_cleaned(job, won.denoiser)
+    return Traced(frame, outcome.samples, outcome.estimate, notes, options, seconds, method=method)
+
+
+def _batches(job: Job) -> FullInBatches:
+    source = job.traced
+    kind = SubpixelBatches if isinstance(source, SubpixelRays) else FullInBatches
+    return kind(
+        job.integrator,
+        source,
+        seed=job.settings.seed,
+        box_filter=job.box_filter,
+        transfer=job.transfer,
+        memory=job.memory,
+    )
+
+
+def _denoised_part(job: Job) -> Traced:
+    """So many samples without their noise, for a picture that is put together and judged elsewhere."""
+    batches = _batches(job)
+    batches.add(job.settings.samples, job.progress)
+    denoiser = _denoiser(job, lambda: _rays_per_pixel(job, batches.rays))
+    assert denoiser is not None
+    denoised = _denoised(job, batches, denoiser)
+    errors = denoised.squared_error()
+    frame = Frame(denoised.picture(), batches.rays, batches.seconds_compile, batches.seconds_trace)
+    frame.maps[ERROR_LAYER] = np.maximum(errors.values, 0)
+    seconds = {"denoise": denoiser.seconds}
+    return Traced(frame, batches.samples, options=_how_cleaned(job, denoiser), seconds=seconds, errors=errors)
+
+
+@dataclass(frozen=True)
+class _Way:
+    """A picture that grows, who judges it, and what takes its noise out."""
+
+    renderer: FullInBatches | Denoised
+    track: Track
+    denoiser: GuidedDenoiser | None = None
+
+
+def _denoised(job: Job, batches: FullInBatches, denoiser: GuidedDenoiser) -> Denoised:
+    share = denoiser.share if denoiser.shares_afterwards else None
+    if isinstance(batches, SubpixelBatches):
+        return DenoisedSubpixels(batches, denoiser.denoise, job.transfer, job.threads, share)
+    return Denoised(batches, denoiser.denoise, job.transfer, job.threads, share)
+
+
+def _denoised_way(job: Job, goal: Goal, batches: FullInBatches, rays: Callable[[], float]) -> _Way:
+    denoiser = _denoiser(job, rays)
+    assert denoiser is not None
+    renderer = _denoised(job, batches, denoiser)
+    seconds = 0.0 if goal.max_time is None else denoiser.probe()
+
+    def dear() -> bool:
+        spent = rays()
+        return 0 < spent < look_cost(spent)
+
+    return _Way(renderer, Track(renderer, _estimator(job, DenoisedEstimator), DENOISED_SLOPE, seconds, dear), denoiser)
+
+
+def _rays_per_pixel(job: Job, rays: RayTotals) -> float:
+    return traced_work(rays.primary, rays.shadow, rays.secondary) / (job.traced.width * job.traced.height)
+
+
+def _estimator(job: Job, kind: type[PictureEstimator] = PictureEstimator) -> PictureEstimator:
+    """Judges a display's picture by its micro-images, a quilt by its views."""
+    source = job.source
+    if isinstance(source, QuiltRays):
+        (_, _, width, height), (whole_width, whole_height) = source.window, source.view_size
+        known = whole_width * whole_height - width * height
+        return kind(Parts.views(source.columns, source.rows, (width, height), known))
+    if isinstance(source, WindowRays):
+        return kind(Parts.micro_images(source.display, source.window))
+    return kind(source.display)
+
+
+def _reused(job: Job) -> Traced:
+    settings = job.settings
+    assert settings.method in ("lens-view", "interpolated")
+    assert isinstance(job.source, DisplayRays)
+    frame = trace_reused(
+        job.integrator,
+        job.source,
+        method=settings.method,
+        order=settings.order or "default",
+        careful=settings.careful,
+        samples=settings.samples,
+        seed=settings.seed,
+        box_filter=job.box_filter,
+        transfer=job.transfer,
+        memory=job.memory,
+        display_from_world=job.display_from_world,
+        threads=job.threads,
+        progress=job.progress,
+    )
+    return Traced(frame, settings.samples, notes=(f"no estimate of the error: {settings.method} has more than noise",))
+
+
+def _cleaned(job: Job, traced: Traced) -> Traced:
+    """What was traced without its noise, where that is asked for and nothing is known of the error anyway."""
+    denoiser = _denoiser(job, lambda: _rays_per_pixel(job, traced.frame.rays))
+    if denoiser is None:
+        return traced
+    cleaned, source = denoiser(traced.frame.pixels), job.traced
+    traced.frame.pixels = source.own_colors(cleaned) if isinstance(source, SubpixelRays) else cleaned
+    return replace(traced, options=_how_cleaned(job, denoiser), seconds={"denoise": denoiser.seconds})
+
+
+def _denoiser(job: Job, rays_per_pixel: Callable[[], float]) -> GuidedDenoiser | None:
+    asked: Denoiser = "oidn" if job.settings.denoise == "auto" else job.settings.denoise
+    if asked == "none":
+        return None
+    common = job.treatment
+    return GuidedDenoiser(
+        job.built,
+        job.traced,
+        job.display_from_world,
+        seed=job.settings.seed,
+        box_filter=job.box_filter,
+        memory=job.memory,
+        threads=job.threads,
+        effort=(lambda: effort_of(asked, rays_per_pixel())) if common is None else (lambda: common.effort),
+        exposure=None if common is None else common.exposure,
+        # Where a denoised picture is free to be the best one, it shares its light.
+        shares=job.settings.shares_light or job.settings.denoise == "auto",
+        progress=job.progress,
+    )
+
+
+def _how_cleaned(job: Job, denoiser: GuidedDenoiser | None) -> dict[str, Any]:
+    if denoiser is None:
+        return {}
+    return {"denoise": "oidn", "denoise_effort": denoiser.used, "denoise_form": denoiser.form()}
+
+
+def _how_it_ended(goal: Goal, outcome: Outcome) -> tuple[str, ...]:
+    if outcome.estimate is None:
+        return ("no estimate of the error: there was time for one sample per pixel only",)
+    if outcome.end == "quality" or not goal.has_quality:
+        return ()
+    what = "the time is up" if outcome.end == "time" else "the samples are spent"
+    return (f"{what} before the quality asked for was reached: {goal.describe(outcome.estimate)}",)

@@ -1,0 +1,1 @@
+"""Reprojection under lens arrays of any layout: backward warps along epipolar lines."""

@@ -1,0 +1,187 @@
+"""Points of finished micro-images gathered by others, pixel by pixel, for lenses of any layout. Compiled.
+
+A pixel of the target sees along its light line; under another lens that line appears as a straight line of pixels, its
+points in order of their height. The pixel walks along it, from the nearest point to the farthest, until the line enters
+a surface that the other lens sees: there it has found its own point. Colour and disparity are taken between the four
+pixels around that place, if these see one surface: no holes open up, and no colour is taken from half a pixel away.
+
+Where the line passes an outline at its very depth, the nearer surface may reach further than its last pixel. And nearer
+things that no source has seen are not known: therefore some pixels, the *probes*, are traced beforehand, on a wide grid
+over the whole picture that comes to every row and column; a point farther away than what the probes around it have met
+is not taken.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lippmann.rendering.reprojection.arrays.bilinear import color_at, is_trusted
+from lippmann.rendering.reprojection.arrays.epipolar_march import look_along
+from lippmann.rendering.reprojection.common.lens_map import LensField
+from lippmann.rendering.reprojection.common.point_image import BACKGROUND, REPROJECTED, TRACED, PointImage
+from lippmann.rendering.reprojection.common.thresholds import (
+    ONE_POINT,
+    ONE_PROBED_SURFACE,
+    Rules,
+    alike,
+    coded_value,
+    nearer,
+)
+from lippmann.runtime.numba_jit import compiled, uncounted
+
+
+class Gathering(NamedTuple):
+    """Who gathers from whom.
+
+    Attributes
+    ----------
+    target:
+        ``(lenses,)`` bool: lenses that gather.
+    source:
+        ``(lenses, n)`` lenses that they gather from, -1: none.
+    probe_stride, probe_shift:
+        Columns from one probe to the next in a row, and how far they move from row to row.
+    probe_reach:
+        Rows and columns from a pixel over which probes are asked.
+    """
+
+    target: NDArray[np.bool_]
+    source: NDArray[np.int64]
+    probe_stride: int
+    probe_shift: int
+    probe_reach: int
+
+
+@uncounted
+def probed_limit(points: PointImage, field: LensField, row: int, column: int, gathering: Gathering) -> float:
+    """Nothing farther than this disparity is to be expected at a pixel, say the probes around it; 0: no one knows."""
+    height, width = points.status.shape
+    stride, reach = gathering.probe_stride, gathering.probe_reach
+    nearest, farthest = 0.0, 0.0
+    for r in range(max(0, row - reach), min(height, row + reach + 1)):
+        left = max(0, column - reach)
+        c = left + (r * gathering.probe_shift - left) % stride
+        while c <= column + reach and c < width:
+            if field.lens[r, c] == field.lens[row, column] and points.status[r, c] == TRACED:
+                s = np.float64(points.disparity[r, c])
+                if nearest == 0.0:
+                    nearest, farthest = s, s
+                elif nearer(s, nearest):
+                    nearest = s
+                elif nearer(farthest, s):
+                    farthest = s
+            c += stride
+    # Probes that see one surface vouch for all of it; between different ones only the nearer is sure.
+    return farthest if alike(nearest, farthest, ONE_PROBED_SURFACE) else nearest
+
+
+@compiled
+def gather(
+    first_row: int,
+    last_row: int,
+    points: PointImage,
+    field: LensField,
+    gathering: Gathering,
+    rules: Rules,
+    nearest: Any,
+    unsettled: Any,
+) -> None:
+    """Give the pixels of the targets the points of their sources.
+
+    Pixels that get a point become :data:`REPROJECTED`; traced ones stay as they are. ``nearest (H, W)`` as of
+    :func:`mark_nearest`; ``unsettled (H, runs)`` says which stretches of the targets have missed pixels left.
+    """
+    sources = gathering.source.shape[1]
+    depth = np.empty(sources)
+    share = np.empty(sources)
+    color = np.empty((sources, 3))
+    for row in range(first_row, last_row):
+        for run in range(unsettled.shape[1]):
+            begin, end = field.first[row, run], field.first[row, run + 1]
+            if begin == end or not gathering.target[field.lens[row, begin]]:
+                continue
+            missed = 0
+            for column in range(begin, end):
+                if points.status[row, column] != TRACED:
+                    got = _gather_pixel(points, field, gathering, rules, nearest, row, column, depth, share, color)
+                    missed += not got
+            unsettled[row, run] = missed > 0
+
+
+@uncounted
+def _gather_pixel(
+    points: PointImage,
+    field: LensField,
+    gathering: Gathering,
+    rules: Rules,
+    nearest: Any,
+    row: int,
+    column: int,
+    depth: Any,
+    share: Any,
+    color: Any,
+) -> bool:
+    lens = field.lens[row, column]
+    front = 0.0
+    outlines, seen, asked = 0, 0, 0
+    beside_nearest = BACKGROUND
+    doubted = 0
+    for k in range(len(depth)):
+        share[k] = 0.0
+        source = gathering.source[lens, k]
+        if source < 0:
+            continue
+        shift_x = field.center[source, 0] - field.center[lens, 0]
+        shift_y = field.center[source, 1] - field.center[lens, 1]
+        place, s, beside = look_along(points, field, nearest, source, column + shift_x, row + shift_y, shift_x, shift_y)
+        asked += 1
+        if beside != BACKGROUND:
+            outlines += 1
+            if nearer(beside, beside_nearest):
+                beside_nearest = beside
+        if not place.found:
+            continue
+        seen += 1
+        depth[k] = s
+        share[k] = 1.0 / np.sqrt(shift_x * shift_x + shift_y * shift_y)
+        if front == 0.0 or nearer(s, front):
+            front = s
+        if rules.careful and not is_trusted(points, place, rules):
+            # Only what is taken in the end must be trusted.
+            doubted |= 1 << k
+        for channel in range(3):
+            color[k, channel] = color_at(points, place, channel)
+    if seen == 0:
+        return False
+    total, mean = 0.0, 0.0
+    for k in range(len(depth)):
+        if share[k] > 0.0 and not alike(depth[k], front, ONE_POINT):
+            share[k] = 0.0
+        if share[k] == 0.0:
+            # What no source gave is no number, perhaps: even nothing of it would count.
+            continue
+        if doubted >> k & 1:
+            return False
+        total += share[k]
+        mean += share[k] * depth[k]
+    mean /= total
+    limit = probed_limit(points, field, row, column, gathering)
+    if limit != 0.0 and nearer(limit, mean) and not alike(limit, mean, ONE_PROBED_SURFACE):
+        return False
+    if nearer(beside_nearest, mean) and (rules.careful or outlines == asked):
+        return False
+    for channel in range(3):
+        value, low, high = 0.0, np.inf, -np.inf
+        for k in range(len(depth)):
+            if share[k] > 0.0:
+                value += share[k] * color[k, channel]
+                low, high = min(low, color[k, channel]), max(high, color[k, channel])
+        if rules.careful and coded_value(high, rules.coded) - coded_value(low, rules.coded) > rules.tolerance:
+            return False
+        points.color[row, column, channel] = value / total
+    points.disparity[row, column] = mean
+    points.status[row, column] = REPROJECTED
+    return True

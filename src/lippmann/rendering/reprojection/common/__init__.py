@@ -1,0 +1,1 @@
+"""Parts that all reprojection methods share: point images, gaps, thresholds, schedules."""

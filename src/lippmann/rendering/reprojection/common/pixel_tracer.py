@@ -1,0 +1,176 @@
+"""Tracing a list of pixels: those that no point reached."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from lippmann.device.sobol import PIXEL_DIMENSION, SampleStream
+from lippmann.rendering.film.sample_batches import SEED_STEP, STREAMS
+from lippmann.rendering.film.wavefront import RayTotals, compile_seconds, divide
+from lippmann.rendering.reprojection.common.frozen_kernel import Frozen
+from lippmann.rendering.reprojection.common.point_image import BACKGROUND, SMALLEST_HEIGHT, TRACED, PointImage
+from lippmann.rendering.transport.integrator import ReusableIntegrator
+from lippmann.rendering.transport.ray_source import DisplayRays
+from lippmann.runtime.numba_jit import uncounted
+from lippmann.runtime.row_threads import Bands
+
+#: Samples of one pixel whose disparities differ by more than this part of the nearest's see different surfaces.
+_ONE_SURFACE = 0.2
+
+#: Bytes: the widest vector of a processor.
+_ALIGNMENT = 64
+
+Pixels = NDArray[np.uint32]
+
+
+class PixelTracer:
+    """Traces any pixels of a display's picture and enters what they hit into a point image.
+
+    A pixel gets the very samples that the full renderer would give it, so that its colour is the same. The mean point
+    of several samples stands for the pixel; if they see different surfaces, the nearest, and the pixel is fragile.
+    """
+
+    def __init__(
+        self,
+        integrator: ReusableIntegrator,
+        source: DisplayRays,
+        *,
+        samples: int,
+        seed: int,
+        box_filter: bool,
+        most_lanes: int,
+        display_from_world: NDArray[np.float64],
+        bands: Bands,
+    ) -> None:
+        self._bands = bands
+        self._integrator = integrator
+        self._source = source
+        self._samples = samples
+        self._box_filter = box_filter
+        self._pixels_per_call = max(1, most_lanes // samples)
+        self._height_row = np.asarray(display_from_world, dtype=np.float64)[2].tolist()
+        self._seed = dr.opaque(mi.UInt32, seed)
+        self._kernel = Frozen(self._sample, integrator)
+        self.rays = RayTotals()
+        self.seconds_compile = 0.0
+        self.seconds_trace = 0.0
+
+    def trace(self, numbers: Pixels, points: PointImage) -> None:
+        """Fill the pixels ``numbers`` (row * width + column, no pixel twice) of ``points``."""
+        for start in range(0, len(numbers), self._pixels_per_call):
+            part = numbers[start : start + self._pixels_per_call]
+            started = time.perf_counter()
+            # For all parts alike: a kernel that is recorded with a history is another one without.
+            with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
+                found = self._trace(part)
+                compiling = compile_seconds()
+            self.seconds_compile += compiling
+            self.seconds_trace += time.perf_counter() - started - compiling
+            self._bands.pixels(_enter, len(part), points, part, self._samples, *found)
+
+    def _trace(self, numbers: Pixels) -> tuple[NDArray[Any], ...]:
+        """Red, green, blue, disparity and whether it is fragile of all samples, pixel by pixel."""
+        pixel = mi.UInt32(_aligned(numbers))
+        sample = mi.UInt32(0)
+        if self._samples > 1:
+            chosen, sample = divide(dr.arange(mi.UInt32, len(numbers) * self._samples), self._samples)
+            pixel = dr.gather(mi.UInt32, pixel, chosen)
+        dr.make_opaque(pixel, sample)
+        radiance, secondary, shadow, finite, disparity, fragile = self._kernel(pixel, sample, self._seed)
+        # All at once: a sum of an unevaluated radiance would run the path loop anew.
+        dr.eval(radiance, secondary, shadow, finite, disparity, fragile)
+        lanes = len(numbers) * self._samples
+        self.rays.primary += lanes
+        self.rays.secondary += _total(secondary)
+        self.rays.shadow += _total(shadow)
+        self.rays.discarded += lanes - _total(finite)
+        return tuple(np.asarray(part) for part in (*radiance, disparity, fragile))
+
+    def _sample(self, pixel: Any, sample: Any, seed: Any) -> tuple[Any, ...]:
+        row, column = divide(pixel, self._source.width)
+        number, of_stream = divide(sample, STREAMS)
+        stream = SampleStream.of_pixels(pixel, number, seed + of_stream * SEED_STEP)
+        jitter = stream.next_2d(PIXEL_DIMENSION) if self._box_filter else mi.Point2f(0.5)
+        ray = self._source.rays(column, row, mi.UInt32(0), jitter)
+        radiance, counts, first = self._integrator.sample_with_hit(ray, stream, mi.Bool(True))
+        finite = dr.isfinite(radiance.x) & dr.isfinite(radiance.y) & dr.isfinite(radiance.z)
+        radiance = dr.select(finite, radiance, mi.Color3f(0))
+        one, none = mi.UInt32(1), mi.UInt32(0)
+        return (
+            radiance,
+            counts.secondary + none,
+            counts.shadow + none,
+            dr.select(finite, one, none),
+            self._disparity(ray, first.distance),
+            dr.select(first.view_dependent, one, none),
+        )
+
+    def _disparity(self, ray: Any, distance: Any) -> Any:
+        """Gap over the height of the point at ``distance`` along ``ray``."""
+        hit = dr.isfinite(distance)
+        p = ray(dr.select(hit, distance, 0))
+        a, b, c, d = self._height_row
+        z = a * p.x + b * p.y + c * p.z + d
+        z = dr.copysign(dr.maximum(dr.abs(z), SMALLEST_HEIGHT), z)
+        return dr.select(hit, self._source.display.gap / z, BACKGROUND)
+
+
+def _aligned(numbers: Pixels) -> Pixels:
+    """A copy that begins at a whole number of :data:`_ALIGNMENT` bytes.
+
+    The device reads host memory in place and would record the kernel anew for every new alignment.
+    """
+    raw = np.empty(numbers.nbytes + _ALIGNMENT, dtype=np.uint8)
+    start = -raw.ctypes.data % _ALIGNMENT
+    copy = raw[start : start + numbers.nbytes].view(np.uint32)
+    copy[:] = numbers
+    return copy
+
+
+def _total(counts: Any) -> int:
+    """The sum over all lanes. For short lists a sum on the device would take longer than the tracing."""
+    return int(np.asarray(counts).sum(dtype=np.uint64))
+
+
+@uncounted
+def _enter(
+    first: int,
+    last: int,
+    points: PointImage,
+    numbers: Any,
+    samples: int,
+    red: Any,
+    green: Any,
+    blue: Any,
+    disparity: Any,
+    fragile: Any,
+) -> None:
+    width = points.status.shape[1]
+    for i in range(first, last):
+        row, column = divmod(int(numbers[i]), width)
+        r, g, b, total = 0.0, 0.0, 0.0, 0.0
+        nearest = disparity[i * samples]
+        farthest = nearest
+        is_fragile = False
+        for k in range(i * samples, (i + 1) * samples):
+            r, g, b = r + red[k], g + green[k], b + blue[k]
+            s = disparity[k]
+            total += s
+            if s > 0.0 if (s > 0.0) != (nearest > 0.0) else s < nearest:
+                nearest = s
+            if farthest > 0.0 if (farthest > 0.0) != (s > 0.0) else farthest < s:
+                farthest = s
+            is_fragile |= fragile[k] != 0
+        points.color[row, column, 0] = r / samples
+        points.color[row, column, 1] = g / samples
+        points.color[row, column, 2] = b / samples
+        one_surface = abs(nearest - farthest) <= _ONE_SURFACE * max(abs(nearest), abs(farthest))
+        points.disparity[row, column] = total / samples if one_surface else nearest
+        points.fragile[row, column] = is_fragile or not one_surface
+        points.status[row, column] = TRACED

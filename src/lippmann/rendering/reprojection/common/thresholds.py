@@ -1,0 +1,97 @@
+"""What counts as alike: the small comparisons that all reuse kernels share."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from lippmann.display import Display
+from lippmann.rendering.reprojection.common.schedule import few_lenses
+from lippmann.runtime.numba_jit import inlined
+
+#: Neighbouring pixels see one surface if their disparities differ by at most this part of the larger: a surface that
+#: turns away from the viewer by up to 75 degrees, on a display with a field of 18 degrees and 8 pixels under a lens.
+ONE_SURFACE = 0.2
+#: Two views of one point: left and right source agree to this part.
+ONE_POINT = 0.15
+#: Two probes that see one surface, some pixels apart.
+ONE_PROBED_SURFACE = 0.3
+
+#: A point this near to a pixel's centre, in pixels, lies on it: rounding must not decide whether a piece reaches it.
+ON_CENTER = 1e-3
+
+
+class Rules(NamedTuple):
+    """What reprojection may do.
+
+    Attributes
+    ----------
+    careful:
+        Leave to tracing what would be falsified: fragile points, colour edges, the pixel beside an outline, and points
+        on which the two sources disagree.
+    tolerance:
+        Colour difference that counts as an edge or as a disagreement.
+    coded:
+        Compare colours on a scale like the eye's (square root), else as they are.
+    probe_rows:
+        Every so many rows have probes.
+    longest_gap:
+        Pixels from one traced pixel to the next in what no point reached; what lies between them is bridged.
+    overhang:
+        Pixels at the end of a micro-image that may be extrapolated.
+    middles:
+        Trace the middle of a gap between different surfaces, else each of them is taken to reach halfway.
+    """
+
+    careful: bool
+    tolerance: float
+    coded: bool
+    probe_rows: int
+    longest_gap: int
+    overhang: int
+    middles: bool = True
+
+
+def choose_rules(display: Display, *, careful: bool, coded: bool) -> Rules:
+    """Rules for a display.
+
+    Parameters
+    ----------
+    careful, coded:
+        As in :class:`Rules`.
+    """
+    if careful:
+        return Rules(True, 0.06, coded, probe_rows=4, longest_gap=3, overhang=0)
+    few = few_lenses(display.lens_grid.columns)
+    return Rules(False, 0.12, coded, probe_rows=8 if few else 16, longest_gap=5, overhang=1, middles=not few)
+
+
+@inlined
+def nearer(s: float, t: float) -> bool:
+    """Whether disparity ``s`` belongs to a point nearer to the viewer than that of ``t``."""
+    return s > 0.0 if (s > 0.0) != (t > 0.0) else s < t
+
+
+@inlined
+def alike(s: float, t: float, part: float) -> bool:
+    """Whether two disparities differ by at most ``part`` of the larger."""
+    return abs(s - t) <= part * max(abs(s), abs(t))
+
+
+@inlined
+def coded_value(value: float, coded: bool) -> float:
+    """A colour value as differences of it are judged."""
+    value = min(max(value, 0.0), 1.0)
+    return np.sqrt(value) if coded else value
+
+
+@inlined
+def color_difference(color: Any, row: int, column: int, other_row: int, other_column: int, coded: bool) -> float:
+    """Largest difference of a channel between two pixels."""
+    largest = 0.0
+    for channel in range(3):
+        one = coded_value(color[row, column, channel], coded)
+        other = coded_value(color[other_row, other_column, channel], coded)
+        largest = max(largest, abs(one - other))
+    return largest

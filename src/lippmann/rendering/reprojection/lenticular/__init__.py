@@ -1,0 +1,1 @@
+"""Reprojection under straight cylindrical lenses: forward warps of rows."""

@@ -1,0 +1,210 @@
+"""A picture by reuse: from the choice of the method to the frame."""
+
+from __future__ import annotations
+
+import time
+from typing import Any, Literal, Protocol, cast
+
+import numpy as np
+from numba.core import event
+from numpy.typing import NDArray
+
+from lippmann.color.transfer import Transfer
+from lippmann.display import Display
+from lippmann.errors import MemoryLimitError
+from lippmann.progress import Progress, ProgressCallback, silent
+from lippmann.rendering.film import wavefront_plan
+from lippmann.rendering.film.wavefront import Frame
+from lippmann.rendering.reprojection.common.gap_filling import Settled
+from lippmann.rendering.reprojection.common.pixel_tracer import Pixels, PixelTracer
+from lippmann.rendering.reprojection.common.point_image import (
+    BYTES_PER_PIXEL,
+    INTERPOLATED,
+    REPROJECTED,
+    STATUS_LAYER,
+    TRACED,
+    PointImage,
+)
+from lippmann.rendering.reprojection.common.thresholds import Rules, choose_rules
+from lippmann.rendering.reprojection.retrace.adaptive_retrace import choose_looks, search
+from lippmann.rendering.transport.integrator import ReusableIntegrator
+from lippmann.rendering.transport.ray_source import DisplayRays
+from lippmann.runtime.row_threads import Bands
+
+ReuseMethod = Literal["lens-view", "interpolated"]
+ReuseOrder = Literal["default", "paper"]
+
+
+class Maker(Protocol):
+    """What makes the micro-images of one kind of display, in one order."""
+
+    def lens_view(self) -> None:
+        """Every micro-image from others; what no point reached is traced."""
+        ...
+
+    def interpolated(self) -> None:
+        """Every other micro-image so; what no point reached of the rest is averaged from its neighbours."""
+        ...
+
+
+class SearchedMaker(Maker, Protocol):
+    """One whose pictures can be searched for what was falsified."""
+
+    @property
+    def reach(self) -> int:
+        """Columns of a micro-image, about."""
+        ...
+
+    def lens_numbers(self) -> NDArray[np.int32]:
+        """The lens of every pixel, ``(H, W)``."""
+        ...
+
+    def follow(self, surprised: Pixels, lens: NDArray[np.int32], wanted: NDArray[np.bool_]) -> None:
+        """Want the pixels of other lenses that should see the points of surprising ones."""
+        ...
+
+
+def trace_reused(
+    integrator: ReusableIntegrator,
+    source: DisplayRays,
+    *,
+    method: ReuseMethod,
+    order: ReuseOrder,
+    careful: bool,
+    samples: int,
+    seed: int,
+    box_filter: bool,
+    transfer: Transfer,
+    memory: int,
+    display_from_world: NDArray[np.float64],
+    threads: int,
+    progress: ProgressCallback = silent,
+) -> Frame:
+    """Trace some pixels of a display's picture and carry their colours over to the others.
+
+    Parameters
+    ----------
+    method, order:
+        As in :class:`~lippmann.rendering.request.settings.RenderSettings`.
+    careful:
+        Trace what carrying over would falsify; of no meaning in the paper's order, which does not know how.
+    samples, seed, box_filter:
+        Of the traced pixels, which get the very samples that :func:`~lippmann.rendering.film.wavefront.trace_frame`
+        gives them.
+    transfer:
+        How the values become codes: colours are compared as an eye sees them.
+    memory:
+        Bytes that may be taken.
+    threads:
+        At work on the points; the result does not depend on them.
+
+    Returns
+    -------
+    Frame
+        With the layer ``status`` ((H, W) int8: :data:`~lippmann.rendering.reprojection.common.point_image.TRACED`,
+        ``REPROJECTED`` or ``INTERPOLATED``), and the shares of pixels that were ``traced``, ``reprojected`` and
+        ``interpolated``.
+
+    Raises
+    ------
+    MemoryLimitError
+        If picture, points and the smallest wavefront do not fit into ``memory``.
+    """
+    most_lanes = lanes_within(memory, source.width, source.height, samples)
+    started = time.perf_counter()
+    points = PointImage.empty(source.height, source.width)
+    compiling = cast("Any", event).TimingListener()
+    with event.install_listener("numba:compile", compiling), Bands(threads) as bands:
+        tracer = PixelTracer(
+            integrator,
+            source,
+            samples=samples,
+            seed=seed,
+            box_filter=box_filter,
+            most_lanes=most_lanes,
+            display_from_world=display_from_world,
+            bands=bands,
+        )
+        settled = _report(progress, source.width * source.height)
+        if order == "paper":
+            _make(_paper_maker(source.display, points, tracer, bands, settled), method)
+        else:
+            rules = choose_rules(source.display, careful=careful, coded=transfer == "srgb")
+            maker = _default_maker(source.display, points, tracer, bands, rules, settled)
+            _make(maker, method)
+            if careful:
+                lens = maker.lens_numbers()
+                looks = choose_looks(source.display, maker.reach)
+                search(points, lens, maker.reach, looks, tracer, bands, rules, maker.follow, settled)
+    progress(Progress("trace", 1, 1))
+    seconds_compile = tracer.seconds_compile + (compiling.duration if compiling.done else 0.0)
+    return Frame(
+        points.color,
+        tracer.rays,
+        seconds_compile=seconds_compile,
+        seconds_trace=tracer.seconds_trace,
+        seconds_reuse=max(0.0, time.perf_counter() - started - tracer.seconds_trace - seconds_compile),
+        maps={STATUS_LAYER: points.status},
+        shares={
+            "traced": points.share(TRACED),
+            "reprojected": points.share(REPROJECTED),
+            "interpolated": points.share(INTERPOLATED),
+        },
+    )
+
+
+def lanes_within(memory: int, width: int, height: int, samples: int) -> int:
+    """Lanes of the largest wavefront beside a picture with its points.
+
+    Raises
+    ------
+    MemoryLimitError
+        If ``memory`` bytes do not hold even a small one.
+    """
+    lane = wavefront_plan.BYTES_PER_LANE
+    fixed = width * height * (wavefront_plan.BYTES_PER_PIXEL + BYTES_PER_PIXEL)
+    needed = max(samples, min(wavefront_plan.SMALLEST_LANES, width * height * samples))
+    if memory < fixed + needed * lane:
+        raise MemoryLimitError(
+            f"{memory / 2**20:.0f} MiB are too small for {width}x{height} pixels",
+            where="--memory",
+            rule=f"the picture, its points and one wavefront need {(fixed + needed * lane) / 2**20:.0f} MiB",
+            fix="raise the limit",
+        )
+    return max(needed, min(wavefront_plan.PREFERRED_LANES, (memory - fixed) // lane))
+
+
+def _make(maker: Maker, method: ReuseMethod) -> None:
+    if method == "lens-view":
+        maker.lens_view()
+    else:
+        maker.interpolated()
+
+
+def _default_maker(
+    display: Display, points: PointImage, tracer: PixelTracer, bands: Bands, rules: Rules, settled: Settled
+) -> SearchedMaker:
+    if display.lattice.rows_are_alike:
+        from lippmann.rendering.reprojection.lenticular.renderer import StraightRenderer
+
+        return StraightRenderer(display, points, tracer, bands, rules, settled)
+    from lippmann.rendering.reprojection.arrays.renderer import ArrayRenderer
+
+    return ArrayRenderer(display, points, tracer, bands, rules, settled)
+
+
+def _paper_maker(display: Display, points: PointImage, tracer: PixelTracer, bands: Bands, settled: Settled) -> Maker:
+    from lippmann.rendering.reprojection.paper_order import PaperOrder
+
+    return PaperOrder(display, points, tracer, bands, settled)
+
+
+def _report(progress: ProgressCallback, total: int) -> Settled:
+    done = 0
+
+    def settled(pixels: int) -> None:
+        nonlocal done
+        done += pixels
+        progress(Progress("trace", min(done, total), total))
+
+    return settled

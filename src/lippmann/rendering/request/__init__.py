@@ -1,0 +1,1 @@
+"""The request: settings, the defaults that follow from the scene, and the region of interest."""

@@ -1,0 +1,1 @@
+"""Denoised light shared across lenses and across views."""

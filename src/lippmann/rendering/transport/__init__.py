@@ -1,0 +1,1 @@
+"""Light transport: ray sources, integrators, and light sampling."""

@@ -1,0 +1,236 @@
+"""Where rays start: one class per kind of picture, all asked the same way for the pixels of a grid."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any, Protocol
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from lippmann.device.drjit_ops import DEVICE
+from lippmann.display import Display
+from lippmann.display.view_cone import cone_tangent
+from lippmann.rendering.request.region_of_interest import PixelWindow
+from lippmann.scene.values.description import Camera
+
+Matrix = NDArray[np.float64]
+
+
+class RaySource(Protocol):
+    """Rays through the pixels of a picture.
+
+    ``channels`` is 1 where a pixel's colours share their rays, 3 where each sub-pixel has its own.
+    """
+
+    width: int
+    height: int
+    channels: int
+
+    def rays(self, column: Any, row: Any, channel: Any, jitter: Any) -> Any:
+        """World-space rays (``mi.Ray3f``) through ``jitter`` (Point2f in [0, 1)^2) of the (sub-)pixels named."""
+        ...
+
+
+def pixel_number(source: RaySource, column: Any, row: Any) -> Any:
+    """The numbers (UInt32) of pixels by which their random numbers are drawn: row by row, of a window as in its whole.
+
+    So a pixel has the same samples whichever part of the picture it is rendered with.
+    """
+    if isinstance(source, WindowRays | SubpixelRays):
+        return source.number(column, row)
+    return row * source.width + column
+
+
+class _OnePicture:
+    """A source whose pixels all show one picture."""
+
+    width: int
+    height: int
+
+    def tiles(self) -> Iterator[tuple[slice, slice]]:
+        """Rows and columns of what shows one picture: all of it."""
+        yield slice(0, self.height), slice(0, self.width)
+
+
+class DisplayRays(_OnePicture):
+    """The light lines of a display's pixels, or of its sub-pixels, placed into a scene.
+
+    A pixel's samples fill its square; a sub-pixel's fill a third of its width about the sub-pixel's own place.
+    """
+
+    def __init__(self, display: Display, world_from_display: Matrix, subpixels: bool = False) -> None:
+        self.display = display
+        self.width = display.panel.width
+        self.height = display.panel.height
+        self.channels = 3 if subpixels else 1
+        self.world_from_display = np.asarray(world_from_display, dtype=np.float64)
+
+    def rays(self, column: Any, row: Any, channel: Any, jitter: Any) -> Any:
+        u = mi.Float64(column) + mi.Float64(jitter.x)
+        v = mi.Float64(row) + mi.Float64(jitter.y)
+        if self.channels == 3:
+            u = mi.Float64(column) + 0.5 + (mi.Float64(jitter.x) - 0.5) / 3
+            x, y = self.display.subpixel_point(u, v, mi.Float64(channel), DEVICE)
+        else:
+            x, y = self.display.panel_point(u, v, DEVICE)
+        origin, direction = self.display.light_ray(x, y, DEVICE)
+        return world_ray(self.world_from_display, origin, direction)
+
+
+class WindowRays(_OnePicture):
+    """A window of a display's pixels, as a picture of its own; its pixels keep the random numbers of the whole's."""
+
+    def __init__(self, source: DisplayRays, window: PixelWindow) -> None:
+        self.display = source.display
+        self.world_from_display = source.world_from_display
+        self.window = window
+        self.width, self.height, self.channels = window.width, window.height, source.channels
+        self._source = source
+        # Opaque to the compiler, so that windows of one size share their kernels.
+        self._left, self._top = (dr.opaque(mi.UInt32, first) for first in (window.left, window.top))
+
+    def rays(self, column: Any, row: Any, channel: Any, jitter: Any) -> Any:
+        return self._source.rays(column + self._left, row + self._top, channel, jitter)
+
+    def number(self, column: Any, row: Any) -> Any:
+        """Numbers (UInt32) of pixels in the whole picture."""
+        return (row + self._top) * self._source.width + (column + self._left)
+
+
+class SubpixelRays(_OnePicture):
+    """The sub-pixels of a display or of its window, as the pixels of a picture that is three times as wide.
+
+    They have the rays and the random numbers of their pixels' sub-pixels, but keep all three colours, of which the
+    display will show one. Columns ``3 x`` to ``3 x + 2`` are the sub-pixels of the pixel in column x, from left to
+    right as they lie on the panel.
+    """
+
+    channels = 1
+
+    def __init__(self, source: DisplayRays | WindowRays) -> None:
+        self.display = source.display
+        self.window = source.window if isinstance(source, WindowRays) else None
+        self.width, self.height = 3 * source.width, source.height
+        self._source = source
+        #: Of the sub-pixels from left to right, which colour they show.
+        self._shown = self.display.panel.subpixel_order
+
+    def rays(self, column: Any, row: Any, channel: Any, jitter: Any) -> Any:
+        del channel
+        pixel, shown = self._subpixel(column)
+        return self._source.rays(pixel, row, shown, jitter)
+
+    def number(self, column: Any, row: Any) -> Any:
+        """Numbers (UInt32) of sub-pixels in the whole picture."""
+        pixel, shown = self._subpixel(column)
+        return pixel_number(self._source, pixel, row) * 3 + shown
+
+    def own_colors(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
+        """``(..., H, 3 W, 3)`` colours of these pixels to ``(..., H, W, 3)``: each sub-pixel shows its own."""
+        apart = values.reshape(*values.shape[:-2], values.shape[-2] // 3, 3, 3)
+        return np.stack([apart[..., self._shown.index(c), c] for c in range(3)], axis=-1)
+
+    def _subpixel(self, column: Any) -> tuple[Any, Any]:
+        """Column of the pixel, and the number of its sub-pixel."""
+        pixel = column // 3
+        place = column - 3 * pixel
+        shown = dr.select(place == 0, self._shown[0], dr.select(place == 1, self._shown[1], self._shown[2]))
+        return pixel, mi.UInt32(shown)
+
+
+class QuiltRays:
+    """Cameras side by side before a lenticular display, each one's picture a tile of ``view_size`` pixels.
+
+    Of N = ``columns * rows`` cameras number k stands at the viewing distance, level with the display's middle, at
+    ``D tan(cone / 2) (2 (k + 0.5) / N - 1)`` to the right of it: in even steps over the whole cone. All see the panel's
+    rectangle in the lens plane, off-axis, never turned; where the viewing distance is infinite they are parallel
+    cameras. Tile 0 is at the bottom left, tiles follow to the right and then upwards. Rays begin where the display's
+    own begin, at the aperture distance.
+
+    With a ``window`` tiles hold that part of the pictures alone.
+    """
+
+    channels = 1
+
+    def __init__(
+        self,
+        display: Display,
+        world_from_display: Matrix,
+        columns: int,
+        rows: int,
+        view_size: tuple[int, int],
+        window: PixelWindow | None = None,
+    ) -> None:
+        self.display = display
+        self.columns = columns
+        self.rows = rows
+        self.view_size = view_size
+        self.window = window or PixelWindow(0, 0, *view_size)
+        self.width = columns * self.window.width
+        self.height = rows * self.window.height
+        self.world_from_display = np.asarray(world_from_display, dtype=np.float64)
+
+    @property
+    def views(self) -> int:
+        """Number of cameras."""
+        return self.columns * self.rows
+
+    def tiles(self) -> Iterator[tuple[slice, slice]]:
+        """Rows and columns of every camera's tile, the leftmost camera's first."""
+        width, height = self.window.width, self.window.height
+        for number in range(self.views):
+            below, right = divmod(number, self.columns)
+            top = (self.rows - 1 - below) * height
+            yield slice(top, top + height), slice(right * width, (right + 1) * width)
+
+    def rays(self, column: Any, row: Any, channel: Any, jitter: Any) -> Any:
+        del channel
+        left, top, width, height = self.window
+        right, above = column // width, self.rows - 1 - row // height
+        view = mi.Float64(above * self.columns + right)
+        panel_width, panel_height = self.display.size_mm
+        u = mi.Float64(column - right * width) + mi.Float64(jitter.x)
+        v = mi.Float64(row - row // height * height) + mi.Float64(jitter.y)
+        x = ((left + u) / self.view_size[0] - 0.5) * panel_width
+        y = (0.5 - (top + v) / self.view_size[1]) * panel_height
+        convergence = 1 / self.display.viewing_distance
+        side = ((2 * view + 1) / self.views - 1) * cone_tangent(self.display)
+        slope_x, slope_y = x * convergence - side, y * convergence
+        aperture = self.display.aperture_distance
+        origin = (x - slope_x * aperture, y - slope_y * aperture, dr.full(mi.Float64, aperture, dr.width(x)))
+        return world_ray(self.world_from_display, origin, (slope_x, slope_y, dr.full(mi.Float64, -1, dr.width(x))))
+
+
+class CameraRays:
+    """A pinhole or parallel camera, pixel (0, 0) at the top left."""
+
+    def __init__(self, camera: Camera, width: int, height: int) -> None:
+        self.camera = camera
+        self.width = width
+        self.height = height
+        self.channels = 1
+
+    def rays(self, column: Any, row: Any, channel: Any, jitter: Any) -> Any:
+        del channel
+        x = (mi.Float64(column) + mi.Float64(jitter.x)) * (2 / self.height) - self.width / self.height
+        y = 1 - (mi.Float64(row) + mi.Float64(jitter.y)) * (2 / self.height)
+        zero = dr.zeros(mi.Float64, dr.width(x))
+        if self.camera.fov_y is not None:
+            slope = float(np.tan(self.camera.fov_y / 2))
+            origin, direction = (zero, zero, zero), (x * slope, y * slope, zero - 1)
+        else:
+            half = (self.camera.height or 2.0) / 2
+            origin, direction = (x * half, y * half, zero), (zero, zero, zero - 1)
+        return world_ray(np.asarray(self.camera.world_from_camera, dtype=np.float64), origin, direction)
+
+
+def world_ray(matrix: Matrix, origin: tuple[Any, Any, Any], direction: tuple[Any, Any, Any]) -> Any:
+    # Opaque to the compiler, so that a display that moves from frame to frame keeps its kernel.
+    rows = [[dr.opaque(mi.Float64, value) for value in row] for row in matrix[:3].tolist()]
+    o = [sum((m * a for m, a in zip(row[:3], origin, strict=True)), row[3]) for row in rows]
+    d = [sum((m * a for m, a in zip(row[:3], direction, strict=True)), mi.Float64(0)) for row in rows]
+    length = dr.rsqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2])
+    return mi.Ray3f(mi.Point3f(*(mi.Float(a) for a in o)), mi.Vector3f(*(mi.Float(a * length) for a in d)))

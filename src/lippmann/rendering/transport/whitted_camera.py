@@ -1,0 +1,62 @@
+"""Rays of a classic scene's own camera."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+
+from lippmann.device.sobol import hash32
+from lippmann.scene.values.whitted_scene import ClassicCamera, Handedness
+
+
+class ClassicCameraRays:
+    """Pixels of a picture as the scene's camera sees it, pixel (0, 0) at the top left.
+
+    Samples fill a pixel's square about the point where its first sample lies: the upper right corner (Tachyon) or the
+    center. Depth of field spreads them over the aperture too, the sample in the middle aside. ``handedness`` is the
+    scene's; rays come in the right-handed world, z negated for a left-handed scene.
+    """
+
+    def __init__(self, camera: ClassicCamera, handedness: Handedness, width: int, height: int) -> None:
+        self.camera = camera
+        self.width = width
+        self.height = height
+        self.channels = 1
+        self._flip = -1.0 if handedness == "left" else 1.0
+
+    def rays(self, column: Any, row: Any, channel: Any, jitter: Any) -> Any:
+        del channel
+        camera = self.camera
+        left, right, bottom, top = camera.window(self.width, self.height)
+        shift = (0.5, -0.5) if camera.pixel_point == "upper-right" else (0.0, 0.0)
+        x = left + (mi.Float64(column) + mi.Float64(jitter.x) + shift[0]) * ((right - left) / self.width)
+        y = top - (mi.Float64(row) + mi.Float64(jitter.y) + shift[1]) * ((top - bottom) / self.height)
+        across, up, view = (mi.Vector3d(*axis.tolist()) for axis in camera.frame())
+        o = mi.Vector3d(*camera.center) + mi.Vector3d(dr.zeros(mi.Float64, dr.width(x)))
+        if camera.projection == "orthographic":
+            o += across * x + up * y
+            d = view + mi.Vector3d(dr.zeros(mi.Float64, dr.width(x)))
+        elif camera.projection == "fisheye":
+            d = (view * dr.cos(x) + across * dr.sin(x)) * dr.cos(y) + up * dr.sin(y)
+        elif camera.projection == "perspective-dof":
+            a, b = _lens_point(column, row, jitter)
+            x0, y0 = a * (camera.aperture * (right - left)), b * (camera.aperture * (top - bottom))
+            o += across * x0 + up * y0
+            d = dr.normalize(view + across * (x - x0) + up * (y - y0))
+        else:
+            d = dr.normalize(view + across * x + up * y)
+        return mi.Ray3f(mi.Point3f(self._world(o)), mi.Vector3f(self._world(d)))
+
+    def _world(self, v: Any) -> Any:
+        return mi.Vector3d(v.x, v.y, v.z * self._flip)
+
+
+def _lens_point(column: Any, row: Any, jitter: Any) -> tuple[Any, Any]:
+    """Two numbers in [-0.5, 0.5) that follow from the sample's place in the picture, 0 in the middle of its pixel."""
+    bits = [dr.reinterpret_array(mi.UInt32, mi.Float(part)) for part in (jitter.x, jitter.y)]
+    first = hash32(bits[0] ^ hash32(bits[1] ^ hash32(mi.UInt32(column) ^ hash32(mi.UInt32(row)))))
+    middle = (jitter.x == 0.5) & (jitter.y == 0.5)
+    a, b = (mi.Float64(number >> 8) * 2.0**-24 - 0.5 for number in (first, hash32(first ^ 0x68BC21EB)))
+    return dr.select(middle, 0, a), dr.select(middle, 0, b)

@@ -1,0 +1,195 @@
+"""The page: one self-contained HTML file, for a screen of any width, in light and dark."""
+
+from __future__ import annotations
+
+import math
+
+from lippmann.reproduce import charts, tables
+from lippmann.reproduce import paper_values as printed
+from lippmann.reproduce.experiment import COMPARED, METHODS, Manner, Results, Variant
+from lippmann.reproduce.figures import gloss_figures, missed_figures, scene_figures
+from lippmann.reproduce.html import Markup, element, escaped, paragraph, raw, section
+from lippmann.reproduce.style import STYLE
+
+TITLE = "The paper's system, measured again"
+
+#: The manners whose figures stand at the top.
+_AT_THE_TOP = (Manner.PAPER, Manner.GLOSS)
+
+#: How a mark of the chart tells the manner by its shape and the method by its colour.
+_SHAPES = {Manner.PAPER: "circle", Manner.DEFAULT: "square", Manner.GLOSS: "triangle"}
+_COLORS = {"lens-view": "a", "interpolated": "b"}
+
+
+def report_page(results: Results) -> str:
+    """The whole page as HTML text; it refers to nothing outside itself."""
+    sections = _sections(results)
+    links = [element("li", element("a", escaped(title), href=f"#{id_}")) for id_, title, _ in sections]
+    body = element(
+        "body",
+        element(
+            "header",
+            element("h1", escaped(TITLE)),
+            paragraph(escaped(_conditions(results)), class_="soft"),
+            *(_facts(results, manner) for manner in _AT_THE_TOP),
+            element("nav", element("ul", *links), aria_label="contents"),
+        ),
+        element("main", *(section(title, *inside, id_=id_) for id_, title, inside in sections)),
+    )
+    head = element(
+        "head",
+        Markup('<meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">'),
+        element("title", escaped(f"Lippmann: {TITLE}")),
+        # A page without a picture of its own would ask the server for one.
+        Markup('<link rel="icon" href="data:,">'),
+        element("style", Markup(STYLE)),
+    )
+    return f"<!doctype html>\n{element('html', head, body, lang='en')}\n"
+
+
+def _sections(results: Results) -> list[tuple[str, str, list[Markup]]]:
+    first = results.experiment.scenes[0]
+    return [
+        ("display", "Table I: the display", [tables.table_1(results.experiment.display)]),
+        ("time", "Table II: time", _time(results)),
+        ("quality", "Table III: quality", _quality(results, first)),
+        ("rays", "Rays against time", _ray_chart(results)),
+        ("gloss", "What respecting gloss changes", _gloss(results)),
+        ("missed", "Figures 5 to 8: missed pixels", missed_figures(results)),
+        ("scenes", "Figures 9 to 13: the scenes", scene_figures(results)),
+        ("method", "How it was measured", _method(results)),
+    ]
+
+
+def _conditions(results: Results) -> str:
+    experiment = results.experiment
+    made = results.full(experiment.scenes[0]).image.provenance
+    panel = experiment.display.panel
+    return (
+        f"{', '.join(experiment.scenes)}: {panel.width} x {panel.height} pixels for {experiment.display.name}, one ray "
+        f"per pixel, integrator {made.integrator}, ray depth {made.depth}. Lippmann {made.version} on {made.device}."
+    )
+
+
+def _facts(results: Results, manner: Manner) -> Markup:
+    """What one wants to know first of interpolation in one manner."""
+    runs = [results.of(scene, Variant("interpolated", manner).key) for scene in results.runs]
+    found = [tables.comparison(run) for run in runs]
+    least = min(one.paper.mean_psnr for one in found)
+    worst = min(one.worst.psnr for one in found)
+    entries = (
+        ("of the time saved", _range([run.saved_percent for run in runs], "%")),
+        ("of the pixels traced", _range([100 * run.traced_share for run in runs], "%")),
+        ("least mean PSNR of a scene", _decibels(least)),
+        ("worst micro-image of all scenes", _decibels(worst)),
+    )
+    cards = (element("div", element("dt", escaped(text)), element("dd", escaped(value))) for text, value in entries)
+    heading = element("h3", escaped(f"{manner.value}: interpolation"))
+    return raw(heading, element("dl", *cards, class_="facts"))
+
+
+def _decibels(value: float) -> str:
+    return f"{value:.1f} dB" if math.isfinite(value) else "no error"
+
+
+def _range(values: list[float], unit: str) -> str:
+    low, high = f"{min(values):.0f}", f"{max(values):.0f}"
+    return f"{low} {unit}" if low == high else f"{low} to {high} {unit}"
+
+
+def _time(results: Results) -> list[Markup]:
+    low, high = printed.SAVED_PERCENT
+    least, most = printed.FULL_SECONDS
+    text = (
+        f"The paper prints {least} to {most} s for full tracing of its scenes and {low} to {high} % saved by "
+        f"interpolation. Its row of the tree says {printed.TREE_PRINTED_PERCENT} %, but the seconds beside it come to "
+        f"{printed.TREE_COMPUTED_PERCENT} %. The scenes here are of the same kind and count as its own, not copies of "
+        "them, and the machine is another: compare shares, not seconds. Negative savings are losses."
+    )
+    return [paragraph(escaped(text)), *(tables.table_2(results, manner) for manner in Manner)]
+
+
+def _quality(results: Results, scene: str) -> list[Markup]:
+    text = (
+        "The paper measures each micro-image by itself, on 8-bit codes, and averages the PSNR over lenses: "
+        f"{printed.TEAPOT_PSNR:g} dB over {printed.TEAPOT_LENSES} lenses of its teapot. The lenses shown here are "
+        "spread evenly and need not be the paper's. Its “RMSE” (equation 1) has no root: it is the mean squared error, "
+        "and 13.5795 gives 36.802 dB."
+    )
+    return [
+        paragraph(escaped(text)),
+        tables.table_3(results, scene),
+        element("h3", escaped(f"Lens by lens: {scene}, interpolated")),
+        _lens_chart(results, scene),
+        element("h3", escaped("All scenes")),
+        paragraph(escaped("PSNR in dB against full tracing. Only the paper's mean is an average over lenses.")),
+        *(tables.quality_table(results, manner) for manner in Manner),
+    ]
+
+
+def _lens_chart(results: Results, scene: str) -> Markup:
+    drawn, entries = [], []
+    level = printed.TEAPOT_PSNR if scene == printed.TEAPOT else None
+    values = [] if level is None else [level]
+    for manner, class_ in zip(_AT_THE_TOP, "ab", strict=True):
+        row = tables.comparison(results.of(scene, Variant("interpolated", manner).key)).paper.psnr[0].tolist()
+        values += row
+        drawn.append(charts.Line(list(enumerate(row)), class_, manner.value))
+        entries.append(("line", class_, manner.value))
+    columns = results.experiment.display.lens_grid.columns
+    x = charts.Axis(0, columns, columns / 8, "Lens")
+    y = charts.Axis.around(values, "PSNR of the micro-image, dB")
+    chart = charts.lines(drawn, x, y, title=f"PSNR of every micro-image of the {scene}", level=level)
+    dashed = "" if level is None else f"Dashed: the paper's mean, {level:g} dB. "
+    note = escaped(f"{dashed}Gaps are micro-images without any error.")
+    return raw(chart, charts.key(entries), paragraph(note, class_="soft"))
+
+
+def _ray_chart(results: Results) -> list[Markup]:
+    marks = []
+    for scene in results.runs:
+        for variant in COMPARED:
+            run = results.of(scene, variant.key)
+            said = (
+                f"{scene}, {variant.title}: {tables.percent(run.ray_share)} of the rays, "
+                f"{tables.percent(run.time_share)} of the time"
+            )
+            marks.append(charts.Mark(100 * run.ray_share, 100 * run.time_share, *_look(variant), said))
+    x = charts.Axis.around([*(mark.x for mark in marks), 100], "Rays, share of full tracing's", " %", low=0)
+    y = charts.Axis.around([*(mark.y for mark in marks), 100], "Seconds, share of full tracing's", " %", low=0)
+    text = (
+        "Each mark is a scene rendered in one way. On the dashed line a ray saved is its time saved; above it, looking "
+        "after points costs more than the rays they spare."
+    )
+    chart = charts.scatter(marks, x, y, title="Share of rays against share of time")
+    return [paragraph(escaped(text)), chart, charts.key([(*_look(variant), variant.title) for variant in COMPARED])]
+
+
+def _look(variant: Variant) -> tuple[str, str]:
+    """Shape and colour of a variant's marks."""
+    assert variant.manner is not None
+    return _SHAPES[variant.manner], _COLORS[variant.method]
+
+
+def _gloss(results: Results) -> list[Markup]:
+    text = (
+        "A mirror, glass or a highlight has another colour in every direction, so the colour that one lens saw is "
+        "wrong for the next. The paper reuses it all the same; --respect-gloss traces such pixels anew."
+    )
+    shown = (tables.gloss_table(results, method) for method in METHODS)
+    return [paragraph(escaped(text)), *shown, *gloss_figures(results)]
+
+
+def _method(results: Results) -> list[Markup]:
+    experiment = results.experiment
+    runs = f"the median of {experiment.runs} runs" if experiment.runs > 1 else "those of one run"
+    warm = f" after {experiment.warm_up} to warm up" if experiment.warm_up else ""
+    texts = (
+        f"Seconds are {runs}{warm}, the ways of rendering one scene taking turns. They count tracing and reusing "
+        "points: loading, building the scene, compiling kernels and writing files are left out. Every picture is "
+        "compared with full tracing of the same rays.",
+        "PSNR without a further word is that of the pooled mean squared error of coded values in [0, 1], all channels; "
+        "the 1st percentile and the worst are of micro-images; SSIM is that of Wang et al. (2004), of each view, "
+        "averaged.",
+    )
+    return [paragraph(escaped(text)) for text in texts]

@@ -1,0 +1,108 @@
+"""One call from the bundled scenes to the report."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, cast
+
+from lippmann.display import Display, load_display
+from lippmann.image import IntegralImage
+from lippmann.progress import ProgressCallback, silent
+from lippmann.reproduce import paper_values
+from lippmann.reproduce.experiment import Experiment, Renderer, Variant, run_experiment
+from lippmann.reproduce.page import report_page
+from lippmann.reproduce.summary import summary
+from lippmann.runtime.atomic_write import check_folder_writable, replacing_folder
+from lippmann.scene import bundled
+from lippmann.scene.placement import PlacementOptions
+from lippmann.scene.readers.load import load_scene
+from lippmann.scene.scene import Scene
+
+if TYPE_CHECKING:
+    from lippmann.rendering.request.settings import Device, Method, Order
+
+#: What :func:`reproduce` writes.
+PAGE, FIGURES = "report.html", "results.json"
+
+#: The quick version: two scenes, one with highlights and one of mirrors, on a smaller panel.
+QUICK_SCENES = ("teapot", "small-balls")
+QUICK_SIZE = (256, 256)
+
+
+def reproduce(
+    folder: Path,
+    *,
+    quick: bool = False,
+    device: str = "auto",
+    threads: int | None = None,
+    progress: ProgressCallback = silent,
+) -> dict[str, Any]:
+    """Render the paper's scenes in all ways, compare them, and write the report and its figures into ``folder``.
+
+    Parameters
+    ----------
+    folder:
+        Where ``report.html`` and ``results.json`` go. It appears whole or not at all.
+    quick:
+        Fewer scenes, fewer pixels, one run.
+    device, threads:
+        As in :class:`~lippmann.rendering.request.settings.RenderSettings`.
+
+    Returns
+    -------
+    dict
+        The figures, see :func:`~lippmann.reproduce.summary.summary`.
+
+    Raises
+    ------
+    OutputError
+        If the folder cannot be written; found before anything is rendered.
+    EngineError
+        If the machine cannot render.
+    """
+    check_folder_writable(folder)
+    experiment = make_experiment(quick=quick)
+    results = run_experiment(experiment, engine_renderer(experiment.display, device, threads), progress)
+    figures = summary(results)
+    with replacing_folder(folder) as temporary:
+        (temporary / PAGE).write_text(report_page(results), encoding="utf-8")
+        text = json.dumps(figures, indent=2, ensure_ascii=False, allow_nan=False)
+        (temporary / FIGURES).write_text(text + "\n", encoding="utf-8")
+    return figures
+
+
+def make_experiment(*, quick: bool) -> Experiment:
+    """The paper's scenes on its display; or, quick, some of them on a part of it."""
+    display = load_display(paper_values.DISPLAY)
+    if quick:
+        return Experiment(QUICK_SCENES, display.resized(*QUICK_SIZE), runs=1)
+    return Experiment(bundled.names(), display)
+
+
+def engine_renderer(display: Display, device: str = "auto", threads: int | None = None) -> Renderer:
+    """Renders bundled scenes as the paper does: its light model and ray depth, one ray through each pixel's middle."""
+    loaded: dict[str, Scene] = {}
+
+    def render(name: str, variant: Variant) -> IntegralImage:
+        # Only now: whoever imports this module does not need the engine.
+        from lippmann.rendering.picture import render_integral_image
+        from lippmann.rendering.request.settings import RenderSettings
+
+        if name not in loaded:
+            loaded.clear()  # scenes come one after the other
+            loaded[name] = load_scene(name)
+        settings = RenderSettings(
+            method=cast("Method", variant.method),
+            order=cast("Order | None", variant.order),
+            respect_gloss=variant.respect_gloss,
+            integrator="classic",
+            depth=paper_values.RAY_DEPTH,
+            spp=1,
+            pixel_filter="point",
+            device=cast("Device", device),
+            threads=threads,
+        )
+        return render_integral_image(loaded[name], display, settings, PlacementOptions(), silent)
+
+    return render

@@ -1,0 +1,167 @@
+"""The paper's Tables I to III with what was measured beside what it prints."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from lippmann.display import Display
+from lippmann.metrics import Comparison
+from lippmann.reproduce import paper_values
+from lippmann.reproduce.experiment import COMPARED, Manner, Results, Run, Variant
+from lippmann.reproduce.html import Markup, element, escaped, raw, table
+
+#: Stands where there is nothing to say.
+NOTHING = "-"
+
+
+def table_1(display: Display) -> Markup:
+    """The display: the paper's, and the one rendered for."""
+    panel, grid = display.panel, display.lens_grid
+    across = display.pixels_per_lens[0]
+    distance = "infinite" if math.isinf(display.viewing_distance) else f"{display.viewing_distance:g} mm"
+    here = (
+        f"{panel.width} x {panel.height} at {25.4 / panel.pixel_pitch:g} dpi",
+        f"{grid.columns} cylindrical, of {across:g} pixels",
+        f"{display.lens_array.pitch:.7g} mm",
+        f"{display.gap:g} mm",
+        f"{display.field_of_view:.1f} degrees",
+        f"{display.aperture_distance:g} mm",
+        distance,
+        f"{paper_values.RAY_DEPTH}",
+    )
+    rows = [_cells(name, value, ours) for (name, value), ours in zip(paper_values.TABLE_I, here, strict=True)]
+    caption = f"The display of the experiments; here the preset {display.name}."
+    return table(("", "Paper", "Here"), rows, caption=caption, wrap=True)
+
+
+def table_2(results: Results, manner: Manner) -> Markup:
+    """Seconds of every scene by full tracing and by the methods of one manner, and what these save."""
+    variants = results.of_manner(manner)
+    head = ["Scene", "s", *("s", "saved, s", "saved, %", "pixels traced", "rays") * len(variants)]
+    spans = [("", 1), ("full", 1), *((variant.method, 5) for variant in variants)]
+    if manner is Manner.PAPER:
+        head.append("interpolation saves, %")
+        spans.append(("the paper", 1))
+    rows = []
+    for scene in results.runs:
+        shown = [scene, seconds(results.full(scene).seconds)]
+        for variant in variants:
+            run = results.of(scene, variant.key)
+            shown += [seconds(run.seconds), seconds(run.saved_seconds), f"{run.saved_percent:.1f}"]
+            shown += [percent(run.traced_share), percent(run.ray_share)]
+        if manner is Manner.PAPER:
+            shown.append(_printed_saving(scene))
+        rows.append(_cells(*shown))
+    note = ""
+    if manner is Manner.PAPER and paper_values.TREE in results.runs:
+        note = f". * The paper's own seconds come to {paper_values.TREE_COMPUTED_PERCENT} %"
+    return table(head, rows, caption=manner.value + note, spans=spans)
+
+
+def _printed_saving(scene: str) -> str:
+    if scene == paper_values.TREE:
+        return f"{paper_values.TREE_PRINTED_PERCENT} *"
+    low, high = paper_values.SAVED_PERCENT
+    return f"{low} to {high}"
+
+
+def lenses_of_table_3(display: Display) -> tuple[int, ...]:
+    """Columns of evenly spread lenses, as many as the paper's: each the second of a pair, which the odd/even method
+    interpolates."""
+    columns = display.lens_grid.columns
+    count = min(paper_values.TEAPOT_LENSES, columns)
+    middles = (int((k + 0.5) * columns / count) for k in range(count))
+    return tuple(sorted({min(column | 1, columns - 1) for column in middles}))
+
+
+def table_3(results: Results, scene: str) -> Markup:
+    """The paper's PSNR of some lenses of one scene, and its averages."""
+    lenses = lenses_of_table_3(results.experiment.display)
+    head = ("Method", *(str(lens) for lens in lenses), f"mean of {len(lenses)}", "mean of all")
+    rows = []
+    for variant in COMPARED:
+        found = comparison(results.of(scene, variant.key))
+        row = found.paper.psnr[0]
+        shown = [float(row[lens]) for lens in lenses]
+        cells = _cells(variant.title, *map(decibels, shown), "", decibels(found.paper.mean_psnr))
+        cells[-2] = element("b", escaped(decibels(finite_mean(shown))))
+        rows.append(cells)
+    if scene == paper_values.TEAPOT:
+        blank = [NOTHING] * len(lenses)
+        rows.append(_cells("the paper prints", *blank, f"{paper_values.TEAPOT_PSNR:g}", NOTHING))
+    caption = (
+        f"PSNR in dB of micro-images of the {scene} against full tracing, by the paper's formula. Lenses are counted "
+        "from 0 at the left; a micro-image without error (=) has no part in the means."
+    )
+    return table(head, rows, caption=caption, spans=[("", 1), ("lens", len(lenses)), ("", 2)])
+
+
+def quality_table(results: Results, manner: Manner) -> Markup:
+    """All scenes: the paper's mean beside the figures that show what a mean hides."""
+    variants = results.of_manner(manner)
+    head = ["Scene", *("paper's mean", "PSNR", "1st percentile", "worst lens", "SSIM") * len(variants)]
+    rows = []
+    for scene in results.runs:
+        shown = [scene]
+        for variant in variants:
+            found = comparison(results.of(scene, variant.key))
+            figures = (found.paper.mean_psnr, found.psnr, found.percentile_1.psnr, found.worst.psnr)
+            shown += [*map(decibels, figures), f"{found.views.mean:.4f}"]
+        rows.append(_cells(*shown))
+    spans = [("", 1), *((variant.method, 5) for variant in variants)]
+    return table(head, rows, caption=manner.value, spans=spans)
+
+
+def gloss_table(results: Results, method: str) -> Markup:
+    """What respecting gloss costs and gains in the default order, for one method."""
+    keys = [Variant(method, manner).key for manner in (Manner.DEFAULT, Manner.GLOSS)]
+    rows = []
+    for scene in results.runs:
+        before, after = (results.of(scene, key) for key in keys)
+        rows.append(
+            [
+                escaped(scene),
+                _change(decibels(comparison(before).psnr), decibels(comparison(after).psnr)),
+                _change(decibels(comparison(before).worst.psnr), decibels(comparison(after).worst.psnr)),
+                _change(percent(before.traced_share), percent(after.traced_share)),
+                _change(seconds(before.seconds), seconds(after.seconds)),
+            ]
+        )
+    head = ("Scene", "PSNR, dB", "worst lens, dB", "pixels traced", "s")
+    return table(head, rows, caption=f"{method}: gloss not respected → respected, in the default order")
+
+
+def comparison(run: Run) -> Comparison:
+    """The comparison of a run that is not full tracing itself."""
+    assert run.comparison is not None
+    return run.comparison
+
+
+def finite_mean(values: Sequence[float]) -> float:
+    """The mean of the finite values; infinite if there are none."""
+    finite = [value for value in values if math.isfinite(value)]
+    return sum(finite) / len(finite) if finite else math.inf
+
+
+def decibels(value: float) -> str:
+    """A PSNR; ``=`` where there is no error."""
+    return f"{value:.2f}" if math.isfinite(value) else "="
+
+
+def percent(share: float) -> str:
+    """A share in percent."""
+    return f"{100 * share:.1f} %"
+
+
+def seconds(value: float) -> str:
+    """Seconds with three significant digits or milliseconds, whichever is coarser."""
+    return f"{value:.3f}" if abs(value) < 10 else f"{value:.1f}"
+
+
+def _cells(*texts: str) -> list[Markup]:
+    return [escaped(text) for text in texts]
+
+
+def _change(before: str, after: str) -> Markup:
+    return raw(escaped(before), Markup(" <span class=soft>→</span> "), escaped(after))

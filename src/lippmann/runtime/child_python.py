@@ -1,0 +1,92 @@
+"""Child Python processes that import nothing from the working directory.
+
+``python -c`` puts the working directory first on ``sys.path``, and :mod:`multiprocessing` starts its children that way:
+a file ``socket.py`` beside a downloaded scene would run. Python 3.11 and newer leave the entry out where
+``PYTHONSAFEPATH`` is set. Otherwise the first statement of the child's code removes it.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import partial
+from typing import Any
+
+VARIABLE = "PYTHONSAFEPATH"
+
+_KNOWS_VARIABLE = sys.version_info >= (3, 11)
+
+# ``sys`` is built into the interpreter: importing it searches no folder. ``-c`` adds the entry as an empty string.
+_REMOVE_ENTRY = "import sys; sys.path[:1] == [''] and sys.path.pop(0)\n"
+
+_lock = threading.Lock()
+_users = 0
+_undo: Callable[[], None] | None = None
+
+
+def python_command(code: str, *arguments: str) -> tuple[list[str], dict[str, str]]:
+    """Command line and environment of a child Python that runs ``code`` without the working directory on its path.
+
+    The user's environment, ``PYTHONPATH`` included, is handed on. The child finds ``arguments`` in ``sys.argv[1:]``.
+    """
+    if not _KNOWS_VARIABLE:
+        code = _REMOVE_ENTRY + code
+    return [sys.executable, "-c", code, *arguments], {**os.environ, VARIABLE: "1"}
+
+
+@contextmanager
+def spawn_safely() -> Iterator[None]:
+    """Processes that :mod:`multiprocessing` spawns inside the ``with`` import nothing from the working directory.
+
+    Once such a process has started, its ``sys.path`` is a copy of this process's, as always. The setting belongs to the
+    whole process: it begins with the first thread that enters and ends with the last that leaves.
+    """
+    global _users, _undo
+    with _lock:
+        _users += 1
+        if _users == 1:
+            # Children of ``python -E`` are started with ``-E``, too, and ignore the variable.
+            reads_variable = _KNOWS_VARIABLE and not sys.flags.ignore_environment
+            _undo = _set_variable() if reads_variable else _prefix_spawned_code()
+    try:
+        yield
+    finally:
+        with _lock:
+            _users -= 1
+            if _users == 0 and _undo is not None:
+                _undo()
+
+
+def _set_variable() -> Callable[[], None]:
+    """Set :data:`VARIABLE` in this process's environment. The result undoes it."""
+    saved = os.environ.get(VARIABLE)
+    os.environ[VARIABLE] = "1"
+    return partial(_restore_variable, saved)
+
+
+def _restore_variable(saved: str | None) -> None:
+    if saved is None:
+        os.environ.pop(VARIABLE, None)
+    else:
+        os.environ[VARIABLE] = saved
+
+
+def _prefix_spawned_code() -> Callable[[], None]:
+    """Put :data:`_REMOVE_ENTRY` before the code of all that multiprocessing starts. The result undoes it.
+
+    Children, resource tracker and fork server are all started by one function of multiprocessing.
+    """
+    from multiprocessing import util
+
+    spawn: Any = util.spawnv_passfds
+
+    def spawn_with_prefix(path: Any, args: Any, passfds: Any) -> Any:
+        words = list(args)
+        words[words.index("-c") + 1] = _REMOVE_ENTRY + words[words.index("-c") + 1]
+        return spawn(path, words, passfds)
+
+    util.spawnv_passfds = spawn_with_prefix
+    return partial(setattr, util, "spawnv_passfds", spawn)

@@ -1,0 +1,297 @@
+"""The rendering engine: the only place that picks a Mitsuba variant and an LLVM library.
+
+Mitsuba and Dr.Jit are imported here first, after the library has been chosen, and by nothing that runs before
+:func:`start`. :func:`diagnose` says what would be used, and proves it in another process.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import json
+import os
+import platform
+import subprocess
+import sys
+import time
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any, Literal
+
+from lippmann.errors import EngineError, UsageError
+from lippmann.runtime import gpu, llvm, machine
+from lippmann.runtime.child_python import python_command
+from lippmann.runtime.engine_lock import exclusive
+
+DeviceChoice = Literal["auto", "cpu", "gpu"]
+DEVICES: tuple[DeviceChoice, ...] = ("auto", "cpu", "gpu")
+VARIANTS: dict[str, Literal["cpu", "gpu"]] = {"llvm_ad_rgb": "cpu", "cuda_ad_rgb": "gpu"}
+
+_REINSTALL = "install Lippmann anew: pip install --force-reinstall lippmann"
+_PROBE_SECONDS = 120
+
+_set_here: str | None = None  # the variant that `start` set last: any other was set by the caller
+
+
+@dataclass(frozen=True)
+class Engine:
+    """A running engine. ``llvm_path``, ``llvm_version`` are ``None`` on the GPU, ``gpu_name`` on the CPU."""
+
+    variant: str
+    device: Literal["cpu", "gpu"]
+    threads: int
+    llvm_path: str | None = None
+    llvm_version: str | None = None
+    gpu_name: str | None = None
+
+
+def start(device: DeviceChoice = "auto", threads: int | None = None) -> Engine:
+    """Load the engine, or set up the running one anew. Costs about half a second once and next to nothing after.
+
+    Parameters
+    ----------
+    device:
+        ``cpu``, ``gpu`` or ``auto``: the variant that the caller has set in Mitsuba himself if it is one of
+        :data:`VARIANTS`, else the GPU where it can be used, else the CPU.
+    threads:
+        CPU threads, at least 1; by default all cores that the process may use.
+
+    Raises
+    ------
+    UsageError
+        If an argument is out of range.
+    EngineError
+        If the device cannot be used on this machine; the message says how to mend that. No LLVM library that might
+        end the process is ever put to work.
+    """
+    global _set_here
+    if device not in DEVICES:
+        raise UsageError(f"device '{device}' is unknown", rule=f"known are {', '.join(DEVICES)}")
+    if threads is not None and threads < 1:
+        raise UsageError(f"{threads} threads are too few", rule="at least 1 is needed")
+    with exclusive():
+        library = None if "drjit" in sys.modules else _point_to_llvm(device)
+        dr, mi = _load()
+        _search_package_alone(mi)
+        kind = _resolve(device, dr, mi)
+        engine = _on_gpu() if kind == "gpu" else _on_cpu(dr, library)
+        if mi.variant() != engine.variant:
+            try:
+                mi.set_variant(engine.variant)
+            except ImportError as error:
+                raise EngineError(f"Mitsuba cannot use '{engine.variant}': {error}", fix=_REINSTALL) from error
+            _set_here = engine.variant
+        mi.set_log_level(mi.LogLevel.Error)
+        dr.set_log_level(dr.LogLevel.Error)
+        count = threads or machine.usable_cores()
+        if dr.thread_count() != count:
+            dr.set_thread_count(count)
+        return replace(engine, threads=count)
+
+
+def _point_to_llvm(device: DeviceChoice) -> llvm.Library | None:
+    """Tell Dr.Jit, which is not loaded yet, which LLVM library to take."""
+    try:
+        library = llvm.choose()
+    except EngineError as error:
+        forced_wrong = error.where == llvm.PATH_VARIABLE
+        if device == "gpu" or (device == "auto" and not forced_wrong and gpu.find()):
+            return None  # Dr.Jit may find another one by itself, but nothing is compiled with it on the GPU
+        raise
+    os.environ[llvm.PATH_VARIABLE] = str(library.path)
+    return library
+
+
+def _load() -> tuple[Any, Any]:
+    try:
+        # Dr.Jit loads LLVM in the background; importing Mitsuba meanwhile hides most of that time.
+        import drjit
+        import mitsuba
+    except (ImportError, NameError) as error:
+        # Dr.Jit trips over a name of its own while it explains a library that it misses: the reason lies beneath.
+        reason = error.__context__ if isinstance(error, NameError) and error.__context__ else error
+        raise EngineError(f"Mitsuba cannot be loaded: {reason}", fix=_fix_of_import(str(reason))) from error
+    return drjit, mitsuba
+
+
+def _search_package_alone(mi: Any) -> None:
+    """Let Mitsuba look for plugins and tables in its own package alone.
+
+    By itself it looks in the working directory first, and runs the code of any ``plugins/NAME.so`` there.
+    """
+    resolver = mi.file_resolver()
+    resolver.clear()
+    resolver.append(str(Path(mi.__file__).resolve().parent))
+
+
+def _fix_of_import(reason: str) -> str:
+    if "libatomic.so" in reason:  # the one library that Mitsuba takes from the system and Debian may lack
+        return "install it: sudo apt-get install libatomic1"
+    return _REINSTALL
+
+
+def _resolve(device: DeviceChoice, dr: Any, mi: Any) -> Literal["cpu", "gpu"]:
+    current = mi.variant()
+    if device == "auto" and current in VARIANTS and current != _set_here:
+        return VARIANTS[current]
+    if device == "cpu":
+        return "cpu"
+    obstacle = gpu.obstacle(dr)
+    if device == "gpu" and obstacle:
+        raise EngineError(obstacle, where="device 'gpu'", fix="render on the CPU: device 'cpu'")
+    return "cpu" if obstacle else "gpu"
+
+
+def _on_cpu(dr: Any, library: llvm.Library | None) -> Engine:
+    if not dr.has_backend(dr.JitBackend.LLVM):
+        library = library or llvm.choose()  # its error is the better explanation, if it raises one
+        raise EngineError(
+            f"the LLVM library '{library.path}' could not be used{_load_error(library.path)}",
+            rule="it has to load, and the processor has to know AVX and FMA (x86) or NEON (ARM)",
+            fix=f"install another: {llvm.install_command()}",
+        )
+    version = tuple(dr.detail.llvm_version())
+    if version[0] < llvm.OLDEST:
+        llvm.choose()  # raises the better explanation if there is no other library
+        raise EngineError(
+            f"Dr.Jit has loaded LLVM {version[0]}, which is too old",
+            rule=f"LLVM {llvm.OLDEST} or newer is needed, and Dr.Jit takes another only before it is first imported",
+            fix=f"start Lippmann before Mitsuba is imported, or set {llvm.PATH_VARIABLE}",
+        )
+    path = str(library.path) if library else os.environ.get(llvm.PATH_VARIABLE)
+    return Engine("llvm_ad_rgb", "cpu", 1, llvm_path=path, llvm_version=".".join(map(str, version)))
+
+
+def _load_error(path: Path) -> str:
+    try:
+        ctypes.CDLL(str(path))
+    except OSError as error:
+        return f": {error}"
+    return ""
+
+
+def _on_gpu() -> Engine:
+    return Engine("cuda_ad_rgb", "gpu", 1, gpu_name=gpu.find())
+
+
+@dataclass(frozen=True)
+class Check:
+    """One finding: what was looked at, what it is, and how to mend it if it is not ``ok``.
+
+    A render can run without what is not ``needed``.
+    """
+
+    name: str
+    ok: bool
+    value: str
+    fix: str = ""
+    needed: bool = True
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """All findings, and the engine that a render would use (``None`` if it would not run)."""
+
+    checks: tuple[Check, ...]
+    engine: Engine | None
+
+    @property
+    def ok(self) -> bool:
+        """Whether a render would run."""
+        return self.engine is not None and all(check.ok for check in self.checks if check.needed)
+
+
+def diagnose(device: DeviceChoice = "auto") -> Diagnosis:
+    """Find out what would be used, and render a small picture with it in another process.
+
+    Never raises for what is wrong with the machine, and loads no library into this process: one that ends its process
+    ends the other.
+    """
+    render, engine = _try_render(device)
+    on_gpu = engine is not None and engine.device == "gpu"
+    checks = (
+        _check_packages(),
+        Check("variant", engine is not None, engine.variant if engine else "none", render.fix),
+        _check_llvm(needed=not on_gpu),
+        Check("GPU", on_gpu, (engine.gpu_name if engine and on_gpu else None) or "none in use", needed=False),
+        Check("threads", True, str(machine.usable_cores())),
+        Check("memory", True, f"{_gib(machine.available_memory())} free of {_gib(machine.total_memory())}"),
+        render,
+    )
+    return Diagnosis(checks, engine)
+
+
+def _gib(size: int) -> str:
+    return f"{size / 2**30:.1f} GiB"
+
+
+def _check_packages() -> Check:
+    from importlib.metadata import PackageNotFoundError, version  # slow to import, and wanted here alone
+
+    found = [f"Python {platform.python_version()}"]
+    for label, name in (("Lippmann", "lippmann"), ("Mitsuba", "mitsuba"), ("Dr.Jit", "drjit")):
+        try:
+            found.append(f"{label} {version(name)}")
+        except PackageNotFoundError:
+            return Check("versions", False, f"{', '.join(found)}; {label} is not installed", _REINSTALL)
+    return Check("versions", True, ", ".join(found))
+
+
+def _check_llvm(*, needed: bool) -> Check:
+    try:
+        library = llvm.choose()
+    except EngineError as error:
+        return Check("LLVM", False, f"{error.where}: {error.what}" if error.where else error.what, error.fix, needed)
+    others = ", ".join(other.version_text for other in llvm.installed() if other.problem)
+    passed_over = f" (passed over: {others})" if others else ""
+    return Check("LLVM", True, f"{library.version_text}, {library.path}{passed_over}", needed=needed)
+
+
+def _try_render(device: DeviceChoice) -> tuple[Check, Engine | None]:
+    """Run :func:`_probe` in another process and judge how it ended."""
+    name = "test render"
+    command, environment = python_command(
+        "import sys; from lippmann.runtime.engine import _probe; _probe(sys.argv[1])", device
+    )
+    began = time.perf_counter()
+    try:
+        run = subprocess.run(
+            command, capture_output=True, text=True, timeout=_PROBE_SECONDS, check=False, env=environment
+        )
+    except (OSError, subprocess.SubprocessError) as error:
+        return Check(name, False, f"did not finish: {error}", _REINSTALL), None
+    seconds = time.perf_counter() - began
+    if run.returncode != 0:
+        last = (run.stderr.strip().splitlines() or ["without a word"])[-1]
+        end = f"signal {-run.returncode}" if run.returncode < 0 else f"exit code {run.returncode}"
+        return Check(name, False, f"the engine ended its process with {end}: {last}", _REINSTALL), None
+    answer = json.loads(run.stdout.splitlines()[-1])
+    if "problem" in answer:
+        return Check(name, False, answer["problem"], answer["fix"]), None
+    return Check(name, True, f"done in {seconds:.1f} s, start of the engine included"), Engine(**answer)
+
+
+def _probe(device: DeviceChoice) -> None:
+    """Start the engine, render a white ball under a white sky, and write the engine or the problem as JSON."""
+    try:
+        engine = start(device)
+        _, mi = _load()
+        scene = {
+            "type": "scene",
+            "integrator": {"type": "path", "max_depth": 3},
+            "sensor": {
+                "type": "perspective",
+                "to_world": mi.ScalarTransform4f().look_at([0, 0, 5], [0, 0, 0], [0, 1, 0]),
+                "film": {"type": "hdrfilm", "width": 16, "height": 16, "rfilter": {"type": "box"}},
+            },
+            "ball": {"type": "sphere", "bsdf": {"type": "diffuse", "reflectance": {"type": "rgb", "value": 0.5}}},
+            "sky": {"type": "constant", "radiance": {"type": "rgb", "value": 1.0}},
+        }
+        picture = mi.render(mi.load_dict(scene), spp=4).numpy()
+        corner, centre = float(picture[0, 0, 0]), float(picture[8, 8, 0])
+        if not (abs(corner - 1) < 1e-3 and abs(centre - 0.5) < 0.25):
+            raise EngineError(f"the picture is wrong: {corner:g} and {centre:g} for 1 and 0.5", fix=_REINSTALL)
+    except EngineError as error:
+        where = f"{error.where}: " if error.where else ""
+        print(json.dumps({"problem": where + error.what, "fix": error.fix}))
+    else:
+        print(json.dumps(asdict(engine)))

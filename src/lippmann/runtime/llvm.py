@@ -1,0 +1,264 @@
+"""Finding an LLVM library that Dr.Jit can use, without loading any.
+
+Dr.Jit compiles its CPU kernels with the first libLLVM that it finds. Not every version will do: 14 and older are
+refused, and 15 and 16 end the whole process in the middle of a compilation (``Cannot select: fminimum``). So the
+library is chosen here, by the version that it states about itself in its file, and handed to Dr.Jit by path.
+"""
+
+from __future__ import annotations
+
+import functools
+import os
+import platform
+import re
+import struct
+import subprocess
+import sys
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from lippmann.errors import EngineError
+from lippmann.runtime.child_python import python_command
+
+#: The environment variable by which Dr.Jit is told its library, and by which users may force one.
+PATH_VARIABLE = "DRJIT_LIBLLVM_PATH"
+#: The oldest major version that compiles all kernels.
+OLDEST = 17
+#: The newest major version that was tried; a newer one is taken only where nothing else is found.
+NEWEST_TRIED = 22
+
+_MAC = sys.platform == "darwin"
+_FILE_NAME = re.compile(r"libLLVM(-\d[\w.]*)?(\.so(\.\d[\w.]*)?|\.dylib)")
+_VERSION_IN_NAME = re.compile(r"libLLVM(?:-|\.so\.)(\d+(?:\.\d+)*)")
+
+# ELF: kinds of segments (PT_LOAD, PT_DYNAMIC) and of entries of the dynamic section (DT_STRTAB, DT_SONAME).
+_LOADED_SEGMENT, _DYNAMIC_SEGMENT = 1, 2
+_STRINGS_ENTRY, _NAME_ENTRY = 5, 14
+
+
+@dataclass(frozen=True)
+class Library:
+    """One LLVM library found on the machine.
+
+    ``version`` is empty if it cannot be told; ``problem`` says why the library will not do and is empty if it will.
+    """
+
+    path: Path
+    version: tuple[int, ...] = ()
+    problem: str = ""
+
+    @property
+    def version_text(self) -> str:
+        return ".".join(str(part) for part in self.version) or "of unknown version"
+
+
+def install_command() -> str:
+    """The command that installs a library that will do, for this kind of machine."""
+    if _MAC:
+        return "brew install llvm"
+    for tool, command in (
+        ("apt-get", "sudo apt-get install libllvm19"),
+        ("dnf", "sudo dnf install llvm-libs"),
+        ("pacman", "sudo pacman -S llvm-libs"),
+        ("zypper", "sudo zypper install libLLVM19"),
+    ):
+        if any((Path(folder) / tool).exists() for folder in ("/usr/bin", "/bin")):
+            return command
+    return f"install the LLVM runtime library, version {OLDEST} or newer"
+
+
+def choose() -> Library:
+    """The library to use: the one that ``DRJIT_LIBLLVM_PATH`` names, else the newest good one of the machine.
+
+    Takes a few milliseconds and loads nothing.
+
+    Raises
+    ------
+    EngineError
+        If the variable names a library that will not do, or if no good one is found.
+    """
+    named = os.environ.get(PATH_VARIABLE)
+    if named:
+        return _named(named)
+    found = []
+    # The system's list of libraries is asked last: it costs a process, and mostly the folders are enough.
+    for files in (files_in(search_folders()), listed_files()):
+        found += [inspect(path) for path in files]
+        good = [library for library in found if not library.problem]
+        if good:
+            return max(good, key=_rank)
+    raise EngineError(
+        f"no usable LLVM library is installed{_passed_over(found)}",
+        rule=f"rendering on the CPU needs LLVM {OLDEST} or newer",
+        fix=f"install it: {install_command()}",
+    )
+
+
+def installed() -> list[Library]:
+    """All LLVM libraries found on the machine, the best first; those that will not do say why."""
+    paths = dict.fromkeys((*files_in(search_folders()), *listed_files()))
+    libraries = [inspect(path) for path in paths]
+    return sorted(libraries, key=lambda library: (not library.problem, _rank(library)), reverse=True)
+
+
+@functools.cache
+def inspect(path: Path) -> Library:
+    """What the library file ``path`` is, judged without loading it into this process."""
+    if path.is_dir():
+        return Library(path, problem="is a folder, not a library")
+    try:
+        name = _own_name(path)
+    except FileNotFoundError:
+        return Library(path, problem="is not there")
+    except OSError as error:
+        return Library(path, problem=f"cannot be read ({error.strerror})")
+    except (ValueError, struct.error):
+        return Library(path, problem="is not a shared library, or a damaged one")
+    match = _VERSION_IN_NAME.match(name)
+    version = tuple(int(part) for part in match[1].split(".")) if match else _ask(path)
+    if not version:
+        return Library(path, problem="is not an LLVM library, or cannot be loaded")
+    if version[0] < OLDEST:
+        return Library(path, version, f"is LLVM {version[0]}, which is too old")
+    return Library(path, version)
+
+
+def search_folders() -> list[Path]:
+    """Folders where LLVM libraries are usually installed, without repeats."""
+    machine = platform.machine()
+    homes = [sys.prefix, os.environ.get("CONDA_PREFIX", "")]
+    folders = [Path(entry) for entry in os.environ.get("LD_LIBRARY_PATH", "").split(os.pathsep) if entry]
+    folders += [Path(home) / "lib" for home in homes if home]
+    fixed = [f"/usr/lib/{machine}-linux-gnu", "/usr/lib64", "/usr/lib", "/usr/local/lib", "/usr/local/lib64"]
+    folders += [Path(name) for name in fixed]
+    for root, pattern in (
+        ("/usr/lib", "llvm*/lib"),
+        ("/usr/lib", "llvm/*/lib*"),
+        ("/usr/lib64", "llvm*/lib*"),
+        ("/usr/local", "llvm*/lib"),
+        ("/opt", "llvm*/lib"),
+        ("/opt/homebrew/opt", "llvm*/lib"),
+        ("/usr/local/opt", "llvm*/lib"),
+    ):
+        folders += sorted(Path(root).glob(pattern))
+    return list(dict.fromkeys(folders))
+
+
+def files_in(folders: Iterable[Path]) -> Iterator[Path]:
+    """Files in ``folders`` that are named like an LLVM library, each real file once."""
+    seen = set()
+    for folder in folders:
+        try:
+            names = sorted(name for name in os.listdir(folder) if _FILE_NAME.fullmatch(name))
+        except OSError:
+            continue
+        for name in names:
+            real = (folder / name).resolve()
+            if real not in seen and real.is_file():
+                seen.add(real)
+                yield real
+
+
+def listed_files() -> Iterator[Path]:
+    """LLVM libraries of the system's own list (``ldconfig``), which knows folders that no one else does."""
+    if not sys.platform.startswith("linux"):
+        return
+    for command in ("/sbin/ldconfig", "ldconfig"):
+        try:
+            run = subprocess.run([command, "-p"], capture_output=True, text=True, timeout=10, check=False)
+        except (OSError, subprocess.SubprocessError):
+            continue
+        places = (line.partition("=>")[2].strip() for line in run.stdout.splitlines())
+        yield from {Path(p).resolve(): None for p in places if _FILE_NAME.fullmatch(os.path.basename(p))}
+        return
+
+
+def _named(name: str) -> Library:
+    path: Path | None = Path(name).absolute()
+    if os.sep not in name:  # the dynamic loader looks such a name up in its folders, never in the current one
+        path = next((folder / name for folder in search_folders() if (folder / name).is_file()), None)
+    library = inspect(path) if path else Library(Path(name), problem="is not there")
+    if library.problem:
+        raise EngineError(
+            f"'{name}' {library.problem}",
+            where=PATH_VARIABLE,
+            rule=f"it has to name an LLVM library of version {OLDEST} or newer",
+            fix=f"unset it, or correct it; to install a library: {install_command()}",
+        )
+    return library
+
+
+def _rank(library: Library) -> tuple[bool, tuple[int, ...]]:
+    """Sorts the newest tried version highest, and of the untried ones the nearest to those tried."""
+    if library.version and library.version[0] > NEWEST_TRIED:
+        return False, tuple(-part for part in library.version)
+    return True, library.version
+
+
+def _passed_over(found: list[Library]) -> str:
+    if not found:
+        return ""
+    versions = sorted({library.version_text for library in found if library.version})
+    return f" (found only {', '.join(versions)})" if versions else f" ('{found[0].path}' {found[0].problem})"
+
+
+def _own_name(path: Path) -> str:
+    """The name that a library was built under (ELF ``SONAME``), or its file's name where the format holds none.
+
+    The file's name may be any; what it was built under tells the version. The layout is that of the System V ABI,
+    "Object Files" and "Dynamic Linking".
+    """
+    with path.open("rb") as file:
+        length = os.fstat(file.fileno()).st_size
+
+        def read(offset: int, size: int) -> bytes:
+            if offset + size > length:
+                raise ValueError("the file is cut off")
+            file.seek(offset)
+            return file.read(size)
+
+        head = read(0, 64)
+        if _MAC and head[:4] in (b"\xcf\xfa\xed\xfe", b"\xca\xfe\xba\xbe"):
+            return path.resolve().name
+        if head[:6] != b"\x7fELF\x02\x01" or head[18:20] != _machine_code():
+            raise ValueError("not a 64-bit little-endian library for this processor")
+        table, size, count = *struct.unpack_from("<Q", head, 32), *struct.unpack_from("<HH", head, 54)
+        segments = [struct.unpack("<IIQQQQQQ", read(table + size * i, 56)) for i in range(count)]
+        dynamic = next((s for s in segments if s[0] == _DYNAMIC_SEGMENT), None)
+        if dynamic is None:
+            raise ValueError("not a shared library")
+        entries = dict(reversed(list(struct.iter_unpack("<QQ", read(dynamic[2], dynamic[5])))))  # the first one counts
+        if _NAME_ENTRY not in entries:
+            return path.name
+        address = entries.get(_STRINGS_ENTRY, 0) + entries[_NAME_ENTRY]
+        load = next((s for s in segments if s[0] == _LOADED_SEGMENT and s[3] <= address < s[3] + s[5]), None)
+        if load is None:
+            raise ValueError("the name lies outside the file")
+        start = address - load[3] + load[2]
+        name, end, _ = read(start, min(256, length - start)).partition(b"\0")
+        if not end:
+            raise ValueError("the name is cut off")
+        return name.decode("ascii")
+
+
+@functools.cache
+def _machine_code() -> bytes:
+    """The processor's number in ELF files, taken from the running Python."""
+    with Path(sys.executable).open("rb") as file:
+        return file.read(20)[18:]
+
+
+def _ask(path: Path) -> tuple[int, ...]:
+    """The version that the library itself reports, asked in another process: it may not survive being loaded."""
+    code = (
+        "import ctypes, sys; n = [ctypes.c_uint() for _ in range(3)];"
+        "ctypes.CDLL(sys.argv[1]).LLVMGetVersion(*map(ctypes.byref, n)); print(*(v.value for v in n))"
+    )
+    command, environment = python_command(code, str(path))
+    try:
+        run = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False, env=environment)
+    except (OSError, subprocess.SubprocessError):
+        return ()
+    parts = run.stdout.split()
+    return tuple(int(part) for part in parts) if run.returncode == 0 and len(parts) == 3 else ()

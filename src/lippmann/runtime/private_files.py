@@ -1,0 +1,207 @@
+"""Private files: files and folders that the program names itself, opened without following links and only if own.
+
+The user names an output, so that a link there is followed. The program makes up the names of journals and half-written
+files. In a folder that others may write to, such as ``/tmp``, another user may have put a link or a file there first.
+
+A private folder is checked by its owner and permissions; its files are then opened by their paths, not relative to an
+open folder. That suffices: nobody else can exchange names in a folder that belongs to the user and that nobody else may
+write to. Folders above it are not checked: whoever may rename things there can exchange the output as well.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import secrets
+import shutil
+import stat
+from contextlib import suppress
+from pathlib import Path
+from typing import IO
+
+#: Permissions of private folders and files.
+FOLDER_MODE, FILE_MODE = 0o700, 0o600
+
+_OTHERS_FIX = "choose another name, or another folder"
+
+#: What :func:`_shown_in` found.
+_shown: dict[Path, os.stat_result] = {}
+
+
+class ForeignFileError(Exception):
+    """A file or folder that is not to be used; the text is a predicate, such as ``is a symbolic link``.
+
+    Parameters
+    ----------
+    predicate:
+        What it is.
+    fix:
+        What the user can do about it; empty where the caller knows better.
+    """
+
+    def __init__(self, predicate: str, fix: str = "") -> None:
+        super().__init__(predicate)
+        self.fix = fix
+
+
+def make_folder(path: Path) -> None:
+    """Make the folder ``path`` for the user alone, or check the one that is there.
+
+    Raises
+    ------
+    ForeignFileError
+        As :func:`check_folder`.
+    OSError
+        If it cannot be made.
+    """
+    with suppress(FileExistsError):
+        os.mkdir(path, FOLDER_MODE)
+    if not check_folder(path):
+        raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), str(path))  # removed again by another process
+
+
+def check_folder(path: Path) -> bool:
+    """Whether there is a folder at ``path``.
+
+    Raises
+    ------
+    ForeignFileError
+        If something else lies there, the folder is another user's, or other users may write to it.
+    OSError
+        If that cannot be found out.
+    """
+    try:
+        status = os.lstat(path)
+    except FileNotFoundError:
+        return False
+    if _is_link(status):
+        raise ForeignFileError("is a symbolic link")
+    if not stat.S_ISDIR(status.st_mode):
+        raise ForeignFileError("is no folder")
+    if not _is_own(status, path.parent):
+        raise ForeignFileError("belongs to another user", _OTHERS_FIX)
+    if hasattr(os, "geteuid") and status.st_mode & 0o022:
+        shown = _shown_in(path.parent)
+        # File systems without permissions, such as FAT, show everything as open to all.
+        if shown is None or not shown.st_mode & 0o077:
+            raise ForeignFileError(
+                "can be written to by other users", f"take that permission away: chmod go-w '{path}'"
+            )
+    return True
+
+
+def open_to_read(path: Path, owner: int | None = None) -> IO[bytes]:
+    """Open the file ``path`` for reading.
+
+    Parameters
+    ----------
+    owner:
+        The number of a user whose file it may be, instead of this user's.
+
+    Raises
+    ------
+    ForeignFileError
+        If it is a link, no regular file, or another user's.
+    OSError
+        If it cannot be opened.
+    """
+    return os.fdopen(_open(path, os.O_RDONLY, owner=owner), "rb")
+
+
+def open_to_append(path: Path) -> IO[bytes]:
+    """Open the file ``path``, made if it is not there, for reading and adding.
+
+    Raises
+    ------
+    ForeignFileError
+        If it is a link, no regular file, another user's, or has a second name: writing would change that file, too.
+    OSError
+        If it cannot be opened.
+    """
+    return os.fdopen(_open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND, is_changed=True), "a+b")
+
+
+def is_own(path: Path) -> bool:
+    """Whether ``path``, which may itself be a link, belongs to the user."""
+    try:
+        return _is_own(os.lstat(path), path.parent)
+    except OSError:
+        return False
+
+
+def remove(path: Path) -> None:
+    """Remove the file, link or folder ``path`` if it is the user's own, as far as that is possible.
+
+    Links are removed, not followed.
+    """
+    if not is_own(path):
+        return
+    with suppress(OSError):
+        if stat.S_ISDIR(os.lstat(path).st_mode):
+            shutil.rmtree(path, ignore_errors=True)
+        else:
+            path.unlink()
+
+
+def without_following() -> int:
+    """Flags for :func:`os.open`: fail at links, do not wait for the other end of pipes; as far as the system can."""
+    names = ("O_NOFOLLOW", "O_CLOEXEC", "O_NONBLOCK", "O_BINARY")
+    flags = 0
+    for name in names:
+        flags |= getattr(os, name, 0)
+    return flags
+
+
+def _open(path: Path, flags: int, *, owner: int | None = None, is_changed: bool = False) -> int:
+    if not hasattr(os, "O_NOFOLLOW") and os.path.islink(path):
+        raise ForeignFileError("is a symbolic link")
+    try:
+        descriptor = os.open(path, flags | without_following(), FILE_MODE)
+    except OSError as error:
+        if os.path.islink(path):
+            raise ForeignFileError("is a symbolic link") from error
+        raise
+    try:
+        status = os.fstat(descriptor)
+        if not stat.S_ISREG(status.st_mode):
+            raise ForeignFileError("is no regular file")
+        if not (_is_own(status, path.parent) if owner is None else status.st_uid == owner):
+            raise ForeignFileError("belongs to another user", _OTHERS_FIX)
+        if is_changed and status.st_nlink > 1:
+            raise ForeignFileError("has another name, too (a hard link)")
+    except BaseException:
+        os.close(descriptor)
+        raise
+    return descriptor
+
+
+def _is_link(status: os.stat_result) -> bool:
+    """Whether this is a symbolic link or, on Windows, a junction."""
+    junction = getattr(stat, "IO_REPARSE_TAG_MOUNT_POINT", None)
+    return stat.S_ISLNK(status.st_mode) or getattr(status, "st_reparse_tag", 0) == junction
+
+
+def _is_own(status: os.stat_result, folder: Path) -> bool:
+    """Whether what has this status and lies in ``folder`` belongs to the user."""
+    if not hasattr(os, "geteuid") or status.st_uid == os.geteuid():
+        return True
+    # Network drives and containers may show one owner for all files of a user, and not the one who made them.
+    shown = _shown_in(folder)
+    return shown is not None and shown.st_uid == status.st_uid
+
+
+def _shown_in(folder: Path) -> os.stat_result | None:
+    """Owner and permissions that the file system shows for a private file made in ``folder``; None if none can be."""
+    if folder not in _shown:
+        path = folder / f".{secrets.token_hex(8)}.part"
+        try:
+            descriptor = os.open(path, os.O_CREAT | os.O_EXCL | os.O_WRONLY | without_following(), FILE_MODE)
+        except OSError:
+            return None
+        try:
+            _shown[folder] = os.fstat(descriptor)
+        finally:
+            os.close(descriptor)
+            with suppress(OSError):
+                path.unlink()
+    return _shown[folder]

@@ -1,0 +1,1 @@
+"""Tools that several scene readers share: files, tokens, triangulation, texture maps."""

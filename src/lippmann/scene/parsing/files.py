@@ -1,0 +1,216 @@
+"""Files that a scene file names: where they may lie, and how their pictures become texels."""
+
+from __future__ import annotations
+
+import difflib
+import io
+from collections.abc import Sequence
+from pathlib import Path, PurePosixPath, PureWindowsPath
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lippmann.codecs.pillow_formats import RULE, is_allowed, open_picture
+from lippmann.errors import SceneError
+from lippmann.scene.values.description import Image
+
+if TYPE_CHECKING:
+    from PIL import Image as Pillow
+
+
+def read_bytes(path: Path, most: int = -1) -> bytes:
+    """A scene file, or its first ``most`` bytes.
+
+    Raises
+    ------
+    SceneError
+        The file is missing, a folder, unreadable or empty.
+    """
+    where = path.name
+    try:
+        if path.is_dir():
+            raise SceneError("is a folder, not a scene file", where=str(path), fix="name the file inside it")
+        with path.open("rb") as file:
+            data = file.read(most)
+    except FileNotFoundError:
+        raise SceneError("no such file", where=str(path), fix=_near_miss(path)) from None
+    except OSError as error:
+        raise SceneError(f"cannot be read ({error.strerror or error})", where=str(path)) from None
+    if not data:
+        raise SceneError("the file is empty", where=where)
+    return data
+
+
+def decode_text(data: bytes, where: str) -> str:
+    """The text of an OBJ, MTL or similar file: UTF-8, else Latin-1, which old exporters wrote.
+
+    Raises
+    ------
+    SceneError
+        The bytes are not text.
+    """
+    if b"\0" in data[:4096]:
+        raise SceneError("is not a text file", where=where, rule="this format is plain text")
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return data.decode("latin-1")
+
+
+def resolve(folder: Path, name: str, *, where: str, what: str, allow_outside: bool) -> Path:
+    """The file that ``name`` means, seen from ``folder``, in which it must lie; see :func:`find_file`."""
+    return find_file(name, [folder], folder, where=where, what=what, allow_outside=allow_outside)
+
+
+def find_file(
+    name: str, folders: Sequence[Path], scene_folder: Path, *, where: str, what: str, allow_outside: bool
+) -> Path:
+    """The file that ``name`` means, seen from the first of ``folders`` that has it.
+
+    Exporters on Windows write backslashes and absolute paths; a path that leads out of ``scene_folder`` is taken to
+    mean the file of that name inside one of the folders, unless ``allow_outside`` trusts the scene file to name any
+    file of the machine. Errors tell nothing of what lies outside.
+
+    Parameters
+    ----------
+    where:
+        File and line that speak of ``name``, for the error.
+    what:
+        The kind of file, such as "texture".
+
+    Raises
+    ------
+    SceneError
+        No such file, or it lies outside ``scene_folder`` and ``allow_outside`` is false.
+    """
+    plain = name.replace("\\", "/")
+    absolute = _is_absolute(name)
+    candidates = [Path(plain)] if absolute else [folder / plain for folder in folders]
+    inside = [candidate for candidate in candidates if _lies_in(candidate, scene_folder)]
+    allowed = candidates if allow_outside else inside
+    for candidate in allowed:
+        if is_file(candidate):
+            return candidate
+    if absolute or not inside:
+        for folder in folders:
+            beside = folder / PurePosixPath(plain).name
+            if is_file(beside) and (allow_outside or _lies_in(beside, scene_folder)):
+                return beside
+    if not allowed and any(_lies_in(candidate, scene_folder) is False for candidate in candidates):
+        raise _outside(name, where, what)
+    raise SceneError(f"{what} '{name}' is not there", where=where, fix=_near_miss(allowed[0]) if allowed else "")
+
+
+def find_folder(
+    name: str, folders: Sequence[Path], scene_folder: Path, *, where: str, what: str, allow_outside: bool
+) -> Path:
+    """The folder that ``name`` means, seen from the first of ``folders`` that has it.
+
+    Raises
+    ------
+    SceneError
+        No such folder, or it lies outside ``scene_folder`` and ``allow_outside`` is false.
+    """
+    plain = name.replace("\\", "/")
+    candidates = [Path(plain)] if _is_absolute(name) else [folder / plain for folder in folders]
+    inside = [candidate for candidate in candidates if allow_outside or _lies_in(candidate, scene_folder)]
+    if not inside:
+        raise _outside(name, where, what)
+    for candidate in inside:
+        if is_folder(candidate):
+            return candidate
+    raise SceneError(f"{what} '{name}' is not there", where=where, rule="it must be a folder")
+
+
+def _outside(name: str, where: str, what: str) -> SceneError:
+    return SceneError(
+        f"{what} '{name}' lies outside the scene's folder",
+        where=where,
+        rule="a scene file may name only files in its own folder and below",
+        fix="move it there, or trust the scene file with --allow-outside",
+    )
+
+
+def _is_absolute(name: str) -> bool:
+    return PurePosixPath(name.replace("\\", "/")).is_absolute() or PureWindowsPath(name).is_absolute()
+
+
+def _lies_in(path: Path, folder: Path) -> bool | None:
+    """Whether a file lies in ``folder`` or deeper, wherever links lead; None of a name that no file can have."""
+    try:
+        return path.resolve().is_relative_to(folder.resolve())
+    except (OSError, ValueError, RuntimeError):  # a NUL, a name too long, links that run in a circle
+        return None
+
+
+def is_file(path: Path) -> bool:
+    """Whether there is such a file; of a name that no file can have, there is none."""
+    try:
+        return path.is_file()
+    except (OSError, ValueError):  # a name too long, or with a NUL
+        return False
+
+
+def is_folder(path: Path) -> bool:
+    """Whether there is such a folder; of a name that no folder can have, there is none."""
+    try:
+        return path.is_dir()
+    except (OSError, ValueError):  # as above
+        return False
+
+
+def _near_miss(path: Path) -> str:
+    """A hint at the file that was meant: other case, or a slip of the pen."""
+    try:
+        names = sorted(entry.name for entry in path.parent.iterdir() if entry.is_file())
+    except OSError:
+        return f"there is no folder '{path.parent}'"
+    folded = {name.casefold(): name for name in names}
+    close = difflib.get_close_matches(path.name.casefold(), folded, n=1, cutoff=0.75)
+    return f"is '{folded[close[0]]}' meant?" if close else ""
+
+
+def read_image(path: Path, *, where: str) -> Image:
+    """Decode a picture file; see :func:`decode_image`."""
+    return decode_image(read_bytes(path), path.name, where=where)
+
+
+def decode_image(data: bytes, name: str, *, where: str) -> Image:
+    """Texels ``(h, w, 1 | 3 | 4)`` of an encoded picture: uint8, or float32 in [0, 1] where the file holds 16 bits.
+
+    Raises
+    ------
+    SceneError
+        The bytes are no picture of a format of :data:`lippmann.codecs.pillow_formats.FORMATS`, are cut short, or decode
+        to more pixels than Pillow's safety limit.
+    """
+    from PIL import UnidentifiedImageError
+
+    try:
+        with open_picture(io.BytesIO(data)) as picture:
+            pixels = texels_of(picture)
+    except UnidentifiedImageError:
+        raise SceneError(f"texture '{name}' is not a picture that can be read", where=where, rule=RULE) from None
+    except Exception as error:  # Pillow's decoders pass on whatever their libraries throw at damaged data
+        raise SceneError(f"texture '{name}' cannot be decoded ({error})", where=where) from error
+    return Image(name, pixels)
+
+
+def texels_of(picture: Pillow.Image) -> NDArray[np.generic]:
+    """Texels ``(h, w, 1 | 3 | 4)`` of a Pillow image, as :func:`decode_image` gives them.
+
+    Raises
+    ------
+    SceneError
+        The image was opened from a file of another format than those of :data:`lippmann.codecs.pillow_formats.FORMATS`.
+    """
+    if not is_allowed(picture):
+        raise SceneError(f"a texture is a {picture.format} picture", rule=RULE, fix="convert it")
+    if picture.mode.startswith("I;16") or picture.mode in ("I", "F"):
+        wide = np.asarray(picture).astype(np.float32)
+        return np.asarray(wide[..., None] if picture.mode == "F" else wide[..., None] / np.float32(65535.0))
+    if picture.mode in ("1", "L"):
+        return np.array(picture.convert("L"))[..., None]
+    has_alpha = "A" in picture.getbands() or "transparency" in picture.info
+    return np.array(picture.convert("RGBA" if has_alpha else "RGB"))

@@ -1,0 +1,1 @@
+"""Readers of scene files, one per format, and of objects of other libraries."""

@@ -1,0 +1,106 @@
+"""Bytes that a glTF file carries or names: buffers, views of them, data URIs, files beside it."""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import re
+from urllib.parse import unquote
+
+from lippmann.errors import SceneError
+from lippmann.scene.parsing.files import read_bytes, resolve
+from lippmann.scene.readers.gltf.document import Document
+
+_SCHEME = re.compile(r"[A-Za-z][A-Za-z0-9+.-]+:")  # two letters or more: "C:" is a Windows drive
+
+
+def read_uri(document: Document, uri: str, place: str, what: str) -> tuple[bytes, str]:
+    """The bytes that a URI stands for, and a name for them.
+
+    Parameters
+    ----------
+    place:
+        Where in the file the URI stands.
+    what:
+        The kind of thing, such as "texture".
+
+    Raises
+    ------
+    SceneError
+        The URI is damaged, points to the network, to a file that is not there, or out of the scene's folder.
+    """
+    if uri[:5].lower() == "data:":
+        return _decode_data_uri(document, uri, place), place
+    if _SCHEME.match(uri) or uri.startswith("//"):
+        raise document.error(
+            f"{what} '{uri[:80]}' is not a file in the scene's folder",
+            rule="nothing is fetched from the network",
+            fix="save it beside the scene and name it there",
+        )
+    name = unquote(uri)
+    path = resolve(document.folder, name, where=document.file, what=what, allow_outside=document.allow_outside)
+    return read_bytes(path), name
+
+
+def _decode_data_uri(document: Document, uri: str, place: str) -> bytes:
+    header, comma, payload = uri.partition(",")
+    if not comma or not header.lower().endswith(";base64"):
+        raise document.error(f"the data URI of {place} is damaged", rule="it must hold base64 data")
+    try:
+        return base64.b64decode(unquote(payload) if "%" in payload else payload, validate=True)
+    except (binascii.Error, ValueError) as error:
+        raise document.error(f"the data URI of {place} is damaged ({error})", rule="it must hold base64") from None
+
+
+class Buffers:
+    """The buffers of a document, each read when first used and kept once."""
+
+    def __init__(self, document: Document) -> None:
+        self._document = document
+        self._loaded: dict[int, memoryview] = {}
+
+    def all(self) -> list[bytes]:
+        """Every buffer; raises as :meth:`view`."""
+        return [bytes(self._buffer(index)) for index in range(len(self._document.all("buffers")))]
+
+    def view(self, index: int) -> tuple[memoryview, int | None]:
+        """The bytes of ``bufferViews[index]`` and its stride in bytes, if it has one.
+
+        Raises
+        ------
+        SceneError
+            The view reaches beyond its buffer, or the buffer cannot be read.
+        """
+        fields = self._document.all("bufferViews")[index]
+        buffer = self._buffer(self._document.required_reference(fields, "buffer", "buffers"))
+        offset = fields.optional_integer("byteOffset") or 0
+        length = fields.integer("byteLength")
+        if offset + length > len(buffer):
+            raise self._document.error(
+                f"{fields.place} ends at byte {offset + length}", rule=f"its buffer holds {len(buffer)} bytes"
+            )
+        return buffer[offset : offset + length], fields.optional_integer("byteStride")
+
+    def _buffer(self, index: int) -> memoryview:
+        if index not in self._loaded:
+            self._loaded[index] = self._load(index)
+        return self._loaded[index]
+
+    def _load(self, index: int) -> memoryview:
+        fields = self._document.all("buffers")[index]
+        length = fields.integer("byteLength")
+        uri = fields.text("uri")
+        if uri is not None:
+            data, name = read_uri(self._document, uri, fields.place, "buffer")
+            found = memoryview(data)
+        elif index == 0 and self._document.binary_chunk is not None:
+            found, name = self._document.binary_chunk, "binary chunk"
+        else:
+            raise fields.error("uri", "only the first buffer of a .glb file does without one")
+        if len(found) < length:
+            raise SceneError(
+                f"{fields.place} ({name}) holds {len(found)} of {length} bytes",
+                where=self._document.file,
+                fix="copy it anew",
+            )
+        return found[:length]

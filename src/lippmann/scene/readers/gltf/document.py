@@ -1,0 +1,258 @@
+"""A glTF file opened: its JSON, its binary chunk, its remarks, and the extensions that it may ask for."""
+
+from __future__ import annotations
+
+import json
+import struct
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Literal
+
+from lippmann.errors import SceneError
+from lippmann.scene.parsing.files import read_bytes
+from lippmann.scene.readers.gltf.json_fields import Fields
+
+Kind = Literal[
+    "accessors",
+    "bufferViews",
+    "buffers",
+    "cameras",
+    "images",
+    "materials",
+    "meshes",
+    "nodes",
+    "samplers",
+    "scenes",
+    "skins",
+    "textures",
+]
+
+_MAGIC = b"glTF"
+_CHUNK_JSON = 0x4E4F534A
+_CHUNK_BIN = 0x004E4942
+_HEADER = struct.Struct("<4sII")
+_CHUNK_HEADER = struct.Struct("<II")
+
+# Extensions whose members are read.
+_UNDERSTOOD = frozenset(
+    {
+        "EXT_mesh_gpu_instancing",
+        "EXT_texture_avif",
+        "EXT_texture_webp",
+        "KHR_lights_punctual",
+        "KHR_materials_clearcoat",
+        "KHR_materials_emissive_strength",
+        "KHR_materials_ior",
+        "KHR_materials_pbrSpecularGlossiness",
+        "KHR_materials_sheen",
+        "KHR_materials_specular",
+        "KHR_materials_transmission",
+        "KHR_materials_unlit",
+        "KHR_materials_variants",
+        "KHR_materials_volume",
+        "KHR_mesh_quantization",
+        "KHR_node_visibility",
+        "KHR_texture_transform",
+    }
+)
+
+# They say nothing about what is seen while the scene stands still.
+_SILENT = frozenset({"KHR_xmp", "KHR_xmp_json_ld", "KHR_node_selectability", "KHR_node_hoverability"})
+
+_PICTURE_FORMATS = {"EXT_texture_webp": "webp", "EXT_texture_avif": "avif"}
+
+
+@dataclass
+class Notes:
+    """Remarks of the reader; equal ones about several things become one line."""
+
+    _places: dict[str, list[str]] = field(default_factory=dict)
+
+    def add(self, remark: str, place: str = "") -> None:
+        """Remark on ``place``, once."""
+        places = self._places.setdefault(remark, [])
+        if place and place not in places:
+            places.append(place)
+
+    def lines(self) -> tuple[str, ...]:
+        """One line per remark, in the order in which they came."""
+        return tuple(_line(remark, places) for remark, places in self._places.items())
+
+
+def _line(remark: str, places: list[str]) -> str:
+    if not places:
+        return remark
+    others = f" and {len(places) - 1} more" if len(places) > 1 else ""
+    return f"{remark} ({places[0]}{others})"
+
+
+@dataclass(frozen=True, eq=False)
+class Document:
+    """The JSON of a glTF file, its top-level lists by kind, and its binary chunk (glb only).
+
+    ``folder`` holds the files that the document names; ``allow_outside`` lets it name files elsewhere.
+    """
+
+    file: str
+    folder: Path
+    allow_outside: bool
+    root: Fields
+    binary_chunk: memoryview | None
+    notes: Notes = field(default_factory=Notes)
+    _lists: dict[str, list[Fields]] = field(default_factory=dict)
+
+    def all(self, kind: Kind) -> list[Fields]:
+        """All objects of a top-level list."""
+        if kind not in self._lists:
+            self._lists[kind] = self.root.children(kind)
+        return self._lists[kind]
+
+    def with_nodes(self, nodes: list[Fields]) -> Document:
+        """The same file with other nodes, as an animation moves them; notes are shared."""
+        return replace(self, _lists={**self._lists, "nodes": nodes})
+
+    def reference(self, source: Fields, key: str, kind: Kind) -> int | None:
+        """The index that member ``key`` holds, within the list ``kind``; None where absent.
+
+        Raises
+        ------
+        SceneError
+            The list has no such entry.
+        """
+        index = source.optional_integer(key)
+        if index is not None and index >= len(self.all(kind)):
+            raise source.error(key, f"there are {len(self.all(kind))} {kind}, counted from 0")
+        return index
+
+    def required_reference(self, source: Fields, key: str, kind: Kind) -> int:
+        """As :meth:`reference`, for a member that must be there."""
+        index = self.reference(source, key, kind)
+        if index is None:
+            raise source.error(key, "it is required")
+        return index
+
+    def references(self, source: Fields, key: str, kind: Kind) -> list[int]:
+        """As :meth:`reference`, for a list of indices."""
+        indices = source.integers(key)
+        if any(index >= len(self.all(kind)) for index in indices):
+            raise source.error(key, f"there are {len(self.all(kind))} {kind}, counted from 0")
+        return indices
+
+    def error(self, what: str, rule: str = "", fix: str = "") -> SceneError:
+        """An error about this file."""
+        return SceneError(what, where=self.file, rule=rule, fix=fix)
+
+
+def open_document(path: Path, *, allow_outside: bool) -> Document:
+    """Open a ``.glb`` or ``.gltf`` file; which of the two it is, its first bytes tell.
+
+    Raises
+    ------
+    SceneError
+        The file is missing, empty, cut short, of another format or of another glTF version.
+    """
+    data = read_bytes(path)
+    if data[:4] == _MAGIC:
+        text, binary_chunk = _chunks(data, path.name)
+    else:
+        text, binary_chunk = memoryview(data), None
+    root = _parse(text, path.name)
+    document = Document(path.name, path.parent, allow_outside, root, binary_chunk)
+    _check_version(root)
+    return document
+
+
+def _chunks(data: bytes, file: str) -> tuple[memoryview, memoryview | None]:
+    """The JSON and binary chunks of a glb container (glTF 2.0, section 4)."""
+    if len(data) < _HEADER.size:
+        raise SceneError(f"the file ends after {len(data)} bytes", where=file, rule="a glb header has 12")
+    _, version, length = _HEADER.unpack_from(data)
+    if version != 2:
+        raise SceneError(f"binary glTF of version {version}", where=file, rule="version 2 is understood")
+    if length > len(data):
+        raise SceneError(
+            f"the file is cut short: it holds {len(data)} of {length} bytes", where=file, fix="copy it anew"
+        )
+    chunks: dict[int, memoryview] = {}
+    position = _HEADER.size
+    while position + _CHUNK_HEADER.size <= length:
+        size, kind = _CHUNK_HEADER.unpack_from(data, position)
+        position += _CHUNK_HEADER.size
+        if size > length - position:
+            raise SceneError(
+                f"a chunk of {size} bytes begins {length - position} bytes before the end",
+                where=file,
+                fix="copy it anew",
+            )
+        chunks.setdefault(kind, memoryview(data)[position : position + size])
+        position += size
+    if _CHUNK_JSON not in chunks:
+        raise SceneError("the file has no JSON chunk", where=file, rule="a glb file begins with one")
+    return chunks[_CHUNK_JSON], chunks.get(_CHUNK_BIN)
+
+
+def _parse(text: memoryview, file: str) -> Fields:
+    try:
+        value = json.loads(str(text, "utf-8-sig"))
+    except UnicodeDecodeError as error:
+        raise SceneError(
+            f"not a glTF file: byte {error.start} is no UTF-8 text",
+            where=file,
+            rule="glTF is JSON or begins with 'glTF'",
+        ) from None
+    except json.JSONDecodeError as error:
+        raise SceneError(
+            f"line {error.lineno}, column {error.colno}: {error.msg}", where=file, rule="a glTF file holds JSON"
+        ) from None
+    except (RecursionError, ValueError):  # lists nested thousands deep; whole numbers of thousands of digits
+        raise SceneError("the JSON is nested or its numbers are too long to be read", where=file) from None
+    if not isinstance(value, dict):
+        raise SceneError("the JSON is not an object", where=file, rule="a glTF file holds one JSON object")
+    return Fields(value, "", file)
+
+
+def _check_version(root: Fields) -> None:
+    asset = root.child("asset")
+    if asset is None:
+        raise root.error("asset", "every glTF file says its version there")
+    # minVersion, where given, is what a reader must understand; version is what the file was written for.
+    key = "minVersion" if asset.has("minVersion") else "version"
+    version = asset.text(key)
+    if version is None or version.split(".")[0] != "2" or (key == "minVersion" and version != "2.0"):
+        raise asset.error(key, "glTF 2.0 is understood")
+
+
+def texture_extension_is_readable(name: str) -> bool:
+    """Whether the installed Pillow decodes what ``EXT_texture_webp`` or ``EXT_texture_avif`` points to."""
+    from PIL import features
+
+    return bool(features.check(_PICTURE_FORMATS[name]))
+
+
+def check_extensions(document: Document) -> None:
+    """Refuse what must be understood and is not; note what may be left out.
+
+    Raises
+    ------
+    SceneError
+        ``extensionsRequired`` names an extension that is not understood.
+    """
+    required = document.root.texts("extensionsRequired")
+    for name in required:
+        if not _is_understood(name) and name not in _SILENT:
+            raise document.error(
+                f"the file requires the glTF extension {name}",
+                rule="it is not understood",
+                fix="export the scene without it",
+            )
+    for name in document.root.texts("extensionsUsed"):
+        if name == "KHR_materials_variants":
+            document.notes.add("of the material variants the default one is shown")
+        if not _is_understood(name) and name not in _SILENT:
+            document.notes.add(f"the glTF extension {name} is not understood; what it adds is left out")
+
+
+def _is_understood(name: str) -> bool:
+    if name in _PICTURE_FORMATS:
+        return texture_extension_is_readable(name)
+    return name in _UNDERSTOOD

@@ -1,0 +1,105 @@
+"""Meshes: one copy of each, however many nodes show it."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from lippmann.scene.readers.gltf.document import Document
+from lippmann.scene.readers.gltf.json_fields import Fields
+from lippmann.scene.readers.gltf.materials import Materials
+from lippmann.scene.readers.gltf.primitives import Geometry, Primitives
+from lippmann.scene.readers.gltf.skinning import Skin
+from lippmann.scene.values.description import FloatArray, Material, Mesh, Texture
+
+_Key = tuple[Hashable, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Meshes:
+    """The meshes of a document as they are asked for; a primitive becomes one mesh of one material.
+
+    Primitives of the same data and material share a mesh; those of the same data share their arrays.
+    """
+
+    document: Document
+    primitives: Primitives
+    materials: Materials
+    read: list[Mesh] = field(default_factory=list)
+    _places: dict[tuple[_Key, int], int] = field(default_factory=dict)
+    _by_mesh: dict[_Key, list[int]] = field(default_factory=dict)
+    _geometries: dict[_Key, Geometry | None] = field(default_factory=dict)
+
+    def posed(self, document: Document, primitives: Primitives) -> Meshes:
+        """To read the meshes of the same file as other nodes show them; what keeps its shape is kept."""
+        kept = {key: geometry for key, geometry in self._geometries.items() if key[2:] == ((), None)}
+        return Meshes(document, primitives, self.materials, _geometries=kept)
+
+    def places(self, index: int, node: Fields, skin: Skin | None) -> list[int]:
+        """The places in :attr:`read` of the primitives of ``meshes[index]``, as ``node`` shows it.
+
+        Raises
+        ------
+        SceneError
+            As :meth:`Primitives.read` and :meth:`Materials.place`.
+        """
+        fields = self.document.all("meshes")[index]
+        weights = _weights(node) or _weights(fields)
+        key = (index, weights, None if skin is None else skin.index)
+        if key not in self._by_mesh:
+            self._by_mesh[key] = self._read(fields, weights, skin)
+        return self._by_mesh[key]
+
+    def _read(self, fields: Fields, weights: tuple[float, ...], skin: Skin | None) -> list[int]:
+        primitives = fields.children("primitives")
+        found: list[int] = []
+        for primitive in primitives:
+            key = _key(primitive, weights, skin)
+            if key not in self._geometries:
+                self._geometries[key] = self.primitives.read(primitive, weights, skin)
+            geometry = self._geometries[key]
+            if geometry is None:
+                continue
+            material = self.materials.place(self.document.reference(primitive, "material", "materials"))
+            if (key, material) not in self._places:
+                self._places[key, material] = len(self.read)
+                name = fields.text("name") or fields.place
+                name = name if len(primitives) == 1 else f"{name}/{len(found)}"
+                self.read.append(self._mesh(name, geometry, material, primitive))
+            found.append(self._places[key, material])
+        return found
+
+    def _mesh(self, name: str, geometry: Geometry, material: int, primitive: Fields) -> Mesh:
+        wanted = _uv_sets(self.materials.read[material])
+        uvs = geometry.uvs
+        if wanted > len(uvs):
+            self.document.notes.add(
+                "a texture wants coordinates that its mesh lacks; one texel covers all of it", primitive.place
+            )
+            missing: FloatArray = np.zeros((len(geometry.positions), 2), np.float32)
+            uvs += (missing,) * (wanted - len(uvs))
+        return Mesh(name, geometry.positions, geometry.faces, material, geometry.normals, uvs, geometry.colors)
+
+
+def _weights(fields: Fields) -> tuple[float, ...]:
+    values = fields.values.get("weights")
+    return tuple(fields.numbers("weights", len(values) if isinstance(values, list) else 0) or ())
+
+
+def _key(primitive: Fields, weights: tuple[float, ...], skin: Skin | None) -> _Key:
+    """Equal for primitives of equal geometry: their data, their kind, morph weights, and the skin that holds them."""
+    attributes = primitive.child("attributes")
+    vertices = [attributes] if attributes is not None else []
+    if any(weights):
+        vertices += primitive.children("targets")
+    sources = tuple(tuple(sorted((key, data.optional_integer(key)) for key in data.values)) for data in vertices)
+    shape = (primitive.optional_integer("mode"), primitive.optional_integer("indices"))
+    return sources, shape, weights if any(weights) else (), None if skin is None else skin.index
+
+
+def _uv_sets(material: Material) -> int:
+    """How many sets of texture coordinates the textures of a material reach for."""
+    textures = [value for value in vars(material).values() if isinstance(value, Texture)]
+    return max((texture.uv_set + 1 for texture in textures), default=0)

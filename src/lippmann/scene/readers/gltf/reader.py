@@ -1,0 +1,182 @@
+"""A glTF file into a scene description."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lippmann.scene.readers.gltf.accessors import Accessors
+from lippmann.scene.readers.gltf.buffers import Buffers
+from lippmann.scene.readers.gltf.cameras_lights import read_camera, read_light
+from lippmann.scene.readers.gltf.document import Document, check_extensions, open_document
+from lippmann.scene.readers.gltf.json_fields import Fields
+from lippmann.scene.readers.gltf.materials import Materials
+from lippmann.scene.readers.gltf.meshes import Meshes
+from lippmann.scene.readers.gltf.nodes import Nodes, instance_matrices, ranks
+from lippmann.scene.readers.gltf.primitives import Primitives
+from lippmann.scene.readers.gltf.skinning import read_skin
+from lippmann.scene.readers.gltf.textures import Textures
+from lippmann.scene.values.description import Camera, Instance, Light, Matrix, Mesh, SceneDescription
+
+# A few nodes that repeat one list of copies could otherwise ask for all the memory there is.
+_MOST_INSTANCES = 1 << 21
+
+
+def read_gltf(path: Path, *, allow_outside: bool = False) -> SceneDescription:
+    """Read the default scene of a ``.gltf`` or ``.glb`` file as it stands at rest.
+
+    Parameters
+    ----------
+    allow_outside:
+        Let the file name buffers and images outside its own folder.
+
+    Raises
+    ------
+    SceneError
+        The file, or one that it names, is missing, damaged or beyond its bounds; it requires an extension that is not
+        understood; it holds no triangles.
+    """
+    document = open_document(path, allow_outside=allow_outside)
+    check_extensions(document)
+    if document.root.children("animations"):
+        document.notes.add("animations are not played without --frames; the scene is shown at rest")
+    return Contents.of(document).description(path.stem)
+
+
+@dataclass(frozen=True, eq=False)
+class _Placements:
+    """Copies of one mesh (a place in the list of meshes) at ``worlds`` ``(k, 4, 4)``, shown by ``node``."""
+
+    mesh: int
+    worlds: Matrix
+    node: Fields
+
+
+@dataclass(frozen=True, eq=False)
+class Contents:
+    """A file taken apart: what is read once (bytes, materials), and what its nodes bring into the scene."""
+
+    document: Document
+    accessors: Accessors
+    nodes: Nodes
+    meshes: Meshes
+    placements: list[_Placements] = field(default_factory=list)
+    lights: list[Light] = field(default_factory=list)
+    cameras: list[Camera] = field(default_factory=list)
+
+    @classmethod
+    def of(cls, document: Document) -> Contents:
+        """Of a file as it stands at rest."""
+        buffers = Buffers(document)
+        accessors = Accessors(document, buffers)
+        materials = Materials(document, Textures(document, buffers))
+        meshes = Meshes(document, Primitives(document, accessors), materials)
+        return cls(document, accessors, Nodes(document), meshes)
+
+    def posed(self, nodes: list[Fields]) -> Contents:
+        """Of the same file with other ``nodes``; bytes, materials and meshes that no joint holds are not read again."""
+        document = self.document.with_nodes(nodes)
+        meshes = self.meshes.posed(document, Primitives(document, self.accessors))
+        return Contents(document, self.accessors, Nodes(document), meshes)
+
+    def description(self, name: str) -> SceneDescription:
+        """The scene that the nodes make; to be asked for once.
+
+        Raises
+        ------
+        SceneError
+            See :func:`read_gltf`.
+        """
+        for index, visible in self.nodes.shown():
+            self._add(index, visible=visible)
+        meshes, instances = _placed(self.meshes.read, self.placements, self.document)
+        if not instances:
+            raise self.document.error(
+                "the file shows no triangles", rule="a scene needs a mesh on a node of its default scene"
+            )
+        return SceneDescription(
+            name=name,
+            meshes=meshes,
+            materials=tuple(self.meshes.materials.read),
+            instances=instances,
+            lights=tuple(self.lights),
+            cameras=tuple(self.cameras),
+            notes=self.document.notes.lines(),
+        )
+
+    def _add(self, index: int, *, visible: bool) -> None:
+        """Take over what ``nodes[index]`` carries; of an invisible node, its camera alone."""
+        node = self.document.all("nodes")[index]
+        world = self.nodes.world(index)
+        camera = self.document.reference(node, "camera", "cameras")
+        if camera is not None:
+            self.cameras.append(read_camera(self.document.all("cameras")[camera], node, world))
+        if not visible:
+            return
+        light = read_light(node, world, self.document)
+        if light is not None:
+            self.lights.append(light)
+        mesh = self.document.reference(node, "mesh", "meshes")
+        if mesh is not None:
+            self._add_mesh(mesh, node, world)
+
+    def _add_mesh(self, mesh: int, node: Fields, world: Matrix) -> None:
+        skin_index = self.document.reference(node, "skin", "skins")
+        if skin_index is None:
+            worlds = world @ instance_matrices(node, self.document, self.accessors)
+            places = self.meshes.places(mesh, node, None)
+        else:
+            # A skin places its mesh in the world by itself, whatever the node's own transformation (section 3.7.3.3).
+            worlds = np.eye(4)[None]
+            skin = read_skin(skin_index, self.document, self.accessors, self.nodes)
+            places = self.meshes.places(mesh, node, skin)
+        self.placements.extend(_Placements(place, worlds, node) for place in places)
+
+
+def _placed(
+    meshes: list[Mesh], placements: list[_Placements], document: Document
+) -> tuple[tuple[Mesh, ...], tuple[Instance, ...]]:
+    """Meshes and their instances.
+
+    A matrix that flattens its mesh cannot be inverted, which renderers do; that mesh gets a flattened copy instead.
+    """
+    reaches = [np.abs(mesh.positions).max(axis=0).astype(np.float64) for mesh in meshes]
+    copies: list[Mesh] = []
+    instances: list[Instance] = []
+    for placed, kept in zip(placements, _ranks(placements, document), strict=True):
+        farthest = np.abs(placed.worlds[:, :3, :3]) @ reaches[placed.mesh] + np.abs(placed.worlds[:, :3, 3])
+        if (farthest > np.finfo(np.float32).max).any():
+            raise document.error(
+                f"{placed.node.place} puts its mesh beyond all bounds", rule="positions must be finite"
+            )
+        for world, rank in zip(placed.worlds, kept, strict=True):
+            if rank == 3:
+                instances.append(Instance(placed.mesh, world))
+            elif rank == 2:
+                instances.append(Instance(len(meshes) + len(copies), np.eye(4)))
+                copies.append(_flattened(meshes[placed.mesh], world))
+            else:
+                document.notes.add("a mesh that is scaled to nothing is left out", placed.node.place)
+    return (*meshes, *copies), tuple(instances)
+
+
+def _ranks(placements: list[_Placements], document: Document) -> list[NDArray[np.int64]]:
+    """The ranks of all matrices, found at one go, which many single ones would make slow."""
+    counts = np.array([len(placed.worlds) for placed in placements], np.int64)
+    if counts.sum() > _MOST_INSTANCES:
+        first = placements[int(np.argmax(np.cumsum(counts) > _MOST_INSTANCES))]
+        raise document.error(
+            f"{first.node.place} brings the copies of meshes to more than {_MOST_INSTANCES}",
+            rule="so many may be placed",
+        )
+    if not placements:
+        return []
+    return np.split(ranks(np.concatenate([placed.worlds for placed in placements])), np.cumsum(counts)[:-1])
+
+
+def _flattened(mesh: Mesh, world: Matrix) -> Mesh:
+    positions = (mesh.positions @ world[:3, :3].T + world[:3, 3]).astype(np.float32)
+    return replace(mesh, positions=positions, normals=None)

@@ -1,0 +1,1 @@
+"""Animated glTF files: keyframes, and the scene at a given time."""

@@ -1,0 +1,213 @@
+"""Any scene, from a file, a name or a Python object: :func:`load_scene`."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Mapping
+from dataclasses import replace
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lippmann.errors import SceneError, UsageError
+from lippmann.scene.mitsuba_source import MitsubaSource
+from lippmann.scene.parsing.files import read_bytes
+from lippmann.scene.scene import Scene, checked, lit
+from lippmann.scene.values.description import Camera, Color, Environment, SceneDescription
+from lippmann.scene.values.whitted_scene import Background, ClassicScene
+from lippmann.scene.whitted.world_frame import world_camera
+
+#: Words in place of an environment file: the built-in studio, and no light but the scene's own.
+STUDIO, NO_ENVIRONMENT = "studio", "none"
+
+# Suffix -> "module:function" of its reader: read(path, *, allow_outside) gives a SceneDescription, a MitsubaSource or a
+# ClassicScene.
+_READERS = {
+    ".dat": "lippmann.scene.readers.tachyon.reader:read_tachyon",
+    ".glb": "lippmann.scene.readers.gltf:read_gltf",
+    ".gltf": "lippmann.scene.readers.gltf:read_gltf",
+    ".nff": "lippmann.scene.readers.nff:read_nff",
+    ".obj": "lippmann.scene.readers.obj:read_obj",
+    ".ply": "lippmann.scene.readers.ply:read_ply",
+    ".stl": "lippmann.scene.readers.stl:read_stl",
+    ".xml": "lippmann.scene.mitsuba_source:read_mitsuba",
+}
+
+# How a file begins -> the suffix that goes with it, where the beginning leaves no doubt.
+_BEGINNINGS = {b"glTF": ".glb", b"ply\n": ".ply", b"ply\r": ".ply", b"<": ".xml", b"{": ".gltf"}
+
+
+_PAPER_DEPTH = 2
+
+
+def load_scene(
+    source: object,
+    *,
+    environment: str | Path | Environment | None = None,
+    background: Color | None = None,
+    allow_outside: bool = False,
+) -> Scene:
+    """Load a scene.
+
+    Parameters
+    ----------
+    source:
+        The path of a scene file, the name of a bundled scene, or an object: a :class:`SceneDescription`, a
+        :class:`ClassicScene`, a ``trimesh.Scene`` or ``Trimesh``, a PyVista data set, a ``mitsuba.Scene`` or a
+        dictionary for ``mitsuba.load_dict``.
+    environment:
+        Light from all around in place of the scene's own: an EXR or HDR file, or "studio" for the built-in one.
+        A scene without any light gets the studio anyway, unless this is "none".
+    background:
+        Linear RGB seen where nothing is hit; None for the environment (for the studio a grey backdrop).
+    allow_outside:
+        Let the scene file name files outside its own folder.
+
+    Raises
+    ------
+    SceneError
+        The scene or something it needs is missing, damaged, foreign, or has nothing to see.
+    UsageError
+        The background is no colour, or ``source`` is an object that is not understood.
+    """
+    sky = _environment(environment)
+    color = _background(background)
+    scene = _from_name(source, allow_outside) if isinstance(source, str | Path) else _from_object(source)
+    studio = scene.studio and str(environment) != NO_ENVIRONMENT
+    if scene.classic is not None and color is not None:
+        scene = replace(scene, classic=replace(scene.classic, background=Background(color=color)))
+    if scene.is_classic and sky is None:
+        return replace(scene, studio=studio)
+    # The classic light models know no surroundings: who asks for them gets the physical form.
+    return replace(scene, description=lit(scene.physical, sky, color), studio=studio)
+
+
+def known_suffixes() -> tuple[str, ...]:
+    """The endings of the scene files that can be read."""
+    return tuple(_READERS)
+
+
+def kind_of_file(source: str | Path) -> str | None:
+    """The ending that goes with a scene file's content, or else its own; None for the name of a bundled scene.
+
+    Raises
+    ------
+    SceneError
+        The file is missing or cannot be read.
+    """
+    path = Path(source)
+    if isinstance(source, str) and not path.suffix and path.name == source and not path.exists():
+        return None
+    return _suffix_by_content(path) or path.suffix.lower()
+
+
+def _from_name(source: str | Path, allow_outside: bool) -> Scene:
+    path = Path(source)
+    suffix = path.suffix.lower()
+    if isinstance(source, str) and not suffix and path.name == source:
+        from lippmann.scene import bundled
+
+        if source in bundled.names():
+            return _from_library(source)
+        if not path.exists():
+            close = difflib.get_close_matches(source, bundled.names(), n=1)
+            raise SceneError(
+                f"no bundled scene or file is named '{source}'",
+                rule=f"bundled are {', '.join(bundled.names())}",
+                fix=f"is '{close[0]}' meant?" if close else "",
+            )
+    reader = _READERS.get(suffix)
+    by_content = _suffix_by_content(path)
+    if by_content is not None:
+        if reader not in (None, _READERS[by_content]):
+            raise SceneError(f"is no {suffix} file", where=path.name, rule=f"it begins like a {by_content} file")
+        reader = _READERS[by_content]
+    if reader is None:
+        raise SceneError(
+            f"'{suffix}' is no known kind of scene file" if suffix else "is no known kind of scene file",
+            where=path.name,
+            rule=f"known are {', '.join(_READERS)}",
+        )
+    module, function = reader.split(":")
+    description = getattr(import_module(module), function)(path, allow_outside=allow_outside)
+    if isinstance(description, ClassicScene):
+        return _classic(description, world_camera(description))
+    if isinstance(description, SceneDescription):
+        checked(description, path.name)
+    return Scene(description.name, description)
+
+
+def _suffix_by_content(path: Path) -> str | None:
+    """The kind of file that the first bytes give away, where they do."""
+    head = read_bytes(path, 64).removeprefix(b"\xef\xbb\xbf").lstrip()
+    return next((suffix for beginning, suffix in _BEGINNINGS.items() if head.startswith(beginning)), None)
+
+
+def _from_library(name: str) -> Scene:
+    from lippmann.scene import bundled
+
+    made = bundled.make(name)
+    classic = made if isinstance(made, ClassicScene) else bundled.make_classic(name)
+    # The paper renders its scenes with this ray depth.
+    classic = replace(classic, camera=replace(classic.camera, ray_depth=_PAPER_DEPTH))
+    if isinstance(made, ClassicScene):
+        return _classic(classic, bundled.stage_of(name).camera())
+    description = checked(made, name)
+    home = description.cameras[0].name if description.cameras else None
+    return Scene(name, description, home_camera=home, classic=classic)
+
+
+def _classic(scene: ClassicScene, camera: Camera) -> Scene:
+    return Scene(scene.name, home_camera=camera.name, classic=scene, views=(camera,))
+
+
+def _from_object(source: object) -> Scene:
+    if isinstance(source, Scene):
+        return source
+    if isinstance(source, ClassicScene):
+        return _classic(source, world_camera(source))
+    if isinstance(source, SceneDescription):
+        return Scene(source.name, checked(source, source.name))
+    if isinstance(source, MitsubaSource):
+        return Scene(source.name, source)
+    if isinstance(source, Mapping):
+        if source.get("type") != "scene":
+            raise SceneError(f"a dictionary of type {source.get('type')!r}", rule="Mitsuba scenes have type 'scene'")
+        return Scene("mitsuba", MitsubaSource("mitsuba", dict(source)))
+    if type(source).__module__.partition(".")[0] == "mitsuba" and type(source).__name__ == "Scene":
+        return Scene("mitsuba", MitsubaSource("mitsuba", source))
+    from lippmann.scene.readers.trimesh_pyvista import adapter_for
+
+    adapter = adapter_for(source)
+    if adapter is None:
+        raise UsageError(
+            f"a {type(source).__module__}.{type(source).__qualname__} is no scene",
+            rule="a path, a bundled scene's name, or a scene of Mitsuba, trimesh or PyVista is",
+        )
+    description = adapter(source)
+    return Scene(description.name, checked(description, description.name))
+
+
+def _environment(environment: str | Path | Environment | None) -> Environment | None:
+    if environment is None or isinstance(environment, Environment):
+        return environment
+    if str(environment) == NO_ENVIRONMENT:
+        return None
+    if str(environment) == STUDIO:
+        from lippmann.scene.studio_light import studio
+
+        return studio()
+    from lippmann.scene.readers.environment_map import read_environment
+
+    return read_environment(Path(environment))
+
+
+def _background(background: Any) -> Color | None:
+    if background is None:
+        return None
+    values = tuple(float(value) for value in background)
+    if len(values) != 3 or not np.isfinite(values).all() or min(values) < 0.0:
+        raise UsageError(f"{background!r}", where="background", rule="three numbers of 0 or more, linear RGB")
+    return (values[0], values[1], values[2])

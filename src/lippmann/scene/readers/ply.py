@@ -1,0 +1,400 @@
+"""Stanford polygon files (``.ply``), text and binary.
+
+Read from Greg Turk's description of the format (1994). The reader is Lippmann's own because trimesh's refuses binary
+files that mix triangles and larger polygons, which is what modelling programs write.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lippmann.color.transfer import decode_srgb
+from lippmann.errors import SceneError
+from lippmann.scene.parsing.files import read_bytes, read_image, resolve
+from lippmann.scene.parsing.triangulation import triangulate
+from lippmann.scene.values.description import Instance, Material, Mesh, SceneDescription, Texture
+
+UP_NOTE = "up is taken as +y, for nothing in the data says it (turn 0,-90 sets a model upright whose up is +z)"
+
+_TYPES = {
+    **dict.fromkeys(("char", "int8"), "i1"),
+    **dict.fromkeys(("uchar", "uint8"), "u1"),
+    **dict.fromkeys(("short", "int16"), "i2"),
+    **dict.fromkeys(("ushort", "uint16"), "u2"),
+    **dict.fromkeys(("int", "int32"), "i4"),
+    **dict.fromkeys(("uint", "uint32"), "u4"),
+    **dict.fromkeys(("float", "float32"), "f4"),
+    **dict.fromkeys(("double", "float64"), "f8"),
+}
+_UV_NAMES = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"))
+_BYTE_ORDERS = {"binary_little_endian": "<", "binary_big_endian": ">"}
+
+#: Digits of a number of entries; no file has room for more.
+_LONGEST_COUNT = 18
+#: More vertices than any file has.
+_MOST_VERTICES = 1 << 53
+
+Numbers = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class _Lists:
+    """A list property: all values in a row, and how many belong to each entry."""
+
+    values: Numbers
+    sizes: Integers
+
+
+Columns = Mapping[str, "Numbers | _Lists"]
+
+
+@dataclass(frozen=True)
+class _Property:
+    name: str
+    type: str
+    count_type: str | None  # of a list, None for a scalar
+
+
+@dataclass
+class _Element:
+    name: str
+    count: int
+    properties: list[_Property] = field(default_factory=list)
+
+
+@dataclass
+class _Header:
+    elements: list[_Element] = field(default_factory=list)
+    textures: list[str] = field(default_factory=list)
+    order: str | None = None  # "<" or ">" if binary, None if text
+    end: int = 0
+    lines: int = 0
+
+
+def read_ply(path: Path, *, allow_outside: bool = False) -> SceneDescription:
+    """Read a PLY mesh with its vertex normals, colours and texture coordinates.
+
+    Colours are taken as sRGB-coded. Without normals the facets are flat.
+
+    Raises
+    ------
+    SceneError
+        The file is missing, foreign, cut short, or holds no faces; its texture is not there.
+    """
+    where = path.name
+    data = read_bytes(path)
+    header = _read_header(data, where)
+    columns = _read_body(data, header, where)
+    if not all(isinstance(columns.get("vertex", {}).get(axis), np.ndarray) for axis in "xyz"):
+        raise SceneError("holds no vertices with x, y and z", where=where)
+    if not len(_outline(columns, where).sizes):
+        raise SceneError("holds no faces", where=where, fix="a cloud of points must be meshed first")
+    notes = [UP_NOTE]
+    texture = None
+    if header.textures:
+        found = resolve(path.parent, header.textures[0], where=where, what="texture", allow_outside=allow_outside)
+        texture = Texture(read_image(found, where=where), srgb=True)
+        if len(header.textures) > 1:
+            notes.append(f"only the first of {len(header.textures)} textures is used")
+    mesh = _mesh(columns, {element.name: element for element in header.elements}, path.stem, where)
+    if texture is not None and not mesh.uvs:
+        notes.append("the texture is not used: the file gives no texture coordinates")
+        texture = None
+    plain = (1.0, 1.0, 1.0) if texture is not None or mesh.colors is not None else (0.7, 0.7, 0.7)
+    material = Material(path.stem, base_color=plain, base_color_texture=texture, roughness=0.6, double_sided=True)
+    return SceneDescription(path.stem, [mesh], [material], [Instance(0, np.eye(4))], notes=notes)
+
+
+def _read_header(data: bytes, where: str) -> _Header:
+    if not data.startswith((b"ply\n", b"ply\r")):
+        raise SceneError("is no PLY file", where=where, rule="one begins with the line 'ply'")
+    header = _Header()
+    form = ""
+    position, number = 0, 0
+    while True:
+        stop = data.find(b"\n", position)
+        if stop < 0:
+            raise SceneError("the header has no end", where=where, rule="it ends with 'end_header'")
+        line = data[position:stop].decode("latin-1").strip()
+        position, number = stop + 1, number + 1
+        words = line.split()
+        if not words or words[0] in ("ply", "obj_info"):
+            continue
+        if words[0] == "end_header":
+            break
+        if words[0] == "comment":
+            if len(words) > 2 and words[1].lower() == "texturefile":
+                header.textures.append(line.split(None, 2)[2])
+            continue
+        if words[0] == "format":
+            form = words[1] if len(words) > 1 else ""
+        else:
+            _read_declaration(header, words, f"{where}:{number}")
+    if form != "ascii" and form not in _BYTE_ORDERS:
+        raise SceneError(f"format '{form}'", where=where, rule=f"known are ascii, {', '.join(_BYTE_ORDERS)}")
+    for element in header.elements:
+        if len({each.name for each in element.properties}) < len(element.properties):
+            raise SceneError(f"'{element.name[:40]}' has a property twice", where=where, rule="names tell them apart")
+    header.order, header.end, header.lines = _BYTE_ORDERS.get(form), position, number
+    return header
+
+
+def _read_declaration(header: _Header, words: list[str], where: str) -> None:
+    match words:
+        case ["element", name, count] if count.isdecimal() and len(count) <= _LONGEST_COUNT:
+            header.elements.append(_Element(name, int(count)))
+        case ["property", "list", count, kind, name] if (
+            header.elements and {count, kind} <= _TYPES.keys() and _TYPES[count][0] in "iu"
+        ):
+            header.elements[-1].properties.append(_Property(name, _TYPES[kind], _TYPES[count]))
+        case ["property", kind, name] if header.elements and kind in _TYPES:
+            header.elements[-1].properties.append(_Property(name, _TYPES[kind], None))
+        case _:
+            raise SceneError(f"header line '{' '.join(words)[:60]}'", where=where, rule="no such line in a PLY header")
+
+
+def _read_body(data: bytes, header: _Header, where: str) -> dict[str, Columns]:
+    columns: dict[str, Columns] = {}
+    position = header.end
+    lines: list[bytes] = []
+    if header.order is None:
+        lines = [line for line in data[header.end :].split(b"\n") if line.strip()]
+        position = 0
+    for element in header.elements:
+        if header.order is None:
+            rows = lines[position : position + element.count]
+            if len(rows) < element.count:
+                raise _cut_short(element, len(rows), where)
+            columns[element.name] = _text_columns(element, rows, where)
+            position += element.count
+        else:
+            columns[element.name], position = _binary_columns(element, data, position, header.order, where)
+    return columns
+
+
+def _cut_short(element: _Element, found: int, where: str) -> SceneError:
+    return SceneError(
+        f"ends after {found} of {element.count} entries of '{element.name}'", where=where, fix="is it cut short?"
+    )
+
+
+def _text_columns(element: _Element, rows: list[bytes], where: str) -> Columns:
+    try:
+        table = [[float(word) for word in row.split()] for row in rows]
+    except ValueError as error:
+        raise SceneError(f"element '{element.name}': {error}", where=where, rule="numbers only") from None
+    scalars: dict[str, list[float]] = {each.name: [] for each in element.properties if each.count_type is None}
+    lists: dict[str, tuple[list[float], list[int]]] = {
+        each.name: ([], []) for each in element.properties if each.count_type is not None
+    }
+    for number, row in enumerate(table):
+        place = 0
+        for each in element.properties:
+            if place >= len(row):
+                raise _short_row(element, number, where)
+            if each.count_type is None:
+                scalars[each.name].append(row[place])
+                place += 1
+                continue
+            size = int(row[place]) if np.isfinite(row[place]) else -1
+            if size < 0 or place + 1 + size > len(row):
+                raise _short_row(element, number, where)
+            values, sizes = lists[each.name]
+            values.extend(row[place + 1 : place + 1 + size])
+            sizes.append(size)
+            place += 1 + size
+    columns: dict[str, Numbers | _Lists] = {name: np.array(values) for name, values in scalars.items()}
+    columns |= {name: _Lists(np.array(values), np.array(sizes, int)) for name, (values, sizes) in lists.items()}
+    return columns
+
+
+def _short_row(element: _Element, number: int, where: str) -> SceneError:
+    return SceneError(
+        f"entry {number} of '{element.name}' has too few numbers", where=where, fix="is the file cut short?"
+    )
+
+
+@np.errstate(invalid="ignore")  # of damaged floats, which are looked at where they are used
+def _binary_columns(element: _Element, data: bytes, start: int, order: str, where: str) -> tuple[Columns, int]:
+    """The element's columns and where the next element begins."""
+    if not element.properties or element.count == 0:
+        return {}, start
+    first = _sizes_at(element, data, start, order, where)
+    kinds: list[tuple[str, str] | tuple[str, str, tuple[int]]] = []
+    for number, each in enumerate(element.properties):
+        if each.count_type is not None:
+            kinds.append((f"count {number}", order + each.count_type))
+            kinds.append((f"{number}", order + each.type, (first[number],)))
+        else:
+            kinds.append((f"{number}", order + each.type))
+    row = np.dtype(kinds)
+    fits = start + element.count * row.itemsize <= len(data)
+    if fits:
+        table = np.frombuffer(data, row, element.count, start)
+        if all((table[f"count {number}"] == size).all() for number, size in first.items()):
+            columns: dict[str, Numbers | _Lists] = {}
+            for number, each in enumerate(element.properties):
+                values = table[f"{number}"].astype(np.float64)
+                if each.count_type is None:
+                    columns[each.name] = values
+                else:
+                    columns[each.name] = _Lists(values.ravel(), np.full(element.count, first[number]))
+            return columns, start + element.count * row.itemsize
+    elif not first:
+        raise _cut_short(element, (len(data) - start) // row.itemsize, where)
+    return _mixed_columns(element, data, start, order, where)
+
+
+def _sizes_at(element: _Element, data: bytes, start: int, order: str, where: str) -> dict[int, int]:
+    """The size of each list of the entry at ``start``, by the number of its property."""
+    sizes: dict[int, int] = {}
+    place = start
+    for number, each in enumerate(element.properties):
+        if each.count_type is not None:
+            kind = np.dtype(order + each.count_type)
+            if place + kind.itemsize > len(data):
+                raise _cut_short(element, 0, where)
+            sizes[number] = int(np.frombuffer(data, kind, 1, place)[0])
+            if sizes[number] < 0:
+                raise SceneError(f"a list of {sizes[number]} numbers in '{element.name}'", where=where)
+            place += kind.itemsize + sizes[number] * np.dtype(each.type).itemsize
+        else:
+            place += np.dtype(each.type).itemsize
+    if place > len(data):
+        raise _cut_short(element, 0, where)
+    return sizes
+
+
+def _mixed_columns(element: _Element, data: bytes, start: int, order: str, where: str) -> tuple[Columns, int]:
+    """Entries of different lengths: one after the other to find their places, then each column in one go."""
+    endian = "little" if order == "<" else "big"
+    shapes = [
+        (
+            np.dtype(each.count_type).itemsize if each.count_type is not None else 0,
+            each.count_type is not None and each.count_type[0] == "i",
+            np.dtype(each.type).itemsize,
+        )
+        for each in element.properties
+    ]
+    starts: list[list[int]] = [[] for _ in shapes]
+    sizes: list[list[int]] = [[] for _ in shapes]
+    place = start
+    for entry in range(element.count):
+        for number, (count_bytes, signed, item_bytes) in enumerate(shapes):
+            size = 1
+            if count_bytes:
+                size = int.from_bytes(data[place : place + count_bytes], endian, signed=signed)  # type: ignore[arg-type]
+                place += count_bytes
+            starts[number].append(place)
+            sizes[number].append(size)
+            place += size * item_bytes
+            if place > len(data) or size < 0:
+                raise _cut_short(element, entry, where)
+    buffer = np.frombuffer(data, np.uint8)
+    columns: dict[str, Numbers | _Lists] = {}
+    for number, each in enumerate(element.properties):
+        size_of = np.array(sizes[number])
+        item = np.dtype(order + each.type)
+        within = np.arange(size_of.sum()) - np.repeat(np.cumsum(size_of) - size_of, size_of)
+        offsets = np.repeat(np.array(starts[number]), size_of) + within * item.itemsize
+        raw = buffer[offsets[:, None] + np.arange(item.itemsize)]
+        values = np.ascontiguousarray(raw).view(item).ravel().astype(np.float64)
+        columns[each.name] = values if each.count_type is None else _Lists(values, size_of)
+    return columns, place
+
+
+def _outline(columns: Mapping[str, Columns], where: str) -> _Lists:
+    for name in ("vertex_indices", "vertex_index"):
+        found = columns.get("face", {}).get(name)
+        if isinstance(found, _Lists):
+            return found
+    if "tristrips" in columns:
+        raise SceneError("holds triangle strips", where=where, rule="only faces are read", fix="convert it to faces")
+    return _Lists(np.zeros(0), np.zeros(0, np.int64))
+
+
+@np.errstate(over="ignore")  # a number too large for a float is an infinite one, which is refused
+def _mesh(columns: Mapping[str, Columns], elements: Mapping[str, _Element], name: str, where: str) -> Mesh:
+    vertex = {key: column for key, column in columns["vertex"].items() if isinstance(column, np.ndarray)}
+    positions = np.stack([vertex[axis] for axis in "xyz"], axis=-1)
+    outline = _outline(columns, where)
+    keep = outline.sizes >= 3
+    numbers = outline.values[np.repeat(keep, outline.sizes)]
+    if not (np.abs(numbers) < _MOST_VERTICES).all():
+        raise SceneError("a face uses a vertex whose number is none", where=where, rule="vertices are counted from 0")
+    corners = numbers.astype(np.int64)
+    if len(corners) == 0:
+        raise SceneError("holds no faces with three corners", where=where)
+    if corners.min() < 0 or corners.max() >= len(positions):
+        bad = corners.min() if corners.min() < 0 else corners.max()
+        raise SceneError(f"a face uses vertex {bad}", where=where, rule=f"the file has 0 to {len(positions) - 1}")
+    if not (finite := np.isfinite(positions.astype(np.float32)).all(axis=1)).all():
+        bad = int(np.argmin(finite))
+        raise SceneError(
+            f"vertex {bad} is {positions[bad].tolist()}", where=where, rule="coordinates must be finite numbers"
+        )
+    places, owners = triangulate(positions, corners, outline.sizes[keep])
+    faces = corners[places]
+    normals = _stacked(vertex, ("nx", "ny", "nz"))
+    uvs = next((found for names in _UV_NAMES if (found := _stacked(vertex, names)) is not None), None)
+    colors = _colors(columns["vertex"], elements["vertex"])
+    per_corner = _corner_uvs(columns["face"], outline, keep)
+    face_colors = _colors(columns["face"], elements["face"])
+    if per_corner is not None or (face_colors is not None and colors is None):
+        # What belongs to a corner or a face needs vertices that no other face shares.
+        flat = faces.ravel()
+        positions, normals = positions[flat], None if normals is None else normals[flat]
+        colors = None if colors is None else colors[flat]
+        uvs = per_corner[places.ravel()] if per_corner is not None else None if uvs is None else uvs[flat]
+        if face_colors is not None and colors is None:
+            colors = np.repeat(face_colors[keep][owners], 3, axis=0)
+        faces = np.arange(len(flat)).reshape(-1, 3)
+    return Mesh(
+        name=name,
+        positions=positions.astype(np.float32),
+        faces=faces.astype(np.uint32),
+        material=0,
+        normals=_unit(normals),
+        uvs=() if uvs is None else ((uvs * (1.0, -1.0) + (0.0, 1.0)).astype(np.float32),),  # v runs upwards in PLY
+        colors=colors,
+    )
+
+
+def _stacked(columns: Mapping[str, Numbers], names: tuple[str, ...]) -> Numbers | None:
+    return np.stack([columns[name] for name in names], axis=-1) if columns.keys() >= set(names) else None
+
+
+def _corner_uvs(face: Columns, outline: _Lists, keep: NDArray[np.bool_]) -> Numbers | None:
+    """uvs ``(corners, 2)`` of the faces in ``keep``, where the file gives one pair per corner."""
+    found = face.get("texcoord")
+    if not isinstance(found, _Lists) or not (found.sizes == 2 * outline.sizes).all():
+        return None
+    return found.values.reshape(-1, 2)[np.repeat(keep, outline.sizes)]
+
+
+def _colors(columns: Columns, element: _Element) -> NDArray[np.float32] | None:
+    """Linear RGB(A); bytes count to 255, other whole numbers to 255 or 65535 by their type, reals to 1."""
+    scalars = {each.name: each.type for each in element.properties if each.count_type is None}
+    names = [name for name in ("red", "green", "blue", "alpha") if name in scalars]
+    if names[:3] != ["red", "green", "blue"]:
+        return None
+    tops = [1.0 if scalars[name][0] == "f" else 65535.0 if scalars[name] == "u2" else 255.0 for name in names]
+    values = np.stack([np.asarray(columns[name]) / top for name, top in zip(names, tops, strict=True)], axis=-1)
+    values = np.clip(np.nan_to_num(values), 0.0, 1.0)
+    return np.concatenate([decode_srgb(values[:, :3]), values[:, 3:]], axis=1).astype(np.float32)
+
+
+def _unit(normals: Numbers | None) -> NDArray[np.float32] | None:
+    """Unit normals; None if one of them has no length, for then the facets are flat."""
+    if normals is None:
+        return None
+    length = np.linalg.norm(normals, axis=1, keepdims=True)
+    if not np.isfinite(length).all() or (length <= 0.0).any():
+        return None
+    return np.asarray(normals / length, np.float32)

@@ -1,0 +1,1 @@
+"""Tachyon scene files (``.dat``)."""

@@ -1,0 +1,323 @@
+"""Reader of Tachyon scene files (``.dat``) and camera paths (``.cam``).
+
+The grammar and its meaning are those of the program Tachyon 0.99; ``docs/tachyon.md`` lists what is honoured, what is
+refused and where this reader is stricter. Numbers are rounded to single precision, as the program does.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lippmann.errors import SceneError
+from lippmann.scene.parsing.tokens import Words
+from lippmann.scene.readers.tachyon.files import SceneFiles
+from lippmann.scene.readers.tachyon.shapes import SHAPES, ShapeReader
+from lippmann.scene.readers.tachyon.textures import TextureTable
+from lippmann.scene.values.whitted_scene import (
+    AmbientOcclusion,
+    Background,
+    CameraPose,
+    ClassicCamera,
+    ClassicLight,
+    ClassicScene,
+    Fog,
+    Projection,
+    Shading,
+    Vector,
+)
+from lippmann.scene.whitted.builder import ClassicSceneBuilder, unit
+
+_COMMENT = re.compile(r"(?<!\S)#(?!\S)[^\n]*")
+_DEEPEST_INCLUDE = 32
+_MOST_INCLUDES = 1000
+_MOST_SAMPLES = 65535
+_DEEPEST_RAY = 1000
+_LARGEST_PICTURE = 65536
+
+_PROJECTIONS: dict[str, Projection] = {
+    "PERSPECTIVE": "perspective",
+    "PERSPECTIVE_DOF": "perspective-dof",
+    "ORTHOGRAPHIC": "orthographic",
+    "FISHEYE": "fisheye",
+}
+_REFUSED = {
+    "SCALARVOL": "volumes are not rendered",
+    "MGFFILE": "MGF files are not read (nor by the usual builds of Tachyon)",
+}
+
+
+def read_tachyon(path: str | Path, *, allow_outside: bool = False) -> ClassicScene:
+    """Read a Tachyon scene file with all that it includes.
+
+    Parameters
+    ----------
+    path:
+        The ``.dat`` file.
+    allow_outside:
+        Let the scene name files outside its own folder.
+
+    Raises
+    ------
+    SceneError
+        With file, line, the word found and what was expected; also for files that are missing, and for a scene
+        without any primitive.
+    """
+    path = Path(path)
+    reader = _SceneReader(path, SceneFiles(path, allow_outside=allow_outside))
+    return reader.read()
+
+
+def read_cam(path: str | Path) -> list[CameraPose]:
+    """Read a camera path: per frame nine numbers, the view direction, the up direction and the center.
+
+    Raises
+    ------
+    SceneError
+        If the file is missing or empty, or a frame is incomplete or impossible.
+    """
+    path = Path(path)
+    words = Words.of_file(path, path.name, comment=_COMMENT, single=True)
+    poses = []
+    while words.left:
+        pose = CameraPose(view=words.direction(), up=words.direction(), center=words.vector())
+        if not np.cross(pose.view, pose.up).any():
+            raise words.wrong("an up direction that is not the view direction", back=6)
+        poses.append(pose)
+    if not poses:
+        raise SceneError("no frame of a camera path", where=path.name, rule="nine numbers per frame")
+    return poses
+
+
+class _SceneReader:
+    """Reads the items one by one; what they set is kept here until the scene is built."""
+
+    def __init__(self, path: Path, files: SceneFiles) -> None:
+        self._path = path
+        self._files = files
+        self._builder = ClassicSceneBuilder(path.stem)
+        self._items: dict[str, Callable[[Words, Path], None]] = {
+            "CAMERA": self._camera,
+            "LIGHT": self._point_light,
+            "SPOTLIGHT": self._spotlight,
+            "DIRECTIONAL_LIGHT": self._directional_light,
+            "SKY_LIGHT": self._sky_light,
+            "BACKGROUND": self._background,
+            "BACKGROUND_GRADIENT": self._gradient,
+            "FOG": self._fog,
+            "SHADER_MODE": self._shader_mode,
+            "INCLUDE": self._include,
+            "START_CLIPGROUP": self._start_clip_group,
+            "END_CLIPGROUP": self._end_clip_group,
+            "TEXDEF": lambda words, holder: self._textures.define(words, holder),
+            "TEXALIAS": lambda words, holder: self._textures.alias(words),
+            "IMAGEDEF": lambda words, holder: self._textures.define_image(words),
+        }
+        reserved = {*self._items, *SHAPES, *_REFUSED, "END_SCENE"}
+        self._textures = TextureTable(self._builder, files, reserved)
+        self._shapes = ShapeReader(self._builder, self._textures, files)
+        self._open_files: list[Path] = []
+        self._includes = 0
+        self._projection: Projection = "perspective"
+        self._aperture = 0.0
+        self._focal_length = 1.0
+        self._planar_fog = False
+        self._fog_values: dict[str, Any] | None = None
+        self._background_values: dict[str, Any] = {}
+        self._shading_values: dict[str, Any] = {}
+        self._scene_values: dict[str, Any] = {}
+
+    def read(self) -> ClassicScene:
+        words = Words.of_file(self._path, self._path.name, comment=_COMMENT, single=True)
+        words.keyword("BEGIN_SCENE")
+        words.keyword("RESOLUTION")
+        width, height = (words.integer(1, _LARGEST_PICTURE) for _ in range(2))
+        if not self._read_items(words, self._path):
+            raise SceneError("the file ends without END_SCENE", where=words.place(), fix="is it cut short?")
+        if words.left:
+            self._builder.notes.append(f"{words.place()}: what follows END_SCENE is not read")
+        self._shapes.finish()
+        self._textures.finish()
+        if "camera" not in self._scene_values:
+            self._builder.notes.append("no CAMERA: seen from the origin along +z")
+        if self._focal_length != 1.0:
+            self._builder.notes.append("FOCALLENGTH has no effect: Tachyon focuses at distance 1")
+        if self._fog_values is not None:
+            self._scene_values["fog"] = Fog(planar=self._planar_fog, **self._fog_values)
+        scene = self._builder.build(
+            resolution=(width, height),
+            background=Background(**self._background_values),
+            shading=Shading(**self._shading_values),
+            **self._scene_values,
+        )
+        if not any(scene.counts().values()):
+            raise SceneError("the scene has no geometry", where=self._path.name, rule="at least one primitive")
+        return scene
+
+    def _read_items(self, words: Words, holder: Path) -> bool:
+        """Reads the file ``holder`` to END_SCENE (True) or to its end (False)."""
+        self._open_files.append(holder)
+        ended = False
+        while words.left and not ended:
+            keyword = words.peek().upper()
+            if keyword in SHAPES:
+                words.take()
+                SHAPES[keyword](self._shapes, words, holder)
+            elif keyword in self._items:
+                words.take()
+                self._items[keyword](words, holder)
+            elif keyword == "END_SCENE":
+                words.take()
+                ended = True
+            elif keyword in _REFUSED:
+                raise SceneError(f"{keyword} cannot be rendered", where=words.place(), rule=_REFUSED[keyword])
+            else:
+                raise words.wrong("the keyword of an item, such as SPHERE, or END_SCENE")
+        self._open_files.pop()
+        return ended
+
+    def _include(self, words: Words, holder: Path) -> None:
+        where = words.place()
+        path = self._files.find(words.name("the name of a file"), holder, where=where, what="included file")
+        shown = self._files.shown(path)
+        if any(path.samefile(other) for other in self._open_files):
+            raise SceneError(f"'{shown}' includes itself", where=where, rule="includes may not run in a circle")
+        self._includes += 1
+        if len(self._open_files) > _DEEPEST_INCLUDE or self._includes > _MOST_INCLUDES:
+            limits = f"at most {_DEEPEST_INCLUDE} deep and {_MOST_INCLUDES} in all"
+            raise SceneError(f"'{shown}' is one include too many", where=where, rule=limits)
+        self._read_items(self._files.words(path, comment=_COMMENT, where=where), path)
+
+    def _camera(self, words: Words, holder: Path) -> None:
+        if words.has("PROJECTION"):
+            self._projection = _choice(words, _PROJECTIONS)
+            if self._projection == "perspective-dof":
+                self._focal_length = words.number("FOCALLENGTH")
+                self._aperture = words.number("APERTURE")
+        start = words.place()
+        values: dict[str, Any] = {
+            "zoom": words.positive("ZOOM"),
+            "aspect": words.positive("ASPECTRATIO"),
+            "antialiasing": words.integer(0, _MOST_SAMPLES, "ANTIALIASING"),
+            "ray_depth": max(1, words.integer(0, _DEEPEST_RAY, "RAYDEPTH")),  # 0 traces as deep as 1
+            "center": words.vector("CENTER"),
+            "view": words.direction("VIEWDIR"),
+            "up": words.direction("UPDIR"),
+        }
+        if words.has("FRUSTUM"):
+            values["frustum"] = (words.number(), words.number(), words.number(), words.number())
+        words.keyword("END_CAMERA")
+        try:
+            camera = ClassicCamera(projection=self._projection, aperture=self._aperture, **values)
+        except SceneError as error:
+            raise SceneError(error.what, where=start, rule=error.rule) from None
+        self._scene_values["camera"] = camera
+
+    def _point_light(self, words: Words, holder: Path) -> None:
+        center, radius = words.vector("CENTER"), words.radius("RAD")
+        self._light(words, "point", center=center, radius=radius)
+
+    def _spotlight(self, words: Words, holder: Path) -> None:
+        self._light(
+            words,
+            "spot",
+            center=words.vector("CENTER"),
+            radius=words.radius("RAD"),
+            direction=_unit(words.direction("DIRECTION")),
+            falloff_start=words.number("FALLOFF_START"),
+            falloff_end=words.number("FALLOFF_END"),
+        )
+
+    def _light(self, words: Words, kind: Any, **values: Any) -> None:
+        if words.has("ATTENUATION"):
+            factors = (words.radius("CONSTANT"), words.radius("LINEAR"), words.radius("QUADRATIC"))
+            if not any(factors):
+                raise words.wrong("factors of attenuation that are not all 0", back=1)
+            values["attenuation"] = factors
+        color = words.vector("COLOR")
+        self._builder.light(ClassicLight(kind, color=color, clip_group=self._shapes.clip_group, **values))
+
+    def _directional_light(self, words: Words, holder: Path) -> None:
+        direction = _unit(words.direction("DIRECTION"))
+        self._builder.light(ClassicLight("directional", color=words.vector("COLOR"), direction=direction))
+
+    def _sky_light(self, words: Words, holder: Path) -> None:
+        samples = words.integer(0, _MOST_SAMPLES, "NUMSAMPLES")
+        self._ambient_occlusion(samples, words.vector("COLOR"))
+
+    def _ambient_occlusion(self, samples: int, color: Vector) -> None:
+        self._scene_values["ambient_occlusion"] = AmbientOcclusion(samples, color) if samples else None
+
+    def _background(self, words: Words, holder: Path) -> None:
+        self._background_values["color"] = words.vector()
+
+    def _gradient(self, words: Words, holder: Path) -> None:
+        kinds = {"SKY_SPHERE": "sky-sphere", "SKY_ORTHO_PLANE": "sky-plane"}
+        self._background_values["kind"] = _choice(words, kinds)
+        self._background_values["up"] = words.vector("UPDIR")
+        top, bottom = words.number("TOPVAL"), words.number("BOTTOMVAL")
+        if top == bottom:
+            raise words.wrong("a bottom value that differs from the top value", back=1)
+        self._background_values.update(top_value=top, bottom_value=bottom)
+        self._background_values["top_color"] = words.vector("TOPCOLOR")
+        self._background_values["bottom_color"] = words.vector("BOTTOMCOLOR")
+
+    def _fog(self, words: Words, holder: Path) -> None:
+        kind = _choice(words, {"LINEAR": "linear", "EXP": "exp", "EXP2": "exp2", "OFF": "off"})
+        start, end = words.number("START"), words.number("END")
+        if kind == "linear" and start == end:
+            raise words.wrong("an end of the fog that differs from its start", back=1)
+        density, color = words.number("DENSITY"), words.vector("COLOR")
+        values = {"kind": kind, "start": start, "end": end, "density": density, "color": color}
+        self._fog_values = None if kind == "off" else values
+
+    def _shader_mode(self, words: Words, holder: Path) -> None:
+        modes = {"FULL": "full", "MEDIUM": "medium", "LOW": "low", "LOWEST": "lowest"}
+        values = self._shading_values
+        values["mode"] = _choice(words, modes)
+        while not words.has("END_SHADER_MODE"):
+            if words.has("SHADOW_FILTER_ON"):
+                values["shadow_filter"] = True
+            elif words.has("SHADOW_FILTER_OFF"):
+                values["shadow_filter"] = False
+            elif words.has("TRANS_MAX_SURFACES"):
+                values["max_transparent_surfaces"] = words.integer(0, 2**31 - 1)
+            elif words.has("TRANS_ORIG"):
+                values["raster3d"] = values["local_times_opacity"] = False
+            elif words.has("TRANS_RASTER3D"):
+                values["raster3d"] = True
+            elif words.has("TRANS_VMD"):
+                values["local_times_opacity"] = True
+            elif words.has("FOG_VMD"):
+                self._planar_fog = True
+            elif words.has("AMBIENT_OCCLUSION"):
+                color = words.vector("AMBIENT_COLOR")
+                values["light_scale"] = words.number("RESCALE_DIRECT")
+                self._ambient_occlusion(words.integer(0, _MOST_SAMPLES, "SAMPLES"), color)
+            else:
+                raise words.wrong("an option of SHADER_MODE, or END_SHADER_MODE")
+
+    def _start_clip_group(self, words: Words, holder: Path) -> None:
+        planes = words.numbers(words.count(4, "NUMPLANES"), 4)
+        self._shapes.clip_group = self._builder.clip_group(planes)
+
+    def _end_clip_group(self, words: Words, holder: Path) -> None:
+        self._shapes.clip_group = -1
+
+
+def _choice(words: Words, choices: dict[str, Any]) -> Any:
+    """Reads one of the keywords and gives what it stands for."""
+    keyword = words.peek().upper()
+    if keyword not in choices:
+        raise words.wrong(" or ".join(choices))
+    words.take()
+    return choices[keyword]
+
+
+def _unit(direction: Vector) -> Vector:
+    x, y, z = unit(direction, "a direction").tolist()
+    return x, y, z

@@ -1,0 +1,255 @@
+"""Meshes and scenes of other Python libraries as plain values: trimesh and PyVista.
+
+Neither library is imported here: whoever has an object of one has loaded it.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lippmann.color.transfer import decode_srgb
+from lippmann.errors import SceneError
+from lippmann.scene.parsing.files import texels_of
+from lippmann.scene.readers.ply import UP_NOTE
+from lippmann.scene.values.description import (
+    AlphaMode,
+    Camera,
+    Color,
+    Image,
+    Instance,
+    Light,
+    Material,
+    Mesh,
+    SceneDescription,
+    Texture,
+)
+
+_GREY = Material("grey", base_color=(0.7, 0.7, 0.7), roughness=0.6, double_sided=True)
+_COLORED = Material("vertex colours", roughness=0.6, double_sided=True)
+
+_LIGHT_KINDS: dict[str, Literal["point", "spot", "directional"]] = {
+    "PointLight": "point",
+    "SpotLight": "spot",
+    "DirectionalLight": "directional",
+}
+
+
+def from_trimesh(source: Any) -> SceneDescription:
+    """A ``trimesh.Scene`` or ``trimesh.Trimesh``: geometry, instances, materials, camera, lamps.
+
+    Vertex normals are taken where the mesh already holds them; otherwise its facets are flat. Vertex and face colours
+    are taken as sRGB-coded. A Phong (simple) material becomes a rough dielectric of its diffuse colour.
+
+    Raises
+    ------
+    SceneError
+        The scene holds no triangles.
+    """
+    scene = source if hasattr(source, "graph") else source.scene()
+    meshes: list[Mesh] = []
+    materials: list[Material] = []
+    index_of: dict[str, int] = {}
+    notes: list[str] = []
+    images: dict[int, Image] = {}
+    for name, geometry in scene.geometry.items():
+        if not hasattr(geometry, "faces") or len(geometry.faces) == 0:
+            notes.append(f"'{name}' has no faces and is not rendered")
+            continue
+        index_of[name] = len(meshes)
+        mesh, material = _from_trimesh_mesh(geometry, str(name), len(materials), images)
+        meshes.append(mesh)
+        materials.append(material)
+    if not meshes:
+        raise SceneError("the trimesh scene holds no triangles", rule="there must be at least one mesh with faces")
+    instances = []
+    for node in scene.graph.nodes_geometry:
+        matrix, name = scene.graph[node]
+        if name in index_of:
+            instances.append(Instance(index_of[name], np.asarray(matrix, np.float64)))
+    cameras = [_from_trimesh_camera(scene)] if scene.has_camera else []
+    # Asking for `lights` would invent some where there are none.
+    lights = [_from_trimesh_light(scene, light) for light in getattr(scene, "_lights", None) or ()]
+    name = str(scene.metadata.get("name") or "trimesh")
+    return SceneDescription(name, meshes, materials, instances, lights, cameras, notes=notes)
+
+
+def _from_trimesh_mesh(geometry: Any, name: str, material: int, images: dict[int, Image]) -> tuple[Mesh, Material]:
+    positions = np.asarray(geometry.vertices, np.float64)
+    faces = np.asarray(geometry.faces)
+    visual = geometry.visual
+    kind = getattr(visual, "kind", None)
+    normals = np.asarray(geometry.vertex_normals) if "vertex_normals" in geometry._cache else None
+    uvs: tuple[NDArray[np.float32], ...] = ()
+    colors = None
+    surface = _GREY
+    if kind == "texture":
+        if visual.uv is not None and len(visual.uv) == len(positions):
+            uvs = ((np.asarray(visual.uv)[:, :2] * (1.0, -1.0) + (0.0, 1.0)).astype(np.float32),)  # v runs upwards
+        surface = _from_trimesh_material(visual.material, images)
+    elif kind == "vertex":
+        colors, surface = _linear_colors(visual.vertex_colors), _COLORED
+    elif kind == "face":
+        corners = faces.ravel()
+        positions, normals = positions[corners], None if normals is None else normals[corners]
+        colors, surface = np.repeat(_linear_colors(visual.face_colors), 3, axis=0), _COLORED
+        faces = np.arange(len(corners)).reshape(-1, 3)
+    mesh = Mesh(
+        name=name,
+        positions=positions.astype(np.float32),
+        faces=faces.astype(np.uint32),
+        material=material,
+        normals=None if normals is None else normals.astype(np.float32),
+        uvs=uvs,
+        colors=colors,
+    )
+    return mesh, surface
+
+
+def _from_trimesh_material(material: Any, images: dict[int, Image]) -> Material:
+    if hasattr(material, "materials"):  # several in one mesh: trimesh itself falls back to the first
+        material = material.materials[0] if len(material.materials) else None
+    if material is None:
+        return _GREY
+
+    def texture(picture: Any, *, srgb: bool) -> Texture | None:
+        if picture is None:
+            return None
+        if id(picture) not in images:
+            images[id(picture)] = Image(str(material.name), texels_of(picture))
+        return Texture(images[id(picture)], srgb=srgb)
+
+    if hasattr(material, "glossiness"):
+        return _from_phong(material, texture(material.image, srgb=True))
+    factor = _fraction(material.baseColorFactor, (255, 255, 255, 255))
+    emission = (0.0, 0.0, 0.0) if material.emissiveFactor is None else _color(material.emissiveFactor)
+    if material.emissiveTexture is not None and material.emissiveFactor is None:
+        emission = (1.0, 1.0, 1.0)
+    modes: dict[str | None, AlphaMode] = {"MASK": "mask", "BLEND": "blend"}
+    return Material(
+        name=str(material.name or ""),
+        base_color=_color(factor),
+        base_color_texture=texture(material.baseColorTexture, srgb=True),
+        alpha=float(factor[3]),
+        alpha_mode=modes.get(material.alphaMode, "opaque"),
+        alpha_cutoff=0.5 if material.alphaCutoff is None else material.alphaCutoff,
+        # glTF's own defaults, whose terms the class says it uses
+        metallic=1.0 if material.metallicFactor is None else material.metallicFactor,
+        roughness=1.0 if material.roughnessFactor is None else material.roughnessFactor,
+        metallic_roughness_texture=texture(material.metallicRoughnessTexture, srgb=False),
+        normal_texture=texture(material.normalTexture, srgb=False),
+        emission=emission,
+        emission_texture=texture(material.emissiveTexture, srgb=True),
+        double_sided=bool(material.doubleSided),
+    )
+
+
+def _from_phong(material: Any, texture: Texture | None) -> Material:
+    factor = _fraction(material.diffuse, (255, 255, 255, 255))
+    unset = bool((np.asarray(material.diffuse) == np.array([102, 102, 102, 255])).all())
+    pbr = material.to_pbr()
+    return Material(
+        name=str(material.name or ""),
+        # trimesh puts its own grey where a textured material gives no diffuse colour
+        base_color=(1.0, 1.0, 1.0) if texture is not None and unset else _color(factor),
+        base_color_texture=texture,
+        alpha=float(factor[3]),
+        alpha_mode="blend" if factor[3] < 1.0 else "opaque",
+        roughness=float(min(max(pbr.roughnessFactor, 0.0), 1.0)),
+        double_sided=True,
+    )
+
+
+def _from_trimesh_camera(scene: Any) -> Camera:
+    fov_x, fov_y = (float(angle) for angle in np.radians(scene.camera.fov))
+    return Camera(
+        name=str(scene.camera.name or "camera"),
+        world_from_camera=np.array(scene.camera_transform, np.float64),
+        fov_y=fov_y,
+        aspect=float(np.tan(fov_x / 2.0) / np.tan(fov_y / 2.0)),
+    )
+
+
+def _from_trimesh_light(scene: Any, light: Any) -> Light:
+    intensity = 1.0 if light.intensity is None else float(light.intensity)
+    red, green, blue = (float(value) * intensity for value in _fraction(light.color, (255, 255, 255, 255))[:3])
+    return Light(
+        kind=_LIGHT_KINDS[type(light).__name__],
+        color=(red, green, blue),
+        world_from_light=np.asarray(scene.graph[light.name][0], np.float64),
+        inner_angle=float(getattr(light, "innerConeAngle", 0.0)),
+        outer_angle=float(getattr(light, "outerConeAngle", np.pi / 4)),
+        name=str(light.name),
+    )
+
+
+def from_pyvista(source: Any) -> SceneDescription:
+    """A PyVista data set: its surface, cut into triangles.
+
+    Point normals and texture coordinates are taken where they are active. Colours are taken where the active scalars
+    are bytes with three or four channels (sRGB-coded); numbers without colours are not mapped to any.
+
+    Raises
+    ------
+    SceneError
+        The data set has no surface.
+    """
+    if hasattr(source, "combine"):  # a collection of blocks
+        source = source.combine()
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of defaults to come, whose new names older versions do not know
+        surface = (source if hasattr(source, "verts") else source.extract_surface()).triangulate()
+    faces = np.asarray(surface.faces).reshape(-1, 4)[:, 1:]
+    positions = np.asarray(surface.points, np.float64)
+    if len(faces) == 0:
+        raise SceneError("the PyVista data set has no surface", rule="there must be at least one face")
+    notes = [UP_NOTE]
+    normals, uvs, colors = surface.point_data.active_normals, surface.active_texture_coordinates, None
+    scalars = surface.active_scalars
+    if scalars is not None and scalars.dtype == np.uint8 and scalars.ndim == 2 and scalars.shape[1] in (3, 4):
+        colors = _linear_colors(scalars)
+        if len(colors) != len(positions):  # one colour per face
+            corners = faces.ravel()
+            colors, positions = np.repeat(colors, 3, axis=0), positions[corners]
+            normals = None if normals is None else np.asarray(normals)[corners]
+            uvs = None if uvs is None else np.asarray(uvs)[corners]
+            faces = np.arange(len(corners)).reshape(-1, 3)
+    elif scalars is not None:
+        notes.append(f"the scalars '{surface.active_scalars_name}' are not colours (bytes, RGB) and are not shown")
+    mesh = Mesh(
+        name="pyvista",
+        positions=positions.astype(np.float32),
+        faces=faces.astype(np.uint32),
+        material=0,
+        normals=None if normals is None else np.asarray(normals, np.float32),
+        uvs=() if uvs is None else ((np.asarray(uvs) * (1.0, -1.0) + (0.0, 1.0)).astype(np.float32),),
+        colors=colors,
+    )
+    material = _GREY if colors is None else _COLORED
+    return SceneDescription("pyvista", [mesh], [material], [Instance(0, np.eye(4))], notes=notes)
+
+
+def adapter_for(source: object) -> Callable[[Any], SceneDescription] | None:
+    """The function that reads an object of another library, by the library it or a base of its class comes from."""
+    libraries = {kind.__module__.partition(".")[0] for kind in type(source).__mro__}
+    if "trimesh" in libraries and (hasattr(source, "graph") or hasattr(source, "faces")):
+        return from_trimesh
+    return from_pyvista if "pyvista" in libraries else None
+
+
+def _linear_colors(colors: Any) -> NDArray[np.float32]:
+    """Linear RGBA of sRGB-coded bytes ``(n, 3 or 4)``."""
+    fraction = np.asarray(colors, np.float64) / 255.0
+    return np.concatenate([decode_srgb(fraction[:, :3]), fraction[:, 3:]], axis=1).astype(np.float32)
+
+
+def _fraction(color: Any, default: tuple[int, ...]) -> NDArray[np.float64]:
+    return np.asarray(default if color is None else color, np.float64) / 255.0
+
+
+def _color(values: Any) -> Color:
+    return (float(values[0]), float(values[1]), float(values[2]))

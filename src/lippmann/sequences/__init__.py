@@ -1,0 +1,1 @@
+"""Moving scenes: one integral image a frame, in files, resumable."""

@@ -1,0 +1,184 @@
+"""The frames of a sequence in files, and going on with a sequence that was interrupted."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeAlias, cast
+
+from lippmann.display import Display
+from lippmann.image.provenance import Provenance
+from lippmann.image.read import read_metadata
+from lippmann.image.write import format_for
+from lippmann.journal.fingerprint import content_hash, in_words
+from lippmann.journal.frame_journal import ENDING, FrameJournal
+from lippmann.journal.tile_journal import sweep_beside
+from lippmann.progress import ProgressCallback, silent
+from lippmann.runtime import engine
+from lippmann.scene.placement import Mode, PlacementOptions
+from lippmann.sequences.frames import Stand, filed, find_stand, rendered
+from lippmann.sequences.motion import Motion
+
+if TYPE_CHECKING:
+    from lippmann.tiles.tiled_render import Runner
+
+#: A frame's number, how it was made, and what was chosen for it.
+_Made: TypeAlias = "tuple[int, Provenance, dict[str, str]]"
+
+#: Options that change nothing in the pictures.
+_IMMATERIAL = ("device", "threads")
+#: Options that are chosen for the first frame and hold for all.
+_CHOSEN = ("method", "denoise")
+
+
+@dataclass(frozen=True, eq=False)
+class SavedFrame:
+    """A frame in its file.
+
+    Attributes
+    ----------
+    number, path:
+        Of the frame and its file.
+    provenance:
+        How it was made; without seconds where it was ``found``.
+    found:
+        Whether an earlier run had rendered it.
+    """
+
+    number: int
+    path: Path
+    provenance: Provenance
+    found: bool = False
+
+
+def journal_of(output: Path, first: Path) -> Path:
+    """The journal of a sequence called ``output`` whose first frame's file is ``first``."""
+    return first.parent / (output.name + ENDING)
+
+
+@contextmanager
+def saved_sequence(
+    motion: Motion,
+    output: Path,
+    path_of: Callable[[int], Path],
+    display: Display,
+    frames: Sequence[int],
+    *,
+    resume: bool = False,
+    bits: int | None = None,
+    runner: Runner | None = None,
+    camera: str | None = None,
+    place: str | None = None,
+    turn: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    shift: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    scale: float = 1.0,
+    pop_out: float | None = None,
+    progress: ProgressCallback = silent,
+    **options: Any,
+) -> Iterator[Iterator[SavedFrame]]:
+    """Render one file a frame; a journal beside them tells which are finished.
+
+    A context manager: each frame is rendered when it is asked for, and the journal is removed once the ``with`` ends
+    well and all frames have been asked for. What is made of the frames inside of it, a film, may be interrupted, too.
+
+    Parameters
+    ----------
+    output:
+        What the sequence is called; see :func:`journal_of`.
+    path_of:
+        The file of each frame.
+    resume:
+        Keep the frames that an interrupted run finished, if there are any: those whose files are as they were then. All
+        frames together are the same, byte for byte, as those of an unbroken run.
+    runner:
+        Renders the frames in tiles, as of :func:`lippmann.sequences.frames.sequence_to_files`; without one they are
+        rendered whole, as of :func:`lippmann.sequences.frames.render_sequence`.
+    bits, options:
+        As there; the others as of :func:`lippmann.sequences.frames.render_sequence`.
+
+    Yields
+    ------
+    Iterator[SavedFrame]
+        An iterator over the frames in their order, each once it lies in its file.
+
+    Raises
+    ------
+    PictureError
+        If the journal is of another sequence: another scene, display, version or option; says what differs.
+    LippmannError
+        As those functions.
+    """
+    from lippmann.rendering.denoise import oidn
+    from lippmann.tiles.job import made_by
+
+    name, stored = format_for(path_of(frames[0]), bits)
+    placed = PlacementOptions(cast("Mode | None", place), camera, turn, shift, scale, pop_out)
+    started = engine.start(options.get("device", "auto"), options.get("threads"))
+    # "auto", the default, may use the denoiser where it is installed.
+    denoiser = oidn.denoiser_version() if options.get("denoise") != "none" else None
+    fingerprint = {
+        **made_by(started.gpu_name or "cpu", started.llvm_version, denoiser),
+        "the scene and what moves in it": content_hash(motion.content),
+        **in_words(display.to_dict(), "the display's "),
+        **in_words({key: value for key, value in options.items() if key not in _IMMATERIAL}),
+        **in_words(vars(placed), "placement "),
+        "the format": name,
+        "values": stored,
+        "frames are rendered": "whole" if runner is None else "in tiles",
+        # What is chosen for it holds for all.
+        "the first frame": str(frames[0]),
+    }
+    where = find_stand(motion, display, placed)
+    with FrameJournal.open(journal_of(output, path_of(frames[0])), fingerprint, resume=resume) as journal:
+        missing = [number for number in frames if not journal.holds(number, path_of(number))]
+        if missing:
+            sweep_beside(path_of(missing[0]))  # which an interrupted run may have left half written
+        if missing and missing[0] != frames[0]:
+            # Nothing else is taken from a journal, which somebody may have changed.
+            options |= {name: value for name, value in journal.chosen.items() if name in _CHOSEN}
+        if runner is None:
+            made = _whole(motion, display, missing, where, path_of, bits, progress, options)
+        else:
+            files = filed(motion, display, missing, where, path_of, runner, bits, progress, options)
+            made = ((number, written.provenance, {}) for number, written in files)
+        yield _in_order(frames, missing, path_of, made, journal)
+        if all(number in journal for number in frames):
+            journal.finish()
+
+
+def _in_order(
+    frames: Sequence[int],
+    missing: Sequence[int],
+    path_of: Callable[[int], Path],
+    made: Iterator[_Made],
+    journal: FrameJournal,
+) -> Iterator[SavedFrame]:
+    """The frames that lie there and those that are ``made``; the latter are written down."""
+    absent = set(missing)
+    for number in frames:
+        path = path_of(number)
+        if number not in absent:
+            yield SavedFrame(number, path, read_metadata(path).provenance, found=True)
+            continue
+        _, provenance, chosen = next(made)
+        journal.add(number, path, chosen)
+        yield SavedFrame(number, path, provenance)
+
+
+def _whole(
+    motion: Motion,
+    display: Display,
+    frames: Sequence[int],
+    where: Stand,
+    path_of: Callable[[int], Path],
+    bits: int | None,
+    progress: ProgressCallback,
+    options: dict[str, Any],
+) -> Iterator[_Made]:
+    """Frames rendered in one piece, and saved."""
+    for number, image in rendered(motion, display, frames, where, progress, options):
+        image.save(path_of(number), bits=bits)
+        made = image.provenance
+        yield number, made, {"method": made.method, "denoise": str(made.options.get("denoise", "none"))}

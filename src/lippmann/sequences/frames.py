@@ -1,0 +1,291 @@
+"""Sequences: one integral image a frame, of a scene that moves or that the display flies through.
+
+The display's place is held fixed over all frames: where the scene is fitted to it, the box around all that the motion
+ever fills is; where it follows a camera, it stays in the same place before that camera. So nothing jumps from frame to
+frame, and a frame is the same whether it is rendered alone or with all others.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+
+from lippmann.api import render, render_to_file
+from lippmann.display import Display, load_display
+from lippmann.errors import SceneError, UsageError
+from lippmann.progress import Progress, ProgressCallback, silent
+from lippmann.scene.placement import Mode, Placement, PlacementOptions, place, stand
+from lippmann.scene.values.description import Camera, Matrix
+from lippmann.sequences.motion import Motion, open_motion
+
+if TYPE_CHECKING:
+    from lippmann.image import IntegralImage
+    from lippmann.tiles.tiled_render import Rendered, Runner
+
+#: Options of methods that tiles cannot be rendered with.
+_WHOLE_PICTURE_ONLY = ("order", "respect_gloss")
+
+
+@dataclass(frozen=True)
+class FrameRange:
+    """Frames ``first``, ``first + step``, ... before ``stop``; ``stop`` None is the motion's end.
+
+    Raises
+    ------
+    UsageError
+        It is empty, or a number is out of range.
+    """
+
+    first: int = 0
+    stop: int | None = None
+    step: int = 1
+
+    def __post_init__(self) -> None:
+        if self.first < 0 or self.step < 1 or (self.stop is not None and self.stop <= self.first):
+            raise UsageError(
+                f"the frames {self.first} to {'the end' if self.stop is None else self.stop} in steps of {self.step}",
+                where="--frames",
+                rule="FIRST:STOP or FIRST:STOP:STEP, such as 0:48 for the frames 0 to 47",
+            )
+
+    def of(self, motion: Motion) -> range:
+        """The frames of a motion.
+
+        Raises
+        ------
+        UsageError
+            The motion ends before.
+        """
+        frames = range(self.first, motion.count if self.stop is None else self.stop, self.step)
+        if not frames or frames[-1] >= motion.count:
+            last = frames[-1] if frames else self.first
+            raise UsageError(
+                f"there is no frame {last}",
+                where="--frames",
+                rule=f"there are {motion.count}, counted from 0",
+                fix=f"ask for {min(self.first, motion.count - 1)}:{motion.count}",
+            )
+        return frames
+
+
+@dataclass(frozen=True)
+class Stand:
+    """Where the display stands in every frame; call it with a frame's number.
+
+    ``camera`` is the name of the scene's camera that the display follows, if it follows one of the scene's own.
+    """
+
+    motion: Motion
+    display: Display
+    mode: Mode
+    first: Matrix
+    camera: str | None = None
+    first_pose: Matrix | None = None
+
+    def __call__(self, frame: int) -> Placement:
+        scene = self.motion.scene(frame)
+        where = self.first
+        if self.first_pose is not None:
+            camera = cast(Camera, self.motion.camera(frame, self.camera))
+            where = _pose(camera) @ np.linalg.inv(self.first_pose) @ self.first
+        return stand(where, scene.bounds, self.display, mode=self.mode, bounds_in=scene.bounds_in)
+
+
+def find_stand(motion: Motion, display: Display, options: PlacementOptions) -> Stand:
+    """Where a display stands in a scene that moves, for all its frames alike.
+
+    Raises
+    ------
+    UsageError, SceneError
+        As :func:`lippmann.scene.placement.place`; or a flight is to be fitted.
+    """
+    camera = motion.camera(0, options.camera)
+    if camera is None and options.mode == "camera":
+        cameras = motion.scene(0).cameras
+        if not cameras:
+            raise SceneError("the scene has no cameras", where="--place", fix="fit it instead")
+        options = replace(options, camera=cameras[0].name)
+        camera = motion.camera(0, options.camera)
+    if camera is None:
+        placement = place(motion.bounds(), display, options=options)
+        return Stand(motion, display, placement.mode, placement.world_from_display)
+    if options.mode not in (None, "camera"):
+        raise UsageError(
+            f"placement '{options.mode}' beside a flight", where="--place", rule="the display follows the camera"
+        )
+    following = replace(options, mode="camera", camera=camera.name)
+    placement = place(motion.bounds(), display, cameras=(camera,), options=following)
+    return Stand(motion, display, "camera", placement.world_from_display, options.camera, _pose(camera))
+
+
+def render_sequence(
+    motion: Motion,
+    display: Display | str | Path = "seed-lenticular",
+    frames: FrameRange | Sequence[int] = FrameRange(),
+    *,
+    camera: str | None = None,
+    place: str | None = None,
+    turn: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    shift: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    scale: float = 1.0,
+    pop_out: float | None = None,
+    progress: ProgressCallback = silent,
+    **options: Any,
+) -> Iterator[tuple[int, IntegralImage]]:
+    """Render one integral image a frame; each is traced when it is asked for.
+
+    Parameters
+    ----------
+    motion:
+        What :func:`lippmann.sequences.motion.open_motion` gives.
+    display:
+        A display, a preset's name, or a TOML file.
+    frames:
+        Which frames.
+    camera, place, turn, shift, scale, pop_out:
+        As of :func:`lippmann.render`, for the whole sequence; a camera is followed as it moves.
+    progress:
+        Called with reports of each frame's stages; notes say which frame it is.
+    options:
+        Further options of :func:`lippmann.render`. All frames have the same seed, so that noise does not flicker.
+
+    Yields
+    ------
+    int, IntegralImage
+        A frame's number and picture, whose provenance has ``frame`` among its options.
+
+    Raises
+    ------
+    LippmannError
+        Of the kind that says what was wrong; before the first frame for what can be told then.
+    """
+    placed = PlacementOptions(cast("Mode | None", place), camera, turn, shift, scale, pop_out)
+    shown, wanted, where = _begun(motion, display, frames, placed)
+    return rendered(motion, shown, wanted, where, progress, options)
+
+
+def sequence_to_files(
+    motion: Motion,
+    path_of: Callable[[int], Path],
+    display: Display | str | Path = "seed-lenticular",
+    frames: FrameRange | Sequence[int] = FrameRange(),
+    *,
+    runner: Runner | None = None,
+    bits: int | None = None,
+    camera: str | None = None,
+    place: str | None = None,
+    turn: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    shift: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    scale: float = 1.0,
+    pop_out: float | None = None,
+    progress: ProgressCallback = silent,
+    **options: Any,
+) -> Iterator[tuple[int, Rendered]]:
+    """Render one file a frame in tiles, which a ``runner`` may spread over a cluster.
+
+    What an interrupted run left of a frame is gone on with.
+
+    Parameters
+    ----------
+    path_of:
+        The file of each frame.
+    runner, bits:
+        As of :func:`lippmann.api.render_to_file`.
+    options:
+        As there; the others as of :func:`render_sequence`.
+
+    Yields
+    ------
+    int, Rendered
+        A frame's number, and what was written.
+
+    Raises
+    ------
+    LippmannError
+        As :func:`lippmann.api.render_to_file`.
+    """
+    placed = PlacementOptions(cast("Mode | None", place), camera, turn, shift, scale, pop_out)
+    shown, wanted, where = _begun(motion, display, frames, placed)
+    return filed(motion, shown, wanted, where, path_of, runner, bits, progress, options)
+
+
+def _begun(
+    motion: Motion, display: Display | str | Path, frames: FrameRange | Sequence[int], options: PlacementOptions
+) -> tuple[Display, Sequence[int], Stand]:
+    shown = display if isinstance(display, Display) else load_display(display)
+    wanted = frames.of(motion) if isinstance(frames, FrameRange) else frames
+    return shown, wanted, find_stand(motion, shown, options)
+
+
+def rendered(
+    motion: Motion,
+    display: Display,
+    frames: Sequence[int],
+    where: Stand,
+    progress: ProgressCallback,
+    options: dict[str, Any],
+) -> Iterator[tuple[int, IntegralImage]]:
+    """The frames of :func:`render_sequence`, once it is known where the display stands."""
+    for position, frame in enumerate(frames):
+        report = _of_frame(progress, position, len(frames))
+        image = render(motion.scene(frame), display, placed=where(frame), progress=report, **options)
+        if position == 0:
+            # What was chosen for the first frame holds for all: a change of method would be seen.
+            made = image.provenance
+            options = {**options, "method": made.method, "denoise": made.options.get("denoise", "none")}
+        provenance = replace(image.provenance, options={**image.provenance.options, "frame": frame})
+        yield frame, replace(image, provenance=provenance)
+
+
+def filed(
+    motion: Motion,
+    display: Display,
+    frames: Sequence[int],
+    where: Stand,
+    path_of: Callable[[int], Path],
+    runner: Runner | None,
+    bits: int | None,
+    progress: ProgressCallback,
+    options: dict[str, Any],
+) -> Iterator[tuple[int, Rendered]]:
+    """The files of :func:`sequence_to_files`, once it is known where the display stands."""
+    for name in _WHOLE_PICTURE_ONLY:
+        if options.get(name) is not None:
+            raise UsageError("is for methods that need the whole picture", where=f"--{name.replace('_', '-')}")
+    options = {name: value for name, value in options.items() if name not in _WHOLE_PICTURE_ONLY}
+    for position, frame in enumerate(frames):
+        yield (
+            frame,
+            render_to_file(
+                motion.scene(frame),
+                path_of(frame),
+                display,
+                bits=bits,
+                resume=True,
+                placement=where(frame),
+                runner=runner,
+                progress=_of_frame(progress, position, len(frames)),
+                **options,
+            ),
+        )
+
+
+def _of_frame(progress: ProgressCallback, position: int, frames: int) -> ProgressCallback:
+    """Reports of one frame's tracing as reports of the whole sequence."""
+
+    def report(inner: Progress) -> None:
+        done = position + (inner.done / inner.total if inner.stage in ("trace", "tiles") else 0.0)
+        progress(Progress("sequence", done, frames, f"frame {position + 1} of {frames}"))
+
+    return report
+
+
+def _pose(camera: Camera) -> Matrix:
+    return np.asarray(camera.world_from_camera, np.float64)
+
+
+__all__ = ["FrameRange", "Motion", "find_stand", "open_motion", "render_sequence", "sequence_to_files"]

@@ -1,0 +1,209 @@
+"""Scenes that move: the frames of a glTF animation, and flights of a camera through a Tachyon scene."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lippmann.errors import UsageError
+from lippmann.scene.placement import Bounds
+from lippmann.scene.readers.load import kind_of_file, load_scene
+from lippmann.scene.scene import Scene, checked, find_camera, lit
+from lippmann.scene.values.description import Camera, Environment
+from lippmann.scene.values.whitted_scene import CameraPose, ClassicScene
+from lippmann.scene.whitted.world_frame import world_camera
+
+#: Frames of an animation per second where nothing is said.
+FRAMES_PER_SECOND = 24.0
+
+#: Moments, spread evenly over an animation, whose boxes together stand for all that it ever fills.
+_MOMENTS = 65
+
+#: A frame that rounding puts this far (frames) beyond an animation's end still belongs to it.
+_ROUNDING = 1e-3
+
+
+class Motion(ABC):
+    """A scene frame by frame, counted from 0."""
+
+    @property
+    @abstractmethod
+    def count(self) -> int:
+        """How many frames there are; at least 1."""
+
+    @property
+    @abstractmethod
+    def content(self) -> object:
+        """All that any frame is made of, as plain values: what :func:`lippmann.journal.content_hash` takes."""
+
+    @abstractmethod
+    def scene(self, frame: int) -> Scene:
+        """The scene as it is in a frame."""
+
+    @abstractmethod
+    def camera(self, frame: int, name: str | None) -> Camera | None:
+        """The camera that the display follows; ``name`` asks for one of the scene's own. None: it stands still."""
+
+    @abstractmethod
+    def bounds(self) -> Bounds:
+        """The box ``(2, 3)`` around all that is ever filled, world units; the same whichever frames are rendered."""
+
+
+class GltfMotion(Motion):
+    """The frames of a glTF animation; beyond its end the scene stands still.
+
+    Parameters
+    ----------
+    fps:
+        Frames per second of the animation's own time, which begins at 0.
+    animation:
+        Its name; ``None`` for the file's first.
+    environment, background, allow_outside:
+        As of :func:`lippmann.scene.readers.load.load_scene`.
+
+    Raises
+    ------
+    SceneError
+        As :class:`lippmann.scene.readers.gltf_animation.animated_file.MovingGltf`.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        *,
+        fps: float = FRAMES_PER_SECOND,
+        animation: str | None = None,
+        environment: str | Path | Environment | None = None,
+        background: Any = None,
+        allow_outside: bool = False,
+    ) -> None:
+        from lippmann.scene.readers.gltf_animation.animated_file import MovingGltf
+
+        if not (math.isfinite(fps) and fps > 0.0):
+            raise UsageError(f"{fps:g} frames per second", where="--fps", rule="a number above 0")
+        self._file = path.name
+        self._fps = fps
+        self._moving = MovingGltf(path, animation=animation, allow_outside=allow_outside)
+        # Surroundings and background are read once, with the first frame.
+        self._first = load_scene(self._moving.at(0.0), environment=environment, background=background)
+
+    @property
+    def count(self) -> int:
+        return int(self._moving.duration * self._fps + _ROUNDING) + 1
+
+    @property
+    def content(self) -> object:
+        return self._first, self._moving.content, self._fps
+
+    def scene(self, frame: int) -> Scene:
+        return self._at(frame / self._fps)
+
+    def camera(self, frame: int, name: str | None) -> Camera | None:
+        return None if name is None else find_camera(self.scene(frame).cameras, name)
+
+    def bounds(self) -> Bounds:
+        boxes = [self._at(seconds).bounds for seconds in np.linspace(0.0, self._moving.duration, _MOMENTS)]
+        return np.stack([np.min(boxes, axis=0)[0], np.max(boxes, axis=0)[1]])
+
+    def _at(self, seconds: float) -> Scene:
+        description = checked(self._moving.at(seconds), self._file)
+        physical = self._first.physical
+        return replace(self._first, description=lit(description, physical.environment, physical.background))
+
+
+class Flight(Motion):
+    """A camera that flies through a scene made for the classic light models, one pose a frame.
+
+    Raises
+    ------
+    UsageError
+        The scene has no form for the classic light models, whose coordinates the poses are in.
+    """
+
+    def __init__(self, scene: Scene, poses: Sequence[CameraPose]) -> None:
+        if scene.classic is None:
+            raise UsageError(
+                f"'{scene.name}' is no scene that a camera path leads through",
+                where="--camera-path",
+                rule="paths are for Tachyon (.dat) and NFF files and the bundled scenes",
+            )
+        self._scene = scene
+        self._classic: ClassicScene = scene.classic
+        self._poses = poses
+
+    @property
+    def count(self) -> int:
+        return len(self._poses)
+
+    @property
+    def content(self) -> object:
+        return self._scene, self._poses
+
+    def scene(self, frame: int) -> Scene:
+        return self._scene
+
+    def camera(self, frame: int, name: str | None) -> Camera:
+        if name is not None:
+            raise UsageError(f"camera '{name}' beside a path", where="--camera", rule="the path says where it stands")
+        pose = self._poses[frame]
+        own = replace(self._classic.camera, view=pose.view, up=pose.up, center=pose.center)
+        return world_camera(replace(self._classic, camera=own), name="flight")
+
+    def bounds(self) -> Bounds:
+        return self._scene.bounds
+
+
+def open_motion(
+    source: str | Path,
+    *,
+    fps: float | None = None,
+    animation: str | None = None,
+    camera_path: Path | None = None,
+    environment: str | Path | Environment | None = None,
+    background: Any = None,
+    allow_outside: bool = False,
+) -> Motion:
+    """What moves in a scene file.
+
+    Parameters
+    ----------
+    fps, animation:
+        Of a glTF file, see :class:`GltfMotion`.
+    camera_path:
+        A Tachyon ``.cam`` file: the display flies along it.
+    environment, background, allow_outside:
+        As of :func:`lippmann.scene.readers.load.load_scene`.
+
+    Raises
+    ------
+    SceneError
+        A file is missing or damaged, or has no (such) animation.
+    UsageError
+        Nothing moves in a scene of this kind, or options contradict each other.
+    """
+    options: dict[str, Any] = {
+        "environment": environment,
+        "background": background,
+        "allow_outside": allow_outside,
+    }
+    if camera_path is not None:
+        for option, value in (("--animation", animation), ("--fps", fps)):
+            if value is not None:
+                raise UsageError("a camera path has one pose a frame", where=option, fix="leave it out")
+        from lippmann.scene.readers.tachyon.reader import read_cam
+
+        return Flight(load_scene(source, **options), read_cam(camera_path))
+    if kind_of_file(source) not in (".glb", ".gltf"):
+        raise UsageError(
+            f"nothing moves in '{source}'",
+            where="--frames",
+            rule="glTF files have animations; Tachyon and NFF scenes are flown through",
+            fix="add --camera-path FILE.cam for a flight",
+        )
+    return GltfMotion(Path(source), fps=FRAMES_PER_SECOND if fps is None else fps, animation=animation, **options)

@@ -1,0 +1,223 @@
+"""Tiles of a picture, rendered: the job's scene is built once, then any tile can be asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lippmann.display import NUMPY, Display
+from lippmann.display.pixel_window import Window
+from lippmann.image.encoding import stored_values
+from lippmann.journal.tile_file import TileResult
+from lippmann.progress import Progress, ProgressCallback, silent
+from lippmann.rendering.denoise.exposure_survey import Treatment, survey
+from lippmann.rendering.estimate.pixel_errors import ErrorSums, PixelErrors
+from lippmann.rendering.estimate.psnr import ERROR_LAYER, why_no_estimate
+from lippmann.rendering.film.sample_batches import FullInBatches
+from lippmann.rendering.film.wavefront import RayTotals, trace_frame
+from lippmann.rendering.film.wavefront_plan import make_plan
+from lippmann.rendering.methods import SAMPLES_LAYER, Job, trace
+from lippmann.rendering.picture import build_for, make_integrator
+from lippmann.rendering.request.region_of_interest import PixelWindow
+from lippmann.rendering.transport.ray_source import DisplayRays, WindowRays
+from lippmann.runtime import engine as engines
+from lippmann.runtime.engine_lock import exclusive
+from lippmann.scene.placement import Placement, place
+from lippmann.tiles.job import TileJob
+
+#: The arrays of :attr:`TileResult.sums`: flat indices of the lenses that have pixels in the tile, and their sums; those
+#: of the samples' errors, where denoised pixels have others.
+LENSES = "lenses"
+SUMS = tuple(each.name for each in fields(ErrorSums))
+OF_SAMPLES = "samples "
+
+
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """A job with its scene on the device. Make one with :func:`prepare`, once in a process.
+
+    ``no_estimate`` says why tiles have no ``sums``, None if they have; ``treatment`` how all tiles are denoised.
+    """
+
+    job: TileJob
+    built: Any
+    placement: Placement
+    engine: engines.Engine
+    no_estimate: str | None
+    integrator: Any
+    source: DisplayRays
+    treatment: Treatment | None
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """What the picture's file says of how it was made in tiles."""
+        job = self.job
+        if job.surroundings is None:
+            return {}
+        cut = {"tile_side": job.side, "tile_margin": job.surroundings.margin}
+        if self.treatment is None:
+            return cut
+        return {**cut, "denoise": "oidn", "denoise_effort": self.treatment.effort, "denoise_form": "raw"}
+
+
+@dataclass(frozen=True, eq=False)
+class TracedTile:
+    """A tile in linear light: ``(rows, columns, 3)`` float32, with the errors where it knows them.
+
+    ``maps``: further layers ``(rows, columns)`` of its method; ``rays``: those of its surroundings count, too.
+    """
+
+    index: int
+    pixels: NDArray[np.float32]
+    errors: PixelErrors | None
+    rays: RayTotals
+    maps: Mapping[str, NDArray[Any]] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+
+
+@exclusive()
+def prepare(job: TileJob, progress: ProgressCallback = silent) -> Prepared:
+    """Start the engine, build the scene, place the display.
+
+    Raises
+    ------
+    SceneError, EngineError, UsageError
+        As the stages find them.
+    """
+    progress(Progress("load", 0, 1))
+    engine = engines.start(job.settings.device, job.settings.threads)
+    progress(Progress("build", 0, 1))
+    scene, settings = job.scene, job.settings
+    built = build_for(scene, settings)
+    placement = job.placement
+    if not isinstance(placement, Placement):
+        placement = place(
+            scene.bounds,
+            job.display,
+            cameras=scene.cameras,
+            options=placement,
+            home_camera=scene.home_camera,
+            bounds_in=scene.bounds_in,
+        )
+    source = DisplayRays(job.display, placement.world_from_display, settings.subpixels)
+    integrator = make_integrator(built, settings, placement.display_from_world, source)
+    return Prepared(
+        job,
+        built,
+        placement,
+        engine,
+        why_no_estimate(settings),
+        integrator,
+        source,
+        survey(integrator, source, settings) if settings.denoises else None,
+    )
+
+
+def render_tile(prepared: Prepared, index: int) -> TileResult:
+    """One tile, ready to be kept: the same whenever, wherever and beside whatever it is rendered."""
+    return packed(prepared, trace_tile(prepared, index))
+
+
+@exclusive()
+def trace_tile(prepared: Prepared, index: int) -> TracedTile:
+    """The part of :func:`render_tile` that the engine does."""
+    job, settings = prepared.job, prepared.job.settings
+    # Another thread may have rendered on another device since the last tile.
+    engines.start(prepared.engine.device, prepared.engine.threads)
+    if job.surroundings is not None:
+        return _trace_window(prepared, index)
+    window = job.grid[index]
+    is_box = settings.pixel_filter == "box"
+    if prepared.no_estimate is not None:
+        plan = make_plan(
+            window.columns,
+            window.rows,
+            settings.samples,
+            channels=prepared.source.channels,
+            memory=job.tile_memory,
+        )
+        frame = trace_frame(
+            prepared.integrator,
+            prepared.source,
+            plan,
+            seed=settings.seed,
+            box_filter=is_box,
+            corner=(window.row, window.column),
+        )
+        return TracedTile(index, frame.pixels, None, frame.rays)
+    batches = FullInBatches(
+        prepared.integrator,
+        prepared.source,
+        seed=settings.seed,
+        box_filter=is_box,
+        transfer=job.transfer,
+        memory=job.tile_memory,
+        window=window,
+    )
+    batches.add(settings.samples)
+    errors = batches.squared_error()
+    maps = {ERROR_LAYER: np.maximum(errors.values, 0)}
+    return TracedTile(index, batches.picture(), errors, batches.rays, maps)
+
+
+def _trace_window(prepared: Prepared, index: int) -> TracedTile:
+    """A tile as the middle of a larger picture, which is rendered as any other is."""
+    job = prepared.job
+    tile, window = job.grid[index], job.window(index)
+    place = PixelWindow(window.column, window.row, window.columns, window.rows)
+    traced = trace(
+        Job(
+            prepared.built,
+            prepared.integrator,
+            WindowRays(prepared.source, place),
+            job.settings,
+            prepared.placement.display_from_world,
+            job.transfer,
+            job.tile_memory,
+            prepared.engine.threads,
+            treatment=prepared.treatment,
+        )
+    )
+    inside = replace(tile, row=tile.row - window.row, column=tile.column - window.column).slices
+    maps = {name: values[inside] for name, values in traced.frame.maps.items() if name != SAMPLES_LAYER}
+    errors = None if traced.errors is None else traced.errors.part(inside)
+    return TracedTile(index, traced.frame.pixels[inside], errors, traced.frame.rays, maps, traced.notes)
+
+
+def packed(prepared: Prepared, traced: TracedTile) -> TileResult:
+    """The part of :func:`render_tile` that needs no engine: values as the file holds them, errors as sums."""
+    job = prepared.job
+    sums, maps = {}, {}
+    if traced.errors is not None:
+        sums = lens_sums(job.display, job.grid[traced.index], traced.errors)
+    if job.keeps_maps:
+        maps = dict(traced.maps)
+    values = stored_values(traced.pixels, job.stored, job.transfer)
+    return TileResult(traced.index, values, maps, sums, dict(vars(traced.rays)), traced.notes)
+
+
+def lens_sums(display: Display, window: Window, errors: PixelErrors) -> dict[str, NDArray[Any]]:
+    """Sums over the part of each micro-image that lies in the tile."""
+    lenses, owner, pixels = np.unique(_owners(display, window), return_inverse=True, return_counts=True)
+    found: dict[str, NDArray[Any]] = {LENSES: lenses}
+    for before, each in (("", errors), (OF_SAMPLES, errors.samples)):
+        if each is not None:
+            sums = ErrorSums.none(len(lenses), pixels)
+            sums.add(owner, each)
+            found |= {before + name: getattr(sums, name) for name in SUMS}
+    return found
+
+
+def _owners(display: Display, window: Window) -> NDArray[np.int64]:
+    """``(rows, columns)``: the flat index of every pixel's lens."""
+    u, v = np.meshgrid(
+        window.column + np.arange(window.columns) + 0.5,
+        window.row + np.arange(window.rows) + 0.5,
+    )
+    i, j = display.lens_of(*display.panel_point(u, v, NUMPY), NUMPY)
+    owners: NDArray[np.int64] = j.astype(np.int64) * display.lens_grid.columns + i.astype(np.int64)
+    return owners

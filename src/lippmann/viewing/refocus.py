@@ -1,0 +1,107 @@
+"""The picture that a camera takes whose lens is as wide as the display's whole field, focused on one plane.
+
+Every view is what one point of that wide lens sees. A point P of the plane is looked at from all of these points; each
+line of sight meets one display lens and, through it, one pixel; their mean is the picture at P. On a display of
+parallel views with whole pixels behind every lens this is the usual shift and sum,
+``I(v, u) = mean over t, s of L(t, s, v + alpha (t - t0), u + alpha (s - s0))`` with
+``alpha = z d / (g p)`` for the plane at z, in units of lenses (R. Ng et al., Light field photography with a hand-held
+plenoptic camera, 2005). In the lens plane itself, z = 0, it is the mean of each micro-image.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lippmann.display import NUMPY, Display
+from lippmann.errors import UsageError
+from lippmann.image.integral_image import IntegralImage
+from lippmann.image.stored_values import FloatArray
+from lippmann.image.streamed import LargePicture
+from lippmann.image.views import pixels_of_view, view_grid
+from lippmann.viewing.replay import Eye, Real, checked_size, default_size, eye_of_view, lens_plane_points, pixel_at
+
+Index = NDArray[np.intp]
+Flags = NDArray[np.bool_]
+View = tuple[int, int]
+
+#: Widest picture that is made where nothing is said, in pixels: every view is looked up for every one of them.
+DEFAULT_WIDTH = 1024
+
+
+def refocus(image: IntegralImage | LargePicture, plane: float, *, size: tuple[int, int] | None = None) -> FloatArray:
+    """The picture focused on the plane at z = ``plane``.
+
+    Parameters
+    ----------
+    image:
+        What the panel shows.
+    plane:
+        Height of the plane over the lens plane in mm, positive toward the viewer, below the viewing distance.
+    size:
+        Width and height of the picture in pixels; by default the panel's, at most 1024 wide.
+
+    Returns
+    -------
+    ``(height, width, 3)`` float32 linear RGB of the part of the plane in front of (or behind) the panel's rectangle;
+    black where no line of sight meets the panel.
+
+    Raises
+    ------
+    UsageError
+        If the plane is not finite or not below the viewing distance.
+    """
+    display = image.display
+    if not math.isfinite(plane) or plane >= display.viewing_distance:
+        rule = f"it must be finite and below the viewing distance of {display.viewing_distance:g} mm"
+        raise UsageError(f"the plane is at {plane:g} mm", rule=rule)
+    width, height = checked_size(default_size(display, DEFAULT_WIDTH) if size is None else size)
+    looked_up = _of_views(image)
+    grid = view_grid(display)
+    eyes = {(ky, kx): eye_of_view(display, ky, kx) for ky, kx in np.ndindex(len(grid.down), len(grid.right))}
+    picture = np.zeros((height, width, 3), dtype=np.float32)
+    for rows, x, y in lens_plane_points(display, width, height):
+        total, count = np.zeros((*x.shape, 3), dtype=np.float32), np.zeros(x.shape, dtype=np.float32)
+        for view, eye in eyes.items():
+            row, column, inside = _line_of_sight(display, eye, (x, y, plane))
+            colors, found = looked_up(view, row, column)
+            inside &= found
+            total += colors * inside[..., None]
+            count += inside
+        picture[rows] = total / np.maximum(count, 1)[..., None]
+    return picture
+
+
+def _of_views(image: IntegralImage | LargePicture) -> Callable[[View, Index, Index], tuple[FloatArray, Flags]]:
+    """What looks up views: their values ``(..., 3)`` at rows and columns, and where there are such pixels."""
+    if isinstance(image, IntegralImage):
+        views, masks = image.views_and_mask()
+        return lambda view, row, column: (views[view][row, column], masks[view][row, column])
+    display, grid = image.display, view_grid(image.display)
+
+    def worked_out(view: View, row: Index, column: Index) -> tuple[FloatArray, Flags]:
+        found, at_row, at_column = pixels_of_view(display, grid, view, row, column)
+        return image.take(np.where(found, at_row, 0), np.where(found, at_column, 0)), found
+
+    return worked_out
+
+
+def _line_of_sight(
+    display: Display, eye: Eye, point: tuple[Real, Real, float]
+) -> tuple[Index, Index, NDArray[np.bool_]]:
+    """Row and column, in the eye's view, of what shows the points to it, and whether there is a lens (and row)."""
+    x, y, z = point
+    # From the eye through the point to the lens plane.
+    stretch = z / (eye[2] - z)
+    lens_x, lens_y = x + (x - eye[0]) * stretch, y + (y - eye[1]) * stretch
+    i, j = display.lens_of(lens_x * display.magnification, lens_y * display.magnification, NUMPY)
+    column, row = i.astype(np.intp), j.astype(np.intp)
+    rows = display.lens_grid.rows
+    if display.lens_array.layout == "lenticular":
+        panel_point = display.panel_point_seen_by(*eye, lens_x, lens_y, NUMPY)
+        row, rows = pixel_at(display.pixel_coordinates(*panel_point, NUMPY)[1]), display.panel.height
+    inside = (column >= 0) & (column < display.lens_grid.columns) & (row >= 0) & (row < rows)
+    return np.where(inside, row, 0), np.where(inside, column, 0), inside

@@ -1,0 +1,47 @@
+"""TIFF files: the pixels are those of the file itself, whatever its description says."""
+
+from __future__ import annotations
+
+import builtins
+
+import numpy as np
+import pytest
+import tifffile
+
+from lippmann.display.pixel_window import Window
+from lippmann.image.encoding import decode_stored, read_header
+from lippmann.image.streamed import open_pixels
+
+OME = """<?xml version="1.0" encoding="UTF-8"?><!DOCTYPE OME [<!ENTITY other SYSTEM "file://{folder}/secret.tif">]>
+<OME xmlns="http://www.openmicroscopy.org/Schemas/OME/2016-06" UUID="urn:uuid:00000000-0000-0000-0000-000000000001">
+<Image ID="Image:0"><Pixels ID="Pixels:0" DimensionOrder="XYCZT" Type="uint8" SizeX="6" SizeY="4" SizeC="3" SizeZ="1"
+SizeT="1"><Channel ID="Channel:0:0" SamplesPerPixel="3"/><TiffData IFD="0" PlaneCount="1">
+<UUID FileName="secret.tif">urn:uuid:00000000-0000-0000-0000-000000000002</UUID></TiffData></Pixels></Image></OME>"""
+
+
+@pytest.fixture
+def opened(monkeypatch):
+    """The names of all files that are opened."""
+    names, plain = [], builtins.open
+
+    def noted(file, *options, **more):
+        names.append(str(file))
+        return plain(file, *options, **more)
+
+    monkeypatch.setattr(builtins, "open", noted)
+    return names
+
+
+def test_a_description_that_names_another_file_is_not_followed(tmp_path, opened):
+    values = np.random.default_rng(0).integers(0, 256, (4, 6, 3), dtype=np.uint8)
+    description = OME.format(folder=tmp_path)
+    for name, pixels in (("a.tif", values), ("secret.tif", 255 - values)):
+        tifffile.imwrite(tmp_path / name, pixels, photometric="rgb", description=description, metadata=None)
+    with tifffile.TiffFile(tmp_path / "a.tif") as file:
+        assert file.is_ome  # the library itself would look for the other file, were it asked for a series
+    opened.clear()
+    assert read_header(tmp_path / "a.tif").width == 6
+    np.testing.assert_array_equal(decode_stored(tmp_path / "a.tif", "tiff")[0][""], values)
+    np.testing.assert_array_equal(open_pixels(tmp_path / "a.tif", "tiff").window(Window(0, 0, 4, 6)), values)
+    assert any(name.endswith("a.tif") for name in opened)
+    assert not any(name.endswith("secret.tif") for name in opened)

@@ -1,0 +1,58 @@
+import numpy as np
+import pytest
+
+from lippmann.color.transfer import coding_slope, decode_srgb, dequantize, encode_srgb, quantize
+
+
+@pytest.mark.parametrize("transfer", ["srgb", "linear"])
+@pytest.mark.parametrize("bits", [8, 16])
+def test_every_code_comes_back(bits, transfer):
+    codes = np.arange(2**bits, dtype=np.uint8 if bits == 8 else np.uint16).reshape(-1, 4)
+    linear = dequantize(codes, transfer)
+    assert linear.dtype == np.float32
+    back = quantize(linear, bits, transfer)
+    assert back.dtype == codes.dtype
+    np.testing.assert_array_equal(back, codes)
+
+
+def test_known_values_of_the_srgb_curve():
+    # 0.5 in linear light is 0.7353570 coded (IEC 61966-2-1); code 188 of 8 bits is the nearest.
+    assert encode_srgb(np.array([0.5]))[0] == pytest.approx(0.735356983, abs=1e-8)
+    assert decode_srgb(np.array([0.5]))[0] == pytest.approx(0.214041140, abs=1e-8)
+    assert decode_srgb([-0.1, 0.0, 0.04045, 1.0]) == pytest.approx([-0.1 / 12.92, 0.0, 0.04045 / 12.92, 1.0], abs=1e-7)
+    assert quantize(np.float32([0.5, 0.002, 1.0, 0.0]), 8, "srgb").tolist() == [188, 7, 255, 0]
+    assert quantize(np.float32([0.5, 0.002, 1.0, 0.0]), 8, "linear").tolist() == [128, 1, 255, 0]
+
+
+def test_values_out_of_range_go_to_the_ends():
+    linear = np.float32([-1.0, -0.0, 1.0001, 3e38])
+    assert quantize(linear, 8, "srgb").tolist() == [0, 0, 255, 255]
+    assert quantize(linear, 16, "linear").tolist() == [0, 0, 65535, 65535]
+
+
+def test_rounding_is_to_the_nearest_code():
+    linear = np.float32([10.49, 10.51]) / np.float32(255)
+    assert quantize(linear, 8, "linear").tolist() == [10, 11]
+
+
+def test_large_pictures_are_coded_in_blocks_alike():
+    linear = np.random.default_rng(1).random((1 << 22) + 17).astype(np.float32)
+    whole = quantize(linear, 16, "srgb")
+    np.testing.assert_array_equal(whole[-100:], quantize(linear[-100:], 16, "srgb"))
+
+
+def test_a_transposed_picture_keeps_its_order():
+    linear = np.random.default_rng(1).random((5, 4, 3)).astype(np.float32)
+    np.testing.assert_array_equal(
+        quantize(linear.swapaxes(0, 1), 8, "srgb"), quantize(linear, 8, "srgb").swapaxes(0, 1)
+    )
+
+
+def test_the_slope_is_that_of_the_curve():
+    linear = np.array([-0.1, 0.0, 1e-3, 0.002, 0.01, 0.2, 0.9, 1.2], dtype=np.float32)
+    slope = coding_slope(linear, "srgb")
+    assert slope[[0, 7]] == pytest.approx([0, 0], abs=1e-6)
+    assert slope[2:4] == pytest.approx([12.92, 12.92], rel=1e-3)
+    expected = 1.055 / 2.4 * linear[4:7] ** (1 / 2.4 - 1)
+    assert slope[4:7] == pytest.approx(expected, rel=1e-3)
+    assert coding_slope(linear, "linear").tolist() == [0, 1, 1, 1, 1, 1, 1, 0]

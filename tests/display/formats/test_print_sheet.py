@@ -1,0 +1,128 @@
+"""Prints behind lens sheets: pitches, gaps, pixels, and what is refused."""
+
+from __future__ import annotations
+
+import math
+from contextlib import suppress
+
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from lippmann.display import load_display
+from lippmann.display.formats.print_sheet import Print, print_of_texts
+from lippmann.errors import DisplayError
+
+GOOD = {"lpi": "60", "ppi": "720", "size": "200x300mm", "viewing-distance": "500"}
+
+
+def test_the_example():
+    display = print_of_texts(GOOD).display()
+    assert (display.panel.width, display.panel.height) == (5669, 8504)
+    assert display.panel.pixel_pitch == 25.4 / 720
+    assert display.panel.subpixel_offsets == ((0, 0),) * 3
+    assert display.lens_array.pitch == pytest.approx(25.4 / 60)
+    assert display.lens_array.slant == 0
+    assert display.viewing_distance == 500
+    assert display.field_of_view == pytest.approx(54)
+    # p (D + g) / D
+    assert display.micro_image_pitch == pytest.approx(25.4 / 60 * (500 + display.gap) / 500)
+    assert display.size_mm == pytest.approx((200, 300), abs=25.4 / 720 / 2)
+    assert display == load_display("print:lpi=60,ppi=720,size=200x300mm,viewing-distance=500")
+
+
+def test_the_preset_can_be_said_so():
+    preset = load_display("print-60lpi")
+    same = load_display("print:lpi=60,ppi=720,size=200x150mm,thickness=0.6594mm,index=1.57")
+    assert same.gap == pytest.approx(preset.gap)
+    assert same.panel == preset.panel
+    assert same.lens_array == preset.lens_array
+    assert same.lattice == preset.lattice
+
+
+@given(
+    lpi=st.floats(10, 200),
+    distance=st.just(math.inf) | st.floats(100, 5000),
+    field=st.none() | st.floats(15, 80),
+    thickness=st.none() | st.floats(0.3, 3),
+    measured=st.booleans(),
+)
+@settings(deadline=None)
+def test_pitches_gaps_and_fields_agree(lpi, distance, field, thickness, measured):
+    if thickness:
+        # Thick sheets of fine lenses have no field to speak of.
+        field = None
+        assume(5.1 < math.degrees(2 * math.atan(25.4 / lpi / 2 * 1.57 / thickness)) < 149)
+    stated = {"print_lpi" if measured else "lpi": lpi, "field": field, "thickness": thickness}
+    sheet = Print(ppi=20 * lpi, size=(50, 20), viewing_distance=distance, **stated)
+    display = sheet.display()
+    assert 25.4 / display.micro_image_pitch == pytest.approx(sheet.pitch_on_print)
+    assert 25.4 / display.lens_array.pitch == pytest.approx(sheet.pitch_of_sheet)
+    assert (sheet.pitch_on_print if measured else sheet.pitch_of_sheet) == pytest.approx(lpi)
+    assert sheet.pitch_of_sheet == pytest.approx(sheet.pitch_on_print * (1 + display.gap / distance))
+    if thickness:
+        assert display.gap == pytest.approx(thickness / 1.57)
+    else:
+        assert display.field_of_view == pytest.approx(field or 54)
+
+
+def test_lengths_have_units():
+    one = print_of_texts({**GOOD, "thickness": "26mil", "viewing-distance": "20in", "size": "8x10in"})
+    assert (one.thickness, one.viewing_distance, *one.size) == pytest.approx((0.6604, 508, 203.2, 254))
+    assert print_of_texts({**GOOD, "viewing-distance": "infinite"}).pitch_on_print == 60
+    without = {key: text for key, text in GOOD.items() if key != "viewing-distance"}
+    assert print_of_texts(without).viewing_distance == 500
+
+
+@pytest.mark.parametrize(
+    ("texts", "where", "said"),
+    [
+        ({"lpi": "0"}, "lpi", "lpi is 0; it must lie between 1 and 1000 lenses per inch"),
+        ({"lpi": "-60"}, "lpi", "lpi is -60"),
+        ({"lpi": "sixty"}, "lpi", "'sixty' is not a number"),
+        ({"lpi": "1e999"}, "lpi", "lpi is inf"),
+        ({"lpi": "60 lpi"}, "lpi", "it must be a number without a unit"),
+        ({"ppi": "0"}, "ppi", "ppi is 0"),
+        ({"ppi": "-720"}, "ppi", "ppi is -720"),
+        ({"ppi": "1e9"}, "ppi", "it must lie between 10 and 20000 pixels per inch"),
+        ({"ppi": "90"}, "ppi", "a lens covers 1.501 pixels; two are the least"),
+        ({"size": "0x300mm"}, "size", "a side of 0 mm is 0 pixels"),
+        ({"size": "-200x300mm"}, "size", "a side of -200 mm"),
+        ({"size": "200mm"}, "size", "'200mm' is not a size"),
+        ({"size": "200x300km"}, "size", "unknown unit 'km'"),
+        ({"size": "1e9x1mm"}, "size", "it must be 1 to 1000000 pixels"),
+        ({"size": "0.2x300mm"}, "size", "a lens covers 12.01 pixels; the print has only 6"),
+        ({"viewing-distance": "0"}, "viewing-distance", "it must be a length of at least 10 mm, or infinite"),
+        ({"viewing-distance": "-500"}, "viewing-distance", "viewing_distance is -500 mm"),
+        ({"viewing-distance": "far"}, "viewing-distance", "'far' is not a length"),
+        ({"thickness": "0"}, "thickness", "thickness is 0 mm"),
+        ({"thickness": "-1mm"}, "thickness", "thickness is -1 mm"),
+        ({"thickness": "26"}, "thickness", "a field of view of 5 to 150 degrees; look at its unit"),
+        ({"thickness": "0.66", "field": "54"}, "thickness", "thickness and field are both given"),
+        ({"index": "1.5"}, "index", "index is given without a thickness"),
+        ({"thickness": "0.66", "index": "0"}, "index", "index is 0"),
+        ({"field": "0"}, "field", "field is 0"),
+        ({"field": "180"}, "field", "field is 180"),
+        ({"print-lpi": "59.9"}, "print-lpi", "print_lpi and lpi are both given"),
+        ({"lpi": "1", "ppi": "72", "viewing-distance": "60"}, "viewing-distance", "look from farther away"),
+        ({"paper": "A4"}, "paper", "unknown key 'paper'"),
+    ],
+)
+def test_nonsense_is_refused(texts, where, said):
+    with pytest.raises(DisplayError) as caught:
+        print_of_texts({**GOOD, **texts})
+    assert caught.value.where == where
+    assert said in str(caught.value)
+
+
+@pytest.mark.parametrize("missing", ["lpi", "ppi", "size"])
+def test_what_is_missing_is_named(missing):
+    with pytest.raises(DisplayError, match=f"{missing} is missing"):
+        print_of_texts({key: text for key, text in GOOD.items() if key != missing})
+
+
+@given(st.dictionaries(st.sampled_from([*GOOD, "thickness", "index", "field"]), st.text(max_size=8)))
+@settings(deadline=None)
+def test_whatever_is_typed_is_a_print_or_refused(texts):
+    with suppress(DisplayError):
+        assert print_of_texts({**GOOD, **texts}).display().gap > 0

@@ -1,0 +1,49 @@
+"""Pictures written a few rows at a time are the files that are written in one piece."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from lippmann.codecs import tiff
+from lippmann.errors import PictureError
+from lippmann.image import IntegralImage
+from lippmann.image.metadata import metadata_of
+from lippmann.image.streamed_write import can_be_banded, write_in_bands
+
+
+def content(path):
+    files = path.rglob("*") if path.is_dir() else [path]
+    return {file.relative_to(path).as_posix(): file.read_bytes() for file in files if file.is_file()}
+
+
+@pytest.mark.parametrize("name", ["a.tif", "a.zarr"])
+@pytest.mark.parametrize("bits", [8, 16, 32])
+def test_bands_make_the_same_file(display, tmp_path, monkeypatch, name, bits):
+    monkeypatch.setattr(tiff, "TILE", 16)
+    monkeypatch.setattr(tiff, "TILED_FROM", 0)
+    shown = display("square", lenses=(9, 7), pixels=5)
+    values = np.random.default_rng(0).uniform(0, 1.1, (35, 45, 3)).astype(np.float32)
+    image = IntegralImage(values, shown)
+    asked = []
+
+    def rows(first, last):
+        asked.append((first, last))
+        return values[first:last]
+
+    for folder in ("bands", "whole"):
+        (tmp_path / folder).mkdir()
+    write_in_bands(rows, metadata_of(image), tmp_path / "bands" / name, bits=bits)
+    image.save(tmp_path / "whole" / name, bits=bits)
+    assert content(tmp_path / "bands" / name) == content(tmp_path / "whole" / name)
+    assert asked == [(0, 16), (16, 32), (32, 35)]
+
+
+def test_what_cannot_be_written_so_is_refused(display, tmp_path):
+    image = IntegralImage(np.zeros((9, 12, 3), np.float32), display())
+    with pytest.raises(PictureError, match="written whole"):
+        write_in_bands(lambda first, last: image.rows(first, last), metadata_of(image), tmp_path / "a.png")
+    with pytest.raises(PictureError, match="not finite"):
+        write_in_bands(lambda first, last: image.rows(first, last) * np.nan, metadata_of(image), tmp_path / "a.tif")
+    assert list(tmp_path.iterdir()) == []
+    assert [can_be_banded(name) for name in ("png", "exr", "tiff", "zarr")] == [False, False, True, True]

@@ -1,0 +1,223 @@
+"""Quilts as files and as folders of views."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from lippmann.errors import OutputError, PictureError
+from lippmann.image import encoding
+from lippmann.quilts import files as quilt_files
+from lippmann.quilts.files import read_quilt, read_views, write_quilt, write_views
+from lippmann.quilts.quilt import Quilt, QuiltLayout
+
+LAYOUT = QuiltLayout(8, 6, 0.75)
+SIZE = (48, 64)
+
+
+def codes_of(number, size=SIZE):
+    """A view of 8-bit codes unlike all others; the corners tell it from its mirror images."""
+    picture = np.random.default_rng(number).integers(0, 256, (size[1], size[0], 3)).astype(np.uint8)
+    picture[:4, :4] = (number, 0, 255)
+    return picture
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """48 views, numbered from 0."""
+    made = tmp_path / "views"
+    made.mkdir()
+    for number in range(LAYOUT.views):
+        Image.fromarray(codes_of(number)).save(made / f"shot2_{number:03}.png")
+    return made
+
+
+def test_the_leftmost_view_is_at_the_bottom_left(folder, tmp_path):
+    path = tmp_path / "teapot_qs8x6a0.75.png"
+    write_quilt(read_views(folder, LAYOUT), path)
+    written = np.asarray(Image.open(path))
+    assert written.shape == (6 * 64, 8 * 48, 3)
+    assert written.dtype == np.uint8
+    np.testing.assert_array_equal(written[-64:, :48], codes_of(0))
+    np.testing.assert_array_equal(written[-64:, 48:96], codes_of(1))
+    np.testing.assert_array_equal(written[-128:-64, :48], codes_of(8))
+    np.testing.assert_array_equal(written[:64, -48:], codes_of(47))
+
+
+def test_round_trips_are_exact(folder, tmp_path):
+    path = tmp_path / "a_qs8x6a0.75.png"
+    write_quilt(read_views(folder, LAYOUT), path)
+    write_views(read_quilt(path), tmp_path / "again")
+    for number in range(LAYOUT.views):
+        again = np.asarray(Image.open(tmp_path / "again" / f"view_{number:02}.png"))
+        np.testing.assert_array_equal(again, codes_of(number))
+    write_quilt(read_views(tmp_path / "again", LAYOUT), tmp_path / "b_qs8x6a0.75.png")
+    np.testing.assert_array_equal(Image.open(tmp_path / "b_qs8x6a0.75.png"), Image.open(path))
+
+
+@pytest.mark.parametrize("ending", [".exr", ".tif"])
+def test_values_stay_what_they_are_in_other_formats(tmp_path, ending):
+    pixels = np.random.default_rng(0).uniform(0, 3, (256, 256, 3)).astype(np.float32)
+    bits = 32
+    path = tmp_path / f"x_qs4x2{ending}"
+    write_quilt(Quilt(pixels, QuiltLayout(4, 2, None)), path, bits=bits)
+    read = read_quilt(path)
+    np.testing.assert_array_equal(read.pixels, pixels)
+    write_views(read, tmp_path / "views")
+    np.testing.assert_array_equal(read_views(tmp_path / "views", QuiltLayout(4, 2, None)).pixels, pixels)
+
+
+def test_jpegs_of_others_are_read(tmp_path):
+    path = tmp_path / "x_qs4x2a2.jpg"
+    Image.new("RGB", (512, 256), (200, 100, 50)).save(path, quality=95)
+    quilt = read_quilt(path)
+    assert quilt.stored == "uint8"
+    assert quilt.pixels[0, 0] == pytest.approx([0.578, 0.127, 0.032], abs=0.02)
+
+
+def test_jpegs_are_not_written(folder, tmp_path):
+    with pytest.raises(OutputError, match=r"the ending '\.jpg' is unknown"):
+        write_quilt(read_views(folder, LAYOUT), tmp_path / "x_qs8x6a0.75.jpg")
+
+
+def test_a_file_whose_size_disagrees_with_its_name_is_refused(tmp_path):
+    path = tmp_path / "x_qs8x6a0.75.png"
+    Image.new("RGB", (400, 388)).save(path)
+    with pytest.raises(PictureError, match=r"x_qs8x6a0\.75\.png: it is 388 pixels high"):
+        read_quilt(path)
+
+
+def test_a_size_that_disagrees_is_refused_before_the_pixels_are_read(tmp_path, monkeypatch):
+    monkeypatch.setattr(quilt_files, "_read", None)
+    for ending in ("png", "jpg", "tif"):
+        path = tmp_path / f"x_qs8x6a0.75.{ending}"
+        Image.new("RGB", (400, 388)).save(path)
+        with pytest.raises(PictureError, match="it is 388 pixels high"):
+            read_quilt(path)
+
+
+@pytest.mark.parametrize(("bits", "stored"), [(8, "uint8"), (16, "uint16"), (32, "float32")])
+def test_a_quilt_is_held_as_it_is_stored(tmp_path, bits, stored):
+    pixels = np.random.default_rng(1).uniform(0, 1, (256, 256, 3)).astype(np.float32)
+    path = tmp_path / "x_qs4x2.tif"
+    write_quilt(Quilt(pixels, QuiltLayout(4, 2, None)), path, bits=bits)
+    quilt = read_quilt(path)
+    assert (quilt.values.dtype, quilt.stored) == (stored, stored)
+    np.testing.assert_allclose(quilt.pixels, pixels, atol=2.0 / 2**bits)
+    write_views(quilt, tmp_path / "views", format="tiff", bits=bits)
+    packed = read_views(tmp_path / "views", quilt.layout)
+    assert packed.values.dtype == stored
+    np.testing.assert_array_equal(packed.values, quilt.values)
+
+
+def test_views_of_several_depths_become_linear(folder):
+    encoding.encode_file(
+        folder / "shot2_000.png", "png", {"": np.full((64, 48, 3), 0.25, np.float32)}, stored="uint16", transfer="srgb"
+    )
+    quilt = read_views(folder, LAYOUT)
+    assert (quilt.values.dtype, quilt.stored) == ("float32", "float32")
+    np.testing.assert_allclose(quilt.view(0), 0.25, atol=1e-4)
+    np.testing.assert_array_equal(quilt.view(1), encoding.linear_values(codes_of(1), "srgb"))
+
+
+def test_more_than_can_be_held_is_refused_before_it_is_read(folder, monkeypatch):
+    monkeypatch.setattr(quilt_files, "MOST_PIXELS", 48 * 64 * 47)
+    monkeypatch.setattr(quilt_files, "_read", None)
+    with pytest.raises(PictureError, match="it holds 48 views of 48 x 64 pixels; together they have at most 144384"):
+        read_views(folder)
+
+
+def test_values_that_are_not_finite_are_not_written(tmp_path):
+    quilt = Quilt(np.full((384, 384, 3), np.nan, dtype=np.float32), LAYOUT)
+    with pytest.raises(PictureError, match="not finite"):
+        write_quilt(quilt, tmp_path / "x_qs8x6a0.75.png")
+
+
+def test_a_quilt_is_not_written_under_another_s_name(tmp_path):
+    quilt = Quilt(np.zeros((384, 384, 3), dtype=np.float32), LAYOUT)
+    with pytest.raises(PictureError, match="the name says 6x8; the quilt has 8x6 views"):
+        write_quilt(quilt, tmp_path / "x_qs6x8a0.75.png")
+
+
+# ---- Folders ---------------------------------------------------------------------------------------------------------
+
+
+def test_views_may_be_numbered_from_one_and_without_zeros(folder, tmp_path):
+    other = tmp_path / "other"
+    other.mkdir()
+    (other / "notes.txt").write_text("no view")
+    for number in range(LAYOUT.views):
+        (folder / f"shot2_{number:03}.png").rename(other / f"v{number + 1}.png")
+    np.testing.assert_array_equal(
+        read_views(other, LAYOUT).view(11), read_views(other).view(11), "in a grid and in a row"
+    )
+    assert read_views(other).layout == (48, 1, None)
+    write_views(read_views(other), tmp_path / "out")
+    np.testing.assert_array_equal(Image.open(tmp_path / "out" / "view_11.png"), codes_of(11))
+
+
+def test_an_absent_view_is_named(folder):
+    (folder / "shot2_017.png").unlink()
+    with pytest.raises(PictureError, match="view 17 is absent; views run to 47"):
+        read_views(folder)
+
+
+def test_a_missing_end_is_counted(folder):
+    (folder / "shot2_047.png").unlink()
+    with pytest.raises(PictureError, match="it holds 47 views; 8x6 are 48"):
+        read_views(folder, LAYOUT)
+
+
+def test_a_view_of_another_size_is_named(folder):
+    Image.fromarray(codes_of(5, (48, 63))).save(folder / "shot2_005.png")
+    with pytest.raises(PictureError, match=r"shot2_005\.png: has 48 x 63 pixels.*has 48 x 64"):
+        read_views(folder, LAYOUT)
+
+
+def test_a_damaged_view_is_named(folder):
+    (folder / "shot2_005.png").write_bytes(b"no picture")
+    with pytest.raises(PictureError, match=r"shot2_005\.png"):
+        read_views(folder, LAYOUT)
+    (folder / "shot2_005.png").rename(folder / "shot2_005.jpg")
+    with pytest.raises(PictureError, match=r"shot2_005\.jpg: cannot be read"):
+        read_views(folder, LAYOUT)
+
+
+@pytest.mark.parametrize(
+    ("names", "said"),
+    [
+        ([], "there are no views"),
+        (["a.png"], "the name has no number"),
+        (["a_2.png", "a_3.png"], "the first view is 2"),
+        (["a_0.png", "b_0.png"], r"b_0\.png: is view 0, as a_0\.png is"),
+        (["a_0.png", "lippmann.json"], "a folder of 'lippmann views'"),
+    ],
+)
+def test_folders_that_leave_the_order_open_are_refused(names, said, tmp_path):
+    for name in names:
+        (tmp_path / name).write_bytes(b"")
+    with pytest.raises(PictureError, match=said):
+        read_views(tmp_path)
+
+
+def test_an_absent_folder_is_said(tmp_path):
+    with pytest.raises(PictureError, match="No such file"):
+        read_views(tmp_path / "absent")
+
+
+def test_unknown_formats_are_refused(folder, tmp_path):
+    quilt = read_views(folder, LAYOUT)
+    with pytest.raises(OutputError, match="'jpeg' is unknown"):
+        write_views(quilt, tmp_path / "out", format="jpeg")
+    assert not (tmp_path / "out").exists()
+
+
+def test_large_jpegs_are_read_without_a_warning(tmp_path, monkeypatch):
+    monkeypatch.setattr(Image, "MAX_IMAGE_PIXELS", 100_000)
+    path = tmp_path / "x_qs4x2a2.jpg"
+    Image.new("RGB", (512, 256)).save(path)
+    assert read_quilt(path).view_size == (128, 128)
+    monkeypatch.setattr(Image, "MAX_IMAGE_PIXELS", 10_000)
+    with pytest.raises(PictureError, match="cannot be read"):
+        read_quilt(path)

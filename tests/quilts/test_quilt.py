@@ -1,0 +1,89 @@
+"""Quilts: names, sizes, and where the views lie."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from lippmann.color.transfer import dequantize
+from lippmann.display import load_display
+from lippmann.errors import PictureError
+from lippmann.quilts.quilt import DEVICE_QUILTS, Quilt, QuiltLayout, check_size, layout_of_name
+
+LAYOUT = QuiltLayout(8, 6, 0.75)
+
+
+def test_what_the_sides_leave_over_lies_right_and_on_top():
+    pixels = np.zeros((512, 512, 3), dtype=np.float32)
+    quilt = Quilt(pixels, QuiltLayout(5, 9, 1.6))
+    assert quilt.view_size == (102, 56)
+    for number in range(45):
+        quilt.view(number)[...] = number + 1
+    assert (pixels[:, 510:] == 0).all()
+    assert (pixels[:8] == 0).all()
+    assert (pixels[8:, :510] > 0).all()
+    assert pixels[511, 0, 0] == 1
+    assert pixels[8, 509, 0] == 45
+
+
+def test_rows_of_all_views_are_those_of_each():
+    codes = np.random.default_rng(3).integers(0, 256, (512, 512, 3)).astype(np.uint8)
+    quilt = Quilt(codes, QuiltLayout(5, 9, 1.6))
+    rows = quilt.view_rows(7, 20)
+    for number in range(45):
+        np.testing.assert_array_equal(rows[number], quilt.view(number)[7:20])
+    np.testing.assert_array_equal(quilt.pixels, dequantize(codes, "srgb"))
+
+
+@pytest.mark.parametrize(
+    ("name", "layout"),
+    [
+        ("teapot_qs8x6a0.75.png", (8, 6, 0.75)),
+        ("a_qs5x9a1.77778.png", (5, 9, 1.77778)),
+        ("old one_qs5x9.png", (5, 9, None)),
+        ("x_qs2x2a1_qs11x6a0.5625.exr", (11, 6, 0.5625)),
+        ("_qs32x1a2.png", (32, 1, 2.0)),
+    ],
+)
+def test_names_are_read(tmp_path, name, layout):
+    assert layout_of_name(tmp_path / name) == layout
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("teapot.png", "does not say how many views"),
+        ("x_qs8x6a0.75_final.png", "does not say how many views"),
+        ("x_qs8x.png", "does not say how many views"),
+        ("x_qs0x6a0.75.png", "0 columns and 6 rows"),
+        ("x_qs33x6a0.75.png", "33 columns and 6 rows; there are 1 to 32"),
+        ("x_qs8x6a0.png", "the aspect 0"),
+        ("x_qs8x6a100.png", "the aspect 100"),
+    ],
+)
+def test_impossible_names_are_refused(tmp_path, name, said):
+    with pytest.raises(PictureError, match=said) as caught:
+        layout_of_name(tmp_path / name)
+    assert name in str(caught.value)
+
+
+@pytest.mark.parametrize("device", DEVICE_QUILTS, ids=lambda d: f"{d.display}-{d.width}")
+def test_devices(device, tmp_path):
+    assert layout_of_name(tmp_path / f"x{device.layout.ending}.png") == device.layout
+    check_size(device.width, device.height, device.layout, "x")
+    panel = load_display(device.display).panel
+    assert panel.width / panel.height == pytest.approx(device.layout.aspect, rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("width", "height", "said"),
+    [
+        (3361, 3360, "it is 3361 pixels wide.*3361 is no multiple of 8"),
+        (3360, 3364, "it is 3364 pixels high.*3364 is no multiple of 6"),
+        (248, 3360, "a quilt's sides are 256 to 16384"),
+        (3360, 16386, "it is 16386 pixels high"),
+    ],
+)
+def test_sizes_that_disagree_with_the_name_are_refused(width, height, said):
+    with pytest.raises(PictureError, match=said):
+        check_size(width, height, LAYOUT, "x")

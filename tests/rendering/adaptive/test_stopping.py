@@ -1,0 +1,184 @@
+"""When a rendering stops, with renderers whose error is known and a clock that is told."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from lippmann.display import Display
+from lippmann.display.lens_array import LensArray
+from lippmann.display.panel import Panel
+from lippmann.errors import UsageError
+from lippmann.progress import Progress
+from lippmann.rendering.adaptive.convergence import Track
+from lippmann.rendering.adaptive.stopping import STEP, TOLERANCE, Goal, reach, reach_judged
+from lippmann.rendering.estimate.pixel_errors import OWN_NOISE, PixelErrors
+from lippmann.rendering.estimate.psnr import Estimate, PictureEstimator
+
+SHOWN = Display("test", Panel(64, 64, 0.25), LensArray("square", 2.0), gap=6.8)
+
+
+class Noise:
+    """A renderer whose squared error is ``error * samples**-slope``; a sample takes ``seconds`` of its own clock."""
+
+    def __init__(self, error=0.05, slope=1.0, seconds=0.01, floor=0.0):
+        self.error, self.slope, self.seconds, self.floor = error, slope, seconds, floor
+        self.samples, self.now = 0, 0.0
+        self.random = np.random.default_rng(1)
+
+    def add(self, samples, progress=lambda _: None):
+        self.samples += samples
+        self.now += samples * self.seconds
+        progress(Progress("trace", samples, samples))
+
+    def squared_error(self):
+        expected = self.error * self.samples**-self.slope + self.floor
+        return PixelErrors((expected * self.random.chisquare(1, (64, 64))).astype(np.float32), None, OWN_NOISE)
+
+    def clock(self):
+        return self.now
+
+
+def run(goal, renderer, reports=None):
+    listen = reports.append if reports is not None else lambda _: None
+    return reach(goal, renderer, PictureEstimator(SHOWN), listen, renderer.clock)
+
+
+@pytest.mark.parametrize("slope", [0.8, 1.0, 1.5])
+def test_the_quality_is_reached_without_wasting_samples(slope):
+    renderer = Noise(slope=slope)
+    outcome = run(Goal(quality=40), renderer)
+    assert outcome.end == "quality"
+    assert outcome.estimate.worst >= 40
+    assert outcome.estimate.worst_low >= 40 - TOLERANCE
+    # The worst of 64 lenses of 64 pixels is about 2 dB worse than all together.
+    assert outcome.estimate.worst < 42
+    assert len(outcome.rounds) <= 9
+    assert outcome.samples == renderer.samples
+
+
+class Sooner(PictureEstimator):
+    first = fewest = 4
+
+
+@pytest.mark.parametrize(("dear_until", "first"), [(0, 4), (5, 8), (100, 8)])
+def test_the_first_look_waits_while_it_takes_more_than_samples(dear_until, first):
+    """Not longer than for twice the fewest samples; whatever comes then is a multiple of the batches again."""
+    renderer = Noise(error=0.2)
+    track = Track(renderer, Sooner(SHOWN), dear=lambda: 0 < renderer.samples < dear_until)
+    outcome = reach_judged(Goal(quality_mean=40), renderer.add, track, clock=renderer.clock)
+    found = [each.samples for each in outcome.rounds]
+    assert found[0] == first
+    assert all(samples % STEP == 0 for samples in found[1:])
+
+
+def test_where_time_is_short_no_look_waits():
+    renderer = Noise(error=0.2, seconds=1.0)
+    track = Track(renderer, Sooner(SHOWN), dear=lambda: True)
+    goal = Goal(quality_mean=40, max_time=5.5)
+    outcome = reach_judged(goal, renderer.add, track, clock=renderer.clock, probe=lambda: 1.0)
+    assert renderer.now <= 5.5
+    assert outcome.rounds[0].samples == 4
+
+
+def test_the_mean_asks_for_less_than_the_worst():
+    worst, mean = Noise(), Noise()
+    run(Goal(quality=40), worst)
+    outcome = run(Goal(quality_mean=40), mean)
+    assert outcome.estimate.psnr >= 40
+    assert mean.samples < 0.8 * worst.samples
+
+
+def test_time_ends_it_with_the_best_so_far():
+    renderer = Noise(seconds=0.05)
+    outcome = run(Goal(quality=60, max_time=10.0), renderer)
+    assert outcome.end == "time"
+    assert 8.0 <= renderer.now <= 10.0
+
+
+@pytest.mark.parametrize(("seconds", "samples"), [(0.5, 19), (1.5, 6), (4.0, 2), (9.5, 1), (40.0, 1)])
+def test_the_first_round_fits_the_time(seconds, samples):
+    """A probe tells how many samples there is time for; one of every pixel is the least that is a picture."""
+    renderer = Noise(seconds=seconds)
+    goal = Goal(max_time=10.0)
+    outcome = reach(goal, renderer, PictureEstimator(SHOWN), clock=renderer.clock, probe=lambda: seconds)
+    assert renderer.now <= max(10.0, seconds)
+    assert (outcome.end, outcome.samples) == ("time", samples)
+    assert (outcome.estimate is None) == (outcome.samples == 1)
+
+
+def test_a_probe_that_promised_too_much_is_not_believed_twice():
+    renderer = Noise(seconds=1.0)
+    outcome = reach(Goal(max_time=10.0), renderer, PictureEstimator(SHOWN), clock=renderer.clock, probe=lambda: 1.2)
+    assert (outcome.samples, renderer.now <= 10.0) == (9, True)
+    slow = Noise(seconds=30.0)
+    outcome = reach(Goal(max_time=40.0), slow, PictureEstimator(SHOWN), clock=slow.clock, probe=lambda: 25.0)
+    assert (outcome.samples, outcome.estimate) == (1, None)
+
+
+def test_without_a_limit_of_time_nothing_is_probed():
+    def never():
+        raise AssertionError("no probe is wanted")
+
+    renderer = Noise()
+    assert reach(Goal(spp=8), renderer, PictureEstimator(SHOWN), clock=renderer.clock, probe=never).samples == 8
+
+
+def test_samples_end_it():
+    renderer = Noise()
+    outcome = run(Goal(quality=60, spp=100), renderer)
+    assert (outcome.end, outcome.samples) == ("samples", 100)
+
+
+def test_samples_alone_are_spent_in_one_go():
+    outcome = run(Goal(spp=37), Noise())
+    assert (outcome.end, outcome.samples, len(outcome.rounds)) == ("samples", 37, 1)
+
+
+def test_a_renderer_that_stops_getting_better_is_not_followed_for_ever():
+    outcome = run(Goal(quality=50, spp=5000), Noise(floor=1e-3))
+    assert outcome.end == "samples"
+
+
+@pytest.mark.parametrize(("seems", "samples"), [(30.5, 16), (33.0, 16), (35.5, 8), (37.0, 8), (38.5, 4), (90.0, 4)])
+def test_a_few_samples_are_believed_where_they_are_far_better_than_what_is_asked_for(seems, samples):
+    class Still(Noise):
+        """It does not get better."""
+
+        def squared_error(self):
+            return PixelErrors(np.full((64, 64), 10 ** (-seems / 10), np.float32), None, OWN_NOISE)
+
+    outcome = run(Goal(quality_mean=30), Still())
+    assert (outcome.end, outcome.samples) == ("quality", samples)
+    assert len(outcome.rounds) <= 3
+
+
+def test_no_look_is_lost_on_a_picture_that_will_not_be_believed():
+    outcome = run(Goal(quality_mean=30, spp=1000), Noise(error=0.5))
+    assert [each.samples for each in outcome.rounds][:2] == [4, PictureEstimator.fewest]
+
+
+def test_reports_climb_to_the_end_and_say_where_the_picture_stands():
+    reports = []
+    run(Goal(quality=40), Noise(), reports)
+    done = [report.done for report in reports]
+    assert done == sorted(done)
+    assert all(report.done <= report.total for report in reports)
+    assert "of 40 dB, about" in reports[-1].note
+    assert reports[-1].note.endswith("s left")
+
+
+def test_missing_is_by_the_likely_value_and_by_the_low_end():
+    wide = Estimate(45, 44, 46, 41.0, 38.0, 43.0, (0, 0))
+    assert Goal(quality=40).missing(wide) == pytest.approx(1.0)
+    narrow = Estimate(45, 44.9, 45.1, 41.0, 40.8, 41.2, (0, 0))
+    assert Goal(quality=42).missing(narrow) == pytest.approx(1.0)
+    assert Goal(quality_mean=44).missing(wide) <= 0
+
+
+@pytest.mark.parametrize(
+    "values", [{}, {"quality": 0}, {"quality": 81}, {"quality_mean": -1}, {"max_time": 0}, {"spp": 1}]
+)
+def test_goals_without_sense_are_refused(values):
+    with pytest.raises(UsageError):
+        Goal(**values)

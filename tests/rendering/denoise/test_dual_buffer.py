@@ -1,0 +1,182 @@
+"""Denoised halves that judge each other, against truths that are known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from lippmann.color.transfer import encode_srgb
+from lippmann.rendering.denoise.dual_buffer import Denoised
+from lippmann.rendering.estimate.pixel_errors import CROSS_NOISE, OWN_NOISE, PixelErrors
+
+SHAPE = (256, 256, 3)
+
+
+class Noise:
+    """Two halves of a smooth picture, each with noise of its own."""
+
+    def __init__(self, spread=0.05, seed=1):
+        random = np.random.default_rng(seed)
+        y, x = np.mgrid[0:1:256j, 0:1:256j]
+        self.truth = np.stack([0.2 + 0.3 * x, 0.2 + 0.3 * y, 0.3 + 0.1 * np.sin(9 * x)], axis=-1).astype(np.float32)
+        self._halves = [self.truth + random.normal(0, spread, SHAPE).astype(np.float32) for _ in range(2)]
+        self.added = 0
+
+    def add(self, samples, progress=lambda _: None):
+        self.added += samples
+        self.samples += samples
+
+    samples = 2
+
+    def picture(self):
+        return self._halves[0]
+
+    def halves(self):
+        return tuple(self._halves)
+
+    def squared_error(self):
+        difference = np.square(self._halves[0] - self._halves[1]).mean(axis=2) / 4
+        return PixelErrors(difference, None, OWN_NOISE)
+
+
+def blur(picture, turned=False):
+    padded = np.pad(picture, ((2, 2), (2, 2), (0, 0)), mode="edge")
+    windows = np.lib.stride_tricks.sliding_window_view(padded, (5, 5), axis=(0, 1))
+    return windows.mean(axis=(-1, -2)).astype(np.float32)
+
+
+def true_error(picture, truth):
+    return float(np.square(encode_srgb(picture.astype(float)) - encode_srgb(truth.astype(float))).mean())
+
+
+def told_and_true(renderer, denoise):
+    denoised = Denoised(renderer, denoise, "srgb")
+    told = denoised.squared_error()
+    assert told.noise is CROSS_NOISE
+    return float(told.values.mean()), true_error(denoised.picture(), renderer.truth)
+
+
+DENOISERS = {"blur": blur, "flat": lambda p, _: np.full_like(p, 0.3), "brighter": lambda p, _: p + np.float32(0.05)}
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("denoise", DENOISERS.values(), ids=DENOISERS)
+def test_the_error_is_neither_missed_nor_much_overstated(denoise, seed, as_denoised):
+    """Bias and left-over noise both count, however strong the noise of the judges is."""
+    told, true = told_and_true(Noise(seed=seed), denoise)
+    assert told == pytest.approx(true, rel=0.2)
+
+
+@pytest.mark.parametrize("denoise", DENOISERS.values(), ids=DENOISERS)
+def test_samples_that_take_the_place_of_worse_pixels_do_not_flatter(denoise):
+    told, true = np.mean([told_and_true(Noise(seed=seed), denoise) for seed in range(8)], axis=0)
+    assert told == pytest.approx(true, rel=0.15)
+
+
+def test_noise_that_both_halves_share_would_not_be_seen_but_theirs_is_their_own():
+    """The judge of a half is the other one: a denoiser that does nothing is told its whole noise."""
+    renderer = Noise()
+    told = Denoised(renderer, lambda picture, _: picture, "srgb").squared_error()
+    noise = true_error(np.mean(renderer.halves(), axis=0), renderer.truth)
+    assert float(told.values.mean()) == pytest.approx(noise, rel=0.2)
+
+
+def test_what_the_halves_differ_by_is_known():
+    renderer = Noise()
+    told = Denoised(renderer, lambda picture, _: picture, "srgb").squared_error()
+    # Halves that are their samples have nothing wrong in common.
+    assert float(told.apart.mean()) == pytest.approx(float(told.values.mean()), rel=0.2)
+    assert told.apart.min() >= 0
+    # With a blur they agree better than its samples do, but not wholly.
+    blurred = Denoised(renderer, blur, "srgb").squared_error()
+    assert 0.01 < float(blurred.apart.mean()) / float(told.apart.mean()) < 0.3
+
+
+@pytest.mark.parametrize(("samples", "hidden"), [(4, True), (64, False)])
+def test_a_pixel_that_both_halves_hit_hard_does_not_hide_what_is_wrong_elsewhere(samples, hidden, as_denoised):
+    """A caustic's rare light: the product of two hits is larger than any error of a code. Of few samples it counts."""
+    renderer = Noise()
+    renderer.samples = samples
+    clear = float(Denoised(renderer, lambda p, _: blur(np.minimum(p, 1)), "srgb").squared_error().values.mean())
+    for half in renderer.halves():
+        half[100, 100] += 15
+    told = float(Denoised(renderer, lambda p, _: blur(np.minimum(p, 1)), "srgb").squared_error().values.mean())
+    assert (told > 2 * clear) == hidden
+
+
+@pytest.mark.parametrize(("samples", "all_may_be"), [(2, True), (5, True), (6, False), (64, False)])
+def test_of_few_samples_any_hit_may_be_lone(samples, all_may_be):
+    renderer = Noise()
+    renderer.samples = samples
+    told = Denoised(renderer, blur, "srgb").squared_error().samples
+    assert (told.lone is not None) == all_may_be
+    if all_may_be:
+        assert np.array_equal(told.lone, told.values)
+
+
+def test_more_samples_are_cleaned_anew():
+    renderer = Noise()
+    calls = []
+
+    def denoise(picture, turned):
+        calls.append(turned)
+        return picture
+
+    denoised = Denoised(renderer, denoise, "srgb")
+    denoised.picture(), denoised.squared_error()
+    # Halves that the network sees another way: of itself it gets other things wrong.
+    assert calls == [False, True]
+    denoised.add(4)
+    denoised.picture()
+    assert (len(calls), renderer.added) == (4, 4)
+    renderer.add(2)  # past it
+    denoised.picture()
+    assert len(calls) == 6
+
+
+def test_a_single_sample_has_no_halves():
+    renderer = Noise()
+    renderer.samples = 1
+    assert np.array_equal(Denoised(renderer, lambda p, _: p * 2, "srgb").picture(), 2 * renderer.picture())
+
+
+@pytest.mark.parametrize("samples", [4, 16])
+def test_the_stated_interval_holds_for_open_image_denoise(engine, samples):
+    import lippmann
+    from lippmann.metrics.mse_psnr import low_percentile, micro_image_means, psnr, squared_errors
+
+    display = lippmann.load_display("seed-lenticular").resized(192, 128)
+    long = lippmann.render("teapot", display, spp=256, seed=99)
+    image = lippmann.render("teapot", display, spp=samples, denoise="oidn")
+    stated = image.provenance.estimate
+    errors = squared_errors(long, image)
+    assert stated["psnr_low"] < psnr(float(errors.mean())) < stated["psnr_high"]
+    worst = low_percentile(*micro_image_means(errors, display), 0.0).psnr
+    assert stated["worst_low"] < worst < stated["worst_high"]
+
+
+@pytest.mark.parametrize("transfer", ["srgb", "linear"])
+def test_light_spread_beyond_white_is_not_lost_where_codes_are_cut_off(transfer, as_denoised):
+    """Beside a lamp a denoiser may make pixels brighter than white: the whole step from the truth to white counts."""
+    truth = np.full(SHAPE, 0.35, dtype=np.float32)
+    random = np.random.default_rng(4)
+    renderer = Noise()
+    renderer._halves = [truth + random.normal(0, 0.02, SHAPE).astype(np.float32) for _ in range(2)]
+    told = Denoised(renderer, lambda p, _: np.full_like(p, 1.2), transfer).squared_error()
+    code = encode_srgb(np.float64(0.35)) if transfer == "srgb" else 0.35
+    assert float(told.values.mean()) == pytest.approx((1 - code) ** 2, rel=0.05)
+    # White beyond white is as white.
+    renderer._halves = [half + np.float32(2) for half in renderer._halves]
+    assert float(np.abs(Denoised(renderer, lambda p, _: p + 1, transfer).squared_error().values).max()) < 1e-12
+
+
+def test_where_codes_are_steep_the_whole_step_counts(as_denoised):
+    """A black corner that a denoiser makes dark grey: the slope there is that of the grey, the step far more."""
+    truth = np.full(SHAPE, 0.001, dtype=np.float32)
+    random = np.random.default_rng(5)
+    renderer = Noise()
+    renderer._halves = [truth + random.normal(0, 0.0005, SHAPE).astype(np.float32) for _ in range(2)]
+    told = Denoised(renderer, lambda p, _: np.full_like(p, 0.02), "srgb").squared_error()
+    step = float(encode_srgb(np.float64(0.02)) - encode_srgb(np.float64(0.001)))
+    assert step**2 < 1.5 * float(told.values.mean())
+    assert float(told.values.mean()) < step**2

@@ -1,0 +1,63 @@
+"""The network sees what has noise: surfaces and a margin; the rest stays as it is."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from lippmann.rendering.denoise import oidn_masked as module
+from lippmann.rendering.denoise.oidn_masked import EDGE, MARGIN, denoise_seen
+
+SHAPE = (200, 260)
+
+
+@pytest.fixture
+def calls(monkeypatch):
+    """What the network was shown; it answers with -1."""
+    shown = []
+
+    def network(color, albedo, normal, **options):
+        shown.append((color, albedo, normal, options))
+        return np.full_like(color, -1)
+
+    monkeypatch.setattr(module, "denoise", network)
+    return shown
+
+
+def layers(*surfaces):
+    rng = np.random.default_rng(1)
+    color, albedo = (rng.random((*SHAPE, 3)).astype(np.float32) for _ in range(2))
+    normal = np.zeros((*SHAPE, 3), dtype=np.float32)
+    for row, column in surfaces:
+        normal[row, column] = (0, 0, -1)
+    return color, albedo, normal
+
+
+def test_the_rectangle_of_all_surfaces_is_shown_and_they_are_cleaned(calls):
+    color, albedo, normal = layers((70, 100), (90, 47))
+    result = denoise_seen(color, albedo, normal, effort="fast", exposure=2.0, turned=True, threads=1)
+    cleaned = np.zeros(SHAPE, bool)
+    for row, column in ((70, 100), (90, 47)):
+        cleaned[row - EDGE : row + EDGE + 1, column - EDGE : column + EDGE + 1] = True
+    assert (result[cleaned] == -1).all()
+    np.testing.assert_array_equal(result[~cleaned], color[~cleaned])
+    ((*shown, options),) = calls
+    for part, whole in zip(shown, (color, albedo, normal), strict=True):
+        # It begins where the network's steps do.
+        np.testing.assert_array_equal(part, whole[48 : 91 + MARGIN, 16 : 101 + MARGIN])
+    assert options == {"effort": "fast", "exposure": 2.0, "turned": True, "threads": 1, "clean_guides": True}
+
+
+def test_at_the_edge_the_picture_ends(calls):
+    color, albedo, normal = layers((0, 259), (199, 3))
+    result = denoise_seen(color, albedo, normal)
+    assert (result[: EDGE + 1, -EDGE - 1 :] == -1).all()
+    assert calls[0][0].shape == color.shape
+
+
+def test_where_nothing_is_seen_nothing_is_done(calls):
+    color, albedo, normal = layers()
+    result = denoise_seen(color, albedo, normal)
+    np.testing.assert_array_equal(result, color)
+    assert result is not color
+    assert calls == []

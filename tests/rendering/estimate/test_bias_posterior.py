@@ -1,0 +1,56 @@
+"""What is likely wrong with both halves of a denoised picture, for what they differ by."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from lippmann.rendering.estimate.bias_posterior import LONE_RATIO, USUAL_RATIO, likely_error
+
+ENDS = np.array([0.025, 0.5, 0.975])
+chances = st.floats(1e-8, 1e-2)
+
+
+@given(chances, st.floats(-10, 100), st.floats(1e-3, 100), st.floats(0, 1))
+def test_no_picture_is_better_than_what_its_halves_differ_by(by_chance, ratio, deviation, lone):
+    low, middle, high = likely_error(by_chance, ratio * by_chance, deviation * by_chance, lone).quantiles(ENDS)
+    assert by_chance <= low < middle < high
+
+
+@given(chances, st.floats(0.1, 300), st.floats(0, 1))
+def test_what_is_measured_well_is_the_error(by_chance, ratio, lone):
+    found = likely_error(by_chance, ratio * by_chance, 1e-3 * ratio * by_chance, lone)
+    assert found.quantiles(0.5) == pytest.approx((1 + ratio) * by_chance, rel=0.02)
+
+
+@given(chances, st.floats(0, 1))
+def test_where_nothing_is_measured_the_usual_ratio_stands(by_chance, lone):
+    found = likely_error(by_chance, 0.0, 1e6 * by_chance, lone)
+    assert found.quantiles(0.5) == pytest.approx(
+        (1 + USUAL_RATIO ** (1 - lone) * LONE_RATIO**lone) * by_chance, rel=0.02
+    )
+
+
+@given(chances, st.floats(-3, 30), st.floats(0.1, 10), st.floats(0, 1), st.floats(1e-2, 1e2))
+def test_only_ratios_count(by_chance, ratio, deviation, lone, scale):
+    one = likely_error(by_chance, ratio * by_chance, deviation * by_chance, lone).quantiles(ENDS)
+    other = likely_error(*(scale * by_chance * factor for factor in (1, ratio, deviation)), lone).quantiles(ENDS)
+    np.testing.assert_allclose(other, scale * one, rtol=1e-6)
+
+
+@pytest.mark.parametrize("ratio", [1e5, 1e8])
+def test_beyond_all_ratios_the_measurement_alone_counts(ratio):
+    found = likely_error(1e-9, ratio * 1e-9, 1e-2 * ratio * 1e-9, 0.0).quantiles(ENDS)
+    assert found[0] < ratio * 1e-9 < found[2]
+    assert found[1] == pytest.approx(ratio * 1e-9, rel=0.1)
+
+
+def test_the_measurement_is_believed_the_more_the_surer_it_is():
+    middles = [float(likely_error(1e-4, 2e-3, deviation, 0.0).quantiles(0.5)) for deviation in (1e-2, 1e-3, 1e-4)]
+    assert middles[0] < middles[1] < middles[2] <= 2.1e-3
+
+
+def test_a_picture_without_any_error_is_not_worse_than_what_codes_tell():
+    assert float(likely_error(0.0, 0.0, 0.0, 0.0).quantiles(0.975)) < 1e-10

@@ -1,0 +1,99 @@
+"""The error of a picture by its own batches, for noise that is made and so known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from lippmann.color.transfer import encode_srgb
+
+pytestmark = pytest.mark.usefixtures("engine")
+
+
+def errors(batches, taken=None, transfer="srgb"):
+    """Of the means ``batches`` ``(K, pixels)`` of grey pixels, each of ``taken`` samples."""
+    from lippmann.rendering.estimate.jackknife import error_of_batches
+
+    taken = [1] * len(batches) if taken is None else taken
+    sums = np.repeat(np.asarray(batches)[..., None] * np.asarray(taken)[:, None, None], 3, axis=2)
+    return error_of_batches(sums.astype(np.float32), taken, transfer)
+
+
+def picture(batches, taken=None):
+    return np.average(batches, axis=0, weights=taken)
+
+
+def true_error(batches, truth, taken=None, transfer="srgb"):
+    code = encode_srgb if transfer == "srgb" else lambda x: np.clip(x, 0, 1)
+    return np.square(code(picture(batches, taken)) - code(np.full(1, truth))).mean()
+
+
+@pytest.mark.parametrize("transfer", ["srgb", "linear"])
+@pytest.mark.parametrize("number", [2, 4, 8])
+def test_plain_noise_is_measured_without_bias(number, transfer):
+    random = np.random.default_rng(number)
+    batches = 0.4 + 0.05 * random.standard_normal((number, 60000))
+    found, lone = errors(batches, transfer=transfer)
+    assert found.mean() == pytest.approx(true_error(batches, 0.4, transfer=transfer), rel=0.04)
+    assert lone.sum() < 0.05 * found.sum()
+
+
+def test_evenly_spread_samples_are_given_their_due():
+    random = np.random.default_rng(1)
+    batches = 0.4 + 0.05 * random.standard_normal((8, 60000))
+    for stream in (slice(0, 4), slice(4, 8)):
+        # The batches of a stream make up for most of what each is off.
+        batches[stream] -= 0.8 * (batches[stream].mean(axis=0) - 0.4)
+    found, _ = errors(batches)
+    assert found.mean() == pytest.approx(true_error(batches, 0.4), rel=0.06)
+
+
+def test_streams_that_agree_too_well_do_not_hide_that_they_are_two():
+    random = np.random.default_rng(1)
+    batches = 0.4 + 0.05 * random.standard_normal((4, 60000))
+    # The same noise twice: as if both streams had one seed. Half of the error is all that can be seen then.
+    found, _ = errors(np.concatenate([batches, batches]))
+    assert found.mean() < 0.05 * true_error(np.concatenate([batches, batches]), 0.4)
+
+
+def test_batches_count_by_their_samples():
+    random = np.random.default_rng(1)
+    taken = [3, 3, 2, 2, 3, 2, 2, 2]
+    batches = 0.4 + 0.1 * random.standard_normal((8, 60000)) / np.sqrt(taken)[:, None]
+    found, _ = errors(batches, taken)
+    assert found.mean() == pytest.approx(true_error(batches, 0.4, taken), rel=0.05)
+
+
+def test_batches_that_hold_nothing_are_no_witnesses():
+    random = np.random.default_rng(1)
+    taken = [1, 1, 0, 0, 1, 0, 0, 0]
+    batches = 0.4 + 0.03 * random.standard_normal((8, 60000))
+    found, _ = errors(batches, taken)
+    assert found.mean() == pytest.approx(true_error(batches, 0.4, taken), rel=0.06)
+
+
+def test_noise_that_clips_is_measured_as_it_shows():
+    random = np.random.default_rng(1)
+    batches = random.exponential(0.9, (8, 60000))
+    found, _ = errors(batches)
+    true = true_error(batches, 0.9)
+    carried_by_slope = np.var(picture(batches)) * (1.055 / 2.4 * 0.9 ** (1 / 2.4 - 1)) ** 2
+    assert found.mean() == pytest.approx(true, rel=0.12)
+    assert carried_by_slope > 1.4 * true
+
+
+def test_fireflies_count_as_what_they_show_and_are_called_lone():
+    random = np.random.default_rng(1)
+    batches = 0.2 + 100.0 * (random.random((8, 60000)) < 1e-4)
+    hit = (batches > 1).any(axis=0)
+    found, lone = errors(batches)
+    shown = np.square(encode_srgb(np.ones(1)) - encode_srgb(np.full(1, 0.2)))[0]
+    assert found[hit].mean() == pytest.approx(shown, rel=0.3)
+    assert found[~hit].max() < 1e-6
+    assert lone[hit] == pytest.approx(found[hit], rel=0.2)
+
+
+def test_what_no_sample_changes_has_no_error():
+    found, lone = errors(np.full((8, 100), 0.3))
+    assert np.abs(found).max() < 1e-10
+    assert lone.max() == 0

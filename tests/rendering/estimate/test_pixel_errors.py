@@ -1,0 +1,70 @@
+"""Sums of pixels' errors over the parts of a picture."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+
+import numpy as np
+import pytest
+
+from lippmann.rendering.estimate.pixel_errors import (
+    CROSS_NOISE,
+    LONE_CERTAIN,
+    OWN_NOISE,
+    ErrorSums,
+    PixelErrors,
+    parts_with_pixels,
+)
+
+
+@pytest.fixture
+def errors():
+    values, lone, apart, of_samples = np.random.default_rng(1).exponential(0.01, (4, 12, 10)).astype(np.float32)
+    samples = PixelErrors(of_samples, lone * np.float32(0.1), OWN_NOISE)
+    return PixelErrors(values, None, CROSS_NOISE, samples, apart * np.float32(0.1))
+
+
+OWNER = np.arange(120).reshape(12, 10) // 30
+
+
+def test_sums_over_rows_are_those_of_the_whole(errors):
+    for each in (errors, errors.samples):
+        whole, bands = ErrorSums.none(4, 30), ErrorSums.none(4, 30)
+        whole.add(OWNER, each)
+        for first in range(0, 12, 5):
+            bands.add(OWNER[first : first + 5], each.part(slice(first, first + 5)))
+        for field in fields(ErrorSums):
+            np.testing.assert_allclose(getattr(bands, field.name), getattr(whole, field.name), rtol=1e-12)
+        assert (whole.pixels == 30).all()
+
+
+def test_only_what_is_uncertain_is_squared(errors):
+    known = ErrorSums.none(4, 30)
+    known.add(OWNER, errors)
+    uncertain = (errors.values - errors.apart).astype(np.float64)
+    np.testing.assert_allclose(known.squares, np.square(uncertain).reshape(4, 30).sum(axis=1), rtol=1e-5)
+    np.testing.assert_allclose(known.apart, errors.apart.reshape(4, 30).sum(axis=1), rtol=1e-5)
+    of_samples = ErrorSums.none(4, 30)
+    of_samples.add(OWNER, errors.samples)
+    uncertain = errors.samples.values - LONE_CERTAIN * errors.samples.lone.astype(np.float64)
+    np.testing.assert_allclose(of_samples.squares, np.square(uncertain).reshape(4, 30).sum(axis=1), rtol=1e-5)
+    np.testing.assert_allclose(of_samples.lone, errors.samples.lone.reshape(4, 30).sum(axis=1), rtol=1e-5)
+
+
+def test_a_part_has_all_that_the_whole_has(errors):
+    part = errors.part((slice(2, 5), slice(3, 9)))
+    assert part.noise is errors.noise
+    for mine, whole in (
+        (part.values, errors.values),
+        (part.apart, errors.apart),
+        (part.samples.lone, errors.samples.lone),
+    ):
+        assert np.array_equal(mine, whole[2:5, 3:9])
+    assert part.lone is None
+
+
+def test_parts_without_pixels_are_left_out():
+    sums = ErrorSums.none(3, np.array([4, 0, 2]))
+    index, known = parts_with_pixels(sums)
+    assert index.tolist() == [0, 2]
+    assert known.pixels.tolist() == [4, 2]

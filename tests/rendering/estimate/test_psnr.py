@@ -1,0 +1,191 @@
+"""What a picture says of its own error, against errors that are known because they were made."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from lippmann.display import Display
+from lippmann.display.lens_array import LensArray
+from lippmann.display.panel import Panel
+from lippmann.image.micro_images import lens_indices
+from lippmann.metrics.mse_psnr import micro_image_means, psnr
+from lippmann.rendering.estimate.pixel_errors import CROSS_NOISE, OWN_NOISE, PixelErrors
+from lippmann.rendering.estimate.psnr import CEILING, Estimate, PictureEstimator, _lenses, cut_at_zero, why_no_estimate
+from lippmann.rendering.request.settings import RenderSettings
+
+ARRAYS = {
+    "straight": LensArray("lenticular", 1.0),
+    "slanted": LensArray("lenticular", 1.3, slant=9.46),
+    "square": LensArray("square", 2.0),
+    "hexagonal": LensArray("hexagonal", 1.75),
+}
+
+
+def display(kind="square", size=64):
+    return Display(kind, Panel(size, size, 0.25), ARRAYS[kind], gap=6.8, aperture_distance=10.0)
+
+
+def noisy_picture(shown, seed, spread=0.5):
+    """Errors of normal noise whose strength differs from lens to lens: estimates by two halves, and the true ones."""
+    random = np.random.default_rng(seed)
+    owner = lens_indices(shown)
+    strength = 0.02 * np.exp(spread * random.standard_normal(owner.max() + 1))[owner]
+    a, b = strength * math.sqrt(2) * random.standard_normal((2, *owner.shape))
+    return PixelErrors(((a - b) ** 2 / 4).astype(np.float32), None, OWN_NOISE), ((a + b) / 2) ** 2
+
+
+def truth(errors, shown):
+    return psnr(float(errors.mean())), psnr(float(np.nanmax(micro_image_means(errors, shown)[0])))
+
+
+@pytest.mark.parametrize("kind", list(ARRAYS))
+def test_intervals_hold_the_truth_for_every_layout(kind):
+    shown = display(kind)
+    estimator = PictureEstimator(shown)
+    whole = worst = 0
+    off = []
+    for seed in range(40):
+        errors, true = noisy_picture(shown, seed)
+        found = estimator.estimate(errors)
+        true_psnr, true_worst = truth(true, shown)
+        whole += found.psnr_low <= true_psnr <= found.psnr_high
+        worst += found.worst_low <= true_worst <= found.worst_high
+        off.append(found.worst - true_worst)
+    assert whole >= 36
+    assert worst >= 36
+    assert abs(np.mean(off)) < 0.5
+
+
+def test_intervals_say_something():
+    shown = display()
+    found = PictureEstimator(shown).estimate(noisy_picture(shown, 3, spread=0.2)[0])
+    assert found.psnr_high - found.psnr_low < 1.5
+    assert found.worst_high - found.worst_low < 4.5
+
+
+def test_the_worst_of_many_equal_lenses_is_not_the_worst_estimate():
+    shown = display()
+    naive, ours = [], []
+    for seed in range(20):
+        random = np.random.default_rng(seed)
+        own, a, b = random.standard_normal((3, 64, 64)) * np.array([0.01, 0.04, 0.04])[:, None, None]
+        errors = PixelErrors(((own - a) * (own - b)).astype(np.float32), None, CROSS_NOISE)
+        worst = truth(own**2, shown)[1]
+        naive.append(truth(errors.values, shown)[1] - worst)
+        ours.append(PictureEstimator(shown).estimate(errors).worst - worst)
+    # A noise sixteen times what it is to measure.
+    assert np.mean(naive) < -5
+    assert abs(np.mean(ours)) < 3
+
+
+def test_products_of_independent_pictures_are_judged_as_what_they_are():
+    shown = display()
+    estimator = PictureEstimator(shown)
+    inside = 0
+    for seed in range(40):
+        random = np.random.default_rng(seed)
+        own, a, b = random.standard_normal((3, 64, 64)) * np.array([0.01, 0.04, 0.04])[:, None, None]
+        errors = PixelErrors(((own - a) * (own - b)).astype(np.float32), None, CROSS_NOISE)
+        found = estimator.estimate(errors)
+        inside += found.psnr_low <= truth(own**2, shown)[0] <= found.psnr_high
+    assert inside >= 36
+
+
+def test_one_bad_lens_among_good_ones_is_found():
+    shown = display()
+    errors, _ = noisy_picture(shown, 1, spread=0.2)
+    values = errors.values.copy()
+    values[16:24, 40:48] *= 100
+    found = PictureEstimator(shown).estimate(PixelErrors(values, None, OWN_NOISE))
+    assert found.worst_lens == (5, 2)
+    assert found.worst == pytest.approx(psnr(float(values[16:24, 40:48].mean())), abs=1.0)
+
+
+@pytest.mark.parametrize("kind", ["hexagonal", "square"])
+def test_a_lens_that_met_nothing_among_equals_is_not_believed_to_be_perfect(kind):
+    shown = display(kind)
+    counts = micro_image_means(np.zeros((64, 64)), shown)[1].ravel()
+    smallest = int(np.flatnonzero(counts)[np.argmin(counts[counts > 0])])
+    errors, _ = noisy_picture(shown, 1, spread=0.0)
+    values = errors.values.copy()
+    values[lens_indices(shown) == smallest] = 0
+    estimator = PictureEstimator(shown)
+    lenses = _lenses(
+        estimator._sums(PixelErrors(values, None, OWN_NOISE)), (estimator._rows, estimator._columns), OWN_NOISE
+    )
+    believed = lenses.expected[list(lenses.index).index(smallest)]
+    assert believed > 0.3 * values.mean()
+
+
+def test_lone_hits_widen_the_interval_to_the_worse_side_only():
+    shown = display()
+    errors, _ = noisy_picture(shown, 1)
+    calm = PictureEstimator(shown).estimate(errors)
+    doubted = PictureEstimator(shown).estimate(PixelErrors(errors.values, errors.values, OWN_NOISE))
+    assert doubted.psnr == calm.psnr
+    assert doubted.psnr_low < calm.psnr_low - 1
+    assert doubted.psnr_high <= calm.psnr_high + 0.01
+    assert doubted.worst_low < calm.worst_low
+
+
+def test_no_error_at_all_is_the_ceiling():
+    shown = display()
+    found = PictureEstimator(shown).estimate(PixelErrors(np.zeros((64, 64), np.float32), None, OWN_NOISE))
+    assert found.psnr == pytest.approx(CEILING)
+    assert found.worst > CEILING - 6
+
+
+def test_an_estimate_survives_its_plain_form():
+    shown = display()
+    found = PictureEstimator(shown).estimate(noisy_picture(shown, 1)[0])
+    again = Estimate.from_dict(found.to_dict())
+    assert again.worst_lens == found.worst_lens
+    assert again.worst == pytest.approx(found.worst, abs=0.005)
+    assert f"{found.psnr:.1f} dB" in str(found)
+
+
+@pytest.mark.parametrize(
+    ("settings", "reason"),
+    [
+        ({"integrator": "classic", "pixel_filter": "point"}, "chance"),
+        ({"integrator": "path", "pixel_filter": "point"}, None),
+        ({"integrator": "classic", "pixel_filter": "box"}, None),
+        ({"integrator": "path", "spp": 1}, "one sample"),
+    ],
+)
+def test_pictures_without_an_estimate_say_why(settings, reason):
+    found = why_no_estimate(RenderSettings(**settings))
+    assert found is None if reason is None else reason in found
+
+
+def test_noise_that_hides_the_error_widens_the_interval_and_promises_nothing():
+    # Products with noisy judges of a picture that is far better than they can tell: their mean may well be negative.
+    shown, true = display(size=128), 1e-6
+    estimator = PictureEstimator(shown)
+    inside = 0
+    for seed in range(40):
+        random = np.random.default_rng(seed)
+        values = true + 1e-3 * random.standard_normal((128, 128))
+        found = estimator.estimate(PixelErrors(values.astype(np.float32), None, CROSS_NOISE))
+        # A thousandth of noise in 16384 pixels tells errors down to 8e-6, which is 51 dB.
+        assert 45 < found.psnr < 66
+        assert found.worst < found.psnr + 3
+        inside += found.psnr_low <= psnr(true) <= found.psnr_high or psnr(true) > found.psnr_high
+        assert found.psnr_low < psnr(true)
+    assert inside == 40
+
+
+@given(st.floats(-50, 50), st.floats(1e-6, 10))
+def test_what_cannot_be_negative_is_not(mean, deviation):
+    found = cut_at_zero(mean, deviation)
+    assert found > 0
+    assert found >= mean
+    if mean > 6 * deviation:
+        assert found == pytest.approx(mean)
+    if mean == 0:
+        assert found == pytest.approx(deviation * math.sqrt(2 / math.pi))

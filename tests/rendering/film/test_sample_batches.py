@@ -1,0 +1,195 @@
+"""Full rendering in batches: the same picture however it is cut, and an error that a long render confirms."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+import pytest
+
+from lippmann.display import Display
+from lippmann.display.lens_array import LensArray
+from lippmann.display.panel import Panel
+from lippmann.errors import MemoryLimitError, UsageError
+
+pytestmark = pytest.mark.usefixtures("engine")
+
+SIZE = 32
+SHOWN = Display("test", Panel(SIZE, SIZE, 0.25), LensArray("square", 2.0), gap=6.8, aperture_distance=10.0)
+
+
+@pytest.fixture(scope="module")
+def integrator(engine):
+    """A ball in a corner, under an area light and a little sky."""
+    import mitsuba as mi
+
+    from lippmann.rendering.transport.path import PathIntegrator
+    from lippmann.rendering.transport.scene_flags import make_traits
+
+    def grey(value):
+        return {"type": "twosided", "bsdf": {"type": "diffuse", "reflectance": {"type": "rgb", "value": value}}}
+
+    pose = mi.ScalarTransform4f
+    scene = mi.load_dict(
+        {
+            "type": "scene",
+            "floor": {
+                "type": "rectangle",
+                "to_world": pose().translate([0, -4, 0]).rotate([1, 0, 0], -90).scale(9),
+                "bsdf": grey(0.7),
+            },
+            "back": {"type": "rectangle", "to_world": pose().translate([0, 0, -6]).scale(12), "bsdf": grey(0.5)},
+            "ball": {"type": "sphere", "center": [1, -2, -1], "radius": 2, "bsdf": {"type": "roughconductor"}},
+            "lamp": {
+                "type": "rectangle",
+                "to_world": pose().translate([0, 8, 0]).rotate([1, 0, 0], 90).scale(2),
+                "emitter": {"type": "area", "radiance": {"type": "rgb", "value": 12}},
+            },
+            "sky": {"type": "constant", "radiance": {"type": "rgb", "value": 0.1}},
+        }
+    )
+    return PathIntegrator(scene, make_traits(scene, has_null=False), 5)
+
+
+def rays(subpixels=False):
+    from lippmann.rendering.transport.ray_source import DisplayRays
+
+    return DisplayRays(SHOWN, np.eye(4), subpixels)
+
+
+def batches(integrator, *, seed=1, memory=2**30, subpixels=False, **options):
+    from lippmann.rendering.film.sample_batches import FullInBatches
+
+    return FullInBatches(integrator, rays(subpixels), seed=seed, memory=memory, **options)
+
+
+#: Enough for all batches and the smallest wavefronts.
+TIGHT = SIZE * SIZE * (8 * 12 + 36) + (1 << 14) * 96
+
+
+def test_the_picture_is_the_same_however_it_is_cut(integrator):
+    whole, cut = batches(integrator), batches(integrator, memory=TIGHT)
+    whole.add(37)
+    cut.add(37)
+    assert np.array_equal(whole.picture(), cut.picture())
+    assert whole.samples == cut.samples == 37
+
+
+def test_bands_of_rows_are_the_picture_in_one_piece(integrator):
+    from lippmann.rendering.film.sample_batches import trace_in_batches
+
+    whole = batches(integrator)
+    whole.add(16)
+    expected = whole.squared_error()
+    reports = []
+    for memory in (2**30, SIZE * SIZE * 32 + 2 * (1 << 13) * 96):
+        frame, found = trace_in_batches(
+            integrator, rays(), 16, seed=1, memory=memory, progress=lambda report: reports.append(report)
+        )
+        assert np.array_equal(frame.pixels, whole.picture())
+        assert np.allclose(found.values, expected.values, atol=1e-7)
+        assert frame.rays.primary == whole.rays.primary == SIZE * SIZE * 16
+        assert reports[-1].done == pytest.approx(reports[-1].total)
+    assert len(reports) > 2
+
+
+class SampleNumbers:
+    """Gives each sample's number in its stream, the square of that, and what tells the streams apart, as a colour."""
+
+    def sample(self, ray, stream, active):
+        import mitsuba as mi
+
+        from lippmann.rendering.transport.integrator import RayCounts
+
+        number, none = mi.Float(stream.index), mi.UInt32(stream.index) * 0
+        return mi.Color3f(number, number * number, mi.Float(stream.key >> 8) * 2.0**-24), RayCounts(none, none)
+
+
+@pytest.mark.parametrize(
+    ("rounds", "shares"),
+    [((16,), (8, 8)), ((8, 8), (8, 8)), ((2, 3, 4, 7), (8, 8)), ((13, 2), (8, 7)), ((1, 1), (1, 1))],
+)
+@pytest.mark.parametrize("memory", [2**30, TIGHT])
+def test_every_sample_of_both_streams_is_taken_once(engine, rounds, shares, memory):
+    renderer = batches(SampleNumbers(), memory=memory)
+    for samples in rounds:
+        renderer.add(samples)
+    found = renderer.picture()
+    numbers = np.concatenate([np.arange(share) for share in shares])
+    assert np.allclose(found[..., 0], numbers.mean())
+    assert np.allclose(found[..., 1], np.square(numbers).mean())
+    # Keys are as even as numbers drawn at random, two to a pixel.
+    assert found[..., 2].var() == pytest.approx(1 / 24, rel=0.2)
+
+
+@pytest.mark.parametrize("subpixels", [False, True])
+def test_the_mean_is_that_of_full_and_the_error_what_it_says(integrator, subpixels):
+    from lippmann.color.transfer import encode_srgb
+    from lippmann.rendering.estimate.psnr import PictureEstimator
+    from lippmann.rendering.film.wavefront import trace_frame
+    from lippmann.rendering.film.wavefront_plan import make_plan
+
+    plan = make_plan(SIZE, SIZE, 768, channels=3 if subpixels else 1, memory=2**30)
+    reference = encode_srgb(trace_frame(integrator, rays(subpixels), plan, seed=77).pixels)
+    estimator = PictureEstimator(SHOWN)
+    renderer = batches(integrator, subpixels=subpixels)
+    for samples in (8, 8, 48):
+        renderer.add(samples)
+        errors = np.square(encode_srgb(renderer.picture()) - reference)
+        found = estimator.estimate(renderer.squared_error())
+        assert found.psnr_low <= -10 * np.log10(errors.mean()) <= found.psnr_high
+    worst = errors.mean(axis=2).reshape(4, 8, 4, 8).mean(axis=(1, 3)).max()
+    assert found.worst_low <= -10 * np.log10(worst) <= found.worst_high
+
+
+def test_a_quality_that_is_asked_for_is_kept(integrator):
+    from lippmann.color.transfer import encode_srgb
+    from lippmann.rendering.adaptive.stopping import Goal, reach
+    from lippmann.rendering.estimate.psnr import PictureEstimator
+
+    renderer = batches(integrator, seed=5)
+    outcome = reach(Goal(quality=30), renderer, PictureEstimator(SHOWN))
+    long = batches(integrator, seed=6)
+    long.add(768)
+    errors = np.square(encode_srgb(renderer.picture()) - encode_srgb(long.picture())).mean(axis=2)
+    worst = -10 * np.log10(errors.reshape(4, 8, 4, 8).mean(axis=(1, 3)).max())
+    assert outcome.end == "quality"
+    assert 29 <= worst <= 34
+
+
+def test_one_sample_says_nothing_of_its_error(integrator):
+    renderer = batches(integrator)
+    renderer.add(1)
+    with pytest.raises(UsageError, match="one sample"):
+        renderer.squared_error()
+
+
+def test_few_samples_say_something(integrator):
+    for samples in (2, 3, 5):
+        renderer = batches(integrator)
+        renderer.add(samples)
+        assert renderer.squared_error().values.mean() > 0
+
+
+def test_fewer_batches_are_kept_where_memory_is_short_and_none_where_it_is_too_short(integrator):
+    small = batches(integrator, memory=SIZE * SIZE * (2 * 12 + 36) + (1 << 14) * 96)
+    small.add(16)
+    plenty = batches(integrator)
+    plenty.add(16)
+    assert small.squared_error().values.mean() == pytest.approx(plenty.squared_error().values.mean(), rel=0.5)
+    with pytest.raises(MemoryLimitError, match="its own error"):
+        batches(integrator, memory=100_000)
+
+
+def test_a_probe_tells_the_time_and_leaves_no_trace(integrator):
+    renderer, untouched = batches(integrator), batches(integrator)
+    started = time.perf_counter()
+    seconds = renderer.probe()
+    # So small a picture is probed as a whole.
+    assert 0 < seconds <= time.perf_counter() - started
+    assert (renderer.samples, renderer.rays.primary) == (0, 0)
+    for one in (renderer, untouched):
+        one.add(4)
+    assert np.array_equal(renderer.picture(), untouched.picture())
+    assert renderer.rays == untouched.rays
+    assert renderer.seconds_trace > 0

@@ -1,0 +1,48 @@
+"""Plans cover every sample once and stay within the memory."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from lippmann.errors import MemoryLimitError
+from lippmann.rendering.film.wavefront_plan import BYTES_PER_LANE, BYTES_PER_PIXEL, make_plan
+
+
+@settings(deadline=None, max_examples=60)
+@given(
+    st.integers(1, 9000), st.integers(1, 5000), st.integers(1, 3000), st.sampled_from([1, 3]), st.integers(2**22, 2**33)
+)
+def test_every_sample_once_and_within_memory(width, height, samples, channels, memory):
+    try:
+        plan = make_plan(width, height, samples, channels=channels, memory=memory)
+    except MemoryLimitError:
+        least = max(width * channels, min(1 << 14, width * channels * height * samples))
+        assert memory - width * height * BYTES_PER_PIXEL < least * BYTES_PER_LANE
+        return
+    rows = [row for tile in plan.tiles for row in (tile.first_row, tile.first_row + tile.rows)]
+    assert rows[0] == 0
+    assert rows[-1] == height
+    assert rows[1:-1:2] == rows[2::2]
+    runs = plan.passes
+    assert [r.first for r in runs] == [sum(q.count for q in runs[:i]) for i in range(len(runs))]
+    assert sum(r.count for r in runs) == samples
+    assert sum(t.rows * width * channels * r.count for t, r in plan) == plan.work
+    assert plan.lanes * BYTES_PER_LANE + width * height * BYTES_PER_PIXEL <= memory
+
+
+def test_a_small_picture_is_one_wavefront():
+    plan = make_plan(512, 512, 1, memory=2**31)
+    assert len(plan.tiles) == len(plan.passes) == 1
+
+
+def test_an_8k_picture_of_four_samples_fits_two_gigabytes():
+    plan = make_plan(7680, 4320, 4, memory=2 * 2**30)
+    assert plan.samples_per_pass == 4
+    assert 2**19 <= plan.lanes <= 2**20
+
+
+def test_too_little_memory_says_how_much_is_needed():
+    with pytest.raises(MemoryLimitError, match=r"--memory: .* too small .* one tile need \d+ MiB; raise the limit"):
+        make_plan(4096, 4096, 1, memory=2**20)

@@ -1,0 +1,392 @@
+import errno
+import os
+import stat
+from pathlib import Path
+
+import pytest
+
+from lippmann.errors import OutputError
+from lippmann.runtime import atomic_write
+
+
+def names(folder: Path) -> list[str]:
+    return sorted(path.name for path in folder.iterdir())
+
+
+def test_file_appears_whole_at_the_end(tmp_path):
+    place = tmp_path / "picture.png"
+    with atomic_write.replacing(place) as temporary:
+        assert temporary.parent == tmp_path
+        assert temporary.suffix == ".png"
+        temporary.write_bytes(b"half")
+        assert not place.exists()
+        temporary.write_bytes(b"whole")
+    assert place.read_bytes() == b"whole"
+    assert names(tmp_path) == ["picture.png"]
+
+
+@pytest.mark.parametrize("failure", [ValueError("writer"), KeyboardInterrupt(), SystemExit(3)])
+def test_failure_leaves_the_old_file_and_nothing_else(tmp_path, failure):
+    place = tmp_path / "picture.png"
+    place.write_bytes(b"old")
+
+    def write():
+        with atomic_write.replacing(place) as temporary:
+            temporary.write_bytes(b"new")
+            raise failure
+
+    with pytest.raises(type(failure)):
+        write()
+    assert place.read_bytes() == b"old"
+    assert names(tmp_path) == ["picture.png"]
+
+
+def test_full_disk_is_one_line_about_the_output(tmp_path):
+    place = tmp_path / "picture.png"
+    with pytest.raises(OutputError, match="no space") as raised, atomic_write.replacing(place) as temporary:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(temporary))
+    assert str(raised.value).startswith(f"{place}: ")
+    assert "\n" not in str(raised.value)
+    assert ".part" not in str(raised.value)
+    assert names(tmp_path) == []
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="/dev/full, the disk that is always full, is Linux's")
+def test_full_disk_met_by_the_writer_itself(tmp_path):
+    with (
+        pytest.raises(OutputError, match="no space"),
+        atomic_write.replacing(tmp_path / "picture.png"),
+        open("/dev/full", "wb", buffering=0) as full,
+    ):
+        full.write(b"x")
+    assert names(tmp_path) == []
+
+
+def test_error_about_another_file_passes_through(tmp_path):
+    with pytest.raises(FileNotFoundError), atomic_write.replacing(tmp_path / "picture.png"):
+        (tmp_path / "texture.png").read_bytes()
+    assert names(tmp_path) == []
+
+
+def test_missing_folder_is_named_with_the_command_that_makes_it(tmp_path):
+    place = tmp_path / "no" / "picture.png"
+    with pytest.raises(OutputError, match="mkdir -p") as raised, atomic_write.replacing(place):
+        pass
+    assert str(tmp_path / "no") in raised.value.what
+
+
+@pytest.mark.parametrize("use", [atomic_write.replacing, atomic_write.check_writable])
+def test_places_where_no_file_can_be(tmp_path, use):
+    def attempt(path):
+        result = use(path)
+        if result is not None:
+            with result:
+                pass
+
+    (tmp_path / "file").write_bytes(b"kept")
+    with pytest.raises(OutputError, match="this is a folder"):
+        attempt(tmp_path)
+    with pytest.raises(OutputError, match="is not a folder"):
+        attempt(tmp_path / "file" / "picture.png")
+    with pytest.raises(OutputError, match="too long"):
+        attempt(tmp_path / ("x" * 300 + ".png"))
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(OutputError, match="not a regular file"):
+        attempt(tmp_path / "pipe")
+    assert stat.S_ISFIFO((tmp_path / "pipe").stat().st_mode)
+    (tmp_path / "loop").symlink_to("loop")
+    with pytest.raises(OutputError):
+        attempt(tmp_path / "loop")
+    assert names(tmp_path) == ["file", "loop", "pipe"]
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
+def test_permission_denied(tmp_path):
+    tmp_path.chmod(0o555)
+    try:
+        with pytest.raises(OutputError, match="permission"):
+            atomic_write.check_writable(tmp_path / "picture.png")
+    finally:
+        tmp_path.chmod(0o755)
+
+
+def test_permission_denied_by_the_system(tmp_path, monkeypatch):
+    def denied(*_):
+        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+
+    monkeypatch.setattr(os, "open", denied)
+    with pytest.raises(OutputError, match="permission"):
+        atomic_write.check_writable(tmp_path / "picture.png")
+
+
+def test_permissions_are_the_usual_ones_or_those_of_the_old_file(tmp_path):
+    place = tmp_path / "picture.png"
+    mask = os.umask(0o027)
+    try:
+        with atomic_write.replacing(place) as temporary:
+            temporary.write_bytes(b"1")
+        assert stat.S_IMODE(place.stat().st_mode) == 0o640
+        place.chmod(0o604)
+        with atomic_write.replacing(place) as temporary:
+            temporary.write_bytes(b"2")
+        assert stat.S_IMODE(place.stat().st_mode) == 0o604
+    finally:
+        os.umask(mask)
+
+
+def test_link_stays_and_its_target_is_replaced(tmp_path):
+    (tmp_path / "real").mkdir()
+    target = tmp_path / "real" / "picture.png"
+    target.write_bytes(b"old")
+    link = tmp_path / "link.png"
+    link.symlink_to(target)
+    with atomic_write.replacing(link) as temporary:
+        temporary.write_bytes(b"new")
+    assert link.is_symlink()
+    assert target.read_bytes() == b"new"
+
+
+def test_a_private_file_replaces_the_link_in_its_place(tmp_path):
+    target, link = tmp_path / "precious.txt", tmp_path / "job.json"
+    target.write_text("mine")
+    target.chmod(0o666)
+    for _ in range(2):
+        with atomic_write.replacing(link, private=True) as temporary:
+            assert stat.S_IMODE(temporary.stat().st_mode) == 0o600
+            temporary.write_bytes(b"new")
+        assert not link.is_symlink()
+        assert link.read_bytes() == b"new"
+        assert stat.S_IMODE(link.stat().st_mode) == 0o600
+        link.unlink()
+        link.symlink_to(target)
+    assert target.read_text() == "mine"
+
+
+def test_a_private_file_does_not_replace_a_folder(tmp_path):
+    (tmp_path / "job.json").mkdir()
+    with (
+        pytest.raises(OutputError, match="a folder of this name"),
+        atomic_write.replacing(tmp_path / "job.json", private=True),
+    ):
+        pass
+    assert names(tmp_path) == ["job.json"]
+
+
+def test_relative_path_survives_a_change_of_folder(tmp_path, monkeypatch):
+    (tmp_path / "elsewhere").mkdir()
+    monkeypatch.chdir(tmp_path)
+    with atomic_write.replacing(Path("picture.png")) as temporary:
+        temporary.write_bytes(b"1")
+        monkeypatch.chdir(tmp_path / "elsewhere")
+    assert (tmp_path / "picture.png").read_bytes() == b"1"
+
+
+def write_folder(place: Path, files: dict[str, str]) -> None:
+    with atomic_write.replacing_folder(place) as temporary:
+        for name, content in files.items():
+            (temporary / name).parent.mkdir(exist_ok=True)
+            (temporary / name).write_text(content)
+
+
+def test_folder_is_replaced_as_a_whole(tmp_path):
+    place = tmp_path / "views"
+    write_folder(place, {"a.png": "1", "b.png": "2", "sub/c.png": "3"})
+    write_folder(place, {"a.png": "4"})
+    assert names(place) == [atomic_write.CONTENTS_FILE, "a.png"]
+    assert (place / "a.png").read_text() == "4"
+    assert names(tmp_path) == ["views"]
+
+
+def test_empty_folder_is_taken(tmp_path):
+    (tmp_path / "views").mkdir()
+    write_folder(tmp_path / "views", {"a.png": "1"})
+    assert (tmp_path / "views" / "a.png").read_text() == "1"
+
+
+def test_files_of_the_user_are_never_lost(tmp_path):
+    place = tmp_path / "views"
+    write_folder(place, {"a.png": "1"})
+    (place / "notes.txt").write_text("mine")
+    with pytest.raises(OutputError, match=r"notes\.txt"):
+        write_folder(place, {"b.png": "2"})
+    with pytest.raises(OutputError, match=r"notes\.txt"):
+        atomic_write.check_folder_writable(place)
+    assert names(place) == [atomic_write.CONTENTS_FILE, "a.png", "notes.txt"]
+    assert names(tmp_path) == ["views"]
+
+
+def test_file_put_into_the_folder_meanwhile_is_not_lost(tmp_path):
+    place = tmp_path / "views"
+    place.mkdir()
+
+    def write():
+        with atomic_write.replacing_folder(place) as temporary:
+            (temporary / "a.png").write_text("1")
+            (place / "notes.txt").write_text("mine")
+
+    with pytest.raises(OutputError, match=r"notes\.txt"):
+        write()
+    assert names(place) == ["notes.txt"]
+    assert names(tmp_path) == ["views"]
+
+
+@pytest.mark.parametrize("failure", [OSError(errno.ENOSPC, "full"), KeyboardInterrupt()])
+def test_failure_leaves_the_old_folder(tmp_path, failure):
+    place = tmp_path / "views"
+    write_folder(place, {"a.png": "1"})
+
+    def write():
+        with atomic_write.replacing_folder(place) as temporary:
+            (temporary / "a.png").write_text("2")
+            raise failure
+
+    with pytest.raises((OutputError, KeyboardInterrupt)):
+        write()
+    assert (place / "a.png").read_text() == "1"
+    assert names(tmp_path) == ["views"]
+
+
+def test_failure_of_the_exchange_puts_the_old_folder_back(tmp_path, monkeypatch):
+    place = tmp_path / "views"
+    write_folder(place, {"a.png": "1"})
+    rename = os.rename
+
+    def second_fails(source, target, calls=[]):  # noqa: B006 - counts its calls
+        calls.append(source)
+        if len(calls) == 2:
+            raise OSError(errno.EIO, "broken")
+        rename(source, target)
+
+    monkeypatch.setattr(os, "rename", second_fails)
+    with pytest.raises(OutputError, match="broken"):
+        write_folder(place, {"a.png": "2"})
+    assert (place / "a.png").read_text() == "1"
+    assert names(tmp_path) == ["views"]
+
+
+def test_a_link_to_a_folder_in_a_folder_is_the_users(tmp_path):
+    place = tmp_path / "views"
+    (tmp_path / "pictures").mkdir()
+    write_folder(place, {"a.png": "1"})
+    (place / "link").symlink_to(tmp_path / "pictures")
+    with pytest.raises(OutputError, match="the folder holds 'link'"):
+        write_folder(place, {"a.png": "2"})
+    assert names(place) == [atomic_write.CONTENTS_FILE, "a.png", "link"]
+
+
+@pytest.mark.parametrize("plant", ["symlink_to", "mkfifo"])
+def test_the_list_of_a_folder_is_a_file(tmp_path, plant):
+    """Somebody else could say by a link that the user's files are Lippmann's."""
+    place = tmp_path / "views"
+    place.mkdir()
+    (place / "thesis.pdf").write_text("mine")
+    (tmp_path / "list").write_text("thesis.pdf\n")
+    if plant == "symlink_to":
+        (place / atomic_write.CONTENTS_FILE).symlink_to(tmp_path / "list")
+    else:
+        os.mkfifo(place / atomic_write.CONTENTS_FILE)
+    with pytest.raises(OutputError, match=r"the folder holds 'thesis\.pdf'"):
+        write_folder(place, {"a.png": "1"})
+    assert (place / "thesis.pdf").read_text() == "mine"
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root can give files to other users")
+def test_the_list_of_a_folder_is_its_owners(tmp_path):
+    place = tmp_path / "views"
+    write_folder(place, {"a.png": "1"})
+    os.chown(place / atomic_write.CONTENTS_FILE, 12345, -1)
+    with pytest.raises(OutputError, match=r"the folder holds 'a\.png'"):
+        write_folder(place, {"a.png": "2"})
+    os.chown(place, 12345, -1)  # a colleague wrote both
+    write_folder(place, {"a.png": "2"})
+    assert (place / "a.png").read_text() == "2"
+
+
+def test_names_in_a_folder_reach_no_terminal_as_commands(tmp_path):
+    (tmp_path / "views").mkdir()
+    (tmp_path / "views" / "\x1b[2J").touch()
+    with pytest.raises(OutputError) as raised:
+        write_folder(tmp_path / "views", {"a.png": "1"})
+    assert str(raised.value).isprintable()
+
+
+def test_a_folder_is_its_users_alone_until_it_is_whole(tmp_path):
+    mask = os.umask(0o002)
+    try:
+        with atomic_write.replacing_folder(tmp_path / "views") as temporary:
+            assert stat.S_IMODE(temporary.stat().st_mode) == 0o700
+            (temporary / "a.png").touch()
+    finally:
+        os.umask(mask)
+    assert stat.S_IMODE((tmp_path / "views").stat().st_mode) == 0o775
+    assert stat.S_IMODE((tmp_path / "views" / "a.png").stat().st_mode) == 0o664
+
+
+def test_file_systems_without_permissions_take_folders_and_files(tmp_path, monkeypatch):
+    """FAT refuses to keep others out."""
+    modes = []
+
+    def refused(path, mode):
+        modes.append(mode)
+        raise PermissionError(errno.EPERM, os.strerror(errno.EPERM), str(path))
+
+    monkeypatch.setattr(Path, "chmod", refused)
+    write_folder(tmp_path / "views", {"a.png": "1"})
+    assert (tmp_path / "views" / "a.png").read_text() == "1"
+    assert modes
+
+
+def test_what_replaces_a_private_picture_is_private_from_the_first(tmp_path, monkeypatch):
+    """Whoever opened the file before its permissions were changed could read it later."""
+    place = tmp_path / "picture.png"
+    place.touch(mode=0o600)
+    made, opened = [], os.open
+
+    def watched(path, flags, mode=0o777):
+        descriptor = opened(path, flags, mode)
+        if flags & os.O_CREAT:
+            made.append(stat.S_IMODE(os.fstat(descriptor).st_mode))
+        return descriptor
+
+    monkeypatch.setattr(os, "open", watched)
+    with atomic_write.replacing(place):
+        pass
+    assert made == [0o600]
+
+
+def test_nobody_is_told_to_delete_what_is_his_own(tmp_path):
+    (tmp_path / "views").mkdir()
+    (tmp_path / "views" / "notes.txt").touch()
+    with pytest.raises(OutputError, match="choose a new folder, or move what is yours out of this one"):
+        write_folder(tmp_path / "views", {"a.png": "1"})
+
+
+def test_a_folder_into_which_somebody_puts_a_file_at_once_is_not_used(tmp_path, monkeypatch):
+    (tmp_path / "precious.txt").write_text("mine")
+    mkdir = Path.mkdir
+
+    def planted(path, *words, **options):
+        mkdir(path, *words, **options)
+        (path / atomic_write.CONTENTS_FILE).symlink_to(tmp_path / "precious.txt")
+
+    monkeypatch.setattr(Path, "mkdir", planted)
+    with pytest.raises(OutputError, match="cannot be written"), atomic_write.replacing_folder(tmp_path / "views"):
+        pass
+    assert (tmp_path / "precious.txt").read_text() == "mine"
+    assert names(tmp_path) == ["precious.txt"]
+
+
+def test_file_in_the_place_of_a_folder(tmp_path):
+    (tmp_path / "views").write_text("mine")
+    with pytest.raises(OutputError, match="this is a file"):
+        write_folder(tmp_path / "views", {"a.png": "1"})
+    assert (tmp_path / "views").read_text() == "mine"
+
+
+def test_check_leaves_nothing(tmp_path):
+    (tmp_path / "old.png").write_text("kept")
+    atomic_write.check_writable(tmp_path / "new.png")
+    atomic_write.check_writable(tmp_path / "old.png")
+    atomic_write.check_folder_writable(tmp_path / "views")
+    assert names(tmp_path) == ["old.png"]
+    assert (tmp_path / "old.png").read_text() == "kept"

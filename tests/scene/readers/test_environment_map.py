@@ -1,0 +1,94 @@
+"""Environment pictures from files."""
+
+import imagecodecs
+import numpy as np
+import OpenEXR
+import pytest
+
+from lippmann.errors import SceneError
+from lippmann.scene.readers.environment_map import read_environment
+
+
+@pytest.fixture
+def pixels():
+    return np.random.default_rng(1).random((8, 16, 3)).astype(np.float32) * 10
+
+
+def save_exr(path, channels, kind=OpenEXR.scanlineimage):
+    with OpenEXR.File({"compression": OpenEXR.ZIP_COMPRESSION, "type": kind}, channels) as file:
+        file.write(str(path))
+    return path
+
+
+def test_exr(tmp_path, pixels):
+    found = read_environment(save_exr(tmp_path / "sky.exr", {"RGB": pixels}))
+    assert (found.pixels == pixels).all()
+    assert found.pixels.dtype == np.float32
+    assert found.name == "sky.exr"
+
+
+def test_half_precision_and_alpha(tmp_path, pixels):
+    rgba = np.concatenate([pixels, np.ones((8, 16, 1), np.float32)], axis=-1).astype(np.float16)
+    found = read_environment(save_exr(tmp_path / "sky.exr", {"RGBA": rgba}))
+    assert found.pixels == pytest.approx(pixels, rel=1e-3)
+
+
+def test_luminance_alone_is_grey(tmp_path, pixels):
+    found = read_environment(save_exr(tmp_path / "sky.exr", {"Y": np.ascontiguousarray(pixels[..., 0])}))
+    assert (found.pixels == pixels[..., :1]).all()
+
+
+def test_hdr(tmp_path, pixels):
+    path = tmp_path / "sky.hdr"
+    path.write_bytes(imagecodecs.rgbe_encode(pixels, header=True))
+    found = read_environment(path).pixels
+    assert np.abs(found - pixels).max() < pixels.max() / 128  # the format's own step
+
+
+def test_the_content_counts_and_not_the_name(tmp_path, pixels):
+    save_exr(tmp_path / "sky.exr", {"RGB": pixels}).rename(tmp_path / "sky.hdr")
+    assert (read_environment(tmp_path / "sky.hdr").pixels == pixels).all()
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({(2, 3): (1, np.nan, 1)}, r"sky\.exr: pixel \(3, 2\) is \[1\.0, nan, 1\.0\]; light is finite"),
+        ({(2, 3): (1, np.inf, 1)}, r"pixel \(3, 2\)"),
+        ({(0, 0): (-1, 0, 0)}, r"pixel \(0, 0\) is \[-1\.0, 0\.0, 0\.0\]"),
+    ],
+)
+def test_light_that_cannot_be(tmp_path, pixels, change, message):
+    for place, value in change.items():
+        pixels[place] = value
+    with pytest.raises(SceneError, match=message):
+        read_environment(save_exr(tmp_path / "sky.exr", {"RGB": pixels}))
+
+
+def test_shapes_that_are_no_panorama(tmp_path, pixels):
+    with pytest.raises(SceneError, match=r"is 8x8 pixels; an equirectangular picture"):
+        read_environment(save_exr(tmp_path / "sky.exr", {"RGB": np.ascontiguousarray(pixels[:, :8])}))
+    with pytest.raises(SceneError, match=r"is 2x1 pixels"):
+        read_environment(save_exr(tmp_path / "sky.exr", {"RGB": np.ascontiguousarray(pixels[:1, :2])}))
+
+
+def test_channels_that_are_no_colour(tmp_path, pixels):
+    with pytest.raises(SceneError, match=r"has the channels Z; R, G and B"):
+        read_environment(save_exr(tmp_path / "sky.exr", {"Z": np.ascontiguousarray(pixels[..., 0])}))
+
+
+def test_damaged_and_foreign_files(tmp_path, pixels):
+    path = save_exr(tmp_path / "sky.exr", {"RGB": pixels})
+    data = path.read_bytes()
+    for end in (100, 350, len(data) - 20):
+        path.write_bytes(data[:end])
+        with pytest.raises(SceneError, match=r"sky\.exr: cannot be decoded"):
+            read_environment(path)
+    path.write_bytes(imagecodecs.rgbe_encode(pixels, header=True)[:90])
+    with pytest.raises(SceneError, match=r"sky\.exr: cannot be decoded"):
+        read_environment(path)
+    path.write_bytes(b"\x89PNG")
+    with pytest.raises(SceneError, match=r"is no environment picture; OpenEXR"):
+        read_environment(path)
+    with pytest.raises(SceneError, match="no such file"):
+        read_environment(tmp_path / "none.exr")

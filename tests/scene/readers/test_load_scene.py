@@ -1,0 +1,171 @@
+"""Any scene, from a file, a name or an object."""
+
+import struct
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lippmann.errors import SceneError, UsageError
+from lippmann.scene import bundled
+from lippmann.scene.mitsuba_source import MitsubaSource
+from lippmann.scene.readers.load import known_suffixes, load_scene
+from lippmann.scene.scene import STUDIO_NOTE
+from lippmann.scene.studio_light import BACKDROP, studio
+from lippmann.scene.values.description import Environment, Instance, Material, Mesh, SceneDescription
+
+OBJ = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
+PLY = (
+    "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+    "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"
+)
+STL = b"\0" * 80 + struct.pack("<I12fH", 1, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0)
+XML = '<scene version="3.0.0"><shape type="sphere"/></scene>'
+FILES = {"a.obj": OBJ.encode(), "a.PLY": PLY.encode(), "a.stl": STL, "a.xml": XML.encode()}
+
+
+@pytest.fixture
+def save(tmp_path):
+    def save(name, data):
+        path = tmp_path / name
+        path.write_bytes(data)
+        return path
+
+    return save
+
+
+def triangle(**fields):
+    mesh = Mesh("t", np.eye(3, dtype=np.float32), np.array([[0, 1, 2]], np.uint32), 0)
+    return SceneDescription("thing", [mesh], [Material()], [Instance(0, np.eye(4))], **fields)
+
+
+@pytest.mark.parametrize("name", ["a.obj", "a.PLY", "a.stl"])
+@pytest.mark.parametrize("kind", [str, Path])
+def test_files_by_ending(save, name, kind):
+    scene = load_scene(kind(save(name, FILES[name])))
+    assert scene.name == "a"
+    assert scene.bounds.tolist() == [[0, 0, 0], [1, 1, 0]]
+    assert STUDIO_NOTE in scene.notes
+
+
+def test_mitsuba_files_are_not_loaded_yet(save):
+    scene = load_scene(save("a.xml", XML.encode()), background=(0, 0, 1))
+    assert isinstance(scene.description, MitsubaSource)
+    assert scene.background == (0, 0, 1)
+    sky = Environment(np.ones((2, 4, 3), np.float32))
+    assert load_scene(scene, environment=sky).environment is sky
+
+
+def test_gltf_is_read_by_its_own_reader(shared_scenes):
+    scene = load_scene(shared_scenes / "gltf" / "clearcoat_test" / "ClearCoatTest.gltf")
+    assert len(scene.description.meshes) > 3
+
+
+def test_content_counts_where_the_name_says_nothing(save):
+    assert load_scene(save("model.data", PLY.encode())).bounds[1].tolist() == [1, 1, 0]
+    assert load_scene(save("model", PLY.encode())).name == "model"
+
+
+@pytest.mark.parametrize(
+    ("name", "data", "message"),
+    [
+        ("a.glb", PLY.encode(), r"a\.glb: is no \.glb file; it begins like a \.ply file"),
+        ("a.obj", b"glTF....", r"a\.obj: is no \.obj file; it begins like a \.glb file"),
+        ("a.ply", b"<html>", r"a\.ply: is no \.ply file; it begins like a \.xml file"),
+        ("a.ply", OBJ.encode(), r"a\.ply: is no PLY file"),
+        ("a.stl", OBJ.encode(), r"a\.stl: is no STL file"),
+        ("a.xml", b"<html></html>", r"a\.xml: is XML of a 'html'"),
+        ("a.xml", XML.encode()[:-3], r"a\.xml:1: is no well-formed XML"),
+        ("a.fbx", b"Kaydara FBX", r"a\.fbx: '\.fbx' is no known kind of scene file; known are \.dat, \.glb, \.gltf"),
+        ("a.obj", b"", r"a\.obj: the file is empty"),
+        ("a.glb", b"", r"a\.glb: the file is empty"),
+        ("a.glb", b"glTF", r"a\.glb"),
+        ("a.gltf", b"{", r"a\.gltf"),
+    ],
+)
+def test_foreign_and_damaged_files(save, name, data, message):
+    with pytest.raises(SceneError, match=message) as caught:
+        load_scene(save(name, data))
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("suffix", known_suffixes())
+def test_files_that_are_missing_or_unreadable(tmp_path, suffix):
+    with pytest.raises(SceneError, match="no such file"):
+        load_scene(tmp_path / f"none{suffix}")
+    (tmp_path / f"folder{suffix}").mkdir()
+    with pytest.raises(SceneError, match="is a folder"):
+        load_scene(tmp_path / f"folder{suffix}")
+
+
+def test_a_description_is_checked_whoever_made_it(save):
+    bad = PLY.replace("1 0 0\n", "inf 0 0\n")
+    with pytest.raises(SceneError, match=r"a\.ply: vertex 1 is \[inf, 0\.0, 0\.0\]"):
+        load_scene(save("a.ply", bad.encode()))
+    with pytest.raises(SceneError, match="the scene has no geometry"):
+        load_scene(SceneDescription("nothing"))
+    with pytest.raises(SceneError, match=r"a\.stl: mesh 'a' has 1 vertices that are not finite"):
+        load_scene(save("a.stl", STL[:96] + struct.pack("<f", np.nan) + STL[100:]))
+
+
+def test_a_bundled_scene_by_name():
+    assert "teapot" in bundled.names()
+    scene = load_scene("teapot")
+    assert scene.name == "teapot"
+    assert scene.home_camera == scene.cameras[0].name
+    assert scene.camera() is scene.cameras[0]
+
+
+def test_an_unknown_name_suggests_the_likely_one():
+    with pytest.raises(
+        SceneError, match=r"no bundled scene or file is named 'taepot'; bundled are .*is 'teapot' meant\?"
+    ):
+        load_scene("taepot")
+    with pytest.raises(SceneError, match=r"is named 'zzz'; bundled are [a-z, -]+$"):
+        load_scene("zzz")
+
+
+def test_objects():
+    description = triangle()
+    assert load_scene(description).description is description
+    assert load_scene(load_scene(description)).description is description
+    assert isinstance(load_scene({"type": "scene"}).description, MitsubaSource)
+    with pytest.raises(SceneError, match="a dictionary of type 'sphere'; Mitsuba scenes have type 'scene'"):
+        load_scene({"type": "sphere"})
+    with pytest.raises(UsageError, match=r"a builtins\.int is no scene"):
+        load_scene(3)
+
+
+def test_light_and_background():
+    scene = load_scene(triangle(), background=(0, 0.5, 2))
+    assert (scene.background, scene.environment) == ((0, 0.5, 2), studio())
+    for kind in (str, Path):
+        scene = load_scene(triangle(), environment=kind("studio"))
+        assert scene.environment is studio()
+        assert scene.notes == ()
+        scene = load_scene(triangle(), environment=kind("none"))
+        assert (scene.environment, scene.notes) == (None, ())
+        assert load_scene(scene).environment is None
+    assert load_scene(triangle()).background == BACKDROP
+    sky = Environment(np.ones((2, 4, 3), np.float32))
+    assert load_scene(triangle(environment=studio()), environment=sky).environment is sky
+
+
+@pytest.mark.parametrize("background", [(1, 2), (0, 0, -1), (0, 0, np.nan), (1, 1, 1, 1)])
+def test_backgrounds_that_are_no_colour(background):
+    with pytest.raises(UsageError, match=r"background: .*three numbers of 0 or more"):
+        load_scene(triangle(), background=background)
+
+
+def test_an_environment_that_is_not_there(tmp_path):
+    with pytest.raises(SceneError, match="no such file"):
+        load_scene(triangle(), environment=tmp_path / "none.exr")
+
+
+def test_outside_files_need_leave(save, tmp_path):
+    (tmp_path / "sub").mkdir()
+    save("m.mtl", b"newmtl red\nKd 1 0 0\n")
+    path = save("sub/a.obj", b"mtllib ../m.mtl\n" + OBJ.replace("f", "usemtl red\nf").encode())
+    with pytest.raises(SceneError, match=r"a\.obj:1: material library '\.\./m\.mtl' lies outside"):
+        load_scene(path)
+    assert load_scene(path, allow_outside=True).description.materials[0].base_color == (1, 0, 0)

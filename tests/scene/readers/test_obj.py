@@ -1,0 +1,206 @@
+"""Wavefront OBJ: geometry."""
+
+import numpy as np
+import pytest
+
+from lippmann.color.transfer import decode_srgb
+from lippmann.errors import SceneError
+from lippmann.scene.readers.obj import read_obj
+
+SQUARE = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
+
+
+@pytest.fixture
+def read(tmp_path):
+    def read(text, **files):
+        for name, content in files.items():
+            (tmp_path / name.replace("__", ".")).write_text(content)
+        path = tmp_path / "model.obj"
+        path.write_text(text)
+        return read_obj(path)
+
+    return read
+
+
+def corner_positions(mesh):
+    return mesh.positions[mesh.faces]
+
+
+def test_a_square_becomes_two_triangles(read):
+    scene = read(SQUARE + "f 1 2 3 4\n")
+    (mesh,) = scene.meshes
+    assert mesh.positions.dtype == np.float32
+    assert mesh.faces.dtype == np.uint32
+    assert corner_positions(mesh)[..., :2].tolist() == [[[0, 0], [1, 0], [1, 1]], [[0, 0], [1, 1], [0, 1]]]
+    assert mesh.normals is None
+    assert mesh.uvs == ()
+    assert mesh.colors is None
+    assert scene.name == "model"
+    assert [instance.mesh for instance in scene.instances] == [0]
+
+
+def test_every_form_of_corner(read):
+    tables = SQUARE + "vt 0.25 0.75\nvt 1 0\nvt 0 1\nvn 0 0 2\n"
+    plain = corner_positions(read(SQUARE + "f 1 2 3\n").meshes[0])
+    for face in ("f 1 2 3", "f 1/1 2/2 3/3", "f 1//1 2//1 3//1", "f 1/1/1 2/2/1 3/3/1", "f -4/-3/-1 -3/-2/-1 -2/-1/-1"):
+        (mesh,) = read(tables + face + "\n").meshes
+        assert (corner_positions(mesh) == plain).all()
+        assert (mesh.normals is not None) == ("//" in face or face.count("/") == 6)
+        assert bool(mesh.uvs) == ("/1" in face.replace("//1", "") or "/-" in face)
+        if mesh.uvs:
+            # v counts upwards in OBJ and downwards in a description
+            assert mesh.uvs[0][mesh.faces][0, 0].tolist() == [0.25, 0.25]
+        if mesh.normals is not None:
+            assert (mesh.normals == (0, 0, 1)).all()
+
+
+def test_mixed_corners_in_one_file(read):
+    (mesh,) = read(SQUARE + "vt 0 0\nvn 0 0 -1\nf 1/1 2 3//1\nf 1/1/1 3/1/ 4\n").meshes
+    assert len(mesh.faces) == 2
+    by_corner = mesh.normals[mesh.faces]
+    assert by_corner[0].tolist() == [[0, 0, 1], [0, 0, 1], [0, 0, -1]]  # flat where not given
+    assert by_corner[1].tolist() == [[0, 0, -1], [0, 0, 1], [0, 0, 1]]
+
+
+def test_negative_indices_count_from_the_face_itself(read):
+    text = "v 9 9 9\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf -3 -2 -1\nv 0 0 5\nv 1 0 5\nv 0 1 5\nf -3 -2 -1\n"
+    (mesh,) = read(text).meshes
+    assert corner_positions(mesh)[:, :, 2].tolist() == [[0, 0, 0], [5, 5, 5]]
+
+
+def test_vertices_are_shared_only_where_all_agrees(read):
+    both = SQUARE + "vt 0 0\nvt 1 1\nf 1/1 2/1 3/1\nf 1/1 3/{} 4/1\n"
+    assert len(read(both.format(1)).meshes[0].positions) == 4
+    assert len(read(both.format(2)).meshes[0].positions) == 5
+
+
+def test_unused_vertices_do_not_count(read):
+    (mesh,) = read("v 99 99 99\n" + SQUARE + "f 2 3 4\n").meshes
+    assert mesh.positions.max() == 1
+
+
+def test_smoothing_groups_round_edges(read):
+    roof = "v 0 0 0\nv 1 0 0\nv 1 1 1\nv 0 1 1\nv 0 2 0\nv 1 2 0\n"
+    faces = "f 1 2 3 4\nf 4 3 6 5\n"
+    assert read(roof + faces).meshes[0].normals is None
+    assert read(roof + "s off\n" + faces).meshes[0].normals is None
+    (mesh,) = read(roof + "s 1\n" + faces).meshes
+    ridge = mesh.positions[:, 1] == 1
+    assert mesh.normals[ridge] == pytest.approx(np.tile((0, 0, 1), (2, 1)), abs=1e-6)
+    assert np.linalg.norm(mesh.normals, axis=1) == pytest.approx(np.ones(6), abs=1e-6)
+    (mesh,) = read(roof + "s 1\nf 1 2 3 4\ns 2\nf 4 3 6 5\n").meshes  # a crease between two groups
+    ridge = mesh.positions[:, 1] == 1
+    assert np.abs(mesh.normals[ridge][:, 1]) == pytest.approx(np.full(4, np.sqrt(0.5)), abs=1e-6)
+
+
+def test_normals_of_no_length_count_as_absent(read):
+    assert read(SQUARE + "vn 0 0 0\nf 1//1 2//1 3//1\n").meshes[0].normals is None
+
+
+def test_vertex_colours_are_srgb(read):
+    text = "v 0 0 0 1 0 0.5\nv 1 0 0 0 1 0.5\nv 0 1 0 0 0 0.5\nf 1 2 3\n"
+    (mesh,) = read(text).meshes
+    assert mesh.colors[:2, :2].tolist() == [[1, 0], [0, 1]]
+    assert mesh.colors[:, 2] == pytest.approx(np.full(3, decode_srgb(np.array(0.5))), abs=1e-6)
+
+
+def test_a_weight_is_no_colour(read):
+    assert read("v 0 0 0 1\nv 1 0 0 1\nv 0 1 0 1\nf 1 2 3\n").meshes[0].colors is None
+
+
+def test_rows_of_different_length(read):
+    (mesh,) = read("v 0 0 0 1\nv 1 0 0\nv 0 1 0\nvt 1\nvt 0.5 0.5 0\nf 1/1 2/2 3/1\n").meshes
+    assert mesh.positions.shape == (3, 3)
+    assert mesh.uvs[0].tolist() == [[1, 1], [0.5, 1], [1, 1]]
+
+
+def test_layout_of_lines(read):
+    text = "\ufeff# a comment\r\nmtllib\r\nv 0 0 0 # origin\r\n\tv   1\t0 0\r\nv 0 1 \\\r\n0\r\n"
+    (mesh,) = read(text + "g a b\no thing\nf 1 2 \\\n3").meshes
+    assert corner_positions(mesh)[0].tolist() == [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
+
+
+def test_lines_and_points_are_counted_in_a_note(read):
+    scene = read(SQUARE + "l 1 2\nl 2 3\np 1\nmystery 3\nf 1 2 3\n")
+    assert scene.notes == [
+        "2 lines are not rendered",
+        "1 points are not rendered",
+        "1 statements 'mystery' are not rendered",
+    ]
+
+
+def test_faces_are_gathered_by_material(read):
+    mtl = "newmtl red paint\nKd 1 0 0\nnewmtl blue\nKd 0 0 1\n"
+    text = "mtllib my colours.mtl\n" + SQUARE + "f 1 2 3\nusemtl red paint\nf 1 2 4\nusemtl blue\nf 1 3 4\n"
+    scene = read(text + "usemtl red paint\nf 2 3 4\n", **{"my colours__mtl": mtl})
+    assert [(mesh.name, len(mesh.faces)) for mesh in scene.meshes] == [("model", 1), ("red paint", 2), ("blue", 1)]
+    colors = [scene.materials[mesh.material].base_color for mesh in scene.meshes]
+    assert colors == [(0.7, 0.7, 0.7), (1, 0, 0), (0, 0, 1)]
+
+
+def test_several_libraries(read):
+    files = {"a__mtl": "newmtl a\nKd 1 0 0\n", "b__mtl": "newmtl b\nKd 0 1 0\nnewmtl a\nKd 0 0 0\n"}
+    scene = read("mtllib a.mtl b.mtl\n" + SQUARE + "usemtl a\nf 1 2 3\nusemtl b\nf 1 3 4\n", **files)
+    assert [material.base_color for material in scene.materials] == [(1, 0, 0), (0, 1, 0)]
+
+
+def test_an_unknown_material_is_noted(read):
+    scene = read(SQUARE + "usemtl gold\nf 1 2 3\n")
+    assert scene.notes == ["material 'gold' is in no material library: taken as plain grey"]
+    assert scene.materials[0].name == "gold"
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("v 0 0 nan\n" + SQUARE + "f 1 2 3\n", r"model\.obj:1: vertex '0 0 nan'; coordinates must be finite"),
+        (SQUARE + "v inf 0 0\nf 1 2 3\n", r"model\.obj:5: vertex 'inf 0 0'"),
+        (SQUARE + "v 1e300 0 0\nf 1 2 3\n", r"model\.obj:5: vertex '1e300 0 0'"),
+        (SQUARE + "v 1 2\nf 1 2 3\n", r"model\.obj:5: vertex with 2 numbers; it takes 3"),
+        (SQUARE + "v\nf 1 2 3\n", r"model\.obj:5: vertex with 0 numbers"),
+        ("v 1 2\nv 1 2\nf 1 1 2\n", r"model\.obj:1: vertex with 2 numbers"),
+        (SQUARE + "v 1 2 x\nf 1 2 3\n", r"model\.obj:5: vertex '1 2 x'; numbers only"),
+        (SQUARE + "vn 1 2\nf 1//1 2//1 3//1\n", r"model\.obj:5: normal with 2 numbers"),
+        (SQUARE + "f 1 2 5\n", r"model\.obj:5: face uses vertex 5; the file has 1 to 4"),
+        (SQUARE + "f 1 2 3\nf 1 2 0\n", r"model\.obj:6: face uses vertex 0"),
+        (SQUARE + "f 1/1 2/1 3/1\n", r"model\.obj:5: face uses texture coordinate 1; the file has no texture"),
+        (SQUARE + "vn 0 0 1\nf 1//1 2//2 3//1\n", r"model\.obj:6: face uses normal 2; the file has 1 to 1"),
+        (SQUARE + "f -1 -2 -5\n", r"model\.obj:5: face counts back 5 entries of 4"),
+        (SQUARE + "f 1 2\n", r"model\.obj:5: face with 2 corners"),
+        (SQUARE + "f 1 2 3\nf 1 2 x\n", r"model\.obj:6: face corner 'x'; it is v, v/vt"),
+        (SQUARE + "f 1 2 3\nf -1 2 x\n", r"model\.obj:6: face corner 'x'"),
+        (SQUARE + "f 1 2 3/1/1/1\n", r"model\.obj:5: face corner '3/1/1/1'"),
+        (SQUARE + "f 1/ 2 /3\n", r"model\.obj:5: face uses vertex 0"),
+        (
+            SQUARE + "f 1 2 99999999999999999999\n",
+            r"model\.obj:5: face .*9{8}|model\.obj:5: face uses vertex 9223372036854775807",
+        ),
+        (SQUARE, r"model\.obj: holds no faces; points and lines"),
+        ("# nothing\n", r"model\.obj: holds no faces; is it an OBJ file\?"),
+        ("<html>\n", r"model\.obj: holds no faces; is it an OBJ file\?"),
+        (SQUARE + "f 1 2 \\", r"model\.obj:5: the file ends in a continued line"),
+        (SQUARE + "mtllib none.mtl\nf 1 2 3\n", r"model\.obj:5: material library 'none\.mtl' is not there"),
+        ("\0\0\0\0", r"model\.obj: is not a text file"),
+        ("", r"model\.obj: the file is empty"),
+    ],
+)
+def test_bad_files(read, text, message):
+    with pytest.raises(SceneError, match=message) as caught:
+        read(text)
+    assert "\n" not in str(caught.value)
+
+
+def test_every_cut_short_file_is_refused_or_whole(read):
+    """A file cut anywhere gives an error, or fewer whole faces: never a wild one."""
+    text = SQUARE + "vt 0 0\nvn 0 0 1\n" + "f 1/1/1 2/1/1 3/1/1 4/1/1\n" * 3
+    whole = corner_positions(read(text).meshes[0])
+    outcomes = set()
+    for end in range(len(text)):
+        try:
+            found = corner_positions(read(text[:end]).meshes[0])
+        except SceneError:
+            outcomes.add("refused")
+        else:
+            outcomes.add("shorter")
+            assert (found == whole[: len(found)]).all()
+    assert outcomes == {"refused", "shorter"}

@@ -1,0 +1,153 @@
+"""PLY meshes, text and binary."""
+
+import struct
+
+import numpy as np
+import pytest
+from PIL import Image as Pillow
+
+from lippmann.color.transfer import decode_srgb
+from lippmann.errors import SceneError
+from lippmann.scene.readers.ply import read_ply
+
+VERTICES = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (2, 0.5, 0)]
+FACES = [(0, 1, 2, 3), (1, 4, 2)]
+
+
+def header(form, vertex="", face="", vertices=5, faces=2, comment=""):
+    return (
+        f"ply\nformat {form} 1.0\n{comment}element vertex {vertices}\nproperty float x\nproperty float y\n"
+        f"property float z\n{vertex}element face {faces}\nproperty list uchar int vertex_indices\n{face}end_header\n"
+    )
+
+
+def text_file(faces=FACES):
+    rows = [" ".join(map(str, vertex)) for vertex in VERTICES]
+    rows += [f"{len(face)} " + " ".join(map(str, face)) for face in faces]
+    return (header("ascii", faces=len(faces)) + "\n".join(rows) + "\n").encode()
+
+
+def binary_file(order="<", faces=FACES):
+    form = "binary_little_endian" if order == "<" else "binary_big_endian"
+    data = b"".join(struct.pack(f"{order}3f", *vertex) for vertex in VERTICES)
+    data += b"".join(struct.pack(f"{order}B{len(face)}i", len(face), *face) for face in faces)
+    return header(form, faces=len(faces)).encode() + data
+
+
+@pytest.fixture
+def read(tmp_path):
+    def read(data):
+        path = tmp_path / "model.ply"
+        path.write_bytes(data)
+        return read_ply(path)
+
+    return read
+
+
+@pytest.mark.parametrize("data", [text_file(), binary_file("<"), binary_file(">")])
+def test_triangles_and_larger_polygons_together(read, data):
+    (mesh,) = read(data).meshes
+    assert mesh.positions.tolist() == [list(map(float, vertex)) for vertex in VERTICES]
+    assert mesh.faces.tolist() == [[0, 1, 2], [0, 2, 3], [1, 4, 2]]
+    assert mesh.normals is None
+
+
+@pytest.mark.parametrize("order", ["<", ">"])
+def test_equal_polygons_take_the_short_way(read, order):
+    faces = [(0, 1, 2), (1, 4, 2)]
+    assert read(binary_file(order, faces)).meshes[0].faces.tolist() == [[0, 1, 2], [1, 4, 2]]
+
+
+def test_attributes_of_vertices(read, tmp_path):
+    Pillow.new("RGB", (4, 2), (9, 8, 7)).save(tmp_path / "my skin.png")
+    extra = "".join(f"property float {name}\n" for name in ("nx", "ny", "nz", "s", "t"))
+    extra += "".join(f"property uchar {name}\n" for name in ("red", "green", "blue", "alpha"))
+    rows = "\n".join(f"{x} {y} {z} 0 0 2 {x / 2} {y} 255 0 188 51" for x, y, z in VERTICES)
+    comment = "comment TextureFile my skin.png\n"
+    scene = read((header("ascii", extra, faces=1, comment=comment) + rows + "\n3 0 1 2\n").encode())
+    (mesh,), (material,) = scene.meshes, scene.materials
+    assert (mesh.normals == (0, 0, 1)).all()
+    assert mesh.uvs[0][2].tolist() == [0.5, 0.0]  # v counts upwards in PLY and downwards in a description
+    assert mesh.colors[0] == pytest.approx([1, 0, float(decode_srgb(np.array(188 / 255))), 0.2], abs=1e-6)
+    assert material.base_color_texture.image.pixels.shape == (2, 4, 3)
+    assert material.base_color == (1, 1, 1)
+
+
+def test_colours_of_any_type(read):
+    for kind, top in (("float", 1), ("ushort", 65535), ("int", 255)):
+        extra = "".join(f"property {kind} {name}\n" for name in ("red", "green", "blue"))
+        rows = "\n".join(f"{x} {y} {z} {top} 0 0" for x, y, z in VERTICES)
+        (mesh,) = read((header("ascii", extra, faces=1) + rows + "\n3 0 1 2\n").encode()).meshes
+        assert (mesh.colors == (1, 0, 0)).all()
+
+
+def test_colours_and_uvs_of_faces_part_the_vertices(read):
+    face = "property list uchar float texcoord\nproperty uchar red\nproperty uchar green\nproperty uchar blue\n"
+    rows = "\n".join(" ".join(map(str, vertex)) for vertex in VERTICES)
+    rows += "\n4 0 1 2 3 8 0 0 1 0 1 1 0 1 255 0 0\n3 1 4 2 6 0 0 1 0 0 1 0 255 0\n"
+    (mesh,) = read((header("ascii", face=face) + rows).encode()).meshes
+    assert len(mesh.positions) == 9
+    assert mesh.positions[mesh.faces][2].tolist() == [[1, 0, 0], [2, 0.5, 0], [1, 1, 0]]
+    assert mesh.colors[mesh.faces][:, 0].tolist() == [[1, 0, 0], [1, 0, 0], [0, 1, 0]]
+    assert mesh.uvs[0][mesh.faces][2].tolist() == [[0, 1], [1, 1], [0, 0]]
+
+
+def test_elements_between_are_stepped_over(read):
+    text = text_file().decode()
+    edges = text.replace("element face", "element edge 2\nproperty int vertex1\nproperty int vertex2\nelement face")
+    edges = edges.replace("2 0.5 0\n", "2 0.5 0\n0 1\n1 2\n")
+    assert len(read(edges.encode()).meshes[0].faces) == 3
+
+
+def test_faces_without_area_in_their_list(read):
+    assert len(read(text_file([(0, 1), (0, 1, 2), ()])).meshes[0].faces) == 1
+    assert len(read(binary_file("<", [(0, 1), (0, 1, 2), ()])).meshes[0].faces) == 1
+
+
+@pytest.mark.parametrize("data", [text_file(), binary_file()])
+def test_every_cut_short_file_is_refused(read, data):
+    last = data.rstrip(b"\n")
+    for end in range(1, len(last)):
+        if data.startswith(b"ply\nformat ascii") and end == len(last):
+            continue
+        with pytest.raises(SceneError):
+            read(last[:end])
+
+
+@pytest.mark.parametrize(
+    ("data", "message"),
+    [
+        (b"solid x", r"model\.ply: is no PLY file"),
+        (b"ply\nformat ascii 1.0\n", r"model\.ply: the header has no end"),
+        (b"ply\nformat zip 1.0\nend_header\n", r"format 'zip'; known are ascii, binary_little"),
+        (b"ply\nformat ascii 1.0\nelement vertex x\nend_header\n", r"model\.ply:3: header line 'element vertex x'"),
+        (b"ply\nformat ascii 1.0\nproperty float x\nend_header\n", r"model\.ply:3: header line 'property float x'"),
+        (b"ply\nformat ascii 1.0\nend_header\n", r"holds no vertices with x, y and z"),
+        (header("ascii", faces=0).encode() + b"0 0 0\n" * 5, r"holds no faces; a cloud of points"),
+        (text_file([(0, 1, 5)]), r"a face uses vertex 5; the file has 0 to 4"),
+        (text_file([(0, 1, -1)]), r"a face uses vertex -1"),
+        (text_file([(0, 1)]), r"holds no faces with three corners"),
+        (text_file().replace(b"2 0.5 0", b"2 nan 0"), r"vertex 4 is \[2\.0, nan, 0\.0\]; coordinates must be finite"),
+        (text_file().replace(b"2 0.5 0", b"2 x 0"), r"element 'vertex': could not convert"),
+        (text_file().replace(b"2 0.5 0", b"2 0"), r"entry 4 of 'vertex' has too few numbers"),
+        (binary_file()[:-1], r"ends after 1 of 2 entries of 'face'; is it cut short\?"),
+        (binary_file().replace(b"\x04\0\0\0\0", b"\xff\0\0\0\0"), r"ends after 0 of 2 entries of 'face'"),
+        (header("ascii", faces=1).replace("float z", "list uchar float z").encode() + b"0 0 1 0\n" * 6, "x, y and z"),
+        (
+            b"ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\n"
+            b"element tristrips 1\nproperty list int int vertex_indices\nend_header\n0 0 0\n3 0 0 0\n",
+            r"holds triangle strips",
+        ),
+    ],
+)
+def test_bad_files(read, data, message):
+    with pytest.raises(SceneError, match=message) as caught:
+        read(data)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_missing_texture(read):
+    comment = "comment TextureFile none.png\n"
+    data = text_file().replace(b"element vertex", comment.encode() + b"element vertex")
+    with pytest.raises(SceneError, match=r"model\.ply: texture 'none\.png' is not there"):
+        read(data)

@@ -1,0 +1,74 @@
+"""STL meshes, text and binary."""
+
+import struct
+
+import numpy as np
+import pytest
+
+from lippmann.errors import SceneError
+from lippmann.scene.readers.stl import read_stl
+
+TRIANGLES = np.array([[[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 0, 0], [0, 1, 0], [0, 0, 2]]], float)
+
+
+def binary_file(header=b"made by a test"):
+    facets = [struct.pack("<12fH", 0, 0, 1, *triangle.ravel(), 0) for triangle in TRIANGLES]
+    return header.ljust(80, b"\0") + struct.pack("<I", len(facets)) + b"".join(facets)
+
+
+def text_file(solids=1):
+    facets = []
+    for triangle in TRIANGLES:
+        vertices = "".join(f"   vertex {x:e} {y:e} {z:e}\n" for x, y, z in triangle)
+        facets.append(f" facet normal 0 0 1\n  outer loop\n{vertices}  endloop\n endfacet\n")
+    return ("solid a name\n" + "".join(facets) + "endsolid a name\n").encode() * solids
+
+
+@pytest.fixture
+def read(tmp_path):
+    def read(data):
+        path = tmp_path / "model.stl"
+        path.write_bytes(data)
+        return read_stl(path)
+
+    return read
+
+
+@pytest.mark.parametrize("data", [text_file(), binary_file(), binary_file(b"solid beginnings lie")])
+def test_facets(read, data):
+    (mesh,) = read(data).meshes
+    assert (mesh.positions[mesh.faces] == TRIANGLES).all()
+    assert mesh.positions.dtype == np.float32
+    assert mesh.normals is None
+
+
+def test_several_solids(read):
+    assert len(read(text_file(3)).meshes[0].faces) == 6
+
+
+@pytest.mark.parametrize("data", [text_file(), binary_file()])
+def test_every_cut_short_file_is_refused(read, data):
+    for end in range(1, len(data.rstrip()) - len(b" a name")):
+        with pytest.raises(SceneError):
+            read(data[:end])
+
+
+@pytest.mark.parametrize(
+    ("data", "message"),
+    [
+        (b"", "the file is empty"),
+        (b"hello", "is no STL file"),
+        (b"x" * 200, r"has 200 bytes, and its header speaks of \d+ facets"),
+        (binary_file() + b"\0", r"has 185 bytes, and its header speaks of 2 facets; they take 184 bytes"),
+        (binary_file()[:-1], "is it cut short"),
+        (b"\0" * 84, "holds no facets"),
+        (b"solid\nendsolid\n", "holds no facets"),
+        (text_file().replace(b"0.000000e+00 0.000000e+00 2.0", b"0 x 2.0"), "cannot be read"),
+        (text_file().replace(b"0.000000e+00 0.000000e+00 2.0", b"0 2.0"), "cannot be read"),
+        (text_file().replace(b"endsolid a name", b""), "has 1 'solid' and 0 'endsolid'"),
+    ],
+)
+def test_bad_files(read, data, message):
+    with pytest.raises(SceneError, match=message) as caught:
+        read(data)
+    assert "\n" not in str(caught.value)

@@ -1,0 +1,198 @@
+"""Sequences that are interrupted: killed processes, changed scenes and options, damaged frames."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from lippmann.display import load_display
+from lippmann.errors import PictureError, UsageError
+from lippmann.sequences.files import journal_of, saved_sequence
+from lippmann.sequences.motion import open_motion
+
+QUICK = {"integrator": "direct", "spp": 1, "device": "cpu"}
+FRAMES = range(0, 12, 3)
+
+
+@pytest.fixture(scope="module")
+def display():
+    return load_display("seed-lenticular")
+
+
+@pytest.fixture(scope="module")
+def unbroken(engine, moving_ball, display, tmp_path_factory):
+    """The frames of a run that nothing interrupted."""
+    folder = tmp_path_factory.mktemp("unbroken")
+    assert [frame.found for frame in run(moving_ball, display, folder)] == [False] * 4
+    return contents(folder)
+
+
+def run(scene, display, folder, *, frames=FRAMES, most=99, resume=False, motion=None, **options):
+    """Render frames, at most so many of them; those that came."""
+    moving = motion or open_motion(scene)
+    came = []
+    name = folder / "f_%02d.png"
+
+    def path_of(number):
+        return folder / f"f_{number:02}.png"
+
+    with saved_sequence(moving, name, path_of, display, frames, resume=resume, **QUICK, **options) as saved:
+        for frame in saved:
+            came.append(frame)
+            if len(came) == most:
+                break
+    return came
+
+
+def contents(folder):
+    return {path.name: path.read_bytes() for path in sorted(folder.iterdir())}
+
+
+def test_a_whole_run_leaves_its_frames_alone(unbroken):
+    assert list(unbroken) == [f"f_{number:02}.png" for number in FRAMES]
+    assert len(set(unbroken.values())) == 4
+
+
+def test_finished_frames_are_kept_and_the_rest_is_the_same(unbroken, moving_ball, display, tmp_path):
+    run(moving_ball, display, tmp_path, most=2)
+    assert (tmp_path / "f_%02d.png.journal").exists()
+    written = {path.name: path.stat().st_mtime_ns for path in tmp_path.glob("*.png")}
+    frames = run(moving_ball, display, tmp_path, resume=True)
+    assert [(frame.number, frame.found) for frame in frames] == [(0, True), (3, True), (6, False), (9, False)]
+    assert frames[0].provenance.spp == 1
+    assert contents(tmp_path) == unbroken
+    assert {name: (tmp_path / name).stat().st_mtime_ns for name in written} == written
+
+
+def test_damaged_and_absent_frames_are_rendered_again(unbroken, moving_ball, display, tmp_path):
+    run(moving_ball, display, tmp_path, most=3)
+    (tmp_path / "f_00.png").unlink()
+    (tmp_path / "f_03.png").write_bytes(unbroken["f_06.png"])
+    frames = run(moving_ball, display, tmp_path, resume=True)
+    assert [frame.found for frame in frames] == [False, False, True, False]
+    assert contents(tmp_path) == unbroken
+
+
+def test_what_was_half_written_is_swept(unbroken, moving_ball, display, tmp_path):
+    run(moving_ball, display, tmp_path, most=1)
+    (tmp_path / ".f_03-0123abcd.part.png").write_bytes(b"half")
+    run(moving_ball, display, tmp_path, resume=True)
+    assert contents(tmp_path) == unbroken
+
+
+def test_what_was_chosen_for_the_first_frame_holds(unbroken, moving_ball, display, tmp_path):
+    run(moving_ball, display, tmp_path, most=1)
+    journal = tmp_path / "f_%02d.png.journal"
+    head, line = journal.read_text().splitlines()
+    assert json.loads(line)["chosen"] == {"method": "full", "denoise": "none"}
+    journal.write_text(f"{head}\n{line.replace('full', 'guessed')}\n")
+    with pytest.raises(UsageError, match="--method: 'guessed' is not known"):
+        run(moving_ball, display, tmp_path, resume=True)
+
+
+def test_a_journal_chooses_no_other_options(unbroken, moving_ball, display, tmp_path):
+    run(moving_ball, display, tmp_path, most=1)
+    journal = tmp_path / "f_%02d.png.journal"
+    text = journal.read_text()
+    journal.write_text(text.replace('"chosen": {', '"chosen": {"integrator": "normal", "device": "gpu", '))
+    assert journal.read_text() != text
+    run(moving_ball, display, tmp_path, resume=True)
+    assert contents(tmp_path) == unbroken
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"seed": 1}, r"seed \(is new\)"),
+        ({"subpixels": True}, r"subpixels \(is new\)"),
+        ({"shift": (0.0, 0.0, 1.0)}, r"placement shift \(was \(0\.0, 0\.0, 0\.0\), is \(0\.0, 0\.0, 1\.0\)\)"),
+        ({"bits": 16}, r"values \(was uint8, is uint16\)"),
+        ({"frames": range(3, 12, 3)}, r"the first frame \(was 0, is 3\)"),
+    ],
+)
+def test_other_options_are_refused(engine, moving_ball, display, tmp_path, options, said):
+    run(moving_ball, display, tmp_path, most=1)
+    before = contents(tmp_path)
+    with pytest.raises(PictureError, match=f"the unfinished sequence is another one: {said}"):
+        run(moving_ball, display, tmp_path, resume=True, **options)
+    assert contents(tmp_path) == before
+
+
+def test_other_scenes_and_displays_are_refused(engine, moving_ball, display, tmp_path):
+    out = tmp_path / "out"
+    out.mkdir()
+    run(moving_ball, display, out, most=1)
+    scene = tmp_path / "scene"
+    shutil.copytree(moving_ball.parent, scene)
+    assert run(scene / moving_ball.name, display, out, most=1, resume=True)[0].found
+    tree = json.loads((scene / moving_ball.name).read_text())
+    tree["materials"] = [{"pbrMetallicRoughness": {"roughnessFactor": 0.31}}]
+    (scene / moving_ball.name).write_text(json.dumps(tree))
+    with pytest.raises(PictureError, match="another one: the scene and what moves in it;"):
+        run(scene / moving_ball.name, display, out, resume=True)
+    with pytest.raises(PictureError, match="another one: the scene and what moves in it;"):
+        run(moving_ball, display, out, resume=True, motion=open_motion(moving_ball, fps=25))
+    with pytest.raises(PictureError, match="the display's gap"):
+        run(moving_ball, load_display("panel-4k"), out, resume=True)
+
+
+def test_more_or_fewer_frames_may_be_asked_for(unbroken, moving_ball, display, tmp_path):
+    run(moving_ball, display, tmp_path, most=2)
+    frames = run(moving_ball, display, tmp_path, frames=range(7), most=5, resume=True)
+    assert [frame.found for frame in frames] == [True, False, False, True, False]
+    assert all(contents(tmp_path)[name] == unbroken[name] for name in ("f_00.png", "f_03.png"))
+
+
+def test_frames_that_are_rendered_in_tiles_are_kept_too(engine, moving_ball, display, tmp_path):
+    from lippmann.tiles.tiled_render import render_here
+
+    whole, broken = tmp_path / "whole", tmp_path / "broken"
+    whole.mkdir()
+    broken.mkdir()
+    tiles = {"frames": range(0, 6, 3), "runner": render_here, "method": "full", "denoise": "none"}
+    run(moving_ball, display, whole, **tiles)
+    run(moving_ball, display, broken, most=1, **tiles)
+    with pytest.raises(PictureError, match="frames are rendered"):
+        run(moving_ball, display, broken, resume=True, **tiles | {"runner": None})
+    assert [frame.found for frame in run(moving_ball, display, broken, resume=True, **tiles)] == [True, False]
+    assert contents(broken) == contents(whole)
+
+
+def command(scene, folder, *more):
+    words = ("render", scene, "--frames", "0:24:3", "-o", folder / "f_%02d.png", "--integrator", "direct", "--spp", "1")
+    start = "from lippmann.cli import main; main()"
+    return [sys.executable, "-c", start, *map(str, (*words, "--device", "cpu", *more))]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="there is no such signal there")
+@pytest.mark.parametrize("film", [pytest.param("film.png", marks=pytest.mark.long), "film.mp4"])
+def test_killed_in_mid_sequence_and_gone_on_with(unbroken, moving_ball, tmp_path, film):
+    whole, broken = tmp_path / "whole", tmp_path / "broken"
+    whole.mkdir()
+    broken.mkdir()
+    subprocess.run(command(moving_ball, whole, "--video", whole / film), check=True, capture_output=True)
+    assert len(contents(whole)) == 9
+    assert contents(whole).items() >= unbroken.items()
+    more = ("--video", broken / film, "--resume", "--json")
+    killed = subprocess.Popen(command(moving_ball, broken, *more), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    journal = journal_of(broken / "f_%02d.png", broken / "f_00.png")
+    end = time.monotonic() + 120
+    while not journal.exists() or journal.read_bytes().count(b"\n") < 3:
+        assert time.monotonic() < end
+        assert killed.poll() is None
+        time.sleep(0.002)
+    os.kill(killed.pid, signal.SIGKILL)
+    killed.wait()
+    assert not (broken / film).exists()
+    done = subprocess.run(command(moving_ball, broken, *more), check=True, capture_output=True, text=True)
+    found = [frame["found"] for frame in json.loads(done.stdout)["frames"]]
+    assert 2 <= sum(found) < 8
+    assert found == sorted(found, reverse=True)
+    assert contents(broken) == contents(whole)

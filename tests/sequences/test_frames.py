@@ -1,0 +1,185 @@
+"""Sequences: what stands still from frame to frame, what moves, and what is not compiled twice."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from lippmann import api
+from lippmann.display import load_display
+from lippmann.errors import SceneError, UsageError
+from lippmann.progress import silent
+from lippmann.scene.placement import PlacementOptions, place
+from lippmann.sequences.frames import FrameRange, filed, find_stand, render_sequence, rendered, sequence_to_files
+from lippmann.sequences.motion import open_motion
+
+BODY = "CAMERA ZOOM 1 ASPECTRATIO 1 ANTIALIASING 0 RAYDEPTH 2 CENTER 0 0 -5 VIEWDIR 0 0 1 UPDIR 0 1 0 END_CAMERA"
+BALL = "SPHERE CENTER 0 0 0 RAD 1 TEXTURE AMBIENT 0.2 DIFFUSE 0.8 SPECULAR 0 OPACITY 1 COLOR 1 1 1 TEXFUNC 0"
+#: Forward, then to the right, then a turn.
+FLIGHT = "0 0 1 0 1 0 0 0 -5\n0 0 1 0 1 0 0.5 0 -5\n0.1 0 1 0 1 0 0.5 0 -5\n"
+
+
+@pytest.fixture
+def room(tmp_path):
+    (tmp_path / "room.dat").write_text(f"BEGIN_SCENE RESOLUTION 64 64 {BODY} {BALL} END_SCENE")
+    (tmp_path / "room.cam").write_text(FLIGHT)
+    return tmp_path / "room.dat", tmp_path / "room.cam"
+
+
+@pytest.fixture(scope="session")
+def display():
+    return load_display("seed-lenticular")
+
+
+def test_a_display_that_does_not_follow_stands_still(moving_ball, display):
+    motion = open_motion(moving_ball)
+    where = find_stand(motion, display, PlacementOptions())
+    first, middle = where(0), where(motion.count // 2)
+    assert np.array_equal(first.world_from_display, middle.world_from_display)
+    assert first.depth_range != middle.depth_range
+
+
+def test_nothing_ever_leaves_the_depth_that_the_scene_is_fitted_to(moving_ball, display):
+    motion = open_motion(moving_ball)
+    fitted = place(motion.bounds(), display)
+    where = find_stand(motion, display, PlacementOptions())
+    for frame in range(motion.count):
+        back, front = where(frame).depth_range
+        assert fitted.depth_range[0] - 1e-6 <= back <= front <= fitted.depth_range[1] + 1e-6
+
+
+def test_where_it_stands_does_not_hang_on_the_frame_rate(moving_ball, display):
+    slow, fast = (find_stand(open_motion(moving_ball, fps=fps), display, PlacementOptions()) for fps in (5, 60))
+    assert np.array_equal(slow.first, fast.first)
+
+
+def test_a_flight_keeps_the_display_before_the_camera(room, display):
+    motion = open_motion(room[0], camera_path=room[1])
+    where = find_stand(motion, display, PlacementOptions())
+    for frame in range(3):
+        camera = motion.camera(frame, None)
+        relative = np.linalg.inv(camera.world_from_camera) @ where(frame).world_from_display
+        first = np.linalg.inv(motion.camera(0, None).world_from_camera) @ where(0).world_from_display
+        assert relative == pytest.approx(first, abs=1e-9)
+    assert where(1).world_from_display[0, 3] - where(0).world_from_display[0, 3] == pytest.approx(0.5)
+
+
+def test_the_first_frame_of_a_flight_is_the_scene_seen_by_that_camera(room, display):
+    """The path begins where the file's own camera stands."""
+    flown = find_stand(open_motion(room[0], camera_path=room[1]), display, PlacementOptions())(0)
+    scene = api.load_scene(room[0])
+    still = place(scene.bounds, display, cameras=scene.cameras, home_camera=scene.home_camera)
+    assert flown.world_from_display == pytest.approx(still.world_from_display, rel=1e-6)
+
+
+def test_a_camera_of_the_file_is_followed(moving_ball, display):
+    motion = open_motion(moving_ball)
+    where = find_stand(motion, display, PlacementOptions(camera="eye"))
+    moved = where(24).world_from_display[:3, 3] - where(0).world_from_display[:3, 3]
+    assert moved == pytest.approx([1, 0, 0], abs=1e-6)
+
+
+def test_a_frame_alone_is_the_same_as_among_others(engine, moving_ball):
+    motion = open_motion(moving_ball)
+    options = {"integrator": "direct", "spp": 1, "device": "cpu"}
+    among = dict(render_sequence(motion, frames=FrameRange(0, 3), **options))
+    (alone,) = (image for _, image in render_sequence(motion, frames=[2], **options))
+    assert np.array_equal(among[2].pixels, alone.pixels)
+    assert not np.array_equal(among[2].pixels, among[0].pixels)
+    assert among[2].provenance.options["frame"] == 2
+
+
+def test_frames_are_rendered_in_tiles_too(engine, moving_ball, tmp_path):
+    motion = open_motion(moving_ball)
+    options = {"integrator": "direct", "spp": 1, "device": "cpu"}
+    (whole,) = (image for _, image in render_sequence(motion, frames=[3], **options))
+    made = dict(sequence_to_files(motion, lambda frame: tmp_path / f"{frame}.exr", frames=[3], bits=32, **options))
+    assert made[3].tiles > 1
+    from lippmann.image import read_picture
+
+    read = read_picture(tmp_path / "3.exr")
+    assert np.array_equal(read.pixels, whole.pixels)
+    assert np.array_equal(read.world_from_display, whole.world_from_display)
+
+
+@pytest.mark.parametrize("kind", ["animation", "flight"])
+def test_nothing_is_compiled_for_later_frames(engine, moving_ball, room, kind, monkeypatch):
+    import drjit as dr
+
+    from lippmann.rendering.film import sample_batches
+
+    motion = open_motion(moving_ball) if kind == "animation" else open_motion(room[0], camera_path=room[1])
+    options = {"integrator": "direct"} if kind == "animation" else {}
+    kernels: list[set[object]] = []
+
+    def look() -> float:
+        kernels[-1] |= {kernel["hash"] for kernel in dr.kernel_history() if "hash" in kernel}
+        return 0.0
+
+    monkeypatch.setattr(sample_batches, "compile_seconds", look)
+    images = render_sequence(motion, frames=[0, 1, 2], spp=2, device="cpu", **options)
+    for _ in range(3):
+        kernels.append(set())
+        next(images)
+    assert kernels[2]
+    assert kernels[2] <= kernels[0] | kernels[1]
+
+
+def test_what_was_chosen_for_the_first_frame_holds(engine, moving_ball):
+    images = render_sequence(open_motion(moving_ball), frames=[0, 1], integrator="direct", spp=1, device="cpu")
+    assert [image.provenance.method for _, image in images] == ["full", "full"]
+
+
+@pytest.mark.parametrize(
+    ("first", "stop", "step", "wanted"),
+    [(0, 3, 1, [0, 1, 2]), (0, None, 10, [0, 10, 20]), (24, None, 1, [24]), (1, 8, 3, [1, 4, 7])],
+)
+def test_ranges(moving_ball, first, stop, step, wanted):
+    assert list(FrameRange(first, stop, step).of(open_motion(moving_ball))) == wanted
+
+
+@pytest.mark.parametrize(("first", "stop"), [(0, 26), (25, None), (99, 100)])
+def test_frames_beyond_the_end_are_refused(moving_ball, first, stop):
+    with pytest.raises(UsageError, match="there are 25, counted from 0"):
+        FrameRange(first, stop).of(open_motion(moving_ball))
+
+
+@pytest.mark.parametrize(("first", "stop", "step"), [(3, 3, 1), (4, 2, 1), (0, 4, 0), (-1, 3, 1)])
+def test_empty_ranges_are_refused(first, stop, step):
+    with pytest.raises(UsageError, match="FIRST:STOP"):
+        FrameRange(first, stop, step)
+
+
+def test_contradictions_are_refused(moving_ball, room, display):
+    flight = open_motion(room[0], camera_path=room[1])
+    with pytest.raises(UsageError, match="beside a flight"):
+        find_stand(flight, display, PlacementOptions(mode="fit"))
+    with pytest.raises(UsageError, match="beside a path"):
+        find_stand(flight, display, PlacementOptions(camera="x"))
+    with pytest.raises(SceneError, match="no camera is named 'x'"):
+        find_stand(open_motion(moving_ball), display, PlacementOptions(camera="x"))
+    with pytest.raises(UsageError, match="one pose a frame"):
+        open_motion(room[0], camera_path=room[1], animation="x")
+    with pytest.raises(UsageError, match="a camera path leads through"):
+        open_motion(moving_ball, camera_path=room[1])
+    with pytest.raises(UsageError, match="nothing moves in 'teapot'"):
+        open_motion("teapot")
+    with pytest.raises(UsageError, match="frames per second"):
+        open_motion(moving_ball, fps=0.0)
+
+
+def test_surroundings_hold_for_all_frames(moving_ball):
+    motion = open_motion(moving_ball, environment="none", background=(0.1, 0.2, 0.3))
+    assert [motion.scene(frame).background for frame in (0, 9)] == [(0.1, 0.2, 0.3)] * 2
+    assert not motion.scene(9).in_studio
+
+
+def test_the_callers_options_stay_as_they_are(engine, moving_ball, display, tmp_path):
+    motion = open_motion(moving_ball)
+    where = find_stand(motion, display, PlacementOptions())
+    options = {"integrator": "direct", "spp": 1, "device": "cpu", "order": None}
+    given = dict(options)
+    list(rendered(motion, display, [0], where, silent, options))
+    assert options == given
+    list(filed(motion, display, [0], where, lambda _: tmp_path / "a.png", None, None, silent, options))
+    assert options == given

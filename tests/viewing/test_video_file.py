@@ -1,0 +1,77 @@
+import os
+
+import av
+import numpy as np
+import pytest
+from PIL import Image, ImageSequence
+
+from lippmann.color.transfer import quantize
+from lippmann.errors import OutputError
+from lippmann.viewing.video_file import check_animation_path, write_animation
+
+
+def frames(count=5, height=24, width=32):
+    """A bright column that moves to the right over a ramp."""
+    base = np.linspace(0, 0.5, height * width * 3, dtype=np.float32).reshape(height, width, 3)
+    for k in range(count):
+        frame = base.copy()
+        frame[:, 4 * k : 4 * k + 4] = (1, 0.2, 0)
+        yield frame
+
+
+@pytest.mark.parametrize("name", ["a.png", "a.apng"])
+def test_apng_is_exact(tmp_path, name):
+    write_animation(frames(), tmp_path / name, frames_per_second=20)
+    with Image.open(tmp_path / name) as animation:
+        assert animation.n_frames == 5
+        assert animation.info["loop"] == 0
+        for shown, frame in zip(ImageSequence.Iterator(animation), frames(), strict=True):
+            assert shown.info["duration"] == 50
+            np.testing.assert_array_equal(np.asarray(shown.convert("RGB")), quantize(frame, 8, "srgb"))
+
+
+def test_mp4_is_close(tmp_path):
+    write_animation(frames(7, 63, 49), tmp_path / "a.mp4", frames_per_second=25)
+    with av.open(str(tmp_path / "a.mp4")) as video:
+        stream = video.streams.video[0]
+        assert stream.average_rate == 25
+        shown = [frame.to_ndarray(format="rgb24", src_colorspace="ITU709") for frame in video.decode(stream)]
+    assert len(shown) == 7
+    for codes, frame in zip(shown, frames(7, 63, 49), strict=True):
+        assert codes.shape == (64, 50, 3)
+        difference = codes[:63, :49].astype(float) - quantize(frame, 8, "srgb")
+        # Halved colour resolution blurs the edges of the column; the rest is near.
+        assert np.median(np.abs(difference)) <= 3
+        assert np.abs(difference.mean(axis=(0, 1))).max() < 4
+
+
+def test_one_frame_is_enough(tmp_path):
+    for name in ("a.png", "a.mp4"):
+        write_animation(frames(1), tmp_path / name)
+        assert (tmp_path / name).stat().st_size > 100
+
+
+def test_places_that_cannot_be(tmp_path):
+    for name, message in (
+        ("a.gif", "the ending '.gif' is unknown; animations are .png, .apng, .mp4"),
+        ("a", "no ending"),
+    ):
+        with pytest.raises(OutputError, match=message):
+            check_animation_path(tmp_path / name)
+        with pytest.raises(OutputError, match=message):
+            write_animation(frames(), tmp_path / name)
+    with pytest.raises(OutputError, match="is not there"):
+        write_animation(frames(), tmp_path / "missing" / "a.mp4")
+
+
+@pytest.mark.parametrize("name", ["a.png", "a.mp4"])
+def test_a_failure_in_the_middle_keeps_the_old_file(tmp_path, name):
+    def failing():
+        yield from frames(2)
+        raise KeyboardInterrupt
+
+    (tmp_path / name).write_bytes(b"the old one")
+    with pytest.raises(KeyboardInterrupt):
+        write_animation(failing(), tmp_path / name)
+    assert (tmp_path / name).read_bytes() == b"the old one"
+    assert os.listdir(tmp_path) == [name]

@@ -1,0 +1,66 @@
+"""What a film shows of a picture."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lippmann.errors import OutputError, PictureError
+from lippmann.image import read_picture
+from lippmann.quilts.quilt import QuiltLayout
+from lippmann.viewing.replay import default_eye, replay
+from lippmann.viewing.video_frames import WIDEST_QUILT, projection_of, quilt_of
+
+
+@pytest.fixture(scope="module")
+def image(engine, tmp_path_factory):
+    from lippmann import api
+
+    return api.render("primitives", integrator="normal", spp=1, device="cpu")
+
+
+def test_a_plain_name_shows_what_an_eye_sees(image):
+    assert np.array_equal(projection_of(Path("film.mp4"))(image), replay(image))
+    eye = (20.0, 0.0, 900.0)
+    assert np.array_equal(projection_of(Path("film.png"), eye)(image), replay(image, eye))
+
+
+def test_a_quilts_name_shows_a_quilt(image):
+    seen = projection_of(Path("film_qs4x2a1.mp4"))(image)
+    assert seen.shape == (1024, 2048, 3)
+    assert np.array_equal(seen, quilt_of(image, QuiltLayout(4, 2, 1.0)).pixels)
+
+
+def test_the_views_of_a_quilt_go_from_left_to_right_across_the_field(image):
+    quilt = quilt_of(image, QuiltLayout(3, 1, None))
+    x, y, z = default_eye(image.display)
+    reach = 2 * z * np.tan(np.radians(image.display.field_of_view / 2))
+    size = quilt.view_size
+    for number, place in enumerate((-1 / 3, 0, 1 / 3)):
+        assert np.array_equal(quilt.view(number), replay(image, (x + place * reach, y, z), size=size))
+    assert not np.array_equal(quilt.view(0), quilt.view(2))
+
+
+def test_quilts_keep_within_what_players_take(image):
+    assert quilt_of(image, QuiltLayout(12, 4, None)).pixels.shape[1] <= WIDEST_QUILT
+
+
+@pytest.mark.parametrize(
+    ("name", "kind", "message"),
+    [
+        ("film.avi", OutputError, "animations are"),
+        ("film_qs.mp4", PictureError, "does not say how many views"),
+        ("film_qs0x4a1.mp4", PictureError, "columns"),
+    ],
+)
+def test_other_names_are_refused(name, kind, message):
+    with pytest.raises(kind, match=message):
+        projection_of(Path(name))
+
+
+def test_a_picture_from_a_file_is_shown_alike(image, tmp_path):
+    image.save(tmp_path / "x.exr", bits=32)
+    show = projection_of(Path("film.mp4"))
+    assert np.array_equal(show(read_picture(tmp_path / "x.exr")), show(image))
