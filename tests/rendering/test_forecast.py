@@ -23,13 +23,24 @@ def short_probe(monkeypatch):
     monkeypatch.setattr(forecast, "PROBE_SECONDS", 0.2)
 
 
-def test_rays_are_those_of_the_rendering():
+@pytest.mark.parametrize("seconds", [0.0, 0.5])
+def test_rays_are_those_of_the_rendering(monkeypatch, seconds):
+    # However long the probe lasts: later samples take fewer shadow rays than the first.
+    monkeypatch.setattr(forecast, "PROBE_SECONDS", seconds)
     options = {"spp": 8, "subpixels": True, "seed": 4}
     foreseen = lippmann.plan("teapot", SHEET, **options)
     rays = lippmann.render("teapot", SHEET, **options).stats["rays"]
     assert foreseen.rays["primary"] == rays["primary"] == 240 * 160 * 3 * 8
     for kind in ("shadow", "secondary"):
         assert foreseen.rays[kind] == pytest.approx(rays[kind], rel=0.1)
+
+
+@pytest.mark.parametrize("spp", [2, 64])
+def test_later_samples_take_fewer_shadow_rays(monkeypatch, spp):
+    monkeypatch.setattr(forecast, "PROBE_SECONDS", 0.0)
+    foreseen = lippmann.plan("teapot", SHEET, spp=spp)
+    rays = lippmann.render("teapot", SHEET, method="full", spp=spp).stats["rays"]
+    assert foreseen.rays["shadow"] == pytest.approx(rays["shadow"], rel=0.1)
 
 
 def test_depth_is_that_of_the_picture():

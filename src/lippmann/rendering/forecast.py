@@ -6,6 +6,7 @@ the picture's own settings in ever larger wavefronts for about two seconds. What
 
 from __future__ import annotations
 
+import itertools
 import time
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
@@ -43,6 +44,8 @@ PROBE_SECONDS = 2.0
 
 #: Pixels of the probe, and how many lie side by side in a run.
 _PIXELS, _RUN = 1 << 14, 16
+#: Samples per pixel after which each takes as many rays as the one before: the first of either stream sample more light.
+_STEADY_SAMPLES = 16
 #: Lanes beyond which a wavefront gets no faster.
 _ENOUGH_LANES = 1 << 20
 #: Bytes per pixel that Open Image Denoise and its guides take, up to the most that the library lets itself have.
@@ -226,19 +229,27 @@ class _Probe:
         batches.add(STREAMS)
         compiled, samples, spent, last = batches.seconds_compile, STREAMS, 0.0, 0.0
         count, done = STREAMS, 0
-        while spent < PROBE_SECONDS:
+        rays = {kind: [(0, 0)] for kind in ("shadow", "secondary")}
+
+        def count_rays() -> None:
+            for kind, counts in rays.items():
+                counts.append((samples, getattr(batches.rays, kind)))
+
+        count_rays()
+        while spent < PROBE_SECONDS or samples < min(settings.samples, _STEADY_SAMPLES):
             started = time.perf_counter()
             batches.add(count)
             last = (time.perf_counter() - started) / (count * pixels)
             spent += last * count * pixels
             samples += count
             done += count
+            count_rays()
             progress(Progress("probe", min(spent, PROBE_SECONDS), PROBE_SECONDS))
             if 2 * count * pixels <= _ENOUGH_LANES:
                 count *= 2
-        number = samples * pixels
-        rays = {"shadow": batches.rays.shadow / number, "secondary": batches.rays.secondary / number}
-        return _Found(done * pixels, spent, compiled, last, rays)
+        number = settings.samples * pixels
+        shares = {kind: _count_at(settings.samples, counts) / number for kind, counts in rays.items()}
+        return _Found(done * pixels, spent, compiled, last, shares)
 
     def share_beyond(self, built: BuiltScene | BuiltClassic, at: Placement, memory: int) -> float:
         """Share of the pixels whose middle sees a surface that the display does not resolve."""
@@ -248,6 +259,14 @@ class _Probe:
         far, near = at.resolvable_range
         seen: NDArray[np.bool_] = np.isfinite(depth) & ((depth < far) | (depth > near))
         return float(seen.mean())
+
+
+def _count_at(samples: int, counts: list[tuple[int, int]]) -> float:
+    """A running count at ``samples``, linear between the ``(samples, count)`` given and beyond the last two."""
+    for (low, below), (high, above) in itertools.pairwise(counts):
+        if samples <= high:
+            break
+    return below + (samples - low) * (above - below) / (high - low)
 
 
 def _denoise_seconds(
