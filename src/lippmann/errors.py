@@ -15,7 +15,10 @@ class LippmannError(Exception):
     what:
         What was found, with the offending value.
     where:
-        The file (with line where known), option or argument concerned; empty if there is none.
+        The file (with line where known); empty if there is none.
+    parameter:
+        The function's parameter concerned, by its Python name; empty if there is none. ``rule`` and ``fix`` write
+        values of parameters as Python does: ``method="full"``. The command line translates both into its options.
     rule:
         What would have been right.
     fix:
@@ -24,29 +27,30 @@ class LippmannError(Exception):
 
     exit_code = 2
 
-    def __init__(self, what: str, *, where: str = "", rule: str = "", fix: str = "") -> None:
+    def __init__(self, what: str, *, where: str = "", parameter: str = "", rule: str = "", fix: str = "") -> None:
         self.what = what
         self.where = where
+        self.parameter = parameter
         self.rule = rule
         self.fix = fix
         super().__init__(str(self))
 
     def __str__(self) -> str:
-        head = f"{self.where}: {self.what}" if self.where else self.what
+        head = ": ".join(part for part in (self.where, self.parameter, self.what) if part)
         line = "; ".join(part for part in (head, self.rule, self.fix) if part)
         return " ".join(line.split())  # a value quoted from a file may hold line breaks
 
     def __reduce__(self) -> tuple[object, ...]:
         # Keyword-only fields are lost by the default pickling, which worker processes rely on.
-        return (_rebuild, (type(self), self.what, self.where, self.rule, self.fix))
+        return (_rebuild, (type(self), self.what, self.where, self.parameter, self.rule, self.fix))
 
 
-def _rebuild(kind: type[LippmannError], what: str, where: str, rule: str, fix: str) -> LippmannError:
-    return kind(what, where=where, rule=rule, fix=fix)
+def _rebuild(kind: type[LippmannError], what: str, where: str, parameter: str, rule: str, fix: str) -> LippmannError:
+    return kind(what, where=where, parameter=parameter, rule=rule, fix=fix)
 
 
 class UsageError(LippmannError):
-    """An option or argument that cannot be honoured."""
+    """A parameter whose value cannot be honoured."""
 
 
 class SceneError(LippmannError):
