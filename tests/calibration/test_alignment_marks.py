@@ -10,10 +10,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lippmann.calibration import Window
 from lippmann.calibration.alignment_marks import Marks, with_marks
 from lippmann.display import load_display
 from lippmann.display.formats.print_sheet import Print
+from lippmann.display.pixel_window import PixelWindow
 from lippmann.errors import UsageError
 from lippmann.image import IntegralImage
 from lippmann.viewing.replay import replay
@@ -31,7 +31,7 @@ def picture(display=DISPLAY, seed=1):
 
 def whole(marks):
     panel = marks.sheet.panel
-    return marks.draw(Window(0, 0, panel.width, panel.height))
+    return marks.draw(PixelWindow(0, 0, panel.width, panel.height))
 
 
 @given(
@@ -132,7 +132,7 @@ def test_cutting_lines_begin_where_the_picture_ends():
     assert not ink[M : height - M, M : width - M].any()
 
 
-@given(window=st.builds(Window, st.integers(0, 700), st.integers(0, 500), st.integers(1, 90), st.integers(1, 80)))
+@given(window=st.builds(PixelWindow, st.integers(0, 700), st.integers(0, 500), st.integers(1, 90), st.integers(1, 80)))
 @settings(deadline=None, max_examples=40)
 def test_windows_are_cut_from_the_whole(window):
     every = whole(MARKS)
@@ -143,7 +143,7 @@ def test_windows_are_cut_from_the_whole(window):
 def test_a_poster_s_margin_is_drawn_in_windows():
     marks = Marks(Print(ppi=720, size=(1000, 700), lpi=60).display(), 12.0)
     panel = marks.sheet.panel
-    assert marks.draw(Window(panel.width - 200, panel.height - 100, 200, 100)).shape == (100, 200)
+    assert marks.draw(PixelWindow(panel.width - 200, panel.height - 100, 200, 100)).shape == (100, 200)
 
 
 def test_the_words_say_what_to_check():

@@ -10,10 +10,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lippmann.calibration import NAMES, Pattern, Window, draw, fields, whole
+from lippmann.calibration import NAMES, Pattern, draw, fields, whole
 from lippmann.calibration.patterns import COLORS, LIT, step_of
 from lippmann.display import Panel
 from lippmann.display.formats.monitor import Monitor
+from lippmann.display.pixel_window import PixelWindow
 from lippmann.errors import UsageError
 from lippmann.image import IntegralImage, Provenance
 from lippmann.viewing.replay import replay
@@ -69,7 +70,7 @@ def test_every_subpixel_follows_the_formula(name, slope):
 
 @given(
     name=st.sampled_from(NAMES),
-    window=st.builds(Window, st.integers(0, 400), st.integers(0, 200), st.integers(1, 80), st.integers(1, 64)),
+    window=st.builds(PixelWindow, st.integers(0, 400), st.integers(0, 200), st.integers(1, 80), st.integers(1, 64)),
     count=st.integers(2, 30),
 )
 @settings(deadline=None, max_examples=40)
@@ -78,12 +79,12 @@ def test_windows_are_cut_from_the_whole(name, window, count):
     every = draw(pattern, MONITOR)
     part = every[window.top : window.top + window.height, window.left : window.left + window.width]
     np.testing.assert_array_equal(draw(pattern, MONITOR, window), part)
-    assert whole(MONITOR) == Window(0, 0, 480, 264)
+    assert whole(MONITOR) == PixelWindow(0, 0, 480, 264)
 
 
 def test_a_wide_panel_is_drawn_in_windows_without_the_rest():
     monitor = replace(MONITOR, panel=Panel(900_000, 600_000, 25.4 / 1200), pitch=75.0)
-    window = Window(899_900, 599_900, 100, 100)
+    window = PixelWindow(899_900, 599_900, 100, 100)
     for name in NAMES:
         assert draw(Pattern(name), monitor, window).shape == (100, 100, 3)
 

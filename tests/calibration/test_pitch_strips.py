@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lippmann.calibration import Window
 from lippmann.calibration.pitch_strips import PitchTest
 from lippmann.display.formats.print_sheet import Print
+from lippmann.display.pixel_window import PixelWindow
 from lippmann.errors import UsageError
 from lippmann.image import IntegralImage
 from lippmann.viewing.replay import replay
@@ -21,7 +21,7 @@ SHEET = Print(ppi=360, size=(60, 40), lpi=20, viewing_distance=400)
 
 
 def whole(test):
-    return test.draw(Window(0, 0, *test.sheet.pixels))
+    return test.draw(PixelWindow(0, 0, *test.sheet.pixels))
 
 
 def under_the_sheet(test, lpi=None, distance=400.0, shift=0.0):
@@ -97,7 +97,7 @@ def test_strips_have_the_pitch_that_is_written_beside_them():
 
 
 @given(
-    window=st.builds(Window, st.integers(0, 700), st.integers(0, 500), st.integers(1, 150), st.integers(1, 67)),
+    window=st.builds(PixelWindow, st.integers(0, 700), st.integers(0, 500), st.integers(1, 150), st.integers(1, 67)),
     strips=st.integers(1, 40),
 )
 @settings(deadline=None, max_examples=30)
@@ -111,7 +111,7 @@ def test_windows_are_cut_from_the_whole(window, strips):
 def test_a_poster_is_drawn_in_windows():
     test = PitchTest(Print(ppi=720, size=(1000, 1400), lpi=60))
     assert test.sheet.pixels == (28346, 39685)
-    assert test.draw(Window(28000, 39000, 300, 200)).shape == (200, 300)
+    assert test.draw(PixelWindow(28000, 39000, 300, 200)).shape == (200, 300)
 
 
 def test_the_middle_is_what_is_expected_in_round_numbers():

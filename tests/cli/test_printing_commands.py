@@ -60,9 +60,9 @@ def test_a_pitch_test(lippmann, tmp_path):
     test = PitchTest(sheet, 5, 0.2)
     assert outcome.json["strips"] == [strip.lpi for strip in test.made_of]
     assert outcome.json["expected"] == pytest.approx(sheet.pitch_on_print)
-    from lippmann.calibration import Window
+    from lippmann.display.pixel_window import PixelWindow
 
-    np.testing.assert_array_equal(tifffile.imread(path), test.draw(Window(0, 0, 315, 157)))
+    np.testing.assert_array_equal(tifffile.imread(path), test.draw(PixelWindow(0, 0, 315, 157)))
     assert dpi(path) == ((200, 1), (200, 1))
     said = lippmann("pitch-test", *SHEET, "-o", path)
     assert said.code == 0

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import tifffile
 
-from lippmann.display.pixel_window import Window
+from lippmann.display.pixel_window import PixelWindow
 from lippmann.image.encoding import decode_stored, read_header
 from lippmann.image.streamed import open_pixels
 
@@ -42,6 +42,6 @@ def test_a_description_that_names_another_file_is_not_followed(tmp_path, opened)
     opened.clear()
     assert read_header(tmp_path / "a.tif").width == 6
     np.testing.assert_array_equal(decode_stored(tmp_path / "a.tif", "tiff")[0][""], values)
-    np.testing.assert_array_equal(open_pixels(tmp_path / "a.tif", "tiff").window(Window(0, 0, 4, 6)), values)
+    np.testing.assert_array_equal(open_pixels(tmp_path / "a.tif", "tiff").window(PixelWindow(0, 0, 6, 4)), values)
     assert any(name.endswith("a.tif") for name in opened)
     assert not any(name.endswith("secret.tif") for name in opened)

@@ -21,7 +21,7 @@ import zarr
 
 from lippmann.codecs.zarr_array import open_zarr
 from lippmann.codecs.zarr_reader import open_array, read_array_metadata
-from lippmann.display.pixel_window import Window
+from lippmann.display.pixel_window import PixelWindow
 from lippmann.errors import PictureError
 from lippmann.exchange.zarr_store import read_zarr
 from lippmann.image import read_picture
@@ -126,7 +126,7 @@ HOSTILE = {
         values_of,
         read_header,
         read_picture,
-        lambda folder: open_pixels(folder, "zarr").window(Window(0, 0, 4, 6)),
+        lambda folder: open_pixels(folder, "zarr").window(PixelWindow(0, 0, 6, 4)),
     ],
     ids=["values", "header", "picture", "pieces"],
 )
@@ -434,7 +434,7 @@ def test_what_others_write_in_format_3_is_read(tmp_path, options):
     array = zarr.create_array(tmp_path / "x.zarr", shape=values.shape, chunks=(8, 8, 3), dtype="<u2", **options)
     array[...] = values
     np.testing.assert_array_equal(values_of(tmp_path / "x.zarr"), values)
-    window = open_pixels(tmp_path / "x.zarr", "zarr").window(Window(5, 7, 11, 13))
+    window = open_pixels(tmp_path / "x.zarr", "zarr").window(PixelWindow(7, 5, 13, 11))
     np.testing.assert_array_equal(window, values[5:16, 7:20])
 
 

@@ -12,12 +12,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lippmann.codecs import tiff
+from lippmann.display.pixel_window import PixelWindow
 from lippmann.errors import PictureError
 from lippmann.image import IntegralImage, part_folders, read_picture, streamed, write_micro_images, write_views
 from lippmann.image.part_folders import write_large_micro_images, write_large_views
 from lippmann.image.streamed import ChunkedPixels, LargePicture, open_picture, open_pixels
 from lippmann.image.views import panel_rows_of_view_rows, pixels_of_view, pixels_of_view_rows, view_grid
-from lippmann.journal import Window
 from lippmann.viewing.refocus import refocus
 from lippmann.viewing.replay import replay
 
@@ -88,7 +88,7 @@ def test_windows_and_single_pixels_of_any_cut(data):
         (width, height), (high, wide), values.dtype, load, cache_bytes=data.draw(st.integers(0, 400))
     )
     top, left = data.draw(st.integers(0, height - 1)), data.draw(st.integers(0, width - 1))
-    window = Window(top, left, data.draw(st.integers(1, height - top)), data.draw(st.integers(1, width - left)))
+    window = PixelWindow(left, top, data.draw(st.integers(1, width - left)), data.draw(st.integers(1, height - top)))
     assert np.array_equal(source.window(window), values[window.slices])
     rows = np.array(data.draw(st.lists(st.integers(0, height - 1), max_size=12)), dtype=np.intp)
     columns = np.array([(3 * row + 1) % width for row in rows], dtype=np.intp)
@@ -118,18 +118,18 @@ def test_pieces_are_decoded_once_while_they_are_kept(counted):
     source.take(row, np.zeros(6, dtype=int))
     assert loads == [(0, 0), (1, 0), (2, 0)]
     # What was not looked at for longest goes first.
-    source.window(Window(0, 0, 1, 1))
-    source.window(Window(12, 0, 1, 1))
-    source.window(Window(0, 0, 1, 1))
+    source.window(PixelWindow(0, 0, 1, 1))
+    source.window(PixelWindow(0, 12, 1, 1))
+    source.window(PixelWindow(0, 0, 1, 1))
     assert loads[3:] == [(3, 0)]
-    source.window(Window(4, 0, 1, 1))
+    source.window(PixelWindow(0, 4, 1, 1))
     assert loads[4:] == [(1, 0)]
 
 
 def test_rows_from_the_top_down_decode_each_piece_once(counted):
     source, loads = counted(40, 32)
     for top in range(0, 29, 2):
-        source.window(Window(top, 0, 4, 40))
+        source.window(PixelWindow(0, top, 40, 4))
     assert len(loads) == len(set(loads)) == 10 * 8
 
 
@@ -210,11 +210,11 @@ def test_grey_and_transparent_pieces(tmp_path):
     grey = rng.integers(0, 256, (40, 50), dtype=np.uint8)
     tifffile.imwrite(tmp_path / "grey.tif", grey, tile=(16, 16), photometric="minisblack")
     source = open_pixels(tmp_path / "grey.tif", "tiff")
-    assert np.array_equal(source.window(Window(0, 0, 40, 50)), np.repeat(grey[..., None], 3, axis=2))
+    assert np.array_equal(source.window(PixelWindow(0, 0, 50, 40)), np.repeat(grey[..., None], 3, axis=2))
     clear = rng.integers(0, 255, (40, 50, 4), dtype=np.uint8)
     tifffile.imwrite(tmp_path / "clear.tif", clear, tile=(16, 16), photometric="rgb", extrasamples=["unassalpha"])
     with pytest.raises(PictureError, match="transparent"):
-        open_pixels(tmp_path / "clear.tif", "tiff").window(Window(0, 0, 4, 4))
+        open_pixels(tmp_path / "clear.tif", "tiff").window(PixelWindow(0, 0, 4, 4))
 
 
 @pytest.mark.parametrize("name", ["tiled.tif", "a.zarr"])

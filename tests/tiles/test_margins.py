@@ -47,8 +47,8 @@ def test_windows_hold_their_tiles_with_the_margin(name, settings, width, height,
     for tile in grid:
         window = around.window(tile, side, (width, height))
         for first, length, begin, count, whole in (
-            (tile.row, tile.rows, window.row, window.rows, height),
-            (tile.column, tile.columns, window.column, window.columns, width),
+            (tile.top, tile.height, window.top, window.height, height),
+            (tile.left, tile.width, window.left, window.width, width),
         ):
             assert begin == max(0, begin) <= max(0, first - around.margin)
             assert begin % around.step == 0

@@ -24,8 +24,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.calibration.labels import label_window, paint_label
-from lippmann.calibration.patterns import Window
 from lippmann.display import Display
+from lippmann.display.pixel_window import PixelWindow
 from lippmann.errors import UsageError
 from lippmann.image import IntegralImage, Provenance
 
@@ -84,10 +84,10 @@ class Marks:
         return round(self.margin / self.display.panel.pixel_pitch)
 
     @property
-    def picture(self) -> Window:
+    def picture(self) -> PixelWindow:
         """Where the picture lies on the marked sheet."""
         panel = self.display.panel
-        return Window(self.pixels, self.pixels, panel.width, panel.height)
+        return PixelWindow(self.pixels, self.pixels, panel.width, panel.height)
 
     @property
     def sheet(self) -> Display:
@@ -105,18 +105,18 @@ class Marks:
         distance = f"{display.viewing_distance:g} mm" if display.viewing_distance < 1e9 else "afar"
         return f"{lpi:.6g} lpi, printed at {seen:.6g} lpi, {ppi:.6g} ppi, seen from {distance}"
 
-    def draw(self, window: Window) -> NDArray[np.float32]:
+    def draw(self, window: PixelWindow) -> NDArray[np.float32]:
         """``(height, width)`` of a window of the marked sheet, 0 ink or 1 paper; paper where the picture goes."""
-        rows = np.arange(window.top, window.top + window.height, dtype=np.float64)[:, None]
-        columns = np.arange(window.left, window.left + window.width, dtype=np.float64)[None, :]
+        rows = np.arange(window.top, window.bottom, dtype=np.float64)[:, None]
+        columns = np.arange(window.left, window.right, dtype=np.float64)[None, :]
         ink = self._strips(columns, rows) | self._cuts(columns, rows)
         for center in self._cross_centers():
             ink |= self._cross(columns, rows, *center)
         pixels = np.where(ink, np.float32(0), np.float32(1))
         m, inside = self.pixels, self.picture
         room = round((1 - _CUT) * 0.8 * m)
-        for text, top in (("TOP", 0.1 * m), (self.words(), inside.top + inside.height + _CUT * m)):
-            line = Window(inside.left, round(top), inside.width, room)
+        for text, top in (("TOP", 0.1 * m), (self.words(), inside.bottom + _CUT * m)):
+            line = PixelWindow(inside.left, round(top), inside.width, room)
             box = label_window(text, line, room, at="bottom")
             paint_label(pixels, window, text, box, ink=0, paper=1)
         return pixels
@@ -131,16 +131,16 @@ class Marks:
     def _strips(self, column: Real, row: Real) -> Ink:
         inside, m = self.picture, self.pixels
         above = inside.top - 0.5 - row
-        away = np.where(above > 0, above, row + 0.5 - inside.top - inside.height)
-        is_across = (column >= inside.left) & (column < inside.left + inside.width)
+        away = np.where(above > 0, above, row + 0.5 - inside.bottom)
+        is_across = (column >= inside.left) & (column < inside.right)
         in_strip = is_across & (away >= _STRIP[0] * m) & (away < _STRIP[1] * m)
         return in_strip & (np.abs(self.place_under_lens(column) - 0.5) < 0.25)
 
     def _cuts(self, column: Real, row: Real) -> Ink:
         """Lines of one line's width just outside the picture's edges, near the corners, in the outer margin."""
         inside, m, line = self.picture, self.pixels, self._line
-        right = np.maximum(inside.left - column, column - (inside.left + inside.width - 1))
-        down = np.maximum(inside.top - row, row - (inside.top + inside.height - 1))
+        right = np.maximum(inside.left - column, column - (inside.right - 1))
+        down = np.maximum(inside.top - row, row - (inside.bottom - 1))
         is_upright = (right > 0) & (right <= line) & (down > _CUT * m)
         is_lying = (down > 0) & (down <= line) & (right > _CUT * m)
         return is_upright | is_lying
@@ -148,7 +148,7 @@ class Marks:
     def _cross_centers(self) -> list[tuple[float, float]]:
         """Places in pixels from the sheet's left and top edges; a lens's middle is put there by :meth:`_cross`."""
         inside, half = self.picture, self.pixels / 2
-        far_right, far_down = inside.left + inside.width + half, inside.top + inside.height + half
+        far_right, far_down = inside.right + half, inside.bottom + half
         middle = inside.top + inside.height / 2
         return [(x, y) for x in (half, far_right) for y in (half, middle, far_down)]
 
@@ -195,19 +195,18 @@ def marked_rows(marks: Marks, rows: Callable[[int, int], FloatArray], first: int
     """
     m, picture, width = marks.pixels, marks.picture, marks.picture.width + 2 * marks.pixels
     pixels = np.empty((last - first, width, 3), dtype=np.float32)
-    top, bottom = (min(max(edge, first), last) for edge in (picture.top, picture.top + picture.height))
+    top, bottom = (min(max(edge, first), last) for edge in (picture.top, picture.bottom))
     if bottom > top:
         pixels[top - first : bottom - first, m : width - m] = rows(top - m, bottom - m)
     edges = (
-        Window(0, first, width, top - first),
-        Window(0, bottom, width, last - bottom),
-        Window(0, top, m, bottom - top),
-        Window(width - m, top, m, bottom - top),
+        PixelWindow(0, first, width, top - first),
+        PixelWindow(0, bottom, width, last - bottom),
+        PixelWindow(0, top, m, bottom - top),
+        PixelWindow(width - m, top, m, bottom - top),
     )
     for edge in edges:
         if edge.height > 0:
-            down = edge.top - first
-            pixels[down : down + edge.height, edge.left : edge.left + edge.width] = marks.draw(edge)[..., None]
+            pixels[edge.top - first : edge.bottom - first, edge.columns] = marks.draw(edge)[..., None]
     return pixels
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.calibration.patterns import Window, common
+from lippmann.display.pixel_window import PixelWindow
 
 Mask = NDArray[np.bool_]
 
@@ -25,7 +25,7 @@ _STROKE = 0.025
 _MEASURE = 100
 
 
-def label_window(text: str, inside: Window, height: int, *, at: str = "left") -> Window | None:
+def label_window(text: str, inside: PixelWindow, height: int, *, at: str = "left") -> PixelWindow | None:
     """The box of a label: ``height`` high at most, in the middle of the ``left`` or the ``bottom`` edge of a window.
 
     A label that would be wider than the window is made smaller; None if it could not be read.
@@ -38,22 +38,26 @@ def label_window(text: str, inside: Window, height: int, *, at: str = "left") ->
         return None
     width = min(inside.width, max(1, round(height * aspect)))
     if at == "left":
-        return Window(inside.left, inside.top + (inside.height - height) // 2, width, height)
-    return Window(inside.left + (inside.width - width) // 2, inside.top + inside.height - height, width, height)
+        return PixelWindow(inside.left, inside.top + (inside.height - height) // 2, width, height)
+    return PixelWindow(inside.left + (inside.width - width) // 2, inside.top + inside.height - height, width, height)
 
 
 def paint_label(
-    pixels: NDArray[Any], window: Window, text: str, box: Window | None, *, ink: float = 1.0, paper: float = 0.0
+    pixels: NDArray[Any],
+    window: PixelWindow,
+    text: str,
+    box: PixelWindow | None,
+    *,
+    ink: float = 1.0,
+    paper: float = 0.0,
 ) -> None:
     """Paint ``text`` into the part of ``pixels``, ``(h, w, ...)`` of ``window``, that lies in its box."""
-    part = None if box is None else common(box, window)
+    part = None if box is None else box.intersection(window)
     if part is None or box is None:
         return
     mask = _mask(text, box.width, box.height)
-    rows, columns = slice(part.top - box.top, None), slice(part.left - box.left, None)
-    mask = mask[rows, columns][: part.height, : part.width]
-    top, left = part.top - window.top, part.left - window.left
-    target = pixels[top : top + part.height, left : left + part.width]
+    mask = mask[part.relative_to(box).slices]
+    target = pixels[part.relative_to(window).slices]
     target[...] = np.where(mask.reshape(*mask.shape, *(1,) * (pixels.ndim - 2)), ink, paper)
 
 

@@ -9,9 +9,10 @@ import numpy as np
 
 from lippmann._version import VERSION
 from lippmann.calibration.labels import label_window, paint_label
-from lippmann.calibration.patterns import FloatArray, Pattern, Window, draw, fields, step_of
+from lippmann.calibration.patterns import FloatArray, Pattern, draw, fields, step_of
 from lippmann.display.display import INFINITE
 from lippmann.display.formats.monitor import Monitor
+from lippmann.display.pixel_window import PixelWindow
 from lippmann.image import IntegralImage, Provenance
 from lippmann.progress import Progress, ProgressCallback, silent
 
@@ -22,7 +23,7 @@ _LABEL = 0.65
 _BLOCK = 1 << 20
 
 
-def draw_labelled(pattern: Pattern, monitor: Monitor, window: Window) -> FloatArray:
+def draw_labelled(pattern: Pattern, monitor: Monitor, window: PixelWindow) -> FloatArray:
     """:func:`~lippmann.calibration.patterns.draw` with the labels of the fields, white on black; raises as that."""
     pixels = draw(pattern, monitor, window)
     if pattern.name == "stripes":
@@ -50,9 +51,9 @@ def pattern_picture(pattern: Pattern, monitor: Monitor, *, progress: ProgressCal
     pixels = np.empty((height, width, 3), dtype=np.float32)
     step = max(1, _BLOCK // width)
     for top in range(0, height, step):
-        band = Window(0, top, width, min(step, height - top))
-        pixels[top : top + band.height] = draw_labelled(pattern, monitor, band)
-        progress(Progress("draw", top + band.height, height))
+        band = PixelWindow(0, top, width, min(step, height - top))
+        pixels[band.rows] = draw_labelled(pattern, monitor, band)
+        progress(Progress("draw", band.bottom, height))
     options: dict[str, Any] = {"pattern": pattern.name, "pitch": monitor.pitch, "center": monitor.center}
     options["slope"] = INFINITE if math.isinf(monitor.slope) else monitor.slope
     options |= {"views": pattern.views} if pattern.name == "stripes" else {"step": step_of(pattern, monitor)}

@@ -46,6 +46,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.display.formats.monitor import Monitor
+from lippmann.display.pixel_window import PixelWindow
 from lippmann.errors import LippmannError, UsageError
 
 FloatArray = NDArray[np.float32]
@@ -66,20 +67,10 @@ LIT: dict[Name, float] = {"pitch": 1 / 4, "slope": 1 / 4, "center": 1 / 12}
 
 
 @dataclass(frozen=True)
-class Window:
-    """A part of the panel: ``width`` x ``height`` pixels from column ``left`` and row ``top``, row 0 on top."""
-
-    left: int
-    top: int
-    width: int
-    height: int
-
-
-@dataclass(frozen=True)
 class Field:
     """A part of the panel with values of its own, and the value in question, as ``text`` for a label."""
 
-    window: Window
+    window: PixelWindow
     monitor: Monitor
     value: float
     text: str
@@ -123,20 +114,12 @@ class Pattern:
             raise UsageError(f"the step {self.step:g} will not do", rule="it must be a number above zero")
 
 
-def whole(monitor: Monitor) -> Window:
+def whole(monitor: Monitor) -> PixelWindow:
     """The window that is the whole panel."""
-    return Window(0, 0, monitor.panel.width, monitor.panel.height)
+    return PixelWindow(0, 0, monitor.panel.width, monitor.panel.height)
 
 
-def common(a: Window, b: Window) -> Window | None:
-    """The part that two windows share, None if there is none."""
-    left, top = max(a.left, b.left), max(a.top, b.top)
-    width = min(a.left + a.width, b.left + b.width) - left
-    height = min(a.top + a.height, b.top + b.height) - top
-    return Window(left, top, width, height) if width > 0 and height > 0 else None
-
-
-def draw(pattern: Pattern, monitor: Monitor, window: Window | None = None) -> FloatArray:
+def draw(pattern: Pattern, monitor: Monitor, window: PixelWindow | None = None) -> FloatArray:
     """The pattern in a window of the panel, by default all of it.
 
     Returns
@@ -149,18 +132,17 @@ def draw(pattern: Pattern, monitor: Monitor, window: Window | None = None) -> Fl
         If ``pattern`` has fields whose values no monitor can have, or more of them than the panel has pixels.
     """
     window = whole(monitor) if window is None else window
-    pixels = np.zeros((window.height, window.width, 3), dtype=np.float32)
+    pixels = np.zeros((*window.shape, 3), dtype=np.float32)
     if pattern.name == "stripes":
         for channel in range(3):
             view = view_of_phase(_phase(monitor, window, channel), pattern.views)
             pixels[..., channel] = np.array([color[channel] for color in COLORS])[view % len(COLORS)]
         return pixels
     for field in fields(pattern, monitor):
-        part = common(field.window, window)
+        part = field.window.intersection(window)
         if part is None:
             continue
-        rows = slice(part.top - window.top, part.top - window.top + part.height)
-        columns = slice(part.left - window.left, part.left - window.left + part.width)
+        rows, columns = part.relative_to(window).slices
         for channel in range(3):
             place = _phase(field.monitor, part, channel) % 1.0
             pixels[rows, columns, channel] = np.abs(place - 0.5) < LIT[pattern.name]
@@ -191,7 +173,7 @@ def fields(pattern: Pattern, monitor: Monitor) -> list[Field]:
     for number in range(count):
         first, last = number * extent // count, (number + 1) * extent // count
         size = last - first
-        window = Window(0, first, panel.width, size) if is_lying else Window(first, 0, size, panel.height)
+        window = PixelWindow(0, first, panel.width, size) if is_lying else PixelWindow(first, 0, size, panel.height)
         made.append(_field(pattern.name, monitor, window, (number - (count - 1) / 2) * step))
     return made
 
@@ -208,7 +190,7 @@ def step_of(pattern: Pattern, monitor: Monitor) -> float:
     return rounded(0.5 / (panel.height * monitor.lenses_right))
 
 
-def _field(name: Name, monitor: Monitor, window: Window, change: float) -> Field:
+def _field(name: Name, monitor: Monitor, window: PixelWindow, change: float) -> Field:
     try:
         if name == "center":
             center = (monitor.center + change) % 1.0
@@ -229,9 +211,9 @@ def _field(name: Name, monitor: Monitor, window: Window, change: float) -> Field
     return Field(window, replace(changed, center=monitor.center + turned), value, text)
 
 
-def _phase(monitor: Monitor, window: Window, channel: int) -> Real:
-    columns = np.arange(window.left, window.left + window.width, dtype=np.float64)
-    rows = np.arange(window.top, window.top + window.height, dtype=np.float64)
+def _phase(monitor: Monitor, window: PixelWindow, channel: int) -> Real:
+    columns = np.arange(window.left, window.right, dtype=np.float64)
+    rows = np.arange(window.top, window.bottom, dtype=np.float64)
     return monitor.phase(*np.meshgrid(columns, rows), channel)
 
 

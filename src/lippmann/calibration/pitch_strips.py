@@ -18,8 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.calibration.labels import label_window, paint_label
-from lippmann.calibration.patterns import Window, common, rounded
+from lippmann.calibration.patterns import rounded
 from lippmann.display.formats.print_sheet import Print
+from lippmann.display.pixel_window import PixelWindow
 from lippmann.errors import UsageError
 from lippmann.runtime.cached_property import cached_property
 
@@ -36,7 +37,7 @@ STRIPS = (1, 199)
 class Strip:
     """One strip: where it is, its print pitch in lenses per inch, and that as written beside it."""
 
-    window: Window
+    window: PixelWindow
     lpi: float
     text: str
 
@@ -102,7 +103,7 @@ class PitchTest:
         strips = []
         for k in range(self.strips):
             lpi = self.lpi_of(k)
-            strips.append(Strip(Window(0, rows[k], width, rows[k + 1] - rows[k]), lpi, f"{lpi:.{decimals}f}"))
+            strips.append(Strip(PixelWindow(0, rows[k], width, rows[k + 1] - rows[k]), lpi, f"{lpi:.{decimals}f}"))
         return tuple(strips)
 
     def title(self) -> str:
@@ -111,25 +112,24 @@ class PitchTest:
         distance = "infinitely far" if math.isinf(sheet.viewing_distance) else f"{sheet.viewing_distance:g} mm"
         return f"print pitch in lpi: {sheet.pitch_of_sheet:.6g}-lpi sheet, {sheet.ppi:g} ppi, from {distance}"
 
-    def draw(self, window: Window) -> NDArray[np.uint8]:
+    def draw(self, window: PixelWindow) -> NDArray[np.uint8]:
         """``(height, width)`` of a window of the print, 0 black or 255 white."""
-        pixels = np.full((window.height, window.width), 255, dtype=np.uint8)
+        pixels = np.full(window.shape, 255, dtype=np.uint8)
         width = self.sheet.pixels[0]
         tallest = round(_LABEL * self.sheet.ppi / 25.4)
-        head = Window(0, 0, width, self.made_of[0].window.top)
+        head = PixelWindow(0, 0, width, self.made_of[0].window.top)
         paint_label(pixels, window, self.title(), label_window(self.title(), head, tallest), ink=0, paper=255)
-        columns = np.arange(window.left, window.left + window.width)
+        columns = np.arange(window.left, window.right)
         inches = (columns + 0.5 - width / 2) / self.sheet.ppi
         for strip in self.made_of:
-            part = common(strip.window, window)
+            part = strip.window.intersection(window)
             if part is None:
                 continue
             gutter = round(_GUTTER * strip.window.height)
-            rows = np.arange(part.top, part.top + part.height) - strip.window.top
+            rows = np.arange(part.top, part.bottom) - strip.window.top
             is_dark = np.abs((inches * strip.lpi + 0.5) % 1.0 - 0.5) < 0.25
             inside = rows < strip.window.height - gutter
-            top = part.top - window.top
-            pixels[top : top + part.height][inside] = np.where(is_dark, 0, 255)
+            pixels[part.relative_to(window).rows][inside] = np.where(is_dark, 0, 255)
             box = label_window(strip.text, strip.window, min(tallest, round(0.7 * strip.window.height)))
             paint_label(pixels, window, strip.text, box, ink=0, paper=255)
         return pixels

@@ -1,4 +1,4 @@
-"""A picture cut into tiles: rectangles of whole pixels, counted row by row from the top left."""
+"""Rectangles of whole pixels, and a picture cut into a grid of them."""
 
 from __future__ import annotations
 
@@ -7,23 +7,58 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
-class Window:
-    """``rows`` x ``columns`` pixels whose top left one is ``(row, column)``."""
+class PixelWindow:
+    """A rectangle of ``width`` x ``height`` whole pixels from column ``left`` and row ``top``, row 0 on top."""
 
-    row: int
-    column: int
-    rows: int
-    columns: int
+    left: int
+    top: int
+    width: int
+    height: int
+
+    @property
+    def right(self) -> int:
+        """The column past the last."""
+        return self.left + self.width
+
+    @property
+    def bottom(self) -> int:
+        """The row past the last."""
+        return self.top + self.height
+
+    @property
+    def rows(self) -> slice:
+        """Rows of the whole picture that the rectangle covers."""
+        return slice(self.top, self.bottom)
+
+    @property
+    def columns(self) -> slice:
+        """Columns of the whole picture that the rectangle covers."""
+        return slice(self.left, self.right)
 
     @property
     def slices(self) -> tuple[slice, slice]:
-        """What cuts the window out of an array of the whole picture."""
-        return slice(self.row, self.row + self.rows), slice(self.column, self.column + self.columns)
+        """Rows and columns, the index of the rectangle in an array of the whole picture."""
+        return self.rows, self.columns
 
     @property
     def shape(self) -> tuple[int, int]:
-        """Rows and columns."""
-        return self.rows, self.columns
+        """Height and width, the shape of an array of the rectangle's pixels."""
+        return self.height, self.width
+
+    @property
+    def pixels(self) -> int:
+        """Number of pixels."""
+        return self.width * self.height
+
+    def intersection(self, other: PixelWindow) -> PixelWindow | None:
+        """The rectangle common to both; None if they share no pixel."""
+        left, top = max(self.left, other.left), max(self.top, other.top)
+        width, height = min(self.right, other.right) - left, min(self.bottom, other.bottom) - top
+        return PixelWindow(left, top, width, height) if width > 0 and height > 0 else None
+
+    def relative_to(self, other: PixelWindow) -> PixelWindow:
+        """The same rectangle, counted from the top left pixel of ``other``."""
+        return PixelWindow(self.left - other.left, self.top - other.top, self.width, self.height)
 
 
 @dataclass(frozen=True)
@@ -47,14 +82,14 @@ class TileGrid:
     def __len__(self) -> int:
         return self.rows * self.columns
 
-    def __getitem__(self, index: int) -> Window:
+    def __getitem__(self, index: int) -> PixelWindow:
         if not 0 <= index < len(self):
             raise IndexError(f"there is no tile {index} of {len(self)}")
         row, column = divmod(index, self.columns)
-        top, left = row * self.side, column * self.side
-        return Window(top, left, min(self.side, self.height - top), min(self.side, self.width - left))
+        left, top = column * self.side, row * self.side
+        return PixelWindow(left, top, min(self.side, self.width - left), min(self.side, self.height - top))
 
-    def __iter__(self) -> Iterator[Window]:
+    def __iter__(self) -> Iterator[PixelWindow]:
         return (self[index] for index in range(len(self)))
 
     def name(self, index: int) -> str:

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.display import micro_image_shape, pixel_indices_under_lens, pixel_lenses
-from lippmann.display.pixel_window import Window
+from lippmann.display.pixel_window import PixelWindow
 from lippmann.errors import OutputError, PictureError
 from lippmann.image.encoding import (
     STORED,
@@ -257,7 +257,7 @@ def _large_views(picture: LargePicture, grid: ViewGrid) -> Iterator[Part]:
         has_any = [False] * len(lot)
         for first, last in row_blocks(rows, display.panel.width * panel_rows):
             top, bottom = panel_rows_of_view_rows(display, first, last)
-            values = source.window(Window(top, 0, bottom - top, display.panel.width))
+            values = source.window(PixelWindow(0, top, display.panel.width, bottom - top))
             for number, view in enumerate(lot):
                 found, at_row, at_column = pixels_of_view_rows(display, grid, view, first, last)
                 if not found.any():

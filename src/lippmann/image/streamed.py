@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from lippmann.codecs import tiff, zarr_array
 from lippmann.display import Display
-from lippmann.display.pixel_window import Window
+from lippmann.display.pixel_window import PixelWindow
 from lippmann.errors import PictureError
 from lippmann.image.encoding import FormatName, check_stored, linear_values, opaque_colors
 from lippmann.image.integral_image import IntegralImage
@@ -65,18 +65,17 @@ class ChunkedPixels:
         self._most = max(2 * self._columns + 1, cache_bytes // (chunk[0] * chunk[1] * 3 * dtype.itemsize))
         self._kept: OrderedDict[tuple[int, int], Values] = OrderedDict()
 
-    def window(self, window: Window) -> Values:
+    def window(self, window: PixelWindow) -> Values:
         """``(rows, columns, 3)`` values of a rectangle."""
         values = np.empty((*window.shape, 3), dtype=self.dtype)
         high, wide = self.chunk
-        bottom, right = window.row + window.rows, window.column + window.columns
-        for row in range(window.row // high, -(-bottom // high)):
-            for column in range(window.column // wide, -(-right // wide)):
-                top, left = row * high, column * wide
-                rows = slice(max(top, window.row), min(top + high, bottom))
-                columns = slice(max(left, window.column), min(left + wide, right))
-                piece = self._piece(row, column)[_moved(rows, -top), _moved(columns, -left)]
-                values[_moved(rows, -window.row), _moved(columns, -window.column)] = piece
+        for row in range(window.top // high, -(-window.bottom // high)):
+            for column in range(window.left // wide, -(-window.right // wide)):
+                chunk = PixelWindow(column * wide, row * high, wide, high)
+                part = chunk.intersection(window)
+                if part is not None:
+                    piece = self._piece(row, column)
+                    values[part.relative_to(window).slices] = piece[part.relative_to(chunk).slices]
         return values
 
     def take(self, row: NDArray[Any], column: NDArray[Any]) -> Values:
@@ -141,10 +140,6 @@ def _zarr_pixels(path: Path) -> ChunkedPixels:
     return ChunkedPixels((width, height), (high, wide), np.dtype(array.dtype), load)
 
 
-def _moved(part: slice, by: int) -> slice:
-    return slice(part.start + by, part.stop + by)
-
-
 class Picture(Protocol):
     """What an :class:`IntegralImage` and a :class:`LargePicture` have in common."""
 
@@ -186,7 +181,7 @@ class LargePicture:
 
     def rows(self, first: int, last: int) -> FloatArray:
         """``(last - first, W, 3)`` linear values of whole rows."""
-        values = self.source.window(Window(first, 0, last - first, self.source.width))
+        values = self.source.window(PixelWindow(0, first, self.source.width, last - first))
         return linear_values(values, self.provenance.transfer)
 
     @property

@@ -1,6 +1,6 @@
 """Pictures in the making: tiles on the disk, safe from whatever ends a process, and what tells whether they fit."""
 
-from lippmann.display.pixel_window import TileGrid, Window
+from lippmann.display.pixel_window import TileGrid
 from lippmann.journal.fingerprint import content_hash, differences, in_words
 from lippmann.journal.frame_journal import FrameJournal
 from lippmann.journal.tile_file import DamagedTile, TileResult, decode, encode
@@ -12,7 +12,6 @@ __all__ = [
     "TileGrid",
     "TileResult",
     "TileStore",
-    "Window",
     "content_hash",
     "decode",
     "differences",

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from lippmann.color.transfer import Transfer, encode, linear_levels
 from lippmann.display import Display
-from lippmann.display.pixel_window import Window
+from lippmann.display.pixel_window import PixelWindow
 from lippmann.image import IntegralImage
 from lippmann.image.micro_images import lens_indices, row_blocks
 from lippmann.image.streamed import LargePicture
@@ -44,7 +44,7 @@ def stored_rows(image: IntegralImage | LargePicture, first: int, last: int) -> N
     """``(last - first, W, 3)`` values of whole rows: codes of a picture that is read piece by piece, else linear."""
     if isinstance(image, IntegralImage):
         return image.rows(first, last)
-    return image.source.window(Window(first, 0, last - first, image.source.width))
+    return image.source.window(PixelWindow(0, first, image.source.width, last - first))
 
 
 def coded_values(values: NDArray[Any], transfer: Transfer) -> Real:

@@ -269,9 +269,9 @@ def _estimator(job: Job, kind: type[PictureEstimator] = PictureEstimator) -> Pic
     """Judges a display's picture by its micro-images, a quilt by its views."""
     source = job.source
     if isinstance(source, QuiltRays):
-        (_, _, width, height), (whole_width, whole_height) = source.window, source.view_size
-        known = whole_width * whole_height - width * height
-        return kind(Parts.views(source.columns, source.rows, (width, height), known))
+        window, (width, height) = source.window, source.view_size
+        known = width * height - window.pixels
+        return kind(Parts.views(source.columns, source.rows, (window.width, window.height), known))
     if isinstance(source, WindowRays):
         return kind(Parts.micro_images(source.display, source.window))
     return kind(source.display)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from lippmann._version import VERSION
 from lippmann.color.transfer import Transfer
 from lippmann.display import Display
+from lippmann.display.pixel_window import PixelWindow
 from lippmann.errors import UsageError
 from lippmann.image import IntegralImage, Provenance
 from lippmann.progress import Progress, ProgressCallback, silent
@@ -20,7 +21,7 @@ from lippmann.rendering.adaptive.stopping import goal_of
 from lippmann.rendering.denoise.oidn import load_denoiser
 from lippmann.rendering.estimate.psnr import Estimate
 from lippmann.rendering.film.wavefront_plan import make_plan
-from lippmann.rendering.request.region_of_interest import PixelWindow, even_background, panel_window, scene_corners
+from lippmann.rendering.request.region_of_interest import even_background, panel_window, scene_corners
 from lippmann.rendering.request.resolve import decide
 from lippmann.rendering.request.settings import REUSING, RenderSettings
 from lippmann.runtime import engine as engines
@@ -169,15 +170,14 @@ def traced_window(
 
 def _widen(frame: Frame, window: PixelWindow, display: Display, background: Color | None) -> None:
     """Put the background about what was traced; maps are 0 there."""
-    rows, columns = slice(window.top, window.top + window.height), slice(window.left, window.left + window.width)
     size = display.panel.height, display.panel.width
     pixels = np.empty((*size, 3), dtype=np.float32)
     pixels[...] = background
-    pixels[rows, columns] = frame.pixels
+    pixels[window.slices] = frame.pixels
     frame.pixels = pixels
     for name, values in frame.maps.items():
         frame.maps[name] = np.zeros((*size, *values.shape[2:]), dtype=values.dtype)
-        frame.maps[name][rows, columns] = values
+        frame.maps[name][window.slices] = values
 
 
 def placed_options(settings: RenderSettings, placement: Placement) -> dict[str, Any]:

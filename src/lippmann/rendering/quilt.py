@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -124,7 +124,7 @@ def render_quilt(
         options={
             **traced.options,
             "views": [columns, rows],
-            "window": list(source.window),
+            "window": list(astuple(source.window)),
             "pixel_filter": settings.pixel_filter,
             "placement": placement.mode,
             "depth_range": list(placement.depth_range),
@@ -156,12 +156,12 @@ def _assembled(
         return pixels
     whole = np.zeros((size[1], size[0], 3), dtype=np.float32)
     width, height = source.view_size
-    left, top, window_width, window_height = source.window
+    window = source.window
     for number, tile in enumerate(source.tiles()):
         above, right = divmod(number, source.columns)
         first, column = size[1] - (above + 1) * height, right * width
+        view = whole[first : first + height, column : column + width]
         if background is not None:
-            whole[first : first + height, column : column + width] = background
-        rows = slice(first + top, first + top + window_height)
-        whole[rows, column + left : column + left + window_width] = pixels[tile]
+            view[...] = background
+        view[window.slices] = pixels[tile]
     return whole

@@ -17,7 +17,7 @@ import numpy as np
 from lippmann._version import VERSION
 from lippmann.color.transfer import Transfer
 from lippmann.display import Display
-from lippmann.display.pixel_window import TileGrid, Window
+from lippmann.display.pixel_window import PixelWindow, TileGrid
 from lippmann.errors import MemoryLimitError, UsageError
 from lippmann.journal.fingerprint import content_hash, in_words
 from lippmann.rendering.picture import default_memory, transfer_of
@@ -102,7 +102,7 @@ class TileJob:
         """What is rendered around tiles; None where each pixel stands for itself."""
         return surroundings_of(self.display, self.settings)
 
-    def window(self, index: int) -> Window:
+    def window(self, index: int) -> PixelWindow:
         """The pixels that are rendered for a tile: its own and, where it needs any, those around."""
         tile = self.grid[index]
         around = self.surroundings

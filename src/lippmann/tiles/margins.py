@@ -18,7 +18,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from lippmann.display import Display
-from lippmann.display.pixel_window import Window
+from lippmann.display.pixel_window import PixelWindow
 from lippmann.rendering.denoise.oidn import NETWORK_STEP
 from lippmann.rendering.request.settings import RenderSettings
 
@@ -39,15 +39,15 @@ class Surroundings:
         """The longest side of the window of a tile with this side, in pixels."""
         return -(-(side + 2 * self.margin + self.step - 1) // self.step) * self.step
 
-    def window(self, tile: Window, side: int, size: tuple[int, int]) -> Window:
+    def window(self, tile: PixelWindow, side: int, size: tuple[int, int]) -> PixelWindow:
         """What is rendered for ``tile`` of a grid of tiles with this ``side`` on a panel of ``size`` (width, height).
 
         All windows that the panel's edges do not cut are equally large, so that they share their kernels.
         """
         width, height = size
-        left, columns = self._span(tile.column, side, width)
-        top, rows = self._span(tile.row, side, height)
-        return Window(top, left, rows, columns)
+        left, columns = self._span(tile.left, side, width)
+        top, rows = self._span(tile.top, side, height)
+        return PixelWindow(left, top, columns, rows)
 
     def _span(self, first: int, side: int, count: int) -> tuple[int, int]:
         begin = (first - self.margin) // self.step * self.step

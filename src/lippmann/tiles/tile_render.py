@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, fields
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.display import NUMPY, Display
-from lippmann.display.pixel_window import Window
+from lippmann.display.pixel_window import PixelWindow
 from lippmann.image.encoding import stored_values
 from lippmann.journal.tile_file import TileResult
 from lippmann.progress import Progress, ProgressCallback, silent
@@ -22,7 +22,6 @@ from lippmann.rendering.film.wavefront import RayTotals, trace_frame
 from lippmann.rendering.film.wavefront_plan import make_plan
 from lippmann.rendering.methods import SAMPLES_LAYER, Job, trace
 from lippmann.rendering.picture import build_for, make_integrator
-from lippmann.rendering.request.region_of_interest import PixelWindow
 from lippmann.rendering.transport.ray_source import DisplayRays, WindowRays
 from lippmann.runtime import engine as engines
 from lippmann.runtime.engine_lock import exclusive
@@ -134,8 +133,8 @@ def trace_tile(prepared: Prepared, index: int) -> TracedTile:
     is_box = settings.pixel_filter == "box"
     if prepared.no_estimate is not None:
         plan = make_plan(
-            window.columns,
-            window.rows,
+            window.width,
+            window.height,
             settings.samples,
             channels=prepared.source.channels,
             memory=job.tile_memory,
@@ -146,7 +145,7 @@ def trace_tile(prepared: Prepared, index: int) -> TracedTile:
             plan,
             seed=settings.seed,
             box_filter=is_box,
-            corner=(window.row, window.column),
+            corner=(window.top, window.left),
         )
         return TracedTile(index, frame.pixels, None, frame.rays)
     batches = FullInBatches(
@@ -168,12 +167,11 @@ def _trace_window(prepared: Prepared, index: int) -> TracedTile:
     """A tile as the middle of a larger picture, which is rendered as any other is."""
     job = prepared.job
     tile, window = job.grid[index], job.window(index)
-    place = PixelWindow(window.column, window.row, window.columns, window.rows)
     traced = trace(
         Job(
             prepared.built,
             prepared.integrator,
-            WindowRays(prepared.source, place),
+            WindowRays(prepared.source, window),
             job.settings,
             prepared.placement.display_from_world,
             job.transfer,
@@ -182,7 +180,7 @@ def _trace_window(prepared: Prepared, index: int) -> TracedTile:
             treatment=prepared.treatment,
         )
     )
-    inside = replace(tile, row=tile.row - window.row, column=tile.column - window.column).slices
+    inside = tile.relative_to(window).slices
     maps = {name: values[inside] for name, values in traced.frame.maps.items() if name != SAMPLES_LAYER}
     errors = None if traced.errors is None else traced.errors.part(inside)
     return TracedTile(index, traced.frame.pixels[inside], errors, traced.frame.rays, maps, traced.notes)
@@ -200,7 +198,7 @@ def packed(prepared: Prepared, traced: TracedTile) -> TileResult:
     return TileResult(traced.index, values, maps, sums, dict(vars(traced.rays)), traced.notes)
 
 
-def lens_sums(display: Display, window: Window, errors: PixelErrors) -> dict[str, NDArray[Any]]:
+def lens_sums(display: Display, window: PixelWindow, errors: PixelErrors) -> dict[str, NDArray[Any]]:
     """Sums over the part of each micro-image that lies in the tile."""
     lenses, owner, pixels = np.unique(_owners(display, window), return_inverse=True, return_counts=True)
     found: dict[str, NDArray[Any]] = {LENSES: lenses}
@@ -212,11 +210,11 @@ def lens_sums(display: Display, window: Window, errors: PixelErrors) -> dict[str
     return found
 
 
-def _owners(display: Display, window: Window) -> NDArray[np.int64]:
+def _owners(display: Display, window: PixelWindow) -> NDArray[np.int64]:
     """``(rows, columns)``: the flat index of every pixel's lens."""
     u, v = np.meshgrid(
-        window.column + np.arange(window.columns) + 0.5,
-        window.row + np.arange(window.rows) + 0.5,
+        window.left + np.arange(window.width) + 0.5,
+        window.top + np.arange(window.height) + 0.5,
     )
     i, j = display.lens_of(*display.panel_point(u, v, NUMPY), NUMPY)
     owners: NDArray[np.int64] = j.astype(np.int64) * display.lens_grid.columns + i.astype(np.int64)

@@ -12,7 +12,7 @@ import numpy as np
 
 from lippmann.codecs.png import encode_png
 from lippmann.color.transfer import quantize
-from lippmann.display.pixel_window import Window
+from lippmann.display.pixel_window import PixelWindow
 from lippmann.errors import UsageError
 from lippmann.image import IntegralImage
 from lippmann.image.encoding import linear_values
@@ -71,7 +71,7 @@ class Tiles:
             raise UsageError(f"there is no tile in column {column}, row {row}", rule=rule)
         top, left, panel = row * self._size, column * self._size, self._image.display.panel
         rows, columns = min(self._size, panel.height - top), min(self._size, panel.width - left)
-        window = Window(top, left, rows, columns)
+        window = PixelWindow(left, top, columns, rows)
         return self._picture_codes(window) if layer == PICTURE else self._overlays[layer].codes(window.slices)
 
     def rgb(self, layer: str, column: int, row: int) -> bytes:
@@ -82,7 +82,7 @@ class Tiles:
         """A PNG file of a tile, without a colour space, so that nothing changes its codes; raises as :meth:`codes`."""
         return encode_png(self.codes(layer, column, row), text={}, srgb=False)
 
-    def _picture_codes(self, window: Window) -> Codes:
+    def _picture_codes(self, window: PixelWindow) -> Codes:
         transfer = self._image.provenance.transfer
         if isinstance(self._image, IntegralImage):
             return quantize(self._image.pixels[window.slices], 8, transfer).astype(np.uint8)

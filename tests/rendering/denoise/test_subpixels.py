@@ -10,8 +10,8 @@ import pytest
 import lippmann
 from lippmann.color.transfer import encode_srgb
 from lippmann.display import Display, LensArray, Panel
+from lippmann.display.pixel_window import PixelWindow
 from lippmann.metrics.mse_psnr import psnr
-from lippmann.rendering.request.region_of_interest import PixelWindow
 from lippmann.rendering.request.settings import RenderSettings
 
 pytestmark = pytest.mark.usefixtures("engine")

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from lippmann.display import Display, LensArray, Panel
+from lippmann.display.pixel_window import PixelWindow
 from lippmann.rendering.film.feature_buffers import Guides
-from lippmann.rendering.request.region_of_interest import PixelWindow
 from lippmann.rendering.sharing.cross_lens import lens_numbers, lens_numbers_in_full_color, share_light
 
 RGB_STRIPE = ((-1 / 3, 0.0), (0.0, 0.0), (1 / 3, 0.0))

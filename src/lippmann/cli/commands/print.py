@@ -137,9 +137,9 @@ def pitch_test(
     quiet: options.Quiet = False,
 ) -> None:
     """Draw strips at slightly different print pitches: the one that stands still is the sheet's."""
-    from lippmann.calibration import Window
     from lippmann.calibration.pitch_strips import PitchTest
     from lippmann.codecs.tiff_strips import write_tiff_bands
+    from lippmann.display.pixel_window import PixelWindow
     from lippmann.runtime.atomic_write import check_writable, replacing
 
     console = Console(quiet, as_json)
@@ -163,7 +163,7 @@ def pitch_test(
         write_tiff_bands(
             temporary,
             (width, height),
-            lambda first, last: test.draw(Window(0, first, width, last - first)),
+            lambda first, last: test.draw(PixelWindow(0, first, width, last - first)),
             pixel_pitch=25.4 / sheet.ppi,
             progress=progress,
         )

@@ -25,9 +25,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.display import Display
+from lippmann.display.pixel_window import PixelWindow
 from lippmann.image.micro_images import lens_indices, row_blocks
 from lippmann.rendering.estimate.pixel_errors import ErrorSums, NoiseShares, PixelErrors, parts_with_pixels
-from lippmann.rendering.request.region_of_interest import PixelWindow
 from lippmann.rendering.request.settings import RenderSettings
 
 Real = NDArray[np.float64]
@@ -132,8 +132,7 @@ class Parts:
         owner = lens_indices(display)
         if window is None:
             return cls(owner, grid.rows, grid.columns)
-        left, top, width, height = window
-        inside = owner[top : top + height, left : left + width]
+        inside = owner[window.slices]
         whole, part = (np.bincount(each.ravel(), minlength=grid.rows * grid.columns) for each in (owner, inside))
         return cls(inside, grid.rows, grid.columns, whole - part)
 

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from lippmann.color.transfer import Transfer
 from lippmann.device.sobol import PIXEL_DIMENSION, SampleStream
-from lippmann.display.pixel_window import Window
+from lippmann.display.pixel_window import PixelWindow
 from lippmann.errors import MemoryLimitError, UsageError
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.rendering.estimate.jackknife import error_of_batches
@@ -98,7 +98,7 @@ class FullInBatches:
         box_filter: bool = True,
         transfer: Transfer = "srgb",
         memory: int,
-        window: Window | None = None,
+        window: PixelWindow | None = None,
     ) -> None:
         self._integrator = integrator
         self._source = source
@@ -108,9 +108,9 @@ class FullInBatches:
         self.rays = RayTotals()
         self.seconds_compile = 0.0
         self.seconds_trace = 0.0
-        self._window = window or Window(0, 0, source.height, source.width)
+        self._window = window or PixelWindow(0, 0, source.width, source.height)
         self._shape = self._window.shape
-        pixels = self._shape[0] * self._shape[1]
+        pixels = self._window.pixels
         batches, self._lanes = _sizes(pixels, source.channels, memory)
         self._sums = np.zeros((batches, pixels, 3), dtype=np.float32)
         self._taken = [0] * batches
@@ -265,9 +265,9 @@ class FullInBatches:
         rest, place = divide(rest, dr.opaque(mi.UInt32, number))
         pixel, channel = divide(rest, channels)
         pixel = dr.opaque(mi.UInt32, run.first) + pixel * dr.opaque(mi.UInt32, run.step)
-        row, column = divide(pixel, window.columns)
-        row += dr.opaque(mi.UInt32, window.row)
-        column += dr.opaque(mi.UInt32, window.column)
+        row, column = divide(pixel, window.width)
+        row += dr.opaque(mi.UInt32, window.top)
+        column += dr.opaque(mi.UInt32, window.left)
         pixel = pixel_number(self._source, column, row)
         sample += dr.gather(mi.UInt32, _table(run.starts), place)
         stream_of = dr.gather(mi.UInt32, _table([batch // per_stream for batch in run.batches]), place)
@@ -321,7 +321,7 @@ def trace_in_batches(
             box_filter=box_filter,
             transfer=transfer,
             memory=left,
-            window=Window(first, 0, last - first, width),
+            window=PixelWindow(0, first, width, last - first),
         )
         band.add(samples, _of_band(progress, first / height, (last - first) / height, samples * height * width))
         whole[first:last] = band.picture()

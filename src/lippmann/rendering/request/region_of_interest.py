@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import itertools
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.display import Display
+from lippmann.display.pixel_window import PixelWindow
 from lippmann.display.view_cone import cone_tangent
 from lippmann.rendering.request.settings import RenderSettings
 from lippmann.scene.values.description import Color
@@ -24,15 +25,6 @@ _SHOW_BACKGROUND = ("path", "direct")
 _MARGIN = 8
 #: A window of more than this share of the view saves nothing.
 _WORTH = 0.9
-
-
-class PixelWindow(NamedTuple):
-    """The rectangle of pixels that is traced, from its top left corner."""
-
-    left: int
-    top: int
-    width: int
-    height: int
 
 
 def even_background(built: BuiltScene | BuiltClassic, settings: RenderSettings) -> Color | None:
@@ -102,7 +94,7 @@ def _window(
     left, right = _span(columns, size[0], margin)
     top, bottom = _span(rows, size[1], margin)
     window = PixelWindow(left, top, right - left, bottom - top)
-    return window if window.width * window.height < _WORTH * size[0] * size[1] else None
+    return window if window.pixels < _WORTH * size[0] * size[1] else None
 
 
 def _span(places: NDArray[np.float64], count: int, margin: int) -> tuple[int, int]:

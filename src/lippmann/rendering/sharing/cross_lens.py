@@ -19,12 +19,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.display import Display
+from lippmann.display.pixel_window import PixelWindow
 from lippmann.rendering.sharing.cross_lens_kernel import share_rows
 from lippmann.runtime.row_threads import Bands
 
 if TYPE_CHECKING:
     from lippmann.rendering.film.feature_buffers import Guides
-    from lippmann.rendering.request.region_of_interest import PixelWindow
 
 Floats = NDArray[np.float32]
 
@@ -91,11 +91,12 @@ def share_light(
 def lens_numbers(display: Display, window: PixelWindow | None = None, *, subpixels: bool = False) -> NDArray[np.int32]:
     """``(1, H, W)`` number of the lens of every pixel, lenses counted row by row; ``(3, H, W)`` of every sub-pixel."""
     panel, grid = display.panel, display.lens_grid
-    left, top, columns, rows = window or (0, 0, panel.width, panel.height)
-    result = np.empty((3 if subpixels else 1, rows, columns), dtype=np.int32)
-    for first in range(0, rows, _BLOCK):
-        last = min(first + _BLOCK, rows)
-        v, u = (index + 0.5 for index in np.mgrid[top + first : top + last, left : left + columns].astype(np.float64))
+    window = window or PixelWindow(0, 0, panel.width, panel.height)
+    result = np.empty((3 if subpixels else 1, *window.shape), dtype=np.int32)
+    for first in range(0, window.height, _BLOCK):
+        last = min(first + _BLOCK, window.height)
+        band = slice(window.top + first, window.top + last)
+        v, u = (index + 0.5 for index in np.mgrid[band, window.columns].astype(np.float64))
         for channel, part in enumerate(result):
             x, y = display.subpixel_point(u, v, np.full_like(u, channel)) if subpixels else display.panel_point(u, v)
             i, j = display.lens_of(x, y)

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from lippmann.device.drjit_ops import DEVICE
 from lippmann.display import Display
+from lippmann.display.pixel_window import PixelWindow
 from lippmann.display.view_cone import cone_tangent
-from lippmann.rendering.request.region_of_interest import PixelWindow
 from lippmann.scene.values.description import Camera
 
 Matrix = NDArray[np.float64]
@@ -188,14 +188,14 @@ class QuiltRays:
 
     def rays(self, column: Any, row: Any, channel: Any, jitter: Any) -> Any:
         del channel
-        left, top, width, height = self.window
+        width, height = self.window.width, self.window.height
         right, above = column // width, self.rows - 1 - row // height
         view = mi.Float64(above * self.columns + right)
         panel_width, panel_height = self.display.size_mm
         u = mi.Float64(column - right * width) + mi.Float64(jitter.x)
         v = mi.Float64(row - row // height * height) + mi.Float64(jitter.y)
-        x = ((left + u) / self.view_size[0] - 0.5) * panel_width
-        y = (0.5 - (top + v) / self.view_size[1]) * panel_height
+        x = ((self.window.left + u) / self.view_size[0] - 0.5) * panel_width
+        y = (0.5 - (self.window.top + v) / self.view_size[1]) * panel_height
         convergence = 1 / self.display.viewing_distance
         side = ((2 * view + 1) / self.views - 1) * cone_tangent(self.display)
         slope_x, slope_y = x * convergence - side, y * convergence
