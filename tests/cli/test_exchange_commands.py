@@ -23,7 +23,7 @@ def test_there_and_back(lippmann, picture, tmp_path, layout):
         "views": [8, 1],
         "size": [64, 512],
         "stored": "uint8",
-        "notes": ["there is no ground truth in it: render with --layers for one"] if layout == "hci" else [],
+        "notes": ["no ground truth is written: the picture has no layer depth (render with layers)"] if layout == "hci" else [],
     }
     again = lippmann("import", path, "-o", tmp_path / "again.png", "--json", "-q")
     assert again.json["display"] == "seed-lenticular"
@@ -35,7 +35,7 @@ def test_there_and_back(lippmann, picture, tmp_path, layout):
 def test_remarks_and_results_are_told(lippmann, picture, tmp_path):
     done = lippmann("export", picture, "--as", "hci", "-o", tmp_path / "out", "--bits", "16", "--distance", "900")
     assert done.out == f"{tmp_path / 'out'}: 8x1 views of 64x512 pixels, uint16\n"
-    assert "no ground truth in it" in done.err
+    assert "no ground truth is written" in done.err
     again = lippmann("import", tmp_path / "out", "-o", tmp_path / "x.png", "--bits", "16")
     assert again.out == f"{tmp_path / 'x.png'}: 512x512 pixels for seed-lenticular\n"
 
@@ -46,7 +46,7 @@ def test_another_program_s_views_on_a_display_that_is_asked_for(lippmann, tmp_pa
         Image.new("RGB", (34, 34), (number, 0, 9)).save(tmp_path / "theirs" / f"{number:03}.png")
     refused = lippmann("import", tmp_path / "theirs", "-o", tmp_path / "x.png", "-q")
     assert (refused.code, refused.err.count("\n")) == (2, 1)
-    assert "there is no telling how many views make a row" in refused.err
+    assert "the number of views in a row is unknown" in refused.err
     assert lippmann("import", tmp_path / "theirs", "-d", "mla-square", "-o", tmp_path / "x.png", "-q").code == 0
     codes = np.asarray(Image.open(tmp_path / "x.png"))
     # Under each lens the first camera's pixel is the last one, at the lower right.

@@ -89,9 +89,12 @@ def test_wrong_and_half_files_are_refused(display, picture, tmp_path):
 
     assert "is not there" in refused()
     Image.new("RGB", (28, 30)).save(path)
-    assert "has 28 x 30 pixels; with 14 x 14 pixels a lens its sides are multiples of these; say --display" in refused()
+    assert (
+        "has 28 x 30 pixels; with 14 x 14 pixels per lens its sides must be multiples of these; say --display"
+        in refused()
+    )
     Image.new("L", (28, 28)).save(path)
-    assert "is no picture in colour" in refused()
+    assert "is not in colour" in refused()
     Image.new("RGB", (28, 28)).save(path, format="TIFF")
     assert "is a picture of the format tiff; ESLF is PNG" in refused()
     image = picture(display(), stored="uint8")
@@ -100,7 +103,7 @@ def test_wrong_and_half_files_are_refused(display, picture, tmp_path):
     path.write_bytes(whole[: len(whole) // 2])
     assert "this PNG is damaged" in refused()
     path.write_bytes(whole)
-    assert "has 12 x 9 pixels; with 5 x 3 pixels a lens" in refused(lens=(5, 3))
+    assert "has 12 x 9 pixels; with 5 x 3 pixels per lens" in refused(lens=(5, 3))
     with pytest.raises(PictureError, match="hexagonal lenses; ESLF takes"):
         write_eslf(light_field_of(picture(display("hexagonal")), "uint8"), display("hexagonal"), path)
     assert path.read_bytes() == whole

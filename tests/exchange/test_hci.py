@@ -112,7 +112,7 @@ def test_a_folder_of_the_benchmark_itself(display, picture, tmp_path):
     for path in (tmp_path / "hci").glob("gt_*_Cam*.pfm"):
         path.unlink()
     found = read_hci(tmp_path / "hci")
-    assert found.notes == ("the ground truth is that of one view only and is not taken along",)
+    assert found.notes == ("ground truth of a single view is left out",)
     shown = found.image()
     np.testing.assert_array_equal(shown.pixels, image.pixels)
     # Its cameras are those of the display it came from, so the display made of them has the same optics.
@@ -163,9 +163,9 @@ def resize(name):
         ),
         (
             lambda f: write_pfm(f / "gt_disp_lowres.pfm", np.full((3, 4), np.nan, np.float32)),
-            "gt_disp_lowres.pfm: holds values that are no numbers",
+            "gt_disp_lowres.pfm: holds NaN",
         ),
-        (damage("lippmann.json", b"{}"), "lippmann.json: what it says of its display makes no sense"),
+        (damage("lippmann.json", b"{}"), "lippmann.json: the JSON text that describes the display is damaged"),
         (damage("lippmann.json", b'{"lippmann": 1, "layout": "views"}'), "the layout is 'views'; it must be 'hci'"),
         (
             lambda f: [resize(f"input_Cam{n:03}.png")(f) for n in range(9)],

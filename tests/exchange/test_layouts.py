@@ -8,7 +8,7 @@ from PIL import Image
 
 from lippmann.errors import LippmannError, OutputError, PictureError, UsageError
 from lippmann.exchange import LAYOUTS, export_image, import_image
-from lippmann.exchange.layouts import recognized, stored_in
+from lippmann.exchange.layouts import recognize, stored_in
 from lippmann.exchange.light_field import light_field_of
 from lippmann.image import Provenance, write_micro_images, write_views
 
@@ -16,12 +16,12 @@ NAMES = {"hci": "x", "lftoolbox": "x.mat", "eslf": "x.png", "zarr": "x.zarr", "v
 
 
 @pytest.mark.parametrize("layout", LAYOUTS)
-def test_every_layout_is_recognized_and_comes_back(display, picture, same, tmp_path, layout):
+def test_every_layout_is_recognize_and_comes_back(display, picture, same, tmp_path, layout):
     image = picture(display(distance=300), stored="uint8", depth=True)
     path = tmp_path / NAMES[layout]
     done = export_image(image, path, layout)
     assert (done.stored, done.shape) == ("uint8", (3, 3, 3, 4))
-    assert recognized(path) == layout
+    assert recognize(path) == layout
     found, notes = import_image(path)
     same(found, image, maps=layout == "zarr")
     assert notes == ()
@@ -87,7 +87,7 @@ def test_what_is_not_meant_is_refused(display, picture, tmp_path):
     with pytest.raises(PictureError, match="is not there"):
         import_image(tmp_path / "no")
     (tmp_path / "x.dat").write_bytes(b"1")
-    with pytest.raises(PictureError, match="there is no telling which layout this is; say --as"):
+    with pytest.raises(PictureError, match="the layout is not recognized; say --as"):
         import_image(tmp_path / "x.dat")
 
 
@@ -103,7 +103,9 @@ def test_a_missing_library_is_named(display, picture, tmp_path, monkeypatch, lay
         return real(name, *rest)
 
     monkeypatch.setattr(importlib, "import_module", without)
-    with pytest.raises(UsageError, match=f'needs {library}, which is not installed; install it: pip install "lippmann'):
+    with pytest.raises(
+        UsageError, match=f'{library} is not installed; this layout needs it; install it: pip install "lippmann'
+    ):
         export_image(picture(display()), tmp_path / NAMES[layout], layout)
     assert not list(tmp_path.iterdir())
 

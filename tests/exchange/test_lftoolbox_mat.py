@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import h5py
 import numpy as np
 import pytest
@@ -204,8 +206,8 @@ def test_no_other_file_is_read(tmp_path, hdf5, store, name):
         store(file, name, tmp_path)
 
     line = refused(hdf5(write))
-    assert f"{name} is " in line
-    assert "a variable lies in the file itself" in line
+    assert re.search(f"{name} (is a link|lies in another file)", line)
+    assert "variables must be in the file itself" in line
     assert "secret" not in line
 
 
@@ -226,8 +228,8 @@ def test_filters_that_would_be_loaded_are_refused(hdf5, number, name):
         with_filter(file, name, number)
 
     line = refused(hdf5(write))
-    assert f"{name} is packed by the HDF5 filter {number}" in line
-    assert "read are deflate, shuffle, fletcher32, lzf" in line
+    assert f"{name} is compressed by the HDF5 filter {number}" in line
+    assert "accepted are deflate, shuffle, fletcher32, lzf" in line
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,14 @@ from hypothesis import strategies as st
 
 from lippmann.errors import PictureError
 from lippmann.exchange.cameras import Cameras
-from lippmann.exchange.light_field import LightField, check_rectangular, light_field_of, view_shape
+from lippmann.exchange.light_field import (
+    LightField,
+    check_rectangular,
+    decode_weights,
+    encode_weights,
+    light_field_of,
+    view_shape,
+)
 from lippmann.image import IntegralImage
 from lippmann.viewing.replay import eye_of_view
 
@@ -104,3 +111,21 @@ def test_only_rows_and_columns_of_whole_lenses_are_rectangular(display):
     ):
         with pytest.raises(PictureError, match=what):
             check_rectangular(made, "it")
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16])
+def test_every_code_of_a_weight_comes_back(dtype):
+    codes = np.arange(np.iinfo(dtype).max + 1, dtype=dtype)
+    shares = decode_weights(codes)
+    assert shares.dtype == np.float32
+    assert (shares.min(), shares.max()) == (0, 1)
+    np.testing.assert_array_equal(encode_weights(shares, np.dtype(dtype)), codes)
+
+
+def test_float_weights_stay():
+    values = np.array([0, 0.1, 1, 7], dtype=np.float32)
+    np.testing.assert_array_equal(encode_weights(decode_weights(values), np.dtype(np.float32)), values)
+
+
+def test_weights_are_clipped():
+    assert encode_weights(np.array([-1.0, 2.0], np.float32), np.dtype(np.uint8)).tolist() == [0, 255]

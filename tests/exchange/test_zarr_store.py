@@ -109,10 +109,10 @@ def test_half_and_wrong_stores_are_refused(display, picture, tmp_path):
 
     written()
     (folder / "LF" / "0.0.1.0.0").unlink()
-    assert "LF: 1 of its 3 chunks are absent, the first 0.0.1.0.0" in refused()
+    assert "LF: 1 of its 3 chunks are missing, the first 0.0.1.0.0" in refused()
     written()
     (folder / "maps" / "depth" / "0.0.0.0").unlink()
-    assert "maps/depth: 1 of its 3 chunks are absent" in refused()
+    assert "maps/depth: 1 of its 3 chunks are missing" in refused()
     written()
     (folder / "LF" / "0.0.1.0.0").write_bytes(b"nonsense")
     assert "LF: is damaged" in refused()

@@ -1,4 +1,4 @@
-"""Light fields in other tools' layouts: the folders of the 4D Light Field Benchmark, LFToolbox, ESLF, Zarr, views."""
+"""Light fields in the layouts of other tools: 4D Light Field Benchmark, LFToolbox, ESLF, Zarr, folders of views."""
 
 from lippmann.exchange.cameras import Cameras
 from lippmann.exchange.layouts import LAYOUTS, Exported, export_image, import_image

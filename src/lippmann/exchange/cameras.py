@@ -1,21 +1,22 @@
-"""The cameras whose pictures the views of a display are, and how far things move from one to the next.
+"""The camera grid that is equivalent to a display's views, and the disparity between neighbouring cameras.
 
-Seen from the viewing distance D every lens (pitch p) is a pixel of a pinhole camera that looks at the lens plane, and
-every pixel (size d) under the lenses is one camera, ``B = d D / g`` beside its neighbour (g is the gap). All look
-straight ahead, their frames shifted so that they coincide in the lens plane, the focus plane, at the distance F = D.
+The views of a display are the pictures of pinhole cameras at the viewing distance D. A lens (pitch p) is one pixel of a
+camera; a pixel under the lenses (size d) is one camera, at the baseline ``B = d D / g`` from its neighbour (g is the
+gap). All cameras look straight ahead. Their image planes are shifted so that the frames coincide in the lens plane, the
+focus plane, at the distance F = D.
 
-A point at the distance Z along the axis moves from view to view, in pixels, by the disparity of the 4D Light Field
-Benchmark (K. Honauer et al., A Dataset and Evaluation Methodology for Depth Estimation on 4D Light Fields, 2016)
+A point at the distance Z along the axis moves from view to view by the disparity, in pixels, of the 4D Light Field
+Benchmark (K. Honauer et al., A Dataset and Evaluation Methodology for Depth Estimation on 4D Light Fields, 2016):
 
     disparity = (B f F R / Z - B f R) / (F S) = B / p (F / Z - 1)
 
-for a focal length f and a sensor of the size S with R pixels, since a pixel covers ``p = F S / (f R)`` of the focus
-plane. It is positive for what is nearer than that plane: in the view of the next camera to the right it stands so much
-further left, in that of the next camera below so much higher.
+Here f is the focal length and S the size of a sensor with R pixels; a pixel covers ``p = F S / (f R)`` of the focus
+plane. The disparity of a point nearer than the focus plane is positive: the next camera to the right sees the point so
+much further left, the next camera below so much higher.
 
-Parallel views (D infinite) have no cameras at any distance. A stand-in distance F then gives cameras that see the same
-pictures of a space that is squeezed along the axis: height z over the lens plane becomes ``z F / (F + z)``. So
-disparities stay exact, ``d z / (g p)``, and depths are true to the first order in z / F.
+Parallel views (D infinite) are equivalent to no camera at a finite distance. Stand-in cameras at a distance F see the
+same pictures of a scene that is compressed along the axis: the height z over the lens plane becomes ``z F / (F + z)``.
+Disparities are exact, ``d z / (g p)``; depths are exact to first order in z / F.
 """
 
 from __future__ import annotations
@@ -32,32 +33,32 @@ from lippmann.image.views import view_grid
 
 Real = NDArray[np.float64]
 
-#: How many times the depth that a display of parallel views resolves its stand-in cameras are away: within that depth
-#: the squeezed space is true to 1 %.
+#: Distance of stand-in cameras over the depth that a display of parallel views resolves: within that depth the error
+#: of the compressed depth is at most 1 %.
 STAND_IN = 100.0
 
-#: Focus distance over distance below which a disparity of 32 bits is that of infinity.
+#: Focus distance over distance below which a float32 disparity cannot be told from that of infinity.
 _INFINITE = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
 class Cameras:
-    """A grid of equal pinhole cameras; lengths in millimetres.
+    """A grid of equal pinhole cameras with parallel axes; lengths in millimetres.
 
     Parameters
     ----------
     baseline:
         Distance between neighbouring cameras.
     focus_distance:
-        From the cameras to the plane where their frames coincide.
+        Distance from the cameras to the focus plane, in which their frames coincide.
     pixel_pitch:
-        Size of a pixel in that plane, across.
+        Width of a pixel in the focus plane.
     parallel:
-        Whether they stand in for parallel views.
+        Whether these are stand-in cameras of parallel views.
     center:
-        Place ``(x, y)`` of the middle of the grid in the display frame.
+        Position ``(x, y)`` of the centre of the grid in the display frame.
     world_from_display:
-        ``(4, 4)`` placement of the display frame whose lens plane is the focus plane.
+        ``(4, 4)`` similarity from the display frame, whose lens plane is the focus plane, to the world.
     """
 
     baseline: float
@@ -70,45 +71,45 @@ class Cameras:
     # ---- Disparity and depth --------------------------------------------------------------------------------------
 
     def disparity(self, axial_depth: Real) -> Real:
-        """Disparity in pixels of points at these distances (mm, infinity allowed) along the axis."""
+        """Disparity in pixels per view of points at ``axial_depth`` (mm along the axis, may be infinite)."""
         return self.baseline / self.pixel_pitch * (self.focus_distance / axial_depth - 1.0)
 
     def disparity_of_height(self, z: Real) -> Real:
-        """Disparity of points at the height ``z`` (mm) over the lens plane; of infinity where z is minus infinity."""
-        seen = np.isfinite(z)
-        height = np.where(seen, z, 0.0)
+        """Disparity in pixels per view of points at the height ``z`` (mm, may be -inf) over the lens plane."""
+        is_finite = np.isfinite(z)
+        height = np.where(is_finite, z, 0.0)
         share = height / (self.focus_distance - (0.0 if self.parallel else height))
-        return self.baseline / self.pixel_pitch * np.where(seen, share, -1.0)
+        return self.baseline / self.pixel_pitch * np.where(is_finite, share, -1.0)
 
     def depth_of_disparity(self, disparity: Real) -> Real:
-        """The inverse of :meth:`disparity`; what that cannot tell from infinity, or lies beyond, is infinitely far."""
+        """Distance in mm along the axis of points with this disparity; infinite where float32 cannot resolve it."""
         share = disparity * (self.pixel_pitch / self.baseline) + 1.0
         is_near = share > _INFINITE
         return np.where(is_near, self.focus_distance / np.where(is_near, share, 1.0), np.inf)
 
     def axial_depth(self, z: Real) -> Real:
-        """Distance from the cameras, along the axis, of points at the height ``z`` over the lens plane; both in mm.
+        """Distance in mm from the cameras, along the axis, of points at the height ``z`` (mm) over the lens plane.
 
-        Minus infinity, where nothing is seen, becomes infinity.
+        A height of minus infinity, where a ray meets nothing, becomes an infinite distance.
 
         Raises
         ------
         PictureError
-            If stand-in cameras are too near to see a point: one that far behind the lens plane would lie beyond
-            infinity in their space.
+            If a point lies behind the lens plane by the distance of stand-in cameras or more: its compressed depth
+            would lie beyond infinity.
         """
-        seen = np.isfinite(z)
-        height = np.where(seen, z, 0.0)
+        is_finite = np.isfinite(z)
+        height = np.where(is_finite, z, 0.0)
         if not self.parallel:
-            return np.where(seen, self.focus_distance - height, np.inf)
+            return np.where(is_finite, self.focus_distance - height, np.inf)
         lowest = float(height.min(initial=0.0))
         if lowest <= -self.focus_distance:
-            rule = f"cameras at {self.focus_distance:g} mm that stand for parallel views show what is nearer than that"
+            rule = f"stand-in cameras at {self.focus_distance:g} mm show depths up to that distance"
             raise PictureError(f"a surface lies {-lowest:g} mm behind the lens plane", rule=rule, fix="say --distance")
-        return np.where(seen, self.focus_distance**2 / (self.focus_distance + height), np.inf)
+        return np.where(is_finite, self.focus_distance**2 / (self.focus_distance + height), np.inf)
 
     def height(self, axial_depth: Real) -> Real:
-        """The inverse of :meth:`axial_depth`."""
+        """Height in mm over the lens plane of points at ``axial_depth`` (mm); the inverse of :meth:`axial_depth`."""
         if not self.parallel:
             return self.focus_distance - axial_depth
         return np.where(np.isinf(axial_depth), -np.inf, self.focus_distance**2 / axial_depth - self.focus_distance)
@@ -117,15 +118,20 @@ class Cameras:
 
     @staticmethod
     def of_display(display: Display, distance: float | None = None) -> Cameras:
-        """The cameras of a display's views.
+        """The cameras that are equivalent to a display's views.
 
-        ``distance`` (mm) says where stand-in cameras of parallel views are; by default at 100 times the depth that the
-        display resolves.
+        Parameters
+        ----------
+        display:
+            The display.
+        distance:
+            For parallel views only: distance of the stand-in cameras from the lens plane, in mm. None: 100 times the
+            depth that the display resolves behind the lens plane.
 
         Raises
         ------
         UsageError
-            If a distance is given where the display has a viewing distance of its own, or it is not above zero.
+            If ``distance`` is not positive, or the display has a finite viewing distance.
         """
         parallel = math.isinf(display.viewing_distance)
         if distance is not None and not parallel:
@@ -142,19 +148,28 @@ class Cameras:
         return Cameras(baseline, focus, display.lattice.pitch, parallel, middle)
 
     def display(self, views: int, width: int, height: int, *, where: str = "") -> Display:
-        """The square micro-lens array whose lenses show ``views`` x ``views`` such cameras, each of these pixels.
+        """The square micro-lens array whose views are ``views`` x ``views`` of these cameras.
 
-        One lens per pixel: ``p`` wide, with the gap ``g = p F / (views B - p)``.
+        One lens per pixel of a camera: pitch p, gap ``g = p F / (views B - p)``.
+
+        Parameters
+        ----------
+        views:
+            Cameras across, and down.
+        width, height:
+            Pixels of each camera.
+        where:
+            The file that describes the cameras, for messages.
 
         Raises
         ------
         PictureError
-            If the cameras are so near to each other that the gap would not be above zero.
+            If the baseline is so small that the gap would not be positive.
         """
         spread = views * self.baseline - self.pixel_pitch
         if spread <= 0:
-            rule = f"they must span more than a pixel of the focus plane, {self.pixel_pitch:g} mm"
-            what = f"{views} cameras {self.baseline:g} mm apart make no display"
+            rule = f"they must span more than one pixel of the focus plane, {self.pixel_pitch:g} mm"
+            what = f"{views} cameras with the baseline {self.baseline:g} mm span {views * self.baseline:g} mm"
             raise PictureError(what, where=where, rule=rule, fix="say --display")
         gap = self.pixel_pitch * self.focus_distance / spread
         pixel_pitch = gap * self.baseline / self.focus_distance
@@ -165,6 +180,6 @@ class Cameras:
             lens_array=LensArray("square", self.pixel_pitch),
             gap=gap,
             viewing_distance=self.focus_distance,
-            # The cameras see all that is in front of them; the aperture has to be in front of the viewer.
+            # The cameras see everything in front of them, but the aperture has to lie between them and the display.
             aperture_distance=math.nextafter(self.focus_distance, 0.0),
         )

@@ -1,9 +1,9 @@
-"""ESLF: one PNG of all micro-images side by side, as light fields of lenslet cameras are passed on.
+"""ESLF: one PNG of all micro-images side by side, the usual format of lenslet cameras' light fields.
 
-The pixel ``(t, s)`` under lens ``(v, u)`` lies in row ``v T + t`` and column ``u S + s``; ``t`` and ``s`` count the
-views from the top left. So it is the native picture of a display of such lenses with every micro-image turned about its
-centre: a display shows the right end of a lens to the left. An alpha channel, where there is one, is the weight of each
-value. The file does not say how many pixels lie under a lens; by custom 14 x 14.
+The pixel ``(t, s)`` under lens ``(v, u)`` is in row ``v T + t`` and column ``u S + s``; ``t`` and ``s`` count the views
+from the top left. This is the native picture of a display of such lenses with every micro-image turned by 180 degrees,
+since a display sends the light of a lens's right-most pixel to the left. An alpha channel holds the weight of each
+value. The file does not hold the number of pixels under a lens; 14 x 14 is customary.
 """
 
 from __future__ import annotations
@@ -17,30 +17,48 @@ from numpy.typing import NDArray
 from lippmann.codecs.png import encode_png, read_png, read_png_header
 from lippmann.display import Display
 from lippmann.errors import PictureError
-from lippmann.exchange.light_field import WEIGHT, LightField, check_rectangular, check_shape, view_shape
+from lippmann.exchange.light_field import (
+    WEIGHT,
+    LightField,
+    check_rectangular,
+    check_shape,
+    decode_weights,
+    encode_weights,
+    view_shape,
+)
 from lippmann.exchange.metadata_text import TEXT_KEY, from_note, to_note
-from lippmann.exchange.weights import weight_codes, weights
 from lippmann.image.encoding import read_header
 from lippmann.runtime.atomic_write import replacing
 
 LAYOUT = "eslf"
 
-#: Pixels under a lens, across and down, where nothing says otherwise.
+#: Customary number of pixels under a lens, across and down.
 LENS = (14, 14)
 
 
 def write_eslf(light_field: LightField, display: Display, path: Path) -> None:
-    """Write codes of 8 or 16 bits as one PNG; a map ``weight`` becomes its alpha channel.
+    """Write a light field as one PNG of micro-images.
+
+    Parameters
+    ----------
+    light_field:
+        Codes of 8 or 16 bits. A map ``weight`` becomes the alpha channel.
+    display:
+        The display whose views these are.
+    path:
+        The file; appears whole or not at all.
 
     Raises
     ------
-    PictureError, OutputError
-        If the display's lenses do not stand in rows and columns of whole pixels, or the file cannot be written.
+    PictureError
+        If the display's lenses are not in rows and columns of whole pixels.
+    OutputError
+        If the file cannot be written.
     """
     check_rectangular(display, "ESLF")
-    values = light_field.values
+    values: NDArray[Any] = light_field.values
     if light_field.weight is not None:
-        values = np.concatenate([values, weight_codes(light_field.weight, values.dtype)[..., None]], axis=-1)
+        values = np.concatenate([values, encode_weights(light_field.weight, values.dtype)[..., None]], axis=-1)
     down, across, height, width, channels = values.shape
     picture = values.transpose(2, 0, 3, 1, 4).reshape(height * down, width * across, channels)
     text = {TEXT_KEY: note} if (note := to_note(light_field.metadata, LAYOUT)) else {}
@@ -49,21 +67,25 @@ def write_eslf(light_field: LightField, display: Display, path: Path) -> None:
 
 
 def read_eslf(path: Path, *, lens: tuple[int, int] | None = None) -> LightField:
-    """Read a PNG of micro-images.
+    """Read a light field from one PNG of micro-images.
 
-    ``lens`` says how many pixels lie under a lens, across and down; by default as the file's own display has them, else
-    14 x 14.
+    Parameters
+    ----------
+    path:
+        The file.
+    lens:
+        Pixels under a lens, across and down. None: those of the display that the file names, else 14 x 14.
 
     Raises
     ------
     PictureError
-        If the file is missing, damaged, no PNG in colour, or not made of such micro-images.
+        If the file is missing, damaged or no PNG in colour, or its sides are no multiples of ``lens``.
     """
     header = read_header(path)
     if header.format != "png":
         raise PictureError(f"is a picture of the format {header.format}", where=str(path), rule="ESLF is PNG")
     if header.text:
-        rule = "in ESLF every micro-image is turned about its centre"
+        rule = "in ESLF every micro-image is turned by 180 degrees"
         raise PictureError("is the native picture of a display", where=str(path), rule=rule)
     note = read_png_header(path).text.get(TEXT_KEY, "")
     metadata = from_note(note, LAYOUT, str(path))
@@ -71,14 +93,14 @@ def read_eslf(path: Path, *, lens: tuple[int, int] | None = None) -> LightField:
     if lens is None and metadata is not None:
         down, across = view_shape(metadata.display)[:2]
     if header.width % across or header.height % down:
-        rule = f"with {across} x {down} pixels a lens its sides are multiples of these"
+        rule = f"with {across} x {down} pixels per lens its sides must be multiples of these"
         what = f"has {header.width} x {header.height} pixels"
         raise PictureError(what, where=str(path), rule=rule, fix="say --display, with the lenses it has")
     shape = (down, across, header.height // down, header.width // across)
     check_shape((*shape, 3), str(path))
     codes = read_png(path)
     if codes.ndim != 3 or codes.shape[2] not in (3, 4):
-        raise PictureError("is no picture in colour", where=str(path), rule="ESLF is RGB, or RGB and a weight")
+        raise PictureError("is not in colour", where=str(path), rule="ESLF is RGB, or RGB and a weight")
     values: NDArray[Any] = codes.reshape(shape[2], down, shape[3], across, codes.shape[2]).transpose(1, 3, 0, 2, 4)
-    maps = {} if values.shape[4] == 3 else {WEIGHT: weights(values[..., 3])}
+    maps = {} if values.shape[4] == 3 else {WEIGHT: decode_weights(values[..., 3])}
     return LightField(values[..., :3], metadata, maps)

@@ -1,10 +1,12 @@
 """Folders of the 4D Light Field Benchmark (version 2): one PNG per view, ground truth, and the cameras' parameters.
 
-``input_Cam000.png`` is the view from the top left, the others follow row by row. ``gt_depth_lowres.pfm`` (metres along
-the axis) and ``gt_disp_lowres.pfm`` (pixels from view to view) belong to the view in the middle, or, of an even number,
-to the one after the middle; ``..._highres`` to the same view, ``depth_map_scale`` times finer, here 1; and
-``..._lowres_Cam000.pfm`` and so on to every view, as in the benchmark's own "all views". See
-:mod:`lippmann.exchange.cameras` for what they mean.
+``input_Cam000.png`` is the top left view; the others follow row by row. Ground truth is depth along the axis in metres
+(``gt_depth_...pfm``) and disparity in pixels per view (``gt_disp_...pfm``), defined in
+:mod:`lippmann.exchange.cameras`:
+
+- ``..._lowres`` and ``..._highres``: the middle view (with an even number of views the one after the middle). The
+  second has ``depth_map_scale`` times the resolution of the first, here 1.
+- ``..._lowres_Cam000`` and so on: every view, as in the benchmark's set "all views".
 """
 
 from __future__ import annotations
@@ -24,7 +26,7 @@ from lippmann.exchange.cameras import Cameras
 from lippmann.exchange.hci_parameters import NAME, Parameters, read_parameters, write_parameters
 from lippmann.exchange.light_field import DEPTH, LightField, check_rectangular, check_shape
 from lippmann.exchange.metadata_text import read_note_file, write_note_file
-from lippmann.exchange.view_files import read_view_files, write_view
+from lippmann.exchange.view_folder import read_view_files, write_view
 from lippmann.image import Provenance
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.runtime.atomic_write import replacing_folder
@@ -43,38 +45,45 @@ def write_hci(
     distance: float | None = None,
     progress: ProgressCallback = silent,
 ) -> None:
-    """Write a folder of the benchmark.
+    """Write a folder in the layout of the benchmark.
 
     Parameters
     ----------
     light_field:
-        Codes of 8 or 16 bits; its map ``depth``, if it has one, becomes the ground truth.
+        Codes of 8 or 16 bits. A map ``depth`` becomes the ground truth.
     display:
         The display whose views these are.
     folder:
         The folder; appears whole or not at all.
     distance:
-        Distance of the stand-in cameras of parallel views, see :meth:`Cameras.of_display`.
+        For parallel views only: distance of the stand-in cameras from the lens plane, in mm. None: 100 times the depth
+        range that the display resolves.
+    progress:
+        Called after every view.
 
     Raises
     ------
-    UsageError, PictureError, OutputError
-        If the distance will not do, the display's views are not what a grid of cameras sees, a surface lies beyond what
-        stand-in cameras see, or the folder cannot be written.
+    UsageError
+        If ``distance`` is not positive, or the views are not parallel.
+    PictureError
+        If the display's views are not those of a rectangular grid of cameras, or a surface lies so far behind the lens
+        plane that stand-in cameras cannot show it.
+    OutputError
+        If the folder cannot be written.
     """
     check_rectangular(display, "the benchmark's layout")
     cameras = Cameras.of_display(display, distance)
     truth = None
     if DEPTH in light_field.maps:
-        truth = _Truth.of(cameras, _seen(light_field.maps[DEPTH], light_field.mask))
+        truth = _Truth.of(cameras, _heights(light_field.maps[DEPTH], light_field.mask))
     down, across, height, width = light_field.shape
     with replacing_folder(folder) as temporary:
         for number in range(down * across):
-            at = divmod(number, across)
+            view = divmod(number, across)
             name = f"input_Cam{number:03}.png"
-            write_view(temporary / name, "png", light_field.values[at], light_field.transfer)
+            write_view(temporary / name, "png", light_field.values[view], light_field.transfer)
             if truth is not None:
-                truth.write(temporary, at, f"lowres_Cam{number:03}")
+                truth.write(temporary, view, f"lowres_Cam{number:03}")
             progress(Progress("write", number + 1, down * across))
         disparities = None
         if truth is not None:
@@ -88,15 +97,15 @@ def write_hci(
 
 
 def read_hci(folder: Path, *, progress: ProgressCallback = silent) -> LightField:
-    """Read a folder of the benchmark.
+    """Read a folder in the layout of the benchmark.
 
-    Every view has to be there, of the size that the parameters say. Ground truth of all views becomes the map
-    ``depth``; that of the middle alone is checked and left, as the notes say then.
+    Ground truth of all views becomes the map ``depth``. Ground truth of the middle view alone is checked but not
+    returned; a note says so.
 
     Raises
     ------
     PictureError
-        If a file is missing or damaged, or sizes and numbers disagree; names the file.
+        If a file is missing or damaged, or views differ from the parameters in number or size.
     """
     parameters = read_parameters(folder / NAME)
     shape = (parameters.down, parameters.across, parameters.height, parameters.width)
@@ -114,7 +123,7 @@ def read_hci(folder: Path, *, progress: ProgressCallback = silent) -> LightField
     depth, notes = _read_truth(folder, parameters)
     maps = {}
     if depth is not None:
-        with np.errstate(all="ignore"):  # what is too far for a number is infinitely far
+        with np.errstate(all="ignore"):  # an overflow is infinitely far
             maps[DEPTH] = cameras.height(depth.astype(np.float64)).astype(np.float32)
     return LightField(values, metadata, maps, cameras, notes=notes)
 
@@ -123,9 +132,9 @@ def read_hci(folder: Path, *, progress: ProgressCallback = silent) -> LightField
 
 
 def _view_names(folder: Path, parameters: Parameters) -> list[list[str]]:
-    """The files of the views in rows; refuses views beyond those that the parameters speak of."""
+    """File names of the views in rows; a file beyond them raises :class:`PictureError`."""
     count = parameters.across * parameters.down
-    numbers = [int(found[1]) for path in folder.iterdir() if (found := _VIEW.fullmatch(path.name))]
+    numbers = [int(match[1]) for path in folder.iterdir() if (match := _VIEW.fullmatch(path.name))]
     if beyond := [number for number in numbers if number >= count]:
         rule = f"{NAME} says {parameters.across} x {parameters.down} views"
         raise PictureError("is one view too many", where=str(folder / f"input_Cam{min(beyond):03}.png"), rule=rule)
@@ -136,8 +145,8 @@ def _view_names(folder: Path, parameters: Parameters) -> list[list[str]]:
 # ---- Ground truth --------------------------------------------------------------------------------------------------
 
 
-def _seen(depth: NDArray[Any], mask: NDArray[np.bool_] | None) -> NDArray[np.float64]:
-    """The heights, minus infinity where no pixel stands behind a value."""
+def _heights(depth: NDArray[Any], mask: NDArray[np.bool_] | None) -> NDArray[np.float64]:
+    """Heights over the lens plane in mm; minus infinity where no pixel belongs to a value."""
     return np.where(True if mask is None else mask, depth, -np.inf).astype(np.float64)
 
 
@@ -159,14 +168,14 @@ class _Truth:
 
 
 def _read_truth(folder: Path, parameters: Parameters) -> tuple[NDArray[np.float64] | None, tuple[str, ...]]:
-    """Distances along the axis in mm ``(t, s, v, u)``, if the folder has those of all views; notes on what it has."""
+    """Distances along the axis in mm ``(t, s, v, u)``, None unless the folder has those of all views; and notes."""
     count = parameters.across * parameters.down
     kinds = [kind for kind in ("depth", "disp") if any(folder.glob(f"gt_{kind}_lowres_Cam*.pfm"))]
     alone = [kind for kind in ("depth", "disp") if (folder / f"gt_{kind}_lowres.pfm").exists()]
     for kind in alone:
         _read_map(folder / f"gt_{kind}_lowres.pfm", parameters)
     if not kinds:
-        note = "the ground truth is that of one view only and is not taken along"
+        note = "ground truth of a single view is left out"
         return None, (note,) if alone else ()
     views = [_read_map(folder / f"gt_{kinds[0]}_lowres_Cam{number:03}.pfm", parameters) for number in range(count)]
     truth = np.stack(views).reshape(parameters.down, parameters.across, *views[0].shape).astype(np.float64)
@@ -179,14 +188,14 @@ def _read_map(path: Path, parameters: Parameters) -> NDArray[np.float32]:
         rule = f"{NAME} says {parameters.width} x {parameters.height}"
         raise PictureError(f"has {values.shape[1]} x {values.shape[0]} values", where=str(path), rule=rule)
     if np.isnan(values).any():
-        raise PictureError("holds values that are no numbers", where=str(path))
+        raise PictureError("holds NaN", where=str(path))
     return values
 
 
 def _meta(
     light_field: LightField, display: Display, cameras: Cameras, disparities: NDArray[np.float32] | None
-) -> dict[str, Any]:
-    """The section that describes the scene. Its range of disparities is the truth's, the frustum's what is resolved."""
+) -> dict[str, str | float]:
+    """The section ``meta``. Disparities range over the ground truth, else over the depth that the display resolves."""
     near, far = (float(cameras.disparity_of_height(np.array(z))) for z in display.depth_budget)
     lowest, highest = far, near
     if disparities is not None and disparities.size:

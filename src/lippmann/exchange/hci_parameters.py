@@ -1,7 +1,7 @@
 """``parameters.cfg`` of the 4D Light Field Benchmark: the cameras of a folder, as an INI file.
 
-Blender's conventions hold: metres, a camera without rotation looks along -z with +y up, rotations are Euler angles
-about x, then y, then z. So the display frame is that of a camera without rotation, with the lens plane at the focus
+The conventions are Blender's: metres; a camera without rotation looks along -z with +y up; rotations are Euler angles
+about x, then y, then z. The display frame is that of a camera without rotation, with the lens plane at the focus
 distance.
 """
 
@@ -12,7 +12,6 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,8 +21,8 @@ from lippmann.exchange.cameras import Cameras
 
 NAME = "parameters.cfg"
 
-#: Focal length (mm) and f-number written; of the first only its ratio to the sensor's size counts, and the benchmark's
-#: own scenes have these. Nothing is out of focus.
+#: Focal length in mm and f-number, those of the benchmark's own scenes. Only the ratio of the focal length to the
+#: sensor's size matters; all of the scene is in focus.
 _FOCAL_LENGTH, _FSTOP = 100.0, 100.0
 
 _COUNTS = {"intrinsics": ("image_resolution_x_px", "image_resolution_y_px"), "extrinsics": ("num_cams_x", "num_cams_y")}
@@ -38,13 +37,13 @@ _PLACES = (
 )
 _MOST_COUNT = 1 << 20
 
-#: The parser takes time by the square of a line's length.
+#: Limit on characters of a line: the parser's time is quadratic in them.
 _LONGEST_LINE = 1000
 
 
 @dataclass(frozen=True, eq=False)
 class Parameters:
-    """What the file says: pictures across and down, their width and height in pixels, and the cameras."""
+    """Number of views ``across`` and ``down``, their ``width`` and ``height`` in pixels, and their cameras."""
 
     across: int
     down: int
@@ -53,8 +52,8 @@ class Parameters:
     cameras: Cameras
 
 
-def write_parameters(path: Path, parameters: Parameters, meta: Mapping[str, Any]) -> None:
-    """Write the file; ``meta`` are values of its last section, beside those that the benchmark's readers expect."""
+def write_parameters(path: Path, parameters: Parameters, meta: Mapping[str, str | float]) -> None:
+    """Write ``parameters.cfg``; ``meta`` holds the values of its section ``meta``, which the benchmark's tools read."""
     cameras, larger = parameters.cameras, max(parameters.width, parameters.height)
     focus = cameras.focus_distance
     sensor = _FOCAL_LENGTH * larger * cameras.pixel_pitch / focus
@@ -85,18 +84,18 @@ def write_parameters(path: Path, parameters: Parameters, meta: Mapping[str, Any]
     }
     parser = configparser.ConfigParser(delimiters="=", interpolation=None)
     for section, values in sections.items():
-        parser[section] = {key: _written(value) for key, value in values.items()}
+        parser[section] = {key: _value_text(value) for key, value in values.items()}
     with path.open("w", encoding="utf-8") as file:
         parser.write(file)
 
 
 def read_parameters(path: Path) -> Parameters:
-    """Read the file.
+    """Read ``parameters.cfg``.
 
     Raises
     ------
     PictureError
-        If it is missing, no INI file, or a value that is needed is missing or impossible.
+        If the file is missing or no INI file, or a required value is missing or out of range.
     """
     parser = configparser.ConfigParser(delimiters="=", interpolation=None)
     try:
@@ -116,8 +115,8 @@ def read_parameters(path: Path) -> Parameters:
     focus = 1000 * lengths["focus_distance_m"]
     pixel_pitch = focus * lengths["sensor_size_mm"] / (lengths["focal_length_mm"] * max(width, height))
     if not (math.isfinite(focus) and 0 < pixel_pitch < math.inf):
-        rule = "the size of a pixel in the plane of focus follows from them"
-        raise PictureError("its lengths are absurdly large or small", where=str(path), rule=rule)
+        rule = "focus distance x sensor size / focal length must be a positive number"
+        raise PictureError("its lengths give no pixel size", where=str(path), rule=rule)
     place = [
         _number(parser, "extrinsics", key, path) if parser.has_option("extrinsics", key) else 0.0 for key in _PLACES
     ]
@@ -140,7 +139,7 @@ def _placement(place: list[float], focus: float) -> NDArray[np.float64]:
 def _number(parser: configparser.ConfigParser, section: str, key: str, path: Path) -> float:
     text = parser.get(section, key, fallback=None)
     if text is None:
-        raise PictureError(f"{key} is missing", where=f"{path} [{section}]", rule="the views cannot be placed without")
+        raise PictureError(f"{key} is missing", where=f"{path} [{section}]", rule="the cameras need it")
     try:
         value = float(text)
     except ValueError:
@@ -165,6 +164,6 @@ def _count(parser: configparser.ConfigParser, section: str, key: str, path: Path
     return int(value)
 
 
-def _written(value: Any) -> str:
-    # A line break would begin another key.
+def _value_text(value: str | float) -> str:
+    # A line break would start another key.
     return " ".join(str(value).split())

@@ -1,6 +1,6 @@
-"""Layouts by name: which there are, which one a file has, reading and writing them.
+"""Layouts by name: their list, the recognition of a file's layout, import and export.
 
-Each layout's axes, names and units are known to its own module alone.
+Axes, names and units of a layout are defined in that layout's own module.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ LAYOUTS: tuple[LayoutName, ...] = get_args(LayoutName)
 
 _CODES: Mapping[int, Stored] = {8: "uint8", 16: "uint16"}
 
-#: Type of the values by bits, and layouts that are one file (with their ending) instead of a folder.
+#: Type of the values by layout and bits.
 _BITS: Mapping[LayoutName, Mapping[int, Stored]] = {
     "hci": _CODES,
     "lftoolbox": {**_CODES, 32: "float32"},
@@ -36,15 +36,26 @@ _BITS: Mapping[LayoutName, Mapping[int, Stored]] = {
     "zarr": {**_CODES, 32: "float32"},
     "views": {**_CODES, 32: "float32"},
 }
+#: Endings of the layouts that are one file instead of a folder.
 _ENDING: Mapping[LayoutName, str] = {"lftoolbox": ".mat", "eslf": ".png"}
 
-#: Layers that a layout keeps; Zarr keeps all.
-_KEPT: Mapping[LayoutName, tuple[str, ...]] = {"hci": (DEPTH,), "lftoolbox": (WEIGHT,), "eslf": (WEIGHT,), "views": ()}
+#: Maps that a layout holds; Zarr holds all.
+_MAPS: Mapping[LayoutName, tuple[str, ...]] = {"hci": (DEPTH,), "lftoolbox": (WEIGHT,), "eslf": (WEIGHT,), "views": ()}
 
 
 @dataclass(frozen=True)
 class Exported:
-    """What was written: type of the values, ``(t, s, v, u)``, and what did not go along, as sentences."""
+    """The result of an export.
+
+    Attributes
+    ----------
+    stored:
+        Type of the values in the file: ``uint8``, ``uint16``, ``float16`` or ``float32``.
+    shape:
+        ``(t, s, v, u)``: views down and across, rows and columns of a view.
+    notes:
+        One sentence for each part of the picture that the layout cannot hold.
+    """
 
     stored: Stored
     shape: tuple[int, int, int, int]
@@ -52,12 +63,22 @@ class Exported:
 
 
 def stored_in(layout: LayoutName, image_stored: Stored, bits: int | None) -> Stored:
-    """The type that a picture's values get: that of ``bits``, else their own where the layout has it.
+    """Type in which a layout stores a picture's values.
+
+    Parameters
+    ----------
+    layout:
+        The layout.
+    image_stored:
+        Type of the picture's values: taken if ``bits`` is None and the layout has it. Otherwise floats are taken if the
+        layout has them, else codes of 8 bits.
+    bits:
+        Bits per value, or None.
 
     Raises
     ------
     OutputError
-        If the layout has no such bits.
+        If the layout has no values of ``bits`` bits.
     """
     known = _BITS[layout]
     if bits is not None:
@@ -71,24 +92,24 @@ def stored_in(layout: LayoutName, image_stored: Stored, bits: int | None) -> Sto
 
 
 def check_target(layout: str, path: Path) -> LayoutName:
-    """The layout of that name; refuses unknown ones, and names that a layout's files cannot have.
+    """``layout`` as a :data:`LayoutName`, once ``path`` is known to have an ending that fits it.
 
     Raises
     ------
-    UsageError, OutputError
-        If the layout is unknown or the path has the wrong ending.
+    UsageError
+        If the layout is unknown.
+    OutputError
+        If the path has another ending than the layout's files.
     """
-    if layout not in LAYOUTS:
-        rule = f"known are {', '.join(LAYOUTS)}"
-        raise UsageError(f"the layout {layout!r} is unknown", where="--as", rule=rule)
-    ending = _ENDING.get(layout)
+    name = _layout_name(layout)
+    ending = _ENDING.get(name)
     if ending is not None and path.suffix.lower() != ending:
-        raise OutputError(f"the ending is '{path.suffix}'", where=str(path), rule=f"{layout} files end in {ending}")
-    return layout
+        raise OutputError(f"the ending is '{path.suffix}'", where=str(path), rule=f"{name} files end in {ending}")
+    return name
 
 
 def is_folder(layout: LayoutName) -> bool:
-    """Whether a layout is a folder instead of one file."""
+    """Whether the layout is a folder; otherwise it is one file."""
     return layout not in _ENDING
 
 
@@ -106,21 +127,29 @@ def export_image(
     Parameters
     ----------
     image:
-        The picture; its map ``depth`` becomes ground truth in ``hci``, all its maps go into ``zarr``.
+        The picture. Its map ``depth`` becomes the ground truth of ``hci``; ``zarr`` holds all its maps.
     path:
         The file or folder; appears whole or not at all.
     layout:
-        ``hci``, ``lftoolbox``, ``eslf``, ``zarr`` or ``views``.
+        ``hci`` (4D Light Field Benchmark), ``lftoolbox`` (MATLAB file), ``eslf`` (PNG of micro-images), ``zarr`` or
+        ``views`` (folder of pictures).
     bits:
-        Per value, 8 or 16 for codes, 32 for floats where the layout has them; by default as the picture is stored.
+        Bits per value: 8 or 16 for codes, 32 for floats in ``lftoolbox``, ``zarr`` and ``views``. None: as the picture
+        is stored.
     distance:
-        For ``hci`` with parallel views: distance of the cameras that stand for them, in mm.
+        For ``hci`` and a display of parallel views: distance of the stand-in cameras in mm. None: 100 times the depth
+        that the display resolves.
+    progress:
+        Called after every view or array.
 
     Raises
     ------
-    UsageError, PictureError, OutputError
-        If the layout or the bits are unknown, the layout cannot hold such a display's views, or the place cannot be
-        written.
+    UsageError
+        If the layout is unknown, ``distance`` does not apply, or a library of the extra ``exchange`` is not installed.
+    PictureError
+        If the layout cannot hold the views of the picture's display.
+    OutputError
+        If the layout has no such ``bits``, or ``path`` cannot be written or has the wrong ending.
     """
     name = check_target(layout, path)
     if distance is not None and name != "hci":
@@ -150,23 +179,26 @@ def import_image(
     path:
         The file or folder.
     layout:
-        Its layout; by default as it looks.
+        ``hci``, ``lftoolbox``, ``eslf``, ``zarr`` or ``views``. None: recognized by the ending, or by the files of the
+        folder.
     display:
-        The display that shows it, instead of the one that it names or describes. Its views must be as many and of the
-        same size.
+        The display of the picture; its views must match the file's in number and size. None: the display that the file
+        names or describes.
+    progress:
+        Called after every view or array.
 
     Returns
     -------
-    The picture, and what was not taken along, as sentences.
+    The picture, and one sentence for each part of the file that is left out.
 
     Raises
     ------
-    UsageError, PictureError
-        If the layout is unknown, something is missing, damaged or disagrees, or there is no display.
+    UsageError
+        If the layout is unknown, or a library of the extra ``exchange`` is not installed.
+    PictureError
+        If a file is missing or damaged, the views do not match the display, or there is no display.
     """
-    name = recognized(path) if layout is None else layout
-    if name not in LAYOUTS:
-        raise UsageError(f"the layout {name!r} is unknown", where="--as", rule=f"known are {', '.join(LAYOUTS)}")
+    name = recognize(path) if layout is None else _layout_name(layout)
     if name == "views" and is_composable(path):
         if display is not None:
             raise PictureError("names its own display", where=str(path), fix="leave --display out")
@@ -175,13 +207,13 @@ def import_image(
     return light_field.image(display, where=str(path), layout=name), light_field.notes
 
 
-def recognized(path: Path) -> LayoutName:
-    """The layout that a file or folder seems to have.
+def recognize(path: Path) -> LayoutName:
+    """The layout of a file, by its ending, or of a folder, by the files in it.
 
     Raises
     ------
     PictureError
-        If it is missing, or there is no telling.
+        If there is nothing at ``path``, or the layout is not recognized.
     """
     if path.is_dir():
         if any((path / name).exists() for name in (".zgroup", ".zattrs", "zarr.json")):
@@ -194,10 +226,16 @@ def recognized(path: Path) -> LayoutName:
     for name, ending in _ENDING.items():
         if path.suffix.lower() == ending:
             return name
-    raise PictureError("there is no telling which layout this is", where=str(path), fix="say --as")
+    raise PictureError("the layout is not recognized", where=str(path), fix="say --as")
 
 
-def _read(path: Path, name: str, display: Display | None, progress: ProgressCallback) -> LightField:
+def _layout_name(text: str) -> LayoutName:
+    if text not in LAYOUTS:
+        raise UsageError(f"the layout {text!r} is unknown", where="--as", rule=f"known are {', '.join(LAYOUTS)}")
+    return text
+
+
+def _read(path: Path, name: LayoutName, display: Display | None, progress: ProgressCallback) -> LightField:
     shape = None if display is None else view_shape(display)
     across_and_down = None if shape is None else (shape[1], shape[0])
     if name == "hci":
@@ -214,8 +252,8 @@ def _read(path: Path, name: str, display: Display | None, progress: ProgressCall
 def _notes(image: IntegralImage, name: LayoutName) -> list[str]:
     notes = []
     if name == "hci" and DEPTH not in image.maps:
-        notes.append("there is no ground truth in it: render with --layers for one")
-    left = sorted(set(image.maps) - set(_KEPT.get(name, image.maps)))
-    if left:
-        notes.append(f"{name} does not keep the layers {', '.join(left)}")
+        notes.append("no ground truth is written: the picture has no layer depth (render with layers)")
+    omitted = sorted(set(image.maps) - set(_MAPS.get(name, image.maps)))
+    if omitted:
+        notes.append(f"{name} cannot hold the layers {', '.join(omitted)}")
     return notes

@@ -1,9 +1,8 @@
-"""Light fields as the Light Field Toolbox for MATLAB keeps them: a variable ``LF`` in a ``.mat`` file.
+"""Files of the Light Field Toolbox for MATLAB (D. Dansereau): a variable ``LF`` in a ``.mat`` file.
 
-``LF`` is ``[t, s, v, u, c]`` (uint8, uint16 or single), where ``s`` and ``t`` count the views across and down, ``u``
-and ``v`` the pixels of a view, and a fourth colour, where there is one, is the weight of each value (D. Dansereau,
-Light Field Toolbox). What is written has the version 7.3 (HDF5), whose arrays HDF5 sees with the axes reversed, since
-MATLAB keeps the first index together; versions 5 to 7 are read too.
+``LF`` is ``[t, s, v, u, c]`` (uint8, uint16 or single): ``s`` and ``t`` count the views across and down, ``u`` and
+``v`` the pixels of a view. A fourth colour holds the weight of each value. Files are written in version 7.3 (HDF5),
+where the axes are reversed, since MATLAB is column-major. Versions 5 to 7 are read as well.
 """
 
 from __future__ import annotations
@@ -17,25 +16,31 @@ from numpy.typing import NDArray
 
 from lippmann.display import Display
 from lippmann.errors import PictureError
-from lippmann.exchange.light_field import WEIGHT, LightField, check_rectangular, check_shape
+from lippmann.exchange.light_field import (
+    WEIGHT,
+    LightField,
+    check_rectangular,
+    check_shape,
+    decode_weights,
+    encode_weights,
+)
 from lippmann.exchange.metadata_text import TEXT_KEY, from_note, to_note
-from lippmann.exchange.weights import weight_codes, weights
+from lippmann.exchange.optional_import import optional
 from lippmann.runtime.atomic_write import replacing
-from lippmann.runtime.optional_import import optional
 
 LAYOUT = "lftoolbox"
 
-#: What MATLAB looks for before the HDF5 part: text, a version, and the order of bytes.
+#: The header that MATLAB requires before the HDF5 part: text, a version, and the byte order.
 _USER_BLOCK = 512
 _HEADER = b"MATLAB 7.3 MAT-file, written by Lippmann".ljust(116) + b"\0" * 8 + b"\x00\x02IM"
 
 _CLASSES = {"uint8": b"uint8", "uint16": b"uint16", "float32": b"single"}
 _VARIABLE = "LF"
 
-#: Filters of HDF5 that are read, by number. HDF5 loads others as plugins.
+#: HDF5 filters that are accepted, by number. HDF5 would load others as plugins.
 _FILTERS = {1: "deflate", 2: "shuffle", 3: "fletcher32", 32000: "lzf"}
 
-#: Characters of the text that says what the light field is; ours has some thousand.
+#: Limit on characters of the metadata text, which has some thousand.
 _MOST_TEXT = 1 << 22
 
 #: Classes of a MATLAB variable of version 5 that are arrays of numbers.
@@ -43,27 +48,39 @@ _NUMBERS = ("int8", "uint8", "int16", "uint16", "int32", "uint32", "int64", "uin
 
 
 def write_matlab(light_field: LightField, display: Display, path: Path) -> None:
-    """Write a ``.mat`` file of the version 7.3, losslessly compressed; half floats become single ones, exactly.
+    """Write a ``.mat`` file of version 7.3, losslessly compressed.
 
-    A map ``weight`` becomes the fourth colour. Display, placement and provenance go into a variable of their own.
+    Display, placement and provenance become a variable of their own.
+
+    Parameters
+    ----------
+    light_field:
+        The views; half floats become single floats. A map ``weight`` becomes the fourth colour.
+    display:
+        The display whose views these are.
+    path:
+        The file; appears whole or not at all.
 
     Raises
     ------
-    UsageError, PictureError, OutputError
-        If h5py is not installed, the display's views are not what a grid of cameras sees, or the file cannot be
-        written.
+    UsageError
+        If h5py is not installed.
+    PictureError
+        If the display's views are not those of a rectangular grid of cameras.
+    OutputError
+        If the file cannot be written.
     """
     h5py = optional("h5py")
     check_rectangular(display, "LFToolbox")
-    values = light_field.values
+    values: NDArray[Any] = light_field.values
     if values.dtype == np.float16:
         values = values.astype(np.float32)
     if light_field.weight is not None:
-        values = np.concatenate([values, weight_codes(light_field.weight, values.dtype)[..., None]], axis=-1)
+        values = np.concatenate([values, encode_weights(light_field.weight, values.dtype)[..., None]], axis=-1)
     with replacing(path) as temporary:
         with h5py.File(temporary, "w", userblock_size=_USER_BLOCK) as file:
             reversed_ = values.transpose()
-            # One view and one colour a chunk: what tools look at.
+            # One colour of one view per chunk, the part that tools display.
             chunks = (1, *reversed_.shape[1:3], 1, 1)
             stored = file.create_dataset(_VARIABLE, data=reversed_, chunks=chunks, compression="gzip", shuffle=True)
             stored.attrs["MATLAB_class"] = np.bytes_(_CLASSES[values.dtype.name])
@@ -78,15 +95,16 @@ def write_matlab(light_field: LightField, display: Display, path: Path) -> None:
 
 
 def read_matlab(path: Path) -> LightField:
-    """Read ``LF`` of a ``.mat`` file: uint8, uint16, single, or double, which is rounded to single.
+    """Read the variable ``LF`` of a ``.mat`` file, version 5 to 7.3.
 
-    Floats are taken for linear light.
+    Its type is uint8, uint16, single, or double, which is rounded to single. Floats are linear light.
 
     Raises
     ------
-    UsageError, PictureError
-        If the library that reads this version is not installed, or the file is missing, damaged, no ``.mat`` file, or
-        has no light field in it.
+    UsageError
+        If h5py (version 7.3) or scipy (version 5 to 7) is not installed.
+    PictureError
+        If the file is missing, damaged or no ``.mat`` file, or holds no light field.
     """
     try:
         with path.open("rb") as file:
@@ -105,7 +123,7 @@ def read_matlab(path: Path) -> LightField:
     metadata = from_note(note, LAYOUT, str(path))
     if values.dtype == np.float64:
         values = values.astype(np.float32)
-    maps = {} if values.shape[4] == 3 else {WEIGHT: weights(values[..., 3])}
+    maps = {} if values.shape[4] == 3 else {WEIGHT: decode_weights(values[..., 3])}
     try:
         return LightField(values[..., :3], metadata, maps)
     except PictureError as error:
@@ -113,7 +131,7 @@ def read_matlab(path: Path) -> LightField:
 
 
 def _check_variable(shape: tuple[int, ...], names: list[str], path: Path) -> None:
-    """Refuses before anything is loaded what is no light field; an empty shape says that there is no such variable."""
+    """Raise :class:`PictureError` if ``LF`` is no light field; ``()`` stands for a missing ``LF``."""
     if not shape:
         held = ", ".join(names) or "nothing"
         raise PictureError(f"has no variable {_VARIABLE}; it holds {held}", where=str(path))
@@ -123,7 +141,7 @@ def _check_variable(shape: tuple[int, ...], names: list[str], path: Path) -> Non
     check_shape((*shape[:4], 3), str(path))
 
 
-def _no_numbers(name: str, kind: str, path: Path) -> PictureError:
+def _not_numeric(name: str, kind: str, path: Path) -> PictureError:
     return PictureError(f"{name} holds {kind}", where=str(path), rule="a light field holds numbers")
 
 
@@ -131,47 +149,43 @@ def _read_hdf5(path: Path) -> tuple[NDArray[Any], str]:
     h5py = optional("h5py")
     try:
         with h5py.File(path, "r") as file:
-            names = [name for name in map(str, file) if not name.startswith("#")]  # bytes that are no text stay bytes
-            found = _dataset(h5py, file, _VARIABLE, path)
-            shape = () if found is None else found.shape or ()  # an array can have no shape at all
+            names = [name for name in map(str, file) if not name.startswith("#")]
+            light_field = _dataset(h5py, file, _VARIABLE, path)
+            shape = () if light_field is None else light_field.shape or ()  # a null dataset has no shape
             _check_variable(shape[::-1], names, path)
             note = _dataset(h5py, file, TEXT_KEY, path)
             text = "" if note is None else _text(note, path)
-            values: NDArray[Any] = found[...].transpose()
+            values: NDArray[Any] = light_field[...].transpose()
     except (OSError, RuntimeError, KeyError, UnicodeDecodeError) as error:
         raise _damaged(path, error) from error
     return values, text
 
 
 def _dataset(h5py: Any, file: Any, name: str, path: Path) -> Any:
-    """The array of that name, not yet read; None if there is none.
+    """The HDF5 dataset of that name, not yet read; None if there is none.
 
-    HDF5 can take values from other files, and load programs that unpack them.
-
-    Raises
-    ------
-    PictureError
-        If its values lie in another file, it holds no numbers, or it is packed by a filter that is not read.
+    HDF5 can read values from other files and load filter plugins, which run code: both raise :class:`PictureError`, as
+    does a dataset that is not numeric.
     """
     link = file.get(name, getlink=True)
     if link is None:
         return None
-    rule = "a variable lies in the file itself"
+    rule = "variables must be in the file itself"
     if not isinstance(link, h5py.HardLink):
         raise PictureError(f"{name} is a link", where=str(path), rule=rule)
-    found = file.get(name)
-    if not isinstance(found, h5py.Dataset):
+    dataset = file.get(name)
+    if not isinstance(dataset, h5py.Dataset):
         return None
-    if found.is_virtual or found.external:
-        raise PictureError(f"{name} is kept in another file", where=str(path), rule=rule)
-    if found.dtype.kind not in "uif":
-        raise _no_numbers(name, str(found.dtype), path)
-    how = found.id.get_create_plist()
-    for number in (how.get_filter(place)[0] for place in range(how.get_nfilters())):
+    if dataset.is_virtual or dataset.external:
+        raise PictureError(f"{name} lies in another file", where=str(path), rule=rule)
+    if dataset.dtype.kind not in "uif":
+        raise _not_numeric(name, str(dataset.dtype), path)
+    properties = dataset.id.get_create_plist()
+    for number in (properties.get_filter(i)[0] for i in range(properties.get_nfilters())):
         if number not in _FILTERS:
-            rule = f"read are {', '.join(_FILTERS.values())}"
-            raise PictureError(f"{name} is packed by the HDF5 filter {number}", where=str(path), rule=rule)
-    return found
+            rule = f"accepted are {', '.join(_FILTERS.values())}"
+            raise PictureError(f"{name} is compressed by the HDF5 filter {number}", where=str(path), rule=rule)
+    return dataset
 
 
 def _text(note: Any, path: Path) -> str:
@@ -187,20 +201,20 @@ def _read_version_5(path: Path) -> tuple[NDArray[Any], str]:
     from scipy import io
 
     try:
-        # Mapped: a plain file gives memory to as many bytes as a damaged header asks for.
+        # Memory-mapped: with a plain file scipy allocates as many bytes as a damaged header states.
         with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as content:
             variables = {name: (shape, kind) for name, shape, kind in io.whosmat(content)}
             shape, kind = variables.get(_VARIABLE, ((), ""))
             _check_variable(shape, sorted(variables), path)
-            if kind not in _NUMBERS:  # cells, structures, objects and functions hold anything
-                raise _no_numbers(_VARIABLE, f"the class {kind}", path)
+            if kind not in _NUMBERS:  # cells, structures, objects or functions
+                raise _not_numeric(_VARIABLE, f"the class {kind}", path)
             values: NDArray[Any] = io.loadmat(content, variable_names=[_VARIABLE])[_VARIABLE]
     except PictureError:
         raise
-    except Exception as error:  # the reader stumbles over damaged files in every way there is
+    except Exception as error:  # scipy raises many kinds of errors for damaged files
         raise _damaged(path, error) from error
     if values.dtype.kind not in "uif":
-        raise _no_numbers(_VARIABLE, str(values.dtype), path)
+        raise _not_numeric(_VARIABLE, str(values.dtype), path)
     return values, ""
 
 

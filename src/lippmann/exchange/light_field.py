@@ -1,10 +1,10 @@
-"""A light field as other tools hold it: rows and columns of views, seen from a grid of cameras.
+"""Light fields with the axes that most tools use: a grid of views, one per camera.
 
-The axes are those of most of them, ``[t, s, v, u, colour]``: ``t`` counts the cameras from the top, ``s`` from the
-left, ``v`` the rows of a view from the top, ``u`` its columns from the left. A lens shows the pixel at its right end to
-the left and the one at its lower end upwards, so ``t`` and ``s`` run against the pixels under a lens.
+The axes are ``[t, s, v, u, colour]``: ``t`` counts the cameras from the top, ``s`` from the left, ``v`` the rows of a
+view from the top, ``u`` its columns from the left. A lens sends the light of its right-most pixel to the left and that
+of its lowest pixel upwards, so ``t`` and ``s`` run opposite to the pixels under a lens.
 
-Values stay as they are stored, codes as codes, so that nothing is lost on the way from file to file.
+Values keep the type in which they are stored (codes stay codes), so that a conversion between files is lossless.
 """
 
 from __future__ import annotations
@@ -31,46 +31,50 @@ from lippmann.image.views import view_grid
 #: Cameras down and across, rows and columns of a view.
 Shape = tuple[int, int, int, int]
 
-#: More pixels than any light field has that other tools hold; all of one is in memory at once.
+#: Limit on pixels of all views together: a light field is held in memory as a whole.
 MOST_PIXELS = 1 << 29
 
-#: The map of an integral image that holds the weight of each value, 1 for full: LFToolbox's fourth channel.
+#: Name of the map with the confidence weight of each value, 0 to 1: the fourth channel of LFToolbox and ESLF.
 WEIGHT = "weight"
 
-#: The map that holds the height over the lens plane of what each pixel sees, as ``lippmann render --layers`` makes it.
+#: Name of the map with the height over the lens plane of the surface in each pixel, in mm; rendered with layers.
 DEPTH = "depth"
 
-_BITS = {"uint8": 8, "uint16": 16}
+#: Stored colours: codes of 8 or 16 bits, or linear light.
+Values = NDArray[np.uint8 | np.uint16 | np.float16 | np.float32]
+
+#: Bits of the types that hold codes.
+CODE_BITS: Mapping[str, int] = {"uint8": 8, "uint16": 16}
 
 
 @dataclass(frozen=True, eq=False)
 class LightField:
-    """Views of a grid of cameras.
+    """The views of a grid of cameras.
 
     Parameters
     ----------
     values:
         ``(t, s, v, u, 3)`` RGB: uint8 or uint16 codes, float16 or float32 linear light.
     metadata:
-        Display, placement and provenance, where the file says them.
+        Display, placement and provenance; None if the file holds none.
     maps:
         Further layers by name, ``(t, s, v, u)`` or ``(t, s, v, u, 2 to 4)``, float32 or uint32. ``depth`` is the height
-        over the lens plane in mm, positive toward the cameras, minus infinity where nothing is seen; ``weight`` lies
-        between 0 and 1.
+        over the lens plane in mm, positive toward the cameras, minus infinity where a ray meets nothing; ``weight``
+        lies in [0, 1].
     cameras:
-        Where the cameras stand, where the file says it.
+        Baseline, focus distance and placement of the cameras; None if the file holds none.
     mask:
-        ``(t, s, v, u)``: which values stand for a pixel of the panel; None if all do.
+        ``(t, s, v, u)``, True where a value belongs to a pixel of the panel; None if all do.
     notes:
-        What was found but is not taken along, as sentences.
+        One sentence for each part of the file that is left out.
 
     Raises
     ------
     PictureError
-        If shapes or types are not as said above.
+        If ``values`` has another shape or type, or more than :data:`MOST_PIXELS` pixels.
     """
 
-    values: NDArray[Any]
+    values: Values
     metadata: Metadata | None = None
     maps: Mapping[str, NDArray[Any]] = field(default_factory=dict)
     cameras: Cameras | None = None
@@ -90,45 +94,48 @@ class LightField:
 
     @property
     def stored(self) -> Stored:
-        """The type of the values."""
+        """Type of the values: ``uint8``, ``uint16``, ``float16`` or ``float32``."""
         return cast(Stored, self.values.dtype.name)
 
     @property
     def transfer(self) -> Transfer:
-        """How codes stand for linear light."""
+        """Transfer function between codes and linear light: that of the metadata, else sRGB."""
         return "srgb" if self.metadata is None else self.metadata.provenance.transfer
 
     @property
     def weight(self) -> NDArray[np.float32] | None:
-        """The map ``weight``, if there is one with one float a value."""
-        found = self.maps.get(WEIGHT)
-        return found if found is not None and found.ndim == 4 and found.dtype == np.float32 else None
+        """``(t, s, v, u)`` float32 map ``weight``; None if there is none of this shape and type."""
+        weight = self.maps.get(WEIGHT)
+        return weight if weight is not None and weight.ndim == 4 and weight.dtype == np.float32 else None
 
     def image(self, display: Display | None = None, *, where: str = "", layout: str = "") -> IntegralImage:
-        """The integral image that shows these views.
+        """The integral image whose views these are.
 
         Parameters
         ----------
         display:
-            The display, instead of the one that the file names or that its cameras describe.
-        where, layout:
-            The file, for messages and as the scene's name, and its layout, for the provenance.
+            The display of the image. None takes the display of the metadata, else a square micro-lens array that
+            matches the cameras.
+        where:
+            The file that was read: named in messages, its stem is the scene's name in the provenance.
+        layout:
+            Name of the file's layout, for the provenance.
 
         Raises
         ------
         PictureError
-            If there is no display, or its views are not as many or not of this size.
+            If there is no display, or its views differ from these in number or size.
         """
         target = self._display(display, where)
         _check_fit(self.shape, target, where)
         permutation = Permutation(target)
 
-        def joined(values: NDArray[Any]) -> NDArray[Any]:
+        def join(values: NDArray[Any]) -> NDArray[Any]:
             return np.ascontiguousarray(permutation.join(micro_images_as_views(values[::-1, ::-1], target)))
 
-        pixels = joined(self.values)
+        pixels = join(self.values)
         linear = dequantize(pixels, self.transfer) if pixels.dtype.kind == "u" else pixels.astype(np.float32)
-        maps = {name: joined(values) for name, values in self.maps.items()}
+        maps = {name: join(values) for name, values in self.maps.items()}
         world_from_display, provenance = self._origin(Path(where).stem, layout)
         try:
             return IntegralImage(linear, target, world_from_display, provenance, maps, stored=self.stored)
@@ -156,10 +163,16 @@ class LightField:
 
 
 def light_field_of(image: IntegralImage, stored: Stored) -> LightField:
-    """The views of an integral image, on any display a permutation of its pixels, with its metadata and maps.
+    """The views of an integral image with its metadata and maps: a permutation of its pixels.
 
-    ``stored`` says what the values become: codes are rounded to the nearest, after the picture's own transfer. On
-    displays whose views are not exact these are the pixels of equal place in their micro-images.
+    Parameters
+    ----------
+    image:
+        The picture. If its views are resampled (``views_are_exact`` is False), a view here holds the pixels at the same
+        position of every micro-image.
+    stored:
+        Type of the values. Codes are rounded to nearest, with the transfer function of the picture; half floats are
+        clipped to their largest finite value.
     """
     display, permutation = image.display, Permutation(image.display)
 
@@ -167,8 +180,8 @@ def light_field_of(image: IntegralImage, stored: Stored) -> LightField:
         return micro_images_as_views(permutation.split(values), display)[::-1, ::-1]
 
     pixels: NDArray[Any] = image.pixels
-    if stored in _BITS:
-        pixels = quantize(image.pixels, _BITS[stored], image.provenance.transfer)
+    if stored in CODE_BITS:
+        pixels = quantize(image.pixels, CODE_BITS[stored], image.provenance.transfer)
     elif stored == "float16":
         largest = float(np.finfo(np.float16).max)
         pixels = np.clip(image.pixels, -largest, largest).astype(np.float16)
@@ -178,7 +191,7 @@ def light_field_of(image: IntegralImage, stored: Stored) -> LightField:
 
 
 def check_shape(shape: tuple[int, ...], where: str) -> None:
-    """Raise :class:`PictureError` if no light field in colour has this shape, before memory is given to it."""
+    """Raise :class:`PictureError` unless ``shape`` is ``(t, s, v, u, 3)`` with at most :data:`MOST_PIXELS` pixels."""
     if len(shape) != 5 or shape[4] != 3 or min(shape) < 1:
         rule = "it must be [t, s, v, u, colour] with 3 colours"
         raise PictureError(f"the light field has the shape {shape}", where=where, rule=rule)
@@ -188,10 +201,10 @@ def check_shape(shape: tuple[int, ...], where: str) -> None:
 
 
 def check_rectangular(display: Display, layout: str) -> None:
-    """Raise :class:`PictureError` unless the views are what a rectangular grid of cameras sees.
+    """Raise :class:`PictureError` unless the display's views are those of a rectangular grid of cameras.
 
-    They are not where views are resampled, and where neighbouring rows of a view stand beside each other: hexagonal
-    arrays, slanted sheets.
+    Excluded are resampled views, hexagonal arrays and slanted sheets, whose rows of lenses are offset from each other.
+    ``layout`` names the layout in the message.
     """
     fix = "use 'lippmann export --as zarr', 'lippmann views' or 'lippmann micro-images'"
     if display.lens_array.layout == "hexagonal" or display.lens_array.slant != 0:
@@ -204,17 +217,34 @@ def check_rectangular(display: Display, layout: str) -> None:
 
 
 def view_shape(display: Display) -> Shape:
-    """The shape of the light field of a display's pictures."""
+    """Shape ``(t, s, v, u)`` of the light field of a display's pictures."""
     rows, columns, ny, nx = Permutation(display).shape
     return (1, nx, ny, columns) if display.lens_array.layout == "lenticular" else (ny, nx, rows, columns)
 
 
 def _check_fit(shape: Shape, display: Display, where: str) -> None:
-    wanted = view_shape(display)
-    if shape != wanted:
-        rule = f"the display {display.name} has {_in_words(wanted)}"
-        raise PictureError(f"has {_in_words(shape)}", where=where, rule=rule)
+    expected = view_shape(display)
+    if shape != expected:
+        rule = f"the display {display.name} has {_shape_text(expected)}"
+        raise PictureError(f"has {_shape_text(shape)}", where=where, rule=rule)
 
 
-def _in_words(shape: Shape) -> str:
+def _shape_text(shape: Shape) -> str:
     return f"{shape[1]} x {shape[0]} views of {shape[3]} x {shape[2]} pixels"
+
+
+# ---- Weights as a fourth colour ------------------------------------------------------------------------------------
+
+
+def encode_weights(weight: NDArray[np.float32], dtype: np.dtype[Any]) -> Values:
+    """Weights in [0, 1] as values of the colours' type: codes rounded to nearest, 1 the highest code; or floats."""
+    if dtype.kind == "f":
+        return weight.astype(dtype)
+    top = np.iinfo(dtype).max
+    return np.floor(np.clip(weight.astype(np.float64), 0, 1) * top + 0.5).astype(dtype)
+
+
+def decode_weights(codes: NDArray[Any]) -> NDArray[np.float32]:
+    """Weights in [0, 1] of codes or floats; the inverse of :func:`encode_weights`."""
+    top = 1.0 if codes.dtype.kind == "f" else np.iinfo(codes.dtype).max
+    return (codes.astype(np.float64) / top).astype(np.float32)

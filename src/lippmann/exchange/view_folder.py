@@ -1,34 +1,38 @@
-"""Folders of views: one picture per camera, ``cam_ROW_COLUMN``, counted from the top left.
+"""Folders of views: one picture file per camera, named ``cam_ROW_COLUMN``, counted from the top left.
 
-Other programs' folders are read, too: files whose names end in two numbers, row and column, or in one that counts row
-by row, from 0 or 1. (``lippmann views`` writes folders of another kind: views counted by the pixel under each lens.)
+Folders of other programs are read if the file names end in two numbers (row and column) or in one number that counts
+row by row, from 0 or 1. The folders that :func:`lippmann.image.write_views` writes are a different layout: their views
+are counted by the pixel under each lens, which runs opposite to the cameras.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import get_args
+from typing import Any, cast, get_args
 
 import numpy as np
+from numpy.typing import NDArray
 
+from lippmann.color.transfer import Transfer, dequantize, quantize
 from lippmann.display import Display
 from lippmann.errors import PictureError
-from lippmann.exchange.light_field import LightField, check_rectangular
+from lippmann.exchange.light_field import CODE_BITS, LightField, Values, check_rectangular
 from lippmann.exchange.metadata_text import read_note_file, write_note_file
-from lippmann.exchange.view_files import read_view_files, write_view
-from lippmann.image.encoding import FormatName
+from lippmann.image.encoding import FormatName, decode_file, encode_file, read_header
 from lippmann.image.metadata import parse_json
 from lippmann.image.part_folders import MANIFEST, Kind
+from lippmann.image.stored_values import Stored
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.runtime.atomic_write import replacing_folder
 
 LAYOUT = "views"
 
+#: Row and column of a view, or its number alone.
 Place = tuple[int, ...]
 
-#: Endings of the pictures that are read.
+#: Endings of the picture files that are read.
 _READ = (".png", ".exr", ".tif", ".tiff")
 
 _TWO = re.compile(r"(\d{1,6})\D(\d{1,6})\D*$")
@@ -38,12 +42,25 @@ _ONE = re.compile(r"(\d{1,9})\D*$")
 def write_view_folder(
     light_field: LightField, display: Display, folder: Path, *, progress: ProgressCallback = silent
 ) -> None:
-    """Write codes as PNG, floats as OpenEXR.
+    """Write a folder of views: codes as PNG, floats as OpenEXR.
+
+    Parameters
+    ----------
+    light_field:
+        The views; maps are not written.
+    display:
+        The display whose views these are.
+    folder:
+        The folder; appears whole or not at all.
+    progress:
+        Called after every view.
 
     Raises
     ------
-    PictureError, OutputError
-        If the display's views are not what a grid of cameras sees, or the folder cannot be written.
+    PictureError
+        If the display's views are not those of a rectangular grid of cameras.
+    OutputError
+        If the folder cannot be written.
     """
     check_rectangular(display, "a folder of views")
     name: FormatName = "png" if light_field.values.dtype.kind == "u" else "exr"
@@ -63,13 +80,19 @@ def read_view_folder(
 ) -> LightField:
     """Read a folder of views.
 
-    ``grid`` is how many there are across and down; needed where their names count row by row.
+    Parameters
+    ----------
+    folder:
+        The folder.
+    grid:
+        Views across and down; required if the file names hold a single number.
+    progress:
+        Called after every view.
 
     Raises
     ------
     PictureError
-        If a view is absent, doubled, damaged or of another size or type than the first, or there is no telling which
-        view a file is.
+        If a view is missing, doubled or damaged, differs from the first in size or type, or has no number in its name.
     """
     metadata = read_note_file(folder, LAYOUT)
     paths = _in_rows(_numbered(folder), folder, grid)
@@ -78,7 +101,7 @@ def read_view_folder(
 
 
 def _numbered(folder: Path) -> Mapping[Place, Path]:
-    """The files by the numbers in their names: row and column, or one number."""
+    """Files by the numbers in their names: row and column, or one number."""
     try:
         paths = sorted(path for path in folder.iterdir() if path.suffix.lower() in _READ and path.name[0] != ".")
     except OSError as error:
@@ -86,51 +109,98 @@ def _numbered(folder: Path) -> Mapping[Place, Path]:
     if not paths:
         raise PictureError("there are no views", where=str(folder), rule=f"they end in {', '.join(_READ)}")
     pattern = _TWO if all(_TWO.search(path.stem) for path in paths) else _ONE
-    found: dict[Place, Path] = {}
+    by_place: dict[Place, Path] = {}
     for path in paths:
         numbers = pattern.search(path.stem)
         if numbers is None:
             rule = "views are named by row and column, or counted row by row"
             raise PictureError("the name has no number", where=str(path), rule=rule)
         place = tuple(int(number) for number in numbers.groups())
-        if place in found:
-            raise PictureError(f"is the same view as {found[place].name}", where=str(path))
-        found[place] = path
-    return found
+        if place in by_place:
+            raise PictureError(f"is the same view as {by_place[place].name}", where=str(path))
+        by_place[place] = path
+    return by_place
 
 
-def _in_rows(found: Mapping[Place, Path], folder: Path, grid: tuple[int, int] | None) -> list[list[Path]]:
-    first = np.array(sorted(found)).min(axis=0)
+def _in_rows(by_place: Mapping[Place, Path], folder: Path, grid: tuple[int, int] | None) -> list[list[Path]]:
+    """The files in rows; a missing view raises :class:`PictureError`."""
+    first = np.array(sorted(by_place)).min(axis=0)
     if (first > 1).any():
-        raise PictureError("the first view is absent", where=str(folder), rule="views are counted from 0 or 1")
+        raise PictureError("the first view is missing", where=str(folder), rule="views are counted from 0 or 1")
     counted = len(first) == 1
     if counted and grid is None:
-        rule = "their names count them row by row"
-        raise PictureError(
-            "there is no telling how many views make a row", where=str(folder), rule=rule, fix="say --display"
-        )
-    last = np.array(list(found)).max(axis=0) - first
+        rule = "their names hold one number"
+        raise PictureError("the number of views in a row is unknown", where=str(folder), rule=rule, fix="say --display")
+    last = np.array(list(by_place)).max(axis=0) - first
     across, down = grid if grid is not None and counted else (int(last[-1]) + 1, int(last[0]) + 1)
-    if counted and len(found) != across * down:
+    if counted and len(by_place) != across * down:
         rule = f"the display has {across} x {down}"
-        raise PictureError(f"holds {len(found)} views", where=str(folder), rule=rule)
+        raise PictureError(f"holds {len(by_place)} views", where=str(folder), rule=rule)
     rows: list[list[Path]] = []
     for row in range(down):
         rows.append([])
         for column in range(across):
             place = (row * across + column,) if counted else (row, column)
             number = tuple(int(n) for n in np.add(place, first))
-            if number not in found:
+            if number not in by_place:
                 what = f"view {number[0]}" if counted else f"the view in row {number[0]}, column {number[1]},"
-                raise PictureError(f"{what} is absent", where=str(folder))
-            rows[row].append(found[number])
+                raise PictureError(f"{what} is missing", where=str(folder))
+            rows[row].append(by_place[number])
     return rows
 
 
 def is_composable(folder: Path) -> bool:
-    """Whether the folder is one of ``lippmann views`` or ``micro-images``, for :func:`lippmann.image.compose`."""
+    """Whether :func:`lippmann.image.compose` reads the folder: written by ``write_views`` or ``write_micro_images``."""
     try:
         values = parse_json((folder / MANIFEST).read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError):
         return False
     return isinstance(values, dict) and values.get("kind") in get_args(Kind)
+
+
+# ---- Picture files of the views --------------------------------------------------------------------------------------
+
+
+def write_view(path: Path, name: FormatName, values: Values, transfer: Transfer) -> None:
+    """Write a view ``(H, W, 3)``: codes as PNG, or floats as OpenEXR (``name``), without loss."""
+    codes: NDArray[Any] = values
+    linear = dequantize(codes, transfer) if codes.dtype.kind == "u" else codes.astype(np.float32)
+    encode_file(path, name, {"": linear}, stored=cast(Stored, values.dtype.name), transfer=transfer)
+
+
+def read_view_files(paths: Sequence[Sequence[Path]], transfer: Transfer, progress: ProgressCallback = silent) -> Values:
+    """The views of rows of picture files, ``(t, s, v, u, 3)``, in the type in which they are stored.
+
+    ``transfer`` is the transfer function of the codes; ``progress`` is called after every file.
+
+    Raises
+    ------
+    PictureError
+        If a file is missing or damaged, holds transparent colours, or differs from the first in size or type.
+    """
+    down, across = len(paths), len(paths[0])
+    first = _read_view(paths[0][0], transfer)
+    views = np.empty((down, across, *first.shape), dtype=first.dtype)
+    for number, path in enumerate(path for row in paths for path in row):
+        view = first if number == 0 else _read_view(path, transfer)
+        if view.shape != first.shape:
+            rule = f"the first view, {paths[0][0].name}, has {_size(first)}"
+            raise PictureError(f"has {_size(view)} pixels", where=str(path), rule=rule)
+        if view.dtype != first.dtype:
+            rule = f"the first view, {paths[0][0].name}, holds {first.dtype}"
+            raise PictureError(f"holds {view.dtype} values", where=str(path), rule=rule)
+        views[divmod(number, across)] = view
+        progress(Progress("read", number + 1, down * across))
+    return views
+
+
+def _read_view(path: Path, transfer: Transfer) -> Values:
+    layers, stored = decode_file(path, read_header(path).format, transfer)
+    linear = layers[""]
+    if stored in CODE_BITS:
+        return quantize(linear, CODE_BITS[stored], transfer)
+    return np.asarray(linear.astype(stored))
+
+
+def _size(view: Values) -> str:
+    return f"{view.shape[1]} x {view.shape[0]}"

@@ -1,10 +1,14 @@
-"""Light fields in Zarr (format 2), for programs that read parts of a large one: no convention exists, this is ours.
+"""Light fields in Zarr (format 2), for programs that read parts of a large one; a convention of Lippmann's own.
 
-A group with the array ``LF[t, s, v, u, c]``, one row of lenses a chunk (of a lenticular sheet as many rows of pixels as
-make about a megabyte), so that a chunk holds all views of what it shows; maps of the picture in the group ``maps``, on
-the same first four axes; and ``mask[t, s, v, u]`` where some values stand for no pixel. Every array names its axes in
-``_ARRAY_DIMENSIONS``, as xarray wants them. The attributes of the group are the text of our picture files, see
-``docs/light-fields.md``. All values come back bit by bit, of every display.
+A Zarr group holds:
+
+- the array ``LF[t, s, v, u, c]``. A chunk holds all views of one row of lenses; for a lenticular sheet, all views of as
+  many rows of pixels as make about a megabyte;
+- the group ``maps`` with the maps of the picture, on the same first four axes;
+- the array ``mask[t, s, v, u]``, if some values belong to no pixel.
+
+Every array names its axes in ``_ARRAY_DIMENSIONS``, as xarray expects. The attributes of the group are the metadata of
+a picture file, see ``docs/light-fields.md``. The layout holds the pictures of every display without loss.
 """
 
 from __future__ import annotations
@@ -25,10 +29,10 @@ from lippmann.codecs.zarr_reader import node_kind, open_array, read_array_metada
 from lippmann.errors import PictureError
 from lippmann.exchange.light_field import LightField, check_shape
 from lippmann.exchange.metadata_text import from_note, to_note
+from lippmann.exchange.optional_import import optional
 from lippmann.image.metadata import KEY, Metadata
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.runtime.atomic_write import replacing_folder
-from lippmann.runtime.optional_import import optional
 
 LAYOUT = "zarr"
 
@@ -37,19 +41,30 @@ AXES = ("t", "s", "v", "u", "c")
 _VIEWS, _MASK, _MAPS = "LF", "mask", "maps"
 _DIMENSIONS = "_ARRAY_DIMENSIONS"
 
-#: Bytes of a chunk of a lenticular sheet, before packing.
+#: Bytes of a chunk of a lenticular sheet, before compression.
 _CHUNK = 1 << 20
 
 _TYPES = (np.bool_, np.uint8, np.uint16, np.uint32, np.float16, np.float32)
 
 
 def write_zarr(light_field: LightField, folder: Path, *, progress: ProgressCallback = silent) -> None:
-    """Write a Zarr group, losslessly compressed; appears whole or not at all.
+    """Write a Zarr group, losslessly compressed.
+
+    Parameters
+    ----------
+    light_field:
+        The views with all their maps.
+    folder:
+        The folder; appears whole or not at all.
+    progress:
+        Called after every array.
 
     Raises
     ------
-    UsageError, OutputError
-        If zarr is not installed, or the folder cannot be written.
+    UsageError
+        If zarr is not installed.
+    OutputError
+        If the folder cannot be written.
     """
     zarr = optional("zarr")
     arrays: dict[str, NDArray[Any]] = {_VIEWS: light_field.values}
@@ -65,20 +80,29 @@ def write_zarr(light_field: LightField, folder: Path, *, progress: ProgressCallb
         for done, (name, values) in enumerate(arrays.items(), start=1):
             _write_array(zarr, temporary, name, values)
             progress(Progress("write", done, len(arrays)))
-        # Readers then need not list the folder, where the list of its files would make them wonder.
+        # Readers then need not list the folder, and do not meet the list of its files there.
         zarr.consolidate_metadata(str(temporary))
 
 
 def read_zarr(folder: Path, *, progress: ProgressCallback = silent) -> LightField:
     """Read a Zarr group.
 
-    Of a group of our own making every chunk has to be there; one of another program is read as Zarr has it, where
-    absent chunks are constant.
+    A group that Lippmann wrote must have all its chunks. In groups of other programs a missing chunk holds the fill
+    value, as Zarr defines.
+
+    Parameters
+    ----------
+    folder:
+        The Zarr group.
+    progress:
+        Called after every array.
 
     Raises
     ------
-    UsageError, PictureError
-        If zarr is not installed, or the folder is missing, no Zarr group, incomplete, damaged, or has no light field.
+    UsageError
+        If zarr is not installed.
+    PictureError
+        If the folder is missing, no Zarr group, incomplete or damaged, or holds no light field.
     """
     zarr = optional("zarr")
     attributes = _group_attributes(folder)
@@ -87,12 +111,12 @@ def read_zarr(folder: Path, *, progress: ProgressCallback = silent) -> LightFiel
     if _VIEWS not in names:
         held = ", ".join(names) or "nothing"
         raise PictureError(f"has no array {_VIEWS}; it holds {held}", where=str(folder))
-    wanted = [_VIEWS, *(f"{_MAPS}/{name}" for name in map_names), *([_MASK] if _MASK in names else [])]
+    array_names = [_VIEWS, *(f"{_MAPS}/{name}" for name in map_names), *([_MASK] if _MASK in names else [])]
     arrays: dict[str, NDArray[Any]] = {}
-    for done, name in enumerate(wanted, start=1):
+    for done, name in enumerate(array_names, start=1):
         shape = arrays[_VIEWS].shape if arrays else None
         arrays[name] = _read_array(zarr, folder / name, folder, shape, whole=metadata is not None)
-        progress(Progress("read", done, len(wanted)))
+        progress(Progress("read", done, len(array_names)))
     maps = {name: arrays[f"{_MAPS}/{name}"] for name in map_names}
     try:
         return LightField(arrays[_VIEWS], metadata, maps, mask=arrays.get(_MASK))
@@ -101,7 +125,7 @@ def read_zarr(folder: Path, *, progress: ProgressCallback = silent) -> LightFiel
 
 
 def _group_attributes(folder: Path) -> dict[str, Any]:
-    """The attributes of a group; a :class:`PictureError` if it is none."""
+    """The attributes of a Zarr group; anything else raises :class:`PictureError`."""
     try:
         if node_kind(folder) == "group":
             return read_attributes(folder)
@@ -112,7 +136,7 @@ def _group_attributes(folder: Path) -> dict[str, Any]:
 
 
 def _array_names(folder: Path, root: Path) -> list[str]:
-    """The arrays of a group inside ``root``, in both versions of the format."""
+    """Names of the arrays of a group inside ``root``, in format 2 or 3."""
     if not folder.is_dir():
         return []
     return sorted(entry.name for entry in folder.iterdir() if entry.is_dir() and node_kind(entry, root) == "array")
@@ -120,23 +144,23 @@ def _array_names(folder: Path, root: Path) -> list[str]:
 
 @contextmanager
 def _without_warnings() -> Iterator[None]:
-    """Without what the library warns of: files that it does not know, and versions of its format."""
+    """Suppress the library's warnings of unknown files and of format versions."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         yield
 
 
 def _format(zarr: Any) -> dict[str, Any]:
-    """How format 2 is asked for: the library changed the word."""
+    """The keyword for format 2, which version 3 of the library renamed."""
     if int(zarr.__version__.partition(".")[0]) < 3:
         return {"zarr_version": 2}
     return {"zarr_format": 2}
 
 
 def _all_chunks_written(zarr: Any) -> AbstractContextManager[Any]:
-    """Chunks of zeros get files too, which the library's third version by itself leaves out.
+    """A context in which chunks of zeros are written too, which version 3 of the library omits by default.
 
-    Its option of the same name has no effect before 3.1.1.
+    The library's keyword of this name has no effect before 3.1.1.
     """
     if int(zarr.__version__.partition(".")[0]) < 3:
         return nullcontext()
@@ -190,18 +214,18 @@ def _read_array(
             values: NDArray[Any] = np.asarray(array[...])
         except PictureError:
             raise
-        except Exception as error:  # the library stumbles over damaged chunks in every way there is
+        except Exception as error:  # the library raises many kinds of errors for damaged chunks
             raise PictureError(f"is damaged: {error}", where=where, fix="make or fetch it anew") from error
     return values
 
 
 def _check_whole(folder: Path, metadata: ArrayMetadata) -> None:
-    """Raise :class:`PictureError` if the file of a chunk is not there."""
+    """Raise :class:`PictureError` if the file of a chunk is missing."""
     counts = [-(-size // step) for size, step in zip(metadata.shape, metadata.chunks, strict=True)]
-    there = {path.name for path in folder.iterdir()} if folder.is_dir() else set()
-    absent = [name for place in np.ndindex(*counts) if (name := ".".join(map(str, place))) not in there]
-    if absent:
-        what = f"{len(absent)} of its {math.prod(counts)} chunks are absent, the first {absent[0]}"
+    present = {path.name for path in folder.iterdir()} if folder.is_dir() else set()
+    missing = [name for place in np.ndindex(*counts) if (name := ".".join(map(str, place))) not in present]
+    if missing:
+        what = f"{len(missing)} of its {math.prod(counts)} chunks are missing, the first {missing[0]}"
         raise PictureError(what, where=str(folder))
 
 
