@@ -227,9 +227,9 @@ def _references(job: dict[str, Any], folder: Path, python: str, keep: Path) -> P
 
 def _views(folder: Path) -> Picture:
     """``(N, H, W, 3)`` judged views."""
-    from lippmann.image.encoding import decode_file
+    from lippmann.image import open_file
 
-    return np.stack([decode_file(folder / f"view_{number:02}.exr", "exr", "srgb")[0][""] for number in JUDGED])
+    return np.stack([open_file(folder / f"view_{number:02}.exr").decode()[""] for number in JUDGED])
 
 
 # ---- Lippmann --------------------------------------------------------------------------------------------------------

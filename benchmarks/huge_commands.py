@@ -45,7 +45,7 @@ def _repeated(folder: Path, size: tuple[int, int]) -> None:
     from lippmann.display import Display
     from lippmann.image import read_picture
     from lippmann.image.metadata import Metadata
-    from lippmann.image.streamed_write import write_in_bands
+    from lippmann.image.write import write_rows
 
     for ending in ("tif", "zarr"):
         small = read_picture(folder / f"small.{ending}")
@@ -62,7 +62,7 @@ def _repeated(folder: Path, size: tuple[int, int]) -> None:
             return small.pixels[np.arange(first, last) % height][:, columns]  # noqa: B023
 
         metadata = Metadata(display, small.world_from_display, small.provenance)
-        write_in_bands(rows, metadata, folder / f"large.{ending}")
+        write_rows(rows, metadata, folder / f"large.{ending}")
 
 
 def measured(folder: Path) -> dict[str, dict[str, Any]]:

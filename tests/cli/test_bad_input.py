@@ -157,12 +157,12 @@ def test_a_full_disk(lippmann, picture, tmp_path):
         "import errno, os, sys\n"
         "import lippmann.image.write as formats\n"
         "from lippmann.cli import run\n"
-        "real = formats.encode_file\n"
+        "real = formats.encode_rows\n"
         "def full(path, *args, **options):\n"
         "    real(path, *args, **options)\n"
         "    with open('/dev/full', 'wb') as file:\n"
         "        file.write(b'x'); file.flush()\n"
-        "formats.encode_file = full\n"
+        "formats.encode_rows = full\n"
         "sys.exit(run(sys.argv[1:]))\n"
     )
     out = tmp_path / "out.png"
@@ -213,7 +213,7 @@ def test_a_fault_of_the_program_is_one_line_and_exit_code_1(lippmann, picture, m
     def broken(path):
         raise RuntimeError("wheels came off\nbadly")
 
-    monkeypatch.setattr(lippmann.image, "read_info", broken)
+    monkeypatch.setattr(lippmann.image, "open_file", broken)
     done = lippmann_run("info", str(picture))
     assert done == 1
 

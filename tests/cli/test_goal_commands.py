@@ -8,7 +8,7 @@ import time
 import numpy as np
 import pytest
 
-from lippmann.image import read_info, read_picture
+from lippmann.image import open_file, read_picture
 
 #: Bundled scenes that were made for the classic light models.
 CLASSIC = ("gears", "primitives", "room", "small-balls", "tree")
@@ -28,7 +28,7 @@ def test_a_quality_is_worked_for_and_stated(lippmann, engine, tmp_path, small):
     assert stated["worst_low"] < stated["worst"] < stated["worst_high"]
     assert stated["psnr"] > stated["worst"]
     assert done.json["spp"] >= 16
-    assert read_info(out).metadata.provenance.estimate == stated
+    assert open_file(out).metadata.provenance.estimate == stated
     assert f"estimated   {stated['psnr']:.1f} dB" in lippmann("info", out).out
     assert "estimated PSNR" in done.err
     more = lippmann("render", "teapot", "--display", small, "--quality-mean", 36, "--json", "-o", out)

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import builtins
+import io
 
 import numpy as np
 import pytest
 import tifffile
 
 from lippmann.display.pixel_window import PixelWindow
-from lippmann.image.encoding import decode_stored, read_header
-from lippmann.image.streamed import open_pixels
+from lippmann.image import open_file
+from lippmann.image.streamed import pixels_of_file
 
 OME = """<?xml version="1.0" encoding="UTF-8"?><!DOCTYPE OME [<!ENTITY other SYSTEM "file://{folder}/secret.tif">]>
 <OME xmlns="http://www.openmicroscopy.org/Schemas/OME/2016-06" UUID="urn:uuid:00000000-0000-0000-0000-000000000001">
@@ -28,7 +29,8 @@ def opened(monkeypatch):
         names.append(str(file))
         return plain(file, *options, **more)
 
-    monkeypatch.setattr(builtins, "open", noted)
+    for module in (builtins, io):  # the latter's is used by paths
+        monkeypatch.setattr(module, "open", noted)
     return names
 
 
@@ -40,8 +42,8 @@ def test_a_description_that_names_another_file_is_not_followed(tmp_path, opened)
     with tifffile.TiffFile(tmp_path / "a.tif") as file:
         assert file.is_ome  # the library itself would look for the other file, were it asked for a series
     opened.clear()
-    assert read_header(tmp_path / "a.tif").width == 6
-    np.testing.assert_array_equal(decode_stored(tmp_path / "a.tif", "tiff")[0][""], values)
-    np.testing.assert_array_equal(open_pixels(tmp_path / "a.tif", "tiff").window(PixelWindow(0, 0, 6, 4)), values)
-    assert any(name.endswith("a.tif") for name in opened)
+    assert open_file(tmp_path / "a.tif").width == 6
+    np.testing.assert_array_equal(open_file(tmp_path / "a.tif").decode()[""], values)
+    np.testing.assert_array_equal(pixels_of_file(open_file(tmp_path / "a.tif")).window(PixelWindow(0, 0, 6, 4)), values)
+    assert [name for name in opened if name.endswith("a.tif")] == 3 * [str(tmp_path / "a.tif")]
     assert not any(name.endswith("secret.tif") for name in opened)

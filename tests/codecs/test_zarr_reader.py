@@ -19,14 +19,12 @@ import numpy as np
 import pytest
 import zarr
 
-from lippmann.codecs.zarr_array import open_zarr
 from lippmann.codecs.zarr_reader import open_array, read_array_metadata
 from lippmann.display.pixel_window import PixelWindow
 from lippmann.errors import PictureError
 from lippmann.exchange.zarr_store import read_zarr
-from lippmann.image import read_picture
-from lippmann.image.encoding import decode_stored, read_header
-from lippmann.image.streamed import open_pixels
+from lippmann.image import open_file, read_picture
+from lippmann.image.streamed import pixels_of_file
 
 VALUES = np.random.default_rng(0).integers(0, 256, (4, 6, 3), dtype=np.uint8)
 VIEWS = np.random.default_rng(1).integers(0, 256, (2, 2, 2, 3, 3), dtype=np.uint8)
@@ -93,7 +91,7 @@ def group_2(folder, **attributes):
 
 
 def values_of(folder):
-    return decode_stored(folder, "zarr")[0][""]
+    return open_file(folder).decode()[""]
 
 
 def refusal(folder, read=values_of):
@@ -124,9 +122,9 @@ HOSTILE = {
     "read",
     [
         values_of,
-        read_header,
+        open_file,
         read_picture,
-        lambda folder: open_pixels(folder, "zarr").window(PixelWindow(0, 0, 6, 4)),
+        lambda folder: pixels_of_file(open_file(folder)).window(PixelWindow(0, 0, 6, 4)),
     ],
     ids=["values", "header", "picture", "pieces"],
 )
@@ -304,7 +302,7 @@ def test_no_link_leads_out_of_a_picture(tmp_path, secret):
     array_3(folder, attributes={})
     (folder / "zarr.json").unlink()
     (folder / "zarr.json").symlink_to(secret.parent / "three" / "zarr.json")
-    assert "zarr.json is a link" in refusal(folder, read_header)
+    assert "zarr.json is a link" in refusal(folder, open_file)
 
 
 def test_attributes_are_no_link_either(tmp_path, secret):
@@ -312,7 +310,7 @@ def test_attributes_are_no_link_either(tmp_path, secret):
     array_2(folder)
     secret.write_text('{"lippmann": "secret"}')
     (folder / ".zattrs").symlink_to(secret)
-    assert ".zattrs is a link" in refusal(folder, read_header)
+    assert ".zattrs is a link" in refusal(folder, open_file)
 
 
 def test_no_link_leads_out_of_a_light_field(tmp_path, secret):
@@ -434,7 +432,7 @@ def test_what_others_write_in_format_3_is_read(tmp_path, options):
     array = zarr.create_array(tmp_path / "x.zarr", shape=values.shape, chunks=(8, 8, 3), dtype="<u2", **options)
     array[...] = values
     np.testing.assert_array_equal(values_of(tmp_path / "x.zarr"), values)
-    window = open_pixels(tmp_path / "x.zarr", "zarr").window(PixelWindow(7, 5, 13, 11))
+    window = pixels_of_file(open_file(tmp_path / "x.zarr")).window(PixelWindow(7, 5, 13, 11))
     np.testing.assert_array_equal(window, values[5:16, 7:20])
 
 
@@ -485,7 +483,7 @@ def test_metadata_that_is_exchanged_after_the_check_is_not_read(tmp_path):
 def test_arrays_cannot_be_changed(tmp_path):
     array_2(tmp_path / "x.zarr")
     with pytest.raises((PermissionError, ValueError, TypeError)):
-        open_zarr(tmp_path / "x.zarr")[...] = 0
+        open_array(zarr, tmp_path / "x.zarr", read_array_metadata(tmp_path / "x.zarr"))[...] = 0
     np.testing.assert_array_equal(values_of(tmp_path / "x.zarr"), VALUES)
 
 

@@ -14,9 +14,16 @@ from hypothesis import strategies as st
 from lippmann.codecs import tiff
 from lippmann.display.pixel_window import PixelWindow
 from lippmann.errors import PictureError
-from lippmann.image import IntegralImage, part_folders, read_picture, streamed, write_micro_images, write_views
-from lippmann.image.part_folders import write_large_micro_images, write_large_views
-from lippmann.image.streamed import ChunkedPixels, LargePicture, open_picture, open_pixels
+from lippmann.image import (
+    IntegralImage,
+    open_file,
+    part_folders,
+    read_picture,
+    streamed,
+    write_micro_images,
+    write_views,
+)
+from lippmann.image.streamed import ChunkedPixels, LargePicture, open_picture, pixels_of_file
 from lippmann.image.views import panel_rows_of_view_rows, pixels_of_view, pixels_of_view_rows, view_grid
 from lippmann.viewing.refocus import refocus
 from lippmann.viewing.replay import replay
@@ -168,21 +175,20 @@ def test_replay_and_refocus_see_the_same(saved, display, layout):
 
 
 @pytest.mark.parametrize("layout", LAYOUTS, ids=range(len(LAYOUTS)))
-@pytest.mark.parametrize(
-    ("pieces", "whole"), [(write_large_views, write_views), (write_large_micro_images, write_micro_images)]
-)
-def test_folders_are_the_same(saved, display, layout, pieces, whole, tmp_path, monkeypatch):
+@pytest.mark.parametrize("write", [write_views, write_micro_images])
+def test_folders_are_the_same(saved, display, layout, write, tmp_path, monkeypatch):
+    opened, image = saved(display(**layout))
+    count = write(image, tmp_path / "whole")
     # Little at a time, so that every kind of lot comes up.
     monkeypatch.setattr(part_folders, "LOT_BYTES", 3000)
-    opened, image = saved(display(**layout))
-    assert pieces(opened, tmp_path / "pieces") == whole(image, tmp_path / "whole")
+    assert write(opened, tmp_path / "pieces") == count
     files = {path.name: path.read_bytes() for path in (tmp_path / "whole").iterdir()}
     assert {path.name: path.read_bytes() for path in (tmp_path / "pieces").iterdir()} == files
 
 
 def test_folders_in_another_depth(saved, display, tmp_path):
     opened, image = saved(display(**LAYOUTS[0]))
-    write_large_views(opened, tmp_path / "pieces", format="tiff", bits=8)
+    write_views(opened, tmp_path / "pieces", format="tiff", bits=8)
     write_views(image, tmp_path / "whole", format="tiff", bits=8)
     for path in (tmp_path / "whole").glob("*.tif"):
         assert path.read_bytes() == (tmp_path / "pieces" / path.name).read_bytes()
@@ -202,19 +208,19 @@ def test_formats_without_pieces_are_read_whole(display, tmp_path):
     IntegralImage(np.zeros((15, 12, 3), np.float32), display(lenses=(4, 5))).save(tmp_path / "a.png")
     assert isinstance(open_picture(tmp_path / "a.png"), IntegralImage)
     with pytest.raises(PictureError, match="piece by piece"):
-        open_pixels(tmp_path / "a.png", "png")
+        pixels_of_file(open_file(tmp_path / "a.png"))
 
 
 def test_grey_and_transparent_pieces(tmp_path):
     rng = np.random.default_rng(0)
     grey = rng.integers(0, 256, (40, 50), dtype=np.uint8)
     tifffile.imwrite(tmp_path / "grey.tif", grey, tile=(16, 16), photometric="minisblack")
-    source = open_pixels(tmp_path / "grey.tif", "tiff")
+    source = pixels_of_file(open_file(tmp_path / "grey.tif"))
     assert np.array_equal(source.window(PixelWindow(0, 0, 50, 40)), np.repeat(grey[..., None], 3, axis=2))
     clear = rng.integers(0, 255, (40, 50, 4), dtype=np.uint8)
     tifffile.imwrite(tmp_path / "clear.tif", clear, tile=(16, 16), photometric="rgb", extrasamples=["unassalpha"])
     with pytest.raises(PictureError, match="transparent"):
-        open_pixels(tmp_path / "clear.tif", "tiff").window(PixelWindow(0, 0, 4, 4))
+        pixels_of_file(open_file(tmp_path / "clear.tif")).window(PixelWindow(0, 0, 4, 4))
 
 
 @pytest.mark.parametrize("name", ["tiled.tif", "a.zarr"])

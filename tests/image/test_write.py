@@ -17,7 +17,7 @@ from PIL import Image
 from lippmann.codecs.exr import read_exr_header
 from lippmann.color.transfer import dequantize, quantize
 from lippmann.errors import OutputError
-from lippmann.image import IntegralImage, Provenance, read_info, read_metadata, read_picture, write_picture
+from lippmann.image import IntegralImage, Provenance, open_file, read_metadata, read_picture, write_picture
 from lippmann.image.write import format_for, write_plain_picture
 
 KINDS = [("a.png", 8), ("a.png", 16), ("a.exr", 16), ("a.exr", 32), ("a.tif", 8), ("a.tiff", 16), ("a.TIF", 32)]
@@ -102,7 +102,7 @@ def test_maps_travel_in_exr_and_only_there(tmp_path, display, picture):
     for name, values in maps.items():
         assert back.maps[name].dtype == values.dtype
         np.testing.assert_array_equal(back.maps[name], values)
-    assert read_info(tmp_path / "a.exr").layers == ("depth", "normal", "shape-id", "uv")
+    assert open_file(tmp_path / "a.exr").layers == ("depth", "normal", "shape-id", "uv")
     assert set(read_exr_header(tmp_path / "a.exr").channels) >= {"depth.V", "normal.X", "normal.Z", "uv.Y", "R"}
     image.save(tmp_path / "a.png")
     assert not read_picture(tmp_path / "a.png").maps
@@ -182,7 +182,7 @@ def test_a_plain_picture_carries_no_display(tmp_path):
     pixels = np.random.default_rng(1).random((4, 6, 3), dtype=np.float32)
     for name in ("a.png", "a.exr", "a.tif"):
         write_plain_picture(pixels, tmp_path / name)
-        assert read_info(tmp_path / name).metadata is None
+        assert open_file(tmp_path / name).metadata is None
     with Image.open(tmp_path / "a.png") as other:
         np.testing.assert_array_equal(np.asarray(other), quantize(pixels, 8, "srgb"))
 

@@ -112,9 +112,8 @@ def test_a_quilt_is_held_as_it_is_stored(tmp_path, bits, stored):
 
 
 def test_views_of_several_depths_become_linear(folder):
-    encoding.encode_file(
-        folder / "shot2_000.png", "png", {"": np.full((64, 48, 3), 0.25, np.float32)}, stored="uint16", transfer="srgb"
-    )
+    deep = encoding.stored_values(np.full((64, 48, 3), 0.25, np.float32), "uint16", "srgb")
+    encoding.encode_values(folder / "shot2_000.png", "png", {"": deep}, transfer="srgb")
     quilt = read_views(folder, LAYOUT)
     assert (quilt.values.dtype, quilt.stored) == ("float32", "float32")
     np.testing.assert_allclose(quilt.view(0), 0.25, atol=1e-4)

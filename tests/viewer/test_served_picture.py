@@ -44,14 +44,14 @@ def test_many_threads_read_a_file_once(tmp_path, monkeypatch):
     path = tmp_path / "a.png"
     IntegralImage(PIXELS, DISPLAY).save(path)
     read = []
-    really = served_picture.open_shown
+    really = served_picture.picture_of_file
 
-    def slowly(*arguments):
+    def slowly(*arguments, **options):
         read.append(arguments)
         time.sleep(0.05)
-        return really(*arguments)
+        return really(*arguments, **options)
 
-    monkeypatch.setattr(served_picture, "open_shown", slowly)
+    monkeypatch.setattr(served_picture, "picture_of_file", slowly)
     file = PictureFile(path)
     with ThreadPoolExecutor(8) as pool:
         found = list(pool.map(lambda number: file.current() if number % 2 else file.loaded(), range(32)))
@@ -65,7 +65,7 @@ def test_a_large_picture_is_read_piece_by_piece(tmp_path, monkeypatch, bits):
     monkeypatch.setattr(streamed, "LARGE", 100)
     path = tmp_path / "a.zarr"
     IntegralImage(PIXELS, DISPLAY).save(path, bits=bits)
-    opened = served_picture.open_shown(path, None)
+    opened = streamed.open_picture(path, keeps_codes=True)
     assert isinstance(opened, streamed.LargePicture)
     expected = quantize(read_picture(path).pixels, 8, "srgb")
     np.testing.assert_array_equal(Tiles(opened, 7).codes("picture", 1, 1), expected[7:14, 7:14])

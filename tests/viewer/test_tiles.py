@@ -14,8 +14,7 @@ from PIL import Image
 from lippmann.color.transfer import dequantize, quantize
 from lippmann.display import Display, LensArray, Panel
 from lippmann.errors import UsageError
-from lippmann.image import IntegralImage, Provenance, read_picture
-from lippmann.viewer.served_picture import open_shown
+from lippmann.image import IntegralImage, Provenance, open_picture, read_picture
 from lippmann.viewer.tiles import PICTURE, TILE_SIZE, Tiles
 
 LENSES = LensArray("lenticular", 0.4)
@@ -90,7 +89,7 @@ def test_what_is_not_there_is_said(noise, layer, column, row):
 def test_codes_of_a_file_come_back(tmp_path, codes, transfer, size, name):
     image = picture(dequantize(codes, transfer), provenance=Provenance(transfer=transfer))
     image.save(tmp_path / name, bits=8)
-    np.testing.assert_array_equal(joined(Tiles(open_shown(tmp_path / name, None), size)), codes)
+    np.testing.assert_array_equal(joined(Tiles(open_picture(tmp_path / name, keeps_codes=True), size)), codes)
 
 
 FILES = [("a.png", 8), ("a.png", 16), ("a.exr", 16), ("a.exr", 32), ("a.tif", 8), ("a.tif", 16), ("a.tif", 32)]
@@ -100,7 +99,7 @@ FILES = [("a.png", 8), ("a.png", 16), ("a.exr", 16), ("a.exr", 32), ("a.tif", 8)
 def test_files_of_all_depths_are_shown_by_the_same_codes(noise, tmp_path, name, bits):
     picture(noise).save(tmp_path / name, bits=bits)
     expected = quantize(read_picture(tmp_path / name).pixels, 8, "srgb")
-    np.testing.assert_array_equal(joined(Tiles(open_shown(tmp_path / name, None), 16)), expected)
+    np.testing.assert_array_equal(joined(Tiles(open_picture(tmp_path / name, keeps_codes=True), 16)), expected)
 
 
 def test_values_beyond_the_codes_are_clipped_like_the_display_does():

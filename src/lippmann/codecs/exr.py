@@ -78,25 +78,28 @@ def read_exr_header(path: Path) -> ExrHeader:
         If the file is truncated, damaged, no EXR, or of a kind that holds no plain picture (deep, several parts).
     """
     with path.open("rb") as file:
-        if file.read(4) != SIGNATURE:
-            raise PictureError("is no OpenEXR file", where=str(path))
-        try:
-            (version,) = struct.unpack("<I", _exactly(file, 4))
-            if version & (_DEEP | _MULTIPART):
-                raise PictureError(
-                    "is a deep or multi-part OpenEXR file", where=str(path), rule="one flat part is read"
-                )
-            attributes = _attributes(file)
-            x0, y0, x1, y1 = struct.unpack("<4i", attributes["dataWindow"][1])
-            channels = _channel_list(attributes["channels"][1])
-            width, height = x1 - x0 + 1, y1 - y0 + 1
-            if width < 1 or height < 1:
-                raise _damaged(path, f"its size is {width} x {height}")
-            if not version & _TILED:
-                _check_chunks(file, height, attributes["compression"][1][0])
-            text = {name: value.decode("utf-8") for name, (kind, value) in attributes.items() if kind == "string"}
-        except (struct.error, KeyError, IndexError, EOFError, UnicodeDecodeError) as error:
-            raise _damaged(path, "it is cut short or its header makes no sense") from error
+        return exr_header(file, path)
+
+
+def exr_header(file: BinaryIO, path: Path) -> ExrHeader:
+    """:func:`read_exr_header` of a file that is open, at its beginning; ``path`` is its name, for errors."""
+    if file.read(4) != SIGNATURE:
+        raise PictureError("is no OpenEXR file", where=str(path))
+    try:
+        (version,) = struct.unpack("<I", _exactly(file, 4))
+        if version & (_DEEP | _MULTIPART):
+            raise PictureError("is a deep or multi-part OpenEXR file", where=str(path), rule="one flat part is read")
+        attributes = _attributes(file)
+        x0, y0, x1, y1 = struct.unpack("<4i", attributes["dataWindow"][1])
+        channels = _channel_list(attributes["channels"][1])
+        width, height = x1 - x0 + 1, y1 - y0 + 1
+        if width < 1 or height < 1:
+            raise _damaged(path, f"its size is {width} x {height}")
+        if not version & _TILED:
+            _check_chunks(file, height, attributes["compression"][1][0])
+        text = {name: value.decode("utf-8") for name, (kind, value) in attributes.items() if kind == "string"}
+    except (struct.error, KeyError, IndexError, EOFError, UnicodeDecodeError) as error:
+        raise _damaged(path, "it is cut short or its header makes no sense") from error
     return ExrHeader(width, height, channels, text)
 
 

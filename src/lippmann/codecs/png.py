@@ -79,14 +79,19 @@ def read_png_header(path: Path) -> PngHeader:
         If the file is truncated, damaged or no PNG.
     """
     with path.open("rb") as file:
-        header: tuple[int, int, int, int] | None = None
-        text: dict[str, str] = {}
-        for kind, body in _chunks(file, path):
-            if kind == b"IHDR" and len(body) == 13:
-                width, height, bits, color_type = struct.unpack(">IIBB", body[:10])
-                header = width, height, bits, _CHANNELS.get(color_type, 0)
-            elif kind == b"iTXt":
-                text.update(_international_text(body, path))
+        return png_header(file, path)
+
+
+def png_header(file: BinaryIO, path: Path) -> PngHeader:
+    """:func:`read_png_header` of a file that is open, at its beginning; ``path`` is its name, for errors."""
+    header: tuple[int, int, int, int] | None = None
+    text: dict[str, str] = {}
+    for kind, body in _chunks(file, path):
+        if kind == b"IHDR" and len(body) == 13:
+            width, height, bits, color_type = struct.unpack(">IIBB", body[:10])
+            header = width, height, bits, _CHANNELS.get(color_type, 0)
+        elif kind == b"iTXt":
+            text.update(_international_text(body, path))
     if header is None or not header[0] or not header[1] or not header[3]:
         raise _damaged(path, "it has no proper header")
     return PngHeader(*header, text=text)
@@ -100,9 +105,13 @@ def read_png(path: Path) -> NDArray[Any]:
     PictureError
         If a check sum is wrong or the pixels cannot be decoded.
     """
+    return decode_png(path.read_bytes(), path)
+
+
+def decode_png(data: bytes, path: Path) -> NDArray[Any]:
+    """:func:`read_png` of the bytes of a file; ``path`` is its name, for errors."""
     import imagecodecs
 
-    data = path.read_bytes()
     # libpng reports a wrong check sum of most chunks on standard error and goes on; so all are looked at first.
     for _ in _chunks(io.BytesIO(data), path, all_bodies=True):
         pass

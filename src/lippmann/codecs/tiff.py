@@ -5,16 +5,15 @@ from __future__ import annotations
 import contextlib
 import logging
 import struct
-import weakref
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.errors import PictureError
+from lippmann.runtime.cached_property import cached_property
 
 #: Byte order and version of classic and of big TIFF.
 SIGNATURES = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
@@ -44,39 +43,14 @@ _LIBRARY_ERRORS = (
 )
 
 
-@dataclass(frozen=True)
-class TiffHeader:
-    """What a TIFF says of its first page: size, channels, NumPy type name and description."""
-
-    width: int
-    height: int
-    channels: int
-    dtype: str
-    description: str
-
-
 def write_tiff(path: Path, values: NDArray[Any], *, description: str, pixel_pitch: float | None = None) -> None:
     """Write ``(H, W, 3)`` uint8, uint16 or float32 values, losslessly compressed (deflate with predictor).
 
     ``description`` (ASCII) becomes ``ImageDescription``; ``pixel_pitch`` (mm) becomes the resolution in dots per inch.
-    Pictures of :data:`TILED_FROM` pixels and more are written as :func:`write_tiled_tiff` does.
+    Pictures of :data:`TILED_FROM` pixels and more are for :func:`write_tiled_tiff`.
     """
     import tifffile
 
-    height, width = values.shape[:2]
-    if height * width >= TILED_FROM:
-        grid = [(row, column) for row in range(0, height, TILE) for column in range(0, width, TILE)]
-        tiles = (values[row : row + TILE, column : column + TILE] for row, column in grid)
-        write_tiled_tiff(
-            path,
-            tiles,
-            size=(width, height),
-            side=TILE,
-            dtype=values.dtype,
-            description=description,
-            pixel_pitch=pixel_pitch,
-        )
-        return
     tifffile.imwrite(
         path,
         np.ascontiguousarray(values),
@@ -144,61 +118,26 @@ def _resolution(pixel_pitch: float | None) -> dict[str, Any]:
     return {"resolution": (_MM_PER_INCH / pixel_pitch,) * 2, "resolutionunit": "INCH"}
 
 
-def read_tiff_header(path: Path) -> TiffHeader:
-    """Size, type and description of the first page, without decoding its pixels.
+class TiffPicture:
+    """The first page of an open TIFF: its header, read once, and its values, whole or by tiles or strips.
 
-    Raises
-    ------
-    PictureError
-        If the file is damaged, no TIFF, or its pages hold no flat picture.
-    """
-    with _opened(path) as page:
-        shape, dtype = page.shape, page.dtype
-        description = page.tags.get("ImageDescription")
-        text = description.value if description is not None else ""
-        interleaved = page.planarconfig == 1
-    if len(shape) == 2:
-        shape = (*shape, 1)
-    sizes = [size for size in shape if isinstance(size, int) and size >= 1]  # a damaged tag may be anything
-    if len(shape) != 3 or len(sizes) != 3 or dtype is None or not (interleaved or shape[2] == 1):
-        raise PictureError(
-            f"holds an array of shape {shape}", where=str(path), rule="it must be one interleaved picture"
-        )
-    return TiffHeader(shape[1], shape[0], shape[2], np.dtype(dtype).name, text if isinstance(text, str) else "")
+    For one thread at a time. The file has to stay open as long as values are read.
 
-
-def read_tiff(path: Path) -> NDArray[Any]:
-    """Values of the first page as stored, ``(H, W)`` or ``(H, W, channels)``.
-
-    Raises
-    ------
-    PictureError
-        If the pixels cannot be decoded.
-    """
-    with _opened(path) as page:
-        _check_segments(page, path)
-        values: NDArray[Any] = page.asarray()
-    return values
-
-
-def _check_segments(page: Any, path: Path) -> None:
-    """A ValueError if a strip or tile is said to lie (partly) beyond the end: memory would be given to what is said."""
-    size = path.stat().st_size
-    if any(place + count > size for place, count in zip(page.dataoffsets, page.databytecounts, strict=True)):
-        raise ValueError("it is cut short")
-
-
-class TiffSegments:
-    """The tiles or strips of a TIFF's first page, decoded one by one; the file stays open as long as they are used.
+    Parameters
+    ----------
+    file:
+        The open file; where it stands does not matter.
+    path:
+        Its name, for errors.
 
     Attributes
     ----------
-    size:
-        Width and height of the picture.
-    chunk:
-        Rows and columns of a segment; those at the right and lower edge are cut off.
+    width, height, channels:
+        Size in pixels and values per pixel.
     dtype:
-        Type of the values.
+        NumPy type name of the values.
+    description:
+        The text of ``ImageDescription``; empty without.
 
     Raises
     ------
@@ -206,58 +145,87 @@ class TiffSegments:
         If the file is damaged, no TIFF, or no flat interleaved picture.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, file: BinaryIO, path: Path) -> None:
         import tifffile
 
-        header = read_tiff_header(path)
-        self.size = header.width, header.height
-        self.dtype = np.dtype(header.dtype)
-        self._path = path
+        self._path, self._file = path, file
+        file.seek(0)
         with _reported(path):
-            self._file = tifffile.TiffFile(path)
-            weakref.finalize(self, self._file.close)
-            self._page = self._file.pages[0]
-            _check_segments(self._page, path)
-            if self._page.is_tiled:
-                self.chunk = int(self._page.tilelength), int(self._page.tilewidth)
-            else:
-                self.chunk = min(int(self._page.rowsperstrip), header.height), header.width
-            if min(self.chunk) < 1:
-                raise ValueError(f"its pieces have {self.chunk[1]} x {self.chunk[0]} pixels")
-        self._columns = -(-header.width // self.chunk[1])
+            self._page: Any = tifffile.TiffFile(file).pages[0]
+            shape, dtype = self._page.shape, self._page.dtype
+            description = self._page.tags.get("ImageDescription")
+            text = description.value if description is not None else ""
+            interleaved = self._page.planarconfig == 1
+        if len(shape) == 2:
+            shape = (*shape, 1)
+        sizes = [size for size in shape if isinstance(size, int) and size >= 1]  # a damaged tag may be anything
+        if len(shape) != 3 or len(sizes) != 3 or dtype is None or not (interleaved or shape[2] == 1):
+            raise PictureError(
+                f"holds an array of shape {shape}", where=str(path), rule="it must be one interleaved picture"
+            )
+        self.height, self.width, self.channels = sizes
+        self.dtype: str = np.dtype(dtype).name
+        self.description = text if isinstance(text, str) else ""
 
-    def read(self, row: int, column: int) -> NDArray[Any]:
-        """``(rows, columns, channels)`` values of a segment.
+    def read(self) -> NDArray[Any]:
+        """All values as stored, ``(H, W)`` or ``(H, W, channels)``.
+
+        Raises
+        ------
+        PictureError
+            If they cannot be decoded.
+        """
+        with _reported(self._path):
+            self._check_segments()
+            values: NDArray[Any] = self._page.asarray()
+        return values
+
+    @cached_property
+    def chunk(self) -> tuple[int, int]:
+        """Rows and columns of a tile or strip; those at the right and lower edge are cut off.
+
+        Raises
+        ------
+        PictureError
+            If the file is too short for its tiles or strips, or they have no size.
+        """
+        with _reported(self._path):
+            self._check_segments()
+            if self._page.is_tiled:
+                chunk = int(self._page.tilelength), int(self._page.tilewidth)
+            else:
+                chunk = min(int(self._page.rowsperstrip), self.height), self.width
+            if min(chunk) < 1:
+                raise ValueError(f"its pieces have {chunk[1]} x {chunk[0]} pixels")
+        return chunk
+
+    def read_chunk(self, row: int, column: int) -> NDArray[Any]:
+        """``(rows, columns, channels)`` values of the tile or strip in that row and column of them.
 
         Raises
         ------
         PictureError
             If it cannot be decoded.
         """
-        number = row * self._columns + column
-        (height, width), (high, wide) = self.size[::-1], self.chunk
-        shape = min(high, height - row * high), min(wide, width - column * wide)
+        high, wide = self.chunk
+        number = row * -(-self.width // wide) + column
+        shape = min(high, self.height - row * high), min(wide, self.width - column * wide)
         with _reported(self._path):
             page = self._page
-            with self._path.open("rb") as file:
-                file.seek(page.dataoffsets[number])
-                data = file.read(page.databytecounts[number])
-            segment = page.decode(data, number)[0]
+            self._file.seek(page.dataoffsets[number])
+            segment = page.decode(self._file.read(page.databytecounts[number]), number)[0]
             if segment is None:  # a segment without bytes is empty
-                return np.zeros((*shape, page.samplesperpixel), dtype=self.dtype)
+                return np.zeros((*shape, self.channels), dtype=self.dtype)
             values: NDArray[Any] = segment[0, : shape[0], : shape[1]]
             if values.shape[:2] != shape:
                 raise ValueError(f"segment {number} is cut short")
         return values
 
-
-@contextlib.contextmanager
-def _opened(path: Path) -> Iterator[Any]:
-    """The first page; whatever the library raises about the file inside the ``with`` becomes a PictureError."""
-    import tifffile
-
-    with _reported(path), tifffile.TiffFile(path) as file:
-        yield file.pages[0]
+    def _check_segments(self) -> None:
+        """A ValueError if a strip or tile lies (partly) beyond the end: memory would be given to what is claimed."""
+        size, page = self._path.stat().st_size, self._page
+        if any(place + count > size for place, count in zip(page.dataoffsets, page.databytecounts, strict=True)):
+            raise ValueError("it is cut short")
 
 
 @contextlib.contextmanager

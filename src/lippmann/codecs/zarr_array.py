@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.codecs.zarr_reader import open_array, read_array_metadata, read_attributes
+from lippmann.codecs.zarr_reader import open_array, read_array
 from lippmann.errors import PictureError
 
 ENDING = ".zarr"
@@ -84,44 +84,59 @@ def is_zarr(path: Path) -> bool:
         return False
 
 
-def open_zarr(folder: Path) -> Any:
-    """The array of a folder, for reading.
+class ZarrPicture:
+    """The Zarr array of a folder, opened for reading: its metadata, read once, and its values, whole or by chunks.
+
+    Attributes
+    ----------
+    width, height:
+        Size in pixels.
+    dtype:
+        NumPy type name of the values.
+    text:
+        JSON of the attribute :data:`TEXT_KEY`; empty without.
+    chunk:
+        Rows and columns of a chunk; those at the right and lower edge are cut off.
 
     Raises
     ------
     PictureError
         If the library is not installed, or the folder holds no picture, or one whose metadata is not admitted.
     """
-    zarr = load_zarr(folder)
-    metadata = read_array_metadata(folder)
-    if len(metadata.shape) != 3 or metadata.shape[2] != 3 or min(metadata.shape) < 1:
-        raise PictureError(
-            f"holds an array of shape {metadata.shape}", where=str(folder), rule="it must be (height, width, 3)"
-        )
-    return open_array(zarr, folder, metadata)
 
+    def __init__(self, folder: Path) -> None:
+        zarr = load_zarr(folder)
+        metadata, attributes = read_array(folder)
+        if len(metadata.shape) != 3 or metadata.shape[2] != 3 or min(metadata.shape) < 1:
+            raise PictureError(
+                f"holds an array of shape {metadata.shape}", where=str(folder), rule="it must be (height, width, 3)"
+            )
+        self._folder, self._array = folder, open_array(zarr, folder, metadata)
+        self.height, self.width = metadata.shape[:2]
+        self.dtype: str = self._array.dtype.name
+        found = attributes.get(TEXT_KEY)
+        self.text = "" if found is None else json.dumps(found)
+        high, wide = (int(length) for length in self._array.chunks[:2])
+        self.chunk = high, wide
 
-def read_part(array: Any, place: tuple[slice, slice], folder: Path) -> NDArray[Any]:
-    """Some rows and columns of an array; a :class:`PictureError` if they cannot be decoded."""
-    try:
-        values: NDArray[Any] = array[place]
-    except PictureError:
-        raise
-    except Exception as error:  # whatever the library stumbles with over a damaged chunk
-        raise PictureError(f"this Zarr array is damaged: {error}", where=str(folder), fix="make it anew") from error
-    return values
+    def read(self) -> NDArray[Any]:
+        """All ``(height, width, 3)`` values as stored; a :class:`PictureError` if they cannot be decoded."""
+        return self._read(slice(None), slice(None))
 
+    def read_chunk(self, row: int, column: int) -> NDArray[Any]:
+        """``(rows, columns, 3)`` values of a chunk; a :class:`PictureError` if they cannot be decoded."""
+        high, wide = self.chunk
+        return self._read(slice(row * high, (row + 1) * high), slice(column * wide, (column + 1) * wide))
 
-def zarr_text(folder: Path) -> str:
-    """The metadata that the array of a folder carries as JSON; empty without.
-
-    Raises
-    ------
-    PictureError
-        If its attributes are damaged.
-    """
-    found = read_attributes(folder).get(TEXT_KEY)
-    return "" if found is None else json.dumps(found)
+    def _read(self, rows: slice, columns: slice) -> NDArray[Any]:
+        try:
+            values: NDArray[Any] = np.asarray(self._array[rows, columns])
+        except PictureError:
+            raise
+        except Exception as error:  # whatever the library stumbles with over a damaged chunk
+            what = f"this Zarr array is damaged: {error}"
+            raise PictureError(what, where=str(self._folder), fix="make it anew") from error
+        return values
 
 
 def load_zarr(where: Path) -> Any:

@@ -59,13 +59,7 @@ def read_attributes(folder: Path) -> dict[str, Any]:
     PictureError
         If they are damaged, or a link leads out of the folder.
     """
-    values = _json(folder, NODE_3, folder)
-    if values is None:
-        return _json(folder, ATTRIBUTES_2, folder) or {}
-    attributes = values.get("attributes") or {}
-    if not isinstance(attributes, dict):
-        raise _damaged(folder, "its attributes are no object")
-    return attributes
+    return _attributes(folder, _json(folder, NODE_3, folder))
 
 
 def read_array_metadata(folder: Path, root: Path | None = None) -> ArrayMetadata:
@@ -76,11 +70,32 @@ def read_array_metadata(folder: Path, root: Path | None = None) -> ArrayMetadata
     PictureError
         If there is no array, or its metadata is not admitted.
     """
+    return _array_metadata(folder, root or folder)[0]
+
+
+def read_array(folder: Path) -> tuple[ArrayMetadata, dict[str, Any]]:
+    """:func:`read_array_metadata` and :func:`read_attributes` together: each file is read once."""
+    metadata, values = _array_metadata(folder, folder)
+    return metadata, _attributes(folder, values if metadata.version == 3 else None)
+
+
+def _array_metadata(folder: Path, root: Path) -> tuple[ArrayMetadata, dict[str, Any]]:
+    """The metadata admitted, and the JSON object that holds it."""
     for name, version in ((NODE_3, 3), (ARRAY_2, 2)):
-        values = _json(folder, name, root or folder)
+        values = _json(folder, name, root)
         if values is not None:
-            return admitted(values, version, str(folder / name))
+            return admitted(values, version, str(folder / name)), values
     raise _damaged(folder, "there is no array in it")
+
+
+def _attributes(folder: Path, node: dict[str, Any] | None) -> dict[str, Any]:
+    """The attributes in the metadata of a node in format 3; without one, those of format 2, in a file of their own."""
+    if node is None:
+        return _json(folder, ATTRIBUTES_2, folder) or {}
+    attributes = node.get("attributes") or {}
+    if not isinstance(attributes, dict):
+        raise _damaged(folder, "its attributes are no object")
+    return attributes
 
 
 def open_array(zarr: Any, folder: Path, metadata: ArrayMetadata, root: Path | None = None) -> Any:

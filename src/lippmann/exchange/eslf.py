@@ -27,7 +27,7 @@ from lippmann.exchange.light_field import (
     view_shape,
 )
 from lippmann.exchange.metadata_text import TEXT_KEY, from_note, to_note
-from lippmann.image.encoding import read_header
+from lippmann.image.read import open_file
 from lippmann.runtime.atomic_write import replacing
 
 LAYOUT = "eslf"
@@ -81,7 +81,7 @@ def read_eslf(path: Path, *, lens: tuple[int, int] | None = None) -> LightField:
     PictureError
         If the file is missing, damaged or no PNG in colour, or its sides are no multiples of ``lens``.
     """
-    header = read_header(path)
+    header = open_file(path)
     if header.format != "png":
         raise PictureError(f"is a picture of the format {header.format}", where=str(path), rule="ESLF is PNG")
     if header.text:

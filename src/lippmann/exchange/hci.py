@@ -113,7 +113,7 @@ def read_hci(folder: Path, *, progress: ProgressCallback = silent) -> LightField
     metadata = read_note_file(folder, LAYOUT)
     names = _view_names(folder, parameters)
     paths = [[folder / name for name in row] for row in names]
-    values = read_view_files(paths, "srgb" if metadata is None else metadata.provenance.transfer, progress)
+    values = read_view_files(paths, progress)
     if values.shape[2:4] != shape[2:]:
         rule = f"{NAME} says {parameters.width} x {parameters.height}"
         raise PictureError(f"has {values.shape[3]} x {values.shape[2]} pixels", where=str(paths[0][0]), rule=rule)

@@ -10,20 +10,19 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, cast, get_args
+from typing import get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
-from lippmann.color.transfer import Transfer, dequantize, quantize
+from lippmann.color.transfer import Transfer
 from lippmann.display import Display
 from lippmann.errors import PictureError
-from lippmann.exchange.light_field import CODE_BITS, LightField, Values, check_rectangular
+from lippmann.exchange.light_field import LightField, Values, check_rectangular
 from lippmann.exchange.metadata_text import read_note_file, write_note_file
-from lippmann.image.encoding import FormatName, decode_file, encode_file, read_header
+from lippmann.image.encoding import FormatName, encode_values
 from lippmann.image.metadata import parse_json
 from lippmann.image.part_folders import MANIFEST, Kind
-from lippmann.image.stored_values import Stored
+from lippmann.image.read import open_file
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.runtime.atomic_write import replacing_folder
 
@@ -96,8 +95,7 @@ def read_view_folder(
     """
     metadata = read_note_file(folder, LAYOUT)
     paths = _in_rows(_numbered(folder), folder, grid)
-    transfer = "srgb" if metadata is None else metadata.provenance.transfer
-    return LightField(read_view_files(paths, transfer, progress), metadata)
+    return LightField(read_view_files(paths, progress), metadata)
 
 
 def _numbered(folder: Path) -> Mapping[Place, Path]:
@@ -163,15 +161,14 @@ def is_composable(folder: Path) -> bool:
 
 def write_view(path: Path, name: FormatName, values: Values, transfer: Transfer) -> None:
     """Write a view ``(H, W, 3)``: codes as PNG, or floats as OpenEXR (``name``), without loss."""
-    codes: NDArray[Any] = values
-    linear = dequantize(codes, transfer) if codes.dtype.kind == "u" else codes.astype(np.float32)
-    encode_file(path, name, {"": linear}, stored=cast(Stored, values.dtype.name), transfer=transfer)
+    # A view may be cut out of an array in another order, which encoders do not take.
+    encode_values(path, name, {"": values.copy()}, transfer=transfer)
 
 
-def read_view_files(paths: Sequence[Sequence[Path]], transfer: Transfer, progress: ProgressCallback = silent) -> Values:
+def read_view_files(paths: Sequence[Sequence[Path]], progress: ProgressCallback = silent) -> Values:
     """The views of rows of picture files, ``(t, s, v, u, 3)``, in the type in which they are stored.
 
-    ``transfer`` is the transfer function of the codes; ``progress`` is called after every file.
+    ``progress`` is called after every file.
 
     Raises
     ------
@@ -179,10 +176,10 @@ def read_view_files(paths: Sequence[Sequence[Path]], transfer: Transfer, progres
         If a file is missing or damaged, holds transparent colours, or differs from the first in size or type.
     """
     down, across = len(paths), len(paths[0])
-    first = _read_view(paths[0][0], transfer)
+    first: Values = open_file(paths[0][0]).decode()[""]
     views = np.empty((down, across, *first.shape), dtype=first.dtype)
     for number, path in enumerate(path for row in paths for path in row):
-        view = first if number == 0 else _read_view(path, transfer)
+        view = first if number == 0 else open_file(path).decode()[""]
         if view.shape != first.shape:
             rule = f"the first view, {paths[0][0].name}, has {_size(first)}"
             raise PictureError(f"has {_size(view)} pixels", where=str(path), rule=rule)
@@ -192,14 +189,6 @@ def read_view_files(paths: Sequence[Sequence[Path]], transfer: Transfer, progres
         views[divmod(number, across)] = view
         progress(Progress("read", number + 1, down * across))
     return views
-
-
-def _read_view(path: Path, transfer: Transfer) -> Values:
-    layers, stored = decode_file(path, read_header(path).format, transfer)
-    linear = layers[""]
-    if stored in CODE_BITS:
-        return quantize(linear, CODE_BITS[stored], transfer)
-    return np.asarray(linear.astype(stored))
 
 
 def _size(view: Values) -> str:

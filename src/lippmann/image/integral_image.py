@@ -14,11 +14,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lippmann.display import Display
+from lippmann.display.pixel_window import PixelWindow
 from lippmann.errors import PictureError
 from lippmann.image.micro_images import Permutation, micro_images_as_views
+from lippmann.image.picture import Picture
 from lippmann.image.provenance import Provenance
 from lippmann.image.stored_values import FloatArray, Matrix, Stored, checked_similarity
-from lippmann.image.views import Resampling, exact_view_shape, resampled_views, view_grid
+from lippmann.image.views import Resampling, exact_view_shape, resampled_views
 
 _MAP_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_-]*")
 
@@ -27,7 +29,7 @@ _NOTEBOOK_WIDTH = 512
 
 
 @dataclass(frozen=True, eq=False)
-class IntegralImage:
+class IntegralImage(Picture):
     """The pixels of a panel in linear RGB.
 
     Parameters
@@ -84,16 +86,6 @@ class IntegralImage:
         """``(lens_rows, lens_cols, ny, nx)``: which places of :meth:`micro_images` hold a pixel."""
         return Permutation(self.display).mask
 
-    @property
-    def views_are_exact(self) -> bool:
-        """Whether :meth:`views` is a permutation of the pixels; else it is resampled, see :attr:`views_note`."""
-        return view_grid(self.display).exact
-
-    @property
-    def views_note(self) -> str:
-        """What is not exact about the views, as a sentence; empty if nothing is."""
-        return view_grid(self.display).note
-
     def views(self, resampling: Resampling = "nearest") -> FloatArray:
         """Views ``(ny, nx, lens_rows, lens_cols, 3)``; of a lenticular sheet ``(1, nx, H, lens_cols, 3)``.
 
@@ -141,14 +133,14 @@ class IntegralImage:
         """
         return cls(_joined_views(np.asarray(views, dtype=np.float32), display), display, **parts)
 
+    def window(self, window: PixelWindow) -> FloatArray:
+        """``(rows, columns, 3)`` linear RGB of a rectangle; shares its memory with :attr:`pixels`."""
+        return self.pixels[window.slices]
+
     def take(self, row: NDArray[Any], column: NDArray[Any], channels: slice = slice(0, 3)) -> FloatArray:
-        """Values of single pixels, ``(..., channels)``: what reads piece by piece asks a picture for."""
+        """Linear RGB of single pixels, ``(..., channels)``; ``row`` and ``column`` broadcast to ``(...)``."""
         values: FloatArray = self.pixels[..., channels][row, column]
         return values
-
-    def rows(self, first: int, last: int) -> FloatArray:
-        """``(last - first, W, 3)``: whole rows."""
-        return self.pixels[first:last]
 
     # ---- What an eye sees, and files ------------------------------------------------------------------------------
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from lippmann.display import Display
 from lippmann.errors import LippmannError, PictureError
-from lippmann.image.integral_image import IntegralImage
+from lippmann.image.picture import Picture
 from lippmann.image.provenance import Provenance
 from lippmann.image.stored_values import checked_similarity
 
@@ -24,7 +24,7 @@ KEY = "lippmann"
 
 @dataclass(frozen=True, eq=False)
 class Metadata:
-    """The parts of an :class:`IntegralImage` that are not pixels."""
+    """The parts of a picture that are not pixels."""
 
     display: Display
     world_from_display: NDArray[np.float64]
@@ -45,9 +45,9 @@ class Metadata:
         }
 
 
-def metadata_of(image: IntegralImage) -> Metadata:
+def metadata_of(picture: Picture) -> Metadata:
     """The parts of a picture that are not pixels."""
-    return Metadata(image.display, image.world_from_display, image.provenance)
+    return Metadata(picture.display, picture.world_from_display, picture.provenance)
 
 
 def to_text(metadata: Metadata) -> str:

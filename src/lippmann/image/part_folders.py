@@ -7,31 +7,27 @@ picture back exactly, in the depth in which it was stored. Pictures larger than 
 
 from __future__ import annotations
 
+import itertools
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.display import micro_image_shape, pixel_indices_under_lens, pixel_lenses
+from lippmann.display import Display, micro_image_shape, pixel_indices_under_lens, pixel_lenses
 from lippmann.display.pixel_window import PixelWindow
 from lippmann.errors import OutputError, PictureError
-from lippmann.image.encoding import (
-    STORED,
-    FormatName,
-    converted_values,
-    decode_file,
-    encode_values,
-    read_header,
-)
+from lippmann.image.encoding import STORED, FormatName, converted_values, encode_values, linear_values
 from lippmann.image.integral_image import IntegralImage
-from lippmann.image.metadata import KEY, Metadata, from_dict, parse_json
+from lippmann.image.metadata import KEY, Metadata, from_dict, metadata_of, parse_json
 from lippmann.image.micro_images import Permutation, micro_images_as_views, row_blocks
+from lippmann.image.picture import Picture
+from lippmann.image.read import open_file
 from lippmann.image.stored_values import Stored
-from lippmann.image.streamed import LargePicture
 from lippmann.image.views import (
     ViewGrid,
     exact_view_shape,
@@ -46,10 +42,12 @@ from lippmann.runtime.atomic_write import replacing_folder
 
 MANIFEST = "lippmann.json"
 
-#: Bytes of views that are gathered at a time; a large picture is read once for each such lot.
+#: Bytes of views that are gathered at a time; a picture on disk is read once for each such lot.
 LOT_BYTES = 1 << 29
 
 Kind = Literal["views", "micro-images"]
+#: Gives the values of a rectangle of pixels, one or more each.
+Layer = Callable[[PixelWindow], NDArray[Any]]
 #: Row and column of a view or lens, its layers with the RGB linear or as stored, and how far the work is with it.
 Part = tuple[tuple[int, int], dict[str, NDArray[Any]], Progress]
 
@@ -81,7 +79,7 @@ class _Manifest:
 
 
 def write_views(
-    image: IntegralImage,
+    picture: Picture,
     folder: Path,
     *,
     format: FormatName | None = None,
@@ -90,10 +88,24 @@ def write_views(
 ) -> int:
     """Write one picture per view, ``view_ROW_COLUMN``, each with one pixel per lens.
 
-    Those of a lenticular sheet are as high as the panel. ``format`` and ``bits`` say how values are stored (``png`` 8
-    or 16, ``exr`` 32 or 16, ``tiff`` 8, 16 or 32); by default as in the file that the picture came from, computed
-    pictures as 32-bit OpenEXR. Where lenses do not cover whole pixels the views are resampled, and cannot be put
-    together again; elsewhere OpenEXR keeps the picture's maps too.
+    The views of a lenticular sheet are as high as the panel. Where lenses do not cover whole pixels the views are
+    resampled (nearest pixel), and cannot be composed again. :data:`LOT_BYTES` of views are held at a time, and a
+    picture on disk is read once for each such lot.
+
+    Parameters
+    ----------
+    picture:
+        In memory or on disk.
+    folder:
+        The folder to make.
+    format:
+        ``png``, ``exr``, ``tiff`` or ``zarr``; by default PNG for pictures from files with codes, else OpenEXR, which
+        keeps the maps of a picture in memory where its views are exact.
+    bits:
+        Per channel: 8 or 16 (``png``), 32 or 16 (``exr``), 8, 16 or 32 (``tiff``, ``zarr``); by default as in the file
+        that the picture came from.
+    progress:
+        Called for every view written.
 
     Returns
     -------
@@ -104,17 +116,15 @@ def write_views(
     OutputError
         If the format is unknown or has no such bits, or the folder cannot be written.
     """
-    storage = _storage(image, folder, format, bits)
-    views, mask = image.views_and_mask()
-    parts: dict[str, NDArray[Any]] = {"": views}
-    if storage[0] == "exr" and image.views_are_exact:
-        split = Permutation(image.display).split
-        parts |= {k: micro_images_as_views(split(v), image.display) for k, v in image.maps.items()}
-    return _write_parts(image, folder, "views", mask.shape[:2], _parts(parts, mask), storage, progress)
+    storage = _storage(picture, folder, format, bits)
+    grid = view_grid(picture.display)
+    layers = _layers(picture, with_maps=storage[0] == "exr" and grid.exact)
+    shape = len(grid.down), len(grid.right)
+    return _write_parts(picture, folder, "views", shape, _views(picture.display, grid, layers), storage, progress)
 
 
 def write_micro_images(
-    image: IntegralImage,
+    picture: Picture,
     folder: Path,
     *,
     format: FormatName | None = None,
@@ -124,45 +134,12 @@ def write_micro_images(
     """Write one picture per lens, ``lens_ROW_COLUMN``; parameters and errors as for :func:`write_views`.
 
     Exact on every display. Places of a micro-image's box that hold no pixel of the lens are black. Returns the number
-    of micro-images written.
-    """
-    storage = _storage(image, folder, format, bits)
-    permutation = Permutation(image.display)
-    layers = {"": image.pixels, **image.maps} if storage[0] == "exr" else {"": image.pixels}
-    cut = _parts({k: permutation.split(v) for k, v in layers.items()}, permutation.mask)
-    return _write_parts(image, folder, "micro-images", permutation.shape[:2], cut, storage, progress)
-
-
-def write_large_views(
-    picture: LargePicture,
-    folder: Path,
-    *,
-    format: FormatName | None = None,
-    bits: int | None = None,
-    progress: ProgressCallback = silent,
-) -> int:
-    """:func:`write_views` for a picture that is read piece by piece."""
-    storage = _storage(picture, folder, format, bits)
-    grid = view_grid(picture.display)
-    shape = len(grid.down), len(grid.right)
-    return _write_parts(picture, folder, "views", shape, _large_views(picture, grid), storage, progress)
-
-
-def write_large_micro_images(
-    picture: LargePicture,
-    folder: Path,
-    *,
-    format: FormatName | None = None,
-    bits: int | None = None,
-    progress: ProgressCallback = silent,
-) -> int:
-    """:func:`write_micro_images` for a picture that is read piece by piece.
-
-    A row of lenses is held at a time; of a lenticular sheet, whose one row has all pixels, as many lenses as fit.
+    of micro-images written: those of lenses that have any pixel.
     """
     storage = _storage(picture, folder, format, bits)
-    shape = picture.display.lens_grid.rows, picture.display.lens_grid.columns
-    return _write_parts(picture, folder, "micro-images", shape, _large_lenses(picture), storage, progress)
+    grid, layers = picture.display.lens_grid, _layers(picture, with_maps=storage[0] == "exr")
+    parts = _micro_images(picture.display, layers)
+    return _write_parts(picture, folder, "micro-images", (grid.rows, grid.columns), parts, storage, progress)
 
 
 def compose(folder: Path, *, progress: ProgressCallback = silent) -> IntegralImage:
@@ -197,22 +174,30 @@ def compose(folder: Path, *, progress: ProgressCallback = silent) -> IntegralIma
     )
 
 
-def _storage(
-    image: IntegralImage | LargePicture, folder: Path, name: FormatName | None, bits: int | None
-) -> tuple[FormatName, Stored]:
+def _storage(picture: Picture, folder: Path, name: FormatName | None, bits: int | None) -> tuple[FormatName, Stored]:
     """The format and the type of the values of a folder's files: as asked for, else as the picture is stored."""
     if name is None:
-        name = "png" if image.stored in STORED["png"].values() else "exr"
+        name = "png" if picture.stored in STORED["png"].values() else "exr"
     if name not in STORED:
         rule = f"known are {', '.join(STORED)}"
         raise OutputError(f"the format {name!r} is unknown", where=str(folder), rule=rule)
-    if bits is None and image.stored in STORED[name].values():
-        return name, image.stored
-    return name, stored_as(name, folder, bits, image.stored)
+    if bits is None and picture.stored in STORED[name].values():
+        return name, picture.stored
+    return name, stored_as(name, folder, bits, picture.stored)
+
+
+def _layers(picture: Picture, *, with_maps: bool) -> dict[str, Layer]:
+    """The picture as it is held, under ``""``, and its maps by name."""
+    maps = {name: partial(_window_of, values) for name, values in picture.maps.items()} if with_maps else {}
+    return {"": picture.window, **maps}
+
+
+def _window_of(values: NDArray[Any], window: PixelWindow) -> NDArray[Any]:
+    return values[window.slices]
 
 
 def _write_parts(
-    picture: IntegralImage | LargePicture,
+    picture: Picture,
     folder: Path,
     kind: Kind,
     shape: tuple[int, int],
@@ -231,71 +216,86 @@ def _write_parts(
             values = converted_values(layers[""], stored, transfer)
             encode_values(temporary / file, name, {**layers, "": values}, transfer=transfer)
             progress(report)
-        metadata = Metadata(picture.display, picture.world_from_display, picture.provenance)
-        exact = kind == "micro-images" or picture.views_are_exact
-        _write_manifest(temporary, metadata, kind, stored, files, exact=exact)
+        manifest = {
+            **metadata_of(picture).to_dict(),
+            "kind": kind,
+            "stored": stored,
+            "order": _ORDER[kind],
+            "exact": kind == "micro-images" or picture.views_are_exact,
+            "files": files,
+        }
+        text = json.dumps(manifest, allow_nan=False, indent=1)
+        (temporary / MANIFEST).write_text(text + "\n", encoding="ascii")
     return sum(file is not None for row in files for file in row)
 
 
-def _parts(layers: Mapping[str, NDArray[Any]], mask: NDArray[np.bool_]) -> Iterator[Part]:
-    """The parts of layers ``(rows, columns, ...)`` of which the mask shows anything."""
-    places = np.argwhere(np.any(mask, axis=(2, 3))).tolist()
-    for done, (row, column) in enumerate(places, start=1):
-        part = {key: values[row, column] for key, values in layers.items()}
-        yield (row, column), part, Progress("write", done, len(places))
-
-
-def _large_views(picture: LargePicture, grid: ViewGrid) -> Iterator[Part]:
+def _views(display: Display, grid: ViewGrid, layers: Mapping[str, Layer]) -> Iterator[Part]:
     """The views that have any pixel, gathered in lots of :data:`LOT_BYTES`."""
-    display, source = picture.display, picture.source
     rows, columns = lens_rows(display), display.lens_grid.columns
     panel_rows = max(1, display.panel.height // rows)
-    places = [(ky, kx) for ky in range(len(grid.down)) for kx in range(len(grid.right))]
-    step = max(1, LOT_BYTES // (rows * columns * 3 * source.dtype.itemsize))
+    places = list(np.ndindex(len(grid.down), len(grid.right)))
+    pixels, step = _first_pixels(layers, rows * columns)
     for lot in (places[start : start + step] for start in range(0, len(places), step)):
-        views = np.zeros((len(lot), rows, columns, 3), dtype=source.dtype)
-        has_any = [False] * len(lot)
+        views = {key: np.zeros((len(lot), rows, columns, *one.shape), one.dtype) for key, one in pixels.items()}
+        has_any = np.zeros(len(lot), dtype=np.bool_)
         for first, last in row_blocks(rows, display.panel.width * panel_rows):
             top, bottom = panel_rows_of_view_rows(display, first, last)
-            values = source.window(PixelWindow(0, top, display.panel.width, bottom - top))
+            window = PixelWindow(0, top, display.panel.width, bottom - top)
+            values = {key: layer(window) for key, layer in layers.items()}
             for number, view in enumerate(lot):
-                found, at_row, at_column = pixels_of_view_rows(display, grid, view, first, last)
+                found, row, column = pixels_of_view_rows(display, grid, view, first, last)
                 if not found.any():
                     continue
                 has_any[number] = True
-                part = values[np.where(found, at_row - top, 0), np.where(found, at_column, 0)]
-                views[number, first:last] = np.where(found[..., None], part, 0)
+                place = np.where(found, row - top, 0), np.where(found, column, 0)
+                absent = np.broadcast_to(~found, place[0].shape)
+                for key, layer in values.items():
+                    part = layer[place]
+                    part[absent] = 0
+                    views[key][number, first:last] = part
         for number in np.flatnonzero(has_any).tolist():
-            done = lot[number][0] * len(grid.right) + lot[number][1] + 1
-            yield lot[number], {"": views[number]}, Progress("write", done, len(places))
+            ky, kx = lot[number]
+            report = Progress("write", ky * len(grid.right) + kx + 1, len(places))
+            yield (ky, kx), {key: values[number] for key, values in views.items()}, report
 
 
-def _large_lenses(picture: LargePicture) -> Iterator[Part]:
-    """The micro-images ``(ny, nx, 3)`` of the lenses that have a pixel."""
-    display, source = picture.display, picture.source
+def _micro_images(display: Display, layers: Mapping[str, Layer]) -> Iterator[Part]:
+    """The micro-images ``(ny, nx, ...)`` of the lenses that have a pixel.
+
+    A row of lenses is held at a time; of a lenticular sheet, whose one row has all pixels, as many lenses as fit into
+    :data:`LOT_BYTES`.
+    """
     ny, nx = micro_image_shape(display)
     grid, panel = display.lens_grid, display.panel
+    pixels, together = _first_pixels(layers, ny * nx)
     is_sheet = display.lens_array.layout == "lenticular"
-    together = max(1, LOT_BYTES // (ny * nx * 3 * source.dtype.itemsize))
-    for row in range(grid.rows):
+    for row, first in itertools.product(range(grid.rows), range(0, grid.columns, together)):
         reach = (0, panel.height) if is_sheet else panel_rows_of_view_rows(display, row, row + 1)
-        for first in range(0, grid.columns, together):
-            count = min(together, grid.columns - first)
-            values = np.zeros((count * ny * nx, 3), dtype=source.dtype)
-            present = np.zeros(count, dtype=np.bool_)
-            for top, bottom in row_blocks(reach[1] - reach[0], panel.width):
-                span = reach[0] + top, reach[0] + bottom
-                i, j = pixel_lenses(display, span)
-                k_x, k_y = pixel_indices_under_lens(display, span)
-                v, u = np.nonzero((j == row) & (i >= first) & (i < first + count))
-                lens = i[v, u].astype(np.int64) - first
-                values[(lens * ny + k_y[v, u]) * nx + k_x[v, u]] = source.take(v + span[0], u)
-                present[lens] = True
-            micro_images = values.reshape(count, ny, nx, 3)
-            for number in np.flatnonzero(present).tolist():
-                done = row * grid.columns + first + number + 1
-                report = Progress("write", done, grid.rows * grid.columns)
-                yield (row, first + number), {"": micro_images[number]}, report
+        count = min(together, grid.columns - first)
+        lenses = {key: np.zeros((count, ny, nx, *one.shape), one.dtype) for key, one in pixels.items()}
+        has_any = np.zeros(count, dtype=np.bool_)
+        for start, stop in row_blocks(reach[1] - reach[0], panel.width):
+            span = reach[0] + start, reach[0] + stop
+            i, j = pixel_lenses(display, span)
+            k_x, k_y = pixel_indices_under_lens(display, span)
+            v, u = np.nonzero((j == row) & (i >= first) & (i < first + count))
+            if not len(u):
+                continue
+            place = i[v, u] - first, k_y[v, u], k_x[v, u]
+            has_any[place[0]] = True
+            left, right = int(u.min()), int(u.max()) + 1
+            window = PixelWindow(left, span[0], right - left, span[1] - span[0])
+            for key, layer in layers.items():
+                lenses[key][place] = layer(window)[v, u - left]
+        for number in np.flatnonzero(has_any).tolist():
+            report = Progress("write", row * grid.columns + first + number + 1, grid.rows * grid.columns)
+            yield (row, first + number), {key: values[number] for key, values in lenses.items()}, report
+
+
+def _first_pixels(layers: Mapping[str, Layer], size: int) -> tuple[dict[str, NDArray[Any]], int]:
+    """The first pixel of each layer, for its shape and type; how many parts of ``size`` pixels are held at a time."""
+    pixels = {key: layer(PixelWindow(0, 0, 1, 1))[0, 0] for key, layer in layers.items()}
+    return pixels, max(1, LOT_BYTES // (size * sum(pixel.nbytes for pixel in pixels.values())))
 
 
 def _part_name(kind: Kind, name: FormatName, shape: tuple[int, int], place: tuple[int, int]) -> str:
@@ -303,28 +303,6 @@ def _part_name(kind: Kind, name: FormatName, shape: tuple[int, int], place: tupl
     digits = len(str(max(shape) - 1))
     ending = {"png": ".png", "exr": ".exr", "tiff": ".tif", "zarr": ".zarr"}[name]
     return f"{_PREFIX[kind]}_{place[0]:0{digits}}_{place[1]:0{digits}}{ending}"
-
-
-def _write_manifest(
-    folder: Path,
-    metadata: Metadata,
-    kind: Kind,
-    stored: Stored,
-    files: list[list[str | None]],
-    *,
-    exact: bool,
-) -> None:
-    """Write what says what the parts in ``folder`` are."""
-    manifest = {
-        **metadata.to_dict(),
-        "kind": kind,
-        "stored": stored,
-        "order": _ORDER[kind],
-        "exact": exact,
-        "files": files,
-    }
-    text = json.dumps(manifest, allow_nan=False, indent=1)
-    (folder / MANIFEST).write_text(text + "\n", encoding="ascii")
 
 
 def _read_manifest(folder: Path) -> _Manifest:
@@ -383,13 +361,16 @@ def _part_shape(manifest: _Manifest, folder: Path) -> tuple[int, int, int, int]:
 
 
 def _read_part(path: Path, manifest: _Manifest, height: int, width: int) -> dict[str, NDArray[Any]]:
-    header = read_header(path)
-    if (header.height, header.width) != (height, width):
+    """The layers of a part, the RGB linear."""
+    file = open_file(path)
+    if (file.height, file.width) != (height, width):
         rule = f"the {manifest.kind} of this folder have {width} x {height}"
-        raise PictureError(f"has {header.width} x {header.height} pixels", where=str(path), rule=rule)
-    layers, stored = decode_file(path, header.format, manifest.metadata.provenance.transfer)
+        raise PictureError(f"has {file.width} x {file.height} pixels", where=str(path), rule=rule)
+    layers = file.decode()
+    stored = layers[""].dtype.name
     if stored != manifest.stored:
         raise PictureError(f"holds {stored} values", where=str(path), rule=f"{MANIFEST} says {manifest.stored}")
+    layers[""] = linear_values(layers[""], manifest.metadata.provenance.transfer)
     return layers
 
 

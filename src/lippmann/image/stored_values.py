@@ -12,6 +12,9 @@ from lippmann.errors import PictureError
 FloatArray = NDArray[np.float32]
 Matrix = NDArray[np.float64]
 
+#: Values as files hold them: codes of 8 or 16 bits, or linear floats.
+Values = NDArray[np.uint8 | np.uint16 | np.float16 | np.float32]
+
 #: How values were stored in the file that a picture came from; ``float32`` if it came from none.
 Stored = Literal["uint8", "uint16", "float16", "float32"]
 
@@ -20,7 +23,7 @@ _SIMILARITY_TOLERANCE = 1e-6
 
 
 def checked_similarity(matrix: object) -> Matrix:
-    """``matrix`` as a read-only (4, 4) float64 array; a :class:`PictureError` if it is no similarity."""
+    """``matrix`` as a read-only ``(4, 4)`` float64 array; a :class:`PictureError` if it is no similarity."""
     rule = "it must be a 4 x 4 similarity: a rotation times a scale, a translation, and (0, 0, 0, 1) below"
     try:
         values: Matrix = np.array(matrix, dtype=np.float64)

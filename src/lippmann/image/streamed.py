@@ -6,21 +6,20 @@ from collections import OrderedDict
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Protocol, cast
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.codecs import tiff, zarr_array
 from lippmann.display import Display
 from lippmann.display.pixel_window import PixelWindow
 from lippmann.errors import PictureError
-from lippmann.image.encoding import FormatName, check_stored, linear_values, opaque_colors
+from lippmann.image.encoding import linear_values
 from lippmann.image.integral_image import IntegralImage
+from lippmann.image.picture import Picture
 from lippmann.image.provenance import Provenance
-from lippmann.image.read import metadata_for, read_info, read_picture
-from lippmann.image.stored_values import FloatArray, Stored
-from lippmann.image.views import view_grid
+from lippmann.image.read import PictureFile, opaque_colors, open_file
+from lippmann.image.stored_values import FloatArray, Matrix, Stored, Values
 
 #: Pictures of more pixels are read piece by piece: as float32 they would take 400 MB and more.
 LARGE = 1 << 25
@@ -28,8 +27,6 @@ LARGE = 1 << 25
 #: Decoded pieces that are kept, in bytes: two rows of tiles of a picture 40 000 pixels wide, at 8 bits. Two rows of
 #: pieces are kept in any case, so that what reads some rows after others decodes each piece once.
 CACHE_BYTES = 1 << 28
-
-Values = NDArray[Any]
 
 
 class ChunkedPixels:
@@ -104,65 +101,36 @@ class ChunkedPixels:
         return found
 
 
-def open_pixels(path: Path, name: FormatName) -> ChunkedPixels:
+def pixels_of_file(file: PictureFile) -> ChunkedPixels:
     """The values of a TIFF or Zarr picture, checked piece by piece as they are read.
 
     Raises
     ------
     PictureError
-        If the file is damaged, or holds no colours of a known depth; also later, when a piece turns out so.
+        If the file is damaged, holds no colours of a known depth, or its format has no pieces; also later, when a piece
+        turns out so.
     """
-    if name == "zarr":
-        return _zarr_pixels(path)
-    if name == "tiff":
-        return _tiff_pixels(path)
-    raise PictureError(f"is {name.upper()}", where=str(path), rule="only TIFF and Zarr can be read piece by piece")
-
-
-def _tiff_pixels(path: Path) -> ChunkedPixels:
-    segments = tiff.TiffSegments(path)
-
-    def load(row: int, column: int) -> Values:
-        return opaque_colors(segments.read(row, column), path)
-
-    return ChunkedPixels(segments.size, segments.chunk, segments.dtype, load)
-
-
-def _zarr_pixels(path: Path) -> ChunkedPixels:
-    array = zarr_array.open_zarr(path)
-    height, width = array.shape[:2]
-    high, wide = (int(length) for length in array.chunks[:2])
-
-    def load(row: int, column: int) -> Values:
-        place = slice(row * high, (row + 1) * high), slice(column * wide, (column + 1) * wide)
-        return np.asarray(zarr_array.read_part(array, place, path))
-
-    return ChunkedPixels((width, height), (high, wide), np.dtype(array.dtype), load)
-
-
-class Picture(Protocol):
-    """What an :class:`IntegralImage` and a :class:`LargePicture` have in common."""
-
-    @property
-    def display(self) -> Display:
-        """The display that the picture is for."""
-        ...
-
-    @property
-    def provenance(self) -> Provenance:
-        """How the picture was made."""
-        ...
-
-    def take(self, row: NDArray[Any], column: NDArray[Any], channels: slice = ...) -> FloatArray:
-        """Linear values of single pixels, ``(..., channels)``."""
-        ...
+    pieces = file.pieces
+    if pieces is None:
+        rule = "only TIFF and Zarr can be read piece by piece"
+        raise PictureError(f"is {file.format.upper()}", where=str(file.path), rule=rule)
+    dtype = np.dtype(file.check_stored(file.stored))
+    # The file is named here, so that it stays open.
+    return ChunkedPixels(
+        (file.width, file.height),
+        pieces.chunk,
+        dtype,
+        lambda row, column: opaque_colors(pieces.read_chunk(row, column), file.path),
+    )
 
 
 @dataclass(frozen=True, eq=False)
-class LargePicture:
-    """A picture in a file, read as it is asked for. Fields as those of :class:`IntegralImage`.
+class LargePicture(Picture):
+    """A picture whose values stay as its file stores them, and are decoded as they are asked for.
 
-    Attributes
+    For one thread at a time. The parameters but ``source`` are those of :class:`~lippmann.image.IntegralImage`.
+
+    Parameters
     ----------
     source:
         The values as stored.
@@ -170,46 +138,56 @@ class LargePicture:
 
     source: ChunkedPixels
     display: Display
-    world_from_display: NDArray[np.float64]
+    world_from_display: Matrix
     provenance: Provenance
     stored: Stored
     maps: Mapping[str, NDArray[Any]] = field(default_factory=dict)
 
+    def window(self, window: PixelWindow) -> Values:
+        """``(rows, columns, 3)`` values of a rectangle as stored."""
+        return self.source.window(window)
+
     def take(self, row: NDArray[Any], column: NDArray[Any], channels: slice = slice(0, 3)) -> FloatArray:
-        """Linear values of single pixels, ``(..., channels)``."""
+        """Linear RGB of single pixels, ``(..., channels)``; ``row`` and ``column`` broadcast to ``(...)``."""
         return linear_values(self.source.take(row, column)[..., channels], self.provenance.transfer)
 
-    def rows(self, first: int, last: int) -> FloatArray:
-        """``(last - first, W, 3)`` linear values of whole rows."""
-        values = self.source.window(PixelWindow(0, first, self.source.width, last - first))
-        return linear_values(values, self.provenance.transfer)
 
-    @property
-    def views_are_exact(self) -> bool:
-        """As :attr:`IntegralImage.views_are_exact`."""
-        return view_grid(self.display).exact
+def open_picture(
+    path: Path, *, display: Display | None = None, keeps_codes: bool = False
+) -> IntegralImage | LargePicture:
+    """A picture from a file: piece by piece where it is larger than :data:`LARGE` and its format allows that (TIFF,
+    Zarr), else whole.
 
-    @property
-    def views_note(self) -> str:
-        """As :attr:`IntegralImage.views_note`."""
-        return view_grid(self.display).note
+    Parameters
+    ----------
+    path:
+        The file: PNG, OpenEXR, TIFF or Zarr.
+    display:
+        The display that the picture is for, instead of the one that it carries; needed for files of other programs.
+    keeps_codes:
+        Whether a picture that holds codes of 8 or 16 bits keeps them, where it is read whole: quicker, and a quarter or
+        half of the memory that linear values take.
 
-
-def open_picture(path: Path, *, display: Display | None = None) -> IntegralImage | LargePicture:
-    """A picture from a file: whole, or piece by piece where it is large and its format allows that.
-
-    Parameters and errors as for :func:`lippmann.image.read.read_picture`.
+    Raises
+    ------
+    PictureError
+        If the file is missing, empty, foreign or damaged, has no display, or a size other than the display's.
     """
-    info = read_info(path)
-    if info.width * info.height <= LARGE or info.format not in ("tiff", "zarr"):
-        return read_picture(path, display=display)
-    metadata = metadata_for(info, path, display)
-    name = cast(FormatName, info.format)
-    check_stored(info.stored, name, path)
-    return LargePicture(
-        open_pixels(path, name),
-        metadata.display,
-        metadata.world_from_display,
-        metadata.provenance,
-        cast(Stored, info.stored),
-    )
+    return picture_of_file(open_file(path), display, keeps_codes=keeps_codes)
+
+
+def picture_of_file(
+    file: PictureFile, display: Display | None = None, *, keeps_codes: bool = False
+) -> IntegralImage | LargePicture:
+    """:func:`open_picture` of a file that is open."""
+    in_pieces = file.pieces is not None and file.width * file.height > LARGE
+    if not in_pieces and not (keeps_codes and file.stored in ("uint8", "uint16")):
+        return file.picture(display)
+    metadata = file.metadata_for(display)
+    source = pixels_of_file(file) if in_pieces else _one_piece(file.decode()[""])
+    stored = file.check_stored(file.stored)
+    return LargePicture(source, metadata.display, metadata.world_from_display, metadata.provenance, stored)
+
+
+def _one_piece(values: Values) -> ChunkedPixels:
+    return ChunkedPixels(values.shape[1::-1], values.shape[:2], values.dtype, lambda row, column: values)

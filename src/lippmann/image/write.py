@@ -11,13 +11,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lippmann.color.transfer import Transfer
 from lippmann.errors import OutputError, PictureError
-from lippmann.image.encoding import FORMATS, STORED, FormatName, encode_file
-from lippmann.image.integral_image import IntegralImage
-from lippmann.image.metadata import metadata_of, to_text
-from lippmann.image.stored_values import FloatArray, Stored
+from lippmann.image.encoding import FORMATS, STORED, FormatName, Rows, encode_rows
+from lippmann.image.metadata import Metadata, metadata_of, to_text
+from lippmann.image.picture import Picture
+from lippmann.image.stored_values import FloatArray, Stored, Values
 from lippmann.runtime.atomic_write import check_folder_writable, check_writable, replacing, replacing_folder
 
 
@@ -52,28 +53,46 @@ def stored_as(name: FormatName, path: Path, bits: int | None, source: Stored) ->
     return depths[bits]
 
 
-def write_picture(image: IntegralImage, path: Path, *, bits: int | None = None) -> None:
-    """Write an integral image with its metadata; see :func:`format_for` for endings and ``bits``.
+def can_be_banded(name: FormatName) -> bool:
+    """Whether files of this format can be written without the picture being whole in memory."""
+    return name in ("tiff", "zarr")
 
-    Only OpenEXR keeps the picture's maps.
+
+def write_picture(picture: Picture, path: Path, *, bits: int | None = None) -> None:
+    """Write a picture, in memory or on disk, with its metadata; see :func:`format_for` for endings and ``bits``.
+
+    Only OpenEXR keeps the picture's maps. Zarr and large TIFF files are written a few rows at a time.
 
     Raises
     ------
     OutputError
         If the ending is unknown, the format has no such bits, or the place cannot be written.
     """
-    name, stored = format_for(path, bits, source=image.stored)
-    layers = {"": image.pixels, **image.maps} if name == "exr" else {"": image.pixels}
-    with replacing_output(path, name) as temporary:
-        encode_file(
-            temporary,
-            name,
-            layers,
-            stored=stored,
-            transfer=image.provenance.transfer,
-            text=to_text(metadata_of(image)),
-            pixel_pitch=image.display.panel.pixel_pitch,
-        )
+    target = format_for(path, bits, source=picture.stored)
+    _write_rows(path, target, picture.held_rows, metadata_of(picture), maps=picture.maps)
+
+
+def write_rows(rows: Rows, metadata: Metadata, path: Path, *, bits: int | None = None) -> None:
+    """Write the picture that ``rows`` makes, from the top down and each row once, as tiled BigTIFF or Zarr.
+
+    Raises
+    ------
+    OutputError
+        As :func:`write_picture`.
+    PictureError
+        If a value is not finite, or the format has to be written whole.
+    """
+    name, stored = format_for(path, bits)
+    if not can_be_banded(name):
+        raise PictureError(f"{name.upper()} files are written whole", where=str(path), fix="use .tif or .zarr")
+
+    def checked(first: int, last: int) -> Values:
+        values = rows(first, last)
+        if not np.isfinite(values).all():
+            raise PictureError(f"values in the rows from {first} on are not finite")
+        return values
+
+    _write_rows(path, (name, stored), checked, metadata, in_tiles=True)
 
 
 def write_plain_picture(
@@ -82,7 +101,7 @@ def write_plain_picture(
     *,
     bits: int | None = None,
     transfer: Transfer = "srgb",
-    maps: Mapping[str, Any] | None = None,
+    maps: Mapping[str, NDArray[Any]] | None = None,
 ) -> None:
     """Write an ordinary picture, ``(H, W, 3)`` linear RGB: a replay, a preview. OpenEXR takes ``maps`` with it.
 
@@ -96,9 +115,34 @@ def write_plain_picture(
     name, stored = format_for(path, bits)
     if not np.isfinite(pixels).all():
         raise PictureError("the picture holds values that are not finite", where=str(path))
-    layers = {"": pixels, **(maps or {})} if name == "exr" else {"": pixels}
+    size, rows = pixels.shape[1::-1], lambda first, last: pixels[first:last]
     with replacing_output(path, name) as temporary:
-        encode_file(temporary, name, layers, stored=stored, transfer=transfer)
+        encode_rows(temporary, name, rows, size=size, stored=stored, transfer=transfer, maps=maps)
+
+
+def _write_rows(
+    path: Path,
+    target: tuple[FormatName, Stored],
+    rows: Rows,
+    metadata: Metadata,
+    *,
+    maps: Mapping[str, NDArray[Any]] | None = None,
+    in_tiles: bool = False,
+) -> None:
+    panel, (name, stored) = metadata.display.panel, target
+    with replacing_output(path, name) as temporary:
+        encode_rows(
+            temporary,
+            name,
+            rows,
+            size=(panel.width, panel.height),
+            stored=stored,
+            transfer=metadata.provenance.transfer,
+            text=to_text(metadata),
+            pixel_pitch=panel.pixel_pitch,
+            maps=maps,
+            in_tiles=in_tiles,
+        )
 
 
 def replacing_output(path: Path, name: FormatName) -> AbstractContextManager[Path]:

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 
 from lippmann.display import Display
 from lippmann.errors import PictureError
-from lippmann.image import IntegralImage
-from lippmann.image.streamed import LargePicture
+from lippmann.image import IntegralImage, Picture
 from lippmann.metrics.flicker import Flicker
 from lippmann.metrics.mse_psnr import (
     LOW_PERCENTILE,
@@ -54,8 +53,8 @@ class Comparison:
         The figures of the 2014 paper.
     """
 
-    reference: IntegralImage | LargePicture
-    test: IntegralImage | LargePicture
+    reference: Picture
+    test: Picture
     errors: Real
     micro_image_errors: Real
     micro_image_pixels: NDArray[np.intp]
@@ -176,7 +175,7 @@ def compare(reference: IntegralImage, test: IntegralImage, progress: ProgressCal
     )
 
 
-def check_comparable(reference: IntegralImage | LargePicture, test: IntegralImage | LargePicture) -> None:
+def check_comparable(reference: Picture, test: Picture) -> None:
     """Raise :class:`PictureError` if two pictures have different sizes or displays; a display's name does not count."""
     a, b = (picture.display.panel for picture in (reference, test))
     if (a.width, a.height) != (b.width, b.height):
@@ -207,7 +206,7 @@ def _difference(a: Display, b: Display) -> str:
     return f"{key} is {one} in one and {other} in the other"
 
 
-def _notes(reference: IntegralImage | LargePicture, test: IntegralImage | LargePicture) -> Iterator[str]:
+def _notes(reference: Picture, test: Picture) -> Iterator[str]:
     first, second = reference.provenance, test.provenance
     if first.transfer != second.transfer:
         yield f"the codes of the pictures are compared, though one is {first.transfer} and the other {second.transfer}"

@@ -15,10 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.display import Display, micro_image_shape, pixel_indices_under_lens, pixel_lenses
-from lippmann.image import IntegralImage
-from lippmann.image.streamed import LargePicture
+from lippmann.image import Picture
 from lippmann.metrics.comparison import Comparison, check_comparable
-from lippmann.metrics.mse_psnr import coded_values, psnr, squared_differences, stored_rows
+from lippmann.metrics.mse_psnr import coded_values, psnr, squared_differences
 from lippmann.metrics.paper import PaperFigures, paper_codes
 from lippmann.metrics.silhouettes import Silhouettes, edges_between_neighbours
 from lippmann.metrics.view_metrics import ViewSums
@@ -26,7 +25,6 @@ from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.runtime.cached_property import cached_property
 
 Real = NDArray[np.float64]
-AnyPicture = IntegralImage | LargePicture
 
 #: Pixels of the panel that are worked on at a time.
 _BLOCK = 1 << 20
@@ -72,7 +70,7 @@ class LargeComparison(Comparison):
         return psnr(self.off_error / self.off_pixels) if self.off_pixels else None
 
 
-def compare_large(reference: AnyPicture, test: AnyPicture, progress: ProgressCallback = silent) -> LargeComparison:
+def compare_large(reference: Picture, test: Picture, progress: ProgressCallback = silent) -> LargeComparison:
     """:func:`lippmann.metrics.compare` for pictures that are read piece by piece."""
     check_comparable(reference, test)
     panel, grid = reference.display.panel, reference.display.lens_grid
@@ -129,7 +127,7 @@ class _PanelSums:
         Squared errors of the pixels that lie on no silhouette, and how many these are.
     """
 
-    def __init__(self, reference: AnyPicture, test: AnyPicture) -> None:
+    def __init__(self, reference: Picture, test: Picture) -> None:
         self._reference, self._test = reference, test
         grid = reference.display.lens_grid
         lenses = grid.rows * grid.columns
@@ -145,8 +143,8 @@ class _PanelSums:
 
     def _add(self, band: _Band) -> None:
         transfers = self._reference.provenance.transfer, self._test.provenance.transfer
-        around = stored_rows(self._reference, band.top, band.bottom)
-        own = around[band.inner], stored_rows(self._test, band.first, band.last)
+        around = self._reference.held_rows(band.top, band.bottom)
+        own = around[band.inner], self._test.held_rows(band.first, band.last)
         seen = coded_values(around, transfers[0])
         errors = squared_differences(seen[band.inner], coded_values(own[1], transfers[1]))
         codes = (paper_codes(values, transfer) for values, transfer in zip(own, transfers, strict=True))

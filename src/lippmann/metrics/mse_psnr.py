@@ -17,10 +17,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from lippmann.color.transfer import Transfer, encode, linear_levels
 from lippmann.display import Display
-from lippmann.display.pixel_window import PixelWindow
-from lippmann.image import IntegralImage
+from lippmann.image import IntegralImage, Picture
 from lippmann.image.micro_images import lens_indices, row_blocks
-from lippmann.image.streamed import LargePicture
 
 Real = NDArray[np.float64]
 Scalar = TypeVar("Scalar", bound=np.generic)
@@ -34,17 +32,10 @@ def psnr(mean_squared_error: float, peak: float = 1.0) -> float:
     return math.inf if mean_squared_error == 0 else 10 * math.log10(peak * peak / mean_squared_error)
 
 
-def coded(image: IntegralImage | LargePicture, rows: tuple[int, int] | None = None) -> Real:
+def coded(image: Picture, rows: tuple[int, int] | None = None) -> Real:
     """Coded values in [0, 1] of the rows ``first`` to before ``last`` (all if None), ``(rows, W, 3)`` float64."""
     first, last = rows or (0, image.display.panel.height)
-    return coded_values(stored_rows(image, first, last), image.provenance.transfer)
-
-
-def stored_rows(image: IntegralImage | LargePicture, first: int, last: int) -> NDArray[Any]:
-    """``(last - first, W, 3)`` values of whole rows: codes of a picture that is read piece by piece, else linear."""
-    if isinstance(image, IntegralImage):
-        return image.rows(first, last)
-    return image.source.window(PixelWindow(0, first, image.source.width, last - first))
+    return coded_values(image.held_rows(first, last), image.provenance.transfer)
 
 
 def coded_values(values: NDArray[Any], transfer: Transfer) -> Real:

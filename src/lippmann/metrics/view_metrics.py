@@ -14,18 +14,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.image import IntegralImage
-from lippmann.image.streamed import LargePicture
+from lippmann.image import IntegralImage, Picture
 from lippmann.image.views import lens_rows, panel_rows_of_view_rows, pixels_of_view_rows, view_grid
 from lippmann.metrics.flicker import Flicker, FlickerSums
-from lippmann.metrics.mse_psnr import coded_values, stored_rows
+from lippmann.metrics.mse_psnr import coded_values
 from lippmann.metrics.structural_similarity import WINDOW, ViewSimilarity, similarity_sum, window_weights
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.runtime.machine import usable_cores
 
 Real = NDArray[np.float64]
 Flags = NDArray[np.bool_]
-AnyPicture = IntegralImage | LargePicture
 
 #: Pixels of the panel whose views are worked on at a time.
 _BLOCK = 1 << 22
@@ -48,7 +46,7 @@ def view_flicker(reference: IntegralImage, test: IntegralImage) -> Flicker | Non
 
 
 def view_figures(
-    reference: AnyPicture, test: AnyPicture, progress: ProgressCallback = silent
+    reference: Picture, test: Picture, progress: ProgressCallback = silent
 ) -> tuple[ViewSimilarity, Flicker | None]:
     """:func:`view_similarity` and :func:`view_flicker` together, at the price of one."""
     sums = ViewSums(reference, test)
@@ -70,7 +68,7 @@ class _Lot:
 class ViewSums:
     """Sums over the views of two pictures of one display, which grow as :meth:`work` goes on."""
 
-    def __init__(self, reference: AnyPicture, test: AnyPicture) -> None:
+    def __init__(self, reference: Picture, test: Picture) -> None:
         self._pictures = reference, test
         self._display = reference.display
         self._grid = view_grid(self._display)
@@ -100,7 +98,7 @@ class ViewSums:
             for first in range(0, places, step):
                 last = min(first + step, places) + high - 1
                 top, bottom = panel_rows_of_view_rows(self._display, first, last)
-                rows = tuple(stored_rows(picture, top, bottom) for picture in self._pictures)
+                rows = tuple(picture.held_rows(top, bottom) for picture in self._pictures)
                 # Windows overlap from one lot of rows to the next, the rows that flicker is summed over do not.
                 own = slice(0, last - first if last == self._rows else step)
                 self._add(pool, _Lot(first, last, top, (rows[0], rows[1])), own)

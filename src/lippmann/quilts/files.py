@@ -19,16 +19,13 @@ from lippmann.codecs.pillow_formats import open_picture
 from lippmann.errors import OutputError, PictureError
 from lippmann.image.encoding import (
     FORMATS,
-    MOST_PIXELS,
     STORED,
     FormatName,
-    check_stored,
     converted_values,
-    decode_stored,
     encode_values,
-    read_header,
 )
 from lippmann.image.part_folders import MANIFEST
+from lippmann.image.read import MOST_PIXELS, open_file
 from lippmann.image.stored_values import Stored
 from lippmann.image.write import format_for, replacing_output
 from lippmann.progress import Progress, ProgressCallback, silent
@@ -186,16 +183,15 @@ def _size(path: Path) -> tuple[int, int]:
     if path.suffix.lower() in _JPEG:
         with _opened_jpeg(path) as picture:
             return picture.width, picture.height
-    header = read_header(path)
-    return header.width, header.height
+    file = open_file(path)
+    return file.width, file.height
 
 
 def _stored(path: Path) -> Stored:
     if path.suffix.lower() in _JPEG:
         return "uint8"
-    header = read_header(path)
-    check_stored(header.stored, header.format, path)
-    return cast(Stored, header.stored)
+    file = open_file(path)
+    return file.check_stored(file.stored)
 
 
 def _read(path: Path) -> tuple[NDArray[Any], Stored]:
@@ -203,8 +199,8 @@ def _read(path: Path) -> tuple[NDArray[Any], Stored]:
     if path.suffix.lower() in _JPEG:
         with _opened_jpeg(path) as picture:
             return np.asarray(picture if picture.mode == "RGB" else picture.convert("RGB")), "uint8"
-    layers, stored = decode_stored(path, read_header(path).format)
-    return layers[""], stored
+    values = open_file(path).decode()[""]
+    return values, cast(Stored, values.dtype.name)
 
 
 @contextmanager

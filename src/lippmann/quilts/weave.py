@@ -20,7 +20,7 @@ from lippmann.errors import PictureError, UsageError
 from lippmann.image import IntegralImage, Provenance
 from lippmann.image.metadata import Metadata
 from lippmann.image.stored_values import FloatArray
-from lippmann.image.streamed_write import write_in_bands
+from lippmann.image.write import write_rows
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.quilts.quilt import Quilt
 
@@ -86,7 +86,7 @@ def weave_to_file(
 ) -> None:
     """Write what :func:`weave` gives to a TIFF or Zarr file, in memory that does not grow with the panel.
 
-    Parameters and errors as there; of the file as for :func:`lippmann.image.streamed_write.write_in_bands`.
+    Parameters and errors as there; of the file as for :func:`lippmann.image.write.write_rows`.
     """
     _check(quilt, display, choice)
     step = _rows_at_a_time(quilt, display)
@@ -99,7 +99,7 @@ def weave_to_file(
             progress(Progress("weave", stop, display.panel.height))
         return band
 
-    write_in_bands(rows, Metadata(display, np.eye(4), _made(quilt, choice, scene)), path, bits=bits)
+    write_rows(rows, Metadata(display, np.eye(4), _made(quilt, choice, scene)), path, bits=bits)
 
 
 def _made(quilt: Quilt, choice: ViewChoice, scene: str) -> Provenance:

@@ -16,7 +16,7 @@ from lippmann.codecs import tiff, zarr_array
 from lippmann.display import Display
 from lippmann.display.pixel_window import TileGrid
 from lippmann.errors import EngineError, MemoryLimitError
-from lippmann.image.encoding import FormatName, encode_values
+from lippmann.image.encoding import FormatName, encode_tiles, encode_values, is_tiled
 from lippmann.image.metadata import Metadata, to_text
 from lippmann.image.provenance import Provenance
 from lippmann.image.write import check_output, format_for, replacing_output
@@ -272,20 +272,9 @@ def _write(
     text = to_text(Metadata(job.display, prepared.placement.world_from_display, provenance))
     pitch = job.display.panel.pixel_pitch
     with replacing_output(output, name) as temporary:
-        if name == "zarr":
-            files = TileGrid(*size, tiff.TILE)
-            tiles = zip((window.slices for window in files), _file_tiles(store, progress), strict=True)
-            zarr_array.write_zarr(temporary, tiles, size=size, side=tiff.TILE, dtype=dtype, text=text)
-        elif _is_streamed(job, name):
-            tiff.write_tiled_tiff(
-                temporary,
-                _file_tiles(store, progress),
-                size=size,
-                side=tiff.TILE,
-                dtype=dtype,
-                description=text,
-                pixel_pitch=pitch,
-            )
+        if is_tiled(name, size):
+            tiles = _file_tiles(store, progress)
+            encode_tiles(temporary, name, tiles, size=size, dtype=dtype, text=text, pixel_pitch=pitch)
         else:
             layers = _whole(job, store)
             encode_values(temporary, name, layers, transfer=job.transfer, text=text, pixel_pitch=pitch)
@@ -323,11 +312,6 @@ def _whole(job: TileJob, store: TileStore) -> dict[str, NDArray[Any]]:
     return layers
 
 
-def _is_streamed(job: TileJob, name: FormatName) -> bool:
-    """Whether the file is written without the picture ever being whole in memory."""
-    return name == "zarr" or (name == "tiff" and job.grid.width * job.grid.height >= tiff.TILED_FROM)
-
-
 def fits_whole(display: Display, settings: RenderSettings, memory: int) -> bool:
     """Whether a picture can be rendered in one piece within so many bytes; see
     :func:`lippmann.rendering.film.wavefront_plan.make_plan`.
@@ -345,7 +329,7 @@ def _check_fits(job: TileJob, name: FormatName) -> None:
     """Files that are written whole have to fit into the memory."""
     from lippmann.rendering.picture import default_memory
 
-    if _is_streamed(job, name):
+    if is_tiled(name, (job.grid.width, job.grid.height)):
         return
     memory = job.settings.memory or default_memory()
     # The values and the copies that encoders make of them.

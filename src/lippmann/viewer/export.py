@@ -10,8 +10,7 @@ from typing import Any
 
 from lippmann.display import Display
 from lippmann.errors import UsageError
-from lippmann.image import IntegralImage
-from lippmann.image.streamed import LargePicture
+from lippmann.image import Picture
 from lippmann.runtime.atomic_write import replacing
 from lippmann.viewer.manifest import manifest, tile_size
 from lippmann.viewer.page_bundle import whole_page
@@ -37,7 +36,7 @@ def check_exportable(display: Display) -> None:
         )
 
 
-def export_page(pictures: Sequence[tuple[str, IntegralImage | LargePicture]], path: Path) -> None:
+def export_page(pictures: Sequence[tuple[str, Picture]], path: Path) -> None:
     """Write a page that shows one picture, or two with a divider between them.
 
     Parameters
@@ -64,7 +63,7 @@ def export_page(pictures: Sequence[tuple[str, IntegralImage | LargePicture]], pa
         temporary.write_text(whole_page(title, data, len(pictures)), encoding="utf-8")
 
 
-def _embedded(name: str, image: IntegralImage | LargePicture) -> dict[str, Any]:
+def _embedded(name: str, image: Picture) -> dict[str, Any]:
     tiles = Tiles(image, tile_size(image.display))
     described = manifest(image, tiles, name=name, tile_format="png")
     layers = [layer["name"] for layer in described["tiles"]["layers"]]

@@ -11,8 +11,7 @@ import math
 from typing import Any, Literal
 
 from lippmann.display import Display
-from lippmann.image import IntegralImage
-from lippmann.image.streamed import LargePicture
+from lippmann.image import Picture
 from lippmann.image.views import view_grid
 from lippmann.viewer.tiles import TILE_SIZE, Tiles
 from lippmann.viewing.replay import default_eye
@@ -28,9 +27,7 @@ MOST_TILES = 256
 _NO_OFFSETS = ((0.0, 0.0), (0.0, 0.0), (0.0, 0.0))
 
 
-def manifest(
-    image: IntegralImage | LargePicture, tiles: Tiles, *, name: str = "", tile_format: TileFormat = "rgb"
-) -> dict[str, Any]:
+def manifest(image: Picture, tiles: Tiles, *, name: str = "", tile_format: TileFormat = "rgb") -> dict[str, Any]:
     """The description of a picture for the page.
 
     Parameters
@@ -101,7 +98,7 @@ def tile_size(display: Display) -> int:
     return size
 
 
-def facts(image: IntegralImage | LargePicture) -> list[list[str]]:
+def facts(image: Picture) -> list[list[str]]:
     """What one wants to know of the picture, as rows of a table: label and text."""
     display, made = image.display, image.provenance
     grid, panel = display.lens_grid, display.panel

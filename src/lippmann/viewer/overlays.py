@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.color.transfer import quantize
-from lippmann.image import IntegralImage
-from lippmann.image.streamed import LargePicture
+from lippmann.image import Picture
 from lippmann.metrics.error_image import BRIGHTEST, SCALE, in_false_color
 from lippmann.rendering.estimate.psnr import ERROR_LAYER
 from lippmann.rendering.reprojection.common.point_image import INTERPOLATED, REPROJECTED, STATUS_LAYER, TRACED
@@ -64,7 +63,7 @@ class Overlay:
     codes: Callable[[Part], Codes]
 
 
-def overlays(image: IntegralImage | LargePicture) -> dict[str, Overlay]:
+def overlays(image: Picture) -> dict[str, Overlay]:
     """The maps of a picture by name: where its pixels came from, its error, and other layers of numbers."""
     order = [name for name in _TITLES if name in image.maps]
     order += sorted(name for name in image.maps if name not in _TITLES and name not in _NO_PICTURE)
@@ -72,7 +71,7 @@ def overlays(image: IntegralImage | LargePicture) -> dict[str, Overlay]:
     return {name: overlay for name, overlay in found.items() if overlay is not None}
 
 
-def _overlay(image: IntegralImage | LargePicture, name: str) -> Overlay | None:
+def _overlay(image: Picture, name: str) -> Overlay | None:
     values = image.maps[name]
     head = {"name": name, "title": _TITLES.get(name, name.replace("_", " ").capitalize())}
     if values.ndim == 3:

@@ -5,17 +5,12 @@ from __future__ import annotations
 import threading
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
-from lippmann.codecs.png import read_png
-from lippmann.codecs.tiff import read_tiff
 from lippmann.display import Display
 from lippmann.errors import PictureError
-from lippmann.image import IntegralImage, read_info, read_metadata
-from lippmann.image.encoding import check_stored, opaque_colors
-from lippmann.image.read import metadata_for
-from lippmann.image.stored_values import Stored
-from lippmann.image.streamed import LARGE, ChunkedPixels, LargePicture, open_picture
+from lippmann.image import read
+from lippmann.image.streamed import picture_of_file
 from lippmann.viewer.manifest import TileFormat, manifest, tile_size
 from lippmann.viewer.tiles import Tiles
 
@@ -51,12 +46,13 @@ class PictureFile:
     """
 
     def __init__(self, path: Path, display: Display | None = None, tile_format: TileFormat = "rgb") -> None:
-        read_metadata(path, display=display)
         self.path = path
         self._display = display
         self._tile_format = tile_format
         self._lock = threading.Lock()
         self._shown: Shown | None = None
+        self._opened: tuple[str, read.PictureFile] | None = self._version(), read.open_file(path)
+        self._opened[1].metadata_for(display)
 
     def current(self) -> Shown:
         """The picture as the file is now; a :class:`PictureError` if it cannot be read."""
@@ -64,7 +60,10 @@ class PictureFile:
             version = self._version()
             if self._shown is None or self._shown.version != version:
                 self._shown = None  # two pictures of this size need not be in memory at once
-                image = open_shown(self.path, self._display)
+                opened, self._opened = self._opened, None
+                file = opened[1] if opened is not None and opened[0] == version else read.open_file(self.path)
+                # Codes stay codes: they are what the page is given.
+                image = picture_of_file(file, self._display, keeps_codes=True)
                 tiles = Tiles(image, tile_size(image.display))
                 description = manifest(image, tiles, name=self.path.name, tile_format=self._tile_format)
                 self._shown = Shown(version, description, tiles)
@@ -83,23 +82,3 @@ class PictureFile:
             reason = "is not there" if isinstance(error, FileNotFoundError) else f"cannot be read: {error.strerror}"
             raise PictureError(reason, where=str(self.path)) from None
         return f"{state.st_ino:x}-{state.st_size:x}-{state.st_mtime_ns:x}"
-
-
-def open_shown(path: Path, display: Display | None) -> IntegralImage | LargePicture:
-    """A picture for being shown: of a file that holds codes those alone, which is quicker than linear values are.
-
-    Parameters and errors as for :func:`lippmann.image.read.read_picture`; errors in parts of a picture that is read
-    piece by piece come when they are read.
-    """
-    info = read_info(path)
-    is_small = info.width * info.height <= LARGE
-    if info.stored not in ("uint8", "uint16") or not (info.format == "png" or (info.format == "tiff" and is_small)):
-        return open_picture(path, display=display)
-    metadata = metadata_for(info, path, display)
-    check_stored(info.stored, info.format, path)
-    values = opaque_colors(read_png(path) if info.format == "png" else read_tiff(path), path)
-    # One piece, which is there already.
-    source = ChunkedPixels((info.width, info.height), values.shape[:2], values.dtype, lambda row, column: values)
-    return LargePicture(
-        source, metadata.display, metadata.world_from_display, metadata.provenance, cast(Stored, info.stored)
-    )

@@ -11,12 +11,10 @@ from typing import Any
 import numpy as np
 
 from lippmann.codecs.png import encode_png
-from lippmann.color.transfer import quantize
 from lippmann.display.pixel_window import PixelWindow
 from lippmann.errors import UsageError
-from lippmann.image import IntegralImage
-from lippmann.image.encoding import linear_values
-from lippmann.image.streamed import LargePicture
+from lippmann.image import Picture
+from lippmann.image.encoding import converted_values
 from lippmann.viewer.overlays import Codes, overlays
 
 #: Columns and rows of a tile; those on the right and at the bottom may have fewer.
@@ -37,7 +35,7 @@ class Tiles:
         Columns and rows of a tile, at least 1.
     """
 
-    def __init__(self, image: IntegralImage | LargePicture, size: int = TILE_SIZE) -> None:
+    def __init__(self, image: Picture, size: int = TILE_SIZE) -> None:
         self._image = image
         self._size = size
         self._lock = threading.Lock()
@@ -84,12 +82,6 @@ class Tiles:
 
     def _picture_codes(self, window: PixelWindow) -> Codes:
         transfer = self._image.provenance.transfer
-        if isinstance(self._image, IntegralImage):
-            return quantize(self._image.pixels[window.slices], 8, transfer).astype(np.uint8)
-        with self._lock:  # what is read piece by piece is for one thread at a time
-            values = self._image.source.window(window)
-        return (
-            values
-            if values.dtype == np.uint8
-            else quantize(linear_values(values, transfer), 8, transfer).astype(np.uint8)
-        )
+        with self._lock:  # a picture on disk is for one thread at a time
+            values = self._image.window(window)
+        return converted_values(values, "uint8", transfer).astype(np.uint8, copy=False)

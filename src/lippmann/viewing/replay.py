@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 
 from lippmann.display import NUMPY, Display
 from lippmann.errors import UsageError
+from lippmann.image.picture import Picture
 from lippmann.image.stored_values import FloatArray
-from lippmann.image.streamed import Picture
 from lippmann.image.views import view_grid
 
 Eye = tuple[float, float, float]

@@ -14,7 +14,7 @@ from lippmann.errors import UsageError
 
 if TYPE_CHECKING:
     from lippmann.display import Display
-    from lippmann.image import PictureInfo, Provenance
+    from lippmann.image import PictureFile, Provenance
 
 Format = Annotated[str | None, typer.Option("--format", help="png, exr or tiff; by default as the picture is stored.")]
 Filter = Annotated[str, typer.Option("--filter", help="nearest, or linear between pixels of one lens.")]
@@ -26,9 +26,9 @@ def info(
     as_json: options.Json = False,
 ) -> None:
     """Say what a picture is: its display, and how it was made."""
-    from lippmann.image import read_info
+    from lippmann.image import open_file
 
-    found = read_info(picture)
+    found = open_file(picture)
     Console(as_json=as_json).result(_info_values(picture, found), "\n".join(_info_lines(picture, found)))
 
 
@@ -42,19 +42,13 @@ def views(
     quiet: options.Quiet = False,
 ) -> None:
     """Write each view (one direction, one pixel of every lens) as a picture of its own."""
-    from lippmann.image import IntegralImage, write_views
-    from lippmann.image.part_folders import write_large_views
-    from lippmann.image.streamed import open_picture
+    from lippmann.image import open_picture, write_views
     from lippmann.image.views import view_grid
 
     console = Console(quiet, as_json)
     image = open_picture(picture, display=_display(display))
     with console.progress() as progress:
-        asked: dict[str, Any] = {"format": format, "bits": bits, "progress": progress}
-        if isinstance(image, IntegralImage):
-            count = write_views(image, output, **asked)
-        else:
-            count = write_large_views(image, output, **asked)
+        count = write_views(image, output, format=format, bits=bits, progress=progress)  # type: ignore[arg-type]
     if image.views_note:
         console.remark(image.views_note)
     grid = view_grid(image.display)
@@ -73,18 +67,12 @@ def micro_images(
     quiet: options.Quiet = False,
 ) -> None:
     """Write the micro-image of each lens as a picture of its own."""
-    from lippmann.image import IntegralImage, write_micro_images
-    from lippmann.image.part_folders import write_large_micro_images
-    from lippmann.image.streamed import open_picture
+    from lippmann.image import open_picture, write_micro_images
 
     console = Console(quiet, as_json)
     image = open_picture(picture, display=_display(display))
     with console.progress() as progress:
-        asked: dict[str, Any] = {"format": format, "bits": bits, "progress": progress}
-        if isinstance(image, IntegralImage):
-            count = write_micro_images(image, output, **asked)
-        else:
-            count = write_large_micro_images(image, output, **asked)
+        count = write_micro_images(image, output, format=format, bits=bits, progress=progress)  # type: ignore[arg-type]
     grid = image.display.lens_grid
     result = {"output": str(output), "lenses": [grid.rows, grid.columns], "written": count}
     console.result(result, f"{output}: {count} micro-images")
@@ -209,7 +197,7 @@ def _field_width(display: Display, distance: float) -> float:
     return 2 * distance * math.tan(math.radians(display.field_of_view / 2))
 
 
-def _info_values(path: Path, found: PictureInfo) -> dict[str, Any]:
+def _info_values(path: Path, found: PictureFile) -> dict[str, Any]:
     values: dict[str, Any] = {
         "file": str(path),
         "format": found.format,
@@ -229,7 +217,7 @@ def _method(made: Provenance) -> str:
     return ", ".join(part for part in parts if part)
 
 
-def _info_lines(path: Path, found: PictureInfo) -> list[str]:
+def _info_lines(path: Path, found: PictureFile) -> list[str]:
     lines = [f"{path}: {found.format.upper()}, {found.width}x{found.height}, {found.stored}"]
     if found.layers:
         lines.append(f"layers      {', '.join(found.layers)}")

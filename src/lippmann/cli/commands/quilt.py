@@ -233,8 +233,7 @@ def weave(
     """Make a display's native picture from a quilt or a folder of views."""
     from lippmann.display import load_display
     from lippmann.image.streamed import LARGE
-    from lippmann.image.streamed_write import can_be_banded
-    from lippmann.image.write import check_output, format_for
+    from lippmann.image.write import can_be_banded, check_output, format_for
     from lippmann.quilts.weave import weave as weave_views
     from lippmann.quilts.weave import weave_to_file
 

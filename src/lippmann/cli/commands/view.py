@@ -87,15 +87,16 @@ def _read_ahead(files: list[PictureFile], console: Console) -> None:
 
 
 def _export(paths: list[Path], display: Display | None, output: Path, console: Console) -> None:
-    from lippmann.image import read_metadata
+    from lippmann.image import open_file
+    from lippmann.image.streamed import picture_of_file
     from lippmann.runtime.atomic_write import check_writable
     from lippmann.viewer.export import check_exportable, export_page
-    from lippmann.viewer.served_picture import open_shown
 
-    for path in paths:
-        check_exportable(read_metadata(path, display=display).display)
+    files = [open_file(path) for path in paths]
+    for file in files:
+        check_exportable(file.metadata_for(display).display)
     check_writable(output)
-    export_page([(path.name, open_shown(path, display)) for path in paths], output)
+    export_page([(file.path.name, picture_of_file(file, display, keeps_codes=True)) for file in files], output)
     size = output.stat().st_size
     names = " and ".join(str(path) for path in paths)
     console.result({"output": str(output), "bytes": size}, f"{output}: {names}, {size / 1e6:.1f} MB")
