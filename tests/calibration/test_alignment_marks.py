@@ -57,7 +57,7 @@ def test_the_lenses_lie_where_they_lay(lpi, size, margin, distance):
     columns = np.arange(sheet.panel.width)
     x, y = sheet.panel_point(columns + 0.5, np.full(columns.shape, 1.5))
     cx, _ = sheet.lens_center(*sheet.lens_of(x, y), x, y)
-    away = (x - cx * sheet.magnification) / sheet.micro_image_pitch + 0.5 - marks.place_under_lens(columns)
+    away = (x - cx * sheet.magnification) / sheet.micro_image_pitch + 0.5 - marks.lens_phase(columns)
     assert np.abs(away - np.round(away)).max() < 1e-4
 
 
@@ -115,7 +115,7 @@ def test_upright_arms_lie_on_the_middle_of_a_lens():
         row = round(M / 2 - 0.27 * M)
         columns = np.flatnonzero(ink[row, round(x - 0.3 * M) : round(x + 0.3 * M)]) + round(x - 0.3 * M)
         assert len(columns) in (line, line + 1)
-        places = MARKS.place_under_lens(columns.astype(float))
+        places = MARKS.lens_phase(columns.astype(float))
         pixels_per_lens = 360 / PRINT.pitch_on_print
         assert np.abs(places - 0.5).max() * pixels_per_lens <= line / 2
         assert abs(columns.mean() + 0.5 - x) <= pixels_per_lens / 2 + 1
@@ -147,16 +147,16 @@ def test_a_poster_s_margin_is_drawn_in_windows():
 
 
 def test_the_words_say_what_to_check():
-    assert MARKS.words() == "30 lpi, printed at 29.9377 lpi, 360 ppi, seen from 400 mm"
+    assert MARKS.caption() == "30 lpi, printed at 29.9377 lpi, 360 ppi, seen from 400 mm"
     far = Marks(replace(DISPLAY, viewing_distance=math.inf), 8.0)
-    assert far.words() == "30 lpi, printed at 30 lpi, 360 ppi, seen from afar"
+    assert far.caption() == "30 lpi, printed at 30 lpi, 360 ppi, seen from afar"
     below = np.s_[round(MARKS.sheet.panel.height - 0.4 * M) :, M + 5 : -M - 5]
     assert (whole(MARKS)[below] == 0).sum() > 200
 
 
 @pytest.mark.parametrize("margin", [0.0, -5.0, 2.9, 101.0, math.nan])
 def test_impossible_margins_are_refused(margin):
-    with pytest.raises(UsageError, match="a margin with marks is 3 to 100 mm wide"):
+    with pytest.raises(UsageError, match="it must be 3 to 100 mm"):
         Marks(DISPLAY, margin)
 
 

@@ -75,9 +75,9 @@ def test_bands_fit_together(image):
 
 def test_large_pictures_become_tiff(opened, tmp_path):
     _, large = opened(8)
-    with pytest.raises(OutputError, match="a picture of this size is written as TIFF"):
+    with pytest.raises(OutputError, match="a picture of this size needs TIFF"):
         write_marked(large, tmp_path / "sheet.png", 8.0)
-    with pytest.raises(UsageError, match="a margin of 1 mm"):
+    with pytest.raises(UsageError, match="margin: 1 mm is out of range"):
         write_marked(large, tmp_path / "sheet.tif", 1.0)
     slanted = replace(large, display=replace(DISPLAY, lens_array=replace(DISPLAY.lens_array, slant=3.0)))
     with pytest.raises(UsageError, match="slanted lenses"):

@@ -37,7 +37,7 @@ def under_the_sheet(test, lpi=None, distance=400.0, shift=0.0):
 def darkness(test, seen):
     """How much of each strip is dark, beyond its label and away from its rim."""
     shares = []
-    for strip in test.made_of:
+    for strip in test.all_strips:
         top, height, width = strip.window.top, strip.window.height, strip.window.width
         shares.append(1 - seen[top + 2 : top + height - 4, width // 4 : width - 20].mean())
     return np.array(shares)
@@ -45,7 +45,7 @@ def darkness(test, seen):
 
 def test_the_strip_with_the_sheets_print_pitch_is_dark_and_the_others_show_bars():
     test = PitchTest(SHEET, strips=9, step=0.25)
-    right = test.made_of[4]
+    right = test.all_strips[4]
     assert abs(right.lpi - SHEET.pitch_on_print) < 0.25 / 2
     test = replace(test, sheet=replace(SHEET, lpi=20 * right.lpi / SHEET.pitch_on_print))  # exactly on a strip
     assert test.sheet.pitch_on_print == pytest.approx(right.lpi, rel=1e-4)
@@ -60,7 +60,7 @@ def test_the_strip_with_the_sheets_print_pitch_is_dark_and_the_others_show_bars(
 
 def test_another_sheet_has_another_strip():
     test = PitchTest(SHEET, strips=9, step=0.25)
-    wanted = test.made_of[7].lpi
+    wanted = test.all_strips[7].lpi
     lpi = wanted * (1 + SHEET.gap / 400)
     dark = darkness(test, under_the_sheet(test, lpi=lpi))
     assert dark[7] > 0.99
@@ -74,7 +74,7 @@ def test_from_farther_away_another_strip_is_right():
     for distance in (60.0, 100_000.0):
         # Strips less than a quarter of a lens off, on either side, are dark too for an eye in the middle.
         is_dark = darkness(test, under_the_sheet(test, distance=distance)) > 0.99
-        middles.append(np.mean([strip.lpi for strip, dark in zip(test.made_of, is_dark, strict=True) if dark]))
+        middles.append(np.mean([strip.lpi for strip, dark in zip(test.all_strips, is_dark, strict=True) if dark]))
     assert middles[0] == pytest.approx(SHEET.lpi / (1 + test.sheet.gap / 60), abs=0.06)
     assert middles[1] == pytest.approx(20, abs=0.06)
 
@@ -87,7 +87,7 @@ def test_strips_have_the_pitch_that_is_written_beside_them():
     test = PitchTest(replace(SHEET, ppi=1440), strips=5, step=0.5)
     pixels = whole(test)
     width = test.sheet.pixels[0]
-    for strip in test.made_of:
+    for strip in test.all_strips:
         row = pixels[strip.window.top + 4, width // 3 :] == 0
         edges = np.flatnonzero(np.diff(row.astype(int)) == 1)
         lines = (len(edges) - 1) / (edges[-1] - edges[0]) * 1440
@@ -116,22 +116,22 @@ def test_a_poster_is_drawn_in_windows():
 
 def test_the_middle_is_what_is_expected_in_round_numbers():
     test = PitchTest(SHEET)
-    values = [strip.lpi for strip in test.made_of]
-    assert abs(values[10] - SHEET.pitch_on_print) <= test.step_taken / 2
-    assert np.diff(values) == pytest.approx(test.step_taken)
-    assert values[10] / test.step_taken == pytest.approx(round(values[10] / test.step_taken))
+    values = [strip.lpi for strip in test.all_strips]
+    assert abs(values[10] - SHEET.pitch_on_print) <= test.effective_step / 2
+    assert np.diff(values) == pytest.approx(test.effective_step)
+    assert values[10] / test.effective_step == pytest.approx(round(values[10] / test.effective_step))
     # Neighbours differ by half a lens from end to end, or a little less.
-    assert 0.2 <= test.step_taken * 60 / 25.4 <= 0.5
+    assert 0.2 <= test.effective_step * 60 / 25.4 <= 0.5
 
 
 @pytest.mark.parametrize(
     ("asked", "said"),
     [
-        ({"strips": 0}, "0 strips will not do; it must be 1 to 199"),
-        ({"strips": 200}, "200 strips"),
-        ({"step": 0.0}, "the step 0 will not do"),
-        ({"step": math.nan}, "the step nan"),
-        ({"step": 5.0}, "the step 5 will not do; the print pitch is about 19.9"),
+        ({"strips": 0}, "strips: 0 is out of range; it must be 1 to 199"),
+        ({"strips": 200}, "strips: 200 is out of range"),
+        ({"step": 0.0}, "step: 0 is out of range"),
+        ({"step": math.nan}, "step: nan is out of range"),
+        ({"step": 5.0}, "step: 5 is out of range; the print pitch is about 19.9"),
     ],
 )
 def test_nonsense_is_refused(asked, said):
@@ -141,5 +141,5 @@ def test_nonsense_is_refused(asked, said):
 
 
 def test_strips_need_pixels():
-    with pytest.raises(UsageError, match="the print is only 14 pixels high"):
+    with pytest.raises(UsageError, match="the print is 14 pixels high"):
         PitchTest(replace(SHEET, size=(60, 1)))

@@ -23,7 +23,9 @@ def test_there_and_back(lippmann, picture, tmp_path, layout):
         "views": [8, 1],
         "size": [64, 512],
         "stored": "uint8",
-        "notes": ["no ground truth is written: the picture has no layer depth (render with layers)"] if layout == "hci" else [],
+        "notes": ["no ground truth is written: the picture has no layer depth (render with layers)"]
+        if layout == "hci"
+        else [],
     }
     again = lippmann("import", path, "-o", tmp_path / "again.png", "--json", "-q")
     assert again.json["display"] == "seed-lenticular"
@@ -76,7 +78,7 @@ def test_bad_input_is_one_line_and_code_2(lippmann, picture, tmp_path):
     assert "lftoolbox files end in .mat" in refused("export", picture, "--as=lftoolbox", "-o", out)
     assert "holds 'mine.txt', which Lippmann did not write" in refused("export", picture, "--as=hci", "-o", there)
     assert "24 bits per channel" in refused("export", picture, "--as=hci", "-o", out, "--bits", "24")
-    assert "--distance: has no meaning" in refused("export", picture, "--as=views", "-o", out, "--distance=5")
+    assert "--distance: does not apply" in refused("export", picture, "--as=views", "-o", out, "--distance=5")
     assert "is not there" in refused("export", tmp_path / "no.png", "--as=hci", "-o", out)
     assert "is not there" in refused("import", tmp_path / "no", "-o", tmp_path / "x.png")
     assert "is no .mat file" in refused("import", tmp_path / "junk.mat", "-o", tmp_path / "x.png")

@@ -58,7 +58,7 @@ def test_a_pitch_test(lippmann, tmp_path):
     outcome = lippmann("pitch-test", *SHEET, "--strips", "5", "--step", "0.2", "-o", path, "--json")
     sheet = print_of_texts({"lpi": "20", "ppi": "200", "size": "40x20mm", "viewing-distance": "300"})
     test = PitchTest(sheet, 5, 0.2)
-    assert outcome.json["strips"] == [strip.lpi for strip in test.made_of]
+    assert outcome.json["strips"] == [strip.lpi for strip in test.all_strips]
     assert outcome.json["expected"] == pytest.approx(sheet.pitch_on_print)
     from lippmann.display.pixel_window import PixelWindow
 
@@ -111,14 +111,14 @@ def test_bad_prints_are_one_line_and_code_2(lippmann, tmp_path, words, said):
     [
         (("render", "teapot", "--display", "print"), "--ppi: ppi is missing; a print needs lpi"),
         (("render", "teapot", "--display", "print", "--ppi", "720", "--size", "9x9cm"), "--lpi: lpi is missing"),
-        (("render", "teapot", "--lpi", "60"), "--lpi: has no meaning for the display seed-lenticular"),
-        (("render", "teapot", "--display", SHORT, "--ppi", "60"), "--ppi: has no meaning for the display print:"),
+        (("render", "teapot", "--lpi", "60"), "--lpi: does not apply to the display seed-lenticular"),
+        (("render", "teapot", "--display", SHORT, "--ppi", "60"), "--ppi: does not apply to the display print:"),
         (("render", "teapot", "--display", "print:lpi=0,ppi=720,size=9x9cm"), "print: lpi: lpi is 0"),
-        (("render", "teapot", "--display", SHORT, "--marks", "1mm"), "a margin of 1 mm will not do"),
+        (("render", "teapot", "--display", SHORT, "--marks", "1mm"), "1 mm is out of range"),
         (("render", "teapot", "--display", SHORT, "--marks", "wide"), "--marks: 'wide' is not a length"),
         (("render", "teapot", "--display", "mla-square", "--marks", "9mm"), "mla-square has square lenses"),
-        (("pitch-test", *SHEET, "--strips", "0"), "0 strips will not do"),
-        (("pitch-test", *SHEET, "--step", "-1"), "the step -1 will not do"),
+        (("pitch-test", *SHEET, "--strips", "0"), "0 is out of range"),
+        (("pitch-test", *SHEET, "--step", "-1"), "-1 is out of range"),
         (("pitch-test",), "--ppi: ppi is missing"),
         (("marks", "absent.tif"), "absent.tif: is not there"),
     ],
@@ -134,4 +134,4 @@ def test_bad_input_is_one_line_and_code_2(lippmann, tmp_path, words, said):
 def test_a_pitch_test_is_a_tiff(lippmann, tmp_path):
     outcome = lippmann("pitch-test", *SHEET, "-o", tmp_path / "test.png")
     assert outcome.code == 2
-    assert "a pitch test is written as TIFF" in outcome.err
+    assert "a pitch test is a TIFF file" in outcome.err

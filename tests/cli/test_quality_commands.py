@@ -47,7 +47,7 @@ def test_equal_pictures_have_no_figure_in_json(lippmann, pair):
     assert values["identical"] is True
     assert values["psnr"] is values["micro_images"]["worst"]["psnr"] is None
     text = lippmann("compare", pair[0], pair[0]).out
-    assert "show the same" in text
+    assert "the pictures are identical" in text
     assert "infinite" in text
 
 

@@ -80,7 +80,7 @@ def test_what_is_not_meant_is_refused(display, picture, tmp_path):
         with pytest.raises(LippmannError) as refused:
             export_image(*words)
         assert what in str(refused.value)
-    with pytest.raises(UsageError, match="--distance: has no meaning for zarr"):
+    with pytest.raises(UsageError, match="--distance: does not apply to zarr"):
         export_image(image, tmp_path / "x", "zarr", distance=5.0)
     with pytest.raises(UsageError, match="the layout 'hdf' is unknown"):
         import_image(tmp_path, "hdf")

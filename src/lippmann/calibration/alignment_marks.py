@@ -1,18 +1,18 @@
-"""Marks for laying a lens sheet on a print: a margin about the picture, with marks at exact places under the lenses.
+"""Alignment marks for laying a lens sheet on a print: a margin around the picture with marks aligned to the lenses.
 
-The lenses are continued into the margin, so that the marked sheet is a display of its own, whose lenses lie over the
-picture exactly where they lay before. With ``f`` the place of a pixel's centre under its lens, 0 to 1, and m the width
-of the margin:
+The lenses continue into the margin: the marked sheet is a display of its own, with its lenses at the same positions
+over the picture. Let ``f`` be the phase of a pixel's centre under its lens, 0 to 1, and m the width of the margin. The
+marks are:
 
-- above and below the picture, from 0.1 m to 0.5 m away from it, over its whole width: strips of lines, ink where
-  |f - 1/2| < 1/4. Under a sheet that lies right they are dark from end to end for an eye in the middle of the viewing
-  place; bars tell of a turned sheet, a change of both at once of a shifted one.
-- in each corner, and left and right at half height: a cross in a ring. Its upright arm is the middle of a lens, ink
-  within half a line of it.
-- at the picture's corners, from 0.6 m outwards: cutting lines, which begin where the picture ends.
-- outside the lower strip: a line of words. On top: where the top is.
+- Alignment strips above and below the picture, 0.1 m to 0.5 m from it, over its whole width: ink where
+  |f - 1/2| < 1/4. Under an aligned sheet they look uniformly dark to an eye at the centre of the viewing zone. Bars
+  mean a rotated sheet; an equal change of both strips means a shifted one.
+- A cross in a ring in each corner, and left and right at half height. Its upright arm is centred on a lens.
+- Cutting lines at the picture's corners, from 0.6 m outwards, just outside the picture.
+- Text: the print's parameters outside the lower strip, ``TOP`` outside the upper one.
 
-All ink is black on white. Everything is a function of the pixel, so that windows of a large print can be drawn alone.
+All ink is black on white. Every mark is a function of the pixel's position, so that windows of a large print can be
+drawn alone.
 """
 
 from __future__ import annotations
@@ -35,13 +35,13 @@ Ink = NDArray[np.bool_]
 
 _INCH = 25.4
 
-#: Width of the margin, mm; below that no mark can be seen, above it would be paper only.
+#: Width of the margin in mm, least and most: marks in a narrower one would be invisible.
 MARGINS = (3.0, 100.0)
 
-#: Width of lines, mm: a few pixels of a printer.
+#: Width of lines in mm: a few pixels of a printer.
 _LINE = 0.1
 
-#: Parts of the margin: where the strips begin and end, where cutting lines begin, and the ring's radius.
+#: Distances from the picture over the width of the margin: alignment strips, cutting lines; and the ring's radius.
 _STRIP = (0.1, 0.5)
 _CUT = 0.6
 _RING = 0.2
@@ -49,14 +49,14 @@ _RING = 0.2
 
 @dataclass(frozen=True)
 class Marks:
-    """The margin of a display with upright cylindrical lenses, and what is drawn there.
+    """The margin of a display with upright cylindrical lenses, and its marks.
 
     Parameters
     ----------
     display:
         The display of the picture alone.
     margin:
-        Width of the margin in millimetres, 3 to 100; it gets the whole number of pixels next to it.
+        Width of the margin in millimetres, 3 to 100; rounded to whole pixels.
 
     Raises
     ------
@@ -70,12 +70,12 @@ class Marks:
     def __post_init__(self) -> None:
         least, most = MARGINS
         if not least <= self.margin <= most:
-            rule = f"a margin with marks is {least:g} to {most:g} mm wide"
-            raise UsageError(f"a margin of {self.margin:g} mm will not do", rule=rule)
+            rule = f"it must be {least:g} to {most:g} mm"
+            raise UsageError(f"{self.margin:g} mm is out of range", parameter="margin", rule=rule)
         lenses = self.display.lens_array
         if lenses.layout != "lenticular" or lenses.slant:
             kind = "slanted" if lenses.slant else lenses.layout
-            rule = "marks are drawn for upright cylindrical lenses"
+            rule = "marks need upright cylindrical lenses"
             raise UsageError(f"the display {self.display.name} has {kind} lenses", rule=rule)
 
     @property
@@ -85,28 +85,28 @@ class Marks:
 
     @property
     def picture(self) -> PixelWindow:
-        """Where the picture lies on the marked sheet."""
+        """The part of the marked sheet that the picture covers."""
         panel = self.display.panel
         return PixelWindow(self.pixels, self.pixels, panel.width, panel.height)
 
     @property
     def sheet(self) -> Display:
-        """The display of the marked sheet: the same lenses, over the margin too."""
+        """The display of the marked sheet: the same lenses, continued over the margin."""
         panel, lattice = self.display.panel, self.display.lattice
         width, height = panel.width + 2 * self.pixels, panel.height + 2 * self.pixels
         lenses = replace(self.display.lens_array, pitch=lattice.pitch, offset=(lattice.origin_x, 0.0))
         return replace(self.display, panel=replace(panel, width=width, height=height), lens_array=lenses)
 
-    def words(self) -> str:
-        """The line of words below the picture."""
+    def caption(self) -> str:
+        """The line of text below the picture: pitches, resolution and viewing distance."""
         display = self.display
-        lpi, seen = _INCH / display.lattice.pitch, _INCH / (display.lattice.pitch * display.magnification)
+        lpi, print_lpi = _INCH / display.lattice.pitch, _INCH / (display.lattice.pitch * display.magnification)
         ppi = _INCH / display.panel.pixel_pitch
         distance = f"{display.viewing_distance:g} mm" if display.viewing_distance < 1e9 else "afar"
-        return f"{lpi:.6g} lpi, printed at {seen:.6g} lpi, {ppi:.6g} ppi, seen from {distance}"
+        return f"{lpi:.6g} lpi, printed at {print_lpi:.6g} lpi, {ppi:.6g} ppi, seen from {distance}"
 
     def draw(self, window: PixelWindow) -> NDArray[np.float32]:
-        """``(height, width)`` of a window of the marked sheet, 0 ink or 1 paper; paper where the picture goes."""
+        """``(height, width)`` float32 pixels of a window of the marked sheet: 0 ink, 1 paper; no picture."""
         rows = np.arange(window.top, window.bottom, dtype=np.float64)[:, None]
         columns = np.arange(window.left, window.right, dtype=np.float64)[None, :]
         ink = self._strips(columns, rows) | self._cuts(columns, rows)
@@ -115,18 +115,18 @@ class Marks:
         pixels = np.where(ink, np.float32(0), np.float32(1))
         m, inside = self.pixels, self.picture
         room = round((1 - _CUT) * 0.8 * m)
-        for text, top in (("TOP", 0.1 * m), (self.words(), inside.bottom + _CUT * m)):
+        for text, top in (("TOP", 0.1 * m), (self.caption(), inside.bottom + _CUT * m)):
             line = PixelWindow(inside.left, round(top), inside.width, room)
             box = label_window(text, line, room, at="bottom")
             paint_label(pixels, window, text, box, ink=0, paper=1)
         return pixels
 
-    def place_under_lens(self, column: Real) -> Real:
-        """f of pixels of the marked sheet, 0 at the left edge of their lens, 1 at the right."""
+    def lens_phase(self, column: Real) -> Real:
+        """Phase f of the centres of columns of the marked sheet: 0 at the left edge of their lens, 1 at the right."""
         lattice, panel = self.display.lattice, self.display.panel
         x = (column - self.pixels + 0.5 - panel.width / 2) * panel.pixel_pitch
-        place: Real = (x / self.display.magnification - lattice.origin_x) / lattice.pitch + 0.5
-        return place - np.floor(place)
+        phase: Real = (x / self.display.magnification - lattice.origin_x) / lattice.pitch + 0.5
+        return phase - np.floor(phase)
 
     def _strips(self, column: Real, row: Real) -> Ink:
         inside, m = self.picture, self.pixels
@@ -134,19 +134,19 @@ class Marks:
         away = np.where(above > 0, above, row + 0.5 - inside.bottom)
         is_across = (column >= inside.left) & (column < inside.right)
         in_strip = is_across & (away >= _STRIP[0] * m) & (away < _STRIP[1] * m)
-        return in_strip & (np.abs(self.place_under_lens(column) - 0.5) < 0.25)
+        return in_strip & (np.abs(self.lens_phase(column) - 0.5) < 0.25)
 
     def _cuts(self, column: Real, row: Real) -> Ink:
-        """Lines of one line's width just outside the picture's edges, near the corners, in the outer margin."""
+        """Cutting lines: just outside the picture's edges, in the outer margin near the corners."""
         inside, m, line = self.picture, self.pixels, self._line
         right = np.maximum(inside.left - column, column - (inside.right - 1))
         down = np.maximum(inside.top - row, row - (inside.bottom - 1))
-        is_upright = (right > 0) & (right <= line) & (down > _CUT * m)
-        is_lying = (down > 0) & (down <= line) & (right > _CUT * m)
-        return is_upright | is_lying
+        is_vertical = (right > 0) & (right <= line) & (down > _CUT * m)
+        is_horizontal = (down > 0) & (down <= line) & (right > _CUT * m)
+        return is_vertical | is_horizontal
 
     def _cross_centers(self) -> list[tuple[float, float]]:
-        """Places in pixels from the sheet's left and top edges; a lens's middle is put there by :meth:`_cross`."""
+        """Positions ``(x, y)`` in pixels from the sheet's left and top edges, before x moves to a lens centre."""
         inside, half = self.picture, self.pixels / 2
         far_right, far_down = inside.right + half, inside.bottom + half
         middle = inside.top + inside.height / 2
@@ -154,15 +154,15 @@ class Marks:
 
     def _cross(self, column: Real, row: Real, x: float, y: float) -> Ink:
         lattice, panel = self.display.lattice, self.display.panel
-        seen_pitch = lattice.pitch * self.display.magnification / panel.pixel_pitch
-        # The lens's middle next to x, in pixels from the left edge.
+        visual_pitch = lattice.pitch * self.display.magnification / panel.pixel_pitch
+        # The nearest centre of a lens, in pixels from the left edge.
         first = lattice.origin_x * self.display.magnification / panel.pixel_pitch + panel.width / 2 + self.pixels
-        x = first + round((x - first) / seen_pitch) * seen_pitch
+        x = first + round((x - first) / visual_pitch) * visual_pitch
         right, down = column + 0.5 - x, row + 0.5 - y
         half, radius, reach = self._line / 2, _RING * self.pixels, 1.5 * _RING * self.pixels
-        is_upright = (np.abs(right) <= half) & (np.abs(down) <= reach)
-        is_lying = (np.abs(down) <= half) & (np.abs(right) <= reach)
-        return is_upright | is_lying | (np.abs(np.hypot(right, down) - radius) <= half)
+        is_vertical = (np.abs(right) <= half) & (np.abs(down) <= reach)
+        is_horizontal = (np.abs(down) <= half) & (np.abs(right) <= reach)
+        return is_vertical | is_horizontal | (np.abs(np.hypot(right, down) - radius) <= half)
 
     @property
     def _line(self) -> int:
@@ -170,14 +170,19 @@ class Marks:
 
 
 def with_marks(image: IntegralImage, margin: float) -> IntegralImage:
-    """The picture with a margin of ``margin`` mm and its marks, for the display that is larger by as much.
+    """The picture with a margin and its alignment marks, for the display that is larger by the margin.
 
-    Its maps are zero over the margin.
+    Parameters
+    ----------
+    image:
+        The picture of a display with upright cylindrical lenses. Its maps become zero over the margin.
+    margin:
+        Width of the margin in millimetres, 3 to 100.
 
     Raises
     ------
     UsageError
-        As :class:`Marks`.
+        If the margin is out of range, or the lenses are not cylindrical and upright.
     """
     marks = Marks(image.display, margin)
     sheet, m = marks.sheet, marks.pixels
@@ -189,9 +194,16 @@ def with_marks(image: IntegralImage, margin: float) -> IntegralImage:
 
 
 def marked_rows(marks: Marks, rows: Callable[[int, int], FloatArray], first: int, last: int) -> FloatArray:
-    """Rows of the marked sheet from ``first`` up to ``last``, ``(last - first, width, 3)`` linear RGB.
+    """Rows of the marked sheet, ``(last - first, width, 3)`` linear RGB.
 
-    ``rows(first, last)`` gives those of the picture alone; it is asked for no others than are needed.
+    Parameters
+    ----------
+    marks:
+        The margin and its marks.
+    rows:
+        ``rows(first, last)`` returns rows of the picture alone; called for those that are needed only.
+    first, last:
+        First row of the marked sheet and the one past the last.
     """
     m, picture, width = marks.pixels, marks.picture, marks.picture.width + 2 * marks.pixels
     pixels = np.empty((last - first, width, 3), dtype=np.float32)
@@ -210,6 +222,6 @@ def marked_rows(marks: Marks, rows: Callable[[int, int], FloatArray], first: int
     return pixels
 
 
-def marked_provenance(marks: Marks, made: Provenance) -> Provenance:
-    """What a marked picture says of how it was made."""
-    return replace(made, options={**made.options, "margin_pixels": marks.pixels})
+def marked_provenance(marks: Marks, provenance: Provenance) -> Provenance:
+    """Provenance of the marked picture: that of the picture, with the width of the margin in pixels."""
+    return replace(provenance, options={**provenance.options, "margin_pixels": marks.pixels})

@@ -1,9 +1,9 @@
-"""Words on test pictures: painted flat, in all views alike, so that they are read through the lenses and without."""
+"""Labels on test pictures: the same in all views, so that they are legible through the lenses and without them."""
 
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,23 +12,38 @@ from lippmann.display.pixel_window import PixelWindow
 
 Mask = NDArray[np.bool_]
 
-#: Letters smaller than this cannot be told apart, in pixels; no label is painted then.
+#: Smallest legible height of letters in pixels; smaller labels are not painted.
 _SMALLEST = 7
 
-#: Border about the letters, as a part of their height.
+#: Border around the letters over their height.
 _BORDER = 0.25
 
-#: How much bolder than the font letters are, as a part of its size: a lens shows only one column of pixels at a time.
+#: Stroke added to the font over its size: a lens shows one column of pixels at a time, so thin strokes would vanish.
 _STROKE = 0.025
 
-#: Size at which text is measured.
+#: Font size at which text is measured, in pixels.
 _MEASURE = 100
 
 
-def label_window(text: str, inside: PixelWindow, height: int, *, at: str = "left") -> PixelWindow | None:
-    """The box of a label: ``height`` high at most, in the middle of the ``left`` or the ``bottom`` edge of a window.
+def label_window(
+    text: str, inside: PixelWindow, height: int, *, at: Literal["left", "bottom"] = "left"
+) -> PixelWindow | None:
+    """The box of a label at the middle of an edge of a window.
 
-    A label that would be wider than the window is made smaller; None if it could not be read.
+    Parameters
+    ----------
+    text:
+        The label.
+    inside:
+        The window that holds the box.
+    height:
+        Height of the box in pixels, at most; reduced if the box would be wider than the window.
+    at:
+        ``left`` or ``bottom``: the edge of the window.
+
+    Returns
+    -------
+    The box, or None if the letters would be too small to read.
     """
     _, (width_at, height_at) = _extent(text)
     border = _BORDER * height_at
@@ -51,7 +66,21 @@ def paint_label(
     ink: float = 1.0,
     paper: float = 0.0,
 ) -> None:
-    """Paint ``text`` into the part of ``pixels``, ``(h, w, ...)`` of ``window``, that lies in its box."""
+    """Paint a label into the pixels of a window, in place.
+
+    Parameters
+    ----------
+    pixels:
+        ``(height, width, ...)`` of ``window``, of any number type.
+    window:
+        The part of the picture that ``pixels`` holds.
+    text:
+        The label.
+    box:
+        The label's box in the picture, from :func:`label_window`; None paints nothing.
+    ink, paper:
+        Values of letters and background.
+    """
     part = None if box is None else box.intersection(window)
     if part is None or box is None:
         return
@@ -63,20 +92,20 @@ def paint_label(
 
 @lru_cache(maxsize=256)
 def _mask(text: str, width: int, height: int) -> Mask:
-    """Where a box of that size has ink: the text in its middle, as large as its border leaves room."""
+    """``(height, width)``, True in the letters of a label, centred in a box of this size."""
     from PIL import Image, ImageDraw
 
     size = _MEASURE * height / ((1 + 2 * _BORDER) * _extent(text)[1][1])
     (left, top), (text_width, text_height) = _extent(text, size)
     picture = Image.new("L", (width, height))
-    place = (width - text_width) / 2 - left, (height - text_height) / 2 - top
-    ImageDraw.Draw(picture).text(place, text, fill=255, font=_font(size), stroke_width=_STROKE * size)
+    corner = (width - text_width) / 2 - left, (height - text_height) / 2 - top
+    ImageDraw.Draw(picture).text(corner, text, fill=255, font=_font(size), stroke_width=_STROKE * size)
     mask: Mask = np.asarray(picture) >= 128
     return mask
 
 
 def _extent(text: str, size: float = _MEASURE) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Left and top of the ink, and its width and height; that of a line with digits, whatever the letters are."""
+    """Left and top of the ink, and its width and height in pixels; the height is that of digits for every text."""
     left, _, right, _ = _font(size).getbbox(text)
     _, top, _, bottom = _font(size).getbbox("0123456789")
     return (left, top), (max(1.0, right - left), max(1.0, bottom - top))

@@ -1,4 +1,4 @@
-"""A print's file with a margin and its marks, whatever its size."""
+"""Files of prints with a margin and alignment marks."""
 
 from __future__ import annotations
 
@@ -28,16 +28,32 @@ def write_marked(
     bits: int | None = None,
     progress: ProgressCallback = silent,
 ) -> Display:
-    """Write the picture with a margin of ``margin`` mm and its marks; the display of the marked sheet.
+    """Write a picture with a margin and its alignment marks.
 
-    A picture that is not whole in memory is read and written band by band, as TIFF.
+    Parameters
+    ----------
+    picture:
+        The picture, in memory or in a file; a picture in a file is processed in bands.
+    path:
+        The file to write; TIFF for a picture in a file.
+    margin:
+        Width of the margin in millimetres, 3 to 100.
+    bits:
+        Bits per value; None: as the picture is stored.
+    progress:
+        Called as bands are written.
+
+    Returns
+    -------
+    The display of the marked sheet.
 
     Raises
     ------
     UsageError
-        As :class:`~lippmann.calibration.alignment_marks.Marks`.
+        If the margin is out of range, or the display has no upright cylindrical lenses.
     OutputError
-        As :func:`~lippmann.image.write.write_picture`, or if a large picture should become something else than TIFF.
+        If the format is unknown, has no such bits, or is not TIFF for a picture in a file; or the file cannot be
+        written.
     """
     if isinstance(picture, IntegralImage):
         marked = with_marks(picture, margin)
@@ -46,10 +62,10 @@ def write_marked(
     marks = Marks(picture.display, margin)
     name, stored = format_for(path, bits, source=picture.stored)
     if name != "tiff":
-        rule = "a picture of this size is written as TIFF"
-        raise OutputError(f"the ending '{path.suffix}' will not do", where=str(path), rule=rule)
+        rule = "a picture of this size needs TIFF"
+        raise OutputError(f"the ending is '{path.suffix}'", where=str(path), rule=rule)
     sheet, transfer = marks.sheet, picture.provenance.transfer
-    made = Metadata(sheet, picture.world_from_display, marked_provenance(marks, picture.provenance))
+    metadata = Metadata(sheet, picture.world_from_display, marked_provenance(marks, picture.provenance))
 
     def band(first: int, last: int) -> NDArray[Any]:
         return stored_values(marked_rows(marks, picture.rows, first, last), stored, transfer)
@@ -60,7 +76,7 @@ def write_marked(
             (sheet.panel.width, sheet.panel.height),
             band,
             pixel_pitch=sheet.panel.pixel_pitch,
-            description=to_text(made),
+            description=to_text(metadata),
             progress=progress,
         )
     return sheet

@@ -1,4 +1,4 @@
-"""Test patterns as pictures for their panel, each field with its value written on it."""
+"""Test patterns as pictures of the whole panel, with the value of each field as a label."""
 
 from __future__ import annotations
 
@@ -16,35 +16,54 @@ from lippmann.display.pixel_window import PixelWindow
 from lippmann.image import IntegralImage, Provenance
 from lippmann.progress import Progress, ProgressCallback, silent
 
-#: Height of a label, as a part of its field's (of its width, where fields stand side by side).
+#: Height of a label over that of its field (over its width, if fields are side by side).
 _LABEL = 0.65
 
-#: Sub-pixels drawn at a time.
+#: Pixels drawn at a time.
 _BLOCK = 1 << 20
 
 
 def draw_labelled(pattern: Pattern, monitor: Monitor, window: PixelWindow) -> FloatArray:
-    """:func:`~lippmann.calibration.patterns.draw` with the labels of the fields, white on black; raises as that."""
+    """Draw a test pattern with labels of its fields, white on black.
+
+    Parameters
+    ----------
+    pattern:
+        The pattern.
+    monitor:
+        The monitor with its calibration values.
+    window:
+        The part of the panel to draw. Pixels do not depend on the window.
+
+    Returns
+    -------
+    ``(height, width, 3)`` float32, 0 to 1.
+
+    Raises
+    ------
+    UsageError
+        If a field has values that no monitor can have, or there are more fields than pixels.
+    """
     pixels = draw(pattern, monitor, window)
     if pattern.name == "stripes":
         return pixels
-    is_lying = pattern.name != "slope"
+    is_horizontal = pattern.name != "slope"
     for field in fields(pattern, monitor):
-        height = round(_LABEL * (field.window.height if is_lying else field.window.width))
-        box = label_window(field.text, field.window, height, at="left" if is_lying else "bottom")
+        height = round(_LABEL * (field.window.height if is_horizontal else field.window.width))
+        box = label_window(field.text, field.window, height, at="left" if is_horizontal else "bottom")
         paint_label(pixels, window, field.text, box)
     return pixels
 
 
 def pattern_picture(pattern: Pattern, monitor: Monitor, *, progress: ProgressCallback = silent) -> IntegralImage:
-    """The pattern on the whole panel, as a picture that carries its display, so that it can be replayed.
+    """The pattern on the whole panel, as an integral image with its display.
 
     Raises
     ------
     UsageError
-        If the pattern has fields that the monitor cannot have.
+        If a field has values that no monitor can have, or there are more fields than pixels.
     DisplayError
-        If a lens covers less than a pixel, or more than the panel.
+        If a lens is narrower than a pixel, or wider than the panel.
     """
     display = monitor.display()
     width, height = monitor.panel.width, monitor.panel.height
@@ -57,5 +76,5 @@ def pattern_picture(pattern: Pattern, monitor: Monitor, *, progress: ProgressCal
     options: dict[str, Any] = {"pattern": pattern.name, "pitch": monitor.pitch, "center": monitor.center}
     options["slope"] = INFINITE if math.isinf(monitor.slope) else monitor.slope
     options |= {"views": pattern.views} if pattern.name == "stripes" else {"step": step_of(pattern, monitor)}
-    made = Provenance(method="pattern", subpixels=True, scene=pattern.name, version=VERSION, options=options)
-    return IntegralImage(pixels, display, provenance=made)
+    provenance = Provenance(method="pattern", subpixels=True, scene=pattern.name, version=VERSION, options=options)
+    return IntegralImage(pixels, display, provenance=provenance)

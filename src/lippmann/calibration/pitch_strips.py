@@ -1,12 +1,12 @@
-"""The pitch test: strips of lines at slightly different pitches, by which the print pitch of a sheet is found.
+"""Pitch test: strips of lines at slightly different pitches, to find the print pitch of a lens sheet.
 
 Strip k (0 on top) of n has the print pitch ``lpi_k = middle + (k - (n - 1)/2) step`` in lenses per inch. A pixel whose
-centre lies x inches right of the middle of the print has the place ``f = x lpi_k + 1/2 (mod 1)`` under its lens, and is
-black where |f - 1/2| < 1/4. Seen from the distance for which the test is made, the strip with the right pitch is dark
-(or bright, as the sheet happens to lie) from end to end, and changes all at once when the sheet or the head is moved
-sideways; the others show bars. The bars of a strip are as many as its lenses are too many or too few.
+centre is x inches right of the middle of the print has the phase ``f = x lpi_k + 1/2 (mod 1)`` under its lens, and is
+black where |f - 1/2| < 1/4. Seen from the viewing distance of the test, the strip with the right pitch is uniformly
+dark (or bright, depending on the position of the sheet) and changes as a whole when the sheet or the head moves
+sideways. The other strips show bars: as many as they have lenses too many or too few.
 
-All pixels are black or white, so that no printer dithers them. Every function works on windows of the print.
+All pixels are black or white, so that no printer dithers them. All functions draw windows of the print.
 """
 
 from __future__ import annotations
@@ -18,24 +18,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.calibration.labels import label_window, paint_label
-from lippmann.calibration.patterns import rounded
+from lippmann.calibration.patterns import check_step, round_step
 from lippmann.display.formats.print_sheet import Print
 from lippmann.display.pixel_window import PixelWindow
 from lippmann.errors import UsageError
 from lippmann.runtime.cached_property import cached_property
 
-#: The largest label, mm; smaller where strips are.
+#: Largest height of a label in mm; smaller in low strips.
 _LABEL = 6.0
 
-#: Height of the line of words on top, as a part of a strip's; and of the white line between strips.
+#: Height of the white line between strips over that of a strip.
 _GUTTER = 0.04
 
+#: Number of strips, least and most.
 STRIPS = (1, 199)
 
 
 @dataclass(frozen=True)
 class Strip:
-    """One strip: where it is, its print pitch in lenses per inch, and that as written beside it."""
+    """One strip: its part of the print, its print pitch in lenses per inch, and that pitch as its label."""
 
     window: PixelWindow
     lpi: float
@@ -49,12 +50,11 @@ class PitchTest:
     Parameters
     ----------
     sheet:
-        The print: its size, resolution, lenses and distance.
+        Size, resolution, lenses and viewing distance of the print.
     strips:
-        How many, 1 to 199.
+        Number of strips, 1 to 199.
     step:
-        Lenses per inch from strip to strip; None takes the one by which neighbours differ by about half a lens over
-        the width of the print.
+        Step between strips in lenses per inch. None: about half a lens over the width of the print.
 
     Raises
     ------
@@ -69,37 +69,38 @@ class PitchTest:
     def __post_init__(self) -> None:
         least, most = STRIPS
         if not least <= self.strips <= most:
-            raise UsageError(f"{self.strips} strips will not do", rule=f"it must be {least} to {most}")
-        if self.step is not None and not (math.isfinite(self.step) and self.step > 0):
-            raise UsageError(f"the step {self.step:g} will not do", rule="it must be a number above zero")
+            rule = f"it must be {least} to {most}"
+            raise UsageError(f"{self.strips} is out of range", parameter="strips", rule=rule)
+        check_step(self.step)
         if self.strips + 1 > self.sheet.pixels[1]:
-            rule = f"the print is only {self.sheet.pixels[1]} pixels high"
-            raise UsageError(f"{self.strips} strips will not do", rule=rule)
+            rule = f"the print is {self.sheet.pixels[1]} pixels high"
+            raise UsageError(f"{self.strips} is out of range", parameter="strips", rule=rule)
         if self.lpi_of(0) <= 0:
             rule = f"the print pitch is about {self.sheet.pitch_on_print:.6g} lenses per inch"
-            raise UsageError(f"the step {self.step_taken:g} will not do", rule=rule, fix="take a smaller one")
+            what = f"{self.effective_step:g} is out of range"
+            raise UsageError(what, parameter="step", rule=rule, fix="use a smaller step")
 
     @property
-    def step_taken(self) -> float:
-        """Lenses per inch from strip to strip."""
-        return rounded(0.5 * self.sheet.ppi / self.sheet.pixels[0]) if self.step is None else self.step
+    def effective_step(self) -> float:
+        """Step between strips in lenses per inch: the given one, else the default."""
+        return round_step(0.5 * self.sheet.ppi / self.sheet.pixels[0]) if self.step is None else self.step
 
     @property
     def middle(self) -> float:
-        """Lenses per inch of the middle strip: the expected print pitch, rounded to whole steps if those are small."""
-        expected, step = self.sheet.pitch_on_print, self.step_taken
+        """Lenses per inch of the middle strip: the expected print pitch, rounded to whole steps if these are small."""
+        expected, step = self.sheet.pitch_on_print, self.effective_step
         return round(expected / step) * step if step < expected / 2 else expected
 
     def lpi_of(self, strip: int) -> float:
-        """The print pitch of a strip, counted from the top."""
-        return self.middle + (strip - (self.strips - 1) / 2) * self.step_taken
+        """Print pitch in lenses per inch of a strip, counted from 0 at the top."""
+        return self.middle + (strip - (self.strips - 1) / 2) * self.effective_step
 
     @cached_property
-    def made_of(self) -> tuple[Strip, ...]:
-        """All strips, from the top; above them one row as high as they are is left for the title."""
+    def all_strips(self) -> tuple[Strip, ...]:
+        """All strips from the top; the title has the height of a strip above them."""
         width, height = self.sheet.pixels
         rows = [height * (k + 1) // (self.strips + 1) for k in range(self.strips + 1)]
-        decimals = next((d for d in range(2, 6) if math.isclose(round(self.step_taken, d), self.step_taken)), 6)
+        decimals = next((d for d in range(2, 6) if math.isclose(round(self.effective_step, d), self.effective_step)), 6)
         strips = []
         for k in range(self.strips):
             lpi = self.lpi_of(k)
@@ -107,21 +108,21 @@ class PitchTest:
         return tuple(strips)
 
     def title(self) -> str:
-        """What stands above the strips."""
+        """The line of text above the strips."""
         sheet = self.sheet
         distance = "infinitely far" if math.isinf(sheet.viewing_distance) else f"{sheet.viewing_distance:g} mm"
         return f"print pitch in lpi: {sheet.pitch_of_sheet:.6g}-lpi sheet, {sheet.ppi:g} ppi, from {distance}"
 
     def draw(self, window: PixelWindow) -> NDArray[np.uint8]:
-        """``(height, width)`` of a window of the print, 0 black or 255 white."""
+        """``(height, width)`` uint8 pixels of a window of the print, 0 black or 255 white."""
         pixels = np.full(window.shape, 255, dtype=np.uint8)
         width = self.sheet.pixels[0]
         tallest = round(_LABEL * self.sheet.ppi / 25.4)
-        head = PixelWindow(0, 0, width, self.made_of[0].window.top)
+        head = PixelWindow(0, 0, width, self.all_strips[0].window.top)
         paint_label(pixels, window, self.title(), label_window(self.title(), head, tallest), ink=0, paper=255)
         columns = np.arange(window.left, window.right)
         inches = (columns + 0.5 - width / 2) / self.sheet.ppi
-        for strip in self.made_of:
+        for strip in self.all_strips:
             part = strip.window.intersection(window)
             if part is None:
                 continue

@@ -153,7 +153,7 @@ def export_image(
     """
     name = check_target(layout, path)
     if distance is not None and name != "hci":
-        raise UsageError(f"has no meaning for {name}", where="--distance", fix="leave it out")
+        raise UsageError(f"does not apply to {name}", where="--distance", fix="leave it out")
     light_field = light_field_of(image, stored_in(name, image.stored, bits))
     display = image.display
     if name == "hci":

@@ -1,4 +1,4 @@
-"""``lippmann calibrate``: finding a monitor's pitch, slope and centre."""
+"""``lippmann calibrate``: pitch, slope and centre of a slanted lenticular monitor."""
 
 from __future__ import annotations
 
@@ -18,7 +18,9 @@ if TYPE_CHECKING:
     from lippmann.display.formats.monitor import Monitor
 
 calibrate = typer.Typer(
-    help="Find the pitch, slope and centre of a slanted monitor.", no_args_is_help=True, rich_markup_mode=None
+    help="Calibrate the pitch, slope and centre of a slanted monitor.",
+    no_args_is_help=True,
+    rich_markup_mode=None,
 )
 
 
@@ -27,27 +29,32 @@ def pattern(
     name: Annotated[
         str,
         typer.Argument(
-            help="stripes: every view a colour; pitch, slope, center: fields with a value each, of which one is right."
+            help="stripes: one colour per view; pitch, slope, center: one value per field, of which one is right."
         ),
     ],
     output: options.Output,
     display: options.DisplayName,
     pitch: Annotated[
-        str | None, typer.Option("--pitch", help="Lenses per inch as seen, in place of the display's.")
+        str | None, typer.Option("--pitch", help="Visual pitch in lenses per inch. Default: the display's.")
     ] = None,
-    slope: Annotated[str | None, typer.Option("--slope", help="Slope in place of the display's, or infinite.")] = None,
-    center: Annotated[str | None, typer.Option("--center", help="Centre in place of the display's, in lenses.")] = None,
-    views: Annotated[int, typer.Option("--views", help="Views of stripes.")] = 3,
-    fields: Annotated[int, typer.Option("--fields", help="Fields of the other patterns.")] = 11,
+    slope: Annotated[
+        str | None, typer.Option("--slope", help="Slope of the lenses, or infinite. Default: the display's.")
+    ] = None,
+    center: Annotated[str | None, typer.Option("--center", help="Centre in lenses. Default: the display's.")] = None,
+    views: Annotated[int, typer.Option("--views", help="Number of views, for stripes.")] = 3,
+    fields: Annotated[int, typer.Option("--fields", help="Number of fields, for the other patterns.")] = 11,
     step: Annotated[
         float | None,
-        typer.Option("--step", help="From field to field: pitch in lpi, slope in 1/slope, center in lenses."),
+        typer.Option(
+            "--step",
+            help="Step between fields: pitch in lpi, slope in 1/slope, center in lenses.",
+        ),
     ] = None,
     bits: options.Bits = None,
     as_json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
-    """Draw a native test pattern for a display with cylindrical lenses."""
+    """Write a native test pattern for a lenticular display."""
     from lippmann.calibration.pattern_files import pattern_picture
     from lippmann.calibration.patterns import Pattern
     from lippmann.calibration.patterns import fields as fields_of
@@ -61,34 +68,34 @@ def pattern(
     check_writable(output)
     chosen = Pattern(name, views, fields, step)  # type: ignore[arg-type]  # it is checked there
     if name == "stripes" and step is not None:
-        raise UsageError("stripes have no fields", where="--step", fix="leave it out")
-    monitor = _turned(Monitor.of_display(load_display(display)), pitch, slope, center)
+        raise UsageError("does not apply to stripes", where="--step", fix="leave it out")
+    monitor = _with_values(Monitor.of_display(load_display(display)), pitch, slope, center)
     with console.progress() as progress:
         image = pattern_picture(chosen, monitor, progress=progress)
     image.save(output, bits=bits)
-    drawn = [] if name == "stripes" else fields_of(chosen, monitor)
-    values = [None if math.isinf(field.value) else field.value for field in drawn]
-    written = None if math.isinf(monitor.slope) else monitor.slope
+    pattern_fields = [] if name == "stripes" else fields_of(chosen, monitor)
+    values = [None if math.isinf(field.value) else field.value for field in pattern_fields]
+    json_slope = None if math.isinf(monitor.slope) else monitor.slope
     result: dict[str, Any] = {"output": str(output), "size": [monitor.panel.width, monitor.panel.height]}
-    result |= {"pitch": monitor.pitch, "slope": written, "center": monitor.center, "pattern": name, "fields": values}
+    result |= {"pitch": monitor.pitch, "slope": json_slope, "center": monitor.center, "pattern": name, "fields": values}
     lines = [f"{output}: {name}, pitch {monitor.pitch:.6g} lpi, slope {monitor.slope:.6g}, center {monitor.center:.4g}"]
-    if drawn:
+    if pattern_fields:
         order = "left to right" if name == "slope" else "top to bottom"
-        lines.append(f"fields from {order}: {', '.join(field.text for field in drawn)}")
+        lines.append(f"fields from {order}: {', '.join(field.text for field in pattern_fields)}")
     console.result(result, "\n".join(lines))
 
 
 @calibrate.command("page")
 def page(
-    display: Annotated[str, typer.Argument(help="The display to start from, as for --display.")],
-    output: Annotated[Path, typer.Option("--output", "-o", help="The display file that the page saves: .toml.")],
+    display: Annotated[str, typer.Argument(help="Display to start from: a name, a TOML file, or as for --display.")],
+    output: Annotated[Path, typer.Option("--output", "-o", help="Display file to save (.toml).")],
     host: viewing.Host = "127.0.0.1",
     port: viewing.Port = 0,
     no_browser: viewing.NoBrowser = False,
     as_json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
-    """Turn pitch, slope and centre in a browser on the monitor itself, and save them as a display file."""
+    """Adjust pitch, slope and centre in a browser on the monitor, and save a display file."""
     from lippmann.display import load_display
     from lippmann.display.formats.monitor import Monitor
     from lippmann.runtime.atomic_write import check_writable
@@ -99,12 +106,12 @@ def page(
         raise OutputError(f"the ending is '{output.suffix}'", where=str(output), rule="display files end in .toml")
     check_writable(output)
     monitor = Monitor.of_display(load_display(display))
-    site = CalibrationSite(monitor, output, lambda turned: console.remark(_saved(output, turned)))
+    site = CalibrationSite(monitor, output, lambda calibrated: console.remark(_saved(output, calibrated)))
     viewing.serve(site, f"calibrate {monitor.name}", console, host=host, port=port, browser=not no_browser)
 
 
-def _turned(monitor: Monitor, pitch: str | None, slope: str | None, center: str | None) -> Monitor:
-    """The monitor with the values that were typed."""
+def _with_values(monitor: Monitor, pitch: str | None, slope: str | None, center: str | None) -> Monitor:
+    """The monitor with the options' values."""
     from lippmann.display.display import INFINITE
     from lippmann.display.units import plain_number
 

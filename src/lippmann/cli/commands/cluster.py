@@ -1,4 +1,4 @@
-"""``lippmann worker``, and the options of commands that render on a cluster."""
+"""``lippmann worker``, and the options of commands that render on a Dask cluster."""
 
 from __future__ import annotations
 
@@ -21,20 +21,18 @@ ClusterName = Annotated[
     str | None,
     typer.Option(
         "--cluster",
-        help="Render the picture's tiles on a Dask cluster: tls://HOST:8786 of its scheduler (tcp:// without "
-        "certificates: open to all who reach it), or local:N for N workers here (extra 'cluster').",
+        help="Render on a Dask cluster: tls://HOST:8786 (scheduler; tcp:// is open to everyone who can reach it), or "
+        "local:N (N workers on this machine). Needs the extra 'cluster'.",
     ),
 ]
-TlsCa = Annotated[
-    Path | None, typer.Option("--tls-ca", help="Certificate of the authority that all trust (PEM), for tls://.")
-]
-TlsCert = Annotated[Path | None, typer.Option("--tls-cert", help="This machine's certificate (PEM).")]
-TlsKey = Annotated[Path | None, typer.Option("--tls-key", help="Its key (PEM).")]
+TlsCa = Annotated[Path | None, typer.Option("--tls-ca", help="Certificate of the authority (PEM), for tls://.")]
+TlsCert = Annotated[Path | None, typer.Option("--tls-cert", help="Certificate of this machine (PEM).")]
+TlsKey = Annotated[Path | None, typer.Option("--tls-key", help="Private key of this machine (PEM).")]
 
 
 @dataclass(frozen=True)
 class Asked:
-    """What ``--cluster`` and the options beside it ask for; true where a cluster is to render."""
+    """The values of ``--cluster`` and ``--tls-...``; true if a cluster is to render."""
 
     name: str | None
     tls_ca: Path | None = None
@@ -45,21 +43,21 @@ class Asked:
         for option in ("tls_ca", "tls_cert", "tls_key"):
             if self.name is None and getattr(self, option) is not None:
                 name = f"--{option.replace('_', '-')}"
-                raise UsageError("is for clusters", where=name, fix="add --cluster tls://HOST:8786")
+                raise UsageError("applies to a cluster only", where=name, fix="add --cluster tls://HOST:8786")
 
     def __bool__(self) -> bool:
         return self.name is not None
 
     @contextmanager
     def runner(self, console: Console, threads: int | None) -> Iterator[Runner | None]:
-        """What renders tiles, for as long as the connection stands; None where this process does.
+        """The runner that renders tiles on the cluster while the connection is open; None without a cluster.
 
         Raises
         ------
         UsageError
-            The cluster's name is none, or files for encryption are missing.
+            If the cluster's address is invalid, or a TLS file is missing.
         ClusterError
-            It cannot be reached.
+            If the cluster cannot be reached.
         """
         if self.name is None:
             yield None
@@ -74,26 +72,32 @@ class Asked:
 
 
 def worker(
-    scheduler: Annotated[str, typer.Argument(help="The scheduler's address: tls://HOST:8786, or tcp://.")],
+    scheduler: Annotated[str, typer.Argument(help="Address of the scheduler: tls://HOST:8786, or tcp://HOST:8786.")],
     threads: options.Threads = None,
     memory: Annotated[
-        str | None, typer.Option("--memory", help="Beyond this, such as 8G, the worker is started anew.")
+        str | None,
+        typer.Option(
+            "--memory",
+            help="Memory limit, such as 8G, beyond which the worker restarts.",
+        ),
     ] = None,
     host: Annotated[
         str | None,
-        typer.Option("--host", help="This machine's address for the others; loopback unless given."),
+        typer.Option("--host", help="Address of this machine in the cluster's network. Default: loopback."),
     ] = None,
-    name: Annotated[str | None, typer.Option("--name", help="What the dashboard calls this worker.")] = None,
+    name: Annotated[str | None, typer.Option("--name", help="Name of this worker in the dashboard.")] = None,
     tls_ca: TlsCa = None,
     tls_cert: TlsCert = None,
     tls_key: TlsKey = None,
     quiet: options.Quiet = False,
 ) -> None:
-    """Work for a cluster: a Dask worker with the engine warm, until its scheduler ends."""
+    """Run a Dask worker for renders on a cluster, until its scheduler ends."""
     from lippmann.cluster.address import TlsFiles
     from lippmann.cluster.worker import WorkerOptions, serve
 
-    wanted = WorkerOptions(scheduler, threads, parse.memory(memory), host, name, TlsFiles(tls_ca, tls_cert, tls_key))
+    worker_options = WorkerOptions(
+        scheduler, threads, parse.memory(memory), host, name, TlsFiles(tls_ca, tls_cert, tls_key)
+    )
     remark = Console(quiet).remark
     remark(f"working for {scheduler}")
-    serve(wanted, quiet=quiet, remark=remark)
+    serve(worker_options, quiet=quiet, remark=remark)

@@ -1,4 +1,4 @@
-"""Commands that judge: how far a picture is from a reference, and how this program stands to the paper's."""
+"""``lippmann compare`` and ``lippmann reproduce``: the error of a picture, and the paper's tables and figures."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from lippmann.cli.shared import options
+from lippmann.cli.shared import options, parse
 from lippmann.cli.shared.console import Console
 from lippmann.errors import UsageError
 
@@ -18,21 +18,20 @@ if TYPE_CHECKING:
 
 
 def compare(
-    reference: Annotated[Path, typer.Argument(help="The picture to measure against (PNG, EXR, TIFF or Zarr).")],
-    test: Annotated[Path, typer.Argument(help="The picture to judge: of the same display.")],
+    reference: Annotated[Path, typer.Argument(help="Reference picture: PNG, EXR, TIFF or Zarr.")],
+    test: Annotated[Path, typer.Argument(help="Picture to compare, of the same display.")],
     table: Annotated[
-        Path | None, typer.Option("--csv", help="Write the figures of every micro-image to this CSV file.")
+        Path | None, typer.Option("--csv", help="Write the metrics of every micro-image to this CSV file.")
     ] = None,
     picture: Annotated[
         Path | None,
-        typer.Option("--map", help="Write a picture of the errors: .png, or .exr with layers.", show_default=False),
+        typer.Option("--map", help="Write a map of the errors: .png, or .exr with layers.", show_default=False),
     ] = None,
     display: options.PictureDisplay = None,
     as_json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
-    """Say how far a picture is from a reference: PSNR, its worst micro-images, SSIM of views, the paper's figures."""
-    from lippmann.display import load_display
+    """Compare a picture with a reference: PSNR, worst micro-images, SSIM of views, the paper's metrics."""
     from lippmann.image import IntegralImage
     from lippmann.image.streamed import open_picture
     from lippmann.image.write import format_for
@@ -47,14 +46,14 @@ def compare(
     for path in (table, picture):
         if path is not None:
             check_writable(path)
-    given = None if display is None else load_display(display)
-    first, second = (open_picture(path, display=given) for path in (reference, test))
+    target = parse.display(display)
+    first, second = (open_picture(path, display=target) for path in (reference, test))
     with console.progress() as progress:
         if isinstance(first, IntegralImage) and isinstance(second, IntegralImage):
             comparison = compare_pictures(first, second, progress)
         else:
             if picture is not None:
-                raise UsageError("needs the whole picture in memory", where="--map", fix="leave it out")
+                raise UsageError("needs pictures that fit in memory", where="--map", fix="leave it out")
             comparison = compare_large(first, second, progress)
     if table is not None:
         _write_table(comparison, table)
@@ -68,29 +67,29 @@ def compare(
 
 def reproduce(
     output: options.Folder,
-    fast: Annotated[
-        bool, typer.Option("--quick", help="A minute's version: two scenes, fewer pixels, one run.")
+    quick: Annotated[
+        bool, typer.Option("--quick", help="Take about a minute: two scenes, fewer pixels, one run.")
     ] = False,
     device: options.Device = "auto",
     threads: options.Threads = None,
     as_json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
-    """Measure the paper's tables and figures again: its scenes, its methods, and a report of both."""
+    """Reproduce the paper's tables and figures and write a report."""
     from lippmann.reproduce.run import PAGE
     from lippmann.reproduce.run import reproduce as reproduce_paper
 
     console = Console(quiet, as_json)
     with console.progress() as progress:
-        figures = reproduce_paper(output, quick=fast, device=device, threads=threads, progress=progress)
+        figures = reproduce_paper(output, quick=quick, device=device, threads=threads, progress=progress)
     page = output / PAGE
     lines = [f"{page}: {', '.join(figures['scenes'])}"]
     for scene, runs in figures["scenes"].items():
         paper, gloss = runs["interpolated-paper"], runs["interpolated-gloss"]
         lines.append(
             f"{scene:<12} interpolated as in the paper: {paper['saved_percent']:.0f} % of the time saved, "
-            f"{_given(paper['paper_mean_psnr'])}; gloss respected: {gloss['saved_percent']:.0f} %, "
-            f"{_given(gloss['paper_mean_psnr'])}"
+            f"{_report_decibels(paper['paper_mean_psnr'])}; gloss respected: {gloss['saved_percent']:.0f} %, "
+            f"{_report_decibels(gloss['paper_mean_psnr'])}"
         )
     console.result({"output": str(page), **figures}, "\n".join(lines))
 
@@ -111,7 +110,7 @@ def _lines(comparison: Comparison) -> list[str]:
     off = comparison.psnr_off_silhouettes
     source = "depths" if silhouettes.source == "depth" else "strong edges"
     lenses = int((comparison.micro_image_pixels > 0).sum())
-    lines = ["the pictures show the same"] if comparison.identical else []
+    lines = ["the pictures are identical"] if comparison.identical else []
     lines += [
         f"PSNR                {_decibels(comparison.psnr)}",
         f"off silhouettes     {'no pixel' if off is None else _decibels(off)} "
@@ -128,20 +127,20 @@ def _lines(comparison: Comparison) -> list[str]:
 
 
 def _flicker_line(comparison: Comparison) -> str:
-    found = comparison.flicker
-    if found is None:
+    flicker = comparison.flicker
+    if flicker is None:
         return "flicker of views    one view only"
-    return f"flicker of views    {_decibels(found.psnr)} ({found.share:.2f} of the error changes from view to view)"
+    return f"flicker of views    {_decibels(flicker.psnr)} ({flicker.share:.2f} of the error changes from view to view)"
 
 
 def _decibels(value: float) -> str:
     return "infinite" if math.isinf(value) else f"{value:.2f} dB"
 
 
-def _given(value: float | None) -> str:
-    """A figure of the report, where an infinite one stands as None."""
+def _report_decibels(value: float | None) -> str:
+    """A PSNR of the report, which holds an infinite one as None."""
     return _decibels(math.inf if value is None else value)
 
 
-def _lens(found: MicroImage) -> str:
-    return f"lens {found.column}, {found.row}"
+def _lens(micro_image: MicroImage) -> str:
+    return f"lens {micro_image.column}, {micro_image.row}"

@@ -1,4 +1,4 @@
-"""Commands that write pictures in other tools' layouts and read theirs."""
+"""``lippmann export`` and ``lippmann import``: light fields in other tools' layouts."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from lippmann.cli.shared import options
+from lippmann.cli.shared import options, parse
 from lippmann.cli.shared.console import Console
 
 _LAYOUTS = "hci (4D Light Field Benchmark), lftoolbox (.mat), eslf (.png), zarr, or views"
@@ -15,19 +15,21 @@ _LAYOUTS = "hci (4D Light Field Benchmark), lftoolbox (.mat), eslf (.png), zarr,
 
 def export(
     picture: options.Picture,
-    output: Annotated[Path, typer.Option("--output", "-o", help="The file or folder to write.")],
-    layout: Annotated[str, typer.Option("--as", help=f"{_LAYOUTS}.")],
+    output: Annotated[Path, typer.Option("--output", "-o", help="File or folder to write.")],
+    layout: Annotated[str, typer.Option("--as", help=f"Layout: {_LAYOUTS}.")],
     distance: Annotated[
         float | None,
-        typer.Option("--distance", help="For hci, of displays of parallel views: where cameras stand for them, in mm."),
+        typer.Option("--distance", help="Distance of the cameras in mm, for hci and displays of parallel views."),
     ] = None,
-    bits: Annotated[int | None, typer.Option("--bits", help="Bits per value: 8, 16, or 32 for floats.")] = None,
+    bits: Annotated[
+        int | None,
+        typer.Option("--bits", help="Bits per value: 8, 16, or 32 (float). Default: as the picture is stored."),
+    ] = None,
     display: options.PictureDisplay = None,
     as_json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
-    """Write a picture in another light-field tool's layout."""
-    from lippmann.display import load_display
+    """Export a picture to the layout of another light-field tool."""
     from lippmann.exchange import export_image
     from lippmann.exchange.layouts import check_target, is_folder
     from lippmann.image import read_picture
@@ -35,7 +37,7 @@ def export(
 
     console = Console(quiet, as_json)
     (check_folder_writable if is_folder(check_target(layout, output)) else check_writable)(output)
-    image = read_picture(picture, display=None if display is None else load_display(display))
+    image = read_picture(picture, display=parse.display(display))
     with console.progress() as progress:
         done = export_image(image, output, layout, bits=bits, distance=distance, progress=progress)
     for note in done.notes:
@@ -53,29 +55,27 @@ def export(
 
 
 def import_(
-    source: Annotated[Path, typer.Argument(help="A file or folder of another light-field tool.")],
+    source: Annotated[Path, typer.Argument(help="File or folder of another light-field tool.")],
     output: options.Output,
-    layout: Annotated[str | None, typer.Option("--as", help=f"{_LAYOUTS}; by default as it looks.")] = None,
+    layout: Annotated[str | None, typer.Option("--as", help=f"Layout: {_LAYOUTS}. Default: recognized.")] = None,
     display: Annotated[
         str | None,
         typer.Option(
-            "--display", "-d", help="The display that shows it; by default as the file names or describes it."
+            "--display", "-d", help="Display that shows the light field. Default: the one that the file describes."
         ),
     ] = None,
     bits: options.Bits = None,
     as_json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
-    """Read a light field of another tool as a picture for a display."""
-    from lippmann.display import load_display
+    """Import a light field of another tool as a picture for a display."""
     from lippmann.exchange import import_image
     from lippmann.image.write import check_output, format_for
 
     console = Console(quiet, as_json)
     check_output(output, format_for(output, bits)[0])
-    target = None if display is None else load_display(display)
     with console.progress() as progress:
-        image, notes = import_image(source, layout, display=target, progress=progress)
+        image, notes = import_image(source, layout, display=parse.display(display), progress=progress)
     image.save(output, bits=bits)
     for note in notes:
         console.remark(note)

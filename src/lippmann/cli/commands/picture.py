@@ -1,4 +1,4 @@
-"""Commands on pictures that exist: look into them, take them apart, put them together, see what an eye sees."""
+"""Commands on existing pictures: ``info``, ``views``, ``micro-images``, ``compose``, ``replay``, ``refocus``."""
 
 from __future__ import annotations
 
@@ -16,20 +16,25 @@ if TYPE_CHECKING:
     from lippmann.display import Display
     from lippmann.image import PictureFile, Provenance
 
-Format = Annotated[str | None, typer.Option("--format", help="png, exr or tiff; by default as the picture is stored.")]
-Filter = Annotated[str, typer.Option("--filter", help="nearest, or linear between pixels of one lens.")]
-Size = Annotated[str | None, typer.Option("--size", help="Width x height in pixels.")]
+Format = Annotated[
+    str | None, typer.Option("--format", help="Picture format: png, exr or tiff. Default: as the picture is stored.")
+]
+Filter = Annotated[str, typer.Option("--filter", help="Pixel filter: nearest, or linear within one lens.")]
+Size = Annotated[
+    str | None,
+    typer.Option("--size", help="Size of the result, WIDTHxHEIGHT in pixels. Default: as the panel, reduced."),
+]
 
 
 def info(
     picture: options.Picture,
     as_json: options.Json = False,
 ) -> None:
-    """Say what a picture is: its display, and how it was made."""
+    """Show a picture's display, size and provenance."""
     from lippmann.image import open_file
 
-    found = open_file(picture)
-    Console(as_json=as_json).result(_info_values(picture, found), "\n".join(_info_lines(picture, found)))
+    file = open_file(picture)
+    Console(as_json=as_json).result(_info_values(picture, file), "\n".join(_info_lines(picture, file)))
 
 
 def views(
@@ -41,12 +46,12 @@ def views(
     as_json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
-    """Write each view (one direction, one pixel of every lens) as a picture of its own."""
+    """Split a picture into views: one picture per direction, one pixel per lens."""
     from lippmann.image import open_picture, write_views
     from lippmann.image.views import view_grid
 
     console = Console(quiet, as_json)
-    image = open_picture(picture, display=_display(display))
+    image = open_picture(picture, display=parse.display(display))
     with console.progress() as progress:
         count = write_views(image, output, format=format, bits=bits, progress=progress)  # type: ignore[arg-type]
     if image.views_note:
@@ -66,11 +71,11 @@ def micro_images(
     as_json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
-    """Write the micro-image of each lens as a picture of its own."""
+    """Split a picture into micro-images: one picture per lens."""
     from lippmann.image import open_picture, write_micro_images
 
     console = Console(quiet, as_json)
-    image = open_picture(picture, display=_display(display))
+    image = open_picture(picture, display=parse.display(display))
     with console.progress() as progress:
         count = write_micro_images(image, output, format=format, bits=bits, progress=progress)  # type: ignore[arg-type]
     grid = image.display.lens_grid
@@ -79,13 +84,13 @@ def micro_images(
 
 
 def compose(
-    folder: Annotated[Path, typer.Argument(help="A folder that 'views' or 'micro-images' wrote.")],
+    folder: Annotated[Path, typer.Argument(help="Folder written by 'lippmann views' or 'lippmann micro-images'.")],
     output: options.Output,
     bits: options.Bits = None,
     as_json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
-    """Put views or micro-images back together into the native picture."""
+    """Join views or micro-images into the native picture."""
     from lippmann.image import compose as compose_folder
     from lippmann.image.write import format_for
     from lippmann.runtime.atomic_write import check_writable
@@ -105,14 +110,18 @@ def replay(
     picture: options.Picture,
     output: options.Output,
     eye: Annotated[
-        str | None, typer.Option("--eye", help="The eye's place X,Y,Z in mm, z toward the viewer; by default central.")
+        str | None,
+        typer.Option(
+            "--eye",
+            help="Position of the eye, X,Y,Z in mm, z toward the viewer. Default: central.",
+        ),
     ] = None,
     sweep: Annotated[
-        bool, typer.Option("--sweep", help="An animation from left to right: .png (APNG) or .mp4.")
+        bool, typer.Option("--sweep", help="Write an animation from left to right: .png (APNG) or .mp4.")
     ] = False,
-    frames: Annotated[int, typer.Option("--frames", help="Frames of a sweep.")] = 48,
+    frames: Annotated[int, typer.Option("--frames", help="Number of frames of the sweep.")] = 48,
     width: Annotated[
-        float | None, typer.Option("--sweep-width", help="How far a sweep goes in mm; by default through the field.")
+        float | None, typer.Option("--sweep-width", help="Width of the sweep in mm. Default: the field of view.")
     ] = None,
     size: Size = None,
     filter: Filter = "nearest",
@@ -121,7 +130,7 @@ def replay(
     as_json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
-    """Show what an eye in front of the display sees."""
+    """Simulate what an eye in front of the display sees."""
     from lippmann.image.streamed import open_picture
     from lippmann.image.write import format_for, write_plain_picture
     from lippmann.runtime.atomic_write import check_writable
@@ -135,39 +144,41 @@ def replay(
         check_animation_path(output)
     else:
         format_for(output, bits)
-        for option, value in (("--sweep-width", width),):
-            if value is not None:
-                raise UsageError("has no meaning for a single picture", where=option, fix="add --sweep")
+        if width is not None:
+            raise UsageError("applies to a sweep only", where="--sweep-width", fix="add --sweep")
     check_writable(output)
-    image = open_picture(picture, display=_display(display))
-    place = default_eye(image.display) if eye is None else parse.triple(eye, "--eye")
+    image = open_picture(picture, display=parse.display(display))
+    position = default_eye(image.display) if eye is None else parse.triple(eye, "--eye")
     pixels = None if size is None else parse.size(size, "--size")
     transfer = image.provenance.transfer
-    result: dict[str, Any] = {"output": str(output), "eye": list(place), "filter": filter}
+    result: dict[str, Any] = {"output": str(output), "eye": list(position), "filter": filter}
     if not sweep:
-        seen = replay_picture(image, place, size=pixels, filter=filter)  # type: ignore[arg-type]
-        write_plain_picture(seen, output, bits=bits, transfer=transfer)
-        console.result(result, f"{output}: seen from {_place(place)}")
+        pixels_seen = replay_picture(image, position, size=pixels, filter=filter)  # type: ignore[arg-type]
+        write_plain_picture(pixels_seen, output, bits=bits, transfer=transfer)
+        console.result(result, f"{output}: seen from {_position(position)}")
         return
-    reach = _field_width(image.display, place[2]) if width is None else width
-    start, stop = ((place[0] + side * reach / 2, place[1], place[2]) for side in (-1, 1))
+    reach = _field_width(image.display, position[2]) if width is None else width
+    start, stop = ((position[0] + side * reach / 2, *position[1:]) for side in (-1, 1))
     moving = sweep_picture(image, start, stop, frames, size=pixels, filter=filter)  # type: ignore[arg-type]
     write_animation(moving, output, transfer=transfer)
     result |= {"frames": frames, "start": list(start), "stop": list(stop)}
-    console.result(result, f"{output}: {frames} frames, seen from {_place(start)} to {_place(stop)}")
+    console.result(result, f"{output}: {frames} frames, seen from {_position(start)} to {_position(stop)}")
 
 
 def refocus(
     picture: options.Picture,
     output: options.Output,
-    plane: Annotated[float, typer.Option("--plane", help="Height of the plane in focus in mm, toward the viewer.")],
+    plane: Annotated[
+        float,
+        typer.Option("--plane", help="Height of the focus plane in mm, positive toward the viewer."),
+    ],
     size: Size = None,
     bits: options.Bits = None,
     display: options.PictureDisplay = None,
     as_json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
-    """Focus on a plane, as a camera with an aperture as wide as the field would."""
+    """Refocus on a plane, as a camera whose aperture is as wide as the field of view."""
     from lippmann.image.streamed import open_picture
     from lippmann.image.write import format_for, write_plain_picture
     from lippmann.runtime.atomic_write import check_writable
@@ -176,37 +187,31 @@ def refocus(
     console = Console(quiet, as_json)
     format_for(output, bits)
     check_writable(output)
-    image = open_picture(picture, display=_display(display))
-    seen = refocus_picture(image, plane, size=None if size is None else parse.size(size, "--size"))
-    write_plain_picture(seen, output, bits=bits, transfer=image.provenance.transfer)
+    image = open_picture(picture, display=parse.display(display))
+    pixels = refocus_picture(image, plane, size=None if size is None else parse.size(size, "--size"))
+    write_plain_picture(pixels, output, bits=bits, transfer=image.provenance.transfer)
     console.result({"output": str(output), "plane": plane}, f"{output}: focused at {plane:g} mm")
 
 
-def _display(name: str | None) -> Display | None:
-    from lippmann.display import load_display
-
-    return None if name is None else load_display(name)
-
-
-def _place(eye: tuple[float, float, float]) -> str:
+def _position(eye: tuple[float, float, float]) -> str:
     return f"({eye[0]:.0f}, {eye[1]:.0f}, {eye[2]:.0f}) mm"
 
 
 def _field_width(display: Display, distance: float) -> float:
-    """How wide the display's field is at ``distance``: from one flip of the picture to the next, in mm."""
+    """Width in mm of the display's field of view at ``distance`` mm, from one flip of the views to the next."""
     return 2 * distance * math.tan(math.radians(display.field_of_view / 2))
 
 
-def _info_values(path: Path, found: PictureFile) -> dict[str, Any]:
+def _info_values(path: Path, file: PictureFile) -> dict[str, Any]:
     values: dict[str, Any] = {
         "file": str(path),
-        "format": found.format,
-        "size": [found.width, found.height],
-        "stored": found.stored,
-        "layers": list(found.layers),
+        "format": file.format,
+        "size": [file.width, file.height],
+        "stored": file.stored,
+        "layers": list(file.layers),
     }
-    if found.metadata is not None:
-        values |= found.metadata.to_dict()
+    if file.metadata is not None:
+        values |= file.metadata.to_dict()
     return values
 
 
@@ -217,13 +222,13 @@ def _method(made: Provenance) -> str:
     return ", ".join(part for part in parts if part)
 
 
-def _info_lines(path: Path, found: PictureFile) -> list[str]:
-    lines = [f"{path}: {found.format.upper()}, {found.width}x{found.height}, {found.stored}"]
-    if found.layers:
-        lines.append(f"layers      {', '.join(found.layers)}")
-    if found.metadata is None:
-        return [*lines, "no Lippmann metadata: say --display where a command needs the display"]
-    display, made = found.metadata.display, found.metadata.provenance
+def _info_lines(path: Path, file: PictureFile) -> list[str]:
+    lines = [f"{path}: {file.format.upper()}, {file.width}x{file.height}, {file.stored}"]
+    if file.layers:
+        lines.append(f"layers      {', '.join(file.layers)}")
+    if file.metadata is None:
+        return [*lines, "no Lippmann metadata: commands that need the display take --display"]
+    display, made = file.metadata.display, file.metadata.provenance
     grid = display.lens_grid
     lines += [
         f"display     {display.name} ({display.lens_array.layout}, {grid.columns}x{grid.rows} lenses, "

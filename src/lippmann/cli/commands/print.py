@@ -1,4 +1,4 @@
-"""``lippmann pitch-test`` and ``lippmann marks``, and the options of ``--display print``."""
+"""``lippmann pitch-test`` and ``lippmann marks``, and the options that describe a print."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from lippmann.cli.shared import options
+from lippmann.cli.shared import options, parse
 from lippmann.cli.shared.console import Console
 from lippmann.errors import DisplayError, OutputError, UsageError
 
@@ -16,31 +16,42 @@ if TYPE_CHECKING:
     from lippmann.display.formats.print_sheet import Print
     from lippmann.image import IntegralImage
 
-Lpi = Annotated[str | None, typer.Option("--lpi", help="Print: lenses per inch of the sheet.")]
+Lpi = Annotated[str | None, typer.Option("--lpi", help="Print: pitch of the lens sheet in lenses per inch.")]
 PrintLpi = Annotated[
-    str | None, typer.Option("--print-lpi", help="Print: in its place, the print pitch that a pitch test found.")
+    str | None,
+    typer.Option("--print-lpi", help="Print: print pitch in lenses per inch from a pitch test, in place of --lpi."),
 ]
-Ppi = Annotated[str | None, typer.Option("--ppi", help="Print: pixels per inch.")]
-Size = Annotated[str | None, typer.Option("--size", help="Print: WIDTHxHEIGHT with a unit, such as 200x300mm, 8x10in.")]
+Ppi = Annotated[str | None, typer.Option("--ppi", help="Print: resolution in pixels per inch.")]
+Size = Annotated[
+    str | None, typer.Option("--size", help="Print: WIDTHxHEIGHT with a unit, such as 200x300mm or 8x10in.")
+]
 Distance = Annotated[
     str | None,
-    typer.Option("--viewing-distance", help="Print: from sheet to eye, 500 mm by default; or infinite."),
+    typer.Option("--viewing-distance", help="Print: viewing distance, such as 600mm, or infinite. Default: 500mm."),
 ]
-Thickness = Annotated[str | None, typer.Option("--thickness", help="Print: of the sheet, such as 0.66mm or 26mil.")]
-Index = Annotated[str | None, typer.Option("--index", help="Print: refractive index of the sheet, 1.57 by default.")]
+Thickness = Annotated[
+    str | None, typer.Option("--thickness", help="Print: thickness of the sheet, such as 0.66mm or 26mil.")
+]
+Index = Annotated[str | None, typer.Option("--index", help="Print: refractive index of the sheet. Default: 1.57.")]
 Field = Annotated[
     str | None,
-    typer.Option("--field", help="Print: field of view in degrees, in place of a thickness; 54 by default."),
+    typer.Option("--field", help="Print: field of view in degrees, instead of --thickness. Default: 54."),
 ]
 MarksMargin = Annotated[
-    str | None, typer.Option("--marks", help="Add a margin of this width with alignment marks, such as 10mm.")
+    str | None, typer.Option("--marks", help="Print: add a margin of this width, such as 10mm, with alignment marks.")
 ]
 
 _PRINT = "print"
 
 
 def print_of(**texts: str | None) -> Print:
-    """The print of the options above, by their names; a :class:`DisplayError` names the option."""
+    """The print that the options describe; ``texts`` are their values by parameter name.
+
+    Raises
+    ------
+    DisplayError
+        If a value is missing or invalid; names the option.
+    """
     from lippmann.display.formats.print_sheet import print_of_texts
 
     try:
@@ -50,14 +61,14 @@ def print_of(**texts: str | None) -> Print:
 
 
 def display_of(name: str, **texts: str | None) -> Display:
-    """The display of that name; ``print`` is said by the options above.
+    """The display ``name``; ``print`` is described by ``texts``, the values of the print options by parameter name.
 
     Raises
     ------
     DisplayError
-        As :func:`~lippmann.display.load_display`, or naming the option.
+        If the display is unknown, or a print option is missing or invalid.
     UsageError
-        If options of a print are given to another display.
+        If print options are given for another display.
     """
     from lippmann.display import load_display
 
@@ -65,25 +76,31 @@ def display_of(name: str, **texts: str | None) -> Display:
         return print_of(**texts).display()
     for key, text in texts.items():
         if text is not None:
-            rule = f"it belongs to --display {_PRINT}"
-            raise UsageError(f"has no meaning for the display {name}", where=f"--{_option(key)}", rule=rule)
+            rule = f"it applies to --display {_PRINT} only"
+            raise UsageError(f"does not apply to the display {name}", where=f"--{_option(key)}", rule=rule)
     return load_display(name)
 
 
 def margin_of(text: str | None, display: Display, *, in_frames: bool) -> float | None:
-    """The margin of ``--marks`` in mm, None if there is none; refuses what cannot be drawn for the display."""
+    """The margin of ``--marks`` in mm; None without ``--marks``.
+
+    Raises
+    ------
+    UsageError
+        If the margin is out of range, the display has no upright cylindrical lenses, or frames are rendered.
+    """
     if text is None:
         return None
     from lippmann.calibration.alignment_marks import Marks
     from lippmann.display.units import length
 
     if in_frames:
-        raise UsageError("has no meaning for moving scenes", where="--marks", fix="leave it out")
+        raise UsageError("does not apply to frames of a moving scene", where="--marks", fix="leave it out")
     return Marks(display, length(text, "--marks")).margin
 
 
 def marked(image: IntegralImage, margin: float | None) -> IntegralImage:
-    """The picture with its margin, where one is wanted."""
+    """The picture with a margin of ``margin`` mm and its marks; the picture itself if ``margin`` is None."""
     if margin is None:
         return image
     from lippmann.calibration.alignment_marks import with_marks
@@ -94,15 +111,14 @@ def marked(image: IntegralImage, margin: float | None) -> IntegralImage:
 def marks(
     picture: options.Picture,
     output: options.Output,
-    margin: Annotated[str, typer.Option("--margin", help="Width of the margin, such as 10mm.")] = "10mm",
+    margin: Annotated[str, typer.Option("--margin", help="Width of the margin with a unit, such as 10mm.")] = "10mm",
     display: options.PictureDisplay = None,
     bits: options.Bits = None,
     as_json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
-    """Add a margin with alignment marks to a picture that is to be printed."""
+    """Add a margin with alignment marks to a picture for print."""
     from lippmann.calibration.marked_files import write_marked
-    from lippmann.display import load_display
     from lippmann.display.units import length
     from lippmann.image.streamed import open_picture
     from lippmann.image.write import format_for
@@ -112,7 +128,7 @@ def marks(
     format_for(output, bits)
     check_writable(output)
     width = length(margin, "--margin")
-    image = open_picture(picture, display=None if display is None else load_display(display))
+    image = open_picture(picture, display=parse.display(display))
     with console.progress() as progress:
         panel = write_marked(image, output, width, bits=bits, progress=progress).panel
     result = {"output": str(output), "size": [panel.width, panel.height], "size_mm": list(panel.size_mm)}
@@ -120,7 +136,7 @@ def marks(
 
 
 def pitch_test(
-    output: Annotated[Path, typer.Option("--output", "-o", help="The TIFF file to write.")],
+    output: Annotated[Path, typer.Option("--output", "-o", help="TIFF file to write.")],
     lpi: Lpi = None,
     print_lpi: PrintLpi = None,
     ppi: Ppi = None,
@@ -129,14 +145,15 @@ def pitch_test(
     thickness: Thickness = None,
     index: Index = None,
     field: Field = None,
-    strips: Annotated[int, typer.Option("--strips", help="How many strips.")] = 21,
+    strips: Annotated[int, typer.Option("--strips", help="Number of strips.")] = 21,
     step: Annotated[
-        float | None, typer.Option("--step", help="Lenses per inch from strip to strip; by default by the width.")
+        float | None,
+        typer.Option("--step", help="Step between strips in lenses per inch. Default: half a lens over the width."),
     ] = None,
     as_json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
-    """Draw strips at slightly different print pitches: the one that stands still is the sheet's."""
+    """Write a pitch test: strips at slightly different print pitches, to find the sheet's."""
     from lippmann.calibration.pitch_strips import PitchTest
     from lippmann.codecs.tiff_strips import write_tiff_bands
     from lippmann.display.pixel_window import PixelWindow
@@ -144,8 +161,8 @@ def pitch_test(
 
     console = Console(quiet, as_json)
     if output.suffix.lower() not in (".tif", ".tiff"):
-        rule = "a pitch test is written as TIFF, which carries its true resolution"
-        raise OutputError(f"the ending '{output.suffix}' will not do", where=str(output), rule=rule)
+        rule = "a pitch test is a TIFF file, which holds its resolution"
+        raise OutputError(f"the ending is '{output.suffix}'", where=str(output), rule=rule)
     sheet = print_of(
         lpi=lpi,
         print_lpi=print_lpi,
@@ -167,9 +184,9 @@ def pitch_test(
             pixel_pitch=25.4 / sheet.ppi,
             progress=progress,
         )
-    values = [strip.lpi for strip in test.made_of]
+    values = [strip.lpi for strip in test.all_strips]
     result = {"output": str(output), "size": [width, height], "expected": sheet.pitch_on_print, "strips": values}
-    texts = [strip.text for strip in test.made_of]
+    texts = [strip.text for strip in test.all_strips]
     line = f"{output}: {strips} strips from {texts[0]} to {texts[-1]} lpi, {sheet.pitch_on_print:.6g} expected"
     console.result(result, f"{line}, {width}x{height} pixels at {sheet.ppi:g} ppi")
 

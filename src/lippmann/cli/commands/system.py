@@ -1,4 +1,4 @@
-"""``lippmann doctor`` and ``lippmann displays``: what is there."""
+"""``lippmann doctor`` and ``lippmann displays``."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def doctor(as_json: options.Json = False) -> None:
-    """Say what a render would use here, and how to mend what is missing."""
+    """Check the rendering engine of this machine and say how to fix what is missing."""
     from lippmann.runtime import engine
 
     diagnosis = engine.diagnose()
@@ -25,7 +25,7 @@ def doctor(as_json: options.Json = False) -> None:
         lines.append(f"{_mark(check)} {check.name:<{width}}  {check.value}")
         if check.fix:
             lines.append(f"{'':<{width + 4}} -> {check.fix}")
-    verdict = "a render would run" if diagnosis.ok else "a render would not run"
+    verdict = "ready to render" if diagnosis.ok else "not ready to render"
     checks = [asdict(check) for check in diagnosis.checks]
     Console(as_json=as_json).result({"ok": diagnosis.ok, "checks": checks}, "\n".join([*lines, verdict]))
     raise typer.Exit(0 if diagnosis.ok else 1)
@@ -38,7 +38,7 @@ def _mark(check: Check) -> str:
 
 
 def displays(as_json: options.Json = False) -> None:
-    """List the displays that come with the program."""
+    """List the bundled displays."""
     from lippmann.display import list_displays
 
     rows = [display.summary() for display in list_displays()]

@@ -1,4 +1,4 @@
-"""``lippmann view``: a picture as its display would show it, in a browser."""
+"""``lippmann view``: a picture in a browser, as its display shows it."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from lippmann.cli.shared import options
+from lippmann.cli.shared import options, parse
 from lippmann.cli.shared.console import Console
 from lippmann.cli.shared.exit_codes import INTERRUPTED
 from lippmann.errors import LippmannError, UsageError
@@ -22,15 +22,14 @@ if TYPE_CHECKING:
     from lippmann.viewer.manifest import TileFormat
     from lippmann.viewer.served_picture import PictureFile
 
-Other = Annotated[Path | None, typer.Argument(help="A second picture, beside the first behind a divider.")]
+Other = Annotated[Path | None, typer.Argument(help="Second picture to compare, behind a divider.")]
 Export = Annotated[
-    Path | None, typer.Option("--export", help="Write one HTML file that needs no server instead, and leave.")
+    Path | None,
+    typer.Option("--export", help="Write a single HTML file that needs no server, and exit."),
 ]
-Host = Annotated[
-    str, typer.Option("--host", help="The address to listen on. By default only this machine can open the page.")
-]
-Port = Annotated[int, typer.Option("--port", help="The port to listen on; 0 takes a free one.")]
-NoBrowser = Annotated[bool, typer.Option("--no-browser", help="Only print the address.")]
+Host = Annotated[str, typer.Option("--host", help="Address to listen on; the default admits this machine only.")]
+Port = Annotated[int, typer.Option("--port", help="Port to listen on; 0 takes a free one.")]
+NoBrowser = Annotated[bool, typer.Option("--no-browser", help="Do not open a browser.")]
 
 
 def view(
@@ -44,24 +43,22 @@ def view(
     as_json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
-    """Show a picture in a browser as its display would show it."""
-    from lippmann.display import load_display
-
+    """View a picture in a browser as its display shows it."""
     console = Console(quiet, as_json)
     paths = [picture] if other is None else [picture, other]
-    shown_on = None if display is None else load_display(display)
+    target = parse.display(display)
     if export is not None:
         for name, given in (("--host", host != "127.0.0.1"), ("--port", port != 0), ("--no-browser", no_browser)):
             if given:
-                raise UsageError("has no meaning for a file", where=name, fix="leave --export or this out")
-        _export(paths, shown_on, export, console)
+                raise UsageError("does not apply to --export", where=name, fix="leave it out")
+        _export(paths, target, export, console)
         return
     from lippmann.viewer.served_picture import PictureFile
     from lippmann.viewer.server import ViewerSite
 
-    # Bare bytes are quickest on one machine, packed ones through a tunnel.
+    # Uncompressed tiles are fastest on one machine, PNG through a tunnel.
     tile_format: TileFormat = "png" if is_remote() else "rgb"
-    files = [PictureFile(path, shown_on, tile_format) for path in paths]
+    files = [PictureFile(path, target, tile_format) for path in paths]
     serve(
         ViewerSite(files),
         " and ".join(str(path) for path in paths),
@@ -74,7 +71,7 @@ def view(
 
 
 def _read_ahead(files: list[PictureFile], console: Console) -> None:
-    """Begin to read the pictures while the browser starts; what is wrong with one is said here and on the page."""
+    """Start reading the pictures while the browser starts; errors are printed, and shown on the page."""
 
     def read() -> None:
         for file in files:
@@ -112,27 +109,34 @@ def serve(
     browser: bool,
     started: Callable[[], None] = lambda: None,
 ) -> None:
-    """Serve a page until Ctrl-C, which leaves with 130.
+    """Serve a page until Ctrl-C, then exit with the code 130.
 
     Parameters
     ----------
     site:
-        What is served.
+        The pages to serve.
     what:
-        What the page shows, for people.
+        Title of the page in the printed line.
+    console:
+        Receives the address and remarks.
     host, port:
-        Where, see :class:`~lippmann.viewer.http_server.WebServer`; raises as that.
+        Address and port to listen on; port 0 takes a free one.
     browser:
-        Whether to open the page, where there is a screen.
+        Whether to open the page in a browser, if there is a screen.
     started:
         Called once the page can be opened.
+
+    Raises
+    ------
+    UsageError
+        If the address or the port cannot be used.
     """
     import webbrowser  # as socket below: not for --help
 
     from lippmann.viewer.http_server import WebServer, is_loopback
 
     with WebServer(site, host, port) as server:
-        # The address comes last: who reads it may send Ctrl-C at once.
+        # The address is printed last: its reader may send Ctrl-C at once.
         if not is_loopback(host):
             console.remark("everyone who can reach this machine can open the page")
         elif is_remote():
@@ -146,23 +150,23 @@ def serve(
         try:
             threading.Event().wait()
         except KeyboardInterrupt:
-            raise SystemExit(INTERRUPTED) from None  # that is how a page ends; no other word is needed
+            raise SystemExit(INTERRUPTED) from None  # the regular end of a page: no message
 
 
 def is_remote() -> bool:
-    """Whether the command is typed from another machine."""
+    """Whether the command runs in an SSH session."""
     return "SSH_CONNECTION" in os.environ
 
 
 def has_screen() -> bool:
-    """Whether a browser could be seen; one that draws letters into the terminal does not count."""
+    """Whether there is a screen for a graphical browser."""
     if sys.platform in ("win32", "darwin"):
         return not is_remote()
     return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
 
 
 def tunnel(port: int) -> str:
-    """The command that brings a port of this machine to another one."""
+    """The SSH command that forwards a port of this machine to another one."""
     import socket
 
     return f"ssh -L {port}:127.0.0.1:{port} {os.environ.get('USER', 'you')}@{socket.gethostname()}"

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from lippmann.errors import UsageError
 
 if TYPE_CHECKING:
+    from lippmann.display import Display
     from lippmann.scene.placement import PlacementOptions
 
 _MEMORY_UNITS = {"": 1, "k": 2**10, "m": 2**20, "g": 2**30, "t": 2**40}
@@ -56,6 +57,13 @@ def memory(text: str | None, option: str = "--memory") -> int | None:
 def color(text: str | None) -> tuple[float, float, float] | None:
     """A background colour from what was typed."""
     return None if text is None else triple(text, "--background")
+
+
+def display(name: str | None) -> Display | None:
+    """The display of that name or file; None if no name is given."""
+    from lippmann.display import load_display
+
+    return None if name is None else load_display(name)
 
 
 def placement(
