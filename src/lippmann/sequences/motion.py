@@ -16,7 +16,8 @@ from lippmann.scene.placement import Bounds
 from lippmann.scene.readers.load import kind_of_file, load_scene
 from lippmann.scene.scene import Scene, checked, find_camera, lit
 from lippmann.scene.values.description import Camera, Environment
-from lippmann.scene.values.whitted_scene import CameraPose, ClassicScene
+from lippmann.scene.values.whitted_camera import CameraPose
+from lippmann.scene.values.whitted_scene import ClassicScene
 from lippmann.scene.whitted.world_frame import world_camera
 
 #: Frames of an animation per second where nothing is said.

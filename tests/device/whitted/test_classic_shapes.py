@@ -7,7 +7,9 @@ import pytest
 
 from lippmann.device.whitted.bvh import GRID, LEAF, make_bvh
 from lippmann.device.whitted.shape_table import MOST_LISTED_SHAPES, Column, make_shape_table
-from lippmann.scene.values.whitted_scene import ClassicLight, ClassicMaterial, ClassicScene
+from lippmann.scene.values.whitted_lighting import ClassicLight
+from lippmann.scene.values.whitted_scene import ClassicScene
+from lippmann.scene.values.whitted_surfaces import ClassicMaterial
 from lippmann.scene.whitted.builder import ClassicSceneBuilder
 
 pytestmark = pytest.mark.usefixtures("engine")

@@ -7,7 +7,7 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from lippmann.scene.values.whitted_scene import Background, Fog
+from lippmann.scene.values.whitted_lighting import Background, Fog
 
 
 def background_color(background: Background, o: Any, d: Any) -> Any:

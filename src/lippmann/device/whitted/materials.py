@@ -11,7 +11,7 @@ import mitsuba as mi
 import numpy as np
 
 from lippmann.device.whitted.intersections import xyz
-from lippmann.scene.values.whitted_scene import ClassicMaterial
+from lippmann.scene.values.whitted_surfaces import ClassicMaterial
 
 #: Smallest share of anything that Tachyon takes into account.
 LEAST = 0.001959

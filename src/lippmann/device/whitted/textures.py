@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from lippmann.device.sobol import hash32
 from lippmann.device.whitted.intersections import xyz
-from lippmann.scene.values.whitted_scene import (
+from lippmann.scene.values.whitted_surfaces import (
     TEXTURE_KINDS,
     ClassicImage,
     ClassicMaterial,

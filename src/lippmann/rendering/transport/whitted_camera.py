@@ -8,7 +8,7 @@ import drjit as dr
 import mitsuba as mi
 
 from lippmann.device.sobol import hash32
-from lippmann.scene.values.whitted_scene import ClassicCamera, Handedness
+from lippmann.scene.values.whitted_camera import ClassicCamera, Handedness
 
 
 class ClassicCameraRays:

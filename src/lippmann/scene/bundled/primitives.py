@@ -14,16 +14,10 @@ from numpy.typing import NDArray
 
 from lippmann.scene.bundled import textures
 from lippmann.scene.bundled.stage import Stage
-from lippmann.scene.values.whitted_scene import (
-    Background,
-    ClassicImage,
-    ClassicLight,
-    ClassicMaterial,
-    ClassicScene,
-    ClassicTexture,
-    TextureKind,
-    Vector,
-)
+from lippmann.scene.values.whitted_lighting import Background, ClassicLight
+from lippmann.scene.values.whitted_numbers import Vector
+from lippmann.scene.values.whitted_scene import ClassicScene
+from lippmann.scene.values.whitted_surfaces import ClassicImage, ClassicMaterial, ClassicTexture, TextureKind
 from lippmann.scene.whitted.builder import ClassicSceneBuilder, unit
 
 NAME = "primitives"

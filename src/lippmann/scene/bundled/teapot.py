@@ -22,7 +22,9 @@ from lippmann.scene.values.description import (
     Mesh,
     SceneDescription,
 )
-from lippmann.scene.values.whitted_scene import Background, ClassicLight, ClassicMaterial, ClassicScene
+from lippmann.scene.values.whitted_lighting import Background, ClassicLight
+from lippmann.scene.values.whitted_scene import ClassicScene
+from lippmann.scene.values.whitted_surfaces import ClassicMaterial
 from lippmann.scene.whitted.builder import ClassicSceneBuilder
 
 NAME = "teapot"

@@ -16,7 +16,8 @@ from lippmann.scene.mitsuba_source import MitsubaSource
 from lippmann.scene.parsing.files import read_bytes
 from lippmann.scene.scene import Scene, checked, lit
 from lippmann.scene.values.description import Camera, Color, Environment, SceneDescription
-from lippmann.scene.values.whitted_scene import Background, ClassicScene
+from lippmann.scene.values.whitted_lighting import Background
+from lippmann.scene.values.whitted_scene import ClassicScene
 from lippmann.scene.whitted.world_frame import world_camera
 
 #: Words in place of an environment file: the built-in studio, and no light but the scene's own.

@@ -10,14 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from lippmann.errors import SceneError
-from lippmann.scene.values.whitted_scene import (
-    ClassicImage,
-    ClassicLight,
-    ClassicMaterial,
-    ClassicScene,
-    Handedness,
-    Rules,
-)
+from lippmann.scene.values.whitted_camera import Handedness
+from lippmann.scene.values.whitted_lighting import ClassicLight
+from lippmann.scene.values.whitted_scene import ClassicScene, Rules
 from lippmann.scene.values.whitted_shapes import (
     Batch,
     Boxes,
@@ -29,6 +24,7 @@ from lippmann.scene.values.whitted_shapes import (
     Triangles,
     Tubes,
 )
+from lippmann.scene.values.whitted_surfaces import ClassicImage, ClassicMaterial
 
 B = TypeVar("B", bound=Batch)
 
@@ -58,7 +54,7 @@ class ClassicSceneBuilder:
 
     Example
     -------
-    >>> from lippmann.scene.values.whitted_scene import ClassicMaterial
+    >>> from lippmann.scene.values.whitted_surfaces import ClassicMaterial
     >>> builder = ClassicSceneBuilder("two balls")
     >>> red = builder.material(ClassicMaterial(color=(1.0, 0.0, 0.0)))
     >>> builder.spheres([[0, 0, 0], [3, 0, 0]], 1.0, red)

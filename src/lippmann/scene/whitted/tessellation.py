@@ -12,8 +12,9 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.scene.values.whitted_scene import ClassicScene, ClassicTexture
+from lippmann.scene.values.whitted_scene import ClassicScene
 from lippmann.scene.values.whitted_shapes import Batch, Numbers, Spheres, Tubes
+from lippmann.scene.values.whitted_surfaces import ClassicTexture
 
 Whole = NDArray[np.int64]
 #: Positions, faces and normals.

@@ -9,7 +9,8 @@ import pytest
 
 from lippmann.errors import SceneError
 from lippmann.scene.readers.tachyon.reader import read_cam, read_tachyon
-from lippmann.scene.values.whitted_scene import ClassicMaterial, ClassicScene
+from lippmann.scene.values.whitted_scene import ClassicScene
+from lippmann.scene.values.whitted_surfaces import ClassicMaterial
 
 TEXTURE = "TEXTURE AMBIENT 0 DIFFUSE 1 SPECULAR 0 OPACITY 1 COLOR 1 0 0 TEXFUNC 0"
 SPHERE = f"SPHERE CENTER 0 0 0 RAD 1 {TEXTURE}\n"

@@ -14,7 +14,8 @@ import pytest
 from PIL import Image
 
 from lippmann.scene.readers.tachyon.reader import read_tachyon
-from lippmann.scene.values.whitted_scene import TEXTURE_KINDS, ClassicMaterial, ClassicScene, ClassicTexture
+from lippmann.scene.values.whitted_scene import ClassicScene
+from lippmann.scene.values.whitted_surfaces import TEXTURE_KINDS, ClassicMaterial, ClassicTexture
 from lippmann.scene.whitted.builder import ClassicSceneBuilder
 
 SIZE = 96

@@ -11,7 +11,7 @@ import numpy as np
 from lippmann.errors import SceneError
 from lippmann.scene.parsing.files import decode_image, read_bytes, resolve
 from lippmann.scene.parsing.tokens import Words
-from lippmann.scene.values.whitted_scene import ClassicImage
+from lippmann.scene.values.whitted_surfaces import ClassicImage
 
 _MOST_WORDS = 20_000_000
 _MOST_TEXELS = 1 << 27

@@ -12,7 +12,7 @@ import numpy as np
 
 from lippmann.scene.parsing.tokens import Words
 from lippmann.scene.readers.tachyon.files import SceneFiles
-from lippmann.scene.values.whitted_scene import TEXTURE_KINDS, ClassicImage, ClassicMaterial, ClassicTexture
+from lippmann.scene.values.whitted_surfaces import TEXTURE_KINDS, ClassicImage, ClassicMaterial, ClassicTexture
 from lippmann.scene.whitted.builder import ClassicSceneBuilder
 
 DEFAULT_MATERIAL = ClassicMaterial()
