@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 from lippmann.display.array_ops import NUMPY, Array, ArrayOps
 from lippmann.display.lattice import Lattice
 from lippmann.display.lens_array import LensArray
+from lippmann.display.lens_grid import WHOLE_TOLERANCE, LensGrid, lattice_in_front_of
 from lippmann.display.panel import Panel
 from lippmann.display.validation import check_keys, check_text, number, positive
 from lippmann.errors import DisplayError
@@ -35,27 +36,8 @@ INFINITE = "infinite"
 
 Vector = tuple[Array, Array, Array]
 
-#: A point nearer to a boundary between micro-images than this counts as lying on it, in pixels. Rounding noise of
-#: double precision stays below 1e-10 pixels on a panel of 100 000 pixels; no optics is made to a billionth of a pixel.
-BOUNDARY_TOLERANCE = 1e-9
-
-#: A number of micro-images (or of pixels in one) that is whole to this is taken as whole.
-WHOLE_TOLERANCE = 1e-6
-
 #: A scene point is resolved while it spreads over at most this many lens pitches.
 RESOLVED_PITCHES = 1.0
-
-
-@dataclass(frozen=True)
-class LensGrid:
-    """All lenses that own a point of the panel: ``columns`` x ``rows`` of them, counted from (0, 0) at the top left.
-
-    The corners of a slanted or hexagonal array may hold indices of lenses that own none. A lenticular sheet has one
-    row.
-    """
-
-    columns: int
-    rows: int
 
 
 @dataclass(frozen=True)
@@ -390,23 +372,7 @@ class Display:
 
     @cached_property
     def _lenses(self) -> tuple[Lattice, LensGrid]:
-        panel, lenses = self.panel, self.lens_array
-        across, down = self.pixels_per_lens
-        width, height = (side / self.magnification for side in panel.size_mm)
-        pitch, origin_x = lenses.pitch, 0.0
-        if lenses.slant == 0.0:
-            pitch, origin_x = _aligned(lenses.pitch, panel.width / across, width)
-        row_pitch, origin_y = math.inf, 0.0
-        if down is not None:
-            row_pitch, origin_y = _aligned(lenses.row_spacing, panel.height / down, height)
-        tolerance = BOUNDARY_TOLERANCE / across
-        lattice = Lattice(lenses.layout, pitch, row_pitch, lenses.slant, origin_x, origin_y, tolerance)
-        if lenses.offset is not None:
-            x, y = lenses.offset
-            origin = {"origin_x": lattice.across(x, y)} if down is None else {"origin_x": x, "origin_y": y}
-            lattice = replace(lattice, **origin)
-        lattice, columns, rows = lattice.from_corner_of((-width / 2, width / 2, -height / 2, height / 2))
-        return lattice, LensGrid(columns, rows)
+        return lattice_in_front_of(self.panel, self.lens_array, self.pixels_per_lens, self.magnification)
 
 
 def check_tables(values: Mapping[str, Any]) -> None:
@@ -414,15 +380,6 @@ def check_tables(values: Mapping[str, Any]) -> None:
     check_keys(values, Display, "")
     check_keys(values["panel"], Panel, "panel")
     check_keys(values["lens_array"], LensArray, "lens_array")
-
-
-def _aligned(pitch: float, count: float, extent: float) -> tuple[float, float]:
-    """Pitch in effect and position of a lens centre, for ``count`` lenses over an extent centred on zero."""
-    whole = round(count)
-    if abs(count - whole) > WHOLE_TOLERANCE:
-        return pitch, 0.0
-    pitch = extent / whole
-    return pitch, 0.5 * pitch if whole % 2 == 0 else 0.0
 
 
 def _nonzero(value: Array, ops: ArrayOps) -> Array:

@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.display.array_ops import NUMPY
-from lippmann.display.display import BOUNDARY_TOLERANCE, WHOLE_TOLERANCE, Display
+from lippmann.display.display import Display
+from lippmann.display.lens_grid import BOUNDARY_TOLERANCE, WHOLE_TOLERANCE
 
 Indices = NDArray[np.int32]
 
