@@ -143,7 +143,7 @@ def test_the_method_of_the_picture():
 
 @pytest.mark.parametrize("plane", [300.0, 400.0, math.inf, math.nan, -math.inf])
 def test_planes_that_cannot_be(plane):
-    with pytest.raises(UsageError, match=r"the plane is at .* below the viewing distance of 300 mm"):
+    with pytest.raises(UsageError, match=r"plane: .* below the viewing distance of 300 mm"):
         refocus(random_picture(square(3, 3, 300.0)), plane)
     with pytest.raises(UsageError, match="the size is"):
         refocus(random_picture(square(3, 3)), 0.0, size=(0, 3))

@@ -25,7 +25,7 @@ from lippmann.exchange.cameras import Cameras
 from lippmann.image import IntegralImage, Metadata, Provenance
 from lippmann.image.metadata import metadata_of
 from lippmann.image.micro_images import Permutation, micro_images_as_views
-from lippmann.image.stored_values import Stored
+from lippmann.image.stored_values import Stored, Values
 from lippmann.image.views import view_grid
 
 #: Cameras down and across, rows and columns of a view.
@@ -39,9 +39,6 @@ WEIGHT = "weight"
 
 #: Name of the map with the height over the lens plane of the surface in each pixel, in mm; rendered with layers.
 DEPTH = "depth"
-
-#: Stored colours: codes of 8 or 16 bits, or linear light.
-Values = NDArray[np.uint8 | np.uint16 | np.float16 | np.float32]
 
 #: Bits of the types that hold codes.
 CODE_BITS: Mapping[str, int] = {"uint8": 8, "uint16": 16}

@@ -17,12 +17,13 @@ import numpy as np
 from lippmann.color.transfer import Transfer
 from lippmann.display import Display
 from lippmann.errors import PictureError
-from lippmann.exchange.light_field import LightField, Values, check_rectangular
+from lippmann.exchange.light_field import LightField, check_rectangular
 from lippmann.exchange.metadata_text import read_note_file, write_note_file
 from lippmann.image.encoding import FormatName, encode_values
 from lippmann.image.metadata import parse_json
 from lippmann.image.part_folders import MANIFEST, Kind
 from lippmann.image.read import open_file
+from lippmann.image.stored_values import Values
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.runtime.atomic_write import replacing_folder
 

@@ -1,8 +1,10 @@
-"""Pictures for the page: maps of where pixels came from, parts of frames, what an eye sees; as data URIs."""
+"""Diagnostic maps of a picture: origin of pixels, estimated error, samples per pixel; as codes, PNG files, data
+URIs."""
 
 from __future__ import annotations
 
 import base64
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,36 +14,38 @@ from lippmann.color.transfer import quantize
 from lippmann.image import IntegralImage
 from lippmann.metrics import Comparison
 from lippmann.metrics.error_image import BRIGHTEST, in_false_color
+from lippmann.rendering.estimate.psnr import ERROR_LAYER
 from lippmann.rendering.reprojection.common.point_image import INTERPOLATED, REPROJECTED, STATUS_LAYER, TRACED
+from lippmann.runtime.atomic_write import replacing_folder
 from lippmann.viewing.replay import default_size, replay
 
 Codes = NDArray[np.uint8]
 Flags = NDArray[np.bool_]
 
-#: Codes of the map of missed pixels: reprojected ones are dark, missed ones light by how they were filled.
+#: Codes of the map of pixel origins: reprojected pixels dark, missed ones by how they were filled.
 REPROJECTED_CODE = (28, 32, 40)
 TRACED_CODE = (240, 240, 236)
 INTERPOLATED_CODE = (224, 140, 48)
 
-#: What lies beside the chosen pixels of a frame; a colour that scenes do not have, so that black can be told from it.
+#: Codes of the pixels that a partial picture leaves out: violet, which is unlike black.
 EMPTY_CODE = (96, 60, 112)
 
-#: Widest replayed picture, in pixels.
+#: Limit on the width of a replayed picture, in pixels.
 REPLAY_WIDTH = 512
 
 
 def display_codes(image: IntegralImage) -> Codes:
-    """``(H, W, 3)`` uint8: what the panel shows."""
+    """``(H, W, 3)`` uint8 codes of the native picture."""
     return _codes(image.pixels, image)
 
 
 def replayed_codes(image: IntegralImage) -> Codes:
-    """What an eye in the middle sees, at most :data:`REPLAY_WIDTH` pixels wide."""
+    """``(h, w, 3)`` uint8 codes of the picture that a central eye sees, at most :data:`REPLAY_WIDTH` pixels wide."""
     return _codes(replay(image, size=default_size(image.display, REPLAY_WIDTH)), image)
 
 
 def missed_codes(image: IntegralImage) -> Codes | None:
-    """A map of how each pixel came about, None if the picture does not tell."""
+    """``(H, W, 3)`` uint8 map of pixel origins: reprojected, traced or interpolated; None if the picture has none."""
     status = pixel_status(image)
     if status is None:
         return None
@@ -52,40 +56,93 @@ def missed_codes(image: IntegralImage) -> Codes | None:
     return codes
 
 
-def part_codes(image: IntegralImage, chosen: Flags) -> Codes:
-    """The chosen ``(H, W)`` pixels of a picture, the others in one colour."""
+def part_codes(image: IntegralImage, mask: Flags) -> Codes:
+    """``(H, W, 3)`` uint8 codes of the pixels where ``mask`` ``(H, W)`` is True; the others are violet."""
     codes = display_codes(image)
-    codes[~chosen] = EMPTY_CODE
+    codes[~mask] = EMPTY_CODE
     return codes
 
 
 def reprojected_codes(image: IntegralImage) -> Codes | None:
-    """The pixels that reprojection filled, alone."""
+    """Codes of the reprojected pixels alone; None if the picture has no pixel origins."""
     status = pixel_status(image)
     return None if status is None else part_codes(image, status == REPROJECTED)
 
 
 def traced_codes(image: IntegralImage) -> Codes | None:
-    """The pixels that were traced, alone."""
+    """Codes of the traced pixels alone; None if the picture has no pixel origins."""
     status = pixel_status(image)
     return None if status is None else part_codes(image, status == TRACED)
 
 
 def error_codes(comparison: Comparison) -> Codes:
-    """The errors of a picture in false colour."""
-    shown = in_false_color(np.sqrt(comparison.errors) / BRIGHTEST)
-    return quantize(shown, 8, "linear").astype(np.uint8)
+    """``(H, W, 3)`` uint8: root of the squared error of each pixel, in false colours."""
+    return _error_codes(comparison.errors)
 
 
 def pixel_status(image: IntegralImage) -> NDArray[np.int8] | None:
-    """``(H, W)``: :data:`TRACED`, :data:`REPROJECTED` or :data:`INTERPOLATED`; None if the picture does not tell."""
+    """``(H, W)`` origin of pixels: ``TRACED``, ``REPROJECTED`` or ``INTERPOLATED``; None if the picture has none."""
     layer = image.maps.get(STATUS_LAYER)
     return None if layer is None else layer.astype(np.int8)
 
 
 def data_uri(codes: Codes) -> str:
-    """A PNG of ``(H, W, 3)`` codes inside a ``data:`` URI."""
+    """A ``data:`` URI with the PNG of ``(H, W, 3)`` uint8 codes."""
     return "data:image/png;base64," + base64.b64encode(encode_png(codes, text={})).decode("ascii")
+
+
+def write_maps(image: IntegralImage, folder: Path) -> None:
+    """Write the diagnostic maps of a picture as PNG files.
+
+    - ``samples.png``: samples of each pixel, from none (dark) to the largest number (bright).
+    - ``error.png``, for methods that estimate their noise: estimated error of each pixel in false colours, on the scale
+      of ``lippmann compare --map``.
+    - For methods that reproject: ``missed.png``, the origin of each pixel (dark: reprojected, light: missed and traced,
+      orange: missed and interpolated), and ``reprojected.png``, ``traced.png`` and ``interpolated.png``, the pixels of
+      one origin with the others violet. The last is written only if there are such pixels.
+
+    Parameters
+    ----------
+    image:
+        A rendered picture.
+    folder:
+        The folder; appears whole or not at all.
+
+    Raises
+    ------
+    OutputError
+        If the folder cannot be written.
+    """
+    from lippmann.rendering.methods import SAMPLES_LAYER  # loads the engine
+
+    maps = _origin_maps(image)
+    if ERROR_LAYER in image.maps:
+        maps["error"] = _error_codes(image.maps[ERROR_LAYER])
+    samples = image.maps[SAMPLES_LAYER]
+    maps["samples"] = _false_color_codes(samples / max(1, int(samples.max())))
+    with replacing_folder(folder) as temporary:
+        for name, codes in maps.items():
+            png = encode_png(codes, text={}, pixel_pitch=image.display.panel.pixel_pitch)
+            (temporary / f"{name}.png").write_bytes(png)
+
+
+def _origin_maps(image: IntegralImage) -> dict[str, Codes]:
+    status, missed = pixel_status(image), missed_codes(image)
+    if status is None or missed is None:
+        return {}
+    maps = {"missed": missed}
+    for name, value in (("reprojected", REPROJECTED), ("traced", TRACED), ("interpolated", INTERPOLATED)):
+        if name != "interpolated" or (status == value).any():
+            maps[name] = part_codes(image, status == value)
+    return maps
+
+
+def _error_codes(squared_error: NDArray[np.floating]) -> Codes:
+    return _false_color_codes(np.sqrt(squared_error) / BRIGHTEST)
+
+
+def _false_color_codes(values: NDArray[np.floating]) -> Codes:
+    return quantize(in_false_color(values.astype(np.float64)), 8, "linear").astype(np.uint8)
 
 
 def _codes(linear: NDArray[np.float32], image: IntegralImage) -> Codes:

@@ -1,11 +1,11 @@
-"""The picture that a camera takes whose lens is as wide as the display's whole field, focused on one plane.
+"""Synthetic refocusing: the picture of a camera whose aperture is as wide as the display's field of view.
 
-Every view is what one point of that wide lens sees. A point P of the plane is looked at from all of these points; each
-line of sight meets one display lens and, through it, one pixel; their mean is the picture at P. On a display of
-parallel views with whole pixels behind every lens this is the usual shift and sum,
-``I(v, u) = mean over t, s of L(t, s, v + alpha (t - t0), u + alpha (s - s0))`` with
-``alpha = z d / (g p)`` for the plane at z, in units of lenses (R. Ng et al., Light field photography with a hand-held
-plenoptic camera, 2005). In the lens plane itself, z = 0, it is the mean of each micro-image.
+Each view is the picture of one point of the aperture. The picture at a point P of the focus plane is the mean over all
+views: the line of sight from the view's eye to P meets one display lens and, through it, one pixel. On a display of
+parallel views with whole pixels under every lens this is shift and sum,
+``I(v, u) = mean over t, s of L(t, s, v + alpha (t - t0), u + alpha (s - s0))`` with ``alpha = z d / (g p)`` for the
+plane at z, in units of lenses (R. Ng et al., Light field photography with a hand-held plenoptic camera, 2005). In the
+lens plane, z = 0, it is the mean of each micro-image.
 """
 
 from __future__ import annotations
@@ -28,21 +28,21 @@ Index = NDArray[np.intp]
 Flags = NDArray[np.bool_]
 View = tuple[int, int]
 
-#: Widest picture that is made where nothing is said, in pixels: every view is looked up for every one of them.
+#: Default limit on the width of the picture, in pixels: every pixel takes a look-up in every view.
 DEFAULT_WIDTH = 1024
 
 
 def refocus(image: IntegralImage | LargePicture, plane: float, *, size: tuple[int, int] | None = None) -> FloatArray:
-    """The picture focused on the plane at z = ``plane``.
+    """Picture focused on the plane at z = ``plane``.
 
     Parameters
     ----------
     image:
-        What the panel shows.
+        The native picture.
     plane:
         Height of the plane over the lens plane in mm, positive toward the viewer, below the viewing distance.
     size:
-        Width and height of the picture in pixels; by default the panel's, at most 1024 wide.
+        Width and height of the result in pixels, 1 to 65535. None: the panel's, at most 1024 wide.
 
     Returns
     -------
@@ -52,14 +52,14 @@ def refocus(image: IntegralImage | LargePicture, plane: float, *, size: tuple[in
     Raises
     ------
     UsageError
-        If the plane is not finite or not below the viewing distance.
+        If the plane is not finite or not below the viewing distance, or the size is out of range.
     """
     display = image.display
     if not math.isfinite(plane) or plane >= display.viewing_distance:
         rule = f"it must be finite and below the viewing distance of {display.viewing_distance:g} mm"
-        raise UsageError(f"the plane is at {plane:g} mm", rule=rule)
+        raise UsageError(f"{plane:g} mm is out of range", parameter="plane", rule=rule)
     width, height = checked_size(default_size(display, DEFAULT_WIDTH) if size is None else size)
-    looked_up = _of_views(image)
+    look_up = _view_lookup(image)
     grid = view_grid(display)
     eyes = {(ky, kx): eye_of_view(display, ky, kx) for ky, kx in np.ndindex(len(grid.down), len(grid.right))}
     picture = np.zeros((height, width, 3), dtype=np.float32)
@@ -67,32 +67,32 @@ def refocus(image: IntegralImage | LargePicture, plane: float, *, size: tuple[in
         total, count = np.zeros((*x.shape, 3), dtype=np.float32), np.zeros(x.shape, dtype=np.float32)
         for view, eye in eyes.items():
             row, column, inside = _line_of_sight(display, eye, (x, y, plane))
-            colors, found = looked_up(view, row, column)
-            inside &= found
+            colors, exists = look_up(view, row, column)
+            inside &= exists
             total += colors * inside[..., None]
             count += inside
         picture[rows] = total / np.maximum(count, 1)[..., None]
     return picture
 
 
-def _of_views(image: IntegralImage | LargePicture) -> Callable[[View, Index, Index], tuple[FloatArray, Flags]]:
-    """What looks up views: their values ``(..., 3)`` at rows and columns, and where there are such pixels."""
+def _view_lookup(image: IntegralImage | LargePicture) -> Callable[[View, Index, Index], tuple[FloatArray, Flags]]:
+    """A function of view, rows and columns that returns values ``(..., 3)`` and whether there are such pixels."""
     if isinstance(image, IntegralImage):
         views, masks = image.views_and_mask()
         return lambda view, row, column: (views[view][row, column], masks[view][row, column])
     display, grid = image.display, view_grid(image.display)
 
-    def worked_out(view: View, row: Index, column: Index) -> tuple[FloatArray, Flags]:
-        found, at_row, at_column = pixels_of_view(display, grid, view, row, column)
-        return image.take(np.where(found, at_row, 0), np.where(found, at_column, 0)), found
+    def from_pixels(view: View, row: Index, column: Index) -> tuple[FloatArray, Flags]:
+        exists, pixel_row, pixel_column = pixels_of_view(display, grid, view, row, column)
+        return image.take(np.where(exists, pixel_row, 0), np.where(exists, pixel_column, 0)), exists
 
-    return worked_out
+    return from_pixels
 
 
 def _line_of_sight(
     display: Display, eye: Eye, point: tuple[Real, Real, float]
 ) -> tuple[Index, Index, NDArray[np.bool_]]:
-    """Row and column, in the eye's view, of what shows the points to it, and whether there is a lens (and row)."""
+    """Row and column of the eye's view at which it sees the points, and whether there is a lens (and row)."""
     x, y, z = point
     # From the eye through the point to the lens plane.
     stretch = z / (eye[2] - z)

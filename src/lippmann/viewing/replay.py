@@ -1,12 +1,11 @@
-"""What an eye in front of the display sees.
+"""Replay: the picture that an eye in front of the display sees.
 
-The eye looks at a point of the lens plane; the lens there shows it one point of the panel
-(:meth:`lippmann.display.Display.panel_point_seen_by`), so a round lens is filled with one colour, and a cylindrical
-one with one colour across. Outside the display's field a lens shows a pixel of its neighbour's micro-image, as a real
-display does.
+Through a point of the lens plane the eye sees one point of the panel
+(:meth:`lippmann.display.Display.panel_point_seen_by`). A round lens is filled with one colour, a cylindrical one has
+one colour across. Outside the display's field of view a lens shows a pixel of its neighbour's micro-image, as on a real
+display.
 
-Pictures replayed are perspective pictures of the panel's rectangle in the lens plane: the frame of the picture is the
-rectangle itself, wherever the eye is.
+The frame of the picture is the panel's rectangle in the lens plane for every position of the eye.
 """
 
 from __future__ import annotations
@@ -29,39 +28,38 @@ Eye = tuple[float, float, float]
 Real = NDArray[np.float64]
 Filter = Literal["nearest", "linear"]
 
-#: Widest picture that is made where nothing is said, in pixels.
+#: Default limit on the width of the picture, in pixels.
 DEFAULT_WIDTH = 2048
 
-#: An eye so far away (mm) counts as infinitely far: over a panel of a metre its lines are parallel to 1e-7 pixels.
+#: Distance in mm of an eye at infinity: over a panel of a metre its lines of sight are parallel to 1e-7 pixels.
 FAR = 1e12
 
-#: Parts of a pixel by which a point may miss a boundary between pixels and still count as lying on it; above what FAR
-#: and rounding leave, far below what can be seen.
+#: Tolerance in pixels for points on a boundary between pixels: above the rounding error with FAR, far below visibility.
 _ON_BOUNDARY = 1e-6
 
-#: Points whose geometry is computed at a time: few enough for their arrays to stay in the processor's cache.
+#: Points per block, so that their arrays stay in the processor's cache.
 _BLOCK = 1 << 15
 
 
 @dataclass(frozen=True, eq=False)
 class LensSamples:
-    """What one eye sees through every lens, at the lens's centre.
+    """What one eye sees at the centre of every lens.
 
-    All are ``(lens_rows, lens_cols, ...)``; the rows of a lenticular sheet are the panel's, and its points those of the
-    lens's axis through which the eye sees the middle of the row.
+    Arrays are ``(lens_rows, lens_cols, ...)``. For a lenticular sheet the rows are the panel's, and the points are on
+    the lens's axis where the eye sees the middle of the row.
 
     Parameters
     ----------
     points:
-        ``(..., 2)`` places in the lens plane, mm.
+        ``(..., 2)`` positions in the lens plane, mm.
     pixels:
         ``(..., 2)`` column and row of the pixel seen; may lie off the panel.
     offsets:
-        ``(..., 2)`` how far right and down of that pixel's centre the eye looks, in pixels.
+        ``(..., 2)`` offset right and down of the point seen from that pixel's centre, in pixels.
     colors:
         ``(..., 3)`` linear RGB of the pixel; zero off the panel.
     own:
-        Whether the pixel is on the panel and belongs to the lens: else the eye is outside its field.
+        True if the pixel is on the panel and belongs to the lens; otherwise the eye is outside the lens's field.
     """
 
     points: Real
@@ -79,46 +77,47 @@ def replay(
     filter: Filter = "nearest",
     subpixels: bool | None = None,
 ) -> FloatArray:
-    """The picture that an eye sees through the lenses.
+    """Picture that an eye sees through the lenses.
 
     Parameters
     ----------
     image:
-        What the panel shows.
+        The native picture.
     eye:
-        ``(x, y, z)`` in the display frame, mm, z > 0; by default :func:`default_eye`.
+        Position ``(x, y, z)`` in the display frame in mm, z > 0. None: central, at the viewing distance, or within the
+        field of view if that distance is infinite.
     size:
-        Width and height of the picture in pixels; by default the panel's, at most 2048 wide.
+        Width and height of the result in pixels, 1 to 65535. None: the panel's, at most 2048 wide.
     filter:
-        ``nearest`` takes the pixel at the panel point seen; ``linear`` interpolates between the pixels about it that
-        belong to the same lens.
+        ``nearest`` takes the pixel at the panel point seen; ``linear`` interpolates between the surrounding pixels of
+        the same lens.
     subpixels:
-        Whether red, green and blue lie at their own places of the pixel, as on the real panel; by default if the
-        picture was rendered so.
+        Whether red, green and blue have their own positions in the pixel, as on the real panel. None: as the picture
+        was rendered.
 
     Returns
     -------
-    ``(height, width, 3)`` float32 linear RGB; black where the eye looks past the panel.
+    ``(height, width, 3)`` float32 linear RGB; black where the line of sight misses the panel.
 
     Raises
     ------
     UsageError
-        If the eye is not in front of the lens plane, or the size or filter is impossible.
+        If the eye is not in front of the lens plane, the size is out of range, or the filter is unknown.
     """
     eye = _checked_eye(default_eye(image.display) if eye is None else eye)
     width, height = checked_size(default_size(image.display) if size is None else size)
     if filter not in get_args(Filter):
-        raise UsageError(f"the filter {filter!r} is not known", rule=f"known are {', '.join(get_args(Filter))}")
+        raise UsageError(f"the filter {filter!r} is unknown", rule=f"known are {', '.join(get_args(Filter))}")
     subpixels = image.provenance.subpixels if subpixels is None else subpixels
-    seen = np.empty((height, width, 3), dtype=np.float32)
+    picture = np.empty((height, width, 3), dtype=np.float32)
     for rows, x, y in lens_plane_points(image.display, width, height):
         panel_x, panel_y = image.display.panel_point_seen_by(*eye, x, y, NUMPY)
-        seen[rows] = _panel_colors(image, panel_x, panel_y, filter, subpixels)
-    return seen
+        picture[rows] = _panel_colors(image, panel_x, panel_y, filter, subpixels)
+    return picture
 
 
 def replay_at_lens_centers(image: Picture, eye: Eye) -> LensSamples:
-    """One sample per lens, unfiltered: for measuring, and for comparing with a picture taken at the same points.
+    """Unfiltered samples at the centres of all lenses, for comparison with renders of the same rays.
 
     Raises
     ------
@@ -154,24 +153,45 @@ def sweep(
     filter: Filter = "nearest",
     subpixels: bool | None = None,
 ) -> Iterator[FloatArray]:
-    """The pictures of an eye that moves from ``start`` to ``stop`` in even steps; parameters as for :func:`replay`.
+    """Pictures of an eye that moves from ``start`` to ``stop`` in equal steps.
+
+    Parameters
+    ----------
+    image:
+        The native picture.
+    start, stop:
+        First and last position ``(x, y, z)`` of the eye in the display frame in mm, z > 0.
+    frames:
+        Number of pictures, at least 1.
+    size:
+        Width and height of a picture in pixels, 1 to 65535. None: the panel's, at most 2048 wide.
+    filter:
+        ``nearest`` takes the pixel at the panel point seen; ``linear`` interpolates between the surrounding pixels of
+        the same lens.
+    subpixels:
+        Whether red, green and blue have their own positions in the pixel. None: as the picture was rendered.
+
+    Yields
+    ------
+    ``(height, width, 3)`` float32 linear RGB.
 
     Raises
     ------
     UsageError
-        If there is less than one frame, or as :func:`replay`.
+        If ``frames`` is below 1, an eye is not in front of the lens plane, the size is out of range, or the filter is
+        unknown.
     """
     if frames < 1:
-        raise UsageError(f"{frames} frames will not do", rule="at least 1 is needed")
+        raise UsageError(f"{frames} is out of range", parameter="frames", rule="it must be at least 1")
     places = np.linspace(_checked_eye(start), _checked_eye(stop), frames)
     eyes: list[Eye] = [(float(x), float(y), float(z)) for x, y, z in places]
     return (replay(image, eye, size=size, filter=filter, subpixels=subpixels) for eye in eyes)
 
 
 def default_eye(display: Display) -> Eye:
-    """The middle of the place to look from: at the viewing distance, or, if that is infinite, well within the field.
+    """Centre ``(x, y, z)`` of the viewing zone in mm: at the viewing distance, if that is finite.
 
-    Parallel views overlap from the distance at which the field is as wide as the panel; the eye is half as far again.
+    For parallel views the eye is at 1.5 times the distance at which the field of view is as wide as the panel.
     """
     if math.isfinite(display.viewing_distance):
         return 0.0, 0.0, display.viewing_distance
@@ -182,9 +202,9 @@ def default_eye(display: Display) -> Eye:
 
 
 def eye_of_view(display: Display, ky: int, kx: int) -> Eye:
-    """Where the eye is that sees view ``(ky, kx)`` of :meth:`IntegralImage.views` through all lenses at once.
+    """Position ``(x, y, z)`` in mm of the eye that sees view ``(ky, kx)`` through all lenses.
 
-    It is at the viewing distance; if that is infinite, at :data:`FAR`.
+    Its distance is the viewing distance; if that is infinite, :data:`FAR`.
 
     Raises
     ------
@@ -199,9 +219,9 @@ def eye_of_view(display: Display, ky: int, kx: int) -> Eye:
 
 
 def eye_of_offset(display: Display, right: float, down: float) -> Eye:
-    """Where the eye is that sees, through all lenses, the place so many pixels from the middle of the micro-image."""
+    """Position in mm of the eye that sees, through all lenses, the point ``(right, down)`` pixels from the centre."""
     distance = display.viewing_distance if math.isfinite(display.viewing_distance) else FAR
-    # From the panel through the lens's centre: what lies to the right of the middle is seen from the left.
+    # From the panel through the lens's centre: a point right of the centre is seen from the left.
     scale = -display.panel.pixel_pitch * distance / display.gap
     if display.lens_array.layout != "lenticular":
         return right * scale, -down * scale, distance
@@ -212,14 +232,14 @@ def eye_of_offset(display: Display, right: float, down: float) -> Eye:
 
 
 def default_size(display: Display, widest: int = DEFAULT_WIDTH) -> tuple[int, int]:
-    """Width and height of the panel in pixels, shrunk in proportion to at most ``widest``."""
+    """Width and height of the panel in pixels, reduced in proportion to a width of at most ``widest``."""
     panel = display.panel
     shrink = min(1.0, widest / panel.width)
     return max(1, round(panel.width * shrink)), max(1, round(panel.height * shrink))
 
 
 def lens_plane_points(display: Display, width: int, height: int) -> Iterator[tuple[slice, Real, Real]]:
-    """The points (mm) of the lens plane behind the pixels of a picture of the panel's rectangle, in blocks of rows."""
+    """Rows, x and y in mm of the lens-plane points at the pixels of a ``width`` x ``height`` picture, in blocks."""
     step = max(1, _BLOCK // width)
     panel = display.panel
     u = (np.arange(width) + 0.5) * (panel.width / width)
@@ -232,8 +252,8 @@ def lens_plane_points(display: Display, width: int, height: int) -> Iterator[tup
 
 
 def pixel_at(coordinate: Real) -> NDArray[np.int64]:
-    """The column (row) that holds a continuous pixel coordinate; on a boundary the one to the right (below)."""
-    # Far off the panel coordinates exceed all integers; there the exact number says nothing.
+    """Column (row) that holds a continuous pixel coordinate; on a boundary the one to the right (below)."""
+    # Coordinates far off the panel exceed all integers; their exact value does not matter.
     return np.floor(np.clip(coordinate, -1e9, 1e9) + _ON_BOUNDARY).astype(np.int64)
 
 
@@ -254,7 +274,7 @@ def _panel_colors(image: Picture, x: Real, y: Real, filter_: Filter, subpixels: 
     for channel, offset in enumerate(panel.subpixel_offsets):
         part = slice(channel, channel + 1)
         if panel.subpixel_cells is not None:
-            colors[..., part] = _of_cells(image, x, y, channel, filter_)
+            colors[..., part] = _cell_values(image, x, y, channel, filter_)
             continue
         colors[..., part] = take(image, x, y, part, offset)
     return colors
@@ -294,11 +314,11 @@ def _linear(image: Picture, x: Real, y: Real, channels: slice, offset: tuple[flo
     return np.where(usable[..., None], total / np.where(usable, weights, 1.0)[..., None], alone).astype(np.float32)
 
 
-def _of_cells(image: Picture, x: Real, y: Real, channel: int, filter_: Filter) -> FloatArray:
-    """Values of one colour's sub-pixels at the points, ``(..., 1)``, where pixels are of several kinds.
+def _cell_values(image: Picture, x: Real, y: Real, channel: int, filter_: Filter) -> FloatArray:
+    """Values of one colour's sub-pixels at the points, ``(..., 1)``, on a panel with several kinds of pixels.
 
-    The grid of such sub-pixels is uneven: ``nearest`` takes the one whose centre is nearest, ``linear`` weighs those
-    less than a pixel away, right and down, by their distances.
+    Their grid is uneven: ``nearest`` takes the sub-pixel with the nearest centre, ``linear`` weights those less than a
+    pixel away, right and down, by their distances.
     """
     display = image.display
     lens = display.lens_of(x, y, NUMPY)
@@ -331,8 +351,8 @@ def _of_cells(image: Picture, x: Real, y: Real, channel: int, filter_: Filter) -
                 total += weight * values
                 weights += weight
     usable = weights > _ON_BOUNDARY
-    seen = np.where(usable, total / np.where(usable, weights, 1.0), nearest)
-    return seen.astype(np.float32)[..., None]
+    values = np.where(usable, total / np.where(usable, weights, 1.0), nearest)
+    return values.astype(np.float32)[..., None]
 
 
 def _lens_points(display: Display, eye: Eye) -> tuple[Real, Real, Real, Real]:
@@ -356,15 +376,15 @@ def _checked_eye(eye: Eye) -> Eye:
     try:
         x, y, z = (float(value) for value in eye)
     except (TypeError, ValueError):
-        raise UsageError(f"the eye is {eye!r}", rule="it must be three numbers X,Y,Z in mm") from None
+        raise UsageError(f"the eye is {eye!r}", rule="it must be three numbers x, y, z in mm") from None
     if not (math.isfinite(x) and math.isfinite(y) and math.isfinite(z)) or z <= 0:
-        rule = "it must be in front of the lens plane: X,Y,Z in mm with Z above 0"
+        rule = "it must be in front of the lens plane: x, y, z in mm with z above 0"
         raise UsageError(f"the eye is at {x:g},{y:g},{z:g}", rule=rule)
     return x, y, z
 
 
 def checked_size(size: tuple[int, int]) -> tuple[int, int]:
-    """``size`` if it is a width and a height that a picture can have, else a :class:`UsageError`."""
+    """``size`` itself; :class:`UsageError` unless it is two whole numbers from 1 to 65535."""
     width, height = size
     if not (isinstance(width, int) and isinstance(height, int) and 1 <= width <= 65535 and 1 <= height <= 65535):
         raise UsageError(f"the size is {size!r}", rule="it must be two whole numbers from 1 to 65535")

@@ -1,4 +1,4 @@
-"""Animations of a moving eye: APNG, exact in 8 bits, and MP4 (H.264), small."""
+"""Animation files: APNG, lossless with 8 bits, and MP4 (H.264)."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from lippmann.errors import OutputError
 from lippmann.image.stored_values import FloatArray
 from lippmann.runtime.atomic_write import replacing
 
-#: Endings of the file names that are known.
+#: Endings of the file names.
 ANIMATIONS = (".png", ".apng", ".mp4")
 
-#: Quality of H.264: constant rate factor, 18 is held to be visually lossless.
+#: Constant rate factor of H.264; 18 is considered visually lossless, lower is better.
 _RATE_FACTOR = "16"
 
 #: sRGB and BT.709 in the numbering of ITU-T H.273.
@@ -26,7 +26,7 @@ _BT709, _SRGB_TRANSFER, _LIMITED_RANGE = 1, 13, 1
 
 
 def check_animation_path(path: Path) -> None:
-    """Raise :class:`OutputError` if the ending is not one of :data:`ANIMATIONS`: before the frames are made."""
+    """Raise :class:`OutputError` unless the name ends in ``.png``, ``.apng`` or ``.mp4``."""
     if path.suffix.lower() not in ANIMATIONS:
         ending = f"the ending '{path.suffix}' is unknown" if path.suffix else "the name has no ending"
         raise OutputError(ending, where=str(path), rule=f"animations are {', '.join(ANIMATIONS)}")
@@ -35,9 +35,19 @@ def check_animation_path(path: Path) -> None:
 def write_animation(
     frames: Iterable[FloatArray], path: Path, *, frames_per_second: float = 24.0, transfer: Transfer = "srgb"
 ) -> None:
-    """Write at least one frame ``(H, W, 3)`` of linear RGB, all of one size, as ``.png``/``.apng`` or ``.mp4``.
+    """Write frames as an animation.
 
-    An APNG repeats for ever. H.264 wants even sizes: an odd last column or row is doubled.
+    Parameters
+    ----------
+    frames:
+        At least one frame ``(H, W, 3)`` of linear RGB; all have one size.
+    path:
+        The file: ``.png`` or ``.apng`` for APNG, which repeats forever, or ``.mp4``. H.264 needs even sizes: an odd
+        last column or row is doubled.
+    frames_per_second:
+        Frame rate.
+    transfer:
+        Transfer function of the codes.
 
     Raises
     ------
@@ -56,7 +66,7 @@ def write_animation(
 def _write_apng(frames: Iterator[NDArray[Any]], path: Path, frames_per_second: float) -> None:
     from PIL import Image
 
-    # A list, though it holds all frames: Pillow goes through them twice, and finds a generator empty.
+    # A list of all frames: Pillow iterates twice, which exhausts a generator.
     first, *others = [Image.fromarray(frame) for frame in frames]
     duration = 1000 / frames_per_second
     first.save(path, format="PNG", save_all=True, append_images=others, duration=duration, loop=0)

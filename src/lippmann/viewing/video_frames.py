@@ -1,4 +1,4 @@
-"""What a film shows of integral images: what an eye sees, or a quilt of what many eyes see."""
+"""Frames of a video from integral images: the picture that an eye sees, or a quilt of such pictures."""
 
 from __future__ import annotations
 
@@ -15,39 +15,52 @@ from lippmann.quilts.quilt import Quilt, QuiltLayout, layout_of_name
 from lippmann.viewing.replay import Eye, default_eye, default_size, replay
 from lippmann.viewing.video_file import check_animation_path
 
-#: Widest quilt of a film in pixels: what players and H.264's usual levels still take.
+#: Limit on the width of a quilt in a video, in pixels: that of players and of common H.264 levels.
 WIDEST_QUILT = 4096
 
 Projection = Callable[[IntegralImage], FloatArray]
 
 
 def projection_of(path: Path, eye: Eye | None = None) -> Projection:
-    """What a film called ``path`` shows of a picture: a quilt if its name says so (``_qs8x6a0.75``), else a replay.
+    """The function that makes a video's frame of an integral image: a quilt or a replay.
 
     Parameters
     ----------
+    path:
+        The video. A name with a quilt's layout (``_qs8x6a0.75``) asks for quilts.
     eye:
-        Where the eye is (mm, display frame); of a quilt, the middle one. None: where the display is made to be seen
-        from.
+        Position ``(x, y, z)`` of the eye in the display frame in mm; for a quilt, of the central one. None: the centre
+        of the viewing zone.
 
     Raises
     ------
-    OutputError, PictureError
-        The ending is no film's, or the name's layout is impossible.
+    OutputError
+        If the name has no ending of an animation, or the quilt has too many columns.
+    PictureError
+        If the name's layout is out of range.
     """
     check_animation_path(path)
     if "_qs" not in path.stem:
         return lambda image: replay(image, eye)
     layout = layout_of_name(path)
     if layout.columns > WIDEST_QUILT // 16:
-        raise OutputError(f"{layout.columns} columns are too many", where=str(path), rule="a view is 16 pixels or more")
+        rule = f"a view of a quilt in a video has at least 16 of {WIDEST_QUILT} pixels"
+        raise OutputError(f"{layout.columns} columns are too many", where=str(path), rule=rule)
     return lambda image: quilt_of(image, layout, eye).pixels
 
 
 def quilt_of(image: IntegralImage, layout: QuiltLayout, eye: Eye | None = None) -> Quilt:
-    """Replays from evenly spaced places across the display's field, the leftmost at the bottom left.
+    """Quilt of replays from equally spaced eyes across the display's field of view.
 
-    Views have the panel's proportions, and the size at which the quilt is no wider than :data:`WIDEST_QUILT`.
+    Parameters
+    ----------
+    image:
+        The native picture.
+    layout:
+        Columns and rows of the quilt. Views have the panel's proportions; the quilt is at most :data:`WIDEST_QUILT`
+        wide.
+    eye:
+        Position ``(x, y, z)`` of the central eye in the display frame in mm. None: the centre of the viewing zone.
     """
     x, y, z = default_eye(image.display) if eye is None else eye
     reach = 2 * z * math.tan(math.radians(image.display.field_of_view / 2))

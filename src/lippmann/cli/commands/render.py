@@ -177,7 +177,6 @@ def render(
     from lippmann import api
     from lippmann.image.write import format_for
     from lippmann.runtime.atomic_write import check_folder_writable, check_writable
-    from lippmann.viewing.map_folder import write_maps
 
     console = Console(quiet, as_json)
     target = printing.display_of(
@@ -249,6 +248,8 @@ def render(
         writing = time.perf_counter()
         image = _with_seconds(image, load=load_seconds)
         if maps is not None:
+            from lippmann.viewing.diagnostic_maps import write_maps
+
             write_maps(image, maps)
         image = printing.marked(image, margin)
         image.save(output, bits=bits)
