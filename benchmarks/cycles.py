@@ -284,7 +284,7 @@ def _native_tries(stage: Stage, size: Size) -> Tries:
             stage.display,
             method=METHOD,
             subpixels=True,
-            scale=stage.options.scale,
+            placement=stage.options,
             spp=samples,
             depth=DEPTH,
             seed=1,
@@ -314,12 +314,11 @@ class _Cut:
 def _traced(stage: Stage, source: Any, samples: int) -> Picture:
     from lippmann.rendering.film.wavefront import trace_frame
     from lippmann.rendering.film.wavefront_plan import make_plan
-    from lippmann.rendering.picture import build_for, make_integrator
-    from lippmann.rendering.request.settings import RenderSettings
+    from lippmann.rendering.request.render_request import RenderRequest
+    from lippmann.rendering.session import open_session
 
-    settings = RenderSettings(integrator="path", depth=DEPTH)
-    built = build_for(stage.scene, settings)
-    integrator = make_integrator(built, settings, stage.placement.display_from_world, source)
+    session = open_session(stage.scene, RenderRequest(integrator="path", depth=DEPTH))
+    integrator = session.integrator(source, stage.placement.display_from_world)
     plan = make_plan(source.width, source.height, samples, channels=source.channels, memory=2 << 30)
     return trace_frame(integrator, source, plan, seed=2).pixels
 

@@ -61,12 +61,15 @@ Point = dict[str, Any]
 class Stage:
     """A scene before a display, ready to be traced."""
 
-    built: Any
+    session: Any
     integrator: Any
     source: Any
     display: Any
     display_from_world: NDArray[np.float64]
-    settings: Any
+
+    @property
+    def built(self) -> Any:
+        return self.session.built
 
 
 def main() -> None:
@@ -98,13 +101,10 @@ def prepare(name: str, display_name: str) -> Stage:
     from dataclasses import replace
 
     import lippmann
-    from lippmann.rendering.picture import build_for, make_integrator
-    from lippmann.rendering.request.settings import RenderSettings
-    from lippmann.rendering.transport.ray_source import DisplayRays
-    from lippmann.runtime import engine
+    from lippmann.rendering.request.render_request import RenderRequest
+    from lippmann.rendering.session import open_session
     from lippmann.scene.placement import place
 
-    engine.start("auto")
     optics, options, rows = DISPLAYS[display_name]
     whole = lippmann.load_display(optics)
     if "finer" in options:
@@ -114,11 +114,13 @@ def prepare(name: str, display_name: str) -> Stage:
     scene = lippmann.load_scene(GLTF.get(name, name))
     at = place(scene.bounds, whole, cameras=scene.cameras, home_camera=scene.home_camera, bounds_in=scene.bounds_in)
     display = whole if rows is None else whole.resized(whole.panel.width, rows)
-    settings = RenderSettings(integrator="path")
-    built = build_for(scene, settings)
+    session = open_session(scene, RenderRequest(integrator="path"), memory=4 << 30)
+
+    from lippmann.rendering.transport.ray_source import DisplayRays
+
     source = DisplayRays(display, at.world_from_display)
-    integrator = make_integrator(built, settings, at.display_from_world, source)
-    return Stage(built, integrator, source, display, at.display_from_world, settings)
+    integrator = session.integrator(source, at.display_from_world)
+    return Stage(session, integrator, source, display, at.display_from_world)
 
 
 def _measure(stage: Stage, references: Path | None) -> dict[str, Any]:

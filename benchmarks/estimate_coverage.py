@@ -15,6 +15,7 @@ from __future__ import annotations
 import argparse
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -76,18 +77,19 @@ class Case:
 
     def __init__(self, scene: str, display: Any, seconds: float, folder: Path | None) -> None:
         from lippmann.api import load_scene
-        from lippmann.device.pbr import build
-        from lippmann.rendering.picture import make_integrator
-        from lippmann.rendering.request.settings import RenderSettings
+        from lippmann.rendering.request.render_request import RenderRequest
+        from lippmann.rendering.session import open_session
+
+        request = RenderRequest(integrator="path", depth=DEPTH, threads=THREADS)
+        self.session = open_session(load_scene(HARD_SCENES[scene]()), request, memory=MEMORY)
+
         from lippmann.rendering.transport.ray_source import DisplayRays
 
-        self.built = build(load_scene(HARD_SCENES[scene]()))
         self.world_from_display = np.diag([2 / display.size_mm[0]] * 3 + [1.0])
         self.display = display
         self.source = DisplayRays(display, self.world_from_display)
-        settings = RenderSettings(depth=DEPTH)
         self.display_from_world = np.linalg.inv(self.world_from_display)
-        self.integrator = make_integrator(self.built, settings, self.display_from_world, self.source)
+        self.integrator = self.session.integrator(self.source, self.display_from_world)
         file = folder and folder / f"{scene}-{display.name}.npz"
         found = kept(file, lambda: dict(zip(("parts", "samples"), self._long(seconds), strict=True)))
         self.reference, self.reference_samples = found["parts"], int(found["samples"])
@@ -109,12 +111,11 @@ class Case:
     def trace(self, way: str, seed: int, **asked: Any) -> Any:
         """A picture made that way, as the whole program makes it."""
         from lippmann.rendering.methods import Job, trace
-        from lippmann.rendering.request.settings import RenderSettings
 
         method, denoise = WAYS[way]
-        settings = RenderSettings(method=method, denoise=denoise, seed=seed, depth=DEPTH, **asked)
-        job = Job(self.built, self.integrator, self.source, settings, self.display_from_world, "srgb", MEMORY, THREADS)
-        return trace(job)
+        request = replace(self.session.request, method=method, denoise=denoise, seed=seed, pixel_filter="box", **asked)
+        session = replace(self.session, request=request)
+        return trace(Job(session, self.integrator, self.source, self.display_from_world))
 
     def truth(self, picture: NDArray[np.float32]) -> tuple[float, float]:
         """True PSNR of a picture and of its worst micro-image."""

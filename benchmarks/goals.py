@@ -15,7 +15,7 @@ import statistics
 from dataclasses import replace
 from typing import Any
 
-from equal_error import CORES, Stage, asked, once, prepare
+from equal_error import Stage, asked, once, prepare
 from harness import save, saved
 
 QUALITIES = (35.0, 40.0)
@@ -51,19 +51,11 @@ def _measured(stage: Stage) -> dict[str, Any]:
 def _reached(stage: Stage, quality: float, options: dict[str, Any]) -> dict[str, Any]:
     """Seconds and samples, and where it ended."""
     from lippmann.rendering.methods import Job, trace
-    from lippmann.rendering.request.resolve import decide
+    from lippmann.rendering.request.resolve import resolve
 
-    settings = replace(stage.settings, quality_mean=quality, spp=MOST_SAMPLES, **options)
-    job = Job(
-        stage.built,
-        stage.integrator,
-        stage.source,
-        decide(settings).settings,
-        stage.display_from_world,
-        "srgb",
-        memory=4 << 30,
-        threads=CORES,
-    )
+    asked = replace(stage.session.request, quality_mean=quality, spp=MOST_SAMPLES, **options)
+    session = replace(stage.session, request=resolve(asked, stage.session.scene))
+    job = Job(session, stage.integrator, stage.source, stage.display_from_world)
     seconds, traced = once(lambda: trace(job))
     assert traced.estimate is not None
     short = max(0.0, quality - traced.estimate.psnr)

@@ -27,11 +27,10 @@ TILES_BETWEEN = 8
 
 def main() -> None:
     import lippmann
-    from lippmann.device.pbr import build
     from lippmann.rendering.film.wavefront import trace_frame
     from lippmann.rendering.film.wavefront_plan import make_plan
-    from lippmann.rendering.picture import make_integrator
-    from lippmann.rendering.request.settings import RenderSettings
+    from lippmann.rendering.request.render_request import RenderRequest
+    from lippmann.rendering.session import open_session
     from lippmann.rendering.transport.ray_source import DisplayRays
     from lippmann.scene.placement import place
 
@@ -44,12 +43,12 @@ def main() -> None:
         image.save(Path(folder) / "frame.png")
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
 
-    built = build(scene)
+    session = open_session(scene, RenderRequest(integrator="path", spp=SPP))
     frames = {}
     for name, shown in (("large", display), ("small", optics.resized(*SMALL))):
         at = place(scene.bounds, shown, cameras=scene.cameras, home_camera=scene.home_camera)
         source = DisplayRays(shown, at.world_from_display)
-        integrator = make_integrator(built, RenderSettings(spp=SPP), at.display_from_world, source)
+        integrator = session.integrator(source, at.display_from_world)
         frames[name] = (integrator, source, make_plan(source.width, source.height, SPP, memory=MEMORY))
 
     for seed in range(5):

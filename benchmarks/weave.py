@@ -65,8 +65,8 @@ def _measure(name: str, reference: int) -> tuple[dict[str, Any], list[Picture]]:
     from lippmann.image import IntegralImage
     from lippmann.quilts.quilt import Quilt, QuiltLayout
     from lippmann.quilts.weave import weave
-    from lippmann.rendering.picture import build_for, make_integrator
-    from lippmann.rendering.request.settings import RenderSettings
+    from lippmann.rendering.request.render_request import RenderRequest
+    from lippmann.rendering.session import open_session
     from lippmann.rendering.transport.ray_source import DisplayRays, QuiltRays
     from lippmann.runtime import engine
     from lippmann.scene.placement import place
@@ -77,9 +77,9 @@ def _measure(name: str, reference: int) -> tuple[dict[str, Any], list[Picture]]:
     display = whole.resized(*PANEL)
     scene = lippmann.load_scene(SCENES[name])
     at = place(scene.bounds, whole, cameras=scene.cameras, home_camera=scene.home_camera, bounds_in=scene.bounds_in)
-    settings = RenderSettings(integrator="path")
+    session = open_session(scene, RenderRequest(integrator="path"))
     direct = DisplayRays(display, at.world_from_display, subpixels=True)
-    integrator = make_integrator(build_for(scene, settings), settings, at.display_from_world, direct)
+    integrator = session.integrator(direct, at.display_from_world)
     cameras = QuiltRays(display, at.world_from_display, COLUMNS, ROWS, VIEW)
 
     def traced(source: Any, samples: int, seed: int) -> tuple[Picture, float]:

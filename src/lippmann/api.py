@@ -1,4 +1,4 @@
-"""The library by its few calls: ``load_scene``, ``render``, ``render_quilt``, ``preview``.
+"""The library by its few calls: load a scene, render it, whole or into a file, as a quilt or a preview, or plan that.
 
 Everything else hangs on what they return.
 
@@ -13,14 +13,17 @@ Everything else hangs on what they return.
 
 from __future__ import annotations
 
+import warnings
+from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING
 
 from lippmann.display import Display, load_display
 from lippmann.progress import ProgressCallback, silent
-from lippmann.rendering.request.defaults import AUTO, choose
-from lippmann.rendering.request.settings import Device, RenderSettings
-from lippmann.scene.placement import Mode, Placement, PlacementOptions
+from lippmann.rendering.request.choices import Denoiser, Device, Integrator, Method, Order, PixelFilter
+from lippmann.rendering.request.render_request import RenderRequest
+from lippmann.scene.placement import Placement, PlacementOptions
 from lippmann.scene.readers.load import load_scene as _load_scene
 from lippmann.scene.scene import Scene
 
@@ -28,18 +31,22 @@ if TYPE_CHECKING:
     from lippmann.image import IntegralImage
     from lippmann.quilts.quilt import Quilt
     from lippmann.rendering.forecast import Forecast
-    from lippmann.rendering.picture import Preview
+    from lippmann.rendering.preview import Preview
+    from lippmann.scene.values.description import Environment
     from lippmann.tiles.tiled_render import Rendered, Runner
+
+#: Keywords that :func:`render` took before ``placement``, and what they are called there.
+_FORMER_PLACEMENT = {"place": "mode", **{name: name for name in ("camera", "turn", "shift", "scale", "pop_out")}}
 
 
 def load_scene(
     source: object,
     *,
-    environment: str | Path | Any | None = None,
+    environment: str | Path | Environment | None = None,
     background: tuple[float, float, float] | None = None,
     allow_outside: bool = False,
 ) -> Scene:
-    """A scene from a file, a bundled scene's name, or an object of another library.
+    """Load a scene from a file, a bundled scene's name, or an object of another library.
 
     Parameters
     ----------
@@ -67,10 +74,11 @@ def render(
     scene: Scene | object,
     display: Display | str | Path = "seed-lenticular",
     *,
-    method: str = AUTO,
-    order: str | None = None,
+    placement: PlacementOptions | Placement | None = None,
+    method: Method = "auto",
+    order: Order | None = None,
     respect_gloss: bool | None = None,
-    integrator: str = AUTO,
+    integrator: Integrator = "auto",
     depth: int | None = None,
     spp: int | None = None,
     quality: float | None = None,
@@ -78,20 +86,14 @@ def render(
     max_time: float | None = None,
     seed: int = 0,
     subpixels: bool = False,
-    pixel_filter: str = AUTO,
-    denoise: str = AUTO,
+    pixel_filter: PixelFilter = "auto",
+    denoise: Denoiser = "auto",
     layers: bool = False,
-    camera: str | None = None,
-    place: str | None = None,
-    turn: tuple[float, float, float] = (0.0, 0.0, 0.0),
-    shift: tuple[float, float, float] = (0.0, 0.0, 0.0),
-    scale: float = 1.0,
-    pop_out: float | None = None,
-    placed: Placement | None = None,
-    device: str = "auto",
+    device: Device = "auto",
     threads: int | None = None,
     memory: int | None = None,
     progress: ProgressCallback = silent,
+    **former: object,
 ) -> IntegralImage:
     """Render a scene into the native pixels of a display.
 
@@ -103,21 +105,60 @@ def render(
     scene:
         What :func:`load_scene` returned, or anything that it takes.
     display:
-        A :class:`~lippmann.display.Display`, a preset's name, or a TOML file.
-    method, order, respect_gloss, integrator, depth, spp, seed, subpixels, pixel_filter:
-        See :class:`~lippmann.rendering.request.settings.RenderSettings`; what is "auto" or None follows from the scene,
-        see :func:`~lippmann.rendering.request.defaults.choose`, and the method from what is asked for, see
-        :func:`~lippmann.rendering.request.resolve.decide`.
-    quality, quality_mean, max_time, denoise, layers, device, threads, memory:
-        See there, too.
-    camera, place, turn, shift, scale, pop_out:
-        Where the display stands in the scene, see :class:`~lippmann.scene.placement.PlacementOptions`: by a camera,
-        fitted to the display's depth (``place="fit"``), or with scene units taken for millimetres of the display
-        (``place="display"``); then turned (yaw, pitch, roll in degrees), moved (mm) and scaled.
-    placed:
-        Where it stands, found before; the six above do not count then.
+        A :class:`~lippmann.display.Display`, a preset's name, or a TOML file. Default ``seed-lenticular``.
+    placement:
+        Where the display stands in the scene: a :class:`~lippmann.scene.placement.PlacementOptions` (by a camera,
+        fitted to the display's depth, or in the display's own millimetres; then turned, moved, scaled), or a placement
+        found before. By default a bundled scene's own camera, else fitted.
+    method:
+        ``auto`` (default): ``full`` for a number of samples; for a quality or a time the faster of ``full`` and
+        ``pooled``. ``full`` traces every ray. ``pooled`` denoises, and all micro-images that show a point share its
+        light. ``lens-view`` reprojects points from micro-image to micro-image and traces the missed pixels;
+        ``interpolated`` averages those of every other micro-image from its neighbours.
+    order:
+        For ``lens-view`` and ``interpolated``: ``paper`` goes lens by lens as the paper does; ``default`` in the order
+        that traces fewer pixels.
+    respect_gloss:
+        For ``lens-view`` and ``interpolated``: trace what reprojection would falsify (mirrors, glass, highlights). By
+        default True, but in the paper's order.
+    integrator:
+        ``path`` (all light), ``direct`` (light straight from emitters and environment), ``classic`` (Whitted ray
+        tracing, for Tachyon and NFF scenes), or a property of the first surface: ``normal``, ``depth``, ``position``,
+        ``albedo``. ``auto`` (default): what the scene was made for.
+    depth:
+        Surfaces along a path, the primary ray's counting 1; 1 to 4096. Default 8 for ``path``, 1 for ``direct``, the
+        file's own for ``classic``.
+    spp:
+        Samples per pixel, or per sub-pixel; 1 to 2**24. Default 16, 1 for ``classic``, and with a quality or a time as
+        many as that takes.
+    quality, quality_mean:
+        PSNR in dB that the worst micro-image, or the whole picture, is to reach by its own estimate; above 0, at most
+        80. Default: none.
+    max_time:
+        Seconds of tracing after which the best picture so far is taken. Default: none.
+    seed:
+        Of all random choices, 0 to 2**32 - 1. Default 0.
+    subpixels:
+        Trace a ray for each sub-pixel, at its own place. Default False.
+    pixel_filter:
+        ``box`` spreads the samples over the pixel, ``point`` takes its centre. ``auto`` (default): ``box``, but for
+        ``classic`` with one sample.
+    denoise:
+        ``oidn`` denoises by Open Image Denoise with the effort that the traced rays deserve, ``oidn-fast`` and
+        ``oidn-high`` with a given one, ``none`` not at all. ``auto`` (default): as the method needs it.
+    layers:
+        Add depth, position, normal, albedo and shape of what each pixel sees to the picture's maps. Default False.
+    device:
+        ``cpu``, ``gpu``, or ``auto`` (default): the GPU if there is one.
+    threads:
+        CPU threads, 1 to 4096. Default: all cores.
+    memory:
+        Bytes to use. Default: 60 % of what is free.
     progress:
         Called with :class:`~lippmann.progress.Progress` as the work goes on.
+    **former:
+        Deprecated: ``camera``, ``place``, ``turn``, ``shift``, ``scale``, ``pop_out`` and ``placed``, which are
+        parts of ``placement`` now.
 
     Returns
     -------
@@ -129,39 +170,29 @@ def render(
     LippmannError
         Of the kind that says what was wrong; see ``lippmann.errors``.
     """
-    from lippmann.rendering.picture import render_integral_image
+    from lippmann.rendering.picture import render_picture
 
-    loaded = _scene(scene)
-    settings = _settings(
-        loaded,
-        integrator=integrator,
-        depth=depth,
-        spp=spp,
-        pixel_filter=pixel_filter,
+    request = RenderRequest(
+        placement=_placement(placement, former, "render"),
         method=method,
         order=order,
         respect_gloss=respect_gloss,
+        integrator=integrator,
+        depth=depth,
+        spp=spp,
         quality=quality,
         quality_mean=quality_mean,
         max_time=max_time,
         seed=seed,
         subpixels=subpixels,
+        pixel_filter=pixel_filter,
         denoise=denoise,
         layers=layers,
         device=device,
         threads=threads,
         memory=memory,
     )
-    options = PlacementOptions(
-        mode=cast("Mode | None", place),
-        camera=camera,
-        turn=turn,
-        shift=shift,
-        scale=scale,
-        pop_out=pop_out,
-    )
-    shown = display if isinstance(display, Display) else load_display(display)
-    return render_integral_image(loaded, shown, settings, options, progress, placed)
+    return render_picture(_scene(scene), _display(display), request, progress)
 
 
 def render_to_file(
@@ -169,12 +200,12 @@ def render_to_file(
     output: str | Path,
     display: Display | str | Path = "seed-lenticular",
     *,
+    placement: PlacementOptions | Placement | None = None,
     bits: int | None = None,
     resume: bool = False,
-    placement: PlacementOptions | Placement | None = None,
     runner: Runner | None = None,
     progress: ProgressCallback = silent,
-    **options: Any,
+    **options: object,
 ) -> Rendered:
     """Render a scene into a file tile by tile: for pictures larger than memory, and runs that may be interrupted.
 
@@ -182,19 +213,17 @@ def render_to_file(
 
     Parameters
     ----------
-    scene, display, progress:
+    scene, display, placement, progress:
         As for :func:`render`.
     output:
         The file; ``.tif`` and ``.zarr`` are written in memory that does not grow with the picture.
     bits:
-        Bits per value: PNG 8, 16; EXR 16, 32; TIFF and Zarr 8, 16, 32.
+        Bits per value: PNG 8, 16; EXR 16, 32; TIFF and Zarr 8, 16, 32. Default: 8; 16 for EXR.
     resume:
-        Go on with what an interrupted run left beside ``output``, if there is anything.
-    placement:
-        Where the display stands in the scene.
+        Go on with what an interrupted run left beside ``output``, if there is anything. Default False.
     runner:
         Who renders the tiles, see :mod:`lippmann.tiles.tiled_render`; by default this process.
-    options:
+    **options:
         ``method`` (``full``, ``pooled``), ``denoise``, ``integrator``, ``depth``, ``spp``, ``seed``, ``subpixels``,
         ``pixel_filter``, ``device``, ``threads`` and ``memory`` as for :func:`render`. Others are refused: they need
         the whole picture at once.
@@ -211,13 +240,11 @@ def render_to_file(
     """
     from lippmann.tiles.tiled_render import render_to_file as rendered
 
-    loaded = _scene(scene)
-    shown = display if isinstance(display, Display) else load_display(display)
+    request = _request(placement, options)
     return rendered(
-        loaded,
-        shown,
-        _settings(loaded, **{"method": AUTO, "denoise": AUTO, **options}),
-        placement or PlacementOptions(),
+        _scene(scene),
+        _display(display),
+        request,
         Path(output),
         bits=bits,
         resume=resume,
@@ -226,78 +253,52 @@ def render_to_file(
     )
 
 
-def _settings(
-    scene: Scene,
-    *,
-    integrator: str = AUTO,
-    depth: int | None = None,
-    spp: int | None = None,
-    pixel_filter: str = AUTO,
-    quality: float | None = None,
-    quality_mean: float | None = None,
-    max_time: float | None = None,
-    **others: Any,
-) -> RenderSettings:
-    """The settings of :func:`render`, what is left open filled in from the scene."""
-    open_ended = not (quality is quality_mean is max_time is None)
-    choice = choose(
-        scene, integrator=integrator, depth=depth, spp=spp, pixel_filter=pixel_filter, open_ended=open_ended
-    )
-    return RenderSettings(**vars(choice), quality=quality, quality_mean=quality_mean, max_time=max_time, **others)
-
-
 def preview(
     scene: Scene | object,
     size: tuple[int, int] = (512, 512),
     *,
     camera: str | None = None,
-    integrator: str = AUTO,
-    depth: int | None = None,
-    spp: int | None = None,
-    seed: int = 0,
-    pixel_filter: str = AUTO,
-    device: str = "auto",
-    threads: int | None = None,
-    memory: int | None = None,
     progress: ProgressCallback = silent,
+    **options: object,
 ) -> Preview:
-    """The plain picture that a camera of the scene sees. Calls of other threads wait, as of :func:`render`.
+    """Render the plain picture that a camera of the scene sees. Calls of other threads wait, as of :func:`render`.
 
     Parameters
     ----------
+    scene, progress:
+        As for :func:`render`.
     size:
-        Width and height in pixels.
+        Width and height in pixels. Default 512 x 512.
     camera:
         A camera of the scene by name; None takes the first, or one that frames a scene without any.
+    **options:
+        ``integrator``, ``depth``, ``spp``, ``seed``, ``pixel_filter``, ``device``, ``threads`` and ``memory`` as for
+        :func:`render`.
 
     Returns
     -------
     Preview
         With ``.pixels`` ``(height, width, 3)`` float32 linear RGB and ``.provenance``.
-    """
-    from lippmann.rendering.picture import render_preview
 
-    loaded = _scene(scene)
-    choice = choose(loaded, integrator=integrator, depth=depth, spp=spp, pixel_filter=pixel_filter, own_camera=True)
-    settings = RenderSettings(
-        **vars(choice),
-        seed=seed,
-        device=cast(Device, device),
-        threads=threads,
-        memory=memory,
-    )
-    return render_preview(loaded, camera, size, settings, progress)
+    Raises
+    ------
+    LippmannError
+        Of the kind that says what was wrong.
+    """
+    from lippmann.rendering.preview import render_preview
+
+    return render_preview(_scene(scene), camera, size, RenderRequest.of(options), progress)
 
 
 def render_quilt(
     scene: Scene | object,
     display: Display | str | Path = "portrait",
     *,
+    placement: PlacementOptions | Placement | None = None,
     views: tuple[int, int] | None = None,
     size: tuple[int, int] | None = None,
-    placement: PlacementOptions | None = None,
     progress: ProgressCallback = silent,
-    **options: Any,
+    **options: object,
 ) -> Quilt:
     """Render the views that cameras before a display see, side by side in one picture.
 
@@ -305,16 +306,14 @@ def render_quilt(
 
     Parameters
     ----------
-    scene:
-        What :func:`load_scene` returned, or anything that it takes.
+    scene, placement, progress:
+        As for :func:`render`; the same placement gives the same place.
     display:
-        A device's name (``portrait``), or any lenticular display as :func:`render` takes it.
+        A device's name (default ``portrait``), or any lenticular display as :func:`render` takes it.
     views, size:
         Columns and rows of views, width and height in pixels; by default those that the device is given, see
         :data:`lippmann.quilts.quilt.DEVICE_QUILTS`.
-    placement:
-        Where the display stands in the scene; the same as for :func:`render` gives the same place.
-    options:
+    **options:
         ``integrator``, ``depth``, ``spp``, ``quality``, ``quality_mean``, ``max_time``, ``seed``, ``pixel_filter``,
         ``denoise``, ``device``, ``threads`` and ``memory`` as for :func:`render`; every view counts as a micro-image
         does there. ``method``: ``auto``, ``full``, or ``pooled``, with which neighbouring views share their light
@@ -333,28 +332,26 @@ def render_quilt(
     from lippmann.quilts.quilt import Quilt, load_device, quilt_of_display
     from lippmann.rendering.quilt import render_quilt as rendered
 
-    shown = display if isinstance(display, Display) else load_device(str(display))
-    wanted = quilt_of_display(shown, views, size)
-    loaded = _scene(scene)
+    device = display if isinstance(display, Display) else load_device(str(display))
+    layout = quilt_of_display(device, views, size)
     frame = rendered(
-        loaded,
-        shown,
-        (wanted.layout.columns, wanted.layout.rows),
-        (wanted.width, wanted.height),
-        _settings(loaded, **{"method": AUTO, "denoise": AUTO, **options}),
-        placement or PlacementOptions(),
+        _scene(scene),
+        device,
+        (layout.layout.columns, layout.layout.rows),
+        (layout.width, layout.height),
+        _request(placement, options),
         progress,
     )
-    return Quilt(frame.pixels, wanted.layout, provenance=frame.provenance)
+    return Quilt(frame.pixels, layout.layout, provenance=frame.provenance)
 
 
 def plan(
     scene: Scene | object,
     display: Display | str | Path = "seed-lenticular",
     *,
-    placement: PlacementOptions | None = None,
+    placement: PlacementOptions | Placement | None = None,
     progress: ProgressCallback = silent,
-    **options: Any,
+    **options: object,
 ) -> Forecast:
     """Say what rendering a scene for a display will show and take, without rendering more than a few pixels.
 
@@ -362,11 +359,9 @@ def plan(
 
     Parameters
     ----------
-    scene, display:
+    scene, display, placement, progress:
         As for :func:`render`.
-    placement:
-        Where the display stands in the scene.
-    options:
+    **options:
         ``integrator``, ``depth``, ``spp``, ``seed``, ``subpixels``, ``pixel_filter``, ``denoise``, ``device``,
         ``threads`` and ``memory`` as for :func:`render`, of the method ``full``.
 
@@ -382,14 +377,37 @@ def plan(
     """
     from lippmann.rendering.forecast import forecast
 
-    loaded = _scene(scene)
-    shown = display if isinstance(display, Display) else load_display(display)
-    settings = _settings(loaded, **{"method": AUTO, "denoise": AUTO, **options})
-    return forecast(loaded, shown, settings, placement or PlacementOptions(), progress)
+    return forecast(_scene(scene), _display(display), _request(placement, options), progress)
 
 
 def _scene(source: Scene | object) -> Scene:
     return source if isinstance(source, Scene) else load_scene(source)
+
+
+def _display(source: Display | str | Path) -> Display:
+    return source if isinstance(source, Display) else load_display(source)
+
+
+def _request(placement: PlacementOptions | Placement | None, options: Mapping[str, object]) -> RenderRequest:
+    return replace(RenderRequest.of(options), placement=placement or PlacementOptions())
+
+
+def _placement(
+    placement: PlacementOptions | Placement | None, former: Mapping[str, object], function: str
+) -> PlacementOptions | Placement:
+    """``placement``, or what former keywords say instead of it, with a warning."""
+    for name in former:
+        if name not in (*_FORMER_PLACEMENT, "placed"):
+            raise TypeError(f"{function}() got an unexpected keyword argument '{name}'")
+    if former:
+        instead = "placement=PlacementOptions(mode=..., camera=..., turn=..., shift=..., scale=..., pop_out=...)"
+        warnings.warn(f"{', '.join(former)} of {function}(): use {instead}", DeprecationWarning, stacklevel=3)
+        found = former.get("placed")
+        if isinstance(found, Placement):
+            return found
+        options = {_FORMER_PLACEMENT[name]: value for name, value in former.items() if name != "placed"}
+        return PlacementOptions(**options)  # type: ignore[arg-type]  # it checks them
+    return placement or PlacementOptions()
 
 
 __all__ = ["load_scene", "plan", "preview", "render", "render_quilt", "render_to_file"]

@@ -184,10 +184,11 @@ def test_pictures_beyond_the_memory_go_to_tiles(lippmann, engine, display, tmp_p
 def test_what_is_made_from_neighbours_goes_to_tiles_sooner():
     from lippmann.cli.commands.render import is_tiled
     from lippmann.display import load_display
+    from lippmann.rendering.request.render_request import RenderRequest
 
     def asked(**more):
-        given = {"memory": 1 << 30, **more}
-        return is_tiled(Path("a.tif"), None, load_display("panel-4k"), resume=False, **given)
+        request = RenderRequest(**{"memory": 1 << 30} | more)
+        return is_tiled(Path("a.tif"), None, load_display("panel-4k"), request, resume=False)
 
     assert not asked()
     assert asked(method="pooled", denoise="auto")
@@ -206,7 +207,7 @@ def test_what_is_made_from_neighbours_goes_to_tiles_sooner():
         (("--maps", "m"), "--maps: needs the whole picture at once"),
         (("--layers",), "--layers"),
         (("--quality", 40), "--quality: 40.0 needs the whole picture"),
-        (("--order", "paper"), "--order: is for methods that need the whole picture"),
+        (("--order", "paper"), "--order: paper needs the whole picture"),
         (("--bits", 12), "12 bits per channel are not possible"),
     ],
 )

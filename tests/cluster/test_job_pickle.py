@@ -10,8 +10,7 @@ import pytest
 from lippmann.cluster.job_pickle import SMALLEST_PART, content_name, pack, unpack
 from lippmann.display import load_display
 from lippmann.errors import ClusterError, UsageError
-from lippmann.rendering.request.settings import RenderSettings
-from lippmann.scene.placement import PlacementOptions
+from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.scene.readers.load import load_scene
 from lippmann.tiles.job import make_job
 
@@ -20,8 +19,8 @@ XML = """<scene version="3.0.0">
 
 
 def job_of(scene, **settings):
-    chosen = RenderSettings(**{"integrator": "direct", "spp": 2} | settings)
-    return make_job(load_scene(scene), load_display("seed-lenticular"), chosen, PlacementOptions(), stored="uint8")
+    chosen = RenderRequest(**{"integrator": "direct", "spp": 2} | settings)
+    return make_job(load_scene(scene), load_display("seed-lenticular"), chosen, stored="uint8")
 
 
 def unpacked(parcel, folder):
@@ -105,8 +104,7 @@ def test_files_outside_the_scenes_folder_do_not_travel(xml):
     job = make_job(
         load_scene(xml, allow_outside=True),
         load_display("seed-lenticular"),
-        RenderSettings(integrator="direct", spp=2),
-        PlacementOptions(),
+        RenderRequest(integrator="direct", spp=2),
         stored="uint8",
     )
     object.__setattr__(job, "scene_hash", "known")

@@ -14,6 +14,7 @@ from PIL import Image
 
 from lippmann.display import Display, LensArray, Panel
 from lippmann.exchange import export_image
+from lippmann.scene.placement import PlacementOptions
 
 VIEWS, SIZE = 5, 96
 
@@ -71,7 +72,9 @@ def folder(request, engine, tmp_path_factory):
     from lippmann import api
 
     display = display_at(request.param)
-    image = api.render(wavy_cloth(), display, place="display", integrator="albedo", spp=4, layers=True)
+    image = api.render(
+        wavy_cloth(), display, placement=PlacementOptions(mode="display"), integrator="albedo", spp=4, layers=True
+    )
     folder = tmp_path_factory.mktemp("truth") / "cloth"
     export_image(image, folder, "hci")
     return folder

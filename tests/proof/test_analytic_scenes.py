@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 from handmade_display import APERTURE, Sheet
 
+from lippmann.scene.placement import PlacementOptions
+
 pytestmark = pytest.mark.usefixtures("engine")
 
 STRAIGHT = Sheet("lenticular", across=8, width=24 * 8, height=60)
@@ -37,7 +39,8 @@ def shown(objects, display, **options):
     from lippmann.api import load_scene, render
 
     scene = load_scene({"type": "scene"} | objects, background=(0.0, 0.0, 0.0))
-    defaults = {"place": "display", "integrator": "path", "depth": 1, "spp": 1, "pixel_filter": "point"}
+    placement = PlacementOptions(mode="display")
+    defaults = {"placement": placement, "integrator": "path", "depth": 1, "spp": 1, "pixel_filter": "point"}
     return render(scene, display, **(defaults | options))
 
 
@@ -53,7 +56,9 @@ def test_glow_of_one_before_a_sky_of_one_is_one_exactly(name):
     from lippmann.api import load_scene, render
 
     scene = load_scene({"type": "scene"} | furnace(glowing_ball((3, 2, -10), 12)))
-    picture = render(scene, SHEETS[name].display(), place="display", spp=3, subpixels=name == "slanted")
+    picture = render(
+        scene, SHEETS[name].display(), placement=PlacementOptions(mode="display"), spp=3, subpixels=name == "slanted"
+    )
     assert np.abs(picture.pixels - 1).max() <= 2e-7
 
 
@@ -62,7 +67,12 @@ def test_white_furnace_is_one_in_every_pixel(name):
     from lippmann.api import load_scene, render
 
     white = {"type": "sphere", "center": [3, 2, -10], "radius": 12, "bsdf": {"type": "diffuse", "reflectance": 1.0}}
-    picture = render(load_scene({"type": "scene"} | furnace(white)), SHEETS[name].display(), place="display", spp=64)
+    picture = render(
+        load_scene({"type": "scene"} | furnace(white)),
+        SHEETS[name].display(),
+        placement=PlacementOptions(mode="display"),
+        spp=64,
+    )
     # Lamps and lobes are both sampled: means of 64 scatter by 1 % on the ball, and 14 000 pixels within 6 times that.
     assert np.abs(picture.pixels - 1).max() < 0.1
     assert picture.pixels.mean() == pytest.approx(1.0, abs=5e-4)
@@ -318,5 +328,7 @@ def test_no_ray_slips_through_between_triangles():
     scene = load_scene(SceneDescription("grid", [mesh], [Material()], [Instance(0, np.eye(4))]))
     for tangent in (0.0, 1e-9):
         display = replace(STRAIGHT, width=16 * 8, tangent=tangent).display()
-        depth = render(scene, display, place="display", integrator="depth", spp=1, pixel_filter="point").pixels
+        depth = render(
+            scene, display, placement=PlacementOptions(mode="display"), integrator="depth", spp=1, pixel_filter="point"
+        ).pixels
         assert depth.max() < -9

@@ -26,10 +26,13 @@ import pytest
 from handmade_display import Sheet, lens_plane_points, samples_of
 from mitsuba_cameras import camera_rays, direct_pictures, in_display, intersect
 
+from lippmann.scene.placement import PlacementOptions
+
 SCENES = ("teapot", "fancy teapot", "clear coat")
 
 pytestmark = pytest.mark.usefixtures("engine")
 
+FITTED = PlacementOptions(mode="fit")
 #: The least agreement (dB), and the largest distance (mm) between what any one lens shows and what the camera sees.
 LEAST_PSNR, LARGEST_ERROR = 45.0, 2e-3
 
@@ -66,10 +69,10 @@ class Pictures:
         self.depth = float(np.ptp(self.position.provenance.options["depth_range"]))
 
 
-def rendered(scene, sheet, subpixels=False, **placement):
+def rendered(scene, sheet, subpixels=False, placement=FITTED):
     from lippmann.api import render
 
-    common = {"spp": 1, "pixel_filter": "point", "subpixels": subpixels, "place": "fit"} | placement
+    common = {"spp": 1, "pixel_filter": "point", "subpixels": subpixels, "placement": placement}
     display = sheet.display()
     position, normal = (render(scene, display, integrator=name, **common) for name in ("position", "normal"))
     return Pictures(position, normal, render(scene, display, integrator="path", depth=1, **common), sheet, subpixels)
@@ -165,7 +168,7 @@ def check_eye_where_views_meet(made, built):
 def test_pixels_per_lens_need_not_be_whole(pictures):
     """A corner of a 4K panel's worth: every pixel stands at a place of its own behind its lens."""
     sheet = Sheet("lenticular", 6.2867, 320, 180, distance=600.0, tangent=-0.1666, pixel=0.0899, gap=0.886)
-    made, built = pictures("teapot", sheet, subpixels=True, scale=2.5)
+    made, built = pictures("teapot", sheet, subpixels=True, placement=PlacementOptions(mode="fit", scale=2.5))
     figures = compare(made, built, (21.7, 40.3, 550.0), size=(9, 7))
     assert figures["cameras"] > 40
     check(figures)
@@ -227,7 +230,7 @@ def test_the_scenes_own_camera_is_the_eye_at_the_viewing_point(pictures, glowing
     import mitsuba as mi
 
     sheet = Sheet("square", across=7, down=7, width=22 * 7, height=20 * 7, distance=400.0)
-    made, built = pictures("teapot", sheet, place="camera")
+    made, built = pictures("teapot", sheet, placement=PlacementOptions(mode="camera"))
     pose = mi.ScalarTransform4d(glowing("teapot").cameras[0].world_from_camera)
     # Mitsuba's cameras look along +z.
     pose = pose @ mi.ScalarTransform4d().rotate([0, 1, 0], 180)

@@ -13,6 +13,7 @@ import pytest
 from lippmann.color.transfer import encode_srgb
 from lippmann.display import Display
 from lippmann.metrics.mse_psnr import micro_image_means
+from lippmann.scene.placement import PlacementOptions
 
 REFERENCE_SEEDS = 1001, 2002
 
@@ -35,7 +36,9 @@ class JudgedScene:
         import lippmann
 
         scale = self.display.size_mm[0] / 2
-        return lippmann.render(self.scene, self.display, place="display", scale=scale, seed=seed, **options)
+        return lippmann.render(
+            self.scene, self.display, placement=PlacementOptions(mode="display", scale=scale), seed=seed, **options
+        )
 
     def picture(self, samples, method="full", denoise="none", seed=7):
         """Made once."""

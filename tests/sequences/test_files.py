@@ -9,15 +9,18 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 
 import pytest
 
 from lippmann.display import load_display
 from lippmann.errors import PictureError, UsageError
+from lippmann.rendering.request.render_request import RenderRequest
+from lippmann.scene.placement import PlacementOptions
 from lippmann.sequences.files import journal_of, saved_sequence
 from lippmann.sequences.motion import open_motion
 
-QUICK = {"integrator": "direct", "spp": 1, "device": "cpu"}
+QUICK = RenderRequest(integrator="direct", spp=1, device="cpu")
 FRAMES = range(0, 12, 3)
 
 
@@ -34,7 +37,9 @@ def unbroken(engine, moving_ball, display, tmp_path_factory):
     return contents(folder)
 
 
-def run(scene, display, folder, *, frames=FRAMES, most=99, resume=False, motion=None, **options):
+def run(
+    scene, display, folder, *, frames=FRAMES, most=99, resume=False, motion=None, bits=None, runner=None, **changes
+):
     """Render frames, at most so many of them; those that came."""
     moving = motion or open_motion(scene)
     came = []
@@ -43,7 +48,10 @@ def run(scene, display, folder, *, frames=FRAMES, most=99, resume=False, motion=
     def path_of(number):
         return folder / f"f_{number:02}.png"
 
-    with saved_sequence(moving, name, path_of, display, frames, resume=resume, **QUICK, **options) as saved:
+    request = replace(QUICK, **changes)
+    with saved_sequence(
+        moving, name, path_of, display, frames, request, resume=resume, bits=bits, runner=runner
+    ) as saved:
         for frame in saved:
             came.append(frame)
             if len(came) == most:
@@ -93,7 +101,7 @@ def test_what_was_chosen_for_the_first_frame_holds(unbroken, moving_ball, displa
     head, line = journal.read_text().splitlines()
     assert json.loads(line)["chosen"] == {"method": "full", "denoise": "none"}
     journal.write_text(f"{head}\n{line.replace('full', 'guessed')}\n")
-    with pytest.raises(UsageError, match="--method: 'guessed' is not known"):
+    with pytest.raises(UsageError, match="method: 'guessed' is not known"):
         run(moving_ball, display, tmp_path, resume=True)
 
 
@@ -110,9 +118,12 @@ def test_a_journal_chooses_no_other_options(unbroken, moving_ball, display, tmp_
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        ({"seed": 1}, r"seed \(is new\)"),
-        ({"subpixels": True}, r"subpixels \(is new\)"),
-        ({"shift": (0.0, 0.0, 1.0)}, r"placement shift \(was \(0\.0, 0\.0, 0\.0\), is \(0\.0, 0\.0, 1\.0\)\)"),
+        ({"seed": 1}, r"seed \(was 0, is 1\)"),
+        ({"subpixels": True}, r"subpixels \(was False, is True\)"),
+        (
+            {"placement": PlacementOptions(shift=(0.0, 0.0, 1.0))},
+            r"placement shift \(was \(0\.0, 0\.0, 0\.0\), is \(0\.0, 0\.0, 1\.0\)\)",
+        ),
         ({"bits": 16}, r"values \(was uint8, is uint16\)"),
         ({"frames": range(3, 12, 3)}, r"the first frame \(was 0, is 3\)"),
     ],

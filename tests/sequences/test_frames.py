@@ -8,9 +8,8 @@ import pytest
 from lippmann import api
 from lippmann.display import load_display
 from lippmann.errors import SceneError, UsageError
-from lippmann.progress import silent
 from lippmann.scene.placement import PlacementOptions, place
-from lippmann.sequences.frames import FrameRange, filed, find_stand, render_sequence, rendered, sequence_to_files
+from lippmann.sequences.frames import FrameRange, find_stand, render_sequence, sequence_to_files
 from lippmann.sequences.motion import open_motion
 
 BODY = "CAMERA ZOOM 1 ASPECTRATIO 1 ANTIALIASING 0 RAYDEPTH 2 CENTER 0 0 -5 VIEWDIR 0 0 1 UPDIR 0 1 0 END_CAMERA"
@@ -172,14 +171,3 @@ def test_surroundings_hold_for_all_frames(moving_ball):
     motion = open_motion(moving_ball, environment="none", background=(0.1, 0.2, 0.3))
     assert [motion.scene(frame).background for frame in (0, 9)] == [(0.1, 0.2, 0.3)] * 2
     assert not motion.scene(9).in_studio
-
-
-def test_the_callers_options_stay_as_they_are(engine, moving_ball, display, tmp_path):
-    motion = open_motion(moving_ball)
-    where = find_stand(motion, display, PlacementOptions())
-    options = {"integrator": "direct", "spp": 1, "device": "cpu", "order": None}
-    given = dict(options)
-    list(rendered(motion, display, [0], where, silent, options))
-    assert options == given
-    list(filed(motion, display, [0], where, lambda _: tmp_path / "a.png", None, None, silent, options))
-    assert options == given

@@ -14,17 +14,17 @@ from lippmann import api
 from lippmann.display import Display, LensArray, Panel, load_display
 from lippmann.errors import MemoryLimitError, UsageError
 from lippmann.journal import TileGrid, encode
-from lippmann.rendering.request.settings import RenderSettings
+from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.scene.placement import PlacementOptions
 from lippmann.tiles.job import FEWEST_TILES, make_job
 
-SETTINGS = RenderSettings(integrator="direct", spp=2, memory=1 << 30)
+SETTINGS = RenderRequest(integrator="direct", spp=2, memory=1 << 30)
 #: A display with lenses that no tile's edge respects.
 DISPLAY = load_display("seed-lenticular").resized(128, 64)
 
 
-def job(scene="small-balls", display=DISPLAY, settings=SETTINGS, placement=None, stored="float32", **options):
-    return make_job(api.load_scene(scene), display, settings, placement or PlacementOptions(), stored=stored, **options)
+def job(scene="small-balls", display=DISPLAY, settings=SETTINGS, stored="float32", **options):
+    return make_job(api.load_scene(scene), display, settings, stored=stored, **options)
 
 
 def rendered(made, order=None):
@@ -68,14 +68,13 @@ def test_threads_do_not_matter(engine):
     import hashlib, sys
     from lippmann import api
     from lippmann.display import Display, LensArray, Panel, load_display
-    from lippmann.rendering.request.settings import RenderSettings
+    from lippmann.rendering.request.render_request import RenderRequest
     from lippmann.tiles.tile_render import prepare, render_tile
     from lippmann.tiles.job import make_job
-    from lippmann.scene.placement import PlacementOptions
     from lippmann.journal import TileGrid, encode
-    settings = RenderSettings(integrator="direct", spp=2, threads=int(sys.argv[1]))
+    settings = RenderRequest(integrator="direct", spp=2, threads=int(sys.argv[1]))
     display = load_display("seed-lenticular").resized(64, 64)
-    job = make_job(api.load_scene("small-balls"), display, settings, PlacementOptions(), stored="float32", side=64)
+    job = make_job(api.load_scene("small-balls"), display, settings, stored="float32", side=64)
     prepared = prepare(job)
     print(hashlib.sha256(b"".join(encode(render_tile(prepared, index)) for index in range(len(job.grid)))).hexdigest())
     """
@@ -126,7 +125,7 @@ def test_the_sums_of_tiles_give_the_estimate_of_the_whole(engine, layout):
         ({"settings": replace(SETTINGS, spp=3)}, "spp"),
         ({"settings": replace(SETTINGS, seed=1)}, "seed"),
         ({"settings": replace(SETTINGS, depth=2)}, "depth"),
-        ({"placement": PlacementOptions(shift=(0.0, 1.0, 0.0))}, "placement shift"),
+        ({"settings": replace(SETTINGS, placement=PlacementOptions(shift=(0.0, 1.0, 0.0)))}, "placement shift"),
         ({"stored": "uint8"}, "values"),
     ],
 )
@@ -208,17 +207,17 @@ def test_an_object_of_mitsubas_has_no_content_to_compare(engine):
 
 
 @pytest.mark.parametrize(
-    ("changes", "option"),
+    ("changes", "parameter"),
     [
-        ({"method": "lens-view", "integrator": "path"}, "--method"),
-        ({"quality": 40.0, "spp": None}, "--quality"),
-        ({"quality_mean": 40.0, "spp": None}, "--quality-mean"),
-        ({"max_time": 1.0, "spp": None}, "--max-time"),
-        ({"layers": True}, "--layers"),
+        ({"method": "lens-view", "integrator": "path"}, "method"),
+        ({"quality": 40.0, "spp": None}, "quality"),
+        ({"quality_mean": 40.0, "spp": None}, "quality_mean"),
+        ({"max_time": 1.0, "spp": None}, "max_time"),
+        ({"layers": True}, "layers"),
     ],
 )
-def test_what_needs_the_whole_picture_is_refused(changes, option):
-    with pytest.raises(UsageError, match=f"^{option}: .*needs the whole picture"):
+def test_what_needs_the_whole_picture_is_refused(changes, parameter):
+    with pytest.raises(UsageError, match=f"^{parameter}: .*needs the whole picture"):
         job(settings=replace(SETTINGS, **changes))
 
 

@@ -8,11 +8,11 @@ from hypothesis import strategies as st
 from lippmann.display import Display, LensArray, Panel, load_display
 from lippmann.journal import TileGrid
 from lippmann.rendering.denoise.oidn import NETWORK_STEP
-from lippmann.rendering.request.settings import RenderSettings
+from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.tiles.margins import DENOISER_REACH, SHARED_LENSES, surroundings_of
 
-DENOISED = RenderSettings(denoise="oidn")
-SHARED = RenderSettings(method="pooled", denoise="oidn")
+DENOISED = RenderRequest(denoise="oidn")
+SHARED = RenderRequest(method="pooled", denoise="oidn")
 DISPLAYS = ("seed-lenticular", "print-60lpi", "mla-square", "mla-hexagonal", "looking-glass-portrait")
 
 
@@ -30,7 +30,7 @@ def test_shared_light_has_more_lenses_around_it_where_they_are_large():
 
 
 def test_pixels_that_stand_for_themselves_have_nothing_around_them():
-    assert surroundings_of(load_display("seed-lenticular"), RenderSettings()) is None
+    assert surroundings_of(load_display("seed-lenticular"), RenderRequest()) is None
 
 
 @given(

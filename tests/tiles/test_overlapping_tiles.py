@@ -13,8 +13,7 @@ from lippmann import api
 from lippmann.codecs import tiff
 from lippmann.display import load_display
 from lippmann.errors import MemoryLimitError
-from lippmann.rendering.request.settings import RenderSettings
-from lippmann.scene.placement import PlacementOptions
+from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.tiles import job as tiles
 from lippmann.tiles import tiled_render
 from lippmann.tiles.job import make_job
@@ -23,7 +22,7 @@ from lippmann.tiles.tiled_render import render_to_file
 
 #: Four tiles.
 DISPLAY, SIDE = load_display("seed-lenticular").resized(128, 128), 64
-SHARED = RenderSettings(method="pooled", denoise="oidn-fast", integrator="direct", spp=2, threads=2)
+SHARED = RenderRequest(method="pooled", denoise="oidn-fast", integrator="direct", spp=2, threads=2)
 DENOISED = replace(SHARED, method="full")
 SUBPIXELS = replace(SHARED, subpixels=True)
 WAYS = [
@@ -39,9 +38,7 @@ def coded(x):
 
 
 def job(settings, scene="teapot", side=SIDE, display=DISPLAY, **options):
-    return make_job(
-        api.load_scene(scene), display, settings, PlacementOptions(), stored="float32", side=side, **options
-    )
+    return make_job(api.load_scene(scene), display, settings, stored="float32", side=side, **options)
 
 
 def in_tiles(settings):
@@ -166,7 +163,7 @@ def test_an_interrupted_run_gives_the_same_file(settings, ending, tmp_path, monk
 
     def render(name, memory=1 << 30, **options):
         asked = replace(settings, memory=memory)
-        return render_to_file(scene, DISPLAY, asked, PlacementOptions(), tmp_path / name, **options)
+        return render_to_file(scene, DISPLAY, asked, tmp_path / name, **options)
 
     def content(name):
         path = tmp_path / name
@@ -210,9 +207,7 @@ def test_the_sums_of_tiles_give_the_estimate_of_the_whole():
 def test_the_file_says_how_it_was_made(tmp_path):
     from lippmann.image import read_picture
 
-    found = render_to_file(
-        api.load_scene("teapot"), DISPLAY, SHARED, PlacementOptions(), tmp_path / "a.exr", runner=None
-    )
+    found = render_to_file(api.load_scene("teapot"), DISPLAY, SHARED, tmp_path / "a.exr", runner=None)
     image = read_picture(tmp_path / "a.exr")
     made = image.provenance
     assert made.method == "pooled"
@@ -257,7 +252,7 @@ def test_without_a_limit_free_memory_does_not_matter(monkeypatch):
     wide = DISPLAY.resized(34_000, 22_000)
     sides = []
     for free in (8 << 30, 64 << 30):
-        monkeypatch.setattr(tiles, "default_memory", lambda free=free: free)
+        monkeypatch.setattr(tiles, "memory_limit", lambda _, free=free: free)
         sides.append(job(SHARED, display=wide, side=None).side)
     assert sides == [1024, 1024]
 

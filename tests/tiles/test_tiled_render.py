@@ -20,8 +20,7 @@ from lippmann.errors import EngineError, MemoryLimitError, OutputError, PictureE
 from lippmann.image import read_picture
 from lippmann.journal import journal_of
 from lippmann.progress import Progress
-from lippmann.rendering.request.settings import RenderSettings
-from lippmann.scene.placement import PlacementOptions
+from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.tiles import job as tiles
 from lippmann.tiles import tiled_render
 from lippmann.tiles.tiled_render import render_to_file
@@ -29,7 +28,7 @@ from lippmann.tiles.tiled_render import render_to_file
 #: 12 tiles of 32 x 32 pixels, all alike.
 DISPLAY = load_display("seed-lenticular").resized(128, 96)
 SIDE = 32
-SETTINGS = RenderSettings(integrator="direct", spp=2, memory=1 << 30)
+SETTINGS = RenderRequest(integrator="direct", spp=2, memory=1 << 30)
 TILES = 12
 
 
@@ -52,7 +51,7 @@ def scene(engine, tmp_path_factory):
 @pytest.fixture(scope="module")
 def render(scene):
     def call(output, settings=SETTINGS, display=DISPLAY, **options):
-        return render_to_file(scene, display, settings, PlacementOptions(), output, **options)
+        return render_to_file(scene, display, settings, output, **options)
 
     return call
 

@@ -20,7 +20,7 @@ from lippmann.errors import ClusterError
 from lippmann.journal.tile_file import DamagedTile, decode
 
 if TYPE_CHECKING:
-    from lippmann.rendering.request.settings import Device
+    from lippmann.rendering.request.choices import Device
     from lippmann.tiles.job import TileJob
     from lippmann.tiles.tile_render import Prepared
     from lippmann.tiles.tiled_render import Put, Runner
@@ -68,8 +68,8 @@ def run_on(cluster: Cluster, job: TileJob, missing: Sequence[int], put: Put) -> 
 def _sent(prepared: Prepared) -> TileJob:
     """The job as workers get it: on the device that was chosen here, with threads and memory of their own."""
     job = prepared.job
-    device: Device = "gpu" if prepared.engine.gpu_name else "cpu"
-    return replace(job, settings=replace(job.settings, device=device, threads=None, memory=None))
+    device: Device = "gpu" if prepared.session.engine.gpu_name else "cpu"
+    return replace(job, request=replace(job.request, device=device, threads=None, memory=None))
 
 
 @dataclass(eq=False)

@@ -86,8 +86,8 @@ def render_part(
     try:
         with _engine:
             prepared = _prepared(key, outline, names, parts)
-            settings = prepared.job.settings
-            engine.start(settings.device, settings.threads)  # each thread of a worker chooses its variant
+            request = prepared.job.request
+            engine.start(request.device, request.threads)  # each thread of a worker chooses its variant
             traced = trace_tile(prepared, index)
         return encode(packed(prepared, traced))
     except Exception as error:  # noqa: BLE001 - whatever it was, it has to travel
@@ -121,6 +121,6 @@ def _prepared(key: str, outline: NDArray[np.uint8], names: Sequence[str], parts:
         _current.clear()  # one scene at a time: the last job's is not needed any more
         with tempfile.TemporaryDirectory(prefix="lippmann-scene-") as folder:
             job = unpack(outline, names, parts, Path(folder))
-            job = replace(job, settings=replace(job.settings, threads=engine_threads()))
+            job = replace(job, request=replace(job.request, threads=engine_threads()))
             _current[key] = prepare(job)
     return _current[key]

@@ -6,7 +6,6 @@ the picture's own settings in ever larger wavefronts for about two seconds. What
 
 from __future__ import annotations
 
-import itertools
 import time
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
@@ -16,27 +15,19 @@ from numpy.typing import NDArray
 
 from lippmann.display import Display
 from lippmann.progress import Progress, ProgressCallback, silent
-from lippmann.rendering.estimate.psnr import why_no_estimate
-from lippmann.rendering.film.wavefront_plan import BYTES_PER_LANE, BYTES_PER_PIXEL, make_plan
-from lippmann.rendering.picture import (
-    Stopwatch,
-    build_for,
-    default_memory,
-    make_integrator,
-    scene_notes,
-    traced_window,
-    transfer_of,
-)
-from lippmann.rendering.request.resolve import decide
-from lippmann.rendering.request.settings import RenderSettings
-from lippmann.runtime import engine as engines
+from lippmann.rendering.film import memory_model
+from lippmann.rendering.film.wavefront_plan import make_plan
+from lippmann.rendering.picture import traced_window
+from lippmann.rendering.request.preconditions import why_no_estimate
+from lippmann.rendering.request.render_request import RenderRequest
+from lippmann.rendering.request.resolve import resolve
+from lippmann.rendering.session import Session, open_session
 from lippmann.runtime.engine_lock import exclusive
-from lippmann.scene.placement import Placement, PlacementOptions, place
+from lippmann.scene.placement import Placement
 from lippmann.scene.scene import Scene
 
 if TYPE_CHECKING:
-    from lippmann.device.pbr import BuiltScene
-    from lippmann.device.whitted.scene import BuiltClassic
+    from lippmann.rendering.transport.integrator import Integrator
     from lippmann.rendering.transport.ray_source import DisplayRays, WindowRays
 
 #: Seconds that the probe traces for, compiling aside.
@@ -44,12 +35,10 @@ PROBE_SECONDS = 2.0
 
 #: Pixels of the probe, and how many lie side by side in a run.
 _PIXELS, _RUN = 1 << 14, 16
-#: Samples per pixel after which each takes as many rays as the one before: the first of either stream sample more light.
+#: Samples per pixel after which each takes as many rays as the one before; the first sample more light.
 _STEADY_SAMPLES = 16
 #: Lanes beyond which a wavefront gets no faster.
 _ENOUGH_LANES = 1 << 20
-#: Bytes per pixel that Open Image Denoise and its guides take, up to the most that the library lets itself have.
-_DENOISE_BYTES, _DENOISE_MOST = 600, 3 << 30
 
 
 @dataclass(frozen=True)
@@ -103,74 +92,57 @@ class Forecast:
 
 
 @exclusive()
-def forecast(
-    scene: Scene,
-    display: Display,
-    settings: RenderSettings,
-    placement_options: PlacementOptions,
-    progress: ProgressCallback = silent,
-) -> Forecast:
-    """Foresee what ``full`` with ``settings`` will take; nothing but the probe is rendered.
+def forecast(scene: Scene, display: Display, request: RenderRequest, progress: ProgressCallback = silent) -> Forecast:
+    """Foresee what rendering ``scene`` for ``display`` will take; nothing but the probe is rendered.
 
     Raises
     ------
     UsageError, SceneError, MemoryLimitError, EngineError
         Those that rendering would raise before its first ray.
     """
-    watch = Stopwatch(progress)
-    settings = decide(settings).settings
-    limit = settings.memory or default_memory()
+    request = resolve(request, scene, display, "forecast")
     width, height = display.panel.width, display.panel.height
-    channels = 3 if settings.subpixels else 1
-    make_plan(width, height, 1, channels=channels, memory=limit)
-    engine = watch.stage("load", lambda: engines.start(settings.device, settings.threads))
-    built = watch.stage("build", lambda: build_for(scene, settings))
-    at = place(
-        scene.bounds,
-        display,
-        cameras=scene.cameras,
-        options=placement_options,
-        home_camera=scene.home_camera,
-        bounds_in=scene.bounds_in,
-    )
+    session = open_session(scene, request, (width, height), progress=progress)
+    placement = session.place(display)
 
     from lippmann.rendering.transport.ray_source import DisplayRays, WindowRays
 
-    whole = DisplayRays(display, at.world_from_display, settings.subpixels)
-    window = traced_window(built, display, settings, at)
+    whole = DisplayRays(display, placement.world_from_display, request.subpixels)
+    window = traced_window(session, display, placement)
     source = whole if window is None else WindowRays(whole, window)
-    probe = _Probe(source, settings.seed)
-    samples = source.width * source.height * channels * settings.samples
-    integrator = watch.stage("build", lambda: make_integrator(built, settings, at.display_from_world, whole))
-    found = probe.trace(integrator, settings, limit, progress)
+    probe = _Probe(source, request.seed)
+    samples = source.width * source.height * request.channels * request.samples
+    integrator = session.integrator(whole, placement.display_from_world)
+    found = probe.trace(integrator, session)
     seconds = {
-        "load": watch.seconds["load"],
-        "build": watch.seconds["build"],
+        "load": session.watch.seconds["load"],
+        "build": session.watch.seconds["build"],
         "trace": found.compile + samples * found.seconds_per_sample,
     }
-    if settings.denoises:
-        seconds["denoise"] = _denoise_seconds(built, source, at, settings, engine.threads, found, limit)
+    if request.denoises:
+        seconds["denoise"] = _denoise_seconds(session, source, placement, found)
     seconds["total"] = sum(seconds.values())
     per_pixel = display.panel.pixel_pitch / display.gap / display.lens_array.pitch
+    share_beyond = probe.share_beyond(session, placement) * source.width * source.height / (width * height)
     return Forecast(
         display=display.name,
         size=(width, height),
-        subpixels=settings.subpixels,
-        spp=settings.samples,
-        placement=at.mode,
-        depth_range=at.depth_range,
-        resolvable_range=at.resolvable_range,
-        blur=(abs(at.depth_range[0]) * per_pixel, abs(at.depth_range[1]) * per_pixel),
-        blurred_share=probe.share_beyond(built, at, limit) * source.width * source.height / (width * height),
+        subpixels=request.subpixels,
+        spp=request.samples,
+        placement=placement.mode,
+        depth_range=placement.depth_range,
+        resolvable_range=placement.resolvable_range,
+        blur=(abs(placement.depth_range[0]) * per_pixel, abs(placement.depth_range[1]) * per_pixel),
+        blurred_share=share_beyond,
         rays={"primary": samples, **{kind: round(samples * share) for kind, share in found.rays.items()}},
         memory={
-            "expected": _resident() + width * height * BYTES_PER_PIXEL + _working_bytes(source, settings, limit),
-            "limit": limit,
+            "expected": _resident() + width * height * memory_model.PICTURE + _working_bytes(source, session),
+            "limit": session.memory,
         },
         seconds=seconds,
         probe={"samples": found.samples, "seconds": found.seconds},
-        device=engine.gpu_name or f"cpu, {engine.threads} threads",
-        notes=(*scene_notes(scene, built), *at.warnings),
+        device=session.engine.gpu_name or f"cpu, {session.engine.threads} threads",
+        notes=(*session.notes, *placement.warnings),
     )
 
 
@@ -212,17 +184,18 @@ class _Probe:
         column, row = (dr.gather(mi.UInt32, values, place) for values in (self._columns, self._rows))
         return self._source.rays(column, row, channel, jitter)
 
-    def trace(self, integrator: Any, settings: RenderSettings, memory: int, progress: ProgressCallback) -> _Found:
+    def trace(self, integrator: Integrator, session: Session) -> _Found:
         """Sample the pixels again and again, each time with twice as many samples, until the time is up."""
         from lippmann.rendering.film.sample_batches import STREAMS, FullInBatches
 
+        request, progress = session.request, session.watch.progress
         batches = FullInBatches(
             integrator,
             self,
-            seed=settings.seed,
-            box_filter=settings.pixel_filter == "box",
-            transfer=transfer_of(settings),
-            memory=memory,
+            seed=request.seed,
+            box_filter=request.box_filter,
+            transfer=request.transfer,
+            memory=session.memory,
         )
         pixels = self.width * self.height * self.channels
         # Twice the same: the first compiles.
@@ -236,7 +209,7 @@ class _Probe:
                 counts.append((samples, getattr(batches.rays, kind)))
 
         count_rays()
-        while spent < PROBE_SECONDS or samples < min(settings.samples, _STEADY_SAMPLES):
+        while spent < PROBE_SECONDS or samples < min(request.samples, _STEADY_SAMPLES):
             started = time.perf_counter()
             batches.add(count)
             last = (time.perf_counter() - started) / (count * pixels)
@@ -247,75 +220,67 @@ class _Probe:
             progress(Progress("probe", min(spent, PROBE_SECONDS), PROBE_SECONDS))
             if 2 * count * pixels <= _ENOUGH_LANES:
                 count *= 2
-        number = settings.samples * pixels
-        shares = {kind: _count_at(settings.samples, counts) / number for kind, counts in rays.items()}
+        number = request.samples * pixels
+        shares = {kind: _count_at(request.samples, counts) / number for kind, counts in rays.items()}
         return _Found(done * pixels, spent, compiled, last, shares)
 
-    def share_beyond(self, built: BuiltScene | BuiltClassic, at: Placement, memory: int) -> float:
+    def share_beyond(self, session: Session, placement: Placement) -> float:
         """Share of the pixels whose middle sees a surface that the display does not resolve."""
         from lippmann.rendering.film.aov import plan_layers, trace_layers
 
-        depth = trace_layers(built, self, plan_layers(self, memory), at.display_from_world)["depth"]
-        far, near = at.resolvable_range
+        plan = plan_layers(self, session.memory)
+        depth = trace_layers(session.built, self, plan, placement.display_from_world)["depth"]
+        far, near = placement.resolvable_range
         seen: NDArray[np.bool_] = np.isfinite(depth) & ((depth < far) | (depth > near))
         return float(seen.mean())
 
 
 def _count_at(samples: int, counts: list[tuple[int, int]]) -> float:
     """A running count at ``samples``, linear between the ``(samples, count)`` given and beyond the last two."""
-    for (low, below), (high, above) in itertools.pairwise(counts):
-        if samples <= high:
-            break
+    place = next((place for place, (taken, _) in enumerate(counts) if samples <= taken), len(counts) - 1)
+    (low, below), (high, above) = counts[place - 1 : place + 1]
     return below + (samples - low) * (above - below) / (high - low)
 
 
-def _denoise_seconds(
-    built: BuiltScene | BuiltClassic,
-    source: DisplayRays | WindowRays,
-    at: Placement,
-    settings: RenderSettings,
-    threads: int,
-    found: _Found,
-    memory: int,
-) -> float:
+def _denoise_seconds(session: Session, source: DisplayRays | WindowRays, placement: Placement, found: _Found) -> float:
     from lippmann.rendering.denoise.cost_model import effort_of, traced_work
     from lippmann.rendering.denoise.guided_denoiser import GuidedDenoiser
-    from lippmann.rendering.denoise.oidn import load_denoiser
     from lippmann.rendering.transport.ray_source import SubpixelRays
 
-    load_denoiser()
-    traced = SubpixelRays(source) if settings.keeps_colors(source.display) else source
-    rays_per_pixel = traced.channels * settings.samples * traced_work(1, found.rays["shadow"], found.rays["secondary"])
+    request = session.request
+    traced = SubpixelRays(source) if request.keeps_colors(source.display) else source
+    rays_per_pixel = traced.channels * request.samples * traced_work(1, found.rays["shadow"], found.rays["secondary"])
     denoiser = GuidedDenoiser(
-        built,
+        session.built,
         traced,
-        at.display_from_world,
-        seed=settings.seed,
-        box_filter=settings.pixel_filter == "box",
-        memory=memory,
-        threads=threads,
-        effort=lambda: effort_of(settings.denoise, rays_per_pixel),
+        placement.display_from_world,
+        seed=request.seed,
+        box_filter=request.box_filter,
+        memory=session.memory,
+        threads=session.engine.threads,
+        effort=lambda: effort_of(request.denoise, rays_per_pixel),
     )
     return denoiser.probe()
 
 
-def _working_bytes(source: DisplayRays | WindowRays, settings: RenderSettings, limit: int) -> int:
+def _working_bytes(source: DisplayRays | WindowRays, session: Session) -> int:
     """What batches, wavefront and denoiser take at the peak, see :mod:`~lippmann.rendering.film.sample_batches`."""
-    from lippmann.rendering.film.sample_batches import MOST_BATCHES, bytes_per_pixel
+    from lippmann.rendering.film.sample_batches import MOST_BATCHES
 
-    pixels = source.width * source.height * (3 if settings.keeps_colors(source.display) else 1)
-    lanes = make_plan(source.width, source.height, settings.samples, channels=source.channels, memory=limit).lanes
-    wave = lanes * BYTES_PER_LANE
-    if why_no_estimate(settings) is not None:
+    request, limit = session.request, session.memory
+    pixels = source.width * source.height * (3 if request.keeps_colors(source.display) else 1)
+    lanes = make_plan(source.width, source.height, request.samples, channels=source.channels, memory=limit).lanes
+    wave = lanes * memory_model.BYTES_PER_LANE
+    if why_no_estimate(request) is not None:
         kept = 0
-    elif settings.denoises:
-        kept = pixels * bytes_per_pixel(MOST_BATCHES)
+    elif request.denoises:
+        kept = pixels * memory_model.batches(MOST_BATCHES)
     else:
         # Batches are kept for a band of rows only, of half of what the picture leaves.
-        left = limit - pixels * (BYTES_PER_PIXEL + 8)
-        kept = min(pixels * bytes_per_pixel(MOST_BATCHES), max(0, left) // 2)
-    if settings.denoises:
-        kept += min(pixels * _DENOISE_BYTES, _DENOISE_MOST)
+        left = limit - pixels * (memory_model.PICTURE + memory_model.ERROR_MAPS)
+        kept = min(pixels * memory_model.batches(MOST_BATCHES), max(0, left) // 2)
+    if request.denoises:
+        kept += min(pixels * memory_model.DENOISER, memory_model.DENOISER_MOST)
     return min(kept + wave, limit)
 
 

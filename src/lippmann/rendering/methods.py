@@ -9,29 +9,29 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.color.transfer import Transfer
-from lippmann.progress import ProgressCallback, silent
+from lippmann.progress import ProgressCallback
 from lippmann.rendering.adaptive.convergence import Judge, Track
 from lippmann.rendering.adaptive.method_race import DENOISED_SLOPE, Contest
-from lippmann.rendering.adaptive.stopping import Goal, Outcome, goal_of, reach_judged
+from lippmann.rendering.adaptive.stopping import Goal, Outcome, goal_of, reach
 from lippmann.rendering.denoise.cost_model import effort_of, look_cost, traced_work
 from lippmann.rendering.denoise.dual_buffer import Denoised
 from lippmann.rendering.denoise.guided_denoiser import GuidedDenoiser
 from lippmann.rendering.denoise.subpixels import DenoisedSubpixels, SubpixelBatches
 from lippmann.rendering.estimate.denoised_psnr import DenoisedEstimator
 from lippmann.rendering.estimate.pixel_errors import PixelErrors
-from lippmann.rendering.estimate.psnr import ERROR_LAYER, Estimate, Parts, PictureEstimator, why_no_estimate
+from lippmann.rendering.estimate.psnr import ERROR_LAYER, Estimate, Parts, PictureEstimator
 from lippmann.rendering.film.sample_batches import FullInBatches, trace_in_batches
 from lippmann.rendering.film.wavefront import Frame, RayTotals, trace_frame
 from lippmann.rendering.film.wavefront_plan import make_plan
 from lippmann.rendering.reprojection.common.point_image import STATUS_LAYER, TRACED
-from lippmann.rendering.reprojection.renderer import trace_reused
-from lippmann.rendering.request.settings import REUSING, Denoiser, Method, RenderSettings
+from lippmann.rendering.reprojection.renderer import trace_reused as trace_reprojected
+from lippmann.rendering.request.choices import Denoiser, Method
+from lippmann.rendering.request.preconditions import why_no_estimate
+from lippmann.rendering.request.render_request import RenderRequest
+from lippmann.rendering.session import Session
 from lippmann.rendering.transport.ray_source import DisplayRays, QuiltRays, SubpixelRays, WindowRays
 
 if TYPE_CHECKING:
-    from lippmann.device.pbr import BuiltScene
-    from lippmann.device.whitted.scene import BuiltClassic
     from lippmann.rendering.denoise.exposure_survey import Treatment
 
 Floats = NDArray[np.float32]
@@ -40,45 +40,43 @@ Floats = NDArray[np.float32]
 SAMPLES_LAYER = "samples"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Job:
     """What is to be traced.
 
     Attributes
     ----------
-    built, integrator, source:
-        The scene on the device, what is gathered in it, and along which rays.
+    session:
+        The scene on the device, the request, and the machine's share.
+    integrator, source:
+        What is gathered along which rays.
     display_from_world:
         ``(4, 4)`` similarity to the display's frame (mm).
-    transfer:
-        How values become codes.
-    memory:
-        Bytes that may be used.
     treatment:
         Of a part of a picture that is denoised: how all its parts are.
     """
 
-    built: BuiltScene | BuiltClassic
+    session: Session
     integrator: Any
     source: DisplayRays | WindowRays | QuiltRays
-    settings: RenderSettings
     display_from_world: NDArray[np.float64]
-    transfer: Transfer
-    memory: int
-    threads: int
-    progress: ProgressCallback = silent
     treatment: Treatment | None = None
 
     @property
-    def box_filter(self) -> bool:
-        """Samples are spread over the pixel, not all at its centre."""
-        return self.settings.pixel_filter == "box"
+    def request(self) -> RenderRequest:
+        """How the picture is to be made."""
+        return self.session.request
+
+    @property
+    def progress(self) -> ProgressCallback:
+        """Whom to tell how far it is."""
+        return self.session.watch.progress
 
     @property
     def traced(self) -> DisplayRays | WindowRays | QuiltRays | SubpixelRays:
         """Whose samples are gathered: of sub-pixels that are denoised, all colours."""
         source = self.source
-        if isinstance(source, QuiltRays) or not self.settings.keeps_colors(source.display):
+        if isinstance(source, QuiltRays) or not self.request.keeps_colors(source.display):
             return source
         return SubpixelRays(source)
 
@@ -112,10 +110,37 @@ class Traced:
 
 
 def trace(job: Job) -> Traced:
-    """The picture by the method of ``job.settings``, with the samples of each pixel among its maps."""
-    traced = _traced(job)
+    """The picture by the method of ``job.request``, with the samples of each pixel among its maps."""
+    traced = RECIPES[job.request.method](job)
     traced.frame.maps.setdefault(SAMPLES_LAYER, _samples_of_pixels(traced))
     return traced
+
+
+def trace_samples(job: Job) -> Traced:
+    """Every pixel's own samples: a given number, or as many as a goal takes; denoised where that is asked for."""
+    why = why_no_estimate(job.request)
+    if why is not None:
+        return _denoised_whole(job, _one_stream(job, why))
+    if job.treatment is not None:
+        return _denoised_part(job)
+    if job.request.denoise == "none" and not job.request.is_open_ended:
+        return _fixed_samples(job)
+    goal = goal_of(job.request) or Goal(spp=job.request.samples)
+    return _until(job, replace(goal, part="view") if isinstance(job.source, QuiltRays) else goal)
+
+
+def trace_reused(job: Job) -> Traced:
+    """Points of one micro-image reprojected into the others; denoised where that is asked for."""
+    return _denoised_whole(job, _reused(job))
+
+
+#: How each method makes a picture. Pooled light differs from full rendering in what the denoiser shares.
+RECIPES: dict[Method, Callable[[Job], Traced]] = {
+    "full": trace_samples,
+    "pooled": trace_samples,
+    "lens-view": trace_reused,
+    "interpolated": trace_reused,
+}
 
 
 def _samples_of_pixels(traced: Traced) -> NDArray[np.uint32]:
@@ -127,48 +152,33 @@ def _samples_of_pixels(traced: Traced) -> NDArray[np.uint32]:
     return np.where(status == TRACED, np.uint32(traced.samples), np.uint32(0))
 
 
-def _traced(job: Job) -> Traced:
-    goal = goal_of(job.settings)
-    why = why_no_estimate(job.settings)
-    if job.settings.method in REUSING:
-        return _cleaned(job, _reused(job))
-    if why is not None:
-        return _cleaned(job, _plain(job, why))
-    if goal is None and job.settings.denoise == "none":
-        return _full(job)
-    if job.treatment is not None:
-        return _denoised_part(job)
-    goal = goal or Goal(spp=job.settings.samples)
-    return _full_until(job, replace(goal, part="view") if isinstance(job.source, QuiltRays) else goal)
-
-
-def _plain(job: Job, why: str) -> Traced:
+def _one_stream(job: Job, why: str) -> Traced:
     """All samples in one stream: nothing is known of the error."""
-    settings, source = job.settings, job.traced
-    plan = make_plan(source.width, source.height, settings.samples, channels=source.channels, memory=job.memory)
+    request, source = job.request, job.traced
+    plan = make_plan(source.width, source.height, request.samples, channels=source.channels, memory=job.session.memory)
     frame = trace_frame(
-        job.integrator, source, plan, seed=settings.seed, box_filter=job.box_filter, progress=job.progress
+        job.integrator, source, plan, seed=request.seed, box_filter=job.request.box_filter, progress=job.progress
     )
-    return Traced(frame, settings.samples, notes=(why,))
+    return Traced(frame, request.samples, notes=(why,))
 
 
-def _full(job: Job) -> Traced:
+def _fixed_samples(job: Job) -> Traced:
     """So many samples, band by band."""
     frame, errors = trace_in_batches(
         job.integrator,
         job.source,
-        job.settings.samples,
-        seed=job.settings.seed,
-        box_filter=job.box_filter,
-        transfer=job.transfer,
-        memory=job.memory,
+        job.request.samples,
+        seed=job.request.seed,
+        box_filter=job.request.box_filter,
+        transfer=job.request.transfer,
+        memory=job.session.memory,
         progress=job.progress,
     )
     frame.maps[ERROR_LAYER] = np.maximum(errors.values, 0)
-    return Traced(frame, job.settings.samples, _estimator(job).estimate(errors))
+    return Traced(frame, job.request.samples, _estimator(job).estimate(errors))
 
 
-def _full_until(job: Job, goal: Goal) -> Traced:
+def _until(job: Job, goal: Goal) -> Traced:
     """As many samples as the goal takes, the noise taken out of them where that is asked for or proves better."""
     batches = _batches(job)
     estimator = _estimator(job)
@@ -176,18 +186,18 @@ def _full_until(job: Job, goal: Goal) -> Traced:
     def rays() -> float:
         return _rays_per_pixel(job, batches.rays)
 
-    plain = _Way(batches, Track(batches, estimator))
-    denoised = None if job.settings.denoise == "none" else _denoised_way(job, goal, batches, rays)
+    plain = _Candidate(batches, Track(batches, estimator))
+    denoised = None if job.request.denoise == "none" else _denoised_candidate(job, goal, batches, rays)
     if denoised is None:
         judge: Judge = plain.track
-    elif job.settings.denoise == "auto":
+    elif job.request.denoise == "auto":
         judge = Contest(goal, plain.track, denoised.track, rays)
     else:
         judge = denoised.track
-    outcome = reach_judged(goal, batches.add, judge, job.progress, probe=batches.probe)
+    outcome = reach(goal, batches.add, judge, job.progress, probe=batches.probe)
     options: dict[str, Any] = {}
-    notes = _how_it_ended(goal, outcome)
-    method = job.settings.method
+    notes = _end_notes(goal, outcome)
+    method = job.request.method
     won = denoised or plain
     if isinstance(judge, Contest):
         if judge.leader == "plain":
@@ -201,7 +211,7 @@ def _full_until(job: Job, goal: Goal) -> Traced:
     if outcome.errors is not None:
         frame.maps[ERROR_LAYER] = np.maximum(outcome.errors.values, 0)
     seconds = {} if denoised is None or denoised.denoiser is None else {"denoise": denoised.denoiser.seconds}
-    options |= _how_cleaned(job, won.denoiser)
+    options |= _how_denoised_whole(job, won.denoiser)
     return Traced(frame, outcome.samples, outcome.estimate, notes, options, seconds, method=method)
 
 
@@ -211,17 +221,17 @@ def _batches(job: Job) -> FullInBatches:
     return kind(
         job.integrator,
         source,
-        seed=job.settings.seed,
-        box_filter=job.box_filter,
-        transfer=job.transfer,
-        memory=job.memory,
+        seed=job.request.seed,
+        box_filter=job.request.box_filter,
+        transfer=job.request.transfer,
+        memory=job.session.memory,
     )
 
 
 def _denoised_part(job: Job) -> Traced:
     """So many samples without their noise, for a picture that is put together and judged elsewhere."""
     batches = _batches(job)
-    batches.add(job.settings.samples, job.progress)
+    batches.add(job.request.samples, job.progress)
     denoiser = _denoiser(job, lambda: _rays_per_pixel(job, batches.rays))
     assert denoiser is not None
     denoised = _denoised(job, batches, denoiser)
@@ -229,11 +239,11 @@ def _denoised_part(job: Job) -> Traced:
     frame = Frame(denoised.picture(), batches.rays, batches.seconds_compile, batches.seconds_trace)
     frame.maps[ERROR_LAYER] = np.maximum(errors.values, 0)
     seconds = {"denoise": denoiser.seconds}
-    return Traced(frame, batches.samples, options=_how_cleaned(job, denoiser), seconds=seconds, errors=errors)
+    return Traced(frame, batches.samples, options=_how_denoised_whole(job, denoiser), seconds=seconds, errors=errors)
 
 
 @dataclass(frozen=True)
-class _Way:
+class _Candidate:
     """A picture that grows, who judges it, and what takes its noise out."""
 
     renderer: FullInBatches | Denoised
@@ -244,11 +254,11 @@ class _Way:
 def _denoised(job: Job, batches: FullInBatches, denoiser: GuidedDenoiser) -> Denoised:
     share = denoiser.share if denoiser.shares_afterwards else None
     if isinstance(batches, SubpixelBatches):
-        return DenoisedSubpixels(batches, denoiser.denoise, job.transfer, job.threads, share)
-    return Denoised(batches, denoiser.denoise, job.transfer, job.threads, share)
+        return DenoisedSubpixels(batches, denoiser.denoise, job.request.transfer, job.session.engine.threads, share)
+    return Denoised(batches, denoiser.denoise, job.request.transfer, job.session.engine.threads, share)
 
 
-def _denoised_way(job: Job, goal: Goal, batches: FullInBatches, rays: Callable[[], float]) -> _Way:
+def _denoised_candidate(job: Job, goal: Goal, batches: FullInBatches, rays: Callable[[], float]) -> _Candidate:
     denoiser = _denoiser(job, rays)
     assert denoiser is not None
     renderer = _denoised(job, batches, denoiser)
@@ -258,7 +268,8 @@ def _denoised_way(job: Job, goal: Goal, batches: FullInBatches, rays: Callable[[
         spent = rays()
         return 0 < spent < look_cost(spent)
 
-    return _Way(renderer, Track(renderer, _estimator(job, DenoisedEstimator), DENOISED_SLOPE, seconds, dear), denoiser)
+    track = Track(renderer, _estimator(job, DenoisedEstimator), DENOISED_SLOPE, seconds, dear)
+    return _Candidate(renderer, track, denoiser)
 
 
 def _rays_per_pixel(job: Job, rays: RayTotals) -> float:
@@ -278,65 +289,65 @@ def _estimator(job: Job, kind: type[PictureEstimator] = PictureEstimator) -> Pic
 
 
 def _reused(job: Job) -> Traced:
-    settings = job.settings
-    assert settings.method in ("lens-view", "interpolated")
+    request = job.request
+    assert request.method in ("lens-view", "interpolated")
     assert isinstance(job.source, DisplayRays)
-    frame = trace_reused(
+    frame = trace_reprojected(
         job.integrator,
         job.source,
-        method=settings.method,
-        order=settings.order or "default",
-        careful=settings.careful,
-        samples=settings.samples,
-        seed=settings.seed,
-        box_filter=job.box_filter,
-        transfer=job.transfer,
-        memory=job.memory,
+        method=request.method,
+        order=request.order or "default",
+        careful=request.careful,
+        samples=request.samples,
+        seed=request.seed,
+        box_filter=job.request.box_filter,
+        transfer=job.request.transfer,
+        memory=job.session.memory,
         display_from_world=job.display_from_world,
-        threads=job.threads,
+        threads=job.session.engine.threads,
         progress=job.progress,
     )
-    return Traced(frame, settings.samples, notes=(f"no estimate of the error: {settings.method} has more than noise",))
+    return Traced(frame, request.samples, notes=(f"no estimate of the error: {request.method} has more than noise",))
 
 
-def _cleaned(job: Job, traced: Traced) -> Traced:
+def _denoised_whole(job: Job, traced: Traced) -> Traced:
     """What was traced without its noise, where that is asked for and nothing is known of the error anyway."""
     denoiser = _denoiser(job, lambda: _rays_per_pixel(job, traced.frame.rays))
     if denoiser is None:
         return traced
     cleaned, source = denoiser(traced.frame.pixels), job.traced
     traced.frame.pixels = source.own_colors(cleaned) if isinstance(source, SubpixelRays) else cleaned
-    return replace(traced, options=_how_cleaned(job, denoiser), seconds={"denoise": denoiser.seconds})
+    return replace(traced, options=_how_denoised_whole(job, denoiser), seconds={"denoise": denoiser.seconds})
 
 
 def _denoiser(job: Job, rays_per_pixel: Callable[[], float]) -> GuidedDenoiser | None:
-    asked: Denoiser = "oidn" if job.settings.denoise == "auto" else job.settings.denoise
+    asked: Denoiser = "oidn" if job.request.denoise == "auto" else job.request.denoise
     if asked == "none":
         return None
     common = job.treatment
     return GuidedDenoiser(
-        job.built,
+        job.session.built,
         job.traced,
         job.display_from_world,
-        seed=job.settings.seed,
-        box_filter=job.box_filter,
-        memory=job.memory,
-        threads=job.threads,
+        seed=job.request.seed,
+        box_filter=job.request.box_filter,
+        memory=job.session.memory,
+        threads=job.session.engine.threads,
         effort=(lambda: effort_of(asked, rays_per_pixel())) if common is None else (lambda: common.effort),
         exposure=None if common is None else common.exposure,
         # Where a denoised picture is free to be the best one, it shares its light.
-        shares=job.settings.shares_light or job.settings.denoise == "auto",
+        shares=job.request.shares_light or job.request.denoise == "auto",
         progress=job.progress,
     )
 
 
-def _how_cleaned(job: Job, denoiser: GuidedDenoiser | None) -> dict[str, Any]:
+def _how_denoised_whole(job: Job, denoiser: GuidedDenoiser | None) -> dict[str, Any]:
     if denoiser is None:
         return {}
     return {"denoise": "oidn", "denoise_effort": denoiser.used, "denoise_form": denoiser.form()}
 
 
-def _how_it_ended(goal: Goal, outcome: Outcome) -> tuple[str, ...]:
+def _end_notes(goal: Goal, outcome: Outcome) -> tuple[str, ...]:
     if outcome.estimate is None:
         return ("no estimate of the error: there was time for one sample per pixel only",)
     if outcome.end == "quality" or not goal.has_quality:

@@ -49,14 +49,14 @@ class Variant:
 
     @property
     def order(self) -> str | None:
-        """As in :class:`~lippmann.rendering.request.settings.RenderSettings`."""
+        """As in :class:`~lippmann.rendering.request.render_request.RenderRequest`."""
         if self.manner is None:
             return None
         return "paper" if self.manner is Manner.PAPER else "default"
 
     @property
     def respect_gloss(self) -> bool | None:
-        """As in :class:`~lippmann.rendering.request.settings.RenderSettings`."""
+        """As in :class:`~lippmann.rendering.request.render_request.RenderRequest`."""
         return None if self.manner is None else self.manner is Manner.GLOSS
 
 

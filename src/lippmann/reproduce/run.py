@@ -15,12 +15,11 @@ from lippmann.reproduce.page import report_page
 from lippmann.reproduce.summary import summary
 from lippmann.runtime.atomic_write import check_folder_writable, replacing_folder
 from lippmann.scene import bundled
-from lippmann.scene.placement import PlacementOptions
 from lippmann.scene.readers.load import load_scene
 from lippmann.scene.scene import Scene
 
 if TYPE_CHECKING:
-    from lippmann.rendering.request.settings import Device, Method, Order
+    from lippmann.rendering.request.choices import Device, Method, Order
 
 #: What :func:`reproduce` writes.
 PAGE, FIGURES = "report.html", "results.json"
@@ -47,7 +46,7 @@ def reproduce(
     quick:
         Fewer scenes, fewer pixels, one run.
     device, threads:
-        As in :class:`~lippmann.rendering.request.settings.RenderSettings`.
+        As in :class:`~lippmann.rendering.request.render_request.RenderRequest`.
 
     Returns
     -------
@@ -86,13 +85,13 @@ def engine_renderer(display: Display, device: str = "auto", threads: int | None 
 
     def render(name: str, variant: Variant) -> IntegralImage:
         # Only now: whoever imports this module does not need the engine.
-        from lippmann.rendering.picture import render_integral_image
-        from lippmann.rendering.request.settings import RenderSettings
+        from lippmann.rendering.picture import render_picture
+        from lippmann.rendering.request.render_request import RenderRequest
 
         if name not in loaded:
             loaded.clear()  # scenes come one after the other
             loaded[name] = load_scene(name)
-        settings = RenderSettings(
+        request = RenderRequest(
             method=cast("Method", variant.method),
             order=cast("Order | None", variant.order),
             respect_gloss=variant.respect_gloss,
@@ -103,6 +102,6 @@ def engine_renderer(display: Display, device: str = "auto", threads: int | None 
             device=cast("Device", device),
             threads=threads,
         )
-        return render_integral_image(loaded[name], display, settings, PlacementOptions(), silent)
+        return render_picture(loaded[name], display, request)
 
     return render

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias, cast
+from typing import TYPE_CHECKING, TypeAlias
 
 from lippmann.display import Display
 from lippmann.image.provenance import Provenance
@@ -16,9 +16,10 @@ from lippmann.journal.fingerprint import content_hash, in_words
 from lippmann.journal.frame_journal import ENDING, FrameJournal
 from lippmann.journal.tile_journal import sweep_beside
 from lippmann.progress import ProgressCallback, silent
+from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.runtime import engine
-from lippmann.scene.placement import Mode, PlacementOptions
-from lippmann.sequences.frames import Stand, filed, find_stand, rendered
+from lippmann.scene.placement import PlacementOptions
+from lippmann.sequences.frames import Stand, find_stand, hold_choice, render_frames, render_tiled_frames
 from lippmann.sequences.motion import Motion
 
 if TYPE_CHECKING:
@@ -27,10 +28,8 @@ if TYPE_CHECKING:
 #: A frame's number, how it was made, and what was chosen for it.
 _Made: TypeAlias = "tuple[int, Provenance, dict[str, str]]"
 
-#: Options that change nothing in the pictures.
-_IMMATERIAL = ("device", "threads")
-#: Options that are chosen for the first frame and hold for all.
-_CHOSEN = ("method", "denoise")
+#: What of a request changes nothing in the pictures, or is told apart.
+_IMMATERIAL = ("device", "threads", "reason", "placement")
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,18 +64,12 @@ def saved_sequence(
     path_of: Callable[[int], Path],
     display: Display,
     frames: Sequence[int],
+    request: RenderRequest,
     *,
     resume: bool = False,
     bits: int | None = None,
     runner: Runner | None = None,
-    camera: str | None = None,
-    place: str | None = None,
-    turn: tuple[float, float, float] = (0.0, 0.0, 0.0),
-    shift: tuple[float, float, float] = (0.0, 0.0, 0.0),
-    scale: float = 1.0,
-    pop_out: float | None = None,
     progress: ProgressCallback = silent,
-    **options: Any,
 ) -> Iterator[Iterator[SavedFrame]]:
     """Render one file a frame; a journal beside them tells which are finished.
 
@@ -89,14 +82,16 @@ def saved_sequence(
         What the sequence is called; see :func:`journal_of`.
     path_of:
         The file of each frame.
+    request:
+        How each is made; its placement is for the whole sequence.
     resume:
         Keep the frames that an interrupted run finished, if there are any: those whose files are as they were then. All
         frames together are the same, byte for byte, as those of an unbroken run.
     runner:
         Renders the frames in tiles, as of :func:`lippmann.sequences.frames.sequence_to_files`; without one they are
         rendered whole, as of :func:`lippmann.sequences.frames.render_sequence`.
-    bits, options:
-        As there; the others as of :func:`lippmann.sequences.frames.render_sequence`.
+    bits:
+        As there.
 
     Yields
     ------
@@ -114,34 +109,37 @@ def saved_sequence(
     from lippmann.tiles.job import made_by
 
     name, stored = format_for(path_of(frames[0]), bits)
-    placed = PlacementOptions(cast("Mode | None", place), camera, turn, shift, scale, pop_out)
-    started = engine.start(options.get("device", "auto"), options.get("threads"))
-    # "auto", the default, may use the denoiser where it is installed.
-    denoiser = oidn.denoiser_version() if options.get("denoise") != "none" else None
+    placement = request.placement
+    if not isinstance(placement, PlacementOptions):
+        raise TypeError("a sequence finds the placement of each frame by itself")
+    started = engine.start(request.device, request.threads)
+    denoiser = oidn.denoiser_version() if request.denoise != "none" else None
+    options = {name: value for name, value in vars(request).items() if name not in _IMMATERIAL}
     fingerprint = {
         **made_by(started.gpu_name or "cpu", started.llvm_version, denoiser),
         "the scene and what moves in it": content_hash(motion.content),
         **in_words(display.to_dict(), "the display's "),
-        **in_words({key: value for key, value in options.items() if key not in _IMMATERIAL}),
-        **in_words(vars(placed), "placement "),
+        **in_words(options),
+        **in_words(vars(placement), "placement "),
         "the format": name,
         "values": stored,
         "frames are rendered": "whole" if runner is None else "in tiles",
         # What is chosen for it holds for all.
         "the first frame": str(frames[0]),
     }
-    where = find_stand(motion, display, placed)
+    where = find_stand(motion, display, placement)
     with FrameJournal.open(journal_of(output, path_of(frames[0])), fingerprint, resume=resume) as journal:
         missing = [number for number in frames if not journal.holds(number, path_of(number))]
         if missing:
             sweep_beside(path_of(missing[0]))  # which an interrupted run may have left half written
         if missing and missing[0] != frames[0]:
             # Nothing else is taken from a journal, which somebody may have changed.
-            options |= {name: value for name, value in journal.chosen.items() if name in _CHOSEN}
+            chosen = {"method": request.method, "denoise": request.denoise, **journal.chosen}
+            request = hold_choice(request, chosen["method"], chosen["denoise"])
         if runner is None:
-            made = _whole(motion, display, missing, where, path_of, bits, progress, options)
+            made = _whole(motion, display, missing, where, path_of, bits, progress, request)
         else:
-            files = filed(motion, display, missing, where, path_of, runner, bits, progress, options)
+            files = render_tiled_frames(motion, display, missing, where, path_of, request, runner, bits, progress)
             made = ((number, written.provenance, {}) for number, written in files)
         yield _in_order(frames, missing, path_of, made, journal)
         if all(number in journal for number in frames):
@@ -175,10 +173,10 @@ def _whole(
     path_of: Callable[[int], Path],
     bits: int | None,
     progress: ProgressCallback,
-    options: dict[str, Any],
+    request: RenderRequest,
 ) -> Iterator[_Made]:
     """Frames rendered in one piece, and saved."""
-    for number, image in rendered(motion, display, frames, where, progress, options):
+    for number, image in render_frames(motion, display, frames, where, request, progress):
         image.save(path_of(number), bits=bits)
         made = image.provenance
         yield number, made, {"method": made.method, "denoise": str(made.options.get("denoise", "none"))}

@@ -10,24 +10,22 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
-from lippmann.api import render, render_to_file
 from lippmann.display import Display, load_display
 from lippmann.errors import SceneError, UsageError
 from lippmann.progress import Progress, ProgressCallback, silent
+from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.scene.placement import Mode, Placement, PlacementOptions, place, stand
 from lippmann.scene.values.description import Camera, Matrix
 from lippmann.sequences.motion import Motion, open_motion
 
 if TYPE_CHECKING:
     from lippmann.image import IntegralImage
+    from lippmann.rendering.request.choices import Denoiser, Method
     from lippmann.tiles.tiled_render import Rendered, Runner
-
-#: Options of methods that tiles cannot be rendered with.
-_WHOLE_PICTURE_ONLY = ("order", "respect_gloss")
 
 
 @dataclass(frozen=True)
@@ -48,7 +46,7 @@ class FrameRange:
         if self.first < 0 or self.step < 1 or (self.stop is not None and self.stop <= self.first):
             raise UsageError(
                 f"the frames {self.first} to {'the end' if self.stop is None else self.stop} in steps of {self.step}",
-                where="--frames",
+                parameter="frames",
                 rule="FIRST:STOP or FIRST:STOP:STEP, such as 0:48 for the frames 0 to 47",
             )
 
@@ -65,7 +63,7 @@ class FrameRange:
             last = frames[-1] if frames else self.first
             raise UsageError(
                 f"there is no frame {last}",
-                where="--frames",
+                parameter="frames",
                 rule=f"there are {motion.count}, counted from 0",
                 fix=f"ask for {min(self.first, motion.count - 1)}:{motion.count}",
             )
@@ -107,7 +105,7 @@ def find_stand(motion: Motion, display: Display, options: PlacementOptions) -> S
     if camera is None and options.mode == "camera":
         cameras = motion.scene(0).cameras
         if not cameras:
-            raise SceneError("the scene has no cameras", where="--place", fix="fit it instead")
+            raise SceneError("the scene has no cameras", parameter="place", fix="fit it instead")
         options = replace(options, camera=cameras[0].name)
         camera = motion.camera(0, options.camera)
     if camera is None:
@@ -115,7 +113,7 @@ def find_stand(motion: Motion, display: Display, options: PlacementOptions) -> S
         return Stand(motion, display, placement.mode, placement.world_from_display)
     if options.mode not in (None, "camera"):
         raise UsageError(
-            f"placement '{options.mode}' beside a flight", where="--place", rule="the display follows the camera"
+            f"placement '{options.mode}' beside a flight", parameter="place", rule="the display follows the camera"
         )
     following = replace(options, mode="camera", camera=camera.name)
     placement = place(motion.bounds(), display, cameras=(camera,), options=following)
@@ -127,14 +125,9 @@ def render_sequence(
     display: Display | str | Path = "seed-lenticular",
     frames: FrameRange | Sequence[int] = FrameRange(),
     *,
-    camera: str | None = None,
-    place: str | None = None,
-    turn: tuple[float, float, float] = (0.0, 0.0, 0.0),
-    shift: tuple[float, float, float] = (0.0, 0.0, 0.0),
-    scale: float = 1.0,
-    pop_out: float | None = None,
+    placement: PlacementOptions | None = None,
     progress: ProgressCallback = silent,
-    **options: Any,
+    **options: object,
 ) -> Iterator[tuple[int, IntegralImage]]:
     """Render one integral image a frame; each is traced when it is asked for.
 
@@ -146,11 +139,11 @@ def render_sequence(
         A display, a preset's name, or a TOML file.
     frames:
         Which frames.
-    camera, place, turn, shift, scale, pop_out:
-        As of :func:`lippmann.render`, for the whole sequence; a camera is followed as it moves.
+    placement:
+        Where the display stands during the whole sequence; a camera is followed as it moves.
     progress:
         Called with reports of each frame's stages; notes say which frame it is.
-    options:
+    **options:
         Further options of :func:`lippmann.render`. All frames have the same seed, so that noise does not flicker.
 
     Yields
@@ -163,9 +156,8 @@ def render_sequence(
     LippmannError
         Of the kind that says what was wrong; before the first frame for what can be told then.
     """
-    placed = PlacementOptions(cast("Mode | None", place), camera, turn, shift, scale, pop_out)
-    shown, wanted, where = _begun(motion, display, frames, placed)
-    return rendered(motion, shown, wanted, where, progress, options)
+    target, numbers, where = _begin(motion, display, frames, placement)
+    return render_frames(motion, target, numbers, where, RenderRequest.of(options), progress)
 
 
 def sequence_to_files(
@@ -174,16 +166,11 @@ def sequence_to_files(
     display: Display | str | Path = "seed-lenticular",
     frames: FrameRange | Sequence[int] = FrameRange(),
     *,
+    placement: PlacementOptions | None = None,
     runner: Runner | None = None,
     bits: int | None = None,
-    camera: str | None = None,
-    place: str | None = None,
-    turn: tuple[float, float, float] = (0.0, 0.0, 0.0),
-    shift: tuple[float, float, float] = (0.0, 0.0, 0.0),
-    scale: float = 1.0,
-    pop_out: float | None = None,
     progress: ProgressCallback = silent,
-    **options: Any,
+    **options: object,
 ) -> Iterator[tuple[int, Rendered]]:
     """Render one file a frame in tiles, which a ``runner`` may spread over a cluster.
 
@@ -195,7 +182,7 @@ def sequence_to_files(
         The file of each frame.
     runner, bits:
         As of :func:`lippmann.api.render_to_file`.
-    options:
+    **options:
         As there; the others as of :func:`render_sequence`.
 
     Yields
@@ -208,70 +195,83 @@ def sequence_to_files(
     LippmannError
         As :func:`lippmann.api.render_to_file`.
     """
-    placed = PlacementOptions(cast("Mode | None", place), camera, turn, shift, scale, pop_out)
-    shown, wanted, where = _begun(motion, display, frames, placed)
-    return filed(motion, shown, wanted, where, path_of, runner, bits, progress, options)
+    target, numbers, where = _begin(motion, display, frames, placement)
+    request = RenderRequest.of(options)
+    return render_tiled_frames(motion, target, numbers, where, path_of, request, runner, bits, progress)
 
 
-def _begun(
-    motion: Motion, display: Display | str | Path, frames: FrameRange | Sequence[int], options: PlacementOptions
+def _begin(
+    motion: Motion,
+    display: Display | str | Path,
+    frames: FrameRange | Sequence[int],
+    placement: PlacementOptions | None,
 ) -> tuple[Display, Sequence[int], Stand]:
-    shown = display if isinstance(display, Display) else load_display(display)
-    wanted = frames.of(motion) if isinstance(frames, FrameRange) else frames
-    return shown, wanted, find_stand(motion, shown, options)
+    target = display if isinstance(display, Display) else load_display(display)
+    numbers = frames.of(motion) if isinstance(frames, FrameRange) else frames
+    return target, numbers, find_stand(motion, target, placement or PlacementOptions())
 
 
-def rendered(
+def render_frames(
     motion: Motion,
     display: Display,
     frames: Sequence[int],
     where: Stand,
+    request: RenderRequest,
     progress: ProgressCallback,
-    options: dict[str, Any],
 ) -> Iterator[tuple[int, IntegralImage]]:
     """The frames of :func:`render_sequence`, once it is known where the display stands."""
+    from lippmann.rendering.picture import render_picture
+
     for position, frame in enumerate(frames):
         report = _of_frame(progress, position, len(frames))
-        image = render(motion.scene(frame), display, placed=where(frame), progress=report, **options)
+        image = render_picture(motion.scene(frame), display, replace(request, placement=where(frame)), report)
         if position == 0:
             # What was chosen for the first frame holds for all: a change of method would be seen.
             made = image.provenance
-            options = {**options, "method": made.method, "denoise": made.options.get("denoise", "none")}
+            request = hold_choice(request, made.method, str(made.options.get("denoise", "none")))
         provenance = replace(image.provenance, options={**image.provenance.options, "frame": frame})
         yield frame, replace(image, provenance=provenance)
 
 
-def filed(
+def render_tiled_frames(
     motion: Motion,
     display: Display,
     frames: Sequence[int],
     where: Stand,
     path_of: Callable[[int], Path],
+    request: RenderRequest,
     runner: Runner | None,
     bits: int | None,
     progress: ProgressCallback,
-    options: dict[str, Any],
 ) -> Iterator[tuple[int, Rendered]]:
     """The files of :func:`sequence_to_files`, once it is known where the display stands."""
-    for name in _WHOLE_PICTURE_ONLY:
-        if options.get(name) is not None:
-            raise UsageError("is for methods that need the whole picture", where=f"--{name.replace('_', '-')}")
-    options = {name: value for name, value in options.items() if name not in _WHOLE_PICTURE_ONLY}
+    from lippmann.tiles.tiled_render import render_to_file
+
     for position, frame in enumerate(frames):
         yield (
             frame,
             render_to_file(
                 motion.scene(frame),
-                path_of(frame),
                 display,
+                replace(request, placement=where(frame)),
+                path_of(frame),
                 bits=bits,
                 resume=True,
-                placement=where(frame),
                 runner=runner,
                 progress=_of_frame(progress, position, len(frames)),
-                **options,
             ),
         )
+
+
+def hold_choice(request: RenderRequest, method: str, denoise: str) -> RenderRequest:
+    """``request`` with the method and the denoiser that were chosen for a sequence's first frame.
+
+    Raises
+    ------
+    UsageError
+        They are not known.
+    """
+    return replace(request, method=cast("Method", method), denoise=cast("Denoiser", denoise))
 
 
 def _of_frame(progress: ProgressCallback, position: int, frames: int) -> ProgressCallback:

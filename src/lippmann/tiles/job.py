@@ -18,15 +18,15 @@ from lippmann._version import VERSION
 from lippmann.color.transfer import Transfer
 from lippmann.display import Display
 from lippmann.display.pixel_window import PixelWindow, TileGrid
-from lippmann.errors import MemoryLimitError, UsageError
+from lippmann.errors import UsageError
 from lippmann.journal.fingerprint import content_hash, in_words
-from lippmann.rendering.picture import default_memory, transfer_of
-from lippmann.rendering.request.resolve import decide
-from lippmann.rendering.request.settings import RenderSettings
+from lippmann.rendering.film import memory_model
+from lippmann.rendering.request.render_request import RenderRequest
+from lippmann.rendering.request.resolve import resolve
+from lippmann.rendering.session import memory_limit
 from lippmann.runtime.cached_property import cached_property
 from lippmann.scene.mitsuba_source import MitsubaSource
 from lippmann.scene.mitsuba_xml import MitsubaXml
-from lippmann.scene.placement import Placement, PlacementOptions
 from lippmann.scene.scene import Scene
 from lippmann.tiles.margins import Surroundings, surroundings_of
 
@@ -39,20 +39,12 @@ SIDES = (1024, 512, 256, 128)
 MOST_SAMPLES = 1 << 24
 #: Fewer tiles than this leave little to resume and nothing to share out.
 FEWEST_TILES = 32
-#: What rendering a pixel of a tile takes in memory: sums of eight batches, the picture, its errors, and a wavefront.
-BYTES_PER_PIXEL = 8 * 12 + 24 + 12 + 96
-#: The same for a pixel of a window whose tile needs its surroundings: pictures, batches, guides and what Open Image
-#: Denoise works with.
-BYTES_DENOISED = 768
 #: Fewer tiles than this do where each is rendered with its surroundings: small ones are mostly those.
 FEWEST_WINDOWS = 4
 #: The most memory that tiles with surroundings are planned for where no limit is given.
 MOST_MEMORY = 4 << 30
-#: Pictures number their sub-pixels in 32 bits.
-MOST_SUBPIXELS = 1 << 32
-
-#: Settings that change nothing in the picture.
-_IMMATERIAL = ("device", "threads", "memory")
+#: What of a request changes nothing in the picture.
+_IMMATERIAL = ("device", "threads", "memory", "reason")
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,26 +53,22 @@ class TileJob:
 
     Parameters
     ----------
-    scene, display, settings, placement:
-        As for :func:`lippmann.rendering.picture.render_integral_image`; a placement may be known already.
+    scene, display, request:
+        As for :func:`lippmann.rendering.picture.render_picture`; the request is a resolved one.
     side:
         Pixels along a tile's sides.
     stored:
         The type of the values that tiles hold.
     keeps_maps:
         Whether the file holds maps: the estimated error of each pixel, and its samples.
-    why:
-        Why it is this method, where the user left that open.
     """
 
     scene: Scene
     display: Display
-    settings: RenderSettings
-    placement: PlacementOptions | Placement
+    request: RenderRequest
     side: int
     stored: Stored
     keeps_maps: bool = False
-    why: str = ""
 
     @property
     def grid(self) -> TileGrid:
@@ -90,17 +78,17 @@ class TileJob:
     @property
     def transfer(self) -> Transfer:
         """How values become codes."""
-        return transfer_of(self.settings)
+        return self.request.transfer
 
     @property
     def tile_memory(self) -> int:
         """Bytes that a tile may use, whatever is free: how it is cut into wavefronts must not depend on that."""
-        return bytes_of_tile(self.side, self.display, self.settings)
+        return bytes_of_tile(self.side, self.display, self.request)
 
     @property
     def surroundings(self) -> Surroundings | None:
         """What is rendered around tiles; None where each pixel stands for itself."""
-        return surroundings_of(self.display, self.settings)
+        return surroundings_of(self.display, self.request)
 
     def window(self, index: int) -> PixelWindow:
         """The pixels that are rendered for a tile: its own and, where it needs any, those around."""
@@ -131,21 +119,21 @@ class TileJob:
 
     def fingerprint(self, device: str, llvm: str | None = None, denoiser: str | None = None) -> dict[str, str]:
         """All that the picture's bytes depend on, by names for people; parameters as of :func:`made_by`."""
-        settings = {
-            f.name.replace("_", " "): repr(getattr(self.settings, f.name))
-            for f in dataclasses.fields(self.settings)
-            if f.name not in _IMMATERIAL
+        request = {
+            f.name.replace("_", " "): repr(getattr(self.request, f.name))
+            for f in dataclasses.fields(self.request)
+            if f.name not in (*_IMMATERIAL, "placement")
         }
         placement = {
-            f"placement {f.name.replace('_', ' ')}": _text(getattr(self.placement, f.name))
-            for f in dataclasses.fields(self.placement)
+            f"placement {f.name.replace('_', ' ')}": _text(getattr(self.request.placement, f.name))
+            for f in dataclasses.fields(self.request.placement)
         }
         return {
             **made_by(device, llvm, denoiser),
             "the scene's name": self.scene.name,
             "the scene": self.scene_hash,
             **in_words(self.display.to_dict(), "the display's "),
-            **settings,
+            **request,
             **placement,
             "values": self.stored,
             "maps": str(self.keeps_maps),
@@ -163,8 +151,7 @@ class TileJob:
 def make_job(
     scene: Scene,
     display: Display,
-    settings: RenderSettings,
-    placement: PlacementOptions | Placement,
+    request: RenderRequest,
     *,
     stored: Stored,
     keeps_maps: bool = False,
@@ -175,16 +162,12 @@ def make_job(
     Raises
     ------
     UsageError
-        If the settings ask for something that needs the whole picture at once.
+        If the request is for something that needs the whole picture at once.
     MemoryLimitError
-        If ``settings.memory`` does not hold the smallest tile.
+        If ``request.memory`` does not hold the smallest tile.
     """
-    choice = decide(settings)
-    settings = choice.settings
-    _check_possible(display, settings)
-    if side is None:
-        side = _best_side(display, settings)
-    return TileJob(scene, display, settings, placement, side, stored, keeps_maps, choice.why)
+    request = resolve(request, scene, display, "tiles")
+    return TileJob(scene, display, request, _best_side(display, request) if side is None else side, stored, keeps_maps)
 
 
 def made_by(device: str, llvm: str | None = None, denoiser: str | None = None) -> dict[str, str]:
@@ -208,62 +191,32 @@ def made_by(device: str, llvm: str | None = None, denoiser: str | None = None) -
     }
 
 
-def bytes_of_tile(side: int, display: Display, settings: RenderSettings) -> int:
+def bytes_of_tile(side: int, display: Display, request: RenderRequest) -> int:
     """What rendering a tile takes in memory; small ones are given enough for wavefronts that are worth starting."""
-    around = surroundings_of(display, settings)
+    around = surroundings_of(display, request)
     if around is None:
-        return max(side, 256) ** 2 * BYTES_PER_PIXEL
-    return max(around.longest(side), 256) ** 2 * BYTES_DENOISED * (3 if settings.keeps_colors(display) else 1)
+        return max(side, 256) ** 2 * memory_model.TILE
+    return (
+        max(around.longest(side), 256) ** 2 * memory_model.DENOISED_TILE * (3 if request.keeps_colors(display) else 1)
+    )
 
 
-def _best_side(display: Display, settings: RenderSettings) -> int:
-    panel, channels = display.panel, 3 if settings.subpixels else 1
-    memory, fewest = settings.memory, FEWEST_TILES
-    if surroundings_of(display, settings) is not None:
+def _best_side(display: Display, request: RenderRequest) -> int:
+    panel = display.panel
+    memory, fewest = request.memory, FEWEST_TILES
+    if surroundings_of(display, request) is not None:
         fewest = FEWEST_WINDOWS
-        memory = memory or min(MOST_MEMORY, default_memory())
+        memory = memory or min(MOST_MEMORY, memory_limit(request))
     for side in SIDES:
-        fits = memory is None or bytes_of_tile(side, display, settings) <= memory
-        is_light = side * side * settings.samples * channels <= MOST_SAMPLES
+        fits = memory is None or bytes_of_tile(side, display, request) <= memory
+        is_light = side * side * request.samples * request.channels <= MOST_SAMPLES
         if fits and is_light and len(TileGrid(panel.width, panel.height, side)) >= fewest:
             return side
     smallest = SIDES[-1]
-    required = bytes_of_tile(smallest, display, settings)
+    required = bytes_of_tile(smallest, display, request)
     if memory is not None and memory < required:
-        raise MemoryLimitError(
-            f"{memory / 2**20:.0f} MiB are too small for a tile",
-            where="--memory",
-            rule=f"{required / 2**20:.0f} MiB are needed beside the scene",
-            fix="raise the limit",
-        )
+        raise memory_model.too_small(memory, "a tile, beside the scene", required)
     return smallest
-
-
-def _check_possible(display: Display, settings: RenderSettings) -> None:
-    whole = {
-        "--method": None if settings.method in ("full", "pooled") else settings.method,
-        "--quality": settings.quality,
-        "--quality-mean": settings.quality_mean,
-        "--max-time": settings.max_time,
-        "--layers": True if settings.layers else None,
-    }
-    for option, value in whole.items():
-        if value is not None:
-            raise UsageError(
-                "needs the whole picture" if value is True else f"{value} needs the whole picture",
-                where=option,
-                rule="with --resume, to Zarr and beyond the memory pictures are rendered in tiles",
-                fix="leave it out" if option != "--method" else "use --method full or pooled",
-            )
-    panel = display.panel
-    subpixels = panel.width * panel.height * (3 if settings.subpixels else 1)
-    if subpixels >= MOST_SUBPIXELS:
-        raise UsageError(
-            f"the display {display.name} has {panel.width} x {panel.height} pixels",
-            where="--display",
-            rule=f"pictures of fewer than {MOST_SUBPIXELS} (sub-)pixels are rendered",
-            fix="render it in parts",
-        )
 
 
 def _text(value: object) -> str:

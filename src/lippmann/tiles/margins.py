@@ -20,7 +20,7 @@ from dataclasses import dataclass
 from lippmann.display import Display
 from lippmann.display.pixel_window import PixelWindow
 from lippmann.rendering.denoise.oidn import NETWORK_STEP
-from lippmann.rendering.request.settings import RenderSettings
+from lippmann.rendering.request.render_request import RenderRequest
 
 #: Whole lenses around a tile whose light is shared after denoising.
 SHARED_LENSES = 2
@@ -55,10 +55,10 @@ class Surroundings:
         return max(0, begin), end - max(0, begin)
 
 
-def surroundings_of(display: Display, settings: RenderSettings) -> Surroundings | None:
+def surroundings_of(display: Display, request: RenderRequest) -> Surroundings | None:
     """What has to be rendered around tiles of a picture; None where every pixel stands for itself."""
-    if not settings.denoises:
+    if not request.denoises:
         return None
     lens = max(1, round(display.pixels_per_lens[0]))
-    shared = SHARED_LENSES * lens if settings.shares_light else 0
+    shared = SHARED_LENSES * lens if request.shares_light else 0
     return Surroundings(max(shared, DENOISER_REACH), NETWORK_STEP)

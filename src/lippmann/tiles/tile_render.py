@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
@@ -13,19 +13,20 @@ from lippmann.display import NUMPY, Display
 from lippmann.display.pixel_window import PixelWindow
 from lippmann.image.encoding import stored_values
 from lippmann.journal.tile_file import TileResult
-from lippmann.progress import Progress, ProgressCallback, silent
+from lippmann.progress import ProgressCallback, silent
 from lippmann.rendering.denoise.exposure_survey import Treatment, survey
 from lippmann.rendering.estimate.pixel_errors import ErrorSums, PixelErrors
-from lippmann.rendering.estimate.psnr import ERROR_LAYER, why_no_estimate
+from lippmann.rendering.estimate.psnr import ERROR_LAYER
 from lippmann.rendering.film.sample_batches import FullInBatches
 from lippmann.rendering.film.wavefront import RayTotals, trace_frame
 from lippmann.rendering.film.wavefront_plan import make_plan
 from lippmann.rendering.methods import SAMPLES_LAYER, Job, trace
-from lippmann.rendering.picture import build_for, make_integrator
+from lippmann.rendering.request.preconditions import why_no_estimate
+from lippmann.rendering.session import Session, Stopwatch, open_session
 from lippmann.rendering.transport.ray_source import DisplayRays, WindowRays
 from lippmann.runtime import engine as engines
 from lippmann.runtime.engine_lock import exclusive
-from lippmann.scene.placement import Placement, place
+from lippmann.scene.placement import Placement
 from lippmann.tiles.job import TileJob
 
 #: The arrays of :attr:`TileResult.sums`: flat indices of the lenses that have pixels in the tile, and their sums; those
@@ -43,9 +44,8 @@ class Prepared:
     """
 
     job: TileJob
-    built: Any
+    session: Session
     placement: Placement
-    engine: engines.Engine
     no_estimate: str | None
     integrator: Any
     source: DisplayRays
@@ -87,33 +87,15 @@ def prepare(job: TileJob, progress: ProgressCallback = silent) -> Prepared:
     SceneError, EngineError, UsageError
         As the stages find them.
     """
-    progress(Progress("load", 0, 1))
-    engine = engines.start(job.settings.device, job.settings.threads)
-    progress(Progress("build", 0, 1))
-    scene, settings = job.scene, job.settings
-    built = build_for(scene, settings)
-    placement = job.placement
-    if not isinstance(placement, Placement):
-        placement = place(
-            scene.bounds,
-            job.display,
-            cameras=scene.cameras,
-            options=placement,
-            home_camera=scene.home_camera,
-            bounds_in=scene.bounds_in,
-        )
-    source = DisplayRays(job.display, placement.world_from_display, settings.subpixels)
-    integrator = make_integrator(built, settings, placement.display_from_world, source)
-    return Prepared(
-        job,
-        built,
-        placement,
-        engine,
-        why_no_estimate(settings),
-        integrator,
-        source,
-        survey(integrator, source, settings) if settings.denoises else None,
-    )
+    request = job.request
+    session = open_session(job.scene, request, memory=job.tile_memory, progress=progress)
+    placement = session.place(job.display)
+    source = DisplayRays(job.display, placement.world_from_display, request.subpixels)
+    integrator = session.integrator(source, placement.display_from_world)
+    treatment = survey(integrator, source, request) if request.denoises else None
+    # Tiles are traced in silence, whoever counts them.
+    quiet = replace(session, watch=Stopwatch())
+    return Prepared(job, quiet, placement, why_no_estimate(request), integrator, source, treatment)
 
 
 def render_tile(prepared: Prepared, index: int) -> TileResult:
@@ -124,18 +106,17 @@ def render_tile(prepared: Prepared, index: int) -> TileResult:
 @exclusive()
 def trace_tile(prepared: Prepared, index: int) -> TracedTile:
     """The part of :func:`render_tile` that the engine does."""
-    job, settings = prepared.job, prepared.job.settings
+    job, request, engine = prepared.job, prepared.job.request, prepared.session.engine
     # Another thread may have rendered on another device since the last tile.
-    engines.start(prepared.engine.device, prepared.engine.threads)
+    engines.start(engine.device, engine.threads)
     if job.surroundings is not None:
         return _trace_window(prepared, index)
     window = job.grid[index]
-    is_box = settings.pixel_filter == "box"
     if prepared.no_estimate is not None:
         plan = make_plan(
             window.width,
             window.height,
-            settings.samples,
+            request.samples,
             channels=prepared.source.channels,
             memory=job.tile_memory,
         )
@@ -143,21 +124,21 @@ def trace_tile(prepared: Prepared, index: int) -> TracedTile:
             prepared.integrator,
             prepared.source,
             plan,
-            seed=settings.seed,
-            box_filter=is_box,
+            seed=request.seed,
+            box_filter=request.box_filter,
             corner=(window.top, window.left),
         )
         return TracedTile(index, frame.pixels, None, frame.rays)
     batches = FullInBatches(
         prepared.integrator,
         prepared.source,
-        seed=settings.seed,
-        box_filter=is_box,
+        seed=request.seed,
+        box_filter=request.box_filter,
         transfer=job.transfer,
         memory=job.tile_memory,
         window=window,
     )
-    batches.add(settings.samples)
+    batches.add(request.samples)
     errors = batches.squared_error()
     maps = {ERROR_LAYER: np.maximum(errors.values, 0)}
     return TracedTile(index, batches.picture(), errors, batches.rays, maps)
@@ -169,15 +150,11 @@ def _trace_window(prepared: Prepared, index: int) -> TracedTile:
     tile, window = job.grid[index], job.window(index)
     traced = trace(
         Job(
-            prepared.built,
+            prepared.session,
             prepared.integrator,
             WindowRays(prepared.source, window),
-            job.settings,
             prepared.placement.display_from_world,
-            job.transfer,
-            job.tile_memory,
-            prepared.engine.threads,
-            treatment=prepared.treatment,
+            prepared.treatment,
         )
     )
     inside = tile.relative_to(window).slices

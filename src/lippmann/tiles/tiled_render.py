@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from lippmann.codecs import tiff, zarr_array
 from lippmann.display import Display
 from lippmann.display.pixel_window import TileGrid
-from lippmann.errors import EngineError, MemoryLimitError
+from lippmann.errors import EngineError
 from lippmann.image.encoding import FormatName, encode_tiles, encode_values, is_tiled
 from lippmann.image.metadata import Metadata, to_text
 from lippmann.image.provenance import Provenance
@@ -27,9 +27,10 @@ from lippmann.rendering.denoise import oidn
 from lippmann.rendering.estimate.denoised_psnr import estimate_denoised
 from lippmann.rendering.estimate.pixel_errors import OWN_NOISE, ErrorSums
 from lippmann.rendering.estimate.psnr import Estimate, estimate_of_sums
-from lippmann.rendering.request.settings import RenderSettings
+from lippmann.rendering.film import memory_model
+from lippmann.rendering.request.render_request import RenderRequest
+from lippmann.rendering.session import memory_limit
 from lippmann.runtime import engine as engines
-from lippmann.scene.placement import Placement, PlacementOptions
 from lippmann.scene.scene import Scene
 from lippmann.tiles.job import SIDES, TileJob, make_job
 
@@ -44,10 +45,6 @@ Runner = Callable[["Prepared", Sequence[int], Put], None]
 
 #: Threads that pack and write while the next tile is traced, and tiles that may wait for them.
 _WRITERS, _WAITING = 2, 3
-
-#: What a picture rendered in one piece takes: float32 RGB and the copies that methods and writers make of it, errors;
-#: and where pixels are made from their neighbours, the batches or halves of all samples, which are kept to the end.
-_WHOLE_BYTES_PER_PIXEL, _WHOLE_BYTES_WITH_NEIGHBOURS = 48, 256
 
 #: How often tiles that turn out damaged are made anew before the disk is blamed.
 _MOST_REPAIRS = 3
@@ -75,8 +72,7 @@ class Rendered:
 def render_to_file(
     scene: Scene,
     display: Display,
-    settings: RenderSettings,
-    placement: PlacementOptions | Placement,
+    request: RenderRequest,
     output: Path,
     *,
     bits: int | None = None,
@@ -117,19 +113,18 @@ def render_to_file(
     job = make_job(
         scene,
         display,
-        settings,
-        placement,
+        request,
         stored=stored,
         keeps_maps=name == "exr",
         side=_side_of(output) if resume else None,
     )
     _check_fits(job, name)
     denoiser = None
-    if job.settings.denoises:
+    if job.request.denoises:
         oidn.load_denoiser()
         denoiser = oidn.denoiser_version()
     progress(Progress("load", 0, 1))
-    engine = engines.start(settings.device, settings.threads)
+    engine = engines.start(request.device, request.threads)
     fingerprint = {"the format": name, **job.fingerprint(engine.gpu_name or "cpu", engine.llvm_version, denoiser)}
     with TileStore.open(output, fingerprint, job.grid, resume=resume) as store:
         sweep_beside(output)
@@ -209,7 +204,7 @@ class _Counted:
 def _summed(prepared: Prepared, store: TileStore) -> Provenance:
     """Rays and the estimate from all tiles, in their order; each is checked on the way."""
     from lippmann.rendering.film.wavefront import Frame, RayTotals
-    from lippmann.rendering.picture import Stopwatch, placed_options, provenance_of
+    from lippmann.rendering.picture import placed_options
     from lippmann.tiles.tile_render import LENSES, OF_SAMPLES, SUMS
 
     job, grid = prepared.job, prepared.job.display.lens_grid
@@ -241,19 +236,14 @@ def _summed(prepared: Prepared, store: TileStore) -> Provenance:
         estimate = estimate_denoised(sums[""], sums[OF_SAMPLES], size)
     # Only the size of these pixels is asked for; they take no memory.
     frame = Frame(np.broadcast_to(np.float32(0), (job.grid.height, job.grid.width, 3)), rays)
-    return provenance_of(
-        job.scene,
-        prepared.built,
-        job.settings,
-        prepared.engine,
+    return prepared.session.provenance(
         frame,
-        Stopwatch(),
-        samples=job.settings.samples,
+        samples=job.request.samples,
         estimate=estimate,
         options={
-            **({"auto": job.why} if job.why else {}),
+            **({"auto": job.request.reason} if job.request.reason else {}),
             **prepared.options,
-            **placed_options(job.settings, prepared.placement),
+            **placed_options(job.request, prepared.placement),
         },
         notes=tuple(notes),
     )
@@ -303,7 +293,7 @@ def _whole(job: TileJob, store: TileStore) -> dict[str, NDArray[Any]]:
     height, width = job.grid.height, job.grid.width
     layers: dict[str, NDArray[Any]] = {"": np.empty((height, width, 3), dtype=job.stored)}
     if job.keeps_maps:
-        layers[SAMPLES_LAYER] = np.full((height, width), job.settings.samples, dtype=np.uint32)
+        layers[SAMPLES_LAYER] = np.full((height, width), job.request.samples, dtype=np.uint32)
     for tile in store.results():
         place = job.grid[tile.index].slices
         layers[""][place] = tile.pixels
@@ -312,36 +302,31 @@ def _whole(job: TileJob, store: TileStore) -> dict[str, NDArray[Any]]:
     return layers
 
 
-def fits_whole(display: Display, settings: RenderSettings, memory: int) -> bool:
-    """Whether a picture can be rendered in one piece within so many bytes; see
+def fits_whole(display: Display, request: RenderRequest) -> bool:
+    """Whether a picture can be rendered in one piece within the memory that it may use; see
     :func:`lippmann.rendering.film.wavefront_plan.make_plan`.
 
     Beside its own pixels that takes their errors and the codes of its file; more where it is pooled or denoised, and
     thrice as much where so are sub-pixels that keep all colours.
     """
-    with_neighbours = settings.method == "pooled" or settings.denoises
-    per_pixel = _WHOLE_BYTES_WITH_NEIGHBOURS if with_neighbours else _WHOLE_BYTES_PER_PIXEL
-    per_pixel *= 3 if with_neighbours and settings.keeps_colors(display) else 1
-    return display.panel.width * display.panel.height * per_pixel <= memory
+    with_neighbours = request.method == "pooled" or request.denoises
+    per_pixel = memory_model.WHOLE_WITH_NEIGHBOURS if with_neighbours else memory_model.WHOLE
+    per_pixel *= 3 if with_neighbours and request.keeps_colors(display) else 1
+    return display.panel.width * display.panel.height * per_pixel <= memory_limit(request)
 
 
 def _check_fits(job: TileJob, name: FormatName) -> None:
     """Files that are written whole have to fit into the memory."""
-    from lippmann.rendering.picture import default_memory
-
     if is_tiled(name, (job.grid.width, job.grid.height)):
         return
-    memory = job.settings.memory or default_memory()
+    memory = memory_limit(job.request)
     # The values and the copies that encoders make of them.
     per_pixel = 3 * 3 * np.dtype(job.stored).itemsize + (24 if job.keeps_maps else 0)
     required = job.grid.width * job.grid.height * per_pixel
     if required > memory:
-        raise MemoryLimitError(
-            f"{memory / 2**20:.0f} MiB are too small for {job.grid.width}x{job.grid.height} pixels as {name.upper()}",
-            where="--memory",
-            rule=f"such a file is written whole and needs {required / 2**20:.0f} MiB",
-            fix="give the output the ending .tif or .zarr, or raise the limit",
-        )
+        what = f"{job.grid.width}x{job.grid.height} pixels as {name.upper()}, which is written whole"
+        fix = "give the output the ending .tif or .zarr, or raise the limit"
+        raise memory_model.too_small(memory, what, required, fix)
 
 
 def _side_of(output: Path) -> int | None:

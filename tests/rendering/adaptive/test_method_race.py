@@ -13,7 +13,7 @@ from lippmann.display.panel import Panel
 from lippmann.progress import silent
 from lippmann.rendering.adaptive.convergence import Track
 from lippmann.rendering.adaptive.method_race import ASKED_AGAIN, Contest
-from lippmann.rendering.adaptive.stopping import Goal, reach_judged
+from lippmann.rendering.adaptive.stopping import Goal, reach
 from lippmann.rendering.estimate.pixel_errors import CROSS_NOISE, OWN_NOISE, PixelErrors
 from lippmann.rendering.estimate.psnr import PictureEstimator
 
@@ -74,7 +74,7 @@ def run(
         Track(clean, Sooner(SHOWN), 0.6),
         lambda: rays * samples.taken,
     )
-    outcome = reach_judged(goal, samples.add, contest, clock=lambda: samples.now, probe=lambda: seconds)
+    outcome = reach(goal, samples.add, contest, clock=lambda: samples.now, probe=lambda: seconds)
     return contest, outcome, clean
 
 

@@ -9,22 +9,19 @@ import pytest
 
 from lippmann import api
 from lippmann.display import load_display
-from lippmann.rendering.request.settings import RenderSettings
-from lippmann.scene.placement import PlacementOptions
+from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.tiles.job import make_job
 
 pytestmark = pytest.mark.usefixtures("engine")
 
-SETTINGS = RenderSettings(integrator="direct", denoise="oidn", spp=4)
+SETTINGS = RenderRequest(integrator="direct", denoise="oidn", spp=4)
 
 
 def treatment(scene="small-balls", settings=SETTINGS, size=(96, 64)):
     from lippmann.tiles.tile_render import prepare
 
     display = load_display("seed-lenticular").resized(*size)
-    return prepare(
-        make_job(api.load_scene(scene), display, settings, PlacementOptions(), stored="float32", side=128)
-    ).treatment
+    return prepare(make_job(api.load_scene(scene), display, settings, stored="float32", side=128)).treatment
 
 
 def test_many_rays_deserve_the_high_effort():
@@ -35,7 +32,7 @@ def test_many_rays_deserve_the_high_effort():
 
 
 def test_plain_settings_need_none():
-    assert treatment(settings=RenderSettings(integrator="direct", spp=1)) is None
+    assert treatment(settings=RenderRequest(integrator="direct", spp=1)) is None
 
 
 def test_exposure_makes_the_mean_a_middle_grey():

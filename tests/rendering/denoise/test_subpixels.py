@@ -12,7 +12,7 @@ from lippmann.color.transfer import encode_srgb
 from lippmann.display import Display, LensArray, Panel
 from lippmann.display.pixel_window import PixelWindow
 from lippmann.metrics.mse_psnr import psnr
-from lippmann.rendering.request.settings import RenderSettings
+from lippmann.rendering.request.render_request import RenderRequest
 
 pytestmark = pytest.mark.usefixtures("engine")
 
@@ -21,11 +21,10 @@ SHEET = Display("sheet", Panel(96, 64, 0.2), LensArray("lenticular", 1.24, slant
 
 @pytest.fixture(scope="module")
 def integrator(engine):
-    from lippmann.rendering.picture import build_for, make_integrator
-    from lippmann.rendering.request.settings import RenderSettings
+    from lippmann.rendering.session import open_session
 
-    settings = RenderSettings(integrator="direct")
-    return make_integrator(build_for(lippmann.load_scene("teapot"), settings), settings, np.eye(4), rays())
+    session = open_session(lippmann.load_scene("teapot"), RenderRequest(integrator="direct"))
+    return session.integrator(rays(), np.eye(4))
 
 
 def rays(window=None, display=SHEET):
@@ -107,7 +106,7 @@ def error(image, references):
 @pytest.mark.parametrize(("method", "samples"), [("pooled", 2), ("full", 1)])
 def test_all_colours_are_worth_more_than_one(references, method, samples, monkeypatch):
     found = picture(method, samples, denoise="oidn-fast")
-    monkeypatch.setattr(RenderSettings, "keeps_colors", lambda *_: False)
+    monkeypatch.setattr(RenderRequest, "keeps_colors", lambda *_: False)
     of_one = picture(method, samples, denoise="oidn-fast")
     assert error(found, references) < 0.6 * error(of_one, references)
     assert found.provenance.rays == of_one.provenance.rays

@@ -15,8 +15,9 @@ from lippmann.display.panel import Panel
 from lippmann.image.micro_images import lens_indices
 from lippmann.metrics.mse_psnr import micro_image_means, psnr
 from lippmann.rendering.estimate.pixel_errors import CROSS_NOISE, OWN_NOISE, PixelErrors
-from lippmann.rendering.estimate.psnr import CEILING, Estimate, PictureEstimator, _lenses, cut_at_zero, why_no_estimate
-from lippmann.rendering.request.settings import RenderSettings
+from lippmann.rendering.estimate.psnr import CEILING, Estimate, PictureEstimator, _lenses, cut_at_zero
+from lippmann.rendering.request.preconditions import why_no_estimate
+from lippmann.rendering.request.render_request import RenderRequest
 
 ARRAYS = {
     "straight": LensArray("lenticular", 1.0),
@@ -159,7 +160,7 @@ def test_an_estimate_survives_its_plain_form():
     ],
 )
 def test_pictures_without_an_estimate_say_why(settings, reason):
-    found = why_no_estimate(RenderSettings(**settings))
+    found = why_no_estimate(RenderRequest(**settings))
     assert found is None if reason is None else reason in found
 
 

@@ -148,7 +148,7 @@ def test_plans_follow_the_memory():
     from lippmann.errors import MemoryLimitError
     from lippmann.rendering.film.aov import plan_layers
     from lippmann.rendering.film.feature_buffers import plan_guides
-    from lippmann.rendering.film.wavefront_plan import BYTES_PER_LANE
+    from lippmann.rendering.film.memory_model import BYTES_PER_LANE
     from lippmann.rendering.transport.ray_source import DisplayRays
 
     source = DisplayRays(load_display("seed-lenticular"), np.eye(4))
@@ -157,7 +157,7 @@ def test_plans_follow_the_memory():
         for plan in (plan_layers(source, memory), plan_guides(source, 16, memory)):
             assert plan.lanes * BYTES_PER_LANE < memory - layers
     assert plan_layers(source, 3 * layers).lanes < plan_layers(source, 8 * layers).lanes
-    with pytest.raises(MemoryLimitError, match="--memory"):
+    with pytest.raises(MemoryLimitError, match="memory: 11 MiB are too small for 512x512 pixels; it needs "):
         plan_layers(source, layers)
 
 

@@ -7,7 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lippmann.errors import MemoryLimitError
-from lippmann.rendering.film.wavefront_plan import BYTES_PER_LANE, BYTES_PER_PIXEL, make_plan
+from lippmann.rendering.film.memory_model import BYTES_PER_LANE, PICTURE
+from lippmann.rendering.film.wavefront_plan import make_plan
 
 
 @settings(deadline=None, max_examples=60)
@@ -19,7 +20,7 @@ def test_every_sample_once_and_within_memory(width, height, samples, channels, m
         plan = make_plan(width, height, samples, channels=channels, memory=memory)
     except MemoryLimitError:
         least = max(width * channels, min(1 << 14, width * channels * height * samples))
-        assert memory - width * height * BYTES_PER_PIXEL < least * BYTES_PER_LANE
+        assert memory - width * height * PICTURE < least * BYTES_PER_LANE
         return
     rows = [row for tile in plan.tiles for row in (tile.first_row, tile.first_row + tile.rows)]
     assert rows[0] == 0
@@ -29,7 +30,7 @@ def test_every_sample_once_and_within_memory(width, height, samples, channels, m
     assert [r.first for r in runs] == [sum(q.count for q in runs[:i]) for i in range(len(runs))]
     assert sum(r.count for r in runs) == samples
     assert sum(t.rows * width * channels * r.count for t, r in plan) == plan.work
-    assert plan.lanes * BYTES_PER_LANE + width * height * BYTES_PER_PIXEL <= memory
+    assert plan.lanes * BYTES_PER_LANE + width * height * PICTURE <= memory
 
 
 def test_a_small_picture_is_one_wavefront():
@@ -44,5 +45,5 @@ def test_an_8k_picture_of_four_samples_fits_two_gigabytes():
 
 
 def test_too_little_memory_says_how_much_is_needed():
-    with pytest.raises(MemoryLimitError, match=r"--memory: .* too small .* one tile need \d+ MiB; raise the limit"):
+    with pytest.raises(MemoryLimitError, match=r"memory: .* too small .* it needs \d+ MiB; raise the limit"):
         make_plan(4096, 4096, 1, memory=2**20)

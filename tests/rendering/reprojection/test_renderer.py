@@ -157,29 +157,31 @@ def test_threads_do_not_matter(case, careful):
 
 def test_small_wavefronts_make_the_same_picture(case):
     """So little memory that lists of pixels are traced in parts."""
-    from lippmann.rendering.reprojection.renderer import lanes_within
+    from lippmann.rendering.reprojection.renderer import wavefront_lanes
 
     wide, narrow = 1 << 30, 2_600_000
-    assert lanes_within(narrow, 128, 128, 8) // 8 < 0.2 * 128 * 128
+    assert wavefront_lanes(narrow, 128, 128, 8) // 8 < 0.2 * 128 * 128
     one, other = case("teapot").reused(memory=wide, samples=8), case("teapot").reused(memory=narrow, samples=8)
     assert np.allclose(one.pixels, other.pixels, atol=1e-6)
 
 
 def test_too_little_memory_says_how_much_it_takes(case):
-    with pytest.raises(MemoryLimitError, match=r"--memory: 1 MiB are too small for 128x128 pixels; .* need 2 MiB"):
+    with pytest.raises(
+        MemoryLimitError, match=r"memory: 1 MiB are too small for 128x128 pixels and their points; it needs 2 MiB"
+    ):
         case("teapot").reused(memory=1 << 20)
 
 
 def test_lanes_follow_the_memory():
-    from lippmann.rendering.film.wavefront_plan import PREFERRED_LANES
-    from lippmann.rendering.reprojection.renderer import lanes_within
+    from lippmann.rendering.film.memory_model import PREFERRED_LANES
+    from lippmann.rendering.reprojection.renderer import wavefront_lanes
 
-    assert lanes_within(8 << 30, 512, 512, 1) == PREFERRED_LANES
-    assert lanes_within(64 << 20, 512, 512, 1) < PREFERRED_LANES
+    assert wavefront_lanes(8 << 30, 512, 512, 1) == PREFERRED_LANES
+    assert wavefront_lanes(64 << 20, 512, 512, 1) < PREFERRED_LANES
     # A pixel's samples are traced together.
-    assert lanes_within(8 << 30, 512, 512, 1 << 22) == 1 << 22
+    assert wavefront_lanes(8 << 30, 512, 512, 1 << 22) == 1 << 22
     with pytest.raises(MemoryLimitError):
-        lanes_within(64 << 20, 512, 512, 1 << 22)
+        wavefront_lanes(64 << 20, 512, 512, 1 << 22)
 
 
 @pytest.mark.parametrize("method", ["lens-view", "interpolated"])

@@ -52,7 +52,7 @@ def test_nothing_of_the_scene_is_outside_a_panels_window(ball, display, place):
     )
     found = panel_window(corners, display)
     assert found is not None
-    image = lippmann.render(ball, display, integrator="direct", spp=2, subpixels=True, denoise="none", placed=at)
+    image = lippmann.render(ball, display, integrator="direct", spp=2, subpixels=True, denoise="none", placement=at)
     seen = (image.pixels != np.float32(BACKDROP)).any(axis=-1)
     inside = np.zeros_like(seen)
     inside[found.top : found.top + found.height, found.left : found.left + found.width] = True
@@ -90,7 +90,7 @@ def test_nothing_of_the_scene_is_outside_a_quilts_windows(ball, display, monkeyp
 
 def test_denoised_frames_are_traced_where_the_scene_is(ball):
     display = DISPLAYS[0]
-    options = {"subpixels": True, "scale": 0.6, "seed": 3, "integrator": "direct"}
+    options = {"subpixels": True, "placement": PlacementOptions(scale=0.6), "seed": 3, "integrator": "direct"}
     image = lippmann.render(ball, display, spp=4, denoise="oidn-fast", layers=True, **options)
     assert 0 < image.stats["traced_fraction"] < 0.7
     fine = lippmann.render(ball, display, spp=64, denoise="none", **options)
@@ -120,7 +120,14 @@ def test_before_a_sky_that_is_seen_denoised_frames_are_traced_whole():
         "sky": {"type": "constant", "radiance": {"type": "rgb", "value": 0.5}},
     }
     display = DISPLAYS[0].resized(64, 48)
-    image = lippmann.render(scene, display, place="display", scale=9, integrator="direct", spp=2, denoise="oidn-fast")
+    image = lippmann.render(
+        scene,
+        display,
+        placement=PlacementOptions(mode="display", scale=9),
+        integrator="direct",
+        spp=2,
+        denoise="oidn-fast",
+    )
     assert image.stats["traced_fraction"] == 1.0
     assert image.pixels[0, 0] == pytest.approx(0.5, abs=0.1)
 
@@ -140,10 +147,10 @@ def test_where_nothing_is_saved_there_is_no_window(ball, monkeypatch):
 
 def test_only_an_even_background_is_known_without_rays(ball):
     from lippmann.device.pbr import build
-    from lippmann.rendering.request.settings import RenderSettings
+    from lippmann.rendering.request.render_request import RenderRequest
 
     built = build(ball)
-    assert region_of_interest.even_background(built, RenderSettings(integrator="path")) == BACKDROP
-    assert region_of_interest.even_background(built, RenderSettings(integrator="normal")) is None
+    assert region_of_interest.even_background(built, RenderRequest(integrator="path")) == BACKDROP
+    assert region_of_interest.even_background(built, RenderRequest(integrator="normal")) is None
     lit = lippmann.load_scene(trimesh.creation.box(), environment=None, background=(0.1, 0.2, 0.3))
-    assert region_of_interest.even_background(build(lit), RenderSettings(integrator="direct")) == (0.1, 0.2, 0.3)
+    assert region_of_interest.even_background(build(lit), RenderRequest(integrator="direct")) == (0.1, 0.2, 0.3)

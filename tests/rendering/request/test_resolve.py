@@ -5,68 +5,71 @@ from __future__ import annotations
 import pytest
 
 from lippmann.rendering.denoise.cost_model import HIGH_FROM, denoising_cost, effort_of, traced_work
-from lippmann.rendering.request.resolve import decide
-from lippmann.rendering.request.settings import RenderSettings
+from lippmann.rendering.request.render_request import RenderRequest
+from lippmann.rendering.request.resolve import resolve
+from lippmann.scene.readers.load import load_scene
+
+SCENE = load_scene("teapot")
 
 
 def decided(**values):
-    return decide(RenderSettings(**{"method": "auto", "denoise": "auto"} | values))
+    return resolve(RenderRequest(**values), SCENE)
 
 
 @pytest.mark.parametrize("values", [{}, {"spp": 4}, {"integrator": "classic"}, {"layers": True}])
 def test_samples_stay_as_they_are(values):
     found = decided(**values)
-    assert (found.settings.method, found.settings.denoise) == ("full", "none")
-    assert "no quality is asked for" in found.why
+    assert (found.method, found.denoise) == ("full", "none")
+    assert "no quality is asked for" in found.reason
 
 
 @pytest.mark.parametrize("goal", [{"quality": 30.0}, {"quality_mean": 30.0}, {"max_time": 5.0}])
 def test_a_goal_opens_the_contest(goal):
     found = decided(**goal)
-    assert (found.settings.method, found.settings.denoise) == ("full", "auto")
+    assert (found.method, found.denoise) == ("full", "auto")
 
 
 @pytest.mark.parametrize("goal", [{"quality": 30.0}, {"quality_mean": 30.0}, {"max_time": 5.0}])
 def test_light_that_cannot_be_pooled_has_no_contest(goal):
     found = decided(integrator="classic", **goal)
-    assert (found.settings.method, found.settings.denoise) == ("full", "none")
-    assert "the light of classic is not pooled" in found.why
+    assert (found.method, found.denoise) == ("full", "none")
+    assert "the light of classic is not pooled" in found.reason
 
 
 @pytest.mark.parametrize("denoise", ["none", "oidn", "oidn-fast", "oidn-high"])
 def test_what_is_asked_for_wins(denoise):
     found = decided(quality=30.0, denoise=denoise)
-    assert (found.settings.method, found.settings.denoise) == ("full", denoise)
-    assert "as asked for" in found.why
+    assert (found.method, found.denoise) == ("full", denoise)
+    assert "as asked for" in found.reason
 
 
 def test_pooled_light_is_denoised():
-    assert decided(method="pooled").settings.denoise == "oidn"
+    assert decided(method="pooled").denoise == "oidn"
 
 
 @pytest.mark.parametrize("goal", [{"quality": 30.0}, {"quality_mean": 30.0}])
 def test_a_quality_opens_the_contest_for_pooled_light_too(goal):
-    found = decided(method="pooled", **goal).settings
+    found = decided(method="pooled", **goal)
     assert (found.method, found.denoise) == ("pooled", "auto")
-    assert decided(method="pooled", denoise="oidn-fast", **goal).settings.denoise == "oidn-fast"
+    assert decided(method="pooled", denoise="oidn-fast", **goal).denoise == "oidn-fast"
 
 
 def test_the_best_pooled_light_of_a_time_is_pooled():
-    assert decided(method="pooled", max_time=5.0).settings.denoise == "oidn"
+    assert decided(method="pooled", max_time=5.0).denoise == "oidn"
 
 
 @pytest.mark.parametrize("method", ["full", "lens-view", "interpolated"])
 def test_a_named_method_is_left_alone(method):
     found = decided(method=method)
-    assert (found.settings.method, found.settings.denoise, found.why) == (method, "none", "")
+    assert (found.method, found.denoise, found.reason) == (method, "none", "")
     named = decided(method=method, denoise="oidn")
-    assert named.settings.denoise == "oidn"
+    assert named.denoise == "oidn"
 
 
 def test_what_has_no_noise_is_not_denoised():
     found = decided(integrator="normal", spp=4)
-    assert found.settings.denoise == "none"
-    assert "no noise" in found.why
+    assert found.denoise == "none"
+    assert "no noise" in found.reason
 
 
 def test_effort_follows_the_rays_unless_it_is_named():

@@ -202,7 +202,7 @@ def test_a_woven_quilt_is_near_the_direct_picture():
     """Many views of a flat scene in and near the lens plane, woven: what the display's own rays see."""
     place = PlacementOptions(mode="fit")
     options = {"integrator": "albedo", "spp": 16, "seed": 3}
-    direct = lippmann.render("teapot", SHEET, subpixels=True, place="fit", **options)
+    direct = lippmann.render("teapot", SHEET, subpixels=True, placement=PlacementOptions(mode="fit"), **options)
     # A view as fine as the panel, 60 of them.
     quilt = lippmann.render_quilt("teapot", SHEET, views=(10, 6), size=(1500, 1200), placement=place, **options)
     woven = weave(quilt, SHEET)

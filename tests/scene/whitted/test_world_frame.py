@@ -8,7 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lippmann.errors import SceneError, UsageError
-from lippmann.rendering.request.defaults import choose
+from lippmann.rendering.request.render_request import RenderRequest
+from lippmann.rendering.request.resolve import resolve
 from lippmann.scene.readers.load import load_scene
 from lippmann.scene.scene import bounds_of
 from lippmann.scene.values.whitted_camera import ClassicCamera
@@ -183,22 +184,22 @@ def test_defaults_follow_the_scene(tmp_path):
     )
     scene = load_scene(tmp_path / "one.dat")
     assert scene.is_classic
-    shown = choose(scene)
+    shown = resolve(RenderRequest(), scene)
     assert (shown.integrator, shown.depth, shown.spp, shown.pixel_filter) == ("classic", 7, 1, "point")
-    own = choose(scene, own_camera=True)
+    own = resolve(RenderRequest(), scene, form="preview")
     assert (own.spp, own.pixel_filter) == (4, "box")
-    path = choose(scene, integrator="path")
+    path = resolve(RenderRequest(integrator="path"), scene)
     assert (path.integrator, path.depth, path.spp, path.pixel_filter) == ("path", None, 16, "box")
-    assert choose(load_scene("teapot")).integrator == "path"
-    assert choose(load_scene("teapot"), integrator="classic").depth == 2
-    assert choose(load_scene("tree")).integrator == "classic"
+    assert resolve(RenderRequest(), load_scene("teapot")).integrator == "path"
+    assert resolve(RenderRequest(integrator="classic"), load_scene("teapot")).depth == 2
+    assert resolve(RenderRequest(), load_scene("tree")).integrator == "classic"
     with pytest.raises(UsageError, match=r"has no form for the classic"):
-        choose(load_scene(to_physical(every_shape().build())), integrator="classic")
+        resolve(RenderRequest(integrator="classic"), load_scene(to_physical(every_shape().build())))
 
 
 def test_surroundings_asked_for_give_the_physical_form():
     scene = load_scene("small-balls", environment="studio")
     assert not scene.is_classic
-    assert choose(scene).integrator == "path"
+    assert resolve(RenderRequest(), scene).integrator == "path"
     black = load_scene("small-balls", background=(0, 0, 0))
     assert black.classic.background == Background(color=(0, 0, 0))

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from lippmann.cli.commands import render
 from lippmann.cli.shared import options, parse
 from lippmann.cli.shared.console import Console
 from lippmann.cli.shared.picture_report import depths
+from lippmann.cli.shared.scene_source import SceneSource
 
 if TYPE_CHECKING:
     from lippmann.rendering.forecast import Forecast
@@ -23,15 +23,15 @@ def plan(
     depth: options.Depth = None,
     spp: options.Spp = None,
     seed: options.Seed = 0,
-    subpixels: render.Subpixels = False,
+    subpixels: options.Subpixels = False,
     pixel_filter: options.PixelFilter = "auto",
-    denoise: render.Denoise = "auto",
-    camera: render.Camera = None,
-    place: render.Place = None,
-    turn: render.Turn = None,
-    shift: render.Shift = None,
-    scale: render.Scale = 1.0,
-    pop_out: render.PopOut = None,
+    denoise: options.Denoise = "auto",
+    camera: options.Camera = None,
+    place: options.Place = None,
+    turn: options.Turn = None,
+    shift: options.Shift = None,
+    scale: options.Scale = 1.0,
+    pop_out: options.PopOut = None,
     environment: options.Environment = None,
     background: options.Background = None,
     allow_outside: options.AllowOutside = False,
@@ -42,29 +42,28 @@ def plan(
     quiet: options.Quiet = False,
 ) -> None:
     """Say what 'render' will show and take, without rendering: depth, blur, rays, memory and time."""
-    from lippmann import api
+    from lippmann.display import load_display
+    from lippmann.rendering.forecast import forecast
+    from lippmann.rendering.request.render_request import RenderRequest
 
     console = Console(quiet, as_json)
+    request = RenderRequest(
+        integrator=integrator,
+        depth=depth,
+        spp=spp,
+        seed=seed,
+        subpixels=subpixels,
+        pixel_filter=pixel_filter,
+        denoise=denoise,
+        placement=parse.placement(camera, place, turn, shift, scale, pop_out),
+        device=device,
+        threads=threads,
+        memory=parse.memory(memory),
+    )
+    source = SceneSource(scene, environment, parse.color(background), allow_outside)
     with console.progress() as progress:
-        loaded = api.load_scene(
-            scene, environment=environment, background=parse.color(background), allow_outside=allow_outside
-        )
-        found = api.plan(
-            loaded,
-            display,
-            integrator=integrator,
-            depth=depth,
-            spp=spp,
-            seed=seed,
-            subpixels=subpixels,
-            pixel_filter=pixel_filter,
-            denoise=denoise,
-            placement=parse.placement(camera, place, turn, shift, scale, pop_out),
-            device=device,
-            threads=threads,
-            memory=parse.memory(memory),
-            progress=progress,
-        )
+        loaded = source.load()
+        found = forecast(loaded, load_display(display), request, progress)
     for note in found.notes:
         console.remark(note)
     console.result({"scene": loaded.name, **found.to_dict()}, "\n".join(_lines(loaded.name, found)))

@@ -10,6 +10,7 @@ import typer
 from lippmann.cli.shared import options, parse
 from lippmann.cli.shared.console import Console
 from lippmann.cli.shared.picture_report import add_seconds, report
+from lippmann.cli.shared.scene_source import SceneSource
 
 
 def preview(
@@ -33,33 +34,30 @@ def preview(
     quiet: options.Quiet = False,
 ) -> None:
     """Render the plain picture that the scene's camera sees."""
-    from lippmann import api
     from lippmann.image.write import format_for, write_plain_picture
+    from lippmann.rendering.preview import render_preview
+    from lippmann.rendering.request.render_request import RenderRequest
     from lippmann.runtime.atomic_write import check_writable
 
     console = Console(quiet, as_json)
     format_for(output, bits)
     check_writable(output)
+    request = RenderRequest(
+        integrator=integrator,
+        depth=depth,
+        spp=spp,
+        seed=seed,
+        pixel_filter=pixel_filter,
+        device=device,
+        threads=threads,
+        memory=parse.memory(memory),
+    )
+    source = SceneSource(scene, environment, parse.color(background), allow_outside)
     with console.progress() as progress:
         started = time.perf_counter()
-        loaded = api.load_scene(
-            scene, environment=environment, background=parse.color(background), allow_outside=allow_outside
-        )
+        loaded = source.load()
         load_seconds = time.perf_counter() - started
-        plain = api.preview(
-            loaded,
-            size=parse.size(size, "--size"),
-            camera=camera,
-            integrator=integrator,
-            depth=depth,
-            spp=spp,
-            seed=seed,
-            pixel_filter=pixel_filter,
-            device=device,
-            threads=threads,
-            memory=parse.memory(memory),
-            progress=progress,
-        )
+        plain = render_preview(loaded, camera, parse.size(size, "--size"), request, progress)
         writing = time.perf_counter()
         provenance = add_seconds(plain.provenance, load=load_seconds)
         write_plain_picture(plain.pixels, output, bits=bits, transfer=provenance.transfer)

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from lippmann.cli.commands import render as rendering
 from lippmann.cli.shared import options, parse
 from lippmann.cli.shared.console import Console, estimate_in_words
 from lippmann.cli.shared.picture_report import add_seconds, depth_line, report
+from lippmann.cli.shared.scene_source import SceneSource
 from lippmann.progress import Progress, ProgressCallback
 
 if TYPE_CHECKING:
@@ -44,7 +44,7 @@ Size = Annotated[
     str | None, typer.Option("--size", help="Width x height of the quilt in pixels; by default the device's.")
 ]
 Method = Annotated[
-    str,
+    Literal["auto", "full", "pooled"],
     typer.Option(
         "--method",
         help="auto: what is fastest for the quality asked for; full: every ray is traced; "
@@ -68,17 +68,17 @@ def render(
     quality: Annotated[
         float | None, typer.Option("--quality", help="Work until every view is estimated to reach this PSNR in dB.")
     ] = None,
-    quality_mean: rendering.QualityMean = None,
-    max_time: rendering.MaxTime = None,
+    quality_mean: options.QualityMean = None,
+    max_time: options.MaxTime = None,
     seed: options.Seed = 0,
     pixel_filter: options.PixelFilter = "auto",
-    denoise: rendering.Denoise = "auto",
-    camera: rendering.Camera = None,
-    place: rendering.Place = None,
-    turn: rendering.Turn = None,
-    shift: rendering.Shift = None,
-    scale: rendering.Scale = 1.0,
-    pop_out: rendering.PopOut = None,
+    denoise: options.Denoise = "auto",
+    camera: options.Camera = None,
+    place: options.Place = None,
+    turn: options.Turn = None,
+    shift: options.Shift = None,
+    scale: options.Scale = 1.0,
+    pop_out: options.PopOut = None,
     environment: options.Environment = None,
     background: options.Background = None,
     allow_outside: options.AllowOutside = False,
@@ -90,10 +90,11 @@ def render(
     quiet: options.Quiet = False,
 ) -> None:
     """Render a scene as a quilt: the views of cameras side by side before the display."""
-    from lippmann import api
     from lippmann.image.write import format_for
     from lippmann.quilts.files import write_quilt
-    from lippmann.quilts.quilt import load_device, quilt_of_display
+    from lippmann.quilts.quilt import Quilt, load_device, quilt_of_display
+    from lippmann.rendering.quilt import render_quilt
+    from lippmann.rendering.request.render_request import RenderRequest
     from lippmann.runtime.atomic_write import check_writable
 
     console = Console(quiet, as_json)
@@ -104,33 +105,32 @@ def render(
     _check_name(path, wanted.layout.ending)
     format_for(path, bits)
     check_writable(path)
+    request = RenderRequest(
+        method=method,
+        integrator=integrator,
+        depth=depth,
+        spp=spp,
+        quality=quality,
+        quality_mean=quality_mean,
+        max_time=max_time,
+        seed=seed,
+        pixel_filter=pixel_filter,
+        denoise=denoise,
+        placement=parse.placement(camera, place, turn, shift, scale, pop_out),
+        device=device,
+        threads=threads,
+        memory=parse.memory(memory),
+    )
+    source = SceneSource(scene, environment, parse.color(background), allow_outside)
     with console.progress() as progress:
         started = time.perf_counter()
-        loaded = api.load_scene(
-            scene, environment=environment, background=parse.color(background), allow_outside=allow_outside
-        )
+        loaded = source.load()
         load_seconds = time.perf_counter() - started
-        made = api.render_quilt(
-            loaded,
-            target,
-            views=(wanted.layout.columns, wanted.layout.rows),
-            size=(wanted.width, wanted.height),
-            method=method,
-            integrator=integrator,
-            depth=depth,
-            spp=spp,
-            quality=quality,
-            quality_mean=quality_mean,
-            max_time=max_time,
-            seed=seed,
-            pixel_filter=pixel_filter,
-            denoise=denoise,
-            placement=parse.placement(camera, place, turn, shift, scale, pop_out),
-            device=device,
-            threads=threads,
-            memory=parse.memory(memory),
-            progress=progress,
+        layout = wanted.layout
+        frame = render_quilt(
+            loaded, target, (layout.columns, layout.rows), (wanted.width, wanted.height), request, progress
         )
+        made = Quilt(frame.pixels, layout, provenance=frame.provenance)
         progress(Progress("write", 0, 1))
         writing = time.perf_counter()
         write_quilt(made, path, bits=bits)

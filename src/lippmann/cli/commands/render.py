@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -17,37 +17,16 @@ from lippmann.cli.commands import sequence
 from lippmann.cli.shared import options, parse
 from lippmann.cli.shared.console import Console
 from lippmann.cli.shared.picture_report import add_seconds, remarks, report
+from lippmann.cli.shared.scene_source import SceneSource
 from lippmann.errors import UsageError
 from lippmann.progress import Progress, ProgressCallback
 
 if TYPE_CHECKING:
     from lippmann.display import Display
     from lippmann.image import IntegralImage
-    from lippmann.tiles.tiled_render import Rendered, Runner
+    from lippmann.rendering.request.render_request import RenderRequest
+    from lippmann.tiles.tiled_render import Runner
 
-Method = Annotated[
-    str,
-    typer.Option(
-        "--method",
-        help="auto: what is fastest for the quality asked for; full: every ray is traced; "
-        "lens-view: points are carried from lens to lens and missed pixels traced; "
-        "interpolated: those of every other lens are averaged; "
-        "pooled: noise is taken out, and all lenses that see a point share its light.",
-    ),
-]
-Order = Annotated[
-    str | None,
-    typer.Option("--order", help="For lens-view and interpolated: default, or paper (lens by lens, as the paper did)."),
-]
-RespectGloss = Annotated[
-    bool | None,
-    typer.Option(
-        "--respect-gloss/--no-respect-gloss",
-        help="For them: trace what carrying over would falsify (mirrors, glass, highlights, edges). "
-        "By default yes, but in the paper's order.",
-        show_default=False,
-    ),
-]
 Maps = Annotated[
     Path | None,
     typer.Option(
@@ -56,46 +35,6 @@ Maps = Annotated[
         show_default=False,
     ),
 ]
-Camera = Annotated[str | None, typer.Option("--camera", help="Place the display by this camera of the scene file.")]
-Place = Annotated[
-    str | None,
-    typer.Option(
-        "--place",
-        help="fit: the scene into the display's depth; camera: as the scene's camera looks; "
-        "display: scene units are its mm. By default a bundled scene's own camera, else fit.",
-    ),
-]
-Turn = Annotated[str | None, typer.Option("--turn", help="Turn the scene: YAW[,PITCH[,ROLL]] in degrees.")]
-Shift = Annotated[str | None, typer.Option("--shift", help="Move the scene: X,Y,Z in mm.")]
-Scale = Annotated[float, typer.Option("--scale", help="Enlarge the scene about the display's centre.")]
-PopOut = Annotated[
-    float | None, typer.Option("--pop-out", help="Share of the scene's depth in front of the lens plane, 0 to 1.")
-]
-Quality = Annotated[
-    float | None,
-    typer.Option("--quality", help="Work until every micro-image is estimated to reach this PSNR in dB, such as 40."),
-]
-QualityMean = Annotated[
-    float | None, typer.Option("--quality-mean", help="Work until the whole picture is estimated to reach this PSNR.")
-]
-MaxTime = Annotated[
-    float | None, typer.Option("--max-time", help="Stop tracing after so many seconds, with the best so far.")
-]
-Denoise = Annotated[
-    str,
-    typer.Option(
-        "--denoise",
-        help="none, or oidn: take the noise out with Open Image Denoise, with the effort that the rays deserve; "
-        "oidn-fast and oidn-high name it. auto: with --method pooled, and where --method auto finds that better.",
-    ),
-]
-Layers = Annotated[
-    bool,
-    typer.Option(
-        "--layers", help="Add depth, position, normal, albedo and shape of what each pixel sees (OpenEXR only)."
-    ),
-]
-Subpixels = Annotated[bool, typer.Option("--subpixels", help="A ray for every sub-pixel, at its own place.")]
 Resume = Annotated[
     bool,
     typer.Option(
@@ -105,44 +44,32 @@ Resume = Annotated[
     ),
 ]
 
-#: What places the display, by the names of ``PlacementOptions``.
-_PLACEMENT = {
-    "place": "mode",
-    "camera": "camera",
-    "turn": "turn",
-    "shift": "shift",
-    "scale": "scale",
-    "pop_out": "pop_out",
-}
-#: What only renderers of whole pictures know; refused where it is asked for.
-_WHOLE = {"order": "--order", "respect_gloss": "--respect-gloss"}
-
 
 def render(
     scene: options.Scene,
     output: options.Output,
     display: options.DisplayName = "seed-lenticular",
-    method: Method = "auto",
-    order: Order = None,
-    respect_gloss: RespectGloss = None,
+    method: options.Method = "auto",
+    order: options.Order = None,
+    respect_gloss: options.RespectGloss = None,
     maps: Maps = None,
     integrator: options.Integrator = "auto",
     depth: options.Depth = None,
     spp: options.Spp = None,
-    quality: Quality = None,
-    quality_mean: QualityMean = None,
-    max_time: MaxTime = None,
+    quality: options.Quality = None,
+    quality_mean: options.QualityMean = None,
+    max_time: options.MaxTime = None,
     seed: options.Seed = 0,
-    subpixels: Subpixels = False,
+    subpixels: options.Subpixels = False,
     pixel_filter: options.PixelFilter = "auto",
-    denoise: Denoise = "auto",
-    layers: Layers = False,
-    camera: Camera = None,
-    place: Place = None,
-    turn: Turn = None,
-    shift: Shift = None,
-    scale: Scale = 1.0,
-    pop_out: PopOut = None,
+    denoise: options.Denoise = "auto",
+    layers: options.Layers = False,
+    camera: options.Camera = None,
+    place: options.Place = None,
+    turn: options.Turn = None,
+    shift: options.Shift = None,
+    scale: options.Scale = 1.0,
+    pop_out: options.PopOut = None,
     environment: options.Environment = None,
     background: options.Background = None,
     allow_outside: options.AllowOutside = False,
@@ -174,8 +101,9 @@ def render(
     quiet: options.Quiet = False,
 ) -> None:
     """Render a scene into the native pixels of a display."""
-    from lippmann import api
     from lippmann.image.write import format_for
+    from lippmann.rendering.picture import render_picture
+    from lippmann.rendering.request.render_request import RenderRequest
     from lippmann.runtime.atomic_write import check_folder_writable, check_writable
 
     console = Console(quiet, as_json)
@@ -191,59 +119,48 @@ def render(
         field=field,
     )
     margin = printing.margin_of(marks, target, in_frames=frames is not None)
-    asked: dict[str, Any] = {
-        "display": target,
-        "method": method,
-        "order": order,
-        "respect_gloss": respect_gloss,
-        "integrator": integrator,
-        "depth": depth,
-        "spp": spp,
-        "quality": quality,
-        "quality_mean": quality_mean,
-        "max_time": max_time,
-        "seed": seed,
-        "subpixels": subpixels,
-        "pixel_filter": pixel_filter,
-        "denoise": denoise,
-        "layers": layers,
-        "camera": camera,
-        "place": place,
-        "turn": parse.angles(turn),
-        "shift": (0.0, 0.0, 0.0) if shift is None else parse.triple(shift, "--shift"),
-        "scale": scale,
-        "pop_out": pop_out,
-        "device": device,
-        "threads": threads,
-        "memory": parse.memory(memory),
-    }
-    load: dict[str, Any] = {
-        "environment": environment,
-        "background": parse.color(background),
-        "allow_outside": allow_outside,
-    }
+    request = RenderRequest(
+        method=method,
+        order=order,
+        respect_gloss=respect_gloss,
+        integrator=integrator,
+        depth=depth,
+        spp=spp,
+        quality=quality,
+        quality_mean=quality_mean,
+        max_time=max_time,
+        seed=seed,
+        subpixels=subpixels,
+        pixel_filter=pixel_filter,
+        denoise=denoise,
+        layers=layers,
+        placement=parse.placement(camera, place, turn, shift, scale, pop_out),
+        device=device,
+        threads=threads,
+        memory=parse.memory(memory),
+    )
+    source = SceneSource(scene, environment, parse.color(background), allow_outside)
     wanted = sequence.Wanted(frames, fps, animation, camera_path, video, eye)
     on_cluster = clusters.Asked(cluster, tls_ca, tls_cert, tls_key)
     if wanted:
-        files: dict[str, Any] = {"bits": bits, "maps": maps, "resume": resume}
+        files = sequence.Files(output, bits, maps, resume)
         with on_cluster.runner(console, threads) as runner:
-            sequence.render_frames(scene, output, wanted, console, load=load, runner=runner, **files, **asked)
+            sequence.render_frames(source, target, request, wanted, files, console, runner)
         return
     _check_layers(layers, format_for(output, bits)[0], output)
-    sizing = {name: asked[name] for name in ("method", "denoise", "subpixels", "memory")}
-    if on_cluster or is_tiled(output, bits, target, resume=resume, **sizing):
+    if on_cluster or is_tiled(output, bits, target, request, resume=resume):
         _check_whole({"--maps": maps, "--marks": margin})
         with on_cluster.runner(console, threads) as runner:
-            _render_tiled(scene, output, console, bits=bits, resume=resume, load=load, runner=runner, **asked)
+            _render_tiled(source, target, request, output, console, bits=bits, resume=resume, runner=runner)
         return
     check_writable(output)
     if maps is not None:
         check_folder_writable(maps)
     with console.progress() as progress:
         started = time.perf_counter()
-        loaded = api.load_scene(scene, **load)
+        loaded = source.load()
         load_seconds = time.perf_counter() - started
-        image = api.render(loaded, **asked, progress=progress)
+        image = render_picture(loaded, target, request, progress)
         progress(Progress("write", 0, 1))
         writing = time.perf_counter()
         image = _with_seconds(image, load=load_seconds)
@@ -296,22 +213,15 @@ def _with_seconds(image: IntegralImage, **seconds: float) -> IntegralImage:
     return replace(image, provenance=add_seconds(image.provenance, **seconds))
 
 
-def is_tiled(output: Path, bits: int | None, display: Display, *, resume: bool, **asked: Any) -> bool:
-    """Whether a picture has to be rendered in tiles: where that is asked for, or is the only way.
-
-    ``asked``: method, denoise, subpixels and memory, as those of
-    :class:`~lippmann.rendering.request.settings.RenderSettings`.
-    """
+def is_tiled(output: Path, bits: int | None, display: Display, request: RenderRequest, *, resume: bool) -> bool:
+    """Whether a picture has to be rendered in tiles: where that is asked for, or is the only way."""
     from lippmann.image.write import format_for
-    from lippmann.rendering.picture import default_memory
-    from lippmann.rendering.request.settings import RenderSettings
     from lippmann.tiles.tiled_render import fits_whole
 
     name, _ = format_for(output, bits)
     if resume or name == "zarr":
         return True
-    settings = RenderSettings(**asked)
-    return name == "tiff" and not fits_whole(display, settings, settings.memory or default_memory())
+    return name == "tiff" and not fits_whole(display, request)
 
 
 @contextmanager
@@ -336,38 +246,23 @@ def _kept(output: Path, console: Console) -> Iterator[ProgressCallback]:
 
 
 def _render_tiled(
-    scene: str,
+    source: SceneSource,
+    display: Display,
+    request: RenderRequest,
     output: Path,
     console: Console,
     *,
-    display: Display,
     bits: int | None,
     resume: bool,
-    load: Mapping[str, Any],
-    runner: Runner | None = None,
-    **asked: Any,
-) -> Rendered:
+    runner: Runner | None,
+) -> None:
     """Render into a file tile by tile, and say what came of it."""
-    from lippmann import api
-    from lippmann.scene.placement import PlacementOptions
+    from lippmann.tiles.tiled_render import render_to_file
 
-    for name, option in _WHOLE.items():
-        if asked.pop(name) is not None:
-            raise UsageError("is for methods that need the whole picture", where=option, fix="leave it out")
-    placement = PlacementOptions(**{_PLACEMENT[name]: asked.pop(name) for name in list(asked) if name in _PLACEMENT})
     started = time.perf_counter()
     with _kept(output, console) as progress:
-        loaded = api.load_scene(scene, **load)
-        rendered = api.render_to_file(
-            loaded,
-            output,
-            display,
-            bits=bits,
-            resume=resume,
-            placement=placement,
-            runner=runner,
-            progress=progress,
-            **asked,
+        rendered = render_to_file(
+            source.load(), display, request, output, bits=bits, resume=resume, runner=runner, progress=progress
         )
     made = rendered.provenance
     remarks(console, made)
@@ -380,4 +275,3 @@ def _render_tiled(
         f"{output}: {width}x{height} pixels for {display.name}, {made.spp} samples per pixel{found}, "
         f"{sum(made.rays.values()) / 1e6:.1f} M rays, {time.perf_counter() - started:.1f} s",
     )
-    return rendered

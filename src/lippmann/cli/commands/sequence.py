@@ -18,7 +18,10 @@ from lippmann.cli.shared.console import Console
 from lippmann.errors import OutputError, PictureError, UsageError
 
 if TYPE_CHECKING:
+    from lippmann.cli.shared.scene_source import SceneSource
+    from lippmann.display import Display
     from lippmann.progress import ProgressCallback
+    from lippmann.rendering.request.render_request import RenderRequest
     from lippmann.sequences.files import SavedFrame
     from lippmann.sequences.frames import FrameRange
     from lippmann.tiles.tiled_render import Runner
@@ -83,20 +86,26 @@ class Wanted:
         return False
 
 
+@dataclass(frozen=True)
+class Files:
+    """What is written: the output, its bits per value, maps, and whether to go on with an interrupted run."""
+
+    output: Path
+    bits: int | None
+    maps: Path | None
+    resume: bool
+
+
 def render_frames(
-    scene: str,
-    output: Path,
+    source: SceneSource,
+    display: Display,
+    request: RenderRequest,
     wanted: Wanted,
+    files: Files,
     console: Console,
-    *,
-    bits: int | None,
-    maps: Path | None,
-    load: dict[str, Any],
-    resume: bool,
     runner: Runner | None,
-    **asked: Any,
 ) -> None:
-    """Render and write all frames; ``load`` goes to the reader of the scene, ``asked`` to the renderer."""
+    """Render and write all frames."""
     from lippmann.image import read_picture
     from lippmann.image.write import format_for
     from lippmann.journal.tile_journal import sweep_beside
@@ -116,19 +125,22 @@ def render_frames(
     chosen = frame_range(wanted.frames or "")
     eye = None if wanted.eye is None else parse.triple(wanted.eye, "--eye")
     projection = None if wanted.video is None else projection_of(wanted.video, eye)
+    output = files.output
     motion = open_motion(
-        scene,
+        source.name,
         fps=None if flying else wanted.fps,
         animation=wanted.animation,
         camera_path=wanted.camera_path,
-        **load,
+        environment=source.environment,
+        background=source.background,
+        allow_outside=source.allow_outside,
     )
     frames = chosen.of(motion)
     path_of = numbered(output, len(frames))
-    name, _ = format_for(path_of(frames[0]), bits)
-    if maps is not None:
+    name, _ = format_for(path_of(frames[0]), files.bits)
+    if files.maps is not None:
         raise UsageError("a sequence writes no pictures of its maps", where="--maps", fix="leave it out")
-    if asked.get("layers") and name != "exr":
+    if request.layers and name != "exr":
         raise UsageError(
             "the frames cannot hold layers", where="--layers", rule="OpenEXR can", fix="name them %04d.exr"
         )
@@ -156,16 +168,25 @@ def render_frames(
     with (
         _kept(output, path_of(frames[0]), console) as progress,
         saved_sequence(
-            motion, output, path_of, frames=frames, resume=resume, runner=runner, bits=bits, progress=progress, **asked
+            motion,
+            output,
+            path_of,
+            display,
+            frames,
+            request,
+            resume=files.resume,
+            bits=files.bits,
+            runner=runner,
+            progress=progress,
         ) as saved,
     ):
-        files = map(noted, saved)
+        noted_frames = map(noted, saved)
         if projection is None or wanted.video is None:
-            deque(files, maxlen=0)
+            deque(noted_frames, maxlen=0)
         else:
             sweep_beside(wanted.video)
             # The film shows what the files hold, whether they were rendered now or before an interruption.
-            images = (read_picture(frame.path) for frame in files)
+            images = (read_picture(frame.path) for frame in noted_frames)
             first = next(images)
             write_animation(
                 map(projection, chain([first], images)),

@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from lippmann.rendering.request import choices
+
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on standard output.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Say nothing but errors.")]
 Output = Annotated[Path, typer.Option("--output", "-o", help="The file to write; its ending names the format.")]
@@ -30,7 +32,7 @@ Scene = Annotated[
     ),
 ]
 Integrator = Annotated[
-    str,
+    choices.Integrator,
     typer.Option(
         "--integrator",
         help="path (all light), direct (lamps and sky only), classic (light of Tachyon and NFF scenes), or normal, "
@@ -43,10 +45,10 @@ Spp = Annotated[
 ]
 Seed = Annotated[int, typer.Option("--seed", help="Of all random choices.")]
 PixelFilter = Annotated[
-    str,
+    choices.PixelFilter,
     typer.Option("--pixel-filter", help="box: over the pixel; point: at its centre. By default box, but for classic."),
 ]
-Device = Annotated[str, typer.Option("--device", help="auto, cpu or gpu.")]
+Device = Annotated[choices.Device, typer.Option("--device", help="Where to render; auto: the GPU if there is one.")]
 Threads = Annotated[int | None, typer.Option("--threads", help="CPU threads; all cores by default.")]
 Memory = Annotated[str | None, typer.Option("--memory", help="Memory to use, such as 2G; 60 % of the free by default.")]
 Environment = Annotated[
@@ -58,6 +60,69 @@ Background = Annotated[
 AllowOutside = Annotated[
     bool, typer.Option("--allow-outside", help="Let a scene file refer to files outside its own folder.")
 ]
+Method = Annotated[
+    choices.Method,
+    typer.Option(
+        "--method",
+        help="auto: what is fastest for the quality asked for; full: every ray is traced; "
+        "lens-view: points are carried from lens to lens and missed pixels traced; "
+        "interpolated: those of every other lens are averaged; "
+        "pooled: noise is taken out, and all lenses that see a point share its light.",
+    ),
+]
+Order = Annotated[
+    choices.Order | None,
+    typer.Option("--order", help="For lens-view and interpolated: default, or paper (lens by lens, as the paper did)."),
+]
+RespectGloss = Annotated[
+    bool | None,
+    typer.Option(
+        "--respect-gloss/--no-respect-gloss",
+        help="For them: trace what carrying over would falsify (mirrors, glass, highlights, edges). "
+        "By default yes, but in the paper's order.",
+        show_default=False,
+    ),
+]
+Camera = Annotated[str | None, typer.Option("--camera", help="Place the display by this camera of the scene file.")]
+Place = Annotated[
+    str | None,
+    typer.Option(
+        "--place",
+        help="fit: the scene into the display's depth; camera: as the scene's camera looks; "
+        "display: scene units are its mm. By default a bundled scene's own camera, else fit.",
+    ),
+]
+Turn = Annotated[str | None, typer.Option("--turn", help="Turn the scene: YAW[,PITCH[,ROLL]] in degrees.")]
+Shift = Annotated[str | None, typer.Option("--shift", help="Move the scene: X,Y,Z in mm.")]
+Scale = Annotated[float, typer.Option("--scale", help="Enlarge the scene about the display's centre.")]
+PopOut = Annotated[
+    float | None, typer.Option("--pop-out", help="Share of the scene's depth in front of the lens plane, 0 to 1.")
+]
+Quality = Annotated[
+    float | None,
+    typer.Option("--quality", help="Work until every micro-image is estimated to reach this PSNR in dB, such as 40."),
+]
+QualityMean = Annotated[
+    float | None, typer.Option("--quality-mean", help="Work until the whole picture is estimated to reach this PSNR.")
+]
+MaxTime = Annotated[
+    float | None, typer.Option("--max-time", help="Stop tracing after so many seconds, with the best so far.")
+]
+Denoise = Annotated[
+    choices.Denoiser,
+    typer.Option(
+        "--denoise",
+        help="none, or oidn: take the noise out with Open Image Denoise, with the effort that the rays deserve; "
+        "oidn-fast and oidn-high name it. auto: with --method pooled, and where --method auto finds that better.",
+    ),
+]
+Layers = Annotated[
+    bool,
+    typer.Option(
+        "--layers", help="Add depth, position, normal, albedo and shape of what each pixel sees (OpenEXR only)."
+    ),
+]
+Subpixels = Annotated[bool, typer.Option("--subpixels", help="A ray for every sub-pixel, at its own place.")]
 Bits = Annotated[
     int | None, typer.Option("--bits", help="Bits per value: PNG 8, 16; EXR 16, 32; TIFF and Zarr 8, 16, 32.")
 ]

@@ -12,14 +12,13 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Literal, Protocol
+from typing import Literal
 
-from lippmann.errors import UsageError
 from lippmann.progress import Progress, ProgressCallback, silent
-from lippmann.rendering.adaptive.convergence import Judge, Judgement, Track
+from lippmann.rendering.adaptive.convergence import Judge, Judgement
 from lippmann.rendering.estimate.pixel_errors import PixelErrors
-from lippmann.rendering.estimate.psnr import Estimate, PictureEstimator, why_no_estimate
-from lippmann.rendering.request.settings import RenderSettings
+from lippmann.rendering.estimate.psnr import Estimate
+from lippmann.rendering.request.render_request import RenderRequest
 
 End = Literal["quality", "time", "samples"]
 
@@ -55,11 +54,6 @@ class Goal:
         Samples per pixel; at least two, fewer tell no error.
     part:
         What a part of the picture that is judged by itself is called.
-
-    Raises
-    ------
-    UsageError
-        If nothing is set, or a value is out of its range.
     """
 
     quality: float | None = None
@@ -67,17 +61,6 @@ class Goal:
     max_time: float | None = None
     spp: int | None = None
     part: str = "micro-image"
-
-    def __post_init__(self) -> None:
-        for name, value in (("quality", self.quality), ("quality-mean", self.quality_mean)):
-            if value is not None and not 0 < value <= 80:
-                raise UsageError(f"{value:g} dB will not do", where=f"--{name}", rule="above 0 and at most 80 dB")
-        if self.max_time is not None and not (self.max_time > 0 and math.isfinite(self.max_time)):
-            raise UsageError(f"{self.max_time:g} s will not do", where="--max-time", rule="seconds above 0")
-        if self.spp is not None and self.spp < FEWEST:
-            raise UsageError(f"{self.spp} will not do", where="--spp", rule="two samples or more tell their error")
-        if self.quality is self.quality_mean is self.max_time is self.spp is None:
-            raise UsageError("nothing says when to stop", fix="give --quality, --quality-mean, --max-time or --spp")
 
     @property
     def has_quality(self) -> bool:
@@ -117,37 +100,11 @@ class Goal:
         return ", ".join(parts)
 
 
-def goal_of(settings: RenderSettings) -> Goal | None:
-    """When to stop, where that is not a number of samples alone.
-
-    Raises
-    ------
-    UsageError
-        If a value is out of range, or the method or the light has no noise that more samples would reduce.
-    """
-    if settings.quality is settings.quality_mean is settings.max_time is None:
+def goal_of(request: RenderRequest) -> Goal | None:
+    """When to stop, where that is not a number of samples alone."""
+    if not request.is_open_ended:
         return None
-    goal = Goal(settings.quality, settings.quality_mean, settings.max_time, settings.spp)
-    given = "--max-time" if settings.max_time is not None else "--quality"
-    if settings.method not in ("full", "pooled"):
-        raise UsageError(
-            f"{settings.method} does not know its own error",
-            where=given,
-            rule="full and pooled do",
-            fix="use --method full",
-        )
-    why = why_no_estimate(settings)
-    if why is not None:
-        raise UsageError(why, where=given, fix="leave it out")
-    return goal
-
-
-class ProgressiveRenderer(Protocol):
-    """A picture that gets better with every call of :meth:`add`."""
-
-    def add(self, samples: int, progress: ProgressCallback = silent) -> None: ...
-
-    def squared_error(self) -> PixelErrors: ...
+    return Goal(request.quality, request.quality_mean, request.max_time, request.spp)
 
 
 @dataclass(frozen=True)
@@ -176,29 +133,17 @@ class Outcome:
 
 def reach(
     goal: Goal,
-    renderer: ProgressiveRenderer,
-    estimator: PictureEstimator,
-    progress: ProgressCallback = silent,
-    clock: Callable[[], float] = time.perf_counter,
-    probe: Callable[[], float] | None = None,
-) -> Outcome:
-    """Give ``renderer`` rounds of samples until ``goal`` is reached; ``estimator`` is that of its display.
-
-    ``probe`` measures the seconds of a sample per pixel by a few of them. It is asked where time is limited: without
-    it the first round has two samples, however long they take.
-    """
-    return reach_judged(goal, renderer.add, Track(renderer, estimator), progress, clock, probe)
-
-
-def reach_judged(
-    goal: Goal,
     add: Callable[[int, ProgressCallback], None],
     judge: Judge,
     progress: ProgressCallback = silent,
     clock: Callable[[], float] = time.perf_counter,
     probe: Callable[[], float] | None = None,
 ) -> Outcome:
-    """As :func:`reach`, with samples from ``add`` and ``judge`` to say how good the picture is."""
+    """Take rounds of samples by ``add`` until ``judge`` says that ``goal`` is reached.
+
+    ``probe`` measures the seconds of a sample per pixel by a few of them. It is asked where time is limited: without
+    it the first round has two samples, however long they take.
+    """
     return _Climb(goal, add, judge, progress, clock, probe).run()
 
 

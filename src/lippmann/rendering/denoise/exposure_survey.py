@@ -18,7 +18,7 @@ from lippmann.rendering.denoise.cost_model import effort_of, traced_work
 from lippmann.rendering.denoise.oidn import Effort
 from lippmann.rendering.film.wavefront import trace_frame
 from lippmann.rendering.film.wavefront_plan import make_plan
-from lippmann.rendering.request.settings import RenderSettings
+from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.rendering.transport.ray_source import DisplayRays
 
 #: Pixels looked at along each side of the picture, and samples of each.
@@ -56,16 +56,16 @@ class ScatteredRays:
         return self._source.rays(column, row, channel, jitter)
 
 
-def survey(integrator: Any, source: DisplayRays, settings: RenderSettings) -> Treatment:
+def survey(integrator: Any, source: DisplayRays, request: RenderRequest) -> Treatment:
     """What suits the picture as a whole: the same for the same picture, whoever looks."""
-    few, box = ScatteredRays(source), settings.pixel_filter == "box"
-    samples = min(settings.samples, SAMPLES) if box else 1
+    few, box = ScatteredRays(source), request.box_filter
+    samples = min(request.samples, SAMPLES) if box else 1
     plan = make_plan(few.width, few.height, samples, channels=few.channels, memory=MEMORY)
-    frame = trace_frame(integrator, few, plan, seed=settings.seed, box_filter=box)
+    frame = trace_frame(integrator, few, plan, seed=request.seed, box_filter=box)
     rays = traced_work(frame.rays.primary, frame.rays.shadow, frame.rays.secondary)
     # What is denoised: pixels, or sub-pixels.
-    places = few.width * few.height * (3 if settings.keeps_colors(source.display) else 1)
-    effort = effort_of(settings.denoise, rays / places * settings.samples / samples)
+    places = few.width * few.height * (3 if request.keeps_colors(source.display) else 1)
+    effort = effort_of(request.denoise, rays / places * request.samples / samples)
     return Treatment(effort, exposure_of(frame.pixels))
 
 

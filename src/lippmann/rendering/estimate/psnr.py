@@ -28,22 +28,12 @@ from lippmann.display import Display
 from lippmann.display.pixel_window import PixelWindow
 from lippmann.image.micro_images import lens_indices, row_blocks
 from lippmann.rendering.estimate.pixel_errors import ErrorSums, NoiseShares, PixelErrors, parts_with_pixels
-from lippmann.rendering.request.settings import RenderSettings
 
 Real = NDArray[np.float64]
 Floats = NDArray[np.float32]
 
 #: The layer of a picture with the estimated squared error of each pixel's code.
 ERROR_LAYER = "error"
-
-
-def why_no_estimate(settings: RenderSettings) -> str | None:
-    """Why a picture made with ``settings`` says nothing of its own error, as a sentence; None if it does."""
-    if settings.pixel_filter == "point" and settings.integrator not in ("path", "direct"):
-        return "no estimate of the error: one ray through each pixel's middle leaves nothing to chance"
-    if settings.spp == 1:
-        return "no estimate of the error: one sample per pixel does not tell it, two or more do"
-    return None
 
 
 @dataclass(frozen=True)

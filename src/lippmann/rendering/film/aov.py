@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.progress import Progress, ProgressCallback, silent
+from lippmann.rendering.film.memory_model import AOVS
 from lippmann.rendering.film.wavefront import divide
 from lippmann.rendering.film.wavefront_plan import Plan, Tile, make_plan
 from lippmann.rendering.transport.first_surface import Surfaces, surfaces_of
@@ -28,9 +29,6 @@ FloatArray = NDArray[np.float32]
 #: Layers and their channels.
 LAYERS = {"depth": 1, "normal": 3, "albedo": 3, "shape": 1, "position": 3}
 
-#: All layers of a pixel, and the copies that a file writer makes of them.
-_BYTES_PER_PIXEL = 2 * 4 * sum(LAYERS.values())
-
 #: The sub-pixel in the middle, whose place is the pixel's.
 _MIDDLE_CHANNEL = 1
 
@@ -43,8 +41,8 @@ def plan_layers(source: RaySource, memory: int) -> Plan:
     MemoryLimitError
         If that is too little for one row.
     """
-    kept = source.width * source.height * _BYTES_PER_PIXEL
-    return make_plan(source.width, source.height, 1, memory=memory - kept)
+    kept = source.width * source.height * AOVS
+    return make_plan(source.width, source.height, 1, memory=memory, kept=kept)
 
 
 def trace_layers(

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.rendering.film.aov import to_numpy
+from lippmann.rendering.film.memory_model import FEATURE_BUFFERS
 from lippmann.rendering.film.wavefront import rays_of_tile
 from lippmann.rendering.film.wavefront_plan import Pass, Plan, Tile, make_plan
 from lippmann.rendering.transport.first_surface import Surfaces, surfaces_of
@@ -25,9 +26,6 @@ FloatArray = NDArray[np.float32]
 
 #: Samples of a pixel: fewer leave steps in the guides where edges cross it, more gain nothing.
 LEAST_SAMPLES, MOST_SAMPLES = 8, 16
-
-#: Albedo, normal and height, and what a tile adds to them.
-_BYTES_PER_PIXEL = 56
 
 #: Heights beyond this many millimetres count as lying there: light lines of all lenses are parallel for them.
 _FARTHEST = 1e5
@@ -64,9 +62,9 @@ def plan_guides(source: RaySource, samples: int, memory: int) -> Plan:
     MemoryLimitError
         If that is too little for one row.
     """
-    kept = source.width * source.height * _BYTES_PER_PIXEL
+    kept = source.width * source.height * FEATURE_BUFFERS
     samples = min(max(samples, LEAST_SAMPLES), MOST_SAMPLES)
-    return make_plan(source.width, source.height, samples, channels=source.channels, memory=memory - kept)
+    return make_plan(source.width, source.height, samples, channels=source.channels, memory=memory, kept=kept)
 
 
 def trace_guides(

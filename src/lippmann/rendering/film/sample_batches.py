@@ -21,12 +21,12 @@ from numpy.typing import NDArray
 from lippmann.color.transfer import Transfer
 from lippmann.device.sobol import PIXEL_DIMENSION, SampleStream
 from lippmann.display.pixel_window import PixelWindow
-from lippmann.errors import MemoryLimitError, UsageError
+from lippmann.errors import UsageError
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.rendering.estimate.jackknife import error_of_batches
 from lippmann.rendering.estimate.pixel_errors import OWN_NOISE, PixelErrors
+from lippmann.rendering.film import memory_model
 from lippmann.rendering.film.wavefront import Frame, RayTotals, compile_seconds, divide, evaluated
-from lippmann.rendering.film.wavefront_plan import BYTES_PER_LANE, BYTES_PER_PIXEL, PREFERRED_LANES, SMALLEST_LANES
 from lippmann.rendering.transport.integrator import Integrator
 from lippmann.rendering.transport.ray_source import RaySource, pixel_number
 
@@ -307,9 +307,9 @@ def trace_in_batches(
     whole = np.zeros((height, width, 3), dtype=np.float32)
     error, lone = np.zeros((height, width), dtype=np.float32), np.zeros((height, width), dtype=np.float32)
     frame = Frame(whole)
-    left = memory - height * width * (BYTES_PER_PIXEL + 8)
+    left = memory - height * width * (memory_model.PICTURE + memory_model.ERROR_MAPS)
     # Half of what is left for the batches, half for the wavefronts.
-    most = max(1, left // 2 // (width * bytes_per_pixel(MOST_BATCHES)))
+    most = max(1, left // 2 // (width * memory_model.batches(MOST_BATCHES)))
     bands = -(-height // most)
     rows = -(-height // bands)
     for first in range(0, height, rows):
@@ -348,22 +348,13 @@ def _alternate(number: int) -> tuple[int, ...]:
 def _sizes(pixels: int, channels: int, memory: int) -> tuple[int, int]:
     """How many batches are kept, and the lanes of a wavefront."""
     for batches in (MOST_BATCHES, MOST_BATCHES // 2, STREAMS):
-        kept = pixels * bytes_per_pixel(batches)
-        lanes = min(PREFERRED_LANES, (memory - kept) // BYTES_PER_LANE)
-        if lanes >= min(SMALLEST_LANES, pixels * channels * batches):
-            return batches, lanes
-    required = kept + SMALLEST_LANES * BYTES_PER_LANE
-    raise MemoryLimitError(
-        f"{memory / 2**20:.0f} MiB are too small for {pixels} pixels",
-        where="--memory",
-        rule=f"a picture that is to know its own error needs {required / 2**20:.0f} MiB",
-        fix="raise the limit",
-    )
-
-
-def bytes_per_pixel(batches: int) -> int:
-    """Per batch the sums (float32 RGB); beside them the picture and its error."""
-    return batches * 12 + BYTES_PER_PIXEL + 12
+        kept = pixels * memory_model.batches(batches)
+        needed = min(memory_model.SMALLEST_LANES, pixels * channels * batches)
+        fits = memory >= kept + needed * memory_model.BYTES_PER_LANE
+        if fits or batches == STREAMS:
+            break
+    what = f"a picture of {pixels} pixels that is to know its own error"
+    return batches, memory_model.lanes_within(memory, kept, needed, what)
 
 
 def _table(numbers: Sequence[int]) -> Any:

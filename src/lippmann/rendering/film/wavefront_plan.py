@@ -9,17 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from lippmann.errors import MemoryLimitError
-
-#: Memory a lane needs at the widest moment: its radiance, its ray counts, the sums and their copies. Measured: see
-#: ``docs/methods.md``.
-BYTES_PER_LANE = 96
-#: Beyond this many lanes the wavefront leaves the caches and nothing is gained.
-PREFERRED_LANES = 1 << 20
-#: Fewer lanes than this leave the threads idle while kernels start.
-SMALLEST_LANES = 1 << 14
-#: The picture itself: float32 RGB, and the copy that a file writer makes of it.
-BYTES_PER_PIXEL = 24
+from lippmann.rendering.film.memory_model import PICTURE, PREFERRED_LANES, SMALLEST_LANES, lanes_within
 
 
 @dataclass(frozen=True)
@@ -75,27 +65,27 @@ class Plan:
 
 
 def make_plan(
-    width: int, height: int, samples: int, *, channels: int = 1, memory: int, preferred_lanes: int = PREFERRED_LANES
+    width: int,
+    height: int,
+    samples: int,
+    *,
+    channels: int = 1,
+    memory: int,
+    kept: int = 0,
+    preferred_lanes: int = PREFERRED_LANES,
 ) -> Plan:
     """Divide ``width`` x ``height`` pixels of ``samples`` each so that the work fits into ``memory`` bytes.
+
+    ``kept``: bytes of them that something else takes beside the picture.
 
     Raises
     ------
     MemoryLimitError
         If not even one row of one sample fits beside the picture.
     """
-    free = memory - width * height * BYTES_PER_PIXEL
     row_lanes = width * channels
-    most = min(preferred_lanes, free // BYTES_PER_LANE)
     needed = max(row_lanes, min(SMALLEST_LANES, row_lanes * height * samples))
-    if free // BYTES_PER_LANE < needed:
-        required = width * height * BYTES_PER_PIXEL + needed * BYTES_PER_LANE
-        raise MemoryLimitError(
-            f"{memory / 2**20:.0f} MiB are too small for {width}x{height} pixels",
-            where="--memory",
-            rule=f"the picture and one tile need {required / 2**20:.0f} MiB",
-            fix="raise the limit",
-        )
+    most = lanes_within(memory, kept + width * height * PICTURE, needed, f"{width}x{height} pixels", preferred_lanes)
     most = max(most, row_lanes)
     run = max(1, min(samples, most // row_lanes))
     passes = -(-samples // run)

@@ -11,14 +11,12 @@ from numpy.typing import NDArray
 
 from lippmann.color.transfer import Transfer
 from lippmann.display import Display
-from lippmann.errors import MemoryLimitError
 from lippmann.progress import Progress, ProgressCallback, silent
-from lippmann.rendering.film import wavefront_plan
+from lippmann.rendering.film.memory_model import PICTURE, POINT_IMAGE, SMALLEST_LANES, lanes_within
 from lippmann.rendering.film.wavefront import Frame
 from lippmann.rendering.reprojection.common.gap_filling import Settled
 from lippmann.rendering.reprojection.common.pixel_tracer import Pixels, PixelTracer
 from lippmann.rendering.reprojection.common.point_image import (
-    BYTES_PER_PIXEL,
     INTERPOLATED,
     REPROJECTED,
     STATUS_LAYER,
@@ -85,7 +83,7 @@ def trace_reused(
     Parameters
     ----------
     method, order:
-        As in :class:`~lippmann.rendering.request.settings.RenderSettings`.
+        As in :class:`~lippmann.rendering.request.render_request.RenderRequest`.
     careful:
         Trace what carrying over would falsify; of no meaning in the paper's order, which does not know how.
     samples, seed, box_filter:
@@ -110,7 +108,7 @@ def trace_reused(
     MemoryLimitError
         If picture, points and the smallest wavefront do not fit into ``memory``.
     """
-    most_lanes = lanes_within(memory, source.width, source.height, samples)
+    most_lanes = wavefront_lanes(memory, source.width, source.height, samples)
     started = time.perf_counter()
     points = PointImage.empty(source.height, source.width)
     compiling = cast("Any", event).TimingListener()
@@ -153,7 +151,7 @@ def trace_reused(
     )
 
 
-def lanes_within(memory: int, width: int, height: int, samples: int) -> int:
+def wavefront_lanes(memory: int, width: int, height: int, samples: int) -> int:
     """Lanes of the largest wavefront beside a picture with its points.
 
     Raises
@@ -161,17 +159,9 @@ def lanes_within(memory: int, width: int, height: int, samples: int) -> int:
     MemoryLimitError
         If ``memory`` bytes do not hold even a small one.
     """
-    lane = wavefront_plan.BYTES_PER_LANE
-    fixed = width * height * (wavefront_plan.BYTES_PER_PIXEL + BYTES_PER_PIXEL)
-    needed = max(samples, min(wavefront_plan.SMALLEST_LANES, width * height * samples))
-    if memory < fixed + needed * lane:
-        raise MemoryLimitError(
-            f"{memory / 2**20:.0f} MiB are too small for {width}x{height} pixels",
-            where="--memory",
-            rule=f"the picture, its points and one wavefront need {(fixed + needed * lane) / 2**20:.0f} MiB",
-            fix="raise the limit",
-        )
-    return max(needed, min(wavefront_plan.PREFERRED_LANES, (memory - fixed) // lane))
+    needed = max(samples, min(SMALLEST_LANES, width * height * samples))
+    kept = width * height * (PICTURE + POINT_IMAGE)
+    return max(needed, lanes_within(memory, kept, needed, f"{width}x{height} pixels and their points"))
 
 
 def _make(maker: Maker, method: ReuseMethod) -> None:

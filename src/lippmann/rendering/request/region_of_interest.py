@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from lippmann.display import Display
 from lippmann.display.pixel_window import PixelWindow
 from lippmann.display.view_cone import cone_tangent
-from lippmann.rendering.request.settings import RenderSettings
+from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.scene.values.description import Color
 
 if TYPE_CHECKING:
@@ -27,9 +27,9 @@ _MARGIN = 8
 _WORTH = 0.9
 
 
-def even_background(built: BuiltScene | BuiltClassic, settings: RenderSettings) -> Color | None:
+def even_background(built: BuiltScene | BuiltClassic, request: RenderRequest) -> Color | None:
     """The one colour that rays see which meet nothing; None if there is no such colour."""
-    if settings.integrator not in _SHOW_BACKGROUND:
+    if request.integrator not in _SHOW_BACKGROUND:
         return None
     return getattr(built, "background", None)
 

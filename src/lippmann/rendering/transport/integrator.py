@@ -28,8 +28,12 @@ class FirstHit:
 class Integrator(Protocol):
     """Light along rays. An integrator holds its scene; it may be asked for any wavefront."""
 
-    name: str
     depth: int
+
+    @property
+    def name(self) -> str:
+        """What the light is called in a request."""
+        ...
 
     def sample(self, ray: Any, stream: SampleStream, active: Any) -> tuple[Any, RayCounts]:
         """Radiance (``mi.Color3f``) arriving along ``ray`` (world space), with the rays counted per lane."""

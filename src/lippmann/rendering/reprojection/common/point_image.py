@@ -62,8 +62,3 @@ class PointImage(NamedTuple):
     def share(self, status: int) -> float:
         """Fraction of pixels of one status."""
         return float(np.count_nonzero(self.status == status)) / self.status.size
-
-
-#: Memory that reuse takes beyond the picture itself: points without colours, plain rows, maps and lists of pixels. The
-#: paper's order takes the most: 6 for points, 4 for lenses, 8 for places beside centres, 12 for the sorted list.
-BYTES_PER_PIXEL = 32

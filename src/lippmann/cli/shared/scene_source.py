@@ -1,0 +1,37 @@
+"""The scene that a command names, with what its options say of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from lippmann.scene.scene import Scene
+
+
+@dataclass(frozen=True)
+class SceneSource:
+    """A scene's file or name, and the options ``--environment``, ``--background`` and ``--allow-outside``."""
+
+    name: str
+    environment: Path | None = None
+    background: tuple[float, float, float] | None = None
+    allow_outside: bool = False
+
+    def load(self) -> Scene:
+        """The scene.
+
+        Raises
+        ------
+        SceneError
+            As :func:`lippmann.load_scene`.
+        """
+        from lippmann.api import load_scene
+
+        return load_scene(
+            self.name,
+            environment=self.environment,
+            background=self.background,
+            allow_outside=self.allow_outside,
+        )

@@ -1,0 +1,76 @@
+"""How many bytes pictures take while they are made: every figure of it, and the lanes that fit beside them.
+
+Figures are bytes per pixel unless they are named otherwise. Measured: see ``docs/methods.md``.
+"""
+
+from __future__ import annotations
+
+from lippmann.errors import MemoryLimitError
+
+#: A lane of a wavefront at its widest moment: its radiance, its ray counts, the sums and their copies.
+BYTES_PER_LANE = 96
+#: Beyond this many lanes a wavefront leaves the caches and nothing is gained.
+PREFERRED_LANES = 1 << 20
+#: Fewer lanes than this leave the threads idle while kernels start.
+SMALLEST_LANES = 1 << 14
+
+#: The picture: float32 RGB, and the copy that a file writer makes of it.
+PICTURE = 24
+#: The squared error of each pixel and its outliers' share, where a picture is judged band by band.
+ERROR_MAPS = 8
+#: The sums of one batch of samples, float32 RGB.
+BATCH = 12
+#: The errors that are made from batches.
+BATCH_ERRORS = 12
+#: What reuse of points takes: points without colours, plain rows, maps and lists of pixels. The paper's order takes
+#: the most: 6 for points, 4 for lenses, 8 for places beside centres, 12 for the sorted list.
+POINT_IMAGE = 32
+#: Depth, normal, albedo, shape and position, and the copies that a file writer makes of them.
+AOVS = 2 * 4 * (1 + 3 + 3 + 1 + 3)
+#: Albedo, normal and height for the denoiser, and what a tile adds to them.
+FEATURE_BUFFERS = 56
+#: Open Image Denoise with its feature buffers, up to the most that the library lets itself have, in bytes.
+DENOISER, DENOISER_MOST = 600, 3 << 30
+#: A picture rendered in one piece, with the copies that methods and writers make of it; where pixels are made from
+#: their neighbours, the batches or halves of all samples, which are kept to the end.
+WHOLE, WHOLE_WITH_NEIGHBOURS = 48, 256
+
+
+def batches(number: int) -> int:
+    """Bytes per pixel of a picture kept in so many batches: their sums, the picture and its errors."""
+    return number * BATCH + PICTURE + BATCH_ERRORS
+
+
+#: A pixel of a tile: eight batches and a wavefront; with what denoising adds, a pixel of a tile with its margin.
+TILE, DENOISED_TILE = batches(8) + BYTES_PER_LANE, 768
+
+
+def lanes_within(memory: int, kept: int, needed: int, what: str, preferred: int = PREFERRED_LANES) -> int:
+    """Lanes of a wavefront beside ``kept`` bytes in ``memory`` bytes, at most ``preferred``.
+
+    Parameters
+    ----------
+    needed:
+        The fewest lanes that do.
+    what:
+        What is to fit, for the complaint: "512x512 pixels", say.
+
+    Raises
+    ------
+    MemoryLimitError
+        If ``memory`` does not hold so many.
+    """
+    lanes = (memory - kept) // BYTES_PER_LANE
+    if lanes < needed:
+        raise too_small(memory, what, kept + needed * BYTES_PER_LANE)
+    return min(preferred, lanes)
+
+
+def too_small(memory: int, what: str, required: int, fix: str = "raise the limit") -> MemoryLimitError:
+    """The error that ``memory`` bytes do not hold ``what``, which needs ``required``."""
+    return MemoryLimitError(
+        f"{memory / 2**20:.0f} MiB are too small for {what}",
+        parameter="memory",
+        rule=f"it needs {required / 2**20:.0f} MiB",
+        fix=fix,
+    )

@@ -1,0 +1,63 @@
+"""The plain picture that a camera of the scene sees."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lippmann.image import Provenance
+from lippmann.progress import ProgressCallback, silent
+from lippmann.rendering.film.wavefront_plan import make_plan
+from lippmann.rendering.request.render_request import RenderRequest
+from lippmann.rendering.request.resolve import resolve
+from lippmann.rendering.session import open_session
+from lippmann.runtime.engine_lock import exclusive
+from lippmann.scene.scene import Scene
+
+
+@dataclass(frozen=True, eq=False)
+class Preview:
+    """A plain picture: ``pixels`` ``(height, width, 3)`` float32 linear RGB, with how it was made."""
+
+    pixels: NDArray[np.float32]
+    provenance: Provenance
+
+
+@exclusive()
+def render_preview(
+    scene: Scene,
+    camera: str | None,
+    size: tuple[int, int],
+    request: RenderRequest,
+    progress: ProgressCallback = silent,
+) -> Preview:
+    """Render what ``camera`` sees in ``size`` (width, height) pixels.
+
+    The camera None is the scene's first one, or one that frames a scene without any.
+
+    Raises
+    ------
+    UsageError, SceneError, MemoryLimitError, EngineError
+        As the stages find them.
+    """
+    request = resolve(request, scene, form="preview")
+    session = open_session(scene, request, size, progress=progress)
+    pose = scene.camera(camera)
+
+    from lippmann.rendering.film.wavefront import trace_frame
+    from lippmann.rendering.transport.ray_source import CameraRays, RaySource
+    from lippmann.rendering.transport.whitted_camera import ClassicCameraRays
+
+    source: RaySource
+    if request.integrator == "classic" and scene.classic is not None:
+        # Its own camera, with all that only such a camera does.
+        source = ClassicCameraRays(scene.classic.camera, scene.classic.handedness, *size)
+    else:
+        source = CameraRays(pose, *size)
+    integrator = session.integrator(source, np.linalg.inv(np.asarray(pose.world_from_camera, dtype=np.float64)))
+    plan = make_plan(*size, request.samples, memory=session.memory)
+    frame = trace_frame(integrator, source, plan, seed=request.seed, box_filter=request.box_filter, progress=progress)
+    options = {"pixel_filter": request.pixel_filter, "camera": pose.name}
+    return Preview(frame.pixels, session.provenance(frame, samples=request.samples, options=options))

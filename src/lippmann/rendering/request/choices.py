@@ -1,0 +1,19 @@
+"""The words that a request is made of; loads nothing, so that help texts can list them at once."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+Method = Literal["auto", "full", "lens-view", "interpolated", "pooled"]
+Order = Literal["default", "paper"]
+Integrator = Literal["auto", "classic", "path", "direct", "normal", "depth", "position", "albedo"]
+PixelFilter = Literal["auto", "box", "point"]
+Device = Literal["auto", "cpu", "gpu"]
+Denoiser = Literal["auto", "none", "oidn", "oidn-fast", "oidn-high"]
+
+#: The methods that reuse points of one micro-image in others.
+REUSING: tuple[Method, ...] = ("lens-view", "interpolated")
+#: Integrators that gather light; the others name a property of a surface.
+LIGHT: tuple[Integrator, ...] = ("classic", "path", "direct")
+#: Those whose light can be pooled.
+POOLED_LIGHT: tuple[Integrator, ...] = ("path", "direct")

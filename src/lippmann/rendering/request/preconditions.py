@@ -1,0 +1,168 @@
+"""What can be honoured: options that belong together, and what each form of a picture allows."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from lippmann.display import Display
+from lippmann.errors import PictureError, UsageError
+from lippmann.rendering.request.choices import LIGHT, POOLED_LIGHT, REUSING
+from lippmann.rendering.request.render_request import RenderRequest
+
+#: What is made of a request: a picture in one piece, one in tiles, a quilt, a forecast, a camera's plain picture.
+Form = Literal["picture", "tiles", "quilt", "forecast", "preview"]
+
+#: Pictures number their sub-pixels in 32 bits.
+MOST_SUBPIXELS = 1 << 32
+
+
+def check(request: RenderRequest, form: Form, display: Display | None) -> None:
+    """Refuse what cannot be honoured.
+
+    Raises
+    ------
+    UsageError
+        Options contradict each other, or mean nothing in this form.
+    PictureError
+        The display's lenses have no quilt.
+    """
+    if form == "tiles":
+        _check_tiles(request, display)
+    if form == "quilt":
+        _check_quilt(request, display)
+    _check_denoiser(request)
+    _check_reuse(request)
+    _check_goal(request)
+
+
+def why_no_estimate(request: RenderRequest) -> str | None:
+    """Why a picture says nothing of its own error, as a sentence; None if it does."""
+    if request.pixel_filter == "point" and request.integrator not in POOLED_LIGHT:
+        return "no estimate of the error: one ray through each pixel's middle leaves nothing to chance"
+    if request.spp == 1:
+        return "no estimate of the error: one sample per pixel does not tell it, two or more do"
+    return None
+
+
+def _check_denoiser(request: RenderRequest) -> None:
+    if request.method == "pooled" and request.integrator not in POOLED_LIGHT:
+        raise UsageError(
+            f"the light of {request.integrator} cannot be pooled",
+            parameter="integrator",
+            rule=f'method="pooled" works with {" and ".join(POOLED_LIGHT)}',
+            fix='use method="full"',
+        )
+    if request.denoises and request.integrator not in LIGHT:
+        raise UsageError(
+            f"{request.integrator} has no noise",
+            parameter="denoise",
+            rule=f"it is for {', '.join(LIGHT)}",
+            fix="leave it out",
+        )
+    if request.method == "pooled" and request.denoise == "none":
+        raise UsageError(
+            "pooled needs the denoiser",
+            parameter="denoise",
+            rule="pooled shares denoised light",
+            fix='use method="full", or leave denoise out',
+        )
+
+
+def _check_reuse(request: RenderRequest) -> None:
+    if request.method not in REUSING:
+        for name in ("order", "respect_gloss"):
+            if getattr(request, name) is not None:
+                raise UsageError(
+                    f"{request.method} reuses no points",
+                    parameter=name,
+                    rule=f"it is for {' and '.join(REUSING)}",
+                    fix="leave it out",
+                )
+        return
+    if request.order == "paper" and request.respect_gloss:
+        raise UsageError(
+            "the paper's order takes every colour as it is",
+            parameter="respect_gloss",
+            rule='it is for order="default"',
+            fix="leave one of the two out",
+        )
+    if request.subpixels:
+        raise UsageError(
+            f"{request.method} reuses whole pixels",
+            parameter="subpixels",
+            rule="a sub-pixel has rays of its own",
+            fix='use method="full"',
+        )
+    if request.integrator not in LIGHT:
+        raise UsageError(
+            f"{request.method} reuses light, and {request.integrator} gathers none",
+            parameter="integrator",
+            rule=f"it works with {', '.join(LIGHT)}",
+            fix='use method="full"',
+        )
+
+
+def _check_goal(request: RenderRequest) -> None:
+    """A quality or a time needs samples that tell their error."""
+    if not request.is_open_ended:
+        return
+    name = "max_time" if request.max_time is not None else "quality" if request.quality is not None else "quality_mean"
+    if request.spp == 1:
+        raise UsageError("1 will not do", parameter="spp", rule="two samples or more tell their error")
+    if request.method in REUSING:
+        raise UsageError(
+            f"{request.method} does not know its own error",
+            parameter=name,
+            rule="full and pooled do",
+            fix='use method="full"',
+        )
+    why = why_no_estimate(request)
+    if why is not None:
+        raise UsageError(why, parameter=name, fix="leave it out")
+
+
+def _check_tiles(request: RenderRequest, display: Display | None) -> None:
+    whole = {
+        "method": request.method if request.method in REUSING else None,
+        "order": request.order,
+        "respect_gloss": request.respect_gloss,
+        "quality": request.quality,
+        "quality_mean": request.quality_mean,
+        "max_time": request.max_time,
+        "layers": True if request.layers else None,
+    }
+    for name, value in whole.items():
+        if value is not None:
+            raise UsageError(
+                "needs the whole picture" if value is True else f"{value} needs the whole picture",
+                parameter=name,
+                rule="with resume=True, to Zarr and beyond the memory pictures are rendered in tiles",
+                fix='use method="full" or method="pooled"' if name == "method" else "leave it out",
+            )
+    if display is None:
+        return
+    panel = display.panel
+    if panel.width * panel.height * request.channels >= MOST_SUBPIXELS:
+        raise UsageError(
+            f"the display {display.name} has {panel.width} x {panel.height} pixels",
+            parameter="display",
+            rule=f"pictures of fewer than {MOST_SUBPIXELS} (sub-)pixels are rendered",
+            fix="render it in parts",
+        )
+
+
+def _check_quilt(request: RenderRequest, display: Display | None) -> None:
+    if display is not None and display.lens_array.layout != "lenticular":
+        raise PictureError(
+            f"the display {display.name} has {display.lens_array.layout} lenses",
+            rule="a quilt's views lie side by side, for cylindrical lenses",
+        )
+    for name, given in (
+        ("method", request.method in REUSING),
+        ("subpixels", request.subpixels),
+        ("layers", request.layers),
+    ):
+        if given:
+            value = request.method if name == "method" else "it"
+            rule = "every pixel of a quilt is traced, for all colours"
+            raise UsageError(f"{value} will not do for a quilt", parameter=name, rule=rule, fix="leave it out")

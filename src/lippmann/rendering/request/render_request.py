@@ -1,0 +1,207 @@
+"""What a render is asked for: one value from the command line, or a call, down to the first ray."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from typing import TYPE_CHECKING, get_args
+
+from lippmann.color.transfer import Transfer
+from lippmann.errors import UsageError
+from lippmann.rendering.request.choices import Denoiser, Device, Integrator, Method, Order, PixelFilter
+from lippmann.scene.placement import Placement, PlacementOptions
+
+if TYPE_CHECKING:
+    from lippmann.display import Display
+
+#: Samples per pixel where nothing is said.
+DEFAULT_SPP = 16
+#: Surfaces per path where nothing is said.
+DEFAULT_DEPTH: dict[Integrator, int] = {"classic": 2, "path": 8, "direct": 1}
+
+_WORDS = {
+    "method": Method,
+    "order": Order,
+    "integrator": Integrator,
+    "pixel_filter": PixelFilter,
+    "device": Device,
+    "denoise": Denoiser,
+}
+#: Lowest and highest values of the whole numbers.
+_RANGES = {
+    "depth": (1, 4096),
+    "spp": (1, 2**24),
+    "seed": (0, 2**32 - 1),
+    "threads": (1, 4096),
+    "memory": (1, 2**63),
+}
+
+
+@dataclass(frozen=True)
+class RenderRequest:
+    """How a picture is to be made, and where the display stands.
+
+    Every value is checked by itself here. :func:`~lippmann.rendering.request.resolve.resolve` fills in what is "auto"
+    or None and checks what belongs together.
+
+    Parameters
+    ----------
+    method:
+        ``full`` traces every ray. ``pooled`` denoises, and all micro-images that show a point share its light.
+        ``lens-view`` reprojects points from micro-image to micro-image and traces the missed pixels. ``interpolated``
+        averages the missed pixels of every other micro-image from its neighbours.
+    order:
+        For ``lens-view`` and ``interpolated``: ``paper`` goes lens by lens as the paper does; ``default`` (None is the
+        same) in the order that traces fewer pixels.
+    respect_gloss:
+        For ``lens-view`` and ``interpolated``: trace what reprojection would falsify, such as mirrors, glass and
+        highlights. None: in the default order, not in the paper's.
+    integrator:
+        ``path`` (all light), ``direct`` (light straight from emitters and environment), ``classic`` (Whitted ray
+        tracing with the light models of Tachyon and NFF), or a property of the first surface: ``normal``, ``depth``,
+        ``position``, ``albedo``.
+    depth:
+        Surfaces along a path, the primary ray's counting 1; 1 to 4096. None: 8 for ``path``, 1 for ``direct``, the
+        file's own for ``classic``.
+    spp:
+        Samples per pixel, or per sub-pixel; 1 to 2**24. None: 16, or with a quality or a time as many as that takes.
+    quality, quality_mean:
+        PSNR in dB that the worst micro-image, or the whole picture, is to reach by its own estimate; above 0, at most
+        80.
+    max_time:
+        Seconds of tracing after which the best picture so far is taken.
+    seed:
+        Of all random choices, 0 to 2**32 - 1.
+    subpixels:
+        Trace a ray for each sub-pixel, at its own place.
+    pixel_filter:
+        ``box`` spreads the samples over the pixel, ``point`` takes its centre.
+    denoise:
+        ``oidn`` denoises by Open Image Denoise with the effort that the traced rays deserve
+        (:mod:`~lippmann.rendering.denoise.cost_model`), ``oidn-fast`` and ``oidn-high`` with a given one, ``none`` not
+        at all.
+    layers:
+        Add depth, position, normal, albedo and shape of what each pixel sees to the picture's maps.
+    placement:
+        Where the display stands in the scene: options, or a placement found before.
+    device, threads, memory:
+        Where it runs, on how many CPU threads (None: all cores), and in how many bytes (None: 60 % of what is free).
+    reason:
+        Why the method is this one, where it was left open; set by the resolver.
+
+    Raises
+    ------
+    UsageError
+        A value is unknown or out of its range.
+    """
+
+    method: Method = "auto"
+    order: Order | None = None
+    respect_gloss: bool | None = None
+    integrator: Integrator = "auto"
+    depth: int | None = None
+    spp: int | None = None
+    quality: float | None = None
+    quality_mean: float | None = None
+    max_time: float | None = None
+    seed: int = 0
+    subpixels: bool = False
+    pixel_filter: PixelFilter = "auto"
+    denoise: Denoiser = "auto"
+    layers: bool = False
+    placement: PlacementOptions | Placement = field(default_factory=PlacementOptions)
+    device: Device = "auto"
+    threads: int | None = None
+    memory: int | None = None
+    reason: str = field(default="", compare=False)
+
+    def __post_init__(self) -> None:
+        for name, words in _WORDS.items():
+            value, known = getattr(self, name), get_args(words)
+            if value not in known and not (name == "order" and value is None):
+                raise UsageError(f"'{value}' is not known", parameter=name, rule=f"known are {', '.join(known)}")
+        for name, (low, high) in _RANGES.items():
+            value = getattr(self, name)
+            if value is None and name != "seed":
+                continue
+            if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
+                rule = f"a whole number from {low} to {high}"
+                raise UsageError(f"{value!r} will not do", parameter=name, rule=rule)
+        for name in ("quality", "quality_mean"):
+            value = getattr(self, name)
+            if value is not None and not 0 < value <= 80:
+                raise UsageError(f"{value:g} dB will not do", parameter=name, rule="above 0 and at most 80 dB")
+        if self.max_time is not None and not 0 < self.max_time < float("inf"):
+            raise UsageError(f"{self.max_time:g} s will not do", parameter="max_time", rule="seconds above 0")
+
+    @classmethod
+    def of(cls, options: Mapping[str, object]) -> RenderRequest:
+        """The request of keyword arguments.
+
+        Raises
+        ------
+        UsageError
+            A name or a value is not known.
+        """
+        known = [each.name for each in fields(cls) if each.name != "reason"]
+        for name in options:
+            if name not in known:
+                raise UsageError(f"'{name}' is no option of a render", rule=f"known are {', '.join(known)}")
+        return cls(**options)  # type: ignore[arg-type]  # checked by __post_init__
+
+    @property
+    def denoises(self) -> bool:
+        """Whether the picture is denoised whatever comes."""
+        return self.denoise not in ("none", "auto")
+
+    @property
+    def shares_light(self) -> bool:
+        """Whether denoised light is shared between the micro-images."""
+        return self.method == "pooled"
+
+    @property
+    def box_filter(self) -> bool:
+        """Whether samples are spread over the pixel, not all at its centre."""
+        return self.pixel_filter == "box"
+
+    @property
+    def has_quality(self) -> bool:
+        """Whether a PSNR is to be reached."""
+        return self.quality is not None or self.quality_mean is not None
+
+    @property
+    def is_open_ended(self) -> bool:
+        """Whether something else than a number of samples says when to stop."""
+        return self.has_quality or self.max_time is not None
+
+    def keeps_colors(self, display: Display) -> bool:
+        """Whether the rays of sub-pixels keep all three colours, whichever is shown, for a denoiser to use.
+
+        Under cylinders; on arrays, whose micro-images are short in both directions, that was better here, worse there.
+        """
+        return self.subpixels and self.denoise != "none" and display.lens_array.layout == "lenticular"
+
+    @property
+    def careful(self) -> bool:
+        """Whether what reprojection would falsify is traced."""
+        return self.order != "paper" if self.respect_gloss is None else self.respect_gloss
+
+    @property
+    def samples(self) -> int:
+        """Samples per pixel where nothing else says when to stop."""
+        return DEFAULT_SPP if self.spp is None else self.spp
+
+    @property
+    def surfaces(self) -> int:
+        """The depth that will be used."""
+        return DEFAULT_DEPTH.get(self.integrator, 1) if self.depth is None else self.depth
+
+    @property
+    def channels(self) -> int:
+        """Rays with places of their own in a pixel: 3 for sub-pixels, else 1."""
+        return 3 if self.subpixels else 1
+
+    @property
+    def transfer(self) -> Transfer:
+        """How values become codes: those of the classic models are codes already, as their own programs write them."""
+        return "linear" if self.integrator == "classic" else "srgb"

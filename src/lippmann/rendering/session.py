@@ -1,0 +1,260 @@
+"""How every render begins: the engine runs, the scene lies on the device, the display stands in it.
+
+Pictures, quilts, previews, forecasts and tiles open a session, take their rays and their integrator from it, and let it
+write down how they were made. Mitsuba is loaded by :func:`open_session`: modules that need it are imported after that.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, TypeVar, cast
+
+from lippmann._version import VERSION
+from lippmann.display import Display
+from lippmann.image.provenance import Provenance
+from lippmann.progress import Progress, ProgressCallback, silent
+from lippmann.rendering.denoise.oidn import load_denoiser
+from lippmann.rendering.estimate.psnr import Estimate
+from lippmann.rendering.film.wavefront_plan import make_plan
+from lippmann.rendering.request.render_request import RenderRequest
+from lippmann.runtime import engine as engines
+from lippmann.runtime import machine
+from lippmann.scene.placement import Placement, place
+from lippmann.scene.scene import Scene
+from lippmann.scene.values.description import Matrix
+
+if TYPE_CHECKING:
+    from lippmann.device.pbr import BuiltScene
+    from lippmann.device.whitted.scene import BuiltClassic
+    from lippmann.rendering.film.wavefront import Frame
+    from lippmann.rendering.transport.integrator import Integrator
+    from lippmann.rendering.transport.ray_source import RaySource
+    from lippmann.rendering.transport.surface_property import SurfaceProperty
+
+#: Share of the free memory that is used where no limit is given.
+DEFAULT_MEMORY_SHARE = 0.6
+
+T = TypeVar("T")
+
+
+@dataclass
+class Stopwatch:
+    """Seconds by stage, reported as each stage begins and ends."""
+
+    progress: ProgressCallback = silent
+    seconds: dict[str, float] = field(default_factory=dict)
+    started: float = field(default_factory=time.perf_counter)
+
+    def stage(self, name: str, work: Callable[[], T]) -> T:
+        """What ``work`` returns; its seconds are added to those of the stage ``name``."""
+        self.progress(Progress(name, 0, 1))
+        start = time.perf_counter()
+        result = work()
+        self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - start
+        self.progress(Progress(name, 1, 1))
+        return result
+
+    @property
+    def total(self) -> float:
+        """Seconds since the stopwatch was made."""
+        return time.perf_counter() - self.started
+
+
+@dataclass(frozen=True, eq=False)
+class Session:
+    """A scene ready to be rendered. Make one with :func:`open_session`.
+
+    Attributes
+    ----------
+    scene, request:
+        What is rendered, and how; the request is a resolved one.
+    engine:
+        The engine, as it was started.
+    built:
+        The scene on the device.
+    memory:
+        Bytes that the picture may use.
+    watch:
+        Times the stages and reports them.
+    """
+
+    scene: Scene
+    request: RenderRequest
+    engine: engines.Engine
+    built: BuiltScene | BuiltClassic
+    memory: int
+    watch: Stopwatch
+
+    def place(self, display: Display) -> Placement:
+        """Where ``display`` stands in the scene.
+
+        Raises
+        ------
+        UsageError, SceneError
+            As :func:`lippmann.scene.placement.place`.
+        """
+        scene, placement = self.scene, self.request.placement
+        if isinstance(placement, Placement):
+            return placement
+        return place(
+            scene.bounds,
+            display,
+            cameras=scene.cameras,
+            options=placement,
+            home_camera=scene.home_camera,
+            bounds_in=scene.bounds_in,
+        )
+
+    def integrator(self, source: RaySource, frame_from_world: Matrix) -> Integrator:
+        """The integrator that the request names, for the built scene.
+
+        Parameters
+        ----------
+        source:
+            Rays of the whole picture, by which emitters are weighted: those who render parts of one picture must give
+            the same.
+        frame_from_world:
+            ``(4, 4)``: the frame in which surface properties are told.
+        """
+        return self.watch.stage("build", lambda: _make_integrator(self.built, self.request, frame_from_world, source))
+
+    def provenance(
+        self,
+        frame: Frame,
+        *,
+        samples: int,
+        options: Mapping[str, Any],
+        method: str | None = None,
+        estimate: Estimate | None = None,
+        notes: tuple[str, ...] = (),
+    ) -> Provenance:
+        """How a picture of ``frame`` was made, for its file; ``method`` is the request's where it is None."""
+        request = self.request
+        height, width = frame.pixels.shape[:2]
+        rays = frame.rays
+        return Provenance(
+            method=method or request.method,
+            integrator=request.integrator,
+            depth=request.surfaces,
+            spp=samples,
+            seed=request.seed,
+            subpixels=request.subpixels,
+            scene=self.scene.name,
+            transfer=request.transfer,
+            version=VERSION,
+            device=self.engine.gpu_name or "cpu",
+            traced_fraction=rays.primary / (height * width * samples * request.channels),
+            pixel_shares=frame.shares,
+            rays={"primary": rays.primary, "shadow": rays.shadow, "secondary": rays.secondary},
+            seconds=_stage_seconds(self.watch, frame),
+            estimate=None if estimate is None else estimate.to_dict(),
+            options=dict(options),
+            notes=(*self.notes, *notes, *_frame_notes(frame)),
+        )
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Remarks of the scene's reader and builder, one line each."""
+        from lippmann.device.pbr import BuiltScene
+
+        built = self.built
+        return (*self.scene.notes, *built.notes) if isinstance(built, BuiltScene) else built.scene.notes
+
+
+def open_session(
+    scene: Scene,
+    request: RenderRequest,
+    size: tuple[int, int] | None = None,
+    *,
+    memory: int | None = None,
+    progress: ProgressCallback = silent,
+) -> Session:
+    """Start the engine and build the scene; what cannot be done is refused before anything is loaded.
+
+    Parameters
+    ----------
+    scene, request:
+        What is rendered, and how: what :func:`~lippmann.rendering.request.resolve.resolve` returned.
+    size:
+        Width and height of the picture in pixels, which must fit the memory; None where it is rendered in tiles.
+    memory:
+        Bytes that the picture may use, instead of the request's.
+    progress:
+        Told of all stages.
+
+    Raises
+    ------
+    MemoryLimitError, SceneError, EngineError
+        As the stages find them.
+    """
+    watch = Stopwatch(progress)
+    memory = memory or memory_limit(request)
+    if size is not None:
+        make_plan(*size, 1, channels=request.channels, memory=memory)
+    if request.denoises:
+        load_denoiser()
+    engine = watch.stage("load", lambda: engines.start(request.device, request.threads))
+    built = watch.stage("build", lambda: _build(scene, request))
+    return Session(scene, request, engine, built, memory, watch)
+
+
+def memory_limit(request: RenderRequest) -> int:
+    """The memory in bytes that a picture may use: the request's, or a share of what is free."""
+    return request.memory or int(machine.available_memory() * DEFAULT_MEMORY_SHARE)
+
+
+def _build(scene: Scene, request: RenderRequest) -> BuiltScene | BuiltClassic:
+    """The scene on the device, in the form that the integrator needs."""
+    if request.integrator == "classic":
+        from lippmann.device.whitted.scene import build_classic
+
+        assert scene.classic is not None  # the resolver refuses others
+        return build_classic(scene.classic)
+    from lippmann.device.pbr import build
+
+    return build(scene)
+
+
+def _make_integrator(
+    built: BuiltScene | BuiltClassic, request: RenderRequest, frame_from_world: Matrix, source: RaySource
+) -> Integrator:
+    from lippmann.device.whitted.scene import BuiltClassic
+    from lippmann.rendering.transport.light_sampling import weigh_lamps
+    from lippmann.rendering.transport.path import PathIntegrator
+    from lippmann.rendering.transport.scene_flags import make_traits
+    from lippmann.rendering.transport.surface_property import SurfaceIntegrator
+    from lippmann.rendering.transport.whitted import ClassicIntegrator
+
+    if isinstance(built, BuiltClassic):
+        return ClassicIntegrator(built, request.surfaces)
+    if request.integrator in ("path", "direct"):
+        traits = make_traits(
+            built.mitsuba, background=built.background, has_null=built.has_null, absorption=built.absorption
+        )
+        integrator = PathIntegrator(built.mitsuba, traits, request.surfaces, name=request.integrator)
+        if not built.borrowed:
+            weigh_lamps(integrator, source)
+        return integrator
+    return SurfaceIntegrator(built.mitsuba, cast("SurfaceProperty", request.integrator), frame_from_world)
+
+
+def _stage_seconds(watch: Stopwatch, frame: Frame) -> dict[str, float]:
+    """Seconds by stage, in the order of the work; ``write`` is added by who writes."""
+    return {
+        "load": watch.seconds.get("load", 0.0),
+        "build": watch.seconds.get("build", 0.0),
+        "compile": frame.seconds_compile,
+        "trace": frame.seconds_trace,
+        "reuse": frame.seconds_reuse,
+        **{name: watch.seconds[name] for name in ("denoise", "layers") if name in watch.seconds},
+        "write": 0.0,
+        "total": watch.total,
+    }
+
+
+def _frame_notes(frame: Frame) -> tuple[str, ...]:
+    if not frame.rays.discarded:
+        return ()
+    return (f"{frame.rays.discarded} samples were not finite and count as black",)
