@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     from lippmann.errors import LippmannError
     from lippmann.image import IntegralImage, read_picture
     from lippmann.progress import Progress
+    from lippmann.rendering.request.render_request import RenderRequest
+    from lippmann.scene.placement import PlacementOptions
     from lippmann.scene.scene import Scene
 
 __version__ = _version.VERSION
@@ -35,7 +37,9 @@ _HOME = {
     "LippmannError": "lippmann.errors",
     "IntegralImage": "lippmann.image",
     "read_picture": "lippmann.image",
+    "PlacementOptions": "lippmann.scene.placement",
     "Progress": "lippmann.progress",
+    "RenderRequest": "lippmann.rendering.request.render_request",
     "Scene": "lippmann.scene.scene",
 }
 
@@ -45,7 +49,9 @@ __all__ = [
     "LensArray",
     "LippmannError",
     "Panel",
+    "PlacementOptions",
     "Progress",
+    "RenderRequest",
     "Scene",
     "__version__",
     "list_displays",
