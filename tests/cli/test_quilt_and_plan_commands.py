@@ -91,7 +91,7 @@ def test_bad_input_is_one_line_and_code_2(lippmann, tmp_path):
     assert "does not say how many views" in refused(*render, "-o", tmp_path / "x.png")
     assert "the ending '.jpg'" in refused(*render, "-o", tmp_path / "x_qs8x6a0.75.jpg")
     assert "unknown display" in refused(*render, "-d", "portrai")
-    assert "no quilt of it is known" in refused(*render, "-d", "panel-4k")
+    assert "no quilt is known" in refused(*render, "-d", "panel-4k")
     assert "columns x rows, such as 8x6" in refused(*render, "--views", "48")
     assert "such as 512x512" in refused(*render, "--size", "3360")
     assert "no multiple of 8" in refused(*render, "--size", "3361x3360")

@@ -158,13 +158,13 @@ def test_views_may_be_numbered_from_one_and_without_zeros(folder, tmp_path):
 
 def test_an_absent_view_is_named(folder):
     (folder / "shot2_017.png").unlink()
-    with pytest.raises(PictureError, match="view 17 is absent; views run to 47"):
+    with pytest.raises(PictureError, match="view 17 is missing; views run to 47"):
         read_views(folder)
 
 
 def test_a_missing_end_is_counted(folder):
     (folder / "shot2_047.png").unlink()
-    with pytest.raises(PictureError, match="it holds 47 views; 8x6 are 48"):
+    with pytest.raises(PictureError, match="it holds 47 views; 8x6 views are 48"):
         read_views(folder, LAYOUT)
 
 
@@ -190,7 +190,7 @@ def test_a_damaged_view_is_named(folder):
         (["a.png"], "the name has no number"),
         (["a_2.png", "a_3.png"], "the first view is 2"),
         (["a_0.png", "b_0.png"], r"b_0\.png: is view 0, as a_0\.png is"),
-        (["a_0.png", "lippmann.json"], "a folder of 'lippmann views'"),
+        (["a_0.png", "lippmann.json"], "a folder of integral views"),
     ],
 )
 def test_folders_that_leave_the_order_open_are_refused(names, said, tmp_path):

@@ -276,7 +276,7 @@ def test_other_wrong_questions():
             replay(image, size=size)
     with pytest.raises(UsageError, match="the filter 'cubic' is unknown; known are nearest, linear"):
         replay(image, filter="cubic")
-    with pytest.raises(UsageError, match="0 frames will not do"):
+    with pytest.raises(UsageError, match="frames: 0 is out of range"):
         sweep(image, (0, 0, 5), (1, 0, 5), 0)
     with pytest.raises(UsageError, match=r"no view \(0, 4\); the display sheet has 1 x 4"):
         eye_of_view(SHEET, 0, 4)

@@ -1,7 +1,7 @@
-"""Quilts as files, and as folders with one picture per view.
+"""Quilt files, and folders with one picture per view.
 
-A quilt is held as it is stored: the largest there are take 0.8 GB with 8 bits, four times that with floats. How large a
-picture is, is known before memory is given to it.
+Values keep the type in which they are stored: the largest quilts take 0.8 GB with 8 bits, four times that as floats.
+The size of a picture is checked before memory is allocated for it.
 """
 
 from __future__ import annotations
@@ -32,18 +32,18 @@ from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.quilts.quilt import MOST_SIDE, Quilt, QuiltLayout, check_size, layout_of_name
 from lippmann.runtime.atomic_write import replacing_folder
 
-#: Endings of the pictures that are read; JPEG is never written.
+#: Endings of the picture files that are read; JPEG is not written.
 _JPEG = (".jpg", ".jpeg")
 _READ = (*FORMATS, *_JPEG)
 
 
 def read_quilt(path: Path) -> Quilt:
-    """Read a quilt: PNG, OpenEXR, TIFF or JPEG.
+    """Read a quilt: PNG, OpenEXR, TIFF or JPEG. Its name states the layout, such as ``_qs8x6a0.75``.
 
     Raises
     ------
     PictureError
-        If the file is missing or damaged, or its name and its size disagree.
+        If the file is missing or damaged, or its name has no layout or one that does not fit its size.
     """
     layout = layout_of_name(path)
     _check_ending(path)
@@ -53,21 +53,28 @@ def read_quilt(path: Path) -> Quilt:
 
 
 def read_views(folder: Path, layout: QuiltLayout | None = None, *, progress: ProgressCallback = silent) -> Quilt:
-    """The quilt of a folder with one picture per view.
+    """Read a quilt from a folder with one picture per view.
 
-    Views are numbered by the last number in their files' names, from 0 or 1, the leftmost camera first. ``layout`` says
-    how many there have to be; without it they stand in one row.
+    Parameters
+    ----------
+    folder:
+        The folder. Views are numbered by the last number in their file names, from 0 or 1, that of the leftmost camera
+        first.
+    layout:
+        Columns, rows and aspect ratio of the quilt. None: one row of all views.
+    progress:
+        Called after every view.
 
     Raises
     ------
     PictureError
-        If a view is absent, damaged or of another size than the first.
+        If a view is missing or damaged, or differs from the first in size.
     """
     paths = _numbered(folder)
     if layout is None:
         layout = QuiltLayout(len(paths), 1, None)
     if len(paths) != layout.views:
-        rule = f"{layout.columns}x{layout.rows} are {layout.views}"
+        rule = f"{layout.columns}x{layout.rows} views are {layout.views}"
         raise PictureError(f"it holds {len(paths)} views", where=str(folder), rule=rule)
     width, height = _size(paths[0])
     if width * height * layout.views > MOST_PIXELS:
@@ -77,9 +84,9 @@ def read_views(folder: Path, layout: QuiltLayout | None = None, *, progress: Pro
     stored = depths.pop() if len(depths) == 1 else "float32"
     quilt = Quilt(np.empty((height * layout.rows, width * layout.columns, 3), dtype=stored), layout, stored)
     for number, path in enumerate(paths):
-        if (found := _size(path)) != (width, height):
+        if (size := _size(path)) != (width, height):
             rule = f"the first view, {paths[0].name}, has {width} x {height}"
-            raise PictureError(f"has {found[0]} x {found[1]} pixels", where=str(path), rule=rule)
+            raise PictureError(f"has {size[0]} x {size[1]} pixels", where=str(path), rule=rule)
         values, _ = _read(path)
         quilt.view_values(number)[...] = converted_values(values, stored, "srgb")
         progress(Progress("read", number + 1, layout.views))
@@ -87,18 +94,29 @@ def read_views(folder: Path, layout: QuiltLayout | None = None, *, progress: Pro
 
 
 def write_quilt(quilt: Quilt, path: Path, *, bits: int | None = None) -> None:
-    """Write a quilt, with as many bits as it was stored with unless told otherwise.
+    """Write a quilt to a file.
+
+    Parameters
+    ----------
+    quilt:
+        The quilt.
+    path:
+        The file, ``.png``, ``.exr`` or ``.tif``; its name states the quilt's columns and rows.
+    bits:
+        Bits per value: 8 or 16 for PNG, 16 or 32 for OpenEXR, 8, 16 or 32 for TIFF. None: as the quilt is stored.
 
     Raises
     ------
-    PictureError, OutputError
-        If the name does not say the quilt's layout or the size is impossible, or the file cannot be written.
+    PictureError
+        If the name states no layout or another one, the size does not fit it, or a value is not finite.
+    OutputError
+        If the format is unknown or has no such bits, or the file cannot be written.
     """
-    named = layout_of_name(path)
-    if named[:2] != quilt.layout[:2]:
+    layout = layout_of_name(path)
+    if layout[:2] != quilt.layout[:2]:
         rule = f"the quilt has {quilt.layout.columns}x{quilt.layout.rows} views"
-        raise PictureError(f"the name says {named.columns}x{named.rows}", where=str(path), rule=rule)
-    check_size(*quilt.size, named, str(path))
+        raise PictureError(f"the name says {layout.columns}x{layout.rows}", where=str(path), rule=rule)
+    check_size(*quilt.size, layout, str(path))
     name, stored = format_for(path, bits, source=quilt.stored)
     if quilt.values.dtype.kind == "f" and not np.isfinite(quilt.values).all():
         raise PictureError("the quilt holds values that are not finite", where=str(path))
@@ -115,9 +133,20 @@ def write_views(
     bits: int | None = None,
     progress: ProgressCallback = silent,
 ) -> None:
-    """Write one picture per view, ``view_00`` the leftmost camera's.
+    """Write a folder with one picture per view; ``view_00`` is that of the leftmost camera.
 
-    ``format`` is ``png``, ``exr`` or ``tiff``, by default what holds the quilt's values exactly.
+    Parameters
+    ----------
+    quilt:
+        The quilt.
+    folder:
+        The folder; appears whole or not at all.
+    format:
+        ``png``, ``exr`` or ``tiff``. None: the one that holds the quilt's values without loss.
+    bits:
+        Bits per value. None: as the quilt is stored.
+    progress:
+        Called after every view.
 
     Raises
     ------
@@ -140,14 +169,14 @@ def write_views(
 
 
 def _numbered(folder: Path) -> Sequence[Path]:
-    """The views of a folder in order; refuses gaps, doubles and names without a number."""
+    """The views of a folder in order; a gap, a double or a name without a number raises :class:`PictureError`."""
     try:
         paths = sorted(path for path in folder.iterdir() if path.suffix.lower() in _READ and path.name[0] != ".")
     except OSError as error:
         raise PictureError(f"cannot be read: {error.strerror}", where=str(folder)) from None
     if (folder / MANIFEST).exists():
         rule = "its pictures have one pixel for every lens"
-        raise PictureError("this is a folder of 'lippmann views'", where=str(folder), rule=rule, fix="compose it")
+        raise PictureError("is a folder of integral views", where=str(folder), rule=rule, fix="compose it")
     if not paths:
         raise PictureError("there are no views", where=str(folder), rule=f"they end in {', '.join(_READ)}")
     by_number: dict[int, Path] = {}
@@ -161,12 +190,12 @@ def _numbered(folder: Path) -> Sequence[Path]:
     first = min(by_number)
     if first > 1:
         raise PictureError(f"the first view is {first}", where=str(folder), rule="views are numbered from 0 or 1")
-    if absent := _first_absent(by_number, first):
-        raise PictureError(f"view {absent} is absent", where=str(folder), rule=f"views run to {max(by_number)}")
+    if missing := _first_missing(by_number, first):
+        raise PictureError(f"view {missing} is missing", where=str(folder), rule=f"views run to {max(by_number)}")
     return [by_number[number] for number in sorted(by_number)]
 
 
-def _first_absent(numbers: Iterable[int], first: int) -> int | None:
+def _first_missing(numbers: Iterable[int], first: int) -> int | None:
     for expected, number in enumerate(sorted(numbers), start=first):
         if number != expected:
             return expected
@@ -179,7 +208,7 @@ def _check_ending(path: Path) -> None:
 
 
 def _size(path: Path) -> tuple[int, int]:
-    """Width and height, before memory is given to the pixels."""
+    """Width and height of a picture file, without decoding its pixels."""
     if path.suffix.lower() in _JPEG:
         with _opened_jpeg(path) as picture:
             return picture.width, picture.height
@@ -195,17 +224,17 @@ def _stored(path: Path) -> Stored:
 
 
 def _read(path: Path) -> tuple[NDArray[Any], Stored]:
-    """The values as stored, ``(H, W, 3)``, and their type."""
+    """Values ``(H, W, 3)`` in the type in which they are stored, and that type."""
     if path.suffix.lower() in _JPEG:
         with _opened_jpeg(path) as picture:
             return np.asarray(picture if picture.mode == "RGB" else picture.convert("RGB")), "uint8"
-    values = open_file(path).decode()[""]
+    values = open_file(path).decode()[0]
     return values, cast(Stored, values.dtype.name)
 
 
 @contextmanager
 def _opened_jpeg(path: Path) -> Iterator[Any]:
-    """The picture, not yet decoded; whatever its library raises about the file becomes a PictureError."""
+    """The opened JPEG, not yet decoded; errors of the library about the file become :class:`PictureError`."""
     from PIL import Image
 
     try:

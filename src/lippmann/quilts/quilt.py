@@ -1,8 +1,9 @@
-"""Quilts: the views of a scene side by side in one picture, as light-field displays and their programs exchange them.
+"""Quilts: the views of a scene side by side in one picture, the exchange format of light-field displays.
 
-View 0, the leftmost camera's, is at the bottom left; views follow to the right, then row by row upwards. A quilt's
-name ends in ``_qs8x6a0.75``: columns x rows, and the aspect of the picture shown, which the tiles need not have. Where
-the sides of the file are no multiples of columns and rows (4096 / 5) the rest lies unused on the right and on top.
+View 0, that of the leftmost camera, is at the bottom left; views follow to the right, then row by row upwards. A
+quilt's name ends in ``_qs8x6a0.75``: columns x rows, and the aspect ratio of the displayed picture, which the tiles
+need not have. If the sides of the file are no multiples of columns and rows (4096 / 5), the rest is unused, on the
+right and on top.
 """
 
 from __future__ import annotations
@@ -10,26 +11,33 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lippmann.display import Display, load_display
 from lippmann.errors import PictureError, UsageError
 from lippmann.image.encoding import linear_values
 from lippmann.image.provenance import Provenance
-from lippmann.image.stored_values import FloatArray, Stored
+from lippmann.image.stored_values import FloatArray, Stored, Values
 
-#: Pixels of a quilt's sides, and its columns and rows, within which displays take them.
+#: Least and largest side of a quilt in pixels, and the largest number of columns or rows.
 LEAST_SIDE, MOST_SIDE, MOST_TILES = 256, 16384, 32
 
 _NAME = re.compile(r"_qs(\d{1,4})x(\d{1,4})(?:a(\d{1,4}(?:\.\d{1,12})?))?$")
-_CONVENTION = "a quilt's name ends in columns x rows and the picture's aspect, such as _qs8x6a0.75.png"
+_CONVENTION = "a quilt's name ends in columns x rows and aspect ratio, such as _qs8x6a0.75.png"
 
 
 class QuiltLayout(NamedTuple):
-    """What a quilt's name says; ``aspect`` (width / height of the picture shown) is None in names of older programs."""
+    """The layout in a quilt's name.
+
+    Attributes
+    ----------
+    columns, rows:
+        Views side by side, and one above the other, 1 to 32.
+    aspect:
+        Width over height of the displayed picture; None in names that older programs wrote.
+    """
 
     columns: int
     rows: int
@@ -42,14 +50,23 @@ class QuiltLayout(NamedTuple):
 
     @property
     def ending(self) -> str:
-        """The end of the name, such as ``_qs8x6a0.75``."""
+        """The ending of the file's stem, such as ``_qs8x6a0.75``."""
         return f"_qs{self.columns}x{self.rows}" + ("" if self.aspect is None else f"a{self.aspect:.6g}")
 
 
 class DeviceQuilt(NamedTuple):
-    """The quilt that a display is given: its preset's name, width and height in pixels, and layout.
+    """The recommended quilt of a display.
 
-    ``serial`` is how the serial numbers of such devices begin; empty where that is not known.
+    Attributes
+    ----------
+    display:
+        Name of the display's preset.
+    width, height:
+        Size of the quilt in pixels.
+    layout:
+        Columns, rows and aspect ratio.
+    serial:
+        Prefix of the serial numbers of such devices; empty if unknown.
     """
 
     display: str
@@ -59,7 +76,7 @@ class DeviceQuilt(NamedTuple):
     serial: str = ""
 
 
-#: What the names of the devices' presets begin with.
+#: Prefix of the names of the devices' presets.
 _FAMILY = "looking-glass-"
 
 
@@ -69,7 +86,7 @@ def _device(
     return DeviceQuilt(_FAMILY + display, width, height, QuiltLayout(columns, rows, aspect), serial)
 
 
-#: Recommended quilts, by device. The 16" landscape of the third generation has two: published, and as devices report.
+#: Recommended quilts. The 16" landscape of the third generation has two: the published one and that of its devices.
 DEVICE_QUILTS: tuple[DeviceQuilt, ...] = (
     _device("8.9-gen1", 4096, 4096, 5, 9, 1.6, "LKG-2K"),
     _device("15.6-gen1", 4096, 4096, 5, 9, 1.77778, "LKG-4K"),
@@ -96,17 +113,17 @@ class Quilt:
     Parameters
     ----------
     values:
-        ``(height, width, 3)``, row 0 on top: float32 linear RGB or, so that the largest quilts take less, codes of 8 or
-        16 bits or half floats as files hold them.
+        ``(height, width, 3)`` RGB, row 0 on top: linear light as float32 or float16, or codes as uint8 or uint16 as
+        files hold them, which saves memory.
     layout:
-        Columns, rows and the aspect of the picture shown.
+        Columns, rows and aspect ratio.
     stored:
-        How the values were stored in the file that they came from.
+        Type of the values in the file.
     provenance:
-        How it was made, as far as that is known: files do not say it.
+        How the quilt was made; files do not hold it.
     """
 
-    values: NDArray[Any]
+    values: Values
     layout: QuiltLayout
     stored: Stored = "float32"
     provenance: Provenance = field(default_factory=Provenance)
@@ -133,17 +150,17 @@ class Quilt:
         return right * width, self.size[1] - (up + 1) * height
 
     def view(self, number: int) -> FloatArray:
-        """``(height, width, 3)`` linear RGB of a view, 0 the leftmost camera's; shares memory with linear values."""
+        """``(height, width, 3)`` linear RGB of a view, 0 that of the leftmost camera."""
         return linear_values(self.view_values(number), self.provenance.transfer)
 
-    def view_values(self, number: int) -> NDArray[Any]:
-        """``(height, width, 3)`` values of a view; shares the quilt's memory."""
+    def view_values(self, number: int) -> Values:
+        """``(height, width, 3)`` values of a view as they are held; shares the quilt's memory."""
         width, height = self.view_size
         column, row = self.corner(number)
         return self.values[row : row + height, column : column + width]
 
     def view_rows(self, first: int, last: int) -> FloatArray:
-        """``(views, last - first, width, 3)`` linear RGB of some rows of all views."""
+        """``(views, last - first, width, 3)`` linear RGB of rows of all views."""
         width, _ = self.view_size
         rows = np.empty((self.layout.views, last - first, width, 3), dtype=np.float32)
         for number in range(self.layout.views):
@@ -152,12 +169,12 @@ class Quilt:
 
 
 def load_device(name: str) -> Display:
-    """The display of a device by the last part of its preset's name, such as ``portrait``; or any other display.
+    """Load a Looking Glass device by the end of its preset's name, such as ``portrait``, or any other display.
 
     Raises
     ------
     DisplayError
-        As :func:`~lippmann.display.load_display`.
+        If the display is unknown, or its description is missing or invalid.
     """
     known = {device.display for device in DEVICE_QUILTS}
     return load_display(_FAMILY + name if _FAMILY + name in known else name)
@@ -166,71 +183,80 @@ def load_device(name: str) -> Display:
 def quilt_of_display(
     display: Display, grid: tuple[int, int] | None = None, size: tuple[int, int] | None = None
 ) -> DeviceQuilt:
-    """The quilt that a display is given, known by its preset's name or the beginning of its serial.
+    """The quilt for a display.
 
-    ``grid`` (columns, rows) and ``size`` (width, height in pixels) say otherwise; for displays of no known kind both
-    are needed. The aspect is that of the display's panel.
+    Parameters
+    ----------
+    display:
+        The display; a device is recognized by its preset's name or by its serial number.
+    grid:
+        Columns and rows of views, 1 to 32 each. None: as recommended for the device.
+    size:
+        Width and height of the quilt in pixels, 256 to 16384 each. None: as recommended for the device.
+
+    Returns
+    -------
+    The quilt's size and layout, with the aspect ratio of the display's panel.
 
     Raises
     ------
-    UsageError, PictureError
-        If there is no such quilt.
+    UsageError
+        If the grid is out of range, or no recommendation is known for what is None.
+    PictureError
+        If the size is out of range, or does not divide into views.
     """
-    layout = None if grid is None else _checked_grid(grid)
+    if grid is not None and not (1 <= grid[0] <= MOST_TILES and 1 <= grid[1] <= MOST_TILES):
+        rule = f"there are 1 to {MOST_TILES} columns and rows"
+        raise UsageError(f"{grid[0]}x{grid[1]} is out of range", parameter="views", rule=rule)
+    layout = grid
     known = [
         device
         for device in DEVICE_QUILTS
         if device.display == display.name or (device.serial and display.name.startswith(device.serial))
     ]
-    fitting = [device for device in known if layout is None or device.layout[:2] == layout]
-    if size is None and not fitting:
-        what = "no quilt of it is known" if layout is None else f"no quilt of {layout[0]}x{layout[1]} views is known"
+    matching = [device for device in known if layout is None or device.layout[:2] == layout]
+    if size is None and not matching:
+        what = "no quilt is known" if layout is None else f"no quilt of {layout[0]}x{layout[1]} views is known"
         rule = f"known are those of {', '.join(sorted({device.display for device in DEVICE_QUILTS}))}"
         fix = "say --views and --size" if layout is None else "say --size, too"
         raise UsageError(what, where=display.name, rule=rule, fix=fix)
     if layout is None:
         if not known:
-            raise UsageError("how many views it takes is not known", where=display.name, fix="say --views, too")
+            raise UsageError("the number of views is not known", where=display.name, fix="say --views, too")
         layout = known[0].layout[:2]
-    width, height = size or fitting[0][1:3]
+    width, height = size or matching[0][1:3]
     aspect = float(f"{display.panel.width / display.panel.height:.6g}")
     quilt = DeviceQuilt(display.name, width, height, QuiltLayout(*layout, aspect))
     check_size(width, height, quilt.layout, "quilt")
     return quilt
 
 
-def _checked_grid(grid: tuple[int, int]) -> tuple[int, int]:
-    if not (1 <= grid[0] <= MOST_TILES and 1 <= grid[1] <= MOST_TILES):
-        rule = f"there are 1 to {MOST_TILES} columns and rows"
-        raise UsageError(f"{grid[0]}x{grid[1]} views will not do", where="--views", rule=rule)
-    return grid
-
-
 def layout_of_name(path: Path) -> QuiltLayout:
-    """Columns, rows and aspect from a quilt's name.
+    """Columns, rows and aspect ratio from a quilt's file name.
 
     Raises
     ------
     PictureError
-        If the name does not say them, or they are impossible.
+        If the name has no layout, or its numbers are out of range.
     """
-    found = _NAME.search(path.stem)
-    if found is None:
+    match = _NAME.search(path.stem)
+    if match is None:
         raise PictureError("the name does not say how many views there are", where=str(path), rule=_CONVENTION)
-    columns, rows = int(found[1]), int(found[2])
+    columns, rows = int(match[1]), int(match[2])
     if not (1 <= columns <= MOST_TILES and 1 <= rows <= MOST_TILES):
         rule = f"there are 1 to {MOST_TILES} of both"
         raise PictureError(f"the name says {columns} columns and {rows} rows", where=str(path), rule=rule)
-    aspect = None if found[3] is None else float(found[3])
+    aspect = None if match[3] is None else float(match[3])
     if aspect is not None and not 0.05 <= aspect <= 20:
-        raise PictureError(f"the name says the aspect {found[3]}", where=str(path), rule=_CONVENTION)
+        raise PictureError(f"the name says the aspect {match[3]}", where=str(path), rule=_CONVENTION)
     return QuiltLayout(columns, rows, aspect)
 
 
 def check_size(width: int, height: int, layout: QuiltLayout, where: str) -> None:
-    """Raise :class:`PictureError` if a quilt of this layout cannot have this size.
+    """Raise :class:`PictureError` unless a quilt of this layout can have this size in pixels.
 
-    Its sides are multiples of columns and rows, or powers of two, as the first devices' are, with a rest unused.
+    Its sides are multiples of columns and rows, or powers of two with an unused rest, as for the first devices.
+    ``where`` names the file in messages.
     """
     for side, count, what in ((width, layout.columns, "wide"), (height, layout.rows, "high")):
         if not LEAST_SIDE <= side <= MOST_SIDE:

@@ -1,9 +1,9 @@
-"""The native picture of a lenticular display from views of the scene: each sub-pixel takes the views that it shows.
+"""Weaving: the native picture of a lenticular display from the views of a quilt.
 
-A sub-pixel at the right edge under its lens is seen from the left, so it shows view 0, the leftmost camera's; one at
-the left edge shows the last. Views are counted by the place under the lens, which is even in the tangent of the
-direction. In the view, the colour is taken where the sub-pixel's light line meets the lens plane: a view shows the
-panel's rectangle in the lens plane, as an off-axis camera focused there sees it.
+A sub-pixel at the right edge of its lens is seen from the left, so it shows view 0, that of the leftmost camera; one at
+the left edge shows the last view. The view is linear in the position under the lens, which is linear in the tangent of
+the direction. Within the view, the colour is that of the point at which the sub-pixel's light line meets the lens
+plane: a view shows the panel's rectangle in the lens plane, as an off-axis camera focused there sees it.
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ from lippmann.quilts.quilt import Quilt
 Real = NDArray[np.float64]
 ViewChoice = Literal["nearest", "linear"]
 
-#: Pixels woven at a time, with some 50 arrays of as many numbers, and pixels of the views that are linear for that.
+#: Pixels per block, with some 50 arrays of this length; and pixels of the views that are made linear for a block.
 _BLOCK, _VIEW_BLOCK = 1 << 18, 1 << 24
 
-#: Relative difference of aspects that rounding in names and displays' shapes leaves.
+#: Tolerance of aspect ratios: relative error that rounding in names and panel sizes causes.
 _ASPECT_TOLERANCE = 0.02
 
 
@@ -42,26 +42,28 @@ def weave(
     scene: str = "",
     progress: ProgressCallback = silent,
 ) -> IntegralImage:
-    """The picture that shows the views of ``quilt`` on ``display``.
+    """Native picture that shows the views of a quilt on a display.
 
     Parameters
     ----------
     quilt:
-        The views, the leftmost camera's first.
+        The views, that of the leftmost camera first.
     display:
         A lenticular display, slanted or not.
     choice:
-        ``nearest`` takes the one view nearest to a sub-pixel's direction, ``linear`` mixes the two next to it. In a
-        view, colours are interpolated between pixels in either case.
+        ``nearest`` takes the view nearest to a sub-pixel's direction; ``linear`` interpolates between the two nearest
+        views. Within a view, colours are interpolated between pixels in either case.
     scene:
-        Name for the picture's provenance.
+        Name of the scene, for the provenance.
+    progress:
+        Called after every block of rows.
 
     Raises
     ------
     UsageError
         If the choice is unknown.
     PictureError
-        If the display is not lenticular, or the quilt was made for another shape of panel.
+        If the display is not lenticular, or the quilt has another aspect ratio than its panel.
     """
     _check(quilt, display, choice)
     width, height = display.panel.width, display.panel.height
@@ -69,9 +71,9 @@ def weave(
     step = _rows_at_a_time(quilt, display)
     for first in range(0, height, step):
         last = min(first + step, height)
-        pixels[first:last] = _woven(quilt, display, choice, first, last)
+        pixels[first:last] = _weave_rows(quilt, display, choice, first, last)
         progress(Progress("weave", last, height))
-    return IntegralImage(pixels, display, provenance=_made(quilt, choice, scene))
+    return IntegralImage(pixels, display, provenance=_provenance(quilt, choice, scene))
 
 
 def weave_to_file(
@@ -84,9 +86,34 @@ def weave_to_file(
     bits: int | None = None,
     progress: ProgressCallback = silent,
 ) -> None:
-    """Write what :func:`weave` gives to a TIFF or Zarr file, in memory that does not grow with the panel.
+    """Write the native picture that shows the views of a quilt, in memory that does not grow with the panel.
 
-    Parameters and errors as there; of the file as for :func:`lippmann.image.write.write_rows`.
+    Parameters
+    ----------
+    quilt:
+        The views, that of the leftmost camera first.
+    display:
+        A lenticular display, slanted or not.
+    path:
+        The TIFF or Zarr file.
+    choice:
+        ``nearest`` takes the view nearest to a sub-pixel's direction; ``linear`` interpolates between the two nearest
+        views.
+    scene:
+        Name of the scene, for the provenance.
+    bits:
+        Bits per value; None for the format's default.
+    progress:
+        Called after every block of rows.
+
+    Raises
+    ------
+    UsageError
+        If the choice is unknown.
+    PictureError
+        If the display is not lenticular, or the quilt has another aspect ratio than its panel.
+    OutputError
+        If the format is not TIFF or Zarr or has no such bits, or the file cannot be written.
     """
     _check(quilt, display, choice)
     step = _rows_at_a_time(quilt, display)
@@ -95,14 +122,14 @@ def weave_to_file(
         band = np.empty((last - first, display.panel.width, 3), dtype=np.float32)
         for start in range(first, last, step):
             stop = min(start + step, last)
-            band[start - first : stop - first] = _woven(quilt, display, choice, start, stop)
+            band[start - first : stop - first] = _weave_rows(quilt, display, choice, start, stop)
             progress(Progress("weave", stop, display.panel.height))
         return band
 
-    write_rows(rows, Metadata(display, np.eye(4), _made(quilt, choice, scene)), path, bits=bits)
+    write_rows(rows, Metadata(display, np.eye(4), _provenance(quilt, choice, scene)), path, bits=bits)
 
 
-def _made(quilt: Quilt, choice: ViewChoice, scene: str) -> Provenance:
+def _provenance(quilt: Quilt, choice: ViewChoice, scene: str) -> Provenance:
     options = {"views": quilt.layout.views, "view_choice": choice, "direction": "even in the tangent"}
     return Provenance(method="weave", subpixels=True, scene=scene, version=VERSION, options=options)
 
@@ -112,16 +139,16 @@ def _rows_at_a_time(quilt: Quilt, display: Display) -> int:
     return max(1, min(_BLOCK // display.panel.width, _VIEW_BLOCK * display.panel.height // (width * height)))
 
 
-def _woven(quilt: Quilt, display: Display, choice: ViewChoice, first: int, last: int) -> FloatArray:
-    """Some rows of the picture, ``(last - first, W, 3)``."""
+def _weave_rows(quilt: Quilt, display: Display, choice: ViewChoice, first: int, last: int) -> FloatArray:
+    """Rows ``first`` to ``last`` of the picture, ``(last - first, W, 3)``."""
     from lippmann.quilts.weave_kernel import weave_channel
 
     shape = last - first, display.panel.width
-    woven = np.empty((*shape, 3), dtype=np.float32)
-    channels = _places(quilt, display, choice, first, last)
-    # Only these rows of the views are looked at.
-    top = min(int(places.down.min()) for places in channels)
-    bottom = max(int(places.down.max()) for places in channels) + 2
+    result = np.empty((*shape, 3), dtype=np.float32)
+    channels = _samples_of_rows(quilt, display, choice, first, last)
+    # Only these rows of the views are sampled.
+    top = min(int(samples.down.min()) for samples in channels)
+    bottom = max(int(samples.down.max()) for samples in channels) + 2
     views = quilt.view_rows(top, min(bottom, quilt.view_size[1]))
     for channel, (number, share, across, down) in enumerate(channels):
         weave_channel(
@@ -131,14 +158,17 @@ def _woven(quilt: Quilt, display: Display, choice: ViewChoice, first: int, last:
             np.broadcast_to(share, shape),
             np.broadcast_to(across, shape),
             np.broadcast_to(down - top, shape),
-            woven,
+            result,
         )
-    return woven
+    return result
 
 
-class _Places(NamedTuple):
-    """What sub-pixels show, as arrays that broadcast to the pixels: a view, the share of the next one, and where in
-    them, in pixels from the middle of the first."""
+class _Samples(NamedTuple):
+    """What sub-pixels show, as arrays that broadcast to the pixels.
+
+    ``number`` is a view and ``share`` the weight of the next one; ``across`` and ``down`` are the position in them, in
+    pixels from the centre of the first pixel.
+    """
 
     number: NDArray[np.intp]
     share: Real
@@ -146,33 +176,34 @@ class _Places(NamedTuple):
     down: Real
 
 
-def _places(quilt: Quilt, display: Display, choice: ViewChoice, first: int, last: int) -> list[_Places]:
-    """What the sub-pixels of some rows show, by channel."""
+def _samples_of_rows(quilt: Quilt, display: Display, choice: ViewChoice, first: int, last: int) -> list[_Samples]:
+    """Samples of the sub-pixels of rows ``first`` to ``last``, by channel."""
     panel = display.panel
     u: Real = np.arange(panel.width, dtype=np.float64)[None] + 0.5
     v: Real = np.arange(first, last, dtype=np.float64)[:, None] + 0.5
-    found: list[_Places] = []
+    channels: list[_Samples] = []
     for channel in range(3):
         offset, before = panel.subpixel_offsets[channel], panel.subpixel_offsets[:channel]
         if panel.subpixel_cells is None and offset in before:
-            found.append(found[before.index(offset)])
+            channels.append(channels[before.index(offset)])
         elif panel.subpixel_cells is None and display.lattice.rows_are_alike:
-            # Columns show the same heights, too.
-            column = _places_of(quilt, display, choice, channel, u[:, :1], v)
-            found.append(_places_of(quilt, display, choice, channel, u, v[:1])._replace(down=column.down))
+            # All columns have the same heights as well.
+            column = _samples_at(quilt, display, choice, channel, u[:, :1], v)
+            channels.append(_samples_at(quilt, display, choice, channel, u, v[:1])._replace(down=column.down))
         else:
-            found.append(_places_of(quilt, display, choice, channel, *np.meshgrid(u, v)))
-    return found
+            channels.append(_samples_at(quilt, display, choice, channel, *np.meshgrid(u, v)))
+    return channels
 
 
-def _places_of(quilt: Quilt, display: Display, choice: ViewChoice, channel: int, u: Real, v: Real) -> _Places:
+def _samples_at(quilt: Quilt, display: Display, choice: ViewChoice, channel: int, u: Real, v: Real) -> _Samples:
     x, y = display.subpixel_point(u, v, channel, NUMPY)
     number, share = _views(view_fraction(display, x, y), quilt.layout.views, choice)
-    return _Places(number, share, *_place_in_view(quilt, display, x, y))
+    return _Samples(number, share, *_position_in_view(quilt, display, x, y))
 
 
 def view_fraction(display: Display, x: Real, y: Real) -> Real:
-    """Which view a panel point (mm) of a lenticular display shows: 0 the leftmost edge of the cone, 1 the rightmost."""
+    """View that a panel point (mm) of a lenticular display shows: 0 at the left edge of the view cone, 1 at the
+    right."""
     lattice, scale = display.lattice, display.magnification
     i, _ = display.lens_of(x, y, NUMPY)
     axis = (lattice.origin_x + i * lattice.pitch) * scale
@@ -183,33 +214,33 @@ def view_fraction(display: Display, x: Real, y: Real) -> Real:
 
 def _check(quilt: Quilt, display: Display, choice: str) -> None:
     if choice not in get_args(ViewChoice):
-        raise UsageError(f"the choice {choice!r} is not known", rule=f"known are {', '.join(get_args(ViewChoice))}")
+        raise UsageError(f"the choice {choice!r} is unknown", rule=f"known are {', '.join(get_args(ViewChoice))}")
     _check_fit(quilt, display)
 
 
 def _check_fit(quilt: Quilt, display: Display) -> None:
     if display.lens_array.layout != "lenticular":
-        rule = "a quilt's views lie side by side, for cylindrical lenses"
+        rule = "a quilt needs cylindrical lenses"
         raise PictureError(f"the display {display.name} has {display.lens_array.layout} lenses", rule=rule)
     shape = display.panel.width / display.panel.height
     aspect = quilt.layout.aspect
     if aspect is not None and abs(aspect / shape - 1) > _ASPECT_TOLERANCE:
         rule = f"the display {display.name} has {shape:.6g}"
-        raise PictureError(f"the quilt's picture has the aspect {aspect:.6g}", rule=rule, fix="take its own display")
+        raise PictureError(f"the quilt has the aspect {aspect:.6g}", rule=rule, fix="use the quilt's display")
 
 
 def _views(fraction: Real, count: int, choice: ViewChoice) -> tuple[NDArray[np.intp], Real]:
-    """The view to take and the share of the next one."""
+    """The view and the weight of the next one."""
     if choice == "nearest":
         return np.minimum((fraction * count).astype(np.intp), count - 1), np.zeros_like(fraction)
-    # View i is right in the middle of its part of the cone.
+    # View i is exact at the centre of its part of the cone.
     position = np.clip(fraction * count - 0.5, 0.0, count - 1.0)
     number = position.astype(np.intp)
     return number, position - number
 
 
-def _place_in_view(quilt: Quilt, display: Display, x: Real, y: Real) -> tuple[Real, Real]:
-    """Pixel coordinates in a view, 0 at the middle of its first pixel, of what the panel points show."""
+def _position_in_view(quilt: Quilt, display: Display, x: Real, y: Real) -> tuple[Real, Real]:
+    """Pixel coordinates in a view, 0 at the centre of its first pixel, of the points that panel points show."""
     lens = display.lens_of(x, y, NUMPY)
     lens_x, lens_y = display.lens_center(*lens, x, y, NUMPY)
     width, height = quilt.view_size

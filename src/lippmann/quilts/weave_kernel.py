@@ -1,4 +1,4 @@
-"""The compiled part of weaving. It is imported late: loading Numba takes half a second."""
+"""The compiled kernel of weaving. It is imported late: loading Numba takes half a second."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from lippmann.runtime.numba_jit import inlined, uncounted
 
 @inlined
 def _between(view: Any, channel: int, across: float, down: float) -> float:
-    """A value of ``(rows, width, 3)`` at a place, interpolated between its pixels."""
+    """Bilinear interpolation of ``view`` ``(rows, width, 3)`` at a position in pixels."""
     left, top = int(across), int(down)
     right, bottom = min(left + 1, view.shape[1] - 1), min(top + 1, view.shape[0] - 1)
     part_x, part_y = across - left, down - top
@@ -20,10 +20,10 @@ def _between(view: Any, channel: int, across: float, down: float) -> float:
 
 @uncounted
 def weave_channel(views: Any, channel: int, number: Any, share: Any, across: Any, down: Any, woven: Any) -> None:
-    """One channel of ``woven`` ``(H, W, 3)``: each value from the view ``number`` and, by ``share``, the next one.
+    """Fill one channel of ``woven`` ``(H, W, 3)`` with samples of the views.
 
-    ``views`` is ``(views, rows, width, 3)``; ``across`` and ``down`` are pixel coordinates in them, 0 at the middle of
-    the first pixel. These two, ``number`` and ``share`` are ``(H, W)``.
+    ``views`` is ``(views, rows, width, 3)``. The other arrays are ``(H, W)``: ``number`` is a view, ``share`` the
+    weight of the next one, ``across`` and ``down`` are pixel coordinates in them, 0 at the centre of the first pixel.
     """
     last = views.shape[0] - 1
     for y in range(woven.shape[0]):

@@ -223,7 +223,7 @@ def test_the_quilts_of_devices_are_known_by_name_serial_and_calibration():
     assert quilt_of_display(landscape).layout[:2] == (7, 7)
     assert quilt_of_display(landscape, (8, 6))[1:3] == (7680, 4320)
     assert quilt_of_display(portrait, size=(1680, 1680)).layout[:2] == (8, 6)
-    with pytest.raises(UsageError, match="no quilt of it is known"):
+    with pytest.raises(UsageError, match="no quilt is known"):
         quilt_of_display(SHEET)
     with pytest.raises(UsageError, match="say --views, too"):
         quilt_of_display(SHEET, size=(800, 800))
