@@ -33,6 +33,7 @@ def main(arguments: list[str] | None = None) -> None:
 def run(words: list[str], *, debug: bool = False) -> int:
     """Run one command; errors become one line on standard error unless ``debug`` asks for the traceback."""
     from lippmann.cli.app import app
+    from lippmann.cli.shared.option_names import in_options
 
     try:
         code = app(words, prog_name="lippmann", standalone_mode=False)
@@ -44,7 +45,7 @@ def run(words: list[str], *, debug: bool = False) -> int:
         if debug:
             raise
         if isinstance(error, LippmannError):
-            return _leave(str(error), error.exit_code)
+            return _leave(in_options(error), error.exit_code)
         if isinstance(error, _ComplaintError):
             return _leave(_usage(error), 2)
         if isinstance(error, MemoryError):

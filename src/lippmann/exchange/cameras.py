@@ -105,7 +105,9 @@ class Cameras:
         lowest = float(height.min(initial=0.0))
         if lowest <= -self.focus_distance:
             rule = f"stand-in cameras at {self.focus_distance:g} mm show depths up to that distance"
-            raise PictureError(f"a surface lies {-lowest:g} mm behind the lens plane", rule=rule, fix="say --distance")
+            raise PictureError(
+                f"a surface lies {-lowest:g} mm behind the lens plane", rule=rule, fix="say distance=..."
+            )
         return np.where(is_finite, self.focus_distance**2 / (self.focus_distance + height), np.inf)
 
     def height(self, axial_depth: Real) -> Real:
@@ -136,9 +138,9 @@ class Cameras:
         parallel = math.isinf(display.viewing_distance)
         if distance is not None and not parallel:
             rule = f"the views of {display.name} meet at its viewing distance of {display.viewing_distance:g} mm"
-            raise UsageError("is for parallel views", where="--distance", rule=rule)
+            raise UsageError("is for parallel views", parameter="distance", rule=rule)
         if distance is not None and not 0 < distance < math.inf:
-            raise UsageError(f"{distance:g} mm will not do", where="--distance", rule="it must be above zero")
+            raise UsageError(f"{distance:g} mm will not do", parameter="distance", rule="it must be above zero")
         focus = display.viewing_distance
         if parallel:
             focus = -STAND_IN * display.resolvable_depth[1] if distance is None else distance
@@ -170,7 +172,7 @@ class Cameras:
         if spread <= 0:
             rule = f"they must span more than one pixel of the focus plane, {self.pixel_pitch:g} mm"
             what = f"{views} cameras with the baseline {self.baseline:g} mm span {views * self.baseline:g} mm"
-            raise PictureError(what, where=where, rule=rule, fix="say --display")
+            raise PictureError(what, where=where, rule=rule, fix="say display=...")
         gap = self.pixel_pitch * self.focus_distance / spread
         pixel_pitch = gap * self.baseline / self.focus_distance
         return Display(

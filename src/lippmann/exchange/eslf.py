@@ -95,7 +95,7 @@ def read_eslf(path: Path, *, lens: tuple[int, int] | None = None) -> LightField:
     if header.width % across or header.height % down:
         rule = f"with {across} x {down} pixels per lens its sides must be multiples of these"
         what = f"has {header.width} x {header.height} pixels"
-        raise PictureError(what, where=str(path), rule=rule, fix="say --display, with the lenses it has")
+        raise PictureError(what, where=str(path), rule=rule, fix="say display=..., with the lenses it has")
     shape = (down, across, header.height // down, header.width // across)
     check_shape((*shape, 3), str(path))
     codes = read_png(path)

@@ -84,7 +84,7 @@ def stored_in(layout: LayoutName, image_stored: Stored, bits: int | None) -> Sto
     if bits is not None:
         if bits not in known:
             rule = f"{layout} has {', '.join(map(str, known))}"
-            raise OutputError(f"{bits} bits per channel are not possible", where="--bits", rule=rule)
+            raise OutputError(f"{bits} bits per channel are not possible", parameter="bits", rule=rule)
         return known[bits]
     if image_stored in known.values() or (layout == "zarr" and image_stored == "float16"):
         return image_stored
@@ -153,7 +153,7 @@ def export_image(
     """
     name = check_target(layout, path)
     if distance is not None and name != "hci":
-        raise UsageError(f"does not apply to {name}", where="--distance", fix="leave it out")
+        raise UsageError(f"does not apply to {name}", parameter="distance", fix="leave it out")
     light_field = light_field_of(image, stored_in(name, image.stored, bits))
     display = image.display
     if name == "hci":
@@ -201,7 +201,7 @@ def import_image(
     name = recognize(path) if layout is None else _layout_name(layout)
     if name == "views" and is_composable(path):
         if display is not None:
-            raise PictureError("names its own display", where=str(path), fix="leave --display out")
+            raise PictureError("names its own display", where=str(path), fix="leave display=... out")
         return compose(path, progress=progress), ()
     light_field = _read(path, name, display, progress)
     return light_field.image(display, where=str(path), layout=name), light_field.notes
@@ -226,12 +226,12 @@ def recognize(path: Path) -> LayoutName:
     for name, ending in _ENDING.items():
         if path.suffix.lower() == ending:
             return name
-    raise PictureError("the layout is not recognized", where=str(path), fix="say --as")
+    raise PictureError("the layout is not recognized", where=str(path), fix="say layout=...")
 
 
 def _layout_name(text: str) -> LayoutName:
     if text not in LAYOUTS:
-        raise UsageError(f"the layout {text!r} is unknown", where="--as", rule=f"known are {', '.join(LAYOUTS)}")
+        raise UsageError(f"the layout {text!r} is unknown", parameter="layout", rule=f"known are {', '.join(LAYOUTS)}")
     return text
 
 

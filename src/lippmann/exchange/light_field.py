@@ -148,7 +148,7 @@ class LightField:
         if self.cameras is not None and down == across:
             return self.cameras.display(across, width, height, where=where)
         what = "has no display in it" if self.cameras is None else f"has {across} x {down} views, of unlike number"
-        fix = f"say --display, with {across} x {down} pixels per lens and {width} x {height} lenses"
+        fix = f"say display=..., with {across} x {down} pixels per lens and {width} x {height} lenses"
         raise PictureError(what, where=where, fix=fix)
 
     def _origin(self, scene: str, layout: str) -> tuple[NDArray[np.float64], Provenance]:

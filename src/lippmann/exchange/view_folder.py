@@ -129,7 +129,9 @@ def _in_rows(by_place: Mapping[Place, Path], folder: Path, grid: tuple[int, int]
     counted = len(first) == 1
     if counted and grid is None:
         rule = "their names hold one number"
-        raise PictureError("the number of views in a row is unknown", where=str(folder), rule=rule, fix="say --display")
+        raise PictureError(
+            "the number of views in a row is unknown", where=str(folder), rule=rule, fix="say display=..."
+        )
     last = np.array(list(by_place)).max(axis=0) - first
     across, down = grid if grid is not None and counted else (int(last[-1]) + 1, int(last[0]) + 1)
     if counted and len(by_place) != across * down:

@@ -97,7 +97,7 @@ class PictureFile:
         metadata = self.metadata
         if metadata is None:
             if display is None:
-                raise PictureError("has no display in it", where=str(self.path), fix="say --display")
+                raise PictureError("has no display in it", where=str(self.path), fix="say display=...")
             metadata = Metadata(display, np.eye(4), Provenance())
         elif display is not None:
             metadata = replace(metadata, display=display)

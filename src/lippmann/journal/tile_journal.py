@@ -271,7 +271,7 @@ def _is_begun(output: Path, folder: Path, job: Mapping[str, Any], resume: bool) 
         raise OutputError(
             f"an unfinished picture lies in {folder.name}",
             where=str(output),
-            fix=f"go on with --resume, or {_put_away(folder)}",
+            fix=f"go on with resume=True, or {_put_away(folder)}",
         )
     found = differences(before["fingerprint"], job["fingerprint"])
     if not found and before.get("grid") != job["grid"]:

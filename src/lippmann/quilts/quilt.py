@@ -218,11 +218,11 @@ def quilt_of_display(
     if size is None and not matching:
         what = "no quilt is known" if layout is None else f"no quilt of {layout[0]}x{layout[1]} views is known"
         rule = f"known are those of {', '.join(sorted({device.display for device in DEVICE_QUILTS}))}"
-        fix = "say --views and --size" if layout is None else "say --size, too"
+        fix = "say views=... and size=..." if layout is None else "say size=..., too"
         raise UsageError(what, where=display.name, rule=rule, fix=fix)
     if layout is None:
         if not known:
-            raise UsageError("the number of views is not known", where=display.name, fix="say --views, too")
+            raise UsageError("the number of views is not known", where=display.name, fix="say views=..., too")
         layout = known[0].layout[:2]
     width, height = size or matching[0][1:3]
     aspect = float(f"{display.panel.width / display.panel.height:.6g}")

@@ -174,7 +174,7 @@ def _look(variant: Variant) -> tuple[str, str]:
 def _gloss(results: Results) -> list[Markup]:
     text = (
         "A mirror, glass or a highlight has another colour in every direction, so the colour that one lens saw is "
-        "wrong for the next. The paper reuses it all the same; --respect-gloss traces such pixels anew."
+        "wrong for the next. The paper reuses it all the same; the mode that respects gloss traces such pixels anew."
     )
     shown = (tables.gloss_table(results, method) for method in METHODS)
     return [paragraph(escaped(text)), *shown, *gloss_figures(results)]

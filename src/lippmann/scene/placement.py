@@ -83,20 +83,24 @@ class PlacementOptions:
 
     def __post_init__(self) -> None:
         if self.mode is not None and self.mode not in get_args(Mode):
-            raise UsageError(f"placement '{self.mode}'", where="place", rule=f"known are {', '.join(get_args(Mode))}")
+            raise UsageError(
+                f"placement '{self.mode}'", parameter="mode", rule=f"known are {', '.join(get_args(Mode))}"
+            )
         for name in ("turn", "shift"):
             values = getattr(self, name)
             if len(values) != 3 or not np.isfinite(values).all():
-                raise UsageError(f"{values!r}", where=name, rule="three finite numbers")
+                raise UsageError(f"{values!r}", parameter=name, rule="three finite numbers")
         if not (np.isfinite(self.scale) and self.scale > 0.0):
-            raise UsageError(f"{self.scale:g}", where="scale", rule="a factor above 0")
+            raise UsageError(f"{self.scale:g}", parameter="scale", rule="a factor above 0")
         if self.pop_out is not None and not 0.0 <= self.pop_out <= 1.0:
-            raise UsageError(f"{self.pop_out:g}", where="pop_out", rule="a share of the depth, 0 to 1")
+            raise UsageError(f"{self.pop_out:g}", parameter="pop_out", rule="a share of the depth, 0 to 1")
         if self.camera is not None and self.mode not in (None, "camera"):
-            raise UsageError(f"camera '{self.camera}' beside placement '{self.mode}'", where="camera", rule="only one")
+            raise UsageError(
+                f"camera '{self.camera}' beside placement '{self.mode}'", parameter="camera", rule="only one"
+            )
         if self.pop_out is not None and self.mode == "display":
             raise UsageError(
-                "coordinates of the display leave nothing to choose", where="pop_out", fix="use shift 0,0,Z instead"
+                "coordinates of the display leave nothing to choose", parameter="pop_out", fix="use shift=0,0,Z instead"
             )
 
 
@@ -193,7 +197,7 @@ def _chosen(cameras: Sequence[Camera], name: str | None) -> Camera:
     if name is not None:
         return find_camera(cameras, name)
     if not cameras:
-        raise SceneError("the scene has no cameras", where="place", fix="fit it instead")
+        raise SceneError("the scene has no cameras", parameter="mode", fix="fit it instead")
     return cameras[0]
 
 
@@ -279,7 +283,7 @@ def _seen_by(camera: Camera, bounds: Bounds, display: Display, options: Placemen
     farthest, nearest = -float(in_camera[:, 2].min()), max(-float(in_camera[:, 2].max()), 0.0)
     if farthest <= 0.0:
         raise SceneError(
-            f"camera '{camera.name}' has the whole scene behind it", where="camera", fix="choose another, or fit"
+            f"camera '{camera.name}' has the whole scene behind it", parameter="camera", fix="choose another, or fit"
         )
     if options.pop_out is not None:
         focus = nearest + options.pop_out * (farthest - nearest)
@@ -289,12 +293,12 @@ def _seen_by(camera: Camera, bounds: Bounds, display: Display, options: Placemen
         center = -float(in_camera[:, 2].mean())
         focus = center if center > 0.0 else (nearest + farthest) / 2.0
     if not (np.isfinite(focus) and focus > 0.0):
-        raise SceneError(f"camera '{camera.name}' focuses at {focus:g}", where="camera", rule="a distance above 0")
+        raise SceneError(f"camera '{camera.name}' focuses at {focus:g}", parameter="camera", rule="a distance above 0")
     units, (least, most) = _units_per_mm(camera, focus, display), _UNITS_PER_MM
     if not least <= units <= most:
         raise SceneError(
             f"camera '{camera.name}' makes 1 mm of the display {units:g} scene units long",
-            where="camera",
+            parameter="camera",
             rule=f"between {least:g} and {most:g}",
         )
     return _inverse(frame @ _translation((0.0, 0.0, -focus)) @ _scaling(units))
@@ -308,9 +312,9 @@ def _units_per_mm(camera: Camera, focus: float, display: Display) -> float:
     elif camera.height is not None:
         height = camera.height
     else:
-        raise SceneError(f"camera '{camera.name}' has neither an angle nor a height", where="camera")
+        raise SceneError(f"camera '{camera.name}' has neither an angle nor a height", parameter="camera")
     if not (np.isfinite(height) and height > 0.0 and camera.aspect > 0.0):
-        raise SceneError(f"camera '{camera.name}' has a field {height:g} high", where="camera", rule="above 0")
+        raise SceneError(f"camera '{camera.name}' has a field {height:g} high", parameter="camera", rule="above 0")
     return min(height * camera.aspect / display.size_mm[0], height / display.size_mm[1])
 
 
@@ -324,7 +328,7 @@ def _rigid(camera: Camera) -> Matrix:
     right = np.cross(up, back)
     lengths = np.linalg.norm(back), np.linalg.norm(right)
     if not np.isfinite(matrix).all() or min(lengths) <= 0.0:
-        raise SceneError(f"camera '{camera.name}' has a transform that is not invertible", where="camera")
+        raise SceneError(f"camera '{camera.name}' has a transform that is not invertible", parameter="camera")
     back, right = back / lengths[0], right / lengths[1]
     rigid = np.eye(4)
     rigid[:3, :3] = np.stack([right, np.cross(back, right), back], axis=-1)

@@ -170,7 +170,7 @@ def find_camera(cameras: Sequence[Camera], name: str) -> Camera:
     close = difflib.get_close_matches(name, names, n=1)
     raise SceneError(
         f"no camera is named '{name}'",
-        where="camera",
+        parameter="camera",
         rule=f"the scene has {', '.join(repr(known) for known in names)}" if names else "the scene has no cameras",
         fix=f"is '{close[0]}' meant?" if close else "",
     )

@@ -87,7 +87,7 @@ class GltfMotion(Motion):
         from lippmann.scene.readers.gltf_animation.animated_file import MovingGltf
 
         if not (math.isfinite(fps) and fps > 0.0):
-            raise UsageError(f"{fps:g} frames per second", where="--fps", rule="a number above 0")
+            raise UsageError(f"{fps:g} frames per second", parameter="fps", rule="a number above 0")
         self._file = path.name
         self._fps = fps
         self._moving = MovingGltf(path, animation=animation, allow_outside=allow_outside)
@@ -131,7 +131,7 @@ class Flight(Motion):
         if scene.classic is None:
             raise UsageError(
                 f"'{scene.name}' is no scene that a camera path leads through",
-                where="--camera-path",
+                parameter="camera_path",
                 rule="paths are for Tachyon (.dat) and NFF files and the bundled scenes",
             )
         self._scene = scene
@@ -151,7 +151,7 @@ class Flight(Motion):
 
     def camera(self, frame: int, name: str | None) -> Camera:
         if name is not None:
-            raise UsageError(f"camera '{name}' beside a path", where="--camera", rule="the path says where it stands")
+            raise UsageError(f"camera '{name}' beside a path", parameter="camera", rule="the path says where it stands")
         pose = self._poses[frame]
         own = replace(self._classic.camera, view=pose.view, up=pose.up, center=pose.center)
         return world_camera(replace(self._classic, camera=own), name="flight")
@@ -194,17 +194,17 @@ def open_motion(
         "allow_outside": allow_outside,
     }
     if camera_path is not None:
-        for option, value in (("--animation", animation), ("--fps", fps)):
+        for name, value in (("animation", animation), ("fps", fps)):
             if value is not None:
-                raise UsageError("a camera path has one pose a frame", where=option, fix="leave it out")
+                raise UsageError("a camera path has one pose a frame", parameter=name, fix="leave it out")
         from lippmann.scene.readers.tachyon.reader import read_cam
 
         return Flight(load_scene(source, **options), read_cam(camera_path))
     if kind_of_file(source) not in (".glb", ".gltf"):
         raise UsageError(
             f"nothing moves in '{source}'",
-            where="--frames",
+            parameter="frames",
             rule="glTF files have animations; Tachyon and NFF scenes are flown through",
-            fix="add --camera-path FILE.cam for a flight",
+            fix="add camera_path=FILE.cam for a flight",
         )
     return GltfMotion(Path(source), fps=FRAMES_PER_SECOND if fps is None else fps, animation=animation, **options)

@@ -14,6 +14,7 @@ import typer
 from lippmann.cli.shared import options, parse
 from lippmann.cli.shared.console import Console
 from lippmann.cli.shared.exit_codes import INTERRUPTED
+from lippmann.cli.shared.option_names import in_options
 from lippmann.errors import LippmannError, UsageError
 
 if TYPE_CHECKING:
@@ -78,7 +79,7 @@ def _read_ahead(files: list[PictureFile], console: Console) -> None:
             try:
                 file.current()
             except LippmannError as error:
-                console.remark(f"lippmann: {error}")
+                console.remark(f"lippmann: {in_options(error)}")
 
     threading.Thread(target=read, daemon=True).start()
 

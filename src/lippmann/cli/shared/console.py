@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
+from lippmann.cli.shared.option_names import translated
 from lippmann.progress import Progress, ProgressCallback, silent
 
 #: Seconds between two plain progress lines where output is not a terminal.
@@ -49,9 +50,9 @@ class Console:
             print(lines)
 
     def remark(self, line: str) -> None:
-        """One line that is no result: a note or a warning."""
+        """One line that is no result: a note or a warning, its parameters as options."""
         if not self.quiet:
-            print(line, file=sys.stderr)
+            print(translated(line), file=sys.stderr)
 
     @contextmanager
     def progress(self) -> Iterator[ProgressCallback]:

@@ -78,17 +78,19 @@ def denoise(
     """
     if albedo is None and normal is not None:
         raise UsageError(
-            "a normal without an albedo is no guide", where="denoise", fix="give both, or the albedo alone"
+            "a normal without an albedo is no guide", parameter="denoise", fix="give both, or the albedo alone"
         )
     if effort not in get_args(Effort):
-        raise UsageError(f"'{effort}' is not known", where="effort", rule=f"known are {', '.join(get_args(Effort))}")
+        raise UsageError(
+            f"'{effort}' is not known", parameter="effort", rule=f"known are {', '.join(get_args(Effort))}"
+        )
     images = {"color": _picture(color, "color")}
     for name, guide in (("albedo", albedo), ("normal", normal)):
         if guide is not None:
             images[name] = _picture(guide, name)
             if images[name].shape != images["color"].shape:
                 rule = f"that of the picture is {images['color'].shape}"
-                raise UsageError(f"the {name} has the shape {images[name].shape}", where="denoise", rule=rule)
+                raise UsageError(f"the {name} has the shape {images[name].shape}", parameter="denoise", rule=rule)
     options = {"hdr": hdr, "cleanAux": clean_guides and albedo is not None}
     if not turned:
         return _filtered(images, options, effort, threads, exposure)
@@ -118,10 +120,10 @@ def _picture(values: NDArray[Any], name: str) -> FloatArray:
     """Packed float32, as the C library wants it."""
     array = np.ascontiguousarray(values, dtype=np.float32)
     if array.ndim != 3 or array.shape[2] != 3 or 0 in array.shape:
-        raise UsageError(f"the {name} has the shape {array.shape}", where="denoise", rule="it must be (H, W, 3)")
+        raise UsageError(f"the {name} has the shape {array.shape}", parameter="denoise", rule="it must be (H, W, 3)")
     if not np.isfinite(array).all():
         # The network would smear a single one over its whole neighbourhood.
-        raise UsageError(f"the {name} holds values that are not finite", where="denoise", fix="replace them")
+        raise UsageError(f"the {name} holds values that are not finite", parameter="denoise", fix="replace them")
     return array
 
 
@@ -166,7 +168,7 @@ def load_denoiser() -> Any:
         import pyoidn
     except ImportError:
         raise UsageError(
-            "Open Image Denoise is not installed", where="--denoise", fix='install it: pip install "pyoidn>=2.5"'
+            "Open Image Denoise is not installed", parameter="denoise", fix='install it: pip install "pyoidn>=2.5"'
         ) from None
     return pyoidn
 
@@ -201,4 +203,4 @@ def _device(pyoidn: Any, threads: int) -> Any:
 def _check(device: Any) -> None:
     message = device.get_error()
     if message:
-        raise EngineError(f"Open Image Denoise fails: {message}", where="--denoise", fix="render without --denoise")
+        raise EngineError(f"Open Image Denoise fails: {message}", parameter="denoise", fix='render with denoise="none"')

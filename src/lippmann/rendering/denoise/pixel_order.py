@@ -67,11 +67,11 @@ def denoise_views(
         Open Image Denoise fails.
     """
     if form not in get_args(Form):
-        raise UsageError(f"'{form}' is not known", where="form", rule=f"known are {', '.join(get_args(Form))}")
+        raise UsageError(f"'{form}' is not known", parameter="form", rule=f"known are {', '.join(get_args(Form))}")
     panel = display.panel
     if pixels.shape != (panel.height, panel.width, 3):
         rule = f"the display {display.name} has {panel.width} x {panel.height}"
-        raise UsageError(f"the pixels have the shape {pixels.shape}", where="denoise", rule=rule)
+        raise UsageError(f"the pixels have the shape {pixels.shape}", parameter="denoise", rule=rule)
     layers = [pixels, *(() if guides is None else (guides.albedo, guides.normal))]
     if (best_form(display, guides) if form == "auto" else form) == "raw":
         return _denoised(layers, effort, turned, threads)
@@ -130,7 +130,7 @@ def _by_views(
     if not has_exact_views(display):
         raise UsageError(
             f"the lenses of the display {display.name} do not cover whole pixels",
-            where="form",
+            parameter="form",
             rule="its views cannot be put together again",
             fix="use raw",
         )

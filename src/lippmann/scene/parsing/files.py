@@ -128,7 +128,7 @@ def _outside(name: str, where: str, what: str) -> SceneError:
         f"{what} '{name}' lies outside the scene's folder",
         where=where,
         rule="a scene file may name only files in its own folder and below",
-        fix="move it there, or trust the scene file with --allow-outside",
+        fix="move it there, or trust the scene file with allow_outside=True",
     )
 
 

@@ -210,5 +210,5 @@ def _background(background: Any) -> Color | None:
         return None
     values = tuple(float(value) for value in background)
     if len(values) != 3 or not np.isfinite(values).all() or min(values) < 0.0:
-        raise UsageError(f"{background!r}", where="background", rule="three numbers of 0 or more, linear RGB")
+        raise UsageError(f"{background!r}", parameter="background", rule="three numbers of 0 or more, linear RGB")
     return (values[0], values[1], values[2])

@@ -1,4 +1,4 @@
-"""Classic scenes in the terms of physically based light: what ``--integrator path`` renders of them.
+"""Classic scenes in the terms of physically based light: what the integrator ``path`` renders of them.
 
 ``docs/classic.md`` holds the mapping in words. Colours and pictures of classic scenes are display codes; they are taken
 for sRGB, so that the physical picture, coded by that curve, looks alike; light adds up as numbers, so its colours stay.

@@ -42,7 +42,7 @@ def read_gltf(path: Path, *, allow_outside: bool = False) -> SceneDescription:
     document = open_document(path, allow_outside=allow_outside)
     check_extensions(document)
     if document.root.children("animations"):
-        document.notes.add("animations are not played without --frames; the scene is shown at rest")
+        document.notes.add("animations are not played without frames=...; the scene is shown at rest")
     return Contents.of(document).description(path.stem)
 
 

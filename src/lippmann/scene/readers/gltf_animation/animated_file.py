@@ -76,7 +76,7 @@ def _moved(node: Fields, target: Target, value: Floats) -> Fields:
 
 def _chosen(animations: tuple[Animation, ...], name: str | None, file: str) -> Animation:
     if not animations:
-        raise SceneError("the file has no animation", where=file, fix="leave --frames out")
+        raise SceneError("the file has no animation", where=file, fix="leave frames=... out")
     if name is None:
         return animations[0]
     for animation in animations:

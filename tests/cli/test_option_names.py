@@ -1,0 +1,84 @@
+"""The library names its parameters, the command line its options."""
+
+from __future__ import annotations
+
+import ast
+import re
+from pathlib import Path
+
+import pytest
+
+import lippmann as package
+from lippmann.cli.shared.option_names import in_options, option_of, translated
+from lippmann.errors import UsageError
+
+SOURCE = Path(package.__file__).parent
+#: Parameters of the library that no command has.
+OF_THE_LIBRARY = {"form", "effort"}
+#: Files whose texts are for other programs: pip, a style sheet's variables, Dask's own command.
+OTHER_PROGRAMS = {
+    "runtime/engine.py",
+    "scene/mitsuba_plugins.py",
+    "reproduce/style.py",
+    "cluster/worker_preload.py",
+}
+#: Whole commands, named as such.
+COMMANDS = re.compile(r"lippmann (?:export|compare)[\w `-]*--\w+|``--json``")
+
+
+def library():
+    for path in sorted(SOURCE.rglob("*.py")):
+        name = path.relative_to(SOURCE).as_posix()
+        if not name.startswith("cli/"):
+            yield name, ast.parse(path.read_text(encoding="utf-8"))
+
+
+def test_every_parameter_that_an_error_names_is_an_option():
+    named = {
+        keyword.value.value: name
+        for name, tree in library()
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Call)
+        for keyword in node.keywords
+        if keyword.arg == "parameter" and isinstance(keyword.value, ast.Constant)
+    }
+    assert len(named) > 20
+    unknown = {parameter: name for parameter, name in named.items() if option_of(parameter) == parameter}
+    assert {parameter for parameter in unknown if parameter not in OF_THE_LIBRARY} == set(), unknown
+
+
+def test_the_library_says_no_flag():
+    said = [
+        (name, node.value)
+        for name, tree in library()
+        if name not in OTHER_PROGRAMS
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Constant) and isinstance(node.value, str)
+        if re.search(r"(?<![\w-])--[a-z]", COMMANDS.sub("", node.value))
+    ]
+    assert said == []
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ('use method="full"', "use --method full"),
+        ("go on with resume=True, or not", "go on with --resume, or not"),
+        ("respect_gloss=False helps", "--no-respect-gloss helps"),
+        ("say display=..., with 3 x 4", "say --display, with 3 x 4"),
+        ("use shift=0,0,Z instead", "use --shift 0,0,Z instead"),
+        ("add camera_path=FILE.cam for a flight", "add --camera-path FILE.cam for a flight"),
+        ('mode="fit"', "--place fit"),
+        ("nothing=3 is named so", "nothing=3 is named so"),
+        ("spp=4.", "--spp 4."),
+    ],
+)
+def test_settings_become_options(text, said):
+    assert translated(text) == said
+
+
+def test_an_error_says_the_option_after_the_file():
+    error = UsageError("1 will not do", where="a.png", parameter="quality_mean", rule="a", fix='use method="full"')
+    assert in_options(error) == "a.png: --quality-mean: 1 will not do; a; use --method full"
+    assert str(error) == 'a.png: quality_mean: 1 will not do; a; use method="full"'
+    assert in_options(UsageError("odd", parameter="form")) == "form: odd"
