@@ -229,7 +229,7 @@ def _views(folder: Path) -> Picture:
     """``(N, H, W, 3)`` judged views."""
     from lippmann.image import open_file
 
-    return np.stack([open_file(folder / f"view_{number:02}.exr").decode()[""] for number in JUDGED])
+    return np.stack([open_file(folder / f"view_{number:02}.exr").decode()[0] for number in JUDGED])
 
 
 # ---- Lippmann --------------------------------------------------------------------------------------------------------

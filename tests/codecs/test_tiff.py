@@ -43,7 +43,7 @@ def test_a_description_that_names_another_file_is_not_followed(tmp_path, opened)
         assert file.is_ome  # the library itself would look for the other file, were it asked for a series
     opened.clear()
     assert open_file(tmp_path / "a.tif").width == 6
-    np.testing.assert_array_equal(open_file(tmp_path / "a.tif").decode()[""], values)
+    np.testing.assert_array_equal(open_file(tmp_path / "a.tif").decode()[0], values)
     np.testing.assert_array_equal(pixels_of_file(open_file(tmp_path / "a.tif")).window(PixelWindow(0, 0, 6, 4)), values)
     assert [name for name in opened if name.endswith("a.tif")] == 3 * [str(tmp_path / "a.tif")]
     assert not any(name.endswith("secret.tif") for name in opened)

@@ -91,7 +91,7 @@ def group_2(folder, **attributes):
 
 
 def values_of(folder):
-    return open_file(folder).decode()[""]
+    return open_file(folder).decode()[0]
 
 
 def refusal(folder, read=values_of):

@@ -366,12 +366,11 @@ def _read_part(path: Path, manifest: _Manifest, height: int, width: int) -> dict
     if (file.height, file.width) != (height, width):
         rule = f"the {manifest.kind} of this folder have {width} x {height}"
         raise PictureError(f"has {file.width} x {file.height} pixels", where=str(path), rule=rule)
-    layers = file.decode()
-    stored = layers[""].dtype.name
-    if stored != manifest.stored:
-        raise PictureError(f"holds {stored} values", where=str(path), rule=f"{MANIFEST} says {manifest.stored}")
-    layers[""] = linear_values(layers[""], manifest.metadata.provenance.transfer)
-    return layers
+    values, layers = file.decode()
+    if values.dtype.name != manifest.stored:
+        rule = f"{MANIFEST} says {manifest.stored}"
+        raise PictureError(f"holds {values.dtype.name} values", where=str(path), rule=rule)
+    return {"": linear_values(values, manifest.metadata.provenance.transfer), **layers}
 
 
 def _names(layers: Mapping[str, NDArray[Any]]) -> str:

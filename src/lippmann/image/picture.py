@@ -1,55 +1,52 @@
-"""The interface of pictures in memory and on disk: their values by windows, rows and single pixels."""
+"""The interface of pictures in memory and on disk: values by windows, rows and single pixels."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from typing import Any
-
-from numpy.typing import NDArray
 
 from lippmann.display import Display
 from lippmann.display.pixel_window import PixelWindow
 from lippmann.image.encoding import linear_values
 from lippmann.image.provenance import Provenance
-from lippmann.image.stored_values import FloatArray, Matrix, Stored, Values
+from lippmann.image.stored_values import FloatArray, Indices, Layer, Matrix, Stored, Values
 from lippmann.image.views import view_grid
 
 
 class Picture(ABC):
-    """The pixels of a panel, in memory (:class:`~lippmann.image.IntegralImage`) or in a file that is read piece by
-    piece (:class:`~lippmann.image.LargePicture`).
+    """The pixels of a panel: :class:`~lippmann.image.IntegralImage` in memory, or
+    :class:`~lippmann.image.LargePicture` in a file that is decoded piece by piece.
 
     Attributes
     ----------
     display:
-        The display that the pixels are for; its panel has ``W x H`` pixels.
+        Display of the picture; its panel has ``W x H`` pixels.
     world_from_display:
-        ``(4, 4)`` similarity that puts the display frame (mm) into the scene.
+        ``(4, 4)`` similarity from the display frame (mm) to the scene.
     provenance:
         How the picture was made.
     maps:
-        Further layers by name, ``(H, W)`` or ``(H, W, 2 to 4)``.
+        Layers beside the RGB by name, ``(H, W)`` or ``(H, W, 2 to 4)``.
     stored:
-        Type of the values in the picture's file.
+        Type of the values in the picture's file; ``float32`` if it has none.
     """
 
     display: Display
     world_from_display: Matrix
     provenance: Provenance
-    maps: Mapping[str, NDArray[Any]]
+    maps: Mapping[str, Layer]
     stored: Stored
 
     @abstractmethod
     def window(self, window: PixelWindow) -> Values:
-        """``(rows, columns, 3)`` values of a rectangle as they are held: linear floats, or codes."""
+        """``(rows, columns, 3)`` values of a rectangle as the picture holds them: linear floats or codes."""
 
     @abstractmethod
-    def take(self, row: NDArray[Any], column: NDArray[Any], channels: slice = slice(0, 3)) -> FloatArray:
-        """Linear RGB of single pixels, ``(..., channels)``; ``row`` and ``column`` broadcast to ``(...)``."""
+    def take(self, row: Indices, column: Indices, channels: slice = slice(0, 3)) -> FloatArray:
+        """Linear RGB ``(..., channels)`` of single pixels; ``row`` and ``column`` broadcast to ``(...)``."""
 
     def held_rows(self, first: int, last: int) -> Values:
-        """``(last - first, W, 3)`` values of whole rows as they are held: linear floats, or codes."""
+        """``(last - first, W, 3)`` values of whole rows as the picture holds them: linear floats or codes."""
         return self.window(PixelWindow(0, first, self.display.panel.width, last - first))
 
     def rows(self, first: int, last: int) -> FloatArray:
@@ -58,10 +55,10 @@ class Picture(ABC):
 
     @property
     def views_are_exact(self) -> bool:
-        """Whether the views are a permutation of the pixels; else they are resampled, see :attr:`views_note`."""
+        """Whether the views are a permutation of the pixels; otherwise they are resampled."""
         return view_grid(self.display).exact
 
     @property
     def views_note(self) -> str:
-        """A sentence about the way in which the views are not exact; empty if they are."""
+        """A sentence on how the views deviate from exact ones; empty if they do not."""
         return view_grid(self.display).note

@@ -1,4 +1,4 @@
-"""Pictures of which only pieces are in memory: decoded as they are asked for, so that none is too large to look at."""
+"""Pictures larger than memory: values decoded in pieces, on demand."""
 
 from __future__ import annotations
 
@@ -6,10 +6,8 @@ from collections import OrderedDict
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lippmann.display import Display
 from lippmann.display.pixel_window import PixelWindow
@@ -19,38 +17,38 @@ from lippmann.image.integral_image import IntegralImage
 from lippmann.image.picture import Picture
 from lippmann.image.provenance import Provenance
 from lippmann.image.read import PictureFile, opaque_colors, open_file
-from lippmann.image.stored_values import FloatArray, Matrix, Stored, Values
+from lippmann.image.stored_values import FloatArray, Indices, Layer, Matrix, Stored, Values
 
-#: Pictures of more pixels are read piece by piece: as float32 they would take 400 MB and more.
+#: Pictures of more pixels are decoded piece by piece: as float32 they would take 400 MB and more.
 LARGE = 1 << 25
 
-#: Decoded pieces that are kept, in bytes: two rows of tiles of a picture 40 000 pixels wide, at 8 bits. Two rows of
-#: pieces are kept in any case, so that what reads some rows after others decodes each piece once.
+#: Bytes of decoded pieces kept: two rows of tiles of a picture 40 000 pixels wide, at 8 bits. Two rows of pieces are
+#: kept in any case, so that a reader of overlapping rows decodes each piece once.
 CACHE_BYTES = 1 << 28
 
 
 class ChunkedPixels:
-    """Values ``(height, width, 3)`` as stored, decoded in rectangular pieces as they are asked for.
+    """Values ``(height, width, 3)`` as stored, decoded in rectangular pieces on demand; for one thread at a time.
 
     Parameters
     ----------
     size:
-        Width and height.
+        Width and height in pixels.
     chunk:
-        Rows and columns of a piece; those at the right and lower edge may be smaller.
+        Rows and columns of a piece; pieces at the right and lower edge may be smaller.
     dtype:
         Type of the values.
     load:
         ``load(row, column)`` decodes the piece in that row and column of pieces.
     cache_bytes:
-        What may be kept of them; at least two rows of pieces and one piece are.
+        Bytes of decoded pieces to keep; two rows of pieces and one piece are kept in any case.
     """
 
     def __init__(
         self,
         size: tuple[int, int],
         chunk: tuple[int, int],
-        dtype: np.dtype[Any],
+        dtype: np.dtype[np.generic],
         load: Callable[[int, int], Values],
         cache_bytes: int = CACHE_BYTES,
     ) -> None:
@@ -60,11 +58,11 @@ class ChunkedPixels:
         self._load = load
         self._columns = -(-self.width // chunk[1])
         self._most = max(2 * self._columns + 1, cache_bytes // (chunk[0] * chunk[1] * 3 * dtype.itemsize))
-        self._kept: OrderedDict[tuple[int, int], Values] = OrderedDict()
+        self._cache: OrderedDict[tuple[int, int], Values] = OrderedDict()
 
     def window(self, window: PixelWindow) -> Values:
         """``(rows, columns, 3)`` values of a rectangle."""
-        values = np.empty((*window.shape, 3), dtype=self.dtype)
+        values: Values = np.empty((*window.shape, 3), dtype=self.dtype)
         high, wide = self.chunk
         for row in range(window.top // high, -(-window.bottom // high)):
             for column in range(window.left // wide, -(-window.right // wide)):
@@ -75,13 +73,13 @@ class ChunkedPixels:
                     values[part.relative_to(window).slices] = piece[part.relative_to(chunk).slices]
         return values
 
-    def take(self, row: NDArray[Any], column: NDArray[Any]) -> Values:
-        """``(..., 3)`` values of single pixels; quickest where those near in the arrays are near in the picture."""
+    def take(self, row: Indices, column: Indices) -> Values:
+        """``(..., 3)`` values of single pixels; fastest where neighbours in the arrays are neighbours too."""
         shape = np.broadcast_shapes(row.shape, column.shape)
         rows, columns = (np.broadcast_to(part, shape).ravel() for part in (row, column))
         high, wide = self.chunk
         number = (rows // high) * self._columns + columns // wide
-        values = np.empty((rows.size, 3), dtype=self.dtype)
+        values: Values = np.empty((rows.size, 3), dtype=self.dtype)
         order = np.argsort(number, kind="stable")
         ends = np.flatnonzero(np.diff(number[order])) + 1
         for places in np.split(order, ends) if rows.size else ():
@@ -91,49 +89,33 @@ class ChunkedPixels:
         return values.reshape(*shape, 3)
 
     def _piece(self, row: int, column: int) -> Values:
-        found = self._kept.get((row, column))
-        if found is None:
-            found = self._load(row, column)
-            self._kept[row, column] = found
-            if len(self._kept) > self._most:
-                self._kept.popitem(last=False)
-        self._kept.move_to_end((row, column))
-        return found
-
-
-def pixels_of_file(file: PictureFile) -> ChunkedPixels:
-    """The values of a TIFF or Zarr picture, checked piece by piece as they are read.
-
-    Raises
-    ------
-    PictureError
-        If the file is damaged, holds no colours of a known depth, or its format has no pieces; also later, when a piece
-        turns out so.
-    """
-    pieces = file.pieces
-    if pieces is None:
-        rule = "only TIFF and Zarr can be read piece by piece"
-        raise PictureError(f"is {file.format.upper()}", where=str(file.path), rule=rule)
-    dtype = np.dtype(file.check_stored(file.stored))
-    # The file is named here, so that it stays open.
-    return ChunkedPixels(
-        (file.width, file.height),
-        pieces.chunk,
-        dtype,
-        lambda row, column: opaque_colors(pieces.read_chunk(row, column), file.path),
-    )
+        piece = self._cache.get((row, column))
+        if piece is None:
+            piece = self._cache[row, column] = self._load(row, column)
+            if len(self._cache) > self._most:
+                self._cache.popitem(last=False)
+        self._cache.move_to_end((row, column))
+        return piece
 
 
 @dataclass(frozen=True, eq=False)
 class LargePicture(Picture):
-    """A picture whose values stay as its file stores them, and are decoded as they are asked for.
-
-    For one thread at a time. The parameters but ``source`` are those of :class:`~lippmann.image.IntegralImage`.
+    """A picture whose values are held as stored and decoded on demand; for one thread at a time.
 
     Parameters
     ----------
     source:
         The values as stored.
+    display:
+        Display of the picture; its panel has the size of ``source``.
+    world_from_display:
+        ``(4, 4)`` similarity from the display frame (mm) to the scene.
+    provenance:
+        How the picture was made; its transfer function codes the values.
+    stored:
+        Type of the values.
+    maps:
+        Layers beside the RGB by name.
     """
 
     source: ChunkedPixels
@@ -141,32 +123,30 @@ class LargePicture(Picture):
     world_from_display: Matrix
     provenance: Provenance
     stored: Stored
-    maps: Mapping[str, NDArray[Any]] = field(default_factory=dict)
+    maps: Mapping[str, Layer] = field(default_factory=dict)
 
     def window(self, window: PixelWindow) -> Values:
         """``(rows, columns, 3)`` values of a rectangle as stored."""
         return self.source.window(window)
 
-    def take(self, row: NDArray[Any], column: NDArray[Any], channels: slice = slice(0, 3)) -> FloatArray:
-        """Linear RGB of single pixels, ``(..., channels)``; ``row`` and ``column`` broadcast to ``(...)``."""
+    def take(self, row: Indices, column: Indices, channels: slice = slice(0, 3)) -> FloatArray:
+        """Linear RGB ``(..., channels)`` of single pixels; ``row`` and ``column`` broadcast to ``(...)``."""
         return linear_values(self.source.take(row, column)[..., channels], self.provenance.transfer)
 
 
 def open_picture(
     path: Path, *, display: Display | None = None, keeps_codes: bool = False
 ) -> IntegralImage | LargePicture:
-    """A picture from a file: piece by piece where it is larger than :data:`LARGE` and its format allows that (TIFF,
-    Zarr), else whole.
+    """Open an integral image, whole in memory or, if it has more than 2^25 pixels, piece by piece (TIFF, Zarr).
 
     Parameters
     ----------
     path:
-        The file: PNG, OpenEXR, TIFF or Zarr.
+        A PNG, OpenEXR, TIFF or Zarr file.
     display:
-        The display that the picture is for, instead of the one that it carries; needed for files of other programs.
+        Display of the picture, instead of the one in the file; required for files of other programs.
     keeps_codes:
-        Whether a picture that holds codes of 8 or 16 bits keeps them, where it is read whole: quicker, and a quarter or
-        half of the memory that linear values take.
+        Whether codes of 8 or 16 bits stay codes in memory: a quarter or half of the bytes of linear values.
 
     Raises
     ------
@@ -179,15 +159,36 @@ def open_picture(
 def picture_of_file(
     file: PictureFile, display: Display | None = None, *, keeps_codes: bool = False
 ) -> IntegralImage | LargePicture:
-    """:func:`open_picture` of a file that is open."""
+    """The picture of an open file; ``display``, ``keeps_codes`` and errors as in :func:`open_picture`."""
     in_pieces = file.pieces is not None and file.width * file.height > LARGE
     if not in_pieces and not (keeps_codes and file.stored in ("uint8", "uint16")):
         return file.picture(display)
-    metadata = file.metadata_for(display)
-    source = pixels_of_file(file) if in_pieces else _one_piece(file.decode()[""])
-    stored = file.check_stored(file.stored)
+    metadata, stored = file.metadata_for(display), file.check_stored(file.stored)
+    if in_pieces:
+        source = pixels_of_file(file)
+    else:
+        values = file.decode()[0]
+        size = file.width, file.height
+        source = ChunkedPixels(size, size[::-1], values.dtype, lambda row, column: values)
     return LargePicture(source, metadata.display, metadata.world_from_display, metadata.provenance, stored)
 
 
-def _one_piece(values: Values) -> ChunkedPixels:
-    return ChunkedPixels(values.shape[1::-1], values.shape[:2], values.dtype, lambda row, column: values)
+def pixels_of_file(file: PictureFile) -> ChunkedPixels:
+    """The values of an open TIFF or Zarr file, checked piece by piece as they are decoded.
+
+    Raises
+    ------
+    PictureError
+        If the file is damaged, holds no opaque colours of a known depth, or is of another format. Faults of a piece are
+        raised when it is decoded.
+    """
+    pieces = file.pieces
+    if pieces is None:
+        rule = "only TIFF and Zarr can be read piece by piece"
+        raise PictureError(f"is {file.format.upper()}", where=str(file.path), rule=rule)
+
+    def load(row: int, column: int) -> Values:
+        return opaque_colors(pieces.read_chunk(row, column), file.path)  # this reference keeps the file open
+
+    dtype = np.dtype(file.check_stored(file.stored))
+    return ChunkedPixels((file.width, file.height), pieces.chunk, dtype, load)

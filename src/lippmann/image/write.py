@@ -1,6 +1,6 @@
-"""Picture files written: the format by the ending of the name, the bits per channel, replacing only what is whole.
+"""Picture files written: the format by the name's ending, the bits per channel; a file appears whole or not at all.
 
-What the formats do to the values is told in :mod:`lippmann.image.encoding`.
+How formats code values is described in :mod:`lippmann.image.encoding`.
 """
 
 from __future__ import annotations
@@ -8,26 +8,40 @@ from __future__ import annotations
 from collections.abc import Mapping
 from contextlib import AbstractContextManager
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lippmann.color.transfer import Transfer
 from lippmann.errors import OutputError, PictureError
-from lippmann.image.encoding import FORMATS, STORED, FormatName, Rows, encode_rows
+from lippmann.image.encoding import (
+    FORMATS,
+    STORED,
+    FormatName,
+    Rows,
+    converted_values,
+    encode_tiles,
+    encode_values,
+    is_tiled,
+    tiles_of_rows,
+)
 from lippmann.image.metadata import Metadata, metadata_of, to_text
 from lippmann.image.picture import Picture
-from lippmann.image.stored_values import FloatArray, Stored, Values
+from lippmann.image.stored_values import FloatArray, Layer, Stored, Values
 from lippmann.runtime.atomic_write import check_folder_writable, check_writable, replacing, replacing_folder
 
 
 def format_for(path: Path, bits: int | None = None, *, source: Stored = "float32") -> tuple[FormatName, Stored]:
-    """The format that a file name stands for and the type of the values that would be stored in it.
+    """File format for a name, and type of the values that such a file stores.
 
-    ``bits`` per channel: 8 or 16 for PNG, 16 or 32 for EXR (float), 8, 16 or 32 (float) for TIFF and Zarr. None takes
-    those of ``source`` where the format has them, so that a picture is written as exactly as it was read, except that
-    computed values (``float32``) go to 8 bits unless the format is OpenEXR.
+    Parameters
+    ----------
+    path:
+        The file; its ending chooses the format: ``.png``, ``.exr``, ``.tif``, ``.tiff`` or ``.zarr``.
+    bits:
+        Bits per channel: 8 or 16 (PNG), 16 or 32 (OpenEXR, floats), 8, 16 or 32 (TIFF and Zarr, floats). By default
+        those of ``source`` if the format has them; 8 for computed values, 32 in OpenEXR.
+    source:
+        Type of the values in the file that the picture came from; ``float32`` for computed ones.
 
     Raises
     ------
@@ -42,11 +56,10 @@ def format_for(path: Path, bits: int | None = None, *, source: Stored = "float32
 
 
 def stored_as(name: FormatName, path: Path, bits: int | None, source: Stored) -> Stored:
-    """The type of the values that a file of the format ``name`` stores; see :func:`format_for`."""
+    """Type of the values in a file of the format ``name``; the other parameters and errors are :func:`format_for`'s."""
     depths = STORED[name]
     if bits is None:
-        is_kept = source in depths.values() and source != "float32"
-        return source if is_kept else next(iter(depths.values()))
+        return source if source in depths.values() and source != "float32" else next(iter(depths.values()))
     if bits not in depths:
         known = " or ".join(str(depth) for depth in sorted(depths))
         raise OutputError(f"{bits} bits per channel are not possible", where=str(path), rule=f"{name} has {known}")
@@ -54,37 +67,56 @@ def stored_as(name: FormatName, path: Path, bits: int | None, source: Stored) ->
 
 
 def can_be_banded(name: FormatName) -> bool:
-    """Whether files of this format can be written without the picture being whole in memory."""
+    """Whether files of this format can be written without the whole picture in memory."""
     return name in ("tiff", "zarr")
 
 
 def write_picture(picture: Picture, path: Path, *, bits: int | None = None) -> None:
-    """Write a picture, in memory or on disk, with its metadata; see :func:`format_for` for endings and ``bits``.
+    """Write a picture, in memory or on disk, with its metadata.
 
-    Only OpenEXR keeps the picture's maps. Zarr and large TIFF files are written a few rows at a time.
+    Zarr and large TIFF files are written some rows at a time.
+
+    Parameters
+    ----------
+    picture:
+        The picture; OpenEXR alone keeps its maps.
+    path:
+        The file; its ending chooses the format.
+    bits:
+        Bits per channel, see :func:`format_for`; by default as in the file that the picture came from.
 
     Raises
     ------
     OutputError
-        If the ending is unknown, the format has no such bits, or the place cannot be written.
+        If the ending is unknown, the format has no such bits, or the file cannot be written.
     """
-    target = format_for(path, bits, source=picture.stored)
-    _write_rows(path, target, picture.held_rows, metadata_of(picture), maps=picture.maps)
+    target, panel = format_for(path, bits, source=picture.stored), picture.display.panel
+    size, transfer = (panel.width, panel.height), picture.provenance.transfer
+    _write(path, target, picture.held_rows, size, transfer, metadata_of(picture), picture.maps)
 
 
 def write_rows(rows: Rows, metadata: Metadata, path: Path, *, bits: int | None = None) -> None:
-    """Write the picture that ``rows`` makes, from the top down and each row once, as tiled BigTIFF or Zarr.
+    """Write a computed picture some rows at a time, as tiled BigTIFF or Zarr.
+
+    Parameters
+    ----------
+    rows:
+        ``rows(first, last)`` computes linear RGB ``(last - first, W, 3)``; called from the top down, once for each row.
+    metadata:
+        Display, placement and provenance of the picture.
+    path, bits:
+        The file and its bits per channel, see :func:`format_for`.
 
     Raises
     ------
     OutputError
-        As :func:`write_picture`.
+        If the ending is unknown, the format has no such bits, or the file cannot be written.
     PictureError
         If a value is not finite, or the format has to be written whole.
     """
-    name, stored = format_for(path, bits)
-    if not can_be_banded(name):
-        raise PictureError(f"{name.upper()} files are written whole", where=str(path), fix="use .tif or .zarr")
+    target, panel = format_for(path, bits), metadata.display.panel
+    if not can_be_banded(target[0]):
+        raise PictureError(f"{target[0].upper()} files are written whole", where=str(path), fix="use .tif or .zarr")
 
     def checked(first: int, last: int) -> Values:
         values = rows(first, last)
@@ -92,7 +124,8 @@ def write_rows(rows: Rows, metadata: Metadata, path: Path, *, bits: int | None =
             raise PictureError(f"values in the rows from {first} on are not finite")
         return values
 
-    _write_rows(path, (name, stored), checked, metadata, in_tiles=True)
+    size, transfer = (panel.width, panel.height), metadata.provenance.transfer
+    _write(path, target, checked, size, transfer, metadata, in_tiles=True)
 
 
 def write_plain_picture(
@@ -101,58 +134,76 @@ def write_plain_picture(
     *,
     bits: int | None = None,
     transfer: Transfer = "srgb",
-    maps: Mapping[str, NDArray[Any]] | None = None,
+    maps: Mapping[str, Layer] | None = None,
 ) -> None:
-    """Write an ordinary picture, ``(H, W, 3)`` linear RGB: a replay, a preview. OpenEXR takes ``maps`` with it.
+    """Write an ordinary picture, such as a replay or a preview, without metadata.
+
+    Parameters
+    ----------
+    pixels:
+        ``(H, W, 3)`` linear RGB, finite.
+    path, bits:
+        The file and its bits per channel, see :func:`format_for`.
+    transfer:
+        Coding of the values in integer formats.
+    maps:
+        Further layers, ``(H, W)`` or ``(H, W, 2 to 4)``; OpenEXR alone keeps them.
 
     Raises
     ------
     OutputError
-        As :func:`write_picture`.
+        If the ending is unknown, the format has no such bits, or the file cannot be written.
     PictureError
         If a value is not finite.
     """
-    name, stored = format_for(path, bits)
+    target, (height, width) = format_for(path, bits), pixels.shape[:2]
     if not np.isfinite(pixels).all():
         raise PictureError("the picture holds values that are not finite", where=str(path))
-    size, rows = pixels.shape[1::-1], lambda first, last: pixels[first:last]
-    with replacing_output(path, name) as temporary:
-        encode_rows(temporary, name, rows, size=size, stored=stored, transfer=transfer, maps=maps)
-
-
-def _write_rows(
-    path: Path,
-    target: tuple[FormatName, Stored],
-    rows: Rows,
-    metadata: Metadata,
-    *,
-    maps: Mapping[str, NDArray[Any]] | None = None,
-    in_tiles: bool = False,
-) -> None:
-    panel, (name, stored) = metadata.display.panel, target
-    with replacing_output(path, name) as temporary:
-        encode_rows(
-            temporary,
-            name,
-            rows,
-            size=(panel.width, panel.height),
-            stored=stored,
-            transfer=metadata.provenance.transfer,
-            text=to_text(metadata),
-            pixel_pitch=panel.pixel_pitch,
-            maps=maps,
-            in_tiles=in_tiles,
-        )
+    _write(path, target, lambda first, last: pixels[first:last], (width, height), transfer, maps=maps)
 
 
 def replacing_output(path: Path, name: FormatName) -> AbstractContextManager[Path]:
-    """:func:`lippmann.runtime.atomic_write.replacing`, or what does the same for the formats that are folders."""
+    """Temporary path for a picture file, renamed to ``path`` when the block succeeds; a folder for Zarr.
+
+    Raises
+    ------
+    OutputError
+        If ``path`` cannot be written.
+    """
     return replacing_folder(path) if name == "zarr" else replacing(path)
 
 
 def check_output(path: Path, name: FormatName) -> None:
-    """Raise :class:`OutputError` now if a picture of this format could not be written to ``path`` later."""
+    """Raise :class:`OutputError` if a picture of this format cannot be written to ``path``; writes nothing."""
     if name == "zarr":
         check_folder_writable(path)
     else:
         check_writable(path)
+
+
+def _write(
+    path: Path,
+    target: tuple[FormatName, Stored],
+    rows: Rows,
+    size: tuple[int, int],
+    transfer: Transfer,
+    metadata: Metadata | None = None,
+    maps: Mapping[str, Layer] | None = None,
+    *,
+    in_tiles: bool = False,
+) -> None:
+    """Write rows of linear floats or codes; ``in_tiles`` writes even a small TIFF tile by tile."""
+    name, stored = target
+    text = "" if metadata is None else to_text(metadata)
+    pixel_pitch = None if metadata is None else metadata.display.panel.pixel_pitch
+
+    def converted(first: int, last: int) -> Values:
+        return converted_values(rows(first, last), stored, transfer)
+
+    with replacing_output(path, name) as temporary:
+        if in_tiles or is_tiled(name, size):
+            tiles = tiles_of_rows(converted, size)
+            encode_tiles(temporary, name, tiles, size=size, dtype=np.dtype(stored), text=text, pixel_pitch=pixel_pitch)
+        else:
+            layers = {"": converted(0, size[1]), **(maps or {})}
+            encode_values(temporary, name, layers, transfer=transfer, text=text, pixel_pitch=pixel_pitch)
