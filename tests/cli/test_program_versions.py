@@ -11,6 +11,7 @@ import pytest
 from lippmann.errors import PictureError
 from lippmann.journal import journal_of
 from lippmann.rendering.denoise.oidn import denoiser_version
+from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.runtime import engine as engines
 from lippmann.sequences.files import saved_sequence
 from lippmann.sequences.motion import open_motion
@@ -131,10 +132,8 @@ def test_a_sequence_begun_with_other_programs_is_refused(
             lambda number: tmp_path / f"f_{number}.png",
             make_display(lenses=(4, 3)),
             range(2),
+            RenderRequest(integrator="direct", spp=1, device="cpu"),
             resume=True,
-            integrator="direct",
-            spp=1,
-            device="cpu",
         ) as saved:
             next(iter(saved))
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import errno
 import os
+import re
 import sys
 from contextlib import suppress
 from typing import NoReturn
@@ -91,8 +92,15 @@ def _is_interrupt(error: BaseException | None) -> bool:
     return False
 
 
+#: How typer refuses a word that is not among those listed.
+_NOT_LISTED = re.compile(r"Invalid value for '(--[\w-]+)'.*: (?:Value error, )?('.*?') is not one of (.*)\.")
+
+
 def _usage(error: BaseException) -> str:
     message = " ".join(getattr(error, "format_message", error.__str__)().split())
+    listed = _NOT_LISTED.fullmatch(message)
+    if listed is not None:
+        return f"{listed[1]}: {listed[2]} is not known; known are {listed[3].replace(chr(39), '')}"
     context = getattr(error, "ctx", None)
     command = getattr(context, "command_path", "lippmann")
     return f"{message} See '{command} --help'."

@@ -9,12 +9,9 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping
 from functools import cache
-from typing import TYPE_CHECKING
+from typing import Any
 
 from lippmann.errors import LippmannError
-
-if TYPE_CHECKING:
-    from click import Command
 
 #: Parameters whose options have other names than they have.
 _OTHERWISE = {
@@ -71,7 +68,8 @@ def _options() -> Mapping[str, str]:
     return names | _OTHERWISE
 
 
-def _commands(command: Command) -> Iterator[Command]:
+def _commands(command: Any) -> Iterator[Any]:
+    """A command of click's, whose home moved between releases of typer, and those below it."""
     yield command
     for each in getattr(command, "commands", {}).values():
         yield from _commands(each)
