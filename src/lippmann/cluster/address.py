@@ -1,4 +1,4 @@
-"""What a cluster's address names: a scheduler somewhere, or workers to be started here."""
+"""What ``--cluster`` names: a scheduler somewhere, or workers to be started here."""
 
 from __future__ import annotations
 
@@ -38,8 +38,8 @@ class TlsFiles:
     key: Path | None = None
 
     def options(self) -> dict[str, Path | None]:
-        """The three by the names of the parameters that they come from."""
-        return {"tls_ca": self.ca, "tls_cert": self.certificate, "tls_key": self.key}
+        """The three by the names of the command line's options."""
+        return {"--tls-ca": self.ca, "--tls-cert": self.certificate, "--tls-key": self.key}
 
     def security(self) -> Any:
         """``distributed.Security`` with these files, or with what Dask is configured to use.
@@ -53,13 +53,12 @@ class TlsFiles:
         distributed = import_distributed()
         if not any(given.values()):
             return distributed.Security()
-        for name, path in given.items():
+        for option, path in given.items():
             if path is None:
-                rule = "tls_ca=..., tls_cert=... and tls_key=... go together"
-                raise UsageError("is missing", parameter=name, rule=rule)
+                raise UsageError("is missing", where=option, rule="--tls-ca, --tls-cert and --tls-key go together")
             if not path.is_file():
-                raise UsageError(f"no such file '{path}'", parameter=name)
-        roles = {f"tls_{role}_{what}": str(given[f"tls_{what}"]) for role in _ROLES for what in ("cert", "key")}
+                raise UsageError(f"no such file '{path}'", where=option)
+        roles = {f"tls_{role}_{what}": str(given[f"--tls-{what}"]) for role in _ROLES for what in ("cert", "key")}
         return distributed.Security(require_encryption=True, tls_ca_file=str(self.ca), **roles)
 
 
@@ -96,12 +95,12 @@ def warn_of_exposure(address: str, security: Any, remark: Callable[[str], None])
     who = "every account of this machine" if is_loopback(address) else "everyone who can reach that port"
     remark(
         f"WARNING: {address} asks nobody for a certificate: {who} can run code as you, on the workers and here "
-        "(use tls:// with tls_ca=..., tls_cert=... and tls_key=...)"
+        "(use tls:// with --tls-ca, --tls-cert and --tls-key)"
     )
 
 
 def parse_target(text: str) -> Target:
-    """What the text of a cluster's address names.
+    """What the text of ``--cluster`` names.
 
     Raises
     ------
@@ -112,12 +111,12 @@ def parse_target(text: str) -> Target:
     if local is not None:
         count = int(local[1])
         if not 1 <= count <= _MOST_LOCAL:
-            raise UsageError(f"{count} workers", parameter="cluster", rule=f"1 to {_MOST_LOCAL} can be started here")
+            raise UsageError(f"{count} workers", where="--cluster", rule=f"1 to {_MOST_LOCAL} can be started here")
         return Target(local=count)
-    return Target(address=checked_address(text.strip(), "cluster", _RULE))
+    return Target(address=checked_address(text.strip(), "--cluster", _RULE))
 
 
-def checked_address(text: str, parameter: str, rule: str) -> str:
+def checked_address(text: str, where: str, rule: str) -> str:
     """A scheduler's address, known to have a host and a port.
 
     Raises
@@ -131,7 +130,7 @@ def checked_address(text: str, parameter: str, rule: str) -> str:
     except ValueError:
         fits = False
     if not fits:
-        raise UsageError(f"'{text}' will not do", parameter=parameter, rule=rule)
+        raise UsageError(f"'{text}' will not do", where=where, rule=rule)
     return text
 
 

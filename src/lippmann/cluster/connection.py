@@ -89,9 +89,9 @@ def connect(
     _hush()
     tls = tls or TlsFiles()
     if target.local is not None:
-        for name, path in tls.options().items():
+        for option, path in tls.options().items():
             if path is not None:
-                raise UsageError("is for tls://HOST:8786", parameter=name, rule="local:N makes its own certificate")
+                raise UsageError("is for tls://HOST:8786", where=option, rule="local:N makes its own certificate")
         with _started_here(distributed, target.local, threads) as client, _watched(client) as roster:
             yield Cluster(client, roster, f"local:{target.local}", remark)
         return
@@ -107,7 +107,7 @@ def connect(
         why = " ".join(str(error).split())[:200]
         raise ClusterError(
             f"no scheduler answers at {target.address} ({type(error).__name__}: {why})",
-            parameter="cluster",
+            where="--cluster",
             fix="start one: dask scheduler",
         ) from None
     try:

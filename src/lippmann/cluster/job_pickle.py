@@ -110,7 +110,7 @@ def _scene_files(job: TileJob, parts: dict[str, NDArray[Any]]) -> dict[str, str]
         if PurePosixPath(key).is_absolute() or ".." in PurePosixPath(key).parts:
             raise UsageError(
                 f"the scene names '{path}', which lies outside its folder",
-                parameter="cluster",
+                where="--cluster",
                 rule="a scene travels with the files of its own folder",
                 fix="move it there",
             )

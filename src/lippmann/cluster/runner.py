@@ -248,8 +248,8 @@ class _Run:
     def _lost(self) -> ClusterError:
         return ClusterError(
             f"the connection to the scheduler of {self.cluster.name} is lost",
-            parameter="cluster",
-            fix="run again with resume=True: what was rendered is kept",
+            where="--cluster",
+            fix="run again with --resume: what was rendered is kept",
         )
 
     def _failure(self) -> ClusterError:
@@ -257,7 +257,7 @@ class _Run:
         more = f" and {len(names) - 4} more" if len(names) > 4 else ""
         return ClusterError(
             f"{len(names)} of {self.total} tiles failed again and again: {', '.join(names[:4])}{more}",
-            fix="run again with resume=True: the other tiles are kept",
+            fix="run again with --resume: the other tiles are kept",
         )
 
 
