@@ -218,7 +218,7 @@ def test_first_samples_draw_several_lamps_each(monkeypatch):
 
     several, mean = noise()
     rays = trace(four_lamps(), camera(4, 50), 16, 1, 1).rays
-    monkeypatch.setattr(path, "FIRST_LAMPS", 1)
+    monkeypatch.setattr(path, "FIRST_EMITTER_SAMPLES", 1)
     one, same_mean = noise()
     fewer = trace(four_lamps(), camera(4, 50), 16, 1, 1).rays
     assert (rays.shadow, fewer.shadow) == (4 * 256, 256)
@@ -242,9 +242,9 @@ def test_lamps_of_all_samples_are_one_stratified_sequence():
     import mitsuba as mi
 
     from lippmann.device.sobol import SampleStream
-    from lippmann.rendering.transport.path import lamps_at_first
+    from lippmann.rendering.transport.path import first_emitter_samples
 
-    count, first = (np.array(part) for part in lamps_at_first(dr.arange(mi.UInt32, 12)))
+    count, first = (np.array(part) for part in first_emitter_samples(dr.arange(mi.UInt32, 12)))
     assert count.tolist() == [4] * 4 + [2] * 8
     assert np.array_equal(first, np.cumsum(count) - count)
     stream = SampleStream.of_pixels(mi.UInt32(3), mi.UInt32(5), mi.UInt32(1))

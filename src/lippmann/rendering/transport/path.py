@@ -18,15 +18,16 @@ import mitsuba as mi
 
 from lippmann.device.sobol import SampleStream
 from lippmann.rendering.transport.integrator import FirstHit, RayCounts
+from lippmann.rendering.transport.light_sampling import LightSampler, SceneLights
 from lippmann.rendering.transport.scene_flags import SceneTraits
 
 #: Straight-through surfaces that one ray may cross before it counts as blocked: bounds the loop in a hall of panes.
 MAX_CROSSINGS = 64
 #: Sample dimensions used at one vertex.
 DIMENSIONS_PER_VERTEX = 4
-#: Lamps drawn at the first surface of a path that they can light: many for a pixel's first samples, which know little
-#: else, and fewer for those that follow. Powers of two, so that the points of all samples together stay stratified.
-FIRST_LAMPS, LATER_LAMPS, FIRST_SAMPLES = 4, 2, 4
+#: Emitter samples at the first surface of a path that emitters can light: many for a pixel's first samples, which know
+#: little else, and fewer for those that follow. Powers of two, so that all points together stay stratified.
+FIRST_EMITTER_SAMPLES, LATER_EMITTER_SAMPLES, FIRST_SAMPLES = 4, 2, 4
 
 
 def mis_weight(pdf_a: Any, pdf_b: Any) -> Any:
@@ -36,15 +37,17 @@ def mis_weight(pdf_a: Any, pdf_b: Any) -> Any:
     return dr.select(dr.isfinite(weight), weight, 0)
 
 
-def lamps_at_first(sample: Any) -> tuple[Any, Any]:
-    """How many lamps sample number ``sample`` (UInt32) draws where its path is first lit, and the first one's number.
+def first_emitter_samples(sample: Any) -> tuple[Any, Any]:
+    """Number of emitter samples that sample number ``sample`` (UInt32) takes where its path is first lit, and the first
+    one's number.
 
     Numbers count on from sample to sample: they are places in one sequence of points.
     """
     early = sample < FIRST_SAMPLES
-    before = FIRST_LAMPS * FIRST_SAMPLES
-    first = dr.select(early, FIRST_LAMPS * sample, before + LATER_LAMPS * (sample - FIRST_SAMPLES))
-    return dr.select(early, mi.UInt32(FIRST_LAMPS), LATER_LAMPS), first
+    before = FIRST_EMITTER_SAMPLES * FIRST_SAMPLES
+    later = before + LATER_EMITTER_SAMPLES * (sample - FIRST_SAMPLES)
+    first = dr.select(early, FIRST_EMITTER_SAMPLES * sample, later)
+    return dr.select(early, mi.UInt32(FIRST_EMITTER_SAMPLES), LATER_EMITTER_SAMPLES), first
 
 
 class PathIntegrator:
@@ -59,20 +62,31 @@ class PathIntegrator:
     depth:
         Surfaces per path, at least 1.
     roulette_depth:
-        Surfaces after which faint paths may be ended by chance.
+        Surfaces after which faint paths may be ended by Russian roulette.
+    name:
+        What the light is called in a request.
+    lights:
+        Samples the scene's emitters; by default by the scene's own weights.
     """
 
     # Not a dataclass: Dr.Jit would take it for loop state and write its fields.
     def __init__(
-        self, scene: Any, traits: SceneTraits, depth: int, roulette_depth: int = 5, name: str = "path"
+        self,
+        scene: Any,
+        traits: SceneTraits,
+        depth: int,
+        roulette_depth: int = 5,
+        name: str = "path",
+        lights: LightSampler | None = None,
     ) -> None:
         self.scene = scene
         self.traits = traits
         self.depth = depth
         self.roulette_depth = roulette_depth
         self.name = name
+        self.lights: LightSampler = SceneLights(scene) if lights is None else lights
         emitters = scene.emitters()
-        # A single point of light is always drawn alike.
+        # All samples of a single point of light are the same.
         self._all_alike = len(emitters) == 1 and bool(mi.has_flag(emitters[0].flags(), mi.EmitterFlags.Delta))
 
     def sample(self, ray: Any, stream: SampleStream, active: Any) -> tuple[Any, RayCounts]:
@@ -97,12 +111,12 @@ class PathIntegrator:
         absorption = mi.Color3f(0)  # of the medium the ray travels in, per world unit
         secondary = mi.UInt32(0)
         shadow = mi.UInt32(0)
-        vertex = dr.zeros(mi.Interaction3f)  # last scattering vertex, for the density of emitter sampling there
+        vertex = dr.zeros(mi.Interaction3f)  # last scattering vertex, for the pdf of emitter sampling there
         vertex_pdf = mi.Float(1)
         vertex_delta = mi.Bool(True)
-        vertex_lamps = mi.UInt32(1)  # lamps that were drawn there
-        unlit = mi.Bool(True)  # no surface has drawn lamps yet
-        lamps_at_start, start = lamps_at_first(stream.index)
+        vertex_samples = mi.UInt32(1)  # emitter samples that were taken there
+        unlit = mi.Bool(True)  # no emitter has been sampled yet
+        samples_at_start, start = first_emitter_samples(stream.index)
 
         pi = scene.ray_intersect_preliminary(ray, coherent=True, active=active)
         distance_of_first = mi.Float(pi.t)
@@ -122,28 +136,28 @@ class PathIntegrator:
 
             # ---- emission ----
             ds = mi.DirectionSample3f(scene, si=si, ref=vertex)
-            drawn_pdf = scene.pdf_emitter_direction(vertex, ds, ~vertex_delta) * mi.Float(vertex_lamps)
-            weight = mis_weight(vertex_pdf, drawn_pdf)
+            emitter_pdf = self.lights.pdf_direction(vertex, ds, ~vertex_delta) * mi.Float(vertex_samples)
+            weight = mis_weight(vertex_pdf, emitter_pdf)
             emission = ds.emitter.eval(si) * weight
             if dr.hint(background is not None, mode="scalar"):
                 emission = dr.select((depth == 0) & ~si.is_valid(), mi.Spectrum(background), emission)
             radiance += throughput * emission
 
-            # ---- light sampled at this vertex ----
+            # ---- next-event estimation ----
             going_on = si.is_valid() & (depth < self.depth)
             dimension = (depth * 2 + crossings) * DIMENSIONS_PER_VERTEX + 1
-            drawing = going_on & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
-            lamps, number = mi.UInt32(1), mi.UInt32(stream.index)
+            sampling = going_on & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
+            samples, number = mi.UInt32(1), mi.UInt32(stream.index)
             if dr.hint(not self._all_alike, mode="scalar"):
-                lamps, number = dr.select(unlit, lamps_at_start, lamps), dr.select(unlit, start, number)
-            last = number + lamps
-            while dr.hint(drawing, label="lamps"):
+                samples, number = dr.select(unlit, samples_at_start, samples), dr.select(unlit, start, number)
+            last = number + samples
+            while dr.hint(sampling, label="emitters"):
                 point = stream.at(number).next_2d(dimension)
-                light, tests = self.drawn_light(si, bsdf, point, drawing, draws=mi.Float(lamps))
-                radiance += throughput * light / mi.Float(lamps)
+                light, tests = self.direct_light(si, bsdf, point, sampling, samples=mi.Float(samples))
+                radiance += throughput * light / mi.Float(samples)
                 shadow += tests
                 number += 1
-                drawing &= number != last
+                sampling &= number != last
 
             # ---- the next direction ----
             bs, bsdf_weight = bsdf.sample(
@@ -161,14 +175,14 @@ class PathIntegrator:
                 vertex = mi.Interaction3f(si)
                 vertex_pdf = bs.pdf
                 vertex_delta = mi.has_flag(bs.sampled_type, mi.BSDFFlags.Delta)
-                vertex_lamps = lamps
+                vertex_samples = samples
                 unlit &= ~mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
                 depth += 1
             else:
                 crossings += 1
             going_on &= (dr.max(throughput) > 0) & (crossings < MAX_CROSSINGS)
 
-            # ---- roulette ----
+            # ---- Russian roulette ----
             survival = dr.minimum(dr.max(throughput) * dr.square(eta), 0.95)
             at_stake = going_on & (depth >= self.roulette_depth) & ~passes
             throughput = dr.select(at_stake, throughput * dr.rcp(survival), throughput)
@@ -180,15 +194,16 @@ class PathIntegrator:
 
         return radiance, RayCounts(secondary, shadow), FirstHit(distance_of_first, view_dependent)
 
-    def drawn_light(self, si: Any, bsdf: Any, point: Any, active: Any, draws: Any = 1) -> tuple[Any, Any]:
-        """Light of the lamp that ``point`` draws, as the surface sends it on to ``si.wi``, and the rays it took.
+    def direct_light(self, si: Any, bsdf: Any, point: Any, active: Any, samples: Any = 1) -> tuple[Any, Any]:
+        """Radiance toward ``si.wi`` from the emitter that ``point`` samples, and the shadow rays that it took.
 
-        It is divided by the draw's density and weighed against scattered rays that find the lamp, as one of ``draws``.
+        It is divided by the sample's pdf, and weighted by MIS against scattered rays that meet the emitter, as one of
+        ``samples``.
         """
-        ds, light = self.scene.sample_emitter_direction(si, point, False, active)
+        ds, light = self.lights.sample_direction(si, point, active)
         lit = active & (ds.pdf != 0) & (dr.max(light) > 0)
         value, pdf = bsdf.eval_pdf(mi.BSDFContext(), si, si.to_local(ds.d), lit)
-        weight = dr.select(ds.delta, 1, mis_weight(ds.pdf * draws, pdf))
+        weight = dr.select(ds.delta, 1, mis_weight(ds.pdf * samples, pdf))
         found = value * light * weight
         lit &= dr.max(found) > 0
         visible, tests = self.visibility(si, ds, lit)
