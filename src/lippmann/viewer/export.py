@@ -13,7 +13,7 @@ from lippmann.errors import UsageError
 from lippmann.image import Picture
 from lippmann.runtime.atomic_write import replacing
 from lippmann.viewer.manifest import manifest, tile_size
-from lippmann.viewer.page_bundle import whole_page
+from lippmann.viewer.page import single_file_page
 from lippmann.viewer.tiles import Tiles
 
 #: The most pictures that a page shows: two, with a divider between them.
@@ -60,7 +60,7 @@ def export_page(pictures: Sequence[tuple[str, Picture]], path: Path) -> None:
     data = json.dumps([_embedded(name, image) for name, image in pictures], allow_nan=False, separators=(",", ":"))
     title = " | ".join(name for name, _ in pictures)
     with replacing(path) as temporary:
-        temporary.write_text(whole_page(title, data, len(pictures)), encoding="utf-8")
+        temporary.write_text(single_file_page(title, data, len(pictures)), encoding="utf-8")
 
 
 def _embedded(name: str, image: Picture) -> dict[str, Any]:

@@ -34,13 +34,23 @@ _MOST_DIGITS = 9
 #: Seconds after which a connection that says nothing is closed.
 _PATIENCE = 60.0
 
-_POLICY = (
-    "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; connect-src 'self'; "
-    "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
-)
+_MEDIA_TYPES = {"html": "text/html", "css": "text/css", "js": "text/javascript", "svg": "image/svg+xml"}
+
+
+def content_security_policy(*inline_scripts: str) -> str:
+    """Content-Security-Policy that allows files of this server only, no inline script and no framing.
+
+    ``inline_scripts`` are the exceptions: sources ``'sha256-...'`` of inline scripts, quoted.
+    """
+    scripts = " ".join(["'self'", *inline_scripts])
+    return (
+        f"default-src 'none'; script-src {scripts}; style-src 'self'; "
+        "img-src 'self' blob: data:; connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+    )
+
 
 _HEADERS = {
-    "Content-Security-Policy": _POLICY,
+    "Content-Security-Policy": content_security_policy(),
     "Cross-Origin-Opener-Policy": "same-origin",
     "Cross-Origin-Resource-Policy": "same-origin",
     "Referrer-Policy": "no-referrer",
@@ -140,6 +150,11 @@ class WebServer:
 def text_answer(text: str, kind: str) -> Answer:
     """A text of the media type ``kind``."""
     return Answer(text.encode("utf-8"), f"{kind}; charset=utf-8")
+
+
+def file_answer(name: str, text: str) -> Answer:
+    """A text file; the extension of ``name`` (html, css, js, svg) determines the media type."""
+    return text_answer(text, _MEDIA_TYPES[name.rpartition(".")[2]])
 
 
 def json_answer(values: Any, headers: Mapping[str, str] | None = None) -> Answer:

@@ -1,7 +1,7 @@
 """What the viewer's server answers: the page, its files, and manifests and tiles of the opened pictures. Nothing else.
 
     GET /                                     the page
-    GET /assets/viewer.js, .css, icon.svg     what the page is made of
+    GET /assets/NAME                          a script, a style sheet or the icon of the page
     GET /pictures/N/manifest.json             what the page needs to know of a picture; the ETag names its state
     GET /pictures/N/tiles/LAYER/COLUMN_ROW    a tile in the format of the manifest; If-Match asks for that of a state
 
@@ -12,11 +12,20 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from dataclasses import replace
 from http import HTTPStatus
 
 from lippmann.errors import UsageError
-from lippmann.viewer import page_bundle
-from lippmann.viewer.http_server import Answer, RefusedError, Request, json_answer, text_answer
+from lippmann.viewer import page
+from lippmann.viewer.http_server import (
+    Answer,
+    RefusedError,
+    Request,
+    content_security_policy,
+    file_answer,
+    json_answer,
+    text_answer,
+)
 from lippmann.viewer.served_picture import PictureFile
 
 _MANIFEST = re.compile(r"/pictures/([0-9]{1,3})/manifest\.json")
@@ -28,12 +37,10 @@ class ViewerSite:
 
     def __init__(self, pictures: Sequence[PictureFile]) -> None:
         self._pictures = tuple(pictures)
-        self._page = {
-            "/": text_answer(page_bundle.page_html(len(self._pictures)), "text/html"),
-            "/assets/viewer.js": text_answer(page_bundle.script(), "text/javascript"),
-            "/assets/viewer.css": text_answer(page_bundle.style(), "text/css"),
-            "/assets/icon.svg": text_answer(page_bundle.icon(), "image/svg+xml"),
-        }
+        policy = content_security_policy(page.served_script_hash())
+        html = text_answer(page.served_page(len(self._pictures)), "text/html")
+        self._page = {f"/assets/{name}": file_answer(name, text) for name, text in page.assets().items()}
+        self._page["/"] = replace(html, headers={"Content-Security-Policy": policy})
 
     def get(self, request: Request) -> Answer:
         path = request.path

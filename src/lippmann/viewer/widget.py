@@ -6,6 +6,7 @@ the kernel is gone, in a notebook that was saved with its widgets too.
 
 from __future__ import annotations
 
+import json
 from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING
 
@@ -13,15 +14,33 @@ import anywidget
 import traitlets
 
 from lippmann.runtime.machine import usable_cores
-from lippmann.viewer import page_bundle
+from lippmann.viewer import page
 from lippmann.viewer.manifest import manifest, tile_size
 from lippmann.viewer.tiles import Tiles
 
 if TYPE_CHECKING:
     from lippmann.image import IntegralImage
 
-#: What joins the page's script to the widget's model.
-_GLUE = """
+#: Loads the page's modules and joins the viewer to the widget's model. A notebook's page may have no import map of ours,
+#: but can import blob URLs: anywidget loads this very script from one. Each module therefore becomes a blob, in which
+#: the blob URLs of the modules that it imports take the place of their names.
+_LOADER = """
+const addresses = new Map();
+
+function addressOf(name) {
+  if (!addresses.has(name)) {
+    let text = MODULES[name];
+    for (const other of Object.keys(MODULES)) {
+      if (text.includes(`"${other}"`)) text = text.replaceAll(`"${other}"`, `"${addressOf(other)}"`);
+    }
+    addresses.set(name, URL.createObjectURL(new Blob([text], { type: "text/javascript" })));
+  }
+  return addresses.get(name);
+}
+
+const { createViewer } = await import(addressOf("lippmann/viewer.js"));
+for (const address of addresses.values()) URL.revokeObjectURL(address);
+
 export default {
   render({ model, el }) {
     const tiles = model.get("tiles");
@@ -52,8 +71,8 @@ class PictureWidget(anywidget.AnyWidget):
         What the panel shows. Its tiles are packed here, which takes a second for some ten million pixels.
     """
 
-    _esm = page_bundle.script() + _GLUE
-    _css = page_bundle.style() + _CELL
+    _esm = f"const MODULES = {json.dumps(page.modules())};\n{_LOADER}"
+    _css = page.style() + _CELL
 
     description = traitlets.Dict().tag(sync=True)
     tiles = traitlets.Dict().tag(sync=True)

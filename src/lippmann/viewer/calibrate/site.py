@@ -26,9 +26,7 @@ from lippmann.display.panel import Panel, SubpixelOffsets
 from lippmann.display.units import stripe
 from lippmann.errors import UsageError
 from lippmann.runtime.atomic_write import replacing
-from lippmann.viewer.http_server import Answer, RefusedError, Request, json_answer, text_answer
-
-_KINDS = {"html": "text/html", "css": "text/css", "js": "text/javascript", "svg": "image/svg+xml"}
+from lippmann.viewer.http_server import Answer, RefusedError, Request, file_answer, json_answer
 
 #: Orders of sub-pixels that side by side stripes come in, and pixels whose colours lie in one place.
 _ORDERS = ("rgb", "bgr", "rbg", "brg", "gbr", "grb", "none")
@@ -59,10 +57,9 @@ class CalibrationSite:
         self._saved = saved
         self._token = secrets.token_urlsafe(32)
         self._lock = threading.Lock()
-        assets = {entry.name: entry.read_text(encoding="utf-8") for entry in (files(__package__) / "assets").iterdir()}
-        self._page = {
-            f"/assets/{name}": text_answer(text, _KINDS[name.rpartition(".")[2]]) for name, text in assets.items()
-        }
+        folder = files(__package__) / "assets"
+        assets = {entry.name: entry.read_text(encoding="utf-8") for entry in folder.iterdir()}
+        self._page = {f"/assets/{name}": file_answer(name, text) for name, text in assets.items()}
         self._page["/"] = self._page.pop("/assets/page.html")
 
     def get(self, request: Request) -> Answer:
