@@ -100,7 +100,7 @@ def test_without_dask_it_is_said_how_to_get_it(monkeypatch):
     ("words", "message"),
     [
         (("render", "teapot", "--cluster", "nowhere", "-o", "x.png"), "'nowhere' will not do"),
-        (("render", "teapot", "--tls-ca", "ca.pem", "-o", "x.png"), "--tls-ca: is for clusters"),
+        (("render", "teapot", "--tls-ca", "ca.pem", "-o", "x.png"), "--tls-ca: applies to a cluster only"),
         (("worker", "nowhere"), "'nowhere' will not do"),
         (("worker", "tcp://10.0.0.1:8786"), "--host"),
         (("worker", "tcp://127.0.0.1:8786", "--threads", "0"), "at least 1"),
