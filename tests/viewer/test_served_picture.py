@@ -26,7 +26,7 @@ PIXELS = np.random.default_rng(1).random((12, 20, 3), dtype=np.float32)
 def test_a_picture_without_a_display_needs_one(tmp_path):
     path = tmp_path / "plain.png"
     write_plain_picture(PIXELS, path)
-    with pytest.raises(PictureError, match="say --display"):
+    with pytest.raises(PictureError, match="say display=..."):
         PictureFile(path)
     assert PictureFile(path, DISPLAY).current().tiles.columns == 1
 
