@@ -1,7 +1,7 @@
-"""The page as a notebook's widget.
+"""The viewer as a Jupyter widget.
 
-Everything travels to the browser when the widget is made; nothing comes back, so that the view goes on working when
-the kernel is gone, in a notebook that was saved with its widgets too.
+The widget sends all data to the browser when it is made, and receives nothing. So it works on without a kernel, and in
+a notebook that was saved with its widgets.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from lippmann.viewer.tiles import Tiles
 if TYPE_CHECKING:
     from lippmann.image import IntegralImage
 
-#: Loads the page's modules and joins the viewer to the widget's model. A notebook's page may have no import map of ours,
+#: Loads the page's modules and joins the viewer to the widget's model. A notebook's page has no import map of ours,
 #: but can import blob URLs: anywidget loads this very script from one. Each module therefore becomes a blob, in which
 #: the blob URLs of the modules that it imports take the place of their names.
 _LOADER = """
@@ -55,7 +55,7 @@ export default {
 };
 """
 
-#: A cell has no height of its own, and people may want another one; its controls come when they are called.
+#: A cell gets a height that the user can change, and a button for the controls, which are hidden at first.
 _CELL = """
 .lippmann-cell { height: 34rem; min-height: 12rem; resize: vertical; overflow: hidden; }
 .lippmann-cell .more { display: inline-block; }
@@ -63,12 +63,12 @@ _CELL = """
 
 
 class PictureWidget(anywidget.AnyWidget):
-    """A picture as its display would show it.
+    """Jupyter widget that shows a picture as its display would show it.
 
     Parameters
     ----------
     image:
-        What the panel shows. Its tiles are packed here, which takes a second for some ten million pixels.
+        The picture. Its tiles are compressed here, about ten million pixels per second.
     """
 
     _esm = f"const MODULES = {json.dumps(page.modules())};\n{_LOADER}"
@@ -78,12 +78,16 @@ class PictureWidget(anywidget.AnyWidget):
     tiles = traitlets.Dict().tag(sync=True)
 
     def __init__(self, image: IntegralImage) -> None:
-        cut = Tiles(image, tile_size(image.display))
+        image_tiles = Tiles(image, tile_size(image.display))
         name = image.provenance.scene or "picture"
-        described = manifest(image, cut, name=name, tile_format="png")
-        layers = [layer["name"] for layer in described["tiles"]["layers"]]
-        places = [(layer, c, r) for layer in layers for r in range(cut.rows) for c in range(cut.columns)]
+        description = manifest(image, image_tiles, name=name, tile_format="png")
+        places = [
+            (layer, c, r)
+            for layer in image_tiles.layers
+            for r in range(image_tiles.rows)
+            for c in range(image_tiles.columns)
+        ]
         with ThreadPoolExecutor(usable_cores()) as pool:
-            packed = list(pool.map(lambda place: cut.png(*place), places))
+            files = list(pool.map(lambda place: image_tiles.png(*place), places))
         keys = [f"{layer}/{column}_{row}" for layer, column, row in places]
-        super().__init__(description=described, tiles=dict(zip(keys, packed, strict=True)))
+        super().__init__(description=description, tiles=dict(zip(keys, files, strict=True)))
