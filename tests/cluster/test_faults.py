@@ -105,7 +105,7 @@ def test_a_restarted_scheduler_is_told_and_resumed_from(lab, render, here, until
     lab.kill(scheduler)
     begun.finish()
     assert isinstance(begun.error, ClusterError)
-    assert "--resume" in str(begun.error)
+    assert "resume=True" in str(begun.error)
     lab.heal("slow")
     lab.start()
     again = render(lab.address, resume=True).finish()

@@ -60,8 +60,8 @@ class TlsFiles:
     key: Path | None = None
 
     def options(self) -> dict[str, Path | None]:
-        """The three by the names of the command line's options."""
-        return {"--tls-ca": self.ca, "--tls-cert": self.certificate, "--tls-key": self.key}
+        """The three files by the names of the parameters that they come from."""
+        return {"tls_ca": self.ca, "tls_cert": self.certificate, "tls_key": self.key}
 
     def security(self) -> Security:
         """``distributed.Security`` with these files, or with those of Dask's configuration.
@@ -77,12 +77,13 @@ class TlsFiles:
         distributed = import_distributed()
         if not any(given.values()):
             return distributed.Security()
-        for option, path in given.items():
+        for name, path in given.items():
             if path is None:
-                raise UsageError("is missing", where=option, rule="--tls-ca, --tls-cert and --tls-key go together")
+                rule = "tls_ca=..., tls_cert=... and tls_key=... go together"
+                raise UsageError("is missing", parameter=name, rule=rule)
             if not path.is_file():
-                raise UsageError(f"no such file '{path}'", where=option)
-        roles = {f"tls_{role}_{what}": str(given[f"--tls-{what}"]) for role in _ROLES for what in ("cert", "key")}
+                raise UsageError(f"no such file '{path}'", parameter=name)
+        roles = {f"tls_{role}_{what}": str(given[f"tls_{what}"]) for role in _ROLES for what in ("cert", "key")}
         return distributed.Security(require_encryption=True, tls_ca_file=str(self.ca), **roles)
 
 
@@ -128,7 +129,7 @@ def warn_of_exposure(address: str, security: Security, remark: Callable[[str], N
     who = "every account of this machine" if is_loopback(address) else "everyone who can reach that port"
     remark(
         f"WARNING: {address} asks nobody for a certificate: {who} can run code as you, on the workers and here "
-        "(use tls:// with --tls-ca, --tls-cert and --tls-key)"
+        "(use tls:// with tls_ca=..., tls_cert=... and tls_key=...)"
     )
 
 
@@ -144,20 +145,20 @@ def parse_target(text: str) -> Target:
     if local is not None:
         count = int(local[1])
         if not 1 <= count <= _MOST_LOCAL:
-            raise UsageError(f"{count} workers", where="--cluster", rule=f"1 to {_MOST_LOCAL} can be started here")
+            raise UsageError(f"{count} workers", parameter="cluster", rule=f"1 to {_MOST_LOCAL} can be started here")
         return Target(local=count)
-    return Target(address=checked_address(text.strip(), "--cluster", _RULE))
+    return Target(address=checked_address(text.strip(), "cluster", _RULE))
 
 
-def checked_address(text: str, where: str, rule: str) -> str:
+def checked_address(text: str, parameter: str, rule: str) -> str:
     """``text`` itself, once it is known to be a scheduler's address with host and port.
 
     Parameters
     ----------
     text:
         The address.
-    where, rule:
-        Place and rule for the error message.
+    parameter, rule:
+        Name of the parameter and rule, for the error message.
 
     Raises
     ------
@@ -170,7 +171,7 @@ def checked_address(text: str, where: str, rule: str) -> str:
     except ValueError:
         fits = False
     if not fits:
-        raise UsageError(f"'{text}' will not do", where=where, rule=rule)
+        raise UsageError(f"'{text}' is no address", parameter=parameter, rule=rule)
     return text
 
 

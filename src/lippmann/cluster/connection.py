@@ -96,9 +96,9 @@ def connect(
     _silence_dask()
     tls = tls or TlsFiles()
     if target.local is not None:
-        for option, path in tls.options().items():
+        for name, path in tls.options().items():
             if path is not None:
-                raise UsageError("is for tls://HOST:8786", where=option, rule="local:N makes its own certificate")
+                raise UsageError("is for tls://HOST:8786", parameter=name, rule="local:N makes its own certificate")
         with _started_here(distributed, target.local, threads) as client, _watched(client) as roster:
             yield Cluster(client, roster, f"local:{target.local}", remark)
         return
@@ -114,7 +114,7 @@ def connect(
         why = " ".join(str(error).split())[:200]
         raise ClusterError(
             f"no scheduler answers at {target.address} ({type(error).__name__}: {why})",
-            where="--cluster",
+            parameter="cluster",
             fix="start one: dask scheduler",
         ) from None
     try:

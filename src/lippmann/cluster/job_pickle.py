@@ -121,7 +121,7 @@ def _scene_files(job: TileJob, parts: dict[str, NDArray[Any]]) -> dict[str, str]
         if PurePosixPath(key).is_absolute() or ".." in PurePosixPath(key).parts:
             raise UsageError(
                 f"the scene names '{path}', which lies outside its folder",
-                where="--cluster",
+                parameter="cluster",
                 rule="only files of the scene's own folder are sent",
                 fix="move it there",
             )

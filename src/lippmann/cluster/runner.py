@@ -263,8 +263,8 @@ class _Run:
     def _lost(self) -> ClusterError:
         return ClusterError(
             f"the connection to the scheduler of {self.cluster.name} is lost",
-            where="--cluster",
-            fix="run again with --resume: what was rendered is kept",
+            parameter="cluster",
+            fix="run again with resume=True: what was rendered is kept",
         )
 
     def _failure(self) -> ClusterError:
@@ -272,7 +272,7 @@ class _Run:
         more = f" and {len(names) - 4} more" if len(names) > 4 else ""
         return ClusterError(
             f"{len(names)} of {self.total} tiles failed again and again: {', '.join(names[:4])}{more}",
-            fix="run again with --resume: the other tiles are kept",
+            fix="run again with resume=True: the other tiles are kept",
         )
 
 

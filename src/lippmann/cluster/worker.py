@@ -61,13 +61,13 @@ class WorkerOptions:
     tls: TlsFiles = field(default_factory=TlsFiles)
 
     def __post_init__(self) -> None:
-        checked_address(self.address, "SCHEDULER", "tcp://HOST:8786 or tls://HOST:8786")
+        checked_address(self.address, "scheduler", "tcp://HOST:8786 or tls://HOST:8786")
         if self.threads is not None and self.threads < 1:
-            raise UsageError(f"{self.threads} threads are too few", where="--threads", rule="at least 1")
+            raise UsageError(f"{self.threads} is out of range", parameter="threads", rule="it must be at least 1")
         if self.host is None and not is_loopback(self.address):
             raise UsageError(
                 "is missing",
-                where="--host",
+                parameter="host",
                 rule="a worker of a scheduler on another machine has to be reached from there",
                 fix="give this machine's address in the cluster's network",
             )
