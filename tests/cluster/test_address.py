@@ -27,7 +27,7 @@ def test_targets(text, target):
     ["", "local", "local:0", "local:x", "local:9999", "10.0.0.1:8786", "tcp://10.0.0.1", "http://a:1", "tcp://a:99999"],
 )
 def test_what_is_no_target(text):
-    with pytest.raises(UsageError, match="--cluster"):
+    with pytest.raises(UsageError, match="cluster: "):
         parse_target(text)
 
 
@@ -46,7 +46,7 @@ def test_loopback(address, own):
 
 
 def test_a_worker_of_another_machine_opens_nothing_unasked():
-    with pytest.raises(UsageError, match=r"--host: is missing"):
+    with pytest.raises(UsageError, match=r"host: is missing"):
         WorkerOptions("tcp://10.0.0.1:8786")
     assert WorkerOptions("tcp://10.0.0.1:8786", host="10.0.0.2").host == "10.0.0.2"
     assert WorkerOptions("tcp://127.0.0.1:8786").host is None
@@ -60,9 +60,9 @@ def test_certificates_go_together(tmp_path):
     assert security.require_encryption
     assert security.tls_ca_file == str(tmp_path / "ca")
     assert security.tls_client_cert == security.tls_worker_cert == str(tmp_path / "cert")
-    with pytest.raises(UsageError, match="--tls-key: is missing"):
+    with pytest.raises(UsageError, match="tls_key: is missing"):
         TlsFiles(tmp_path / "ca", tmp_path / "cert").security()
-    with pytest.raises(UsageError, match="--tls-ca: no such file"):
+    with pytest.raises(UsageError, match="tls_ca: no such file"):
         TlsFiles(tmp_path / "none", tmp_path / "cert", tmp_path / "key").security()
 
 
@@ -99,9 +99,9 @@ def test_without_dask_it_is_said_how_to_get_it(monkeypatch):
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (("render", "teapot", "--cluster", "nowhere", "-o", "x.png"), "'nowhere' will not do"),
-        (("render", "teapot", "--tls-ca", "ca.pem", "-o", "x.png"), "--tls-ca: is for clusters"),
-        (("worker", "nowhere"), "'nowhere' will not do"),
+        (("render", "teapot", "--cluster", "nowhere", "-o", "x.png"), "'nowhere' is no address"),
+        (("render", "teapot", "--tls-ca", "ca.pem", "-o", "x.png"), "--tls-ca: applies to a cluster only"),
+        (("worker", "nowhere"), "'nowhere' is no address"),
         (("worker", "tcp://10.0.0.1:8786"), "--host"),
         (("worker", "tcp://127.0.0.1:8786", "--threads", "0"), "at least 1"),
     ],

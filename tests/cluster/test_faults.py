@@ -105,7 +105,7 @@ def test_a_restarted_scheduler_is_told_and_resumed_from(lab, render, here, until
     lab.kill(scheduler)
     begun.finish()
     assert isinstance(begun.error, ClusterError)
-    assert "--resume" in str(begun.error)
+    assert "resume=True" in str(begun.error)
     lab.heal("slow")
     lab.start()
     again = render(lab.address, resume=True).finish()
@@ -120,7 +120,7 @@ def test_a_worker_of_another_version_is_refused_by_name(lab, render, here):
     alone = render(lab.address, "alone.png").finish()
     assert isinstance(alone.error, ClusterError)
     assert "tcp://127.0.0.1:" in str(alone.error)
-    assert "it has Lippmann 0.0.1, here is" in str(alone.error)
+    assert "it has Lippmann 0.0.1, the client has" in str(alone.error)
     assert lab.begun() == set()
 
 

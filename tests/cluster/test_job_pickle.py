@@ -117,7 +117,7 @@ def test_a_part_that_was_changed_on_the_way_is_found(tmp_path):
     parts = [parcel.parts[name] for name in parcel.names]
     parts[0] = np.array(parts[0])
     parts[0].ravel()[3] += 1
-    with pytest.raises(ClusterError, match="damaged on the way"):
+    with pytest.raises(ClusterError, match="damaged in transit"):
         unpack(parcel.outline, parcel.names, parts, tmp_path)
 
 

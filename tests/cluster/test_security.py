@@ -153,7 +153,7 @@ def test_certificates_need_a_package(monkeypatch):
 
 def test_a_cluster_of_this_machine_makes_its_own_certificates(tmp_path):
     tls = TlsFiles(key=tmp_path / "key.pem")
-    with pytest.raises(UsageError, match=r"--tls-key: .*local:N"), connect(Target(local=1), tls):
+    with pytest.raises(UsageError, match=r"tls_key: .*local:N"), connect(Target(local=1), tls):
         pass
 
 
@@ -173,7 +173,7 @@ def test_open_connections_say_what_they_expose(address, who):
     assert line.startswith("WARNING: ")
     assert address in line
     assert f"{who} can run code as you" in line
-    assert "tls:// with --tls-ca, --tls-cert and --tls-key" in line
+    assert "tls:// with tls_ca=..., tls_cert=... and tls_key=..." in line
     assert "\n" not in line
 
 

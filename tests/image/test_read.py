@@ -88,7 +88,7 @@ def test_a_picture_without_a_display(tmp_path, display, picture):
     path = tmp_path / "foreign.png"
     Image.fromarray(codes).save(path)
     for read in (read_picture, read_metadata):
-        with pytest.raises(PictureError, match=r"foreign.png: has no display in it; say --display"):
+        with pytest.raises(PictureError, match=r"foreign.png: has no display in it; say display=..."):
             read(path)
     image = read_picture(path, display=array)
     np.testing.assert_array_equal(quantize(image.pixels, 8, "srgb"), codes)

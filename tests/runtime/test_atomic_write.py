@@ -357,7 +357,7 @@ def test_what_replaces_a_private_picture_is_private_from_the_first(tmp_path, mon
 def test_nobody_is_told_to_delete_what_is_his_own(tmp_path):
     (tmp_path / "views").mkdir()
     (tmp_path / "views" / "notes.txt").touch()
-    with pytest.raises(OutputError, match="choose a new folder, or move what is yours out of this one"):
+    with pytest.raises(OutputError, match="choose a new folder, or move your files out of this one"):
         write_folder(tmp_path / "views", {"a.png": "1"})
 
 

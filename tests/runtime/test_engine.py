@@ -57,7 +57,11 @@ def start_fails(before: str = "", device: str = "cpu", **environment: str) -> st
 
 @pytest.mark.parametrize(
     ("arguments", "problem"),
-    [({"device": "tpu"}, "'tpu' is unknown"), ({"threads": 0}, "0 threads"), ({"threads": -3}, "-3 threads")],
+    [
+        ({"device": "tpu"}, "'tpu' is unknown"),
+        ({"threads": 0}, "threads: 0 is out of range"),
+        ({"threads": -3}, "threads: -3 is out of range"),
+    ],
 )
 def test_arguments_out_of_range(arguments, problem):
     with pytest.raises(UsageError, match=problem):

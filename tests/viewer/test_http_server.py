@@ -11,7 +11,7 @@ from http import HTTPStatus
 import pytest
 
 from lippmann.errors import PictureError, UsageError
-from lippmann.viewer.http_server import Answer, RefusedError, WebServer, is_loopback, json_answer
+from lippmann.viewer.http_server import RefusedError, Response, WebServer, is_loopback, json_response
 
 
 class Echo:
@@ -26,10 +26,10 @@ class Echo:
             raise MemoryError
         if request.path == "/fault":
             raise ZeroDivisionError("a fault")
-        return json_answer({"path": request.path})
+        return json_response({"path": request.path})
 
     def post(self, request, body):
-        return Answer(body, "application/json")
+        return Response(body, "application/json")
 
 
 @pytest.fixture(scope="module")

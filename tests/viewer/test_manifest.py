@@ -12,7 +12,7 @@ from pages import CELLS, DISPLAYS, lenticular, noise
 
 from lippmann.display import Display, LensArray, Panel, list_displays
 from lippmann.image import IntegralImage, Provenance
-from lippmann.viewer.manifest import MOST_TILES, VERSION, facts, manifest, optics, tile_size
+from lippmann.viewer.manifest import MAX_TILES, VERSION, facts, manifest, optics, tile_size
 from lippmann.viewer.tiles import Tiles
 from lippmann.viewing.replay import default_eye
 
@@ -99,6 +99,6 @@ def test_tiles_are_few_enough_for_an_array_texture(width, height):
     display = Display("x", Panel(width, height, 0.1), LensArray("lenticular", 0.1), gap=1.0)
     size = tile_size(display)
     assert size & (size - 1) == 0
-    assert math.ceil(width / size) * math.ceil(height / size) <= MOST_TILES
+    assert math.ceil(width / size) * math.ceil(height / size) <= MAX_TILES
     half = size // 2
-    assert size == 1024 or math.ceil(width / half) * math.ceil(height / half) > MOST_TILES
+    assert size == 1024 or math.ceil(width / half) * math.ceil(height / half) > MAX_TILES

@@ -45,16 +45,16 @@ def test_origins_of_pixels():
     overlay = overlays(picture({"status": status}))["status"]
     colors = {item["label"]: tuple(item["color"]) for item in overlay.description["classes"]}
     codes = overlay.codes(ALL)
-    assert tuple(codes[0, 0]) == colors["missed, then traced"]
-    assert tuple(codes[1, 2]) == colors["missed, then averaged"]
-    assert tuple(codes[3, 3]) == colors["carried over from another lens"]
+    assert tuple(codes[0, 0]) == colors["traced"]
+    assert tuple(codes[1, 2]) == colors["interpolated"]
+    assert tuple(codes[3, 3]) == colors["reprojected"]
     assert tuple(codes[5, 9]) == EMPTY_CODE
     assert len(set(colors.values())) == 3
 
 
 def test_only_origins_that_occur_are_explained():
     overlay = overlays(picture({"status": plain(TRACED)}))["status"]
-    assert [item["label"] for item in overlay.description["classes"]] == ["missed, then traced"]
+    assert [item["label"] for item in overlay.description["classes"]] == ["traced"]
 
 
 @pytest.mark.parametrize(("method", "value"), [("full", 0.01), ("error map", 0.1)])

@@ -26,7 +26,7 @@ PIXELS = np.random.default_rng(1).random((12, 20, 3), dtype=np.float32)
 def test_a_picture_without_a_display_needs_one(tmp_path):
     path = tmp_path / "plain.png"
     write_plain_picture(PIXELS, path)
-    with pytest.raises(PictureError, match="say --display"):
+    with pytest.raises(PictureError, match=r"say display=\.\.\."):
         PictureFile(path)
     assert PictureFile(path, DISPLAY).current().tiles.columns == 1
 
@@ -54,7 +54,7 @@ def test_many_threads_read_a_file_once(tmp_path, monkeypatch):
     monkeypatch.setattr(served_picture, "picture_of_file", slowly)
     file = PictureFile(path)
     with ThreadPoolExecutor(8) as pool:
-        found = list(pool.map(lambda number: file.current() if number % 2 else file.loaded(), range(32)))
+        found = list(pool.map(lambda number: file.current() if number % 2 else file.load_once(), range(32)))
     assert len(read) == 1
     assert len({id(item) for item in found}) == 1
 

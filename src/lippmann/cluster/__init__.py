@@ -1,8 +1,8 @@
-"""Tiles of a picture on a Dask cluster: on this machine, on a lab's, or on one that a queue lends.
+"""Rendering of a picture's tiles on a Dask cluster: workers of this machine, of a network, or of a batch queue.
 
-Dask does the distributing: it starts what it is given where there is room, moves the scene from worker to worker, and
-starts anew what died with its worker. Here is only what it cannot know: how a scene travels in parts that are sent
-once, which workers may take part, how many tiles may be under way, and when a tile is given up.
+Dask schedules the tasks, moves data between workers and repeats tasks whose worker died. This package defines the rest:
+how a scene is split into parts that are sent once, which workers take part, how many tiles are in flight, and when a
+tile is given up.
 """
 
 from __future__ import annotations

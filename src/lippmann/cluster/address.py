@@ -1,4 +1,4 @@
-"""What ``--cluster`` names: a scheduler somewhere, or workers to be started here."""
+"""Addresses of clusters, their TLS files, and the warning of unauthenticated connections."""
 
 from __future__ import annotations
 
@@ -8,14 +8,18 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from types import ModuleType
+from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
 
 from lippmann.errors import ClusterError, UsageError
 
+if TYPE_CHECKING:
+    from distributed import Security
+
 LOOPBACK = "127.0.0.1"
 
-#: Workers that one machine may be asked to start.
+#: Limit on the number of workers started on this machine.
 _MOST_LOCAL = 1024
 
 _RULE = "tcp://HOST:8786 or tls://HOST:8786 of a scheduler, or local:N for N workers here"
@@ -23,7 +27,15 @@ _RULE = "tcp://HOST:8786 or tls://HOST:8786 of a scheduler, or local:N for N wor
 
 @dataclass(frozen=True)
 class Target:
-    """A scheduler's ``address``, or the number of workers to start here: one of the two is set."""
+    """A cluster to render on; exactly one of the two is set.
+
+    Attributes
+    ----------
+    address:
+        Address of a running scheduler, such as ``tls://HOST:8786``.
+    local:
+        Number of workers to start on this machine.
+    """
 
     address: str | None = None
     local: int | None = None
@@ -31,52 +43,65 @@ class Target:
 
 @dataclass(frozen=True)
 class TlsFiles:
-    """Files (PEM) for encrypted connections; all three or none. Without them Dask's own configuration counts."""
+    """PEM files for TLS connections: all three, or none to use Dask's own configuration.
+
+    Attributes
+    ----------
+    ca:
+        Certificate of the authority.
+    certificate:
+        Certificate of this machine.
+    key:
+        Private key of this machine.
+    """
 
     ca: Path | None = None
     certificate: Path | None = None
     key: Path | None = None
 
     def options(self) -> dict[str, Path | None]:
-        """The three by the names of the command line's options."""
-        return {"--tls-ca": self.ca, "--tls-cert": self.certificate, "--tls-key": self.key}
+        """The three files by the names of the parameters that they come from."""
+        return {"tls_ca": self.ca, "tls_cert": self.certificate, "tls_key": self.key}
 
-    def security(self) -> Any:
-        """``distributed.Security`` with these files, or with what Dask is configured to use.
+    def security(self) -> Security:
+        """``distributed.Security`` with these files, or with those of Dask's configuration.
 
         Raises
         ------
         UsageError
-            Some of the three are missing, or a file is.
+            If one of the three is not given, or a file does not exist.
+        ClusterError
+            If Dask is not installed.
         """
         given = self.options()
         distributed = import_distributed()
         if not any(given.values()):
             return distributed.Security()
-        for option, path in given.items():
+        for name, path in given.items():
             if path is None:
-                raise UsageError("is missing", where=option, rule="--tls-ca, --tls-cert and --tls-key go together")
+                rule = "tls_ca=..., tls_cert=... and tls_key=... go together"
+                raise UsageError("is missing", parameter=name, rule=rule)
             if not path.is_file():
-                raise UsageError(f"no such file '{path}'", where=option)
-        roles = {f"tls_{role}_{what}": str(given[f"--tls-{what}"]) for role in _ROLES for what in ("cert", "key")}
+                raise UsageError(f"no such file '{path}'", parameter=name)
+        roles = {f"tls_{role}_{what}": str(given[f"tls_{what}"]) for role in _ROLES for what in ("cert", "key")}
         return distributed.Security(require_encryption=True, tls_ca_file=str(self.ca), **roles)
 
 
 _ROLES = ("client", "worker", "scheduler")
 
-#: Schemes whose two ends ask each other for certificates.
+#: Schemes of mutual authentication by certificates.
 _AUTHENTICATED = ("tls", "wss")
 
 
-def temporary_security() -> Any:
-    """``distributed.Security`` with a certificate that is made for one cluster, kept in memory and trusted by no other.
+def temporary_security() -> Security:
+    """``distributed.Security`` with a new self-signed certificate, held in memory.
 
-    All roles of the cluster have this certificate and accept nobody who has not.
+    All roles of one cluster share the certificate and accept no other.
 
     Raises
     ------
     ClusterError
-        The package that makes certificates is not installed.
+        If the package that makes certificates is not installed.
     """
     try:
         return import_distributed().Security.temporary()
@@ -84,45 +109,61 @@ def temporary_security() -> Any:
         raise ClusterError(f"no certificate can be made ({error})", fix="pip install 'lippmann[cluster]'") from None
 
 
-def warn_of_exposure(address: str, security: Any, remark: Callable[[str], None]) -> None:
-    """Call ``remark`` with one line on who can run code through connections to ``address``, unless certificates forbid.
+def warn_of_exposure(address: str, security: Security, remark: Callable[[str], None]) -> None:
+    """Warn of a connection without certificates, through which others can run code.
 
-    Dask runs whatever functions its peers send: a scheduler those of clients, a worker and a client those of all
-    whom the scheduler lets in. ``security`` is the ``distributed.Security`` of the connection.
+    Dask runs the functions that its peers send: a scheduler those of clients, a worker and a client those of everyone
+    whom the scheduler admits.
+
+    Parameters
+    ----------
+    address:
+        Address of the scheduler.
+    security:
+        Security of the connection.
+    remark:
+        Called with the warning, one line; not called if the connection is authenticated.
     """
     if security.require_encryption or urlsplit(address).scheme in _AUTHENTICATED:
-        return  # Dask connects with certificates on both ends, or not at all
+        return  # Dask then connects with certificates at both ends or not at all
     who = "every account of this machine" if is_loopback(address) else "everyone who can reach that port"
     remark(
         f"WARNING: {address} asks nobody for a certificate: {who} can run code as you, on the workers and here "
-        "(use tls:// with --tls-ca, --tls-cert and --tls-key)"
+        "(use tls:// with tls_ca=..., tls_cert=... and tls_key=...)"
     )
 
 
 def parse_target(text: str) -> Target:
-    """What the text of ``--cluster`` names.
+    """The cluster of a text: ``tcp://HOST:PORT``, ``tls://HOST:PORT`` or ``local:N``.
 
     Raises
     ------
     UsageError
-        Neither form fits.
+        If the text has neither form, or N is not 1 to 1024.
     """
     local = re.fullmatch(r"local:(\d{1,6})", text.strip())
     if local is not None:
         count = int(local[1])
         if not 1 <= count <= _MOST_LOCAL:
-            raise UsageError(f"{count} workers", where="--cluster", rule=f"1 to {_MOST_LOCAL} can be started here")
+            raise UsageError(f"{count} workers", parameter="cluster", rule=f"1 to {_MOST_LOCAL} can be started here")
         return Target(local=count)
-    return Target(address=checked_address(text.strip(), "--cluster", _RULE))
+    return Target(address=checked_address(text.strip(), "cluster", _RULE))
 
 
-def checked_address(text: str, where: str, rule: str) -> str:
-    """A scheduler's address, known to have a host and a port.
+def checked_address(text: str, parameter: str, rule: str) -> str:
+    """``text`` itself, once it is known to be a scheduler's address with host and port.
+
+    Parameters
+    ----------
+    text:
+        The address.
+    parameter, rule:
+        Name of the parameter and rule, for the error message.
 
     Raises
     ------
     UsageError
-        It has not.
+        If the text is no such address.
     """
     try:
         parts = urlsplit(text)
@@ -130,12 +171,12 @@ def checked_address(text: str, where: str, rule: str) -> str:
     except ValueError:
         fits = False
     if not fits:
-        raise UsageError(f"'{text}' will not do", where=where, rule=rule)
+        raise UsageError(f"'{text}' is no address", parameter=parameter, rule=rule)
     return text
 
 
 def is_loopback(address: str) -> bool:
-    """Whether a scheduler's address can only be reached from this machine."""
+    """Whether a scheduler's address is a loopback address, reachable from this machine only."""
     host = urlsplit(address).hostname or ""
     try:
         return ipaddress.ip_address(host).is_loopback
@@ -143,13 +184,13 @@ def is_loopback(address: str) -> bool:
         return host == "localhost"
 
 
-def import_distributed() -> Any:
-    """The package ``distributed``, loaded when a cluster is first asked for.
+def import_distributed() -> ModuleType:
+    """Import the package ``distributed``, which is part of the extra ``cluster``.
 
     Raises
     ------
     ClusterError
-        It is not installed.
+        If it is not installed.
     """
     try:
         return import_module("distributed")

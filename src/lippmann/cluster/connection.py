@@ -1,4 +1,4 @@
-"""A connection to a cluster, or to one started here, for as long as pictures are rendered on it."""
+"""Connections to Dask clusters: to a running scheduler, or to workers started on this machine."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from importlib.util import find_spec
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from lippmann.cluster.address import (
     LOOPBACK,
@@ -26,7 +26,10 @@ from lippmann.errors import ClusterError, UsageError
 from lippmann.runtime import machine
 from lippmann.runtime.child_python import spawn_safely
 
-#: Seconds to wait for a scheduler to answer.
+if TYPE_CHECKING:
+    from distributed import Client, Future
+
+#: Time limit in seconds for a scheduler to answer.
 CONNECT_SECONDS = 20
 
 _LOGGERS = ("distributed", "distributed.client", "distributed.nanny", "distributed.scheduler", "distributed.worker")
@@ -34,27 +37,27 @@ _LOGGERS = ("distributed", "distributed.client", "distributed.nanny", "distribut
 
 @dataclass(frozen=True)
 class Cluster:
-    """A connected cluster; :func:`lippmann.cluster.runner.run_on` renders on it.
+    """A connected cluster, on which :func:`lippmann.cluster.runner.run_on` renders.
 
     Attributes
     ----------
     client:
-        The ``distributed.Client``.
+        The connected client.
     roster:
-        Who may take part.
+        The workers that take part.
     name:
-        What messages call it.
+        Name for messages: the scheduler's address, or ``local:N``.
     remark:
-        Called with one line about what happens on the way.
+        Called with one line on each event, such as a lost worker.
     parts:
-        Dask's futures of the scene's parts that are there, by content hash.
+        Futures of the scene's parts on the cluster, by content hash.
     """
 
-    client: Any
+    client: Client
     roster: Roster
     name: str
     remark: Callable[[str], None]
-    parts: dict[str, Any] = field(default_factory=dict)
+    parts: dict[str, Future] = field(default_factory=dict)
 
 
 @contextmanager
@@ -65,39 +68,43 @@ def connect(
     threads: int | None = None,
     remark: Callable[[str], None] = lambda line: None,
 ) -> Iterator[Cluster]:
-    """Connect to a scheduler, or start workers on this machine that only this process can use.
+    """Connect to a scheduler, or start workers on this machine for this process alone.
 
     Parameters
     ----------
+    target:
+        The scheduler's address, or the number of workers to start.
     tls:
-        Certificates for a scheduler's ``tls://`` address. Workers that are started here have a certificate of their
-        own, made for the occasion.
+        Certificates for a ``tls://`` address. Workers of this machine get a temporary certificate of their own.
     threads:
-        Of workers that are started here, all together; by default all cores.
+        Threads of all workers of this machine together; None for all cores.
     remark:
-        Called with one line about what happens on the way, and with a warning of connections that are not
-        authenticated.
+        Called with one line on each event, and with a warning if connections are not authenticated.
+
+    Yields
+    ------
+    The connected cluster.
 
     Raises
     ------
     ClusterError
-        Dask is not installed, or the scheduler does not answer.
+        If Dask is not installed, or the scheduler does not answer.
     UsageError
-        Files for encryption are missing, or are given for workers that are started here.
+        If a TLS file is missing, or TLS files are given for workers of this machine.
     """
     distributed = import_distributed()
-    _hush()
+    _silence_dask()
     tls = tls or TlsFiles()
     if target.local is not None:
-        for option, path in tls.options().items():
+        for name, path in tls.options().items():
             if path is not None:
-                raise UsageError("is for tls://HOST:8786", where=option, rule="local:N makes its own certificate")
+                raise UsageError("is for tls://HOST:8786", parameter=name, rule="local:N makes its own certificate")
         with _started_here(distributed, target.local, threads) as client, _watched(client) as roster:
             yield Cluster(client, roster, f"local:{target.local}", remark)
         return
     assert target.address is not None
     security = tls.security()
-    # Before there is a connection: whoever listens there can send code as soon as it stands.
+    # Before connecting: whoever listens there can send code as soon as the connection is open.
     warn_of_exposure(target.address, security, remark)
     try:
         client = distributed.Client(
@@ -107,26 +114,26 @@ def connect(
         why = " ".join(str(error).split())[:200]
         raise ClusterError(
             f"no scheduler answers at {target.address} ({type(error).__name__}: {why})",
-            where="--cluster",
+            parameter="cluster",
             fix="start one: dask scheduler",
         ) from None
     try:
         with _watched(client) as roster:
-            _say_dashboard(client, remark)
+            _remark_on_dashboard(client, remark)
             yield Cluster(client, roster, target.address, remark)
     finally:
         client.close(timeout=5)
 
 
 @contextmanager
-def _started_here(distributed: Any, count: int, threads: int | None) -> Iterator[Any]:
-    """A client of workers that other accounts of this machine can neither use nor feed with files."""
+def _started_here(distributed: Any, count: int, threads: int | None) -> Iterator[Client]:
+    """A client of workers that other accounts of this machine can neither use nor give files to."""
     import dask
 
     each = max(1, (threads or machine.usable_cores()) // count)
     security = temporary_security()
     with private_scratch() as folder, spawn_safely():
-        # Dask's HTTP servers answer everyone, and cannot be left out: they have no pages.
+        # Dask's HTTP servers answer everyone and cannot be disabled, so they get no pages.
         pages: dict[str, Any] = {"distributed.scheduler.http.routes": [], "distributed.worker.http.routes": []}
         with dask.config.set({"temporary-directory": folder, **pages}):
             cluster = distributed.LocalCluster(
@@ -143,17 +150,17 @@ def _started_here(distributed: Any, count: int, threads: int | None) -> Iterator
                 memory_limit=machine.total_memory() // count,
                 silence_logs=logging.CRITICAL,
                 env={THREADS_VARIABLE: str(each)},
-                # Workers that are started later, in place of others, are set up alike.
+                # Workers that are started later as replacements have the same configuration.
                 config=copy.deepcopy(dask.config.config),
             )
         with cluster, distributed.Client(cluster, set_as_default=False, name="lippmann") as client:
-            # It would take copies of the scene away from workers between two tiles.
+            # The active memory manager would remove copies of the scene from workers between tiles.
             client.amm.stop()
             yield client
 
 
 @contextmanager
-def _watched(client: Any) -> Iterator[Roster]:
+def _watched(client: Client) -> Iterator[Roster]:
     roster = Roster(client)
     try:
         yield roster
@@ -161,13 +168,13 @@ def _watched(client: Any) -> Iterator[Roster]:
         roster.close()
 
 
-def _say_dashboard(client: Any, remark: Callable[[str], None]) -> None:
+def _remark_on_dashboard(client: Client, remark: Callable[[str], None]) -> None:
     if find_spec("bokeh") and client.dashboard_link:
         remark(f"the cluster's dashboard: {client.dashboard_link}")
 
 
-def _hush() -> None:
-    """What goes wrong with workers is told in our own words; Dask's would break into the progress bar."""
+def _silence_dask() -> None:
+    """Silence Dask's log, which would break the progress bar; failures of workers are reported as remarks."""
     if not sys.flags.dev_mode:
         for name in _LOGGERS:
             logging.getLogger(name).setLevel(logging.CRITICAL)

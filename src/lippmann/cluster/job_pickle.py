@@ -1,4 +1,4 @@
-"""A job cut into parts that travel by content: each array and file once, however many tiles and jobs need it."""
+"""Serialized jobs: arrays and files become parts named by their content, so that each is sent to a cluster once."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from lippmann.scene.mitsuba_source import MitsubaSource
 from lippmann.scene.mitsuba_xml import MitsubaXml
 from lippmann.tiles.job import TileJob
 
-#: Smaller arrays travel with what holds them.
+#: Arrays with fewer bytes stay in the outline.
 SMALLEST_PART = 4096
 
 _HASH = hashlib.sha256
@@ -26,18 +26,18 @@ _HASH = hashlib.sha256
 
 @dataclass(frozen=True, eq=False)
 class Parcel:
-    """A job in parts.
+    """A serialized job in parts.
 
     Attributes
     ----------
     key:
-        Stands for the whole content.
+        SHA-256 of the whole job; equal jobs have equal keys.
     outline:
-        The job with its parts left out, as bytes.
+        ``(n,)`` uint8: the pickled job without its parts.
     names:
-        Content hashes of the parts, in the order in which :meth:`unpack` wants them.
+        Content hashes of the parts, in the order of the arguments of :func:`unpack`.
     parts:
-        The parts by content hash.
+        Arrays and contents of files by content hash.
     """
 
     key: str
@@ -47,17 +47,17 @@ class Parcel:
 
 
 def pack(job: TileJob) -> Parcel:
-    """Cut a job into parts.
+    """Serialize a job in parts.
 
     Raises
     ------
     UsageError
-        Its scene is an object of Mitsuba's, or a Mitsuba file names files outside its own folder.
+        If the scene is a Mitsuba object, or a Mitsuba file refers to files outside its own folder.
     """
     parts: dict[str, NDArray[Any]] = {}
     files = _scene_files(job, parts)
     stream = io.BytesIO()
-    # What was worked out on the way (a scene's bounds, its hash) would travel, too, and make equal jobs differ.
+    # Fresh copies drop cached values (a scene's bounds, its hash), by which equal jobs would differ.
     plain = replace(job, scene=replace(job.scene))
     if files is not None:
         plain = _with_files(plain, {})
@@ -68,60 +68,71 @@ def pack(job: TileJob) -> Parcel:
 
 
 def unpack(outline: NDArray[np.uint8], names: Sequence[str], parts: Sequence[NDArray[Any]], folder: Path) -> TileJob:
-    """The job of :func:`pack`; scene files, where it has any, are written into ``folder``.
+    """Restore a job that :func:`pack` serialized.
+
+    Parameters
+    ----------
+    outline:
+        ``(n,)`` uint8: the pickled job without its parts.
+    names:
+        Content hashes of the parts.
+    parts:
+        The parts in the order of ``names``.
+    folder:
+        Existing folder into which the files of a Mitsuba scene are written.
 
     Raises
     ------
     ClusterError
-        A part has not the content that its name stands for.
+        If a part does not have the content of its hash.
     """
     by_name = dict(zip(names, parts, strict=True))
     for name, part in by_name.items():
         if content_name(part) != name:
-            raise ClusterError("a part of the scene was damaged on the way")
+            raise ClusterError("a part of the scene was damaged in transit")
     job, files = _Unpacker(io.BytesIO(outline.tobytes()), by_name).load()
     assert isinstance(job, TileJob)
     if files is None:
         return job
-    there = {}
+    paths = {}
     for key, name in files.items():
-        there[key] = path = folder.joinpath(*PurePosixPath(key).parts)
+        paths[key] = path = folder.joinpath(*PurePosixPath(key).parts)
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(by_name[name].tobytes())
-    return _with_files(job, there)
+    return _with_files(job, paths)
 
 
 def content_name(array: NDArray[Any]) -> str:
-    """The hash of an array's type, shape and values."""
-    found = _HASH(f"{array.dtype.str}{array.shape}".encode())
-    found.update(np.ascontiguousarray(array).data)
-    return found.hexdigest()
+    """SHA-256, in hexadecimal, of an array's type, shape and values."""
+    digest = _HASH(f"{array.dtype.str}{array.shape}".encode())
+    digest.update(np.ascontiguousarray(array).data)
+    return digest.hexdigest()
 
 
 def _scene_files(job: TileJob, parts: dict[str, NDArray[Any]]) -> dict[str, str] | None:
-    """The files that a Mitsuba scene reads, by key, and names of their content; None for other scenes."""
+    """Content hashes of the files that a Mitsuba scene reads, by key; None for other scenes. Fills ``parts``."""
     described = job.scene.description
     if not isinstance(described, MitsubaSource):
         return None
-    job.scene_hash  # noqa: B018 - refuses objects of Mitsuba's, with the reason
+    job.scene_hash  # noqa: B018 - raises UsageError for Mitsuba objects
     assert isinstance(described.content, MitsubaXml)
-    found: dict[str, str] = {}
+    names: dict[str, str] = {}
     for key, path in described.content.files.items():
         if PurePosixPath(key).is_absolute() or ".." in PurePosixPath(key).parts:
             raise UsageError(
                 f"the scene names '{path}', which lies outside its folder",
-                where="--cluster",
-                rule="a scene travels with the files of its own folder",
+                parameter="cluster",
+                rule="only files of the scene's own folder are sent",
                 fix="move it there",
             )
         content = np.frombuffer(path.read_bytes(), np.uint8)
-        found[key] = name = content_name(content)
+        names[key] = name = content_name(content)
         parts[name] = content
-    return found
+    return names
 
 
 def _with_files(job: TileJob, files: Mapping[str, Path]) -> TileJob:
-    """The job with other places for the files of its Mitsuba scene, which is not loaded yet."""
+    """The job with other paths of the files of its Mitsuba scene, which is not loaded yet."""
     described = job.scene.description
     assert isinstance(described, MitsubaSource)
     described = replace(described, content=replace(described.content, files=files), _loaded={})

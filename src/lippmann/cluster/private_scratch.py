@@ -1,4 +1,4 @@
-"""A folder for Dask's files that other accounts of the machine can neither read nor fill."""
+"""A folder for Dask's files that other accounts of the machine can neither read nor write."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from lippmann.errors import ClusterError
 
 @contextmanager
 def private_scratch() -> Iterator[str]:
-    """A new folder of this account alone, removed at the end.
+    """Path of a new folder of this account alone, removed at the end.
 
-    By default Dask takes ``dask-scratch-space`` in the shared temporary folder, whoever made it, and imports modules
-    from there: it puts the folder first on ``sys.path``. The new folder lies where Dask is configured to keep its
-    temporary files (``temporary-directory``), else in the system's temporary folder.
+    By default Dask uses ``dask-scratch-space`` in the shared temporary folder, whoever created it, and imports modules
+    from it, since it puts the folder first on ``sys.path``. The new folder is created in Dask's configured
+    ``temporary-directory``, else in the system's temporary folder.
 
     Raises
     ------
     ClusterError
-        The folder cannot be made.
+        If the folder cannot be created.
     """
     import dask
 
@@ -39,5 +39,5 @@ def private_scratch() -> Iterator[str]:
         try:
             yield folder
         finally:
-            # Dask leaves it there where something else has come first since. Others could make it anew.
+            # Dask does not remove the entry if another one precedes it, and others could recreate the folder.
             sys.path[:] = [entry for entry in sys.path if not str(entry).startswith(folder)]

@@ -1,4 +1,4 @@
-"""Tiles rendered by the workers of a cluster: as many under way as keep them busy, results taken in as they come."""
+"""Rendering of tiles on a cluster: enough tiles in flight to keep the workers busy, results stored as they arrive."""
 
 from __future__ import annotations
 
@@ -20,43 +20,56 @@ from lippmann.errors import ClusterError
 from lippmann.journal.tile_file import DamagedTile, decode
 
 if TYPE_CHECKING:
+    from distributed import Future as DaskFuture
+
     from lippmann.rendering.request.choices import Device
     from lippmann.tiles.job import TileJob
     from lippmann.tiles.tile_render import Prepared
     from lippmann.tiles.tiled_render import Put, Runner
 
-#: Tiles under way for each thread of the workers: one being rendered, one waiting for its turn.
+#: Tiles in flight per thread of the workers: one rendering, one waiting.
 TILES_PER_THREAD = 2
-#: A tile that has failed so often is given up.
+#: Number of failures after which a tile is given up.
 MOST_FAILURES = 3
-#: And one under which all workers have died so often, whatever Dask itself counts.
+#: Number of times that all workers of a tile died after which it is given up, beside Dask's own limit.
 MOST_DEATHS = 5
-#: So many tiles given up before any was rendered: there is no sense in trying the rest.
+#: Number of tiles given up before any succeeded after which the whole render fails.
 HOPELESS = 8
-#: Tiles whose bytes may be on their way here at once.
+#: Number of concurrent transfers of results.
 FETCHERS = 32
-#: Seconds between two looks at workers and scheduler while no tile comes.
+#: Time in seconds between two checks of workers and scheduler while no tile arrives.
 PATIENCE = 0.5
 
 _DIED = "its workers died"
 
 
 def runner_on(cluster: Cluster) -> Runner:
-    """A runner of :func:`lippmann.tiles.tiled_render.render_to_file` that renders on a cluster."""
-    return lambda prepared, missing, put: run_on(cluster, _sent(prepared), missing, put)
+    """A runner for :func:`lippmann.tiles.tiled_render.render_to_file` that renders on a cluster."""
+    return lambda prepared, missing, put: run_on(cluster, _worker_job(prepared), missing, put)
 
 
 def run_on(cluster: Cluster, job: TileJob, missing: Sequence[int], put: Put) -> None:
-    """Render the tiles ``missing`` of a job; ``put`` is called with each as it comes, in any order.
+    """Render tiles of a job on a cluster.
 
-    No more tiles are under way than keep the workers busy, and none is asked for while ``put`` is at work, so that
-    memory here and there stays bounded.
+    The number of tiles in flight is limited, and no tile is submitted while ``put`` runs, so that memory of client and
+    workers is bounded.
+
+    Parameters
+    ----------
+    cluster:
+        The connected cluster.
+    job:
+        The picture in tiles.
+    missing:
+        Numbers of the tiles to render.
+    put:
+        Called with each result as it arrives, in any order.
 
     Raises
     ------
     ClusterError
-        The scheduler is lost; all workers are of another version; or tiles failed :data:`MOST_FAILURES` times, after
-        all others were rendered.
+        If the scheduler is lost, all workers have other versions, or, after all other tiles, a tile failed
+        :data:`MOST_FAILURES` times.
     """
     run = _Run(cluster, job, put, deque(missing), len(missing))
     try:
@@ -65,8 +78,8 @@ def run_on(cluster: Cluster, job: TileJob, missing: Sequence[int], put: Put) -> 
         run.cancel()
 
 
-def _sent(prepared: Prepared) -> TileJob:
-    """The job as workers get it: on the device that was chosen here, with threads and memory of their own."""
+def _worker_job(prepared: Prepared) -> TileJob:
+    """The job for workers: on the device of this process, with their own threads and memory."""
     job = prepared.job
     device: Device = "gpu" if prepared.session.engine.gpu_name else "cpu"
     return replace(job, request=replace(job.request, device=device, threads=None, memory=None))
@@ -74,10 +87,10 @@ def _sent(prepared: Prepared) -> TileJob:
 
 @dataclass(eq=False)
 class _Tile:
-    """One tile under way: its number, Dask's future, who may render it, and its bytes on their way here."""
+    """One tile in flight: its number, Dask's future, the workers that may render it, and the transfer of its result."""
 
     index: int
-    future: Any
+    future: DaskFuture
     workers: frozenset[str]
     fetch: Future[bytes] | None = None
 
@@ -89,7 +102,7 @@ class _Run:
     put: Put
     waiting: deque[int]
     total: int
-    under_way: dict[str, _Tile] = field(default_factory=dict)
+    in_flight: dict[str, _Tile] = field(default_factory=dict)
     failures: Counter[int] = field(default_factory=Counter)
     deaths: Counter[int] = field(default_factory=Counter)
     given_up: dict[int, str] = field(default_factory=dict)
@@ -98,67 +111,69 @@ class _Run:
     news: queue.SimpleQueue[str] = field(default_factory=queue.SimpleQueue)
     mark: str = field(default_factory=lambda: token_hex(4))
     alone: bool = False
-    # In threads of their own: bytes that lie with a worker that stands still must not hold up the others.
+    # Transfers have threads of their own, so that a worker that hangs does not delay the others.
     fetchers: ThreadPoolExecutor = field(default_factory=lambda: ThreadPoolExecutor(FETCHERS, "lippmann-fetch"))
 
     def finish(self) -> None:
-        """Until every tile is rendered or given up."""
+        """Render until every tile is done or given up; raise :class:`ClusterError` for those given up."""
         parcel = pack(self.job)
         self._send(parcel)
-        while self.waiting or self.under_way:
+        while self.waiting or self.in_flight:
             self._fill(parcel)
             try:
                 key = self.news.get(timeout=PATIENCE)
             except queue.Empty:
-                self._look_round()
+                self._check_workers()
                 continue
-            if key in self.under_way:
+            if key in self.in_flight:
                 self._take(key)
         if self.given_up:
             raise self._failure()
 
     def cancel(self) -> None:
-        """Leave nothing behind on the cluster."""
-        futures = [tile.future for tile in self.under_way.values()]
-        self.under_way.clear()
+        """Cancel all tasks on the cluster and release its data."""
+        futures = [tile.future for tile in self.in_flight.values()]
+        self.in_flight.clear()
         if futures and self.cluster.client.status == "running":
             self.cluster.client.cancel(futures, force=True)
         self.parts = ()
         self.fetchers.shutdown(wait=False, cancel_futures=True)
 
     def _send(self, parcel: Parcel) -> None:
-        """Give the parts to the scheduler as tasks that return them: what dies with its worker is made anew.
+        """Submit the parts as tasks that return them, so that Dask restores a part that is lost with its worker.
 
-        Parts of the last job that this one needs, too, stay where they are.
+        Parts that the previous job had too stay on the cluster.
         """
-        wanted = {parcel.key: parcel.outline, **{name: parcel.parts[name] for name in parcel.names}}
-        there = {name: part for name, part in self.cluster.parts.items() if part.status in ("pending", "finished")}
-        sent = {name: there[name] if name in there else self._sent(name, array) for name, array in wanted.items()}
+        arrays = {parcel.key: parcel.outline, **{name: parcel.parts[name] for name in parcel.names}}
+        present = {name: part for name, part in self.cluster.parts.items() if part.status in ("pending", "finished")}
+        futures = {
+            name: present[name] if name in present else self._submit_part(name, array) for name, array in arrays.items()
+        }
         self.cluster.parts.clear()
-        self.cluster.parts.update(sent)
-        self.parts = tuple(sent.values())
+        self.cluster.parts.update(futures)
+        self.parts = tuple(futures.values())
 
-    def _sent(self, name: str, array: NDArray[Any]) -> Any:
+    def _submit_part(self, name: str, array: NDArray[Any]) -> DaskFuture:
         from toolz import identity
 
         with warnings.catch_warnings():
             warnings.filterwarnings("ignore", message="Sending large graph", category=UserWarning)
-            # A function of Dask's own needs: workers of any kind may keep a part.
+            # A function of a package that Dask needs anyway: every worker can hold a part.
             return self.cluster.client.submit(identity, array, key=f"scene-{name}", pure=False)
 
     def _fill(self, parcel: Parcel) -> None:
-        fit = self.cluster.roster.fit
+        admitted = self.cluster.roster.admitted
         for line in self.cluster.roster.news():
             self.cluster.remark(line)
-        if not fit and self.cluster.roster.refused and not self.under_way and not self.done:
+        if not admitted and self.cluster.roster.refused and not self.in_flight and not self.done:
             raise ClusterError("; ".join(self.cluster.roster.refused), fix="install the same version on all machines")
-        if self.alone != (not fit):
-            self.alone = not fit
+        if self.alone != (not admitted):
+            self.alone = not admitted
             now = "no workers: waiting for some" if self.alone else "workers again"
             self.cluster.remark(f"{self.cluster.name} has {now}")
-        room = TILES_PER_THREAD * sum(fit.values()) - len(self.under_way)
+        room = TILES_PER_THREAD * sum(admitted.values()) - len(self.in_flight)
         while room > 0 and self.waiting and self._may_start(self.waiting[0]):
-            self._start(self.waiting.popleft(), parcel, frozenset(fit))
+            self._start(self.waiting.popleft(), parcel, frozenset(admitted))
             room -= 1
 
     def _start(self, index: int, parcel: Parcel, workers: frozenset[str]) -> None:
@@ -173,21 +188,21 @@ class _Run:
             parts,
             key=key,
             pure=False,
-            # By name: Dask would give tiles to workers that are refused, too.
+            # By name: otherwise Dask would give tiles to refused workers as well.
             workers=sorted(workers),
         )
-        self.under_way[key] = _Tile(index, future, workers)
+        self.in_flight[key] = _Tile(index, future, workers)
         future.add_done_callback(lambda _: self.news.put(key))
 
     def _may_start(self, index: int) -> bool:
-        """A tile under suspicion is tried again alone, so that others are not taken down with it, nor blamed for it."""
-        return not self.under_way or not any(
-            self.failures[one] or self.deaths[one] > 1 for one in (index, *(t.index for t in self.under_way.values()))
+        """Whether a tile may start: one that failed before runs alone, so that it cannot harm other tiles."""
+        return not self.in_flight or not any(
+            self.failures[one] or self.deaths[one] > 1 for one in (index, *(t.index for t in self.in_flight.values()))
         )
 
     def _take(self, key: str) -> None:
-        """What the news of a tile comes to: it is rendered, it is here, or it failed."""
-        tile = self.under_way[key]
+        """Handle a change of a tile: rendered, transferred, or failed."""
+        tile = self.in_flight[key]
         if tile.fetch is not None:
             if tile.fetch.done():
                 self._keep(key, tile.fetch)
@@ -195,7 +210,7 @@ class _Run:
             tile.fetch = self.fetchers.submit(tile.future.result)
             tile.fetch.add_done_callback(lambda _: self.news.put(key))
         elif tile.future.status == "error":
-            del self.under_way[key]
+            del self.in_flight[key]
             self._note_failure(tile.index, tile.future.exception())
         else:
             raise self._lost()
@@ -204,12 +219,12 @@ class _Run:
         try:
             result = decode(fetch.result())
         except (OSError, KeyError, CancelledError, DamagedTile):
-            # It died with its worker on the way here.
+            # The result was lost with its worker during the transfer.
             if self.cluster.client.status != "running":
                 raise self._lost() from None
             self._ask_again(key)
             return
-        del self.under_way[key]
+        del self.in_flight[key]
         self.put(result)
         self.done += 1
 
@@ -219,7 +234,7 @@ class _Run:
         if self.failures[index] < MOST_FAILURES:
             self.waiting.append(index)
         else:
-            self._give_up(index, _in_words(error))
+            self._give_up(index, _error_text(error))
 
     def _give_up(self, index: int, why: str) -> None:
         self.given_up[index] = why
@@ -227,18 +242,18 @@ class _Run:
         if self.done == 0 and len(self.given_up) >= HOPELESS:
             raise self._failure()
 
-    def _look_round(self) -> None:
-        """What no message tells: a scheduler that is gone, tiles that wait for workers which will not come back."""
+    def _check_workers(self) -> None:
+        """Detect what no message reports: a lost scheduler, and tiles that wait for workers which are gone."""
         if self.cluster.client.status != "running":
             raise self._lost()
-        present = frozenset(self.cluster.roster.fit)
-        for key, tile in list(self.under_way.items()):
+        present = frozenset(self.cluster.roster.admitted)
+        for key, tile in list(self.in_flight.items()):
             if present and not tile.workers & present:
                 self.deaths[tile.index] += 1
                 self._ask_again(key)
 
     def _ask_again(self, key: str) -> None:
-        tile = self.under_way.pop(key)
+        tile = self.in_flight.pop(key)
         self.cluster.client.cancel([tile.future], force=True)
         if self.deaths[tile.index] < MOST_DEATHS:
             self.waiting.appendleft(tile.index)
@@ -248,8 +263,8 @@ class _Run:
     def _lost(self) -> ClusterError:
         return ClusterError(
             f"the connection to the scheduler of {self.cluster.name} is lost",
-            where="--cluster",
-            fix="run again with --resume: what was rendered is kept",
+            parameter="cluster",
+            fix="run again with resume=True: what was rendered is kept",
         )
 
     def _failure(self) -> ClusterError:
@@ -257,11 +272,11 @@ class _Run:
         more = f" and {len(names) - 4} more" if len(names) > 4 else ""
         return ClusterError(
             f"{len(names)} of {self.total} tiles failed again and again: {', '.join(names[:4])}{more}",
-            fix="run again with --resume: the other tiles are kept",
+            fix="run again with resume=True: the other tiles are kept",
         )
 
 
-def _in_words(error: BaseException) -> str:
+def _error_text(error: BaseException) -> str:
     if type(error).__name__ == "KilledWorker":
         return _DIED
     what = str(error) if isinstance(error, ClusterError) else f"{type(error).__name__}: {error}"

@@ -1,4 +1,4 @@
-"""What runs inside a worker's process: who it is, and a tile of a picture."""
+"""Tasks that run in a worker's process: its versions, the start of the engine, and a tile of a picture."""
 
 from __future__ import annotations
 
@@ -20,65 +20,71 @@ from lippmann.journal.tile_file import encode
 if TYPE_CHECKING:
     from lippmann.tiles.tile_render import Prepared
 
-#: How many threads the engine takes in a worker; without it as many as the worker itself has.
+#: Environment variable with the number of the engine's threads in a worker.
 THREADS_VARIABLE = "LIPPMANN_WORKER_THREADS"
 
-# One kernel at a time fills all threads of a worker, and the engine keeps its state for the whole process.
+# One kernel at a time fills all threads of a worker, and the engine's state belongs to the whole process.
 _engine = threading.Lock()
 _current: dict[str, Prepared] = {}
 
 
 def own_versions() -> dict[str, str]:
-    """What two machines must have in common to give the same bytes."""
-    return make_introduction()()
+    """Versions of this machine that must agree with those of a worker for equal bytes, by package."""
+    return make_version_query()()
 
 
-def make_introduction() -> Callable[[], dict[str, str]]:
-    """A function that tells the versions of the machine that it runs on; it needs nothing of ours to be there."""
+def make_version_query() -> Callable[[], dict[str, str]]:
+    """A function that returns the versions of the machine on which it runs, even without Lippmann there."""
     packages = {"Lippmann": "lippmann", "Mitsuba": "mitsuba", "Dr.Jit": "drjit", "Open Image Denoise": "pyoidn"}
 
-    # A function inside a function travels as code, not as the name of a module that another version may lack.
-    def introduce() -> dict[str, str]:
+    # A nested function is pickled as code, not as a name in a module that another version may lack.
+    def query_versions() -> dict[str, str]:
         from contextlib import suppress
         from importlib.metadata import PackageNotFoundError, version
 
-        found = {"LLVM": "none"}
+        versions = {"LLVM": "none"}
         for label, package in packages.items():
             try:
-                found[label] = version(package)
+                versions[label] = version(package)
             except PackageNotFoundError:
-                found[label] = "none"
+                versions[label] = "none"
         try:
             from lippmann._version import VERSION
 
-            found["Lippmann"] = VERSION
+            versions["Lippmann"] = VERSION
             from lippmann.errors import EngineError
             from lippmann.runtime import llvm
         except ImportError:
-            return found
-        with suppress(EngineError):  # a machine that renders on its GPU needs none
-            found["LLVM"] = llvm.choose().version_text
-        return found
+            return versions
+        with suppress(EngineError):  # a GPU needs no LLVM
+            versions["LLVM"] = llvm.choose().version_text
+        return versions
 
-    return introduce
+    return query_versions
 
 
 def render_part(
     key: str, index: int, outline: NDArray[np.uint8], names: Sequence[str], parts: Sequence[NDArray[Any]]
 ) -> bytes:
-    """One tile of a parcel's job, as :func:`lippmann.journal.tile_file.encode` writes it.
+    """Render one tile of a serialized job.
 
     Parameters
     ----------
-    key, outline, names, parts:
-        As of :class:`lippmann.cluster.job_pickle.Parcel`; the scene is built once for all tiles of one key.
+    key:
+        SHA-256 of the job; the scene is built once for all tiles of one key.
     index:
-        The tile's number.
+        Number of the tile.
+    outline, names, parts:
+        The job, for :func:`lippmann.cluster.job_pickle.unpack`.
+
+    Returns
+    -------
+    The tile as :func:`lippmann.journal.tile_file.encode` encodes it.
 
     Raises
     ------
     ClusterError
-        Whatever went wrong, in words: not every error can travel.
+        With the text of any error: not every error can be pickled.
     """
     from lippmann.runtime import engine
     from lippmann.tiles.tile_render import packed, trace_tile
@@ -90,22 +96,22 @@ def render_part(
             engine.start(request.device, request.threads)  # each thread of a worker chooses its variant
             traced = trace_tile(prepared, index)
         return encode(packed(prepared, traced))
-    except Exception as error:  # noqa: BLE001 - whatever it was, it has to travel
+    except Exception as error:  # noqa: BLE001 - every error has to reach the client
         raise ClusterError(f"{type(error).__name__}: {error}") from None
 
 
-def warm() -> None:
-    """Start the engine, so that the first tile need not wait for it."""
+def start_engine() -> None:
+    """Start the engine on the CPU before the first tile arrives."""
     from lippmann.runtime.engine import start
 
     start("cpu", engine_threads())
 
 
 def engine_threads() -> int | None:
-    """Threads that the engine takes in this worker; None for all cores where nothing says otherwise."""
-    said = os.environ.get(THREADS_VARIABLE, "")
-    if said.isdigit() and int(said) > 0:
-        return int(said)
+    """Number of the engine's threads in this worker: that of the variable, else the worker's; None for all cores."""
+    text = os.environ.get(THREADS_VARIABLE, "")
+    if text.isdigit() and int(text) > 0:
+        return int(text)
     try:
         from distributed import get_worker
 
@@ -118,7 +124,7 @@ def _prepared(key: str, outline: NDArray[np.uint8], names: Sequence[str], parts:
     if key not in _current:
         from lippmann.tiles.tile_render import prepare
 
-        _current.clear()  # one scene at a time: the last job's is not needed any more
+        _current.clear()  # one scene at a time
         with tempfile.TemporaryDirectory(prefix="lippmann-scene-") as folder:
             job = unpack(outline, names, parts, Path(folder))
             job = replace(job, request=replace(job.request, threads=engine_threads()))

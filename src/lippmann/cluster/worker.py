@@ -1,4 +1,4 @@
-"""A worker that joins a cluster: Dask's own, with the engine warm and the right number of threads."""
+"""A Dask worker that starts the engine in advance and divides threads between Dask and the engine."""
 
 from __future__ import annotations
 
@@ -23,32 +23,34 @@ from lippmann.errors import ClusterError, UsageError
 from lippmann.runtime import machine
 from lippmann.runtime.child_python import spawn_safely
 
-#: Seconds without a scheduler after which a worker gives up.
+#: Time in seconds without a scheduler after which a worker ends.
 DEATH_SECONDS = 60
 
 
 @dataclass(frozen=True)
 class WorkerOptions:
-    """How a worker runs.
+    """Settings of a worker.
 
     Parameters
     ----------
     address:
-        The scheduler's.
+        Address of the scheduler, ``tls://HOST:PORT`` or ``tcp://HOST:PORT``.
     threads:
-        Of the engine; None for all cores.
+        Threads of the engine, at least 1; None for all cores.
     memory:
-        Bytes beyond which Dask kills the worker and starts a new one; None for the threads' share of what there is.
+        Limit in bytes beyond which Dask restarts the worker. None: the share of the machine's memory that corresponds
+        to ``threads``.
     host:
-        The address by which others reach this worker. None is enough where the scheduler runs on this machine;
-        elsewhere it must be given: nothing is opened to the network without being told.
+        Address of this machine in the cluster's network. None: loopback, for a scheduler on this machine.
     name:
-        What the dashboard calls it.
+        Name of the worker in the dashboard; None for Dask's own.
+    tls:
+        Certificates for ``tls://``.
 
     Raises
     ------
     UsageError
-        The address is none, or ``host`` is missing.
+        If the address is invalid, ``threads`` is below 1, or ``host`` is missing for a scheduler on another machine.
     """
 
     address: str
@@ -59,31 +61,39 @@ class WorkerOptions:
     tls: TlsFiles = field(default_factory=TlsFiles)
 
     def __post_init__(self) -> None:
-        checked_address(self.address, "SCHEDULER", "tcp://HOST:8786 or tls://HOST:8786")
+        checked_address(self.address, "scheduler", "tcp://HOST:8786 or tls://HOST:8786")
         if self.threads is not None and self.threads < 1:
-            raise UsageError(f"{self.threads} threads are too few", where="--threads", rule="at least 1")
+            raise UsageError(f"{self.threads} is out of range", parameter="threads", rule="it must be at least 1")
         if self.host is None and not is_loopback(self.address):
             raise UsageError(
                 "is missing",
-                where="--host",
+                parameter="host",
                 rule="a worker of a scheduler on another machine has to be reached from there",
                 fix="give this machine's address in the cluster's network",
             )
 
 
 def serve(options: WorkerOptions, *, quiet: bool = False, remark: Callable[[str], None] = lambda line: None) -> None:
-    """Work for a scheduler until it ends, or until SIGTERM or Ctrl-C.
+    """Run a worker until its scheduler ends, or until SIGTERM or Ctrl-C.
 
-    Dask's own log goes to standard error; ``quiet`` leaves only errors of it. ``remark`` is called with a warning, in
-    one line, where connections are not authenticated.
+    Parameters
+    ----------
+    options:
+        Settings of the worker.
+    quiet:
+        Reduce Dask's log on standard error to errors.
+    remark:
+        Called with a warning, one line, if connections are not authenticated.
 
     Raises
     ------
     ClusterError
-        Dask is not installed, or no scheduler answers for :data:`DEATH_SECONDS`.
+        If Dask is not installed, or no scheduler answers for :data:`DEATH_SECONDS` seconds.
+    UsageError
+        If a TLS file is missing.
     """
     if quiet:
-        # Read when Dask is first loaded, here and in the processes that it starts.
+        # Dask reads the variable when it is loaded, here and in the processes that it starts.
         os.environ.setdefault("DASK_DISTRIBUTED__LOGGING__DISTRIBUTED", "error")
     distributed = import_distributed()
     security = options.tls.security()
@@ -103,7 +113,7 @@ async def _serve(distributed: Any, options: WorkerOptions, security: Any, folder
     try:
         nanny = await distributed.Nanny(
             options.address,
-            # The engine spreads one tile at a time over all its threads; beside it the tile before is packed.
+            # The engine renders one tile at a time on all its threads; the second thread encodes the previous tile.
             nthreads=min(threads, 2),
             memory_limit=memory,
             host=options.host or LOOPBACK,

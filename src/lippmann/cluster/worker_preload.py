@@ -1,13 +1,16 @@
-"""Preloaded by workers (``dask worker --preload lippmann.cluster.worker_preload`` does the same): starts the engine."""
+"""Preload module of workers, as for ``dask worker --preload lippmann.cluster.worker_preload``: starts the engine."""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING
 
-from lippmann.cluster.tasks import warm
+from lippmann.cluster.tasks import start_engine
+
+if TYPE_CHECKING:
+    from distributed import Worker
 
 
-def dask_setup(worker: Any) -> None:
-    """Called by Dask when a worker starts."""
+def dask_setup(worker: Worker) -> None:
+    """Start the engine; Dask calls this function when a worker starts."""
     del worker
-    warm()
+    start_engine()

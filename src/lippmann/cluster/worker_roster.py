@@ -1,94 +1,97 @@
-"""Which workers of a cluster may take part."""
+"""The workers of a cluster that take part in rendering: those with the client's versions."""
 
 from __future__ import annotations
 
 import threading
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING
 
-from lippmann.cluster.tasks import make_introduction, own_versions
+from lippmann.cluster.tasks import make_version_query, own_versions
 
-#: Seconds between two looks at who is there.
+if TYPE_CHECKING:
+    from distributed import Client
+
+#: Time in seconds between two updates of the list of workers.
 INTERVAL = 0.5
 
 
 class Roster:
-    """Watches the workers that come and go; those of other versions are refused, by name.
+    """List of a cluster's workers, updated by a thread of its own; workers with other versions are refused.
 
     Parameters
     ----------
     client:
-        A connected ``distributed.Client``.
+        A connected client.
     """
 
-    def __init__(self, client: Any) -> None:
+    def __init__(self, client: Client) -> None:
         self._client = client
         self._versions = own_versions()
         self._lock = threading.Lock()
-        self._fit: dict[str, int] = {}
+        self._admitted: dict[str, int] = {}
         self._refused: dict[str, str] = {}
-        self._unsaid: list[str] = []
+        self._unreported: list[str] = []
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._watch, name="lippmann-roster", daemon=True)
-        self.look()
+        self.update()
         self._thread.start()
 
     @property
-    def fit(self) -> Mapping[str, int]:
-        """Addresses of the workers that may take part, with their threads."""
+    def admitted(self) -> Mapping[str, int]:
+        """Number of threads of the workers that take part, by address."""
         with self._lock:
-            return dict(self._fit)
+            return dict(self._admitted)
 
     @property
     def refused(self) -> tuple[str, ...]:
-        """Why workers that are there now may not, one line each."""
+        """One line for each present worker that is refused, with the reason."""
         with self._lock:
             return tuple(self._refused.values())
 
     def news(self) -> tuple[str, ...]:
-        """Refusals that have not been told yet."""
+        """Lines of refusals since the last call."""
         with self._lock:
-            said, self._unsaid = tuple(self._unsaid), []
-            return said
+            lines, self._unreported = tuple(self._unreported), []
+            return lines
 
     def close(self) -> None:
-        """Stop watching."""
+        """Stop the thread that updates the list."""
         self._stop.set()
         self._thread.join(timeout=10 * INTERVAL)
 
-    def look(self) -> None:
-        """See who is there now."""
+    def update(self) -> None:
+        """Update the list, and ask new workers for their versions."""
         present = self._client.nthreads()
-        known = {*self._fit, *self._refused}
+        known = {*self._admitted, *self._refused}
         answers = {address: self._ask(address) for address in present if address not in known}
         with self._lock:
-            self._fit = {address: count for address, count in self._fit.items() if address in present}
+            self._admitted = {address: count for address, count in self._admitted.items() if address in present}
             self._refused = {address: why for address, why in self._refused.items() if address in present}
-            for address, found in answers.items():
-                if found is None:  # gone before it answered, or too busy: asked again
+            for address, versions in answers.items():
+                if versions is None:  # gone before it answered, or too busy: asked again
                     continue
-                if found == self._versions:
-                    self._fit[address] = present[address]
+                if versions == self._versions:
+                    self._admitted[address] = present[address]
                 else:
-                    why = f"the worker at {address} is refused: {self._difference(found)}"
+                    why = f"the worker at {address} is refused: {self._difference(versions)}"
                     self._refused[address] = why
-                    self._unsaid.append(why)
+                    self._unreported.append(why)
 
     def _ask(self, address: str) -> dict[str, str] | None:
-        answer = self._client.run(make_introduction(), workers=[address], on_error="return").get(address)
+        answer = self._client.run(make_version_query(), workers=[address], on_error="return").get(address)
         return answer if isinstance(answer, dict) else None
 
-    def _difference(self, found: Mapping[str, str]) -> str:
+    def _difference(self, versions: Mapping[str, str]) -> str:
         parts = (
-            f"it has {name} {found.get(name, 'none')}, here is {own}"
+            f"it has {name} {versions.get(name, 'none')}, the client has {own}"
             for name, own in self._versions.items()
-            if found.get(name) != own
+            if versions.get(name) != own
         )
         return "; ".join(parts)
 
     def _watch(self) -> None:
         while not self._stop.wait(INTERVAL):
             try:
-                self.look()
-            except Exception:  # noqa: BLE001 - a scheduler that is gone is noticed by those who wait for tiles
+                self.update()
+            except Exception:  # noqa: BLE001 - a lost scheduler is reported by the code that waits for tiles
                 continue

@@ -1,7 +1,7 @@
 """Coding of values and layers in picture files.
 
-Integer formats hold values in [0, 1], coded by the transfer function and rounded to the nearest code. Brighter
-values are clipped; nothing is dithered. Float formats hold linear values; half floats are clipped to their largest finite
+Integer formats hold values in [0, 1], coded by the transfer function and rounded to the nearest code. Brighter values
+are clipped; nothing is dithered. Float formats hold linear values. Half floats are clipped to their largest finite
 value.
 """
 

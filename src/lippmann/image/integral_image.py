@@ -1,4 +1,4 @@
-"""The integral image: what the panel shows, with the display it is made for."""
+"""The integral image: the pixels of a panel in memory, with the display that they are for."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, get_args
+from typing import TYPE_CHECKING, TypedDict, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,8 +19,11 @@ from lippmann.errors import PictureError
 from lippmann.image.micro_images import Permutation, micro_images_as_views
 from lippmann.image.picture import Picture
 from lippmann.image.provenance import Provenance
-from lippmann.image.stored_values import FloatArray, Matrix, Stored, checked_similarity
+from lippmann.image.stored_values import FloatArray, Indices, Layer, Matrix, Stored, checked_similarity
 from lippmann.image.views import Resampling, exact_view_shape, resampled_views
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
 
 _MAP_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_-]*")
 
@@ -28,38 +31,47 @@ _MAP_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_-]*")
 _NOTEBOOK_WIDTH = 512
 
 
+class Parts(TypedDict, total=False):
+    """Optional parameters of :class:`IntegralImage`."""
+
+    world_from_display: Matrix
+    provenance: Provenance
+    maps: Mapping[str, Layer]
+    stored: Stored
+
+
 @dataclass(frozen=True, eq=False)
 class IntegralImage(Picture):
-    """The pixels of a panel in linear RGB.
+    """The pixels of a panel in linear RGB, in memory.
 
     Parameters
     ----------
     pixels:
-        ``(H, W, 3)`` linear RGB, row 0 on top, finite; kept as float32 and read-only. 1 is the brightest that integer
-        formats hold.
+        ``(H, W, 3)`` linear RGB, row 0 on top, finite; kept as float32 and read-only. 1 is the brightest value of
+        integer formats.
     display:
-        The display that the pixels are for; its panel has ``W x H`` pixels.
+        Display of the picture; its panel has ``W x H`` pixels.
     world_from_display:
-        ``(4, 4)`` similarity (rotation, scale, translation) that puts the display frame (mm) into the scene.
+        ``(4, 4)`` similarity (rotation, scale, translation) from the display frame (mm) to the scene.
     provenance:
         How the picture was made.
     maps:
-        Further layers by name, such as ``depth`` and ``normal``: ``(H, W)`` or ``(H, W, 2 to 4)``, float32 or uint32.
-        Names begin with a letter and hold letters, digits, ``_`` and ``-``. OpenEXR files carry them, others do not.
+        Layers beside the RGB by name, such as ``depth`` and ``normal``: ``(H, W)`` or ``(H, W, 2 to 4)``, float32 or
+        uint32. Names begin with a letter and hold letters, digits, ``_`` and ``-``. Only OpenEXR files keep maps.
     stored:
-        Depth of the values in the file that the picture was read from, so that it can be written back exactly.
+        Type of the values in the file that the picture was read from, so that it can be written back exactly.
 
     Raises
     ------
     PictureError
-        If shapes, types or values are not as said above.
+        If a shape, type or value is another.
     """
 
     pixels: FloatArray
     display: Display
     world_from_display: Matrix = field(default_factory=lambda: np.eye(4))
     provenance: Provenance = field(default_factory=Provenance)
-    maps: Mapping[str, NDArray[Any]] = field(default_factory=dict)
+    maps: Mapping[str, Layer] = field(default_factory=dict)
     stored: Stored = "float32"
 
     def __post_init__(self) -> None:
@@ -77,43 +89,54 @@ class IntegralImage(Picture):
     def micro_images(self) -> FloatArray:
         """Micro-images ``(lens_rows, lens_cols, ny, nx, 3)``, an exact permutation of the pixels.
 
-        A lenticular sheet has ``(1, lens_cols, H, nx, 3)``. Places where a lens has no pixel, see
-        :meth:`micro_image_mask`, are zero. May share its memory with :attr:`pixels`.
+        A lenticular sheet has ``(1, lens_cols, H, nx, 3)``. Values are zero where :meth:`micro_image_mask` is False.
+        The result may share its memory with :attr:`pixels`.
         """
         return Permutation(self.display).split(self.pixels)
 
     def micro_image_mask(self) -> NDArray[np.bool_]:
-        """``(lens_rows, lens_cols, ny, nx)``: which places of :meth:`micro_images` hold a pixel."""
+        """Mask ``(lens_rows, lens_cols, ny, nx)`` of :meth:`micro_images`: True for places that hold a pixel."""
         return Permutation(self.display).mask
 
     def views(self, resampling: Resampling = "nearest") -> FloatArray:
-        """Views ``(ny, nx, lens_rows, lens_cols, 3)``; of a lenticular sheet ``(1, nx, H, lens_cols, 3)``.
+        """Views ``(ny, nx, lens_rows, lens_cols, 3)``; for a lenticular sheet ``(1, nx, H, lens_cols, 3)``.
 
-        Exact where whole pixels lie from lens to lens. Elsewhere ``resampling`` says what a lens gives that has no
-        pixel at the place of a view: its ``nearest`` pixel or a ``linear`` interpolation between its pixels. Values
-        that no pixel stands for, see :meth:`view_mask`, are zero. A larger ``kx`` is seen from further left, a larger
-        ``ky`` from further up.
+        A larger ``kx`` is seen from further left, a larger ``ky`` from further up. Views are exact where the distance
+        from lens to lens is a whole number of pixels (:attr:`views_are_exact`), else resampled. Values are zero where
+        :meth:`view_mask` is False.
+
+        Parameters
+        ----------
+        resampling:
+            Value of a lens without a pixel at the place of the view: its ``nearest`` pixel, or a ``linear``
+            interpolation between its pixels.
+
+        Raises
+        ------
+        PictureError
+            If ``resampling`` is unknown.
         """
         return self.views_and_mask(resampling)[0]
 
     def view_mask(self) -> NDArray[np.bool_]:
-        """``(ny, nx, lens_rows, lens_cols)``: which values of :meth:`views` stand for a pixel."""
+        """Mask ``(ny, nx, lens_rows, lens_cols)`` of :meth:`views`: True for values that stand for a pixel."""
         return self.views_and_mask()[1]
 
     def views_and_mask(self, resampling: Resampling = "nearest") -> tuple[FloatArray, NDArray[np.bool_]]:
-        """:meth:`views` and :meth:`view_mask` together, at the price of one."""
+        """:meth:`views` and :meth:`view_mask` in one pass; parameter and errors as for :meth:`views`."""
         if resampling not in get_args(Resampling):
             rule = f"it must be one of {', '.join(get_args(Resampling))}"
             raise PictureError(f"resampling is {resampling!r}", rule=rule)
         if not self.views_are_exact:
             return resampled_views(self.pixels, self.display, resampling)
-        permutation = Permutation(self.display)
-        parts = permutation.split(self.pixels), permutation.mask
-        return micro_images_as_views(parts[0], self.display), micro_images_as_views(parts[1], self.display)
+        views = micro_images_as_views(self.micro_images(), self.display)
+        return views, micro_images_as_views(self.micro_image_mask(), self.display)
 
     @classmethod
-    def from_micro_images(cls, micro_images: ArrayLike, display: Display, **parts: Any) -> IntegralImage:
-        """The picture with these :meth:`micro_images`; ``parts`` are the class's other parameters.
+    def from_micro_images(cls, micro_images: ArrayLike, display: Display, **parts: Unpack[Parts]) -> IntegralImage:
+        """The picture with these :meth:`micro_images`, ``(lens_rows, lens_cols, ny, nx, 3)``.
+
+        ``parts`` are further parameters of the class.
 
         Raises
         ------
@@ -123,52 +146,74 @@ class IntegralImage(Picture):
         return cls(Permutation(display).join(np.asarray(micro_images, dtype=np.float32)), display, **parts)
 
     @classmethod
-    def from_views(cls, views: ArrayLike, display: Display, **parts: Any) -> IntegralImage:
-        """The picture with these :meth:`views`; ``parts`` are the class's other parameters.
+    def from_views(cls, views: ArrayLike, display: Display, **parts: Unpack[Parts]) -> IntegralImage:
+        """The picture with these exact :meth:`views`, ``(ny, nx, lens_rows, lens_cols, 3)``.
+
+        ``parts`` are further parameters of the class.
 
         Raises
         ------
         PictureError
-            If the shape is not that of the display's views, or those are not exact.
+            If the shape is not that of the display's views, or the display's views are resampled.
         """
-        return cls(_joined_views(np.asarray(views, dtype=np.float32), display), display, **parts)
+        values, expected = np.asarray(views, dtype=np.float32), exact_view_shape(display)
+        if values.shape[:4] != expected:
+            rule = f"those of the display {display.name} have {expected}"
+            raise PictureError(f"the views have the shape {values.shape[:4]}", rule=rule)
+        return cls.from_micro_images(micro_images_as_views(values, display), display, **parts)
 
     def window(self, window: PixelWindow) -> FloatArray:
         """``(rows, columns, 3)`` linear RGB of a rectangle; shares its memory with :attr:`pixels`."""
         return self.pixels[window.slices]
 
-    def take(self, row: NDArray[Any], column: NDArray[Any], channels: slice = slice(0, 3)) -> FloatArray:
+    def take(self, row: Indices, column: Indices, channels: slice = slice(0, 3)) -> FloatArray:
         """Linear RGB of single pixels, ``(..., channels)``; ``row`` and ``column`` broadcast to ``(...)``."""
         values: FloatArray = self.pixels[..., channels][row, column]
         return values
 
-    # ---- What an eye sees, and files ------------------------------------------------------------------------------
+    # ---- Replay and files -----------------------------------------------------------------------------------------
 
-    def replay(self, eye: tuple[float, float, float] | None = None, **options: Any) -> FloatArray:
-        """What an eye at ``eye`` (mm, display frame) sees; see :func:`lippmann.viewing.replay.replay`."""
+    def replay(
+        self,
+        eye: tuple[float, float, float] | None = None,
+        *,
+        size: tuple[int, int] | None = None,
+        filter: Resampling = "nearest",
+        subpixels: bool | None = None,
+    ) -> FloatArray:
+        """Linear RGB ``(height, width, 3)`` that an eye at ``eye`` (mm, display frame) sees.
+
+        Parameters, defaults and errors are those of :func:`lippmann.viewing.replay.replay`.
+        """
         from lippmann.viewing.replay import replay
 
-        return replay(self, eye, **options)
+        return replay(self, eye, size=size, filter=filter, subpixels=subpixels)
 
-    def refocus(self, plane: float, **options: Any) -> FloatArray:
-        """The picture focused on the plane at z = ``plane`` mm; see :func:`lippmann.viewing.refocus.refocus`."""
+    def refocus(self, plane: float, *, size: tuple[int, int] | None = None) -> FloatArray:
+        """Linear RGB ``(height, width, 3)`` focused on the plane z = ``plane`` mm.
+
+        Parameters, defaults and errors are those of :func:`lippmann.viewing.refocus.refocus`.
+        """
         from lippmann.viewing.refocus import refocus
 
-        return refocus(self, plane, **options)
+        return refocus(self, plane, size=size)
 
     def save(self, path: str | Path, bits: int | None = None) -> None:
-        """Write a PNG, OpenEXR or TIFF file; see :func:`lippmann.image.write.write_picture`."""
+        """Write a PNG, OpenEXR, TIFF or Zarr file.
+
+        Parameters and errors are those of :func:`lippmann.image.write.write_picture`.
+        """
         from lippmann.image.write import write_picture
 
         write_picture(self, Path(path), bits=bits)
 
-    def with_pixels(self, pixels: ArrayLike, **parts: Any) -> IntegralImage:
-        """A copy with other pixels (and other ``parts``), for what works on the values alone."""
+    def with_pixels(self, pixels: ArrayLike, **parts: Unpack[Parts]) -> IntegralImage:
+        """A copy with other ``pixels``, ``(H, W, 3)`` linear RGB, and other ``parts``; errors as of the class."""
         return replace(self, pixels=np.asarray(pixels, dtype=np.float32), **parts)
 
     @property
-    def stats(self) -> dict[str, Any]:
-        """Sizes, rays, seconds and the rest of the provenance as plain values."""
+    def stats(self) -> dict[str, object]:
+        """Display, size in pixels, number of lenses, and provenance, as JSON-able values."""
         grid, panel = self.display.lens_grid, self.display.panel
         return {
             "display": self.display.name,
@@ -184,7 +229,7 @@ class IntegralImage(Picture):
         lenses = f"{grid.columns} x {grid.rows} lenses"
         return f"<IntegralImage {panel.width} x {panel.height} pixels, {lenses}, display {self.display.name}>"
 
-    def _repr_mimebundle_(self, **_: Any) -> Any:
+    def _repr_mimebundle_(self, **_: object) -> object:
         """The viewer's page as a widget, where it can be shown; see :mod:`lippmann.viewer.notebook`."""
         from lippmann.viewer.notebook import mimebundle
 
@@ -197,9 +242,9 @@ class IntegralImage(Picture):
         from lippmann.viewing.replay import default_size
 
         width, height = default_size(self.display, _NOTEBOOK_WIDTH)
-        seen = self.replay(size=(width, height))
         transfer = self.provenance.transfer
-        return encode_png(quantize(seen, 8, transfer), text={}, srgb=transfer == "srgb")
+        codes = quantize(self.replay(size=(width, height)), 8, transfer)
+        return encode_png(codes, text={}, srgb=transfer == "srgb")
 
     def _repr_html_(self) -> str:
         """The picture of :meth:`_repr_png_` above a line of facts."""
@@ -207,16 +252,6 @@ class IntegralImage(Picture):
         caption = html.escape(repr(self)[1:-1] + (f" ({made})" if made else ""))
         picture = base64.b64encode(self._repr_png_()).decode("ascii")
         return f'<figure><img alt="" src="data:image/png;base64,{picture}"/><figcaption>{caption}</figcaption></figure>'
-
-
-def _joined_views(views: NDArray[Any], display: Display) -> NDArray[Any]:
-    """The ``(H, W, ...)`` values whose :meth:`IntegralImage.views` these are."""
-    expected = exact_view_shape(display)
-    if views.shape[:4] != expected:
-        rule = f"those of the display {display.name} have {expected}"
-        raise PictureError(f"the views have the shape {views.shape[:4]}", rule=rule)
-    # The change of axes is its own inverse.
-    return Permutation(display).join(micro_images_as_views(views, display))
 
 
 def _checked_pixels(pixels: object, display: Display) -> FloatArray:
@@ -242,7 +277,7 @@ def _checked_pixels(pixels: object, display: Display) -> FloatArray:
     return values
 
 
-def _checked_map(name: str, values: NDArray[Any], size: tuple[int, ...]) -> NDArray[Any]:
+def _checked_map(name: str, values: ArrayLike, size: tuple[int, ...]) -> Layer:
     if not _MAP_NAME.fullmatch(name):
         rule = "it must begin with a letter and hold letters, digits, _ and - only"
         raise PictureError(f"a map has the name {name!r}", rule=rule)

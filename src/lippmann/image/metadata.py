@@ -1,21 +1,18 @@
-"""What a picture file says of itself: display, placement and provenance as one JSON text."""
+"""Metadata of picture files: display, placement and provenance as one JSON text."""
 
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
-
-import numpy as np
-from numpy.typing import NDArray
 
 from lippmann.display import Display
 from lippmann.errors import LippmannError, PictureError
 from lippmann.image.picture import Picture
 from lippmann.image.provenance import Provenance
-from lippmann.image.stored_values import checked_similarity
+from lippmann.image.stored_values import Matrix, checked_similarity
 
-#: The version of this text. It rises when a name that readers know changes its meaning.
+#: Version of this text; rises when a known name changes its meaning.
 VERSION = 1
 
 #: The key that holds the version and marks the JSON as ours.
@@ -24,17 +21,24 @@ KEY = "lippmann"
 
 @dataclass(frozen=True, eq=False)
 class Metadata:
-    """The parts of a picture that are not pixels."""
+    """Everything that a picture file carries beside the pixels.
+
+    Parameters
+    ----------
+    display:
+        Display of the picture.
+    world_from_display:
+        ``(4, 4)`` similarity from the display frame (mm) to the scene.
+    provenance:
+        How the picture was made.
+    """
 
     display: Display
-    world_from_display: NDArray[np.float64]
+    world_from_display: Matrix
     provenance: Provenance
 
-    def to_dict(self) -> dict[str, Any]:
-        """Plain values for JSON, with the version.
-
-        Seconds are left out: the same picture rendered again is the same file.
-        """
+    def to_dict(self) -> dict[str, object]:
+        """JSON-able values, with the version; without seconds, so that the same picture gives the same file."""
         made = self.provenance.to_dict()
         del made["seconds"]
         return {
@@ -46,22 +50,22 @@ class Metadata:
 
 
 def metadata_of(picture: Picture) -> Metadata:
-    """The parts of a picture that are not pixels."""
+    """Display, placement and provenance of a picture."""
     return Metadata(picture.display, picture.world_from_display, picture.provenance)
 
 
 def to_text(metadata: Metadata) -> str:
-    """ASCII JSON; numbers come back exactly."""
+    """ASCII JSON of the metadata, for :func:`from_text`; numbers come back exactly."""
     return json.dumps(metadata.to_dict(), allow_nan=False, separators=(",", ":"))
 
 
 def from_text(text: str, where: str) -> Metadata | None:
-    """The metadata of :func:`to_text`; None if the text is something else.
+    """Metadata of a text by :func:`to_text`; None for any other text.
 
     Raises
     ------
     PictureError
-        If it is a text of ours whose values make no sense, or of a later version; names ``where``.
+        If a value makes no sense, or the text is of a later version; names ``where``.
     """
     values = parse_json(text)
     if not isinstance(values, dict) or KEY not in values:
@@ -69,24 +73,29 @@ def from_text(text: str, where: str) -> Metadata | None:
     return from_dict(values, where)
 
 
-def parse_json(text: str) -> Any:
-    """The value of a JSON text, or None if it is none; NaN and infinities, which JSON does not have, count as none."""
+def parse_json(text: str) -> object:
+    """Value of a JSON text; None if it is no JSON. NaN and infinities are no JSON."""
     try:
-        return json.loads(text, parse_constant=_refuse_constant)
+        value: object = json.loads(text, parse_constant=_refuse_constant)
     except (ValueError, RecursionError):
         return None
+    return value
 
 
-def from_dict(values: dict[str, Any], where: str) -> Metadata:
-    """The metadata of :meth:`Metadata.to_dict`; raises as :func:`from_text` does."""
+def from_dict(values: Mapping[str, object], where: str) -> Metadata:
+    """Metadata of the values of :meth:`Metadata.to_dict`.
+
+    Raises
+    ------
+    PictureError
+        If a value makes no sense, or the values are of a later version; names ``where``.
+    """
     version = values.get(KEY)
     if isinstance(version, bool) or not isinstance(version, int) or version < 1:
         raise PictureError(f"its metadata has the version {version!r}", where=where, rule="it must be a whole number")
     if version > VERSION:
-        fix = "get a newer Lippmann"
-        raise PictureError(
-            f"its metadata has the version {version}", where=where, rule=f"up to {VERSION} is read", fix=fix
-        )
+        what, rule = f"its metadata has the version {version}", f"up to {VERSION} is read"
+        raise PictureError(what, where=where, rule=rule, fix="get a newer Lippmann")
     try:
         display = Display.from_dict(values.get("display"))  # type: ignore[arg-type]  # it refuses what is no mapping
         matrix = checked_similarity(values.get("world_from_display"))

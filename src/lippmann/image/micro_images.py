@@ -1,8 +1,8 @@
-"""Pictures cut into micro-images and put together again, losing nothing.
+"""Micro-images (elemental images): the permutation from a picture's pixels to boxes of pixels under each lens.
 
-Every pixel belongs to one lens and has one place in that lens's box of ``ny x nx`` places, so the order of a picture's
-values changes and nothing else. Where micro-images are whole rectangles of pixels every place holds a pixel; else
-(hexagons, slant, broken numbers, lenses cut by the panel's edge) some places stay empty: zero, and False in the mask.
+Every pixel belongs to one lens and has one place in that lens's box of ``ny x nx`` places. Where micro-images are whole
+rectangles of pixels, every place holds a pixel. Elsewhere (hexagons, slant, a broken number of pixels per lens, lenses
+cut by the panel's edge) some places are empty: zero, and False in the mask.
 
 A lenticular sheet has one row of lenses, each with a box as high as the panel.
 """
@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,20 +28,26 @@ _BLOCK = 1 << 20
 
 @dataclass(frozen=True)
 class Permutation:
-    """The bijection between the pixels of a display and the filled places of its micro-images."""
+    """Bijection between the pixels of a display and the filled places of its micro-images.
+
+    Parameters
+    ----------
+    display:
+        The display.
+    """
 
     display: Display
 
     @property
     def shape(self) -> tuple[int, int, int, int]:
-        """``(lens_rows, lens_cols, ny, nx)`` of the micro-images."""
+        """Shape ``(lens_rows, lens_cols, ny, nx)`` of the micro-images."""
         grid = self.display.lens_grid
         return (grid.rows, grid.columns, *micro_image_shape(self.display))
 
     def split(self, values: NDArray[Scalar]) -> NDArray[Scalar]:
         """Micro-images ``(lens_rows, lens_cols, ny, nx, ...)`` of ``(H, W, ...)`` values; empty places are zero.
 
-        Where micro-images are whole rectangles the result shares its memory with ``values``.
+        The result shares its memory with ``values`` where micro-images are whole rectangles.
 
         Raises
         ------
@@ -63,7 +69,7 @@ class Permutation:
         return micro_images.reshape(rows, columns, ny, nx, *trailing)
 
     def join(self, micro_images: NDArray[Scalar]) -> NDArray[Scalar]:
-        """The ``(H, W, ...)`` values of :meth:`split`; what lies in empty places is passed over.
+        """``(H, W, ...)`` values of micro-images, inverse of :meth:`split`; values in empty places are left out.
 
         Raises
         ------
@@ -82,7 +88,7 @@ class Permutation:
 
     @property
     def mask(self) -> NDArray[np.bool_]:
-        """``(lens_rows, lens_cols, ny, nx)``: which places hold a pixel."""
+        """Mask ``(lens_rows, lens_cols, ny, nx)``: True for places that hold a pixel."""
         panel = self.display.panel
         return self.split(np.ones((panel.height, panel.width), dtype=np.bool_))
 
@@ -96,7 +102,7 @@ class Permutation:
 
     @cached_property
     def _places(self) -> NDArray[np.int64]:
-        """``(H, W)``: the flat index of every pixel's place in the micro-images."""
+        """Flat index of every pixel's place in the micro-images, ``(H, W)``."""
         _, columns, ny, nx = self.shape
         panel = self.display.panel
         places = np.empty((panel.height, panel.width), dtype=np.int64)
@@ -108,10 +114,10 @@ class Permutation:
 
 
 def micro_images_as_views(micro_images: NDArray[Scalar], display: Display) -> NDArray[Scalar]:
-    """``(lens_rows, lens_cols, ny, nx, ...)`` to ``(ny, nx, lens_rows, lens_cols, ...)``; its own inverse.
+    """Views ``(ny, nx, lens_rows, lens_cols, ...)`` of micro-images ``(lens_rows, lens_cols, ny, nx, ...)``.
 
-    The rows of a lenticular micro-image take the place of the lens rows: there ``(1, lens_cols, H, nx, ...)`` becomes
-    ``(1, nx, H, lens_cols, ...)``.
+    The function is its own inverse. For a lenticular sheet ``(1, lens_cols, H, nx, ...)`` becomes ``(1, nx, H,
+    lens_cols, ...)``: the panel's rows take the place of the lens rows.
     """
     if display.lens_array.layout == "lenticular":
         return micro_images.swapaxes(1, 3)
@@ -119,13 +125,13 @@ def micro_images_as_views(micro_images: NDArray[Scalar], display: Display) -> ND
 
 
 def row_blocks(height: int, width: int) -> Iterator[tuple[int, int]]:
-    """First and past-the-last row of blocks that cover ``height`` rows, each of about a million pixels."""
+    """First and past-the-last row of consecutive blocks of ``height`` rows, each of about a million pixels."""
     step = max(1, _BLOCK // width)
     return ((first, min(first + step, height)) for first in range(0, height, step))
 
 
-def lens_indices(display: Display) -> NDArray[Any]:
-    """``(H, W)`` int32: the flat index ``j * lens_cols + i`` of every pixel's lens."""
+def lens_indices(display: Display) -> NDArray[np.int32]:
+    """Flat index ``j * lens_cols + i`` of every pixel's lens, ``(H, W)`` int32."""
     panel, columns = display.panel, display.lens_grid.columns
     indices = np.empty((panel.height, panel.width), dtype=np.int32)
     for first, last in row_blocks(panel.height, panel.width):

@@ -1,8 +1,8 @@
-"""An integral image as a folder of views or of micro-images, and back.
+"""Folders of views or micro-images: an integral image as one picture file per view or lens, and back.
 
-The folder holds one picture file per view (lens) and ``lippmann.json``, which says what they are: the metadata of the
-picture, the kind of the parts, how values are stored, and the files in rows and columns. Together they give the
-picture back exactly, in the depth in which it was stored. Pictures larger than memory are written piece by piece.
+The manifest ``lippmann.json`` holds the metadata of the picture, the kind of the parts, the type of their values, and
+their file names in rows and columns. A folder gives its picture back exactly, in the type in which it was stored.
+Pictures on disk are read and written piece by piece.
 """
 
 from __future__ import annotations
@@ -13,10 +13,9 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Literal, cast, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lippmann.display import Display, micro_image_shape, pixel_indices_under_lens, pixel_lenses
 from lippmann.display.pixel_window import PixelWindow
@@ -27,7 +26,7 @@ from lippmann.image.metadata import KEY, Metadata, from_dict, metadata_of, parse
 from lippmann.image.micro_images import Permutation, micro_images_as_views, row_blocks
 from lippmann.image.picture import Picture
 from lippmann.image.read import open_file
-from lippmann.image.stored_values import Stored
+from lippmann.image.stored_values import Layer, Stored, Values
 from lippmann.image.views import (
     ViewGrid,
     exact_view_shape,
@@ -42,19 +41,19 @@ from lippmann.runtime.atomic_write import replacing_folder
 
 MANIFEST = "lippmann.json"
 
-#: Bytes of views that are gathered at a time; a picture on disk is read once for each such lot.
+#: Bytes of views gathered at a time; a picture on disk is read once for each lot of views.
 LOT_BYTES = 1 << 29
 
 Kind = Literal["views", "micro-images"]
 #: Gives the values of a rectangle of pixels, one or more each.
-Layer = Callable[[PixelWindow], NDArray[Any]]
-#: Row and column of a view or lens, its layers with the RGB linear or as stored, and how far the work is with it.
-Part = tuple[tuple[int, int], dict[str, NDArray[Any]], Progress]
+Source = Callable[[PixelWindow], Layer]
+#: Row and column of a view or lens, its layers (RGB linear or as stored), and the progress made with it.
+Part = tuple[tuple[int, int], dict[str, Layer], Progress]
 
 #: Beginnings of the files' names.
 _PREFIX: dict[Kind, str] = {"views": "view", "micro-images": "lens"}
 
-#: What the rows and columns of the files are, for the people who read the manifest.
+#: Order of the rows and columns of files, for people who read the manifest.
 _ORDER: dict[Kind, str] = {
     "views": "by row, then column, of the pixel under each lens; the rightmost column is seen from the far left",
     "micro-images": "by row, then column, of the lens, from the top left",
@@ -63,7 +62,7 @@ _ORDER: dict[Kind, str] = {
 
 @dataclass(frozen=True, eq=False)
 class _Manifest:
-    """``files`` are the names in rows and columns, None where there is nothing to see."""
+    """Content of a manifest; ``files`` are names in rows and columns, None for a part without pixels."""
 
     metadata: Metadata
     kind: Kind
@@ -131,10 +130,27 @@ def write_micro_images(
     bits: int | None = None,
     progress: ProgressCallback = silent,
 ) -> int:
-    """Write one picture per lens, ``lens_ROW_COLUMN``; parameters and errors as for :func:`write_views`.
+    """Write one picture per lens, ``lens_ROW_COLUMN``, exactly; places that hold no pixel of the lens are black.
 
-    Exact on every display. Places of a micro-image's box that hold no pixel of the lens are black. Returns the number
-    of micro-images written: those of lenses that have any pixel.
+    Parameters
+    ----------
+    picture:
+        In memory or on disk.
+    folder:
+        The folder to make.
+    format, bits:
+        File format and bits per channel, as for :func:`write_views`; OpenEXR keeps the maps of a picture in memory.
+    progress:
+        Called for every micro-image written.
+
+    Returns
+    -------
+    The number of micro-images written: those of lenses that have any pixel.
+
+    Raises
+    ------
+    OutputError
+        If the format is unknown or has no such bits, or the folder cannot be written.
     """
     storage = _storage(picture, folder, format, bits)
     grid, layers = picture.display.lens_grid, _layers(picture, with_maps=storage[0] == "exr")
@@ -143,7 +159,14 @@ def write_micro_images(
 
 
 def compose(folder: Path, *, progress: ProgressCallback = silent) -> IntegralImage:
-    """The integral image of a folder that :func:`write_views` or :func:`write_micro_images` wrote.
+    """Read the integral image of a folder of views or micro-images.
+
+    Parameters
+    ----------
+    folder:
+        Written by :func:`write_views` or :func:`write_micro_images`.
+    progress:
+        Called for every file read.
 
     Raises
     ------
@@ -152,7 +175,7 @@ def compose(folder: Path, *, progress: ProgressCallback = silent) -> IntegralIma
     """
     manifest = _read_manifest(folder)
     rows, columns, height, width = _part_shape(manifest, folder)
-    parts: dict[str, NDArray[Any]] = {}
+    parts: dict[str, Layer] = {}
     for row, column, name in manifest.named:
         layers = _read_part(folder / name, manifest, height, width)
         if not parts:
@@ -168,14 +191,14 @@ def compose(folder: Path, *, progress: ProgressCallback = silent) -> IntegralIma
     if manifest.kind == "views":
         parts = {key: micro_images_as_views(values, metadata.display) for key, values in parts.items()}
     maps = {key: permutation.join(values) for key, values in parts.items()}
-    pixels = maps.pop("")
+    pixels = np.asarray(maps.pop(""), dtype=np.float32)
     return IntegralImage(
         pixels, metadata.display, metadata.world_from_display, metadata.provenance, maps, stored=manifest.stored
     )
 
 
 def _storage(picture: Picture, folder: Path, name: FormatName | None, bits: int | None) -> tuple[FormatName, Stored]:
-    """The format and the type of the values of a folder's files: as asked for, else as the picture is stored."""
+    """Format and type of the values of a folder's files: as requested, else as the picture is stored."""
     if name is None:
         name = "png" if picture.stored in STORED["png"].values() else "exr"
     if name not in STORED:
@@ -186,13 +209,13 @@ def _storage(picture: Picture, folder: Path, name: FormatName | None, bits: int 
     return name, stored_as(name, folder, bits, picture.stored)
 
 
-def _layers(picture: Picture, *, with_maps: bool) -> dict[str, Layer]:
-    """The picture as it is held, under ``""``, and its maps by name."""
+def _layers(picture: Picture, *, with_maps: bool) -> dict[str, Source]:
+    """Sources of the RGB, ``""``, as the picture holds it, and of its maps by name."""
     maps = {name: partial(_window_of, values) for name, values in picture.maps.items()} if with_maps else {}
     return {"": picture.window, **maps}
 
 
-def _window_of(values: NDArray[Any], window: PixelWindow) -> NDArray[Any]:
+def _window_of(values: Layer, window: PixelWindow) -> Layer:
     return values[window.slices]
 
 
@@ -205,7 +228,7 @@ def _write_parts(
     storage: tuple[FormatName, Stored],
     progress: ProgressCallback,
 ) -> int:
-    """Write the parts, of ``shape`` rows and columns, and the manifest; the number of parts."""
+    """Write the parts, in ``shape`` rows and columns, and the manifest; returns the number of parts."""
     name, stored = storage
     transfer = picture.provenance.transfer
     files: list[list[str | None]] = [[None] * shape[1] for _ in range(shape[0])]
@@ -213,7 +236,7 @@ def _write_parts(
         for (row, column), layers, report in parts:
             file = _part_name(kind, name, shape, (row, column))
             files[row][column] = file
-            values = converted_values(layers[""], stored, transfer)
+            values = converted_values(cast(Values, layers[""]), stored, transfer)
             encode_values(temporary / file, name, {**layers, "": values}, transfer=transfer)
             progress(report)
         manifest = {
@@ -229,7 +252,7 @@ def _write_parts(
     return sum(file is not None for row in files for file in row)
 
 
-def _views(display: Display, grid: ViewGrid, layers: Mapping[str, Layer]) -> Iterator[Part]:
+def _views(display: Display, grid: ViewGrid, layers: Mapping[str, Source]) -> Iterator[Part]:
     """The views that have any pixel, gathered in lots of :data:`LOT_BYTES`."""
     rows, columns = lens_rows(display), display.lens_grid.columns
     panel_rows = max(1, display.panel.height // rows)
@@ -259,7 +282,7 @@ def _views(display: Display, grid: ViewGrid, layers: Mapping[str, Layer]) -> Ite
             yield (ky, kx), {key: values[number] for key, values in views.items()}, report
 
 
-def _micro_images(display: Display, layers: Mapping[str, Layer]) -> Iterator[Part]:
+def _micro_images(display: Display, layers: Mapping[str, Source]) -> Iterator[Part]:
     """The micro-images ``(ny, nx, ...)`` of the lenses that have a pixel.
 
     A row of lenses is held at a time; of a lenticular sheet, whose one row has all pixels, as many lenses as fit into
@@ -292,14 +315,14 @@ def _micro_images(display: Display, layers: Mapping[str, Layer]) -> Iterator[Par
             yield (row, first + number), {key: values[number] for key, values in lenses.items()}, report
 
 
-def _first_pixels(layers: Mapping[str, Layer], size: int) -> tuple[dict[str, NDArray[Any]], int]:
-    """The first pixel of each layer, for its shape and type; how many parts of ``size`` pixels are held at a time."""
+def _first_pixels(layers: Mapping[str, Source], size: int) -> tuple[dict[str, Layer], int]:
+    """First pixel of each layer, for its shape and type, and the number of parts of ``size`` pixels held at a time."""
     pixels = {key: layer(PixelWindow(0, 0, 1, 1))[0, 0] for key, layer in layers.items()}
     return pixels, max(1, LOT_BYTES // (size * sum(pixel.nbytes for pixel in pixels.values())))
 
 
 def _part_name(kind: Kind, name: FormatName, shape: tuple[int, int], place: tuple[int, int]) -> str:
-    """The file of the part in row and column ``place`` of ``shape`` rows and columns."""
+    """File name of the part in row and column ``place`` of ``shape`` rows and columns."""
     digits = len(str(max(shape) - 1))
     ending = {"png": ".png", "exr": ".exr", "tiff": ".tif", "zarr": ".zarr"}[name]
     return f"{_PREFIX[kind]}_{place[0]:0{digits}}_{place[1]:0{digits}}{ending}"
@@ -319,9 +342,7 @@ def _read_manifest(folder: Path) -> _Manifest:
     if not isinstance(values, dict) or KEY not in values:
         raise PictureError("describes no folder of views or micro-images", where=str(path))
     metadata = from_dict(values, str(path))
-    kind: Any = values.get("kind")
-    stored: Any = values.get("stored")
-    files: Any = values.get("files")
+    kind, stored, files = (values.get(key) for key in ("kind", "stored", "files"))
     if kind not in get_args(Kind):
         raise PictureError(f"kind is {kind!r}", where=str(path), rule=f"it must be one of {', '.join(get_args(Kind))}")
     if stored not in get_args(Stored):
@@ -330,11 +351,11 @@ def _read_manifest(folder: Path) -> _Manifest:
     if not isinstance(files, list) or not all(isinstance(row, list) and all(map(_is_name, row)) for row in files):
         rule = "it must be rows of names of files in this folder"
         raise PictureError("'files' makes no sense", where=str(path), rule=rule)
-    return _Manifest(metadata, kind, stored, files)
+    return _Manifest(metadata, cast(Kind, kind), cast(Stored, stored), files)
 
 
 def _is_name(value: object) -> bool:
-    """Whether this is None or the name of a file in the folder itself: no path may lead out of it."""
+    """Whether this is None or the name of a file in the folder itself; no path may lead out of it."""
     if not isinstance(value, str):
         return value is None
     is_text = not any(sign == "\0" or "\ud800" <= sign <= "\udfff" for sign in value)
@@ -342,7 +363,7 @@ def _is_name(value: object) -> bool:
 
 
 def _part_shape(manifest: _Manifest, folder: Path) -> tuple[int, int, int, int]:
-    """Rows and columns of files, height and width of each, as the display wants them."""
+    """Rows and columns of files, height and width of each, checked against the display."""
     path, display = str(folder / MANIFEST), manifest.metadata.display
     try:
         shape = exact_view_shape(display) if manifest.kind == "views" else Permutation(display).shape
@@ -353,15 +374,15 @@ def _part_shape(manifest: _Manifest, folder: Path) -> tuple[int, int, int, int]:
         rule = f"the {manifest.kind} of the display {display.name} are {columns} x {rows}"
         raise PictureError(f"'files' does not have {rows} rows of {columns}", where=path, rule=rule)
     present = Permutation(display).mask
-    wanted = (micro_images_as_views(present, display) if manifest.kind == "views" else present).any(axis=(2, 3))
-    for row, column in np.argwhere(wanted).tolist():
+    mask = micro_images_as_views(present, display) if manifest.kind == "views" else present
+    for row, column in np.argwhere(mask.any(axis=(2, 3))).tolist():
         if manifest.files[row][column] is None:
             raise PictureError(f"'files' has no name in row {row}, column {column}", where=path)
     return shape
 
 
-def _read_part(path: Path, manifest: _Manifest, height: int, width: int) -> dict[str, NDArray[Any]]:
-    """The layers of a part, the RGB linear."""
+def _read_part(path: Path, manifest: _Manifest, height: int, width: int) -> dict[str, Layer]:
+    """Layers of a part: linear RGB under ``""``, and its maps."""
     file = open_file(path)
     if (file.height, file.width) != (height, width):
         rule = f"the {manifest.kind} of this folder have {width} x {height}"
@@ -373,5 +394,5 @@ def _read_part(path: Path, manifest: _Manifest, height: int, width: int) -> dict
     return {"": linear_values(values, manifest.metadata.provenance.transfer), **layers}
 
 
-def _names(layers: Mapping[str, NDArray[Any]]) -> str:
+def _names(layers: Mapping[str, Layer]) -> str:
     return ", ".join(name or "RGB" for name in layers)

@@ -1,9 +1,9 @@
-"""Where a picture came from, as plain values that every file format can carry."""
+"""Provenance: how a picture was made, as plain values that every file format can carry."""
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields
 from typing import Any, get_args
 
@@ -13,50 +13,48 @@ from lippmann.errors import PictureError
 
 @dataclass(frozen=True)
 class Provenance:
-    """How a picture was made. Everything has a default: a picture made by other means knows nothing of itself.
+    """How a picture was made. Every field has a default, for pictures of unknown origin.
 
     Parameters
     ----------
     method, integrator:
-        The renderer and what it gathers, by the names of the command line; empty if unknown.
+        Rendering method and integrator, as the command line names them; empty if unknown.
     depth:
-        Surfaces a path may meet, the primary ray's counting 1.
+        Most surfaces on a path; the primary ray's counts 1.
     spp, seed:
-        Samples per pixel and the seed of all random choices.
+        Samples per pixel, and seed of all random numbers.
     subpixels:
         Whether every sub-pixel was rendered at its own place. Replay samples the colours accordingly.
     scene:
-        The scene's name.
+        Name of the scene.
     version:
-        The Lippmann version that rendered it.
+        Lippmann version that rendered the picture.
     device:
         ``cpu``, or the GPU's name.
     traced_fraction:
-        Primary rays traced divided by the rays that a full rendering traces, in [0, 1] for one sample per pixel and
-        method.
+        Primary rays traced, divided by those of a full rendering (>= 0).
     pixel_shares:
-        How the pixels came about, as shares of all (``traced``, ``reprojected``, ``interpolated``); empty where every
-        pixel was traced.
+        Shares of the pixels by origin (``traced``, ``reprojected``, ``interpolated``); empty if all were traced.
     rays:
         Rays traced by kind (``primary``, ``shadow``, ``secondary``).
     seconds:
-        Seconds spent by stage (``load``, ``build``, ``compile``, ``trace``, ``reuse``, ``total``). Files do not carry
-        them, so that the same picture gives the same file.
+        Seconds by stage (``load``, ``build``, ``compile``, ``trace``, ``reuse``, ``total``). Files leave them out, so
+        that the same picture gives the same file.
     estimate:
-        What the picture says of its own error, dB with the ends of their 95 % intervals: ``psnr``, ``psnr_low``,
-        ``psnr_high`` of the whole, ``worst``, ``worst_low``, ``worst_high`` of the worst micro-image, which is probably
-        ``worst_lens`` [column, row]. None where it says nothing.
+        Estimated PSNR in dB with 95 % confidence intervals: ``psnr``, ``psnr_low``, ``psnr_high`` of the whole;
+        ``worst``, ``worst_low``, ``worst_high`` of the worst micro-image, which is probably ``worst_lens`` [column,
+        row]. None if nothing was estimated.
     transfer:
-        How integer formats code the linear values.
+        Transfer function of the codes in integer formats.
     options:
-        Further settings of the method: names with plain values (text, numbers, booleans, None, lists of these).
+        Further settings of the method by name: text, numbers, booleans, None, or lists of these.
     notes:
-        Sentences for people: warnings of the rendering and the like.
+        Sentences for people, such as warnings.
 
     Raises
     ------
     PictureError
-        If a value has the wrong type or range; ``where`` names it.
+        If a value has the wrong type or range; names the field.
     """
 
     method: str = ""
@@ -72,69 +70,64 @@ class Provenance:
     pixel_shares: Mapping[str, float] = field(default_factory=dict)
     rays: Mapping[str, int] = field(default_factory=dict)
     seconds: Mapping[str, float] = field(default_factory=dict)
-    estimate: Mapping[str, Any] | None = None
+    estimate: Mapping[str, object] | None = None
     transfer: Transfer = "srgb"
-    options: Mapping[str, Any] = field(default_factory=dict)
+    options: Mapping[str, object] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         for name in ("method", "integrator", "scene", "version", "device"):
-            _require(isinstance(getattr(self, name), str), name, getattr(self, name), "text")
+            self._require(name, isinstance(getattr(self, name), str), "text")
         for name in ("depth", "spp", "seed"):
             value = getattr(self, name)
-            _require(value is None or _is_count(value), name, value, "a whole number of at least 0, or nothing")
-        _require(isinstance(self.subpixels, bool), "subpixels", self.subpixels, "true or false")
+            self._require(name, value is None or _is_count(value), "a whole number of at least 0, or nothing")
+        self._require("subpixels", isinstance(self.subpixels, bool), "true or false")
         if self.traced_fraction is not None:
-            _require(
-                _is_amount(self.traced_fraction), "traced_fraction", self.traced_fraction, "a number of at least 0"
-            )
+            self._require("traced_fraction", _is_amount(self.traced_fraction), "a number of at least 0")
             object.__setattr__(self, "traced_fraction", float(self.traced_fraction))
+        self._require("transfer", self.transfer in get_args(Transfer), "'srgb' or 'linear'")
         if self.estimate is not None:
-            estimate = _mapping("estimate", self.estimate, _is_plain, "figures by name, or nothing", _plain)
-            object.__setattr__(self, "estimate", estimate)
-        _require(self.transfer in get_args(Transfer), "transfer", self.transfer, "'srgb' or 'linear'")
-        shares = _mapping("pixel_shares", self.pixel_shares, _is_amount, "shares of the pixels by origin", float)
-        object.__setattr__(self, "pixel_shares", shares)
-        object.__setattr__(self, "rays", _mapping("rays", self.rays, _is_count, "counts by kind of ray", int))
-        object.__setattr__(self, "seconds", _mapping("seconds", self.seconds, _is_amount, "seconds by stage", float))
-        object.__setattr__(
-            self, "options", _mapping("options", self.options, _is_plain, "plain values by name", _plain)
-        )
-        notes = tuple(self.notes) if isinstance(self.notes, (list, tuple)) else self.notes
-        well = isinstance(notes, tuple) and all(isinstance(note, str) for note in notes)
-        _require(well, "notes", self.notes, "a list of sentences")
-        object.__setattr__(self, "notes", notes)
+            self._keep("estimate", _is_plain, _plain, "figures by name, or nothing")
+        self._keep("pixel_shares", _is_amount, float, "shares of the pixels by origin")
+        self._keep("rays", _is_count, int, "counts by kind of ray")
+        self._keep("seconds", _is_amount, float, "seconds by stage")
+        self._keep("options", _is_plain, _plain, "plain values by name")
+        is_list = isinstance(self.notes, (list, tuple))
+        self._require("notes", is_list and all(isinstance(note, str) for note in self.notes), "a list of sentences")
+        object.__setattr__(self, "notes", tuple(self.notes))
 
-    def to_dict(self) -> dict[str, Any]:
+    def _require(self, name: str, well: bool, rule: str) -> None:
+        if not well:
+            what = f"{name} is {_shown(getattr(self, name))}"
+            raise PictureError(what, where="provenance", rule=f"it must be {rule}")
+
+    def _keep(self, name: str, fits: Callable[[object], bool], convert: Callable[[Any], object], rule: str) -> None:
+        """Replace a mapping by a checked and converted copy."""
+        value = getattr(self, name)
+        is_mapping = isinstance(value, Mapping)
+        well = is_mapping and all(isinstance(key, str) and fits(item) for key, item in value.items())
+        self._require(name, well, rule)
+        object.__setattr__(self, name, {key: convert(item) for key, item in value.items()})
+
+    def to_dict(self) -> dict[str, object]:
         """All fields as JSON-able values; :meth:`from_dict` gives an equal object back."""
-        plain = {f.name: getattr(self, f.name) for f in fields(self)}
-        return plain | {
-            "pixel_shares": dict(self.pixel_shares),
-            "rays": dict(self.rays),
-            "seconds": dict(self.seconds),
-            "estimate": None if self.estimate is None else dict(self.estimate),
-            "options": dict(self.options),
-            "notes": list(self.notes),
-        }
+        plain = {part.name: getattr(self, part.name) for part in fields(self)}
+        copies = {name: dict(value) for name, value in plain.items() if isinstance(value, Mapping)}
+        return {**plain, **copies, "notes": list(self.notes)}
 
     @classmethod
     def from_dict(cls, plain: object) -> Provenance:
-        """The provenance that :meth:`to_dict` wrote; names that this version does not know are passed over.
+        """The provenance that :meth:`to_dict` wrote; unknown names are left out.
 
         Raises
         ------
         PictureError
-            If ``plain`` is not a mapping or a value has the wrong type or range.
+            If ``plain`` is no mapping, or a value has the wrong type or range.
         """
         if not isinstance(plain, Mapping):
             raise PictureError(f"the provenance is {_shown(plain)}", rule="it must be a mapping of names to values")
-        known = {f.name for f in fields(cls)}
+        known = {part.name for part in fields(cls)}
         return cls(**{name: value for name, value in plain.items() if name in known})
-
-
-def _require(well: bool, name: str, value: object, rule: str) -> None:
-    if not well:
-        raise PictureError(f"{name} is {_shown(value)}", where="provenance", rule=f"it must be {rule}")
 
 
 def _shown(value: object) -> str:
@@ -160,13 +153,6 @@ def _is_plain(value: object) -> bool:
     return value is None or isinstance(value, (str, bool, int))
 
 
-def _plain(value: Any) -> Any:
+def _plain(value: object) -> object:
     # Lists, as JSON gives them back, so that what was read equals what was written.
     return [_plain(item) for item in value] if isinstance(value, (list, tuple)) else value
-
-
-def _mapping(name: str, value: object, fits: Any, rule: str, convert: Any) -> dict[str, Any]:
-    well = isinstance(value, Mapping) and all(isinstance(key, str) and fits(item) for key, item in value.items())
-    _require(well, name, value, rule)
-    assert isinstance(value, Mapping)
-    return {key: convert(item) for key, item in value.items()}

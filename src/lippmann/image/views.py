@@ -1,13 +1,13 @@
-"""Views: one pixel of every micro-image, seen from one direction.
+"""Views (sub-aperture views): one pixel of every micro-image, seen from one direction.
 
-Where a whole number of pixels lies from lens to lens (and from lens row to lens row), view ``(ky, kx)`` is the pixel
-``(ky, kx)`` of every micro-image: an exact permutation. The place of that pixel behind its lens, and so the direction,
-is the same for all lenses, except that slanted lenses and odd rows of hexagonal lenses may stand a part of a pixel
-aside; :func:`view_grid` tells how much.
+Where the distance from lens to lens (and from lens row to lens row) is a whole number of pixels, view ``(ky, kx)`` is
+pixel ``(ky, kx)`` of every micro-image: an exact permutation. That pixel lies at the same place behind every lens, so
+the view has one direction. Slanted lenses and odd rows of hexagonal lenses may be displaced by a part of a pixel;
+:attr:`ViewGrid.spread` is the largest displacement.
 
-Elsewhere no pixel stands at the same place behind every lens. Then the views are as many as whole pixels fit a
-lens, spread evenly over it, and every lens gives what it shows there: its own nearest pixel, or a value interpolated
-linearly between its own pixels.
+Elsewhere no pixel lies at the same place behind every lens. The number of views is then the number of whole pixels
+under a lens; their places are evenly spaced. Each lens contributes its own nearest pixel, or a linear interpolation
+between its own pixels.
 
 A lens shows the pixel at its right end to the left: a larger ``kx`` is seen from further left, a larger ``ky`` from
 further up.
@@ -18,7 +18,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,29 +27,32 @@ from lippmann.display import NUMPY, Display, micro_image_extent, micro_image_sha
 from lippmann.display.lens_grid import BOUNDARY_TOLERANCE, WHOLE_TOLERANCE
 from lippmann.errors import PictureError
 from lippmann.image.micro_images import Permutation, lens_indices, row_blocks
+from lippmann.image.stored_values import FloatArray, Indices
 
-FloatArray = NDArray[np.float32]
 Real = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+#: Whether each place shows a pixel, and the row and column of that pixel on the panel.
+Pixels = tuple[Flags, NDArray[np.intp], NDArray[np.intp]]
 Resampling = Literal["nearest", "linear"]
 
-#: Parts of a pixel below which two places behind a lens are the same direction.
+#: Distance in pixels below which two places behind a lens count as the same direction.
 _SAME_PLACE = 1e-6
 
 
 @dataclass(frozen=True)
 class ViewGrid:
-    """The places behind a lens that the views of a display show.
+    """Places behind a lens that the views of a display show.
 
     Parameters
     ----------
     right, down:
-        Pixels from the micro-image's centre to the place of the views, one number per ``kx`` and per ``ky``. A
-        lenticular sheet has one ``ky``, level with the pixel itself (0).
+        Offset of each ``kx`` and each ``ky`` from the micro-image's centre, in pixels. A lenticular sheet has one
+        ``ky``, 0.
     exact:
-        Whether the views are an exact permutation of the pixels.
+        Whether the views are a permutation of the pixels.
     spread:
-        By how many pixels at most a pixel stands beside the place of its view; 0 unless some lenses stand between
-        pixels where others do not.
+        Largest distance in pixels between a pixel and the place of its view; above 0 where some lenses are centred
+        between pixels and others are not.
     """
 
     right: tuple[float, ...]
@@ -59,7 +62,7 @@ class ViewGrid:
 
     @property
     def note(self) -> str:
-        """What is not exact about the views, as a sentence; empty if nothing is."""
+        """A sentence on how the views deviate from exact ones; empty if they do not."""
         if not self.exact:
             return "the lenses do not cover whole pixels, so the views are resampled"
         if self.spread > _SAME_PLACE:
@@ -70,7 +73,7 @@ class ViewGrid:
 
 
 def view_grid(display: Display) -> ViewGrid:
-    """The views of a display."""
+    """Views of a display: their places, and whether they are exact."""
     across, down = display.pixels_per_lens
     if _is_whole(across) and (down is None or _is_whole(down)):
         return _pixel_views(display)
@@ -80,12 +83,12 @@ def view_grid(display: Display) -> ViewGrid:
 
 
 def exact_view_shape(display: Display) -> tuple[int, int, int, int]:
-    """``(ny, nx, lens_rows, lens_cols)`` of the views where they are an exact permutation, see :class:`ViewGrid`.
+    """Shape ``(ny, nx, lens_rows, lens_cols)`` of exact views.
 
     Raises
     ------
     PictureError
-        If they are not.
+        If the display's views are resampled.
     """
     if not view_grid(display).exact:
         raise PictureError(
@@ -97,49 +100,57 @@ def exact_view_shape(display: Display) -> tuple[int, int, int, int]:
     return (1, nx, ny, columns) if display.lens_array.layout == "lenticular" else (ny, nx, rows, columns)
 
 
-def resampled_views(
-    pixels: FloatArray, display: Display, resampling: Resampling
-) -> tuple[FloatArray, NDArray[np.bool_]]:
-    """Views ``(ny, nx, lens_rows, lens_cols, 3)`` of a picture at the places of :func:`view_grid`, and their mask.
+def resampled_views(pixels: FloatArray, display: Display, resampling: Resampling) -> tuple[FloatArray, Flags]:
+    """Views of a picture at the places of :func:`view_grid`.
 
-    The mask ``(ny, nx, lens_rows, lens_cols)`` is False, and the value zero, where the place is not the lens's own or
-    the lens has no pixel next to it. The lens rows of a lenticular sheet are the panel's rows.
+    Parameters
+    ----------
+    pixels:
+        ``(H, W, 3)`` values of the panel's size.
+    display:
+        Display of the picture.
+    resampling:
+        ``nearest`` takes the lens's own pixel next to the place; ``linear`` interpolates between its own pixels.
+
+    Returns
+    -------
+    Views ``(ny, nx, lens_rows, lens_cols, 3)`` and their mask ``(ny, nx, lens_rows, lens_cols)``. The mask is False,
+    and the value zero, where the place is another lens's or the lens has no pixel next to it. The lens rows of a
+    lenticular sheet are the panel's rows.
     """
     grid = view_grid(display)
     u_center, v_center, lens = micro_image_centers(display)
     owners = _owner_table(display)
     shape = (len(grid.down), len(grid.right), *u_center.shape)
     views, mask = np.zeros((*shape, 3), dtype=np.float32), np.zeros(shape, dtype=np.bool_)
-    reach = (0,) if display.lens_array.layout == "lenticular" else (-1, 0, 1)
-    for ky, down in enumerate(grid.down):
-        for kx, right in enumerate(grid.right):
-            u, v = u_center + right, v_center + down
-            i, j = display.lens_of(*display.panel_point(u, v, NUMPY), NUMPY)
-            own = j * display.lens_grid.columns + i == lens
-            found, row, column = _nearest_own_pixel(owners, lens, u, v, reach)
-            found &= own
-            views[ky, kx][found] = pixels[row[found], column[found]]
-            mask[ky, kx] = found
-            if resampling == "linear":
-                _interpolate(views[ky, kx], pixels, owners, lens, u, v, found, lenticular=len(reach) == 1)
+    for ky, kx in np.ndindex(shape[:2]):
+        u, v = u_center + grid.right[kx], v_center + grid.down[ky]
+        found, row, column = _nearest_pixels(display, owners, lens, u, v)
+        views[ky, kx][found] = pixels[row[found], column[found]]
+        mask[ky, kx] = found
+        if resampling == "linear":
+            _interpolate(views[ky, kx], pixels, owners, lens, u, v, found, lenticular=_is_lenticular(display))
     return views, mask
 
 
 def micro_image_centers(display: Display, rows: tuple[int, int] | None = None) -> tuple[Real, Real, NDArray[np.int32]]:
     """Centres ``(u, v)`` of the micro-images in pixel coordinates, and the flat index of their lenses.
 
-    All are ``(lens_rows, lens_cols)``, or only the lens ``rows`` from the first up to the last. The rows of a
-    lenticular sheet are the panel's: the centre is where the lens's axis, seen from the viewing distance, crosses the
-    middle of the row.
+    Each is ``(lens_rows, lens_cols)``, or holds the lens ``rows`` from the first to before the last. The rows of a
+    lenticular sheet are the panel's: there the centre is the point at which the lens's axis, seen from the viewing
+    distance, crosses the middle of the row.
     """
     first, last = rows or (0, lens_rows(display))
     row, i = np.indices((last - first, display.lens_grid.columns))
     return centers_of_lenses(display, row + first, i)
 
 
-def centers_of_lenses(display: Display, row: NDArray[Any], i: NDArray[Any]) -> tuple[Real, Real, NDArray[np.int32]]:
-    """:func:`micro_image_centers` of single lenses, by their rows and columns."""
-    row, i = row.astype(np.float64), i.astype(np.float64)
+def centers_of_lenses(display: Display, rows: Indices, columns: Indices) -> tuple[Real, Real, NDArray[np.int32]]:
+    """Centres ``(u, v)`` in pixel coordinates and flat lens indices of the micro-images in these lens rows and columns.
+
+    The three have the shape of ``rows`` and ``columns``; see :func:`micro_image_centers`.
+    """
+    row, i = rows.astype(np.float64), columns.astype(np.float64)
     grid, lattice = display.lens_grid, display.lattice
     if lattice.layout != "lenticular":
         x, y = lattice.center(i, row, 0.0 * i, 0.0 * row, NUMPY)
@@ -153,78 +164,68 @@ def centers_of_lenses(display: Display, row: NDArray[Any], i: NDArray[Any]) -> t
 
 
 def lens_rows(display: Display) -> int:
-    """Rows of a view: those of the lenses; of a lenticular sheet the panel's."""
-    return display.panel.height if display.lens_array.layout == "lenticular" else display.lens_grid.rows
+    """Rows of a view: the rows of lenses, or the panel's rows for a lenticular sheet."""
+    return display.panel.height if _is_lenticular(display) else display.lens_grid.rows
 
 
-def pixels_of_view(
-    display: Display, grid: ViewGrid, view: tuple[int, int], row: NDArray[Any], i: NDArray[Any]
-) -> tuple[NDArray[np.bool_], NDArray[np.intp], NDArray[np.intp]]:
-    """Which pixels a view shows at some of its places, without any table of the whole panel.
+def pixels_of_view(display: Display, grid: ViewGrid, view: tuple[int, int], row: Indices, i: Indices) -> Pixels:
+    """The panel's pixels that a view shows at some of its places; needs no table of the whole panel.
+
+    Resampled views show their nearest pixel, as :meth:`lippmann.image.IntegralImage.views` does by default.
 
     Parameters
     ----------
+    display:
+        The display.
     grid:
         :func:`view_grid` of the display.
     view:
         ``(ky, kx)``.
     row, i:
-        Rows and columns in the view, alike in shape.
+        Rows and columns in the view, of one shape.
 
     Returns
     -------
-    Whether there is such a pixel, its row and its column on the panel; those of :meth:`IntegralImage.views` with the
-    nearest pixel where views are resampled.
+    Whether there is such a pixel, its row and its column on the panel, all of the shape of ``row``.
     """
     ky, kx = view
     u, v, lens = centers_of_lenses(display, row, i)
     owners = _owner_by_geometry(display)
-    is_lenticular = display.lens_array.layout == "lenticular"
     if not grid.exact:
-        u, v = u + grid.right[kx], v + grid.down[ky]
-        owner_i, owner_j = display.lens_of(*display.panel_point(u, v, NUMPY), NUMPY)
-        own = owner_j * display.lens_grid.columns + owner_i == lens
-        found, at_row, at_column = _nearest_own_pixel(owners, lens, u, v, (0,) if is_lenticular else (-1, 0, 1))
-        return found & own, at_row, at_column
+        return _nearest_pixels(display, owners, lens, u + grid.right[kx], v + grid.down[ky])
     # The inverse of :func:`lippmann.display.pixel_indices_under_lens`.
     width, height = micro_image_extent(display)
     at_column = np.ceil(u - 0.5 * width + kx - 0.5 - BOUNDARY_TOLERANCE).astype(np.intp)
     at_row = row.astype(np.intp)
-    if not is_lenticular:
+    if not _is_lenticular(display):
         at_row = np.ceil(v - 0.5 * height + ky - 0.5 - BOUNDARY_TOLERANCE).astype(np.intp)
     return _is_own(owners, lens, at_row, at_column), at_row, at_column
 
 
-def pixels_of_view_rows(
-    display: Display, grid: ViewGrid, view: tuple[int, int], first: int, last: int
-) -> tuple[NDArray[np.bool_], NDArray[np.intp], NDArray[np.intp]]:
-    """:func:`pixels_of_view` of the rows ``first`` to before ``last`` of a view.
+def pixels_of_view_rows(display: Display, grid: ViewGrid, view: tuple[int, int], first: int, last: int) -> Pixels:
+    """The panel's pixels that a view shows in its rows from ``first`` to before ``last``; see :func:`pixels_of_view`.
 
-    The three broadcast to ``(last - first, lens columns)``; under upright cylinders, where all rows are alike, they are
-    single rows and columns.
+    The three arrays broadcast to ``(last - first, lens columns)``; under upright cylinders, where all rows are alike,
+    they are single rows and columns.
     """
-    columns = display.lens_grid.columns
-    if display.lattice.rows_are_alike:
-        row, i = np.indices((1, columns))
-        found, _, at_column = pixels_of_view(display, grid, view, row + first, i)
-        return found, np.arange(first, last)[:, None], at_column
-    row, i = np.indices((last - first, columns))
-    return pixels_of_view(display, grid, view, row + first, i)
+    alike = display.lattice.rows_are_alike
+    row, i = np.indices((1 if alike else last - first, display.lens_grid.columns))
+    found, at_row, at_column = pixels_of_view(display, grid, view, row + first, i)
+    return found, np.arange(first, last)[:, None] if alike else at_row, at_column
 
 
 def panel_rows_of_view_rows(display: Display, first: int, last: int) -> tuple[int, int]:
-    """First and past-the-last row of the panel in which the views' rows ``first`` to before ``last`` have pixels."""
-    if display.lens_array.layout == "lenticular":
+    """First and past-the-last row of the panel that hold all pixels of the views' rows ``first`` to before ``last``."""
+    if _is_lenticular(display):
         return first, last
     ny, _ = micro_image_shape(display)
-    columns = np.zeros((2, 1))
-    _, v, _ = centers_of_lenses(display, np.array([[first], [last - 1]]), columns)
+    _, v, _ = centers_of_lenses(display, np.array([first, last - 1]), np.zeros(2, dtype=np.intp))
     top, bottom = float(v.min() - 0.5 * ny) - 1, float(v.max() + 0.5 * ny) + 1
     return max(0, math.floor(top)), min(display.panel.height, math.ceil(bottom))
 
 
 def _pixel_views(display: Display) -> ViewGrid:
-    """The views of a display with whole pixels from lens to lens: one per place of a micro-image's box."""
+    """Exact views: one per place of a micro-image's box."""
     width, height = micro_image_extent(display)
     ny, nx = micro_image_shape(display)
     across, down = _Offsets(), _Offsets()
@@ -235,18 +236,14 @@ def _pixel_views(display: Display) -> ViewGrid:
         across.add(u, width)
         down.add(v, height)
     right = tuple(across.middle + k for k in range(nx))
-    if display.lens_array.layout == "lenticular":
+    if _is_lenticular(display):
         return ViewGrid(right, (0.0,), exact=True, spread=across.spread)
-    return ViewGrid(
-        right=right,
-        down=tuple(down.middle + k for k in range(ny)),
-        exact=True,
-        spread=max(across.spread, down.spread),
-    )
+    places_down = tuple(down.middle + k for k in range(ny))
+    return ViewGrid(right, places_down, exact=True, spread=max(across.spread, down.spread))
 
 
 class _Offsets:
-    """Where the first pixel of boxes of some size stands from their centres."""
+    """Offsets of the first pixel of boxes from the boxes' centres: their middle, and half their range."""
 
     def __init__(self) -> None:
         self._low, self._high = math.inf, -math.inf
@@ -267,7 +264,7 @@ class _Offsets:
 
 
 def _evenly(size: float) -> tuple[float, ...]:
-    """Places that share ``size`` pixels evenly, one for each whole pixel."""
+    """Centres of equal parts of ``size`` pixels about 0, one part for each whole pixel."""
     count = max(1, math.floor(size + WHOLE_TOLERANCE))
     return tuple((k + 0.5) * size / count - 0.5 * size for k in range(count))
 
@@ -276,10 +273,47 @@ def _is_whole(count: float) -> bool:
     return abs(count - round(count)) <= WHOLE_TOLERANCE
 
 
-def _nearest_own_pixel(
-    owners: _Owners, lens: NDArray[np.int32], u: Real, v: Real, reach: tuple[int, ...]
-) -> tuple[NDArray[np.bool_], NDArray[np.intp], NDArray[np.intp]]:
-    """Whether a lens has a pixel at or next to a place, and the row and column of the nearest one."""
+def _is_lenticular(display: Display) -> bool:
+    return display.lens_array.layout == "lenticular"
+
+
+@dataclass(frozen=True)
+class _Owners:
+    """Flat index of the lens that owns a pixel, by row and column, on a panel of ``shape``."""
+
+    shape: tuple[int, int]
+    lens: Callable[[Indices, Indices], Indices]
+
+
+def _owner_table(display: Display) -> _Owners:
+    """Owners from a table: fast where many are looked up, at four bytes for every pixel of the panel."""
+    table = lens_indices(display)
+    return _Owners((display.panel.height, display.panel.width), lambda row, column: table[row, column])
+
+
+def _owner_by_geometry(display: Display) -> _Owners:
+    """Owners computed for each look-up."""
+
+    def lens(row: Indices, column: Indices) -> Indices:
+        i, j = display.lens_of(*display.panel_point(column + 0.5, row + 0.5, NUMPY), NUMPY)
+        flat: Indices = j * display.lens_grid.columns + i
+        return flat
+
+    return _Owners((display.panel.height, display.panel.width), lens)
+
+
+def _is_own(owners: _Owners, lens: Indices, row: Indices, column: Indices) -> Flags:
+    """Whether a pixel is on the panel and belongs to the lens."""
+    height, width = owners.shape
+    inside = (row >= 0) & (row < height) & (column >= 0) & (column < width)
+    own: Flags = inside & (owners.lens(row.clip(0, height - 1), column.clip(0, width - 1)) == lens)
+    return own
+
+
+def _nearest_pixels(display: Display, owners: _Owners, lens: NDArray[np.int32], u: Real, v: Real) -> Pixels:
+    """Nearest pixel of each lens, at or next to the place ``(u, v)``; none where the place belongs to another lens."""
+    i, j = display.lens_of(*display.panel_point(u, v, NUMPY), NUMPY)
+    own_place = j * display.lens_grid.columns + i == lens
     # A place on the line between two pixels goes to the right or lower one, whatever the rounding noise.
     row, column = (np.floor(place + _SAME_PLACE).astype(np.intp) for place in (v, u))
     found = _is_own(owners, lens, row, column)
@@ -287,7 +321,7 @@ def _nearest_own_pixel(
     open_ = ~found
     distance = np.full(int(open_.sum()), np.inf)
     u, v, lens, row, column = u[open_], v[open_], lens[open_], row[open_], column[open_]
-    for dv in reach:
+    for dv in (0,) if _is_lenticular(display) else (-1, 0, 1):
         for du in (-1, 0, 1):
             squared = (column + (du + 0.5) - u) ** 2 + (row + (dv + 0.5) - v) ** 2
             nearer = _is_own(owners, lens, row + dv, column + du) & (squared < distance)
@@ -295,42 +329,7 @@ def _nearest_own_pixel(
             best_row[open_] = np.where(nearer, row + dv, best_row[open_])
             best_column[open_] = np.where(nearer, column + du, best_column[open_])
     found[open_] = np.isfinite(distance)
-    return found, best_row, best_column
-
-
-def _is_own(
-    owners: _Owners, lens: NDArray[np.int32], row: NDArray[np.intp], column: NDArray[np.intp]
-) -> NDArray[np.bool_]:
-    """Whether a pixel is on the panel and belongs to the lens."""
-    height, width = owners.shape
-    inside = (row >= 0) & (row < height) & (column >= 0) & (column < width)
-    own: NDArray[np.bool_] = inside & (owners.lens(row.clip(0, height - 1), column.clip(0, width - 1)) == lens)
-    return own
-
-
-@dataclass(frozen=True)
-class _Owners:
-    """The flat index of the lens of pixels by row and column, on a panel of ``shape``."""
-
-    shape: tuple[int, int]
-    lens: Callable[[NDArray[np.intp], NDArray[np.intp]], NDArray[Any]]
-
-
-def _owner_table(display: Display) -> _Owners:
-    """Looked up: quick where many are asked for, at four bytes for every pixel."""
-    table = lens_indices(display)
-    return _Owners(table.shape, lambda row, column: table[row, column])
-
-
-def _owner_by_geometry(display: Display) -> _Owners:
-    """Worked out anew each time."""
-
-    def lens(row: NDArray[np.intp], column: NDArray[np.intp]) -> NDArray[Any]:
-        i, j = display.lens_of(*display.panel_point(column + 0.5, row + 0.5, NUMPY), NUMPY)
-        flat: NDArray[Any] = j * display.lens_grid.columns + i
-        return flat
-
-    return _Owners((display.panel.height, display.panel.width), lens)
+    return found & own_place, best_row, best_column
 
 
 def _interpolate(
@@ -340,11 +339,11 @@ def _interpolate(
     lens: NDArray[np.int32],
     u: Real,
     v: Real,
-    found: NDArray[np.bool_],
+    found: Flags,
     *,
     lenticular: bool,
 ) -> None:
-    """Replace the found values of a view by bilinear ones between the lens's own pixels."""
+    """Replace the values of a view where a pixel was ``found`` by bilinear ones between the lens's own pixels."""
     column, row = np.floor(u - 0.5).astype(np.intp), np.floor(v - 0.5).astype(np.intp)
     right, down = u - 0.5 - column, v - 0.5 - row
     total, weights = np.zeros((*u.shape, 3)), np.zeros(u.shape)

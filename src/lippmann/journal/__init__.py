@@ -1,4 +1,4 @@
-"""Pictures in the making: tiles on the disk, safe from whatever ends a process, and what tells whether they fit."""
+"""Journals of unfinished pictures and sequences: finished tiles and frames on disk, for resuming after a crash."""
 
 from lippmann.display.pixel_window import TileGrid
 from lippmann.journal.fingerprint import content_hash, differences, in_words

@@ -1,4 +1,4 @@
-"""One process at a time: an open file that says that somebody is at work."""
+"""Exclusive lock of a journal: one process at a time."""
 
 from __future__ import annotations
 
@@ -10,23 +10,30 @@ from lippmann.runtime.private_files import open_to_append
 
 
 def locked(path: Path, where: Path) -> IO[bytes]:
-    """The file ``path``, made if it is not there, open for reading and adding, and locked until it is closed.
+    """Open a file for reading and appending, and lock it until it is closed.
 
-    The system lets go of it when the process ends, however it does.
+    The system releases the lock when the process ends. File systems without locks give an unlocked file.
+
+    Parameters
+    ----------
+    path:
+        The file; created if it is missing.
+    where:
+        Name of the picture or journal, for errors.
 
     Raises
     ------
     OutputError
-        If another process has it; about ``where``.
+        If another process holds the lock.
     ForeignFileError
-        If it is a link or another user's, see :func:`lippmann.runtime.private_files.open_to_append`.
+        If the file is a link or another user's.
     OSError
-        If it cannot be written.
+        If the file cannot be written.
     """
     file = open_to_append(path)
     try:
         import fcntl
-    except ImportError:  # no such locks on this system: two processes would do the same work twice, to the same end
+    except ImportError:  # a system without such locks: two processes would do the same work twice, with the same result
         return file
     try:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)

@@ -1,4 +1,4 @@
-"""What a picture is made of, in a few words each, so that one begun can tell whether it is still the same."""
+"""Fingerprints of pictures: names and short texts of all settings, compared before an unfinished picture is resumed."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import fields, is_dataclass
 from enum import Enum
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -15,17 +14,17 @@ _LONGEST = 60
 
 
 def content_hash(value: object) -> str:
-    """SHA-256 of a plain value: dataclasses, mappings, sequences, arrays, text and numbers, however nested.
+    """SHA-256 of a plain value: nested dataclasses, mappings, sequences, arrays, texts and numbers.
 
-    Equal values have equal sums in every process and on every machine. Of a path it is the content of the file that
-    counts, not where it lies. Fields whose names begin with an underscore do not count.
+    Equal values have equal sums in every process and on every machine. A path contributes the content of its file.
+    Fields of dataclasses whose names begin with an underscore are left out.
 
     Raises
     ------
     TypeError
-        If some part is no plain value.
+        If a part is no plain value.
     OSError
-        If a file that a path names cannot be read.
+        If the file of a path cannot be read.
     """
     digest = hashlib.sha256()
     _feed(digest, value)
@@ -33,33 +32,33 @@ def content_hash(value: object) -> str:
 
 
 def differences(old: Mapping[str, str], new: Mapping[str, str]) -> list[str]:
-    """What differs between two fingerprints, a phrase each: ``spp (was 4, is 8)``; texts too long to show are named.
+    """Differences of two fingerprints, a phrase each: ``spp (was 4, is 8)``; long texts are named only.
 
-    One of them comes from a file: what it holds is shown without control characters.
+    Control characters are escaped, since one fingerprint comes from a file.
     """
-    found = []
+    phrases = []
     for key in [*old, *(key for key in new if key not in old)]:
         before, after, name = old.get(key), new.get(key), _printable(key)
         if before == after:
             continue
         if before is None or after is None:
-            found.append(f"{name} ({'is new' if before is None else 'is gone'})")
+            phrases.append(f"{name} ({'is new' if before is None else 'is gone'})")
         elif max(len(before), len(after)) > _LONGEST or _is_sum(before):
-            found.append(name)
+            phrases.append(name)
         else:
-            found.append(f"{name} (was {_printable(before)}, is {_printable(after)})")
-    return found
+            phrases.append(f"{name} (was {_printable(before)}, is {_printable(after)})")
+    return phrases
 
 
-def in_words(values: Mapping[str, Any], before: str = "") -> dict[str, str]:
-    """Names and texts of nested plain values, for a fingerprint."""
-    found: dict[str, str] = {}
+def in_words(values: Mapping[str, object], before: str = "") -> dict[str, str]:
+    """Fingerprint of nested plain values: names with the prefix ``before``, and texts of the values."""
+    texts: dict[str, str] = {}
     for name, value in values.items():
         if isinstance(value, Mapping):
-            found |= in_words(value, f"{before}{name} ")
+            texts |= in_words(value, f"{before}{name} ")
         else:
-            found[f"{before}{name.replace('_', ' ')}"] = repr(value)
-    return found
+            texts[f"{before}{name.replace('_', ' ')}"] = repr(value)
+    return texts
 
 
 def _printable(text: str) -> str:
@@ -70,8 +69,8 @@ def _is_sum(text: str) -> bool:
     return len(text) == 64 and all(letter in "0123456789abcdef" for letter in text)
 
 
-def _feed(digest: Any, value: object) -> None:
-    """Each part with its kind and length, so that no two different values give the same stream of bytes."""
+def _feed(digest: hashlib._Hash, value: object) -> None:
+    """Feed each part with its kind and length, so that different values give different streams of bytes."""
     if value is None or isinstance(value, bool | int | str | bytes):
         text = value if isinstance(value, bytes) else str(value).encode()
         _head(digest, type(value).__name__, len(text))
@@ -115,5 +114,5 @@ def _feed(digest: Any, value: object) -> None:
         raise TypeError(f"a {type(value).__name__} is no plain value")
 
 
-def _head(digest: Any, kind: str, length: int) -> None:
+def _head(digest: hashlib._Hash, kind: str, length: int) -> None:
     digest.update(f"{kind}:{length}\n".encode())

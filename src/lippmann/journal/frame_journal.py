@@ -1,9 +1,9 @@
-"""Which frames of a sequence are finished: a file of lines beside them, safe from whatever ends the process.
+"""Journal of a sequence: the finished frames, in a text file beside them.
 
-``frames.journal`` begins with the fingerprint of the sequence; each finished frame adds a line with the check sum of
-its file, once that lies in its place. A line that was cut short ends the journal: what it would have said is rendered
-again. The journal is written in place: it has to be a file of the user's own (:mod:`lippmann.runtime.private_files`),
-and one that begins otherwise is never changed.
+``frames.journal`` begins with the fingerprint of the sequence. Each finished frame adds a line with the check sum of
+its file, after that file is in its place. A line that was cut short ends the journal; its frame is rendered again. The
+journal is written in place: it has to be the user's own file (:mod:`lippmann.runtime.private_files`), and a file with
+another beginning is never changed.
 """
 
 from __future__ import annotations
@@ -15,12 +15,15 @@ from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
-from typing import IO, Any
+from typing import IO, TYPE_CHECKING, Any
 
 from lippmann.errors import OutputError, PictureError
 from lippmann.journal.file_lock import locked
 from lippmann.journal.fingerprint import differences
 from lippmann.runtime.private_files import ForeignFileError
+
+if TYPE_CHECKING:
+    from typing import TypeGuard
 
 #: Added to the sequence's name.
 ENDING = ".journal"
@@ -33,14 +36,14 @@ _BLOCK = 1 << 20
 
 
 class FrameJournal:
-    """The finished frames of one sequence. Make one with :meth:`open`; it is a context manager.
+    """Finished frames of one sequence; made by :meth:`open`, and a context manager.
 
     Attributes
     ----------
     path:
-        Its file.
+        The journal's file.
     chosen:
-        What was chosen for all frames when the first was rendered, by name.
+        Settings by name that were chosen with the first frame and hold for all.
     """
 
     def __init__(self, path: Path, file: IO[bytes], sums: dict[int, str], chosen: dict[str, str]) -> None:
@@ -51,14 +54,23 @@ class FrameJournal:
 
     @classmethod
     def open(cls, path: Path, fingerprint: Mapping[str, str], *, resume: bool) -> FrameJournal:
-        """Begin a journal, or with ``resume`` go on with the one that is there, if there is one.
+        """Open and lock a journal.
+
+        Parameters
+        ----------
+        path:
+            The journal's file.
+        fingerprint:
+            Settings of the sequence by name, see :mod:`lippmann.journal.fingerprint`.
+        resume:
+            Whether to keep the finished frames of an existing journal; otherwise a new one is begun.
 
         Raises
         ------
         OutputError
             If another process works on the sequence, or the journal cannot be written.
         PictureError
-            If the journal is of another sequence, and says what differs; or what lies there is none of the user's.
+            If the journal is of another sequence (names the differences), or the file is no journal of the user's.
         """
         try:
             file = locked(path, path)
@@ -87,30 +99,39 @@ class FrameJournal:
         return journal
 
     def holds(self, frame: int, file: Path) -> bool:
-        """Whether a frame is finished, and its file (or folder) as it was then."""
+        """Whether a frame is finished and its file (or folder) has not changed since."""
         try:
             return frame in self._sums and _sum_of(file) == self._sums[frame]
         except OSError:
             return False
 
     def add(self, frame: int, file: Path, chosen: Mapping[str, str]) -> None:
-        """A frame lies in its file.
+        """Record a finished frame.
+
+        Parameters
+        ----------
+        frame:
+            Its number.
+        file:
+            Its file or folder, complete.
+        chosen:
+            Settings by name that hold for all frames; those of the first frame are kept.
 
         Raises
         ------
         OutputError
-            If that cannot be written down, or the file not be read.
+            If the file cannot be read, or the journal cannot be written.
         """
         try:
-            found = _sum_of(file)
+            check_sum = _sum_of(file)
         except OSError as error:
             raise OutputError(f"cannot be read again: {error.strerror or error}", where=str(file)) from error
-        self._add({"frame": frame, "sum": found, "chosen": dict(chosen)})
-        self._sums[frame] = found
+        self._add({"frame": frame, "sum": check_sum, "chosen": dict(chosen)})
+        self._sums[frame] = check_sum
         self.chosen = self.chosen or dict(chosen)
 
     def finish(self) -> None:
-        """Remove the journal: all is in its place."""
+        """Remove the journal, after the last frame."""
         with suppress(OSError):  # some systems keep what is open
             self.path.unlink()
         self._file.close()
@@ -130,7 +151,7 @@ class FrameJournal:
             self.finish()  # what failed before its first frame leaves nothing behind
         self._file.close()
 
-    def _add(self, values: Mapping[str, Any]) -> None:
+    def _add(self, values: Mapping[str, object]) -> None:
         try:
             self._file.write(json.dumps(values, sort_keys=True).encode() + b"\n")
             self._file.flush()
@@ -139,13 +160,13 @@ class FrameJournal:
             raise OutputError(f"cannot be written: {error.strerror or error}", where=str(self.path)) from error
 
 
-def _head_of(line: bytes, path: Path) -> dict[str, Any]:
-    """What the journal's first line says; nothing if it was cut short before its end.
+def _head_of(line: bytes, path: Path) -> dict[str, object]:
+    """Values of a journal's first line; empty if the line was cut short.
 
     Raises
     ------
     PictureError
-        If this is no journal's.
+        If the line is no journal's.
     """
     is_whole = line.endswith(b"\n")
     if not is_whole and line[: len(_BEGINNING)] == _BEGINNING[: len(line)]:
@@ -165,15 +186,16 @@ def _no_journal(path: Path, why: str, fix: str = "") -> PictureError:
     )
 
 
-def _check_same(begun: Mapping[str, Any], fingerprint: Mapping[str, str], path: Path) -> None:
-    """Refuse the journal of another sequence, and say what differs."""
+def _check_same(begun: Mapping[str, object], fingerprint: Mapping[str, str], path: Path) -> None:
+    """Refuse the journal of another sequence, naming the differences."""
     if begun[_KEY] != _VERSION:
         raise _no_journal(path, f"its version is {begun[_KEY]!r}, this program writes {_VERSION}")
-    if not _are_texts(begun.get("fingerprint")):
+    before = begun.get("fingerprint")
+    if not _are_texts(before):
         raise _no_journal(path, "its first line is damaged")
-    if found := differences(begun["fingerprint"], fingerprint):
+    if phrases := differences(before, fingerprint):
         raise PictureError(
-            f"the unfinished sequence is another one: {', '.join(found)}",
+            f"the unfinished sequence is another one: {', '.join(phrases)}",
             where=str(path),
             rule="what was begun is finished as it was begun",
             fix=f"put that back as it was, or delete {path.name} and begin anew",
@@ -181,7 +203,7 @@ def _check_same(begun: Mapping[str, Any], fingerprint: Mapping[str, str], path: 
 
 
 def _frames_of(data: bytes) -> tuple[dict[int, str], dict[str, str], int]:
-    """Sums by frame, what was chosen, and up to which byte the lines are sound."""
+    """Check sums by frame, chosen settings, and the length in bytes of the undamaged lines."""
     sums: dict[int, str] = {}
     chosen: dict[str, str] = {}
     length = 0
@@ -207,7 +229,7 @@ def _is_frame(values: Mapping[str, Any]) -> bool:
     return type(values.get("frame")) is int and isinstance(values.get("sum"), str) and _are_texts(values.get("chosen"))
 
 
-def _are_texts(values: object) -> bool:
+def _are_texts(values: object) -> TypeGuard[dict[str, str]]:
     return isinstance(values, dict) and all(isinstance(value, str) for value in values.values())
 
 

@@ -1,4 +1,4 @@
-"""The files in a journal's folder: which are the journal's own, and how they are removed without any other."""
+"""Files in a journal's folder: telling the journal's own from others, and removing only the former."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from pathlib import Path
 from lippmann.runtime import private_files
 
 JOB, LOCK = "job.json", "lock"
-#: The ending of a tile's file.
+#: Ending of a tile's file.
 TILE = ".tile"
 
 _TILE_NAME = re.compile(r"r\d{4,}_c\d{4,}\.tile")
@@ -30,22 +30,25 @@ def is_tile(name: str) -> bool:
 
 
 def no_tile(name: str) -> bool:
-    """Of a folder that has no job: nothing is a tile."""
+    """False: a folder without a job has no tiles."""
     return False
 
 
 def holds_tiles(folder: Path) -> bool:
-    """Whether there is anything in the folder to lose; raises :class:`OSError`."""
+    """Whether the folder holds a file with a tile's name; an :class:`OSError` if it cannot be listed."""
     return any(is_tile(name) for name in os.listdir(folder))
 
 
 def foreign_names(folder: Path, tiles: IsTile) -> list[str]:
-    """Names in the folder that are no part of the journal, sorted; raises :class:`OSError`."""
+    """Sorted names in the folder that are no part of the journal; an :class:`OSError` if it cannot be listed.
+
+    ``tiles`` tells the names of the journal's tiles.
+    """
     return sorted(name for name in os.listdir(folder) if not _is_part(folder / name, tiles))
 
 
 def sweep(folder: Path) -> None:
-    """Remove half-written files; only the owner of the lock may."""
+    """Remove half-written files; to be called by the owner of the lock only."""
     for name in os.listdir(folder):
         if _HALF_FILE.fullmatch(name):
             with suppress(OSError):
@@ -53,20 +56,22 @@ def sweep(folder: Path) -> None:
 
 
 def clear(folder: Path, tiles: IsTile, unlock: Callable[[], None] | None = None) -> list[str]:
-    """Remove the journal's own files, and the folder if nothing else is in it.
+    """Remove the journal's own files, and the folder if it is empty then.
 
     Parameters
     ----------
+    folder:
+        The journal's folder.
     tiles:
-        Tells the names of its tiles.
+        Tells the names of the journal's tiles.
     unlock:
-        Closes the lock's file. Windows and network drives can remove it only then.
+        Closes the lock's file, which Windows and network drives cannot remove before.
 
     Returns
     -------
-    What stays: names, sorted.
+    Sorted names of the files that stay.
     """
-    # The job goes after the tiles: what is left when the process ends in between can still be told to be a journal.
+    # The job is removed after the tiles, so that a folder half removed is still recognized as a journal.
     for name in sorted(os.listdir(folder), key=lambda name: name == JOB):
         if name != LOCK and _is_part(folder / name, tiles):
             with suppress(OSError):

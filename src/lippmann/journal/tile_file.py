@@ -1,8 +1,8 @@
-"""One tile as bytes: what lies in a journal, and what travels between machines.
+"""Tile files: one rendered tile as bytes, in a journal or on its way between machines.
 
-A file is the mark, the length of a head (4 bytes, little endian), the head (JSON: the tile's number, its rays, its
-notes, names, types and shapes of its arrays and the lengths of what follows), the arrays one after the other, packed,
-and the SHA-256 of all that. Whatever was cut short, mixed up or changed is found by length or by that sum.
+A file has a mark, the length of the head (4 bytes, little endian), the length of the bodies (8 bytes), the head (JSON:
+the tile's number, rays and notes; names, types, shapes and packed lengths of its arrays), the packed arrays, and the
+SHA-256 of everything before. Length and check sum reveal files that were cut short or changed.
 """
 
 from __future__ import annotations
@@ -13,13 +13,15 @@ import math
 import struct
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-#: Begins every tile; its last letter is the version of the form.
+#: Beginning of every tile file; its last digit is the version.
 MARK = b"LpTile2\n"
+
+Array = NDArray[np.generic]
 
 _SUM = hashlib.sha256
 _SUM_BYTES = _SUM().digest_size
@@ -27,44 +29,44 @@ _SUM_BYTES = _SUM().digest_size
 #: Zstandard packs a block of at most 128 KB into no less than 4 bytes.
 _MOST_PER_BYTE = 1 << 15
 
-#: Journals are read once: a quick packing (Zstandard, level 1) is the right one.
+#: Zstandard level; a journal is read once, so that speed counts more than size.
 _LEVEL = 1
 
 
 class DamagedTile(Exception):  # noqa: N818 - it is not an error of the user's: the tile is made anew
-    """Bytes that are no whole tile."""
+    """Bytes that are no complete tile."""
 
 
 @dataclass(frozen=True, eq=False)
 class TileResult:
-    """What came of one tile.
+    """One rendered tile.
 
     Parameters
     ----------
     index:
-        Its number in the grid.
+        Number in the grid of tiles.
     pixels:
-        ``(rows, columns, 3)`` in the type that the picture's file holds.
+        ``(rows, columns, 3)`` in the type of the picture's file.
     maps:
-        Layers ``(rows, columns)`` float32 that the file holds too.
+        Layers ``(rows, columns)`` float32 for the picture's file.
     sums:
-        Arrays from which the whole picture's estimate of its error is made; empty without one.
+        Arrays that the error estimate of the whole picture sums; empty without an estimate.
     rays:
-        Rays by kind, and samples ``discarded`` for not being finite.
+        Rays by kind, and samples ``discarded`` because they were not finite.
     notes:
-        What is to be known of it, a sentence each.
+        Sentences for people, such as warnings.
     """
 
     index: int
-    pixels: NDArray[Any]
-    maps: Mapping[str, NDArray[Any]] = field(default_factory=dict)
-    sums: Mapping[str, NDArray[Any]] = field(default_factory=dict)
+    pixels: Array
+    maps: Mapping[str, Array] = field(default_factory=dict)
+    sums: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
     rays: Mapping[str, int] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
 
 
 def encode(result: TileResult) -> bytes:
-    """The tile as bytes: the same ones for the same tile."""
+    """Bytes of a tile, the same for equal tiles; :func:`decode` is the inverse."""
     import imagecodecs
 
     entries, bodies = [], []
@@ -81,17 +83,19 @@ def encode(result: TileResult) -> bytes:
 
 
 def decode(data: bytes, most: int | None = None) -> TileResult:
-    """The tile of :func:`encode`.
+    """The tile of the bytes of :func:`encode`.
 
     Parameters
     ----------
+    data:
+        The bytes.
     most:
-        The most bytes that its arrays may take in memory, where the tile may be anybody's.
+        Largest total size of the arrays in bytes, for tiles of unknown origin; any by default.
 
     Raises
     ------
     DamagedTile
-        If these are not exactly such bytes, or the arrays are larger.
+        If the bytes are no complete tile, or the arrays are larger.
     """
     if whole_length(data[: len(MARK) + 12]) != len(data):
         raise DamagedTile("its length is wrong")
@@ -99,20 +103,20 @@ def decode(data: bytes, most: int | None = None) -> TileResult:
     if _SUM(body).digest() != found:
         raise DamagedTile("its check sum is wrong")
     try:
-        return _taken_apart(data, most)
+        return _unpacked(data, most)
     except (ArithmeticError, AttributeError, LookupError, RuntimeError, TypeError, ValueError) as error:
         raise DamagedTile("its sum agrees with a head that makes no sense") from error
 
 
-def _taken_apart(data: bytes, most: int | None) -> TileResult:
-    """The tile; any error if the head is not one of :func:`encode`."""
+def _unpacked(data: bytes, most: int | None) -> TileResult:
+    """The tile of undamaged bytes; any error if the head is not one of :func:`encode`."""
     import imagecodecs
 
     start = len(MARK) + 12
     (length,) = struct.unpack("<I", data[len(MARK) : len(MARK) + 4])
     head = json.loads(data[start : start + length])
     place = start + length
-    arrays: dict[str, dict[str, NDArray[Any]]] = {"pixels": {}, "maps": {}, "sums": {}}
+    arrays: dict[str, dict[str, Array]] = {"pixels": {}, "maps": {}, "sums": {}}
     total = 0
     for kind, name, dtype, shape, size in head["arrays"]:
         unpacked = math.prod(shape) * np.dtype(dtype).itemsize
@@ -125,11 +129,12 @@ def _taken_apart(data: bytes, most: int | None) -> TileResult:
         arrays[kind][name] = np.frombuffer(raw, dtype=dtype).reshape(shape)
         place += size
     notes = tuple(str(note) for note in head["notes"])
-    return TileResult(head["index"], arrays["pixels"][""], arrays["maps"], arrays["sums"], head["rays"], notes)
+    sums = cast("dict[str, NDArray[np.float64]]", arrays["sums"])
+    return TileResult(head["index"], arrays["pixels"][""], arrays["maps"], sums, head["rays"], notes)
 
 
 def whole_length(beginning: bytes) -> int | None:
-    """How long the tile is that begins with these 20 bytes; None if none does."""
+    """Length in bytes of the tile that begins with these 20 bytes; None if they begin no tile."""
     if len(beginning) < len(MARK) + 12 or not beginning.startswith(MARK):
         return None
     head, bodies = struct.unpack("<IQ", beginning[len(MARK) : len(MARK) + 12])

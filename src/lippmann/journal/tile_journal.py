@@ -1,13 +1,12 @@
-"""A picture in the making: a folder of finished tiles beside the place where the picture will lie.
+"""Journal of a picture: a folder of finished tiles beside the picture's file.
 
-``poster.tif.parts/`` holds ``job.json`` (what is being made: the fingerprint and the grid of tiles), one file per
-finished tile, and an empty file whose lock says that a process is at work. Tiles appear whole or not at all and never
-change, so that whatever happens to the process or the machine, what lies under a tile's name is that tile; a copy of
-the folder taken at any moment is a journal too. Sizes are looked at when the folder is opened, check sums when a tile
-is read: a damaged one is removed and made anew.
+``poster.tif.parts/`` holds ``job.json`` (the fingerprint of the picture and the grid of tiles), one file per finished
+tile, and an empty lock file. A tile's file appears whole or not at all and never changes, so a copy of the folder taken
+at any moment is a journal too. Sizes are checked when the folder is opened, check sums when a tile is read; a damaged
+tile is removed and rendered again.
 
-The folder and its files belong to the user alone (:mod:`lippmann.runtime.private_files`): links in their places are not
-followed. A folder of that name which is no journal is refused, and files that are no part of a journal stay.
+The folder and its files belong to the user alone (:mod:`lippmann.runtime.private_files`); links in their places are not
+followed. A folder of that name that is no journal is refused. Files that are no part of a journal stay.
 """
 
 from __future__ import annotations
@@ -20,7 +19,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
-from typing import IO, Any
+from typing import IO, NamedTuple
 
 from lippmann.display.pixel_window import TileGrid
 from lippmann.errors import OutputError, PictureError
@@ -36,25 +35,35 @@ from lippmann.runtime.private_files import ForeignFileError
 ENDING = ".parts"
 
 _KEY, _VERSION = "lippmann-journal", 1
-#: A job is some kilobytes of text.
+#: Largest job in bytes; a job has some kilobytes.
 _MOST_JOB = 1 << 24
-#: No tile takes more bytes than these, and these for each of its pixels: pixels, maps and sums are some 200.
+#: Largest tile in bytes: a constant, and an amount per pixel; pixels, maps and sums take some 200.
 _MOST_BYTES, _MOST_PER_PIXEL = 1 << 20, 1 << 10
 
 
+class Job(NamedTuple):
+    """A journal's job: the fingerprint of the picture, and its grid of tiles as [width, height, side].
+
+    The grid comes from a file, unchecked.
+    """
+
+    fingerprint: Mapping[str, str]
+    grid: object
+
+
 class TileStore:
-    """The tiles of one picture on the disk. Make one with :meth:`open`; it is a context manager.
+    """Tiles of one picture on disk; made by :meth:`open`, and a context manager.
 
     ``put`` and ``put_bytes`` may be called from several threads at once.
 
     Attributes
     ----------
     folder:
-        Where the tiles lie.
+        The journal's folder.
     grid:
-        Which tiles there are.
+        The grid of tiles.
     resumed:
-        How many of them lay there when the folder was opened.
+        Number of tiles that were finished when the folder was opened.
     """
 
     def __init__(self, folder: Path, grid: TileGrid, lock: IO[bytes]) -> None:
@@ -65,19 +74,29 @@ class TileStore:
 
     @classmethod
     def open(cls, output: Path, fingerprint: Mapping[str, str], grid: TileGrid, *, resume: bool) -> TileStore:
-        """Begin the journal of ``output``, or with ``resume`` go on with the one that is there.
+        """Open and lock the journal of a picture.
+
+        Parameters
+        ----------
+        output:
+            The picture's file.
+        fingerprint:
+            Settings of the picture by name, see :mod:`lippmann.journal.fingerprint`.
+        grid:
+            The grid of tiles.
+        resume:
+            Whether to go on with an existing journal; without one a new journal is begun.
 
         Raises
         ------
         OutputError
-            If there is a journal and ``resume`` is not asked for, another process works on it, or it cannot be
-            written.
+            If there is a journal and ``resume`` is False, another process works on it, or it cannot be written.
         PictureError
-            If the journal is of something else, and says what differs; or the folder is no journal of the user's.
+            If the journal is of another picture (names the differences), or the folder is no journal of the user's.
         """
         folder = journal_of(output)
-        job = {_KEY: _VERSION, "fingerprint": dict(fingerprint), "grid": [grid.width, grid.height, grid.side]}
-        _is_begun(output, folder, job, resume)  # nothing is made where there is something to refuse
+        job = Job(dict(fingerprint), [grid.width, grid.height, grid.side])
+        _is_begun(output, folder, job, resume)  # refuses before anything is created
         with _reported(folder):
             private_files.make_folder(folder)
         with _reported(folder, "its lock"):
@@ -86,7 +105,7 @@ class TileStore:
             with _reported(folder):
                 sweep(folder)
             if not _is_begun(output, folder, job, resume):  # again: another process may have begun and ended meanwhile
-                text = json.dumps(job, indent=1, sort_keys=True) + "\n"
+                text = json.dumps({_KEY: _VERSION, **job._asdict()}, indent=1, sort_keys=True) + "\n"
                 with replacing(folder / JOB, private=True) as temporary:
                     temporary.write_text(text, encoding="utf-8")
             return cls(folder, grid, lock)
@@ -95,7 +114,7 @@ class TileStore:
             raise
 
     def missing(self) -> list[int]:
-        """The numbers of the tiles that are still to be made."""
+        """Numbers of the unfinished tiles."""
         present = set(os.listdir(self.folder))
         return [
             index
@@ -104,28 +123,27 @@ class TileStore:
         ]
 
     def put(self, result: TileResult) -> None:
-        """Keep a tile.
+        """Write a finished tile.
 
         Raises
         ------
         OutputError
-            If it cannot be written; what was there before is unharmed.
+            If it cannot be written; an earlier file of the tile stays.
         """
         self.put_bytes(result.index, encode(result))
 
     def put_bytes(self, index: int, data: bytes) -> None:
-        """Keep a tile that is :func:`~lippmann.journal.tile_file.encode`-d already; raises as :meth:`put`."""
+        """Write tile ``index`` as encoded by :func:`lippmann.journal.tile_file.encode`; errors as for :meth:`put`."""
         with replacing(self._path(index), private=True) as temporary:
             temporary.write_bytes(data)
 
     def get(self, index: int) -> TileResult:
-        """A tile, checked.
+        """Read and check a tile.
 
         Raises
         ------
         DamagedTile
-            If it is not there, not whole, a link or another user's, all of which count as missing then; or it cannot be
-            read.
+            If the tile is missing or cannot be read; or it is incomplete, a link or another user's, and is removed.
         """
         path, most = self._path(index), self._most_bytes(index)
         try:
@@ -145,20 +163,20 @@ class TileStore:
         return result
 
     def drop(self, index: int) -> None:
-        """Count a tile as missing."""
+        """Remove a tile's file, so that the tile counts as missing."""
         with suppress(OSError):  # a folder in its place stays
             self._path(index).unlink()
 
     def results(self) -> Iterator[TileResult]:
-        """All tiles in order; raises as :meth:`get`."""
+        """All tiles in order; errors as for :meth:`get`."""
         return (self.get(index) for index in range(len(self.grid)))
 
     def finish(self) -> tuple[str, ...]:
-        """Remove the journal: the picture is in its place.
+        """Remove the journal, after the picture is in its place.
 
         Returns
         -------
-        A sentence for the user if the folder stays, for it holds files that are no part of the journal.
+        A sentence for the user if the folder stays, because it holds files that are no part of the journal.
         """
         place, tiles = self.folder, {self._name(index) for index in range(len(self.grid))}
         with _reported(self.folder):
@@ -175,7 +193,7 @@ class TileStore:
         return (f"the folder {self.folder.name} stays: it holds {left[0]!r}, which is no part of the journal{more}",)
 
     def close(self) -> None:
-        """Let others at the journal."""
+        """Release the lock."""
         self._lock.close()
 
     def __enter__(self) -> TileStore:
@@ -201,20 +219,20 @@ class TileStore:
 
 
 def journal_of(output: Path) -> Path:
-    """The folder in which the tiles of a picture are kept until it is finished."""
+    """Folder of the tiles of the unfinished picture ``output``."""
     place = output.resolve()
     return place.with_name(place.name + ENDING)
 
 
-def read_job(output: Path) -> dict[str, Any] | None:
-    """What the journal of ``output`` says it is of; None if there is no journal with tiles.
+def read_job(output: Path) -> Job | None:
+    """Job of the journal of the picture ``output``; None if there is no journal with tiles.
 
     Raises
     ------
     PictureError
-        If the folder is no journal of ours, one of a later version, or not the user's alone.
+        If the folder is no journal, one of another version, or not the user's alone.
     OutputError
-        If it cannot be read.
+        If the journal cannot be read.
     """
     folder = journal_of(output)
     try:
@@ -239,13 +257,13 @@ def read_job(output: Path) -> dict[str, Any] | None:
     fingerprint = job.get("fingerprint")
     if not isinstance(fingerprint, dict) or not all(isinstance(value, str) for value in fingerprint.values()):
         raise _no_journal(folder, f"its {JOB} is none of ours")
-    return job
+    return Job(fingerprint, job.get("grid"))
 
 
 def sweep_beside(output: Path) -> None:
-    """Remove what a writer of ``output`` left half done when it was killed; only while its journal is locked.
+    """Remove temporary files of killed writers of ``output``; to be called only while its journal is locked.
 
-    Files of other users stay: they may be at work in the same folder.
+    Files of other users stay, since those may be working in the same folder.
     """
     place = output.resolve()
     # The names that lippmann.runtime.atomic_write and TileStore.finish give to what is on its way.
@@ -262,8 +280,8 @@ def sweep_beside(output: Path) -> None:
                 private_files.remove(path)
 
 
-def _is_begun(output: Path, folder: Path, job: Mapping[str, Any], resume: bool) -> bool:
-    """Whether there is a journal of this job to go on with; raises as :meth:`TileStore.open`."""
+def _is_begun(output: Path, folder: Path, job: Job, resume: bool) -> bool:
+    """Whether there is a journal of this job; errors as for :meth:`TileStore.open`."""
     before = read_job(output)
     if before is None:
         return False
@@ -273,12 +291,12 @@ def _is_begun(output: Path, folder: Path, job: Mapping[str, Any], resume: bool) 
             where=str(output),
             fix=f"go on with resume=True, or {_put_away(folder)}",
         )
-    found = differences(before["fingerprint"], job["fingerprint"])
-    if not found and before.get("grid") != job["grid"]:
-        found = [f"the grid of tiles (was {before.get('grid')}, is {job['grid']})"]
-    if found:
+    phrases = differences(before.fingerprint, job.fingerprint)
+    if not phrases and before.grid != job.grid:
+        phrases = [f"the grid of tiles (was {before.grid}, is {job.grid})"]
+    if phrases:
         raise PictureError(
-            f"the unfinished picture is another one: {', '.join(found)}",
+            f"the unfinished picture is another one: {', '.join(phrases)}",
             where=str(folder),
             rule="what was begun is finished as it was begun",
             fix=f"put that back as it was, or {_put_away(folder)} and begin anew",
@@ -287,7 +305,7 @@ def _is_begun(output: Path, folder: Path, job: Mapping[str, Any], resume: bool) 
 
 
 def _put_away(folder: Path) -> str:
-    """How to be rid of a journal; nobody is told to delete what is his own."""
+    """Advice for removing a journal; a folder with the user's own files is only to be moved."""
     return f"move {folder} away" if foreign_names(folder, is_tile) else f"delete {folder}"
 
 
@@ -301,9 +319,9 @@ def _no_journal(folder: Path, why: str, fix: str = "") -> PictureError:
 
 
 def _is_whole(path: Path, most: int) -> bool:
-    """Whether a tile's file is as long as it says itself: an interrupted copy or a crashed disk cuts files off.
+    """Whether a tile's file has the length that its head states, at most ``most`` bytes.
 
-    One of more than ``most`` bytes is none of ours.
+    Interrupted copies and crashed disks cut files off.
     """
     try:
         with private_files.open_to_read(path) as file:

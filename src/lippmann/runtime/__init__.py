@@ -1,1 +1,1 @@
-"""The machine under the program: engine, LLVM, GPU, compiled kernels, threads, and files that appear whole."""
+"""The machine: rendering engine, LLVM, GPU, compiled kernels, threads, child processes and atomic file writes."""

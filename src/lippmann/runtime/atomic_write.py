@@ -1,11 +1,10 @@
-"""Files and folders that appear whole or not at all.
+"""Atomic writes: files and folders appear whole or not at all.
 
-What is written goes to a temporary name beside its place and is renamed into it once it is complete and on the disk.
-Whatever fails on the way (a full disk, an error in the writer, Ctrl-C) leaves the place as it was.
+A file or folder is written under a temporary name beside its path, flushed to disk, and renamed. A failure (full disk,
+error in the writer, Ctrl-C) leaves the path as it was.
 
-Temporary names hold random digits and are made, never opened, so that no link can be planted in their places. In a
-folder in which other users may rename any file, one without a sticky bit, they may exchange them later, and the output
-too.
+Temporary names hold random digits and are created exclusively, so that no link can be planted under them. In a folder
+without a sticky bit that other users may write to, these can still replace temporary files, as they can the output.
 """
 
 from __future__ import annotations
@@ -22,7 +21,7 @@ from pathlib import Path
 from lippmann.errors import OutputError
 from lippmann.runtime.private_files import FILE_MODE, ForeignFileError, open_to_read, without_following
 
-#: Lists the files of a folder written by :func:`replacing_folder`, so that a later run may replace them and no others.
+#: File that lists the files of a folder written by :func:`replacing_folder`, which a later write may replace.
 CONTENTS_FILE = ".lippmann-files"
 
 _REASONS = {
@@ -39,22 +38,24 @@ _REASONS = {
 
 @contextmanager
 def replacing(path: Path, *, private: bool = False) -> Iterator[Path]:
-    """Yield a temporary path beside ``path``, with the same suffix; rename it to ``path`` when the block succeeds.
+    """Write a file atomically: yield a temporary path, which is renamed to ``path`` when the block succeeds.
 
-    The temporary file exists already, empty, with the permissions that ``path`` will have: those of the file it
-    replaces, else the usual ones. A symbolic link is followed: its target is replaced.
+    The temporary file has the same suffix and exists already, empty, with the permissions of the file that it replaces,
+    else the default ones.
 
     Parameters
     ----------
+    path:
+        The file. A symbolic link is followed: its target is replaced.
     private:
-        For names that the program makes up in a folder of its own: only the user may read the file, and a symbolic link
-        is itself replaced.
+        For file names that the program chooses in a folder of its own: only the user may read the file, and a symbolic
+        link is itself replaced.
 
     Raises
     ------
     OutputError
-        If ``path`` cannot be written, or the block fails with an :class:`OSError` about writing. Other exceptions
-        pass through.
+        If ``path`` cannot be written, or the block raises an :class:`OSError` about the temporary file. Other
+        exceptions pass through.
     """
     place = path.absolute() if private else _place(path)
     temporary = place.with_name(f".{place.stem[:64]}-{secrets.token_hex(4)}.part{place.suffix}")
@@ -73,17 +74,16 @@ def replacing(path: Path, *, private: bool = False) -> Iterator[Path]:
 
 @contextmanager
 def replacing_folder(path: Path) -> Iterator[Path]:
-    """Yield a temporary folder beside ``path``; rename it to ``path`` when the block succeeds.
+    """Write a folder atomically: yield a temporary folder, which is renamed to ``path`` when the block succeeds.
 
-    A folder already at ``path`` is replaced if it is empty or was written by this function and holds nothing else
-    since; the file :data:`CONTENTS_FILE` inside tells. So no stale file of an earlier run survives, and no file of the
-    user's is lost.
+    An existing folder is replaced if it is empty, or if this function wrote it and it holds no other files, as listed
+    in its file :data:`CONTENTS_FILE`. No stale file of an earlier write remains, and no file of the user is lost.
 
     Raises
     ------
     OutputError
-        If ``path`` cannot be written, holds files of another origin, or the block fails with an :class:`OSError` about
-        writing. Other exceptions pass through.
+        If ``path`` cannot be written or holds other files, or the block raises an :class:`OSError` about the temporary
+        folder. Other exceptions pass through.
     """
     place = _place(path, folder=True)
     temporary = place.with_name(f".{place.name[:64]}-{secrets.token_hex(4)}.part")
@@ -105,7 +105,7 @@ def replacing_folder(path: Path) -> Iterator[Path]:
 
 
 def check_writable(path: Path) -> None:
-    """Raise :class:`OutputError` now if :func:`replacing` could not write ``path`` later: before hours of work."""
+    """Raise :class:`OutputError` if :func:`replacing` cannot write ``path``, for a check before a long render."""
     place = _place(path)
     temporary = place.with_name(f".{secrets.token_hex(8)}.part")
     with _reported(path, temporary):
@@ -114,7 +114,8 @@ def check_writable(path: Path) -> None:
 
 
 def check_folder_writable(path: Path) -> None:
-    """Raise :class:`OutputError` now if :func:`replacing_folder` could not write ``path`` later."""
+    """Raise :class:`OutputError` if :func:`replacing_folder` cannot write ``path``, for a check before a long
+    render."""
     place = _place(path, folder=True)
     temporary = place.with_name(f".{secrets.token_hex(8)}.part")
     with _reported(path, temporary):
@@ -123,7 +124,7 @@ def check_folder_writable(path: Path) -> None:
 
 
 def _place(path: Path, *, folder: bool = False) -> Path:
-    """Where ``path`` really lies, once it is known that something can be put there."""
+    """The resolved ``path``, once it is known that a file or folder can be written there."""
     try:
         mode = _mode(path)
         place = path.resolve()
@@ -149,7 +150,7 @@ def _place(path: Path, *, folder: bool = False) -> Path:
 
 
 def _mode(path: Path) -> int | None:
-    """Kind and permissions of what lies at ``path``, links followed; ``None`` if nothing does."""
+    """``st_mode`` of ``path``, links followed; None if it does not exist."""
     try:
         return path.stat().st_mode
     except (FileNotFoundError, NotADirectoryError):
@@ -157,7 +158,7 @@ def _mode(path: Path) -> int | None:
 
 
 def _create(temporary: Path, *, like: Path | None) -> None:
-    """Make an empty file with the permissions of ``like``, or the usual ones; for the user alone if that is None."""
+    """Create an empty file with the permissions of ``like``, else the default ones; private if ``like`` is None."""
     replaces = like is not None and like.exists()
     mode = FILE_MODE if like is None or replaces else 0o666  # less the user's umask
     descriptor = os.open(temporary, os.O_CREAT | os.O_EXCL | os.O_WRONLY | without_following(), mode)
@@ -174,11 +175,11 @@ def _create(temporary: Path, *, like: Path | None) -> None:
 
 
 def _make_folder(temporary: Path) -> int:
-    """Make a folder for the user alone, for as long as it is written; the permissions that it is to have then."""
+    """Create a folder that is private while it is written; the permissions that it gets afterwards."""
     temporary.mkdir()
     mode = stat.S_IMODE(temporary.stat().st_mode)
     _set_mode(temporary, mode & ~0o077)
-    if os.listdir(temporary):  # of a user of the same group, who was quicker than the line before
+    if os.listdir(temporary):  # a user of the same group wrote to it before the previous line
         raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST), str(temporary))
     return mode
 
@@ -189,19 +190,19 @@ def _set_mode(folder: Path, mode: int) -> None:
 
 
 def _flush(path: Path) -> None:
-    """Wait until ``path`` is on the disk, so that a crash after the rename cannot leave an empty file."""
+    """Flush ``path`` to disk, so that a crash after the rename cannot leave an empty file."""
     descriptor = os.open(path, os.O_RDONLY | without_following())
     try:
         os.fsync(descriptor)
     except OSError as error:
-        if error.errno not in (errno.EINVAL, errno.ENOTSUP):  # some file systems cannot; that is no failure
+        if error.errno not in (errno.EINVAL, errno.ENOTSUP):  # some file systems cannot flush
             raise
     finally:
         os.close(descriptor)
 
 
 def _flush_folder(folder: Path) -> None:
-    """Make a rename last; where a folder cannot be flushed, the system does it in its own time."""
+    """Flush the entries of a folder to disk, if the system can."""
     with suppress(OSError):
         _flush(folder)
 
@@ -219,15 +220,15 @@ def _refuse_foreign_files(place: Path, path: Path) -> None:
     foreign = sorted(set(_files(place)) - {CONTENTS_FILE, *_listed(place)})
     if foreign:
         raise OutputError(
-            f"the folder holds {foreign[0]!r}, which Lippmann did not write there",
+            f"the folder holds {foreign[0]!r}, which Lippmann did not write",
             where=str(path),
             rule="a folder is replaced as a whole",
-            fix="choose a new folder, or move what is yours out of this one",
+            fix="choose a new folder, or move your files out of this one",
         )
 
 
 def _listed(folder: Path) -> list[str]:
-    """What Lippmann wrote into ``folder``; nothing if somebody else than its owner says so, or a link does."""
+    """Files that Lippmann wrote into ``folder``; none if the list is a link or not the folder owner's."""
     try:
         with open_to_read(folder / CONTENTS_FILE, owner=folder.stat().st_uid) as file:
             return file.read().decode().split("\n")
@@ -236,11 +237,11 @@ def _listed(folder: Path) -> list[str]:
 
 
 def _exchange(temporary: Path, place: Path) -> None:
-    """Put the folder ``temporary`` in the place of the folder ``place``, which may be missing."""
+    """Rename the folder ``temporary`` to ``place``, and remove the folder that was there."""
     if not place.exists():
         os.rename(temporary, place)
         return
-    # Folders cannot be renamed onto filled ones: for an instant the old one lies beside its place.
+    # A folder cannot be renamed onto one that is not empty: for an instant the old one has another name.
     old = temporary.with_suffix(".old")
     os.rename(place, old)
     try:

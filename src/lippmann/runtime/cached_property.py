@@ -1,7 +1,7 @@
-"""Properties computed once, without the lock that ``functools.cached_property`` has before Python 3.12.
+"""``functools.cached_property`` without the lock that it has before Python 3.12.
 
-One lock serves a property of all objects there: a thread that holds it while it waits for another lock, or a fork while
-any thread holds it, stops all who ask any object for that property.
+That lock is shared by the property of all objects. A thread that waits for another lock while it holds it, or a fork
+while any thread holds it, deadlocks every access to the property.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ if TYPE_CHECKING or sys.version_info >= (3, 12):
 else:
 
     class cached_property:  # noqa: N801 - stands in for that of functools
-        """Of two threads that ask at once both compute, and both get what the first one kept."""
+        """If two threads access the property at once, both compute it, and both get the value that was stored first."""
 
         def __init__(self, compute):
             self.compute = compute
@@ -24,7 +24,7 @@ else:
             self.name = name
 
         def __get__(self, instance, owner=None):
-            # Of a class this answers with itself; of an object only until the value lies in its dictionary.
+            # For an object this is called only until the value is in its dictionary.
             return self if instance is None else vars(instance).setdefault(self.name, self.compute(instance))
 
 

@@ -1,8 +1,8 @@
 """Child Python processes that import nothing from the working directory.
 
-``python -c`` puts the working directory first on ``sys.path``, and :mod:`multiprocessing` starts its children that way:
-a file ``socket.py`` beside a downloaded scene would run. Python 3.11 and newer leave the entry out where
-``PYTHONSAFEPATH`` is set. Otherwise the first statement of the child's code removes it.
+``python -c`` puts the working directory first on ``sys.path``, and :mod:`multiprocessing` starts its children so: a
+file ``socket.py`` beside a downloaded scene would run. Python 3.11 and newer omit the entry if ``PYTHONSAFEPATH`` is
+set. For older versions the first statement of the child's code removes it.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ _undo: Callable[[], None] | None = None
 def python_command(code: str, *arguments: str) -> tuple[list[str], dict[str, str]]:
     """Command line and environment of a child Python that runs ``code`` without the working directory on its path.
 
-    The user's environment, ``PYTHONPATH`` included, is handed on. The child finds ``arguments`` in ``sys.argv[1:]``.
+    The child inherits the environment, including ``PYTHONPATH``, and finds ``arguments`` in ``sys.argv[1:]``.
     """
     if not _KNOWS_VARIABLE:
         code = _REMOVE_ENTRY + code
@@ -39,9 +39,9 @@ def python_command(code: str, *arguments: str) -> tuple[list[str], dict[str, str
 
 @contextmanager
 def spawn_safely() -> Iterator[None]:
-    """Processes that :mod:`multiprocessing` spawns inside the ``with`` import nothing from the working directory.
+    """Context in which processes spawned by :mod:`multiprocessing` import nothing from the working directory.
 
-    Once such a process has started, its ``sys.path`` is a copy of this process's, as always. The setting belongs to the
+    Once such a process has started, its ``sys.path`` is a copy of this process's, as usual. The setting belongs to the
     whole process: it begins with the first thread that enters and ends with the last that leaves.
     """
     global _users, _undo

@@ -1,7 +1,7 @@
-"""The rendering engine: the only place that picks a Mitsuba variant and an LLVM library.
+"""Start and diagnosis of the rendering engine; the only module that selects a Mitsuba variant and an LLVM library.
 
-Mitsuba and Dr.Jit are imported here first, after the library has been chosen, and by nothing that runs before
-:func:`start`. :func:`diagnose` says what would be used, and proves it in another process.
+:func:`start` imports Mitsuba and Dr.Jit once it has selected the library; no code imports them before.
+:func:`diagnose` reports what a render would use and tests it in a child process.
 """
 
 from __future__ import annotations
@@ -29,12 +29,26 @@ VARIANTS: dict[str, Literal["cpu", "gpu"]] = {"llvm_ad_rgb": "cpu", "cuda_ad_rgb
 _REINSTALL = "install Lippmann anew: pip install --force-reinstall lippmann"
 _PROBE_SECONDS = 120
 
-_set_here: str | None = None  # the variant that `start` set last: any other was set by the caller
+_set_here: str | None = None  # the variant that `start` set last; any other was set by the caller
 
 
 @dataclass(frozen=True)
 class Engine:
-    """A running engine. ``llvm_path``, ``llvm_version`` are ``None`` on the GPU, ``gpu_name`` on the CPU."""
+    """A running engine.
+
+    Attributes
+    ----------
+    variant:
+        Mitsuba variant, ``llvm_ad_rgb`` or ``cuda_ad_rgb``.
+    device:
+        ``cpu`` or ``gpu``.
+    threads:
+        CPU threads.
+    llvm_path, llvm_version:
+        The LLVM library; None on the GPU.
+    gpu_name:
+        Name of the GPU; None on the CPU.
+    """
 
     variant: str
     device: Literal["cpu", "gpu"]
@@ -45,29 +59,31 @@ class Engine:
 
 
 def start(device: DeviceChoice = "auto", threads: int | None = None) -> Engine:
-    """Load the engine, or set up the running one anew. Costs about half a second once and next to nothing after.
+    """Start the engine, or change the device and threads of the running one.
+
+    The first call takes about half a second, later ones almost none.
 
     Parameters
     ----------
     device:
-        ``cpu``, ``gpu`` or ``auto``: the variant that the caller has set in Mitsuba himself if it is one of
-        :data:`VARIANTS`, else the GPU where it can be used, else the CPU.
+        ``cpu``, ``gpu`` or ``auto``: the Mitsuba variant that the caller has set if it is one of :data:`VARIANTS`, else
+        the GPU if it can be used, else the CPU.
     threads:
-        CPU threads, at least 1; by default all cores that the process may use.
+        CPU threads, at least 1; None for all cores that the process may use.
 
     Raises
     ------
     UsageError
         If an argument is out of range.
     EngineError
-        If the device cannot be used on this machine; the message says how to mend that. No LLVM library that might
-        end the process is ever put to work.
+        If the device cannot be used on this machine; the message names the fix. LLVM libraries that may crash the
+        process are never used.
     """
     global _set_here
     if device not in DEVICES:
         raise UsageError(f"device '{device}' is unknown", rule=f"known are {', '.join(DEVICES)}")
     if threads is not None and threads < 1:
-        raise UsageError(f"{threads} threads are too few", rule="at least 1 is needed")
+        raise UsageError(f"{threads} is out of range", parameter="threads", rule="it must be at least 1")
     with exclusive():
         library = None if "drjit" in sys.modules else _point_to_llvm(device)
         dr, mi = _load()
@@ -89,13 +105,13 @@ def start(device: DeviceChoice = "auto", threads: int | None = None) -> Engine:
 
 
 def _point_to_llvm(device: DeviceChoice) -> llvm.Library | None:
-    """Tell Dr.Jit, which is not loaded yet, which LLVM library to take."""
+    """Select the LLVM library for Dr.Jit, which is not loaded yet."""
     try:
         library = llvm.choose()
     except EngineError as error:
         forced_wrong = error.where == llvm.PATH_VARIABLE
         if device == "gpu" or (device == "auto" and not forced_wrong and gpu.find()):
-            return None  # Dr.Jit may find another one by itself, but nothing is compiled with it on the GPU
+            return None  # Dr.Jit may find another library, but compiles nothing with it on the GPU
         raise
     os.environ[llvm.PATH_VARIABLE] = str(library.path)
     return library
@@ -103,20 +119,20 @@ def _point_to_llvm(device: DeviceChoice) -> llvm.Library | None:
 
 def _load() -> tuple[Any, Any]:
     try:
-        # Dr.Jit loads LLVM in the background; importing Mitsuba meanwhile hides most of that time.
+        # Dr.Jit loads LLVM in the background, during the import of Mitsuba.
         import drjit
         import mitsuba
     except (ImportError, NameError) as error:
-        # Dr.Jit trips over a name of its own while it explains a library that it misses: the reason lies beneath.
+        # Dr.Jit raises NameError while it reports a missing library: the reason is in the context.
         reason = error.__context__ if isinstance(error, NameError) and error.__context__ else error
         raise EngineError(f"Mitsuba cannot be loaded: {reason}", fix=_fix_of_import(str(reason))) from error
     return drjit, mitsuba
 
 
 def _search_package_alone(mi: Any) -> None:
-    """Let Mitsuba look for plugins and tables in its own package alone.
+    """Restrict Mitsuba's search for plugins and tables to its own package.
 
-    By itself it looks in the working directory first, and runs the code of any ``plugins/NAME.so`` there.
+    By default it searches the working directory first and runs the code of any ``plugins/NAME.so`` there.
     """
     resolver = mi.file_resolver()
     resolver.clear()
@@ -124,7 +140,7 @@ def _search_package_alone(mi: Any) -> None:
 
 
 def _fix_of_import(reason: str) -> str:
-    if "libatomic.so" in reason:  # the one library that Mitsuba takes from the system and Debian may lack
+    if "libatomic.so" in reason:  # the only system library of Mitsuba that Debian may lack
         return "install it: sudo apt-get install libatomic1"
     return _REINSTALL
 
@@ -143,7 +159,7 @@ def _resolve(device: DeviceChoice, dr: Any, mi: Any) -> Literal["cpu", "gpu"]:
 
 def _on_cpu(dr: Any, library: llvm.Library | None) -> Engine:
     if not dr.has_backend(dr.JitBackend.LLVM):
-        library = library or llvm.choose()  # its error is the better explanation, if it raises one
+        library = library or llvm.choose()  # its error, if any, explains more
         raise EngineError(
             f"the LLVM library '{library.path}' could not be used{_load_error(library.path)}",
             rule="it has to load, and the processor has to know AVX and FMA (x86) or NEON (ARM)",
@@ -151,10 +167,10 @@ def _on_cpu(dr: Any, library: llvm.Library | None) -> Engine:
         )
     version = tuple(dr.detail.llvm_version())
     if version[0] < llvm.OLDEST:
-        llvm.choose()  # raises the better explanation if there is no other library
+        llvm.choose()  # raises a better error if there is no other library
         raise EngineError(
             f"Dr.Jit has loaded LLVM {version[0]}, which is too old",
-            rule=f"LLVM {llvm.OLDEST} or newer is needed, and Dr.Jit takes another only before it is first imported",
+            rule=f"LLVM {llvm.OLDEST} or newer is needed, and has to be selected before Dr.Jit is first imported",
             fix=f"start Lippmann before Mitsuba is imported, or set {llvm.PATH_VARIABLE}",
         )
     path = str(library.path) if library else os.environ.get(llvm.PATH_VARIABLE)
@@ -175,9 +191,20 @@ def _on_gpu() -> Engine:
 
 @dataclass(frozen=True)
 class Check:
-    """One finding: what was looked at, what it is, and how to mend it if it is not ``ok``.
+    """One finding of a diagnosis.
 
-    A render can run without what is not ``needed``.
+    Attributes
+    ----------
+    name:
+        The part checked, such as ``LLVM``.
+    ok:
+        Whether it can be used.
+    value:
+        What was found.
+    fix:
+        How to fix it; empty if there is nothing to fix.
+    needed:
+        Whether a render needs it.
     """
 
     name: str
@@ -189,22 +216,27 @@ class Check:
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """All findings, and the engine that a render would use (``None`` if it would not run)."""
+    """Findings on the engine, and the engine that a render would use; None if a render would fail."""
 
     checks: tuple[Check, ...]
     engine: Engine | None
 
     @property
     def ok(self) -> bool:
-        """Whether a render would run."""
+        """Whether a render would succeed."""
         return self.engine is not None and all(check.ok for check in self.checks if check.needed)
 
 
 def diagnose(device: DeviceChoice = "auto") -> Diagnosis:
-    """Find out what would be used, and render a small picture with it in another process.
+    """Check the parts of the engine, and render a small picture in a child process.
 
-    Never raises for what is wrong with the machine, and loads no library into this process: one that ends its process
-    ends the other.
+    Problems of the machine are findings, not errors. No library is loaded into this process, so that one that crashes
+    ends the child process only.
+
+    Parameters
+    ----------
+    device:
+        ``auto``, ``cpu`` or ``gpu``, as for :func:`start`.
     """
     render, engine = _try_render(device)
     on_gpu = engine is not None and engine.device == "gpu"
@@ -225,7 +257,7 @@ def _gib(size: int) -> str:
 
 
 def _check_packages() -> Check:
-    from importlib.metadata import PackageNotFoundError, version  # slow to import, and wanted here alone
+    from importlib.metadata import PackageNotFoundError, version  # slow to import
 
     found = [f"Python {platform.python_version()}"]
     for label, name in (("Lippmann", "lippmann"), ("Mitsuba", "mitsuba"), ("Dr.Jit", "drjit")):
@@ -247,7 +279,7 @@ def _check_llvm(*, needed: bool) -> Check:
 
 
 def _try_render(device: DeviceChoice) -> tuple[Check, Engine | None]:
-    """Run :func:`_probe` in another process and judge how it ended."""
+    """Run :func:`_probe` in a child process and check how it ended."""
     name = "test render"
     command, environment = python_command(
         "import sys; from lippmann.runtime.engine import _probe; _probe(sys.argv[1])", device
@@ -261,7 +293,7 @@ def _try_render(device: DeviceChoice) -> tuple[Check, Engine | None]:
         return Check(name, False, f"did not finish: {error}", _REINSTALL), None
     seconds = time.perf_counter() - began
     if run.returncode != 0:
-        last = (run.stderr.strip().splitlines() or ["without a word"])[-1]
+        last = (run.stderr.strip().splitlines() or ["no message"])[-1]
         end = f"signal {-run.returncode}" if run.returncode < 0 else f"exit code {run.returncode}"
         return Check(name, False, f"the engine ended its process with {end}: {last}", _REINSTALL), None
     answer = json.loads(run.stdout.splitlines()[-1])
@@ -271,7 +303,7 @@ def _try_render(device: DeviceChoice) -> tuple[Check, Engine | None]:
 
 
 def _probe(device: DeviceChoice) -> None:
-    """Start the engine, render a white ball under a white sky, and write the engine or the problem as JSON."""
+    """Start the engine, render a grey sphere under a white sky, and print the engine or the problem as JSON."""
     try:
         engine = start(device)
         _, mi = _load()

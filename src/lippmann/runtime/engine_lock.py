@@ -1,8 +1,8 @@
 """The lock of the rendering engine: one thread of a process uses the engine at a time, and no forked child does.
 
-Mitsuba keeps its variant, and Dr.Jit its thread count, its registry of plugins and the kernel that is being recorded,
-for the whole process: two threads that render at the same time end the process. The threads of Dr.Jit and of Open Image
-Denoise do not survive ``os.fork``, and locks that they held are never released in the child.
+The variant of Mitsuba and the thread count, plugin registry and recorded kernel of Dr.Jit belong to the whole process:
+two threads that render at the same time crash it. The threads of Dr.Jit and of Open Image Denoise do not survive
+``os.fork``, and locks that they held are never released in the child.
 """
 
 from __future__ import annotations
@@ -27,15 +27,14 @@ _lost = False  # whether this process was forked from one that had loaded such a
 
 @contextmanager
 def exclusive() -> Iterator[None]:
-    """Keep the engine to the calling thread; a context manager, and as ``@exclusive()`` a decorator.
+    """Exclusive use of the engine by the calling thread; a context manager, and as ``@exclusive()`` a decorator.
 
-    A thread waits until no other thread uses the engine, and Ctrl-C ends the wait. A thread that has the engine may
-    enter again.
+    The call waits until no other thread uses the engine; Ctrl-C ends the wait. The lock is reentrant.
 
     Raises
     ------
     EngineError
-        The process was forked from one that had loaded the engine.
+        If the process was forked from one that had loaded the engine.
     """
     if _lost:
         raise EngineError(
@@ -61,21 +60,20 @@ def _after_fork() -> None:
 
 
 def _leave_exit_functions_out() -> None:
-    """End the process, when its time has come, without functions that were registered before with :mod:`atexit`.
+    """Make the process exit without the functions that were registered before with :mod:`atexit`.
 
-    The one of Dr.Jit waits for the kernel that ran during the fork, and without it the interpreter's own clean-up
-    crashes. Python does not tell exit functions the exit code: it is noted where it arises, in ``sys.exit`` and where
-    uncaught errors are shown.
+    That of Dr.Jit waits for the kernel that ran during the fork, and without it the interpreter's own clean-up crashes.
+    Exit functions do not receive the exit code, so ``sys.exit`` and the hook of uncaught errors store it.
     """
     code: object = None
     leave, show = sys.exit, sys.excepthook
 
-    def noted_exit(status: Any = None, /) -> NoReturn:
+    def exit_and_store(status: Any = None, /) -> NoReturn:
         nonlocal code
         code = status
         leave(status)
 
-    def noted_error(*error: Any) -> None:
+    def show_and_store(*error: Any) -> None:
         nonlocal code
         code = 1
         show(*error)
@@ -88,14 +86,14 @@ def _leave_exit_functions_out() -> None:
             os._exit(0)
         os._exit(code & 0xFF if isinstance(code, int) else 1)  # Python shows anything else as a message
 
-    sys.exit, sys.excepthook = noted_exit, noted_error
+    sys.exit, sys.excepthook = exit_and_store, show_and_store
     atexit.register(end)
 
 
 def _leave_destructors_out() -> None:
-    """End the process, when its time has come, without the destructors of C++ libraries.
+    """Make the process exit without the destructors of C++ libraries, after Python's own clean-up.
 
-    Dr.Jit's wait for threads that the child does not have. Python has finished its own clean-up by then.
+    Those of Dr.Jit wait for threads that the child does not have.
     """
     if _ON_EXIT is not None:
         atexit.register(_LIBC.fflush, None)
@@ -103,8 +101,8 @@ def _leave_destructors_out() -> None:
 
 
 if hasattr(os, "register_at_fork"):  # not on Windows, which has no fork
-    # Found before any fork: the loader's own lock may be held during one.
+    # Loaded before any fork: the loader's own lock may be held during one.
     _LIBC: Any = ctypes.CDLL(None)
-    #: Of the GNU C library alone: runs a function with the exit code, before all destructors that came earlier.
+    #: GNU C library only: registers a function that receives the exit code and runs before earlier destructors.
     _ON_EXIT: Any = getattr(_LIBC, "on_exit", None)
     os.register_at_fork(after_in_child=_after_fork)

@@ -1,14 +1,14 @@
-"""Finding an NVIDIA GPU that can trace rays, through its driver's own libraries."""
+"""Detection of an NVIDIA GPU that can trace rays, through the driver's libraries."""
 
 from __future__ import annotations
 
 import ctypes
 import os
-from typing import Any
+from types import ModuleType
 
 
 def find() -> str | None:
-    """The name of the first GPU, or ``None`` if there is no GPU or no driver for it."""
+    """Name of the first GPU; None without a GPU or its driver."""
     try:
         driver = ctypes.CDLL(os.environ.get("DRJIT_LIBCUDA_PATH") or "libcuda.so.1")
         count = ctypes.c_int(0)
@@ -22,10 +22,10 @@ def find() -> str | None:
     return name.value.decode(errors="replace")
 
 
-def obstacle(dr: Any) -> str:
-    """Why Mitsuba cannot use the GPU; empty if it can. ``dr`` is the loaded Dr.Jit.
+def obstacle(dr: ModuleType) -> str:
+    """Reason why Mitsuba cannot use the GPU; empty if it can.
 
-    It takes a CUDA driver and OptiX, which containers often lack.
+    It needs a CUDA driver and OptiX, which containers often lack. ``dr`` is the module ``drjit``.
     """
     if not dr.has_backend(dr.JitBackend.CUDA):
         return "no NVIDIA GPU with a driver of version 535 or newer was found"
@@ -33,7 +33,7 @@ def obstacle(dr: Any) -> str:
         return "NVIDIA drivers of versions 560 to 569 miscompile kernels; install 570 or newer"
     optix = os.environ.get("DRJIT_LIBOPTIX_PATH") or "libnvoptix.so.1"
     try:
-        ctypes.CDLL(optix).optixQueryFunctionTable  # noqa: B018 - the look-up raises if it is missing
+        ctypes.CDLL(optix).optixQueryFunctionTable  # noqa: B018 - the look-up raises if the function is missing
     except (OSError, AttributeError):
         return f"the GPU's driver cannot trace rays: '{optix}' (OptiX) cannot be loaded"
     return ""

@@ -1,8 +1,8 @@
-"""Finding an LLVM library that Dr.Jit can use, without loading any.
+"""Selection of an LLVM library for Dr.Jit, without loading any.
 
-Dr.Jit compiles its CPU kernels with the first libLLVM that it finds. Not every version will do: 14 and older are
-refused, and 15 and 16 end the whole process in the middle of a compilation (``Cannot select: fminimum``). So the
-library is chosen here, by the version that it states about itself in its file, and handed to Dr.Jit by path.
+Dr.Jit compiles its CPU kernels with the first libLLVM that it finds. It refuses versions up to 14, and versions 15 and
+16 crash the process during compilation (``Cannot select: fminimum``). This module selects a library by the version in
+its file and passes its path to Dr.Jit.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ from pathlib import Path
 from lippmann.errors import EngineError
 from lippmann.runtime.child_python import python_command
 
-#: The environment variable by which Dr.Jit is told its library, and by which users may force one.
+#: Environment variable with the path of Dr.Jit's library; users may set it to force one.
 PATH_VARIABLE = "DRJIT_LIBLLVM_PATH"
 #: The oldest major version that compiles all kernels.
 OLDEST = 17
-#: The newest major version that was tried; a newer one is taken only where nothing else is found.
+#: The newest major version that was tested; a newer one is used only if there is no other.
 NEWEST_TRIED = 22
 
 _MAC = sys.platform == "darwin"
@@ -39,9 +39,16 @@ _STRINGS_ENTRY, _NAME_ENTRY = 5, 14
 
 @dataclass(frozen=True)
 class Library:
-    """One LLVM library found on the machine.
+    """An LLVM library of the machine.
 
-    ``version`` is empty if it cannot be told; ``problem`` says why the library will not do and is empty if it will.
+    Attributes
+    ----------
+    path:
+        The file.
+    version:
+        Its version; empty if unknown.
+    problem:
+        Why it cannot be used; empty if it can.
     """
 
     path: Path
@@ -54,7 +61,7 @@ class Library:
 
 
 def install_command() -> str:
-    """The command that installs a library that will do, for this kind of machine."""
+    """Command that installs a suitable LLVM library on this system."""
     if _MAC:
         return "brew install llvm"
     for tool, command in (
@@ -69,34 +76,34 @@ def install_command() -> str:
 
 
 def choose() -> Library:
-    """The library to use: the one that ``DRJIT_LIBLLVM_PATH`` names, else the newest good one of the machine.
+    """Select the LLVM library: that of ``DRJIT_LIBLLVM_PATH``, else the newest usable one of the machine.
 
-    Takes a few milliseconds and loads nothing.
+    The call takes a few milliseconds and loads no library.
 
     Raises
     ------
     EngineError
-        If the variable names a library that will not do, or if no good one is found.
+        If the library of the variable cannot be used, or there is no usable one.
     """
     named = os.environ.get(PATH_VARIABLE)
     if named:
         return _named(named)
-    found = []
-    # The system's list of libraries is asked last: it costs a process, and mostly the folders are enough.
+    libraries: list[Library] = []
+    # The system's list of libraries comes last: it takes a child process, and the folders usually suffice.
     for files in (files_in(search_folders()), listed_files()):
-        found += [inspect(path) for path in files]
-        good = [library for library in found if not library.problem]
-        if good:
-            return max(good, key=_rank)
+        libraries += [inspect(path) for path in files]
+        usable = [library for library in libraries if not library.problem]
+        if usable:
+            return max(usable, key=_rank)
     raise EngineError(
-        f"no usable LLVM library is installed{_passed_over(found)}",
+        f"no usable LLVM library is installed{_unusable(libraries)}",
         rule=f"rendering on the CPU needs LLVM {OLDEST} or newer",
         fix=f"install it: {install_command()}",
     )
 
 
 def installed() -> list[Library]:
-    """All LLVM libraries found on the machine, the best first; those that will not do say why."""
+    """All LLVM libraries of the machine, the best first; those that cannot be used state their ``problem``."""
     paths = dict.fromkeys((*files_in(search_folders()), *listed_files()))
     libraries = [inspect(path) for path in paths]
     return sorted(libraries, key=lambda library: (not library.problem, _rank(library)), reverse=True)
@@ -104,7 +111,7 @@ def installed() -> list[Library]:
 
 @functools.cache
 def inspect(path: Path) -> Library:
-    """What the library file ``path`` is, judged without loading it into this process."""
+    """Version and usability of a library file, without loading it into this process."""
     if path.is_dir():
         return Library(path, problem="is a folder, not a library")
     try:
@@ -125,7 +132,7 @@ def inspect(path: Path) -> Library:
 
 
 def search_folders() -> list[Path]:
-    """Folders where LLVM libraries are usually installed, without repeats."""
+    """Folders in which LLVM libraries are usually installed, each once."""
     machine = platform.machine()
     homes = [sys.prefix, os.environ.get("CONDA_PREFIX", "")]
     folders = [Path(entry) for entry in os.environ.get("LD_LIBRARY_PATH", "").split(os.pathsep) if entry]
@@ -146,8 +153,8 @@ def search_folders() -> list[Path]:
 
 
 def files_in(folders: Iterable[Path]) -> Iterator[Path]:
-    """Files in ``folders`` that are named like an LLVM library, each real file once."""
-    seen = set()
+    """Files in ``folders`` with the name of an LLVM library, each once after resolving links."""
+    resolved = set()
     for folder in folders:
         try:
             names = sorted(name for name in os.listdir(folder) if _FILE_NAME.fullmatch(name))
@@ -155,13 +162,13 @@ def files_in(folders: Iterable[Path]) -> Iterator[Path]:
             continue
         for name in names:
             real = (folder / name).resolve()
-            if real not in seen and real.is_file():
-                seen.add(real)
+            if real not in resolved and real.is_file():
+                resolved.add(real)
                 yield real
 
 
 def listed_files() -> Iterator[Path]:
-    """LLVM libraries of the system's own list (``ldconfig``), which knows folders that no one else does."""
+    """LLVM libraries of the system's list (``ldconfig``), which includes configured folders."""
     if not sys.platform.startswith("linux"):
         return
     for command in ("/sbin/ldconfig", "ldconfig"):
@@ -190,24 +197,23 @@ def _named(name: str) -> Library:
 
 
 def _rank(library: Library) -> tuple[bool, tuple[int, ...]]:
-    """Sorts the newest tried version highest, and of the untried ones the nearest to those tried."""
+    """Sort key: the newest tested version is highest; of untested ones the oldest."""
     if library.version and library.version[0] > NEWEST_TRIED:
         return False, tuple(-part for part in library.version)
     return True, library.version
 
 
-def _passed_over(found: list[Library]) -> str:
-    if not found:
+def _unusable(libraries: list[Library]) -> str:
+    if not libraries:
         return ""
-    versions = sorted({library.version_text for library in found if library.version})
-    return f" (found only {', '.join(versions)})" if versions else f" ('{found[0].path}' {found[0].problem})"
+    versions = sorted({library.version_text for library in libraries if library.version})
+    return f" (found only {', '.join(versions)})" if versions else f" ('{libraries[0].path}' {libraries[0].problem})"
 
 
 def _own_name(path: Path) -> str:
-    """The name that a library was built under (ELF ``SONAME``), or its file's name where the format holds none.
+    """The ELF ``SONAME`` of a library, which holds its version; else the name of its file.
 
-    The file's name may be any; what it was built under tells the version. The layout is that of the System V ABI,
-    "Object Files" and "Dynamic Linking".
+    The format is that of the System V ABI, "Object Files" and "Dynamic Linking".
     """
     with path.open("rb") as file:
         length = os.fstat(file.fileno()).st_size
@@ -244,13 +250,13 @@ def _own_name(path: Path) -> str:
 
 @functools.cache
 def _machine_code() -> bytes:
-    """The processor's number in ELF files, taken from the running Python."""
+    """Machine code of the processor in ELF files, from that of the running Python."""
     with Path(sys.executable).open("rb") as file:
         return file.read(20)[18:]
 
 
 def _ask(path: Path) -> tuple[int, ...]:
-    """The version that the library itself reports, asked in another process: it may not survive being loaded."""
+    """The version that the library reports, in a child process, which it may crash; empty if it fails."""
     code = (
         "import ctypes, sys; n = [ctypes.c_uint() for _ in range(3)];"
         "ctypes.CDLL(sys.argv[1]).LLVMGetVersion(*map(ctypes.byref, n)); print(*(v.value for v in n))"

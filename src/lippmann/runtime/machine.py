@@ -1,4 +1,4 @@
-"""What the machine offers to this process: cores and memory."""
+"""Cores and memory that this process may use."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ _CONTROL_GROUP = Path("/sys/fs/cgroup")
 
 
 def usable_cores() -> int:
-    """Logical cores that this process may run on, at least 1."""
+    """Number of logical cores that this process may use, at least 1."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
 
 
 def total_memory() -> int:
-    """Bytes of memory that this process could ever have: the machine's, or the container's limit."""
+    """Memory in bytes: that of the machine, or the container's limit if that is lower."""
     import psutil
 
     limit = _limit()
@@ -25,7 +25,7 @@ def total_memory() -> int:
 
 
 def available_memory() -> int:
-    """Bytes of memory that can be taken now without swapping, within the container's limit."""
+    """Memory in bytes that is available now without swapping, within the container's limit."""
     import psutil
 
     available = int(psutil.virtual_memory().available)
@@ -36,7 +36,7 @@ def available_memory() -> int:
 
 
 def _limit() -> int | None:
-    """The memory limit of the container in bytes, if there is one (control groups, version 2 and 1)."""
+    """Memory limit of the container in bytes (control groups, version 2 or 1); None without one."""
     for name in ("memory.max", "memory/memory.limit_in_bytes"):
         try:
             text = (_CONTROL_GROUP / name).read_text().strip()
@@ -48,7 +48,7 @@ def _limit() -> int | None:
 
 
 def _used() -> int:
-    """Bytes that count against the container's limit and that the kernel cannot take back."""
+    """Memory in bytes that counts against the container's limit and cannot be reclaimed."""
     for usage, statistics, key in (
         ("memory.current", "memory.stat", "inactive_file"),
         ("memory/memory.usage_in_bytes", "memory/memory.stat", "total_inactive_file"),

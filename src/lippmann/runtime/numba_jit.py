@@ -1,8 +1,8 @@
-"""How kernels are compiled, and kept on disk.
+"""Compilation of kernels by Numba, and their cache on disk.
 
-Numba keeps compiled code beside the source, or in the user's cache folder where that cannot be written. It looks for
-changes in the file of a kernel only; here a kernel also grows old when any module of its step changes
-(``rendering/reprojection``, ``metrics``), since parts of kernels come from other modules.
+Numba caches compiled code beside the source, or in the user's cache folder if that is read-only. It checks the file of
+a kernel for changes. Kernels use functions of other modules, so here a cached kernel is invalid as soon as any module
+of its package (``rendering/reprojection``, ``metrics``) has changed.
 """
 
 from __future__ import annotations
@@ -18,15 +18,15 @@ from typing import Any, TypeVar, cast
 
 from lippmann.errors import UsageError
 
-#: Numba takes its settings from a file of this name in the working directory: where it keeps compiled code, for
-#: example, which it runs. A downloaded folder must not decide that.
+#: Numba reads settings from a file of this name in the working directory, among them the folder of compiled code that
+#: it runs. A downloaded folder must not set them.
 _SETTINGS_FILE = ".numba_config.yaml"
 
 if "numba" not in sys.modules and os.path.exists(_SETTINGS_FILE):
     raise UsageError(
         "would set up Numba",
         where=_SETTINGS_FILE,
-        rule="files of the working directory are not trusted with that",
+        rule="files of the working directory are not trusted",
         fix="start from another folder, or set variables NUMBA_... in the environment",
     )
 
@@ -64,24 +64,24 @@ _OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy"}
 
 
 def compiled(kernel: Kernel) -> Kernel:
-    """A compiled function."""
-    return _kept(kernel, {})
+    """Compile a kernel, cached on disk; it runs without the interpreter's lock."""
+    return _cached(kernel, {})
 
 
 def uncounted(kernel: Kernel) -> Kernel:
-    """A compiled function that allocates nothing.
+    """Compile a kernel that allocates no memory, without reference counts of its arrays.
 
-    No references to arrays are counted in it: the counters, shared by all threads, would take longer than all else.
+    The counts are shared by all threads and would dominate the run time.
     """
-    return _kept(kernel, {"_nrt": False})
+    return _cached(kernel, {"_nrt": False})
 
 
 def inlined(kernel: Kernel) -> Kernel:
-    """A part of compiled functions."""
+    """Compile a function that is inlined into kernels."""
     return cast("Kernel", cast("Any", njit)(**_OPTIONS, inline="always")(kernel))
 
 
-def _kept(kernel: Kernel, options: dict[str, Any]) -> Kernel:
+def _cached(kernel: Kernel, options: dict[str, Any]) -> Kernel:
     dispatcher = cast("Any", njit)(**_OPTIONS, **options)(kernel)
     try:
         dispatcher.enable_caching()
@@ -90,22 +90,22 @@ def _kept(kernel: Kernel, options: dict[str, Any]) -> Kernel:
         pattern = file._data_name_pattern.replace("{number", "{process}.{number")
         file._data_name = lambda number: pattern.format(process=_process, number=number)
     except RuntimeError:
-        pass  # neither the package nor the user's folder can be written: compiled anew by each process
+        pass  # neither the package nor the user's folder is writable: each process compiles the kernel
     return cast("Kernel", dispatcher)
 
 
 @cache
 def source_stamp(folder: Path) -> str:
-    """Stands for the sources of all modules of a folder's step, and for how they are compiled."""
+    """SHA-256, in hexadecimal, of the sources of a folder's package and of this module."""
     digest = hashlib.sha256(Path(__file__).read_bytes())
-    for path in sorted(_step(folder).rglob("*.py")):
+    for path in sorted(_package(folder).rglob("*.py")):
         digest.update(path.read_bytes())
     return digest.hexdigest()
 
 
-def _step(folder: Path) -> Path:
-    """The step of the way that a folder belongs to: its kernels take parts from one another across folders."""
-    package = Path(__file__).parent.parent
-    if not folder.is_relative_to(package):
+def _package(folder: Path) -> Path:
+    """The package, two levels below the root, to which a folder belongs: its kernels share functions across folders."""
+    root = Path(__file__).parent.parent
+    if not folder.is_relative_to(root):
         return folder
-    return package.joinpath(*folder.relative_to(package).parts[:2])
+    return root.joinpath(*folder.relative_to(root).parts[:2])

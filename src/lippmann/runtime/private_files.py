@@ -1,11 +1,12 @@
 """Private files: files and folders that the program names itself, opened without following links and only if own.
 
-The user names an output, so that a link there is followed. The program makes up the names of journals and half-written
-files. In a folder that others may write to, such as ``/tmp``, another user may have put a link or a file there first.
+The user names an output, so that a link there is followed. The program chooses the names of journals and temporary
+files. In a folder that others may write to, such as ``/tmp``, another user may have created a link or a file under such
+a name.
 
-A private folder is checked by its owner and permissions; its files are then opened by their paths, not relative to an
-open folder. That suffices: nobody else can exchange names in a folder that belongs to the user and that nobody else may
-write to. Folders above it are not checked: whoever may rename things there can exchange the output as well.
+A private folder is checked by its owner and permissions. Its files are then opened by path, which is safe, since nobody
+else can rename files in a folder of the user that nobody else may write to. Parent folders are not checked: whoever can
+rename files there can replace the output as well.
 """
 
 from __future__ import annotations
@@ -24,19 +25,19 @@ FOLDER_MODE, FILE_MODE = 0o700, 0o600
 
 _OTHERS_FIX = "choose another name, or another folder"
 
-#: What :func:`_shown_in` found.
+#: Results of :func:`_shown_in` by folder.
 _shown: dict[Path, os.stat_result] = {}
 
 
 class ForeignFileError(Exception):
-    """A file or folder that is not to be used; the text is a predicate, such as ``is a symbolic link``.
+    """A file or folder that must not be used.
 
     Parameters
     ----------
     predicate:
-        What it is.
+        The reason as a predicate, such as ``is a symbolic link``.
     fix:
-        What the user can do about it; empty where the caller knows better.
+        What the user can do; empty if the caller knows better.
     """
 
     def __init__(self, predicate: str, fix: str = "") -> None:
@@ -45,14 +46,14 @@ class ForeignFileError(Exception):
 
 
 def make_folder(path: Path) -> None:
-    """Make the folder ``path`` for the user alone, or check the one that is there.
+    """Create the private folder ``path``, or check an existing one.
 
     Raises
     ------
     ForeignFileError
-        As :func:`check_folder`.
+        If ``path`` is no folder, the folder is another user's, or other users may write to it.
     OSError
-        If it cannot be made.
+        If it cannot be created.
     """
     with suppress(FileExistsError):
         os.mkdir(path, FOLDER_MODE)
@@ -61,14 +62,14 @@ def make_folder(path: Path) -> None:
 
 
 def check_folder(path: Path) -> bool:
-    """Whether there is a folder at ``path``.
+    """Whether the private folder ``path`` exists.
 
     Raises
     ------
     ForeignFileError
-        If something else lies there, the folder is another user's, or other users may write to it.
+        If ``path`` is no folder, the folder is another user's, or other users may write to it.
     OSError
-        If that cannot be found out.
+        If its status cannot be read.
     """
     try:
         status = os.lstat(path)
@@ -82,7 +83,7 @@ def check_folder(path: Path) -> bool:
         raise ForeignFileError("belongs to another user", _OTHERS_FIX)
     if hasattr(os, "geteuid") and status.st_mode & 0o022:
         shown = _shown_in(path.parent)
-        # File systems without permissions, such as FAT, show everything as open to all.
+        # File systems without permissions, such as FAT, show all files as open to everyone.
         if shown is None or not shown.st_mode & 0o077:
             raise ForeignFileError(
                 "can be written to by other users", f"take that permission away: chmod go-w '{path}'"
@@ -91,17 +92,19 @@ def check_folder(path: Path) -> bool:
 
 
 def open_to_read(path: Path, owner: int | None = None) -> IO[bytes]:
-    """Open the file ``path`` for reading.
+    """Open a private file for reading.
 
     Parameters
     ----------
+    path:
+        The file.
     owner:
-        The number of a user whose file it may be, instead of this user's.
+        User ID of the required owner; None for this user.
 
     Raises
     ------
     ForeignFileError
-        If it is a link, no regular file, or another user's.
+        If it is a link, no regular file, or the file of another user.
     OSError
         If it cannot be opened.
     """
@@ -109,12 +112,12 @@ def open_to_read(path: Path, owner: int | None = None) -> IO[bytes]:
 
 
 def open_to_append(path: Path) -> IO[bytes]:
-    """Open the file ``path``, made if it is not there, for reading and adding.
+    """Open a private file for reading and appending; it is created if it does not exist.
 
     Raises
     ------
     ForeignFileError
-        If it is a link, no regular file, another user's, or has a second name: writing would change that file, too.
+        If it is a link, no regular file, the file of another user, or has a hard link.
     OSError
         If it cannot be opened.
     """
@@ -130,10 +133,7 @@ def is_own(path: Path) -> bool:
 
 
 def remove(path: Path) -> None:
-    """Remove the file, link or folder ``path`` if it is the user's own, as far as that is possible.
-
-    Links are removed, not followed.
-    """
+    """Remove a file, link or folder if it belongs to the user; errors are ignored, links are not followed."""
     if not is_own(path):
         return
     with suppress(OSError):
@@ -144,7 +144,7 @@ def remove(path: Path) -> None:
 
 
 def without_following() -> int:
-    """Flags for :func:`os.open`: fail at links, do not wait for the other end of pipes; as far as the system can."""
+    """Flags for :func:`os.open` that refuse links and do not wait for pipes, as far as the system has them."""
     names = ("O_NOFOLLOW", "O_CLOEXEC", "O_NONBLOCK", "O_BINARY")
     flags = 0
     for name in names:
@@ -176,22 +176,22 @@ def _open(path: Path, flags: int, *, owner: int | None = None, is_changed: bool 
 
 
 def _is_link(status: os.stat_result) -> bool:
-    """Whether this is a symbolic link or, on Windows, a junction."""
+    """Whether the status is that of a symbolic link or, on Windows, a junction."""
     junction = getattr(stat, "IO_REPARSE_TAG_MOUNT_POINT", None)
     return stat.S_ISLNK(status.st_mode) or getattr(status, "st_reparse_tag", 0) == junction
 
 
 def _is_own(status: os.stat_result, folder: Path) -> bool:
-    """Whether what has this status and lies in ``folder`` belongs to the user."""
+    """Whether a file in ``folder`` with this status belongs to the user."""
     if not hasattr(os, "geteuid") or status.st_uid == os.geteuid():
         return True
-    # Network drives and containers may show one owner for all files of a user, and not the one who made them.
+    # Network drives and containers may show another owner for all files of a user.
     shown = _shown_in(folder)
     return shown is not None and shown.st_uid == status.st_uid
 
 
 def _shown_in(folder: Path) -> os.stat_result | None:
-    """Owner and permissions that the file system shows for a private file made in ``folder``; None if none can be."""
+    """Status that the file system shows for a new private file in ``folder``; None if none can be created."""
     if folder not in _shown:
         path = folder / f".{secrets.token_hex(8)}.part"
         try:

@@ -1,4 +1,4 @@
-"""Libraries that print what is wrong with a file on standard error, beside saying it where they were called."""
+"""Suppression of standard error, on which some libraries print errors that they also raise."""
 
 from __future__ import annotations
 
@@ -13,19 +13,18 @@ from typing import TextIO
 _STANDARD_ERROR = 2
 
 _lock = threading.Lock()
-#: How many threads want silence, and what they took away: a copy of the descriptor, and Python's stream, which leads
-#: elsewhere in notebooks.
+#: Number of threads inside the context; copy of the descriptor; and Python's stream, which is another one in notebooks.
 _users = 0
-_kept: int | None = None
+_descriptor: int | None = None
 _stream: TextIO | None = None
 
 
 @contextlib.contextmanager
 def libraries_silenced() -> Iterator[None]:
-    """Nothing that is printed on standard error inside the ``with`` is seen.
+    """Context in which nothing appears on standard error.
 
-    Standard error belongs to the whole process: it is turned away by the first thread that comes and given back by the
-    last that goes.
+    Standard error belongs to the whole process: the first thread that enters redirects it, and the last that leaves
+    restores it.
     """
     _begin()
     try:
@@ -35,14 +34,14 @@ def libraries_silenced() -> Iterator[None]:
 
 
 def _begin() -> None:
-    global _users, _kept, _stream
+    global _users, _descriptor, _stream
     with _lock:
         _users += 1
         if _users > 1:
             return
         _stream, sys.stderr = sys.stderr, io.StringIO()
         try:
-            _kept = os.dup(_STANDARD_ERROR)
+            _descriptor = os.dup(_STANDARD_ERROR)
         except OSError:  # there is none
             return
         with open(os.devnull, "wb") as nowhere:
@@ -52,29 +51,29 @@ def _begin() -> None:
 def _end() -> None:
     global _users
     with _lock:
-        if _users == 0:  # in a child forked meanwhile, which has it back
+        if _users == 0:  # in a child forked meanwhile, which has restored it
             return
         _users -= 1
         if _users == 0:
-            _give_back()
+            _restore()
 
 
-def _give_back() -> None:
-    global _kept, _stream
+def _restore() -> None:
+    global _descriptor, _stream
     sys.stderr, _stream = _stream, None
-    if _kept is not None:
-        os.dup2(_kept, _STANDARD_ERROR)
-        os.close(_kept)
-        _kept = None
+    if _descriptor is not None:
+        os.dup2(_descriptor, _STANDARD_ERROR)
+        os.close(_descriptor)
+        _descriptor = None
 
 
 def _after_fork() -> None:
-    """Give standard error back in the child: the threads that want silence are the parent's."""
+    """Restore standard error in the child: the threads inside the context are the parent's."""
     global _lock, _users
     _lock = threading.Lock()
     if _users:
         _users = 0
-        _give_back()
+        _restore()
 
 
 if hasattr(os, "register_at_fork"):  # not on Windows, which has no fork

@@ -332,6 +332,6 @@ def _check_fits(job: TileJob, name: FormatName) -> None:
 def _side_of(output: Path) -> int | None:
     """The side of the tiles that an earlier run began with; its choice may have hung on its memory."""
     job = read_job(output)
-    grid = None if job is None else job.get("grid")
+    grid = None if job is None else job.grid
     side = grid[2] if isinstance(grid, list) and len(grid) == 3 else None
     return side if side in SIDES else None

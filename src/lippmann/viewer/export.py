@@ -1,4 +1,4 @@
-"""One file that shows a picture anywhere a browser is: page, description and tiles in one, no network needed."""
+"""Export of pictures as one HTML file that contains the viewer and all tiles and needs no network."""
 
 from __future__ import annotations
 
@@ -6,21 +6,19 @@ import base64
 import json
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 from lippmann.display import Display
 from lippmann.errors import UsageError
 from lippmann.image import Picture
 from lippmann.runtime.atomic_write import replacing
 from lippmann.viewer.manifest import manifest, tile_size
-from lippmann.viewer.page_bundle import whole_page
+from lippmann.viewer.page import single_file_page
 from lippmann.viewer.tiles import Tiles
 
-#: The most pictures that a page shows: two, with a divider between them.
-MOST_PICTURES = 2
+#: Limit on the pictures of a page: two, with a divider between them.
+MAX_PICTURES = 2
 
-#: The most pixels of a picture in such a page, which holds all of them several times over while it is written, and
-#: while a browser reads it.
+#: Limit on the pixels of a picture: writing and opening the file hold all of them in memory, several times.
 MOST_PIXELS = 1 << 27
 
 
@@ -37,12 +35,12 @@ def check_exportable(display: Display) -> None:
 
 
 def export_page(pictures: Sequence[tuple[str, Picture]], path: Path) -> None:
-    """Write a page that shows one picture, or two with a divider between them.
+    """Write one HTML file that shows one picture, or two with a divider between them.
 
     Parameters
     ----------
     pictures:
-        What the page calls each picture, and the picture.
+        Title and picture, one or two.
     path:
         The HTML file to write; about a third larger than the pictures as PNG.
 
@@ -53,23 +51,23 @@ def export_page(pictures: Sequence[tuple[str, Picture]], path: Path) -> None:
     OutputError
         If the place cannot be written.
     """
-    if not 1 <= len(pictures) <= MOST_PICTURES:
+    if not 1 <= len(pictures) <= MAX_PICTURES:
         raise UsageError(f"{len(pictures)} pictures will not do", rule="a page shows one or two")
     for _, image in pictures:
         check_exportable(image.display)
-    data = json.dumps([_embedded(name, image) for name, image in pictures], allow_nan=False, separators=(",", ":"))
+    data = json.dumps([_picture_data(name, image) for name, image in pictures], allow_nan=False, separators=(",", ":"))
     title = " | ".join(name for name, _ in pictures)
     with replacing(path) as temporary:
-        temporary.write_text(whole_page(title, data, len(pictures)), encoding="utf-8")
+        temporary.write_text(single_file_page(title, data, len(pictures)), encoding="utf-8")
 
 
-def _embedded(name: str, image: Picture) -> dict[str, Any]:
+def _picture_data(name: str, image: Picture) -> dict[str, object]:
     tiles = Tiles(image, tile_size(image.display))
-    described = manifest(image, tiles, name=name, tile_format="png")
-    layers = [layer["name"] for layer in described["tiles"]["layers"]]
-    return {"manifest": described, "tiles": {layer: _all(tiles, layer) for layer in layers}}
+    description = manifest(image, tiles, name=name, tile_format="png")
+    return {"manifest": description, "tiles": {layer: _base64_tiles(tiles, layer) for layer in tiles.layers}}
 
 
-def _all(tiles: Tiles, layer: str) -> dict[str, str]:
+def _base64_tiles(tiles: Tiles, layer: str) -> dict[str, str]:
+    """PNG files of all tiles of a layer, in base 64, by ``column_row``."""
     places = ((column, row) for row in range(tiles.rows) for column in range(tiles.columns))
     return {f"{c}_{r}": base64.b64encode(tiles.png(layer, c, r)).decode("ascii") for c, r in places}

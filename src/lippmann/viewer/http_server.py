@@ -1,8 +1,7 @@
-"""A small web server for one person's own pages: who may ask, in which form, and what every answer carries.
+"""HTTP server for one user's own pages: request checks, security headers, error responses.
 
-What is answered is the :class:`Site`'s business. Requests are taken from pages of this server alone: one that names
-another host (a foreign page whose name was made to lead here: DNS rebinding) is refused, and nothing that is served
-can be embedded in, or read by, another site's page.
+A :class:`Site` supplies the content. The server refuses requests whose Host header names another machine, which stops
+DNS rebinding: a foreign page whose name resolves to this address. No other site's page can embed or read a response.
 """
 
 from __future__ import annotations
@@ -14,7 +13,7 @@ import socket
 import socketserver
 import sys
 import threading
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from email.message import Message
@@ -27,41 +26,52 @@ from lippmann.errors import LippmannError, UsageError
 
 LOOPBACK = "127.0.0.1"
 
-#: Largest body of a request; what pages send are a few numbers.
-_LARGEST_BODY = 1 << 16
-_MOST_DIGITS = 9
+#: Limit on the body of a request in bytes; pages send a few numbers.
+_MAX_BODY = 1 << 16
+#: Limit on the digits of a Content-Length, so that absurd numbers are never parsed.
+_MAX_LENGTH_DIGITS = 9
 
-#: Seconds after which a connection that says nothing is closed.
-_PATIENCE = 60.0
+#: Seconds after which an idle connection is closed.
+_IDLE_TIMEOUT = 60.0
 
-_POLICY = (
-    "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; connect-src 'self'; "
-    "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
-)
+_MEDIA_TYPES = {"html": "text/html", "css": "text/css", "js": "text/javascript", "svg": "image/svg+xml"}
+
+
+def content_security_policy(*inline_scripts: str) -> str:
+    """Content-Security-Policy that allows files of this server only, no inline script and no framing.
+
+    ``inline_scripts`` are the exceptions: sources ``'sha256-...'`` of inline scripts, quoted.
+    """
+    scripts = " ".join(["'self'", *inline_scripts])
+    return (
+        f"default-src 'none'; script-src {scripts}; style-src 'self'; "
+        "img-src 'self' blob: data:; connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+    )
+
 
 _HEADERS = {
-    "Content-Security-Policy": _POLICY,
+    "Content-Security-Policy": content_security_policy(),
     "Cross-Origin-Opener-Policy": "same-origin",
     "Cross-Origin-Resource-Policy": "same-origin",
     "Referrer-Policy": "no-referrer",
     "X-Content-Type-Options": "nosniff",
     "X-Frame-Options": "DENY",
-    # Pages show files as they are now.
+    # Files change between two requests.
     "Cache-Control": "no-store",
 }
 
 
 @dataclass(frozen=True)
 class Request:
-    """What was asked: the ``path`` as it was sent, nothing decoded, and the headers."""
+    """HTTP request: the ``path`` as sent, without decoding, and the headers."""
 
     path: str
     headers: Message
 
 
 @dataclass(frozen=True)
-class Answer:
-    """What is answered; ``kind`` is the media type."""
+class Response:
+    """HTTP response: body, media type (``kind``), status and additional headers."""
 
     body: bytes
     kind: str
@@ -70,7 +80,7 @@ class Answer:
 
 
 class RefusedError(Exception):
-    """A request that is refused, with a line for people."""
+    """A refused request: HTTP status, and one line that tells the user why."""
 
     def __init__(self, status: HTTPStatus, line: str) -> None:
         self.status = status
@@ -78,26 +88,26 @@ class RefusedError(Exception):
 
 
 class Site(Protocol):
-    """What is served. Both may be called by several threads at once, and may raise :class:`RefusedError`."""
+    """Content of a server. Both methods may be called from several threads and may raise :class:`RefusedError`."""
 
-    def get(self, request: Request) -> Answer:
-        """The answer to GET and HEAD."""
+    def get(self, request: Request) -> Response:
+        """Response to GET and HEAD."""
 
-    def post(self, request: Request, body: bytes) -> Answer:
-        """The answer to POST."""
+    def post(self, request: Request, body: bytes) -> Response:
+        """Response to POST."""
 
 
 class WebServer:
-    """Serves a site from the moment it is made until :meth:`close`.
+    """HTTP server that runs in a thread of its own from construction until :meth:`close`.
 
     Parameters
     ----------
     site:
-        What is served.
+        Content to serve.
     host:
-        The address to listen on: a name of this machine, or an IP address.
+        Address to listen on: a name of this machine, or an IP address.
     port:
-        The port to listen on; 0 takes one that is free.
+        Port to listen on, 0 to 65535; 0 takes a free one.
 
     Raises
     ------
@@ -110,25 +120,25 @@ class WebServer:
             raise UsageError(f"{port} is no port", where="--port", rule="it must lie between 1 and 65535, or be 0")
         try:
             self._server = _Server(site, host, port)
-        except (OSError, UnicodeError) as error:  # the latter of names that no machine can have
+        except (OSError, UnicodeError) as error:  # UnicodeError: a name that no machine can have
             raise _cannot_listen(error, host, port) from None
         self.host, self.port = host, int(self._server.server_address[1])
-        # Daemon: a page that is still being answered does not keep the program alive.
+        # Daemon: an open request does not keep the program alive.
         self._thread = threading.Thread(target=self._server.serve_forever, args=(0.1,), daemon=True)
         self._thread.start()
 
     @property
     def address(self) -> str:
-        """Where a browser on this machine finds the page."""
+        """URL of the page for a browser on this machine."""
         host = {"0.0.0.0": LOOPBACK, "::": "::1"}.get(self.host, self.host)
         return f"http://{f'[{host}]' if ':' in host else host}:{self.port}/"
 
     def close(self) -> None:
-        """Stop listening; connections that are open are cut off."""
+        """Stop listening and end all open connections."""
         self._server.shutdown()
         self._thread.join()
         self._server.server_close()
-        self._server.cut_off()
+        self._server.end_connections()
 
     def __enter__(self) -> WebServer:
         return self
@@ -137,15 +147,20 @@ class WebServer:
         self.close()
 
 
-def text_answer(text: str, kind: str) -> Answer:
-    """A text of the media type ``kind``."""
-    return Answer(text.encode("utf-8"), f"{kind}; charset=utf-8")
+def text_response(text: str, kind: str) -> Response:
+    """UTF-8 text of the media type ``kind``."""
+    return Response(text.encode("utf-8"), f"{kind}; charset=utf-8")
 
 
-def json_answer(values: Any, headers: Mapping[str, str] | None = None) -> Answer:
-    """``values`` as JSON."""
+def file_response(name: str, text: str) -> Response:
+    """A text file; the extension of ``name`` (html, css, js, svg) determines the media type."""
+    return text_response(text, _MEDIA_TYPES[name.rpartition(".")[2]])
+
+
+def json_response(values: object, headers: Mapping[str, str] | None = None) -> Response:
+    """``values``, of types that JSON has, as JSON."""
     body = json.dumps(values, ensure_ascii=False, allow_nan=False).encode("utf-8")
-    return Answer(body, "application/json", headers=headers or {})
+    return Response(body, "application/json", headers=headers or {})
 
 
 def is_loopback(host: str) -> bool:
@@ -159,7 +174,7 @@ def is_loopback(host: str) -> bool:
 class _Server(socketserver.ThreadingMixIn, socketserver.TCPServer):
     daemon_threads = True
     block_on_close = False
-    # A port whose last connections are still being wound up is free.
+    # A port whose last connections are in TIME_WAIT is free.
     allow_reuse_address = sys.platform != "win32"
     request_queue_size = 64
 
@@ -179,24 +194,24 @@ class _Server(socketserver.ThreadingMixIn, socketserver.TCPServer):
         self._open.discard(request)
         super().shutdown_request(request)
 
-    def cut_off(self) -> None:
-        """End all connections, which pages keep open for what they may still ask."""
+    def end_connections(self) -> None:
+        """End all connections, which browsers keep open for further requests."""
         for connection in tuple(self._open):
             with suppress(OSError):
                 connection.shutdown(socket.SHUT_RDWR)
 
     def handle_error(self, request: Any, client_address: Any) -> None:
         error = sys.exc_info()[1]
-        # A page that is closed or reloaded breaks off what it asked for.
+        # A page that is closed or reloaded aborts its requests.
         if not isinstance(error, (ConnectionError, TimeoutError)):
             what = " ".join(f"{type(error).__name__}: {error}".split())
-            print(f"lippmann: internal error while answering the page: {what}; report it", file=sys.stderr)
+            print(f"lippmann: internal error while answering a request: {what}; report it", file=sys.stderr)
 
 
 class _Handler(BaseHTTPRequestHandler):
     server: _Server
     protocol_version = "HTTP/1.1"
-    timeout = _PATIENCE
+    timeout = _IDLE_TIMEOUT
 
     def do_GET(self) -> None:
         self._respond(lambda: self.server.site.get(self._request()))
@@ -207,39 +222,39 @@ class _Handler(BaseHTTPRequestHandler):
     def do_POST(self) -> None:
         self._respond(lambda: self.server.site.post(self._request(), self._body()))
 
-    def _respond(self, answer_to: Any) -> None:
+    def _respond(self, respond: Callable[[], Response]) -> None:
         if self.command != "POST" and (self.headers.get("Content-Length") or self.headers.get("Transfer-Encoding")):
-            self.close_connection = True  # else its body would be taken for the next request
+            self.close_connection = True  # otherwise its body would be parsed as the next request
         try:
             self._check_host()
-            answer = answer_to()
+            response = respond()
         except RefusedError as refusal:
-            answer = _line(str(refusal), refusal.status)
+            response = _line(str(refusal), refusal.status)
         except LippmannError as error:
-            answer = _line(str(error), HTTPStatus.UNPROCESSABLE_ENTITY)
+            response = _line(str(error), HTTPStatus.UNPROCESSABLE_ENTITY)
         except MemoryError:
-            answer = _line("out of memory; close other programs", HTTPStatus.INSUFFICIENT_STORAGE)
-        if self.command == "POST" and answer.status >= HTTPStatus.BAD_REQUEST:
+            response = _line("out of memory; close other programs", HTTPStatus.INSUFFICIENT_STORAGE)
+        if self.command == "POST" and response.status >= HTTPStatus.BAD_REQUEST:
             self.close_connection = True  # its body may not have been read
-        self._send(answer)
+        self._send(response)
 
-    def _send(self, answer: Answer) -> None:
-        self.send_response(answer.status)
-        for name, value in {**_HEADERS, **answer.headers}.items():
+    def _send(self, response: Response) -> None:
+        self.send_response(response.status)
+        for name, value in {**_HEADERS, **response.headers}.items():
             self.send_header(name, value)
-        self.send_header("Content-Type", answer.kind)
-        self.send_header("Content-Length", str(len(answer.body)))
+        self.send_header("Content-Type", response.kind)
+        self.send_header("Content-Length", str(len(response.body)))
         if self.close_connection:
             self.send_header("Connection", "close")
         self.end_headers()
         if self.command != "HEAD":
-            self.wfile.write(answer.body)
+            self.wfile.write(response.body)
 
     def _request(self) -> Request:
         return Request(self.path, self.headers)
 
     def _body(self) -> bytes:
-        """The body of a POST request that a page of this server sent as JSON."""
+        """Body of a POST request that a page of this server sent as JSON."""
         origin = self.headers.get("Origin")
         if origin is not None and _host_of(origin) != self.headers.get("Host"):
             raise RefusedError(HTTPStatus.FORBIDDEN, "only this server's own pages may send something")
@@ -248,48 +263,47 @@ class _Handler(BaseHTTPRequestHandler):
         length = self.headers.get("Content-Length", "")
         if not (length.isascii() and length.isdigit()):
             raise RefusedError(HTTPStatus.LENGTH_REQUIRED, "the length must be said")
-        # A number of absurd length is not even read.
-        if len(length) > _MOST_DIGITS or int(length) > _LARGEST_BODY:
+        if len(length) > _MAX_LENGTH_DIGITS or int(length) > _MAX_BODY:
             raise RefusedError(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, "this is too long")
         return self.rfile.read(int(length))
 
     def _check_host(self) -> None:
-        if self.request_version == "HTTP/0.9":  # whose answers have no headers, so nothing guards them
+        if self.request_version == "HTTP/0.9":  # a response without headers would carry no policy
             raise RefusedError(HTTPStatus.HTTP_VERSION_NOT_SUPPORTED, "HTTP/1.1 is spoken here")
         hosts = self.headers.get_all("Host") or []
-        if len(hosts) != 1 or not _is_expected(hosts[0], self.server.host):
+        if len(hosts) != 1 or not _is_allowed_host(hosts[0], self.server.host):
             raise RefusedError(HTTPStatus.FORBIDDEN, "this address is not served; use the one that was printed")
 
     def version_string(self) -> str:
         return "Lippmann"
 
     def send_error(self, code: int, message: str | None = None, explain: str | None = None) -> None:
-        """What the base class refuses by itself: requests that are no HTTP, and methods without an answer."""
+        """Respond to what the base class refuses: malformed requests, and methods that have no handler."""
         self.close_connection = True
         unknown = code == HTTPStatus.NOT_IMPLEMENTED
         status = HTTPStatus.METHOD_NOT_ALLOWED if unknown else HTTPStatus(code)
         self._send(_line(status.phrase, status))
 
     def log_message(self, format: str, *args: Any) -> None:
-        """Requests are not reported."""
+        """Log nothing."""
 
 
-def _line(line: str, status: HTTPStatus) -> Answer:
-    return replace(json_answer({"error": line}), status=status)
+def _line(line: str, status: HTTPStatus) -> Response:
+    return replace(json_response({"error": line}), status=status)
 
 
 def _host_of(origin: str) -> str | None:
-    """Host and port of an origin; None if it is none."""
+    """Host and port of an origin; None if it is malformed."""
     try:
         return urlsplit(origin).netloc
     except ValueError:
         return None
 
 
-def _is_expected(named: str, listening_on: str) -> bool:
-    """Whether a request may name this host; the port may be that of a tunnel.
+def _is_allowed_host(named: str, listening_on: str) -> bool:
+    """Whether the Host header ``named`` means this server; its port may be that of a tunnel.
 
-    A foreign name may have been made to lead here; an IP address cannot be.
+    DNS rebinding can make a foreign name resolve to this address, but not an IP address.
     """
     try:
         name = urlsplit(f"//{named}").hostname or ""

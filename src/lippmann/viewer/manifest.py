@@ -1,14 +1,15 @@
-"""What the page has to know of a picture to behave as its display does, as plain values for JSON.
+"""Description of a picture and its display for the viewer, as plain values for JSON.
 
-The page draws with the formulas of :mod:`lippmann.viewing.replay` and :mod:`lippmann.display.lattice`; here are their
-numbers, in effect (aligned pitches, lenses counted as in :attr:`Display.lens_grid`), in millimetres, pixels and
-degrees.
+The viewer draws by the formulas of :mod:`lippmann.viewing.replay` and :mod:`lippmann.display.lattice`. Their parameters
+are given as they take effect (aligned pitches, lenses counted as in :attr:`Display.lens_grid`), in millimetres, pixels
+and degrees.
 """
 
 from __future__ import annotations
 
 import math
-from typing import Any, Literal
+from collections.abc import Mapping
+from typing import Literal
 
 from lippmann.display import Display
 from lippmann.image import Picture
@@ -18,47 +19,47 @@ from lippmann.viewing.replay import default_eye
 
 TileFormat = Literal["png", "rgb"]
 
-#: Rises when a name that the page knows changes its meaning.
+#: Version of the description; rises when a key changes its meaning.
 VERSION = 1
 
-#: The most tiles of a picture: each is a layer of one array texture, of which every WebGL 2 has at least so many.
-MOST_TILES = 256
+#: Limit on the tiles of a picture: each is a layer of an array texture, and WebGL 2 guarantees 256.
+MAX_TILES = 256
 
 _NO_OFFSETS = ((0.0, 0.0), (0.0, 0.0), (0.0, 0.0))
 
 
-def manifest(image: Picture, tiles: Tiles, *, name: str = "", tile_format: TileFormat = "rgb") -> dict[str, Any]:
-    """The description of a picture for the page.
+def manifest(image: Picture, tiles: Tiles, *, name: str = "", tile_format: TileFormat = "rgb") -> dict[str, object]:
+    """Description of a picture: name, facts, geometry of the display (:func:`optics`), transfer and tiles.
 
     Parameters
     ----------
     image, tiles:
-        What the panel shows, whole and in tiles.
+        The picture, and its tiles.
     name:
-        What the page calls it, such as the file's name; by default the scene's.
+        Title on the page, such as the file's name; by default the scene's name.
     tile_format:
-        What a tile is sent as: ``png``, or ``rgb`` for bare bytes, three per pixel, row after row from the top.
+        Format of a tile: ``png``, or ``rgb`` for uncompressed bytes, three per pixel, row after row from the top.
     """
-    display, made = image.display, image.provenance
+    display, provenance = image.display, image.provenance
     return {
         "lippmann": VERSION,
-        "name": name or made.scene,
+        "name": name or provenance.scene,
         "display": display.title or display.name,
         "facts": facts(image),
-        **optics(display, subpixels=made.subpixels),
-        "transfer": made.transfer,
+        **optics(display, subpixels=provenance.subpixels),
+        "transfer": provenance.transfer,
         "tiles": {**tiles.description(), "format": tile_format},
     }
 
 
-def optics(display: Display, *, subpixels: bool) -> dict[str, Any]:
-    """The numbers of a display's geometry.
+def optics(display: Display, *, subpixels: bool) -> dict[str, object]:
+    """Geometry of a display as plain values for JSON, in millimetres, pixels and degrees.
 
-    ``subpixels`` says whether red, green and blue lie at their own places; where not, all offsets are zero. The
-    ``row_pitch`` of a lenticular sheet and an infinite ``viewing_distance`` are None.
+    Without ``subpixels`` all sub-pixel offsets are zero. The ``row_pitch`` of a lenticular sheet and an infinite
+    ``viewing_distance`` are None.
     """
     panel, lattice, places = display.panel, display.lattice, view_grid(display)
-    cells: Any = (panel.subpixel_cells or ((panel.subpixel_offsets,),)) if subpixels else ((_NO_OFFSETS,),)
+    cells = (panel.subpixel_cells or ((panel.subpixel_offsets,),)) if subpixels else ((_NO_OFFSETS,),)
     return {
         "panel": {
             "width": panel.width,
@@ -66,7 +67,7 @@ def optics(display: Display, *, subpixels: bool) -> dict[str, Any]:
             "pixel_pitch": panel.pixel_pitch,
             "subpixels": subpixels,
             "cells": [[[list(pair) for pair in cell] for cell in row] for row in cells],
-            # With cells the nearest sub-pixel is looked for even if all cells were alike, as replay does.
+            # As in replay, cells mean a search for the nearest sub-pixel, even if all cells are alike.
             "uneven": subpixels and panel.subpixel_cells is not None,
         },
         "lenses": {
@@ -91,16 +92,16 @@ def optics(display: Display, *, subpixels: bool) -> dict[str, Any]:
 
 
 def tile_size(display: Display) -> int:
-    """Side of a tile in pixels, such that a picture of the display has at most :data:`MOST_TILES`."""
+    """Side of a tile in pixels, such that a picture of the display has at most :data:`MAX_TILES` tiles."""
     size, panel = TILE_SIZE, display.panel
-    while math.ceil(panel.width / size) * math.ceil(panel.height / size) > MOST_TILES:
+    while math.ceil(panel.width / size) * math.ceil(panel.height / size) > MAX_TILES:
         size *= 2
     return size
 
 
 def facts(image: Picture) -> list[list[str]]:
-    """What one wants to know of the picture, as rows of a table: label and text."""
-    display, made = image.display, image.provenance
+    """Facts about a picture for the user, as rows of a table: ``[label, text]``."""
+    display, provenance = image.display, image.provenance
     grid, panel = display.lens_grid, display.panel
     across, down = display.pixels_per_lens
     slant = f", slant {display.lens_array.slant:.3g}°" if display.lens_array.slant else ""
@@ -112,17 +113,17 @@ def facts(image: Picture) -> list[list[str]]:
         ("Pixels per lens", f"{across:.4g}" + ("" if down is None else f" x {down:.4g}")),
         ("Field of view", f"{display.field_of_view:.3g}°"),
         ("Viewing distance", "infinite" if math.isinf(distance) else f"{distance:.4g} mm"),
-        ("Scene", made.scene),
-        ("Method", made.method),
-        ("Samples per pixel", "" if made.spp is None else str(made.spp)),
-        ("Rays traced", "" if made.traced_fraction is None else f"{100 * made.traced_fraction:.3g} %"),
-        ("Estimated quality", _quality(made.estimate)),
-        ("Rendered by", made.version and f"Lippmann {made.version}"),
+        ("Scene", provenance.scene),
+        ("Method", provenance.method),
+        ("Samples per pixel", "" if provenance.spp is None else str(provenance.spp)),
+        ("Rays traced", "" if provenance.traced_fraction is None else f"{100 * provenance.traced_fraction:.3g} %"),
+        ("Estimated quality", _quality(provenance.estimate)),
+        ("Rendered by", provenance.version and f"Lippmann {provenance.version}"),
     ]
     return [[label, text] for label, text in rows if text]
 
 
-def _quality(estimate: Any) -> str:
+def _quality(estimate: Mapping[str, object] | None) -> str:
     psnr = (estimate or {}).get("psnr")
     return f"{psnr:.1f} dB" if isinstance(psnr, (int, float)) else ""
 

@@ -1,17 +1,17 @@
-"""How a picture shows itself in a notebook: as the page, where the extra ``notebook`` is installed."""
+"""Display of a picture in a Jupyter notebook: as the viewer, where the extra ``notebook`` is installed."""
 
 from __future__ import annotations
 
 import sys
 from importlib.util import find_spec
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from lippmann.image import IntegralImage
 
 
-def mimebundle(image: IntegralImage) -> Any:
-    """The widget as IPython asks for it; None where none can be shown, and a plain picture has to do."""
+def mimebundle(image: IntegralImage) -> object:
+    """MIME bundle of the picture's widget for IPython; None outside notebooks or without the extra."""
     if not in_notebook() or find_spec("anywidget") is None:
         return None
     from lippmann.viewer.widget import PictureWidget
@@ -20,7 +20,7 @@ def mimebundle(image: IntegralImage) -> Any:
 
 
 def in_notebook() -> bool:
-    """Whether a notebook's kernel runs this program: a terminal shows no widgets."""
+    """Whether a notebook's kernel runs this program, rather than a script or a terminal."""
     ipython = sys.modules.get("IPython")
     shell = None if ipython is None else ipython.get_ipython()
     return getattr(shell, "kernel", None) is not None

@@ -1,11 +1,10 @@
-"""A picture's file as the page shows it: read when it is first asked for, and again once it was written anew."""
+"""Picture file of the viewer's server: read at the first request, and again after the file has changed."""
 
 from __future__ import annotations
 
 import threading
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from lippmann.display import Display
 from lippmann.errors import PictureError
@@ -16,28 +15,29 @@ from lippmann.viewer.tiles import Tiles
 
 
 @dataclass(frozen=True)
-class Shown:
-    """What the page is given of a picture.
+class ServedPicture:
+    """Description and tiles of a picture.
 
-    ``version`` names the state of the file: tiles belong to the manifest of the same version only.
+    ``version`` identifies the version of the file: tiles belong to the manifest of the same version only.
     """
 
     version: str
-    manifest: dict[str, Any]
+    manifest: dict[str, object]
     tiles: Tiles
+    tile_format: TileFormat
 
 
 class PictureFile:
-    """A file that the page shows. May be used from several threads at once.
+    """Picture file that a server shows. Safe for use from several threads.
 
     Parameters
     ----------
     path:
         The file.
     display:
-        The display that the picture is for, instead of the one that it carries.
+        Display of the picture; by default the one in the file's metadata.
     tile_format:
-        How tiles travel: ``rgb`` bare, quickest on one machine, or ``png``, smaller.
+        Format of the tiles: ``rgb``, uncompressed, fastest on one machine; or ``png``, smaller.
 
     Raises
     ------
@@ -50,30 +50,30 @@ class PictureFile:
         self._display = display
         self._tile_format = tile_format
         self._lock = threading.Lock()
-        self._shown: Shown | None = None
+        self._picture: ServedPicture | None = None
         self._opened: tuple[str, read.PictureFile] | None = self._version(), read.open_file(path)
         self._opened[1].metadata_for(display)
 
-    def current(self) -> Shown:
-        """The picture as the file is now; a :class:`PictureError` if it cannot be read."""
+    def current(self) -> ServedPicture:
+        """The picture in the present version of the file; a :class:`PictureError` if it cannot be read."""
         with self._lock:
             version = self._version()
-            if self._shown is None or self._shown.version != version:
-                self._shown = None  # two pictures of this size need not be in memory at once
+            if self._picture is None or self._picture.version != version:
+                self._picture = None  # frees the memory before the next version is read
                 opened, self._opened = self._opened, None
                 file = opened[1] if opened is not None and opened[0] == version else read.open_file(self.path)
-                # Codes stay codes: they are what the page is given.
+                # The page takes display codes: decoding them would only cost memory.
                 image = picture_of_file(file, self._display, keeps_codes=True)
                 tiles = Tiles(image, tile_size(image.display))
                 description = manifest(image, tiles, name=self.path.name, tile_format=self._tile_format)
-                self._shown = Shown(version, description, tiles)
-            return self._shown
+                self._picture = ServedPicture(version, description, tiles, self._tile_format)
+            return self._picture
 
-    def loaded(self) -> Shown:
-        """The picture as it was last read, whatever has become of the file; reads it if it never was."""
+    def load_once(self) -> ServedPicture:
+        """The picture as last read, even if the file has changed since; reads the file the first time."""
         with self._lock:
-            shown = self._shown
-        return self.current() if shown is None else shown
+            picture = self._picture
+        return self.current() if picture is None else picture
 
     def _version(self) -> str:
         try:

@@ -1,22 +1,31 @@
-"""What the viewer's server answers: the page, its files, and manifests and tiles of the opened pictures. Nothing else.
+"""Content of the viewer's server: the page, its files, and manifests and tiles of pictures.
 
     GET /                                     the page
-    GET /assets/viewer.js, .css, icon.svg     what the page is made of
-    GET /pictures/N/manifest.json             what the page needs to know of a picture; the ETag names its state
-    GET /pictures/N/tiles/LAYER/COLUMN_ROW    a tile in the format of the manifest; If-Match asks for that of a state
+    GET /assets/NAME                          a script, a style sheet or the icon of the page
+    GET /pictures/N/manifest.json             description of a picture; the ETag identifies the file's version
+    GET /pictures/N/tiles/LAYER/COLUMN_ROW    a tile in the manifest's format; If-Match requires a version
 
-Errors are answered as {"error": "a line for people"}.
+All other paths are refused. An error response is {"error": "one line for the user"}.
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from dataclasses import replace
 from http import HTTPStatus
 
 from lippmann.errors import UsageError
-from lippmann.viewer import page_bundle
-from lippmann.viewer.http_server import Answer, RefusedError, Request, json_answer, text_answer
+from lippmann.viewer import page
+from lippmann.viewer.http_server import (
+    RefusedError,
+    Request,
+    Response,
+    content_security_policy,
+    file_response,
+    json_response,
+    text_response,
+)
 from lippmann.viewer.served_picture import PictureFile
 
 _MANIFEST = re.compile(r"/pictures/([0-9]{1,3})/manifest\.json")
@@ -24,18 +33,16 @@ _TILE = re.compile(r"/pictures/([0-9]{1,3})/tiles/([A-Za-z_][A-Za-z0-9_-]{0,99})
 
 
 class ViewerSite:
-    """The viewer's pages for one or more pictures; a :class:`~lippmann.viewer.http_server.Site`."""
+    """The viewer's page for one or more pictures; a :class:`~lippmann.viewer.http_server.Site`."""
 
     def __init__(self, pictures: Sequence[PictureFile]) -> None:
         self._pictures = tuple(pictures)
-        self._page = {
-            "/": text_answer(page_bundle.page_html(len(self._pictures)), "text/html"),
-            "/assets/viewer.js": text_answer(page_bundle.script(), "text/javascript"),
-            "/assets/viewer.css": text_answer(page_bundle.style(), "text/css"),
-            "/assets/icon.svg": text_answer(page_bundle.icon(), "image/svg+xml"),
-        }
+        policy = content_security_policy(page.served_script_hash())
+        html = text_response(page.served_page(len(self._pictures)), "text/html")
+        self._page = {f"/assets/{name}": file_response(name, text) for name, text in page.assets().items()}
+        self._page["/"] = replace(html, headers={"Content-Security-Policy": policy})
 
-    def get(self, request: Request) -> Answer:
+    def get(self, request: Request) -> Response:
         path = request.path
         if path in self._page:
             return self._page[path]
@@ -44,31 +51,31 @@ class ViewerSite:
         if match := _TILE.fullmatch(path):
             number, layer, column, row = match.groups()
             return self._tile(int(number), layer, int(column), int(row), request.headers.get("If-Match"))
-        raise _not_here()
+        raise _not_found()
 
-    def post(self, request: Request, body: bytes) -> Answer:
+    def post(self, request: Request, body: bytes) -> Response:
         raise RefusedError(HTTPStatus.METHOD_NOT_ALLOWED, "nothing is taken here")
 
     def _picture(self, number: int) -> PictureFile:
         if number >= len(self._pictures):
-            raise _not_here()
+            raise _not_found()
         return self._pictures[number]
 
-    def _manifest(self, number: int) -> Answer:
-        shown = self._picture(number).current()
-        return json_answer(shown.manifest, headers={"ETag": f'"{shown.version}"'})
+    def _manifest(self, number: int) -> Response:
+        picture = self._picture(number).current()
+        return json_response(picture.manifest, headers={"ETag": f'"{picture.version}"'})
 
-    def _tile(self, number: int, layer: str, column: int, row: int, version: str | None) -> Answer:
-        shown = self._picture(number).loaded()
-        if version is not None and version != f'"{shown.version}"':
+    def _tile(self, number: int, layer: str, column: int, row: int, version: str | None) -> Response:
+        picture = self._picture(number).load_once()
+        if version is not None and version != f'"{picture.version}"':
             raise RefusedError(HTTPStatus.PRECONDITION_FAILED, "the file was written anew; reload the page")
         try:
-            if shown.manifest["tiles"]["format"] == "png":
-                return Answer(shown.tiles.png(layer, column, row), "image/png")
-            return Answer(shown.tiles.rgb(layer, column, row), "application/octet-stream")
+            if picture.tile_format == "png":
+                return Response(picture.tiles.png(layer, column, row), "image/png")
+            return Response(picture.tiles.rgb(layer, column, row), "application/octet-stream")
         except UsageError as error:
             raise RefusedError(HTTPStatus.NOT_FOUND, str(error)) from None
 
 
-def _not_here() -> RefusedError:
+def _not_found() -> RefusedError:
     return RefusedError(HTTPStatus.NOT_FOUND, "there is nothing here")

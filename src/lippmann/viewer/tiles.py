@@ -1,12 +1,11 @@
-"""A picture and its maps in tiles, as the page asks for them.
+"""Tiles of a picture and its layers for the viewer.
 
-All tiles are parts of the native pixels: an integral image made smaller means nothing to the lenses in front of it.
+Every tile holds native pixels. There are no reduced resolutions: a downscaled integral image no longer fits its lenses.
 """
 
 from __future__ import annotations
 
 import threading
-from typing import Any
 
 import numpy as np
 
@@ -17,20 +16,20 @@ from lippmann.image import Picture
 from lippmann.image.encoding import converted_values
 from lippmann.viewer.overlays import Codes, overlays
 
-#: Columns and rows of a tile; those on the right and at the bottom may have fewer.
+#: Columns and rows of a tile; tiles at the right and lower edge may have fewer.
 TILE_SIZE = 1024
 
-#: The layer that is the picture itself.
+#: Name of the layer that is the picture itself.
 PICTURE = "picture"
 
 
 class Tiles:
-    """The tiles of a picture: 8-bit codes as its display shows them, and its maps in colours.
+    """Tiles of a picture: its 8-bit display codes, and its layers in false colour.
 
     Parameters
     ----------
     image:
-        The picture; nothing is computed before a tile is asked for.
+        The picture; tiles are computed when requested.
     size:
         Columns and rows of a tile, at least 1.
     """
@@ -43,11 +42,16 @@ class Tiles:
         panel = image.display.panel
         self.columns, self.rows = -(-panel.width // size), -(-panel.height // size)
 
-    def description(self) -> dict[str, Any]:
-        """Plain values for the page: ``width``, ``height``, ``size``, ``columns``, ``rows`` and ``layers``.
+    @property
+    def layers(self) -> tuple[str, ...]:
+        """Names of the layers; the first is the picture."""
+        return (PICTURE, *self._overlays)
 
-        A layer has a ``name``, a ``title`` and what :class:`~lippmann.viewer.overlays.Overlay` says of its colours; the
-        first is the picture.
+    def description(self) -> dict[str, object]:
+        """Plain values for JSON: ``width``, ``height``, ``size``, ``columns``, ``rows`` and ``layers``.
+
+        A layer has a ``name``, a ``title`` and the legend of its colours, see
+        :class:`~lippmann.viewer.overlays.Overlay`. The first is the picture.
         """
         panel = self._image.display.panel
         layers = [{"name": PICTURE, "title": "Picture"}, *(item.description for item in self._overlays.values())]
@@ -55,15 +59,15 @@ class Tiles:
         return {"width": panel.width, "height": panel.height, **tiles, "layers": layers}
 
     def codes(self, layer: str, column: int, row: int) -> Codes:
-        """``(rows, columns, 3)`` uint8 codes of one tile, row 0 of the panel on top.
+        """``(rows, columns, 3)`` uint8 codes of one tile; row 0 is the upper one.
 
         Raises
         ------
         UsageError
             If there is no such layer or tile.
         """
-        if layer != PICTURE and layer not in self._overlays:
-            raise UsageError(f"there is no layer {layer!r}", rule=f"there are {', '.join([PICTURE, *self._overlays])}")
+        if layer not in self.layers:
+            raise UsageError(f"there is no layer {layer!r}", rule=f"there are {', '.join(self.layers)}")
         if not (0 <= column < self.columns and 0 <= row < self.rows):
             rule = f"there are {self.columns} x {self.rows}"
             raise UsageError(f"there is no tile in column {column}, row {row}", rule=rule)
@@ -73,15 +77,15 @@ class Tiles:
         return self._picture_codes(window) if layer == PICTURE else self._overlays[layer].codes(window.slices)
 
     def rgb(self, layer: str, column: int, row: int) -> bytes:
-        """The codes of a tile one after the other: R, G, B of its rows from the top; raises as :meth:`codes`."""
+        """Codes of a tile as bytes: R, G, B of each pixel, row after row from the top; raises as :meth:`codes`."""
         return np.ascontiguousarray(self.codes(layer, column, row)).tobytes()
 
     def png(self, layer: str, column: int, row: int) -> bytes:
-        """A PNG file of a tile, without a colour space, so that nothing changes its codes; raises as :meth:`codes`."""
+        """PNG file of a tile, without a colour space, so that no reader changes its codes; raises as :meth:`codes`."""
         return encode_png(self.codes(layer, column, row), text={}, srgb=False)
 
     def _picture_codes(self, window: PixelWindow) -> Codes:
         transfer = self._image.provenance.transfer
-        with self._lock:  # a picture on disk is for one thread at a time
+        with self._lock:  # readers of pictures on disk are not thread-safe
             values = self._image.window(window)
         return converted_values(values, "uint8", transfer).astype(np.uint8, copy=False)

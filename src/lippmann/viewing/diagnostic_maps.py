@@ -117,8 +117,8 @@ def write_maps(image: IntegralImage, folder: Path) -> None:
 
     maps = _origin_maps(image)
     if ERROR_LAYER in image.maps:
-        maps["error"] = _error_codes(image.maps[ERROR_LAYER])
-    samples = image.maps[SAMPLES_LAYER]
+        maps["error"] = _error_codes(np.asarray(image.maps[ERROR_LAYER], dtype=np.float32))
+    samples = np.asarray(image.maps[SAMPLES_LAYER], dtype=np.float64)
     maps["samples"] = _false_color_codes(samples / max(1, int(samples.max())))
     with replacing_folder(folder) as temporary:
         for name, codes in maps.items():

@@ -96,7 +96,11 @@ def margin_of(text: str | None, display: Display, *, in_frames: bool) -> float |
 
     if in_frames:
         raise UsageError("does not apply to frames of a moving scene", where="--marks", fix="leave it out")
-    return Marks(display, length(text, "--marks")).margin
+    try:
+        return Marks(display, length(text, "--marks")).margin
+    except UsageError as error:
+        parameter = "marks" if error.parameter == "margin" else error.parameter
+        raise UsageError(error.what, where=error.where, parameter=parameter, rule=error.rule, fix=error.fix) from None
 
 
 def marked(image: IntegralImage, margin: float | None) -> IntegralImage:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 from lippmann.cli.shared.console import Console, estimate_in_words
 
@@ -45,7 +45,8 @@ def report(output: Path, size: tuple[int, int], provenance: Provenance) -> dict[
 
 def depth_line(made: Provenance) -> str:
     """Where the scene lies, beside what the display can resolve."""
-    (back, front), (far, near) = (made.options[key] for key in ("depth_range", "resolvable_range"))
+    ranges = (cast("tuple[float, float]", made.options[key]) for key in ("depth_range", "resolvable_range"))
+    (back, front), (far, near) = ranges
     return f"scene {depths(back, front)}; the display resolves {depths(far, near)}"
 
 

@@ -3,8 +3,8 @@
  * `?memory=MB` says how much of the graphics card's memory a picture may take.
  */
 
-import { embeddedSource, serverSource } from "./source.js";
-import { createViewer } from "./viewer.js";
+import { embeddedSource, serverSource } from "lippmann/source.js";
+import { createViewer } from "lippmann/viewer.js";
 
 const root = document.querySelector("main[data-lippmann-pictures]");
 if (root) {

@@ -1,11 +1,11 @@
 /** The panel of controls beside the picture. It shows the viewer's state and calls the viewer; it keeps none itself. */
 
-import { group, h, segments, slider, toggle } from "./dom.js";
-import { eyeBounds } from "./eye.js";
-import { KEYS, canTilt } from "./input.js";
-import { flips } from "./optics.js";
-import { Plan } from "./plan.js";
-import { eyeOf } from "./stage.js";
+import { group, h, segments, slider, toggle } from "lippmann/dom.js";
+import { eyeBounds } from "lippmann/eye.js";
+import { KEYS, canTilt } from "lippmann/input.js";
+import { flips } from "lippmann/optics.js";
+import { Plan } from "lippmann/plan.js";
+import { eyeOf } from "lippmann/stage.js";
 
 const millimetres = (value) => `${Number(value).toFixed(0)} mm`;
 

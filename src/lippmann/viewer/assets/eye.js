@@ -1,6 +1,6 @@
 /** Where the eye may be, how it glides there, and how it sways. */
 
-import { halfField } from "./optics.js";
+import { halfField } from "lippmann/optics.js";
 
 /** How much farther than to the edge of the field the pointer leads, so that the flips beyond are seen. */
 const BEYOND_FIELD = 1.3;

@@ -1,6 +1,6 @@
 /** The page's frame around the canvas: title, progress, messages, divider, and the place of the controls. */
 
-import { h } from "./dom.js";
+import { h } from "lippmann/dom.js";
 
 const THEMES = ["auto", "light", "dark"];
 

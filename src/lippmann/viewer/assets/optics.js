@@ -4,7 +4,7 @@
  * display/lattice.py and replay.py; millimetres, x to the right, y up, z toward the viewer.
  */
 
-import { exact } from "./fixed.js";
+import { exact } from "lippmann/fixed.js";
 
 export const LAYOUTS = { lenticular: 0, square: 1, hexagonal: 2 };
 

@@ -1,9 +1,9 @@
 /** A picture on the graphics card: its tiles, its layers, and the programs that draw what an eye sees of it. */
 
-import { setExact } from "./fixed.js";
-import { LAYOUTS, channelPlaces, microImages, sightline } from "./optics.js";
-import { SIGHT_VERTEX, fragmentSource } from "./shaders.js";
-import { TileTexture, capacityOf, tilesOf } from "./tiles.js";
+import { setExact } from "lippmann/fixed.js";
+import { LAYOUTS, channelPlaces, microImages, sightline } from "lippmann/optics.js";
+import { SIGHT_VERTEX, fragmentSource } from "lippmann/shaders.js";
+import { TileTexture, capacityOf, tilesOf } from "lippmann/tiles.js";
 
 export class Picture {
   /**

@@ -1,6 +1,6 @@
 /** The display and the eye from above: lens plane, field, its neighbours, and the plane in focus. */
 
-import { halfField } from "./optics.js";
+import { halfField } from "lippmann/optics.js";
 
 const SVG = "http://www.w3.org/2000/svg";
 const [WIDTH, HEIGHT] = [300, 190];

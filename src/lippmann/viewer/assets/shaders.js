@@ -64,6 +64,17 @@ precision highp sampler2D;
 precision highp sampler2DArray;
 `;
 
+/** The sRGB curve of color/transfer.py in GLSL, for values from 0 to 1; a test compares the two. */
+export const SRGB = `
+vec3 decodeSrgb(vec3 code) {
+  return mix(code / 12.92, pow((code + 0.055) / 1.055, vec3(2.4)), greaterThan(code, vec3(0.04045)));
+}
+
+vec3 encodeSrgb(vec3 light) {
+  return mix(12.92 * light, 1.055 * pow(light, vec3(1.0 / 2.4)) - 0.055, greaterThan(light, vec3(0.0031308)));
+}
+`;
+
 // Numbers with exact fractions, see fixed.js.
 const EXACT = `
 struct Place {
@@ -305,12 +316,11 @@ void main() {
   if (lensOfPoint(pixel, vec2(0.5)) != lensSeen) discard;
 #endif
   vec3 code = codeOf(pixel);
-  vec3 linear = mix(code / 12.92, pow((code + 0.055) / 1.055, vec3(2.4)), greaterThan(code, vec3(0.04045)));
-  color = vec4(isCoded ? linear : code, 1.0);
+  color = vec4(isCoded ? decodeSrgb(code) : code, 1.0);
 }`;
 
 /** The mean of what was added up, as display codes. */
-export const MEAN = `${HEAD}
+export const MEAN = `${HEAD}${SRGB}
 uniform sampler2D sum;
 uniform ivec2 corner;
 uniform bool isCoded;
@@ -319,8 +329,7 @@ out vec4 color;
 void main() {
   vec4 total = texelFetch(sum, ivec2(gl_FragCoord.xy) - corner, 0);
   vec3 mean = clamp(total.rgb / max(total.a, 1.0), 0.0, 1.0);
-  vec3 code = mix(12.92 * mean, 1.055 * pow(mean, vec3(1.0 / 2.4)) - 0.055, greaterThan(mean, vec3(0.0031308)));
-  color = vec4(isCoded ? code : mean, 1.0);
+  color = vec4(isCoded ? encodeSrgb(mean) : mean, 1.0);
 }`;
 
 // The lens that shows a panel point: Display.lens_of.
@@ -409,7 +418,7 @@ export function fragmentSource(kind, { layout, slanted, cells, reach, tiled }) {
   const bodies = {
     eye: SEEN + EYE,
     overlaid: SEEN + OVERLAID,
-    summand: OWNERS + SEEN + SUMMAND,
+    summand: SRGB + OWNERS + SEEN + SUMMAND,
     magnifier: OWNERS + MAGNIFIER,
   };
   return HEAD + defines.join("") + EXACT + LENSES + TILES + bodies[kind];

@@ -1,8 +1,8 @@
 /** The canvas: which panes it has, what is drawn in each, and the picture focused on a plane. */
 
-import { eyesOfViews } from "./optics.js";
-import { Program } from "./picture.js";
-import { MEAN, VERTEX } from "./shaders.js";
+import { eyesOfViews } from "lippmann/optics.js";
+import { Program } from "lippmann/picture.js";
+import { MEAN, VERTEX } from "lippmann/shaders.js";
 
 /** Width of the line between two panes, in canvas pixels. */
 const SEAM = 2;

@@ -6,14 +6,14 @@
  * controls until it is asked for; `memory`, bytes of the graphics card for a picture: of a larger one a part is shown.
  */
 
-import { Controls, focusRange } from "./controls.js";
-import { bounded, eyeAt, eyeBounds, glided, swayStart, swaying } from "./eye.js";
-import { frameBounds, panned, zoomed } from "./frame.js";
-import { followTilt, listen } from "./input.js";
-import { halfField } from "./optics.js";
-import { Layout } from "./layout.js";
-import { Picture, checked } from "./picture.js";
-import { Stage } from "./stage.js";
+import { Controls, focusRange } from "lippmann/controls.js";
+import { bounded, eyeAt, eyeBounds, glided, swayStart, swaying } from "lippmann/eye.js";
+import { frameBounds, panned, zoomed } from "lippmann/frame.js";
+import { followTilt, listen } from "lippmann/input.js";
+import { halfField } from "lippmann/optics.js";
+import { Layout } from "lippmann/layout.js";
+import { Picture, checked } from "lippmann/picture.js";
+import { Stage } from "lippmann/stage.js";
 
 const MODES = ["single", "side-by-side", "anaglyph"];
 

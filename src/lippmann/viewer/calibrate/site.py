@@ -1,8 +1,8 @@
-"""What the calibration's server answers: the page, the display it starts from, and one file that it may write.
+"""Content of the calibration server: the page, the values of a monitor, and one display file that the page may write.
 
 GET /                  the page
-GET /assets/NAME       what the page is made of
-GET /calibration.json  panel, values to start from, and the token that saving takes
+GET /assets/NAME       a script, the style sheet or the icon of the page
+GET /calibration.json  panel, initial values, and the token that POST needs
 POST /display          {"pitch", "slope" (null if infinite), "center", "order"}: writes the display file
 """
 
@@ -26,31 +26,29 @@ from lippmann.display.panel import Panel, SubpixelOffsets
 from lippmann.display.units import stripe
 from lippmann.errors import UsageError
 from lippmann.runtime.atomic_write import replacing
-from lippmann.viewer.http_server import Answer, RefusedError, Request, json_answer, text_answer
+from lippmann.viewer.http_server import RefusedError, Request, Response, file_response, json_response
 
-_KINDS = {"html": "text/html", "css": "text/css", "js": "text/javascript", "svg": "image/svg+xml"}
-
-#: Orders of sub-pixels that side by side stripes come in, and pixels whose colours lie in one place.
+#: Orders of sub-pixels in stripes; "none" means that the three lie in one place.
 _ORDERS = ("rgb", "bgr", "rbg", "brg", "gbr", "grb", "none")
 
-#: Places that are none of these orders.
-_OWN_ORDER = "as they are"
+#: Name of measured sub-pixel places that match no order.
+_MEASURED_ORDER = "as they are"
 
-#: What a page may send, and which values.
-_SENT = {"pitch", "slope", "center", "order"}
+#: Keys of the values that the page posts.
+_KEYS = {"pitch", "slope", "center", "order"}
 
 
 class CalibrationSite:
-    """The page for one monitor; a :class:`~lippmann.viewer.http_server.Site`.
+    """The calibration page of one monitor; a :class:`~lippmann.viewer.http_server.Site`.
 
     Parameters
     ----------
     monitor:
-        The values to start from.
+        Initial values.
     output:
-        The display file to write, and the only one that can be.
+        Display file to write; the page can write no other.
     saved:
-        Called with the monitor each time that it was written.
+        Called with the monitor after each write.
     """
 
     def __init__(self, monitor: Monitor, output: Path, saved: Callable[[Monitor], None]) -> None:
@@ -59,33 +57,32 @@ class CalibrationSite:
         self._saved = saved
         self._token = secrets.token_urlsafe(32)
         self._lock = threading.Lock()
-        assets = {entry.name: entry.read_text(encoding="utf-8") for entry in (files(__package__) / "assets").iterdir()}
-        self._page = {
-            f"/assets/{name}": text_answer(text, _KINDS[name.rpartition(".")[2]]) for name, text in assets.items()
-        }
+        folder = files(__package__) / "assets"
+        assets = {entry.name: entry.read_text(encoding="utf-8") for entry in folder.iterdir()}
+        self._page = {f"/assets/{name}": file_response(name, text) for name, text in assets.items()}
         self._page["/"] = self._page.pop("/assets/page.html")
 
-    def get(self, request: Request) -> Answer:
+    def get(self, request: Request) -> Response:
         if request.path == "/calibration.json":
-            return json_answer(self._start())
+            return json_response(self._start())
         if request.path in self._page:
             return self._page[request.path]
         raise RefusedError(HTTPStatus.NOT_FOUND, "there is nothing here")
 
-    def post(self, request: Request, body: bytes) -> Answer:
+    def post(self, request: Request, body: bytes) -> Response:
         if request.path != "/display":
             raise RefusedError(HTTPStatus.NOT_FOUND, "there is nothing here")
         token = request.headers.get("X-Lippmann-Token", "")
         if not hmac.compare_digest(token.encode("utf-8", "replace"), self._token.encode("ascii")):
             raise RefusedError(HTTPStatus.FORBIDDEN, "this page is an old one; reload it")
-        monitor = self._turned(_sent(body))
+        monitor = self._monitor_with(_values(body))
         with self._lock, replacing(self._output) as temporary:
             temporary.write_text(text_of_monitor(monitor), encoding="utf-8")
         self._saved(monitor)
-        return json_answer({"saved": str(self._output)})
+        return json_response({"saved": str(self._output)})
 
-    def _start(self) -> dict[str, Any]:
-        """What the page starts from, as plain values."""
+    def _start(self) -> dict[str, object]:
+        """Panel and initial values for the page, as plain values for JSON."""
         monitor, panel = self._monitor, self._monitor.panel
         orders = _orders(panel)
         order = next((name for name, offsets in orders.items() if _is_same(offsets, panel.subpixel_offsets)), None)
@@ -104,46 +101,45 @@ class CalibrationSite:
             "monitor": {"pitch": monitor.pitch, "lean": 1 / monitor.slope, "center": monitor.center % 1.0},
         }
 
-    def _turned(self, sent: dict[str, Any]) -> Monitor:
-        """The monitor with the values that were sent; a DisplayError if no monitor can have them."""
-        panel, order = self._monitor.panel, sent["order"]
+    def _monitor_with(self, values: dict[str, Any]) -> Monitor:
+        """The monitor with the posted values; a DisplayError if no monitor can have them."""
+        panel, order = self._monitor.panel, values["order"]
         if order is not None:
-            offered = _orders(panel)
-            if order not in offered:
-                rule = f"it must be one of {', '.join(offered) or 'none, since the display has cells of its own'}"
+            orders = _orders(panel)
+            if order not in orders:
+                rule = f"it must be one of {', '.join(orders) or 'none, since the display has cells of its own'}"
                 raise UsageError(f"the order of sub-pixels is {order!r}", rule=rule)
-            panel = replace(panel, subpixel_offsets=offered[order])
+            panel = replace(panel, subpixel_offsets=orders[order])
         monitor = replace(
             self._monitor,
             name=self._output.stem or self._monitor.name,
             panel=panel,
-            pitch=sent["pitch"],
-            slope=math.inf if sent["slope"] is None else sent["slope"],
-            center=sent["center"],
+            pitch=values["pitch"],
+            slope=math.inf if values["slope"] is None else values["slope"],
+            center=values["center"],
         )
-        monitor.display()  # whether a lens covers as many pixels as it can
+        monitor.display()  # checks the number of pixels that a lens covers
         return monitor
 
 
-def _sent(body: bytes) -> dict[str, Any]:
-    """The values that a page sent; numbers are looked at by the monitor itself."""
+def _values(body: bytes) -> dict[str, Any]:
+    """Values of a POST; :class:`Monitor` checks the numbers."""
     try:
         values = json.loads(body)
     except (ValueError, RecursionError):
         values = None
-    if not isinstance(values, dict) or set(values) != _SENT or not isinstance(values["order"], (str, type(None))):
-        raise UsageError("this is no calibration", rule=f"it must have {', '.join(sorted(_SENT))}")
+    if not isinstance(values, dict) or set(values) != _KEYS or not isinstance(values["order"], (str, type(None))):
+        raise UsageError("this is no calibration", rule=f"it must have {', '.join(sorted(_KEYS))}")
     return values
 
 
 def _orders(panel: Panel) -> dict[str, SubpixelOffsets]:
-    """The orders of sub-pixels that may be chosen, by name: none for a panel whose pixels are of several kinds."""
+    """Orders of sub-pixels to choose from, by name; empty for a panel with cells of several kinds."""
     if panel.subpixel_cells is not None:
         return {}
     orders = {name: stripe(name, "order") for name in _ORDERS}
     own = panel.subpixel_offsets
-    # Places that somebody measured can be kept.
-    return orders if any(_is_same(own, offsets) for offsets in orders.values()) else {_OWN_ORDER: own, **orders}
+    return orders if any(_is_same(own, offsets) for offsets in orders.values()) else {_MEASURED_ORDER: own, **orders}
 
 
 def _is_same(one: SubpixelOffsets, other: SubpixelOffsets) -> bool:
