@@ -76,7 +76,7 @@ def begun(output):
 
 
 def test_an_unfinished_picture_is_not_thrown_away(output, begun):
-    with pytest.raises(OutputError, match=r"unfinished.*--resume, or delete"):
+    with pytest.raises(OutputError, match=r"unfinished.*resume=True, or delete"):
         opened(output, resume=False)
 
 
