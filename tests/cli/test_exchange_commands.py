@@ -23,9 +23,7 @@ def test_there_and_back(lippmann, picture, tmp_path, layout):
         "views": [8, 1],
         "size": [64, 512],
         "stored": "uint8",
-        "notes": ["no ground truth is written: the picture has no layer depth (render with layers)"]
-        if layout == "hci"
-        else [],
+        "notes": ["no ground truth is written: the picture has no layer depth"] if layout == "hci" else [],
     }
     again = lippmann("import", path, "-o", tmp_path / "again.png", "--json", "-q")
     assert again.json["display"] == "seed-lenticular"
@@ -72,7 +70,7 @@ def test_bad_input_is_one_line_and_code_2(lippmann, picture, tmp_path):
         return outcome.err
 
     assert "--as" in refused("export", picture, "-o", out)
-    assert "'hdf5' is unknown; known are hci, lftoolbox, eslf, zarr, views" in refused(
+    assert "'hdf5' is not known; known are hci, lftoolbox, eslf, zarr, views" in refused(
         "export", picture, "--as=hdf5", "-o", out
     )
     assert "lftoolbox files end in .mat" in refused("export", picture, "--as=lftoolbox", "-o", out)

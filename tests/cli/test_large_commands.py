@@ -65,7 +65,7 @@ def test_an_error_map_needs_the_whole_picture(lippmann, pair, tmp_path, monkeypa
     monkeypatch.setattr(streamed, "LARGE", 0)
     done = lippmann("compare", *pair, "--map", tmp_path / "map.png")
     assert done.code == 2
-    assert "--map: needs the whole picture" in done.err
+    assert "--map: needs pictures that fit in memory" in done.err
 
 
 def test_weaving_for_a_large_panel(lippmann, tmp_path, monkeypatch):

@@ -125,7 +125,7 @@ def test_the_display_made_from_cameras_has_these_cameras(data):
 def test_what_cannot_be_is_refused(display):
     with pytest.raises(PictureError, match="with the baseline"):
         Cameras(baseline=0.1, focus_distance=100, pixel_pitch=1.0).display(5, 9, 9)
-    with pytest.raises(UsageError, match="--distance: is for parallel views"):
+    with pytest.raises(UsageError, match="distance: is for parallel views"):
         Cameras.of_display(display(distance=500), 600)
     for distance in (0.0, -5.0, math.inf, math.nan):
         with pytest.raises(UsageError, match="must be above zero"):

@@ -33,7 +33,7 @@ def test_our_own_folders_are_composed(display, picture, same, tmp_path, write):
     image = picture(display(), stored="uint8")
     write(image, tmp_path / "x")
     same(import_image(tmp_path / "x")[0], image)
-    with pytest.raises(PictureError, match="names its own display; leave --display out"):
+    with pytest.raises(PictureError, match="names its own display; leave display=... out"):
         import_image(tmp_path / "x", display=image.display)
 
 
@@ -73,21 +73,21 @@ def test_another_display_shows_the_same_views(display, picture, tmp_path):
 def test_what_is_not_meant_is_refused(display, picture, tmp_path):
     image = picture(display())
     for words, what in (
-        ((image, tmp_path / "x", "hdf"), "--as: the layout 'hdf' is unknown; known are hci, lftoolbox"),
+        ((image, tmp_path / "x", "hdf"), "layout: the layout 'hdf' is unknown; known are hci, lftoolbox"),
         ((image, tmp_path / "x.png", "lftoolbox"), "the ending is '.png'; lftoolbox files end in .mat"),
         ((image, tmp_path / "x", "eslf"), "eslf files end in .png"),
     ):
         with pytest.raises(LippmannError) as refused:
             export_image(*words)
         assert what in str(refused.value)
-    with pytest.raises(UsageError, match="--distance: does not apply to zarr"):
+    with pytest.raises(UsageError, match="distance: does not apply to zarr"):
         export_image(image, tmp_path / "x", "zarr", distance=5.0)
     with pytest.raises(UsageError, match="the layout 'hdf' is unknown"):
         import_image(tmp_path, "hdf")
     with pytest.raises(PictureError, match="is not there"):
         import_image(tmp_path / "no")
     (tmp_path / "x.dat").write_bytes(b"1")
-    with pytest.raises(PictureError, match="the layout is not recognized; say --as"):
+    with pytest.raises(PictureError, match="the layout is not recognized; say layout="):
         import_image(tmp_path / "x.dat")
 
 

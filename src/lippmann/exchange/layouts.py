@@ -252,7 +252,7 @@ def _read(path: Path, name: LayoutName, display: Display | None, progress: Progr
 def _notes(image: IntegralImage, name: LayoutName) -> list[str]:
     notes = []
     if name == "hci" and DEPTH not in image.maps:
-        notes.append("no ground truth is written: the picture has no layer depth (render with layers)")
+        notes.append("no ground truth is written: the picture has no layer depth")
     omitted = sorted(set(image.maps) - set(_MAPS.get(name, image.maps)))
     if omitted:
         notes.append(f"{name} cannot hold the layers {', '.join(omitted)}")

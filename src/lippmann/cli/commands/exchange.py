@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
 from lippmann.cli.shared import options, parse
 from lippmann.cli.shared.console import Console
 
+_Layout = Literal["hci", "lftoolbox", "eslf", "zarr", "views"]
 _LAYOUTS = "hci (4D Light Field Benchmark), lftoolbox (.mat), eslf (.png), zarr, or views"
 
 
 def export(
     picture: options.Picture,
     output: Annotated[Path, typer.Option("--output", "-o", help="File or folder to write.")],
-    layout: Annotated[str, typer.Option("--as", help=f"Layout: {_LAYOUTS}.")],
+    layout: Annotated[_Layout, typer.Option("--as", help=f"Layout: {_LAYOUTS}.")],
     distance: Annotated[
         float | None,
         typer.Option("--distance", help="Distance of the cameras in mm, for hci and displays of parallel views."),
@@ -57,7 +58,7 @@ def export(
 def import_(
     source: Annotated[Path, typer.Argument(help="File or folder of another light-field tool.")],
     output: options.Output,
-    layout: Annotated[str | None, typer.Option("--as", help=f"Layout: {_LAYOUTS}. Default: recognized.")] = None,
+    layout: Annotated[_Layout | None, typer.Option("--as", help=f"Layout: {_LAYOUTS}. Default: recognized.")] = None,
     display: Annotated[
         str | None,
         typer.Option(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -17,9 +17,12 @@ if TYPE_CHECKING:
     from lippmann.image import PictureFile, Provenance
 
 Format = Annotated[
-    str | None, typer.Option("--format", help="Picture format: png, exr or tiff. Default: as the picture is stored.")
+    Literal["png", "exr", "tiff"] | None,
+    typer.Option("--format", help="Picture format. Default: as the picture is stored."),
 ]
-Filter = Annotated[str, typer.Option("--filter", help="Pixel filter: nearest, or linear within one lens.")]
+Filter = Annotated[
+    Literal["nearest", "linear"], typer.Option("--filter", help="Pixel filter: nearest, or linear within one lens.")
+]
 Size = Annotated[
     str | None,
     typer.Option("--size", help="Size of the result, WIDTHxHEIGHT in pixels. Default: as the panel, reduced."),
@@ -53,7 +56,7 @@ def views(
     console = Console(quiet, as_json)
     image = open_picture(picture, display=parse.display(display))
     with console.progress() as progress:
-        count = write_views(image, output, format=format, bits=bits, progress=progress)  # type: ignore[arg-type]
+        count = write_views(image, output, format=format, bits=bits, progress=progress)
     if image.views_note:
         console.remark(image.views_note)
     grid = view_grid(image.display)
@@ -77,7 +80,7 @@ def micro_images(
     console = Console(quiet, as_json)
     image = open_picture(picture, display=parse.display(display))
     with console.progress() as progress:
-        count = write_micro_images(image, output, format=format, bits=bits, progress=progress)  # type: ignore[arg-type]
+        count = write_micro_images(image, output, format=format, bits=bits, progress=progress)
     grid = image.display.lens_grid
     result = {"output": str(output), "lenses": [grid.rows, grid.columns], "written": count}
     console.result(result, f"{output}: {count} micro-images")
@@ -153,13 +156,13 @@ def replay(
     transfer = image.provenance.transfer
     result: dict[str, Any] = {"output": str(output), "eye": list(position), "filter": filter}
     if not sweep:
-        pixels_seen = replay_picture(image, position, size=pixels, filter=filter)  # type: ignore[arg-type]
+        pixels_seen = replay_picture(image, position, size=pixels, filter=filter)
         write_plain_picture(pixels_seen, output, bits=bits, transfer=transfer)
         console.result(result, f"{output}: seen from {_position(position)}")
         return
     reach = _field_width(image.display, position[2]) if width is None else width
     start, stop = ((position[0] + side * reach / 2, *position[1:]) for side in (-1, 1))
-    moving = sweep_picture(image, start, stop, frames, size=pixels, filter=filter)  # type: ignore[arg-type]
+    moving = sweep_picture(image, start, stop, frames, size=pixels, filter=filter)
     write_animation(moving, output, transfer=transfer)
     result |= {"frames": frames, "start": list(start), "stop": list(stop)}
     console.result(result, f"{output}: {frames} frames, seen from {_position(start)} to {_position(stop)}")
