@@ -33,7 +33,7 @@ def test_our_own_folders_are_composed(display, picture, same, tmp_path, write):
     image = picture(display(), stored="uint8")
     write(image, tmp_path / "x")
     same(import_image(tmp_path / "x")[0], image)
-    with pytest.raises(PictureError, match="names its own display; leave display=... out"):
+    with pytest.raises(PictureError, match=r"names its own display; leave display=\.\.\. out"):
         import_image(tmp_path / "x", display=image.display)
 
 

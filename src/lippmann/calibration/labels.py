@@ -58,7 +58,7 @@ def label_window(
 
 
 def paint_label(
-    pixels: NDArray[Any],
+    pixels: NDArray[np.float32] | NDArray[np.uint8],
     window: PixelWindow,
     text: str,
     box: PixelWindow | None,

@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
-
-from numpy.typing import NDArray
 
 from lippmann.calibration.alignment_marks import Marks, marked_provenance, marked_rows, with_marks
 from lippmann.codecs.tiff_strips import write_tiff_bands
@@ -14,6 +11,7 @@ from lippmann.errors import OutputError
 from lippmann.image import IntegralImage
 from lippmann.image.encoding import stored_values
 from lippmann.image.metadata import Metadata, to_text
+from lippmann.image.stored_values import Values
 from lippmann.image.streamed import LargePicture
 from lippmann.image.write import format_for
 from lippmann.progress import ProgressCallback, silent
@@ -67,7 +65,7 @@ def write_marked(
     sheet, transfer = marks.sheet, picture.provenance.transfer
     metadata = Metadata(sheet, picture.world_from_display, marked_provenance(marks, picture.provenance))
 
-    def band(first: int, last: int) -> NDArray[Any]:
+    def band(first: int, last: int) -> Values:
         return stored_values(marked_rows(marks, picture.rows, first, last), stored, transfer)
 
     with replacing(path) as temporary:

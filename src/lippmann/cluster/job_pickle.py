@@ -43,7 +43,7 @@ class Parcel:
     key: str
     outline: NDArray[np.uint8]
     names: tuple[str, ...]
-    parts: Mapping[str, NDArray[Any]]
+    parts: Mapping[str, NDArray[np.generic]]
 
 
 def pack(job: TileJob) -> Parcel:
@@ -54,7 +54,7 @@ def pack(job: TileJob) -> Parcel:
     UsageError
         If the scene is a Mitsuba object, or a Mitsuba file refers to files outside its own folder.
     """
-    parts: dict[str, NDArray[Any]] = {}
+    parts: dict[str, NDArray[np.generic]] = {}
     files = _scene_files(job, parts)
     stream = io.BytesIO()
     # Fresh copies drop cached values (a scene's bounds, its hash), by which equal jobs would differ.
@@ -67,7 +67,9 @@ def pack(job: TileJob) -> Parcel:
     return Parcel(_HASH(outline).hexdigest(), np.frombuffer(outline, np.uint8), names, parts)
 
 
-def unpack(outline: NDArray[np.uint8], names: Sequence[str], parts: Sequence[NDArray[Any]], folder: Path) -> TileJob:
+def unpack(
+    outline: NDArray[np.uint8], names: Sequence[str], parts: Sequence[NDArray[np.generic]], folder: Path
+) -> TileJob:
     """Restore a job that :func:`pack` serialized.
 
     Parameters
@@ -102,14 +104,14 @@ def unpack(outline: NDArray[np.uint8], names: Sequence[str], parts: Sequence[NDA
     return _with_files(job, paths)
 
 
-def content_name(array: NDArray[Any]) -> str:
+def content_name(array: NDArray[np.generic]) -> str:
     """SHA-256, in hexadecimal, of an array's type, shape and values."""
     digest = _HASH(f"{array.dtype.str}{array.shape}".encode())
     digest.update(np.ascontiguousarray(array).data)
     return digest.hexdigest()
 
 
-def _scene_files(job: TileJob, parts: dict[str, NDArray[Any]]) -> dict[str, str] | None:
+def _scene_files(job: TileJob, parts: dict[str, NDArray[np.generic]]) -> dict[str, str] | None:
     """Content hashes of the files that a Mitsuba scene reads, by key; None for other scenes. Fills ``parts``."""
     described = job.scene.description
     if not isinstance(described, MitsubaSource):
@@ -140,7 +142,7 @@ def _with_files(job: TileJob, files: Mapping[str, Path]) -> TileJob:
 
 
 class _Packer(pickle.Pickler):
-    def __init__(self, stream: io.BytesIO, parts: dict[str, NDArray[Any]]) -> None:
+    def __init__(self, stream: io.BytesIO, parts: dict[str, NDArray[np.generic]]) -> None:
         super().__init__(stream, protocol=5)
         self._parts = parts
 
@@ -153,9 +155,9 @@ class _Packer(pickle.Pickler):
 
 
 class _Unpacker(pickle.Unpickler):
-    def __init__(self, stream: io.BytesIO, parts: Mapping[str, NDArray[Any]]) -> None:
+    def __init__(self, stream: io.BytesIO, parts: Mapping[str, NDArray[np.generic]]) -> None:
         super().__init__(stream)
         self._parts = parts
 
-    def persistent_load(self, name: Any) -> NDArray[Any]:
+    def persistent_load(self, name: Any) -> NDArray[np.generic]:
         return self._parts[name]

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 from secrets import token_hex
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.cluster.connection import Cluster
@@ -153,7 +154,7 @@ class _Run:
         self.cluster.parts.update(futures)
         self.parts = tuple(futures.values())
 
-    def _submit_part(self, name: str, array: NDArray[Any]) -> DaskFuture:
+    def _submit_part(self, name: str, array: NDArray[np.generic]) -> DaskFuture:
         from toolz import identity
 
         with warnings.catch_warnings():

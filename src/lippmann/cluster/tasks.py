@@ -8,7 +8,7 @@ import threading
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,7 +64,7 @@ def make_version_query() -> Callable[[], dict[str, str]]:
 
 
 def render_part(
-    key: str, index: int, outline: NDArray[np.uint8], names: Sequence[str], parts: Sequence[NDArray[Any]]
+    key: str, index: int, outline: NDArray[np.uint8], names: Sequence[str], parts: Sequence[NDArray[np.generic]]
 ) -> bytes:
     """Render one tile of a serialized job.
 
@@ -120,7 +120,9 @@ def engine_threads() -> int | None:
         return None
 
 
-def _prepared(key: str, outline: NDArray[np.uint8], names: Sequence[str], parts: Sequence[NDArray[Any]]) -> Prepared:
+def _prepared(
+    key: str, outline: NDArray[np.uint8], names: Sequence[str], parts: Sequence[NDArray[np.generic]]
+) -> Prepared:
     if key not in _current:
         from lippmann.tiles.tile_render import prepare
 

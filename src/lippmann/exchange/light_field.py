@@ -73,7 +73,7 @@ class LightField:
 
     values: Values
     metadata: Metadata | None = None
-    maps: Mapping[str, NDArray[Any]] = field(default_factory=dict)
+    maps: Mapping[str, NDArray[np.generic]] = field(default_factory=dict)
     cameras: Cameras | None = None
     mask: NDArray[np.bool_] | None = None
     notes: tuple[str, ...] = ()
@@ -103,7 +103,9 @@ class LightField:
     def weight(self) -> NDArray[np.float32] | None:
         """``(t, s, v, u)`` float32 map ``weight``; None if there is none of this shape and type."""
         weight = self.maps.get(WEIGHT)
-        return weight if weight is not None and weight.ndim == 4 and weight.dtype == np.float32 else None
+        if weight is None or weight.ndim != 4 or weight.dtype != np.float32:
+            return None
+        return cast("NDArray[np.float32]", weight)
 
     def image(self, display: Display | None = None, *, where: str = "", layout: str = "") -> IntegralImage:
         """The integral image whose views these are.
@@ -233,15 +235,15 @@ def _shape_text(shape: Shape) -> str:
 # ---- Weights as a fourth colour ------------------------------------------------------------------------------------
 
 
-def encode_weights(weight: NDArray[np.float32], dtype: np.dtype[Any]) -> Values:
+def encode_weights(weight: NDArray[np.float32], dtype: np.dtype[np.generic]) -> Values:
     """Weights in [0, 1] as values of the colours' type: codes rounded to nearest, 1 the highest code; or floats."""
     if dtype.kind == "f":
         return weight.astype(dtype)
-    top = np.iinfo(dtype).max
+    top = np.iinfo(dtype.name).max
     return np.floor(np.clip(weight.astype(np.float64), 0, 1) * top + 0.5).astype(dtype)
 
 
-def decode_weights(codes: NDArray[Any]) -> NDArray[np.float32]:
+def decode_weights(codes: Values) -> NDArray[np.float32]:
     """Weights in [0, 1] of codes or floats; the inverse of :func:`encode_weights`."""
-    top = 1.0 if codes.dtype.kind == "f" else np.iinfo(codes.dtype).max
+    top = 1.0 if codes.dtype.kind == "f" else np.iinfo(codes.dtype.name).max
     return (codes.astype(np.float64) / top).astype(np.float32)

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Any
+import numpy as np
+from numpy.typing import NDArray
 
+from lippmann.image.stored_values import FloatArray
 from lippmann.runtime.numba_jit import inlined, uncounted
+
+Real = NDArray[np.float64]
 
 
 @inlined
-def _between(view: Any, channel: int, across: float, down: float) -> float:
+def _between(view: FloatArray, channel: int, across: float, down: float) -> float:
     """Bilinear interpolation of ``view`` ``(rows, width, 3)`` at a position in pixels."""
     left, top = int(across), int(down)
     right, bottom = min(left + 1, view.shape[1] - 1), min(top + 1, view.shape[0] - 1)
@@ -19,7 +23,9 @@ def _between(view: Any, channel: int, across: float, down: float) -> float:
 
 
 @uncounted
-def weave_channel(views: Any, channel: int, number: Any, share: Any, across: Any, down: Any, woven: Any) -> None:
+def weave_channel(
+    views: FloatArray, channel: int, number: NDArray[np.intp], share: Real, across: Real, down: Real, woven: FloatArray
+) -> None:
     """Fill one channel of ``woven`` ``(H, W, 3)`` with samples of the views.
 
     ``views`` is ``(views, rows, width, 3)``. The other arrays are ``(H, W)``: ``number`` is a view, ``share`` the
