@@ -7,7 +7,7 @@ import pytest
 from PIL import Image
 
 from lippmann.errors import OutputError, PictureError
-from lippmann.image import encoding
+from lippmann.image import PictureFile, encoding
 from lippmann.quilts import files as quilt_files
 from lippmann.quilts.files import read_quilt, read_views, write_quilt, write_views
 from lippmann.quilts.quilt import Quilt, QuiltLayout
@@ -89,7 +89,7 @@ def test_a_file_whose_size_disagrees_with_its_name_is_refused(tmp_path):
 
 
 def test_a_size_that_disagrees_is_refused_before_the_pixels_are_read(tmp_path, monkeypatch):
-    monkeypatch.setattr(quilt_files, "_read", None)
+    monkeypatch.setattr(PictureFile, "decode", None)
     for ending in ("png", "jpg", "tif"):
         path = tmp_path / f"x_qs8x6a0.75.{ending}"
         Image.new("RGB", (400, 388)).save(path)
@@ -122,7 +122,7 @@ def test_views_of_several_depths_become_linear(folder):
 
 def test_more_than_can_be_held_is_refused_before_it_is_read(folder, monkeypatch):
     monkeypatch.setattr(quilt_files, "MOST_PIXELS", 48 * 64 * 47)
-    monkeypatch.setattr(quilt_files, "_read", None)
+    monkeypatch.setattr(PictureFile, "decode", None)
     with pytest.raises(PictureError, match="it holds 48 views of 48 x 64 pixels; together they have at most 144384"):
         read_views(folder)
 

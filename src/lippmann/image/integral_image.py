@@ -248,8 +248,8 @@ class IntegralImage(Picture):
 
     def _repr_html_(self) -> str:
         """The picture of :meth:`_repr_png_` above a line of facts."""
-        made = ", ".join(part for part in (self.provenance.scene, self.provenance.method) if part)
-        caption = html.escape(repr(self)[1:-1] + (f" ({made})" if made else ""))
+        origin = ", ".join(part for part in (self.provenance.scene, self.provenance.method) if part)
+        caption = html.escape(repr(self)[1:-1] + (f" ({origin})" if origin else ""))
         picture = base64.b64encode(self._repr_png_()).decode("ascii")
         return f'<figure><img alt="" src="data:image/png;base64,{picture}"/><figcaption>{caption}</figcaption></figure>'
 

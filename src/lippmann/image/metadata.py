@@ -39,13 +39,13 @@ class Metadata:
 
     def to_dict(self) -> dict[str, object]:
         """JSON-able values, with the version; without seconds, so that the same picture gives the same file."""
-        made = self.provenance.to_dict()
-        del made["seconds"]
+        provenance = self.provenance.to_dict()
+        del provenance["seconds"]
         return {
             KEY: VERSION,
             "display": self.display.to_dict(),
             "world_from_display": self.world_from_display.tolist(),
-            "provenance": made,
+            "provenance": provenance,
         }
 
 

@@ -266,12 +266,12 @@ def _views(display: Display, grid: ViewGrid, layers: Mapping[str, Source]) -> It
             window = PixelWindow(0, top, display.panel.width, bottom - top)
             values = {key: layer(window) for key, layer in layers.items()}
             for number, view in enumerate(lot):
-                found, row, column = pixels_of_view_rows(display, grid, view, first, last)
-                if not found.any():
+                valid, row, column = pixels_of_view_rows(display, grid, view, first, last)
+                if not valid.any():
                     continue
                 has_any[number] = True
-                place = np.where(found, row - top, 0), np.where(found, column, 0)
-                absent = np.broadcast_to(~found, place[0].shape)
+                place = np.where(valid, row - top, 0), np.where(valid, column, 0)
+                absent = np.broadcast_to(~valid, place[0].shape)
                 for key, layer in values.items():
                     part = layer[place]
                     part[absent] = 0

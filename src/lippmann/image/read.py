@@ -189,8 +189,8 @@ def open_file(path: Path) -> PictureFile:
     if zarr_array.is_zarr(path):
         array = zarr_array.ZarrPicture(path)
         size, text = (array.width, array.height), array.text
-        found = PictureFile(path, "zarr", *size, array.dtype, (), text, array, lambda: {"": array.read()})
-        return _plausible(found, None)  # the size of a folder shows nothing: chunks without values need no files
+        opened = PictureFile(path, "zarr", *size, array.dtype, (), text, array, lambda: {"": array.read()})
+        return _plausible(opened, None)  # the size of a folder shows nothing: chunks without values need no files
     try:
         file = path.open("rb")
         start = file.peek(8)[:8]
@@ -215,10 +215,10 @@ def _opened(path: Path, file: BufferedReader, start: bytes) -> PictureFile:
         size = header.width, header.height
         return PictureFile(path, "png", *size, stored, (), text, None, lambda: {"": png.decode_png(_whole(file), path)})
     if start.startswith(exr.SIGNATURE):
-        found = exr.exr_header(file, path)
-        layers = tuple(sorted({name.rpartition(".")[0] for name in found.channels} - {""}))
-        stored, text = found.channels.get("R", "none"), found.text.get(TEXT_KEY, "")
-        size = found.width, found.height
+        parts = exr.exr_header(file, path)
+        layers = tuple(sorted({name.rpartition(".")[0] for name in parts.channels} - {""}))
+        stored, text = parts.channels.get("R", "none"), parts.text.get(TEXT_KEY, "")
+        size = parts.width, parts.height
         return PictureFile(
             path, "exr", *size, stored, layers, text, None, lambda: layers_of_channels(exr.read_exr(path), path)
         )

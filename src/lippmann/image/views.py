@@ -125,11 +125,11 @@ def resampled_views(pixels: FloatArray, display: Display, resampling: Resampling
     views, mask = np.zeros((*shape, 3), dtype=np.float32), np.zeros(shape, dtype=np.bool_)
     for ky, kx in np.ndindex(shape[:2]):
         u, v = u_center + grid.right[kx], v_center + grid.down[ky]
-        found, row, column = _nearest_pixels(display, owners, lens, u, v)
-        views[ky, kx][found] = pixels[row[found], column[found]]
-        mask[ky, kx] = found
+        valid, row, column = _nearest_pixels(display, owners, lens, u, v)
+        views[ky, kx][valid] = pixels[row[valid], column[valid]]
+        mask[ky, kx] = valid
         if resampling == "linear":
-            _interpolate(views[ky, kx], pixels, owners, lens, u, v, found, lenticular=_is_lenticular(display))
+            _interpolate(views[ky, kx], pixels, owners, lens, u, v, valid, lenticular=_is_lenticular(display))
     return views, mask
 
 
@@ -210,8 +210,8 @@ def pixels_of_view_rows(display: Display, grid: ViewGrid, view: tuple[int, int],
     """
     alike = display.lattice.rows_are_alike
     row, i = np.indices((1 if alike else last - first, display.lens_grid.columns))
-    found, at_row, at_column = pixels_of_view(display, grid, view, row + first, i)
-    return found, np.arange(first, last)[:, None] if alike else at_row, at_column
+    valid, at_row, at_column = pixels_of_view(display, grid, view, row + first, i)
+    return valid, np.arange(first, last)[:, None] if alike else at_row, at_column
 
 
 def panel_rows_of_view_rows(display: Display, first: int, last: int) -> tuple[int, int]:
@@ -316,9 +316,9 @@ def _nearest_pixels(display: Display, owners: _Owners, lens: NDArray[np.int32], 
     own_place = j * display.lens_grid.columns + i == lens
     # A place on the line between two pixels goes to the right or lower one, whatever the rounding noise.
     row, column = (np.floor(place + _SAME_PLACE).astype(np.intp) for place in (v, u))
-    found = _is_own(owners, lens, row, column)
+    valid = _is_own(owners, lens, row, column)
     best_row, best_column = row.copy(), column.copy()
-    open_ = ~found
+    open_ = ~valid
     distance = np.full(int(open_.sum()), np.inf)
     u, v, lens, row, column = u[open_], v[open_], lens[open_], row[open_], column[open_]
     for dv in (0,) if _is_lenticular(display) else (-1, 0, 1):
@@ -328,8 +328,8 @@ def _nearest_pixels(display: Display, owners: _Owners, lens: NDArray[np.int32], 
             distance[nearer] = squared[nearer]
             best_row[open_] = np.where(nearer, row + dv, best_row[open_])
             best_column[open_] = np.where(nearer, column + du, best_column[open_])
-    found[open_] = np.isfinite(distance)
-    return found & own_place, best_row, best_column
+    valid[open_] = np.isfinite(distance)
+    return valid & own_place, best_row, best_column
 
 
 def _interpolate(
@@ -339,11 +339,11 @@ def _interpolate(
     lens: NDArray[np.int32],
     u: Real,
     v: Real,
-    found: Flags,
+    valid: Flags,
     *,
     lenticular: bool,
 ) -> None:
-    """Replace the values of a view where a pixel was ``found`` by bilinear ones between the lens's own pixels."""
+    """Replace the values of a view where ``valid`` by bilinear ones between the lens's own pixels."""
     column, row = np.floor(u - 0.5).astype(np.intp), np.floor(v - 0.5).astype(np.intp)
     right, down = u - 0.5 - column, v - 0.5 - row
     total, weights = np.zeros((*u.shape, 3)), np.zeros(u.shape)
@@ -355,5 +355,5 @@ def _interpolate(
             at = (row + dv).clip(0, height - 1), (column + du).clip(0, width - 1)
             total += weight[..., None] * pixels[at]
             weights += weight
-    usable = found & (weights > _SAME_PLACE)
+    usable = valid & (weights > _SAME_PLACE)
     view[usable] = total[usable] / weights[usable][..., None]

@@ -76,8 +76,8 @@ def encode(result: TileResult) -> bytes:
             body = bytes(imagecodecs.zstd_encode(array.tobytes(), level=_LEVEL))
             entries.append([kind, name, array.dtype.str, list(array.shape), len(body)])
             bodies.append(body)
-    said = {"index": result.index, "rays": dict(result.rays), "notes": list(result.notes), "arrays": entries}
-    head = json.dumps(said, sort_keys=True).encode()
+    facts = {"index": result.index, "rays": dict(result.rays), "notes": list(result.notes), "arrays": entries}
+    head = json.dumps(facts, sort_keys=True).encode()
     data = b"".join((MARK, struct.pack("<IQ", len(head), sum(map(len, bodies))), head, *bodies))
     return data + _SUM(data).digest()
 
@@ -99,8 +99,8 @@ def decode(data: bytes, most: int | None = None) -> TileResult:
     """
     if whole_length(data[: len(MARK) + 12]) != len(data):
         raise DamagedTile("its length is wrong")
-    body, found = data[:-_SUM_BYTES], data[-_SUM_BYTES:]
-    if _SUM(body).digest() != found:
+    body, digest = data[:-_SUM_BYTES], data[-_SUM_BYTES:]
+    if _SUM(body).digest() != digest:
         raise DamagedTile("its check sum is wrong")
     try:
         return _unpacked(data, most)

@@ -7,26 +7,19 @@ The size of a picture is checked before memory is allocated for it.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, NamedTuple, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lippmann.codecs.pillow_formats import open_picture
 from lippmann.errors import OutputError, PictureError
-from lippmann.image.encoding import (
-    FORMATS,
-    STORED,
-    FormatName,
-    converted_values,
-    encode_values,
-)
+from lippmann.image.encoding import FORMATS, STORED, FormatName, converted_values, encode_values
 from lippmann.image.part_folders import MANIFEST
 from lippmann.image.read import MOST_PIXELS, open_file
-from lippmann.image.stored_values import Stored
+from lippmann.image.stored_values import Stored, Values
 from lippmann.image.write import format_for, replacing_output
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.quilts.quilt import MOST_SIDE, Quilt, QuiltLayout, check_size, layout_of_name
@@ -47,9 +40,10 @@ def read_quilt(path: Path) -> Quilt:
     """
     layout = layout_of_name(path)
     _check_ending(path)
-    check_size(*_size(path), layout, str(path))
-    values, stored = _read(path)
-    return Quilt(values, layout, stored)
+    file = _open(path)
+    check_size(*file.size, layout, str(path))
+    values = file.read()
+    return Quilt(values, layout, cast(Stored, values.dtype.name))
 
 
 def read_views(folder: Path, layout: QuiltLayout | None = None, *, progress: ProgressCallback = silent) -> Quilt:
@@ -76,19 +70,21 @@ def read_views(folder: Path, layout: QuiltLayout | None = None, *, progress: Pro
     if len(paths) != layout.views:
         rule = f"{layout.columns}x{layout.rows} views are {layout.views}"
         raise PictureError(f"it holds {len(paths)} views", where=str(folder), rule=rule)
-    width, height = _size(paths[0])
+    width, height = _open(paths[0]).size
     if width * height * layout.views > MOST_PIXELS:
         rule = f"together they have at most {MOST_PIXELS} pixels"
         raise PictureError(f"it holds {layout.views} views of {width} x {height} pixels", where=str(folder), rule=rule)
-    depths = {_stored(path) for path in paths}
+    depths: set[Stored] = set()
+    for path in paths:
+        file = _open(path)
+        if file.size != (width, height):
+            rule = f"the first view, {paths[0].name}, has {width} x {height}"
+            raise PictureError(f"has {file.size[0]} x {file.size[1]} pixels", where=str(path), rule=rule)
+        depths.add(file.stored())
     stored = depths.pop() if len(depths) == 1 else "float32"
     quilt = Quilt(np.empty((height * layout.rows, width * layout.columns, 3), dtype=stored), layout, stored)
     for number, path in enumerate(paths):
-        if (size := _size(path)) != (width, height):
-            rule = f"the first view, {paths[0].name}, has {width} x {height}"
-            raise PictureError(f"has {size[0]} x {size[1]} pixels", where=str(path), rule=rule)
-        values, _ = _read(path)
-        quilt.view_values(number)[...] = converted_values(values, stored, "srgb")
+        quilt.view_values(number)[...] = converted_values(_open(path).read(), stored, "srgb")
         progress(Progress("read", number + 1, layout.views))
     return quilt
 
@@ -207,29 +203,26 @@ def _check_ending(path: Path) -> None:
         raise PictureError(f"the ending '{path.suffix}' is unknown", where=str(path), rule=f"known: {', '.join(_READ)}")
 
 
-def _size(path: Path) -> tuple[int, int]:
-    """Width and height of a picture file, without decoding its pixels."""
-    if path.suffix.lower() in _JPEG:
+class _OpenFile(NamedTuple):
+    """A picture file whose header is read: its width and height, the type of its values, and their decoder."""
+
+    size: tuple[int, int]
+    stored: Callable[[], Stored]
+    read: Callable[[], Values]
+
+
+def _open(path: Path) -> _OpenFile:
+    if path.suffix.lower() not in _JPEG:
+        file = open_file(path)
+        size = file.width, file.height
+        return _OpenFile(size, lambda: file.check_stored(file.stored), lambda: file.decode()[0])
+
+    def decode() -> Values:
         with _opened_jpeg(path) as picture:
-            return picture.width, picture.height
-    file = open_file(path)
-    return file.width, file.height
+            return np.asarray(picture if picture.mode == "RGB" else picture.convert("RGB"))
 
-
-def _stored(path: Path) -> Stored:
-    if path.suffix.lower() in _JPEG:
-        return "uint8"
-    file = open_file(path)
-    return file.check_stored(file.stored)
-
-
-def _read(path: Path) -> tuple[NDArray[Any], Stored]:
-    """Values ``(H, W, 3)`` in the type in which they are stored, and that type."""
-    if path.suffix.lower() in _JPEG:
-        with _opened_jpeg(path) as picture:
-            return np.asarray(picture if picture.mode == "RGB" else picture.convert("RGB")), "uint8"
-    values = open_file(path).decode()[0]
-    return values, cast(Stored, values.dtype.name)
+    with _opened_jpeg(path) as picture:
+        return _OpenFile((picture.width, picture.height), lambda: "uint8", decode)
 
 
 @contextmanager
