@@ -1,6 +1,6 @@
 /**
- * Starts the page that the script is in: its pictures are inside it, if it is one file, or come from its server.
- * `?memory=MB` says how much of the graphics card's memory a picture may take.
+ * Starts the viewer of a page. The pictures are inside the page, if it is a single file, or come from its server.
+ * `?memory=MB` limits the graphics memory of a picture.
  */
 
 import { embeddedSource, serverSource } from "lippmann/source.js";
@@ -16,9 +16,9 @@ if (root) {
   const memory = Number(new URLSearchParams(location.search).get("memory")) * 1e6;
   const viewer = createViewer(root, sources, memory > 0 ? { memory } : {});
   window.lippmann = { viewer };
-  const named = () => {
+  const setTitle = () => {
     document.title = viewer.manifests.map(({ name }) => name).join(" | ");
   };
-  // What failed is said on the page.
-  viewer.ready.then(named, () => {});
+  // The viewer itself displays errors.
+  viewer.ready.then(setTitle, () => {});
 }

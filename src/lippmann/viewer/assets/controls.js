@@ -1,4 +1,4 @@
-/** The panel of controls beside the picture. It shows the viewer's state and calls the viewer; it keeps none itself. */
+/** The panel of controls beside the picture. It displays the viewer's state and calls the viewer; it has no state. */
 
 import { group, h, segments, slider, toggle } from "lippmann/dom.js";
 import { eyeBounds } from "lippmann/eye.js";
@@ -27,7 +27,7 @@ export class Controls {
     );
   }
 
-  /** Shows the viewer's state. */
+  /** Displays the viewer's state. */
   show(view) {
     this.x.show(view.eye.x);
     this.y.show(view.eye.y);
@@ -38,7 +38,7 @@ export class Controls {
       sides.map((side) => eyeOf(view, side)),
       view.plane,
     );
-    this.place.textContent = placeInField(flips(this.optics, view.eye));
+    this.place.textContent = zoneText(flips(this.optics, view.eye));
     this.sway.show(view.isPlaying);
     this.sway.button.textContent = view.isPlaying ? "Stop" : "Sway";
     this.mode.show(view.mode);
@@ -56,12 +56,12 @@ export class Controls {
     this.#showLayer(view.overlay);
   }
 
-  /** Says that the tilt of the device moves the eye, or no longer. */
+  /** Displays whether the tilt of the device moves the eye. */
   showTilt(isOn) {
     this.tilt?.show(isOn);
   }
 
-  /** Tells how far the zoom goes, and whether only parts of the picture fit the graphics card. */
+  /** Sets the limits of the zoom, and says whether only a part of the picture fits the graphics memory. */
   boundZoom({ widest, smallest }) {
     this.zoom.input.min = 1 / widest;
     this.zoom.input.max = 1 / smallest;
@@ -73,13 +73,13 @@ export class Controls {
     const bounds = eyeBounds(optics);
     this.plan = new Plan(({ x, z }) => viewer.moveEye({ x, z }));
     const move = (axis) => (value) => viewer.moveEye({ [axis]: value });
-    const range = (reach) => ({ min: -reach, max: reach, step: "any", words: millimetres });
+    const range = (reach) => ({ min: -reach, max: reach, step: "any", format: millimetres });
     this.x = slider("Sideways", { ...range(bounds.x), onchange: move("x"), marks: 0.5 });
     this.y = slider("Height", { ...range(bounds.y), onchange: move("y"), marks: 0.5 });
     const [min, max] = [bounds.nearest, bounds.farthest];
-    this.z = slider("Distance", { min, max, step: "any", words: millimetres, onchange: move("z") });
+    this.z = slider("Distance", { min, max, step: "any", format: millimetres, onchange: move("z") });
     this.sway = toggle("Sway", (isOn) => viewer.setPlaying(isOn), { class: "toggle main" });
-    const middle = h("button", { type: "button", onclick: () => viewer.center() }, "To the middle");
+    const middle = h("button", { type: "button", onclick: () => viewer.center() }, "Centre");
     this.tilt = canTilt() ? toggle("Tilt", (isOn) => viewer.setTilting(isOn)) : null;
     const buttons = h("div", { class: "buttons" }, this.sway.button, middle, this.tilt?.button ?? null);
     this.place = h("p", { class: "note place" });
@@ -94,15 +94,15 @@ export class Controls {
       ["anaglyph", "Anaglyph"],
     ];
     this.mode = segments("Eyes", choices, (mode) => viewer.setMode(mode));
-    this.eyeDistance = slider("Between the eyes", {
+    this.eyeDistance = slider("Eye separation", {
       min: 0,
       max: 120,
       step: 1,
-      words: millimetres,
+      format: millimetres,
       onchange: (value) => viewer.set({ eyeDistance: value }),
     });
-    this.crossed = toggle("Crossed eyes", (isOn) => viewer.set({ isCrossed: isOn }));
-    return group("Seen with", this.mode.row, this.eyeDistance.row, this.crossed.button);
+    this.crossed = toggle("Cross-eyed", (isOn) => viewer.set({ isCrossed: isOn }));
+    return group("Viewing mode", this.mode.row, this.eyeDistance.row, this.crossed.button);
   }
 
   #focusGroup() {
@@ -113,14 +113,14 @@ export class Controls {
       min: far,
       max: near,
       step: (near - far) / 400,
-      words: inFocus,
+      format: planeText,
       onchange: (value) => viewer.setPlane(value),
       marks: -far / (near - far),
     });
     const note = h(
       "p",
       { class: "note" },
-      "The mean of all views: a lens as wide as the whole field, sharp in one plane.",
+      "Mean of all views: a synthetic aperture as wide as the view zone, sharp in one plane.",
     );
     return group("Focus", this.refocus.button, this.plane.row, note);
   }
@@ -128,24 +128,25 @@ export class Controls {
   #closerGroup() {
     const { viewer } = this;
     this.magnifier = toggle("Magnifier", (isOn) => viewer.setMagnifier(isOn));
-    this.glassScale = slider("Enlarged", {
+    this.glassScale = slider("Magnification", {
       min: 4,
       max: 40,
       step: 1,
-      words: (value) => `${Number(value).toFixed(0)} x`,
+      format: (value) => `${Number(value).toFixed(0)} x`,
       onchange: (value) => viewer.set({ glassScale: value }),
     });
     this.zoom = slider("Zoom", {
       min: 1,
       max: 16,
       step: "any",
-      words: (value) => `${Number(value).toFixed(1)} x`,
+      format: (value) => `${Number(value).toFixed(1)} x`,
       onchange: (value) => viewer.zoomTo(value),
     });
-    const note = h("p", { class: "note" }, "The raw micro-images. Framed: what the eye sees through each lens.");
-    const larger = "The picture is larger than this page holds at once. Shift and drag moves the part that is shown.";
+    const text = "Native pixels in their micro-images (elemental images). The eye sees the framed pixel of each.";
+    const note = h("p", { class: "note" }, text);
+    const larger = "The picture exceeds the page's graphics memory, so a part is displayed. Shift and drag moves it.";
     this.part = h("p", { class: "note", hidden: true }, larger);
-    return group("Closer", this.magnifier.button, this.glassScale.row, this.zoom.row, this.part, note);
+    return group("Magnify", this.magnifier.button, this.glassScale.row, this.zoom.row, this.part, note);
   }
 
   #layerGroup(manifests) {
@@ -160,11 +161,11 @@ export class Controls {
       h("option", { value: "" }, "None"),
       ...options,
     );
-    this.share = slider("Strength", {
+    this.share = slider("Opacity", {
       min: 0.1,
       max: 1,
       step: 0.05,
-      words: (value) => `${Math.round(100 * value)} %`,
+      format: (value) => `${Math.round(100 * value)} %`,
       onchange: (value) => viewer.setOverlayShare(value),
     });
     this.legend = h("div", { class: "legend" });
@@ -182,19 +183,19 @@ export class Controls {
   }
 }
 
-/** The planes that can be focused on: what the display resolves, short of the viewer. */
+/** Range of the focus plane in mm, [near, far]: the display's resolvable depth, in front of the viewer. */
 export function focusRange(optics) {
   const [near, far] = optics.resolvable_depth;
   return [Math.min(near, 0.9 * (optics.viewing_distance ?? Infinity)), far];
 }
 
-function placeInField([fewest, most]) {
-  if (most === 0) return "In the field";
-  if (fewest === most) return "Beyond the field: flipped";
-  return "At the edge of the field: partly flipped";
+function zoneText([fewest, most]) {
+  if (most === 0) return "In the central view zone";
+  if (fewest === most) return "In a neighbouring view zone";
+  return "Between view zones: a part of the picture has flipped";
 }
 
-function inFocus(value) {
+function planeText(value) {
   const place = Number(value);
   if (Math.abs(place) < 0.05) return "lens plane";
   return `${Math.abs(place).toFixed(1)} mm ${place > 0 ? "in front" : "behind"}`;
@@ -204,16 +205,16 @@ function legend({ classes, range, unit, colors }) {
   const css = (color) => `rgb(${color.join(" ")})`;
   if (classes) {
     return classes.map(({ label, color }) =>
-      h("div", { class: "legend-class" }, colored(h("span", { class: "swatch" }), css(color)), label),
+      h("div", { class: "legend-class" }, withBackground(h("span", { class: "swatch" }), css(color)), label),
     );
   }
-  const words = range.map((value) => `${Number(value.toPrecision(3))}`);
-  const bar = colored(h("div", { class: "scale" }), `linear-gradient(90deg, ${colors.map(css).join(", ")})`);
-  return [bar, h("div", { class: "scale-ends" }, h("span", {}, words[0]), h("span", {}, `${words[1]} ${unit}`.trim()))];
+  const ends = range.map((value) => `${Number(value.toPrecision(3))}`);
+  const bar = withBackground(h("div", { class: "scale" }), `linear-gradient(90deg, ${colors.map(css).join(", ")})`);
+  return [bar, h("div", { class: "scale-ends" }, h("span", {}, ends[0]), h("span", {}, `${ends[1]} ${unit}`.trim()))];
 }
 
-/** Set from the script: the page's policy allows no styles in attributes. */
-function colored(target, background) {
+/** Sets the background from the script: the page's policy forbids style attributes. */
+function withBackground(target, background) {
   target.style.background = background;
   return target;
 }

@@ -1,47 +1,47 @@
-/** Elements of the page, made in one line each. */
+/** Functions that create elements and controls of the page. */
 
 /**
- * An element with attributes and children; a function as an attribute `onname` listens to the event of that name, true
- * sets an attribute without a value, false and null leave it out.
+ * Creates an element with attributes and children. A function as attribute `onNAME` listens to the event NAME; `true`
+ * sets an attribute without a value; `false` and `null` omit it.
  */
 export function h(tag, attributes = {}, ...children) {
-  const made = document.createElement(tag);
+  const created = document.createElement(tag);
   for (const [name, value] of Object.entries(attributes)) {
-    if (typeof value === "function") made.addEventListener(name.slice(2), value);
-    else if (value === true) made.setAttribute(name, "");
-    else if (value !== false && value !== null) made.setAttribute(name, value);
+    if (typeof value === "function") created.addEventListener(name.slice(2), value);
+    else if (value === true) created.setAttribute(name, "");
+    else if (value !== false && value !== null) created.setAttribute(name, value);
   }
-  made.append(...children.filter((child) => child !== null));
-  return made;
+  created.append(...children.filter((child) => child !== null));
+  return created;
 }
 
-/** A titled group of controls. */
+/** Creates a group of controls with a title. */
 export function group(title, ...children) {
   return h("section", { class: "group" }, h("h2", {}, title), ...children);
 }
 
 /**
- * A slider with its name and its value in words.
+ * Creates a slider with a label and its formatted value.
  *
- * @returns an object with the `row` and a function `show(value)` that puts it without telling anybody
+ * @returns the element `row`, and `show(value)`, which sets the value without calling `onchange`
  */
-export function slider(name, { min, max, step, words, onchange, marks = null }) {
+export function slider(name, { min, max, step, format, onchange, marks = null }) {
   const input = h("input", { type: "range", min, max, step, oninput: () => onchange(Number(input.value)) });
   const output = h("output", {});
   const label = h("span", { class: "slider-name" }, name);
   const ticks = marks === null ? null : h("span", { class: "slider-mark" });
-  // Not as an attribute: the page's policy allows no styles in them.
+  // The page's policy forbids style attributes.
   ticks?.style.setProperty("--at", marks);
   const row = h("label", { class: "slider" }, label, output, h("span", { class: "slider-track" }, input, ticks));
   const show = (value) => {
     input.value = value;
-    output.textContent = words(value);
-    input.setAttribute("aria-valuetext", words(value));
+    output.textContent = format(value);
+    input.setAttribute("aria-valuetext", format(value));
   };
   return { row, input, show };
 }
 
-/** A switch: a button that is pressed or not; `show(isOn)` as for the slider. */
+/** Creates a toggle button; `show(isOn)` as for the slider. */
 export function toggle(name, onchange, attributes = {}) {
   const press = () => onchange(button.getAttribute("aria-pressed") !== "true");
   const button = h(
@@ -54,7 +54,7 @@ export function toggle(name, onchange, attributes = {}) {
 
 let groups = 0;
 
-/** One choice of several, as a row of segments; `choices` are pairs of value and text. */
+/** Creates a row of radio buttons; `choices` are pairs of value and label. */
 export function segments(name, choices, onchange) {
   groups += 1;
   const inputs = choices.map(([value]) =>

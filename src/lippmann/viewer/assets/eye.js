@@ -1,18 +1,18 @@
-/** Where the eye may be, how it glides there, and how it sways. */
+/** Position of the eye: its limits, gliding to a goal, and swaying. */
 
 import { halfField } from "lippmann/optics.js";
 
-/** How much farther than to the edge of the field the pointer leads, so that the flips beyond are seen. */
-const BEYOND_FIELD = 1.3;
+/** Reach of the pointer in half widths of the view zone: a little more than 1, to show the flip at its edge. */
+const POINTER_REACH = 1.3;
 
-/** Share of the field that swaying uses, and seconds of one sway. */
+/** Amplitude of swaying in half widths of the view zone, and its period in seconds. */
 const SWAY_SHARE = 0.85;
 const SWAY_SECONDS = 6;
 
-/** Share of the way to its goal that the eye has left after a second of gliding. */
+/** Share of the distance to the goal that remains after a second of gliding. */
 const GLIDE = 1e-6;
 
-/** Bounds of the eye's place, mm, for sliders and for what people do; tests and programs may leave them. */
+/** Limits of the eye's position in mm, for controls and input; `setEye` is not limited. */
 export function eyeBounds(optics) {
   const [, , z] = optics.eye;
   const [nearest, farthest] = [0.25 * z, 4 * z];
@@ -20,13 +20,14 @@ export function eyeBounds(optics) {
   return { x: aside, y: aside, nearest, farthest };
 }
 
-/** The eye for a place in the pane: -1 to 1 from left to right and from bottom to top. */
+/** Eye position at distance `z` for a point of the pane, -1 to 1 right and up. */
 export function eyeAt(optics, z, right, up) {
-  const reach = BEYOND_FIELD * halfField(optics, z);
+  const reach = POINTER_REACH * halfField(optics, z);
   return { x: right * reach, y: up * reach, z };
 }
 
-export function bounded(eye, bounds) {
+/** The eye position clamped to `bounds`. */
+export function clampEye(eye, bounds) {
   const within = (value, low, high) => Math.min(high, Math.max(low, value));
   return {
     x: within(eye.x, -bounds.x, bounds.x),
@@ -35,8 +36,8 @@ export function bounded(eye, bounds) {
   };
 }
 
-/** The eye on its way after some seconds; the goal itself once it is as near as a hundredth of a millimetre. */
-export function glided(eye, goal, seconds) {
+/** Eye position after some seconds of gliding; the goal itself once it is within a hundredth of a millimetre. */
+export function glideEye(eye, goal, seconds) {
   const left = GLIDE ** seconds;
   const next = {};
   let farthest = 0;
@@ -47,15 +48,15 @@ export function glided(eye, goal, seconds) {
   return farthest < 0.01 ? goal : next;
 }
 
-/** The swaying eye: from side to side; in front of round lenses also up and down, twice as quickly. */
-export function swaying(optics, z, seconds) {
+/** Eye position while swaying: sideways; before a lens array also vertically, at twice the frequency. */
+export function swayEye(optics, z, seconds) {
   const turn = (2 * Math.PI * seconds) / SWAY_SECONDS;
   const reach = SWAY_SHARE * halfField(optics, z);
   const up = optics.lenses.layout === "lenticular" ? 0 : 0.4 * Math.sin(2 * turn);
   return { x: reach * Math.sin(turn), y: reach * up, z };
 }
 
-/** Seconds after which {@link swaying} is where the eye is, so that playing begins without a jump. */
+/** Time in seconds at which {@link swayEye} is nearest to the eye, so that swaying starts without a jump. */
 export function swayStart(optics, eye) {
   const share = eye.x / (SWAY_SHARE * halfField(optics, eye.z));
   return (Math.asin(Math.min(1, Math.max(-1, share))) * SWAY_SECONDS) / (2 * Math.PI);

@@ -1,23 +1,23 @@
-/** Pointer, touch, wheel, keys and tilt: what people do becomes a few calls on the viewer. */
+/** Input by pointer, touch, wheel, keys and tilt, translated to calls of the viewer. */
 
-/** What one step of an arrow key moves the eye by, as a share of the field's half width. */
+/** Step of an arrow key in half widths of the view zone. */
 const KEY_STEP = 0.06;
 const WHEEL_RATE = 0.0012;
 
-/** Degrees of tilt that lead to the edge of the pane's reach. */
+/** Tilt in degrees that corresponds to the edge of the pane. */
 const FULL_TILT = 25;
 
 /**
- * Connects a pane's element with the viewer.
+ * Listens to input on the canvas.
  *
- * @returns a function that takes all listeners off again
+ * @returns a function that removes all listeners
  */
 export function listen(canvas, viewer) {
   const stop = new AbortController();
   const on = (target, type, call, options = {}) =>
     target.addEventListener(type, call, { ...options, signal: stop.signal });
   const pointers = new Map();
-  // After a drag or a key the eye stays where it was put until the pointer comes in anew.
+  // After a drag or a key the eye ignores the pointer until it enters the canvas again.
   let followsPointer = true;
   let pinch = null;
 
@@ -73,14 +73,14 @@ export function listen(canvas, viewer) {
   );
   on(canvas, "keydown", (event) => {
     if (event.ctrlKey || event.metaKey || event.altKey) return;
-    if (pressed(event, viewer)) {
+    if (handleKey(event, viewer)) {
       followsPointer = false;
       event.preventDefault();
     }
   });
   return () => stop.abort();
 
-  /** Place of a pointer in the canvas, from -1 to 1, right and up. */
+  /** Position of a pointer in the canvas, from -1 to 1, right and up. */
   function place(event) {
     const box = canvas.getBoundingClientRect();
     return {
@@ -90,21 +90,21 @@ export function listen(canvas, viewer) {
   }
 }
 
-/** What the keys do, as the page tells it. */
+/** Keys and what they do, for the page's table. */
 export const KEYS = [
   ["← → ↑ ↓", "move the eye"],
   ["Page ↑ ↓", "nearer, farther (wheel)"],
-  ["Home", "eye to the middle (double click)"],
+  ["Home", "centre the eye (double click)"],
   ["Space", "sway"],
   ["1 2 3", "one eye, side by side, anaglyph"],
   ["F", "refocus; < and > move the plane"],
   ["M", "magnifier; Shift + arrows move it"],
   ["O", "next layer"],
   ["+ − 0", "zoom in, out, off (Ctrl + wheel)"],
-  ["Shift + drag", "move what is zoomed"],
+  ["Shift + drag", "pan"],
 ];
 
-function pressed(event, viewer) {
+function handleKey(event, viewer) {
   const arrow = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] }[event.key];
   if (arrow) {
     if (event.shiftKey && viewer.view.glass) viewer.moveGlassBy(0.04 * arrow[0], 0.04 * arrow[1]);
@@ -133,32 +133,32 @@ function pressed(event, viewer) {
   return call !== undefined;
 }
 
-/** Whether this device may tell how it is tilted. */
+/** Whether the device can report its tilt. */
 export function canTilt() {
   return "DeviceOrientationEvent" in window && window.isSecureContext && matchMedia("(pointer: coarse)").matches;
 }
 
 /**
- * Lets the tilt of the device move the eye, from where it is held now.
+ * Moves the eye by the tilt of the device, relative to its present orientation.
  *
- * @returns a promise of a function that ends it, or of null if the user refuses
+ * @returns a promise of a function that stops it, or of null if the user refuses permission
  */
 export async function followTilt(viewer) {
   const ask = DeviceOrientationEvent.requestPermission;
   if (ask && (await ask.call(DeviceOrientationEvent)) !== "granted") return null;
-  let held = null;
-  const turned = ({ beta, gamma }) => {
+  let start = null;
+  const onTilt = ({ beta, gamma }) => {
     if (beta === null || gamma === null) return;
     const angle = ((screen.orientation?.angle ?? 0) * Math.PI) / 180;
-    // The device's axes turned into those of the picture on it.
+    // Device axes rotated to the axes of the screen.
     const right = gamma * Math.cos(angle) + beta * Math.sin(angle);
     const up = beta * Math.cos(angle) - gamma * Math.sin(angle);
-    held ??= { right, up };
-    // The side that is turned away from the face is seen from further off that side.
-    viewer.lookFrom((held.right - right) / FULL_TILT, (up - held.up) / FULL_TILT);
+    start ??= { right, up };
+    // Turning the right edge away moves the eye to the left of the display.
+    viewer.lookFrom((start.right - right) / FULL_TILT, (up - start.up) / FULL_TILT);
   };
-  window.addEventListener("deviceorientation", turned);
-  return () => window.removeEventListener("deviceorientation", turned);
+  window.addEventListener("deviceorientation", onTilt);
+  return () => window.removeEventListener("deviceorientation", onTilt);
 }
 
 function spreadOf(pointers) {

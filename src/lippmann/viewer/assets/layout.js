@@ -1,11 +1,11 @@
-/** The page's frame around the canvas: title, progress, messages, divider, and the place of the controls. */
+/** Layout of the page: title, canvas, progress, messages, divider, and the side panel for the controls. */
 
 import { h } from "lippmann/dom.js";
 
 const THEMES = ["auto", "light", "dark"];
 
 export class Layout {
-  /** @param onResize called when there is more or less room for the canvas */
+  /** @param onResize called when the space for the canvas changes */
   constructor(root, { theme = "auto", compact = false }, onResize) {
     this.root = root;
     root.classList.add("lippmann");
@@ -55,7 +55,7 @@ export class Layout {
     this.names.replaceChildren(...manifests.map(({ name }) => h("span", {}, name)));
   }
 
-  /** Makes the canvas as large as the stage has room for, width to height in this proportion. */
+  /** Resizes the canvas to the largest size of this aspect (width / height) that fits the stage. */
   fit(aspect) {
     const box = this.stage.getBoundingClientRect();
     const style = getComputedStyle(this.stage);
@@ -75,13 +75,13 @@ export class Layout {
     this.progress.hidden = share >= 1;
   }
 
-  /** Says something in the middle of the page, or nothing any more (null). */
-  tell(text) {
+  /** Displays a message in the middle of the page, or none (null). */
+  showMessage(text) {
     this.message.hidden = text === null;
     this.message.textContent = text ?? "";
   }
 
-  /** Puts the divider over the first of so many panes. */
+  /** Places the divider at a share of the first of `panes` panes. */
   showDivider(share, panes) {
     this.panes = panes;
     this.divider.style.left = `${(100 * share) / panes}%`;

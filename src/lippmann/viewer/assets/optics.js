@@ -1,35 +1,35 @@
 /**
- * The display's geometry as numbers for the shaders: all that is seen depends linearly on whole numbers (the pixel of
- * the pane, the lens), so a few coefficients in double precision describe it. Formulas of display/display.py,
- * display/lattice.py and replay.py; millimetres, x to the right, y up, z toward the viewer.
+ * Geometry of the display as coefficients for the shaders. Visible points depend linearly on integers (pixel of the
+ * pane, lens), so a few coefficients in double precision describe them. Formulas of display/display.py,
+ * display/lattice.py and viewing/replay.py; millimetres, x to the right, y up, z toward the viewer.
  */
 
-import { exact } from "lippmann/fixed.js";
+import { fixedPoint } from "lippmann/fixed.js";
 
 export const LAYOUTS = { lenticular: 0, square: 1, hexagonal: 2 };
 
-/** Parts of a pixel by which a point may miss a boundary and still count as lying on it, as in replay.py. */
+/** Tolerance in pixels within which a point lies on a pixel boundary, as in replay.py. */
 const ON_BOUNDARY = 1e-6;
 
-/** Parts of a lens by which a point may miss a boundary between lenses: above what the shader rounds off. */
+/** Tolerance in lenses within which a point lies on a lens boundary; exceeds the rounding error of the shader. */
 const ON_LENS_BOUNDARY = 5e-7;
 
-/** An eye so far away (mm) counts as infinitely far, as in replay.py. */
+/** Distance in mm that stands for infinity, as in replay.py. */
 const FAR = 1e12;
 
 /**
- * Coefficients of what an eye sees.
+ * Coefficients of the panel point that an eye sees behind each pixel of a pane.
  *
  * @param optics the manifest
  * @param eye {x, y, z}, z > 0
- * @param plane z of the plane whose points are looked at (0: the lens plane), below the eye
+ * @param plane z of the focus plane (0: the lens plane), below the eye's
  * @param frame the part of the panel's rectangle that fills the pane, in panel pixels
  * @param width, height pixels of the pane
  */
 export function sightline(optics, eye, plane, frame, width, height) {
   const { panel, lenses, gap } = optics;
   const d = panel.pixel_pitch;
-  // Points of the plane behind the pane's pixels, then on along the line of sight to the lens plane.
+  // Points of the plane at the pane's pixels, then along the line of sight to the lens plane.
   const stretch = plane / (eye.z - plane);
   const stepX = (frame.width / width) * d * (1 + stretch);
   const stepY = (-frame.height / height) * d * (1 + stretch);
@@ -45,35 +45,35 @@ export function sightline(optics, eye, plane, frame, width, height) {
   if (lenses.layout !== "lenticular") {
     const isSquare = lenses.layout === "square";
     return {
-      across: exact([stepX / pitch, 0, (left - originX) / pitch + middle]),
-      down: exact([-stepY / rowPitch, (originY - top) / rowPitch + (isSquare ? middle : ON_LENS_BOUNDARY)]),
-      panelU: exact([pitch * beyond, isSquare ? 0 : 0.5 * pitch * beyond, 0, originX * beyond + shiftU]),
-      panelV: exact([rowPitch * beyond, shiftV - originY * beyond]),
+      across: fixedPoint([stepX / pitch, 0, (left - originX) / pitch + middle]),
+      down: fixedPoint([-stepY / rowPitch, (originY - top) / rowPitch + (isSquare ? middle : ON_LENS_BOUNDARY)]),
+      panelU: fixedPoint([pitch * beyond, isSquare ? 0 : 0.5 * pitch * beyond, 0, originX * beyond + shiftU]),
+      panelV: fixedPoint([rowPitch * beyond, shiftV - originY * beyond]),
       slide: 0,
     };
   }
   const [sin, cos] = axis(lenses);
   const along = [stepX * sin, stepY * cos, left * sin + top * cos];
-  // What is seen through the axis lies beside what lies behind the point itself, by the point's place across the lens.
+  // Shift along v between the two edges of a slanted lens, whose axis the eye looks through.
   const slide = pitch * sin * beyond;
   const center = (left * cos - top * sin - originX) / pitch + middle;
   return {
-    across: exact([(stepX * cos) / pitch, (-stepY * sin) / pitch, center]),
-    down: exact([0, 0]),
-    panelU: exact([
+    across: fixedPoint([(stepX * cos) / pitch, (-stepY * sin) / pitch, center]),
+    down: fixedPoint([0, 0]),
+    panelU: fixedPoint([
       pitch * cos * beyond,
       along[0] * sin * beyond,
       along[1] * sin * beyond,
       (originX * cos + along[2] * sin) * beyond + shiftU,
     ]),
-    panelV: exact([-stepY * beyond, shiftV - top * beyond + 0.5 * slide]),
+    panelV: fixedPoint([-stepY * beyond, shiftV - top * beyond + 0.5 * slide]),
     slide,
   };
 }
 
 /**
- * Where the grid of each colour lies: what to add to panel coordinates for red, green and blue, so that whole numbers
- * are its boundaries. With uneven cells only the boundary's tolerance.
+ * Offsets of the red, green and blue sub-pixel grids: added to panel coordinates they make integers the grid's
+ * boundaries. With uneven cells they are the tolerance alone.
  */
 export function channelPlaces(optics) {
   const { cells, uneven } = optics.panel;
@@ -90,7 +90,7 @@ export function channelPlaces(optics) {
   };
 }
 
-/** Which lens a panel point belongs to, and which pixel of each micro-image the eye sees: for the magnifier. */
+/** Coefficients of the lens of a panel point, and of the pixel that the eye sees in each micro-image. */
 export function microImages(optics, eye) {
   const { panel, lenses, gap, magnification } = optics;
   const d = panel.pixel_pitch;
@@ -107,11 +107,11 @@ export function microImages(optics, eye) {
   if (lenses.layout !== "lenticular") {
     const isSquare = lenses.layout === "square";
     return {
-      acrossOf: exact([toLens / pitch, 0, (left - originX) / pitch + middle]),
-      downOf: exact([0, toLens / rowPitch, (originY - top) / rowPitch + (isSquare ? middle : ON_LENS_BOUNDARY)]),
+      acrossOf: fixedPoint([toLens / pitch, 0, (left - originX) / pitch + middle]),
+      downOf: fixedPoint([0, toLens / rowPitch, (originY - top) / rowPitch + (isSquare ? middle : ON_LENS_BOUNDARY)]),
       gradients: [toLens / pitch, 0, 0, toLens / rowPitch],
-      seenU: exact([pitch * beyond, isSquare ? 0 : 0.5 * pitch * beyond, originX * beyond + shiftU]),
-      seenV: exact([rowPitch * beyond, shiftV - originY * beyond]),
+      visibleU: fixedPoint([pitch * beyond, isSquare ? 0 : 0.5 * pitch * beyond, originX * beyond + shiftU]),
+      visibleV: fixedPoint([rowPitch * beyond, shiftV - originY * beyond]),
     };
   }
   const [sin, cos] = axis(lenses);
@@ -120,19 +120,19 @@ export function microImages(optics, eye) {
   const slope = sin / cos;
   const firstY = (panel.height / 2 - 0.5) * d;
   return {
-    acrossOf: exact([perColumn, perRow, (left * cos - top * sin - originX) / pitch + middle]),
-    downOf: exact([0, 0, 0]),
+    acrossOf: fixedPoint([perColumn, perRow, (left * cos - top * sin - originX) / pitch + middle]),
+    downOf: fixedPoint([0, 0, 0]),
     gradients: [perColumn, perRow, 0, 0],
-    seenU: exact([
+    visibleU: fixedPoint([
       (pitch / cos) * beyond,
       -slope,
       (originX / cos) * beyond + (slope * (firstY + eye.y * share)) / d + shiftU,
     ]),
-    seenV: exact([0, 0]),
+    visibleV: fixedPoint([0, 0]),
   };
 }
 
-/** The eyes that see one view each through all lenses at once; eye_of_offset of replay.py. */
+/** Eye positions of the views: each sees one view through all lenses; eye_of_offset of replay.py. */
 export function eyesOfViews(optics) {
   const { panel, lenses, gap, viewing_distance: distance, views } = optics;
   const z = distance ?? FAR;
@@ -147,14 +147,14 @@ export function eyesOfViews(optics) {
   );
 }
 
-/** Half the width (mm) of the field in which the middle lens shows its own micro-image, at a distance. */
+/** Half width in mm, at a distance, of the view zone in which the central lens shows its own micro-image. */
 export function halfField(optics, distance) {
   return (0.5 * distance * optics.micro_image_pitch) / optics.gap;
 }
 
 /**
- * How many micro-images beside its own the lenses at the panel's edges show to an eye: [fewest, most]. Both 0: every
- * lens shows its own, the eye is in the field. Both k: the picture has flipped k times. Else part of it has.
+ * View zone of an eye: least and largest offset [fewest, most], in micro-images, between a lens and the micro-image
+ * that it shows, at the panel's edges. [0, 0]: the central zone. [k, k]: the k-th neighbour. Otherwise between zones.
  */
 export function flips(optics, eye) {
   const { panel, lenses, gap, micro_image_pitch: pitch, viewing_distance: distance } = optics;
@@ -165,7 +165,7 @@ export function flips(optics, eye) {
   const edge = halfWidth * cos + halfHeight * Math.abs(sin);
   const counts = [-edge, edge].map((place) => beside(place, eye.x * cos - eye.y * sin));
   if (lenses.layout !== "lenticular") counts.push(...[-halfHeight, halfHeight].map((place) => beside(place, eye.y)));
-  // In front of an array a flip sideways and one up or down are flips alike.
+  // Horizontal and vertical offsets count alike.
   return counts.every((count) => count === 0) ? [0, 0] : range(counts.map(Math.abs));
 }
 

@@ -1,14 +1,14 @@
-/** A picture on the graphics card: its tiles, its layers, and the programs that draw what an eye sees of it. */
+/** A picture in graphics memory: its tiles, its layers, and the shader programs that draw it. */
 
-import { setExact } from "lippmann/fixed.js";
+import { setFixedPoint } from "lippmann/fixed.js";
 import { LAYOUTS, channelPlaces, microImages, sightline } from "lippmann/optics.js";
 import { SIGHT_VERTEX, fragmentSource } from "lippmann/shaders.js";
 import { TileTexture, capacityOf, tilesOf } from "lippmann/tiles.js";
 
 export class Picture {
   /**
-   * @param manifest the picture's description, see `checked`
-   * @param memory bytes of the graphics card that the picture, and each of its layers, may take
+   * @param manifest the picture's description, see `checkManifest`
+   * @param memory limit on the graphics memory of the picture, and of each of its layers, in bytes
    */
   constructor(gl, manifest, source, memory) {
     this.gl = gl;
@@ -23,7 +23,7 @@ export class Picture {
     this.isReady = false;
   }
 
-  /** Fetches the tiles of the picture, and of its layers at hand, behind a part of the panel's rectangle. */
+  /** Fetches the tiles behind a frame, of the picture and of its loaded layers. */
   async load(frame, onTile) {
     const places = this.#behind(frame);
     const textures = [["picture", this.tiles], ...this.overlays];
@@ -32,7 +32,7 @@ export class Picture {
     this.isReady = !signal.aborted;
   }
 
-  /** Fetches a layer's tiles behind a part of the panel, unless it is there already. */
+  /** Fetches the tiles of a layer behind a frame, unless the layer is loaded. */
   async loadOverlay(name, frame, onTile) {
     const { layers } = this.manifest.tiles;
     if (this.overlays.has(name) || !layers.some((layer) => layer.name === name)) return;
@@ -41,7 +41,7 @@ export class Picture {
     await texture.load(this.source, name, this.#behind(frame), onTile, this.stopped.signal);
   }
 
-  /** The widest part of the panel, 0 to 1, whose tiles the card can hold at a time. */
+  /** Largest width of a frame, 0 to 1, whose tiles fit the graphics memory. */
   get widest() {
     const { size, columns, rows, width, height } = this.manifest.tiles;
     if (this.capacity >= columns * rows) return 1;
@@ -70,7 +70,7 @@ export class Picture {
     });
   }
 
-  /** By how many pixels what the lenses show lies beside them at most, from where the eye usually is. */
+  /** Largest usual distance in pixels between a lens and the pixel that it shows. */
   #margin() {
     const { panel, micro_image_pitch: pitch, gap, eye } = this.manifest;
     return (12 * pitch) / panel.pixel_pitch + (2 * Math.max(panel.width, panel.height) * gap) / eye[2];
@@ -94,23 +94,23 @@ export class Picture {
     gl.drawArrays(gl.TRIANGLES, 0, 3);
   }
 
-  /** Draws what an eye sees of the points of a plane, in linear light with a count of 1 as alpha, to be added up. */
+  /** Draws one view of a focus sum: linear RGB of what an eye sees through a plane, and 1 as alpha to count views. */
   drawSummand(eye, plane, frame, pane) {
     const { gl } = this;
     const program = this.#use("summand");
     this.#setSightline(program, sightline(this.manifest, eye, plane, frame, pane.width, pane.height), pane);
-    this.#setOwners(program, microImages(this.manifest, eye));
+    this.#setLensOfPoint(program, microImages(this.manifest, eye));
     gl.uniform1i(program.at("isCoded"), this.isCoded);
     gl.drawArrays(gl.TRIANGLES, 0, 3);
   }
 
-  /** Draws the raw panel in a round glass; see the program for the parameters. */
+  /** Draws the native pixels in a round magnifier; see the program for the parameters. */
   drawMagnifier(eye, glass) {
     const { gl } = this;
     const program = this.#use("magnifier");
     const parts = microImages(this.manifest, eye);
-    this.#setOwners(program, parts);
-    for (const name of ["seenU", "seenV"]) setExact(gl, program, name, parts[name]);
+    this.#setLensOfPoint(program, parts);
+    for (const name of ["visibleU", "visibleV"]) setFixedPoint(gl, program, name, parts[name]);
     gl.uniform2f(program.at("middle"), glass.x, glass.y);
     gl.uniform1f(program.at("radius"), glass.radius);
     gl.uniform1f(program.at("scale"), glass.scale);
@@ -126,7 +126,7 @@ export class Picture {
     return this.manifest.transfer === "srgb";
   }
 
-  /** Stops loading and frees the card's memory. */
+  /** Stops loading and frees the graphics memory. */
   destroy() {
     this.stopped.abort();
     this.tiles.destroy();
@@ -136,7 +136,9 @@ export class Picture {
 
   #use(kind) {
     const { gl } = this;
-    if (!this.programs.has(kind)) this.programs.set(kind, new Program(gl, fragmentSource(kind, this.variant), SIGHT_VERTEX));
+    if (!this.programs.has(kind)) {
+      this.programs.set(kind, new Program(gl, fragmentSource(kind, this.variant), SIGHT_VERTEX));
+    }
     const program = this.programs.get(kind);
     gl.useProgram(program.handle);
     const { panel, lenses, tiles } = this.manifest;
@@ -147,8 +149,8 @@ export class Picture {
     return program;
   }
 
-  #setOwners(program, parts) {
-    for (const name of ["acrossOf", "downOf"]) setExact(this.gl, program, name, parts[name]);
+  #setLensOfPoint(program, parts) {
+    for (const name of ["acrossOf", "downOf"]) setFixedPoint(this.gl, program, name, parts[name]);
     this.gl.uniform4fv(program.at("gradients"), parts.gradients);
   }
 
@@ -156,7 +158,7 @@ export class Picture {
     const { gl } = this;
     const { panel } = this.manifest;
     const { slide, ...forms } = coefficients;
-    for (const [name, form] of Object.entries(forms)) setExact(gl, program, name, form);
+    for (const [name, form] of Object.entries(forms)) setFixedPoint(gl, program, name, form);
     gl.uniform1f(program.at("slide"), slide);
     for (const [name, places] of Object.entries(channelPlaces(this.manifest))) gl.uniform3fv(program.at(name), places);
     gl.uniform2f(program.at("corner"), pane.x + 0.5, pane.y + pane.height - 0.5);
@@ -166,7 +168,7 @@ export class Picture {
   }
 }
 
-/** A linked program; the places of its uniforms are looked up once. */
+/** A linked shader program; the locations of its uniforms are cached. */
 export class Program {
   constructor(gl, fragment, vertex) {
     this.gl = gl;
@@ -186,9 +188,9 @@ export class Program {
     const isLinked = gl.getProgramParameter(this.handle, gl.LINK_STATUS);
     const reasons = shaders.map((shader) => gl.getShaderInfoLog(shader)).join(" ");
     for (const shader of shaders) gl.deleteShader(shader);
-    // A lost context links nothing; the picture is made anew once it is back.
+    // A lost context links nothing; the picture is loaded again when it is restored.
     if (!isLinked && !gl.isContextLost())
-      throw new Error(`this browser's graphics refuse the page's program: ${reasons}`);
+      throw new Error(`the browser cannot compile the viewer's shaders: ${reasons}`);
   }
 
   at(name) {
@@ -197,8 +199,8 @@ export class Program {
   }
 }
 
-/** The manifest itself, if this page understands it. */
-export function checked(manifest) {
+/** Returns the manifest; throws an Error if its version is not that of this viewer. */
+export function checkManifest(manifest) {
   if (manifest?.lippmann !== 1) throw new Error("the picture's description is of another version than this page");
   return manifest;
 }
@@ -207,7 +209,7 @@ function lensesOf(lenses) {
   return { layout: LAYOUTS[lenses.layout], slanted: lenses.slant !== 0 };
 }
 
-/** How the panel's sub-pixels lie, in the words of `fragmentSource`. */
+/** Arrangement of the panel's sub-pixels: parameters of `fragmentSource`. */
 function variantOf(panel) {
   if (!panel.subpixels) return { cells: 0, reach: 0 };
   if (panel.uneven) {

@@ -1,10 +1,10 @@
-/** The display and the eye from above: lens plane, field, its neighbours, and the plane in focus. */
+/** Plan of display and eye from above: panel, view zones, sight lines, focus plane. */
 
 import { halfField } from "lippmann/optics.js";
 
 const SVG = "http://www.w3.org/2000/svg";
 const [WIDTH, HEIGHT] = [300, 190];
-/** Room above the display, in the drawing's units. */
+/** Margin above the display, in units of the drawing. */
 const TOP = 16;
 
 export class Plan {
@@ -19,7 +19,7 @@ export class Plan {
     this.eyes = element("g", { class: "plan-eyes" });
     this.svg.append(this.neighbours, this.field, this.focus, this.sight, this.panel, this.eyes);
     this.optics = null;
-    const dragged = (event) => {
+    const onDrag = (event) => {
       if (event.buttons === 0 || this.optics === null) return;
       const box = this.svg.getBoundingClientRect();
       const scale = WIDTH / box.width;
@@ -28,12 +28,12 @@ export class Plan {
     };
     this.svg.addEventListener("pointerdown", (event) => {
       this.svg.setPointerCapture(event.pointerId);
-      dragged(event);
+      onDrag(event);
     });
-    this.svg.addEventListener("pointermove", dragged);
+    this.svg.addEventListener("pointermove", onDrag);
   }
 
-  /** @param eyes places {x, z} of the eyes; @param plane z of the plane in focus, or null */
+  /** @param eyes positions {x, z} of the eyes in mm; @param plane z of the focus plane in mm, or null */
   draw(optics, eyes, plane) {
     if (optics !== this.optics) this.#drawDisplay(optics);
     this.eyes.replaceChildren(
@@ -62,7 +62,7 @@ export class Plan {
     this.neighbours.replaceChildren(...beside);
   }
 
-  /** Where all lenses show the micro-image `order` places beside their own: from where it begins to the end. */
+  /** Outline of the view zone in which all lenses show the micro-image `order` places beside their own. */
   #zone(optics, half, order, end) {
     const converge = optics.viewing_distance === null ? 0 : 1 / optics.viewing_distance;
     const rightEdge = (z) =>
@@ -86,9 +86,9 @@ export class Plan {
 }
 
 function element(name, attributes) {
-  const made = document.createElementNS(SVG, name);
-  set(made, attributes);
-  return made;
+  const created = document.createElementNS(SVG, name);
+  set(created, attributes);
+  return created;
 }
 
 function set(target, attributes) {

@@ -1,4 +1,4 @@
-/** The shading programs: what an eye sees, the mean of what many see, and the magnifier. */
+/** Shader programs: what an eye sees, the focus sum over many eyes, and the magnifier. */
 
 /** One triangle that covers the viewport. */
 export const VERTEX = `#version 300 es
@@ -6,11 +6,11 @@ void main() {
   gl_Position = vec4(gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0, 0.0, 1.0);
 }`;
 
-// What runs for every pixel is written with as few operations as can be: software renderers do them all as they stand.
-// Reading a uniform is dear there, for its bounds are checked anew at every pixel: a fifth of a frame went into that. So
-// the numbers of the sightline come to the pixels as outputs of the vertices, flat, that is exactly as they are.
+// The fragment shaders use few operations, because software renderers execute all of them. Such renderers also check
+// the bounds of a uniform array at every pixel, which took a fifth of a frame. The coefficients therefore reach the
+// fragment shader as flat outputs of the vertex shader, which pass values unchanged.
 
-/** The same triangle, with what {@link fragmentSource} asks of it. */
+/** The same triangle, with the flat outputs that the programs of {@link fragmentSource} read. */
 export const SIGHT_VERTEX = `#version 300 es
 uniform vec2 panel;
 uniform vec2 corner;  // middle of the pane's upper left pixel in the canvas
@@ -75,22 +75,22 @@ vec3 encodeSrgb(vec3 light) {
 }
 `;
 
-// Numbers with exact fractions, see fixed.js.
-const EXACT = `
-struct Place {
+// Sums of fixed-point coefficients, see fixed.js.
+const FIXED_POINT = `
+struct Fixed {
   float whole;
   float part;  // 0 to 1
 };
 
-// The number that is about \`rough\` less a half and has the fraction \`parts\` / 2^32.
-Place placed(float rough, uint parts) {
+// The number near \`rough\` - 1/2 whose fraction is \`parts\` / 2^32.
+Fixed fixedPoint(float rough, uint parts) {
   float part = float(int(parts >> 8)) * (1.0 / 16777216.0);
-  return Place(floor(rough - part), part);
+  return Fixed(floor(rough - part), part);
 }
 `;
 
-// The lens that contains a point given in units of the pitches; Lattice.lens_at of display/lattice.py. Half a pitch is
-// in the numbers already where the nearest centre is wanted: lens c contains c <= place < c + 1.
+// Index of the lens that contains a point in units of the pitches; Lattice.lens_at of display/lattice.py. Where the
+// nearest centre counts, the coordinates already include half a pitch: lens c contains c <= coordinate < c + 1.
 const LENSES = `
 #define LENTICULAR 0
 #define SQUARE 1
@@ -110,25 +110,25 @@ float shiftOf(float row) {
 #if LAYOUT != LENTICULAR
 vec2 lensAt(float across, uint acrossParts, float down, uint downParts) {
 #if LAYOUT == SQUARE
-  return vec2(placed(across, acrossParts).whole, placed(down, downParts).whole);
+  return vec2(fixedPoint(across, acrossParts).whole, fixedPoint(down, downParts).whole);
 #else
-  Place row = placed(down, downParts);
+  Fixed row = fixedPoint(down, downParts);
   float shift = shiftOf(row.whole);
   uint shiftParts = uint(shift) << 31;
-  Place upper = placed(across - 0.5 * shift, acrossParts - shiftParts);
-  Place lower = placed(across - 0.5 + 0.5 * shift, acrossParts - 0x80000000u + shiftParts);
+  Fixed upper = fixedPoint(across - 0.5 * shift, acrossParts - shiftParts);
+  Fixed lower = fixedPoint(across - 0.5 + 0.5 * shift, acrossParts - 0x80000000u + shiftParts);
   float besideUpper = upper.part - 0.5, besideLower = lower.part - 0.5;
   float excess = besideLower * besideLower - besideUpper * besideUpper;
   excess += (1.0 - 2.0 * row.part) * rowsPerPitch * rowsPerPitch;
-  // Ties go to the lower row; single precision tells them to a millionth.
+  // Ties go to the lower row; single precision resolves them to 1e-6.
   return excess <= 1e-6 ? vec2(lower.whole, row.whole + 1.0) : vec2(upper.whole, row.whole);
 #endif
 }
 #endif
 `;
 
-// A texture that holds the panel has a black edge of one pixel, so that what is seen past the panel needs no question.
-// Where none can be as large, the tiles are layers of an array, and an index says which; those not there yet are grey.
+// A texture of the whole panel has a black border of one pixel, so that points beside the panel need no test. Otherwise
+// the tiles are layers of an array texture, found by an index texture; tiles that are not loaded yet are grey.
 const TILES = `
 flat in vec2 flatPanel;
 
@@ -152,11 +152,11 @@ vec3 tileCode(sampler2DArray tiles, isampler2D layers, vec2 pixel) {
   return texelFetch(tiles, ivec3(place & ((1 << tileShift) - 1), layer), 0).rgb;
 }
 
-vec3 codeOf(vec2 pixel) {
+vec3 fetchCode(vec2 pixel) {
   return tileCode(picture, pictureLayers, pixel);
 }
 
-vec3 overlayOf(vec2 pixel) {
+vec3 fetchOverlay(vec2 pixel) {
   return tileCode(overlay, overlayLayers, pixel);
 }
 #else
@@ -167,19 +167,19 @@ ivec2 placeOf(vec2 pixel) {
   return ivec2(clamp(pixel + 1.0, vec2(0.0), flatPanel + 1.0));
 }
 
-vec3 codeOf(vec2 pixel) {
+vec3 fetchCode(vec2 pixel) {
   return texelFetch(picture, placeOf(pixel), 0).rgb;
 }
 
-vec3 overlayOf(vec2 pixel) {
+vec3 fetchOverlay(vec2 pixel) {
   return texelFetch(overlay, placeOf(pixel), 0).rgb;
 }
 #endif
 `;
 
 // The panel point that the eye sees: Display.panel_point_seen_by and replay.py. Coordinates (u, v) are pixels of the
-// panel, from its upper left corner; those of the pane likewise.
-const SEEN = `
+// panel from its upper left corner.
+const SIGHTLINE = `
 flat in vec2 flatCorner;
 flat in vec3 flatAcross;
 flat in uvec3 flatAcrossParts;
@@ -193,67 +193,69 @@ flat in float flatSlide;
 flat in vec3 flatRight;
 flat in vec3 flatDownward;
 
-vec2 lensSeen;  // of arrays: the lens that is looked through
+vec2 visibleLens;  // lens arrays only: index of the lens
 
-void seen(out Place u, out Place v) {
+void visiblePoint(out Fixed u, out Fixed v) {
   float x = gl_FragCoord.x - flatCorner.x, y = flatCorner.y - gl_FragCoord.y;
   uint column = uint(int(x)), row = uint(int(y));
 #if LAYOUT == LENTICULAR
 #if SLANTED
   float roughLens = flatAcross[0] * x + flatAcross[1] * y + flatAcross[2];
   uint lensParts = flatAcrossParts[0] * column + flatAcrossParts[1] * row + flatAcrossParts[2];
-  Place lens = placed(roughLens, lensParts);
+  Fixed lens = fixedPoint(roughLens, lensParts);
   uint i = uint(int(lens.whole));
   float roughU = flatPanelU[0] * lens.whole + flatPanelU[1] * x + flatPanelU[2] * y + flatPanelU[3];
-  u = placed(roughU, flatPanelUParts[0] * i + flatPanelUParts[1] * column + flatPanelUParts[2] * row + flatPanelUParts[3]);
-  v = placed(flatPanelV[0] * y + flatPanelV[1], flatPanelVParts[0] * row + flatPanelVParts[1]);
+  uint uParts = flatPanelUParts[0] * i + flatPanelUParts[1] * column + flatPanelUParts[2] * row + flatPanelUParts[3];
+  u = fixedPoint(roughU, uParts);
+  v = fixedPoint(flatPanelV[0] * y + flatPanelV[1], flatPanelVParts[0] * row + flatPanelVParts[1]);
   v.part -= flatSlide * lens.part;
 #else
-  Place lens = placed(flatAcross[0] * x + flatAcross[2], flatAcrossParts[0] * column + flatAcrossParts[2]);
-  u = placed(flatPanelU[0] * lens.whole + flatPanelU[3], flatPanelUParts[0] * uint(int(lens.whole)) + flatPanelUParts[3]);
-  v = placed(flatPanelV[0] * y + flatPanelV[1], flatPanelVParts[0] * row + flatPanelVParts[1]);
+  Fixed lens = fixedPoint(flatAcross[0] * x + flatAcross[2], flatAcrossParts[0] * column + flatAcrossParts[2]);
+  uint uParts = flatPanelUParts[0] * uint(int(lens.whole)) + flatPanelUParts[3];
+  u = fixedPoint(flatPanelU[0] * lens.whole + flatPanelU[3], uParts);
+  v = fixedPoint(flatPanelV[0] * y + flatPanelV[1], flatPanelVParts[0] * row + flatPanelVParts[1]);
 #endif
 #else
   uint acrossAt = flatAcrossParts[0] * column + flatAcrossParts[2], downAt = flatDownParts[0] * row + flatDownParts[1];
   vec2 lens = lensAt(flatAcross[0] * x + flatAcross[2], acrossAt, flatDown[0] * y + flatDown[1], downAt);
-  lensSeen = lens;
+  visibleLens = lens;
   float shift = shiftOf(lens.y);
   uvec3 whole = uvec3(ivec3(vec3(lens, shift)));
   float roughU = flatPanelU[0] * lens.x + flatPanelU[1] * shift + flatPanelU[3];
-  u = placed(roughU, flatPanelUParts[0] * whole.x + flatPanelUParts[1] * whole.z + flatPanelUParts[3]);
-  v = placed(flatPanelV[0] * lens.y + flatPanelV[1], flatPanelVParts[0] * whole.y + flatPanelVParts[1]);
+  u = fixedPoint(roughU, flatPanelUParts[0] * whole.x + flatPanelUParts[1] * whole.z + flatPanelUParts[3]);
+  v = fixedPoint(flatPanelV[0] * lens.y + flatPanelV[1], flatPanelVParts[0] * whole.y + flatPanelVParts[1]);
 #endif
 }
 
-// The pixel seen in green, which stands for the whole one.
-vec2 pixelOf(Place u, Place v) {
+// The pixel at the green sub-pixel, which stands for all three.
+vec2 pixelOf(Fixed u, Fixed v) {
   return vec2(u.whole + floor(u.part + flatRight.y), v.whole + floor(v.part + flatDownward.y));
 }
 
 #if CELLS == 0
-vec3 codeSeen(Place u, Place v) {
-  return codeOf(pixelOf(u, v));
+vec3 sampleCode(Fixed u, Fixed v) {
+  return fetchCode(pixelOf(u, v));
 }
 #elif CELLS == 1
-// Sub-pixels side by side in one row: no two lie farther apart than one pixel and the next.
-vec3 codeSeen(Place u, Place v) {
+// Sub-pixels in one row: the three lie in at most two adjacent pixels.
+vec3 sampleCode(Fixed u, Fixed v) {
   vec3 columns = floor(u.part + flatRight);
   float first = min(columns.x, min(columns.y, columns.z));
   vec2 pixel = vec2(u.whole + first, v.whole + floor(v.part + flatDownward.y));
-  return mix(codeOf(pixel), codeOf(vec2(pixel.x + 1.0, pixel.y)), greaterThan(columns, vec3(first)));
+  return mix(fetchCode(pixel), fetchCode(vec2(pixel.x + 1.0, pixel.y)), greaterThan(columns, vec3(first)));
 }
 #elif CELLS == 2
-vec3 codeSeen(Place u, Place v) {
+vec3 sampleCode(Fixed u, Fixed v) {
   vec3 columns = u.whole + floor(u.part + flatRight), rows = v.whole + floor(v.part + flatDownward);
-  vec3 red = codeOf(vec2(columns.x, rows.x)), green = codeOf(vec2(columns.y, rows.y));
-  return vec3(red.r, green.g, codeOf(vec2(columns.z, rows.z)).b);
+  vec3 red = fetchCode(vec2(columns.x, rows.x)), green = fetchCode(vec2(columns.y, rows.y));
+  return vec3(red.r, green.g, fetchCode(vec2(columns.z, rows.z)).b);
 }
 #else
 uniform ivec2 cellCount;  // columns and rows of the pattern
 uniform vec2 cells[192];  // place of R, G, B in each cell, right and down of its centre, row after row
 
-// The sub-pixels of uneven grids whose centres are nearest to the point.
-vec3 codeSeen(Place u, Place v) {
+// For each colour the sub-pixel whose centre is nearest to the point.
+vec3 sampleCode(Fixed u, Fixed v) {
   vec2 middle = pixelOf(u, v);
   vec2 place = vec2(u.part, v.part) + (vec2(u.whole, v.whole) - middle);
   ivec2 firstCell = ivec2(middle);
@@ -273,7 +275,7 @@ vec3 codeSeen(Place u, Place v) {
       }
     }
   }
-  return vec3(codeOf(nearest[0]).r, codeOf(nearest[1]).g, codeOf(nearest[2]).b);
+  return vec3(fetchCode(nearest[0]).r, fetchCode(nearest[1]).g, fetchCode(nearest[2]).b);
 }
 #endif
 `;
@@ -282,44 +284,44 @@ const EYE = `
 out vec4 color;
 
 void main() {
-  Place u, v;
-  seen(u, v);
-  color = vec4(codeSeen(u, v), 1.0);
+  Fixed u, v;
+  visiblePoint(u, v);
+  color = vec4(sampleCode(u, v), 1.0);
 }`;
 
-// The same with a layer over it.
-const OVERLAID = `
+// The same with an overlay.
+const OVERLAY = `
 uniform float overlayShare;
 out vec4 color;
 
 void main() {
-  Place u, v;
-  seen(u, v);
-  vec3 code = codeSeen(u, v);
+  Fixed u, v;
+  visiblePoint(u, v);
+  vec3 code = sampleCode(u, v);
   vec2 pixel = pixelOf(u, v);
-  if (isOnPanel(pixel)) code = mix(code, overlayOf(pixel), overlayShare);
+  if (isOnPanel(pixel)) code = mix(code, fetchOverlay(pixel), overlayShare);
   color = vec4(code, 1.0);
 }`;
 
-// What one of many eyes sees, in linear light, to be added up; alpha counts.
+// One view of the focus sum: linear RGB, and alpha 1 to count views.
 const SUMMAND = `
 uniform bool isCoded;
 out vec4 color;
 
 void main() {
-  Place u, v;
-  seen(u, v);
+  Fixed u, v;
+  visiblePoint(u, v);
   vec2 pixel = pixelOf(u, v);
   if (!isOnPanel(pixel)) discard;
 #if LAYOUT == HEXAGONAL
-  // The views of a hexagonal array fill the box around a micro-image; its corners belong to the neighbours.
-  if (lensOfPoint(pixel, vec2(0.5)) != lensSeen) discard;
+  // The views of a hexagonal array fill the bounding box of a micro-image, whose corners belong to neighbours.
+  if (lensOfPoint(pixel, vec2(0.5)) != visibleLens) discard;
 #endif
-  vec3 code = codeOf(pixel);
+  vec3 code = fetchCode(pixel);
   color = vec4(isCoded ? decodeSrgb(code) : code, 1.0);
 }`;
 
-/** The mean of what was added up, as display codes. */
+/** The mean of the focus sum, as display codes. */
 export const MEAN = `${HEAD}${SRGB}
 uniform sampler2D sum;
 uniform ivec2 corner;
@@ -332,8 +334,8 @@ void main() {
   color = vec4(isCoded ? encodeSrgb(mean) : mean, 1.0);
 }`;
 
-// The lens that shows a panel point: Display.lens_of.
-const OWNERS = `
+// Index of the lens that shows a panel point: Display.lens_of.
+const LENS_OF_POINT = `
 uniform float acrossOf[3];  // lens coordinate of a panel point: per column and row, and at (0, 0)
 uniform uint acrossOfParts[3];
 uniform float downOf[3];
@@ -346,7 +348,7 @@ vec2 lensOfPoint(vec2 pixel, vec2 within) {
   float a = acrossOf[0] * pixel.x + acrossOf[1] * pixel.y + acrossOf[2] + step.x;
   uint aParts = acrossOfParts[0] * k.x + acrossOfParts[1] * k.y + acrossOfParts[2] + steps.x;
 #if LAYOUT == LENTICULAR
-  return vec2(placed(a, aParts).whole, 0.0);
+  return vec2(fixedPoint(a, aParts).whole, 0.0);
 #else
   float d = downOf[0] * pixel.x + downOf[1] * pixel.y + downOf[2] + step.y;
   return lensAt(a, aParts, d, downOfParts[0] * k.x + downOfParts[1] * k.y + downOfParts[2] + steps.y);
@@ -354,32 +356,32 @@ vec2 lensOfPoint(vec2 pixel, vec2 within) {
 }
 `;
 
-// The raw panel in a round glass: its pixels, the outlines of the micro-images, and in each the pixel that is seen.
+// Native pixels in a round magnifier, with outlines of the micro-images and a frame around each visible pixel.
 const MAGNIFIER = `
-uniform vec2 middle;  // of the glass in the canvas
+uniform vec2 middle;  // of the magnifier in the canvas
 uniform float radius;
 uniform float scale;  // canvas pixels per panel pixel
-uniform vec2 centerPixel;  // the panel pixel in the middle of the glass
+uniform vec2 centerPixel;  // panel pixel in the middle of the magnifier
 uniform vec2 centerPart;
-uniform float seenU[3];  // the column seen through a lens: per lens and row (or shifted row), and at (0, 0)
-uniform uint seenUParts[3];
-uniform float seenV[2];  // the row, per row of lenses
-uniform uint seenVParts[2];
+uniform float visibleU[3];  // visible column of a lens: per lens and row (or shifted row), and at (0, 0)
+uniform uint visibleUParts[3];
+uniform float visibleV[2];  // visible row: per row of lenses, and at 0
+uniform uint visibleVParts[2];
 uniform vec3 rimColor;
 out vec4 color;
 
-bool isSeen(vec2 pixel) {
+bool isVisible(vec2 pixel) {
   vec2 lens = lensOfPoint(pixel, vec2(0.5));
 #if LAYOUT == LENTICULAR
   float second = pixel.y;
 #else
   float second = shiftOf(lens.y);
-  float v = seenV[0] * lens.y + seenV[1];
-  if (placed(v, seenVParts[0] * uint(int(lens.y)) + seenVParts[1]).whole != pixel.y) return false;
+  float v = visibleV[0] * lens.y + visibleV[1];
+  if (fixedPoint(v, visibleVParts[0] * uint(int(lens.y)) + visibleVParts[1]).whole != pixel.y) return false;
 #endif
-  float u = seenU[0] * lens.x + seenU[1] * second + seenU[2];
-  uint uParts = seenUParts[0] * uint(int(lens.x)) + seenUParts[1] * uint(int(second)) + seenUParts[2];
-  return placed(u, uParts).whole == pixel.x;
+  float u = visibleU[0] * lens.x + visibleU[1] * second + visibleU[2];
+  uint uParts = visibleUParts[0] * uint(int(lens.x)) + visibleUParts[1] * uint(int(second)) + visibleUParts[2];
+  return fixedPoint(u, uParts).whole == pixel.x;
 }
 
 void main() {
@@ -389,37 +391,37 @@ void main() {
   vec2 place = centerPart + vec2(beside.x, -beside.y) / scale;
   vec2 pixel = centerPixel + floor(place);
   vec2 within = fract(place);
-  vec3 shown = codeOf(pixel);
+  vec3 shade = fetchCode(pixel);
   vec2 fromEdge = min(within, 1.0 - within) * scale;
   float edge = min(fromEdge.x, fromEdge.y);
   if (isOnPanel(pixel)) {
-    if (scale >= 8.0 && edge < 0.5) shown *= 0.82;
-    if (isSeen(pixel)) shown = edge < max(1.5, 0.12 * scale) ? rimColor : shown;
-    else shown *= 0.72;
-    // Where the next pixel of the glass, or half the one after it, belongs to another lens there is an outline.
+    if (scale >= 8.0 && edge < 0.5) shade *= 0.82;
+    if (isVisible(pixel)) shade = edge < max(1.5, 0.12 * scale) ? rimColor : shade;
+    else shade *= 0.72;
+    // An outline lies where a point 1.5 canvas pixels further belongs to another lens.
     vec2 step = vec2(1.5) / scale;
     vec2 here = lensOfPoint(pixel, within);
     bool isOutline = lensOfPoint(pixel, within + vec2(step.x, 0.0)) != here
       || lensOfPoint(pixel, within + vec2(0.0, step.y)) != here;
-    if (isOutline) shown = vec3(1.0);
+    if (isOutline) shade = vec3(1.0);
   }
   float rim = smoothstep(radius - 1.5, radius - 0.5, distance);
-  color = vec4(mix(shown, vec3(0.95), rim), 1.0 - smoothstep(radius, radius + 1.5, distance));
+  color = vec4(mix(shade, vec3(0.95), rim), 1.0 - smoothstep(radius, radius + 1.5, distance));
 }`;
 
 /**
- * Source of a program for a picture. What differs between pictures is compiled in: layout and slant of the lenses, how
- * sub-pixels lie (`cells`: 0 not at their own places, 1 in a row, 2 anyhow, 3 in cells of several kinds, the nearest of
- * which lie within `reach` pixels), and whether the picture is in one texture or in tiles (`tiled`).
+ * Source of a fragment shader. Properties of the picture are compiled in: layout and slant of the lenses; arrangement
+ * of sub-pixels (`cells`: 0 all in the pixel's centre, 1 in a row, 2 any, 3 in cells of several kinds, the nearest
+ * within `reach` pixels); whether the picture is one texture or an array of tiles (`tiled`).
  */
 export function fragmentSource(kind, { layout, slanted, cells, reach, tiled }) {
   const values = { LAYOUT: layout, SLANTED: slanted, CELLS: cells, REACH: reach, TILED: tiled };
   const defines = Object.entries(values).map(([name, value]) => `#define ${name} ${Number(value)}\n`);
   const bodies = {
-    eye: SEEN + EYE,
-    overlaid: SEEN + OVERLAID,
-    summand: SRGB + OWNERS + SEEN + SUMMAND,
-    magnifier: OWNERS + MAGNIFIER,
+    eye: SIGHTLINE + EYE,
+    overlaid: SIGHTLINE + OVERLAY,
+    summand: SRGB + LENS_OF_POINT + SIGHTLINE + SUMMAND,
+    magnifier: LENS_OF_POINT + MAGNIFIER,
   };
-  return HEAD + defines.join("") + EXACT + LENSES + TILES + bodies[kind];
+  return HEAD + defines.join("") + FIXED_POINT + LENSES + TILES + bodies[kind];
 }

@@ -1,27 +1,27 @@
 /**
- * Where pictures come from. A source has `manifest()`, a promise of the picture's description, and
+ * Sources of pictures. A source has `manifest()`, a promise of the picture's description, and
  * `tile(layer, column, row)`, a promise of the bytes of a tile in the manifest's format.
  */
 
-/** A picture of the server that serves the page. */
+/** Source of a picture on the page's server. */
 export function serverSource(name) {
-  let state = null;
+  let version = null;
   return {
     async manifest() {
-      const answer = await answered(`pictures/${name}/manifest.json`, {});
-      state = answer.headers.get("ETag");
-      return answer.json();
+      const response = await request(`pictures/${name}/manifest.json`, {});
+      version = response.headers.get("ETag");
+      return response.json();
     },
     async tile(layer, column, row) {
-      // The tiles of a file that was written anew meanwhile do not fit those at hand.
-      const headers = state === null ? {} : { "If-Match": state };
-      const answer = await answered(`pictures/${name}/tiles/${layer}/${column}_${row}`, headers);
-      return answer.arrayBuffer();
+      // Tiles of a newer version of the file would not match the tiles loaded before.
+      const headers = version === null ? {} : { "If-Match": version };
+      const response = await request(`pictures/${name}/tiles/${layer}/${column}_${row}`, headers);
+      return response.arrayBuffer();
     },
   };
 }
 
-/** A picture inside the page itself: `manifest`, and `tiles[layer]["column_row"]` in base 64. */
+/** Source of a picture inside the page: `manifest`, and `tiles[layer]["column_row"]` in base 64. */
 export function embeddedSource({ manifest, tiles }) {
   return {
     async manifest() {
@@ -35,11 +35,11 @@ export function embeddedSource({ manifest, tiles }) {
   };
 }
 
-async function answered(address, headers) {
-  const answer = await fetch(address, { headers, cache: "no-store" }).catch(() => {
+async function request(address, headers) {
+  const response = await fetch(address, { headers, cache: "no-store" }).catch(() => {
     throw new Error("Lippmann's server does not answer; is `lippmann view` still running?");
   });
-  if (answer.ok) return answer;
-  const told = await answer.json().catch(() => ({}));
-  throw new Error(told.error ?? `the server answered ${answer.status} to ${address}`);
+  if (response.ok) return response;
+  const { error } = await response.json().catch(() => ({}));
+  throw new Error(error ?? `the server responded with ${response.status} to ${address}`);
 }

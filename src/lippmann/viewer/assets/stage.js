@@ -1,4 +1,4 @@
-/** The canvas: which panes it has, what is drawn in each, and the picture focused on a plane. */
+/** The canvas: its panes, what each displays, and the focus sum (mean of all views focused on a plane). */
 
 import { eyesOfViews } from "lippmann/optics.js";
 import { Program } from "lippmann/picture.js";
@@ -16,18 +16,18 @@ export class Stage {
     this.restart();
   }
 
-  /** Makes again what is lost with the context. */
+  /** Creates what depends on the context; called again when a lost context is restored. */
   restart() {
     const { gl } = this;
     this.mean = null;
     this.focus = null;
-    // Sums of hundreds of views need single precision; half of it does where the card cannot add in single.
+    // Sums of hundreds of views need single precision; half precision where the card cannot blend single.
     const canAddSingle = gl.getExtension("EXT_color_buffer_float") && gl.getExtension("EXT_float_blend");
     this.sumFormat = canAddSingle ? gl.RGBA32F : gl.RGBA16F;
     this.canSum = Boolean(canAddSingle || gl.getExtension("EXT_color_buffer_half_float"));
   }
 
-  /** The panes of a mode, each with the eye that it is for (-1 left, 0 the middle, 1 right); y from below. */
+  /** Panes of a mode, each with its eye (`side` -1 left, 0 centre, 1 right); y from below. */
   panes(mode) {
     const { width, height } = this.canvas;
     if (mode !== "side-by-side") return [{ x: 0, y: 0, width, height, side: 0 }];
@@ -39,7 +39,7 @@ export class Stage {
   }
 
   /**
-   * Draws all.
+   * Draws all panes.
    *
    * @param pictures one or two; the second right of the divider
    * @param view the state of the viewer, see viewer.js
@@ -54,10 +54,10 @@ export class Stage {
     gl.viewport(0, 0, canvas.width, canvas.height);
     gl.clearColor(0, 0, 0, 1);
     gl.clear(gl.COLOR_BUFFER_BIT);
-    const shown = pictures.filter((picture) => picture !== null);
+    const loaded = pictures.filter((picture) => picture !== null);
     let remains = false;
     for (const pane of this.panes(view.mode)) {
-      for (const [part, picture] of this.#parts(pane, shown, view.divider)) {
+      for (const [part, picture] of this.#parts(pane, loaded, view.divider)) {
         gl.enable(gl.SCISSOR_TEST);
         gl.scissor(part.x, part.y, part.width, part.height);
         remains = this.#drawPart(picture, pane, part, view) || remains;
@@ -68,7 +68,7 @@ export class Stage {
     return remains;
   }
 
-  /** The glass over the pane that it is in: over the left part the first picture, over the right the second. */
+  /** Draws the magnifier in its pane, over the first picture left of the divider, over the second right of it. */
   drawMagnifier(pictures, view, glass) {
     const { gl, canvas } = this;
     const pane = this.panes(view.mode).find((each) => glass.x >= each.x && glass.x < each.x + each.width);
@@ -78,15 +78,15 @@ export class Stage {
       pictures.filter((picture) => picture !== null),
       view.divider,
     );
-    const found = parts.find(([part]) => glass.x < part.x + part.width);
-    if (!found) return;
+    const [, picture] = parts.find(([part]) => glass.x < part.x + part.width) ?? [];
+    if (!picture) return;
     gl.viewport(0, 0, canvas.width, canvas.height);
     gl.enable(gl.BLEND);
     gl.blendFunc(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA);
     const { x, y, width, height } = view.frame;
-    const u = (x + ((glass.x - pane.x) / pane.width) * width) * found[1].manifest.panel.width;
-    const v = (y + (1 - (glass.y - pane.y) / pane.height) * height) * found[1].manifest.panel.height;
-    found[1].drawMagnifier(eyeOf(view, pane.side), { ...glass, u, v });
+    const u = (x + ((glass.x - pane.x) / pane.width) * width) * picture.manifest.panel.width;
+    const v = (y + (1 - (glass.y - pane.y) / pane.height) * height) * picture.manifest.panel.height;
+    picture.drawMagnifier(eyeOf(view, pane.side), { ...glass, u, v });
     gl.disable(gl.BLEND);
   }
 
@@ -124,7 +124,7 @@ export class Stage {
     return false;
   }
 
-  /** The mean of all views, a few more with every frame; returns whether views remain. */
+  /** Draws the mean of all views, adding a few with every frame; returns whether views remain. */
   #drawFocused(picture, pane, part, frame, view) {
     const { gl } = this;
     const sum = this.#sumFor(picture, pane, frame, view.plane);
@@ -152,7 +152,7 @@ export class Stage {
     return sum.count < sum.eyes.length;
   }
 
-  /** The sum begun for this picture and plane, or a new one. */
+  /** The focus sum of this picture and plane so far, or a new one. */
   #sumFor(picture, pane, frame, plane) {
     const { gl } = this;
     const key = JSON.stringify([plane, frame, pane.width, pane.height]);
@@ -166,7 +166,8 @@ export class Stage {
     gl.clearColor(0, 0, 0, 0);
     gl.clear(gl.COLOR_BUFFER_BIT);
     const { width, height } = pane;
-    const sum = { key, texture, framebuffer, width, height, count: 0, eyes: spread(eyesOfViews(picture.manifest)) };
+    const eyes = lowDiscrepancyOrder(eyesOfViews(picture.manifest));
+    const sum = { key, texture, framebuffer, width, height, count: 0, eyes };
     this.focus.set(picture, sum);
     return sum;
   }
@@ -189,14 +190,14 @@ export class Stage {
   }
 }
 
-/** Where the left (-1), middle (0) or right (1) eye is; with crossed lines of sight they change places. */
+/** Position of the left (-1), central (0) or right (1) eye; cross-eyed viewing exchanges left and right. */
 export function eyeOf(view, side) {
   const sign = view.isCrossed && view.mode === "side-by-side" ? -side : side;
   return { ...view.eye, x: view.eye.x + 0.5 * sign * view.eyeDistance };
 }
 
-/** The same eyes in an order whose beginnings are spread evenly: steps of the golden section. */
-function spread(eyes) {
+/** The eyes in an order of low discrepancy (golden ratio), so that partial sums cover the aperture evenly. */
+function lowDiscrepancyOrder(eyes) {
   const order = eyes.map((eye, place) => [(place * 0.6180339887498949) % 1, eye]);
   return order.sort(([a], [b]) => a - b).map(([, eye]) => eye);
 }

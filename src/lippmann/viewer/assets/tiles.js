@@ -1,24 +1,24 @@
 /**
- * The tiles of a picture, or of one of its layers, on the graphics card: side by side in one texture, or, if none can
- * be as large or the card shall not hold all of them, those that are wanted as layers of an array.
+ * Tiles of a picture or of one of its layers in graphics memory: side by side in one texture, or, if that would exceed
+ * the largest texture or the memory limit, the tiles in view as layers of an array texture.
  */
 
-/** How many tiles are asked for at a time; browsers open six connections to a server. */
-const AT_A_TIME = 6;
+/** Number of simultaneous requests; browsers open six connections to a server. */
+const CONCURRENT_REQUESTS = 6;
 
-/** Pixels of the black edge around the picture in one texture; textures begin black. */
+/** Width in pixels of the black border around the picture in one texture; textures are initially black. */
 const EDGE = 1;
 
-/** The fewest tiles that a part of a picture needs: it may lie across a corner of four. */
+/** Least capacity: a frame may lie across the corner of four tiles. */
 const FEWEST_TILES = 4;
 
-/** How many tiles of a picture the card shall hold, for so many bytes of its memory. */
+/** Number of a picture's tiles to keep in `memory` bytes of graphics memory. */
 export function capacityOf(gl, tiles, memory) {
   const most = Math.min(gl.getParameter(gl.MAX_ARRAY_TEXTURE_LAYERS), Math.floor(memory / (4 * tiles.size ** 2)));
   return Math.min(tiles.columns * tiles.rows, Math.max(FEWEST_TILES, most));
 }
 
-/** The numbers of the tiles, row after row, that hold some of the pixels of a box {left, top, right, bottom}. */
+/** Indices (row after row) of the tiles that overlap a box {left, top, right, bottom} in pixels. */
 export function tilesOf(tiles, { left, top, right, bottom }) {
   const place = (value, count) => Math.min(count - 1, Math.max(0, Math.floor(value / tiles.size)));
   const places = [];
@@ -34,7 +34,7 @@ export class TileTexture {
   /**
    * @param gl WebGL 2
    * @param tiles the manifest's description: width, height, size, columns, rows, format
-   * @param capacity how many tiles there is room for
+   * @param capacity number of tiles to keep
    */
   constructor(gl, tiles, capacity) {
     this.gl = gl;
@@ -43,10 +43,10 @@ export class TileTexture {
     const count = tiles.columns * tiles.rows;
     this.isTiled = capacity < count || Math.max(tiles.width, tiles.height) + 2 * EDGE > largest;
     this.target = this.isTiled ? gl.TEXTURE_2D_ARRAY : gl.TEXTURE_2D;
-    // Which layer holds a tile, and which tile lies in a layer; -1 for none.
+    // Layer of each tile, and tile in each layer; -1 for none.
     this.layerOf = new Int16Array(count).fill(-1);
     this.holders = new Int32Array(capacity).fill(-1);
-    this.wanted = [];
+    this.requested = [];
     this.coming = new Set();
     while (gl.getError() !== gl.NO_ERROR);
     this.texture = this.#newTexture(this.target);
@@ -54,13 +54,13 @@ export class TileTexture {
     else gl.texStorage2D(this.target, 1, gl.RGBA8, tiles.width + 2 * EDGE, tiles.height + 2 * EDGE);
     this.index = this.#newTexture(gl.TEXTURE_2D);
     gl.texStorage2D(gl.TEXTURE_2D, 1, gl.R16I, tiles.columns, tiles.rows);
-    this.#tellIndex();
+    this.#uploadIndex();
     if (gl.getError() !== gl.NO_ERROR && !gl.isContextLost()) {
       throw new Error(`a picture of ${tiles.width} x ${tiles.height} pixels is too large for this browser's graphics`);
     }
   }
 
-  /** Binds the texture and, if it is tiled, the index of its layers to two units and to the samplers of these names. */
+  /** Binds the texture and, if it is tiled, the index of its layers to texture units and to the samplers `name...`. */
   bind(program, unit, name) {
     const { gl } = this;
     gl.activeTexture(gl.TEXTURE0 + unit);
@@ -73,20 +73,20 @@ export class TileTexture {
   }
 
   /**
-   * Fetches some tiles, not more than there is room for. Others may have to go; what an earlier call still waits for
-   * and nobody wants any more is not asked for.
+   * Fetches tiles, at most `capacity`. They replace tiles that are no longer requested, and the remaining requests of
+   * an earlier call are dropped.
    *
-   * @param places their numbers, row after row
-   * @param onTile called after each tile with the share of those that are there
-   * @param signal an AbortSignal; once it is aborted nothing is touched any more
+   * @param places indices of the tiles, row after row
+   * @param onTile called after each tile with the share of tiles fetched
+   * @param signal an AbortSignal; after abort the texture is left alone
    */
   async load(source, layer, places, onTile, signal) {
-    this.wanted = places;
+    this.requested = places;
     const waiting = places.filter((place) => this.layerOf[place] < 0 && !this.coming.has(place));
     const total = waiting.length;
     let count = 0;
     const work = async () => {
-      while (waiting.length > 0 && this.wanted === places && !signal.aborted) {
+      while (waiting.length > 0 && this.requested === places && !signal.aborted) {
         const place = waiting.shift();
         await this.#fetch(source, layer, place, signal);
         count += 1;
@@ -94,7 +94,7 @@ export class TileTexture {
       }
     };
     try {
-      await Promise.all(Array.from({ length: AT_A_TIME }, work));
+      await Promise.all(Array.from({ length: CONCURRENT_REQUESTS }, work));
     } catch (error) {
       waiting.length = 0;
       throw error;
@@ -111,8 +111,8 @@ export class TileTexture {
     const [column, row] = [place % columns, Math.floor(place / columns)];
     this.coming.add(place);
     try {
-      const decoded = await this.#decoded(await source.tile(layer, column, row), column, row);
-      if (!signal.aborted && this.wanted.includes(place)) this.#put(decoded, place, column, row);
+      const decoded = await this.#decode(await source.tile(layer, column, row), column, row);
+      if (!signal.aborted && this.requested.includes(place)) this.#put(decoded, place, column, row);
     } finally {
       this.coming.delete(place);
     }
@@ -126,7 +126,7 @@ export class TileTexture {
     return texture;
   }
 
-  #tellIndex() {
+  #uploadIndex() {
     const { gl } = this;
     const { columns, rows } = this.tiles;
     gl.bindTexture(gl.TEXTURE_2D, this.index);
@@ -139,7 +139,7 @@ export class TileTexture {
     return [Math.min(size, width - column * size), Math.min(size, height - row * size)];
   }
 
-  async #decoded(bytes, column, row) {
+  async #decode(bytes, column, row) {
     const [width, height] = this.#sizeOf(column, row);
     const damaged = new Error(`the tile in column ${column}, row ${row} of the picture is damaged`);
     if (this.tiles.format === "rgb") {
@@ -161,7 +161,7 @@ export class TileTexture {
     const [width, height] = this.#sizeOf(column, row);
     const { size } = this.tiles;
     const content = decoded instanceof Uint8Array ? withAlpha(decoded, width * height) : decoded;
-    const layer = this.#room();
+    const layer = this.#freeLayer();
     gl.activeTexture(gl.TEXTURE0);
     gl.bindTexture(this.target, this.texture);
     gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
@@ -171,20 +171,20 @@ export class TileTexture {
     decoded.close?.();
     this.holders[layer] = place;
     this.layerOf[place] = layer;
-    if (this.isTiled) this.#tellIndex();
+    if (this.isTiled) this.#uploadIndex();
   }
 
-  /** A layer for another tile: a free one, or that of a tile that is not wanted. */
-  #room() {
+  /** Layer for another tile: a free one, or that of a tile which is no longer requested. */
+  #freeLayer() {
     const free = this.holders.indexOf(-1);
     if (free >= 0) return free;
-    const layer = this.holders.findIndex((place) => !this.wanted.includes(place));
+    const layer = this.holders.findIndex((place) => !this.requested.includes(place));
     this.layerOf[this.holders[layer]] = -1;
     return layer;
   }
 }
 
-/** RGBA of RGB: few graphics cards have textures of three bytes, and drivers are slower to widen them. */
+/** Converts RGB to RGBA: graphics cards store four channels, and drivers convert more slowly. */
 function withAlpha(rgb, count) {
   const rgba = new Uint32Array(count);
   for (let to = 0, from = 0; to < count; to += 1, from += 3) {

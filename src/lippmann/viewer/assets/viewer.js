@@ -1,30 +1,31 @@
 /**
- * The viewer: a picture that behaves as its display does, with its controls.
+ * The viewer: shows a picture as its display does, with controls.
  *
- * `createViewer(root, sources, options)` fills `root` and returns the viewer; `sources` is a source or a list of one or
- * two, see source.js. Options: `theme`, "auto" (the default), "dark" or "light"; `compact`, without the panel of
- * controls until it is asked for; `memory`, bytes of the graphics card for a picture: of a larger one a part is shown.
+ * `createViewer(root, sources, options)` fills the element `root` and returns the viewer; `sources` is a source or a
+ * list of one or two, see source.js. Options: `theme`, "auto" (default), "dark" or "light"; `compact`, which hides the
+ * controls at first; `memory`, the limit on graphics memory per picture in bytes: of a larger picture a part is
+ * displayed.
  */
 
 import { Controls, focusRange } from "lippmann/controls.js";
-import { bounded, eyeAt, eyeBounds, glided, swayStart, swaying } from "lippmann/eye.js";
-import { frameBounds, panned, zoomed } from "lippmann/frame.js";
+import { clampEye, eyeAt, eyeBounds, glideEye, swayStart, swayEye } from "lippmann/eye.js";
+import { frameBounds, panFrame, zoomFrame } from "lippmann/frame.js";
 import { followTilt, listen } from "lippmann/input.js";
 import { halfField } from "lippmann/optics.js";
 import { Layout } from "lippmann/layout.js";
-import { Picture, checked } from "lippmann/picture.js";
+import { Picture, checkManifest } from "lippmann/picture.js";
 import { Stage } from "lippmann/stage.js";
 
 const MODES = ["single", "side-by-side", "anaglyph"];
 
-/** Bytes of the graphics card's memory for a picture where nothing is said: enough for 128 million pixels. */
+/** Default limit on graphics memory per picture in bytes: enough for 128 million pixels. */
 const MEMORY = 512e6;
 
-/** Radius of the magnifier as a share of the shorter side of its pane, and at most so many CSS pixels. */
+/** Radius of the magnifier as a share of the shorter side of the canvas, and its limit in CSS pixels. */
 const GLASS_SHARE = 0.35;
 const LARGEST_GLASS = 140;
 
-/** Views added to the picture in focus per frame, for as many panes as there are. */
+/** Views added to the focus sum per frame. */
 const VIEWS_PER_FRAME = 6;
 
 /** Milliseconds between two updates of the controls while the eye moves. */
@@ -61,16 +62,16 @@ class Viewer {
     this.lastTime = null;
     this.controlsShown = 0;
     this.isDestroyed = false;
-    this.layout = new Layout(root, options, () => this.#resized());
+    this.layout = new Layout(root, options, () => this.#resize());
     this.layout.onDivider = (share) => this.set({ divider: share });
     this.ready = this.#begin();
-    // Whoever waits is told; who does not has it on the page.
+    // The page displays the error; an unhandled rejection would report it again.
     this.ready.catch(() => {});
   }
 
-  // ---- What people and programs ask for ------------------------------------------------------------------------
+  // ---- Public methods ------------------------------------------------------------------------------------------
 
-  /** Puts the eye (mm, display frame) without gliding; it may be anywhere in front of the lenses. */
+  /** Sets the eye position (mm, display frame) at once, anywhere in front of the lenses. */
   setEye(x, y, z) {
     if (!(z > 0) || !Number.isFinite(x + y + z)) throw new RangeError("the eye must be in front of the lens plane");
     this.goal = null;
@@ -90,17 +91,17 @@ class Viewer {
     this.invalidate();
   }
 
-  /** Moves the eye at once to some coordinates, within its bounds. */
+  /** Sets coordinates of the eye at once, within its limits. */
   moveEye(parts) {
     this.pause();
     this.goal = null;
-    this.set({ eye: bounded({ ...this.view.eye, ...parts }, this.bounds) });
+    this.set({ eye: clampEye({ ...this.view.eye, ...parts }, this.bounds) });
   }
 
-  /** Lets the eye glide to where a place of the pane leads, -1 to 1 right and up. */
+  /** Glides to the eye position of a point of the pane, -1 to 1 right and up. */
   lookFrom(right, up) {
     if (this.view.isPlaying || !this.optics) return;
-    // Each of a pair of panes leads as a single one does.
+    // Each of two panes spans the whole range.
     const across = this.view.mode === "side-by-side" ? 2 * right - Math.sign(right) : right;
     this.#glideTo(eyeAt(this.optics, this.view.eye.z, across, up));
   }
@@ -147,7 +148,7 @@ class Viewer {
     this.controls.showTilt(Boolean(this.endTilt));
   }
 
-  /** Focuses on the plane at z mm, or on none (null): what one eye sees is sharp everywhere. */
+  /** Focuses on the plane at z mm; null ends it: what one eye sees is sharp everywhere. */
   setPlane(plane) {
     const [near, far] = focusRange(this.optics);
     this.set({ plane: plane === null ? null : Math.min(near, Math.max(far, plane)) });
@@ -171,7 +172,7 @@ class Viewer {
     this.moveGlass(this.view.glass.x + right, this.view.glass.y + up);
   }
 
-  /** Lays a layer over the picture, or none (null). Resolves once it is there. */
+  /** Overlays a layer on the picture, or none (null). Resolves once its tiles are loaded. */
   async setOverlay(name) {
     this.set({ overlay: name === null ? null : { name, share: this.view.overlay?.share ?? 0.85 } });
     if (name === null) return;
@@ -181,7 +182,7 @@ class Viewer {
       );
       await Promise.all(loads);
     } catch (error) {
-      this.#tell(error);
+      this.#showError(error);
     }
     this.layout.showProgress(1);
     this.invalidate();
@@ -200,9 +201,9 @@ class Viewer {
     this.zoomBy(factor * this.view.frame.width, 0, 0);
   }
 
-  /** Zooms about a place of the canvas, -1 to 1. */
+  /** Zooms about a point of the canvas, -1 to 1 right and up. */
   zoomBy(factor, right, up) {
-    this.#showFrame(zoomed(this.view.frame, factor, right, up, this.zoom));
+    this.#showFrame(zoomFrame(this.view.frame, factor, right, up, this.zoom));
   }
 
   zoomOff() {
@@ -210,10 +211,10 @@ class Viewer {
   }
 
   panBy(right, up) {
-    this.#showFrame(panned(this.view.frame, right, up));
+    this.#showFrame(panFrame(this.view.frame, right, up));
   }
 
-  /** The canvas as it is drawn now: {width, height, data}, RGBA rows from the top in base 64. */
+  /** Pixels of the canvas: {width, height, data}, RGBA, row after row from the top, in base 64. */
   pixels() {
     const { gl, canvas } = this.stage;
     this.#draw({ wholeFocus: true });
@@ -226,7 +227,7 @@ class Viewer {
     return { width, height, data: btoa(rows.map((row) => String.fromCharCode(...row)).join("")) };
   }
 
-  /** Draws at the next opportunity. */
+  /** Requests a redraw. */
   invalidate() {
     if (this.requested === 0 && !this.isDestroyed) this.requested = requestAnimationFrame((time) => this.#frame(time));
   }
@@ -237,16 +238,16 @@ class Viewer {
     this.endTilt?.();
     this.stopListening?.();
     for (const picture of this.pictures) picture?.destroy();
-    // Browsers keep few contexts: a notebook's cells would soon take them all.
+    // Browsers limit the number of contexts, which the cells of a notebook would exhaust.
     this.stage?.gl.getExtension("WEBGL_lose_context")?.loseContext();
     this.layout.destroy();
   }
 
-  // ---- Beginning, and beginning again ----------------------------------------------------------------------------
+  // ---- Loading, and restoring a lost context ---------------------------------------------------------------------
 
   async #begin() {
     try {
-      this.manifests = await Promise.all(this.sources.map(async (source) => checked(await source.manifest())));
+      this.manifests = await Promise.all(this.sources.map(async (source) => checkManifest(await source.manifest())));
       [this.optics] = this.manifests;
       this.bounds = eyeBounds(this.optics);
       const [x, y, z] = this.optics.eye;
@@ -259,7 +260,7 @@ class Viewer {
       this.stopListening = listen(this.layout.canvas, this);
       await this.#load();
     } catch (error) {
-      this.#tell(error);
+      this.#showError(error);
       throw error;
     }
   }
@@ -271,7 +272,7 @@ class Viewer {
     );
     this.zoom = frameBounds(this.pictures);
     this.controls.boundZoom(this.zoom);
-    this.view.frame = zoomed(this.view.frame, 1, 0, 0, this.zoom);
+    this.view.frame = zoomFrame(this.view.frame, 1, 0, 0, this.zoom);
     const onTile = (place) => (share) => {
       shares[place] = share;
       this.layout.showProgress(shares.reduce((a, b) => a + b) / shares.length);
@@ -279,7 +280,7 @@ class Viewer {
     await Promise.all(this.pictures.map((picture, place) => picture.load(this.view.frame, onTile(place))));
     if (this.view.overlay) await this.setOverlay(this.view.overlay.name);
     if (this.isDestroyed) return;
-    this.layout.tell(null);
+    this.layout.showMessage(null);
     this.#draw();
   }
 
@@ -290,17 +291,17 @@ class Viewer {
       event.preventDefault();
       for (const picture of this.pictures) picture?.destroy();
       this.pictures = this.sources.map(() => null);
-      this.layout.tell("The graphics card has dropped the picture; waiting for it to come back.");
+      this.layout.showMessage("The graphics context was lost; waiting for the browser to restore it.");
     });
     canvas.addEventListener("webglcontextrestored", () => {
       this.stage.restart();
       this.ready = this.#load();
-      this.ready.catch((error) => this.#tell(error));
+      this.ready.catch((error) => this.#showError(error));
     });
   }
 
-  #tell(error) {
-    this.layout.tell(error.message);
+  #showError(error) {
+    this.layout.showMessage(error.message);
     this.layout.showProgress(1);
   }
 
@@ -311,10 +312,10 @@ class Viewer {
     const seconds = this.lastTime === null ? 1 / 60 : Math.min(0.1, (time - this.lastTime) / 1000);
     let isMoving = false;
     if (this.view.isPlaying) {
-      this.view.eye = swaying(this.optics, this.view.eye.z, performance.now() / 1000 - this.swayBegan);
+      this.view.eye = swayEye(this.optics, this.view.eye.z, performance.now() / 1000 - this.swayBegan);
       isMoving = true;
     } else if (this.goal) {
-      this.view.eye = glided(this.view.eye, this.goal, seconds);
+      this.view.eye = glideEye(this.view.eye, this.goal, seconds);
       if (this.view.eye === this.goal) this.goal = null;
       isMoving = this.goal !== null;
     }
@@ -332,12 +333,12 @@ class Viewer {
       if (view.glass) this.stage.drawMagnifier(this.pictures, view, this.#glass(view));
       return remains;
     } catch (error) {
-      this.#tell(error);
+      this.#showError(error);
       return false;
     }
   }
 
-  /** The controls follow a moving eye a few times a second: laying them out costs as much as a small picture. */
+  /** Updates the controls, a few times a second while the eye moves: their layout is expensive. */
   #showControls(view, isMoving) {
     const now = performance.now();
     if (isMoving && now - this.controlsShown < CONTROLS_PAUSE) return;
@@ -359,10 +360,10 @@ class Viewer {
     };
   }
 
-  #resized() {
+  #resize() {
     if (!this.stage) return;
     this.layout.fit(this.#aspect());
-    // At once: a canvas loses its content when its size changes.
+    // At once: resizing a canvas clears it.
     this.#draw();
     this.invalidate();
   }
@@ -375,19 +376,19 @@ class Viewer {
 
   #glideTo(goal) {
     if (!this.optics) return;
-    this.goal = bounded(goal, this.bounds);
+    this.goal = clampEye(goal, this.bounds);
     this.invalidate();
   }
 
   #showFrame(frame) {
     this.set({ frame });
     if (this.zoom.widest === 1) return;
-    // The pictures are larger than the card shall hold: their parts come and go.
+    // The pictures exceed the graphics memory: load the tiles of the frame.
     const onTile = (share) => {
       this.layout.showProgress(share);
       this.invalidate();
     };
     const loads = this.pictures.map((picture) => picture?.load(frame, onTile));
-    Promise.all(loads).catch((error) => this.#tell(error));
+    Promise.all(loads).catch((error) => this.#showError(error));
   }
 }

@@ -1,4 +1,4 @@
-/** Draws test patterns into the native pixels of a canvas. */
+/** Draws test patterns in the native pixels of a canvas. */
 
 import { LIT, phaseTables } from "./phases.js";
 
@@ -17,7 +17,7 @@ uniform highp sampler2D places;  // [right, down] of sub-pixels, three columns p
 uniform ivec2 panel;
 uniform ivec2 cells;
 uniform int count;     // of fields
-uniform int direction; // 0: fields lie from the top to the bottom, 1: they stand from the left to the right
+uniform int direction; // 0: fields from top to bottom, 1: from left to right
 uniform int views;     // of stripes; 0 for fields
 uniform float lit;
 uniform int canvasHeight;
@@ -50,11 +50,11 @@ void main() {
   color = vec4(light, 1);
 }`;
 
-/** A drawing on `canvas`: `draw(panel, pattern, fields, views)` fills it; an Error where WebGL 2 is not to be had. */
+/** Creates a drawing on `canvas`: `draw(panel, pattern, fields, views)` fills it; throws an Error without WebGL 2. */
 export function createDrawing(canvas) {
   const gl = canvas.getContext("webgl2", { alpha: false, antialias: false, preserveDrawingBuffer: true });
-  if (gl === null) throw new Error("this browser draws no WebGL 2, which the patterns need; try another one");
-  const program = linked(gl);
+  if (gl === null) throw new Error("this browser has no WebGL 2, which the patterns need; try another one");
+  const program = linkProgram(gl);
   const place = (name) => gl.getUniformLocation(program, name);
   const textures = Object.fromEntries(["columns", "rows", "turns", "places"].map((name) => [name, gl.createTexture()]));
   gl.useProgram(program);
@@ -90,7 +90,7 @@ export function createDrawing(canvas) {
   };
 }
 
-function linked(gl) {
+function linkProgram(gl) {
   const program = gl.createProgram();
   const kinds = { [gl.VERTEX_SHADER]: VERTEX, [gl.FRAGMENT_SHADER]: FRAGMENT };
   const shaders = Object.entries(kinds).map(([kind, text]) => {
@@ -102,8 +102,8 @@ function linked(gl) {
   });
   gl.linkProgram(program);
   if (!gl.getProgramParameter(program, gl.LINK_STATUS) && !gl.isContextLost()) {
-    const told = [...shaders.map((shader) => gl.getShaderInfoLog(shader)), gl.getProgramInfoLog(program)];
-    throw new Error(`the patterns cannot be drawn here: ${told.join(" ")}`);
+    const logs = [...shaders.map((shader) => gl.getShaderInfoLog(shader)), gl.getProgramInfoLog(program)];
+    throw new Error(`the patterns cannot be drawn here: ${logs.join(" ")}`);
   }
   return program;
 }

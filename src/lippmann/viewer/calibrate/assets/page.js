@@ -1,33 +1,34 @@
 /**
- * The page on which a person turns pitch, slope and centre until the test pattern stands still, and saves them.
+ * The calibration page: the user adjusts pitch, slope and centre by test patterns, and saves them.
  *
- * It has to fill the monitor that is calibrated, pixel for pixel: what it draws are native pixels. Text is hard to read
- * through lenses, so that windows of the page share what is turned: one can show the pattern there, another the
- * controls on a plain screen.
+ * It has to fill the monitor that is calibrated, because it draws native pixels. Text is hard to read through lenses,
+ * so windows of the page share their state: one can show the pattern on the display, another the controls on a plain
+ * screen.
  */
 
 import { createDrawing } from "./drawing.js";
-import { LARGEST_LEAN, PITCHES, fieldsOf, steps, turned } from "./phases.js";
+import { LARGEST_LEAN, PITCHES, fieldsOf, steps, withChanges } from "./phases.js";
 
 const find = (name) => document.getElementById(name);
 const canvas = find("pattern");
 
 const ADVICE = {
-  slope: "One eye shut, in the middle of the viewing place: click the field that is white, or black, from top to bottom.",
-  pitch: "Click the field that is white, or black, from end to end. Then look at the slope again, with finer steps.",
-  center: "With the eye in the middle of the viewing place: click the field that is lit.",
-  stripes: "Move sideways: the whole display changes its colour at once. Stripes that lie tell of the slope, upright ones of the pitch.",
+  slope: "One eye closed, at the centre of the view zone: click the field all white or black from top to bottom.",
+  pitch: "Click the field all white or black from edge to edge. Then repeat the slope with finer steps.",
+  center: "Look from the centre of the view zone. Click the field that is lit.",
+  stripes:
+    "Move sideways: the whole display changes colour at once. Horizontal stripes: wrong slope; vertical: wrong pitch.",
 };
 
-/** What windows tell each other: all that is turned and chosen, or that they want to know it. */
+/** Messages between windows of the page: the state, or a request for it. */
 const windows = new BroadcastChannel("lippmann-calibration");
 
-/** How many steps a range may be turned to either side. */
+/** Steps of a slider to either side. */
 const RANGE = 500;
 
-let told; // what the server told of the display
-let monitor; // { pitch, lean, center } as turned so far
-let anchor; // the monitor at the middle of the ranges
+let initial; // the server's description of the display, see calibrate/site.py
+let monitor; // { pitch, lean, center }, the present values
+let anchor; // the monitor at the centre of the sliders
 let panel;
 let order = null;
 let pattern = "slope";
@@ -36,11 +37,11 @@ let drawing;
 start().catch((error) => alertOf(error.message));
 
 async function start() {
-  told = await asked("calibration.json", {});
-  anchor = monitor = { ...told.monitor };
-  document.title = `Calibrate ${told.title}`;
-  find("title").textContent = `Calibrate ${told.title}`;
-  find("save").textContent = `Save ${told.output}`;
+  initial = await request("calibration.json", {});
+  anchor = monitor = { ...initial.monitor };
+  document.title = `Calibrate ${initial.title}`;
+  find("title").textContent = `Calibrate ${initial.title}`;
+  find("save").textContent = `Save ${initial.output}`;
   offerOrders();
   setOrder(null);
   drawing = createDrawing(canvas);
@@ -53,21 +54,21 @@ async function start() {
   find("controls").hidden = location.hash === "#pattern";
   fit();
   windows.addEventListener("message", ({ data }) => hear(data));
-  windows.postMessage({ token: told.token, isAsking: true });
+  windows.postMessage({ token: initial.token, isAsking: true });
 }
 
 function share() {
   const chosen = { pattern, order, fineness: find("fineness").value, views: views() };
-  windows.postMessage({ token: told.token, monitor, anchor, ...chosen });
+  windows.postMessage({ token: initial.token, monitor, anchor, ...chosen });
 }
 
 function hear(message) {
-  if (message.token !== told.token) return; // a window of an earlier server
+  if (message.token !== initial.token) return; // a window of an earlier server
   if (message.isAsking) share();
   else adopt(message);
 }
 
-/** Takes over what was turned in another window. */
+/** Takes over the state of another window. */
 function adopt(state) {
   ({ monitor, anchor, pattern } = state);
   find("fineness").value = state.fineness;
@@ -87,7 +88,7 @@ function listen() {
     button.addEventListener("click", () => choose(button.dataset.pattern));
   }
   for (const name of ["pitch", "slope", "center"]) {
-    find(`${name}-turn`).addEventListener("input", (event) => turnRange(name, Number(event.target.value)));
+    find(`${name}-turn`).addEventListener("input", (event) => moveSlider(name, Number(event.target.value)));
     find(name).addEventListener("change", (event) => type(name, event.target));
   }
   find("fineness").addEventListener("change", () => {
@@ -109,7 +110,7 @@ function listen() {
   document.addEventListener("fullscreenchange", show);
 }
 
-/** Gives the canvas as many pixels as the screen has behind it. */
+/** Resizes the canvas to the native pixels of the screen. */
 function fit(entries) {
   const box = entries?.[0]?.devicePixelContentBoxSize?.[0];
   const width = box ? box.inlineSize : Math.round(canvas.clientWidth * devicePixelRatio);
@@ -121,13 +122,13 @@ function fit(entries) {
   show();
 }
 
-/** Shows what was turned, here and in other windows. */
+/** Displays the state here and in other windows. */
 function update() {
   show();
   share();
 }
 
-/** Draws everything from the state above. */
+/** Displays the state. */
 function show() {
   const fields = fieldsOf(pattern, panel, monitor, fineness());
   drawing.draw(panel, pattern, fields, views());
@@ -136,9 +137,9 @@ function show() {
     button.setAttribute("aria-checked", String(button.dataset.pattern === pattern));
   }
   find("advice").textContent = ADVICE[pattern];
-  find("pitch").value = written("pitch", monitor);
-  find("slope").value = written("slope", monitor);
-  find("center").value = written("center", monitor);
+  find("pitch").value = format("pitch", monitor);
+  find("slope").value = format("slope", monitor);
+  find("center").value = format("center", monitor);
   const step = steps(panel, anchor);
   find("pitch-turn").value = (monitor.pitch - anchor.pitch) / (step.pitch * fineness());
   find("slope-turn").value = (monitor.lean - anchor.lean) / (step.lean * fineness());
@@ -154,7 +155,7 @@ function label(fields) {
   fields.forEach((field, number) => {
     const text = document.createElement("span");
     const middle = (field.first + field.last) / 2;
-    text.textContent = written(pattern, field.monitor);
+    text.textContent = format(pattern, field.monitor);
     text.className = number === (fields.length - 1) / 2 ? "own" : "";
     text.style.left = `${pattern === "slope" ? middle * x : Math.min(innerWidth, panel.width * x) / 8}px`;
     text.style.top = `${pattern === "slope" ? Math.min(innerHeight, panel.height * y) / 8 : middle * y}px`;
@@ -172,7 +173,7 @@ function sizeNote() {
 const fineness = () => Number(find("fineness").value);
 const views = () => Math.min(Math.max(Math.round(Number(find("views").value)) || 2, 2), 100);
 
-function written(name, { pitch, lean, center }) {
+function format(name, { pitch, lean, center }) {
   if (name === "center") return center.toFixed(4);
   if (name === "pitch") return pitch.toFixed(5);
   return lean === 0 ? "infinite" : (1 / lean).toPrecision(7);
@@ -183,24 +184,24 @@ function choose(name) {
   update();
 }
 
-/** Moves a value by so many of its steps; `name` is pitch, lean or center. */
+/** Changes a value by `count` steps; `name` is pitch, lean or center. */
 function nudge(name, count) {
-  monitor = turned(panel, monitor, { [name]: monitor[name] + count * steps(panel, monitor)[name] * fineness() });
+  monitor = withChanges(panel, monitor, { [name]: monitor[name] + count * steps(panel, monitor)[name] * fineness() });
   keepInRange();
   update();
 }
 
-function turnRange(name, value) {
+function moveSlider(name, value) {
   if (name === "center") {
     monitor = { ...monitor, center: value % 1 };
   } else {
     const key = name === "slope" ? "lean" : name;
-    monitor = turned(panel, monitor, { [key]: anchor[key] + value * steps(panel, anchor)[key] * fineness() });
+    monitor = withChanges(panel, monitor, { [key]: anchor[key] + value * steps(panel, anchor)[key] * fineness() });
   }
   update();
 }
 
-/** Takes a value that was typed, if it is one. */
+/** Takes over a typed value, or marks it invalid. */
 function type(name, input) {
   const text = input.value.trim().toLowerCase();
   const number = text === "infinite" ? Infinity : Number(text);
@@ -212,12 +213,12 @@ function type(name, input) {
     !(key === "lean" && Math.abs(value) > LARGEST_LEAN);
   input.setAttribute("aria-invalid", String(!isPossible));
   if (!isPossible) return;
-  monitor = turned(panel, monitor, { [key]: value });
+  monitor = withChanges(panel, monitor, { [key]: value });
   anchor = monitor;
   update();
 }
 
-/** Moves the middle of the ranges to the value, once it is beyond their ends. */
+/** Centres the sliders on the values once these exceed their range. */
 function keepInRange() {
   const step = steps(panel, anchor);
   const isBeyond = (key) => Math.abs(monitor[key] - anchor[key]) > RANGE * step[key] * fineness();
@@ -236,19 +237,19 @@ function takeField(event) {
 }
 
 function offerOrders() {
-  const names = Object.keys(told.orders);
+  const names = Object.keys(initial.orders);
   find("order").replaceChildren(...names.map((name) => new Option(name)));
   find("order").hidden = find("order-label").hidden = names.length === 0;
 }
 
 function setOrder(name) {
   order = name;
-  find("order").value = name ?? told.order ?? find("order").value;
-  panel = name === null ? told.panel : { ...told.panel, cells: [[told.orders[name]]] };
+  find("order").value = name ?? initial.order ?? find("order").value;
+  panel = name === null ? initial.panel : { ...initial.panel, cells: [[initial.orders[name]]] };
 }
 
 function reset() {
-  anchor = monitor = { ...told.monitor };
+  anchor = monitor = { ...initial.monitor };
   setOrder(null);
   update();
 }
@@ -290,9 +291,9 @@ function press(event) {
 async function save() {
   const { pitch, lean, center } = monitor;
   const body = JSON.stringify({ pitch, slope: lean === 0 ? null : 1 / lean, center, order });
-  const headers = { "Content-Type": "application/json", "X-Lippmann-Token": told.token };
+  const headers = { "Content-Type": "application/json", "X-Lippmann-Token": initial.token };
   try {
-    const { saved } = await asked("display", { method: "POST", headers, body });
+    const { saved } = await request("display", { method: "POST", headers, body });
     find("alert").hidden = true;
     find("status").textContent = `Saved ${saved}.`;
   } catch (error) {
@@ -306,18 +307,18 @@ function alertOf(text) {
   find("alert").hidden = false;
 }
 
-/** The JSON that the server answers. */
-async function asked(address, options) {
-  const answer = await fetch(address, { cache: "no-store", ...options }).catch(() => {
+/** Requests JSON from the server; throws an Error with the server's line. */
+async function request(address, options) {
+  const response = await fetch(address, { cache: "no-store", ...options }).catch(() => {
     throw new Error("Lippmann's server does not answer; is `lippmann calibrate page` still running?");
   });
-  const values = await answer.json().catch(() => ({}));
-  if (!answer.ok) throw new Error(values.error ?? `the server answered ${answer.status}`);
+  const values = await response.json().catch(() => ({}));
+  if (!response.ok) throw new Error(values.error ?? `the server responded with ${response.status}`);
   return values;
 }
 
 globalThis.lippmann = {
-  /** For tests: the monitor as turned so far. */
+  /** For tests: the present values. */
   get monitor() {
     return { ...monitor };
   },

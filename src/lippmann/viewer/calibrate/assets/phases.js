@@ -7,12 +7,12 @@
 
 const INCH = 25.4;
 
-/** The patterns, and how far from the middle of its lens light is lit, in lenses; stripes show views instead. */
+/** The patterns, and the half width of the lit part of a lens, in lenses; stripes display views instead. */
 export const PATTERNS = ["stripes", "pitch", "slope", "center"];
 export const LIT = { pitch: 1 / 4, slope: 1 / 4, center: 1 / 12 };
 export const FIELDS = 11;
 
-/** What a monitor may be, as the server checks it too. */
+/** Limits on a monitor's values, which the server checks too. */
 export const PITCHES = [1, 1000];
 export const LARGEST_LEAN = 1 / 0.18;
 
@@ -24,8 +24,8 @@ export function lensesPerPixel(panel, { pitch, lean }) {
   return { right, up: right * lean };
 }
 
-/** The monitor with changed values whose pattern turns about the panel's middle: there the phase stays as it was. */
-export function turned(panel, monitor, changes) {
+/** The monitor with changed values and the same phase at the centre of the panel. */
+export function withChanges(panel, monitor, changes) {
   const pitch = Math.min(Math.max(changes.pitch ?? monitor.pitch, PITCHES[0]), PITCHES[1]);
   const lean = Math.min(Math.max(changes.lean ?? monitor.lean, -LARGEST_LEAN), LARGEST_LEAN);
   const before = lensesPerPixel(panel, monitor);
@@ -34,7 +34,7 @@ export function turned(panel, monitor, changes) {
   return { pitch, lean, center: fraction((changes.center ?? monitor.center) + shift) };
 }
 
-/** The least change of each value that can be seen: a tenth of a lens from end to end. */
+/** Step of each value, the least visible change: a tenth of a lens from one edge of the panel to the other. */
 export function steps(panel, monitor) {
   const { right } = lensesPerPixel(panel, monitor);
   const tenth = { pitch: monitor.pitch / (10 * panel.width * right), lean: 1 / (10 * panel.height * right) };
@@ -42,16 +42,16 @@ export function steps(panel, monitor) {
 }
 
 /**
- * The fields of a pattern: each has the `monitor` that it stands for, its place as `first` and `last` pixel (from the
- * top, of `slope` from the left), and what it adds to the phase: `right` and `up` per pixel, and `constant`.
+ * Fields of a pattern. Each has the `monitor` whose values it displays, its extent from pixel `first` to `last` (from
+ * the top; for `slope` from the left), and its phase in lenses: `right` and `up` per pixel, and `constant`.
  */
 export function fieldsOf(pattern, panel, monitor, scale) {
   const own = lensesPerPixel(panel, monitor);
   if (pattern === "stripes") {
     return [{ monitor, first: 0, last: panel.height, ...own, constant: -monitor.center }];
   }
-  const isLying = pattern !== "slope";
-  const extent = isLying ? panel.height : panel.width;
+  const isHorizontal = pattern !== "slope";
+  const extent = isHorizontal ? panel.height : panel.width;
   const count = Math.min(FIELDS, extent);
   const step = fieldStep(pattern, panel, monitor, count) * scale;
   return Array.from({ length: count }, (_, number) => {
@@ -66,13 +66,13 @@ export function fieldsOf(pattern, panel, monitor, scale) {
     const values = { ...monitor, ...changed };
     const { right, up } = lensesPerPixel(panel, values);
     const middle = (first + last) / 2;
-    const [across, above] = isLying ? [panel.width / 2, panel.height - middle] : [middle, panel.height / 2];
+    const [across, above] = isHorizontal ? [panel.width / 2, panel.height - middle] : [middle, panel.height / 2];
     const constant = across * (own.right - right) + above * (own.up - up) - monitor.center;
-    return { monitor: turned(panel, monitor, changed), first, last, right, up, constant };
+    return { monitor: withChanges(panel, monitor, changed), first, last, right, up, constant };
   });
 }
 
-/** From field to field: half a lens from end to end, or an even share of one. */
+/** Step from field to field: half a lens from one edge of the panel to the other; for `center` an even share of one. */
 function fieldStep(pattern, panel, monitor, count) {
   const { right } = lensesPerPixel(panel, monitor);
   if (pattern === "center") return 1 / count;
@@ -80,8 +80,8 @@ function fieldStep(pattern, panel, monitor, count) {
 }
 
 /**
- * Phases of columns and rows, of every field: single precision keeps a hundredth of a lens only of numbers this small,
- * so that the whole lenses are taken off here. `columns` is width x fields, `rows` height x fields.
+ * Phases of columns and rows, for each field: `columns` is width x fields, `rows` height x fields. Whole lenses are
+ * subtracted here in double precision, because single precision resolves a hundredth of a lens in small numbers only.
  */
 export function phaseTables(panel, fields) {
   const columns = new Float32Array(panel.width * fields.length);
