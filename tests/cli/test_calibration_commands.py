@@ -40,6 +40,14 @@ def test_stripes_for_a_display_file(lippmann, monitor_file, tmp_path):
     assert image.provenance.subpixels
 
 
+def test_a_zarr_picture_is_replaced(lippmann, monitor_file, tmp_path):
+    path = tmp_path / "stripes.zarr"
+    for views in (3, 5):
+        outcome = lippmann("calibrate", "pattern", "stripes", "-d", monitor_file, "--views", views, "-o", path)
+        assert outcome.code == 0
+    np.testing.assert_array_equal(read_picture(path).pixels, draw(Pattern("stripes", views=5), MONITOR))
+
+
 def test_values_can_be_turned(lippmann, monitor_file, tmp_path):
     path = tmp_path / "stripes.tif"
     turned = ("--pitch", "7.2", "--slope", "5", "--center", "-0.1", "--views", "5")

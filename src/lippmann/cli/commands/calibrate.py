@@ -60,12 +60,10 @@ def pattern(
     from lippmann.calibration.patterns import fields as fields_of
     from lippmann.display import load_display
     from lippmann.display.formats.monitor import Monitor
-    from lippmann.image.write import format_for
-    from lippmann.runtime.atomic_write import check_writable
+    from lippmann.image.write import check_output, format_for
 
     console = Console(quiet, as_json)
-    format_for(output, bits)
-    check_writable(output)
+    check_output(output, format_for(output, bits)[0])
     chosen = Pattern(name, views, fields, step)  # type: ignore[arg-type]  # it is checked there
     if name == "stripes" and step is not None:
         raise UsageError("does not apply to stripes", where="--step", fix="leave it out")

@@ -31,7 +31,7 @@ TlsKey = Annotated[Path | None, typer.Option("--tls-key", help="Private key of t
 
 
 @dataclass(frozen=True)
-class Asked:
+class ClusterOptions:
     """The values of ``--cluster`` and ``--tls-...``; true if a cluster is to render."""
 
     name: str | None

@@ -95,12 +95,10 @@ def compose(
 ) -> None:
     """Join views or micro-images into the native picture."""
     from lippmann.image import compose as compose_folder
-    from lippmann.image.write import format_for
-    from lippmann.runtime.atomic_write import check_writable
+    from lippmann.image.write import check_output, format_for
 
     console = Console(quiet, as_json)
-    format_for(output, bits)
-    check_writable(output)
+    check_output(output, format_for(output, bits)[0])
     with console.progress() as progress:
         image = compose_folder(folder, progress=progress)
     image.save(output, bits=bits)
@@ -135,7 +133,7 @@ def replay(
 ) -> None:
     """Simulate what an eye in front of the display sees."""
     from lippmann.image.streamed import open_picture
-    from lippmann.image.write import format_for, write_plain_picture
+    from lippmann.image.write import check_output, format_for, write_plain_picture
     from lippmann.runtime.atomic_write import check_writable
     from lippmann.viewing.replay import default_eye
     from lippmann.viewing.replay import replay as replay_picture
@@ -145,11 +143,11 @@ def replay(
     console = Console(quiet, as_json)
     if sweep:
         check_animation_path(output)
+        check_writable(output)
     else:
-        format_for(output, bits)
         if width is not None:
             raise UsageError("applies to a sweep only", where="--sweep-width", fix="add --sweep")
-    check_writable(output)
+        check_output(output, format_for(output, bits)[0])
     image = open_picture(picture, display=parse.display(display))
     position = default_eye(image.display) if eye is None else parse.triple(eye, "--eye")
     pixels = None if size is None else parse.size(size, "--size")
@@ -183,13 +181,11 @@ def refocus(
 ) -> None:
     """Refocus on a plane, as a camera whose aperture is as wide as the field of view."""
     from lippmann.image.streamed import open_picture
-    from lippmann.image.write import format_for, write_plain_picture
-    from lippmann.runtime.atomic_write import check_writable
+    from lippmann.image.write import check_output, format_for, write_plain_picture
     from lippmann.viewing.refocus import refocus as refocus_picture
 
     console = Console(quiet, as_json)
-    format_for(output, bits)
-    check_writable(output)
+    check_output(output, format_for(output, bits)[0])
     image = open_picture(picture, display=parse.display(display))
     pixels = refocus_picture(image, plane, size=None if size is None else parse.size(size, "--size"))
     write_plain_picture(pixels, output, bits=bits, transfer=image.provenance.transfer)

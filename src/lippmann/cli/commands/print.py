@@ -125,12 +125,10 @@ def marks(
     from lippmann.calibration.marked_files import write_marked
     from lippmann.display.units import length
     from lippmann.image.streamed import open_picture
-    from lippmann.image.write import format_for
-    from lippmann.runtime.atomic_write import check_writable
+    from lippmann.image.write import check_output, format_for
 
     console = Console(quiet, as_json)
-    format_for(output, bits)
-    check_writable(output)
+    check_output(output, format_for(output, bits)[0])
     width = length(margin, "--margin")
     image = open_picture(picture, display=parse.display(display))
     with console.progress() as progress:

@@ -141,7 +141,7 @@ def render(
     )
     source = SceneSource(scene, environment, parse.color(background), allow_outside)
     wanted = sequence.Wanted(frames, fps, animation, camera_path, video, eye)
-    on_cluster = clusters.Asked(cluster, tls_ca, tls_cert, tls_key)
+    on_cluster = clusters.ClusterOptions(cluster, tls_ca, tls_cert, tls_key)
     if wanted:
         files = sequence.Files(output, bits, maps, resume)
         with on_cluster.runner(console, threads) as runner:
