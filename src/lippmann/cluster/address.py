@@ -73,17 +73,17 @@ class TlsFiles:
         ClusterError
             If Dask is not installed.
         """
-        given = self.options()
+        files = self.options()
         distributed = import_distributed()
-        if not any(given.values()):
+        if not any(files.values()):
             return distributed.Security()
-        for name, path in given.items():
+        for name, path in files.items():
             if path is None:
                 rule = "tls_ca=..., tls_cert=... and tls_key=... go together"
                 raise UsageError("is missing", parameter=name, rule=rule)
             if not path.is_file():
                 raise UsageError(f"no such file '{path}'", parameter=name)
-        roles = {f"tls_{role}_{what}": str(given[f"tls_{what}"]) for role in _ROLES for what in ("cert", "key")}
+        roles = {f"tls_{role}_{what}": str(files[f"tls_{what}"]) for role in _ROLES for what in ("cert", "key")}
         return distributed.Security(require_encryption=True, tls_ca_file=str(self.ca), **roles)
 
 

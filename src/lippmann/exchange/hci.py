@@ -200,15 +200,15 @@ def _meta(
     lowest, highest = far, near
     if disparities is not None and disparities.size:
         lowest, highest = float(disparities.min()), float(disparities.max())
-    made = Provenance() if light_field.metadata is None else light_field.metadata.provenance
+    provenance = Provenance() if light_field.metadata is None else light_field.metadata.provenance
     return {
-        "scene": made.scene,
+        "scene": provenance.scene,
         "category": "additional",
         "date": "",
-        "version": made.version,
+        "version": provenance.version,
         "authors": "",
         "contact": "",
-        "cycles_seed": made.seed or 0,
+        "cycles_seed": provenance.seed or 0,
         "disp_min": lowest,
         "disp_max": highest,
         "frustum_disp_min": far,

@@ -259,13 +259,13 @@ def _gib(size: int) -> str:
 def _check_packages() -> Check:
     from importlib.metadata import PackageNotFoundError, version  # slow to import
 
-    found = [f"Python {platform.python_version()}"]
+    versions = [f"Python {platform.python_version()}"]
     for label, name in (("Lippmann", "lippmann"), ("Mitsuba", "mitsuba"), ("Dr.Jit", "drjit")):
         try:
-            found.append(f"{label} {version(name)}")
+            versions.append(f"{label} {version(name)}")
         except PackageNotFoundError:
-            return Check("versions", False, f"{', '.join(found)}; {label} is not installed", _REINSTALL)
-    return Check("versions", True, ", ".join(found))
+            return Check("versions", False, f"{', '.join(versions)}; {label} is not installed", _REINSTALL)
+    return Check("versions", True, ", ".join(versions))
 
 
 def _check_llvm(*, needed: bool) -> Check:

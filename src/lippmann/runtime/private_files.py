@@ -25,8 +25,8 @@ FOLDER_MODE, FILE_MODE = 0o700, 0o600
 
 _OTHERS_FIX = "choose another name, or another folder"
 
-#: Results of :func:`_shown_in` by folder.
-_shown: dict[Path, os.stat_result] = {}
+#: Results of :func:`_status_of_new_file` by folder.
+_probes: dict[Path, os.stat_result] = {}
 
 
 class ForeignFileError(Exception):
@@ -82,9 +82,9 @@ def check_folder(path: Path) -> bool:
     if not _is_own(status, path.parent):
         raise ForeignFileError("belongs to another user", _OTHERS_FIX)
     if hasattr(os, "geteuid") and status.st_mode & 0o022:
-        shown = _shown_in(path.parent)
+        probe = _status_of_new_file(path.parent)
         # File systems without permissions, such as FAT, show all files as open to everyone.
-        if shown is None or not shown.st_mode & 0o077:
+        if probe is None or not probe.st_mode & 0o077:
             raise ForeignFileError(
                 "can be written to by other users", f"take that permission away: chmod go-w '{path}'"
             )
@@ -186,22 +186,22 @@ def _is_own(status: os.stat_result, folder: Path) -> bool:
     if not hasattr(os, "geteuid") or status.st_uid == os.geteuid():
         return True
     # Network drives and containers may show another owner for all files of a user.
-    shown = _shown_in(folder)
-    return shown is not None and shown.st_uid == status.st_uid
+    probe = _status_of_new_file(folder)
+    return probe is not None and probe.st_uid == status.st_uid
 
 
-def _shown_in(folder: Path) -> os.stat_result | None:
+def _status_of_new_file(folder: Path) -> os.stat_result | None:
     """Status that the file system shows for a new private file in ``folder``; None if none can be created."""
-    if folder not in _shown:
+    if folder not in _probes:
         path = folder / f".{secrets.token_hex(8)}.part"
         try:
             descriptor = os.open(path, os.O_CREAT | os.O_EXCL | os.O_WRONLY | without_following(), FILE_MODE)
         except OSError:
             return None
         try:
-            _shown[folder] = os.fstat(descriptor)
+            _probes[folder] = os.fstat(descriptor)
         finally:
             os.close(descriptor)
             with suppress(OSError):
                 path.unlink()
-    return _shown[folder]
+    return _probes[folder]

@@ -214,9 +214,10 @@ def _info_values(path: Path, file: PictureFile) -> dict[str, Any]:
     return values
 
 
-def _method(made: Provenance) -> str:
-    parts = [made.method or "unknown", made.integrator]
-    for text, value in (("depth {}", made.depth), ("{} samples per pixel", made.spp), ("seed {}", made.seed)):
+def _method(provenance: Provenance) -> str:
+    depth, spp, seed = provenance.depth, provenance.spp, provenance.seed
+    parts = [provenance.method or "unknown", provenance.integrator]
+    for text, value in (("depth {}", depth), ("{} samples per pixel", spp), ("seed {}", seed)):
         parts.append("" if value is None else text.format(value))
     return ", ".join(part for part in parts if part)
 
@@ -227,20 +228,21 @@ def _info_lines(path: Path, file: PictureFile) -> list[str]:
         lines.append(f"layers      {', '.join(file.layers)}")
     if file.metadata is None:
         return [*lines, "no Lippmann metadata: commands that need the display take --display"]
-    display, made = file.metadata.display, file.metadata.provenance
+    display, provenance = file.metadata.display, file.metadata.provenance
     grid = display.lens_grid
     lines += [
         f"display     {display.name} ({display.lens_array.layout}, {grid.columns}x{grid.rows} lenses, "
         f"field {display.field_of_view:.1f} degrees)",
-        f"scene       {made.scene or 'unknown'}",
-        f"method      {_method(made)}",
-        f"made by     Lippmann {made.version or '(unknown version)'} on {made.device or 'an unknown device'}",
+        f"scene       {provenance.scene or 'unknown'}",
+        f"method      {_method(provenance)}",
+        f"made by     Lippmann {provenance.version or '(unknown version)'} "
+        f"on {provenance.device or 'an unknown device'}",
     ]
-    if made.estimate is not None:
-        lines.append(f"estimated   {estimate_in_words(made.estimate)}")
-    if made.rays:
-        lines.append("rays        " + ", ".join(f"{count:,} {kind}" for kind, count in made.rays.items()))
-    if made.seconds:
-        lines.append("seconds     " + ", ".join(f"{stage} {spent:.2f}" for stage, spent in made.seconds.items()))
-    lines += [f"{name:<11} {value}" for name, value in made.options.items()]
-    return lines + [f"note        {note}" for note in made.notes]
+    if provenance.estimate is not None:
+        lines.append(f"estimated   {estimate_in_words(provenance.estimate)}")
+    if provenance.rays:
+        lines.append("rays        " + ", ".join(f"{count:,} {kind}" for kind, count in provenance.rays.items()))
+    if provenance.seconds:
+        lines.append("seconds     " + ", ".join(f"{stage} {spent:.2f}" for stage, spent in provenance.seconds.items()))
+    lines += [f"{name:<11} {value}" for name, value in provenance.options.items()]
+    return lines + [f"note        {note}" for note in provenance.notes]

@@ -49,8 +49,8 @@ def view(
     paths = [picture] if other is None else [picture, other]
     target = parse.display(display)
     if export is not None:
-        for name, given in (("--host", host != "127.0.0.1"), ("--port", port != 0), ("--no-browser", no_browser)):
-            if given:
+        for name, is_given in (("--host", host != "127.0.0.1"), ("--port", port != 0), ("--no-browser", no_browser)):
+            if is_given:
                 raise UsageError("does not apply to --export", where=name, fix="leave it out")
         _export(paths, target, export, console)
         return
