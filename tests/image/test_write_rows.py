@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from lippmann.codecs import tiff
+from lippmann.color.transfer import dequantize, quantize
 from lippmann.errors import PictureError
-from lippmann.image import IntegralImage
+from lippmann.image import IntegralImage, read_picture
 from lippmann.image.metadata import metadata_of
 from lippmann.image.write import can_be_banded, write_rows
 
@@ -37,6 +38,11 @@ def test_bands_make_the_same_file(display, tmp_path, monkeypatch, name, bits):
     image.save(tmp_path / "whole" / name, bits=bits)
     assert content(tmp_path / "bands" / name) == content(tmp_path / "whole" / name)
     assert asked == [(0, 16), (16, 32), (32, 35)]
+    stored = {8: "uint8", 16: "uint16", 32: "float32"}[bits]
+    expected = values if bits == 32 else dequantize(quantize(values, bits, "srgb"), "srgb")
+    written = read_picture(tmp_path / "bands" / name)
+    np.testing.assert_array_equal(written.pixels, expected)
+    assert written.stored == stored
 
 
 def test_what_cannot_be_written_so_is_refused(display, tmp_path):
