@@ -221,7 +221,7 @@ def _make_integrator(
     built: BuiltScene | BuiltClassic, request: RenderRequest, frame_from_world: Matrix, source: RaySource
 ) -> Integrator:
     from lippmann.device.whitted.scene import BuiltClassic
-    from lippmann.rendering.transport.light_sampling import lights_for_picture
+    from lippmann.rendering.transport.light_sampling import make_light_sampler
     from lippmann.rendering.transport.path import PathIntegrator
     from lippmann.rendering.transport.scene_flags import make_traits
     from lippmann.rendering.transport.surface_property import SurfaceIntegrator
@@ -235,7 +235,7 @@ def _make_integrator(
         )
         integrator = PathIntegrator(built.mitsuba, traits, request.surfaces, name=request.integrator)
         if not built.borrowed:
-            integrator.lights = lights_for_picture(integrator, source)
+            integrator.light_sampler = make_light_sampler(integrator, source)
         return integrator
     return SurfaceIntegrator(built.mitsuba, cast("SurfaceProperty", request.integrator), frame_from_world)
 

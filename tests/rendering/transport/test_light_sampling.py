@@ -1,4 +1,4 @@
-"""How often emitters are sampled: by what they bring to the picture, which they change as little as the scene."""
+"""Light sampling: probabilities by contribution, unbiased pictures, and scenes that are never written into."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ pytestmark = pytest.mark.usefixtures("engine")
 SIZE = 24
 
 
-def room(order=("sky", "lamp", "spark")):
-    """A closed box that is seen from inside: a bright lamp, a faint one, and a sky that nobody sees."""
+def room(order=("sky", "bright", "faint")):
+    """A closed box seen from inside: a bright emitter, a faint one, and a sky outside."""
 
-    def lamp(x, radiance):
+    def area_light(x, radiance):
         return {
             "type": "sphere",
             "center": [x, 0.8, 0.8],
@@ -21,14 +21,14 @@ def room(order=("sky", "lamp", "spark")):
             "emitter": {"type": "area", "radiance": {"type": "rgb", "value": radiance}},
         }
 
-    lamps = {
+    emitters = {
         "sky": {"type": "constant", "radiance": 5.0},
-        "lamp": lamp(-0.5, 20.0),
-        "spark": lamp(0.5, 2.0),
+        "bright": area_light(-0.5, 20.0),
+        "faint": area_light(0.5, 2.0),
     }
     paint = {"type": "twosided", "bsdf": {"type": "diffuse", "reflectance": 0.6}}
     walls = {"type": "cube", "bsdf": paint}
-    return {"type": "scene", "walls": walls} | {name: lamps[name] for name in order}
+    return {"type": "scene", "walls": walls} | {name: emitters[name] for name in order}
 
 
 def camera():
@@ -62,51 +62,51 @@ def sampling_weights(scene):
     return [float(emitter.sampling_weight()) for emitter in scene.emitters()]
 
 
-@pytest.mark.parametrize("order", [("sky", "lamp", "spark"), ("spark", "sky", "lamp"), ("lamp", "spark", "sky")])
-def test_emitters_are_sampled_by_what_they_bring(order):
-    from lippmann.rendering.transport.light_sampling import EVEN_SHARE, emitter_weights
+@pytest.mark.parametrize("order", [("sky", "bright", "faint"), ("faint", "sky", "bright"), ("bright", "faint", "sky")])
+def test_emitters_are_sampled_by_their_contribution(order):
+    from lippmann.rendering.transport.light_sampling import UNIFORM_SHARE, estimate_emitter_weights
 
-    weights = emitter_weights(*stage(room(order)))
+    weights = estimate_emitter_weights(*stage(room(order)))
     by_name = dict(zip(order, weights, strict=True))
     assert weights.sum() == pytest.approx(1)
-    assert by_name["sky"] == pytest.approx(EVEN_SHARE / 3)
-    assert by_name["lamp"] > 3 * by_name["spark"] > 3 * by_name["sky"]
+    assert by_name["sky"] == pytest.approx(UNIFORM_SHARE / 3)
+    assert by_name["bright"] > 3 * by_name["faint"] > 3 * by_name["sky"]
 
 
 def test_emitters_of_a_scene_with_another_sky_are_told_apart():
     """The new sky comes first among a scene's objects."""
     import mitsuba as mi
 
-    from lippmann.rendering.transport.light_sampling import EVEN_SHARE, emitter_weights
+    from lippmann.rendering.transport.light_sampling import UNIFORM_SHARE, estimate_emitter_weights
     from lippmann.scene.mitsuba_source import with_sky
 
     sky = mi.load_dict({"type": "constant", "radiance": 3.0})
-    integrator, source = stage(with_sky(mi.load_dict(room(("lamp", "spark"))), sky))
-    weights = emitter_weights(integrator, source)
+    integrator, source = stage(with_sky(mi.load_dict(room(("bright", "faint"))), sky))
+    weights = estimate_emitter_weights(integrator, source)
     unseen = [number for number, emitter in enumerate(integrator.scene.emitters()) if emitter.is_environment()]
-    assert weights[unseen] == pytest.approx(EVEN_SHARE / 3)
+    assert weights[unseen] == pytest.approx(UNIFORM_SHARE / 3)
 
 
 def test_the_scene_stays_as_it_was():
-    from lippmann.rendering.transport.light_sampling import emitter_weights, lights_for_picture
+    from lippmann.rendering.transport.light_sampling import estimate_emitter_weights, make_light_sampler
 
     integrator, source = stage(room())
-    first = emitter_weights(integrator, source)
-    lights_for_picture(integrator, source)
+    first = estimate_emitter_weights(integrator, source)
+    make_light_sampler(integrator, source)
     assert sampling_weights(integrator.scene) == [1.0, 1.0, 1.0]
-    assert np.array_equal(emitter_weights(integrator, source), first)
+    assert np.array_equal(estimate_emitter_weights(integrator, source), first)
 
 
-def test_samples_have_the_density_that_is_said_of_them():
-    """Emitters come as often as their weights say, and a sample's density is what a ray that meets it is told."""
+def test_pdf_of_samples_is_that_of_scattered_rays():
+    """Emitters are chosen by their weights, and both ways to ask for a pdf agree."""
     import drjit as dr
     import mitsuba as mi
 
-    from lippmann.rendering.transport.light_sampling import WeightedLights
+    from lippmann.rendering.transport.light_sampling import WeightedLightSampler
 
     scene = mi.load_dict(room())
     weights = np.array([0.1, 0.6, 0.3])
-    lights = WeightedLights(scene, weights)
+    lights = WeightedLightSampler(scene, weights)
     count = 30_000
     reference = dr.zeros(mi.Interaction3f, count)
     reference.p = mi.Point3f(0.2, -0.3, 0.1)
@@ -120,30 +120,113 @@ def test_samples_have_the_density_that_is_said_of_them():
     assert np.array(lights.pdf_direction(reference, sample, mi.Bool(True))) == pytest.approx(
         np.array(sample.pdf), rel=1e-3
     )
-    # What each direction brings, over its density, has the mean that sampling all alike gives.
-    _, brought = scene.sample_emitter_direction(reference, point, False)
-    means = [np.array(each).mean() for each in (radiance, brought)]
+    # Radiance over pdf has the mean that uniform sampling gives.
+    _, uniform = scene.sample_emitter_direction(reference, point, False)
+    means = [np.array(each).mean() for each in (radiance, uniform)]
     assert means[0] == pytest.approx(means[1], rel=0.05)
 
 
-def test_rays_that_meet_no_emitter_have_no_density():
+def test_rays_that_hit_no_emitter_have_pdf_0():
     import drjit as dr
     import mitsuba as mi
 
-    from lippmann.rendering.transport.light_sampling import WeightedLights
+    from lippmann.rendering.transport.light_sampling import WeightedLightSampler
 
-    lights = WeightedLights(mi.load_dict(room()), np.array([0.1, 0.6, 0.3]))
+    lights = WeightedLightSampler(mi.load_dict(room()), np.array([0.1, 0.6, 0.3]))
     nothing = dr.zeros(mi.DirectionSample3f, 4)
     assert np.array(lights.pdf_direction(dr.zeros(mi.Interaction3f, 4), nothing, mi.Bool(True))).tolist() == [0.0] * 4
 
 
+def blackbody(center, radius=0.3):
+    """A sphere of radiance 1 from everywhere: it emits 1 and reflects nothing."""
+    return {
+        "type": "sphere",
+        "center": center,
+        "radius": radius,
+        "bsdf": {"type": "diffuse", "reflectance": 0.0},
+        "emitter": {"type": "area", "radiance": 1.0},
+    }
+
+
+@pytest.mark.parametrize("weights", [(0.8, 0.1, 0.1), (0.1, 0.8, 0.1), (0.02, 0.08, 0.9)])
+def test_white_furnace_is_one_by_any_weights(weights):
+    """White surfaces, emitters of radiance 1 and a sky of radiance 1: MIS must give 1 wherever one looks."""
+    import mitsuba as mi
+
+    from lippmann.rendering.transport.light_sampling import WeightedLightSampler
+
+    scene = mi.load_dict(
+        {
+            "type": "scene",
+            "sky": {"type": "constant", "radiance": 1.0},
+            "left": blackbody([-0.7, 0.0, 0.0]),
+            "right": blackbody([0.7, 0.0, 0.0]),
+            "ball": {"type": "sphere", "radius": 0.38, "bsdf": {"type": "diffuse", "reflectance": 1.0}},
+        }
+    )
+    integrator, source = stage(scene, depth=8)
+    integrator.light_sampler = WeightedLightSampler(scene, np.array(weights))
+    pixels = picture(integrator, source, 512, 1)
+    blocks = pixels.reshape(4, 6, 4, 6, 3).mean(axis=(1, 3, 4))
+    assert blocks == pytest.approx(1.0, abs=0.02)
+    assert pixels.mean() == pytest.approx(1.0, abs=2e-3)
+
+
+def test_delta_emitters_give_the_same_picture_by_any_weights():
+    """A point light, a spot light and a sun above a floor: no scattered ray hits them, and their pdf has no angle."""
+    import mitsuba as mi
+
+    from lippmann.rendering.transport.light_sampling import WeightedLightSampler, make_light_sampler
+
+    transform = mi.ScalarTransform4f
+    scene = {
+        "type": "scene",
+        "floor": {"type": "rectangle", "to_world": transform().scale(4)},
+        "point": {"type": "point", "position": [0.2, 0.1, 0.6], "intensity": 2.0},
+        "spot": {
+            "type": "spot",
+            "to_world": transform().look_at([0, 0, 0.8], [0.2, 0, 0], [0, 1, 0]),
+            "intensity": 3.0,
+            "cutoff_angle": 30.0,
+        },
+        "sun": {"type": "directional", "direction": [0.3, 0, -1], "irradiance": 1.0},
+    }
+    integrator, source = stage(scene, depth=1)
+    samples = 2048
+    # Cutting the samples of a pixel into the emitters' shares is stratified, so that little noise is left.
+    uniform = picture(integrator, source, samples, 3)
+    for lights in (
+        make_light_sampler(integrator, source),
+        WeightedLightSampler(integrator.scene, np.array([0.15, 0.6, 0.25])),
+    ):
+        integrator.light_sampler = lights
+        weighted = picture(integrator, source, samples, 4)
+        assert np.abs(weighted - uniform).max() < 0.02 * uniform.max()
+        assert weighted.mean() == pytest.approx(uniform.mean(), rel=1e-3)
+
+
+def test_more_emitters_than_are_weighed_have_a_picture():
+    """Beyond the most emitters the scene's own sampling is used, and each light still arrives."""
+    from lippmann.rendering.transport.light_sampling import MAX_EMITTERS, SceneLightSampler, make_light_sampler
+
+    count = MAX_EMITTERS + 1
+    lights = {
+        f"light{i}": {"type": "point", "position": [0.0, 0.0, 0.5], "intensity": 1.0 / count} for i in range(count)
+    }
+    floor = {"type": "rectangle", "bsdf": {"type": "diffuse", "reflectance": 0.5}}
+    integrator, source = stage({"type": "scene", "floor": floor} | lights, depth=1)
+    assert isinstance(make_light_sampler(integrator, source), SceneLightSampler)
+    one, _ = stage({"type": "scene", "floor": floor, "light": lights["light0"] | {"intensity": 1.0}}, depth=1)
+    assert picture(integrator, source, 1, 0) == pytest.approx(picture(one, source, 1, 0), rel=1e-3)
+
+
 def test_the_picture_stays_and_its_noise_falls():
-    from lippmann.rendering.transport.light_sampling import lights_for_picture
+    from lippmann.rendering.transport.light_sampling import make_light_sampler
 
     integrator, source = stage(room())
     runs, samples = 12, 16
     even = np.stack([picture(integrator, source, samples, seed) for seed in range(runs)])
-    integrator.lights = lights_for_picture(integrator, source)
+    integrator.light_sampler = make_light_sampler(integrator, source)
     weighted = np.stack([picture(integrator, source, samples, 100 + seed) for seed in range(runs)])
     assert weighted.var(axis=0, ddof=1).mean() < 0.5 * even.var(axis=0, ddof=1).mean()
     blocks = [x.reshape(runs, 4, 6, 4, 6, 3).mean(axis=(2, 4)) for x in (even, weighted)]
@@ -152,9 +235,13 @@ def test_the_picture_stays_and_its_noise_falls():
     assert weighted.mean() == pytest.approx(even.mean(), rel=0.01)
 
 
-def test_emitters_that_nobody_sees_are_sampled_alike():
-    """A camera that sees no surface tells nothing."""
-    from lippmann.rendering.transport.light_sampling import SceneLights, emitter_weights, lights_for_picture
+def test_emitters_without_contribution_are_sampled_uniformly():
+    """A camera that sees no surface."""
+    from lippmann.rendering.transport.light_sampling import (
+        SceneLightSampler,
+        estimate_emitter_weights,
+        make_light_sampler,
+    )
     from lippmann.rendering.transport.ray_source import CameraRays
     from lippmann.scene.values.description import Camera
 
@@ -164,39 +251,39 @@ def test_emitters_that_nobody_sees_are_sampled_alike():
     pose = np.diag([-1.0, 1.0, -1.0, 1.0])  # looks away from the emitters
     pose[2, 3] = 5.0
     source = CameraRays(Camera("away", pose, fov_y=0.5), SIZE, SIZE)
-    assert emitter_weights(integrator, source) == pytest.approx(np.full(3, 1 / 3))
-    assert isinstance(lights_for_picture(integrator, source), SceneLights)
+    assert estimate_emitter_weights(integrator, source) == pytest.approx(np.full(3, 1 / 3))
+    assert isinstance(make_light_sampler(integrator, source), SceneLightSampler)
 
 
-def test_paths_without_a_value_do_not_count(monkeypatch):
+def test_invalid_contributions_do_not_count(monkeypatch):
     from lippmann.rendering.transport import light_sampling
 
     integrator, source = stage(room())
-    whole = light_sampling.emitter_weights(integrator, source)
-    along = light_sampling._squares_along
+    whole = light_sampling.estimate_emitter_weights(integrator, source)
+    along = light_sampling._squared_contributions
 
     def some_lost(*given):
         import drjit as dr
         import mitsuba as mi
 
-        found = along(*given)
-        return dr.select(dr.arange(mi.UInt32, dr.width(found)) % 64 == 0, dr.nan, found)
+        squares = along(*given)
+        return dr.select(dr.arange(mi.UInt32, dr.width(squares)) % 64 == 0, dr.nan, squares)
 
-    monkeypatch.setattr(light_sampling, "_squares_along", some_lost)
-    assert light_sampling.emitter_weights(integrator, source) == pytest.approx(whole, rel=0.05)
+    monkeypatch.setattr(light_sampling, "_squared_contributions", some_lost)
+    assert light_sampling.estimate_emitter_weights(integrator, source) == pytest.approx(whole, rel=0.05)
 
 
-def test_no_emitter_one_or_very_many_are_left_alone(monkeypatch):
+def test_no_emitter_one_or_very_many_keep_the_weights_of_the_scene(monkeypatch):
     from lippmann.rendering.transport import light_sampling
-    from lippmann.rendering.transport.light_sampling import SceneLights
+    from lippmann.rendering.transport.light_sampling import SceneLightSampler
 
-    for order in ((), ("lamp",)):
+    for order in ((), ("bright",)):
         integrator, source = stage(room(order))
-        assert light_sampling.emitter_weights(integrator, source).tolist() == [1.0] * len(order)
-        assert isinstance(light_sampling.lights_for_picture(integrator, source), SceneLights)
-    monkeypatch.setattr(light_sampling, "MOST_EMITTERS", 2)
+        assert light_sampling.estimate_emitter_weights(integrator, source).tolist() == [1.0] * len(order)
+        assert isinstance(light_sampling.make_light_sampler(integrator, source), SceneLightSampler)
+    monkeypatch.setattr(light_sampling, "MAX_EMITTERS", 2)
     integrator, source = stage(room())
-    assert light_sampling.emitter_weights(integrator, source) == pytest.approx(np.full(3, 1 / 3))
+    assert light_sampling.estimate_emitter_weights(integrator, source) == pytest.approx(np.full(3, 1 / 3))
 
 
 def test_two_renders_of_one_scene_leave_each_other_alone(engine):
@@ -211,7 +298,7 @@ def test_two_renders_of_one_scene_leave_each_other_alone(engine):
     request = RenderRequest(method="full", integrator="path", spp=2, seed=5)
 
     def prepared(scene, x):
-        # Near either lamp, each of which is the brightest there.
+        # Near either emitter, each of which is the brightest there.
         pose = np.eye(4)
         pose[:3, 3] = x, 0.0, 0.95
         source = CameraRays(Camera("inside", pose, fov_y=np.radians(100)), SIZE, SIZE)

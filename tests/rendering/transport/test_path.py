@@ -99,7 +99,7 @@ def test_white_furnace_is_one_everywhere():
         "ball": {"type": "sphere", "bsdf": {"type": "diffuse", "reflectance": 1.0}},
     }
     pixels = trace(scene, camera(4), spp=256, depth=64).pixels
-    # Lamps and lobes are both sampled, so that a pixel scatters about 1; its error at 256 samples is below 1 %.
+    # MIS leaves a pixel noise about 1; its error at 256 samples is below 1 %.
     assert pixels == pytest.approx(1.0, abs=0.05)
     assert pixels.mean() == pytest.approx(1.0, abs=5e-4)
 
@@ -179,7 +179,7 @@ def test_coloured_glass_fades_with_the_distance():
 
 
 def test_rays_are_counted():
-    """One white floor under a point light: each hit tests one shadow; the ray scattered at depth 1 looks for lamps."""
+    """One white floor under a point light: each hit tests one shadow; the ray scattered at depth 1 looks for emitters."""
     import mitsuba as mi
 
     scene = {
@@ -191,13 +191,13 @@ def test_rays_are_counted():
     assert (rays.primary, rays.shadow, rays.secondary, rays.discarded) == (256, 256, 256, 0)
 
 
-def four_lamps():
-    """A grey floor under four lamps of which each lights a part of it best."""
+def four_emitters():
+    """A grey floor under four emitters, each of which lights a part of it best."""
     import mitsuba as mi
 
     transform = mi.ScalarTransform4f
-    lamps = {
-        f"lamp{i}": {
+    emitters = {
+        f"emitter{i}": {
             "type": "sphere",
             "center": [x, y, 0.5],
             "radius": 0.05,
@@ -206,29 +206,29 @@ def four_lamps():
         for i, (x, y) in enumerate([(-2, -2), (2, -2), (-2, 2), (2, 2)])
     }
     floor = {"type": "rectangle", "to_world": transform().scale(3), "bsdf": {"type": "diffuse", "reflectance": 0.5}}
-    return {"type": "scene", "floor": floor} | lamps
+    return {"type": "scene", "floor": floor} | emitters
 
 
-def test_first_samples_draw_several_lamps_each(monkeypatch):
+def test_first_samples_take_several_emitter_samples_each(monkeypatch):
     from lippmann.rendering.transport import path
 
     def noise():
-        runs = np.stack([trace(four_lamps(), camera(4, 50), 16, 1, 1, seed).pixels for seed in range(8)])
+        runs = np.stack([trace(four_emitters(), camera(4, 50), 16, 1, 1, seed).pixels for seed in range(8)])
         return runs.var(axis=0, ddof=1).mean(), runs.mean()
 
     several, mean = noise()
-    rays = trace(four_lamps(), camera(4, 50), 16, 1, 1).rays
+    rays = trace(four_emitters(), camera(4, 50), 16, 1, 1).rays
     monkeypatch.setattr(path, "FIRST_EMITTER_SAMPLES", 1)
     one, same_mean = noise()
-    fewer = trace(four_lamps(), camera(4, 50), 16, 1, 1).rays
+    fewer = trace(four_emitters(), camera(4, 50), 16, 1, 1).rays
     assert (rays.shadow, fewer.shadow) == (4 * 256, 256)
-    # One of four by chance has three times its mean's square for variance; all four in turn leave the lamps' own edges.
+    # One of four by chance has three times its mean's square for variance; all four in turn leave the emitters' own edges.
     assert several < 0.05 * one
     assert mean == pytest.approx(same_mean, rel=0.02)
 
 
-def test_later_surfaces_draw_one_lamp():
-    """Inside a hollow ball every surface sees the lamp, but for scattered rays that meet the lamp itself."""
+def test_later_surfaces_take_one_emitter_sample():
+    """Inside a hollow ball every surface sees the emitter, but for scattered rays that hit the emitter itself."""
     paint = {"type": "twosided", "bsdf": {"type": "diffuse", "reflectance": 0.5}}
     lamp = {"type": "sphere", "center": [0, 0.5, 0], "radius": 0.02, "emitter": {"type": "area", "radiance": 5.0}}
     scene = {"type": "scene", "ball": {"type": "sphere", "bsdf": paint}, "lamp": lamp}
@@ -237,7 +237,7 @@ def test_later_surfaces_draw_one_lamp():
     assert 0.98 * (4 + 1) * 256 < rays.shadow <= (4 + 1) * 256
 
 
-def test_lamps_of_all_samples_are_one_stratified_sequence():
+def test_emitter_samples_of_all_paths_are_one_stratified_sequence():
     import drjit as dr
     import mitsuba as mi
 
@@ -248,8 +248,8 @@ def test_lamps_of_all_samples_are_one_stratified_sequence():
     assert count.tolist() == [4] * 4 + [2] * 8
     assert np.array_equal(first, np.cumsum(count) - count)
     stream = SampleStream.of_pixels(mi.UInt32(3), mi.UInt32(5), mi.UInt32(1))
-    drawn = np.array(stream.at(dr.arange(mi.UInt32, 32)).next_2d(1)[0])
-    assert sorted(np.floor(drawn * 32)) == list(range(32))
+    points = np.array(stream.at(dr.arange(mi.UInt32, 32)).next_2d(1)[0])
+    assert sorted(np.floor(points * 32)) == list(range(32))
 
 
 def test_tiles_and_passes_do_not_change_the_picture():

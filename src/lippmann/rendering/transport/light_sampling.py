@@ -1,18 +1,18 @@
-"""Which emitter is sampled at a surface: by the light that each brings to what the picture shows.
+"""Light sampling: which emitter next-event estimation samples at a surface.
 
-Mitsuba samples all emitters alike unless told otherwise, those that light nothing, too: a sky outside a closed room
-takes half of all shadow rays there. Here a few thousand paths from all over the picture find out what each brings. An
-emitter whose light f reaches a path with second moment E[f^2] is best sampled in proportion to its root: then the
-variance of f over its probability is least (importance sampling; Veach 1997, chapter 2.5.2). A share goes to all alike,
-for what was not found.
+Mitsuba samples all emitters uniformly unless a scene sets weights. Emitters that light nothing in the picture then take
+their share too: a sky outside a closed room takes half of all shadow rays. Here a few thousand paths through the whole
+picture estimate each emitter's contribution f. The emitter is sampled in proportion to the root of the second moment
+E[f^2], which minimises the variance of f over its probability (importance sampling; Veach 1997, chapter 2.5.2). A
+uniform share remains for contributions that those paths missed.
 
-The probabilities belong to a sampler that the integrator holds. Nothing is written into the scene, which other renders
-may use at the same time.
+The probabilities belong to a light sampler that the integrator holds. Nothing is written into the scene, which other
+renders may use at the same time.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import drjit as dr
 import mitsuba as mi
@@ -20,136 +20,188 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.device.sobol import PIXEL_DIMENSION, SampleStream
+from lippmann.device.types import (
+    Bool,
+    DirectionSample3f,
+    Float,
+    Interaction3f,
+    MitsubaScene,
+    Point2f,
+    Ray3f,
+    Spectrum,
+    UInt32,
+)
 from lippmann.rendering.transport.ray_source import RaySource
 
 if TYPE_CHECKING:
     from lippmann.rendering.transport.path import PathIntegrator
 
-#: Paths that look, and the fewest for each emitter; of more emitters than ``MOST_EMITTERS`` all are sampled alike.
-PATHS, LEAST_PATHS, MOST_EMITTERS = 1 << 14, 1 << 8, 1 << 10
-#: Surfaces along a path that are looked at.
-SURFACES = 3
-#: Share of the samples that all emitters have alike.
-EVEN_SHARE = 0.2
+#: Pilot paths in all, and the fewest for each emitter.
+PILOT_PATHS, MIN_PATHS_PER_EMITTER = 1 << 14, 1 << 8
+#: Scenes of more emitters are sampled uniformly.
+MAX_EMITTERS = 1 << 10
+#: Surfaces along a pilot path at which emitters are sampled.
+PILOT_SURFACES = 3
+#: Share of the probability that is uniform over all emitters.
+UNIFORM_SHARE = 0.2
 #: Dimensions of the sample stream at one surface.
 DIMENSIONS_PER_SURFACE = 4
-#: Their own seed: the picture's would make the probabilities depend on it.
+#: Seed of the pilot paths: the picture's own would make the probabilities depend on it.
 _SEED = 0x6C616D70
 
 
 class LightSampler(Protocol):
     """Samples directions toward the emitters of a scene."""
 
-    def sample_direction(self, reference: Any, point: Any, active: Any) -> tuple[Any, Any]:
-        """A direction from ``reference`` (Interaction3f) toward an emitter, chosen by ``point`` (Point2f in [0, 1)^2).
+    def sample_direction(
+        self, reference: Interaction3f, point: Point2f, active: Bool
+    ) -> tuple[DirectionSample3f, Spectrum]:
+        """Sample a direction from ``reference`` toward an emitter.
+
+        Parameters
+        ----------
+        reference:
+            The point that is lit.
+        point:
+            Sample in [0, 1)^2; its first coordinate chooses the emitter and is then used again.
+        active:
+            Lanes that sample.
 
         Returns
         -------
         DirectionSample3f, Spectrum
-            ``pdf`` of the sample is per steradian and counts the choice of the emitter; the radiance is divided by it.
-            Visibility is not tested.
+            The direction, with ``pdf`` per steradian including the probability of the emitter (of delta emitters, that
+            probability alone); and the radiance divided by ``pdf``. Visibility is not tested.
         """
         ...
 
-    def pdf_direction(self, reference: Any, sample: Any, active: Any) -> Any:
-        """Density per steradian with which :meth:`sample_direction` gives ``sample`` (DirectionSample3f)."""
+    def pdf_direction(self, reference: Interaction3f, sample: DirectionSample3f, active: Bool) -> Float:
+        """Pdf per steradian with which :meth:`sample_direction` at ``reference`` gives ``sample``.
+
+        0 where ``sample`` has no emitter, or one that a scattered ray cannot hit.
+        """
         ...
 
 
-class SceneLights:
-    """Emitters by the scene's own sampling weights, which are 1 unless its author set them."""
+class SceneLightSampler:
+    """Samples emitters by the scene's own sampling weights, which are uniform unless its author set them."""
 
-    def __init__(self, scene: Any) -> None:
+    def __init__(self, scene: MitsubaScene) -> None:
         self._scene = scene
 
-    def sample_direction(self, reference: Any, point: Any, active: Any) -> tuple[Any, Any]:
-        found: tuple[Any, Any] = self._scene.sample_emitter_direction(reference, point, False, active)
-        return found
+    def sample_direction(
+        self, reference: Interaction3f, point: Point2f, active: Bool
+    ) -> tuple[DirectionSample3f, Spectrum]:
+        sample: tuple[DirectionSample3f, Spectrum] = self._scene.sample_emitter_direction(
+            reference, point, False, active
+        )
+        return sample
 
-    def pdf_direction(self, reference: Any, sample: Any, active: Any) -> Any:
+    def pdf_direction(self, reference: Interaction3f, sample: DirectionSample3f, active: Bool) -> Float:
         return self._scene.pdf_emitter_direction(reference, sample, active)
 
 
-class WeightedLights:
-    """Emitters by probabilities given here.
+class WeightedLightSampler:
+    """Samples emitters by a discrete distribution of its own.
 
     Parameters
     ----------
     scene:
-        A ``mi.Scene`` of two emitters or more.
+        A scene of at least two emitters.
     weights:
-        ``(emitters,)`` in the order of ``mi.Scene.emitters()``, at least one above 0.
+        ``(emitters,)`` in the order of ``mi.Scene.emitters()``, none negative, at least one above 0. They need not add
+        up to 1.
     """
 
-    def __init__(self, scene: Any, weights: NDArray[np.float64]) -> None:
+    def __init__(self, scene: MitsubaScene, weights: NDArray[np.float64]) -> None:
         self._emitters = scene.emitters_dr()
-        self._choice = mi.DiscreteDistribution(mi.Float(weights.astype(np.float32)))
-        # An emitter that a ray has met is known by its place in Dr.Jit's registry; 0 is none.
+        self._distribution = mi.DiscreteDistribution(mi.Float(weights.astype(np.float32)))
+        # A scattered ray knows the emitter that it hit by its index in Dr.Jit's registry; index 0 is no emitter.
         registry = np.array(dr.reinterpret_array(mi.UInt32, self._emitters))
-        probability = np.zeros(int(registry.max()) + 1, np.float32)
-        probability[registry] = np.array(self._choice.eval_pmf_normalized(dr.arange(mi.UInt32, len(weights))))
-        self._probability = mi.Float(probability)
+        pmf = np.zeros(int(registry.max()) + 1, np.float32)
+        pmf[registry] = np.array(self._distribution.eval_pmf_normalized(dr.arange(mi.UInt32, len(weights))))
+        self._pmf = mi.Float(pmf)
 
-    def sample_direction(self, reference: Any, point: Any, active: Any) -> tuple[Any, Any]:
-        index, again, probability = self._choice.sample_reuse_pmf(point.x, active)
+    def sample_direction(
+        self, reference: Interaction3f, point: Point2f, active: Bool
+    ) -> tuple[DirectionSample3f, Spectrum]:
+        index, reused, probability = self._distribution.sample_reuse_pmf(point.x, active)
         emitter = dr.gather(type(self._emitters), self._emitters, index, active)
-        sample, radiance = emitter.sample_direction(reference, mi.Point2f(again, point.y), active)
+        sample, radiance = emitter.sample_direction(reference, mi.Point2f(reused, point.y), active)
         sample.pdf *= probability
         return sample, radiance * dr.rcp(probability)
 
-    def pdf_direction(self, reference: Any, sample: Any, active: Any) -> Any:
-        probability = dr.gather(mi.Float, self._probability, dr.reinterpret_array(mi.UInt32, sample.emitter), active)
+    def pdf_direction(self, reference: Interaction3f, sample: DirectionSample3f, active: Bool) -> Float:
+        probability = dr.gather(mi.Float, self._pmf, dr.reinterpret_array(mi.UInt32, sample.emitter), active)
         return sample.emitter.pdf_direction(reference, sample, active) * probability
 
 
-def lights_for_picture(integrator: PathIntegrator, source: RaySource) -> LightSampler:
-    """The sampler that suits a picture: emitters by what they bring to the pixels of ``source``.
+def make_light_sampler(integrator: PathIntegrator, source: RaySource) -> LightSampler:
+    """Make the light sampler of one picture, by the contributions of the emitters to the pixels of ``source``.
 
-    It depends on the scene and the rays alone. Scenes of one emitter, or of very many, keep their own.
+    It depends on the scene, the ray depth and the rays alone. Where uniform sampling is as good as anything known (a
+    single emitter, more than :data:`MAX_EMITTERS`, no contribution found), the scene's own weights are used.
+
+    Parameters
+    ----------
+    integrator:
+        Integrator of the scene, still with the sampler that it was made with.
+    source:
+        Rays of the whole picture.
     """
     scene = integrator.scene
-    weights = emitter_weights(integrator, source)
-    return WeightedLights(scene, weights) if len(np.unique(weights)) > 1 else SceneLights(scene)
+    weights = estimate_emitter_weights(integrator, source)
+    return WeightedLightSampler(scene, weights) if len(np.unique(weights)) > 1 else SceneLightSampler(scene)
 
 
-def emitter_weights(integrator: PathIntegrator, source: RaySource) -> NDArray[np.float64]:
-    """Probabilities of the emitters, ``(emitters,)``, by what each brings to the pixels of ``source``.
+def estimate_emitter_weights(integrator: PathIntegrator, source: RaySource) -> NDArray[np.float64]:
+    """Estimate sampling probabilities of the emitters, ``(emitters,)``, adding up to 1.
 
-    In the order of ``mi.Scene.emitters()``; they add up to 1. ``integrator`` samples all emitters alike.
+    They are the roots of the second moments of the emitters' contributions to the pixels of ``source``, mixed with a
+    uniform share of :data:`UNIFORM_SHARE`, in the order of ``mi.Scene.emitters()``.
+
+    Parameters
+    ----------
+    integrator:
+        Samples all emitters uniformly.
+    source:
+        Rays of the whole picture.
     """
-    emitters = len(integrator.scene.emitters())
-    even = np.full(emitters, 1 / max(emitters, 1))
-    if not 1 < emitters <= MOST_EMITTERS:
-        return even
-    found = np.sqrt(_second_moments(integrator, source, emitters))
-    return EVEN_SHARE * even + (1 - EVEN_SHARE) * found / found.sum() if found.sum() > 0 else even
+    count = len(integrator.scene.emitters())
+    uniform = np.full(count, 1 / max(count, 1))
+    if not 1 < count <= MAX_EMITTERS:
+        return uniform
+    roots = np.sqrt(_second_moments(integrator, source, count))
+    return UNIFORM_SHARE * uniform + (1 - UNIFORM_SHARE) * roots / roots.sum() if roots.sum() > 0 else uniform
 
 
 def _second_moments(integrator: PathIntegrator, source: RaySource, emitters: int) -> NDArray[np.float64]:
-    """Mean squares of the light that paths find at each emitter, ``(emitters,)``; white, 1, is the most that counts.
+    """Second moments of the emitters' contributions to pilot paths, ``(emitters,)``, each contribution clipped at 1.
 
-    All emitters are looked at along the same paths, so that they differ by nothing else.
+    All emitters are sampled along the same paths, so that the estimates differ by nothing else.
     """
-    paths = max(PATHS // emitters, LEAST_PATHS)
+    paths = max(PILOT_PATHS // emitters, MIN_PATHS_PER_EMITTER)
     lane = dr.arange(mi.UInt32, paths * emitters)
     emitter = lane // dr.opaque(mi.UInt32, paths)
     path = lane - emitter * dr.opaque(mi.UInt32, paths)
     stream = SampleStream.of_pixels(mi.UInt32(0), path, dr.opaque(mi.UInt32, _SEED))
-    place = stream.next_2d(PIXEL_DIMENSION)
-    x, y = place.x * dr.opaque(mi.Float, source.width), place.y * dr.opaque(mi.Float, source.height)
+    point = stream.next_2d(PIXEL_DIMENSION)
+    x, y = point.x * dr.opaque(mi.Float, source.width), point.y * dr.opaque(mi.Float, source.height)
     column, row = mi.UInt32(x), mi.UInt32(y)
     jitter = mi.Point2f(x - mi.Float(column), y - mi.Float(row))
     ray = source.rays(column, row, mi.UInt32(0), jitter)
-    found = _squares_along(integrator, ray, stream, emitter, dr.opaque(mi.Float, emitters))
-    # A path may meet what has no value, such as a normal of no length: there it has found nothing.
-    squares = np.nan_to_num(np.array(found, dtype=np.float64), nan=0.0)
+    contributions = _squared_contributions(integrator, ray, stream, emitter, dr.opaque(mi.Float, emitters))
+    # Invalid values, as from a normal of length 0, count as no contribution.
+    squares = np.nan_to_num(np.array(contributions, dtype=np.float64), nan=0.0)
     means: NDArray[np.float64] = squares.reshape(emitters, paths).mean(axis=1)
     return means
 
 
 @dr.syntax
-def _squares_along(integrator: PathIntegrator, ray: Any, stream: SampleStream, emitter: Any, emitters: Any) -> Any:
-    """Per path the squares of what ``emitter`` brings to its surfaces, added up."""
+def _squared_contributions(
+    integrator: PathIntegrator, ray: Ray3f, stream: SampleStream, emitter: UInt32, emitters: Float
+) -> Float:
+    """Sum over the surfaces of a path of the squared contribution of ``emitter``, one of ``emitters``, per lane."""
     scene = integrator.scene
     context = mi.BSDFContext()
     ray = mi.Ray3f(ray)
@@ -157,21 +209,21 @@ def _squares_along(integrator: PathIntegrator, ray: Any, stream: SampleStream, e
     squares = mi.Float(0)
     surface = mi.UInt32(0)
     active = mi.Bool(True)
-    while dr.hint(active, label="lit surfaces"):
+    while dr.hint(active, label="pilot paths"):
         si = scene.ray_intersect(ray, mi.RayFlags.All, False, active)
         active &= si.is_valid()
         bsdf = si.bsdf(ray)
         dimension = surface * DIMENSIONS_PER_SURFACE + 1
-        # Sampled alike, emitters hold equal parts of the unit interval.
+        # Under uniform sampling each emitter has an equal part of the unit interval.
         point = stream.next_2d(dimension)
         point.x = (mi.Float(emitter) + point.x) / emitters
-        lit = active & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
-        light, _ = integrator.direct_light(si, bsdf, point, lit)
+        sampling = active & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
+        light, _ = integrator.direct_light(si, bsdf, point, sampling)
         squares += dr.square(dr.minimum(dr.mean(throughput * light / emitters), 1))
 
         bs, weight = bsdf.sample(context, si, stream.next_1d(dimension + 1), stream.next_2d(dimension + 2), active)
         throughput *= weight
         ray = si.spawn_ray(si.to_world(bs.wo))
         surface += 1
-        active &= (dr.max(throughput) > 0) & (surface < min(integrator.depth, SURFACES))
+        active &= (dr.max(throughput) > 0) & (surface < min(integrator.depth, PILOT_SURFACES))
     return squares

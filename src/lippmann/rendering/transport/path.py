@@ -1,47 +1,62 @@
-"""Physically based light: paths with emitter sampling, multiple importance sampling and Russian roulette.
+"""Path tracing with next-event estimation, multiple importance sampling and Russian roulette.
 
-It differs from Mitsuba's own ``path`` in what integral images and glTF scenes need: straight-through surfaces (alpha
-masks, thin glass) neither count as a bounce nor block the light that falls through their holes; light inside solid
-coloured glass fades with the distance (Beer-Lambert); what a camera ray sees where nothing is hit can differ from what
-lights the scene; the rays are counted; and samples are stratified per pixel. Without such surfaces its expectation is
-that of Mitsuba's ``path`` with ``max_depth = depth + 1``, which a test holds.
+The integrator differs from Mitsuba's own ``path`` in what integral images and glTF scenes need. Straight-through
+surfaces (alpha masks, thin glass) do not count as a bounce, and shadow rays pass through their holes. Radiance inside
+solid coloured glass decays with distance (Beer-Lambert). The background that a camera ray sees may differ from the
+environment that lights the scene. Rays are counted, and samples are stratified per pixel. In a scene without such
+surfaces the expectation is that of Mitsuba's ``path`` with ``max_depth = depth + 1``.
 
 Ray depth counts surfaces, the primary ray's hit being 1: at depth 1 a surface shows its direct light.
 """
 
 from __future__ import annotations
 
-from typing import Any
-
 import drjit as dr
 import mitsuba as mi
 
 from lippmann.device.sobol import SampleStream
+from lippmann.device.types import (
+    Bool,
+    BSDFPtr,
+    DirectionSample3f,
+    Float,
+    MitsubaScene,
+    Point2f,
+    Ray3f,
+    Spectrum,
+    SurfaceInteraction3f,
+    UInt32,
+)
 from lippmann.rendering.transport.integrator import FirstHit, RayCounts
-from lippmann.rendering.transport.light_sampling import LightSampler, SceneLights
+from lippmann.rendering.transport.light_sampling import LightSampler, SceneLightSampler
 from lippmann.rendering.transport.scene_flags import SceneTraits
 
-#: Straight-through surfaces that one ray may cross before it counts as blocked: bounds the loop in a hall of panes.
+#: Straight-through surfaces that one ray may cross before it counts as blocked. Bounds the loop between many panes.
 MAX_CROSSINGS = 64
 #: Sample dimensions used at one vertex.
 DIMENSIONS_PER_VERTEX = 4
-#: Emitter samples at the first surface of a path that emitters can light: many for a pixel's first samples, which know
-#: little else, and fewer for those that follow. Powers of two, so that all points together stay stratified.
+#: Surfaces after which Russian roulette may end a path.
+ROULETTE_DEPTH = 5
+#: Emitter samples at the first surface of a path that is not purely specular: ``FIRST_EMITTER_SAMPLES`` in each of a
+#: pixel's first ``FIRST_SAMPLES`` samples, then ``LATER_EMITTER_SAMPLES``. Powers of two keep all points stratified.
 FIRST_EMITTER_SAMPLES, LATER_EMITTER_SAMPLES, FIRST_SAMPLES = 4, 2, 4
 
 
-def mis_weight(pdf_a: Any, pdf_b: Any) -> Any:
-    """Power heuristic (Veach 1997, eq. 9.16 with exponent 2); 0 where both densities vanish."""
+def mis_weight(pdf_a: Float, pdf_b: Float) -> Float:
+    """MIS weight of a sample with ``pdf_a`` against ``pdf_b``, by the power heuristic; 0 where both are 0.
+
+    Veach 1997, eq. 9.16 with exponent 2.
+    """
     a2, b2 = dr.square(pdf_a), dr.square(pdf_b)
     weight = a2 / (a2 + b2)
     return dr.select(dr.isfinite(weight), weight, 0)
 
 
-def first_emitter_samples(sample: Any) -> tuple[Any, Any]:
-    """Number of emitter samples that sample number ``sample`` (UInt32) takes where its path is first lit, and the first
-    one's number.
+def first_emitter_samples(sample: UInt32) -> tuple[UInt32, UInt32]:
+    """Count of emitter samples at the first non-specular surface of a pixel's path number ``sample``, and their start.
 
-    Numbers count on from sample to sample: they are places in one sequence of points.
+    The start is the index of the first of them in the pixel's sequence of points, which all paths of the pixel share
+    without gaps.
     """
     early = sample < FIRST_SAMPLES
     before = FIRST_EMITTER_SAMPLES * FIRST_SAMPLES
@@ -58,45 +73,37 @@ class PathIntegrator:
     scene:
         A ``mi.Scene``.
     traits:
-        What of the scene needs more than the plain loop.
+        Features of the scene that need more than the plain loop.
     depth:
         Surfaces per path, at least 1.
-    roulette_depth:
-        Surfaces after which faint paths may be ended by Russian roulette.
     name:
-        What the light is called in a request.
-    lights:
-        Samples the scene's emitters; by default by the scene's own weights.
+        Name of the integrator in a request.
+
+    Attributes
+    ----------
+    light_sampler:
+        Samples the scene's emitters; at first by the scene's own weights.
     """
 
     # Not a dataclass: Dr.Jit would take it for loop state and write its fields.
-    def __init__(
-        self,
-        scene: Any,
-        traits: SceneTraits,
-        depth: int,
-        roulette_depth: int = 5,
-        name: str = "path",
-        lights: LightSampler | None = None,
-    ) -> None:
+    def __init__(self, scene: MitsubaScene, traits: SceneTraits, depth: int, name: str = "path") -> None:
         self.scene = scene
         self.traits = traits
         self.depth = depth
-        self.roulette_depth = roulette_depth
         self.name = name
-        self.lights: LightSampler = SceneLights(scene) if lights is None else lights
+        self.light_sampler: LightSampler = SceneLightSampler(scene)
         emitters = scene.emitters()
-        # All samples of a single point of light are the same.
-        self._all_alike = len(emitters) == 1 and bool(mi.has_flag(emitters[0].flags(), mi.EmitterFlags.Delta))
+        # A single delta emitter: more than one sample of it tells nothing more.
+        self._single_delta = len(emitters) == 1 and bool(mi.has_flag(emitters[0].flags(), mi.EmitterFlags.Delta))
 
-    def sample(self, ray: Any, stream: SampleStream, active: Any) -> tuple[Any, RayCounts]:
-        """Radiance along ``ray`` and the rays it took."""
+    def sample(self, ray: Ray3f, stream: SampleStream, active: Bool) -> tuple[Spectrum, RayCounts]:
+        """Radiance along ``ray``, and the rays traced for it."""
         radiance, counts, _ = self.sample_with_hit(ray, stream, active)
         return radiance, counts
 
     @dr.syntax
-    def sample_with_hit(self, ray: Any, stream: SampleStream, active: Any) -> tuple[Any, RayCounts, FirstHit]:
-        """As :meth:`sample`, with what the primary rays met. A surface that is more than diffuse is view-dependent."""
+    def sample_with_hit(self, ray: Ray3f, stream: SampleStream, active: Bool) -> tuple[Spectrum, RayCounts, FirstHit]:
+        """As :meth:`sample`, with the first hit. Every surface that is not purely diffuse is view-dependent."""
         scene = self.scene
         context = mi.BSDFContext()
         background = self.traits.background
@@ -106,20 +113,20 @@ class PathIntegrator:
         radiance = mi.Spectrum(0)
         throughput = mi.Spectrum(1)
         eta = mi.Float(1)  # product of relative indices, so that roulette sees unitless throughput
-        depth = mi.UInt32(0)  # surfaces met so far, straight-through ones excluded
-        crossings = mi.UInt32(0)  # straight-through surfaces met so far
+        depth = mi.UInt32(0)  # surfaces hit so far, straight-through ones excluded
+        crossings = mi.UInt32(0)  # straight-through surfaces hit so far
         absorption = mi.Color3f(0)  # of the medium the ray travels in, per world unit
         secondary = mi.UInt32(0)
         shadow = mi.UInt32(0)
         vertex = dr.zeros(mi.Interaction3f)  # last scattering vertex, for the pdf of emitter sampling there
         vertex_pdf = mi.Float(1)
         vertex_delta = mi.Bool(True)
-        vertex_samples = mi.UInt32(1)  # emitter samples that were taken there
-        unlit = mi.Bool(True)  # no emitter has been sampled yet
+        vertex_samples = mi.UInt32(1)  # emitter samples taken there
+        all_specular = mi.Bool(True)  # no emitter has been sampled yet
         samples_at_start, start = first_emitter_samples(stream.index)
 
         pi = scene.ray_intersect_preliminary(ray, coherent=True, active=active)
-        distance_of_first = mi.Float(pi.t)
+        first_distance = mi.Float(pi.t)
         view_dependent = mi.Bool(False)
 
         while dr.hint(active, label="paths"):
@@ -129,14 +136,14 @@ class PathIntegrator:
             shiny = (bsdf.flags() & int(mi.BSDFFlags.Glossy | mi.BSDFFlags.Delta | mi.BSDFFlags.Null)) != 0
             view_dependent |= (depth == 0) & si.is_valid() & shiny
 
-            # ---- absorption on the way here ----
+            # ---- absorption along the ray ----
             if dr.hint(self.traits.has_absorption, mode="scalar"):
                 distance = dr.select(si.is_valid(), si.t, 0)
                 throughput *= dr.exp(-absorption * distance)
 
             # ---- emission ----
             ds = mi.DirectionSample3f(scene, si=si, ref=vertex)
-            emitter_pdf = self.lights.pdf_direction(vertex, ds, ~vertex_delta) * mi.Float(vertex_samples)
+            emitter_pdf = self.light_sampler.pdf_direction(vertex, ds, ~vertex_delta) * mi.Float(vertex_samples)
             weight = mis_weight(vertex_pdf, emitter_pdf)
             emission = ds.emitter.eval(si) * weight
             if dr.hint(background is not None, mode="scalar"):
@@ -144,12 +151,15 @@ class PathIntegrator:
             radiance += throughput * emission
 
             # ---- next-event estimation ----
-            going_on = si.is_valid() & (depth < self.depth)
+            continues = si.is_valid() & (depth < self.depth)
             dimension = (depth * 2 + crossings) * DIMENSIONS_PER_VERTEX + 1
-            sampling = going_on & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
+            sampling = continues & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
             samples, number = mi.UInt32(1), mi.UInt32(stream.index)
-            if dr.hint(not self._all_alike, mode="scalar"):
-                samples, number = dr.select(unlit, samples_at_start, samples), dr.select(unlit, start, number)
+            if dr.hint(not self._single_delta, mode="scalar"):
+                samples, number = (
+                    dr.select(all_specular, samples_at_start, samples),
+                    dr.select(all_specular, start, number),
+                )
             last = number + samples
             while dr.hint(sampling, label="emitters"):
                 point = stream.at(number).next_2d(dimension)
@@ -159,9 +169,9 @@ class PathIntegrator:
                 number += 1
                 sampling &= number != last
 
-            # ---- the next direction ----
+            # ---- BSDF sampling ----
             bs, bsdf_weight = bsdf.sample(
-                context, si, stream.next_1d(dimension + 1), stream.next_2d(dimension + 2), going_on
+                context, si, stream.next_1d(dimension + 1), stream.next_2d(dimension + 2), continues
             )
             passes = mi.has_flag(bs.sampled_type, mi.BSDFFlags.Null)
             throughput *= bsdf_weight
@@ -176,48 +186,50 @@ class PathIntegrator:
                 vertex_pdf = bs.pdf
                 vertex_delta = mi.has_flag(bs.sampled_type, mi.BSDFFlags.Delta)
                 vertex_samples = samples
-                unlit &= ~mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
+                all_specular &= ~mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
                 depth += 1
             else:
                 crossings += 1
-            going_on &= (dr.max(throughput) > 0) & (crossings < MAX_CROSSINGS)
+            continues &= (dr.max(throughput) > 0) & (crossings < MAX_CROSSINGS)
 
             # ---- Russian roulette ----
             survival = dr.minimum(dr.max(throughput) * dr.square(eta), 0.95)
-            at_stake = going_on & (depth >= self.roulette_depth) & ~passes
-            throughput = dr.select(at_stake, throughput * dr.rcp(survival), throughput)
-            going_on &= ~at_stake | (stream.next_1d(dimension + 3) < survival)
+            at_risk = continues & (depth >= ROULETTE_DEPTH) & ~passes
+            throughput = dr.select(at_risk, throughput * dr.rcp(survival), throughput)
+            continues &= ~at_risk | (stream.next_1d(dimension + 3) < survival)
 
-            active = going_on
+            active = continues
             pi = scene.ray_intersect_preliminary(ray, coherent=False, active=active)
             secondary += dr.select(active, mi.UInt32(1), mi.UInt32(0))
 
-        return radiance, RayCounts(secondary, shadow), FirstHit(distance_of_first, view_dependent)
+        return radiance, RayCounts(secondary, shadow), FirstHit(first_distance, view_dependent)
 
-    def direct_light(self, si: Any, bsdf: Any, point: Any, active: Any, samples: Any = 1) -> tuple[Any, Any]:
-        """Radiance toward ``si.wi`` from the emitter that ``point`` samples, and the shadow rays that it took.
+    def direct_light(
+        self, si: SurfaceInteraction3f, bsdf: BSDFPtr, point: Point2f, active: Bool, samples: Float = 1
+    ) -> tuple[Spectrum, UInt32]:
+        """Radiance toward ``si.wi`` from the emitter that ``point`` samples, and the shadow rays traced.
 
-        It is divided by the sample's pdf, and weighted by MIS against scattered rays that meet the emitter, as one of
-        ``samples``.
+        The radiance is divided by the pdf of the sample, and weighted by MIS against BSDF sampling, as one of
+        ``samples`` emitter samples at this surface.
         """
-        ds, light = self.lights.sample_direction(si, point, active)
+        ds, light = self.light_sampler.sample_direction(si, point, active)
         lit = active & (ds.pdf != 0) & (dr.max(light) > 0)
         value, pdf = bsdf.eval_pdf(mi.BSDFContext(), si, si.to_local(ds.d), lit)
         weight = dr.select(ds.delta, 1, mis_weight(ds.pdf * samples, pdf))
-        found = value * light * weight
-        lit &= dr.max(found) > 0
+        reflected = value * light * weight
+        lit &= dr.max(reflected) > 0
         visible, tests = self.visibility(si, ds, lit)
-        return dr.select(lit, found * visible, 0), tests
+        return dr.select(lit, reflected * visible, 0), tests
 
     @dr.syntax
-    def visibility(self, si: Any, ds: Any, active: Any) -> tuple[Any, Any]:
-        """Share of light that passes from the emitter sample to the surface, and the rays that finding out took."""
+    def visibility(self, si: SurfaceInteraction3f, ds: DirectionSample3f, active: Bool) -> tuple[Spectrum, UInt32]:
+        """Transmittance in [0, 1] from the emitter sample ``ds`` to the surface, and the shadow rays traced."""
         scene = self.scene
         ray = si.spawn_ray_to(ds.p)
         tests = dr.select(active, mi.UInt32(1), mi.UInt32(0))
-        passed = mi.Spectrum(1)
+        transmittance = mi.Spectrum(1)
         if dr.hint(not self.traits.has_null, mode="scalar"):
-            passed = dr.select(scene.ray_test(ray, active), mi.Spectrum(0), passed)
+            transmittance = dr.select(scene.ray_test(ray, active), mi.Spectrum(0), transmittance)
         else:
             active = mi.Bool(active)
             crossings = mi.UInt32(0)
@@ -225,10 +237,10 @@ class PathIntegrator:
                 hit = scene.ray_intersect(ray, mi.RayFlags.All, False, active)
                 blocked = hit.is_valid()
                 through = hit.bsdf(ray).eval_null_transmission(hit, blocked)
-                passed = dr.select(blocked, passed * through, passed)
+                transmittance = dr.select(blocked, transmittance * through, transmittance)
                 crossings += 1
-                passed = dr.select(blocked & (crossings >= MAX_CROSSINGS), mi.Spectrum(0), passed)
-                active = blocked & (dr.max(passed) > 0) & (crossings < MAX_CROSSINGS)
+                transmittance = dr.select(blocked & (crossings >= MAX_CROSSINGS), mi.Spectrum(0), transmittance)
+                active = blocked & (dr.max(transmittance) > 0) & (crossings < MAX_CROSSINGS)
                 tests += dr.select(active, mi.UInt32(1), mi.UInt32(0))
                 ray = hit.spawn_ray_to(ds.p)
-        return passed, tests
+        return transmittance, tests
