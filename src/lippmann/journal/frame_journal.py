@@ -15,15 +15,12 @@ from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
-from typing import IO, TYPE_CHECKING, Any
+from typing import IO, Any, TypeGuard
 
 from lippmann.errors import OutputError, PictureError
 from lippmann.journal.file_lock import locked
 from lippmann.journal.fingerprint import differences
 from lippmann.runtime.private_files import ForeignFileError
-
-if TYPE_CHECKING:
-    from typing import TypeGuard
 
 #: Added to the sequence's name.
 ENDING = ".journal"
