@@ -140,7 +140,7 @@ class Cameras:
             rule = f"the views of {display.name} meet at its viewing distance of {display.viewing_distance:g} mm"
             raise UsageError("is for parallel views", parameter="distance", rule=rule)
         if distance is not None and not 0 < distance < math.inf:
-            raise UsageError(f"{distance:g} mm will not do", parameter="distance", rule="it must be above zero")
+            raise UsageError(f"{distance:g} mm is out of range", parameter="distance", rule="it must be above zero")
         focus = display.viewing_distance
         if parallel:
             focus = -STAND_IN * display.resolvable_depth[1] if distance is None else distance

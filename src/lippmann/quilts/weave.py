@@ -164,7 +164,7 @@ def _weave_rows(quilt: Quilt, display: Display, choice: ViewChoice, first: int, 
 
 
 class _Samples(NamedTuple):
-    """What sub-pixels show, as arrays that broadcast to the pixels.
+    """Samples of the views that sub-pixels show, as arrays that broadcast to the pixels.
 
     ``number`` is a view and ``share`` the weight of the next one; ``across`` and ``down`` are the position in them, in
     pixels from the centre of the first pixel.

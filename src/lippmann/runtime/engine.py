@@ -26,7 +26,7 @@ DeviceChoice = Literal["auto", "cpu", "gpu"]
 DEVICES: tuple[DeviceChoice, ...] = ("auto", "cpu", "gpu")
 VARIANTS: dict[str, Literal["cpu", "gpu"]] = {"llvm_ad_rgb": "cpu", "cuda_ad_rgb": "gpu"}
 
-_REINSTALL = "install Lippmann anew: pip install --force-reinstall lippmann"
+_REINSTALL = "reinstall Lippmann: pip install --force-reinstall lippmann"
 _PROBE_SECONDS = 120
 
 _set_here: str | None = None  # the variant that `start` set last; any other was set by the caller

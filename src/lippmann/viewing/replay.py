@@ -43,7 +43,7 @@ _BLOCK = 1 << 15
 
 @dataclass(frozen=True, eq=False)
 class LensSamples:
-    """What one eye sees at the centre of every lens.
+    """Samples that one eye sees at the centres of all lenses.
 
     Arrays are ``(lens_rows, lens_cols, ...)``. For a lenticular sheet the rows are the panel's, and the points are on
     the lens's axis where the eye sees the middle of the row.
