@@ -221,7 +221,7 @@ def _make_integrator(
     built: BuiltScene | BuiltClassic, request: RenderRequest, frame_from_world: Matrix, source: RaySource
 ) -> Integrator:
     from lippmann.device.whitted.scene import BuiltClassic
-    from lippmann.rendering.transport.light_sampling import make_light_sampler
+    from lippmann.rendering.transport.emitter_weights import make_light_sampler
     from lippmann.rendering.transport.path import PathIntegrator
     from lippmann.rendering.transport.scene_flags import make_traits
     from lippmann.rendering.transport.surface_property import SurfaceIntegrator

@@ -64,7 +64,7 @@ def sampling_weights(scene):
 
 @pytest.mark.parametrize("order", [("sky", "bright", "faint"), ("faint", "sky", "bright"), ("bright", "faint", "sky")])
 def test_emitters_are_sampled_by_their_contribution(order):
-    from lippmann.rendering.transport.light_sampling import UNIFORM_SHARE, estimate_emitter_weights
+    from lippmann.rendering.transport.emitter_weights import UNIFORM_SHARE, estimate_emitter_weights
 
     weights = estimate_emitter_weights(*stage(room(order)))
     by_name = dict(zip(order, weights, strict=True))
@@ -77,7 +77,7 @@ def test_emitters_of_a_scene_with_another_sky_are_told_apart():
     """The new sky comes first among a scene's objects."""
     import mitsuba as mi
 
-    from lippmann.rendering.transport.light_sampling import UNIFORM_SHARE, estimate_emitter_weights
+    from lippmann.rendering.transport.emitter_weights import UNIFORM_SHARE, estimate_emitter_weights
     from lippmann.scene.mitsuba_source import with_sky
 
     sky = mi.load_dict({"type": "constant", "radiance": 3.0})
@@ -88,7 +88,7 @@ def test_emitters_of_a_scene_with_another_sky_are_told_apart():
 
 
 def test_the_scene_stays_as_it_was():
-    from lippmann.rendering.transport.light_sampling import estimate_emitter_weights, make_light_sampler
+    from lippmann.rendering.transport.emitter_weights import estimate_emitter_weights, make_light_sampler
 
     integrator, source = stage(room())
     first = estimate_emitter_weights(integrator, source)
@@ -176,7 +176,8 @@ def test_delta_emitters_give_the_same_picture_by_any_weights():
     """A point light, a spot light and a sun above a floor: no scattered ray hits them, and their pdf has no angle."""
     import mitsuba as mi
 
-    from lippmann.rendering.transport.light_sampling import WeightedLightSampler, make_light_sampler
+    from lippmann.rendering.transport.emitter_weights import make_light_sampler
+    from lippmann.rendering.transport.light_sampling import WeightedLightSampler
 
     transform = mi.ScalarTransform4f
     scene = {
@@ -207,7 +208,8 @@ def test_delta_emitters_give_the_same_picture_by_any_weights():
 
 def test_more_emitters_than_are_weighed_have_a_picture():
     """Beyond the most emitters the scene's own sampling is used, and each light still arrives."""
-    from lippmann.rendering.transport.light_sampling import MAX_EMITTERS, SceneLightSampler, make_light_sampler
+    from lippmann.rendering.transport.emitter_weights import MAX_EMITTERS, make_light_sampler
+    from lippmann.rendering.transport.light_sampling import SceneLightSampler
 
     count = MAX_EMITTERS + 1
     lights = {
@@ -221,7 +223,7 @@ def test_more_emitters_than_are_weighed_have_a_picture():
 
 
 def test_the_picture_stays_and_its_noise_falls():
-    from lippmann.rendering.transport.light_sampling import make_light_sampler
+    from lippmann.rendering.transport.emitter_weights import make_light_sampler
 
     integrator, source = stage(room())
     runs, samples = 12, 16
@@ -237,11 +239,8 @@ def test_the_picture_stays_and_its_noise_falls():
 
 def test_emitters_without_contribution_are_sampled_uniformly():
     """A camera that sees no surface."""
-    from lippmann.rendering.transport.light_sampling import (
-        SceneLightSampler,
-        estimate_emitter_weights,
-        make_light_sampler,
-    )
+    from lippmann.rendering.transport.emitter_weights import estimate_emitter_weights, make_light_sampler
+    from lippmann.rendering.transport.light_sampling import SceneLightSampler
     from lippmann.rendering.transport.ray_source import CameraRays
     from lippmann.scene.values.description import Camera
 
@@ -256,11 +255,11 @@ def test_emitters_without_contribution_are_sampled_uniformly():
 
 
 def test_invalid_contributions_do_not_count(monkeypatch):
-    from lippmann.rendering.transport import light_sampling
+    from lippmann.rendering.transport import emitter_weights
 
     integrator, source = stage(room())
-    whole = light_sampling.estimate_emitter_weights(integrator, source)
-    along = light_sampling._squared_contributions
+    whole = emitter_weights.estimate_emitter_weights(integrator, source)
+    along = emitter_weights._squared_contributions
 
     def some_lost(*given):
         import drjit as dr
@@ -269,21 +268,21 @@ def test_invalid_contributions_do_not_count(monkeypatch):
         squares = along(*given)
         return dr.select(dr.arange(mi.UInt32, dr.width(squares)) % 64 == 0, dr.nan, squares)
 
-    monkeypatch.setattr(light_sampling, "_squared_contributions", some_lost)
-    assert light_sampling.estimate_emitter_weights(integrator, source) == pytest.approx(whole, rel=0.05)
+    monkeypatch.setattr(emitter_weights, "_squared_contributions", some_lost)
+    assert emitter_weights.estimate_emitter_weights(integrator, source) == pytest.approx(whole, rel=0.05)
 
 
 def test_no_emitter_one_or_very_many_keep_the_weights_of_the_scene(monkeypatch):
-    from lippmann.rendering.transport import light_sampling
+    from lippmann.rendering.transport import emitter_weights
     from lippmann.rendering.transport.light_sampling import SceneLightSampler
 
     for order in ((), ("bright",)):
         integrator, source = stage(room(order))
-        assert light_sampling.estimate_emitter_weights(integrator, source).tolist() == [1.0] * len(order)
-        assert isinstance(light_sampling.make_light_sampler(integrator, source), SceneLightSampler)
-    monkeypatch.setattr(light_sampling, "MAX_EMITTERS", 2)
+        assert emitter_weights.estimate_emitter_weights(integrator, source).tolist() == [1.0] * len(order)
+        assert isinstance(emitter_weights.make_light_sampler(integrator, source), SceneLightSampler)
+    monkeypatch.setattr(emitter_weights, "MAX_EMITTERS", 2)
     integrator, source = stage(room())
-    assert light_sampling.estimate_emitter_weights(integrator, source) == pytest.approx(np.full(3, 1 / 3))
+    assert emitter_weights.estimate_emitter_weights(integrator, source) == pytest.approx(np.full(3, 1 / 3))
 
 
 def test_two_renders_of_one_scene_leave_each_other_alone(engine):

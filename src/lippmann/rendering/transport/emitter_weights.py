@@ -1,0 +1,127 @@
+"""Probabilities of light sampling, by the contribution of each emitter to one picture.
+
+Mitsuba samples all emitters uniformly unless a scene sets weights. Emitters that light nothing in the picture then take
+their share too: a sky outside a closed room takes half of all shadow rays. Here a few thousand paths through the whole
+picture estimate each emitter's contribution f. The emitter is sampled in proportion to the root of the second moment
+E[f^2], which minimises the variance of f over its probability (importance sampling; Veach 1997, chapter 2.5.2). A
+uniform share remains for contributions that those paths missed.
+"""
+
+from __future__ import annotations
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from lippmann.device.sobol import PIXEL_DIMENSION, SampleStream
+from lippmann.device.types import Float, Ray3f, UInt32
+from lippmann.rendering.transport.light_sampling import LightSampler, SceneLightSampler, WeightedLightSampler
+from lippmann.rendering.transport.path import PathIntegrator
+from lippmann.rendering.transport.ray_source import RaySource
+
+#: Pilot paths in all, and the fewest for each emitter.
+PILOT_PATHS, MIN_PATHS_PER_EMITTER = 1 << 14, 1 << 8
+#: Scenes of more emitters are sampled uniformly.
+MAX_EMITTERS = 1 << 10
+#: Surfaces along a pilot path at which emitters are sampled.
+PILOT_SURFACES = 3
+#: Share of the probability that is uniform over all emitters.
+UNIFORM_SHARE = 0.2
+#: Dimensions of the sample stream at one surface.
+DIMENSIONS_PER_SURFACE = 4
+#: Seed of the pilot paths: the picture's own would make the probabilities depend on it.
+_SEED = 0x6C616D70
+
+
+def make_light_sampler(integrator: PathIntegrator, source: RaySource) -> LightSampler:
+    """Make the light sampler of one picture, by the contributions of the emitters to the pixels of ``source``.
+
+    It depends on the scene, the ray depth and the rays alone. Where uniform sampling is as good as anything known (a
+    single emitter, more than :data:`MAX_EMITTERS`, no contribution found), the scene's own weights are used.
+
+    Parameters
+    ----------
+    integrator:
+        Integrator of the scene, still with the sampler that it was made with.
+    source:
+        Rays of the whole picture.
+    """
+    scene = integrator.scene
+    weights = estimate_emitter_weights(integrator, source)
+    return WeightedLightSampler(scene, weights) if len(np.unique(weights)) > 1 else SceneLightSampler(scene)
+
+
+def estimate_emitter_weights(integrator: PathIntegrator, source: RaySource) -> NDArray[np.float64]:
+    """Estimate sampling probabilities of the emitters, ``(emitters,)``, adding up to 1.
+
+    They are the roots of the second moments of the emitters' contributions to the pixels of ``source``, mixed with a
+    uniform share of :data:`UNIFORM_SHARE`, in the order of ``mi.Scene.emitters()``.
+
+    Parameters
+    ----------
+    integrator:
+        Samples all emitters uniformly.
+    source:
+        Rays of the whole picture.
+    """
+    count = len(integrator.scene.emitters())
+    uniform = np.full(count, 1 / max(count, 1))
+    if not 1 < count <= MAX_EMITTERS:
+        return uniform
+    roots = np.sqrt(_second_moments(integrator, source, count))
+    return UNIFORM_SHARE * uniform + (1 - UNIFORM_SHARE) * roots / roots.sum() if roots.sum() > 0 else uniform
+
+
+def _second_moments(integrator: PathIntegrator, source: RaySource, emitters: int) -> NDArray[np.float64]:
+    """Second moments of the emitters' contributions to pilot paths, ``(emitters,)``, each contribution clipped at 1.
+
+    All emitters are sampled along the same paths, so that the estimates differ by nothing else.
+    """
+    paths = max(PILOT_PATHS // emitters, MIN_PATHS_PER_EMITTER)
+    lane = dr.arange(mi.UInt32, paths * emitters)
+    emitter = lane // dr.opaque(mi.UInt32, paths)
+    path = lane - emitter * dr.opaque(mi.UInt32, paths)
+    stream = SampleStream.of_pixels(mi.UInt32(0), path, dr.opaque(mi.UInt32, _SEED))
+    point = stream.next_2d(PIXEL_DIMENSION)
+    x, y = point.x * dr.opaque(mi.Float, source.width), point.y * dr.opaque(mi.Float, source.height)
+    column, row = mi.UInt32(x), mi.UInt32(y)
+    jitter = mi.Point2f(x - mi.Float(column), y - mi.Float(row))
+    ray = source.rays(column, row, mi.UInt32(0), jitter)
+    contributions = _squared_contributions(integrator, ray, stream, emitter, dr.opaque(mi.Float, emitters))
+    # Invalid values, as from a normal of length 0, count as no contribution.
+    squares = np.nan_to_num(np.array(contributions, dtype=np.float64), nan=0.0)
+    means: NDArray[np.float64] = squares.reshape(emitters, paths).mean(axis=1)
+    return means
+
+
+@dr.syntax
+def _squared_contributions(
+    integrator: PathIntegrator, ray: Ray3f, stream: SampleStream, emitter: UInt32, emitters: Float
+) -> Float:
+    """Sum over the surfaces of a path of the squared contribution of ``emitter``, one of ``emitters``, per lane."""
+    scene = integrator.scene
+    context = mi.BSDFContext()
+    ray = mi.Ray3f(ray)
+    throughput = mi.Spectrum(1)
+    squares = mi.Float(0)
+    surface = mi.UInt32(0)
+    active = mi.Bool(True)
+    while dr.hint(active, label="pilot paths"):
+        si = scene.ray_intersect(ray, mi.RayFlags.All, False, active)
+        active &= si.is_valid()
+        bsdf = si.bsdf(ray)
+        dimension = surface * DIMENSIONS_PER_SURFACE + 1
+        # Under uniform sampling each emitter has an equal part of the unit interval.
+        point = stream.next_2d(dimension)
+        point.x = (mi.Float(emitter) + point.x) / emitters
+        sampling = active & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
+        light, _ = integrator.direct_light(si, bsdf, point, sampling)
+        squares += dr.square(dr.minimum(dr.mean(throughput * light / emitters), 1))
+
+        bs, weight = bsdf.sample(context, si, stream.next_1d(dimension + 1), stream.next_2d(dimension + 2), active)
+        throughput *= weight
+        ray = si.spawn_ray(si.to_world(bs.wo))
+        surface += 1
+        active &= (dr.max(throughput) > 0) & (surface < min(integrator.depth, PILOT_SURFACES))
+    return squares
