@@ -8,7 +8,7 @@ A Zarr group holds:
 - the array ``mask[t, s, v, u]``, if some values belong to no pixel.
 
 Every array names its axes in ``_ARRAY_DIMENSIONS``, as xarray expects. The attributes of the group are the metadata of
-a picture file, see ``docs/light-fields.md``. The layout holds the pictures of every display without loss.
+a picture file. The layout holds the pictures of every display without loss.
 """
 
 from __future__ import annotations
