@@ -21,6 +21,7 @@ from lippmann.cli.commands import (
     view,
 )
 from lippmann.cli.commands import print as printing
+from lippmann.cli.shared.option_names import commands_are
 
 app = typer.Typer(
     help="Render 3D scenes into the native pixels of integral-imaging displays.",
@@ -61,3 +62,6 @@ def top(
     if version:
         print(f"lippmann {VERSION}")
         raise typer.Exit
+
+
+commands_are(app)

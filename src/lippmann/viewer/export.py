@@ -28,7 +28,7 @@ def check_exportable(display: Display) -> None:
     if panel.width * panel.height > MOST_PIXELS:
         raise UsageError(
             f"a picture of {panel.width} x {panel.height} pixels will not do",
-            where="--export",
+            parameter="export",
             rule=f"a page in one file shows at most {MOST_PIXELS} pixels",
             fix="leave it out: the viewer's server sends what is looked at",
         )

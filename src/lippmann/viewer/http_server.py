@@ -117,7 +117,7 @@ class WebServer:
 
     def __init__(self, site: Site, host: str = LOOPBACK, port: int = 0) -> None:
         if not 0 <= port <= 65535:
-            raise UsageError(f"{port} is no port", where="--port", rule="it must lie between 1 and 65535, or be 0")
+            raise UsageError(f"{port} is no port", parameter="port", rule="it must lie between 1 and 65535, or be 0")
         try:
             self._server = _Server(site, host, port)
         except (OSError, UnicodeError) as error:  # UnicodeError: a name that no machine can have
@@ -321,9 +321,9 @@ def _is_allowed_host(named: str, listening_on: str) -> bool:
 def _cannot_listen(error: OSError | UnicodeError, host: str, port: int) -> UsageError:
     number = error.errno if isinstance(error, OSError) else None
     if number == errno.EADDRINUSE:
-        return UsageError(f"port {port} is in use", where="--port", fix="say another, or none to have one chosen")
+        return UsageError(f"port {port} is in use", parameter="port", fix="say another, or none to have one chosen")
     if number == errno.EACCES:
-        return UsageError(f"port {port} may not be used", where="--port", fix="say one of at least 1024")
+        return UsageError(f"port {port} may not be used", parameter="port", fix="say one of at least 1024")
     rule = "it must be an address of this machine, such as 127.0.0.1"
     reason = (error.strerror if isinstance(error, OSError) else "") or "no machine has this name"
-    return UsageError(f"cannot listen on '{host}': {reason}", where="--host", rule=rule)
+    return UsageError(f"cannot listen on '{host}': {reason}", parameter="host", rule=rule)

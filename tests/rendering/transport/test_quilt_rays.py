@@ -225,7 +225,7 @@ def test_the_quilts_of_devices_are_known_by_name_serial_and_calibration():
     assert quilt_of_display(portrait, size=(1680, 1680)).layout[:2] == (8, 6)
     with pytest.raises(UsageError, match="no quilt is known"):
         quilt_of_display(SHEET)
-    with pytest.raises(UsageError, match="say views=..., too"):
+    with pytest.raises(UsageError, match=r"say views=\.\.\., too"):
         quilt_of_display(SHEET, size=(800, 800))
     with pytest.raises(UsageError, match="no quilt of 9x9 views"):
         quilt_of_display(portrait, (9, 9))

@@ -9,9 +9,12 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping
 from functools import cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from lippmann.errors import LippmannError
+
+if TYPE_CHECKING:
+    import typer
 
 #: Parameters whose options have other names than they have.
 _OTHERWISE = {
@@ -52,15 +55,22 @@ def _as_option(match: re.Match[str]) -> str:
     return f"{option} {plain if quoted is None else quoted}"
 
 
+def commands_are(app: typer.Typer) -> None:
+    """Say which commands there are: their options are the words of what follows."""
+    _apps[:] = [app]
+    _options.cache_clear()
+
+
+_apps: list[typer.Typer] = []
+
+
 @cache
 def _options() -> Mapping[str, str]:
     """Options by the names of their parameters, of all commands; arguments by theirs, in capitals."""
     import typer
 
-    from lippmann.cli.app import app
-
     names: dict[str, str] = {}
-    for command in _commands(typer.main.get_command(app)):
+    for command in (each for app in _apps for each in _commands(typer.main.get_command(app))):
         for parameter in command.params:
             if parameter.name is not None:
                 long = [option for option in parameter.opts if option.startswith("--")]

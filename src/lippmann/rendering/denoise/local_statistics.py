@@ -36,15 +36,19 @@ def mean_around(values: Floats, reach: int, bands: Bands) -> Floats:
     return mean
 
 
-def known_mean_of_others(values: Floats, reach: int, deviations: float, bands: Bands) -> Floats:
-    """As far as they exceed so many of their own standard deviations, and at least 0: means without the pixel itself.
+def leave_one_out_mean(values: Floats, reach: int, errors: float, bands: Bands) -> Floats:
+    """Leave-one-out local mean, soft-thresholded at ``errors`` of its own standard errors (>= 0), ``(H, W)``.
 
-    The deviation is that of values that know nothing of each other.
+    The mean of a pixel is that of the others up to ``reach`` pixels away, cut at the edges. Its standard error
+    is the sample standard deviation of those n values over the root of n, as of values that know nothing of each
+    other. Where fewer than two others are left, nothing is known: 0.
     """
     count = _pixels_around(values.shape, reach)
     mean, squared = (_mean_of_others(part, count, reach, bands) for part in (values, np.square(values)))
-    deviation = np.sqrt(np.maximum(squared, 0)) / np.float32(2 * reach + 1)
-    return np.maximum(mean - np.float32(deviations) * deviation, 0)
+    # Of n values, n = count - 1: the mean square about the mean, over n - 1.
+    variance = np.maximum(squared - np.square(mean), 0) / np.maximum(count - 2, 1)
+    known = mean - np.float32(errors) * np.sqrt(variance)
+    return np.asarray(np.where(count > 2, np.maximum(known, 0), 0), dtype=np.float32)
 
 
 def _mean_of_others(values: Floats, count: NDArray[np.float64], reach: int, bands: Bands) -> Floats:

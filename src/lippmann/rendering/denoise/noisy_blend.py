@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.color.transfer import Transfer
-from lippmann.rendering.denoise.local_statistics import Halves, known_mean_of_others, mean_around, measured
+from lippmann.rendering.denoise.local_statistics import Halves, leave_one_out_mean, mean_around, measured
 from lippmann.rendering.denoise.local_statistics_kernels import judged_rows
 from lippmann.runtime.row_threads import Bands
 
@@ -54,6 +54,6 @@ def own_share(noisy: Halves, clean: Halves, transfer: Transfer, *, threads: int)
         share = np.ones_like(noise)
         for reach in (NEAR, FAR):
             of_noise = np.maximum(mean_around(noise, reach, bands), 0)
-            known = known_mean_of_others(error, reach, _DEVIATIONS, bands)
+            known = leave_one_out_mean(error, reach, _DEVIATIONS, bands)
             share *= known / (known + of_noise + np.float32(_NOTHING))
     return np.sqrt(share)[..., None]

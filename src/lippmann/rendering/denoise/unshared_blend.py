@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.color.transfer import Transfer
-from lippmann.rendering.denoise.local_statistics import Halves, known_mean_of_others, mean_around, measured
+from lippmann.rendering.denoise.local_statistics import Halves, leave_one_out_mean, mean_around, measured
 from lippmann.rendering.denoise.local_statistics_kernels import compared_rows
 from lippmann.runtime.row_threads import Bands
 
@@ -46,5 +46,5 @@ def own_light(noisy: Halves, clean: Halves, shared: Halves, transfer: Transfer, 
     """
     with Bands(threads) as bands:
         gain, apart = measured(compared_rows, noisy, clean, shared, transfer=transfer, bands=bands)
-        known = known_mean_of_others(gain, REACH, _DEVIATIONS, bands)
+        known = leave_one_out_mean(gain, REACH, _DEVIATIONS, bands)
         return np.minimum(known / (mean_around(apart, REACH, bands) + np.float32(_NOTHING)), 1)[..., None]
