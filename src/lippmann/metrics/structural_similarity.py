@@ -61,20 +61,33 @@ def similarity_sum(
     Pictures are zero where nothing exists. ``windows`` are the weights of a window's rows and columns, see
     :func:`window_weights`.
     """
-    from lippmann.metrics import kernels
-
-    height, width, channels = a.shape
-    present = np.zeros((0, 0))
-    count = (height - len(windows[0]) + 1) * (width - len(windows[1]) + 1)
+    a, b = (np.asarray(picture, np.float64) for picture in (a, b))
+    mean_a, mean_b, squares, products = (_windowed(each, windows) for each in (a, b, a * a + b * b, a * b))
+    centred = None
     if mask is not None:
-        count = int(np.count_nonzero(mask[_centres(mask, windows)]))
-        present = np.repeat(mask.astype(np.float64), channels, axis=1)
-    first, second = (np.ascontiguousarray(picture, np.float64).reshape(height, width * channels) for picture in (a, b))
-    room = np.empty((kernels.SIMILARITY_ROOM, kernels.COLUMNS + (len(windows[1]) - 1) * channels))
-    total = kernels.add_similarities(
-        first, second, present, mask is not None, channels, *windows, K1 * K1, K2 * K2, room
+        # What does not exist weighs nothing. A window without any weight is not centred on a value and does not count.
+        centred = mask[_centres(mask, windows)]
+        weights = np.where(centred, _windowed(mask.astype(np.float64), windows), 1.0)[..., None]
+        mean_a, mean_b, squares, products = (each / weights for each in (mean_a, mean_b, squares, products))
+    # Both variances are needed as a sum only.
+    both, alike = mean_a * mean_a + mean_b * mean_b, 2 * mean_a * mean_b
+    similarity = ((alike + K1 * K1) * (2 * products - alike + K2 * K2)) / (
+        (both + K1 * K1) * (squares - both + K2 * K2)
     )
-    return total, count * channels
+    values = similarity if centred is None else similarity[centred]
+    return float(values.sum()), values.size
+
+
+def _windowed(values: Real, windows: tuple[Real, Real]) -> Real:
+    """Weighted means over the windows that lie inside ``(H, W, ...)``."""
+    from scipy.ndimage import correlate1d
+
+    for axis, weights in enumerate(windows):
+        margin = len(weights) // 2
+        inside = [slice(None)] * values.ndim
+        inside[axis] = slice(margin, values.shape[axis] - margin)
+        values = correlate1d(values, weights, axis=axis, mode="constant")[tuple(inside)]
+    return values
 
 
 @dataclass(frozen=True, eq=False)
