@@ -1,48 +1,52 @@
-"""What every integrator offers: radiance along given rays, and how many rays that took."""
+"""The interface of integrators: radiance along rays, and counts of the rays traced for it."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Protocol
 
 from lippmann.device.sobol import SampleStream
+from lippmann.device.types import Bool, Float, Ray3f, Spectrum, UInt32
 
 
 @dataclass
 class RayCounts:
-    """Rays per lane (UInt32) beyond the primary: ``secondary`` follow scattered light, ``shadow`` test visibility."""
+    """Rays per lane beyond the primary: ``secondary`` follow scattered light, ``shadow`` test visibility."""
 
-    secondary: Any
-    shadow: Any
+    secondary: UInt32
+    shadow: UInt32
 
 
 @dataclass
 class FirstHit:
-    """What a primary ray met: ``distance`` in world units (infinite: nothing), and whether the colour found there
-    depends on where it is seen from (``view_dependent``: mirrors, glass, highlights)."""
+    """First hit of a primary ray.
 
-    distance: Any
-    view_dependent: Any
+    ``distance`` is in world units, infinite where nothing is hit. ``view_dependent`` is True where the radiance depends
+    on the direction from which the surface is seen (mirrors, glass, highlights).
+    """
+
+    distance: Float
+    view_dependent: Bool
 
 
 class Integrator(Protocol):
-    """Light along rays. An integrator holds its scene; it may be asked for any wavefront."""
+    """Estimates radiance along rays of its own scene, for wavefronts of any size."""
 
     depth: int
 
     @property
     def name(self) -> str:
-        """What the light is called in a request."""
+        """Name of the integrator in a request."""
         ...
 
-    def sample(self, ray: Any, stream: SampleStream, active: Any) -> tuple[Any, RayCounts]:
-        """Radiance (``mi.Color3f``) arriving along ``ray`` (world space), with the rays counted per lane."""
+    def sample(self, ray: Ray3f, stream: SampleStream, active: Bool) -> tuple[Spectrum, RayCounts]:
+        """One sample of the radiance along ``ray`` (world space) per lane, and the rays traced for it."""
         ...
 
 
 class ReusableIntegrator(Integrator, Protocol):
-    """An integrator that also says what the primary rays met, so that its light can be used again elsewhere."""
+    """An integrator that also returns the first hit, so that its radiance can be reprojected."""
 
-    def sample_with_hit(self, ray: Any, stream: SampleStream, active: Any) -> tuple[Any, RayCounts, FirstHit]:
-        """As ``sample``, with the first hit; what is not evaluated costs nothing."""
+    def sample_with_hit(self, ray: Ray3f, stream: SampleStream, active: Bool) -> tuple[Spectrum, RayCounts, FirstHit]:
+        """As :meth:`sample`, with the first hit. Results that are never evaluated cost nothing."""
         ...

@@ -1,9 +1,9 @@
-"""Where rays start: one class per kind of picture, all asked the same way for the pixels of a grid."""
+"""Ray sources: world-space rays through the pixels of a picture, one class for each kind of picture."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any, Protocol
+from typing import Protocol
 
 import drjit as dr
 import mitsuba as mi
@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.device.drjit_ops import DEVICE
+from lippmann.device.types import Float64, Point2f, Ray3f, UInt32
 from lippmann.display import Display
 from lippmann.display.pixel_window import PixelWindow
 from lippmann.display.view_cone import cone_tangent
@@ -29,15 +30,25 @@ class RaySource(Protocol):
     height: int
     channels: int
 
-    def rays(self, column: Any, row: Any, channel: Any, jitter: Any) -> Any:
-        """World-space rays (``mi.Ray3f``) through ``jitter`` (Point2f in [0, 1)^2) of the (sub-)pixels named."""
+    def rays(self, column: UInt32, row: UInt32, channel: UInt32, jitter: Point2f) -> Ray3f:
+        """World-space rays through pixels or sub-pixels.
+
+        Parameters
+        ----------
+        column, row:
+            The pixels; row 0 is on top.
+        channel:
+            0, 1 or 2 for the sub-pixel R, G or B. Not read where ``channels`` is 1.
+        jitter:
+            Point in [0, 1)^2 of each (sub-)pixel that its ray passes through.
+        """
         ...
 
 
-def pixel_number(source: RaySource, column: Any, row: Any) -> Any:
-    """The numbers (UInt32) of pixels by which their random numbers are drawn: row by row, of a window as in its whole.
+def pixel_number(source: RaySource, column: UInt32, row: UInt32) -> UInt32:
+    """Index of pixels that seeds their random numbers: row by row over the whole picture, also in a window of it.
 
-    So a pixel has the same samples whichever part of the picture it is rendered with.
+    A pixel thus has the same samples whichever part of the picture it is rendered with.
     """
     if isinstance(source, WindowRays | SubpixelRays):
         return source.number(column, row)
@@ -45,20 +56,30 @@ def pixel_number(source: RaySource, column: Any, row: Any) -> Any:
 
 
 class _OnePicture:
-    """A source whose pixels all show one picture."""
+    """A ray source with a single view."""
 
     width: int
     height: int
 
     def tiles(self) -> Iterator[tuple[slice, slice]]:
-        """Rows and columns of what shows one picture: all of it."""
+        """Rows and columns of each view: here one, the whole picture."""
         yield slice(0, self.height), slice(0, self.width)
 
 
 class DisplayRays(_OnePicture):
-    """The light lines of a display's pixels, or of its sub-pixels, placed into a scene.
+    """Rays along the light lines of a display's pixels or sub-pixels.
 
-    A pixel's samples fill its square; a sub-pixel's fill a third of its width about the sub-pixel's own place.
+    The samples of a pixel fill its square. Those of a sub-pixel fill a third of its width about the sub-pixel's own
+    place.
+
+    Parameters
+    ----------
+    display:
+        The display.
+    world_from_display:
+        ``(4, 4)``, an affine map from the display's frame (mm) to the world.
+    subpixels:
+        Whether each colour has its own rays.
     """
 
     def __init__(self, display: Display, world_from_display: Matrix, subpixels: bool = False) -> None:
@@ -68,7 +89,7 @@ class DisplayRays(_OnePicture):
         self.channels = 3 if subpixels else 1
         self.world_from_display = np.asarray(world_from_display, dtype=np.float64)
 
-    def rays(self, column: Any, row: Any, channel: Any, jitter: Any) -> Any:
+    def rays(self, column: UInt32, row: UInt32, channel: UInt32, jitter: Point2f) -> Ray3f:
         u = mi.Float64(column) + mi.Float64(jitter.x)
         v = mi.Float64(row) + mi.Float64(jitter.y)
         if self.channels == 3:
@@ -81,7 +102,7 @@ class DisplayRays(_OnePicture):
 
 
 class WindowRays(_OnePicture):
-    """A window of a display's pixels, as a picture of its own; its pixels keep the random numbers of the whole's."""
+    """Rays of a window of a display's pixels, which keep the random numbers that they have in the whole picture."""
 
     def __init__(self, source: DisplayRays, window: PixelWindow) -> None:
         self.display = source.display
@@ -92,20 +113,20 @@ class WindowRays(_OnePicture):
         # Opaque to the compiler, so that windows of one size share their kernels.
         self._left, self._top = (dr.opaque(mi.UInt32, first) for first in (window.left, window.top))
 
-    def rays(self, column: Any, row: Any, channel: Any, jitter: Any) -> Any:
+    def rays(self, column: UInt32, row: UInt32, channel: UInt32, jitter: Point2f) -> Ray3f:
         return self._source.rays(column + self._left, row + self._top, channel, jitter)
 
-    def number(self, column: Any, row: Any) -> Any:
-        """Numbers (UInt32) of pixels in the whole picture."""
+    def number(self, column: UInt32, row: UInt32) -> UInt32:
+        """Index of pixels in the whole picture, row by row."""
         return (row + self._top) * self._source.width + (column + self._left)
 
 
 class SubpixelRays(_OnePicture):
-    """The sub-pixels of a display or of its window, as the pixels of a picture that is three times as wide.
+    """Rays of the sub-pixels of a display or of a window, as the pixels of a picture three times as wide.
 
-    They have the rays and the random numbers of their pixels' sub-pixels, but keep all three colours, of which the
-    display will show one. Columns ``3 x`` to ``3 x + 2`` are the sub-pixels of the pixel in column x, from left to
-    right as they lie on the panel.
+    A sub-pixel has the rays and the random numbers that it has in ``source``, and is rendered in all three colours, of
+    which the display shows one. Columns ``3 x`` to ``3 x + 2`` are the sub-pixels of the pixel in column x, from left
+    to right as they lie on the panel.
     """
 
     channels = 1
@@ -115,42 +136,53 @@ class SubpixelRays(_OnePicture):
         self.window = source.window if isinstance(source, WindowRays) else None
         self.width, self.height = 3 * source.width, source.height
         self._source = source
-        #: Of the sub-pixels from left to right, which colour they show.
-        self._shown = self.display.panel.subpixel_order
+        #: Colours of the sub-pixels from left to right.
+        self._colors = self.display.panel.subpixel_order
 
-    def rays(self, column: Any, row: Any, channel: Any, jitter: Any) -> Any:
+    def rays(self, column: UInt32, row: UInt32, channel: UInt32, jitter: Point2f) -> Ray3f:
         del channel
-        pixel, shown = self._subpixel(column)
-        return self._source.rays(pixel, row, shown, jitter)
+        pixel, color = self._subpixel(column)
+        return self._source.rays(pixel, row, color, jitter)
 
-    def number(self, column: Any, row: Any) -> Any:
-        """Numbers (UInt32) of sub-pixels in the whole picture."""
-        pixel, shown = self._subpixel(column)
-        return pixel_number(self._source, pixel, row) * 3 + shown
+    def number(self, column: UInt32, row: UInt32) -> UInt32:
+        """Index of sub-pixels in the whole picture, R, G and B of each pixel in turn."""
+        pixel, color = self._subpixel(column)
+        return pixel_number(self._source, pixel, row) * 3 + color
 
     def own_colors(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
-        """``(..., H, 3 W, 3)`` colours of these pixels to ``(..., H, W, 3)``: each sub-pixel shows its own."""
-        apart = values.reshape(*values.shape[:-2], values.shape[-2] // 3, 3, 3)
-        return np.stack([apart[..., self._shown.index(c), c] for c in range(3)], axis=-1)
+        """Pixels of the display, ``(..., H, W, 3)``, from ``(..., H, 3 W, 3)``: the own colour of each sub-pixel."""
+        subpixels = values.reshape(*values.shape[:-2], values.shape[-2] // 3, 3, 3)
+        return np.stack([subpixels[..., self._colors.index(c), c] for c in range(3)], axis=-1)
 
-    def _subpixel(self, column: Any) -> tuple[Any, Any]:
-        """Column of the pixel, and the number of its sub-pixel."""
+    def _subpixel(self, column: UInt32) -> tuple[UInt32, UInt32]:
+        """Column of the pixel, and colour of the sub-pixel."""
         pixel = column // 3
         place = column - 3 * pixel
-        shown = dr.select(place == 0, self._shown[0], dr.select(place == 1, self._shown[1], self._shown[2]))
-        return pixel, mi.UInt32(shown)
+        color = dr.select(place == 0, self._colors[0], dr.select(place == 1, self._colors[1], self._colors[2]))
+        return pixel, mi.UInt32(color)
 
 
 class QuiltRays:
-    """Cameras side by side before a lenticular display, each one's picture a tile of ``view_size`` pixels.
+    """Rays of a quilt: views of cameras side by side before a lenticular display, each in a tile of the picture.
 
-    Of N = ``columns * rows`` cameras number k stands at the viewing distance, level with the display's middle, at
-    ``D tan(cone / 2) (2 (k + 0.5) / N - 1)`` to the right of it: in even steps over the whole cone. All see the panel's
-    rectangle in the lens plane, off-axis, never turned; where the viewing distance is infinite they are parallel
-    cameras. Tile 0 is at the bottom left, tiles follow to the right and then upwards. Rays begin where the display's
-    own begin, at the aperture distance.
+    Camera k of N = ``columns * rows`` stands at the viewing distance D, level with the centre of the display, at
+    ``D tan(cone / 2) (2 (k + 0.5) / N - 1)`` to the right of it: in equal steps over the whole view cone. Cameras are
+    off-axis, not turned, and see the panel's rectangle in the lens plane. Where the viewing distance is infinite they
+    are parallel cameras. Tile 0 is at the bottom left; tiles follow to the right, then upwards. Rays start at the
+    display's aperture distance.
 
-    With a ``window`` tiles hold that part of the pictures alone.
+    Parameters
+    ----------
+    display:
+        A lenticular display.
+    world_from_display:
+        ``(4, 4)``, an affine map from the display's frame (mm) to the world.
+    columns, rows:
+        Tiles across and up.
+    view_size:
+        Width and height of a view in pixels.
+    window:
+        Part of each view that its tile holds; by default all of it.
     """
 
     channels = 1
@@ -179,14 +211,14 @@ class QuiltRays:
         return self.columns * self.rows
 
     def tiles(self) -> Iterator[tuple[slice, slice]]:
-        """Rows and columns of every camera's tile, the leftmost camera's first."""
+        """Rows and columns of the views, in the order of the cameras from the left."""
         width, height = self.window.width, self.window.height
         for number in range(self.views):
             below, right = divmod(number, self.columns)
             top = (self.rows - 1 - below) * height
             yield slice(top, top + height), slice(right * width, (right + 1) * width)
 
-    def rays(self, column: Any, row: Any, channel: Any, jitter: Any) -> Any:
+    def rays(self, column: UInt32, row: UInt32, channel: UInt32, jitter: Point2f) -> Ray3f:
         del channel
         width, height = self.window.width, self.window.height
         right, above = column // width, self.rows - 1 - row // height
@@ -205,7 +237,7 @@ class QuiltRays:
 
 
 class CameraRays:
-    """A pinhole or parallel camera, pixel (0, 0) at the top left."""
+    """Rays of a perspective or orthographic camera; pixel (0, 0) is at the top left."""
 
     def __init__(self, camera: Camera, width: int, height: int) -> None:
         self.camera = camera
@@ -213,7 +245,7 @@ class CameraRays:
         self.height = height
         self.channels = 1
 
-    def rays(self, column: Any, row: Any, channel: Any, jitter: Any) -> Any:
+    def rays(self, column: UInt32, row: UInt32, channel: UInt32, jitter: Point2f) -> Ray3f:
         del channel
         x = (mi.Float64(column) + mi.Float64(jitter.x)) * (2 / self.height) - self.width / self.height
         y = 1 - (mi.Float64(row) + mi.Float64(jitter.y)) * (2 / self.height)
@@ -227,7 +259,13 @@ class CameraRays:
         return world_ray(np.asarray(self.camera.world_from_camera, dtype=np.float64), origin, direction)
 
 
-def world_ray(matrix: Matrix, origin: tuple[Any, Any, Any], direction: tuple[Any, Any, Any]) -> Any:
+def world_ray(
+    matrix: Matrix, origin: tuple[Float64, Float64, Float64], direction: tuple[Float64, Float64, Float64]
+) -> Ray3f:
+    """World-space ray with unit direction, from an origin and a direction of any length in another frame.
+
+    ``matrix`` is ``(4, 4)``, an affine map from that frame to the world.
+    """
     # Opaque to the compiler, so that a display that moves from frame to frame keeps its kernel.
     rows = [[dr.opaque(mi.Float64, value) for value in row] for row in matrix[:3].tolist()]
     o = [sum((m * a for m, a in zip(row[:3], origin, strict=True)), row[3]) for row in rows]

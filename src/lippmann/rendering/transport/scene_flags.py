@@ -1,45 +1,66 @@
-"""What of a built scene asks for more than the plain path loop, found once and looked up by integrators."""
+"""Features of a built scene that need more than the plain path loop."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import drjit as dr
 import mitsuba as mi
+
+from lippmann.device.types import Color3f, MitsubaScene, ShapePtr
 
 Color = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
 class SceneTraits:
-    """Flags that switch parts of the path loop on.
+    """Features that switch parts of the path loop on.
 
-    ``background`` is what camera rays see where nothing is hit (None: the environment itself); ``has_null`` says that
-    some surface lets rays straight through; ``absorption`` is a table of coefficients per registry index of a shape
-    (empty: no coloured glass).
+    Attributes
+    ----------
+    background:
+        Linear RGB that camera rays see where nothing is hit; None for the environment itself.
+    has_null:
+        Whether some surface lets rays straight through.
+    absorption:
+        ``mi.Color3f`` of absorption coefficients per world unit, indexed by a shape's place in Dr.Jit's registry; None
+        where no shape absorbs.
     """
 
     background: Color | None = None
     has_null: bool = False
-    absorption: Any = None
+    absorption: Color3f | None = None
 
     @property
     def has_absorption(self) -> bool:
+        """Whether some shape absorbs."""
         return self.absorption is not None
 
-    def absorption_of(self, shape: Any) -> Any:
-        """Absorption per world unit inside ``shape`` (ShapePtr) as ``mi.Color3f``."""
+    def absorption_of(self, shape: ShapePtr) -> Color3f:
+        """Absorption coefficients per world unit inside ``shape``."""
         return dr.gather(mi.Color3f, self.absorption, dr.reinterpret_array(mi.UInt32, shape))
 
 
 def make_traits(
-    scene: Any, *, background: Color | None = None, has_null: bool = True, absorption: Mapping[int, Color] | None = None
+    scene: MitsubaScene,
+    *,
+    background: Color | None = None,
+    has_null: bool = True,
+    absorption: Mapping[int, Color] | None = None,
 ) -> SceneTraits:
-    """Traits of a ``mi.Scene``; ``absorption`` maps the position in ``scene.shapes()`` to coefficients per world unit.
+    """Make the traits of a scene.
 
-    ``has_null`` may be True where it is not known: that costs time, but no truth.
+    Parameters
+    ----------
+    scene:
+        The scene.
+    background:
+        Linear RGB that camera rays see where nothing is hit; by default the environment itself.
+    has_null:
+        Whether some surface lets rays straight through. True is always right, and costs time.
+    absorption:
+        Absorption coefficients per world unit, by the index of a shape in ``scene.shapes()``.
     """
     if not absorption:
         return SceneTraits(background, has_null)

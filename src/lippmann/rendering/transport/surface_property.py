@@ -1,8 +1,8 @@
-"""Properties of the first surface, without light: what proofs of geometry and light-field ground truth are made of."""
+"""Properties of the first surface, without light: for tests of geometry and as ground truth of light fields."""
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Literal
 
 import drjit as dr
 import mitsuba as mi
@@ -10,26 +10,35 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.device.sobol import SampleStream
+from lippmann.device.types import Bool, Color3f, MitsubaScene, Ray3f, Vector3f
 from lippmann.rendering.transport.integrator import RayCounts
 
 SurfaceProperty = Literal["normal", "depth", "position", "albedo"]
 
 
 class SurfaceIntegrator:
-    """One property of the first surface hit; 0 where nothing is hit.
+    """Integrator of one property of the first surface; 0 where nothing is hit.
 
-    ``normal`` is the shading normal and ``position`` the point hit, both in the display's frame (mm); ``depth`` is the
-    display-frame z in mm (positive toward the viewer), in all three channels; ``albedo`` is the diffuse reflectance as
-    the surface reports it.
+    Parameters
+    ----------
+    scene:
+        The scene.
+    prop:
+        ``normal``: the unit shading normal, in the display's frame. ``position``: the point hit, in the display's frame
+        (mm). ``depth``: the display-frame z of that point in mm, positive toward the viewer, in all three channels.
+        ``albedo``: the diffuse reflectance in [0, 1].
+    display_from_world:
+        ``(4, 4)``, an affine map.
     """
 
-    def __init__(self, scene: Any, prop: SurfaceProperty, display_from_world: NDArray[np.float64]) -> None:
+    def __init__(self, scene: MitsubaScene, prop: SurfaceProperty, display_from_world: NDArray[np.float64]) -> None:
         self.scene = scene
         self.name = prop
         self.depth = 1
         self._matrix = np.asarray(display_from_world, dtype=np.float64)
 
-    def sample(self, ray: Any, stream: SampleStream, active: Any) -> tuple[Any, RayCounts]:
+    def sample(self, ray: Ray3f, stream: SampleStream, active: Bool) -> tuple[Color3f, RayCounts]:
+        """The property where ``ray`` first hits, as the channels of a colour."""
         del stream
         si = self.scene.ray_intersect(ray, mi.RayFlags.All, True, active)
         hit = si.is_valid()
@@ -43,6 +52,6 @@ class SurfaceIntegrator:
         none = dr.zeros(mi.UInt32, dr.width(si.t))
         return dr.select(hit, value, mi.Color3f(0)), RayCounts(none, none)
 
-    def _linear(self, vector: Any) -> Any:
+    def _linear(self, vector: Vector3f) -> Vector3f:
         rows = self._matrix[:3, :3].tolist()
         return mi.Vector3f(*(row[0] * vector.x + row[1] * vector.y + row[2] * vector.z for row in rows))
