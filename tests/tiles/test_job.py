@@ -18,7 +18,7 @@ from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.scene.placement import PlacementOptions
 from lippmann.tiles.job import FEWEST_TILES, make_job
 
-SETTINGS = RenderRequest(integrator="direct", spp=2, memory=1 << 30)
+SETTINGS = RenderRequest(method="full", integrator="direct", spp=2, memory=1 << 30)
 #: A display with lenses that no tile's edge respects.
 DISPLAY = load_display("seed-lenticular").resized(128, 64)
 

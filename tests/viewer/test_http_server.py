@@ -236,7 +236,7 @@ def test_listening_on_all_addresses_is_reached_by_number_and_own_name():
 
 
 def test_a_port_in_use_is_said(server):
-    with pytest.raises(UsageError, match=f"--port: port {server.port} is in use") as caught:
+    with pytest.raises(UsageError, match=f"port: port {server.port} is in use") as caught:
         WebServer(Echo(), port=server.port)
     assert caught.value.exit_code == 2
 
@@ -249,7 +249,7 @@ def test_no_port(port):
 
 @pytest.mark.parametrize("host", ["192.0.2.1", "no such name", "256.1.1.1", "", "a" * 300, "\u00fc" * 70])
 def test_an_address_of_another_machine(host):
-    with pytest.raises(UsageError, match="--host"):
+    with pytest.raises(UsageError, match="host"):
         WebServer(Echo(), host)
 
 

@@ -179,7 +179,7 @@ def test_coloured_glass_fades_with_the_distance():
 
 
 def test_rays_are_counted():
-    """One white floor under a point light: each hit tests one shadow; the ray scattered at depth 1 looks for emitters."""
+    """One white floor under a point light: each hit tests one shadow; the ray scattered there looks for emitters."""
     import mitsuba as mi
 
     scene = {
@@ -222,7 +222,7 @@ def test_first_samples_take_several_emitter_samples_each(monkeypatch):
     one, same_mean = noise()
     fewer = trace(four_emitters(), camera(4, 50), 16, 1, 1).rays
     assert (rays.shadow, fewer.shadow) == (4 * 256, 256)
-    # One of four by chance has three times its mean's square for variance; all four in turn leave the emitters' own edges.
+    # One of four by chance has three times the square of its mean for variance; all four in turn leave their edges.
     assert several < 0.05 * one
     assert mean == pytest.approx(same_mean, rel=0.02)
 
