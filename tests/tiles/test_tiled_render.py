@@ -6,6 +6,7 @@ import errno
 import random
 import shutil
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -230,7 +231,12 @@ def test_a_copy_of_the_folder_taken_at_a_random_moment_can_be_finished(render, u
     def copy(report: Progress) -> None:
         if report.stage == "tiles" and report.done in (1, 6, 11):
             copies.append(tmp_path / f"copy{len(copies)}")
-            shutil.copytree(output.parent, copies[-1])
+            shutil.copytree(output.parent, copies[-1], copy_function=copy_what_is_there)
+
+    def copy_what_is_there(source: str, target: str) -> None:
+        # Another thread may just have renamed its temporary file.
+        with suppress(FileNotFoundError):
+            shutil.copy2(source, target)
 
     render(output, progress=copy)
     for number, folder in enumerate(copies):

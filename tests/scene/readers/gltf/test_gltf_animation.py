@@ -175,7 +175,7 @@ def test_what_cannot_be_followed_is_said(writer, moving):
 
 
 def test_no_animation(writer, moving):
-    with pytest.raises(SceneError, match="the file has no animation; leave frames=... out"):
+    with pytest.raises(SceneError, match=r"the file has no animation; leave frames=\.\.\. out"):
         moving(writer.triangle())
 
 
