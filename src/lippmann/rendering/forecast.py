@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import time
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from lippmann.device.types import Point2f, Ray3f, UInt32
 from lippmann.display import Display
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.rendering.film import memory_model
@@ -86,7 +87,7 @@ class Forecast:
     device: str
     notes: tuple[str, ...]
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, object]:
         """All of it as plain values for JSON."""
         return {name: list(v) if isinstance(v, tuple) else v for name, v in asdict(self).items()}
 
@@ -176,7 +177,7 @@ class _Probe:
         self.width, self.height = run, count
         self._columns, self._rows = mi.UInt32(columns.ravel()), mi.UInt32(rows)
 
-    def rays(self, column: Any, row: Any, channel: Any, jitter: Any) -> Any:
+    def rays(self, column: UInt32, row: UInt32, channel: UInt32, jitter: Point2f) -> Ray3f:
         import drjit as dr
         import mitsuba as mi
 

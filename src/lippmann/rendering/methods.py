@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +29,7 @@ from lippmann.rendering.request.choices import Denoiser, Method
 from lippmann.rendering.request.preconditions import why_no_estimate
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.rendering.session import Session
+from lippmann.rendering.transport.integrator import Integrator, ReusableIntegrator
 from lippmann.rendering.transport.ray_source import DisplayRays, QuiltRays, SubpixelRays, WindowRays
 
 if TYPE_CHECKING:
@@ -57,7 +58,7 @@ class Job:
     """
 
     session: Session
-    integrator: Any
+    integrator: Integrator
     source: DisplayRays | WindowRays | QuiltRays
     display_from_world: NDArray[np.float64]
     treatment: Treatment | None = None
@@ -103,7 +104,7 @@ class Traced:
     samples: int
     estimate: Estimate | None = None
     notes: tuple[str, ...] = ()
-    options: dict[str, Any] = field(default_factory=dict)
+    options: dict[str, object] = field(default_factory=dict)
     seconds: dict[str, float] = field(default_factory=dict)
     errors: PixelErrors | None = None
     method: Method | None = None
@@ -195,7 +196,7 @@ def _until(job: Job, goal: Goal) -> Traced:
     else:
         judge = denoised.track
     outcome = reach(goal, batches.add, judge, job.progress, probe=batches.probe)
-    options: dict[str, Any] = {}
+    options: dict[str, object] = {}
     notes = _end_notes(goal, outcome)
     method = job.request.method
     won = denoised or plain
@@ -211,7 +212,7 @@ def _until(job: Job, goal: Goal) -> Traced:
     if outcome.errors is not None:
         frame.maps[ERROR_LAYER] = np.maximum(outcome.errors.values, 0)
     seconds = {} if denoised is None or denoised.denoiser is None else {"denoise": denoised.denoiser.seconds}
-    options |= _how_denoised_whole(job, won.denoiser)
+    options |= _denoiser_options(job, won.denoiser)
     return Traced(frame, outcome.samples, outcome.estimate, notes, options, seconds, method=method)
 
 
@@ -239,7 +240,7 @@ def _denoised_part(job: Job) -> Traced:
     frame = Frame(denoised.picture(), batches.rays, batches.seconds_compile, batches.seconds_trace)
     frame.maps[ERROR_LAYER] = np.maximum(errors.values, 0)
     seconds = {"denoise": denoiser.seconds}
-    return Traced(frame, batches.samples, options=_how_denoised_whole(job, denoiser), seconds=seconds, errors=errors)
+    return Traced(frame, batches.samples, options=_denoiser_options(job, denoiser), seconds=seconds, errors=errors)
 
 
 @dataclass(frozen=True)
@@ -293,7 +294,7 @@ def _reused(job: Job) -> Traced:
     assert request.method in ("lens-view", "interpolated")
     assert isinstance(job.source, DisplayRays)
     frame = trace_reprojected(
-        job.integrator,
+        cast("ReusableIntegrator", job.integrator),
         job.source,
         method=request.method,
         order=request.order or "default",
@@ -317,7 +318,7 @@ def _denoised_whole(job: Job, traced: Traced) -> Traced:
         return traced
     cleaned, source = denoiser(traced.frame.pixels), job.traced
     traced.frame.pixels = source.own_colors(cleaned) if isinstance(source, SubpixelRays) else cleaned
-    return replace(traced, options=_how_denoised_whole(job, denoiser), seconds={"denoise": denoiser.seconds})
+    return replace(traced, options=_denoiser_options(job, denoiser), seconds={"denoise": denoiser.seconds})
 
 
 def _denoiser(job: Job, rays_per_pixel: Callable[[], float]) -> GuidedDenoiser | None:
@@ -341,7 +342,7 @@ def _denoiser(job: Job, rays_per_pixel: Callable[[], float]) -> GuidedDenoiser |
     )
 
 
-def _how_denoised_whole(job: Job, denoiser: GuidedDenoiser | None) -> dict[str, Any]:
+def _denoiser_options(job: Job, denoiser: GuidedDenoiser | None) -> dict[str, object]:
     if denoiser is None:
         return {}
     return {"denoise": "oidn", "denoise_effort": denoiser.used, "denoise_form": denoiser.form()}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -109,7 +109,7 @@ def _widen(frame: Frame, window: PixelWindow, display: Display, background: Colo
         frame.maps[name][window.slices] = values
 
 
-def placed_options(request: RenderRequest, placement: Placement) -> dict[str, Any]:
+def placed_options(request: RenderRequest, placement: Placement) -> dict[str, object]:
     """What a picture's file says of its samples' places and of the display's."""
     return {
         "pixel_filter": request.pixel_filter,
@@ -119,7 +119,7 @@ def placed_options(request: RenderRequest, placement: Placement) -> dict[str, An
     }
 
 
-def _reuse_options(request: RenderRequest) -> dict[str, Any]:
+def _reuse_options(request: RenderRequest) -> dict[str, object]:
     if request.method not in REUSING:
         return {}
     return {"order": request.order or "default", "respect_gloss": request.careful}

@@ -9,7 +9,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, TypeVar, cast
+from typing import TYPE_CHECKING, TypeVar, cast
 
 from lippmann._version import VERSION
 from lippmann.display import Display
@@ -125,7 +125,7 @@ class Session:
         frame: Frame,
         *,
         samples: int,
-        options: Mapping[str, Any],
+        options: Mapping[str, object],
         method: str | None = None,
         estimate: Estimate | None = None,
         notes: tuple[str, ...] = (),

@@ -81,7 +81,7 @@ class GltfMotion(Motion):
         fps: float = FRAMES_PER_SECOND,
         animation: str | None = None,
         environment: str | Path | Environment | None = None,
-        background: Any = None,
+        background: tuple[float, float, float] | None = None,
         allow_outside: bool = False,
     ) -> None:
         from lippmann.scene.readers.gltf_animation.animated_file import MovingGltf
@@ -167,7 +167,7 @@ def open_motion(
     animation: str | None = None,
     camera_path: Path | None = None,
     environment: str | Path | Environment | None = None,
-    background: Any = None,
+    background: tuple[float, float, float] | None = None,
     allow_outside: bool = False,
 ) -> Motion:
     """What moves in a scene file.

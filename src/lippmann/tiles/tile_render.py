@@ -23,6 +23,7 @@ from lippmann.rendering.film.wavefront_plan import make_plan
 from lippmann.rendering.methods import SAMPLES_LAYER, Job, trace
 from lippmann.rendering.request.preconditions import why_no_estimate
 from lippmann.rendering.session import Session, Stopwatch, open_session
+from lippmann.rendering.transport.integrator import Integrator
 from lippmann.rendering.transport.ray_source import DisplayRays, WindowRays
 from lippmann.runtime import engine as engines
 from lippmann.runtime.engine_lock import exclusive
@@ -47,17 +48,17 @@ class Prepared:
     session: Session
     placement: Placement
     no_estimate: str | None
-    integrator: Any
+    integrator: Integrator
     source: DisplayRays
     treatment: Treatment | None
 
     @property
-    def options(self) -> dict[str, Any]:
+    def options(self) -> dict[str, object]:
         """What the picture's file says of how it was made in tiles."""
         job = self.job
         if job.surroundings is None:
             return {}
-        cut = {"tile_side": job.side, "tile_margin": job.surroundings.margin}
+        cut: dict[str, object] = {"tile_side": job.side, "tile_margin": job.surroundings.margin}
         if self.treatment is None:
             return cut
         return {**cut, "denoise": "oidn", "denoise_effort": self.treatment.effort, "denoise_form": "raw"}

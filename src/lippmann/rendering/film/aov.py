@@ -6,13 +6,14 @@ the display's frame (mm, +z toward the viewer).
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from lippmann.device.types import Float, Vector3f
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.rendering.film.memory_model import AOVS
 from lippmann.rendering.film.wavefront import divide
@@ -112,13 +113,13 @@ def _trace_tile(
     return {name: to_numpy(value, lanes) for name, value in values.items()}
 
 
-def to_frame(matrix: NDArray[np.float64], vector: Any) -> Any:
+def to_frame(matrix: NDArray[np.float64], vector: Vector3f) -> Vector3f:
     """The linear part of ``matrix`` on a vector of the device."""
     rows = matrix[:3, :3].tolist()
     return mi.Vector3f(*(row[0] * vector.x + row[1] * vector.y + row[2] * vector.z for row in rows))
 
 
-def to_numpy(value: Any, lanes: int) -> FloatArray:
+def to_numpy(value: Float | Vector3f, lanes: int) -> FloatArray:
     """``(lanes,)`` or ``(lanes, channels)`` of an evaluated array; one of a single entry counts for every lane."""
     array = np.asarray(value, dtype=np.float32).T
     shape = (lanes,) if array.ndim == 1 else (lanes, array.shape[1])

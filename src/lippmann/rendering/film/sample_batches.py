@@ -11,7 +11,6 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import drjit as dr
 import mitsuba as mi
@@ -20,6 +19,7 @@ from numpy.typing import NDArray
 
 from lippmann.color.transfer import Transfer
 from lippmann.device.sobol import PIXEL_DIMENSION, SampleStream
+from lippmann.device.types import Spectrum, UInt32
 from lippmann.display.pixel_window import PixelWindow
 from lippmann.errors import UsageError
 from lippmann.progress import Progress, ProgressCallback, silent
@@ -357,12 +357,12 @@ def _sizes(pixels: int, channels: int, memory: int) -> tuple[int, int]:
     return batches, memory_model.lanes_within(memory, kept, needed, what)
 
 
-def _table(numbers: Sequence[int]) -> Any:
+def _table(numbers: Sequence[int]) -> UInt32:
     """``numbers`` on the device, and one more: a single number would become a constant of the kernel."""
     return mi.UInt32([*numbers, 0])
 
 
-def _sums(radiance: Any, channels: int, batches: int, count: int) -> Floats:
+def _sums(radiance: Spectrum, channels: int, batches: int, count: int) -> Floats:
     """``(pixels, batches, 3)`` from lanes ordered pixel, channel, batch, sample."""
     parts = [dr.block_sum(component, count) if count > 1 else component for component in radiance]
     sums: Floats = np.array(dr.ravel(mi.Color3f(*parts))).reshape(-1, channels, batches, 3)

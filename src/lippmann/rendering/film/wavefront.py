@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass, field
-from typing import Any
 
 import drjit as dr
 import mitsuba as mi
@@ -12,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.device.sobol import PIXEL_DIMENSION, SampleStream
+from lippmann.device.types import Ray3f, Spectrum, UInt32
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.rendering.film.wavefront_plan import Pass, Plan, Tile
 from lippmann.rendering.transport.integrator import Integrator, RayCounts
@@ -55,7 +55,7 @@ class Frame:
     seconds_compile: float = 0.0
     seconds_trace: float = 0.0
     seconds_reuse: float = 0.0
-    maps: dict[str, NDArray[Any]] = field(default_factory=dict)
+    maps: dict[str, NDArray[np.generic]] = field(default_factory=dict)
     shares: dict[str, float] = field(default_factory=dict)
 
 
@@ -133,7 +133,7 @@ def rays_of_tile(
     seed: int,
     box_filter: bool,
     corner: tuple[int, int] = (0, 0),
-) -> tuple[Any, SampleStream]:
+) -> tuple[Ray3f, SampleStream]:
     """The rays and sample streams of one wavefront, lanes ordered pixel, then channel, then sample.
 
     ``corner``: row and column at which the part of the picture begins that ``plan`` is of.
@@ -152,7 +152,7 @@ def rays_of_tile(
     return source.rays(column, row, channel, jitter), stream
 
 
-def evaluated(radiance: Any, counts: RayCounts, lanes: int, totals: RayTotals) -> Any:
+def evaluated(radiance: Spectrum, counts: RayCounts, lanes: int, totals: RayTotals) -> Spectrum:
     """The radiance of a wavefront, evaluated, black where it is not finite; ``totals`` grows by the rays it took."""
     finite = dr.isfinite(radiance.x) & dr.isfinite(radiance.y) & dr.isfinite(radiance.z)
     radiance = dr.select(finite, radiance, mi.Color3f(0))
@@ -165,13 +165,13 @@ def evaluated(radiance: Any, counts: RayCounts, lanes: int, totals: RayTotals) -
     return radiance
 
 
-def divide(number: Any, by: Any) -> tuple[Any, Any]:
+def divide(number: UInt32, by: UInt32 | int) -> tuple[UInt32, UInt32]:
     """Quotient and remainder of whole numbers on the device."""
     quotient = number // by
     return quotient, number - quotient * by
 
 
-def _channel_sums(radiance: Any, channels: int, count: int) -> NDArray[np.float32]:
+def _channel_sums(radiance: Spectrum, channels: int, count: int) -> NDArray[np.float32]:
     parts = [dr.block_sum(component, count) if count > 1 else component for component in radiance]
     if channels == 1:
         return np.array(dr.ravel(mi.Color3f(*parts))).reshape(-1, 3)
@@ -180,7 +180,7 @@ def _channel_sums(radiance: Any, channels: int, count: int) -> NDArray[np.float3
     return np.ascontiguousarray(np.diagonal(sums.reshape(-1, 3, 3), axis1=1, axis2=2))
 
 
-def lane_total(counts: Any) -> int:
+def lane_total(counts: UInt32) -> int:
     """The sum of evaluated counts over all lanes."""
     # Sums of 32-bit counts overflow beyond 2^32 rays a wavefront; 64 bits do not.
     return int(dr.sum(mi.UInt64(counts))[0])

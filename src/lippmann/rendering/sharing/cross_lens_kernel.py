@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from lippmann.runtime.numba_jit import uncounted
 
@@ -26,17 +28,17 @@ _DARK = 1e-3
 def share_rows(
     first: int,
     last: int,
-    light: Any,
-    normal: Any,
-    height: Any,
-    lens: Any,
-    centers: Any,
+    light: NDArray[np.float32],
+    normal: NDArray[np.float32],
+    height: NDArray[np.float32],
+    lens: NDArray[np.int32],
+    centers: NDArray[np.float32],
     gap: float,
     reach_i: int,
     reach_j: int,
     cylindrical: bool,
     stop: float,
-    shared: Any,
+    shared: NDArray[np.float32],
 ) -> None:
     """Rows ``[first, last)`` of ``shared``: the weighted mean of ``light`` over all places that show the same point.
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from lippmann.runtime.numba_jit import uncounted
 
@@ -17,15 +19,15 @@ _PIXELS, _OF_HEIGHT = 2.0, 0.01
 def share_view_rows(
     first: int,
     last: int,
-    light: Any,
-    normal: Any,
-    height: Any,
-    slopes: Any,
+    light: NDArray[np.float32],
+    normal: NDArray[np.float32],
+    height: NDArray[np.float32],
+    slopes: NDArray[np.float32],
     columns: int,
     convergence: float,
     pixels_per_mm: float,
     reach: int,
-    shared: Any,
+    shared: NDArray[np.float32],
 ) -> None:
     """Rows ``[first, last)`` of ``shared``: the weighted mean of ``light`` over the views up to ``reach`` to the side.
 
