@@ -79,12 +79,12 @@ def tracer(path: Path, size: int) -> Callable[[], Any]:
     from lippmann.device.whitted.scene import build_classic
     from lippmann.rendering.film.wavefront import trace_frame
     from lippmann.rendering.film.wavefront_plan import make_plan
-    from lippmann.rendering.transport.whitted import ClassicIntegrator
-    from lippmann.rendering.transport.whitted_camera import ClassicCameraRays
+    from lippmann.rendering.transport.whitted import WhittedIntegrator
+    from lippmann.rendering.transport.whitted_camera import WhittedCameraRays
 
     scene = read_tachyon(path)
-    integrator = ClassicIntegrator(build_classic(scene), DEPTH)
-    source = ClassicCameraRays(scene.camera, scene.handedness, size, size)
+    integrator = WhittedIntegrator(build_classic(scene), DEPTH)
+    source = WhittedCameraRays(scene.camera, scene.handedness, size, size)
     plan = make_plan(size, size, 1, memory=2**32)
     return lambda: trace_frame(integrator, source, plan, box_filter=False)
 

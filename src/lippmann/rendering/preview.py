@@ -48,12 +48,12 @@ def render_preview(
 
     from lippmann.rendering.film.wavefront import trace_frame
     from lippmann.rendering.transport.ray_source import CameraRays, RaySource
-    from lippmann.rendering.transport.whitted_camera import ClassicCameraRays
+    from lippmann.rendering.transport.whitted_camera import WhittedCameraRays
 
     source: RaySource
     if request.integrator == "classic" and scene.classic is not None:
         # Its own camera, with all that only such a camera does.
-        source = ClassicCameraRays(scene.classic.camera, scene.classic.handedness, *size)
+        source = WhittedCameraRays(scene.classic.camera, scene.classic.handedness, *size)
     else:
         source = CameraRays(pose, *size)
     integrator = session.integrator(source, np.linalg.inv(np.asarray(pose.world_from_camera, dtype=np.float64)))

@@ -225,10 +225,10 @@ def _make_integrator(
     from lippmann.rendering.transport.path import PathIntegrator
     from lippmann.rendering.transport.scene_flags import make_traits
     from lippmann.rendering.transport.surface_property import SurfaceIntegrator
-    from lippmann.rendering.transport.whitted import ClassicIntegrator
+    from lippmann.rendering.transport.whitted import WhittedIntegrator
 
     if isinstance(built, BuiltClassic):
-        return ClassicIntegrator(built, request.surfaces)
+        return WhittedIntegrator(built, request.surfaces)
     if request.integrator in ("path", "direct"):
         traits = make_traits(
             built.mitsuba, background=built.background, has_null=built.has_null, absorption=built.absorption

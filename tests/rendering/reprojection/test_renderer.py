@@ -17,14 +17,14 @@ class Case:
         from lippmann.device.whitted.scene import build_classic
         from lippmann.display import load_display
         from lippmann.rendering.transport.ray_source import DisplayRays
-        from lippmann.rendering.transport.whitted import ClassicIntegrator
+        from lippmann.rendering.transport.whitted import WhittedIntegrator
         from lippmann.scene import bundled
 
         self.display = load_display(preset).resized(width, height)
         world = bundled.stage_of(name).world_from_display.copy()
         world[:3, :3] *= 512 / height
         self.display_from_world = np.linalg.inv(world)
-        self.integrator = ClassicIntegrator(build_classic(bundled.make_classic(name)), 2)
+        self.integrator = WhittedIntegrator(build_classic(bundled.make_classic(name)), 2)
         self.source = DisplayRays(self.display, world)
 
     def full(self, samples=1):

@@ -34,10 +34,10 @@ class Lab:
 
         from lippmann.device.sobol import SampleStream
         from lippmann.device.whitted.scene import build_classic
-        from lippmann.rendering.transport.whitted import ClassicIntegrator
+        from lippmann.rendering.transport.whitted import WhittedIntegrator
 
         rest.setdefault("background", SKY)
-        integrator = ClassicIntegrator(build_classic(self.builder.build(**rest)), depth)
+        integrator = WhittedIntegrator(build_classic(self.builder.build(**rest)), depth)
         o, d = np.atleast_2d(np.array(origin, float)), np.atleast_2d(np.array(direction, float))
         o, d = np.broadcast_arrays(o, d / np.linalg.norm(d, axis=1, keepdims=True))
         ray = mi.Ray3f(mi.Point3f(o.T.astype(np.float32)), mi.Vector3f(d.T.astype(np.float32)))

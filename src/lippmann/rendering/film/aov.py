@@ -18,7 +18,7 @@ from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.rendering.film.memory_model import AOVS
 from lippmann.rendering.film.wavefront import divide
 from lippmann.rendering.film.wavefront_plan import Plan, Tile, make_plan
-from lippmann.rendering.transport.first_surface import Surfaces, surfaces_of
+from lippmann.rendering.transport.first_surface import Surfaces, make_surfaces
 from lippmann.rendering.transport.ray_source import RaySource
 
 if TYPE_CHECKING:
@@ -75,10 +75,10 @@ def trace_layers(
     - ``position``: the point (x, y, z) in mm; not a number where nothing is seen.
     - ``normal``: unit normal that light is scattered by, normal map included, on the side that is seen; 0 where nothing
       is.
-    - ``albedo``: linear RGB reflectance in [0, 1], see ``docs/layers.md``; 0 where nothing is seen.
-    - ``shape``: whole number of the shape, see ``docs/layers.md``; -1 where nothing is seen.
+    - ``albedo``: linear RGB reflectance in [0, 1], see ``docs/reference/layers.md``; 0 where nothing is seen.
+    - ``shape``: whole number of the shape, see ``docs/reference/layers.md``; -1 where nothing is seen.
     """
-    surfaces = surfaces_of(built)
+    surfaces = make_surfaces(built)
     layers = {
         name: np.zeros((plan.height, plan.width, channels)[: 2 if channels == 1 else 3], dtype=np.float32)
         for name, channels in LAYERS.items()
@@ -99,7 +99,7 @@ def _trace_tile(
     # Opaque, so that one kernel serves all tiles.
     row += dr.opaque(mi.UInt32, tile.first_row)
     ray = source.rays(column, row, mi.UInt32(_MIDDLE_CHANNEL), mi.Point2f(0.5))
-    seen = surfaces.first(ray, mi.Bool(True))
+    seen = surfaces.first_hit(ray)
     position = to_frame(display_from_world, seen.p) + mi.Vector3f(*display_from_world[:3, 3].tolist())
     position = dr.select(seen.hit, position, dr.nan)
     values = {

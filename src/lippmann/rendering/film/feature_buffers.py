@@ -15,7 +15,7 @@ from lippmann.rendering.film.aov import to_numpy
 from lippmann.rendering.film.memory_model import FEATURE_BUFFERS
 from lippmann.rendering.film.wavefront import rays_of_tile
 from lippmann.rendering.film.wavefront_plan import Pass, Plan, Tile, make_plan
-from lippmann.rendering.transport.first_surface import Surfaces, surfaces_of
+from lippmann.rendering.transport.first_surface import Surfaces, make_surfaces
 from lippmann.rendering.transport.ray_source import RaySource
 
 if TYPE_CHECKING:
@@ -83,7 +83,7 @@ def trace_guides(
     where samples fall is all the noise that guides hold, and it would be the picture's own. A sub-pixel that has rays
     of its own gets its own channel of the albedo from them; normal and height are the means of all three.
     """
-    surfaces = surfaces_of(built)
+    surfaces = make_surfaces(built)
     matrix = np.asarray(display_from_world, dtype=np.float64)
     linear = matrix[:3, :3]
     rotation = (linear / np.cbrt(np.linalg.det(linear))).astype(np.float32)
@@ -120,7 +120,7 @@ def _trace_tile(
     lanes = tile.rows * plan.width * plan.channels * run.count
     # Lanes are those of a picture.
     ray, _ = rays_of_tile(source, plan, tile, run, seed, box_filter)
-    albedo, normal, distance = surfaces.guide(ray, mi.Bool(True))
+    albedo, normal, distance = surfaces.features(ray)
     x, y, z = mi.Point3f(ray.o) + mi.Vector3f(ray.d) * distance
     weights = [dr.opaque(mi.Float, float(weight)) for weight in z_from_world]
     height = dr.clip(x * weights[0] + y * weights[1] + z * weights[2] + weights[3], -_FARTHEST, _FARTHEST)

@@ -1,18 +1,33 @@
-"""What a ray sees, apart from light: the first surface, and the first one that is not a mirror or clear glass.
+"""First hits without light, in world space: for ground-truth layers, and as feature buffers of a denoiser.
 
-The first is the truth that layers tell; the second is what a denoiser wants to know, for the edges in a mirror are
-those of the things that it shows. Both speak of world space.
+Layers describe the first surface. Feature buffers describe the first surface that is not a mirror or clear glass,
+because the edges in a reflection are those of the reflected objects.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from lippmann.device.types import (
+    Bool,
+    BSDFPtr,
+    BSDFSample3f,
+    Color3f,
+    Float,
+    Normal3f,
+    Point3f,
+    PreliminaryIntersection3f,
+    Ray3f,
+    Spectrum,
+    SurfaceInteraction3f,
+    UInt32,
+    Vector3f,
+)
 from lippmann.device.whitted.background_fog import background_color
 from lippmann.device.whitted.geometry import NONE
 from lippmann.device.whitted.scene import BuiltClassic
@@ -21,53 +36,68 @@ from lippmann.rendering.transport.path import MAX_CROSSINGS
 if TYPE_CHECKING:
     from lippmann.device.pbr import BuiltScene
 
-#: A surface that lets more than this share of the light straight through is looked through.
-SEEN_THROUGH = 0.5
-#: Mirrors and panes that one ray is followed along.
-MOST_FOLLOWED = 8
-#: How far away (in units of the scene) the sky is.
-FAR_AWAY = 1e6
-#: Sample that draws the middle of a lobe, on the near side of the half at which partly opaque surfaces count as there.
+#: Surfaces with a null transmittance above this are skipped, as if they were not there.
+MAX_NULL_TRANSMITTANCE = 0.5
+#: Specular surfaces along one ray, at most.
+MAX_SPECULAR_SURFACES = 8
+#: Distance of the environment, in units of the scene.
+ENVIRONMENT_DISTANCE = 1e6
+#: Sample at the middle of a lobe, just below 0.5, at which surfaces of opacity 0.5 count as opaque.
 _MIDDLE = 0.49
 
 
 @dataclass
-class Seen:
-    """A surface where a ray meets it, all 0 where ``hit`` is False.
+class SurfaceHit:
+    """Surface at the first hit of each ray; all 0 where ``hit`` is False.
 
-    ``p`` is the point, ``n`` the unit normal that light is scattered by, on the side that the ray comes from;
-    ``albedo`` the reflectance in [0, 1]; ``shape`` (UInt32) the number of the shape.
+    Attributes
+    ----------
+    hit:
+        Whether the ray hits a surface.
+    p:
+        The point.
+    n:
+        Unit shading normal, on the side that the ray comes from.
+    albedo:
+        Reflectance in [0, 1].
+    shape:
+        Index of the shape.
     """
 
-    hit: Any
-    p: Any
-    n: Any
-    albedo: Any
-    shape: Any
+    hit: Bool
+    p: Point3f
+    n: Normal3f
+    albedo: Color3f
+    shape: UInt32
 
 
 class Surfaces(Protocol):
     """The surfaces of one scene on the device."""
 
-    def first(self, ray: Any, active: Any) -> Seen:
-        """What the ray meets first."""
+    def first_hit(self, ray: Ray3f) -> SurfaceHit:
+        """The first surface that ``ray`` hits."""
         ...
 
-    def guide(self, ray: Any, active: Any) -> tuple[Any, Any, Any]:
-        """Albedo (or, of what glows, colour) in [0, 1] and normal of what a denoiser should know the pixel by.
+    def features(self, ray: Ray3f) -> tuple[Color3f, Normal3f, Float]:
+        """Denoising features of the first surface that is not purely specular.
 
-        And how far light has come from there, as multiples of the ray's direction: :data:`FAR_AWAY` from nowhere.
+        Returns
+        -------
+        Color3f, Normal3f, Float
+            Albedo plus emitted radiance, clipped to [0, 1] and tinted by the specular surfaces on the way; the unit
+            shading normal, 0 where nothing is hit; the length of the path there in units of the scene,
+            :data:`ENVIRONMENT_DISTANCE` where nothing is hit.
         """
         ...
 
 
-def surfaces_of(built: BuiltScene | BuiltClassic) -> Surfaces:
-    """The surfaces of a built scene."""
-    return ClassicSurfaces(built) if isinstance(built, BuiltClassic) else PhysicalSurfaces(built)
+def make_surfaces(built: BuiltScene | BuiltClassic) -> Surfaces:
+    """Make the surfaces of a built scene."""
+    return WhittedSurfaces(built) if isinstance(built, BuiltClassic) else PhysicalSurfaces(built)
 
 
 class PhysicalSurfaces:
-    """Surfaces of a Mitsuba scene; ``shape`` counts ``mi.Scene.shapes()``."""
+    """Surfaces of a Mitsuba scene; ``shape`` is an index into ``mi.Scene.shapes()``."""
 
     def __init__(self, built: BuiltScene) -> None:
         self._scene = built.mitsuba
@@ -78,17 +108,18 @@ class PhysicalSurfaces:
         numbers[pointers] = np.arange(len(pointers))
         self._numbers = mi.UInt32(numbers)
 
-    def first(self, ray: Any, active: Any) -> Seen:
+    def first_hit(self, ray: Ray3f) -> SurfaceHit:
+        """The first surface that ``ray`` hits, without those of high null transmittance."""
         ray = mi.Ray3f(ray)
-        pi = self._scene.ray_intersect_preliminary(ray, coherent=True, active=active)
+        pi = self._scene.ray_intersect_preliminary(ray, coherent=True, active=True)
         if self._has_null:
-            ray, pi = self._past_openings(ray, pi)
+            ray, pi = self._skip_null(ray, pi)
         si = pi.compute_surface_interaction(ray, mi.RayFlags.All)
-        hit = active & si.is_valid()
+        hit = si.is_valid()
         bsdf = si.bsdf(ray)
-        placed = dr.reinterpret_array(mi.UInt32, si.instance)
-        pointer = dr.select(placed != 0, placed, dr.reinterpret_array(mi.UInt32, si.shape))
-        return Seen(
+        instance = dr.reinterpret_array(mi.UInt32, si.instance)
+        pointer = dr.select(instance != 0, instance, dr.reinterpret_array(mi.UInt32, si.shape))
+        return SurfaceHit(
             hit,
             dr.select(hit, mi.Point3f(si.p), 0),
             dr.select(hit, _normal(si, bsdf, hit), 0),
@@ -97,14 +128,14 @@ class PhysicalSurfaces:
         )
 
     @dr.syntax
-    def _past_openings(self, ray: Any, pi: Any) -> tuple[Any, Any]:
-        """Ray and hit behind all that is looked through."""
+    def _skip_null(self, ray: Ray3f, pi: PreliminaryIntersection3f) -> tuple[Ray3f, PreliminaryIntersection3f]:
+        """Ray and hit behind the surfaces of high null transmittance."""
         crossings = mi.UInt32(0)
         active = pi.is_valid()
-        while dr.hint(active, label="openings"):
+        while dr.hint(active, label="null surfaces"):
             si = pi.compute_surface_interaction(ray, mi.RayFlags.All)
             through = si.bsdf(ray).eval_null_transmission(si, active)
-            active &= (dr.mean(through) > SEEN_THROUGH) & (crossings < MAX_CROSSINGS)
+            active &= (dr.mean(through) > MAX_NULL_TRANSMITTANCE) & (crossings < MAX_CROSSINGS)
             if active:
                 ray = si.spawn_ray(ray.d)
                 pi = self._scene.ray_intersect_preliminary(ray, coherent=False, active=active)
@@ -113,72 +144,77 @@ class PhysicalSurfaces:
         return ray, pi
 
     @dr.syntax
-    def guide(self, ray: Any, active: Any) -> tuple[Any, Any, Any]:
+    def features(self, ray: Ray3f) -> tuple[Color3f, Normal3f, Float]:
+        """As :meth:`Surfaces.features`."""
         ray = mi.Ray3f(ray)  # current ray
-        active = mi.Bool(active)
+        active = mi.Bool(True)
         albedo, normal = mi.Color3f(0), mi.Vector3f(0)
-        distance = mi.Float(0)  # along the way so far
-        tint = mi.Color3f(1)  # of the mirrors and panes on the way
-        steps = mi.UInt32(0)  # mirrors and panes met so far
+        distance = mi.Float(0)  # length of the path so far
+        tint = mi.Color3f(1)  # of the specular surfaces so far
+        steps = mi.UInt32(0)  # specular surfaces so far
         pi = self._scene.ray_intersect_preliminary(ray, coherent=True, active=active)
         while dr.hint(active, label="to the first rough surface"):
             si = pi.compute_surface_interaction(ray, mi.RayFlags.All)
             hit = si.is_valid()
             bsdf = si.bsdf(ray)
-            glow = si.emitter(self._scene).eval(si)
+            emission = si.emitter(self._scene).eval(si)
             if dr.hint(self._background is not None, mode="scalar"):
-                glow = dr.select((steps == 0) & ~hit, mi.Color3f(self._background), glow)
-            found = dr.clip(tint * (_albedo(si, bsdf, hit) + glow), 0, 1)
+                emission = dr.select((steps == 0) & ~hit, mi.Color3f(self._background), emission)
+            color = dr.clip(tint * (_albedo(si, bsdf, hit) + emission), 0, 1)
 
-            may_show = mi.has_flag(bsdf.flags(), mi.BSDFFlags.Delta) | mi.has_flag(bsdf.flags(), mi.BSDFFlags.Null)
-            bs, weight = _likeliest(si, bsdf, hit & may_show)
-            shows = mi.has_flag(bs.sampled_type, mi.BSDFFlags.Delta) | mi.has_flag(bs.sampled_type, mi.BSDFFlags.Null)
-            goes_on = hit & shows & (steps < MOST_FOLLOWED) & (dr.max(weight) > 0)
-            albedo = dr.select(active & ~goes_on, found, albedo)
-            normal = dr.select(active & ~goes_on & hit, mi.Vector3f(_normal(si, bsdf, hit)), normal)
-            distance += dr.select(active, dr.select(hit, si.t, FAR_AWAY), 0)
+            may_be_specular = _has_specular_lobe(bsdf.flags())
+            bs, weight = _central_sample(si, bsdf, hit & may_be_specular)
+            specular = _has_specular_lobe(bs.sampled_type)
+            continues = hit & specular & (steps < MAX_SPECULAR_SURFACES) & (dr.max(weight) > 0)
+            albedo = dr.select(active & ~continues, color, albedo)
+            normal = dr.select(active & ~continues & hit, mi.Vector3f(_normal(si, bsdf, hit)), normal)
+            distance += dr.select(active, dr.select(hit, si.t, ENVIRONMENT_DISTANCE), 0)
             tint *= weight
             steps += 1
             ray = si.spawn_ray(si.to_world(bs.wo))
-            active &= goes_on
+            active &= continues
             pi = self._scene.ray_intersect_preliminary(ray, coherent=False, active=active)
         return albedo, normal, distance
 
 
-def _likeliest(si: Any, bsdf: Any, active: Any) -> tuple[Any, Any]:
-    """The middle of the lobe that most light takes at a mirror or pane, and the share of the light in it.
+def _has_specular_lobe(flags: UInt32) -> Bool:
+    return mi.has_flag(flags, mi.BSDFFlags.Delta) | mi.has_flag(flags, mi.BSDFFlags.Null)
 
-    Always the same one: what is drawn by chance would put noise into guides.
+
+def _central_sample(si: SurfaceInteraction3f, bsdf: BSDFPtr, active: Bool) -> tuple[BSDFSample3f, Spectrum]:
+    """BSDF sample at the middle of the likeliest lobe, and its weight in [0, 1].
+
+    The sample is fixed, because a random one would put noise into feature buffers.
     """
-    # Weights of radiance change where it enters glass; those of importance are shares of light.
+    # Radiance is scaled where it enters glass; importance is not, so that its weights are shares of energy.
     context = mi.BSDFContext(mi.TransportMode.Importance)
     bs, weight = bsdf.sample(context, si, mi.Float(_MIDDLE), mi.Point2f(_MIDDLE), active)
     return bs, weight
 
 
-def _normal(si: Any, bsdf: Any, active: Any) -> Any:
-    """Normal that light is scattered by, normal map and all, on the viewer's side."""
+def _normal(si: SurfaceInteraction3f, bsdf: BSDFPtr, active: Bool) -> Normal3f:
+    """Shading normal, normal map included, on the side that the ray comes from."""
     plain = dr.select(si.wi.z < 0, -si.sh_frame.n, si.sh_frame.n)
     mapped = active & bsdf.has_attribute("normal", active)
     return dr.select(mapped, mi.Normal3f(bsdf.eval_attribute_3("normal", si, mapped)), plain)
 
 
-def _albedo(si: Any, bsdf: Any, active: Any) -> Any:
-    """Base colour where the surface has one, else diffuse reflectance, else the tint of a mirror or of glass."""
-    based = active & bsdf.has_attribute("base_color", active)
+def _albedo(si: SurfaceInteraction3f, bsdf: BSDFPtr, active: Bool) -> Color3f:
+    """Base colour where the surface has one, else diffuse reflectance, else the tint of a specular surface."""
+    has_base = active & bsdf.has_attribute("base_color", active)
     diffuse = active & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Diffuse)
-    value = dr.select(diffuse, bsdf.eval_diffuse_reflectance(si, diffuse & ~based), 0)
-    sharp = active & ~based & ~diffuse
-    value = dr.select(sharp, _likeliest(si, bsdf, sharp)[1], value)
-    value = dr.select(based, bsdf.eval_attribute_3("base_color", si, based), value)
+    value = dr.select(diffuse, bsdf.eval_diffuse_reflectance(si, diffuse & ~has_base), 0)
+    specular = active & ~has_base & ~diffuse
+    value = dr.select(specular, _central_sample(si, bsdf, specular)[1], value)
+    value = dr.select(has_base, bsdf.eval_attribute_3("base_color", si, has_base), value)
     return dr.clip(mi.Color3f(value), 0, 1)
 
 
-class ClassicSurfaces:
-    """Surfaces of a classic scene.
+class WhittedSurfaces:
+    """Surfaces of a Whitted-style scene.
 
-    All triangles of a material count as one shape, as its number says; every other primitive is a shape of its own,
-    with numbers from there on. What a surface lets through or mirrors is not looked at.
+    All triangles of a material are one shape, with the index of that material. Every other primitive is a shape of its
+    own, with the indices that follow. Reflection and transparency are ignored.
     """
 
     def __init__(self, built: BuiltClassic) -> None:
@@ -187,44 +223,45 @@ class ClassicSurfaces:
         self._triangles = len(built.scene.triangles.material)
         self._materials = len(built.scene.materials)
         centers = [light.center for light in built.scene.lights] or [(0.0, 0.0, 0.0)]
-        self._lamps = mi.Float(np.array(centers, dtype=np.float32).ravel())
+        self._light_centers = mi.Float(np.array(centers, dtype=np.float32).ravel())
 
-    def first(self, ray: Any, active: Any) -> Seen:
-        o, d = self._turned(mi.Vector3f(ray.o)), self._turned(mi.Vector3f(ray.d))
-        return self._first(o, d, mi.Bool(active))
+    def first_hit(self, ray: Ray3f) -> SurfaceHit:
+        """The first surface that ``ray`` hits."""
+        return self._first_hit(self._turned(mi.Vector3f(ray.o)), self._turned(mi.Vector3f(ray.d)))
 
-    def guide(self, ray: Any, active: Any) -> tuple[Any, Any, Any]:
+    def features(self, ray: Ray3f) -> tuple[Color3f, Normal3f, Float]:
+        """As :meth:`Surfaces.features`, of the first surface whatever it is."""
         o, d = self._turned(mi.Vector3f(ray.o)), self._turned(mi.Vector3f(ray.d))
-        seen = self._first(o, d, mi.Bool(active))
+        first = self._first_hit(o, d)
         behind = dr.clip(background_color(self._built.scene.background, o, d), 0, 1)
-        distance = dr.select(seen.hit, dr.norm(mi.Point3f(seen.p) - mi.Point3f(ray.o)), FAR_AWAY)
-        return dr.select(seen.hit, seen.albedo, behind), seen.n, distance
+        distance = dr.select(first.hit, dr.norm(mi.Point3f(first.p) - mi.Point3f(ray.o)), ENVIRONMENT_DISTANCE)
+        return dr.select(first.hit, first.albedo, behind), first.n, distance
 
-    def _first(self, o: Any, d: Any, active: Any) -> Seen:
+    def _first_hit(self, o: Vector3f, d: Vector3f) -> SurfaceHit:
         built = self._built
-        found = built.geometry.closest(o, d, active, coherent=True)
-        hit = active & (found.index != NONE)
-        is_lamp, lamp = built.geometry.lamp(found)
-        is_lamp &= hit
-        on_surface = hit & ~is_lamp
-        surface = built.geometry.surface(found, o, d, on_surface)
+        closest = built.geometry.closest(o, d, mi.Bool(True), coherent=True)
+        hit = closest.index != NONE
+        is_light, light = built.geometry.lamp(closest)
+        is_light &= hit
+        on_surface = hit & ~is_light
+        surface = built.geometry.surface(closest, o, d, on_surface)
         finish = built.materials.fetch(surface.material, on_surface)
         color = dr.select(surface.colored, surface.color, finish.color)
         texture = dr.select(surface.colored, -1, finish.texture)
-        color = built.textures.color(texture, color, surface.p, found.t, on_surface)
-        p = o + d * found.t
-        outward = dr.normalize(p - dr.gather(mi.Vector3f, self._lamps, lamp, is_lamp))
-        n = dr.normalize(dr.select(is_lamp, outward, surface.n))
+        color = built.textures.color(texture, color, surface.p, closest.t, on_surface)
+        p = o + d * closest.t
+        outward = dr.normalize(p - dr.gather(mi.Vector3f, self._light_centers, light, is_light))
+        n = dr.normalize(dr.select(is_light, outward, surface.n))
         n = dr.select(dr.dot(n, d) > 0, -n, n)
-        single = found.index - self._triangles + self._materials
-        return Seen(
+        single = closest.index - self._triangles + self._materials
+        return SurfaceHit(
             hit,
-            dr.select(hit, mi.Point3f(self._turned(dr.select(is_lamp, p, mi.Vector3f(surface.p)))), 0),
+            dr.select(hit, mi.Point3f(self._turned(dr.select(is_light, p, mi.Vector3f(surface.p)))), 0),
             dr.select(hit, self._turned(n), 0),
             dr.select(on_surface, dr.clip(color, 0, 1), 0),
-            dr.select(found.index < self._triangles, surface.material, single),
+            dr.select(closest.index < self._triangles, surface.material, single),
         )
 
-    def _turned(self, v: Any) -> Any:
-        """Between the scene's own frame and the right-handed world."""
+    def _turned(self, v: Vector3f) -> Vector3f:
+        """``v`` from the right-handed world to the scene's own frame, or back."""
         return mi.Vector3f(v.x, v.y, -v.z) if self._mirrored else v

@@ -1,11 +1,11 @@
-"""The classic light models: Tachyon's, and Haines' for NFF.
+"""Whitted ray tracing: by Tachyon's light model, and by Haines' for NFF.
 
-A surface sends back its own colour (``render/classic/shading.py``), a mirrored ray and a ray that goes through. Both
-are followed, depth first: the second waits on a small stack of each lane. All weights are single numbers, for no
-surface tints what it mirrors or lets through.
+A surface has a local colour (``device/whitted/shading.py``), a reflected ray and a transmitted ray. Both rays are
+followed depth first, the second one waiting on a small stack in each lane. Weights of rays are single numbers, because
+no surface tints reflection or transmission.
 
-Ray depth: the primary ray has ``depth``, each further ray one less. Where a ray of depth 1 needs another, Tachyon takes
-the background as that ray's own would see it, without the surface's factor; under NFF's rules nothing is added.
+Ray depth: the primary ray has ``depth``, each further ray one less. Where a ray of depth 1 would need another, Tachyon
+adds the background along the ray that hit the surface, without the surface's factor; NFF adds nothing.
 """
 
 from __future__ import annotations
@@ -17,34 +17,42 @@ import drjit as dr
 import mitsuba as mi
 
 from lippmann.device.sobol import SampleStream
+from lippmann.device.types import Bool, Color3f, Float, Ray3f, UInt32, Vector3f
 from lippmann.device.whitted.background_fog import background_color, clearness
 from lippmann.device.whitted.geometry import FAR, NONE, Hit, Surface
 from lippmann.device.whitted.materials import LEAST, Finish
 from lippmann.device.whitted.scene import BuiltClassic
 from lippmann.rendering.transport.integrator import FirstHit, RayCounts
 
-#: Rays that may wait on a lane's stack. More would take 2^32 rays a pixel to need.
-DEEPEST_STACK = 32
+#: Rays that may wait on the stack of a lane. A path would need 2^32 rays to exceed it.
+MAX_STACK = 32
 #: Rays of less weight are not followed: a thousandth of a step of an 8-bit picture.
-LEAST_WEIGHT = 4e-6
+MIN_WEIGHT = 4e-6
 
 
 @dataclass
 class _Ray:
-    """A ray on its way: what it will count for, and what it has behind it."""
+    """A ray of the tree, with its weight in the pixel."""
 
-    o: Any
-    d: Any
-    weight: Any
-    depth: Any
-    path: Any  # way from the eye, for image textures
-    surfaces: Any  # transparent surfaces that may still be shaded
+    o: Vector3f
+    d: Vector3f
+    weight: Float
+    depth: UInt32
+    path: Float  # distance from the camera along the path, for image textures
+    surfaces: UInt32  # transparent surfaces that may still be shaded
 
 
-class ClassicIntegrator:
-    """Light along rays in a classic scene.
+class WhittedIntegrator:
+    """Whitted ray tracing of one scene.
 
-    World space is right-handed: a scene of a left-handed format lies in it with its z negated.
+    World space is right-handed: a scene of a left-handed format has its z negated in it.
+
+    Parameters
+    ----------
+    built:
+        The scene on the device.
+    depth:
+        Ray depth of primary rays, at least 1.
     """
 
     # Not a dataclass: Dr.Jit would take it for loop state and write its fields.
@@ -64,15 +72,15 @@ class ClassicIntegrator:
         self._branches = self._spawns and materials.branches
         self._limited = shading.max_transparent_surfaces is not None and materials.lets_through
 
-    def sample(self, ray: Any, stream: SampleStream, active: Any) -> tuple[Any, RayCounts]:
-        """As :class:`~lippmann.rendering.transport.integrator.Integrator` has it."""
+    def sample(self, ray: Ray3f, stream: SampleStream, active: Bool) -> tuple[Color3f, RayCounts]:
+        """As :meth:`lippmann.rendering.transport.integrator.Integrator.sample`."""
         radiance, counts, _ = self.sample_with_hit(ray, stream, active)
         return radiance, counts
 
-    def sample_with_hit(self, ray: Any, stream: SampleStream, active: Any) -> tuple[Any, RayCounts, FirstHit]:
-        """As :meth:`sample`, with what the primary ray hit.
+    def sample_with_hit(self, ray: Ray3f, stream: SampleStream, active: Bool) -> tuple[Color3f, RayCounts, FirstHit]:
+        """As :meth:`sample`, with the first hit.
 
-        The colour depends on the direction where a mirrored or transmitted part is in it, a highlight or an outline.
+        Surfaces with reflection, transmission, a highlight or an outline are view-dependent.
         """
         o, d = mi.Vector3f(ray.o), mi.Vector3f(ray.d)
         if self._mirrored:
@@ -84,20 +92,20 @@ class ClassicIntegrator:
             radiance, counts, first = self._follow(primary, stream, active)
             return radiance, counts, first
         hit = self._built.geometry.closest(o, d, active, coherent=True)
-        radiance, shadow, depends, _ = self._shade(primary, hit, stream, mi.UInt32(0), mi.Bool(True), active)
+        radiance, shadow, view_dependent, _ = self._shade(primary, hit, stream, mi.UInt32(0), mi.Bool(True), active)
         none = dr.zeros(mi.UInt32, dr.width(hit.t))
-        return radiance, RayCounts(none, shadow), FirstHit(_distance(hit, active), depends)
+        return radiance, RayCounts(none, shadow), FirstHit(_distance(hit, active), view_dependent)
 
     @dr.syntax
-    def _follow(self, ray: _Ray, stream: SampleStream, active: Any) -> tuple[Any, RayCounts, FirstHit]:
-        """Shades a ray and all that come of it."""
+    def _follow(self, ray: _Ray, stream: SampleStream, active: Bool) -> tuple[Color3f, RayCounts, FirstHit]:
+        """Trace a ray and the tree of reflected and transmitted rays below it."""
         radiance, shadow, secondary = mi.Color3f(0), mi.UInt32(0), mi.UInt32(0)
         distance, view_dependent = mi.Float(dr.inf), mi.Bool(False)
         hits = mi.UInt32(0)
         waiting = mi.UInt32(0)
         if dr.hint(self._branches, mode="scalar"):
-            room = min(self.depth - 1, DEEPEST_STACK)
-            stack = {f.name: dr.alloc_local(type(getattr(ray, f.name)), room + 1) for f in fields(_Ray)}
+            capacity = min(self.depth - 1, MAX_STACK)
+            stack = {f.name: dr.alloc_local(type(getattr(ray, f.name)), capacity + 1) for f in fields(_Ray)}
         while dr.hint(active, label="rays"):
             is_primary = hits == 0
             hit = self._built.geometry.closest(ray.o, ray.d, active, coherent=is_primary)
@@ -109,125 +117,127 @@ class ClassicIntegrator:
             view_dependent |= depends & is_primary & active
             hits += 1
 
-            goes_on = active & (mirrored.weight > LEAST_WEIGHT)
-            passes = active & (through.weight > LEAST_WEIGHT)
-            ray = _either(goes_on, mirrored, through)
+            continues = active & (mirrored.weight > MIN_WEIGHT)
+            passes = active & (through.weight > MIN_WEIGHT)
+            ray = _either(continues, mirrored, through)
             if dr.hint(self._branches, mode="scalar"):
-                # What does not wait goes to a place of no meaning: conditional writes to local memory lose lanes.
-                waits = goes_on & passes & (waiting < room)
-                _store(stack, dr.select(waits, waiting, room), through)
+                # Rays that do not wait go to a spare entry, because conditional writes to local memory lose lanes.
+                waits = continues & passes & (waiting < capacity)
+                _store(stack, dr.select(waits, waiting, capacity), through)
                 waiting += dr.select(waits, mi.UInt32(1), mi.UInt32(0))
-                returns = active & ~goes_on & ~passes & (waiting > 0)
+                returns = active & ~continues & ~passes & (waiting > 0)
                 waiting -= dr.select(returns, mi.UInt32(1), mi.UInt32(0))
                 ray = _either(returns, _load(stack, waiting), ray)
-                active &= goes_on | passes | returns
+                active &= continues | passes | returns
             else:
-                active &= goes_on | passes
+                active &= continues | passes
         return radiance, RayCounts(secondary, shadow), FirstHit(distance, view_dependent)
 
     def _shade(
-        self, ray: _Ray, hit: Hit, stream: SampleStream, hits: Any, primary: Any, active: Any
-    ) -> tuple[Any, Any, Any, tuple[_Ray, _Ray]]:
-        """What a ray brings by itself, weighted; shadow rays; view dependence; the mirrored ray and the one through."""
+        self, ray: _Ray, hit: Hit, stream: SampleStream, hits: UInt32, primary: Bool, active: Bool
+    ) -> tuple[Color3f, UInt32, Bool, tuple[_Ray, _Ray]]:
+        """Weighted local radiance; count of shadow rays; view dependence; the reflected and the transmitted ray."""
         built, shading = self._built, self._scene.shading
-        met = active & (hit.index != NONE)
-        is_lamp, lamp = built.geometry.lamp(hit)
-        is_lamp &= met
-        met &= ~is_lamp
-        surface = built.geometry.surface(hit, ray.o, ray.d, met)
-        finish = built.materials.fetch(surface.material, met)
+        on_surface = active & (hit.index != NONE)
+        is_light, light = built.geometry.lamp(hit)
+        is_light &= on_surface
+        on_surface &= ~is_light
+        surface = built.geometry.surface(hit, ray.o, ray.d, on_surface)
+        finish = built.materials.fetch(surface.material, on_surface)
         path = ray.path + hit.t if shading.mode != "low" else mi.Float(FAR)
         color = dr.select(surface.colored, surface.color, finish.color)
-        color = built.textures.color(dr.select(surface.colored, -1, finish.texture), color, surface.p, path, met)
-        lamp_color = built.lamps.color(lamp, is_lamp)
-        behind = background_color(self._scene.background, ray.o, ray.d)
+        color = built.textures.color(dr.select(surface.colored, -1, finish.texture), color, surface.p, path, on_surface)
+        light_color = built.lamps.color(light, is_light)
+        background = background_color(self._scene.background, ray.o, ray.d)
         if self._plain:
             if shading.mode == "lowest":
-                color, lamp_color, behind = mi.Color3f(1), mi.Color3f(1), mi.Color3f(0)
-            shown = dr.select(met, color, dr.select(is_lamp, lamp_color, behind))
-            return shown * ray.weight, mi.UInt32(0), mi.Bool(False), (_dropped(ray), _dropped(ray))
+                color, light_color, background = mi.Color3f(1), mi.Color3f(1), mi.Color3f(0)
+            radiance = dr.select(on_surface, color, dr.select(is_light, light_color, background))
+            return radiance * ray.weight, mi.UInt32(0), mi.Bool(False), (_dropped(ray), _dropped(ray))
 
-        own, shines, shadow = built.shader.light(surface, finish, color, ray.d, stream, hits, met)
-        passed_over = mi.Bool(False)
+        local, glossy, shadow = built.shader.light(surface, finish, color, ray.d, stream, hits, on_surface)
+        skipped = mi.Bool(False)
         if self._limited:
-            passed_over = met & (finish.opacity < 1) & (ray.surfaces == 0)
+            skipped = on_surface & (finish.opacity < 1) & (ray.surfaces == 0)
         alpha = self._opacity(surface, finish, ray.d)
-        mirrors = met & (finish.specular > (0 if self._nff else LEAST)) & ~passed_over
-        lets_through = met & (finish.opacity < 1 - LEAST) & ~passed_over
-        kept = dr.select(lets_through, alpha, 1) if shading.local_times_opacity else mi.Float(1)
-        mirrored_share = dr.select(mirrors, finish.specular * kept, 0)
-        through_share = dr.select(lets_through, 1 - alpha, 0)
-        own = dr.select(passed_over, 0, own * kept)
+        mirrors = on_surface & (finish.specular > (0 if self._nff else LEAST)) & ~skipped
+        lets_through = on_surface & (finish.opacity < 1 - LEAST) & ~skipped
+        local_share = dr.select(lets_through, alpha, 1) if shading.local_times_opacity else mi.Float(1)
+        reflected_share = dr.select(mirrors, finish.specular * local_share, 0)
+        transmitted_share = dr.select(lets_through, 1 - alpha, 0)
+        local = dr.select(skipped, 0, local * local_share)
 
         direction = ray.d
         if self._nff:
-            direction, reflected = _refracted(surface, finish, ray.d)
-            mirrored_share += dr.select(reflected, through_share, 0)
-            through_share = dr.select(reflected, 0, through_share)
-        through_share = dr.select(passed_over, 1, through_share)
-        ends = ray.depth <= 1
+            direction, total = _refracted(surface, finish, ray.d)
+            reflected_share += dr.select(total, transmitted_share, 0)
+            transmitted_share = dr.select(total, 0, transmitted_share)
+        transmitted_share = dr.select(skipped, 1, transmitted_share)
+        last = ray.depth <= 1
         if not self._nff:
-            missing = dr.select(mirrors, kept, 0) + dr.select(lets_through | passed_over, 1, 0)
-            own += dr.select(ends & met, behind * missing, 0)
+            missing = dr.select(mirrors, local_share, 0) + dr.select(lets_through | skipped, 1, 0)
+            local += dr.select(last & on_surface, background * missing, 0)
 
-        clear, haze = self._fog(hit, ray.d, met, active & ~met & ~is_lamp, passed_over, primary)
-        shown = dr.select(met, own, dr.select(is_lamp, lamp_color, behind)) * clear + haze
-        weight = dr.select(ends | ~met, 0, ray.weight * clear)
+        clear, haze = self._fog(hit, ray.d, on_surface, active & ~on_surface & ~is_light, skipped, primary)
+        radiance = dr.select(on_surface, local, dr.select(is_light, light_color, background)) * clear + haze
+        weight = dr.select(last | ~on_surface, 0, ray.weight * clear)
         mirrored_d = ray.d - surface.n * (2 * dr.dot(surface.n, ray.d))
         mirrored = _Ray(
-            surface.start(mirrored_d), mirrored_d, weight * mirrored_share, ray.depth - 1, path, ray.surfaces
+            surface.start(mirrored_d), mirrored_d, weight * reflected_share, ray.depth - 1, path, ray.surfaces
         )
         through = _Ray(
             surface.start(direction),
             direction,
-            weight * through_share,
+            weight * transmitted_share,
             ray.depth - 1,
             path,
             dr.maximum(ray.surfaces, 1) - 1,
         )
-        depends = met & (mirrors | lets_through | shines | passed_over)
+        view_dependent = on_surface & (mirrors | lets_through | glossy | skipped)
         if built.materials.outlined:
-            depends |= met & (finish.outline > 0)
-        return shown * ray.weight, shadow, depends, (mirrored, through)
+            view_dependent |= on_surface & (finish.outline > 0)
+        return radiance * ray.weight, shadow, view_dependent, (mirrored, through)
 
-    def _opacity(self, surface: Surface, finish: Finish, d: Any) -> Any:
+    def _opacity(self, surface: Surface, finish: Finish, d: Vector3f) -> Float:
         if not self._raster3d:
             return finish.opacity
         by_angle = dr.square(1 + dr.cos(_RASTER3D_PI * (1 - finish.opacity) * dr.dot(surface.n, d))) * 0.25
         return by_angle if self._scene.shading.raster3d else dr.select(finish.raster3d, by_angle, finish.opacity)
 
-    def _fog(self, hit: Hit, d: Any, met: Any, missed: Any, passed_over: Any, primary: Any) -> tuple[Any, Any]:
-        """Share of a ray's colour that is seen through the fog, and what the fog adds."""
+    def _fog(
+        self, hit: Hit, d: Vector3f, on_surface: Bool, missed: Bool, skipped: Bool, primary: Bool
+    ) -> tuple[Float, Color3f]:
+        """Transmittance of the fog along a ray, and the radiance that the fog adds."""
         fog = self._scene.fog
         if fog is None:
             return mi.Float(1), mi.Color3f(0)
-        distance = dr.select(met, hit.t, FAR)
+        distance = dr.select(on_surface, hit.t, FAR)
         if fog.planar:
             view = mi.Vector3f(*self._scene.camera.frame()[2].tolist())
             distance = dr.select(primary, distance * dr.dot(d, view), distance)
-        foggy = (met & ~passed_over) if fog.planar else (met & ~passed_over) | missed
+        foggy = (on_surface & ~skipped) if fog.planar else (on_surface & ~skipped) | missed
         clear = dr.select(foggy, clearness(fog, distance), 1)
         return clear, mi.Color3f(*fog.color) * (1 - clear)
 
 
-#: As Tachyon has it.
+#: Tachyon's value of pi.
 _RASTER3D_PI = 3.1415926
 
 
-def _mirrored(v: Any) -> Any:
+def _mirrored(v: Vector3f) -> Vector3f:
     return mi.Vector3f(v.x, v.y, -v.z)
 
 
-def _store(stack: dict[str, Any], place: Any, ray: _Ray) -> None:
+def _store(stack: dict[str, Any], entry: UInt32, ray: _Ray) -> None:
     for name, column in stack.items():
-        column[place] = getattr(ray, name)
+        column[entry] = getattr(ray, name)
 
 
-def _load(stack: dict[str, Any], place: Any) -> _Ray:
-    return _Ray(**{name: column[place] for name, column in stack.items()})
+def _load(stack: dict[str, Any], entry: UInt32) -> _Ray:
+    return _Ray(**{name: column[entry] for name, column in stack.items()})
 
 
-def _distance(hit: Hit, active: Any) -> Any:
+def _distance(hit: Hit, active: Bool) -> Float:
     return dr.select(active & (hit.index != NONE), hit.t, dr.inf)
 
 
@@ -235,12 +245,12 @@ def _dropped(ray: _Ray) -> _Ray:
     return _Ray(ray.o, ray.d, mi.Float(0), ray.depth, ray.path, ray.surfaces)
 
 
-def _either(condition: Any, a: _Ray, b: _Ray) -> _Ray:
+def _either(condition: Bool, a: _Ray, b: _Ray) -> _Ray:
     return _Ray(*(dr.select(condition, getattr(a, f.name), getattr(b, f.name)) for f in fields(_Ray)))
 
 
-def _refracted(surface: Surface, finish: Finish, d: Any) -> tuple[Any, Any]:
-    """Direction of the refracted ray by Snell's law, and whether all is reflected instead."""
+def _refracted(surface: Surface, finish: Finish, d: Vector3f) -> tuple[Vector3f, Bool]:
+    """Direction of the refracted ray by Snell's law, and whether there is total internal reflection instead."""
     ratio = dr.select(dr.dot(surface.face, d) < 0, dr.rcp(finish.ior), finish.ior)
     cosine = -dr.dot(surface.n, d)
     squared = 1 - ratio * ratio * (1 - cosine * cosine)

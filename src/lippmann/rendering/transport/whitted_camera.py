@@ -1,22 +1,29 @@
-"""Rays of a classic scene's own camera."""
+"""Rays of the camera of a Whitted-style scene."""
 
 from __future__ import annotations
-
-from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 
 from lippmann.device.sobol import hash32
+from lippmann.device.types import Float64, Point2f, Ray3f, UInt32, Vector3d
 from lippmann.scene.values.whitted_camera import ClassicCamera, Handedness
 
 
-class ClassicCameraRays:
-    """Pixels of a picture as the scene's camera sees it, pixel (0, 0) at the top left.
+class WhittedCameraRays:
+    """Rays of the camera of a Whitted-style scene; pixel (0, 0) is at the top left.
 
-    Samples fill a pixel's square about the point where its first sample lies: the upper right corner (Tachyon) or the
-    center. Depth of field spreads them over the aperture too, the sample in the middle aside. ``handedness`` is the
-    scene's; rays come in the right-handed world, z negated for a left-handed scene.
+    Samples fill a square of one pixel about the pixel's reference point: its upper right corner (Tachyon) or its
+    centre. With depth of field they also fill the aperture, except for the sample at the reference point.
+
+    Parameters
+    ----------
+    camera:
+        The camera.
+    handedness:
+        That of the scene. Rays are in the right-handed world: z is negated for a left-handed scene.
+    width, height:
+        Size of the picture in pixels.
     """
 
     def __init__(self, camera: ClassicCamera, handedness: Handedness, width: int, height: int) -> None:
@@ -26,7 +33,8 @@ class ClassicCameraRays:
         self.channels = 1
         self._flip = -1.0 if handedness == "left" else 1.0
 
-    def rays(self, column: Any, row: Any, channel: Any, jitter: Any) -> Any:
+    def rays(self, column: UInt32, row: UInt32, channel: UInt32, jitter: Point2f) -> Ray3f:
+        """As :meth:`~lippmann.rendering.transport.ray_source.RaySource.rays`."""
         del channel
         camera = self.camera
         left, right, bottom, top = camera.window(self.width, self.height)
@@ -49,12 +57,12 @@ class ClassicCameraRays:
             d = dr.normalize(view + across * x + up * y)
         return mi.Ray3f(mi.Point3f(self._world(o)), mi.Vector3f(self._world(d)))
 
-    def _world(self, v: Any) -> Any:
+    def _world(self, v: Vector3d) -> Vector3d:
         return mi.Vector3d(v.x, v.y, v.z * self._flip)
 
 
-def _lens_point(column: Any, row: Any, jitter: Any) -> tuple[Any, Any]:
-    """Two numbers in [-0.5, 0.5) that follow from the sample's place in the picture, 0 in the middle of its pixel."""
+def _lens_point(column: UInt32, row: UInt32, jitter: Point2f) -> tuple[Float64, Float64]:
+    """Point of the aperture in [-0.5, 0.5)^2, hashed from a pixel and its jitter; 0 where the jitter is 0.5."""
     bits = [dr.reinterpret_array(mi.UInt32, mi.Float(part)) for part in (jitter.x, jitter.y)]
     first = hash32(bits[0] ^ hash32(bits[1] ^ hash32(mi.UInt32(column) ^ hash32(mi.UInt32(row)))))
     middle = (jitter.x == 0.5) & (jitter.y == 0.5)
