@@ -1,6 +1,7 @@
 """The shape of the code, held by reading its source: who may import whom, and what may be loaded when."""
 
 import ast
+import itertools
 import re
 import subprocess
 import sys
@@ -358,3 +359,35 @@ def test_no_path_of_one_machine():
 @pytest.mark.parametrize("line", ["see /" + "home/me/x.py", 'open("/' + "tmp/x.png" + '")', "=/" + "work/a"])
 def test_paths_of_one_machine_are_recognised(line):
     assert MACHINE_PATH.search(line)
+
+
+#: How ``lippmann render`` gets from the command to the file, a hop a function: CONTRIBUTING.md shows it to readers.
+WALK = (
+    ("cli.commands.render", "render"),
+    ("rendering.picture", "render_picture"),
+    ("rendering.request.resolve", "resolve"),
+    ("rendering.session", "open_session"),
+    ("rendering.methods", "trace"),
+    ("rendering.methods", "trace_samples"),
+    ("rendering.film.sample_batches", "trace_in_batches"),
+    ("rendering.transport.path", "sample"),
+    ("image.integral_image", "save"),
+    ("image.write", "write_picture"),
+    ("image.encoding", "encode_values"),
+    ("codecs.png", "encode_png"),
+)
+
+
+def test_a_render_is_followed_in_twelve_hops():
+    """Each step is defined where the walk says and named by a step before it; it turns upward three times at most."""
+    named: set[str] = {"render"}
+    for module, function in WALK:
+        tree = ast.parse((SOURCE / f"{module.replace('.', '/')}.py").read_text(encoding="utf-8"))
+        defined = {node.name for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)}
+        assert function in defined, f"{module} has no function {function}"
+        assert function in named, f"nothing before {module}.{function} calls it"
+        named |= {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)}
+        named |= {node.attr for node in ast.walk(tree) if isinstance(node, ast.Attribute)}
+    assert len(WALK) <= 12
+    ranks = [ORDER.index(module.rpartition(".")[0]) for module, _ in WALK]
+    assert sum(after > before for before, after in itertools.pairwise(ranks)) <= 3
