@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.progress import ProgressCallback
-from lippmann.rendering.adaptive.convergence import Judge, Track
-from lippmann.rendering.adaptive.method_race import DENOISED_SLOPE, Contest
+from lippmann.rendering.adaptive.convergence import Assessor, ErrorTrack
+from lippmann.rendering.adaptive.method_race import DENOISED_SLOPE, MethodRace
 from lippmann.rendering.adaptive.stopping import Goal, Outcome, goal_of, reach
 from lippmann.rendering.denoise.cost_model import effort_of, look_cost, traced_work
 from lippmann.rendering.denoise.dual_buffer import Denoised
@@ -187,27 +187,27 @@ def _until(job: Job, goal: Goal) -> Traced:
     def rays() -> float:
         return _rays_per_pixel(job, batches.rays)
 
-    plain = _Candidate(batches, Track(batches, estimator))
+    plain = _Candidate(batches, ErrorTrack(batches, estimator))
     denoised = None if job.request.denoise == "none" else _denoised_candidate(job, goal, batches, rays)
     if denoised is None:
-        judge: Judge = plain.track
+        assessor: Assessor = plain.track
     elif job.request.denoise == "auto":
-        judge = Contest(goal, plain.track, denoised.track, rays)
+        assessor = MethodRace(goal, plain.track, denoised.track, rays)
     else:
-        judge = denoised.track
-    outcome = reach(goal, batches.add, judge, job.progress, probe=batches.probe)
+        assessor = denoised.track
+    outcome = reach(goal, batches.add, assessor, job.progress, probe=batches.probe)
     options: dict[str, object] = {}
     notes = _end_notes(goal, outcome)
     method = job.request.method
     won = denoised or plain
-    if isinstance(judge, Contest):
-        if judge.leader == "plain":
+    if isinstance(assessor, MethodRace):
+        if assessor.leader == "plain":
             won = plain
         if method == "full":
             method = "full" if won is plain else "pooled"
-            options["auto"] = f"{method}: {judge.why}"
+            options["auto"] = f"{method}: {assessor.reason}"
         elif won is plain:
-            notes = (*notes, f"the light is not pooled: {judge.why}")
+            notes = (*notes, f"the light is not pooled: {assessor.reason}")
     frame = Frame(won.renderer.picture(), batches.rays, batches.seconds_compile, batches.seconds_trace)
     if outcome.errors is not None:
         frame.maps[ERROR_LAYER] = np.maximum(outcome.errors.values, 0)
@@ -230,7 +230,7 @@ def _batches(job: Job) -> FullInBatches:
 
 
 def _denoised_part(job: Job) -> Traced:
-    """So many samples without their noise, for a picture that is put together and judged elsewhere."""
+    """So many samples without their noise, for a picture that is put together and assessment elsewhere."""
     batches = _batches(job)
     batches.add(job.request.samples, job.progress)
     denoiser = _denoiser(job, lambda: _rays_per_pixel(job, batches.rays))
@@ -245,10 +245,10 @@ def _denoised_part(job: Job) -> Traced:
 
 @dataclass(frozen=True)
 class _Candidate:
-    """A picture that grows, who judges it, and what takes its noise out."""
+    """A picture that grows, the track of its error, and its denoiser."""
 
     renderer: FullInBatches | Denoised
-    track: Track
+    track: ErrorTrack
     denoiser: GuidedDenoiser | None = None
 
 
@@ -265,11 +265,11 @@ def _denoised_candidate(job: Job, goal: Goal, batches: FullInBatches, rays: Call
     renderer = _denoised(job, batches, denoiser)
     seconds = 0.0 if goal.max_time is None else denoiser.probe()
 
-    def dear() -> bool:
+    def is_expensive() -> bool:
         spent = rays()
         return 0 < spent < look_cost(spent)
 
-    track = Track(renderer, _estimator(job, DenoisedEstimator), DENOISED_SLOPE, seconds, dear)
+    track = ErrorTrack(renderer, _estimator(job, DenoisedEstimator), DENOISED_SLOPE, seconds, is_expensive)
     return _Candidate(renderer, track, denoiser)
 
 

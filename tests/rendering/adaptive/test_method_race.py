@@ -11,8 +11,8 @@ from lippmann.display import Display
 from lippmann.display.lens_array import LensArray
 from lippmann.display.panel import Panel
 from lippmann.progress import silent
-from lippmann.rendering.adaptive.convergence import Track
-from lippmann.rendering.adaptive.method_race import ASKED_AGAIN, Contest
+from lippmann.rendering.adaptive.convergence import ErrorTrack
+from lippmann.rendering.adaptive.method_race import ASKED_AGAIN, MethodRace
 from lippmann.rendering.adaptive.stopping import Goal, reach
 from lippmann.rendering.estimate.pixel_errors import CROSS_NOISE, OWN_NOISE, PixelErrors
 from lippmann.rendering.estimate.psnr import PictureEstimator
@@ -64,67 +64,67 @@ def run(
     floor_of_plain=0.0,
     shaken_to=0,
 ):
-    """The contest, its outcome and the denoised picture."""
+    """The race, its outcome and the denoised picture."""
     samples = Samples(seconds)
     noisy = Picture(samples, plain, floor=floor_of_plain)
     clean = Picture(samples, denoised, slope, floor, CROSS_NOISE, shaken_to)
-    contest = Contest(
+    race = MethodRace(
         goal,
-        Track(noisy, PictureEstimator(SHOWN)),
-        Track(clean, Sooner(SHOWN), 0.6),
+        ErrorTrack(noisy, PictureEstimator(SHOWN)),
+        ErrorTrack(clean, Sooner(SHOWN), 0.6),
         lambda: rays * samples.taken,
     )
-    outcome = reach(goal, samples.add, contest, clock=lambda: samples.now, probe=lambda: seconds)
-    return contest, outcome, clean
+    outcome = reach(goal, samples.add, race, clock=lambda: samples.now, probe=lambda: seconds)
+    return race, outcome, clean
 
 
 def test_denoising_wins_where_noise_is_strong():
-    contest, outcome, _ = run(Goal(quality=25))
-    assert (contest.leader, outcome.end) == ("pooled", "quality")
+    race, outcome, _ = run(Goal(quality=25))
+    assert (race.leader, outcome.end) == ("pooled", "quality")
     assert outcome.samples < 100  # plain samples would have taken 300
-    assert "pooled and" in contest.why
+    assert "pooled and" in race.reason
 
 
 def test_pooled_light_is_believed_sooner():
-    contest, outcome, _ = run(Goal(quality_mean=25), plain=0.5, denoised=1e-3)
-    assert (contest.leader, outcome.end, outcome.samples) == ("pooled", "quality", Sooner.fewest)
+    race, outcome, _ = run(Goal(quality_mean=25), plain=0.5, denoised=1e-3)
+    assert (race.leader, outcome.end, outcome.samples) == ("pooled", "quality", Sooner.fewest)
 
 
 def test_plain_samples_are_not_believed_as_soon_as_pooled_light():
     """They are there with 8; what 16 cost is set against pooling."""
-    contest, outcome, clean = run(Goal(quality_mean=25), plain=0.02, denoised=1e-3, rays=0.5)
-    assert (contest.leader, outcome.end, outcome.samples) == ("plain", "quality", PictureEstimator.fewest)
+    race, outcome, clean = run(Goal(quality_mean=25), plain=0.02, denoised=1e-3, rays=0.5)
+    assert (race.leader, outcome.end, outcome.samples) == ("plain", "quality", PictureEstimator.fewest)
     assert clean.looks == 0
-    dear, outcome, _ = run(Goal(quality_mean=25), plain=0.02, denoised=1e-3, rays=30.0)
-    assert (dear.leader, outcome.samples) == ("pooled", Sooner.fewest)
+    is_expensive, outcome, _ = run(Goal(quality_mean=25), plain=0.02, denoised=1e-3, rays=30.0)
+    assert (is_expensive.leader, outcome.samples) == ("pooled", Sooner.fewest)
 
 
 def test_a_few_plain_samples_end_it_where_they_are_far_better():
     """Nobody looks at pooled light, whatever samples take."""
     for rays in (0.5, 300.0):
-        contest, outcome, clean = run(Goal(quality_mean=25), plain=1e-3, denoised=1e-3, rays=rays)
-        assert (contest.leader, outcome.end, outcome.samples) == ("plain", "quality", PictureEstimator.first)
+        race, outcome, clean = run(Goal(quality_mean=25), plain=1e-3, denoised=1e-3, rays=rays)
+        assert (race.leader, outcome.end, outcome.samples) == ("plain", "quality", PictureEstimator.first)
         assert clean.looks == 0
 
 
 def test_plain_samples_win_where_the_quality_is_near():
-    contest, outcome, clean = run(Goal(quality_mean=24.8), plain=0.05, rays=1.0)
-    assert (contest.leader, outcome.end) == ("plain", "quality")
+    race, outcome, clean = run(Goal(quality_mean=24.8), plain=0.05, rays=1.0)
+    assert (race.leader, outcome.end) == ("plain", "quality")
     assert clean.looks == 0
-    assert "less than pooling takes" in contest.why
+    assert "less than pooling takes" in race.reason
 
 
 def test_a_denoised_picture_that_stays_wrong_is_left():
     """It is better at first, but its bias keeps it from the goal."""
-    contest, outcome, clean = run(Goal(quality=33), plain=0.2, denoised=0.005, floor=1e-3)
-    assert (contest.leader, outcome.end) == ("plain", "quality")
+    race, outcome, clean = run(Goal(quality=33), plain=0.2, denoised=0.005, floor=1e-3)
+    assert (race.leader, outcome.end) == ("plain", "quality")
     assert clean.looks < len(outcome.rounds)
-    assert "which reaches the goal sooner" in contest.why
+    assert "which reaches the goal sooner" in race.reason
 
 
 def test_a_denoised_picture_that_is_worse_is_seldom_looked_at():
-    contest, outcome, clean = run(Goal(quality=40), plain=0.2, denoised=0.5)
-    assert contest.leader == "plain"
+    race, outcome, clean = run(Goal(quality=40), plain=0.2, denoised=0.5)
+    assert race.leader == "plain"
     assert 1 < clean.looks <= 1 + math.log(outcome.samples / 8, ASKED_AGAIN)
     assert clean.looks < len(outcome.rounds)
     timed, _, clean = run(Goal(quality=40, max_time=1000.0), plain=0.2, denoised=0.5)
@@ -133,27 +133,27 @@ def test_a_denoised_picture_that_is_worse_is_seldom_looked_at():
 
 def test_when_no_more_samples_may_be_taken_the_denoised_picture_is_looked_at_again():
     """It lost at first; plain samples did not get there."""
-    contest, outcome, clean = run(Goal(quality=30, spp=24), plain=0.05, floor_of_plain=4e-3, shaken_to=12)
-    assert (contest.leader, outcome.end, outcome.samples, clean.looks) == ("pooled", "quality", 24, 2)
+    race, outcome, clean = run(Goal(quality=30, spp=24), plain=0.05, floor_of_plain=4e-3, shaken_to=12)
+    assert (race.leader, outcome.end, outcome.samples, clean.looks) == ("pooled", "quality", 24, 2)
 
 
 def test_a_denoised_picture_gets_another_chance_where_plain_samples_do_not_keep_their_promise():
     """So it is where the first single hits of strong light shake both, and plain noise then never falls."""
-    contest, outcome, clean = run(Goal(quality=30, spp=4096), plain=0.05, floor_of_plain=2e-3, shaken_to=24)
-    assert (contest.leader, outcome.end) == ("pooled", "quality")
+    race, outcome, clean = run(Goal(quality=30, spp=4096), plain=0.05, floor_of_plain=2e-3, shaken_to=24)
+    assert (race.leader, outcome.end) == ("pooled", "quality")
     assert clean.looks > 1
 
 
 @pytest.mark.parametrize(("seconds", "leader"), [(0.5, "pooled"), (0.0005, "plain")])
 def test_with_a_time_the_better_picture_at_its_end_wins(seconds, leader):
     """Few samples are better denoised; many are better left alone, for denoising then does more harm than good."""
-    contest, outcome, _ = run(Goal(max_time=20.0), floor=2e-3, slope=0.9, seconds=seconds)
-    assert (contest.leader, outcome.end) == (leader, "time")
+    race, outcome, _ = run(Goal(max_time=20.0), floor=2e-3, slope=0.9, seconds=seconds)
+    assert (race.leader, outcome.end) == (leader, "time")
 
 
 def test_samples_bound_both():
-    contest, outcome, _ = run(Goal(quality=60, spp=32))
-    assert (outcome.end, outcome.samples, contest.leader) == ("samples", 32, "pooled")
+    race, outcome, _ = run(Goal(quality=60, spp=32))
+    assert (outcome.end, outcome.samples, race.leader) == ("samples", 32, "pooled")
 
 
 def test_the_same_samples_give_the_same_winner_whatever_they_take():

@@ -9,7 +9,7 @@ from lippmann.display import Display
 from lippmann.display.lens_array import LensArray
 from lippmann.display.panel import Panel
 from lippmann.progress import Progress
-from lippmann.rendering.adaptive.convergence import Track
+from lippmann.rendering.adaptive.convergence import ErrorTrack
 from lippmann.rendering.adaptive.stopping import STEP, TOLERANCE, Goal, reach
 from lippmann.rendering.estimate.pixel_errors import OWN_NOISE, PixelErrors
 from lippmann.rendering.estimate.psnr import Estimate, PictureEstimator
@@ -40,7 +40,7 @@ class Noise:
 
 def run(goal, renderer, reports=None):
     listen = reports.append if reports is not None else lambda _: None
-    return reach(goal, renderer.add, Track(renderer, PictureEstimator(SHOWN)), listen, renderer.clock)
+    return reach(goal, renderer.add, ErrorTrack(renderer, PictureEstimator(SHOWN)), listen, renderer.clock)
 
 
 @pytest.mark.parametrize("slope", [0.8, 1.0, 1.5])
@@ -64,7 +64,7 @@ class Sooner(PictureEstimator):
 def test_the_first_look_waits_while_it_takes_more_than_samples(dear_until, first):
     """Not longer than for twice the fewest samples; whatever comes then is a multiple of the batches again."""
     renderer = Noise(error=0.2)
-    track = Track(renderer, Sooner(SHOWN), dear=lambda: 0 < renderer.samples < dear_until)
+    track = ErrorTrack(renderer, Sooner(SHOWN), is_expensive=lambda: 0 < renderer.samples < dear_until)
     outcome = reach(Goal(quality_mean=40), renderer.add, track, clock=renderer.clock)
     found = [each.samples for each in outcome.rounds]
     assert found[0] == first
@@ -73,7 +73,7 @@ def test_the_first_look_waits_while_it_takes_more_than_samples(dear_until, first
 
 def test_where_time_is_short_no_look_waits():
     renderer = Noise(error=0.2, seconds=1.0)
-    track = Track(renderer, Sooner(SHOWN), dear=lambda: True)
+    track = ErrorTrack(renderer, Sooner(SHOWN), is_expensive=lambda: True)
     goal = Goal(quality_mean=40, max_time=5.5)
     outcome = reach(goal, renderer.add, track, clock=renderer.clock, probe=lambda: 1.0)
     assert renderer.now <= 5.5
@@ -101,7 +101,7 @@ def test_the_first_round_fits_the_time(seconds, samples):
     renderer = Noise(seconds=seconds)
     goal = Goal(max_time=10.0)
     outcome = reach(
-        goal, renderer.add, Track(renderer, PictureEstimator(SHOWN)), clock=renderer.clock, probe=lambda: seconds
+        goal, renderer.add, ErrorTrack(renderer, PictureEstimator(SHOWN)), clock=renderer.clock, probe=lambda: seconds
     )
     assert renderer.now <= max(10.0, seconds)
     assert (outcome.end, outcome.samples) == ("time", samples)
@@ -113,14 +113,14 @@ def test_a_probe_that_promised_too_much_is_not_believed_twice():
     outcome = reach(
         Goal(max_time=10.0),
         renderer.add,
-        Track(renderer, PictureEstimator(SHOWN)),
+        ErrorTrack(renderer, PictureEstimator(SHOWN)),
         clock=renderer.clock,
         probe=lambda: 1.2,
     )
     assert (outcome.samples, renderer.now <= 10.0) == (9, True)
     slow = Noise(seconds=30.0)
     outcome = reach(
-        Goal(max_time=40.0), slow.add, Track(slow, PictureEstimator(SHOWN)), clock=slow.clock, probe=lambda: 25.0
+        Goal(max_time=40.0), slow.add, ErrorTrack(slow, PictureEstimator(SHOWN)), clock=slow.clock, probe=lambda: 25.0
     )
     assert (outcome.samples, outcome.estimate) == (1, None)
 
@@ -132,7 +132,7 @@ def test_without_a_limit_of_time_nothing_is_probed():
     renderer = Noise()
     assert (
         reach(
-            Goal(spp=8), renderer.add, Track(renderer, PictureEstimator(SHOWN)), clock=renderer.clock, probe=never
+            Goal(spp=8), renderer.add, ErrorTrack(renderer, PictureEstimator(SHOWN)), clock=renderer.clock, probe=never
         ).samples
         == 8
     )

@@ -1,4 +1,4 @@
-"""Rendering until a picture is good enough: rounds of samples, each judged by the picture's own estimate.
+"""Rendering until a picture is good enough: rounds of samples, each assessment by the picture's own estimate.
 
 A round is as large as the estimates so far say that it must be, but never more than a few times what has gone before:
 early estimates are rough, and what is overshot is lost. Very few samples end it only where they seem far better than
@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from lippmann.progress import Progress, ProgressCallback, silent
-from lippmann.rendering.adaptive.convergence import Judge, Judgement
+from lippmann.rendering.adaptive.convergence import Assessment, Assessor
 from lippmann.rendering.estimate.pixel_errors import PixelErrors
 from lippmann.rendering.estimate.psnr import Estimate
 from lippmann.rendering.request.render_request import RenderRequest
@@ -53,7 +53,7 @@ class Goal:
     spp:
         Samples per pixel; at least two, fewer tell no error.
     part:
-        What a part of the picture that is judged by itself is called.
+        What a part of the picture that is assessment by itself is called.
     """
 
     quality: float | None = None
@@ -134,45 +134,45 @@ class Outcome:
 def reach(
     goal: Goal,
     add: Callable[[int, ProgressCallback], None],
-    judge: Judge,
+    assessor: Assessor,
     progress: ProgressCallback = silent,
     clock: Callable[[], float] = time.perf_counter,
     probe: Callable[[], float] | None = None,
 ) -> Outcome:
-    """Take rounds of samples by ``add`` until ``judge`` says that ``goal`` is reached.
+    """Take rounds of samples by ``add`` until ``assessor`` says that ``goal`` is reached.
 
     ``probe`` measures the seconds of a sample per pixel by a few of them. It is asked where time is limited: without
     it the first round has two samples, however long they take.
     """
-    return _Climb(goal, add, judge, progress, clock, probe).run()
+    return _AdaptiveLoop(goal, add, assessor, progress, clock, probe).run()
 
 
-def short_of_belief(goal: Goal, estimate: Estimate, samples: int, judge: Judge) -> float:
-    """How many dB ``estimate`` is short of what ``judge`` must say of so many samples to be believed of ``goal``."""
-    return goal.missing(estimate) + judge.margin(samples)
+def missing_with_margin(goal: Goal, estimate: Estimate, samples: int, assessor: Assessor) -> float:
+    """dB by which ``estimate`` is short of ``goal`` and the margin that ``assessor`` asks of so few samples."""
+    return goal.missing(estimate) + assessor.margin(samples)
 
 
-def believed_from(goal: Goal, judged: Judgement, samples: int, judge: Judge) -> int:
-    """With how many samples ``judge`` will be believed of a picture that was ``judged`` after ``samples``.
+def samples_to_trust(goal: Goal, assessment: Assessment, samples: int, assessor: Assessor) -> int:
+    """Samples per pixel at which ``assessor`` is expected to be trusted, after an ``assessment`` at ``samples``.
 
-    That many, or doubled until the picture should be better than ``goal`` by the margin, or samples are enough anyway.
+    Doubled until the picture should exceed ``goal`` by the margin, or no margin is needed any more.
     """
     needed = samples
-    while needed < judge.fewest:
-        gained = 10 * judged.slope * math.log10(needed / samples)
-        if short_of_belief(goal, judged.estimate, needed, judge) <= gained:
+    while needed < assessor.fewest:
+        gained = 10 * assessment.slope * math.log10(needed / samples)
+        if missing_with_margin(goal, assessment.estimate, needed, assessor) <= gained:
             break
         needed *= 2
     return needed
 
 
 @dataclass
-class _Climb:
-    """One rendering on its way; ``spent`` is in samples per pixel, ``rate`` what of them a second brings."""
+class _AdaptiveLoop:
+    """One adaptive rendering; ``spent`` is in samples per pixel, ``rate`` in those per second."""
 
     goal: Goal
     add: Callable[[int, ProgressCallback], None]
-    judge: Judge
+    assessor: Assessor
     progress: ProgressCallback
     clock: Callable[[], float]
     probe: Callable[[], float] | None
@@ -193,16 +193,16 @@ class _Climb:
                 return Outcome("time", None, self.spent, (), None)
             if self.spent < FEWEST:
                 self._take(FEWEST - self.spent)
-            self._take_up_to(self.judge.first)
-            judged = self.judge.judge(self.spent, self._room())
-            self._slope = judged.slope
-            self.rounds.append(Round(self.spent, self._seconds(), judged.estimate))
-            end = self._end(judged.estimate)
+            self._take_up_to(self.assessor.first)
+            assessment = self.assessor.assess(self.spent, self._room())
+            self._slope = assessment.slope
+            self.rounds.append(Round(self.spent, self._seconds(), assessment.estimate))
+            end = self._end(assessment.estimate)
             if end is None:
-                samples = self._next_round(judged)
+                samples = self._next_round(assessment)
                 end = "time" if samples < 1 else None
             if end is not None:
-                return self._outcome(end, judged)
+                return self._outcome(end, assessment)
 
     def _take(self, samples: int) -> None:
         started = self.clock()
@@ -211,20 +211,20 @@ class _Climb:
         self.rate = samples / max(self.clock() - started, 1e-6)
 
     def _take_up_to(self, samples: int) -> None:
-        """What the judge turns out to want, where a quality is asked for and there is time."""
+        """Take what the assessor turns out to need, where a quality is asked for and there is time."""
         more = min(samples, self._most) - self.spent
         if self.goal.has_quality and more > 0 and self._time_for(more):
             self._take(more)
 
-    def _outcome(self, end: End, judged: Judgement) -> Outcome:
-        return Outcome(end, judged.estimate, self.spent, tuple(self.rounds), judged.errors)
+    def _outcome(self, end: End, assessment: Assessment) -> Outcome:
+        return Outcome(end, assessment.estimate, self.spent, tuple(self.rounds), assessment.errors)
 
     def _seconds(self) -> float:
         return self.clock() - self._began
 
     def _end(self, estimate: Estimate) -> End | None:
-        short = short_of_belief(self.goal, estimate, self.spent, self.judge)
-        if self.goal.has_quality and short <= 0 and self.spent >= self.judge.first:
+        short = missing_with_margin(self.goal, estimate, self.spent, self.assessor)
+        if self.goal.has_quality and short <= 0 and self.spent >= self.assessor.first:
             return "quality"
         if self.goal.max_time is not None and self._seconds() >= self.goal.max_time:
             return "time"
@@ -232,28 +232,28 @@ class _Climb:
 
     def _first_round(self) -> int:
         if self.goal.max_time is None:
-            return min(self._most, self.judge.first) if self.goal.has_quality else self._most
+            return min(self._most, self.assessor.first) if self.goal.has_quality else self._most
         if self.probe is None:
             return min(self._most, FEWEST)
         self.rate = 1 / max(self.probe(), 1e-9)
         # A picture has one sample of every pixel at least, whatever the time.
-        return min(self._most, self.judge.fewest, max(1, self._affordable()))
+        return min(self._most, self.assessor.fewest, max(1, self._affordable()))
 
-    def _next_round(self, judged: Judgement) -> int:
+    def _next_round(self, assessment: Assessment) -> int:
         """Samples of the next round; fewer than one if there is no time for any."""
-        if self.goal.has_quality and self.spent < self.judge.fewest:
-            # What is not believed yet says little of how far the goal is.
-            wanted = float(believed_from(self.goal, judged, self.spent, self.judge))
+        if self.goal.has_quality and self.spent < self.assessor.fewest:
+            # An estimate that is not trusted yet says little about the distance to the goal.
+            wanted = float(samples_to_trust(self.goal, assessment, self.spent, self.assessor))
         else:
-            wanted = max(self.spent * self._growth(judged.estimate), self.judge.fewest)
+            wanted = max(self.spent * self._growth(assessment.estimate), self.assessor.fewest)
         total = max(STEP * round(wanted / STEP), STEP * (self.spent // STEP + 1))
         samples = min(total, self._most) - self.spent
         return samples if self.goal.max_time is None else min(samples, self._affordable())
 
     def _affordable(self) -> int:
-        """Samples that there is time for, with what judging them takes."""
+        """Samples that fit the time left, assessment included."""
         assert self.goal.max_time is not None
-        left = self.goal.max_time - self._seconds() - self.judge.seconds()
+        left = self.goal.max_time - self._seconds() - self.assessor.seconds()
         return math.floor(_TIME_SHARE * max(0.0, left) * self.rate)
 
     def _time_for(self, samples: int) -> bool:
