@@ -1,6 +1,7 @@
 # `make demo` renders a first picture, `make test` checks everything; both set up what they need and reuse it.
 
 PICTURE := out/teapot.png
+SITE := build/site
 # Processes that run tests side by side; each renders with all cores.
 JOBS ?= 2
 # How often a search runs each property test, with other examples each time.
@@ -8,7 +9,7 @@ ROUNDS ?= 20
 OPEN := $(if $(filter Darwin,$(shell uname -s)),open,xdg-open)
 
 .DEFAULT_GOAL := help
-.PHONY: audit help setup setup-dev demo test test-oldest search lint clean
+.PHONY: audit docs help setup setup-dev demo test test-oldest search lint clean
 
 help:
 	@echo 'make demo    set up and render a teapot for a lenticular display into $(PICTURE)'
@@ -17,6 +18,7 @@ help:
 	@echo 'make search  look for random examples that break a property test (ROUNDS=20)'
 	@echo 'make test-oldest  run the tests of picture files with the oldest libraries that are allowed'
 	@echo 'make lint    set up, check style and types'
+	@echo 'make docs    set up, build the documentation into $(SITE)'
 	@echo 'make audit   set up, look installed packages up in the list of known vulnerabilities'
 	@echo 'make clean   remove what set-up and tests made; pictures in out/ stay'
 
@@ -31,6 +33,11 @@ demo: setup
 	.venv/bin/lippmann render teapot --display seed-lenticular -o $(PICTURE)
 	@echo 'The picture lies in $(CURDIR)/$(PICTURE). Look at it with:'
 	@echo '  $(OPEN) $(PICTURE)'
+
+docs: setup-dev
+	NO_MKDOCS_2_WARNING=1 .venv/bin/python -m mkdocs build --strict --site-dir $(SITE)
+	@echo 'The site lies in $(CURDIR)/$(SITE). Read it with:'
+	@echo '  $(OPEN) $(SITE)/index.html'
 
 audit: setup-dev
 	.venv/bin/python scripts/audit.py

@@ -1,4 +1,4 @@
-"""The section of ``docs/measurements.md`` on error against time, from the results of ``equal_error.py``."""
+"""The section of ``docs/background/measurements.md`` on error against time, from the results of ``equal_error.py``."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ is not missed in a picture: on the display with 8 pixels small balls, pooled fro
 34.5 dB by two references of 128 samples, 33.2 by two of 256, and 30.5 by two of 1536, which still are full of single
 bright pixels. There all figures are too good, and more samples seem worse.
 
-![PSNR against seconds for every scene and display](images/equal-error.png)"""
+![PSNR against seconds for every scene and display](../images/equal-error.png)"""
     ]
     for name, (title, *rest) in DISPLAYS.items():
         if scenes := result["results"].get(name):

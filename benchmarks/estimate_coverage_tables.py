@@ -1,4 +1,4 @@
-"""The section of ``docs/measurements.md`` on stated intervals, from the results of ``estimate_coverage.py``."""
+"""The section of ``docs/background/measurements.md`` on stated intervals, from ``estimate_coverage.py``."""
 
 from __future__ import annotations
 

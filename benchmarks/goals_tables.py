@@ -1,4 +1,4 @@
-"""The section of ``docs/measurements.md`` on qualities that are asked for, from the results of ``goals.py``."""
+"""The section of ``docs/background/measurements.md`` on qualities that are asked for, from ``goals.py``."""
 
 from __future__ import annotations
 

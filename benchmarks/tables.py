@@ -1,4 +1,4 @@
-"""Writes the tables of ``docs/measurements.md`` from the results in ``results/``: figures are never copied by hand.
+"""Writes the tables of ``docs/background/measurements.md`` from ``results/``: figures are never copied by hand.
 
 python benchmarks/tables.py
 """
@@ -17,7 +17,7 @@ from harness import RESULTS
 
 README = Path(__file__).parent.parent / "README.md"
 BEGIN, END = "<!-- methods -->", "<!-- /methods -->"
-PAGE = Path(__file__).parent.parent / "docs" / "measurements.md"
+PAGE = Path(__file__).parent.parent / "docs" / "background" / "measurements.md"
 
 HEAD = """# Measurements
 
@@ -131,7 +131,7 @@ def _weave(result: dict[str, Any]) -> str:
             "",
             f"{width}x{height} pixels of a nominal Looking Glass Portrait with sub-pixels of their own, and a quilt of "
             f"{result['views']} views of {result['view'][0]}x{result['view'][1]} pixels. "
-            "[Looking Glass](looking-glass.md) says what they are judged by.",
+            "[Quilts](quilts.md) says what they are judged by.",
             "",
             *_weave_rows(result),
             "",
@@ -148,7 +148,7 @@ def _weave_rows(result: dict[str, Any]) -> list[str]:
 
 def _weave_with_picture(result: dict[str, Any]) -> list[str]:
     return [
-        "![What an eye sees: direct, woven with linear and with nearest views](images/weave.png)",
+        "![What an eye sees: direct, woven with linear and with nearest views](../images/weave.png)",
         "",
         "*What an eye on the right of the cone sees of the panel's middle: rendered directly, woven with "
         "`--views linear`, and with `--views nearest`.*",
@@ -229,7 +229,7 @@ def _reuse(result: dict[str, Any]) -> str:
         """## Reusing points (`reuse.py`)
 
 Seconds are those of tracing and reuse; *saved* is the share of `full`'s time. The paper's PSNR is its average over the
-micro-images. [Reusing points](reuse.md) says what the ways mean."""
+micro-images. [Reprojection](reprojection.md) says what the ways mean."""
     ]
     header = "| scene | way | pixels traced | time | full | saved | paper's PSNR | worst micro-image |"
     for name, rows in result["results"].items():
@@ -243,7 +243,7 @@ micro-images. [Reusing points](reuse.md) says what the ways mean."""
     return "\n\n".join(parts) + "\n"
 
 
-QUILTS_PAGE = Path(__file__).parent.parent / "docs" / "looking-glass.md"
+QUILTS_PAGE = Path(__file__).parent.parent / "docs" / "background" / "quilts.md"
 QUILTS_PAGE_TABLES = {"weave": _weave_with_picture, "cycles": _cycles_rows}
 
 

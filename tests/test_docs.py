@@ -1,4 +1,4 @@
-"""Every command in the README and in docs/ runs, and every Python example too."""
+"""Every command in the README and in docs/ runs, every Python example too, and the site of docs/ builds."""
 
 from __future__ import annotations
 
@@ -6,6 +6,9 @@ import json
 import re
 import shlex
 import shutil
+import subprocess
+import sys
+from html.parser import HTMLParser
 from pathlib import Path
 
 import numpy as np
@@ -15,8 +18,18 @@ ROOT = Path(__file__).resolve().parent.parent
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
 
 
+#: Pages are known by their folder, too: several folders have a page of the same name.
+def name(page: Path) -> str:
+    return page.relative_to(ROOT).as_posix()
+
+
 def blocks(page: Path, language: str) -> list[str]:
     return re.findall(rf"^```{language}\n(.*?)^```", page.read_text(encoding="utf-8"), re.S | re.M)
+
+
+def named_files(page: Path) -> list[tuple[str, str]]:
+    """Files that a page tells its reader to save."""
+    return re.findall(r'^```\w+ title="([^"]+)"\n(.*?)^```', page.read_text(encoding="utf-8"), re.S | re.M)
 
 
 def commands(page: Path) -> list[list[str]]:
@@ -28,6 +41,8 @@ def cheaper(words: list[str]) -> list[str]:
     """The same command with less work: what it says is what is tested, not how fine the picture is."""
     if words[1:3] == ["quilt", "render"]:
         return [*words, "--size", "384x384", "--spp", "2"]
+    if "--sweep" in words:
+        return [*words, "--frames", "2"]
     if words[1] not in ("render", "preview") or any(word.startswith(("--quality", "--max-time")) for word in words):
         return words
     kept = list(words)
@@ -70,23 +85,103 @@ def workplace(tmp_path, monkeypatch, moving_ball):
     return tmp_path
 
 
-@pytest.mark.parametrize("page", [p for p in PAGES if commands(p)], ids=lambda page: page.name)
-def test_commands_run_in_the_order_of_the_page(page, workplace, engine, capfd):
-    from lippmann.cli import run
-
-    for words in commands(page):
-        assert words[0] == "lippmann", f"{page.name}: only lippmann's own commands are shown as sh"
-        code = run(cheaper(words)[1:])
-        assert code == 0, f"{page.name}: {shlex.join(words)}\n{capfd.readouterr().err}"
+def save_named_files(page: Path, folder: Path) -> None:
+    for file, text in named_files(page):
+        (folder / file).write_text(text, encoding="utf-8")
 
 
-@pytest.mark.parametrize("page", [p for p in PAGES if blocks(p, "python")], ids=lambda page: page.name)
-def test_python_examples_run(page, workplace, engine):
+def run_python(page: Path) -> None:
     for code in blocks(page, "python"):
         exec(compile(code, str(page), "exec"), {"__name__": "example"})
 
 
+@pytest.mark.parametrize("page", [p for p in PAGES if commands(p)], ids=name)
+def test_commands_and_python_run_in_the_order_of_the_page(page, workplace, engine, capfd):
+    from lippmann.cli import run
+
+    save_named_files(page, workplace)
+    for words in commands(page):
+        assert words[0] == "lippmann", f"{name(page)}: only lippmann's own commands are shown as sh"
+        code = run(cheaper(words)[1:])
+        assert code == 0, f"{name(page)}: {shlex.join(words)}\n{capfd.readouterr().err}"
+    run_python(page)
+
+
+@pytest.mark.parametrize("page", [p for p in PAGES if blocks(p, "python") and not commands(p)], ids=name)
+def test_python_examples_run(page, workplace, engine):
+    run_python(page)
+
+
 def test_links_lead_somewhere():
+    made = re.compile(r"(^|/)commands/[\w-]+\.md$")  # by the site, from the command line's help
     for page in PAGES:
         for target in re.findall(r"\]\((?!https?:)([^)#]+)", page.read_text(encoding="utf-8")):
-            assert (page.parent / target).exists(), f"{page.name} links to {target}"
+            assert made.search(target) or (page.parent / target).exists(), f"{name(page)} links to {target}"
+
+
+class Loaded(HTMLParser):
+    """Addresses that a browser fetches to show a page."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.addresses: list[str] = []
+
+    def handle_starttag(self, tag, attributes):
+        values = dict(attributes)
+        if tag in ("script", "img", "iframe", "source"):
+            self.addresses.append(values.get("src") or "")
+        elif tag == "link" and values.get("rel") in ("stylesheet", "preload", "preconnect", "icon"):
+            self.addresses.append(values.get("href") or "")
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory):
+    """The built site; a warning of MkDocs ends the build."""
+    pytest.importorskip("mkdocs")
+    folder = tmp_path_factory.mktemp("site")
+    words = [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", str(folder)]
+    done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return folder
+
+
+def test_the_site_tells_of_every_option_and_function(site):
+    render = (site / "reference" / "commands" / "render.html").read_text(encoding="utf-8")
+    assert "--quality-mean" in render
+    assert "--tls-key" in render
+    assert (site / "reference" / "commands" / "quilt-pack.html").exists()
+    functions = (site / "reference" / "python" / "rendering.html").read_text(encoding="utf-8")
+    assert 'id="lippmann.render_to_file"' in functions
+    assert "placement" in functions
+
+
+def test_pages_of_the_site_load_nothing_from_other_hosts(site):
+    pages = list(site.rglob("*.html"))
+    assert len(pages) > 50
+    for page in pages:
+        loaded = Loaded()
+        loaded.feed(page.read_text(encoding="utf-8"))
+        foreign = [address for address in loaded.addresses if re.match(r"(https?:)?//", address)]
+        assert not foreign, f"{page.relative_to(site)} loads {foreign}"
+
+
+@pytest.mark.parametrize(
+    "word",
+    [
+        "accommodation",
+        "crosstalk",
+        "elemental image",
+        "EPI",
+        "focal length",
+        "interlacing",
+        "orthoscopic",
+        "pseudoscopic",
+        "sub-aperture view",
+        "turntable",
+        "view zone",
+    ],
+)
+def test_the_glossary_explains_what_users_search_for(word):
+    rows = (ROOT / "docs" / "reference" / "glossary.md").read_text(encoding="utf-8").splitlines()
+    entries = [row.split("|")[1] for row in rows if row.startswith("| ")]
+    assert any(word in entry for entry in entries)

@@ -1,4 +1,4 @@
-"""Every reader of what others wrote, as a function of bytes; see ``docs/file-formats.md``.
+"""Every reader of what others wrote, as a function of bytes; see ``docs/reference/file-formats.md``.
 
 Formats whose reader follows references (materials, chunks, views) take whole folders, packed by :mod:`parcels`.
 """

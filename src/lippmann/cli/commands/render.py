@@ -40,7 +40,7 @@ Resume = Annotated[
     typer.Option(
         "--resume",
         help="Keep finished tiles beside the output, and go on with those (of a sequence: with the frames) that an "
-        "interrupted run left. See docs/large-pictures.md.",
+        "interrupted run left. See docs/how-to/large-pictures.md.",
     ),
 ]
 

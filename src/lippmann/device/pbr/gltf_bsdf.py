@@ -3,7 +3,7 @@
 Mitsuba's own ``principled`` follows another model: its diffuse lobe alone sends back up to 1.3 times the light that
 falls on a rough white surface, it knows no specular colour or texture, and its clear coat has another shape. This
 plugin writes the specification's formulas down instead (appendix B of glTF 2.0 and KHR_materials_{ior, specular,
-transmission, volume, clearcoat, sheen}); ``docs/materials.md`` says where it had to choose.
+transmission, volume, clearcoat, sheen}); ``docs/reference/materials.md`` says where it had to choose.
 
 Inside, all directions are flipped so that the viewer is above the surface (z > 0): both sides of an opaque or thin
 surface look alike. A surface that encloses a solid refracts instead.

@@ -1,7 +1,7 @@
 """glTF materials as Mitsuba BSDFs: which plugin stands for which family of materials, and with what textures.
 
 Perfectly smooth glass, panes and mirrors become Mitsuba's own plugins, whose rays an integrator can follow exactly;
-all else is a :mod:`~lippmann.device.pbr.gltf_bsdf`. ``docs/materials.md`` holds the mapping field by field.
+all else is a :mod:`~lippmann.device.pbr.gltf_bsdf`. ``docs/reference/materials.md`` holds the mapping field by field.
 """
 
 from __future__ import annotations

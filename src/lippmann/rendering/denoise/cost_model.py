@@ -13,14 +13,14 @@ from lippmann.rendering.request.choices import Denoiser
 #: What a shadow ray costs, in rays that are followed and shaded: a third to four fifths in the bundled scenes.
 SHADOW_COST = 0.5
 #: Rays per pixel from which on a picture is worth the high effort. A run then takes the time of 12 rays per pixel more
-#: than the fast one, for 0.7 dB on the average: what a quarter more samples would bring (docs/denoising.md).
+#: than the fast one, for 0.7 dB on the average: what a quarter more samples would bring (docs/background/denoising.md).
 HIGH_FROM = 100.0
 #: What one run of the network costs, in rays per pixel.
 RUN_COST: dict[Effort, float] = {"fast": 3.0, "high": 15.0}
 #: What it costs to share the light of a picture, in rays per pixel.
 SHARING_COST = 1.2
 #: How strongly light that differs is kept apart where micro-images share it, by how much noise there is left to share.
-#: Between 30 and 200 it moves the PSNR of the bundled scenes by less than 0.5 dB (docs/pooled.md).
+#: Between 30 and 200 it moves the PSNR of the bundled scenes by less than 0.5 dB (docs/research/pooled-light.md).
 SHARING_STOP: dict[Effort, float] = {"fast": 40.0, "high": 100.0}
 #: What a sample of the guides costs, in rays.
 GUIDE_COST = 0.4

@@ -28,7 +28,7 @@ from lippmann.rendering.film.feature_buffers import Guides
 FloatArray = NDArray[np.float32]
 Form = Literal["auto", "raw", "views"]
 
-#: Views with fewer pixels on a side are no pictures that the network knows: see ``docs/denoising.md``.
+#: Views with fewer pixels on a side are no pictures that the network knows: see ``docs/background/denoising.md``.
 SMALLEST_VIEW = 48
 
 #: Weight of a difference of normals (components in [-1, 1]) against one of albedo.

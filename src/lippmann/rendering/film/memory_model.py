@@ -1,6 +1,6 @@
 """How many bytes pictures take while they are made: every figure of it, and the lanes that fit beside them.
 
-Figures are bytes per pixel unless they are named otherwise. Measured: see ``docs/methods.md``.
+Figures are bytes per pixel unless they are named otherwise. Measured: see ``docs/background/methods.md``.
 """
 
 from __future__ import annotations

@@ -7,7 +7,7 @@ a pixel is its colour over its albedo, so that textures stay where they are. Hei
 in mirrors and through glass counts as lying as far behind as light travels to it, which is exact for flat ones.
 
 That is done before the denoiser: what it leaves of the noise, and what it blurs with it, it leaves and blurs in all
-views alike, so that sharing its results gains less (docs/looking-glass.md). What is told of the error includes what
+views alike, so that sharing its results gains less (docs/background/quilts.md). What is told of the error includes what
 sharing itself falsifies, such as highlights, which move over a surface from view to view: each half of the samples is
 shared for itself, and judged by the other, which is not.
 """

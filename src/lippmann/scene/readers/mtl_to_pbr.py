@@ -1,4 +1,4 @@
-"""What an MTL material means in metallic-roughness terms; ``docs/scenes.md`` gives the mapping as a table."""
+"""What an MTL material means in metallic-roughness terms; ``docs/reference/scenes.md`` gives the mapping as a table."""
 
 from __future__ import annotations
 

@@ -1,9 +1,9 @@
 """Classic scenes in the terms of physically based light: what the integrator ``path`` renders of them.
 
-``docs/classic.md`` holds the mapping in words. Colours and pictures of classic scenes are display codes; they are taken
-for sRGB, so that the physical picture, coded by that curve, looks alike; light adds up as numbers, so its colours stay.
-Lamps get a size and fall with the square of the distance, as bright as before in the middle of the scene. Round shapes
-become fine meshes, endless ones large ones.
+``docs/reference/whitted.md`` holds the mapping in words. Colours and pictures of classic scenes are display codes; they
+are taken for sRGB, so that the physical picture, coded by that curve, looks alike; light adds up as numbers, so its
+colours stay. Lamps get a size and fall with the square of the distance, as bright as before in the middle of the scene.
+Round shapes become fine meshes, endless ones large ones.
 """
 
 from __future__ import annotations

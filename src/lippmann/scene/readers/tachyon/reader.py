@@ -1,7 +1,8 @@
 """Reader of Tachyon scene files (``.dat``) and camera paths (``.cam``).
 
-The grammar and its meaning are those of the program Tachyon 0.99; ``docs/tachyon.md`` lists what is honoured, what is
-refused and where this reader is stricter. Numbers are rounded to single precision, as the program does.
+The grammar and its meaning are those of the program Tachyon 0.99; ``docs/reference/tachyon.md`` lists what is
+honoured, what is refused and where this reader is stricter. Numbers are rounded to single precision, as the program
+does.
 """
 
 from __future__ import annotations

@@ -1,0 +1,136 @@
+"""What MkDocs builds beside the files of ``docs/``: a page for every command, from the command line's own help.
+
+MkDocs calls the functions named ``on_...``; ``mkdocs.yml`` names this file as a hook.
+"""
+
+from __future__ import annotations
+
+import html
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import typer.main
+from mkdocs.config.defaults import MkDocsConfig
+from mkdocs.structure.files import File, Files
+from mkdocs.structure.pages import Page
+
+COMMANDS = "reference/commands/"
+#: Roles of Sphinx in docstrings, as Markdown leaves them: ``:class:<code>~a.b.Name</code>``.
+ROLE = re.compile(r":[a-z]+:(?=<code>)(<code>)(?:~[\w.]*\.)?")
+
+
+def on_config(config: MkDocsConfig) -> MkDocsConfig:
+    """Put the pages of a folder where the navigation names the folder."""
+    docs = Path(config.docs_dir)
+    pages = [f"{COMMANDS}index.md", *(f"{COMMANDS}{'-'.join(path)}.md" for path, _ in leaves(command_tree()))]
+    config.nav = _expanded(config.nav, {COMMANDS: pages}, docs)
+    return config
+
+
+def on_files(files: Files, config: MkDocsConfig) -> Files:
+    """Add the pages of the commands."""
+    commands = list(leaves(command_tree()))
+    files.append(File.generated(config, f"{COMMANDS}index.md", content=overview(commands)))
+    for path, command in commands:
+        uri = f"{COMMANDS}{'-'.join(path)}.md"
+        files.append(File.generated(config, uri, content=command_page(path, command)))
+    return files
+
+
+def on_page_content(content: str, page: Page, config: MkDocsConfig, files: Files) -> str:
+    """Drop the roles of Sphinx from docstrings."""
+    return ROLE.sub(r"\1", content)
+
+
+def command_tree() -> Any:
+    """The command line as a tree of Click's commands."""
+    from lippmann.cli.app import app
+
+    return typer.main.get_command(app)
+
+
+def leaves(command: Any, path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], Any]]:
+    """Every command that does something, with the words that call it, in the order of the help."""
+    if not hasattr(command, "commands"):
+        yield path, command
+        return
+    for name, child in command.commands.items():
+        if not child.hidden:
+            yield from leaves(child, (*path, name))
+
+
+def overview(commands: list[tuple[tuple[str, ...], Any]]) -> str:
+    """The page that lists all commands."""
+    rows = [
+        f"| [`lippmann {' '.join(path)}`]({'-'.join(path)}.md) | {_cell(_summary(one))} |" for path, one in commands
+    ]
+    head = "# Commands\n\nThis list and its pages are made from the program's own help, `lippmann COMMAND --help`.\n"
+    return "\n".join([head, "| command | what it does |", "|---|---|", *rows]) + "\n"
+
+
+def command_page(path: tuple[str, ...], command: Any) -> str:
+    """The page of one command: usage, arguments, options."""
+    context = command.make_context(path[-1], [], resilient_parsing=True)
+    records: dict[str, list[tuple[str, str]]] = {"argument": [], "option": []}
+    for parameter in command.params:
+        record = parameter.get_help_record(context)
+        if record is not None:
+            records[parameter.param_type_name].append(record)
+    usage = " ".join(["lippmann", *path, *(_usage(parameter) for parameter in command.params if _usage(parameter))])
+    usage += " [OPTIONS]" if records["option"] else ""
+    parts = [f"# lippmann {' '.join(path)}", html.escape(command.help or "", quote=False), f"```text\n{usage}\n```"]
+    if records["argument"]:
+        rows = [f"| {_code(name)} | {_cell(_without_default(text))} |" for name, text in records["argument"]]
+        parts.append("\n".join(["## Arguments\n", "| argument | meaning |", "|---|---|", *rows]))
+    if records["option"]:
+        rows = [
+            f"| {_code(name)} | {_cell(_without_default(text))} | {_default(text)} |"
+            for name, text in records["option"]
+        ]
+        parts.append("\n".join(["## Options\n", "| option | meaning | default |", "|---|---|---|", *rows]))
+    return "\n\n".join(parts) + "\n"
+
+
+def _expanded(nav: Any, generated: dict[str, list[str]], docs: Path) -> Any:
+    if isinstance(nav, list):
+        return [_expanded(item, generated, docs) for item in nav]
+    if isinstance(nav, dict):
+        return {title: _expanded(item, generated, docs) for title, item in nav.items()}
+    if not nav.endswith("/"):
+        return nav
+    if nav in generated:
+        return generated[nav]
+    names = sorted(path.name for path in (docs / nav).glob("*.md"))
+    return [nav + name for name in sorted(names, key=lambda name: name != "index.md")]
+
+
+def _summary(command: Any) -> str:
+    return (command.help or "").split("\n\n")[0]
+
+
+def _usage(parameter: Any) -> str:
+    if parameter.param_type_name != "argument":
+        return ""
+    name = parameter.name.upper().rstrip("_") + ("..." if parameter.nargs == -1 else "")
+    return name if parameter.required else f"[{name}]"
+
+
+def _without_default(text: str) -> str:
+    return re.sub(r"\s*\[(default: [^]]*|required)\]\s*$", "", text)
+
+
+def _default(text: str) -> str:
+    found = re.search(r"\[(?:default: ([^]]*)|(required))\]\s*$", text)
+    if found is None:
+        return ""
+    return found[2] or _code(found[1])
+
+
+def _code(text: str) -> str:
+    return "`" + " ".join(text.split()) + "`"
+
+
+def _cell(text: str | None) -> str:
+    return html.escape(" ".join((text or "").split()), quote=False).replace("|", "\\|").replace("*", "\\*")
