@@ -348,7 +348,7 @@ class TestDisplayFrame:
 @pytest.mark.parametrize(
     ("fields", "message"),
     [
-        ({"mode": "middle"}, "place: placement 'middle'; known are fit, camera, display"),
+        ({"mode": "middle"}, "mode: placement 'middle'; known are fit, camera, display"),
         ({"scale": 0.0}, "scale: 0; a factor above 0"),
         ({"scale": -1.0}, "scale: -1"),
         ({"scale": math.nan}, "scale: nan"),

@@ -248,7 +248,7 @@ def test_variants_and_animations_are_noted(writer, read):
     writer.json["animations"] = [{"channels": [], "samplers": []}]
     assert read(writer).notes == (
         "of the material variants the default one is shown",
-        "animations are not played without --frames; the scene is shown at rest",
+        "animations are not played without frames=...; the scene is shown at rest",
     )
 
 
