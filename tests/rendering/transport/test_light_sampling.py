@@ -336,3 +336,31 @@ def test_the_callers_own_scene_is_not_changed(cut_display):
     described = lippmann.load_scene(room())
     lippmann.render(described, display, method="full", spp=1)
     assert sampling_weights(described.physical.scene()) == before
+
+
+@pytest.mark.parametrize("method", ["lens-view", "interpolated"])
+def test_recorded_kernels_are_shown_the_samplers_arrays(engine, method):
+    """Kernels of reuse are recorded once, with all arrays that they read: of scenes with several emitters, too."""
+    import lippmann
+
+    display = lippmann.load_display("seed-lenticular").resized(64, 16)
+    scene = lippmann.load_scene(room(), background=(0.1, 0.1, 0.1))
+    options = {"integrator": "path", "spp": 2, "seed": 3}
+    reused = lippmann.render(scene, display, method=method, **options)
+    full = lippmann.render(scene, display, method="full", **options)
+    assert reused.pixels.mean() == pytest.approx(full.pixels.mean(), rel=0.2)
+
+
+def test_emitters_are_chosen_as_mitsubas_own_distribution_chooses_them():
+    import mitsuba as mi
+
+    from lippmann.rendering.transport.light_sampling import WeightedLightSampler
+
+    weights = np.array([0.0, 0.5, 0.125])
+    number = mi.PCG32(size=100_000).next_float32()
+    sampler = WeightedLightSampler(mi.load_dict(room()), weights)
+    found = [np.array(each) for each in sampler._sample_emitter(number, mi.Bool(True))]
+    own = mi.DiscreteDistribution(mi.Float(weights)).sample_reuse_pmf(number)
+    for one, other in zip(found, own, strict=True):
+        np.testing.assert_allclose(one, np.array(other), atol=1e-6)
+    assert (found[1].min() >= -1e-6) and (found[1].max() < 1 + 1e-6)

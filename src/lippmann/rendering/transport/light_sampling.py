@@ -12,7 +12,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.device.types import Bool, DirectionSample3f, Float, Interaction3f, MitsubaScene, Point2f, Spectrum
+from lippmann.device.types import Bool, DirectionSample3f, Float, Interaction3f, MitsubaScene, Point2f, Spectrum, UInt32
 
 
 class LightSampler(Protocol):
@@ -78,23 +78,40 @@ class WeightedLightSampler:
         up to 1.
     """
 
+    # The arithmetic is that of Mitsuba's DiscreteDistribution, whose own arrays a recorded kernel could not be shown.
     def __init__(self, scene: MitsubaScene, weights: NDArray[np.float64]) -> None:
         self._emitters = scene.emitters_dr()
-        self._distribution = mi.DiscreteDistribution(mi.Float(weights.astype(np.float32)))
+        single = weights.astype(np.float32)
+        cumulative = np.cumsum(single, dtype=np.float64)
+        possible = np.flatnonzero(single)
+        self._first, self._last = int(possible[0]), int(possible[-1])
+        self._weights, self._cumulative = mi.Float(single), mi.Float(cumulative.astype(np.float32))
+        self._total = dr.opaque(mi.Float, float(np.float32(cumulative[-1])))
+        self._normalization = dr.opaque(mi.Float, float(np.float32(1 / cumulative[-1])))
         # A scattered ray knows the emitter that it hit by its index in Dr.Jit's registry; index 0 is no emitter.
         registry = np.array(dr.reinterpret_array(mi.UInt32, self._emitters))
         pmf = np.zeros(int(registry.max()) + 1, np.float32)
-        pmf[registry] = np.array(self._distribution.eval_pmf_normalized(dr.arange(mi.UInt32, len(weights))))
+        pmf[registry] = single * np.float32(1 / cumulative[-1])
         self._pmf = mi.Float(pmf)
 
     def sample_direction(
         self, reference: Interaction3f, point: Point2f, active: Bool
     ) -> tuple[DirectionSample3f, Spectrum]:
-        index, reused, probability = self._distribution.sample_reuse_pmf(point.x, active)
+        index, reused, probability = self._sample_emitter(point.x, active)
         emitter = dr.gather(type(self._emitters), self._emitters, index, active)
         sample, radiance = emitter.sample_direction(reference, mi.Point2f(reused, point.y), active)
         sample.pdf *= probability
         return sample, radiance * dr.rcp(probability)
+
+    def _sample_emitter(self, number: Float, active: Bool) -> tuple[UInt32, Float, Float]:
+        """Index of an emitter, ``number`` in [0, 1) made uniform again, and the emitter's probability."""
+        wanted = number * self._total
+        index = dr.binary_search(
+            self._first, self._last, lambda place: dr.gather(mi.Float, self._cumulative, place, active) < wanted
+        )
+        probability = dr.gather(mi.Float, self._weights, index, active) * self._normalization
+        before = dr.gather(mi.Float, self._cumulative, index - 1, active & (index > 0)) * self._normalization
+        return index, (number - before) / probability, probability
 
     def pdf_direction(self, reference: Interaction3f, sample: DirectionSample3f, active: Bool) -> Float:
         probability = dr.gather(mi.Float, self._pmf, dr.reinterpret_array(mi.UInt32, sample.emitter), active)
