@@ -35,6 +35,15 @@ def test_metadata_is_read_without_the_pixels(tmp_path, display, picture, name, b
     assert info.stored == {8: "uint8", 16: "float16" if name.endswith("exr") else "uint16", 32: "float32"}[bits]
 
 
+def test_files_may_be_named_by_strings(tmp_path, display, picture):
+    path = tmp_path / "a.png"
+    write_picture(picture, path)
+    name = str(path)
+    np.testing.assert_array_equal(read_picture(name).pixels, read_picture(path).pixels)
+    assert open_file(name).width == display.panel.width
+    assert read_metadata(name).display == read_metadata(path).display
+
+
 def test_a_missing_empty_or_foreign_file(tmp_path):
     for name, content, message in (
         ("missing.png", None, "missing.png: is not there"),

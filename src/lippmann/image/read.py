@@ -142,7 +142,7 @@ class PictureFile:
             raise PictureError(error.what, where=str(self.path), rule=error.rule, fix=error.fix) from error
 
 
-def read_picture(path: Path, *, display: Display | None = None) -> IntegralImage:
+def read_picture(path: str | Path, *, display: Display | None = None) -> IntegralImage:
     """Read a whole integral image from a PNG, OpenEXR, TIFF or Zarr file.
 
     Parameters
@@ -160,7 +160,7 @@ def read_picture(path: Path, *, display: Display | None = None) -> IntegralImage
     return open_file(path).picture(display)
 
 
-def read_metadata(path: Path, *, display: Display | None = None) -> Metadata:
+def read_metadata(path: str | Path, *, display: Display | None = None) -> Metadata:
     """Display, placement and provenance of a picture file, without its pixels.
 
     Parameters
@@ -178,7 +178,7 @@ def read_metadata(path: Path, *, display: Display | None = None) -> Metadata:
     return open_file(path).metadata_for(display)
 
 
-def open_file(path: Path) -> PictureFile:
+def open_file(path: str | Path) -> PictureFile:
     """Open a picture file and read its header: format, size, type of the values, layers and metadata.
 
     Raises
@@ -186,6 +186,7 @@ def open_file(path: Path) -> PictureFile:
     PictureError
         If the file is missing, empty, foreign, cut short, or claims a size that it cannot hold.
     """
+    path = Path(path)
     if zarr_array.is_zarr(path):
         array = zarr_array.ZarrPicture(path)
         size, text = (array.width, array.height), array.text

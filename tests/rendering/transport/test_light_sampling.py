@@ -363,4 +363,5 @@ def test_emitters_are_chosen_as_mitsubas_own_distribution_chooses_them():
     own = mi.DiscreteDistribution(mi.Float(weights)).sample_reuse_pmf(number)
     for one, other in zip(found, own, strict=True):
         np.testing.assert_allclose(one, np.array(other), atol=1e-6)
-    assert (found[1].min() >= -1e-6) and (found[1].max() < 1 + 1e-6)
+    assert found[1].min() >= -1e-6
+    assert found[1].max() < 1 + 1e-6
