@@ -37,7 +37,7 @@ def test_metadata_is_read_without_the_pixels(tmp_path, display, picture, name, b
 
 def test_files_may_be_named_by_strings(tmp_path, display, picture):
     path = tmp_path / "a.png"
-    write_picture(picture, path)
+    write_picture(picture(), path)
     name = str(path)
     np.testing.assert_array_equal(read_picture(name).pixels, read_picture(path).pixels)
     assert open_file(name).width == display.panel.width
