@@ -36,12 +36,13 @@ def test_metadata_is_read_without_the_pixels(tmp_path, display, picture, name, b
 
 
 def test_files_may_be_named_by_strings(tmp_path, display, picture):
+    image = picture(display("lenticular", lenses=(16, 11)))
     path = tmp_path / "a.png"
-    write_picture(picture(), path)
+    write_picture(image, path)
     name = str(path)
     np.testing.assert_array_equal(read_picture(name).pixels, read_picture(path).pixels)
-    assert open_file(name).width == display.panel.width
-    assert read_metadata(name).display == read_metadata(path).display
+    assert open_file(name).width == image.display.panel.width
+    assert read_metadata(name).display == image.display
 
 
 def test_a_missing_empty_or_foreign_file(tmp_path):

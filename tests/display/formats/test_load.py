@@ -99,7 +99,7 @@ def test_own_file_with_units(write):
 
 
 def test_the_documented_example_is_a_display(write):
-    page = (Path(__file__).parents[3] / "docs" / "displays.md").read_text(encoding="utf-8")
+    page = (Path(__file__).parents[3] / "docs" / "reference" / "displays.md").read_text(encoding="utf-8")
     example = page.split("```toml\n")[1].split("```")[0]
     assert load_display(write(example)).lens_array.offset == pytest.approx((1.5 * 25.4 / 282.4, 0))
 
