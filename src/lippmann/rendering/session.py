@@ -196,7 +196,7 @@ def open_session(
     if request.denoises:
         load_denoiser()
     engine = watch.stage("load", lambda: engines.start(request.device, request.threads))
-    built = watch.stage("build", lambda: _build(scene, request))
+    built = watch.stage("build", lambda: _build(scene, request, memory))
     return Session(scene, request, engine, built, memory, watch)
 
 
@@ -205,7 +205,7 @@ def memory_limit(request: RenderRequest) -> int:
     return request.memory or int(machine.available_memory() * DEFAULT_MEMORY_SHARE)
 
 
-def _build(scene: Scene, request: RenderRequest) -> BuiltScene | BuiltClassic:
+def _build(scene: Scene, request: RenderRequest, memory: int) -> BuiltScene | BuiltClassic:
     """The scene on the device, in the form that the integrator needs."""
     if request.integrator == "classic":
         from lippmann.device.whitted.scene import build_classic
@@ -214,7 +214,7 @@ def _build(scene: Scene, request: RenderRequest) -> BuiltScene | BuiltClassic:
         return build_classic(scene.classic)
     from lippmann.device.pbr import build
 
-    return build(scene)
+    return build(scene, memory=memory)
 
 
 def _make_integrator(

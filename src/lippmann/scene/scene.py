@@ -23,6 +23,8 @@ STUDIO_NOTE = "no lights in the scene: lit by the built-in studio"
 # Exact bounds look at each vertex of each instance; beyond this many the corners of the mesh's own box stand in,
 # which can only be too large.
 _EXACT_VERTICES = 20_000_000
+# Points of copies that are transformed at a time.
+_POINTS_AT_A_TIME = 1 << 20
 _FRAMING_FOV = np.radians(30.0)
 
 # A box smaller than this share of its largest coordinate is a single point: a rotation's rounding, a few units in the
@@ -222,23 +224,28 @@ def bounds_of(description: SceneDescription, frame: Matrix | None = None) -> Bou
     SceneError
         The description places no triangle.
     """
-    used = {index: _used_positions(description.meshes[index]) for index in {one.mesh for one in description.instances}}
-    exact = sum(len(used[instance.mesh]) for instance in description.instances) <= _EXACT_VERTICES
-    lows, highs = [], []
-    for instance in description.instances:
-        points = used[instance.mesh]
-        if len(points) == 0:
-            continue
-        if not exact:
-            points = _box_corners(points)
-        matrix = np.asarray(instance.world_from_mesh, np.float64)
-        matrix = matrix if frame is None else frame @ matrix
-        moved = points @ matrix[:3, :3].T + matrix[:3, 3]
-        lows.append(moved.min(axis=0))
-        highs.append(moved.max(axis=0))
-    if not lows:
+    used = {mesh: _used_positions(description.meshes[mesh]) for mesh in description.placements}
+    exact = sum(len(used[mesh]) * len(places) for mesh, places in description.placements.items()) <= _EXACT_VERTICES
+    boxes = []
+    for mesh, places in description.placements.items():
+        points = used[mesh]
+        if len(points) and len(places):
+            boxes.append(_box_of_copies(points if exact else _box_corners(points), places, frame))
+    if not boxes:
         raise SceneError("the scene holds no triangles", where=description.name, rule="there must be something to see")
-    return np.stack([np.min(lows, axis=0), np.max(highs, axis=0)])
+    return np.stack([np.min(boxes, axis=0)[0], np.max(boxes, axis=0)[1]])
+
+
+def _box_of_copies(points: Bounds, world_from_points: Matrix, frame: Matrix | None) -> Bounds:
+    """The box ``(2, 3)`` of points ``(n, 3)`` at all of ``(k, 4, 4)`` places."""
+    low, high = np.full(3, np.inf), np.full(3, -np.inf)
+    step = max(1, _POINTS_AT_A_TIME // len(points))
+    for start in range(0, len(world_from_points), step):
+        matrices = world_from_points[start : start + step]
+        matrices = matrices if frame is None else frame @ matrices
+        moved = points @ matrices[:, :3, :3].transpose(0, 2, 1) + matrices[:, None, :3, 3]
+        low, high = np.minimum(low, moved.min(axis=(0, 1))), np.maximum(high, moved.max(axis=(0, 1)))
+    return np.stack([low, high])
 
 
 def _used_positions(mesh: Mesh) -> Bounds:
@@ -259,7 +266,7 @@ def has_lights(description: SceneDescription) -> bool:
     """
     if description.environment is not None or any(max(light.color) > 0.0 for light in description.lights):
         return True
-    indices = {description.meshes[instance.mesh].material for instance in description.instances}
+    indices = {description.meshes[mesh].material for mesh in description.placements}
     materials = [description.materials[index] for index in indices]
     return any(max(material.emission) > 1.0 for material in materials) or (
         bool(materials) and all(material.unlit for material in materials)
@@ -281,9 +288,9 @@ def checked(description: SceneDescription, where: str) -> SceneDescription:
     for number, instance in enumerate(description.instances):
         if not 0 <= instance.mesh < len(description.meshes):
             raise SceneError(f"instance {number} uses mesh {instance.mesh} of {len(description.meshes)}", where=where)
-        if np.shape(instance.world_from_mesh) != (4, 4) or not np.isfinite(instance.world_from_mesh).all():
+        if np.shape(instance.world_from_mesh)[-2:] != (4, 4) or not np.isfinite(instance.world_from_mesh).all():
             raise SceneError(f"instance {number} has a matrix that is not 4x4 finite numbers", where=where)
-    if not any(len(description.meshes[instance.mesh].faces) for instance in description.instances):
+    if not any(len(places) and len(description.meshes[mesh].faces) for mesh, places in description.placements.items()):
         raise SceneError("the scene has no geometry", where=where, rule="there must be at least one triangle")
     return description
 

@@ -195,7 +195,7 @@ def test_absorbing_bodies_are_not_instanced(build, parts):
     """Their shapes have to be found among the scene's."""
     wine = replace(GLASS, attenuation_color=(0.5, 0.25, 1.0), attenuation_distance=2.0)
     instances = [Instance(0, parts.shift(3.0 * number)) for number in range(6)]
-    built = build(parts.describe([parts.ball(steps=60)], [wine], instances=instances))
+    built = build(parts.describe([parts.ball(steps=180)], [wine], instances=instances))
     assert [shape.is_mesh() for shape in built.mitsuba.shapes()] == [True]
 
 

@@ -3,9 +3,12 @@
 import numpy as np
 import pytest
 
+from lippmann.errors import SceneError
 from lippmann.scene.values.description import Instance, Material, Mesh
 
 PLAIN = Material(base_color=(0.5, 0.5, 0.5), specular=0.0)
+#: Bytes that hold one ball of 60 steps, but not six.
+SCARCE = 4 << 20
 
 
 def moved(*offset, scale=(1.0, 1.0, 1.0), turn=0.0):
@@ -26,10 +29,10 @@ def outward(built, look, x, y, **where):
     return np.array(si.n).T, np.array(si.sh_frame.n).T, np.array(si.p).T
 
 
-def test_repeated_mesh_is_kept_once(build, look, parts):
+def test_a_mesh_whose_copies_would_fill_the_memory_is_kept_once(build, look, parts):
     mesh = parts.ball(steps=60)
-    places = [moved(3.0 * number, 0, 0) for number in range(6)]
-    built = build(parts.describe([mesh], [PLAIN], instances=[Instance(0, place) for place in places]))
+    places = np.stack([moved(3.0 * number, 0, 0) for number in range(6)])
+    built = build(parts.describe([mesh], [PLAIN], instances=[Instance(0, places)]), memory=SCARCE)
     assert len(is_instanced(built)) == len(built.mitsuba.shapes()) == 6
     assert sum(shape.primitive_count() for shape in built.mitsuba.shapes()) == 6
     for number in range(6):
@@ -44,13 +47,15 @@ def test_parts_of_an_object_share_its_instances(build, parts):
     """Meshes that are always placed together, as the primitives of one glTF mesh are, form one group."""
     meshes = [parts.ball(steps=60), parts.ball(1, steps=60, radius=0.5)]
     instances = [Instance(mesh, moved(3.0 * number, 0, 0)) for number in range(6) for mesh in (0, 1)]
-    built = build(parts.describe(meshes, [PLAIN, Material(metallic=1.0)], instances=instances))
+    built = build(parts.describe(meshes, [PLAIN, Material(metallic=1.0)], instances=instances), memory=2 * SCARCE)
     assert len(built.mitsuba.shapes()) == 6
 
 
-def test_small_repeated_meshes_are_merged(build, look, parts):
-    """An instance would cost more than the triangles that it saves."""
-    instances = [Instance(0, moved(3.0 * number, 0, 0)) for number in range(400)]
+@pytest.mark.parametrize("stacked", [True, False])
+def test_copies_are_merged(build, look, parts, stacked):
+    """Instances would cost more time than the triangles that they save."""
+    places = np.stack([moved(3.0 * number, 0, 0) for number in range(400)])
+    instances = [Instance(0, places)] if stacked else [Instance(0, place) for place in places]
     built = build(parts.describe([parts.square()], [PLAIN], instances=instances))
     assert len(built.mitsuba.shapes()) == 1
     assert built.mitsuba.shapes()[0].primitive_count() == 800
@@ -58,15 +63,15 @@ def test_small_repeated_meshes_are_merged(build, look, parts):
     assert not look.hit(built, [1.5, 1195.5], [0, 0]).is_valid().numpy().any()
 
 
-@pytest.mark.parametrize("steps", [12, 60])  # merged, and as instances
+@pytest.mark.parametrize("memory", [None, SCARCE])  # merged, and as instances
 @pytest.mark.parametrize("smooth", [True, False])
-def test_mirrored_placement_keeps_the_outside_out(build, look, parts, steps, smooth):
-    ball = parts.ball(steps=steps)
+def test_mirrored_placement_keeps_the_outside_out(build, look, parts, memory, smooth):
+    ball = parts.ball(steps=60)
     if not smooth:
         ball = Mesh("ball", ball.positions, ball.faces, 0, None, ball.uvs)
     places = [moved(0, 0, 0, scale=(-1, 1, 1)), *(moved(5 + 3 * n, 0, 0) for n in range(5))]
-    built = build(parts.describe([ball], [PLAIN], instances=[Instance(0, place) for place in places]))
-    assert bool(is_instanced(built)) == (steps == 60)
+    built = build(parts.describe([ball], [PLAIN], instances=[Instance(0, place) for place in places]), memory=memory)
+    assert bool(is_instanced(built)) == (memory is not None)
     x, y = np.meshgrid(np.linspace(-0.6, 0.6, 9), np.linspace(-0.61, 0.62, 9))
     normal, shading, point = outward(built, look, x, y)
     assert ((normal * point).sum(1) > 0.9).all()
@@ -123,9 +128,35 @@ def test_family_in_a_repeated_object(build, look, parts):
     meshes = [parts.ball(0, steps=60), parts.ball(1, steps=60)]
     meshes[1] = Mesh("up", meshes[1].positions + np.float32([0, 3, 0]), meshes[1].faces, 1, meshes[1].normals)
     instances = [Instance(mesh, moved(3.0 * number, 0, 0)) for number in range(6) for mesh in (0, 1)]
-    built = build(parts.describe(meshes, materials, instances=instances))
+    built = build(parts.describe(meshes, materials, instances=instances), memory=2 * SCARCE)
+    assert is_instanced(built)
     seen = look.attribute(built, "base_color", [3, 3], [0, 3])
     np.testing.assert_allclose(seen, [(1, 0, 0), (0, 1, 0)], atol=1e-6)
+
+
+def test_copies_keep_colours_coordinates_and_normals(build, look, parts):
+    """Merged copies, some of them mirrored, equal the same meshes one by one."""
+    rng = np.random.default_rng(5)
+    colors = rng.random((4, 3), np.float32)
+    square = parts.square(colors=colors, normals=np.tile(np.float32([0.1, 0, 1]), (4, 1)))
+    places = np.stack([moved(3.0 * n, 0, 0, scale=(1, (-1) ** n, 1), turn=0.1 * n) for n in range(5)])
+    stack = build(parts.describe([square], [PLAIN], instances=[Instance(0, places)]))
+    single = build(parts.describe([square], [PLAIN], instances=[Instance(0, place) for place in places]))
+    x, y = 3.0 * np.arange(5) + 0.2, np.full(5, 0.4)
+    for mine, its in zip(outward(stack, look, x, y), outward(single, look, x, y), strict=True):
+        np.testing.assert_array_equal(mine, its)
+    for number in range(5):
+        alone = build(parts.describe([square], [PLAIN], instances=[Instance(0, places[number])]))
+        expected = look.attribute(alone, "base_color", x[number], 0.4)
+        np.testing.assert_allclose(look.attribute(stack, "base_color", x[number], 0.4), expected, atol=1e-6)
+        for mine, its in zip(outward(stack, look, x[number], 0.4), outward(alone, look, x[number], 0.4), strict=True):
+            np.testing.assert_allclose(mine, its, atol=1e-5)
+
+
+def test_copies_beyond_the_memory_are_refused(build, parts):
+    places = np.tile(np.eye(4), (2_000_000, 1, 1))
+    with pytest.raises(SceneError, match=r"2,000,000 placed meshes of 28,084,000,000 triangles need .* GiB.* 1 GiB"):
+        build(parts.describe([parts.ball(steps=60)], [PLAIN], instances=[Instance(0, places)]), memory=1 << 30)
 
 
 def test_vertex_colours_multiply(build, look, parts):

@@ -18,6 +18,7 @@ from lippmann.device.pbr.shapes import Dress, has_volume, make_shapes
 from lippmann.device.pbr.textures import TextureStore
 from lippmann.errors import SceneError
 from lippmann.runtime import engine as engines
+from lippmann.runtime import machine
 from lippmann.scene.mitsuba_source import MitsubaSource, with_sky
 from lippmann.scene.scene import Scene
 from lippmann.scene.values.description import Color, Matrix, SceneDescription
@@ -56,13 +57,19 @@ class BuiltScene:
     borrowed: bool = False
 
 
-def build(scene: Scene, engine: engines.Engine | None = None) -> BuiltScene:
+def build(scene: Scene, engine: engines.Engine | None = None, *, memory: int | None = None) -> BuiltScene:
     """Make a Mitsuba scene under the variant of ``engine``, a running engine; None starts one.
+
+    Parameters
+    ----------
+    memory:
+        Bytes that the scene's shapes may take; None for all that is free.
 
     Raises
     ------
     SceneError
-        Mitsuba refuses the scene, it shows nothing, or a lamp or environment has values that mean nothing.
+        Mitsuba refuses the scene, it shows nothing, it does not fit the memory, or a lamp or environment
+        has values that mean nothing.
     EngineError
         The engine cannot be started.
     """
@@ -70,16 +77,19 @@ def build(scene: Scene, engine: engines.Engine | None = None) -> BuiltScene:
         engines.start()
     if isinstance(scene.physical, MitsubaSource):
         return _build_source(scene.physical, scene)
-    return build_description(replace(scene.physical, environment=scene.environment, background=scene.background))
+    description = replace(scene.physical, environment=scene.environment, background=scene.background)
+    return build_description(description, memory=memory)
 
 
-def build_description(description: SceneDescription) -> BuiltScene:
+def build_description(description: SceneDescription, *, memory: int | None = None) -> BuiltScene:
     """Make a Mitsuba scene of a description as it stands, under the variant that runs.
+
+    ``memory`` is that of :func:`build`.
 
     Raises
     ------
     SceneError
-        Nothing to see, or a lamp or environment has values that mean nothing.
+        Nothing to see, no room in the memory, or a lamp or environment has values that mean nothing.
     """
     seconds: dict[str, float] = {}
     notes: list[str] = []
@@ -93,7 +103,8 @@ def build_description(description: SceneDescription) -> BuiltScene:
         notes += _texture_notes(description, finishes)
     with _timed(seconds, "shapes"):
         dressed = [(_dress(description, mesh, finishes), matrices) for mesh, matrices in placed.items()]
-        shapes, shape_finishes = make_shapes(dressed)
+        available = machine.available_memory() if memory is None else memory
+        shapes, shape_finishes = make_shapes(dressed, available, name=description.name)
     with _timed(seconds, "lights"):
         lamps = [light_object(light) for light in description.lights if max(light.color) > 0]
         if description.environment is not None:
@@ -129,18 +140,17 @@ def _timed(seconds: dict[str, float], stage: str) -> Iterator[None]:
     seconds[stage] = time.perf_counter() - started
 
 
-def _placements(description: SceneDescription, notes: list[str]) -> dict[int, list[Matrix]]:
-    """Where each mesh that has triangles is placed."""
-    placed: dict[int, list[Matrix]] = {}
+def _placements(description: SceneDescription, notes: list[str]) -> dict[int, Matrix]:
+    """The places ``(k, 4, 4)`` of each mesh that has triangles and volume there."""
+    placed: dict[int, Matrix] = {}
     flat = 0
-    for instance in description.instances:
-        if len(description.meshes[instance.mesh].faces) == 0:
+    for mesh, matrices in description.placements.items():
+        if len(description.meshes[mesh].faces) == 0:
             continue
-        matrix = np.asarray(instance.world_from_mesh, dtype=np.float64)
-        if has_volume(matrix):
-            placed.setdefault(instance.mesh, []).append(matrix)
-        else:
-            flat += 1
+        kept = has_volume(matrices)
+        flat += int(np.count_nonzero(~kept))
+        if kept.any():
+            placed[mesh] = matrices if kept.all() else matrices[kept]
     if flat:
         notes.append(f"{flat} object(s) scaled to nothing along an axis are left out")
     return placed
@@ -169,7 +179,7 @@ def _dress(description: SceneDescription, mesh: int, finishes: Mapping[Variant, 
 def _texture_notes(description: SceneDescription, finishes: Mapping[Variant, Finish]) -> list[str]:
     """Textures that a mesh has no coordinates for."""
     lacking: Counter[int] = Counter()
-    for number in {instance.mesh for instance in description.instances}:
+    for number in description.placements:
         finish = finishes.get(_variant(description, number))
         mesh = description.meshes[number]
         if finish is not None and any(uv_set >= len(mesh.uvs) for uv_set in finish.uv_sets):

@@ -1,12 +1,13 @@
 """Meshes and their placements as Mitsuba shapes: few and large ones, because each costs time at every frame.
 
-Meshes of one finish are merged into one shape in world space. A mesh that is placed often is kept once and instanced,
-where that saves memory worth the cost of its instances.
+Meshes of one finish are merged into one shape in world space. A mesh that is placed often may instead be kept once and
+instanced: :mod:`lippmann.device.pbr.instancing` chooses.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+import hashlib
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,14 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.device.pbr.emitters import glow
+from lippmann.device.pbr.instancing import CopiedMesh, choose_instances
 from lippmann.device.pbr.material_groups import Variant
 from lippmann.device.pbr.materials import Finish
 from lippmann.device.pbr.texture_lookup import ALPHA_ATTRIBUTE, COLOR_ATTRIBUTE, MEMBER_ATTRIBUTE, uv_attribute
 from lippmann.scene.values.description import FloatArray, IndexArray, Matrix, Mesh
 
-#: A mesh is instanced if its copies would add this many triangles, and each copy this many.
-MIN_SAVED_TRIANGLES = 8192
-MIN_INSTANCE_TRIANGLES = 256
+#: Vertices that are transformed at a time, which bounds the memory of double-precision intermediates.
+_VERTICES_AT_A_TIME = 1 << 20
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,51 +36,87 @@ class Dress:
 
 @dataclass(frozen=True, eq=False)
 class Piece:
-    """One dressed mesh at one place."""
+    """One dressed mesh at ``k`` places, ``world_from_mesh`` ``(k, 4, 4)``."""
 
     dress: Dress
     world_from_mesh: Matrix
 
+    @property
+    def vertices(self) -> int:
+        """Vertices of all copies."""
+        return len(self.world_from_mesh) * len(self.dress.mesh.positions)
 
-def has_volume(matrix: Matrix) -> bool:
-    """Whether a placement keeps volume: a flat or singular one shows nothing."""
-    return bool(np.all(np.isfinite(matrix))) and abs(float(np.linalg.det(matrix[:3, :3]))) > 0
+    def per_copy(self, values: NDArray[Any]) -> NDArray[Any]:
+        """Values of one mesh, once per copy."""
+        return np.tile(values, (len(self.world_from_mesh), *[1] * (values.ndim - 1)))
 
 
-def make_shapes(placements: Sequence[tuple[Dress, Sequence[Matrix]]]) -> tuple[list[Any], list[Finish | None]]:
-    """Mitsuba shapes of all meshes, groups among them; and of each its finish, None for instances and groups."""
-    pieces: list[Piece] = []
-    repeated: dict[tuple[bytes, ...], list[tuple[Dress, Sequence[Matrix]]]] = {}
+def has_volume(matrices: Matrix) -> NDArray[np.bool_]:
+    """Whether placements ``(k, 4, 4)`` keep volume: a flat or singular one shows nothing."""
+    finite = np.isfinite(matrices).all(axis=(1, 2))
+    linear = np.where(finite[:, None, None], matrices[:, :3, :3], 0.0)
+    return np.asarray(finite & (np.abs(np.linalg.det(linear)) > 0))
+
+
+def make_shapes(
+    placements: Sequence[tuple[Dress, Matrix]], memory: int, *, name: str = ""
+) -> tuple[list[Any], list[Finish | None]]:
+    """Mitsuba shapes of all meshes, groups among them; and of each its finish, None for instances and groups.
+
+    Parameters
+    ----------
+    placements:
+        Each mesh with its places ``(k, 4, 4)``.
+    memory:
+        Bytes that the shapes may take.
+    name:
+        Name of the scene, for errors.
+
+    Raises
+    ------
+    SceneError
+        The shapes do not fit the memory.
+    """
+    # Meshes that are always placed together, as the primitives of one glTF mesh are, share their instances.
+    together: dict[tuple[bool, bytes], list[Piece]] = {}
     for dress, matrices in placements:
-        if _is_instanced(dress, len(matrices)):
-            key = tuple(np.ascontiguousarray(matrix, dtype=np.float64).tobytes() for matrix in matrices)
-            repeated.setdefault(key, []).append((dress, matrices))
-        else:
-            pieces.extend(Piece(dress, matrix) for matrix in matrices)
+        key = _is_instantiable(dress), hashlib.sha256(np.ascontiguousarray(matrices)).digest()
+        together.setdefault(key, []).append(Piece(dress, matrices))
+    groups = {number: _copied(pieces) for number, pieces in enumerate(together.values())}
+    instanced = choose_instances(groups, memory, name=name)
+    merged = [piece for number, pieces in enumerate(together.values()) if number not in instanced for piece in pieces]
     shapes: list[Any] = []
     finishes: list[Finish | None] = []
-    for shape, finish in _merged(pieces):
+    for shape, finish in _merged(merged):
         shapes.append(shape)
         finishes.append(finish)
-    for group in repeated.values():
-        instances = _instances([dress for dress, _ in group], group[0][1])
-        shapes.extend(instances)
-        finishes.extend([None] * len(instances))
+    for number, pieces in enumerate(together.values()):
+        if number in instanced:
+            instances = _instances([piece.dress for piece in pieces], pieces[0].world_from_mesh)
+            shapes.extend(instances)
+            finishes.extend([None] * len(instances))
     return shapes, finishes
 
 
-def _is_instanced(dress: Dress, copies: int) -> bool:
+def _is_instantiable(dress: Dress) -> bool:
     # Mitsuba's instances cannot glow, and absorption is looked up by shapes of the scene itself.
-    if dress.finish.emission is not None or dress.finish.absorption is not None:
-        return False
-    triangles = len(dress.mesh.faces)
-    return triangles >= MIN_INSTANCE_TRIANGLES and triangles * (copies - 1) >= MIN_SAVED_TRIANGLES
+    return dress.finish.emission is None and dress.finish.absorption is None
 
 
-def _instances(dresses: Sequence[Dress], matrices: Sequence[Matrix]) -> list[Any]:
+def _copied(pieces: Sequence[Piece]) -> CopiedMesh:
+    meshes = [piece.dress.mesh for piece in pieces]
+    return CopiedMesh(
+        triangles=sum(len(mesh.faces) for mesh in meshes),
+        vertices=sum(len(mesh.positions) for mesh in meshes),
+        copies=len(pieces[0].world_from_mesh),
+        instantiable=_is_instantiable(pieces[0].dress),
+    )
+
+
+def _instances(dresses: Sequence[Dress], matrices: Matrix) -> list[Any]:
     import mitsuba as mi
 
-    local = [Piece(dress, np.eye(4)) for dress in dresses]
+    local = [Piece(dress, np.eye(4)[None]) for dress in dresses]
     group = {f"shape{number}": shape for number, (shape, _) in enumerate(_merged(local))}
     shapegroup = mi.load_dict({"type": "shapegroup", **group})
     places = [mi.ScalarTransform4f(np.asarray(matrix).tolist()) for matrix in matrices]
@@ -109,7 +146,7 @@ def _mesh_shape(pieces: Sequence[Piece]) -> Any:
     props["bsdf"] = finish.bsdf
     if finish.emission is not None and any(_has_area(piece) for piece in pieces):  # Mitsuba draws points on it
         props["emitter"] = glow(finish.emission)
-    starts = np.cumsum([0, *(len(piece.dress.mesh.positions) for piece in pieces)])
+    starts = np.cumsum([0, *(piece.vertices for piece in pieces)])
     faces = np.concatenate(
         [_placed_faces(piece) + np.uint32(start) for piece, start in zip(pieces, starts, strict=False)]
     )
@@ -139,61 +176,91 @@ def _device(parts: Sequence[NDArray[Any]]) -> Any:
 
 def _attributes(pieces: Sequence[Piece], finish: Finish) -> Mapping[str, NDArray[Any]]:
     """What finish and meshes say per vertex or face beyond position, normal and the first uv set."""
-    meshes = [piece.dress.mesh for piece in pieces]
     attributes: dict[str, NDArray[Any]] = {}
     if finish.tinted:
-        attributes[COLOR_ATTRIBUTE] = np.concatenate([_colors(mesh)[:, :3] for mesh in meshes])
+        attributes[COLOR_ATTRIBUTE] = np.concatenate([_colors(piece)[:, :3] for piece in pieces])
     if finish.faded:
-        attributes[ALPHA_ATTRIBUTE] = np.concatenate([_colors(mesh)[:, 3:] for mesh in meshes])
+        attributes[ALPHA_ATTRIBUTE] = np.concatenate([_colors(piece)[:, 3:] for piece in pieces])
     for number in finish.uv_sets[1:]:
         uv = np.concatenate([_uv(piece, number) for piece in pieces])
         attributes[uv_attribute(number)] = np.column_stack([uv, np.zeros(len(uv))])
     if len(finish.members) > 1:
         members = [finish.members[piece.dress.variant] for piece in pieces]
-        attributes[MEMBER_ATTRIBUTE] = np.repeat(members, [len(mesh.faces) for mesh in meshes])[:, None]
+        attributes[MEMBER_ATTRIBUTE] = np.repeat(members, [_face_count(piece) for piece in pieces])[:, None]
     return attributes
 
 
-def _colors(mesh: Mesh) -> FloatArray:
-    assert mesh.colors is not None
-    return mesh.colors
+def _face_count(piece: Piece) -> int:
+    return len(piece.world_from_mesh) * len(piece.dress.mesh.faces)
+
+
+def _colors(piece: Piece) -> FloatArray:
+    assert piece.dress.mesh.colors is not None
+    return piece.per_copy(piece.dress.mesh.colors)
 
 
 def _uv(piece: Piece, number: int) -> FloatArray:
     """A uv set; zeros where the mesh lacks it."""
     mesh = piece.dress.mesh
-    return mesh.uvs[number] if number < len(mesh.uvs) else np.zeros((len(mesh.positions), 2), dtype=np.float32)
+    if number < len(mesh.uvs):
+        return piece.per_copy(mesh.uvs[number])
+    return np.zeros((piece.vertices, 2), dtype=np.float32)
 
 
 def _placed_positions(piece: Piece) -> FloatArray:
-    matrix = piece.world_from_mesh
-    if np.array_equal(matrix, np.eye(4)):
-        return piece.dress.mesh.positions
-    return np.asarray(piece.dress.mesh.positions @ matrix[:3, :3].T + matrix[:3, 3], dtype=np.float32)
+    """Positions of all copies in the world, ``(k * n, 3)``."""
+    matrices, positions = piece.world_from_mesh, piece.dress.mesh.positions
+    if np.array_equal(matrices, np.eye(4)[None]):
+        return positions
+    placed = np.empty((len(matrices), len(positions), 3), np.float32)
+    for part in _parts(len(matrices), len(positions)):
+        linear, offset = matrices[part, :3, :3], matrices[part, :3, 3]
+        placed[part] = positions @ linear.transpose(0, 2, 1) + offset[:, None, :]
+    return placed.reshape(-1, 3)
+
+
+def _parts(copies: int, vertices: int) -> Iterator[slice]:
+    """Runs of copies of few enough vertices."""
+    step = max(1, _VERTICES_AT_A_TIME // max(vertices, 1))
+    return (slice(start, start + step) for start in range(0, copies, step))
 
 
 def _placed_faces(piece: Piece) -> IndexArray:
-    """A mirroring placement would turn the mesh inside out: its triangles are wound the other way."""
-    faces = piece.dress.mesh.faces.astype(np.uint32, copy=False)
-    return faces[:, ::-1] if np.linalg.det(piece.world_from_mesh[:3, :3]) < 0 else faces
+    """Triangles of all copies, ``(k * m, 3)``. A mirroring placement would turn its copy inside out: it is reversed."""
+    mesh, matrices = piece.dress.mesh, piece.world_from_mesh
+    faces = mesh.faces.astype(np.uint32, copy=False)
+    mirrored = np.linalg.det(matrices[:, :3, :3]) < 0
+    starts = np.arange(len(matrices), dtype=np.uint32) * np.uint32(len(mesh.positions))
+    placed = faces + starts[:, None, None]
+    placed[mirrored] = placed[mirrored][:, :, ::-1]
+    return placed.reshape(-1, 3)
 
 
 def _has_area(piece: Piece) -> bool:
-    corners = _placed_positions(piece)[piece.dress.mesh.faces]
+    corners = _placed_positions(piece)[_placed_faces(piece)]
     return bool(np.any(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])))
 
 
 def _placed_normals(piece: Piece) -> FloatArray:
-    """Unit normals in world space; where a file has none of length, the mean of the faces around."""
-    mesh = piece.dress.mesh
+    """Unit normals of all copies in the world; where a file has none of length, the mean of the faces around."""
+    mesh, matrices = piece.dress.mesh, piece.world_from_mesh
     assert mesh.normals is not None
-    normals = np.asarray(mesh.normals, dtype=np.float64) @ np.linalg.inv(piece.world_from_mesh[:3, :3])
+    placed = np.empty((len(matrices), len(mesh.positions), 3), np.float32)
+    for part in _parts(len(matrices), len(mesh.positions)):
+        placed[part] = _unit_normals(Piece(piece.dress, matrices[part])).reshape(-1, len(mesh.positions), 3)
+    return placed.reshape(-1, 3)
+
+
+def _unit_normals(piece: Piece) -> NDArray[np.float64]:
+    assert piece.dress.mesh.normals is not None
+    own = np.asarray(piece.dress.mesh.normals, dtype=np.float64)
+    normals = (own @ np.linalg.inv(piece.world_from_mesh[:, :3, :3])).reshape(-1, 3)
     lengths = np.linalg.norm(normals, axis=1, keepdims=True)
     lost = ~(np.isfinite(lengths) & (lengths > 0))[:, 0]
     if lost.any():
         normals[lost] = _face_normals(_placed_positions(piece), _placed_faces(piece))[lost]
         lengths = np.linalg.norm(normals, axis=1, keepdims=True)
-    return np.asarray(normals / lengths, dtype=np.float32)
+    return np.asarray(normals / lengths)
 
 
 def _face_normals(positions: FloatArray, faces: IndexArray) -> NDArray[np.float64]:

@@ -7,12 +7,14 @@ are linear RGB, non-negative. Matrices are 4x4 float64, acting on column vectors
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
+
+from lippmann.runtime.cached_property import cached_property
 
 FloatArray = NDArray[np.float32]
 IndexArray = NDArray[np.uint32]
@@ -117,7 +119,10 @@ class Mesh:
 
 @dataclass(frozen=True, eq=False)
 class Instance:
-    """One placement of one mesh (index into ``SceneDescription.meshes``)."""
+    """Placements of one mesh (index into ``SceneDescription.meshes``).
+
+    ``world_from_mesh`` is ``(4, 4)``, or ``(k, 4, 4)`` for k copies, which takes less memory than k instances.
+    """
 
     mesh: int
     world_from_mesh: Matrix
@@ -187,3 +192,12 @@ class SceneDescription:
     environment: Environment | None = None
     background: Color | None = None
     notes: Sequence[str] = ()
+
+    @cached_property
+    def placements(self) -> Mapping[int, Matrix]:
+        """The places ``(k, 4, 4)`` of each mesh that has any, float64, by the mesh's index."""
+        matrices: dict[int, list[Matrix]] = {}
+        for instance in self.instances:
+            own = np.asarray(instance.world_from_mesh, np.float64).reshape(-1, 4, 4)
+            matrices.setdefault(instance.mesh, []).append(own)
+        return {mesh: stacks[0] if len(stacks) == 1 else np.concatenate(stacks) for mesh, stacks in matrices.items()}

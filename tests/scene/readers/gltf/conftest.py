@@ -123,11 +123,11 @@ def read(tmp_path):
 
 
 def world_points(scene, instance=None):
-    """Vertices of all instances, or of one, in the world."""
-    instances = scene.instances if instance is None else [scene.instances[instance]]
-    return np.concatenate(
-        [scene.meshes[i.mesh].positions @ i.world_from_mesh[:3, :3].T + i.world_from_mesh[:3, 3] for i in instances]
-    )
+    """Vertices of all placements, or of one, in the world."""
+    placements = [(each.mesh, place) for each in scene.instances for place in each.world_from_mesh.reshape(-1, 4, 4)]
+    if instance is not None:
+        placements = [placements[instance]]
+    return np.concatenate([scene.meshes[mesh].positions @ place[:3, :3].T + place[:3, 3] for mesh, place in placements])
 
 
 @pytest.fixture(name="world_points")

@@ -152,10 +152,12 @@ def _placed(
             raise document.error(
                 f"{placed.node.place} puts its mesh beyond all bounds", rule="positions must be finite"
             )
-        for world, rank in zip(placed.worlds, kept, strict=True):
-            if rank == 3:
-                instances.append(Instance(placed.mesh, world))
-            elif rank == 2:
+        solid = kept == 3
+        if solid.any():
+            worlds = placed.worlds if solid.all() else placed.worlds[solid]
+            instances.append(Instance(placed.mesh, worlds[0] if len(worlds) == 1 else worlds))
+        for world, rank in zip(placed.worlds[~solid], kept[~solid], strict=True):
+            if rank == 2:
                 instances.append(Instance(len(meshes) + len(copies), np.eye(4)))
                 copies.append(_flattened(meshes[placed.mesh], world))
             else:
