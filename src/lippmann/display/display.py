@@ -184,17 +184,17 @@ class Display:
 
     # ---- Pixels and panel points -----------------------------------------------------------------------------------
 
-    def panel_point(self, u: Array, v: Array, ops: ArrayOps = NUMPY) -> tuple[Array, Array]:
+    def panel_point(self, u: Array, v: Array) -> tuple[Array, Array]:
         """Panel point in millimetres of continuous pixel coordinates, see :meth:`Panel.point`."""
-        return self.panel.point(u, v, ops)
+        return self.panel.point(u, v)
 
     def subpixel_point(self, u: Array, v: Array, c: Array, ops: ArrayOps = NUMPY) -> tuple[Array, Array]:
         """:meth:`panel_point` displaced by the offset of sub-pixel ``c`` (0 R, 1 G, 2 B)."""
         return self.panel.subpixel_point(u, v, c, ops)
 
-    def pixel_coordinates(self, x: Array, y: Array, ops: ArrayOps = NUMPY) -> tuple[Array, Array]:
+    def pixel_coordinates(self, x: Array, y: Array) -> tuple[Array, Array]:
         """Continuous pixel coordinates ``(u, v)`` of a panel point; the inverse of :meth:`panel_point`."""
-        return self.panel.coordinates(x, y, ops)
+        return self.panel.coordinates(x, y)
 
     # ---- Panel points, lenses and rays -----------------------------------------------------------------------------
 
@@ -277,7 +277,7 @@ class Display:
         px, py, pz = (np.full(i.shape, float(value)) for value in point)
         x, y = self.project(px, py, pz, i, j, NUMPY)
         owner_i, owner_j = self.lens_of(x, y, NUMPY)
-        u, v = self.pixel_coordinates(x, y, NUMPY)
+        u, v = self.pixel_coordinates(x, y)
         on_panel = (u >= 0) & (u < self.panel.width) & (v >= 0) & (v < self.panel.height)
         seen = on_panel & (owner_i == i) & (owner_j == j)
         return np.stack([i[seen], j[seen]], axis=1).astype(np.intp), np.stack([x[seen], y[seen]], axis=1)

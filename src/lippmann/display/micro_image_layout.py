@@ -132,5 +132,5 @@ def _pixel_centers(display: Display, first: int, last: int) -> tuple[NDArray[np.
     if display.lattice.rows_are_alike:
         last = first + 1
     u, v = np.meshgrid(np.arange(display.panel.width) + 0.5, np.arange(first, last) + 0.5)
-    x, y = display.panel_point(u, v, NUMPY)
+    x, y = display.panel_point(u, v)
     return x, y

@@ -71,7 +71,7 @@ class Panel:
         """The sub-pixels (0 R, 1 G, 2 B) from left to right."""
         return tuple(sorted(range(3), key=lambda c: self.subpixel_offsets[c][0]))
 
-    def point(self, u: Array, v: Array, ops: ArrayOps) -> tuple[Array, Array]:
+    def point(self, u: Array, v: Array) -> tuple[Array, Array]:
         """Millimetres (x right, y up, origin in the middle) of continuous pixel coordinates.
 
         ``u`` counts columns from the left edge, ``v`` rows from the top edge: column ``c`` covers ``c <= u < c + 1``
@@ -79,14 +79,14 @@ class Panel:
         """
         return (u - 0.5 * self.width) * self.pixel_pitch, (0.5 * self.height - v) * self.pixel_pitch
 
-    def coordinates(self, x: Array, y: Array, ops: ArrayOps) -> tuple[Array, Array]:
+    def coordinates(self, x: Array, y: Array) -> tuple[Array, Array]:
         """Continuous pixel coordinates of a point in millimetres; the inverse of :meth:`point`."""
         return x / self.pixel_pitch + 0.5 * self.width, 0.5 * self.height - y / self.pixel_pitch
 
     def subpixel_point(self, u: Array, v: Array, c: Array, ops: ArrayOps) -> tuple[Array, Array]:
         """:meth:`point` displaced by the offset of the sub-pixel ``c``: 0 (R), 1 (G), 2 (B); an int or an array."""
         right, down = self.subpixel_offset(u, v, c, ops)
-        return self.point(u + right, v + down, ops)
+        return self.point(u + right, v + down)
 
     def subpixel_offset(self, u: Array, v: Array, c: Array, ops: ArrayOps) -> tuple[Array, Array]:
         """Place ``(right, down)`` of the sub-pixel ``c`` from the centre of its pixel, in pixels.
