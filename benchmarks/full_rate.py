@@ -26,7 +26,7 @@ def main() -> None:
     from lippmann.rendering.film.wavefront_plan import make_plan
     from lippmann.rendering.transport.path import PathIntegrator
     from lippmann.rendering.transport.ray_source import DisplayRays
-    from lippmann.rendering.transport.scene_flags import make_traits
+    from lippmann.rendering.transport.scene_features import make_scene_features
     from lippmann.scene.placement import place
 
     scene = load_scene("teapot")
@@ -38,7 +38,9 @@ def main() -> None:
     plan = make_plan(width, height, 1, memory=2**31)
     ours = PathIntegrator(
         built.mitsuba,
-        make_traits(built.mitsuba, background=built.background, has_null=built.has_null, absorption=built.absorption),
+        make_scene_features(
+            built.mitsuba, background=built.background, has_null=built.has_null, absorption=built.absorption
+        ),
         1,
         name="direct",
     )

@@ -21,6 +21,7 @@ ORDER = (
     "_version",
     "errors",
     "progress",
+    "json_values",
     "color",
     "runtime",
     "display",

@@ -32,7 +32,7 @@ def assert_same_on_device(display, device, seed):
     point, z = rng.uniform(-5, 5, (2, len(u))), rng.uniform(-60, -0.1, len(u))
 
     def evaluate(number, *ops):
-        x, y = display.panel_point(number(u), number(v), *ops)
+        x, y = display.panel_point(number(u), number(v))
         lens = display.lens_of(x, y, *ops)
         ray = display.light_ray(x, y, *ops)
         projected = display.project(number(point[0]), number(point[1]), number(z), *lens, *ops)
@@ -41,7 +41,7 @@ def assert_same_on_device(display, device, seed):
             *lens,
             *(x, y, *ray[0], *ray[1], *projected, *seen),
             *display.subpixel_point(number(u), number(v), number(c), *ops),
-            *display.pixel_coordinates(x, y, *ops),
+            *display.pixel_coordinates(x, y),
         ]
 
     here, there = evaluate(np.asarray), evaluate(real, ops)

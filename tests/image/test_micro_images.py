@@ -33,7 +33,7 @@ def test_a_micro_image_holds_the_pixels_of_its_lens_in_their_order(data, random_
     display = data.draw(random_displays())
     permutation, panel = Permutation(display), display.panel
     v, u = np.indices((panel.height, panel.width)) + 0.5
-    i, j = display.lens_of(*display.panel_point(u, v, NUMPY), NUMPY)
+    i, j = display.lens_of(*display.panel_point(u, v), NUMPY)
     rows, columns, ny, nx = permutation.shape
     mask = permutation.mask
     j_here, i_here, _, _ = np.indices((rows, columns, ny, nx))

@@ -50,7 +50,7 @@ def test_a_view_holds_the_pixels_at_its_place_behind_every_lens(data, random_dis
             shown = mask[ky, kx]
             if not grid.exact:
                 # Places in the corners of a hexagon's box are other lenses'.
-                place = display.panel_point(u_center + right, v_center + (0 if lenticular else down), NUMPY)
+                place = display.panel_point(u_center + right, v_center + (0 if lenticular else down))
                 i, j = display.lens_of(*place, NUMPY)
                 assert (j * display.lens_grid.columns + i == lens)[shown].all()
             beside_u = (views[ky, kx, ..., 0] - u_center - right)[shown]
@@ -68,7 +68,7 @@ def test_resampled_views_take_own_pixels_only(data, random_displays):
     display = data.draw(random_displays(whole=False))
     views, mask = ramp(display).views_and_mask()
     u, v = views[mask][:, 0].astype(float), views[mask][:, 1].astype(float)
-    i, j = display.lens_of(*display.panel_point(u, v, NUMPY), NUMPY)
+    i, j = display.lens_of(*display.panel_point(u, v), NUMPY)
     row, column = np.nonzero(mask)[2:]
     np.testing.assert_array_equal(i, column)
     if display.lens_array.layout != "lenticular":

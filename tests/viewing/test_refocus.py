@@ -69,8 +69,8 @@ def test_in_the_lens_plane_it_is_the_mean_of_each_micro_image(layout, distance):
     for row, column in np.ndindex(height, width):
         u, v = (column + 0.5) / width * display.panel.width, (row + 0.5) / height * display.panel.height
         # A point of the lens plane, the lens that holds it, and the panel point behind it as seen from the distance.
-        x, y = (k * display.magnification for k in display.panel_point(u, v, NUMPY))
-        panel_u, panel_v = display.pixel_coordinates(x, y, NUMPY)
+        x, y = (k * display.magnification for k in display.panel_point(u, v))
+        panel_u, panel_v = display.pixel_coordinates(x, y)
         if not (0 < panel_u < display.panel.width and 0 < panel_v < display.panel.height):
             continue
         i, j = (int(k) for k in display.lens_of(x, y, NUMPY))
@@ -87,7 +87,7 @@ def test_in_the_lens_plane_it_is_the_mean_of_each_micro_image(layout, distance):
 def drawn_at(display, z):
     """What the display shows of a plane at z with stripes 4 mm wide: sampled along the rays of the pixels."""
     v, u = np.indices((display.panel.height, display.panel.width)) + 0.5
-    origin, direction = display.light_ray(*display.panel_point(u, v, NUMPY), NUMPY)
+    origin, direction = display.light_ray(*display.panel_point(u, v), NUMPY)
     x = origin[0] + direction[0] * (z - origin[2]) / direction[2]
     return IntegralImage(np.repeat(stripes(x)[..., None], 3, axis=2), display)
 
@@ -112,7 +112,7 @@ def stripes(x):
 def test_a_drawn_plane_is_sharp_at_its_own_depth_only(display, z):
     image = drawn_at(display, z)
     width, height = display.panel.width, display.panel.height
-    x, _ = display.panel_point(*np.meshgrid(np.arange(width) + 0.5, [0.0]), NUMPY)
+    x, _ = display.panel_point(*np.meshgrid(np.arange(width) + 0.5, [0.0]))
     inner = slice(width // 5, -width // 5)
 
     def error_at(plane):

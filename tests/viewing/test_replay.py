@@ -140,7 +140,7 @@ def test_at_the_viewing_distance_one_view_fills_the_picture(display):
 def test_the_pixel_seen_sends_its_ray_past_the_eye(display, eye):
     samples = replay_at_lens_centers(numbered(display), eye)
     column, row = (samples.pixels[samples.own][:, k] + 0.5 for k in (0, 1))
-    origin, direction = display.light_ray(*display.panel_point(column, row, NUMPY), NUMPY)
+    origin, direction = display.light_ray(*display.panel_point(column, row), NUMPY)
     steps = (eye[2] - origin[2]) / direction[2]
     beside = origin[0] + steps * direction[0] - eye[0], origin[1] + steps * direction[1] - eye[1]
     # Within the half pixel that nearest sampling leaves, magnified from the panel to the eye.
@@ -159,7 +159,7 @@ def test_slanted_sheets_replay_what_the_rays_recorded():
     assert samples.own.sum() > 300
     column, row = (samples.pixels[samples.own][:, k] for k in (0, 1))
     np.testing.assert_array_equal(row, np.argwhere(samples.own)[:, 0])
-    x, y = sheet.panel_point(column + 0.5, row + 0.5, NUMPY)
+    x, y = sheet.panel_point(column + 0.5, row + 0.5)
     origin, direction = sheet.light_ray(x, y, NUMPY)
     steps = (eye[2] - origin[2]) / direction[2]
     across = sheet.lattice.across(origin[0] + steps * direction[0] - eye[0], origin[1] + steps * direction[1] - eye[1])

@@ -30,7 +30,7 @@ def test_the_nearest_subpixel_is_seen(cells):
             centers = display.subpixel_point(column + 0.5, row + 0.5, c, NUMPY)
             distance = np.hypot(panel_x[..., None, None] - centers[0], panel_y[..., None, None] - centers[1])
             found = distance.reshape(*x.shape, -1).argmin(axis=-1)
-            u, v = display.pixel_coordinates(panel_x, panel_y, NUMPY)
+            u, v = display.pixel_coordinates(panel_x, panel_y)
             inner = (u > 2) & (u < 38) & (v > 2) & (v < 22)
             np.testing.assert_array_equal(seen[rows][..., c][inner], values[..., c].ravel()[found][inner])
 

@@ -8,7 +8,7 @@ the identity for both bit depths and both transfers.
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -23,13 +23,13 @@ FloatArray = NDArray[np.float32]
 _BLOCK = 1 << 22
 
 
-def encode_srgb(linear: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
+def encode_srgb(linear: NDArray[np.floating]) -> NDArray[np.floating]:
     """sRGB-coded values in [0, 1] of linear values, which are clipped to [0, 1]; same shape and precision."""
-    value: NDArray[Any] = np.clip(linear, 0, 1)
+    value: NDArray[np.floating] = np.clip(linear, 0, 1)
     return np.where(value <= 0.0031308, 12.92 * value, 1.055 * value ** (1 / 2.4) - 0.055)
 
 
-def encode(linear: NDArray[np.floating[Any]], transfer: Transfer) -> NDArray[np.floating[Any]]:
+def encode(linear: NDArray[np.floating], transfer: Transfer) -> NDArray[np.floating]:
     """Coded values in [0, 1] of linear values by ``transfer``; same shape and precision."""
     return encode_srgb(linear) if transfer == "srgb" else np.clip(linear, 0, 1)
 
@@ -41,7 +41,7 @@ def decode_srgb(coded: ArrayLike) -> NDArray[np.float64]:
     return np.where(value <= 0.04045, value / 12.92, ((np.maximum(value, 0.0) + 0.055) / 1.055) ** 2.4)
 
 
-def coding_slope(linear: NDArray[Any], transfer: Transfer = "srgb") -> NDArray[np.float32]:
+def coding_slope(linear: NDArray[np.floating], transfer: Transfer = "srgb") -> NDArray[np.float32]:
     """Slope of the coding curve: by how much a code in [0, 1] changes with its linear value; 0 outside [0, 1]."""
     inside = (linear >= 0) & (linear <= 1)
     if transfer == "linear":
@@ -53,7 +53,7 @@ def coding_slope(linear: NDArray[Any], transfer: Transfer = "srgb") -> NDArray[n
 
 def quantize(linear: FloatArray, bits: int, transfer: Transfer) -> NDArray[np.uint8] | NDArray[np.uint16]:
     """Codes (uint8 for 8 bits, uint16 for 16) of linear values; same shape, always C-contiguous."""
-    codes: NDArray[Any] = np.empty(linear.shape, dtype=np.uint8 if bits == 8 else np.uint16)
+    codes = np.empty(linear.shape, dtype=np.uint8 if bits == 8 else np.uint16)
     top = 2**bits - 1
     source, target = np.ascontiguousarray(linear).reshape(-1), codes.reshape(-1)
     for start in range(0, source.size, _BLOCK):
@@ -70,7 +70,7 @@ def dequantize(codes: NDArray[np.uint8] | NDArray[np.uint16], transfer: Transfer
 
 
 @lru_cache(maxsize=4)
-def linear_levels(dtype: np.dtype[Any], transfer: Transfer) -> FloatArray:
+def linear_levels(dtype: np.dtype[np.uint8] | np.dtype[np.uint16], transfer: Transfer) -> FloatArray:
     """The linear values of all codes of a type, uint8 or uint16, in their order; not to be changed."""
     top = np.iinfo(dtype).max
     levels = np.arange(top + 1, dtype=np.float64) / top

@@ -12,7 +12,8 @@ from typing import Any, Protocol, TypeAlias
 
 import numpy as np
 
-#: An array (or scalar) of reals of whatever kind the ``ops`` in use understand.
+#: An array (or scalar) of reals of the kind that the ``ops`` in use understand. ``Any``, because NumPy and Dr.Jit share
+#: operators but no type, and Dr.Jit's arrays are untyped.
 Array: TypeAlias = Any
 
 

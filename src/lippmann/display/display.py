@@ -15,7 +15,6 @@ Geometry (display frame, millimetres, right-handed: origin at the array's centre
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -27,8 +26,9 @@ from lippmann.display.lattice import Lattice
 from lippmann.display.lens_array import LensArray
 from lippmann.display.lens_grid import WHOLE_TOLERANCE, LensGrid, lattice_in_front_of
 from lippmann.display.panel import Panel
-from lippmann.display.validation import check_keys, check_text, number, positive
+from lippmann.display.validation import Table, check_keys, check_text, number, positive
 from lippmann.errors import DisplayError
+from lippmann.json_values import JsonObject
 from lippmann.runtime.cached_property import cached_property
 
 #: How an infinite viewing distance is written in files.
@@ -55,10 +55,11 @@ class Display:
     title:
         One line for people.
     viewing_distance:
-        Where all lenses' central rays meet, in millimetres in front of the lens plane; ``math.inf`` allowed.
+        Distance in front of the lens plane at which the central rays of all lenses meet, in millimetres; ``math.inf``
+        allowed.
     aperture_distance:
-        How far in front of the lens plane the recorded rays begin, in millimetres: at least 0, below the viewing
-        distance. What lies nearer to the viewer is not recorded.
+        Distance in front of the lens plane at which the recorded rays begin, in millimetres: at least 0, below the
+        viewing distance. Nothing nearer to the viewer is recorded.
 
     Notes
     -----
@@ -151,7 +152,7 @@ class Display:
 
     @property
     def lattice(self) -> Lattice:
-        """Where the lenses are: aligned, and counted as in :attr:`lens_grid`."""
+        """Lens centres in the lens plane: aligned with the panel, and counted as in :attr:`lens_grid`."""
         return self._lenses[0]
 
     # ---- What the display can show ---------------------------------------------------------------------------------
@@ -184,17 +185,17 @@ class Display:
 
     # ---- Pixels and panel points -----------------------------------------------------------------------------------
 
-    def panel_point(self, u: Array, v: Array, ops: ArrayOps = NUMPY) -> tuple[Array, Array]:
+    def panel_point(self, u: Array, v: Array) -> tuple[Array, Array]:
         """Panel point in millimetres of continuous pixel coordinates, see :meth:`Panel.point`."""
-        return self.panel.point(u, v, ops)
+        return self.panel.point(u, v)
 
     def subpixel_point(self, u: Array, v: Array, c: Array, ops: ArrayOps = NUMPY) -> tuple[Array, Array]:
         """:meth:`panel_point` displaced by the offset of sub-pixel ``c`` (0 R, 1 G, 2 B)."""
         return self.panel.subpixel_point(u, v, c, ops)
 
-    def pixel_coordinates(self, x: Array, y: Array, ops: ArrayOps = NUMPY) -> tuple[Array, Array]:
+    def pixel_coordinates(self, x: Array, y: Array) -> tuple[Array, Array]:
         """Continuous pixel coordinates ``(u, v)`` of a panel point; the inverse of :meth:`panel_point`."""
-        return self.panel.coordinates(x, y, ops)
+        return self.panel.coordinates(x, y)
 
     # ---- Panel points, lenses and rays -----------------------------------------------------------------------------
 
@@ -208,7 +209,7 @@ class Display:
         return self.lattice.lens_at(x * k, y * k, ops)
 
     def lens_center(self, i: Array, j: Array, x: Array, y: Array, ops: ArrayOps = NUMPY) -> tuple[Array, Array]:
-        """Where the light line of the panel point ``(x, y)`` through lens ``(i, j)`` meets the lens plane.
+        """Point where the light line of the panel point ``(x, y)`` through lens ``(i, j)`` crosses the lens plane.
 
         That is the lens's centre; for a lenticular lens a point of its axis.
         """
@@ -277,10 +278,10 @@ class Display:
         px, py, pz = (np.full(i.shape, float(value)) for value in point)
         x, y = self.project(px, py, pz, i, j, NUMPY)
         owner_i, owner_j = self.lens_of(x, y, NUMPY)
-        u, v = self.pixel_coordinates(x, y, NUMPY)
+        u, v = self.pixel_coordinates(x, y)
         on_panel = (u >= 0) & (u < self.panel.width) & (v >= 0) & (v < self.panel.height)
-        seen = on_panel & (owner_i == i) & (owner_j == j)
-        return np.stack([i[seen], j[seen]], axis=1).astype(np.intp), np.stack([x[seen], y[seen]], axis=1)
+        shows = on_panel & (owner_i == i) & (owner_j == j)
+        return np.stack([i[shows], j[shows]], axis=1).astype(np.intp), np.stack([x[shows], y[shows]], axis=1)
 
     # ---- Copies and plain values -----------------------------------------------------------------------------------
 
@@ -288,8 +289,8 @@ class Display:
         """The same optics in front of ``width`` x ``height`` pixels."""
         return replace(self, panel=replace(self.panel, width=width, height=height))
 
-    def summary(self) -> dict[str, Any]:
-        """What one wants to know of a display at a glance, as plain values for a table or JSON.
+    def summary(self) -> JsonObject:
+        """Key figures of the display, as plain values for a table or JSON.
 
         Keys: ``name``, ``title``, ``layout``; ``pixels``, ``lenses`` as [columns, rows]; ``pixels_per_lens`` as
         [across, down], down being None if lenticular; ``size_mm`` as [width, height]; ``field_of_view`` and ``slant``
@@ -312,25 +313,25 @@ class Display:
             "lens_pitch": self.lens_array.pitch,
             "slant": self.lens_array.slant,
             "gap": self.gap,
-            "viewing_distance": self._written_viewing_distance,
+            "viewing_distance": self._plain_viewing_distance,
             "aperture_distance": self.aperture_distance,
         }
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> JsonObject:
         """Plain values for JSON; lengths in millimetres, an infinite distance as ``"infinite"``."""
         panel, lenses = self.panel, self.lens_array
         return {
             "name": self.name,
             "title": self.title,
             "gap": self.gap,
-            "viewing_distance": self._written_viewing_distance,
+            "viewing_distance": self._plain_viewing_distance,
             "aperture_distance": self.aperture_distance,
             "panel": {
                 "width": panel.width,
                 "height": panel.height,
                 "pixel_pitch": panel.pixel_pitch,
                 "subpixel_offsets": [list(offset) for offset in panel.subpixel_offsets],
-                **self._written_cells,
+                **self._plain_cells,
             },
             "lens_array": {
                 "layout": lenses.layout,
@@ -342,12 +343,12 @@ class Display:
         }
 
     @staticmethod
-    def from_dict(values: Mapping[str, Any]) -> Display:
+    def from_dict(values: Table) -> Display:
         """The display of :meth:`to_dict`, exactly; a :class:`DisplayError` if a key is missing or unknown."""
         check_tables(values)
-        parts: dict[str, Any] = dict(values)
-        parts["panel"] = Panel(**values["panel"])
-        parts["lens_array"] = LensArray(**values["lens_array"])
+        parts: dict[str, Any] = dict(values)  # any type until the constructors have checked them
+        parts["panel"] = Panel(**parts["panel"])
+        parts["lens_array"] = LensArray(**parts["lens_array"])
         if parts.get("viewing_distance") == INFINITE:
             parts["viewing_distance"] = math.inf
         return Display(**parts)
@@ -355,11 +356,11 @@ class Display:
     # ---- Derived once ----------------------------------------------------------------------------------------------
 
     @property
-    def _written_viewing_distance(self) -> float | str:
+    def _plain_viewing_distance(self) -> float | str:
         return INFINITE if math.isinf(self.viewing_distance) else self.viewing_distance
 
     @property
-    def _written_cells(self) -> dict[str, Any]:
+    def _plain_cells(self) -> JsonObject:
         """Empty where pixels are all alike, so that earlier versions read the display too."""
         cells = self.panel.subpixel_cells
         if cells is None:
@@ -375,8 +376,8 @@ class Display:
         return lattice_in_front_of(self.panel, self.lens_array, self.pixels_per_lens, self.magnification)
 
 
-def check_tables(values: Mapping[str, Any]) -> None:
-    """Refuses what is not shaped like :meth:`Display.to_dict`: unknown or missing keys, tables that are none."""
+def check_tables(values: Table) -> None:
+    """Refuse tables that are not shaped like :meth:`Display.to_dict`: unknown or missing keys, no tables."""
     check_keys(values, Display, "")
     check_keys(values["panel"], Panel, "panel")
     check_keys(values["lens_array"], LensArray, "lens_array")

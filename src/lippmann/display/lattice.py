@@ -35,7 +35,7 @@ class Lattice:
 
     @property
     def rows_are_alike(self) -> bool:
-        """Whether nothing differs from one row of pixels to the next: so it is under upright cylinders."""
+        """Whether all rows of pixels see the same lens geometry, as under upright cylinders."""
         return self.layout == "lenticular" and self.slant == 0.0
 
     @property
@@ -95,7 +95,7 @@ class Lattice:
         point of the rectangle's inside.
         """
         _, rows = self._span(rectangle)
-        # Whichever row comes first, the next one shall be the shifted one.
+        # The first row is never the shifted one.
         is_shifted = self.layout == "hexagonal" and rows[0] % 2 != 0
         origin_x = self.origin_x + (0.5 * self.pitch if is_shifted else 0.0)
         origin_y = self.origin_y - (rows[0] * self.row_pitch if rows[0] else 0.0)

@@ -52,11 +52,11 @@ class LensArray:
             rule = f"the layouts are {', '.join(LAYOUTS)}"
             raise DisplayError(f"layout is {self.layout!r}", where="lens_array.layout", rule=rule)
         object.__setattr__(self, "pitch", positive(self.pitch, "lens_array.pitch"))
-        object.__setattr__(self, "slant", self._checked_slant())
-        object.__setattr__(self, "offset", self._checked_offset())
-        object.__setattr__(self, "row_pitch", self._checked_row_pitch())
+        object.__setattr__(self, "slant", self._validate_slant())
+        object.__setattr__(self, "offset", self._validate_offset())
+        object.__setattr__(self, "row_pitch", self._validate_row_pitch())
 
-    def _checked_slant(self) -> float:
+    def _validate_slant(self) -> float:
         key = "lens_array.slant"
         slant = finite(self.slant, key)
         if abs(slant) >= MAXIMUM_SLANT:
@@ -67,7 +67,7 @@ class LensArray:
             raise DisplayError(f"slant is {slant:g}", where=key, rule=rule, fix="leave the key out")
         return slant
 
-    def _checked_offset(self) -> tuple[float, float] | None:
+    def _validate_offset(self) -> tuple[float, float] | None:
         if self.offset is None:
             return None
         key, rule = "lens_array.offset", "it must be two finite lengths, x and y"
@@ -77,7 +77,7 @@ class LensArray:
             raise DisplayError(f"offset is {self.offset!r}", where=key, rule=rule) from None
         return finite(x, key, rule=rule), finite(y, key, rule=rule)
 
-    def _checked_row_pitch(self) -> float | None:
+    def _validate_row_pitch(self) -> float | None:
         if self.row_pitch is None:
             return None
         key = "lens_array.row_pitch"

@@ -47,10 +47,10 @@ def lattice_in_front_of(
     width, height = (side / magnification for side in panel.size_mm)
     pitch, origin_x = lenses.pitch, 0.0
     if lenses.slant == 0.0:
-        pitch, origin_x = _aligned(lenses.pitch, panel.width / across, width)
+        pitch, origin_x = _align(lenses.pitch, panel.width / across, width)
     row_pitch, origin_y = math.inf, 0.0
     if down is not None:
-        row_pitch, origin_y = _aligned(lenses.row_spacing, panel.height / down, height)
+        row_pitch, origin_y = _align(lenses.row_spacing, panel.height / down, height)
     tolerance = BOUNDARY_TOLERANCE / across
     lattice = Lattice(lenses.layout, pitch, row_pitch, lenses.slant, origin_x, origin_y, tolerance)
     if lenses.offset is not None:
@@ -61,7 +61,7 @@ def lattice_in_front_of(
     return lattice, LensGrid(columns, rows)
 
 
-def _aligned(pitch: float, count: float, extent: float) -> tuple[float, float]:
+def _align(pitch: float, count: float, extent: float) -> tuple[float, float]:
     """Pitch in effect and position of a lens centre, for ``count`` lenses over an extent centred on zero."""
     whole = round(count)
     if abs(count - whole) > WHOLE_TOLERANCE:

@@ -1,4 +1,4 @@
-"""Which lens and which place in its micro-image each whole pixel has: the bookkeeping of micro-images and views.
+"""Index maps of micro-images (elemental images) and views: the lens of each pixel, and its place under that lens.
 
 Pure integers made from the display's geometry at pixel centres. The pair (lens, index) names a pixel uniquely, on any
 display, so cutting a picture into micro-images and putting it together again loses nothing.
@@ -91,7 +91,7 @@ def _block_by_block(
     row_range: tuple[int, int] | None,
     of_block: Callable[[Display, int, int], tuple[Indices, Indices]],
 ) -> tuple[Indices, Indices]:
-    """Runs ``of_block`` on a few rows at a time: its double-precision arrays would take gigabytes for a whole panel.
+    """Run ``of_block`` on a few rows at a time: its double-precision arrays would take gigabytes for a whole panel.
 
     It may return one row, or one column, that stands for all.
     """
@@ -128,9 +128,9 @@ def _indices_of_block(display: Display, first: int, last: int) -> tuple[Indices,
 
 
 def _pixel_centers(display: Display, first: int, last: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Panel points of the pixels of some rows; of the first of them alone under upright cylinders, which see no row."""
+    """Panel points of pixel centres of some rows; of the first row alone where all rows are alike."""
     if display.lattice.rows_are_alike:
         last = first + 1
     u, v = np.meshgrid(np.arange(display.panel.width) + 0.5, np.arange(first, last) + 0.5)
-    x, y = display.panel_point(u, v, NUMPY)
+    x, y = display.panel_point(u, v)
     return x, y

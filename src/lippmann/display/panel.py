@@ -17,7 +17,7 @@ RGB_STRIPE: SubpixelOffsets = ((-1 / 3, 0.0), (0.0, 0.0), (1 / 3, 0.0))
 #: Pixels of several kinds: rows of a pattern that repeats over the panel, from its top left pixel.
 SubpixelCells = tuple[tuple[SubpixelOffsets, ...], ...]
 
-#: Rows and columns of such a pattern; panels have up to 4, and every kind costs time at every sub-pixel.
+#: Most rows and columns of such a pattern; panels have up to 4, and every kind costs time at every sub-pixel.
 MAXIMUM_CELLS = 8
 
 
@@ -55,9 +55,9 @@ class Panel:
         object.__setattr__(self, "width", whole_count(self.width, "panel.width"))
         object.__setattr__(self, "height", whole_count(self.height, "panel.height"))
         object.__setattr__(self, "pixel_pitch", positive(self.pixel_pitch, "panel.pixel_pitch"))
-        object.__setattr__(self, "subpixel_offsets", _checked_offsets(self.subpixel_offsets))
+        object.__setattr__(self, "subpixel_offsets", _validate_offsets(self.subpixel_offsets))
         if self.subpixel_cells is not None:
-            cells = _checked_cells(self.subpixel_cells)
+            cells = _validate_cells(self.subpixel_cells)
             object.__setattr__(self, "subpixel_cells", cells)
             object.__setattr__(self, "subpixel_offsets", _mean_offsets(cells))
 
@@ -71,7 +71,7 @@ class Panel:
         """The sub-pixels (0 R, 1 G, 2 B) from left to right."""
         return tuple(sorted(range(3), key=lambda c: self.subpixel_offsets[c][0]))
 
-    def point(self, u: Array, v: Array, ops: ArrayOps) -> tuple[Array, Array]:
+    def point(self, u: Array, v: Array) -> tuple[Array, Array]:
         """Millimetres (x right, y up, origin in the middle) of continuous pixel coordinates.
 
         ``u`` counts columns from the left edge, ``v`` rows from the top edge: column ``c`` covers ``c <= u < c + 1``
@@ -79,14 +79,14 @@ class Panel:
         """
         return (u - 0.5 * self.width) * self.pixel_pitch, (0.5 * self.height - v) * self.pixel_pitch
 
-    def coordinates(self, x: Array, y: Array, ops: ArrayOps) -> tuple[Array, Array]:
+    def coordinates(self, x: Array, y: Array) -> tuple[Array, Array]:
         """Continuous pixel coordinates of a point in millimetres; the inverse of :meth:`point`."""
         return x / self.pixel_pitch + 0.5 * self.width, 0.5 * self.height - y / self.pixel_pitch
 
     def subpixel_point(self, u: Array, v: Array, c: Array, ops: ArrayOps) -> tuple[Array, Array]:
         """:meth:`point` displaced by the offset of the sub-pixel ``c``: 0 (R), 1 (G), 2 (B); an int or an array."""
         right, down = self.subpixel_offset(u, v, c, ops)
-        return self.point(u + right, v + down, ops)
+        return self.point(u + right, v + down)
 
     def subpixel_offset(self, u: Array, v: Array, c: Array, ops: ArrayOps) -> tuple[Array, Array]:
         """Place ``(right, down)`` of the sub-pixel ``c`` from the centre of its pixel, in pixels.
@@ -124,7 +124,7 @@ def _offset_of(offsets: SubpixelOffsets, zero: Array, c: Array, ops: ArrayOps) -
     return right, down
 
 
-def _checked_cells(cells: object) -> SubpixelCells:
+def _validate_cells(cells: object) -> SubpixelCells:
     key = "panel.subpixel_cells"
     most = MAXIMUM_CELLS
     rule = f"it must be 1 to {most} rows of 1 to {most} cells each, all rows alike; a cell is three pairs (right, down)"
@@ -134,18 +134,18 @@ def _checked_cells(cells: object) -> SubpixelCells:
         rows = []
     if not 1 <= len(rows) <= most or not 1 <= len(rows[0]) <= most or any(len(row) != len(rows[0]) for row in rows):
         raise DisplayError(f"subpixel_cells is {cells!r}", where=key, rule=rule)
-    return tuple(tuple(_checked_offsets(cell, key) for cell in row) for row in rows)
+    return tuple(tuple(_validate_offsets(cell, key) for cell in row) for row in rows)
 
 
 def _mean_offsets(cells: SubpixelCells) -> SubpixelOffsets:
-    every = [offsets for row in cells for offsets in row]
+    flat = [offsets for row in cells for offsets in row]
     red, green, blue = (
-        (sum(o[c][0] for o in every) / len(every), sum(o[c][1] for o in every) / len(every)) for c in range(3)
+        (sum(o[c][0] for o in flat) / len(flat), sum(o[c][1] for o in flat) / len(flat)) for c in range(3)
     )
     return red, green, blue
 
 
-def _checked_offsets(offsets: object, key: str = "panel.subpixel_offsets") -> SubpixelOffsets:
+def _validate_offsets(offsets: object, key: str = "panel.subpixel_offsets") -> SubpixelOffsets:
     rule = "it must be three pairs (right, down) for R, G and B, in pixels, each number between -1 and 1"
     try:
         pairs = [tuple(pair) for pair in offsets]  # type: ignore[attr-defined]

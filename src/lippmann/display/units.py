@@ -41,11 +41,11 @@ def length(
     text:
         A number, with a unit or without one.
     key:
-        What an error names.
+        Key that errors name.
     scales, per_inch:
-        Units with their millimetres, and units that count things per inch, of which the distance between two is meant.
+        Units with their millimetres, and units that count per inch, which give the distance from one to the next.
     unit:
-        What a bare number is in.
+        Unit of a bare number.
 
     Raises
     ------
@@ -56,15 +56,15 @@ def length(
     if match is None:
         rule = 'a length is a number of millimetres or a string with a unit such as "6.8 mm"'
         raise DisplayError(f"{text!r} is not a length", where=key, rule=rule)
-    amount, found = float(match[1]), match[2] or unit
-    if found in scales:
-        return amount * scales[found]
-    if found in per_inch:
-        apart = INCH / amount if amount > 0 else 0.0
-        if not 0 < apart < math.inf:
-            raise DisplayError(f"{text!r} is no length", where=key, rule=f"{found} must be above zero")
-        return apart
-    raise _unknown(text, found, key, [*scales, *per_inch])
+    amount, symbol = float(match[1]), match[2] or unit
+    if symbol in scales:
+        return amount * scales[symbol]
+    if symbol in per_inch:
+        spacing = INCH / amount if amount > 0 else 0.0
+        if not 0 < spacing < math.inf:
+            raise DisplayError(f"{text!r} is no length", where=key, rule=f"{symbol} must be above zero")
+        return spacing
+    raise _unknown_unit(text, symbol, key, [*scales, *per_inch])
 
 
 def size(text: str, key: str) -> tuple[float, float]:
@@ -85,7 +85,7 @@ def size(text: str, key: str) -> tuple[float, float]:
     sides = []
     for amount, unit in ((match[1], match[2] or unit_of_height), (match[3], unit_of_height)):
         if unit not in MILLIMETRES:
-            raise _unknown(text, unit, key, list(MILLIMETRES))
+            raise _unknown_unit(text, unit, key, list(MILLIMETRES))
         sides.append(float(amount) * MILLIMETRES[unit])
     return sides[0], sides[1]
 
@@ -108,7 +108,7 @@ def stripe(order: str, key: str) -> SubpixelOffsets:
     return (red, 0.0), (green, 0.0), (blue, 0.0)
 
 
-def _unknown(text: str, unit: str, key: str, known: list[str]) -> DisplayError:
+def _unknown_unit(text: str, unit: str, key: str, known: list[str]) -> DisplayError:
     return DisplayError(
         f"{text!r} has the unknown unit {unit!r}",
         where=key,

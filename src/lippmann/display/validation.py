@@ -7,11 +7,18 @@ import difflib
 import math
 from collections.abc import Collection, Iterable, Mapping
 from numbers import Integral, Real
+from typing import Any, TypeAlias
 
 from lippmann.errors import DisplayError
 
 #: Pixels along one side, far beyond any panel or print; keeps every count exact in all that follows.
 MAXIMUM_COUNT = 1_000_000
+
+#: A table of a file before its values are checked: they may be of any type.
+Table: TypeAlias = Mapping[str, object]
+
+#: A table whose keys are known, as arguments of a constructor that checks each value itself. Hence ``Any``.
+Arguments: TypeAlias = Mapping[str, Any]
 
 POSITIVE = "it must be a finite length above zero"
 
@@ -52,7 +59,7 @@ def whole_count(value: object, key: str) -> int:
 
 
 def check_text(value: object, key: str, *, empty: bool = True) -> None:
-    """Refuses what is no string, or an empty one where a name is needed."""
+    """Refuse a value that is no string, or an empty one where a name is needed."""
     if not isinstance(value, str) or not (empty or value):
         raise DisplayError(
             f"{key} is {value!r}", where=key, rule="it must be a text" + ("" if empty else ", not empty")
@@ -60,7 +67,7 @@ def check_text(value: object, key: str, *, empty: bool = True) -> None:
 
 
 def check_keys(values: object, kind: type, where: str) -> None:
-    """Refuses a table whose keys are not the fields of the dataclass ``kind``, or that lacks one without a default."""
+    """Refuse a table whose keys are not the fields of the dataclass ``kind``, or that lacks one without a default."""
     if not isinstance(values, Mapping):
         raise DisplayError(f"{where or 'the display'} is {values!r}", where=where, rule="it must be a table of keys")
     fields = {field.name: field for field in dataclasses.fields(kind)}
@@ -71,7 +78,7 @@ def check_keys(values: object, kind: type, where: str) -> None:
 
 
 def refuse_unknown(given: Iterable[object], known: Collection[str], where: str = "") -> None:
-    """Refuses a key that is not known, in the table ``where``."""
+    """Refuse a key that is not known, in the table ``where``."""
     for key in given:
         if key not in known:
             rule = f"the keys are {', '.join(known)}"

@@ -154,12 +154,12 @@ def centers_of_lenses(display: Display, rows: Indices, columns: Indices) -> tupl
     grid, lattice = display.lens_grid, display.lattice
     if lattice.layout != "lenticular":
         x, y = lattice.center(i, row, 0.0 * i, 0.0 * row, NUMPY)
-        u, v = display.pixel_coordinates(x * display.magnification, y * display.magnification, NUMPY)
+        u, v = display.pixel_coordinates(x * display.magnification, y * display.magnification)
         return u, v, (row * grid.columns + i).astype(np.int32)
-    _, y = display.panel_point(0.0 * row, row + 0.5, NUMPY)
+    _, y = display.panel_point(0.0 * row, row + 0.5)
     slant = math.radians(lattice.slant)
     across = (lattice.origin_x + i * lattice.pitch) * display.magnification
-    u, v = display.pixel_coordinates(across / math.cos(slant) + y * math.tan(slant), y, NUMPY)
+    u, v = display.pixel_coordinates(across / math.cos(slant) + y * math.tan(slant), y)
     return u, v, i.astype(np.int32)
 
 
@@ -295,7 +295,7 @@ def _owner_by_geometry(display: Display) -> _Owners:
     """Owners computed for each look-up."""
 
     def lens(row: Indices, column: Indices) -> Indices:
-        i, j = display.lens_of(*display.panel_point(column + 0.5, row + 0.5, NUMPY), NUMPY)
+        i, j = display.lens_of(*display.panel_point(column + 0.5, row + 0.5), NUMPY)
         flat: Indices = j * display.lens_grid.columns + i
         return flat
 
@@ -312,7 +312,7 @@ def _is_own(owners: _Owners, lens: Indices, row: Indices, column: Indices) -> Fl
 
 def _nearest_pixels(display: Display, owners: _Owners, lens: NDArray[np.int32], u: Real, v: Real) -> Pixels:
     """Nearest pixel of each lens, at or next to the place ``(u, v)``; none where the place belongs to another lens."""
-    i, j = display.lens_of(*display.panel_point(u, v, NUMPY), NUMPY)
+    i, j = display.lens_of(*display.panel_point(u, v), NUMPY)
     own_place = j * display.lens_grid.columns + i == lens
     # A place on the line between two pixels goes to the right or lower one, whatever the rounding noise.
     row, column = (np.floor(place + _SAME_PLACE).astype(np.intp) for place in (v, u))

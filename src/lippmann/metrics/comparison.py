@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from lippmann.display import Display
 from lippmann.errors import PictureError
 from lippmann.image import IntegralImage, Picture
+from lippmann.json_values import JsonObject, JsonValue
 from lippmann.metrics.flicker import Flicker
 from lippmann.metrics.mse_psnr import (
     LOW_PERCENTILE,
@@ -198,12 +199,17 @@ def _difference(a: Display, b: Display) -> str:
     """The first value in which two displays differ, for an error message."""
     if a.name != b.name:
         return f"{a.name} and {b.name}"
-    first, second = a.to_dict(), b.to_dict()
-    pairs = [(key, first[key], second[key]) for key in first if not isinstance(first[key], dict)]
-    for part in ("panel", "lens_array"):
-        pairs += [(f"{part}.{key}", first[part][key], second[part][key]) for key in first[part]]
-    key, one, other = next(pair for pair in pairs if pair[0] != "title" and pair[1] != pair[2])
-    return f"{key} is {one} in one and {other} in the other"
+    first, second = _flatten(a.to_dict()), _flatten(b.to_dict())
+    key = next(key for key in first if key != "title" and first[key] != second.get(key))
+    return f"{key} is {first[key]} in one and {second.get(key)} in the other"
+
+
+def _flatten(values: Mapping[str, JsonValue], prefix: str = "") -> JsonObject:
+    """Nested objects as one, with dotted keys."""
+    flat: JsonObject = {}
+    for key, value in values.items():
+        flat |= _flatten(value, f"{prefix}{key}.") if isinstance(value, Mapping) else {prefix + key: value}
+    return flat
 
 
 def _notes(reference: Picture, test: Picture) -> Iterator[str]:

@@ -223,17 +223,17 @@ def _make_integrator(
     from lippmann.device.whitted.scene import BuiltClassic
     from lippmann.rendering.transport.emitter_weights import make_light_sampler
     from lippmann.rendering.transport.path import PathIntegrator
-    from lippmann.rendering.transport.scene_flags import make_traits
+    from lippmann.rendering.transport.scene_features import make_scene_features
     from lippmann.rendering.transport.surface_property import SurfaceIntegrator
     from lippmann.rendering.transport.whitted import WhittedIntegrator
 
     if isinstance(built, BuiltClassic):
         return WhittedIntegrator(built, request.surfaces)
     if request.integrator in ("path", "direct"):
-        traits = make_traits(
+        features = make_scene_features(
             built.mitsuba, background=built.background, has_null=built.has_null, absorption=built.absorption
         )
-        integrator = PathIntegrator(built.mitsuba, traits, request.surfaces, name=request.integrator)
+        integrator = PathIntegrator(built.mitsuba, features, request.surfaces, name=request.integrator)
         if not built.borrowed:
             integrator.light_sampler = make_light_sampler(integrator, source)
         return integrator

@@ -194,6 +194,6 @@ def _owners(display: Display, window: PixelWindow) -> NDArray[np.int64]:
         window.left + np.arange(window.width) + 0.5,
         window.top + np.arange(window.height) + 0.5,
     )
-    i, j = display.lens_of(*display.panel_point(u, v, NUMPY), NUMPY)
+    i, j = display.lens_of(*display.panel_point(u, v), NUMPY)
     owners: NDArray[np.int64] = j.astype(np.int64) * display.lens_grid.columns + i.astype(np.int64)
     return owners

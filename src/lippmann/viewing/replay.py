@@ -128,9 +128,9 @@ def replay_at_lens_centers(image: Picture, eye: Eye) -> LensSamples:
     display = image.display
     x, y, i, j = _lens_points(display, eye)
     panel_x, panel_y = display.panel_point_seen_by(*eye, x, y, NUMPY)
-    u, v = display.pixel_coordinates(panel_x, panel_y, NUMPY)
+    u, v = display.pixel_coordinates(panel_x, panel_y)
     column, row = pixel_at(u), pixel_at(v)
-    owner_i, owner_j = display.lens_of(*display.panel_point(column + 0.5, row + 0.5, NUMPY), NUMPY)
+    owner_i, owner_j = display.lens_of(*display.panel_point(column + 0.5, row + 0.5), NUMPY)
     inside = is_on_panel(display, column, row)
     colors = np.zeros((*x.shape, 3), dtype=np.float32)
     colors[inside] = image.take(row[inside], column[inside])
@@ -247,7 +247,7 @@ def lens_plane_points(display: Display, width: int, height: int) -> Iterator[tup
     for first in range(0, height, step):
         rows = slice(first, min(first + step, height))
         columns, lines = np.meshgrid(u, v[rows])
-        x, y = display.panel_point(columns, lines, NUMPY)
+        x, y = display.panel_point(columns, lines)
         yield rows, x, y
 
 
@@ -282,7 +282,7 @@ def _panel_colors(image: Picture, x: Real, y: Real, filter_: Filter, subpixels: 
 
 def _nearest(image: Picture, x: Real, y: Real, channels: slice, offset: tuple[float, float]) -> FloatArray:
     """Values of the (sub-)pixels that hold the points; ``offset`` is the sub-pixel's place, right and down."""
-    u, v = image.display.pixel_coordinates(x, y, NUMPY)
+    u, v = image.display.pixel_coordinates(x, y)
     column, row = pixel_at(u - offset[0]), pixel_at(v - offset[1])
     inside = is_on_panel(image.display, column, row)
     values = image.take(np.where(inside, row, 0), np.where(inside, column, 0), channels)
@@ -293,7 +293,7 @@ def _linear(image: Picture, x: Real, y: Real, channels: slice, offset: tuple[flo
     """Values interpolated between those (sub-)pixels about the points that belong to the points' own lens."""
     display = image.display
     lens = display.lens_of(x, y, NUMPY)
-    u, v = display.pixel_coordinates(x, y, NUMPY)
+    u, v = display.pixel_coordinates(x, y)
     u, v = u - offset[0] - 0.5, v - offset[1] - 0.5
     first_column, first_row = pixel_at(u), pixel_at(v)
     right, down = np.clip(u - first_column, 0, 1), np.clip(v - first_row, 0, 1)
@@ -301,7 +301,7 @@ def _linear(image: Picture, x: Real, y: Real, channels: slice, offset: tuple[flo
     for dv, weight_v in ((0, 1 - down), (1, down)):
         for du, weight_u in ((0, 1 - right), (1, right)):
             column, row = first_column + du, first_row + dv
-            place = display.panel_point(column + (0.5 + offset[0]), row + (0.5 + offset[1]), NUMPY)
+            place = display.panel_point(column + (0.5 + offset[0]), row + (0.5 + offset[1]))
             owner = display.lens_of(*place, NUMPY)
             usable = is_on_panel(display, column, row) & (owner[0] == lens[0]) & (owner[1] == lens[1])
             weight = np.where(usable, weight_u * weight_v, 0.0)
@@ -322,7 +322,7 @@ def _cell_values(image: Picture, x: Real, y: Real, channel: int, filter_: Filter
     """
     display = image.display
     lens = display.lens_of(x, y, NUMPY)
-    u, v = display.pixel_coordinates(x, y, NUMPY)
+    u, v = display.pixel_coordinates(x, y)
     middle_column, middle_row = pixel_at(u), pixel_at(v)
     nearest, best = np.zeros(x.shape, dtype=np.float32), np.full(x.shape, np.inf)
     total, weights = np.zeros(x.shape), np.zeros(x.shape)
@@ -363,7 +363,7 @@ def _lens_points(display: Display, eye: Eye) -> tuple[Real, Real, Real, Real]:
         x, y = lattice.center(i, j, 0.0 * i, 0.0 * j, NUMPY)
         return x, y, i, j
     row, i = np.indices((display.panel.height, grid.columns)).astype(np.float64)
-    _, panel_y = display.panel_point(0.0 * row, row + 0.5, NUMPY)
+    _, panel_y = display.panel_point(0.0 * row, row + 0.5)
     # The line from the eye meets the panel at y + (y - eye_y) g / eye_z.
     scale = display.gap / eye[2]
     y = (panel_y + eye[1] * scale) / (1 + scale)

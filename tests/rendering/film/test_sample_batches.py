@@ -24,7 +24,7 @@ def integrator(engine):
     import mitsuba as mi
 
     from lippmann.rendering.transport.path import PathIntegrator
-    from lippmann.rendering.transport.scene_flags import make_traits
+    from lippmann.rendering.transport.scene_features import make_scene_features
 
     def grey(value):
         return {"type": "twosided", "bsdf": {"type": "diffuse", "reflectance": {"type": "rgb", "value": value}}}
@@ -48,7 +48,7 @@ def integrator(engine):
             "sky": {"type": "constant", "radiance": {"type": "rgb", "value": 0.1}},
         }
     )
-    return PathIntegrator(scene, make_traits(scene, has_null=False), 5)
+    return PathIntegrator(scene, make_scene_features(scene, has_null=False), 5)
 
 
 def rays(subpixels=False):

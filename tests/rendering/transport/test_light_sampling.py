@@ -45,10 +45,10 @@ def stage(scene, depth=3):
 
     from lippmann.rendering.transport.path import PathIntegrator
     from lippmann.rendering.transport.ray_source import CameraRays
-    from lippmann.rendering.transport.scene_flags import make_traits
+    from lippmann.rendering.transport.scene_features import make_scene_features
 
     loaded = mi.load_dict(scene) if isinstance(scene, dict) else scene
-    return PathIntegrator(loaded, make_traits(loaded), depth), CameraRays(camera(), SIZE, SIZE)
+    return PathIntegrator(loaded, make_scene_features(loaded), depth), CameraRays(camera(), SIZE, SIZE)
 
 
 def picture(integrator, source, samples, seed):

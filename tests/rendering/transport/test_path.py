@@ -23,12 +23,12 @@ def trace(scene_dict, cam, size=32, spp=64, depth=6, seed=0, background=None, ab
     from lippmann.rendering.film.wavefront_plan import make_plan
     from lippmann.rendering.transport.path import PathIntegrator
     from lippmann.rendering.transport.ray_source import CameraRays
-    from lippmann.rendering.transport.scene_flags import make_traits
+    from lippmann.rendering.transport.scene_features import make_scene_features
 
     scene = mi.load_dict(scene_dict)
     has_null = "mask" in str(scene_dict)
-    traits = make_traits(scene, background=background, has_null=has_null, absorption=absorption)
-    integrator = PathIntegrator(scene, traits, depth)
+    features = make_scene_features(scene, background=background, has_null=has_null, absorption=absorption)
+    integrator = PathIntegrator(scene, features, depth)
     return trace_frame(integrator, CameraRays(cam, size, size), make_plan(size, size, spp, memory=2**31), seed=seed)
 
 
@@ -259,10 +259,10 @@ def test_tiles_and_passes_do_not_change_the_picture():
     from lippmann.rendering.film.wavefront_plan import Plan
     from lippmann.rendering.transport.path import PathIntegrator
     from lippmann.rendering.transport.ray_source import CameraRays
-    from lippmann.rendering.transport.scene_flags import make_traits
+    from lippmann.rendering.transport.scene_features import make_scene_features
 
     scene = mi.load_dict(mixed_scene())
-    integrator = PathIntegrator(scene, make_traits(scene), 3)
+    integrator = PathIntegrator(scene, make_scene_features(scene), 3)
     whole, bands, passes = (
         trace_frame(integrator, CameraRays(camera(5), 24, 20), Plan(24, 20, 1, 8, rows, run), seed=5).pixels
         for rows, run in ((20, 8), (6, 8), (20, 3))

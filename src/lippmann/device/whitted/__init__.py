@@ -1,1 +1,1 @@
-"""Classic scenes on the device: tables of shapes, materials and lamps, and what a ray meets among them."""
+"""Classic scenes on the device: tables of shapes, materials and light sources, and what a ray meets among them."""

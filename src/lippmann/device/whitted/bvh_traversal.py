@@ -18,7 +18,7 @@ MOST_LITERAL = 64
 
 
 class ShapeTracer:
-    """The walked and listed shapes of a table, and its lamps.
+    """The walked and listed shapes of a table, and its lights.
 
     ``closest`` finds the nearest crossing beyond the origin, ``passing`` the light that gets past the shapes.
     """
@@ -35,7 +35,7 @@ class ShapeTracer:
 
     def closest(self, o: Any, d: Any, t: Any, index: Any, active: Any) -> tuple[Any, Any]:
         """Distance and row of the nearest crossing before ``t``; where there is none, ``t`` and ``index``."""
-        for rows in (self._table.listed_rows, self._table.lamp_rows):
+        for rows in (self._table.listed_rows, self._table.light_rows):
             if len(rows) <= MOST_LITERAL:
                 for number in rows:
                     row = literal(self._table.rows[number])

@@ -1,7 +1,7 @@
 """All geometry of a classic scene as one: where a ray hits, how the surface lies there, what light gets past.
 
 A hit is a distance and an index: triangles first, in the order of ``engine_tracer.triangle_order``, then the rows of
-the shape table, lamps last.
+the shape table, lights last.
 """
 
 from __future__ import annotations
@@ -71,9 +71,9 @@ class Geometry:
         self._triangles = len(self._order)
         self._smooth = bool(scene.triangles.smooth.any())
         self._colored = bool(scene.triangles.colored.any())
-        if self._table.lamps:
-            numbers = self._table.rows[self._table.lamp_rows.start :, Column.MATERIAL]
-            self._lamps = mi.UInt32(numbers.astype(np.uint32))
+        if self._table.lights:
+            numbers = self._table.rows[self._table.light_rows.start :, Column.MATERIAL]
+            self._lights = mi.UInt32(numbers.astype(np.uint32))
         self._load_triangles(scene)
 
     def _load_triangles(self, scene: ClassicScene) -> None:
@@ -107,18 +107,18 @@ class Geometry:
         light = dr.select(active, mi.Float(1), mi.Float(0))
         return self._engine.passing(o, d, t, self._shapes.passing(o, d, t, light))
 
-    def lamp(self, hit: Hit) -> tuple[Any, Any]:
-        """Whether a hit is the visible sphere of a lamp, and which."""
-        if not self._table.lamps:
+    def find_light(self, hit: Hit) -> tuple[Any, Any]:
+        """Whether a hit is the visible sphere of a light source, and that light's index."""
+        if not self._table.lights:
             return mi.Bool(False), mi.UInt32(0)
-        first = self._triangles + self._table.lamp_rows.start
-        is_lamp = (hit.index >= first) & (hit.index != NONE)
-        return is_lamp, dr.gather(mi.UInt32, self._lamps, hit.index - first, is_lamp)
+        first = self._triangles + self._table.light_rows.start
+        is_light = (hit.index >= first) & (hit.index != NONE)
+        return is_light, dr.gather(mi.UInt32, self._lights, hit.index - first, is_light)
 
     def surface(self, hit: Hit, o: Any, d: Any, active: Any) -> Surface:
-        """How the surface lies that a ray from ``o`` along ``d`` hits; it is no lamp."""
+        """How the surface lies that a ray from ``o`` along ``d`` hits; not for light sources."""
         p = o + d * hit.t
-        if not self._table.lamp_rows.start:
+        if not self._table.light_rows.start:
             return self._triangle(hit, p, d, active)
         if not self._triangles:
             return self._shape(hit.index, p, d, active)
@@ -151,7 +151,7 @@ class Geometry:
 
     def _shape(self, index: Any, p: Any, d: Any, active: Any) -> Surface:
         row = fetch(self._shapes.rows, index, active)
-        kinds = {Kind(int(kind)) for kind in np.unique(self._table.rows[: self._table.lamp_rows.start, Column.KIND])}
+        kinds = {Kind(int(kind)) for kind in np.unique(self._table.rows[: self._table.light_rows.start, Column.KIND])}
         q = p - row.center
         n, face, refined, size = mi.Vector3f(0), mi.Vector3f(0), mi.Point3f(p), dr.max(dr.abs(q))
         ways = {Kind.SPHERE: _on_sphere, Kind.QUADRIC: _on_quadric, Kind.FLAT: _on_flat, Kind.BOX: _on_box}

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from lippmann.device.whitted.geometry import Geometry
 from lippmann.device.whitted.materials import MaterialTable
-from lippmann.device.whitted.shading import LampTable, Shader
+from lippmann.device.whitted.shading import LightTable, Shader
 from lippmann.device.whitted.textures import TextureTable
 from lippmann.scene.values.whitted_scene import ClassicScene
 
@@ -20,7 +20,7 @@ class BuiltClassic:
     geometry: Geometry
     materials: MaterialTable
     textures: TextureTable
-    lamps: LampTable
+    lights: LightTable
     shader: Shader
     seconds: float
 
@@ -31,6 +31,6 @@ def build_classic(scene: ClassicScene) -> BuiltClassic:
     textures = TextureTable(scene.materials, scene.images)
     materials = MaterialTable(scene.materials, textures.numbers)
     geometry = Geometry(scene)
-    lamps = LampTable(scene.lights)
-    shader = Shader(scene, geometry, lamps, materials)
-    return BuiltClassic(scene, geometry, materials, textures, lamps, shader, time.perf_counter() - started)
+    lights = LightTable(scene.lights)
+    shader = Shader(scene, geometry, lights, materials)
+    return BuiltClassic(scene, geometry, materials, textures, lights, shader, time.perf_counter() - started)

@@ -1,4 +1,4 @@
-"""Lamps and light at a surface in the classic models: ambient, diffuse, highlights, hard shadows, sky light."""
+"""Light sources and local shading in the classic models: ambient, diffuse, highlights, hard shadows, sky light."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _SKY_DIMENSION = 8
 
 @dataclass
 class Illumination:
-    """What one lamp does to a point: unit direction ``toward`` it, its ``distance``, its ``strength`` there."""
+    """Light from one source at a point: unit direction ``toward`` it, its ``distance``, its ``strength`` there."""
 
     toward: Any
     distance: Any
@@ -32,23 +32,23 @@ class Illumination:
     color: Any
 
 
-class LampTable:
-    """The lamps of a scene, as one table on the device."""
+class LightTable:
+    """The light sources of a scene, as one table on the device."""
 
-    def __init__(self, lamps: Sequence[ClassicLight]) -> None:
-        self.count = len(lamps)
-        rows = [_lamp_row(lamp) for lamp in lamps] or [[0.0] * 16]
+    def __init__(self, lights: Sequence[ClassicLight]) -> None:
+        self.count = len(lights)
+        rows = [_light_row(light) for light in lights] or [[0.0] * 16]
         self._rows = mi.Float(np.array(rows, np.float32).ravel())
-        self._directional = any(lamp.kind == "directional" for lamp in lamps)
-        self._attenuated = any(lamp.attenuation is not None for lamp in lamps)
-        self._spots = any(lamp.kind == "spot" for lamp in lamps)
+        self._directional = any(light.kind == "directional" for light in lights)
+        self._attenuated = any(light.attenuation is not None for light in lights)
+        self._spots = any(light.kind == "spot" for light in lights)
 
     def color(self, index: Any, active: Any) -> Any:
-        """What the lamp itself looks like."""
+        """Colour of the visible sphere of a light source."""
         return mi.Color3f(xyz(dr.gather(mi.Vector4f, self._rows, 4 * index + 1, active)))
 
     def illuminate(self, index: Any, p: Any, n: Any) -> Illumination:
-        """Light of a lamp at ``p``; its strength includes the cosine to ``n`` and may be negative."""
+        """Illumination of ``p`` by a light source; its strength includes the cosine to ``n`` and may be negative."""
         a = dr.gather(mi.Vector4f, self._rows, 4 * index)
         b = dr.gather(mi.Vector4f, self._rows, 4 * index + 1)
         toward = xyz(a) - p
@@ -79,9 +79,9 @@ class LampTable:
 class Shader:
     """The local part of the light models: everything but mirrored and transmitted rays."""
 
-    def __init__(self, scene: ClassicScene, geometry: Geometry, lamps: LampTable, materials: MaterialTable) -> None:
+    def __init__(self, scene: ClassicScene, geometry: Geometry, lights: LightTable, materials: MaterialTable) -> None:
         self._geometry = geometry
-        self._lamps = lamps
+        self._lights = lights
         self._materials = materials
         self._shading = scene.shading
         self._shadows = scene.shading.mode == "full"
@@ -91,7 +91,7 @@ class Shader:
         self, surface: Surface, finish: Finish, color: Any, d: Any, stream: SampleStream, hits: Any, active: Any
     ) -> tuple[Any, Any, Any]:
         """Colour that the surface sends back along -``d`` by itself, whether a highlight is in it, and shadow rays."""
-        diffuse, highlight, shadow = self._lamp_light(surface, finish, color, d, active)
+        diffuse, highlight, shadow = self._direct_light(surface, finish, color, d, active)
         if self._sky is not None:
             share, rays = self._open_sky(self._sky.samples, surface, stream, hits, active & self._sees_light(finish))
             diffuse += mi.Color3f(*self._sky.color) * share
@@ -110,27 +110,27 @@ class Shader:
         return (finish.diffuse > LEAST) | (finish.phong > LEAST)
 
     @dr.syntax
-    def _lamp_light(self, surface: Surface, finish: Finish, color: Any, d: Any, active: Any) -> tuple[Any, Any, Any]:
+    def _direct_light(self, surface: Surface, finish: Finish, color: Any, d: Any, active: Any) -> tuple[Any, Any, Any]:
         diffuse, highlight, shadow = mi.Color3f(0), mi.Color3f(0), mi.UInt32(0)
         index = mi.UInt32(0)
         p, n, face, lift = surface.p, surface.n, surface.face, surface.lift
         phong, phong_size, metal = finish.phong, finish.phong_size, finish.metal
         active = active & self._sees_light(finish)
-        while dr.hint(active & (index < self._lamps.count), label="lamps"):
-            lamp = self._lamps.illuminate(index, p, n)
-            strength = lamp.strength * self._shading.light_scale
+        while dr.hint(active & (index < self._lights.count), label="lights"):
+            light = self._lights.illuminate(index, p, n)
+            strength = light.strength * self._shading.light_scale
             lit = strength > LEAST
             if dr.hint(self._shadows, mode="scalar"):
-                start = p + face * dr.copysign(lift, dr.dot(face, lamp.toward))
-                passes = self._geometry.passing(start, lamp.toward, lamp.distance, lit)
+                start = p + face * dr.copysign(lift, dr.dot(face, light.toward))
+                passes = self._geometry.passing(start, light.toward, light.distance, lit)
                 shadow += dr.select(lit, mi.UInt32(1), mi.UInt32(0))
                 lit &= passes > 0
                 strength *= passes
-            diffuse += dr.select(lit, lamp.color * strength, 0)
+            diffuse += dr.select(lit, light.color * strength, 0)
             if dr.hint(self._materials.shines, mode="scalar"):
                 shines = lit & (phong > LEAST)
-                tint = dr.select(metal, color, lamp.color) if self._materials.metal else lamp.color
-                peak = self._peak(lamp.toward, n, d, phong_size) * (phong * self._shading.light_scale)
+                tint = dr.select(metal, color, light.color) if self._materials.metal else light.color
+                peak = self._peak(light.toward, n, d, phong_size) * (phong * self._shading.light_scale)
                 highlight += dr.select(shines, tint * peak, 0)
             index += 1
         return diffuse, highlight, shadow
@@ -171,17 +171,17 @@ def _outline(surface: Surface, finish: Finish, d: Any) -> Any:
     return 1 - finish.outline + share * finish.outline
 
 
-def _lamp_row(lamp: ClassicLight) -> list[float]:
+def _light_row(light: ClassicLight) -> list[float]:
     """Center, directional | color, - | direction, start of the falloff | attenuation, end of the falloff."""
-    spot = lamp.kind == "spot"
-    start, end = (radians(lamp.falloff_start), radians(lamp.falloff_end)) if spot else (4.0, 5.0)
+    spot = light.kind == "spot"
+    start, end = (radians(light.falloff_start), radians(light.falloff_end)) if spot else (4.0, 5.0)
     return [
-        *lamp.center,
-        float(lamp.kind == "directional"),
-        *lamp.color,
+        *light.center,
+        float(light.kind == "directional"),
+        *light.color,
         0.0,
-        *lamp.direction,
+        *light.direction,
         start,
-        *(lamp.attenuation or (1.0, 0.0, 0.0)),
+        *(light.attenuation or (1.0, 0.0, 0.0)),
         end,
     ]

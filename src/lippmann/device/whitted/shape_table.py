@@ -50,7 +50,7 @@ class Column(IntEnum):
     K1 = 7  # flat: outer^2
     K2 = 8
     KIND = 9
-    MATERIAL = 10  # of a lamp's sphere: the number of the lamp
+    MATERIAL = 10  # of a light's sphere: the light's index
     CLIP = 11  # clip group, -1 for none
     LOW = 12
     HIGH = 13
@@ -66,15 +66,15 @@ class ShapeTable:
     """Rows ``(n, 16)`` float32, in runs, one after the other.
 
     ``traced`` spheres are left to the engine's own tracer; ``walked`` shapes go into a hierarchy; ``listed`` ones are
-    tested one by one; ``lamps`` are the visible spheres of lamps, which cast no shadow. ``boxes (walked, 2, 3)`` bound
-    the walked ones.
+    tested one by one; ``lights`` are the visible spheres of light sources, which cast no shadow. ``boxes (walked, 2,
+    3)`` bound the walked ones.
     """
 
     rows: NDArray[np.float32]
     traced: int
     walked: int
     listed: int
-    lamps: int
+    lights: int
     boxes: Numbers
 
     @property
@@ -86,8 +86,8 @@ class ShapeTable:
         return range(self.walked_rows.stop, self.walked_rows.stop + self.listed)
 
     @property
-    def lamp_rows(self) -> range:
-        return range(self.listed_rows.stop, self.listed_rows.stop + self.lamps)
+    def light_rows(self) -> range:
+        return range(self.listed_rows.stop, self.listed_rows.stop + self.lights)
 
 
 def make_shape_table(scene: ClassicScene) -> ShapeTable:
@@ -104,14 +104,14 @@ def make_shape_table(scene: ClassicScene) -> ShapeTable:
     others, other_boxes = bounded[~traced], boxes[~traced]
     apart = len(others) > MOST_LISTED_SHAPES
     walked, listed = (others, unbounded) if apart else (others[:0], np.concatenate([others, unbounded]))
-    lamps = _lamps(scene)
-    rows = np.concatenate([bounded[traced], walked, listed, lamps])
+    lights = _light_spheres(scene)
+    rows = np.concatenate([bounded[traced], walked, listed, lights])
     return ShapeTable(
         rows=rows.astype(np.float32),
         traced=int(traced.sum()),
         walked=len(walked),
         listed=len(listed),
-        lamps=len(lamps),
+        lights=len(lights),
         boxes=other_boxes[: len(walked)],
     )
 
@@ -159,12 +159,13 @@ def _spheres(batch: Spheres) -> Numbers:
     return rows
 
 
-def _lamps(scene: ClassicScene) -> Numbers:
-    seen = [(number, lamp) for number, lamp in enumerate(scene.lights) if lamp.kind != "directional" and lamp.radius]
-    rows = _blank(len(seen), Kind.SPHERE)
-    for row, (number, lamp) in zip(rows, seen, strict=True):
-        row[:3], row[Column.K0] = lamp.center, lamp.radius**2
-        row[Column.MATERIAL], row[Column.CLIP] = number, lamp.clip_group
+def _light_spheres(scene: ClassicScene) -> Numbers:
+    lights = enumerate(scene.lights)
+    visible = [(number, light) for number, light in lights if light.kind != "directional" and light.radius]
+    rows = _blank(len(visible), Kind.SPHERE)
+    for row, (number, light) in zip(rows, visible, strict=True):
+        row[:3], row[Column.K0] = light.center, light.radius**2
+        row[Column.MATERIAL], row[Column.CLIP] = number, light.clip_group
     return rows
 
 

@@ -1,6 +1,6 @@
-"""Displays in one word: ``print:lpi=60,ppi=720,size=200x300mm`` and ``monitor:size=3840x2160,dpi=282,pitch=45.5,...``.
+"""Short forms of displays: ``print:lpi=60,ppi=720,size=8x10in`` and ``monitor:size=3840x2160,dpi=282,pitch=45.5,...``.
 
-The kind, a colon, and ``key=value`` pairs with commas between them; what keys there are say
+The kind, a colon, and ``key=value`` pairs with commas between them. The keys are those of
 :func:`~lippmann.display.formats.print_sheet.print_of_texts` and
 :func:`~lippmann.display.formats.monitor_toml.monitor_of_texts`.
 """
@@ -14,17 +14,17 @@ from lippmann.display.formats.monitor_toml import monitor_of_texts
 from lippmann.display.formats.print_sheet import print_of_texts
 from lippmann.errors import DisplayError
 
-#: What stands before the colon.
+#: Kinds of displays, before the colon.
 KINDS = ("print", "monitor")
 
 
 def is_short_form(name: str) -> bool:
-    """Whether a display's name is one of these words; the kind alone is one too."""
+    """Whether a display's name is a short form; the kind alone is one too."""
     return name.partition(":")[0] in KINDS
 
 
 def display_of_short_form(name: str) -> Display:
-    """The display of such a word.
+    """The display of a short form.
 
     Raises
     ------

@@ -20,9 +20,9 @@ A file holds the keys of :class:`Display`, with the tables ``[panel]`` and ``[le
 
 A file without a ``name`` has its own, less the ending.
 
-A slanted monitor may be said by pitch, slope and centre instead, see :mod:`lippmann.display.formats.monitor_toml`. A
+A slanted monitor may be given by pitch, slope and centre instead, see :mod:`lippmann.display.formats.monitor_toml`. A
 JSON file is the calibration of a Looking Glass, see :mod:`lippmann.display.formats.looking_glass`. Prints and monitors
-can also be said in one word, see :mod:`lippmann.display.formats.inline_spec`.
+also have short forms, see :mod:`lippmann.display.formats.inline_spec`.
 """
 
 from __future__ import annotations
@@ -33,7 +33,6 @@ import sys
 from collections.abc import Mapping
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
 
 from lippmann.display.display import INFINITE, Display, check_tables
 from lippmann.display.formats.inline_spec import display_of_short_form, is_short_form
@@ -41,7 +40,7 @@ from lippmann.display.formats.looking_glass import display_of_calibration, is_ca
 from lippmann.display.formats.monitor_toml import TABLE as MONITOR
 from lippmann.display.formats.monitor_toml import monitor_of_tables
 from lippmann.display.units import MILLIMETRES, length, stripe
-from lippmann.display.validation import positive, suggestion
+from lippmann.display.validation import Arguments, positive, suggestion
 from lippmann.errors import DisplayError
 
 if sys.version_info >= (3, 11):
@@ -90,8 +89,8 @@ def list_displays() -> list[Display]:
 
 def _preset_texts() -> dict[str, str]:
     folder = files("lippmann.display") / "presets"
-    found = (entry for entry in folder.iterdir() if entry.name.endswith(".toml"))
-    return {entry.name[:-5]: entry.read_text(encoding="utf-8") for entry in sorted(found, key=lambda e: e.name)}
+    presets = (entry for entry in folder.iterdir() if entry.name.endswith(".toml"))
+    return {entry.name[:-5]: entry.read_text(encoding="utf-8") for entry in sorted(presets, key=lambda e: e.name)}
 
 
 def _read(path: Path) -> str:
@@ -118,13 +117,13 @@ def _from_toml(text: str, *, where: str, stem: str) -> Display:
         if MONITOR in values:
             return monitor_of_tables(values).display()
         check_tables(values)
-        return Display.from_dict(_in_millimetres(values))
+        return Display.from_dict(_convert_tables(values))
     except DisplayError as error:
-        place = _place(text, error.where, where)
+        place = _locate(text, error.where, where)
         raise DisplayError(error.what, where=place, rule=error.rule, fix=error.fix) from None
 
 
-def _place(text: str, key: str, where: str) -> str:
+def _locate(text: str, key: str, where: str) -> str:
     """``file:line`` of a dotted key, or the file and the table if it is not written there."""
     table, _, name = key.rpartition(".")
     current = ""
@@ -138,17 +137,19 @@ def _place(text: str, key: str, where: str) -> str:
     return f"{where} [{table or key}]" if key else where
 
 
-def _in_millimetres(values: Mapping[str, Any]) -> dict[str, Any]:
-    """The same tables with all lengths in millimetres and sub-pixels as offsets; what is no text stays as it is."""
-    panel = _converted(values["panel"], "panel", None)
-    if isinstance(panel.get("subpixel_offsets"), str):
-        panel["subpixel_offsets"] = stripe(panel["subpixel_offsets"], "panel.subpixel_offsets")
+def _convert_tables(values: Arguments) -> Arguments:
+    """Tables with all lengths in millimetres and sub-pixels as offsets; values that are no strings stay as they are."""
+    panel = _convert_lengths(values["panel"], "panel", None)
+    offsets = panel.get("subpixel_offsets")
+    if isinstance(offsets, str):
+        panel["subpixel_offsets"] = stripe(offsets, "panel.subpixel_offsets")
     pixel = positive(panel["pixel_pitch"], "panel.pixel_pitch")
-    lenses = _converted(values["lens_array"], "lens_array", pixel)
-    return {**_converted(values, "", None), "panel": panel, "lens_array": lenses}
+    lenses = _convert_lengths(values["lens_array"], "lens_array", pixel)
+    return {**_convert_lengths(values, "", None), "panel": panel, "lens_array": lenses}
 
 
-def _converted(values: Mapping[str, Any], table: str, pixel: float | None) -> dict[str, Any]:
+def _convert_lengths(values: Arguments, table: str, pixel: float | None) -> dict[str, object]:
+    """The keys of one table with all lengths in millimetres; ``pixel`` is the pixel pitch, if it may be a unit."""
     converted = dict(values)
     for name, (per_inch, in_pixels) in _LENGTHS[table].items():
         value, key = values.get(name), f"{table}.{name}" if table else name
@@ -161,5 +162,5 @@ def _converted(values: Mapping[str, Any], table: str, pixel: float | None) -> di
 
 
 def _length(value: object, key: str, scales: Mapping[str, float], per_inch: tuple[str, ...]) -> object:
-    """Millimetres of ``"6.8 mm"``; what is no string stays as it is."""
+    """Millimetres of ``"6.8 mm"``; any other type stays as it is, for the constructors to check."""
     return length(value, key, scales, per_inch) if isinstance(value, str) else value

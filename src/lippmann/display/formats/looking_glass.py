@@ -1,9 +1,9 @@
 """The calibration of a Looking Glass (``visual.json``) as a display.
 
-What such a file says, with x and y in [0, 1] from the lower left corner of the panel:
+The formula of such a file, with x and y in [0, 1] from the lower left corner of the panel:
 
     pitch' = pitch (screenW / DPI) cos(atan(1 / slope))         lenses along the panel's width
-    tilt = screenH / (screenW slope), negated if flipImageX     by how much they lean
+    tilt = screenH / (screenW slope), negated if flipImageX     slant of the lenses
     phase = (x + c / (3 screenW) + y tilt) pitch' - center      of sub-pixel c; the second term negated if flipImageX
     phase = (x + dx_c / screenW + (y + dy_c / screenH) tilt) pitch' - center      with the cells of newer panels
     view = 1 - (phase mod 1)                                    0 is the leftmost camera, 1 the rightmost
@@ -23,12 +23,11 @@ import json
 import math
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
 
 from lippmann.display.display import Display
 from lippmann.display.formats.monitor import CONES, PITCHES, Monitor
 from lippmann.display.panel import Offset, Panel, SubpixelCells, SubpixelOffsets
-from lippmann.display.validation import finite, whole_count
+from lippmann.display.validation import Table, finite, whole_count
 from lippmann.errors import DisplayError
 
 _INCH = 25.4
@@ -64,7 +63,7 @@ def display_of_calibration(text: str, *, where: str) -> Display:
     DisplayError
         If the text is no JSON, or a value is missing, not wrapped, zero or nonsensical; names ``where`` and the key.
     """
-    values = _parsed(text, where)
+    values = _parse_json(text, where)
     try:
         return _display(values)
     except DisplayError as error:
@@ -72,7 +71,7 @@ def display_of_calibration(text: str, *, where: str) -> Display:
         raise DisplayError(error.what, where=place, rule=error.rule, fix=error.fix) from None
 
 
-def _parsed(text: str, where: str) -> Mapping[str, Any]:
+def _parse_json(text: str, where: str) -> Table:
     try:
         values = json.loads(text.lstrip("\ufeff"))
     except (ValueError, RecursionError) as error:
@@ -82,21 +81,21 @@ def _parsed(text: str, where: str) -> Mapping[str, Any]:
     return values
 
 
-def _display(values: Mapping[str, Any]) -> Display:
+def _display(values: Table) -> Display:
     serial = values.get("serial", "")
     if not isinstance(serial, str):
         raise DisplayError(f"serial is {serial!r}", where="serial", rule="it must be a text")
-    width, height = _count(values, "screenW"), _count(values, "screenH")
-    dpi = _within(values, "DPI", 10, 10_000)
-    pitch = _within(values, "pitch", *PITCHES)
-    cone = _within(values, "viewCone", *CONES)
-    slope = _wrapped(values, "slope")
-    is_mirrored = _flag(values, "flipImageX", optional=True)
+    width, height = _read_count(values, "screenW"), _read_count(values, "screenH")
+    dpi = _read_within(values, "DPI", 10, 10_000)
+    pitch = _read_within(values, "pitch", *PITCHES)
+    cone = _read_within(values, "viewCone", *CONES)
+    slope = _read_number(values, "slope")
+    is_mirrored = _read_flag(values, "flipImageX", optional=True)
     _check_orientation(values)
     if is_mirrored:
         slope = -slope
-    cells = _cells(values, height, serial)
-    stripe, shift = _stripe(is_mirrored, _flag(values, "flipSubp", optional=True))
+    cells = _read_cells(values, height, serial)
+    stripe, shift = _stripe(is_mirrored, _read_flag(values, "flipSubp", optional=True))
 
     pixel = _INCH / dpi
     monitor = Monitor(
@@ -105,7 +104,7 @@ def _display(values: Mapping[str, Any]) -> Display:
         panel=Panel(width, height, pixel, stripe, cells),
         pitch=pitch,
         slope=slope,
-        center=_wrapped(values, "center"),
+        center=_read_number(values, "center"),
         view_cone=cone,
         viewing_distance=height * pixel / (2 * math.tan(math.radians(CAMERA_FIELD) / 2)),
     )
@@ -114,11 +113,11 @@ def _display(values: Mapping[str, Any]) -> Display:
     return replace(monitor, center=monitor.center - to_green).display()
 
 
-def _check_orientation(values: Mapping[str, Any]) -> None:
-    if not _flag(values, "invView"):
+def _check_orientation(values: Table) -> None:
+    if not _read_flag(values, "invView"):
         rule = "a lens shows on the left what lies on its right, which is invView 1"
         raise DisplayError("invView is 0", where="invView", rule=rule, fix="calibrations of devices have 1")
-    if _flag(values, "flipImageY", optional=True):
+    if _read_flag(values, "flipImageY", optional=True):
         raise DisplayError("flipImageY is 1", where="flipImageY", rule="only 0 is understood", fix="turn the picture")
 
 
@@ -129,7 +128,7 @@ def _stripe(is_mirrored: bool, is_swapped: bool) -> tuple[SubpixelOffsets, float
     return ((blue, green, red) if is_swapped else (red, green, blue)), step
 
 
-def _cells(values: Mapping[str, Any], height: int, serial: str) -> SubpixelCells | None:
+def _read_cells(values: Table, height: int, serial: str) -> SubpixelCells | None:
     """The panel's pattern of cells, None if it has a plain stripe."""
     key, listed = "subpixelCells", values.get("subpixelCells")
     if not listed and serial.startswith(_NEEDS_CELLS):
@@ -141,11 +140,11 @@ def _cells(values: Mapping[str, Any], height: int, serial: str) -> SubpixelCells
         raise DisplayError(f"subpixelCells is {listed!r}", where=key, rule="it must be a list of cells")
     if not listed:
         return None
-    mode = _wrapped(values, "CellPatternMode")
+    mode = _read_number(values, "CellPatternMode")
     if mode not in _PATTERNS:
         raise DisplayError(f"CellPatternMode is {mode:g}", where="CellPatternMode", rule="it must be 0, 1, 2, 3 or 4")
-    is_swapped = _flag(values, "flipSubp", optional=True)
-    cells = [_cell(cell, f"{key}[{number}]", is_swapped) for number, cell in enumerate(listed)]
+    is_swapped = _read_flag(values, "flipSubp", optional=True)
+    cells = [_read_cell(cell, f"{key}[{number}]", is_swapped) for number, cell in enumerate(listed)]
     pattern = _PATTERNS[int(mode)]
     rows = len(pattern[0])
     # The file counts rows from below, the panel from above.
@@ -153,7 +152,7 @@ def _cells(values: Mapping[str, Any], height: int, serial: str) -> SubpixelCells
     return tuple(tuple(cells[column[y] % len(cells)] for column in pattern) for y in upward)
 
 
-def _cell(cell: object, key: str, is_swapped: bool) -> SubpixelOffsets:
+def _read_cell(cell: object, key: str, is_swapped: bool) -> SubpixelOffsets:
     if not isinstance(cell, Mapping):
         raise DisplayError(f"a cell is {cell!r}", where=key, rule=f"it must have the keys {', '.join(_CELL_KEYS)}")
     numbers = []
@@ -170,7 +169,7 @@ def _pair(right_up: list[float]) -> Offset:
     return right_up[0], -right_up[1]
 
 
-def _wrapped(values: Mapping[str, Any], key: str) -> float:
+def _read_number(values: Table, key: str) -> float:
     """The finite number of ``{"value": number}``."""
     if key not in values:
         raise DisplayError(f"{key} is missing", where=key, rule='it must be {"value": number}')
@@ -180,22 +179,22 @@ def _wrapped(values: Mapping[str, Any], key: str) -> float:
     return finite(value["value"], key)
 
 
-def _within(values: Mapping[str, Any], key: str, least: float, most: float) -> float:
-    value = _wrapped(values, key)
+def _read_within(values: Table, key: str, least: float, most: float) -> float:
+    value = _read_number(values, key)
     if not least <= value <= most:
         raise DisplayError(f"{key} is {value:g}", where=key, rule=f"it must lie between {least:g} and {most:g}")
     return value
 
 
-def _count(values: Mapping[str, Any], key: str) -> int:
-    value = _wrapped(values, key)
+def _read_count(values: Table, key: str) -> int:
+    value = _read_number(values, key)
     return whole_count(int(value) if value.is_integer() else value, key)
 
 
-def _flag(values: Mapping[str, Any], key: str, *, optional: bool = False) -> bool:
+def _read_flag(values: Table, key: str, *, optional: bool = False) -> bool:
     if optional and key not in values:
         return False
-    value = _wrapped(values, key)
+    value = _read_number(values, key)
     if value not in (0, 1):
         raise DisplayError(f"{key} is {value:g}", where=key, rule="it must be 0 or 1")
     return value == 1

@@ -43,17 +43,17 @@ PITCHES = (1.0, 1000.0)
 #: Degrees between the outermost views.
 CONES = (1.0, 150.0)
 
-#: Where the eye is if nothing is said, mm.
+#: Default viewing distance, mm.
 DEFAULT_DISTANCE = 600.0
 
 DEFAULT_CONE = 35.0
 
-#: How far in front of the lens plane rays begin, as a part of the viewing distance.
-_APERTURE_PART = 0.1
+#: Aperture distance, as a fraction of the viewing distance.
+_APERTURE_FRACTION = 0.1
 
-#: Of the centre that is computed from a display; beyond lies rounding noise.
+#: Digits of a centre that is computed from a display; further ones are rounding noise.
 _DIGITS = 12
-#: By so much, relatively, numbers that are computed from a display may miss a limit.
+#: Relative rounding error of numbers that are computed from a display.
 _ROUNDING = 1e-12
 
 Real = NDArray[np.float64]
@@ -100,7 +100,7 @@ class Monitor:
         check_text(self.name, "name", empty=False)
         check_text(self.title, "title")
         object.__setattr__(self, "pitch", _within(self.pitch, "pitch", PITCHES, "lenses per inch"))
-        object.__setattr__(self, "slope", _checked_slope(self.slope))
+        object.__setattr__(self, "slope", _validate_slope(self.slope))
         object.__setattr__(self, "center", finite(self.center, "center"))
         object.__setattr__(self, "view_cone", _within(self.view_cone, "view_cone", CONES, "degrees"))
         if self.viewing_distance != math.inf:
@@ -132,20 +132,20 @@ class Monitor:
             If a lens covers less than a pixel, or more than the panel.
         """
         slant = -math.atan(1 / self.slope)
-        seen_pitch = _INCH / self.pitch
-        gap = seen_pitch / (math.cos(slant) * 2 * math.tan(math.radians(self.view_cone) / 2))
+        apparent_pitch = _INCH / self.pitch
+        gap = apparent_pitch / (math.cos(slant) * 2 * math.tan(math.radians(self.view_cone) / 2))
         magnification = 1 + gap / self.viewing_distance
         panel = self.panel
         middle = panel.width / 2 * self.lenses_right + panel.height / 2 * self.lenses_up - self.center
-        axis = (0.5 - middle % 1.0) * seen_pitch / (math.cos(slant) * magnification)
-        # Rays that run on to an infinite distance still have to begin somewhere: where things are hardly resolved.
-        near = 2 * seen_pitch * gap / panel.pixel_pitch
-        aperture = _APERTURE_PART * self.viewing_distance if math.isfinite(self.viewing_distance) else near
+        axis = (0.5 - middle % 1.0) * apparent_pitch / (math.cos(slant) * magnification)
+        # With the viewer at infinity, rays begin where the display hardly resolves anything.
+        near = 2 * apparent_pitch * gap / panel.pixel_pitch
+        aperture = _APERTURE_FRACTION * self.viewing_distance if math.isfinite(self.viewing_distance) else near
         return Display(
             name=self.name,
             title=self.title,
             panel=panel,
-            lens_array=LensArray("lenticular", seen_pitch / magnification, math.degrees(slant), (axis, 0.0)),
+            lens_array=LensArray("lenticular", apparent_pitch / magnification, math.degrees(slant), (axis, 0.0)),
             gap=gap,
             viewing_distance=self.viewing_distance,
             aperture_distance=aperture,
@@ -165,15 +165,17 @@ class Monitor:
             raise DisplayError(f"the display {display.name} has {display.lens_array.layout} lenses", rule=rule)
         lattice, panel = display.lattice, display.panel
         slant = math.radians(lattice.slant)
-        seen_pitch = lattice.pitch * display.magnification
+        apparent_pitch = lattice.pitch * display.magnification
         monitor = Monitor(
             name=display.name,
             title=display.title,
             panel=panel,
-            pitch=_at_limit(_INCH / seen_pitch, *PITCHES),
-            slope=_at_limit(-1 / math.tan(slant), -STEEPEST_SLOPE, STEEPEST_SLOPE) if slant else math.inf,
+            pitch=_snap_to_limit(_INCH / apparent_pitch, *PITCHES),
+            slope=_snap_to_limit(-1 / math.tan(slant), -STEEPEST_SLOPE, STEEPEST_SLOPE) if slant else math.inf,
             center=0.0,
-            view_cone=_at_limit(math.degrees(2 * math.atan(seen_pitch / (math.cos(slant) * 2 * display.gap))), *CONES),
+            view_cone=_snap_to_limit(
+                math.degrees(2 * math.atan(apparent_pitch / (math.cos(slant) * 2 * display.gap))), *CONES
+            ),
             viewing_distance=display.viewing_distance,
         )
         middle = panel.width / 2 * monitor.lenses_right + panel.height / 2 * monitor.lenses_up
@@ -181,8 +183,8 @@ class Monitor:
         return replace(monitor, center=round(center, _DIGITS) % 1.0)
 
 
-def _at_limit(value: float, *limits: float) -> float:
-    """A number computed from a display; where only rounding keeps it from a limit, that."""
+def _snap_to_limit(value: float, *limits: float) -> float:
+    """``value``, or the limit that it misses by rounding alone."""
     return next((limit for limit in limits if math.isclose(value, limit, rel_tol=_ROUNDING)), value)
 
 
@@ -194,7 +196,7 @@ def _within(value: object, key: str, limits: tuple[float, float], unit: str) -> 
     return checked
 
 
-def _checked_slope(value: object) -> float:
+def _validate_slope(value: object) -> float:
     rule = f"it must be at least {STEEPEST_SLOPE:g} in size"
     slope = number(value, "slope", rule=rule)
     if abs(slope) < STEEPEST_SLOPE:

@@ -21,14 +21,17 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
-from typing import Any
+from typing import TypeVar
 
 from lippmann.display.display import INFINITE
 from lippmann.display.formats.monitor import DEFAULT_CONE, DEFAULT_DISTANCE, Monitor
 from lippmann.display.panel import RGB_STRIPE, Panel
 from lippmann.display.units import INCH, MILLIMETRES, length, plain_number, stripe
-from lippmann.display.validation import check_text, finite, positive, refuse_unknown, whole_count
+from lippmann.display.validation import Arguments, Table, check_text, finite, positive, refuse_unknown, whole_count
 from lippmann.errors import DisplayError
+from lippmann.json_values import JsonObject, JsonValue
+
+T = TypeVar("T")
 
 #: The table's name.
 TABLE = "monitor"
@@ -51,7 +54,7 @@ SHORT_KEYS = {
 }
 
 
-def monitor_of_tables(values: Mapping[str, Any]) -> Monitor:
+def monitor_of_tables(values: Table) -> Monitor:
     """The monitor of a file's values: ``name``, ``title`` and the table ``monitor``.
 
     Raises
@@ -91,7 +94,7 @@ def monitor_of_texts(texts: Mapping[str, str]) -> Monitor:
     if not (times and _is_count(width) and _is_count(height)):
         rule = "width x height in pixels, such as 3840x2160"
         raise DisplayError(f"{texts['size']!r} is no number of pixels", where="size", rule=rule)
-    table: dict[str, Any] = {"width": int(width), "height": int(height)}
+    table: dict[str, object] = {"width": int(width), "height": int(height)}
     for key, value in texts.items():
         if key == "dpi":
             table["pixel_pitch"] = f"{plain_number(value, key)!r} dpi"
@@ -112,9 +115,9 @@ def _is_count(text: str) -> bool:
 
 
 def text_of_monitor(monitor: Monitor) -> str:
-    """A display file that gives the monitor back, exactly."""
+    """Text of a display file that gives exactly this monitor again."""
     panel = monitor.panel
-    values: dict[str, Any] = {
+    values: JsonObject = {
         "width": panel.width,
         "height": panel.height,
         "pixel_pitch": panel.pixel_pitch,
@@ -126,18 +129,18 @@ def text_of_monitor(monitor: Monitor) -> str:
         "view_cone": monitor.view_cone,
         "viewing_distance": INFINITE if math.isinf(monitor.viewing_distance) else monitor.viewing_distance,
     }
-    lines = [f"name = {_written(monitor.name)}", f"title = {_written(monitor.title)}", "", f"[{TABLE}]"]
-    lines += [f"{key} = {_written(value)}" for key, value in values.items() if value is not None]
+    lines = [f"name = {_to_toml(monitor.name)}", f"title = {_to_toml(monitor.title)}", "", f"[{TABLE}]"]
+    lines += [f"{key} = {_to_toml(value)}" for key, value in values.items() if value is not None]
     return "\n".join(lines) + "\n"
 
 
-def _written(value: Any) -> str:
-    """A value as TOML; which writes texts and lists as JSON does, and knows ``inf``."""
+def _to_toml(value: JsonValue) -> str:
+    """A value as TOML, which writes strings and lists as JSON does, and knows ``inf``."""
     # One character that JSON writes as it is and TOML does not.
     return "inf" if value == math.inf else json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
-def _monitor(values: Mapping[str, Any], table: Mapping[str, Any]) -> Monitor:
+def _monitor(values: Arguments, table: Arguments) -> Monitor:
     pixel = positive(_millimetres(table["pixel_pitch"], "pixel_pitch", ("dpi", "ppi")), "pixel_pitch")
     offsets = table.get("subpixel_offsets", RGB_STRIPE)
     panel = Panel(
@@ -160,7 +163,7 @@ def _monitor(values: Mapping[str, Any], table: Mapping[str, Any]) -> Monitor:
         view_cone=table.get("view_cone", DEFAULT_CONE),
         viewing_distance=math.inf if distance == INFINITE else _millimetres(distance, "viewing_distance", ()),
     )
-    monitor.display()  # whether a lens covers as many pixels as it can
+    monitor.display()  # checks how many pixels a lens covers
     return monitor
 
 
@@ -169,11 +172,12 @@ def _lenses_per_inch(pitch: object, pixel: float) -> float:
     if not isinstance(pitch, str):
         return finite(pitch, "pitch")
     scales = {**MILLIMETRES, "px": pixel}
-    found = length(pitch, "pitch", scales, per_inch=("lpi",), unit="lpi")
-    if found == 0:
+    spacing = length(pitch, "pitch", scales, per_inch=("lpi",), unit="lpi")
+    if spacing == 0:
         raise DisplayError(f"pitch is {pitch!r}", where="pitch", rule="it must be above zero")
-    return INCH / found
+    return INCH / spacing
 
 
-def _millimetres(value: object, key: str, per_inch: tuple[str, ...]) -> Any:
+def _millimetres(value: T, key: str, per_inch: tuple[str, ...]) -> T | float:
+    """Millimetres of a string with a unit; any other value stays as it is, for the constructors to check."""
     return length(value, key, MILLIMETRES, per_inch) if isinstance(value, str) else value

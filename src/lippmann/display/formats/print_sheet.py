@@ -42,14 +42,14 @@ DEFAULT_INDEX = 1.57
 #: Degrees; makers state some 25 (for depth) to 60 (for flips).
 DEFAULT_FIELD = 54.0
 
-#: From where a print in the hand is looked at, mm.
+#: Viewing distance of a print held in the hand, mm.
 DEFAULT_DISTANCE = 500.0
 
-#: No eye is nearer, mm.
+#: Shortest viewing distance, mm.
 _NEAREST = 10.0
 
-#: How far in front of the lens plane rays begin, as a part of the viewing distance.
-_APERTURE_PART = 0.1
+#: Aperture distance, as a fraction of the viewing distance.
+_APERTURE_FRACTION = 0.1
 
 
 @dataclass(frozen=True)
@@ -179,7 +179,7 @@ class Print:
 
     @property
     def _parallel_gap(self) -> float:
-        """The gap if the micro-images were as wide apart as the number given says."""
+        """The gap for an infinite viewing distance: micro-images as far apart as the stated lenses per inch."""
         field = DEFAULT_FIELD if self.field is None else self.field
         return units.INCH / self._stated_lpi / (2 * math.tan(math.radians(field) / 2))
 
@@ -199,7 +199,7 @@ class Print:
             lens_array=LensArray("lenticular", lens_pitch),
             gap=gap,
             viewing_distance=distance,
-            aperture_distance=hardly_resolved if math.isinf(distance) else _APERTURE_PART * distance,
+            aperture_distance=hardly_resolved if math.isinf(distance) else _APERTURE_FRACTION * distance,
         )
 
 

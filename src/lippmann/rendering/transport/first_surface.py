@@ -241,7 +241,7 @@ class WhittedSurfaces:
         built = self._built
         closest = built.geometry.closest(o, d, mi.Bool(True), coherent=True)
         hit = closest.index != NONE
-        is_light, light = built.geometry.lamp(closest)
+        is_light, light = built.geometry.find_light(closest)
         is_light &= hit
         on_surface = hit & ~is_light
         surface = built.geometry.surface(closest, o, d, on_surface)

@@ -29,7 +29,7 @@ from lippmann.device.types import (
 )
 from lippmann.rendering.transport.integrator import FirstHit, RayCounts
 from lippmann.rendering.transport.light_sampling import LightSampler, SceneLightSampler
-from lippmann.rendering.transport.scene_flags import SceneTraits
+from lippmann.rendering.transport.scene_features import SceneFeatures
 
 #: Straight-through surfaces that one ray may cross before it counts as blocked. Bounds the loop between many panes.
 MAX_CROSSINGS = 64
@@ -72,7 +72,7 @@ class PathIntegrator:
     ----------
     scene:
         A ``mi.Scene``.
-    traits:
+    features:
         Features of the scene that need more than the plain loop.
     depth:
         Surfaces per path, at least 1.
@@ -86,9 +86,9 @@ class PathIntegrator:
     """
 
     # Not a dataclass: Dr.Jit would take it for loop state and write its fields.
-    def __init__(self, scene: MitsubaScene, traits: SceneTraits, depth: int, name: str = "path") -> None:
+    def __init__(self, scene: MitsubaScene, features: SceneFeatures, depth: int, name: str = "path") -> None:
         self.scene = scene
-        self.traits = traits
+        self.features = features
         self.depth = depth
         self.name = name
         self.light_sampler: LightSampler = SceneLightSampler(scene)
@@ -106,7 +106,7 @@ class PathIntegrator:
         """As :meth:`sample`, with the first hit. Every surface that is not purely diffuse is view-dependent."""
         scene = self.scene
         context = mi.BSDFContext()
-        background = self.traits.background
+        background = self.features.background
 
         ray = mi.Ray3f(ray)  # current ray
         active = mi.Bool(active)
@@ -137,7 +137,7 @@ class PathIntegrator:
             view_dependent |= (depth == 0) & si.is_valid() & shiny
 
             # ---- absorption along the ray ----
-            if dr.hint(self.traits.has_absorption, mode="scalar"):
+            if dr.hint(self.features.has_absorption, mode="scalar"):
                 distance = dr.select(si.is_valid(), si.t, 0)
                 throughput *= dr.exp(-absorption * distance)
 
@@ -176,10 +176,10 @@ class PathIntegrator:
             passes = mi.has_flag(bs.sampled_type, mi.BSDFFlags.Null)
             throughput *= bsdf_weight
             eta *= bs.eta
-            if dr.hint(self.traits.has_absorption, mode="scalar"):
+            if dr.hint(self.features.has_absorption, mode="scalar"):
                 crosses = mi.has_flag(bs.sampled_type, mi.BSDFFlags.Transmission) & ~passes
                 inside = dr.dot(bs.wo, mi.Vector3f(0, 0, 1)) < 0
-                absorption = dr.select(crosses, dr.select(inside, self.traits.absorption_of(si.shape), 0), absorption)
+                absorption = dr.select(crosses, dr.select(inside, self.features.absorption_of(si.shape), 0), absorption)
             ray = si.spawn_ray(si.to_world(bs.wo))
             if ~passes:
                 vertex = mi.Interaction3f(si)
@@ -228,7 +228,7 @@ class PathIntegrator:
         ray = si.spawn_ray_to(ds.p)
         tests = dr.select(active, mi.UInt32(1), mi.UInt32(0))
         transmittance = mi.Spectrum(1)
-        if dr.hint(not self.traits.has_null, mode="scalar"):
+        if dr.hint(not self.features.has_null, mode="scalar"):
             transmittance = dr.select(scene.ray_test(ray, active), mi.Spectrum(0), transmittance)
         else:
             active = mi.Bool(active)

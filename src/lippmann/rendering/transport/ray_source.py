@@ -96,7 +96,7 @@ class DisplayRays(_OnePicture):
             u = mi.Float64(column) + 0.5 + (mi.Float64(jitter.x) - 0.5) / 3
             x, y = self.display.subpixel_point(u, v, mi.Float64(channel), DEVICE)
         else:
-            x, y = self.display.panel_point(u, v, DEVICE)
+            x, y = self.display.panel_point(u, v)
         origin, direction = self.display.light_ray(x, y, DEVICE)
         return world_ray(self.world_from_display, origin, direction)
 

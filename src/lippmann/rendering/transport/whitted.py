@@ -139,7 +139,7 @@ class WhittedIntegrator:
         """Weighted local radiance; count of shadow rays; view dependence; the reflected and the transmitted ray."""
         built, shading = self._built, self._scene.shading
         on_surface = active & (hit.index != NONE)
-        is_light, light = built.geometry.lamp(hit)
+        is_light, light = built.geometry.find_light(hit)
         is_light &= on_surface
         on_surface &= ~is_light
         surface = built.geometry.surface(hit, ray.o, ray.d, on_surface)
@@ -147,7 +147,7 @@ class WhittedIntegrator:
         path = ray.path + hit.t if shading.mode != "low" else mi.Float(FAR)
         color = dr.select(surface.colored, surface.color, finish.color)
         color = built.textures.color(dr.select(surface.colored, -1, finish.texture), color, surface.p, path, on_surface)
-        light_color = built.lamps.color(light, is_light)
+        light_color = built.lights.color(light, is_light)
         background = background_color(self._scene.background, ray.o, ray.d)
         if self._plain:
             if shading.mode == "lowest":

@@ -50,15 +50,15 @@ def test_what_changes_after_recording_is_seen(frozen):
     import drjit as dr
     import mitsuba as mi
 
-    from lippmann.rendering.transport.scene_flags import SceneTraits
+    from lippmann.rendering.transport.scene_features import SceneFeatures
 
-    traits = SceneTraits(absorption=mi.Color3f([1.0], [2.0], [3.0]))
-    dr.make_opaque(traits.absorption)
+    features = SceneFeatures(absorption=mi.Color3f([1.0], [2.0], [3.0]))
+    dr.make_opaque(features.absorption)
 
     def kernel(index):
-        return dr.gather(mi.Color3f, traits.absorption, index).y
+        return dr.gather(mi.Color3f, features.absorption, index).y
 
-    call = frozen(kernel, traits)
+    call = frozen(kernel, features)
     zeros = dr.zeros(mi.UInt32, 4)
     dr.make_opaque(zeros)
     assert list(call(zeros)) == [2.0] * 4

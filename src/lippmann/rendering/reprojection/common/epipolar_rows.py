@@ -39,7 +39,7 @@ class Rows(NamedTuple):
     def of(display: Display) -> Rows:
         """The columns of ``display``, which must be lenticular without slant."""
         columns = np.arange(display.panel.width)
-        x, y = display.panel_point(columns + 0.5, np.full(columns.shape, 0.5), NUMPY)
+        x, y = display.panel_point(columns + 0.5, np.full(columns.shape, 0.5))
         i, _ = display.lens_of(x, y, NUMPY)
         lenses = np.arange(display.lens_grid.columns + 1)
         first = np.searchsorted(i, lenses).astype(np.int64)

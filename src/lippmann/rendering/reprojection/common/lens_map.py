@@ -60,7 +60,7 @@ class LensField(NamedTuple):
         rows, columns = (a.ravel().astype(np.float64) for a in np.indices((grid.rows, grid.columns)))
         zero = np.zeros_like(columns)
         x, y = display.lens_center(columns, rows, zero, zero, NUMPY)
-        u, v = display.pixel_coordinates(x, y, NUMPY)
+        u, v = display.pixel_coordinates(x, y)
         return LensField(lens, np.stack([u - 0.5, v - 0.5], axis=1), _stretches(lens), grid.columns)
 
     def corresponding(self, numbers: NDArray[np.int64], other: NDArray[np.int64]) -> NDArray[np.int64]:

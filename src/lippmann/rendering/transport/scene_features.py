@@ -14,7 +14,7 @@ Color = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
-class SceneTraits:
+class SceneFeatures:
     """Features that switch parts of the path loop on.
 
     Attributes
@@ -42,14 +42,14 @@ class SceneTraits:
         return dr.gather(mi.Color3f, self.absorption, dr.reinterpret_array(mi.UInt32, shape))
 
 
-def make_traits(
+def make_scene_features(
     scene: MitsubaScene,
     *,
     background: Color | None = None,
     has_null: bool = True,
     absorption: Mapping[int, Color] | None = None,
-) -> SceneTraits:
-    """Make the traits of a scene.
+) -> SceneFeatures:
+    """The features of a scene, its absorption uploaded to the device.
 
     Parameters
     ----------
@@ -63,11 +63,11 @@ def make_traits(
         Absorption coefficients per world unit, by the index of a shape in ``scene.shapes()``.
     """
     if not absorption:
-        return SceneTraits(background, has_null)
+        return SceneFeatures(background, has_null)
     pointers = dr.reinterpret_array(mi.UInt32, scene.shapes_dr())
     indices = [int(pointers[i]) for i in range(len(pointers))]
     table = [[0.0, 0.0, 0.0] for _ in range(max(indices) + 1)]
     for position, coefficients in absorption.items():
         table[indices[position]] = list(coefficients)
     columns = [mi.Float([row[c] for row in table]) for c in range(3)]
-    return SceneTraits(background, has_null, mi.Color3f(*columns))
+    return SceneFeatures(background, has_null, mi.Color3f(*columns))
