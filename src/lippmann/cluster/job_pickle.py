@@ -137,6 +137,7 @@ def _with_files(job: TileJob, files: Mapping[str, Path]) -> TileJob:
     """The job with other paths of the files of its Mitsuba scene, which is not loaded yet."""
     described = job.scene.description
     assert isinstance(described, MitsubaSource)
+    assert isinstance(described.content, MitsubaXml)
     described = replace(described, content=replace(described.content, files=files), _loaded={})
     return replace(job, scene=replace(job.scene, description=described))
 

@@ -10,7 +10,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,9 @@ from lippmann.runtime.engine_lock import exclusive
 from lippmann.scene.mitsuba_plugins import check_plugins_of
 from lippmann.scene.mitsuba_xml import MitsubaXml, read_mitsuba_xml
 from lippmann.scene.values.description import Camera, Color, Environment
+
+if TYPE_CHECKING:
+    import mitsuba as mi
 
 # Mitsuba's cameras look along +z with +x to the left; ours along -z with +x to the right.
 _MITSUBA_FROM_CAMERA = np.diag([-1.0, 1.0, -1.0, 1.0])
@@ -36,13 +39,13 @@ class MitsubaSource:
     """
 
     name: str
-    content: Any
+    content: MitsubaXml | Mapping[str, object] | mi.Scene
     environment: Environment | None = None
     background: Color | None = None
-    _loaded: dict[str, Any] = field(default_factory=dict, repr=False)
+    _loaded: dict[str, mi.Scene] = field(default_factory=dict, repr=False)
 
     @exclusive()
-    def scene(self) -> Any:
+    def scene(self) -> mi.Scene:
         """The ``mi.Scene`` as described, loaded once per variant. ``environment`` is not in it: see :func:`with_sky`.
 
         Raises
@@ -71,42 +74,40 @@ class MitsubaSource:
         SceneError
             There are no shapes.
         """
-        found = self.scene().bbox()
-        if not found.valid():
+        box = self.scene().bbox()
+        if not box.valid():
             raise SceneError("the scene has no geometry", where=self.name, rule="there must be at least one shape")
-        return np.stack([np.array(found.min, np.float64).ravel(), np.array(found.max, np.float64).ravel()])
+        return np.stack([np.array(box.min, np.float64).ravel(), np.array(box.max, np.float64).ravel()])
 
     @exclusive()
     def cameras(self) -> tuple[Camera, ...]:
         """The perspective (also thin-lens) and orthographic sensors; other kinds cannot place a display."""
         sensors = enumerate(self.scene().sensors())
-        found = (_camera(sensor, sensor.id() or f"sensor_{number}") for number, sensor in sensors)
-        return tuple(camera for camera in found if camera is not None)
+        cameras = (_camera(sensor, sensor.id() or f"sensor_{number}") for number, sensor in sensors)
+        return tuple(camera for camera in cameras if camera is not None)
 
     @exclusive()
     def has_lights(self) -> bool:
         """Whether the scene has any emitter."""
         return bool(self.scene().emitters())
 
-    def _load(self, variant: str) -> Any:
+    def _load(self, variant: str) -> mi.Scene:
         import mitsuba as mi
 
-        if self.is_borrowed:
-            if self.content.variant_name() != variant:
+        content = self.content
+        if not isinstance(content, MitsubaXml | Mapping):
+            if content.variant_name() != variant:
                 raise SceneError(
-                    f"the Mitsuba scene was loaded under '{self.content.variant_name()}'",
+                    f"the Mitsuba scene was loaded under '{content.variant_name()}'",
                     where=self.name,
                     rule=f"the engine runs '{variant}'",
                     fix="load it after mitsuba.set_variant of that name",
                 )
-            return self.content
-        if isinstance(self.content, Mapping):
-            check_plugins_of(self.content, self.name)
+            return content
+        if isinstance(content, Mapping):
+            check_plugins_of(content, self.name)
         try:
-            if isinstance(self.content, MitsubaXml):
-                loaded = mi.load_string(self.content.text())
-            else:
-                loaded = mi.load_dict(dict(self.content))
+            loaded = mi.load_string(content.text()) if isinstance(content, MitsubaXml) else mi.load_dict(dict(content))
         except (RuntimeError, TypeError, ValueError) as error:
             message = " ".join(self._with_origins(str(error)).split())[:_LONGEST_MESSAGE]
             raise SceneError(f"Mitsuba refuses the scene: {message}", where=self.name) from None
@@ -115,11 +116,11 @@ class MitsubaSource:
         return loaded
 
     def _with_origins(self, message: str) -> str:
-        """A message of Mitsuba's about the text that it was given, with the files and lines that it came from."""
+        """A message of Mitsuba's, its lines of the text replaced by the files and lines that they came from."""
         if not isinstance(self.content, MitsubaXml):
             return message
         content = self.content
-        return _TEXT_POSITION.sub(lambda found: content.origin(int(found[1])), message)
+        return _TEXT_POSITION.sub(lambda match: content.origin(int(match[1])), message)
 
 
 def read_mitsuba(path: Path, *, allow_outside: bool = False) -> MitsubaSource:
@@ -133,18 +134,18 @@ def read_mitsuba(path: Path, *, allow_outside: bool = False) -> MitsubaSource:
     return MitsubaSource(path.stem, read_mitsuba_xml(path, allow_outside=allow_outside))
 
 
-def with_sky(scene: Any, emitter: Any) -> Any:
-    """A ``mi.Scene`` of the same shapes and lamps, with ``emitter`` as the only environment."""
+def with_sky(scene: mi.Scene, sky: mi.Emitter) -> mi.Scene:
+    """A ``mi.Scene`` of the same shapes and light sources, with ``sky`` as the only environment."""
     import mitsuba as mi
 
-    parts: dict[str, Any] = {"type": "scene", "environment": emitter}
+    parts: dict[str, object] = {"type": "scene", "environment": sky}
     parts |= {f"shape_{number}": shape for number, shape in enumerate(scene.shapes())}
-    lamps = [
-        lamp
-        for lamp in scene.emitters()
-        if not lamp.is_environment() and not mi.has_flag(lamp.flags(), mi.EmitterFlags.Surface)
+    emitters = [
+        emitter
+        for emitter in scene.emitters()
+        if not emitter.is_environment() and not mi.has_flag(emitter.flags(), mi.EmitterFlags.Surface)
     ]
-    parts |= {f"lamp_{number}": lamp for number, lamp in enumerate(lamps)}
+    parts |= {f"emitter_{number}": emitter for number, emitter in enumerate(emitters)}
     parts |= {f"sensor_{number}": sensor for number, sensor in enumerate(scene.sensors())}
     return mi.load_dict(parts)
 
@@ -159,7 +160,7 @@ def _variant() -> str:
     return variant
 
 
-def _camera(sensor: Any, name: str) -> Camera | None:
+def _camera(sensor: mi.Sensor, name: str) -> Camera | None:
     import mitsuba as mi
 
     world_from_camera = np.array(sensor.world_transform().matrix, np.float64).reshape(4, 4) @ _MITSUBA_FROM_CAMERA
@@ -178,5 +179,5 @@ def _camera(sensor: Any, name: str) -> Camera | None:
     return None
 
 
-def _number(value: Any) -> float:
+def _number(value: mi.Float | float) -> float:
     return float(np.asarray(value).ravel()[0])

@@ -8,7 +8,8 @@ teapot also has a form of its own for physically based light. Nothing is built b
 from __future__ import annotations
 
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from types import ModuleType
+from typing import TYPE_CHECKING
 
 from lippmann.errors import SceneError
 
@@ -72,7 +73,7 @@ def stage_of(name: str) -> Stage:
     return place
 
 
-def _module(name: str) -> Any:
+def _module(name: str) -> ModuleType:
     if name not in _MODULES:
         raise SceneError(f"no bundled scene is named {name!r}", rule=f"there are {', '.join(names())}")
     return import_module(f"{__name__}.{_MODULES[name]}")

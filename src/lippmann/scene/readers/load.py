@@ -7,7 +7,6 @@ from collections.abc import Mapping
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -205,7 +204,7 @@ def _environment(environment: str | Path | Environment | None) -> Environment | 
     return read_environment(Path(environment))
 
 
-def _background(background: Any) -> Color | None:
+def _background(background: Color | None) -> Color | None:
     if background is None:
         return None
     values = tuple(float(value) for value in background)

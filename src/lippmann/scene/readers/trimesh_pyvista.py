@@ -7,10 +7,10 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from lippmann.color.transfer import decode_srgb
 from lippmann.errors import SceneError
@@ -29,6 +29,11 @@ from lippmann.scene.values.description import (
     Texture,
 )
 
+if TYPE_CHECKING:
+    import pyvista
+    import trimesh
+    from PIL import Image as Pillow
+
 _GREY = Material("grey", base_color=(0.7, 0.7, 0.7), roughness=0.6, double_sided=True)
 _COLORED = Material("vertex colours", roughness=0.6, double_sided=True)
 
@@ -39,8 +44,8 @@ _LIGHT_KINDS: dict[str, Literal["point", "spot", "directional"]] = {
 }
 
 
-def from_trimesh(source: Any) -> SceneDescription:
-    """A ``trimesh.Scene`` or ``trimesh.Trimesh``: geometry, instances, materials, camera, lamps.
+def from_trimesh(source: trimesh.Scene | trimesh.Trimesh) -> SceneDescription:
+    """A ``trimesh.Scene`` or ``trimesh.Trimesh``: geometry, instances, materials, camera, light sources.
 
     Vertex normals are taken where the mesh already holds them; otherwise its facets are flat. Vertex and face colours
     are taken as sRGB-coded. A Phong (simple) material becomes a rough dielectric of its diffuse colour.
@@ -78,7 +83,9 @@ def from_trimesh(source: Any) -> SceneDescription:
     return SceneDescription(name, meshes, materials, instances, lights, cameras, notes=notes)
 
 
-def _from_trimesh_mesh(geometry: Any, name: str, material: int, images: dict[int, Image]) -> tuple[Mesh, Material]:
+def _from_trimesh_mesh(
+    geometry: trimesh.Trimesh, name: str, material: int, images: dict[int, Image]
+) -> tuple[Mesh, Material]:
     positions = np.asarray(geometry.vertices, np.float64)
     faces = np.asarray(geometry.faces)
     visual = geometry.visual
@@ -110,13 +117,13 @@ def _from_trimesh_mesh(geometry: Any, name: str, material: int, images: dict[int
     return mesh, surface
 
 
-def _from_trimesh_material(material: Any, images: dict[int, Image]) -> Material:
+def _from_trimesh_material(material: trimesh.visual.material.Material, images: dict[int, Image]) -> Material:
     if hasattr(material, "materials"):  # several in one mesh: trimesh itself falls back to the first
         material = material.materials[0] if len(material.materials) else None
     if material is None:
         return _GREY
 
-    def texture(picture: Any, *, srgb: bool) -> Texture | None:
+    def texture(picture: Pillow.Image | None, *, srgb: bool) -> Texture | None:
         if picture is None:
             return None
         if id(picture) not in images:
@@ -148,7 +155,7 @@ def _from_trimesh_material(material: Any, images: dict[int, Image]) -> Material:
     )
 
 
-def _from_phong(material: Any, texture: Texture | None) -> Material:
+def _from_phong(material: trimesh.visual.material.SimpleMaterial, texture: Texture | None) -> Material:
     factor = _fraction(material.diffuse, (255, 255, 255, 255))
     unset = bool((np.asarray(material.diffuse) == np.array([102, 102, 102, 255])).all())
     pbr = material.to_pbr()
@@ -164,7 +171,7 @@ def _from_phong(material: Any, texture: Texture | None) -> Material:
     )
 
 
-def _from_trimesh_camera(scene: Any) -> Camera:
+def _from_trimesh_camera(scene: trimesh.Scene) -> Camera:
     fov_x, fov_y = (float(angle) for angle in np.radians(scene.camera.fov))
     return Camera(
         name=str(scene.camera.name or "camera"),
@@ -174,7 +181,7 @@ def _from_trimesh_camera(scene: Any) -> Camera:
     )
 
 
-def _from_trimesh_light(scene: Any, light: Any) -> Light:
+def _from_trimesh_light(scene: trimesh.Scene, light: trimesh.scene.lighting.Light) -> Light:
     intensity = 1.0 if light.intensity is None else float(light.intensity)
     red, green, blue = (float(value) * intensity for value in _fraction(light.color, (255, 255, 255, 255))[:3])
     return Light(
@@ -187,7 +194,7 @@ def _from_trimesh_light(scene: Any, light: Any) -> Light:
     )
 
 
-def from_pyvista(source: Any) -> SceneDescription:
+def from_pyvista(source: pyvista.DataSet | pyvista.MultiBlock) -> SceneDescription:
     """A PyVista data set: its surface, cut into triangles.
 
     Point normals and texture coordinates are taken where they are active. Colours are taken where the active scalars
@@ -233,7 +240,7 @@ def from_pyvista(source: Any) -> SceneDescription:
     return SceneDescription("pyvista", [mesh], [material], [Instance(0, np.eye(4))], notes=notes)
 
 
-def adapter_for(source: object) -> Callable[[Any], SceneDescription] | None:
+def adapter_for(source: object) -> Callable[[object], SceneDescription] | None:
     """The function that reads an object of another library, by the library it or a base of its class comes from."""
     libraries = {kind.__module__.partition(".")[0] for kind in type(source).__mro__}
     if "trimesh" in libraries and (hasattr(source, "graph") or hasattr(source, "faces")):
@@ -241,15 +248,16 @@ def adapter_for(source: object) -> Callable[[Any], SceneDescription] | None:
     return from_pyvista if "pyvista" in libraries else None
 
 
-def _linear_colors(colors: Any) -> NDArray[np.float32]:
+def _linear_colors(colors: ArrayLike) -> NDArray[np.float32]:
     """Linear RGBA of sRGB-coded bytes ``(n, 3 or 4)``."""
     fraction = np.asarray(colors, np.float64) / 255.0
     return np.concatenate([decode_srgb(fraction[:, :3]), fraction[:, 3:]], axis=1).astype(np.float32)
 
 
-def _fraction(color: Any, default: tuple[int, ...]) -> NDArray[np.float64]:
+def _fraction(color: ArrayLike | None, default: tuple[int, ...]) -> NDArray[np.float64]:
     return np.asarray(default if color is None else color, np.float64) / 255.0
 
 
-def _color(values: Any) -> Color:
-    return (float(values[0]), float(values[1]), float(values[2]))
+def _color(values: ArrayLike) -> Color:
+    red, green, blue = np.asarray(values, np.float64)[:3].tolist()
+    return red, green, blue

@@ -1,17 +1,17 @@
-"""Puts a :class:`ClassicScene` together: append primitives in any order, get whole batches out."""
+"""Builder of a :class:`ClassicScene`: append primitives in any order, get whole batches out."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import fields
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from lippmann.errors import SceneError
-from lippmann.scene.values.whitted_camera import Handedness
-from lippmann.scene.values.whitted_lighting import ClassicLight
+from lippmann.scene.values.whitted_camera import ClassicCamera, Handedness
+from lippmann.scene.values.whitted_lighting import AmbientOcclusion, Background, ClassicLight, Fog, Shading
 from lippmann.scene.values.whitted_scene import ClassicScene, Rules
 from lippmann.scene.values.whitted_shapes import (
     Batch,
@@ -88,7 +88,7 @@ class ClassicSceneBuilder:
         return len(self._clip_groups) - 1
 
     def light(self, light: ClassicLight) -> None:
-        """Adds a lamp."""
+        """Add a light source."""
         self.lights.append(light)
 
     def spheres(
@@ -190,8 +190,17 @@ class ClassicSceneBuilder:
             clip_group=clip_group,
         )
 
-    def build(self, **rest: Any) -> ClassicScene:
-        """The scene. ``rest`` are the other fields of :class:`ClassicScene`: camera, background, fog, ..."""
+    def build(
+        self,
+        *,
+        camera: ClassicCamera | None = None,
+        resolution: tuple[int, int] = (512, 512),
+        background: Background | None = None,
+        fog: Fog | None = None,
+        ambient_occlusion: AmbientOcclusion | None = None,
+        shading: Shading | None = None,
+    ) -> ClassicScene:
+        """The scene, with these fields of :class:`ClassicScene`; None takes the field's default."""
         return ClassicScene(
             name=self.name,
             rules=self.rules,
@@ -208,12 +217,17 @@ class ClassicSceneBuilder:
             images=tuple(self._images),
             lights=tuple(self.lights),
             notes=tuple(self.notes),
-            **rest,
+            camera=camera or ClassicCamera(),
+            resolution=resolution,
+            background=background or Background(),
+            fog=fog,
+            ambient_occlusion=ambient_occlusion,
+            shading=shading or Shading(),
         )
 
     def _add(self, kind: type[Batch], material: ArrayLike, clip_group: ArrayLike, **columns: ArrayLike) -> None:
-        """Appends one batch; single values are repeated to the number of rows of the longest column."""
-        arrays: dict[str, np.ndarray[Any, Any]] = {
+        """Append one batch; single values are repeated to the number of rows of the longest column."""
+        arrays: dict[str, np.ndarray] = {
             "material": np.asarray(material, dtype=np.int32),
             "clip_group": np.asarray(clip_group, dtype=np.int32),
         }

@@ -8,9 +8,10 @@ does.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Literal, TypeVar
 
 import numpy as np
 
@@ -25,6 +26,8 @@ from lippmann.scene.values.whitted_numbers import Vector
 from lippmann.scene.values.whitted_scene import ClassicScene
 from lippmann.scene.whitted.builder import ClassicSceneBuilder, unit
 
+T = TypeVar("T")
+
 _COMMENT = re.compile(r"(?<!\S)#(?!\S)[^\n]*")
 _DEEPEST_INCLUDE = 32
 _MOST_INCLUDES = 1000
@@ -37,6 +40,19 @@ _PROJECTIONS: dict[str, Projection] = {
     "PERSPECTIVE_DOF": "perspective-dof",
     "ORTHOGRAPHIC": "orthographic",
     "FISHEYE": "fisheye",
+}
+_GRADIENTS: dict[str, Literal["sky-sphere", "sky-plane"]] = {"SKY_SPHERE": "sky-sphere", "SKY_ORTHO_PLANE": "sky-plane"}
+_FOGS: dict[str, Literal["linear", "exp", "exp2"] | None] = {
+    "LINEAR": "linear",
+    "EXP": "exp",
+    "EXP2": "exp2",
+    "OFF": None,
+}
+_SHADING_MODES: dict[str, Literal["full", "medium", "low", "lowest"]] = {
+    "FULL": "full",
+    "MEDIUM": "medium",
+    "LOW": "low",
+    "LOWEST": "lowest",
 }
 _REFUSED = {
     "SCALARVOL": "volumes are not rendered",
@@ -87,28 +103,28 @@ def read_cam(path: str | Path) -> list[CameraPose]:
 
 
 class _SceneReader:
-    """Reads the items one by one; what they set is kept here until the scene is built."""
+    """Reads the items one by one and holds their values until the scene is built."""
 
     def __init__(self, path: Path, files: SceneFiles) -> None:
         self._path = path
         self._files = files
         self._builder = ClassicSceneBuilder(path.stem)
-        self._items: dict[str, Callable[[Words, Path], None]] = {
-            "CAMERA": self._camera,
-            "LIGHT": self._point_light,
-            "SPOTLIGHT": self._spotlight,
-            "DIRECTIONAL_LIGHT": self._directional_light,
-            "SKY_LIGHT": self._sky_light,
-            "BACKGROUND": self._background,
-            "BACKGROUND_GRADIENT": self._gradient,
-            "FOG": self._fog,
-            "SHADER_MODE": self._shader_mode,
-            "INCLUDE": self._include,
+        self._items: dict[str, Callable[[Words], None]] = {
+            "CAMERA": self._read_camera,
+            "LIGHT": self._read_point_light,
+            "SPOTLIGHT": self._read_spotlight,
+            "DIRECTIONAL_LIGHT": self._read_directional_light,
+            "SKY_LIGHT": self._read_sky_light,
+            "BACKGROUND": self._read_background,
+            "BACKGROUND_GRADIENT": self._read_gradient,
+            "FOG": self._read_fog,
+            "SHADER_MODE": self._read_shader_mode,
+            "INCLUDE": self._read_include,
             "START_CLIPGROUP": self._start_clip_group,
             "END_CLIPGROUP": self._end_clip_group,
-            "TEXDEF": lambda words, holder: self._textures.define(words, holder),
-            "TEXALIAS": lambda words, holder: self._textures.alias(words),
-            "IMAGEDEF": lambda words, holder: self._textures.define_image(words),
+            "TEXDEF": lambda words: self._textures.define(words, self._open_files[-1]),
+            "TEXALIAS": lambda words: self._textures.alias(words),
+            "IMAGEDEF": lambda words: self._textures.define_image(words),
         }
         reserved = {*self._items, *SHAPES, *_REFUSED, "END_SCENE"}
         self._textures = TextureTable(self._builder, files, reserved)
@@ -119,10 +135,11 @@ class _SceneReader:
         self._aperture = 0.0
         self._focal_length = 1.0
         self._planar_fog = False
-        self._fog_values: dict[str, Any] | None = None
-        self._background_values: dict[str, Any] = {}
-        self._shading_values: dict[str, Any] = {}
-        self._scene_values: dict[str, Any] = {}
+        self._camera: ClassicCamera | None = None
+        self._fog: Fog | None = None
+        self._background = Background()
+        self._ambient_occlusion: AmbientOcclusion | None = None
+        self._shading = Shading()
 
     def read(self) -> ClassicScene:
         words = Words.of_file(self._path, self._path.name, comment=_COMMENT, single=True)
@@ -135,24 +152,24 @@ class _SceneReader:
             self._builder.notes.append(f"{words.place()}: what follows END_SCENE is not read")
         self._shapes.finish()
         self._textures.finish()
-        if "camera" not in self._scene_values:
+        if self._camera is None:
             self._builder.notes.append("no CAMERA: seen from the origin along +z")
         if self._focal_length != 1.0:
             self._builder.notes.append("FOCALLENGTH has no effect: Tachyon focuses at distance 1")
-        if self._fog_values is not None:
-            self._scene_values["fog"] = Fog(planar=self._planar_fog, **self._fog_values)
         scene = self._builder.build(
             resolution=(width, height),
-            background=Background(**self._background_values),
-            shading=Shading(**self._shading_values),
-            **self._scene_values,
+            camera=self._camera,
+            background=self._background,
+            fog=None if self._fog is None else replace(self._fog, planar=self._planar_fog),
+            ambient_occlusion=self._ambient_occlusion,
+            shading=self._shading,
         )
         if not any(scene.counts().values()):
             raise SceneError("the scene has no geometry", where=self._path.name, rule="at least one primitive")
         return scene
 
     def _read_items(self, words: Words, holder: Path) -> bool:
-        """Reads the file ``holder`` to END_SCENE (True) or to its end (False)."""
+        """Read the file ``holder`` to END_SCENE (True) or to its end (False)."""
         self._open_files.append(holder)
         ended = False
         while words.left and not ended:
@@ -162,7 +179,7 @@ class _SceneReader:
                 SHAPES[keyword](self._shapes, words, holder)
             elif keyword in self._items:
                 words.take()
-                self._items[keyword](words, holder)
+                self._items[keyword](words)
             elif keyword == "END_SCENE":
                 words.take()
                 ended = True
@@ -173,9 +190,11 @@ class _SceneReader:
         self._open_files.pop()
         return ended
 
-    def _include(self, words: Words, holder: Path) -> None:
+    def _read_include(self, words: Words) -> None:
         where = words.place()
-        path = self._files.find(words.name("the name of a file"), holder, where=where, what="included file")
+        path = self._files.find(
+            words.name("the name of a file"), self._open_files[-1], where=where, what="included file"
+        )
         shown = self._files.shown(path)
         if any(path.samefile(other) for other in self._open_files):
             raise SceneError(f"'{shown}' includes itself", where=where, rule="includes may not run in a circle")
@@ -185,38 +204,43 @@ class _SceneReader:
             raise SceneError(f"'{shown}' is one include too many", where=where, rule=limits)
         self._read_items(self._files.words(path, comment=_COMMENT, where=where), path)
 
-    def _camera(self, words: Words, holder: Path) -> None:
+    def _read_camera(self, words: Words) -> None:
         if words.has("PROJECTION"):
-            self._projection = _choice(words, _PROJECTIONS)
+            self._projection = _read_choice(words, _PROJECTIONS)
             if self._projection == "perspective-dof":
                 self._focal_length = words.number("FOCALLENGTH")
                 self._aperture = words.number("APERTURE")
         start = words.place()
-        values: dict[str, Any] = {
-            "zoom": words.positive("ZOOM"),
-            "aspect": words.positive("ASPECTRATIO"),
-            "antialiasing": words.integer(0, _MOST_SAMPLES, "ANTIALIASING"),
-            "ray_depth": max(1, words.integer(0, _DEEPEST_RAY, "RAYDEPTH")),  # 0 traces as deep as 1
-            "center": words.vector("CENTER"),
-            "view": words.direction("VIEWDIR"),
-            "up": words.direction("UPDIR"),
-        }
+        zoom, aspect = words.positive("ZOOM"), words.positive("ASPECTRATIO")
+        antialiasing = words.integer(0, _MOST_SAMPLES, "ANTIALIASING")
+        ray_depth = max(1, words.integer(0, _DEEPEST_RAY, "RAYDEPTH"))  # 0 traces as deep as 1
+        center, view, up = words.vector("CENTER"), words.direction("VIEWDIR"), words.direction("UPDIR")
+        frustum = None
         if words.has("FRUSTUM"):
-            values["frustum"] = (words.number(), words.number(), words.number(), words.number())
+            frustum = (words.number(), words.number(), words.number(), words.number())
         words.keyword("END_CAMERA")
         try:
-            camera = ClassicCamera(projection=self._projection, aperture=self._aperture, **values)
+            self._camera = ClassicCamera(
+                projection=self._projection,
+                center=center,
+                view=view,
+                up=up,
+                zoom=zoom,
+                aspect=aspect,
+                antialiasing=antialiasing,
+                ray_depth=ray_depth,
+                aperture=self._aperture,
+                frustum=frustum,
+            )
         except SceneError as error:
             raise SceneError(error.what, where=start, rule=error.rule) from None
-        self._scene_values["camera"] = camera
 
-    def _point_light(self, words: Words, holder: Path) -> None:
+    def _read_point_light(self, words: Words) -> None:
         center, radius = words.vector("CENTER"), words.radius("RAD")
-        self._light(words, "point", center=center, radius=radius)
+        self._add_light(words, ClassicLight("point", center=center, radius=radius))
 
-    def _spotlight(self, words: Words, holder: Path) -> None:
-        self._light(
-            words,
+    def _read_spotlight(self, words: Words) -> None:
+        light = ClassicLight(
             "spot",
             center=words.vector("CENTER"),
             radius=words.radius("RAD"),
@@ -224,86 +248,90 @@ class _SceneReader:
             falloff_start=words.number("FALLOFF_START"),
             falloff_end=words.number("FALLOFF_END"),
         )
+        self._add_light(words, light)
 
-    def _light(self, words: Words, kind: Any, **values: Any) -> None:
+    def _add_light(self, words: Words, light: ClassicLight) -> None:
+        """Read the attenuation and colour that end a point or spot light, and add it to the scene."""
         if words.has("ATTENUATION"):
             factors = (words.radius("CONSTANT"), words.radius("LINEAR"), words.radius("QUADRATIC"))
             if not any(factors):
                 raise words.wrong("factors of attenuation that are not all 0", back=1)
-            values["attenuation"] = factors
-        color = words.vector("COLOR")
-        self._builder.light(ClassicLight(kind, color=color, clip_group=self._shapes.clip_group, **values))
+            light = replace(light, attenuation=factors)
+        self._builder.light(replace(light, color=words.vector("COLOR"), clip_group=self._shapes.clip_group))
 
-    def _directional_light(self, words: Words, holder: Path) -> None:
+    def _read_directional_light(self, words: Words) -> None:
         direction = _unit(words.direction("DIRECTION"))
         self._builder.light(ClassicLight("directional", color=words.vector("COLOR"), direction=direction))
 
-    def _sky_light(self, words: Words, holder: Path) -> None:
+    def _read_sky_light(self, words: Words) -> None:
         samples = words.integer(0, _MOST_SAMPLES, "NUMSAMPLES")
-        self._ambient_occlusion(samples, words.vector("COLOR"))
+        self._set_ambient_occlusion(samples, words.vector("COLOR"))
 
-    def _ambient_occlusion(self, samples: int, color: Vector) -> None:
-        self._scene_values["ambient_occlusion"] = AmbientOcclusion(samples, color) if samples else None
+    def _set_ambient_occlusion(self, samples: int, color: Vector) -> None:
+        self._ambient_occlusion = AmbientOcclusion(samples, color) if samples else None
 
-    def _background(self, words: Words, holder: Path) -> None:
-        self._background_values["color"] = words.vector()
+    def _read_background(self, words: Words) -> None:
+        self._background = replace(self._background, color=words.vector())
 
-    def _gradient(self, words: Words, holder: Path) -> None:
-        kinds = {"SKY_SPHERE": "sky-sphere", "SKY_ORTHO_PLANE": "sky-plane"}
-        self._background_values["kind"] = _choice(words, kinds)
-        self._background_values["up"] = words.vector("UPDIR")
+    def _read_gradient(self, words: Words) -> None:
+        kind = _read_choice(words, _GRADIENTS)
+        up = words.vector("UPDIR")
         top, bottom = words.number("TOPVAL"), words.number("BOTTOMVAL")
         if top == bottom:
             raise words.wrong("a bottom value that differs from the top value", back=1)
-        self._background_values.update(top_value=top, bottom_value=bottom)
-        self._background_values["top_color"] = words.vector("TOPCOLOR")
-        self._background_values["bottom_color"] = words.vector("BOTTOMCOLOR")
+        self._background = replace(
+            self._background,
+            kind=kind,
+            up=up,
+            top_value=top,
+            bottom_value=bottom,
+            top_color=words.vector("TOPCOLOR"),
+            bottom_color=words.vector("BOTTOMCOLOR"),
+        )
 
-    def _fog(self, words: Words, holder: Path) -> None:
-        kind = _choice(words, {"LINEAR": "linear", "EXP": "exp", "EXP2": "exp2", "OFF": "off"})
+    def _read_fog(self, words: Words) -> None:
+        kind = _read_choice(words, _FOGS)
         start, end = words.number("START"), words.number("END")
         if kind == "linear" and start == end:
             raise words.wrong("an end of the fog that differs from its start", back=1)
         density, color = words.number("DENSITY"), words.vector("COLOR")
-        values = {"kind": kind, "start": start, "end": end, "density": density, "color": color}
-        self._fog_values = None if kind == "off" else values
+        self._fog = None if kind is None else Fog(kind, start, end, density, color)
 
-    def _shader_mode(self, words: Words, holder: Path) -> None:
-        modes = {"FULL": "full", "MEDIUM": "medium", "LOW": "low", "LOWEST": "lowest"}
-        values = self._shading_values
-        values["mode"] = _choice(words, modes)
+    def _read_shader_mode(self, words: Words) -> None:
+        shading = replace(self._shading, mode=_read_choice(words, _SHADING_MODES))
         while not words.has("END_SHADER_MODE"):
             if words.has("SHADOW_FILTER_ON"):
-                values["shadow_filter"] = True
+                shading = replace(shading, shadow_filter=True)
             elif words.has("SHADOW_FILTER_OFF"):
-                values["shadow_filter"] = False
+                shading = replace(shading, shadow_filter=False)
             elif words.has("TRANS_MAX_SURFACES"):
-                values["max_transparent_surfaces"] = words.integer(0, 2**31 - 1)
+                shading = replace(shading, max_transparent_surfaces=words.integer(0, 2**31 - 1))
             elif words.has("TRANS_ORIG"):
-                values["raster3d"] = values["local_times_opacity"] = False
+                shading = replace(shading, raster3d=False, local_times_opacity=False)
             elif words.has("TRANS_RASTER3D"):
-                values["raster3d"] = True
+                shading = replace(shading, raster3d=True)
             elif words.has("TRANS_VMD"):
-                values["local_times_opacity"] = True
+                shading = replace(shading, local_times_opacity=True)
             elif words.has("FOG_VMD"):
                 self._planar_fog = True
             elif words.has("AMBIENT_OCCLUSION"):
                 color = words.vector("AMBIENT_COLOR")
-                values["light_scale"] = words.number("RESCALE_DIRECT")
-                self._ambient_occlusion(words.integer(0, _MOST_SAMPLES, "SAMPLES"), color)
+                shading = replace(shading, light_scale=words.number("RESCALE_DIRECT"))
+                self._set_ambient_occlusion(words.integer(0, _MOST_SAMPLES, "SAMPLES"), color)
             else:
                 raise words.wrong("an option of SHADER_MODE, or END_SHADER_MODE")
+        self._shading = shading
 
-    def _start_clip_group(self, words: Words, holder: Path) -> None:
+    def _start_clip_group(self, words: Words) -> None:
         planes = words.numbers(words.count(4, "NUMPLANES"), 4)
         self._shapes.clip_group = self._builder.clip_group(planes)
 
-    def _end_clip_group(self, words: Words, holder: Path) -> None:
+    def _end_clip_group(self, words: Words) -> None:
         self._shapes.clip_group = -1
 
 
-def _choice(words: Words, choices: dict[str, Any]) -> Any:
-    """Reads one of the keywords and gives what it stands for."""
+def _read_choice(words: Words, choices: Mapping[str, T]) -> T:
+    """The value of the next word, which must be one of the keywords of ``choices``."""
     keyword = words.peek().upper()
     if keyword not in choices:
         raise words.wrong(" or ".join(choices))

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Collection
+from dataclasses import replace
 from itertools import islice
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal, TypedDict
 
 import numpy as np
 
@@ -20,6 +21,19 @@ DEFAULT_MATERIAL = ClassicMaterial()
 
 _MOST_NAMES = 5  # in one note
 _HEX = re.compile(r"[0-9a-fA-F]+").fullmatch
+
+
+class _Finish(TypedDict, total=False):
+    ambient: float
+    diffuse: float
+    specular: float
+    opacity: float
+    raster3d: bool
+    outline: float
+    outline_width: float
+    phong_kind: Literal["plastic", "metal"]
+    phong: float
+    phong_size: float
 
 
 class TextureTable:
@@ -112,10 +126,13 @@ class TextureTable:
     def _remark(self, remark: str, name: str, where: str) -> None:
         self._remarks.setdefault(remark, {}).setdefault(name, where)
 
-    def _finish(self, words: Words) -> dict[str, Any]:
+    def _finish(self, words: Words) -> _Finish:
         """From AMBIENT to the highlight: the fields of ClassicMaterial."""
-        finish: dict[str, Any] = {
-            name: words.number(name.upper()) for name in ("ambient", "diffuse", "specular", "opacity")
+        finish: _Finish = {
+            "ambient": words.number("AMBIENT"),
+            "diffuse": words.number("DIFFUSE"),
+            "specular": words.number("SPECULAR"),
+            "opacity": words.number("OPACITY"),
         }
         if words.has("TRANSMODE"):
             words.keyword("R3D")
@@ -138,15 +155,15 @@ class TextureTable:
         if kind == "constant":
             return ClassicTexture()
         image = self._image(words, holder) if kind.endswith("image") else None
-        axes: dict[str, Any] = {name: words.vector(name.upper()) for name in ("center", "rotate", "scale")}
-        if kind == "wood" and not all(axes["scale"]):
+        center, rotate, scale = words.vector("CENTER"), words.vector("ROTATE"), words.vector("SCALE")
+        if kind == "wood" and not all(scale):
             raise words.wrong("a scale without 0 (wood divides by it)", back=3)
+        texture = ClassicTexture(kind, center, rotate, scale, image=image)
         if kind in ("planar-image", "volume-image"):
-            axes["u_axis"] = words.vector("UAXIS")
-            axes["v_axis"] = words.vector("VAXIS")
+            texture = replace(texture, u_axis=words.vector("UAXIS"), v_axis=words.vector("VAXIS"))
         if kind == "volume-image":
-            axes["w_axis"] = words.vector("WAXIS")
-        return ClassicTexture(kind=kind, image=image, **axes)
+            texture = replace(texture, w_axis=words.vector("WAXIS"))
+        return texture
 
     def _image(self, words: Words, holder: Path) -> int:
         """Index of the image of that name: an inline one, or a file, read once."""
