@@ -12,7 +12,7 @@ from lippmann.scene.readers.load import load_scene
 from lippmann.scene.scene import STUDIO_NOTE
 from lippmann.scene.studio_light import studio
 
-LAMP = '<shape type="sphere"><emitter type="area"/></shape>'
+EMITTER = '<shape type="sphere"><emitter type="area"/></shape>'
 CAMERA = (
     '<sensor type="thinlens" id="eye"><float name="aperture_radius" value="0.1"/>'
     '<float name="focus_distance" value="3"/><float name="fov" value="40"/><string name="fov_axis" value="y"/>'
@@ -32,7 +32,7 @@ def save(tmp_path):
 
 
 def test_a_file(save, engine):
-    scene = load_scene(save(LAMP + CAMERA))
+    scene = load_scene(save(EMITTER + CAMERA))
     assert scene.name == "room"
     assert scene.bounds == pytest.approx(np.array([[-1, -1, -1], [1, 1, 1]]))
     assert scene.has_lights
@@ -44,7 +44,7 @@ def test_a_file(save, engine):
 def test_cameras_look_as_ours_do(save, engine):
     tall = '<sensor type="orthographic"><transform name="to_world"><scale x="2" y="2"/></transform></sensor>'
     odd = '<sensor type="irradiancemeter"/>'
-    first, second = load_scene(save(LAMP.replace("/></shape>", f"/>{odd}</shape>") + CAMERA + tall)).cameras
+    first, second = load_scene(save(EMITTER.replace("/></shape>", f"/>{odd}</shape>") + CAMERA + tall)).cameras
     assert first.name == "eye"
     assert first.world_from_camera == pytest.approx(
         np.array([[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 5], [0, 0, 0, 1]]), abs=1e-6
@@ -61,7 +61,7 @@ def test_a_camera_sees_what_mitsuba_sees(save, engine):
     import mitsuba as mi
 
     pinhole = CAMERA[CAMERA.index('<float name="fov"') :].replace("0,0,5", "4,3,5")
-    scene = load_scene(save(f'{LAMP}<sensor type="perspective">{pinhole}'))
+    scene = load_scene(save(f'{EMITTER}<sensor type="perspective">{pinhole}'))
     (camera,) = scene.cameras
     ray, _ = scene.description.scene().sensors()[0].sample_ray(0, 0.5, mi.Point2f(0.75, 0.1), mi.Point2f(0.5))
     top = np.tan(camera.fov_y / 2)
@@ -81,7 +81,7 @@ def test_a_sky_joins_the_lamps_and_replaces_another_sky(engine):
     parts = {
         "type": "scene",
         "body": {"type": "sphere", "emitter": {"type": "area", "radiance": {"type": "rgb", "value": [2, 2, 2]}}},
-        "lamp": {"type": "point", "position": [0, 5, 0]},
+        "emitter": {"type": "point", "position": [0, 5, 0]},
         "old": {"type": "constant", "radiance": 7.0},
     }
     scene = load_scene(parts).description.scene()
@@ -166,7 +166,7 @@ def test_outside_files_need_leave(save, tmp_path):
 def test_the_engine_has_to_run_first(save):
     code = (
         "from lippmann.scene.readers.load import load_scene\nfrom lippmann.errors import EngineError\n"
-        f"scene = load_scene({str(save(LAMP))!r})\n"
+        f"scene = load_scene({str(save(EMITTER))!r})\n"
         "try:\n    scene.bounds\nexcept EngineError as error:\n    print(error)"
     )
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

@@ -260,9 +260,9 @@ def _box_corners(points: Bounds) -> Bounds:
 
 
 def has_lights(description: SceneDescription) -> bool:
-    """Whether a description sheds light: an environment, a lamp, a surface brighter than white, or only unlit surfaces.
+    """Whether a description has emitters: an environment, a light, a surface brighter than white, or only unlit ones.
 
-    Surfaces that glow no brighter than white (radiance 1) are labels and screens, which do not light a scene.
+    Surfaces of radiance 1 and below are labels and screens, which do not light a scene.
     """
     if description.environment is not None or any(max(light.color) > 0.0 for light in description.lights):
         return True

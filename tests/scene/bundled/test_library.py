@@ -24,7 +24,7 @@ COUNTS = {
     "tree": {"sphere": 4095, "tube": 4095, "triangle": 2},
     "gears": {"triangle": 36610},
 }
-LAMPS = {"teapot": 2, "room": 1, "small-balls": 3, "primitives": 3, "tree": 7, "gears": 5}
+LIGHTS = {"teapot": 2, "room": 1, "small-balls": 3, "primitives": 3, "tree": 7, "gears": 5}
 
 
 @pytest.fixture(scope="module")
@@ -68,7 +68,7 @@ def test_unknown_name_is_an_error_that_lists_the_known(ask):
 def test_counts_and_lamps(scenes, name):
     counted = {kind: count for kind, count in scenes[name].counts().items() if count}
     assert counted == COUNTS[name]
-    assert len(scenes[name].lights) == LAMPS[name]
+    assert len(scenes[name].lights) == LIGHTS[name]
     assert scenes[name].name == name
 
 
@@ -173,12 +173,12 @@ def test_normals_lie_on_the_side_of_the_winding(scenes, name):
 def test_lamps_of_the_classic_scenes_stay_out_of_the_picture(scenes):
     for name, scene in scenes.items():
         place = bundled.stage_of(name)
-        for lamp in scene.lights:
-            if lamp.kind != "directional" and lamp.radius > 0:
-                x, y, z = place.in_display(lamp.center)
+        for light in scene.lights:
+            if light.kind != "directional" and light.radius > 0:
+                x, y, z = place.in_display(light.center)
                 shrink = 1 - z / place.eye_distance  # how far the pyramid of view has narrowed there
                 assert z > 2 * stage.DEPTH_RANGE[1]
-                assert max(abs(x), abs(y)) - lamp.radius > shrink * stage.PICTURE_HEIGHT / 2
+                assert max(abs(x), abs(y)) - light.radius > shrink * stage.PICTURE_HEIGHT / 2
 
 
 class TestRoom:
@@ -224,7 +224,7 @@ class TestPrimitives:
     def test_every_kind_of_everything(self, scenes):
         scene = scenes["primitives"]
         assert min(scene.counts().values()) >= 1
-        assert {lamp.kind for lamp in scene.lights} == {"point", "spot", "directional"}
+        assert {light.kind for light in scene.lights} == {"point", "spot", "directional"}
         kinds = {material.texture.kind for material in scene.materials}
         assert kinds == {
             *("constant", "checker", "marble", "wood", "noise", "cylindrical-checker"),

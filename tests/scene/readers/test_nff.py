@@ -25,7 +25,7 @@ def read(tmp_path):
 
 
 def test_numbers_of_the_shared_scenes(shared_scenes):
-    """Spheres, cones, triangles and lamps as the table of the databases has them."""
+    """Spheres, cones, triangles and lights as the table of the databases has them."""
     found = {}
     for path in (shared_scenes / "spd").glob("*.nff"):
         scene = read_nff(path)

@@ -106,14 +106,14 @@ def test_cameras_and_lamps():
     scene = box().scene()
     assert load_scene(scene).cameras == ()
     assert not load_scene(scene).has_lights
-    scene.lights  # noqa: B018 - asking invents lamps
+    scene.lights  # noqa: B018 - asking invents lights
     invented = load_scene(scene)
     assert invented.has_lights
-    lamp = trimesh.scene.lighting.SpotLight(
-        name="lamp", color=[255, 0, 51, 255], intensity=10, innerConeAngle=0.1, outerConeAngle=0.3
+    light = trimesh.scene.lighting.SpotLight(
+        name="light", color=[255, 0, 51, 255], intensity=10, innerConeAngle=0.1, outerConeAngle=0.3
     )
-    scene.lights = [lamp]
-    scene.graph.update("lamp", "world", matrix=trimesh.transformations.translation_matrix((0, 5, 0)))
+    scene.lights = [light]
+    scene.graph.update("light", "world", matrix=trimesh.transformations.translation_matrix((0, 5, 0)))
     scene.set_camera(angles=(0, 0, 0), distance=10, center=(0, 0, 0), fov=(60, 40))
     found = load_scene(scene).description
     (light,), (camera,) = found.lights, found.cameras

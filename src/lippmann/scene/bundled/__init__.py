@@ -1,7 +1,7 @@
 """Scenes that come with the package, made by code: no file is read.
 
 They are the six of the paper, of the same kind and count as its originals. Each is a module with its sizes
-(``LAYOUT``), its view (``STAGE``) and its lamps (``LAMPS``) as data, and is made for the classic light models; the
+(``LAYOUT``), its view (``STAGE``) and its lights (``LIGHTS``) as data, and is made for the classic light models; the
 teapot also has a form of its own for physically based light. Nothing is built before it is asked for.
 """
 

@@ -54,7 +54,7 @@ STAGE = Stage(target=(0.0, 35.0, 3.4), elevation=38.0)
 OPAQUE = ClassicMaterial(ambient=0.1, diffuse=0.9, phong=0.25, phong_size=30.0)
 CLEAR = ClassicMaterial(ambient=0.05, diffuse=0.25, opacity=0.25, phong=0.25, phong_size=30.0)
 FLOOR = ClassicMaterial(color=(1.0, 0.88, 0.75), ambient=0.07, diffuse=0.35, specular=0.55)
-LAMPS = tuple(
+LIGHTS = tuple(
     ClassicLight("point", (0.28, 0.28, 0.28), center=center)
     for center in (
         (120.0, 260.0, 40.0),
@@ -137,8 +137,8 @@ def make() -> ClassicScene:
         # Neighbours in a layer mesh tooth to gap; the clear wheels form a chequered lattice in depth as well.
         shape = positions if (row + column) % 2 == 0 else half_a_tooth_on
         builder.mesh(shape + center, faces, builder.material(_paint(layer, row, column)))
-    for lamp in LAMPS:
-        builder.light(lamp)
+    for light in LIGHTS:
+        builder.light(light)
     return builder.build(background=SKY, camera=STAGE.classic_camera(ray_depth=RAY_DEPTH))
 
 

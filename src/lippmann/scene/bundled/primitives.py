@@ -1,4 +1,4 @@
-"""Primitives: one of every shape, texture and lamp that the classic light models know, on a shelf before a wall.
+"""Primitives: one of every shape, texture and light that the classic light models know, on a shelf before a wall.
 
 Spheres, tubes, a cone, an endless cylinder, rings, a cube, a plane, flat, smooth and coloured triangles, a bent rod, a
 coloured height field; every texture but the grit, whose grains differ from run to run, and the volume. One unit is
@@ -54,7 +54,7 @@ SHELF = ClassicMaterial(color=(0.75, 0.76, 0.78), ambient=0.15, diffuse=0.6, spe
 WALL = ClassicMaterial(color=(0.42, 0.50, 0.62), ambient=0.35, diffuse=0.45)
 MIRROR = ClassicMaterial(ambient=0.05, diffuse=0.1, specular=0.8, phong=0.6, phong_size=80.0)
 GLASS = ClassicMaterial(color=(0.35, 0.75, 0.65), ambient=0.1, diffuse=0.3, opacity=0.4, phong=0.7, phong_size=60.0)
-LAMPS = (
+LIGHTS = (
     ClassicLight("point", (0.55, 0.53, 0.50), center=(-5.0, 8.0, 6.0)),
     ClassicLight(
         "spot",
@@ -83,8 +83,8 @@ def make() -> ClassicScene:
     builder.tubes((x0, -0.081, z1), (x1, -0.081, z1), 0.08, shelf)
     _add_back_row(builder)
     _add_front_row(builder)
-    for lamp in LAMPS:
-        builder.light(lamp)
+    for light in LIGHTS:
+        builder.light(light)
     return builder.build(background=BACK_COLOR, camera=STAGE.classic_camera(ray_depth=RAY_DEPTH))
 
 

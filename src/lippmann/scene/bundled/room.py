@@ -1,4 +1,4 @@
-"""The room: framed pictures, parquet, a round table with four balls of which one is a mirror, two stools, one lamp.
+"""The room: framed pictures, parquet, a round table with four balls of which one is a mirror, two stools, one light.
 
 The side walls splay toward the viewer like those of a stage, because a display whose views are parallel would otherwise
 see them edge on. Ceiling and rear wall lie far outside the picture; the mirrors show them. Millimetres of the paper's
@@ -75,7 +75,7 @@ BALLS = tuple(
     for color in ((0.9, 0.05, 0.05), (0.05, 0.75, 0.08), (0.08, 0.12, 0.95))
 )
 MIRROR = ClassicMaterial(ambient=0.05, diffuse=0.1, specular=0.75, phong=0.3, phong_size=40.0)
-LAMPS = (ClassicLight("point", (0.95, 0.93, 0.9), center=(-60.0, 190.0, 150.0), radius=4.0),)
+LIGHTS = (ClassicLight("point", (0.95, 0.93, 0.9), center=(-60.0, 190.0, 150.0), radius=4.0),)
 RAY_DEPTH = 5
 
 # Tachyon chooses an image's MIP level by path length times SCALE. Small scales, made up for by long axes, keep the
@@ -93,8 +93,8 @@ def make() -> ClassicScene:
     _add_pictures(builder)
     _add_table(builder)
     _add_stools(builder)
-    for lamp in LAMPS:
-        builder.light(lamp)
+    for light in LIGHTS:
+        builder.light(light)
     return builder.build(camera=STAGE.classic_camera(ray_depth=RAY_DEPTH))
 
 

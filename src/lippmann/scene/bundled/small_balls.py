@@ -46,7 +46,7 @@ STAGE = Stage(target=(0.0, 52.8, 9.0), elevation=70.0)
 
 MIRROR = ClassicMaterial(color=(1.0, 0.9, 0.7), ambient=0.05, diffuse=0.45, specular=0.5, phong=0.5, phong_size=45.0)
 GROUND = ClassicMaterial(color=(1.0, 0.75, 0.33), ambient=0.2, diffuse=0.75)
-LAMPS = tuple(
+LIGHTS = tuple(
     ClassicLight("point", (0.42, 0.42, 0.42), center=center)
     for center in ((150.0, 190.0, 110.0), (-140.0, 260.0, 60.0), (20.0, 220.0, -150.0))
 )
@@ -91,6 +91,6 @@ def make() -> ClassicScene:
     centers, radii = flake()
     builder.planes((0.0, 0.0, 0.0), (0.0, 1.0, 0.0), builder.material(GROUND))
     builder.spheres(centers, radii, builder.material(MIRROR))
-    for lamp in LAMPS:
-        builder.light(lamp)
+    for light in LIGHTS:
+        builder.light(light)
     return builder.build(background=SKY, camera=STAGE.classic_camera(ray_depth=RAY_DEPTH))

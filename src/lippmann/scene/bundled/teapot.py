@@ -1,7 +1,7 @@
 """The teapot: Newell's patches on a half-mirroring checkerboard, the scene that everyone has seen before.
 
 Two lights fall on the same geometry: :func:`describe` gives glazed porcelain in a studio for physically based light,
-:func:`make` the classic metal pot under two lamps. Millimetres of the paper's display, +y up, the floor at y = 0.
+:func:`make` the classic metal pot under two lights. Millimetres of the paper's display, +y up, the floor at y = 0.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ GLAZE = ClassicMaterial(
 )
 LIGHT_TILE = ClassicMaterial(color=(0.92, 0.92, 0.90), ambient=0.08, diffuse=0.45, specular=0.5)
 DARK_TILE = ClassicMaterial(color=(0.10, 0.14, 0.25), ambient=0.08, diffuse=0.45, specular=0.5)
-LAMPS = (
+LIGHTS = (
     ClassicLight("point", (0.84, 0.81, 0.76), center=(-150.0, 210.0, 190.0)),
     ClassicLight("point", (0.50, 0.53, 0.58), center=(190.0, 160.0, 90.0)),
 )
@@ -84,16 +84,16 @@ def tiles(*, light: bool) -> tuple[NDArray[np.float64], NDArray[np.uint32]]:
 
 
 def make() -> ClassicScene:
-    """Return the classic teapot: polished copper on half-mirroring tiles under two lamps."""
+    """Return the classic teapot: polished copper on half-mirroring tiles under two lights."""
     builder = ClassicSceneBuilder(NAME, handedness="right")
-    for light, material in ((True, LIGHT_TILE), (False, DARK_TILE)):
-        corners, faces = tiles(light=light)
+    for is_light, material in ((True, LIGHT_TILE), (False, DARK_TILE)):
+        corners, faces = tiles(light=is_light)
         builder.mesh(corners, faces, builder.material(material))
     pot, matrix = tessellate(LAYOUT.subdivisions), pot_from_newell()[:3, :3]
     normals = pot.normals @ matrix.T / LAYOUT.unit
     builder.mesh(pot.positions @ matrix.T, pot.faces, builder.material(GLAZE), normals=normals)
-    for lamp in LAMPS:
-        builder.light(lamp)
+    for light in LIGHTS:
+        builder.light(light)
     return builder.build(background=SKY, camera=STAGE.classic_camera(ray_depth=RAY_DEPTH))
 
 

@@ -1,4 +1,4 @@
-"""The tree: 4095 tapering branches and as many joints, under seven lamps.
+"""The tree: 4095 tapering branches and as many joints, under seven lights.
 
 Every branch bears two, twelve generations of them: of the kind and count of the tree scene of Haines' Standard
 Procedural Databases (IEEE Computer Graphics and Applications 7(11), 1987). Branches fork by fixed angles about an axis
@@ -51,7 +51,7 @@ STAGE = Stage(target=(0.0, 44.0, 28.2), elevation=15.0)
 
 BARK = ClassicMaterial(color=(0.55, 0.40, 0.20), ambient=0.19, diffuse=1.0)
 LAWN = ClassicMaterial(color=(0.20, 0.70, 0.20), ambient=0.19, diffuse=1.0)
-LAMPS = tuple(
+LIGHTS = tuple(
     ClassicLight("point", (0.19, 0.19, 0.19), center=center)
     for center in (
         (-150.0, 900.0, -100.0),
@@ -114,6 +114,6 @@ def make() -> ClassicScene:
     tree = grow()
     builder.tubes(tree.base, tree.apex, tree.base_radius, bark, apex_radius=tree.apex_radius)
     builder.spheres(tree.apex, tree.apex_radius, bark)
-    for lamp in LAMPS:
-        builder.light(lamp)
+    for light in LIGHTS:
+        builder.light(light)
     return builder.build(background=SKY, camera=STAGE.classic_camera(ray_depth=RAY_DEPTH))

@@ -1,6 +1,6 @@
-"""What a scene is, as plain values: no reader and no renderer in sight.
+"""Scenes as plain values, independent of readers and renderers.
 
-Readers (``gltf.py``, ``obj.py``, ...) produce a :class:`SceneDescription`; ``build.py`` turns it into a Mitsuba scene.
+Readers of files produce a :class:`SceneDescription`; :mod:`lippmann.device.pbr` turns it into a Mitsuba scene.
 World units are the file's own; the frame is right-handed with +y up unless a reader's format says otherwise. Colours
 are linear RGB, non-negative. Matrices are 4x4 float64, acting on column vectors.
 """
@@ -28,10 +28,10 @@ AlphaMode = Literal["opaque", "mask", "blend"]
 
 @dataclass(frozen=True, eq=False)
 class Image:
-    """Decoded texels, shared by the textures that look at them.
+    """Decoded texels, shared by textures.
 
     ``pixels`` is ``(height, width, channels)`` uint8 or float32, row 0 on top, channels 1 (L), 3 (RGB) or 4 (RGBA) as
-    stored. Whether the values are sRGB-coded is the business of the texture that uses them.
+    stored. The texture that uses the image says whether its values are sRGB-coded.
     """
 
     name: str
@@ -130,11 +130,11 @@ class Instance:
 
 @dataclass(frozen=True, eq=False)
 class Light:
-    """A lamp without a body.
+    """A point, spot or directional light source (as in KHR_lights_punctual).
 
     ``point``: ``color`` is radiant intensity (W/sr, falling with the square of the distance); ``spot``: the same inside
-    a cone about the lamp's -z, smooth between the inner and outer half-angle (radians); ``directional``: irradiance
-    (W/m^2) travelling along the lamp's -z. ``radius`` > 0 gives point and spot lamps a glowing sphere of that size.
+    a cone about the light's -z, smooth between the inner and outer half-angle (radians); ``directional``: irradiance
+    (W/m^2) travelling along the light's -z. ``radius`` > 0 makes point and spot lights emissive spheres of that size.
     """
 
     kind: Literal["point", "spot", "directional"]
@@ -177,10 +177,10 @@ class Environment:
 
 @dataclass(frozen=True, eq=False)
 class SceneDescription:
-    """All that a scene file said.
+    """The content of a scene file.
 
     ``background`` is the colour seen where nothing is hit (None: the environment itself, black without one).
-    ``notes`` are the one-line remarks of the reader: what it could not honour and what it assumed.
+    ``notes`` are one-line remarks of the reader: features that it ignored, and its assumptions.
     """
 
     name: str

@@ -55,8 +55,8 @@ class ClassicCamera:
             check(left != right and bottom != top, f"frustum {self.frustum}", "left is not right, bottom not top")
         view, up = np.array(self.view), np.array(self.up)
         across = float(np.linalg.norm(np.cross(up, view)))
-        fair = across > 1e-9 * float(np.linalg.norm(up) * np.linalg.norm(view)) > 0
-        check(fair, f"camera looks along {self.view}, up is {self.up}", "directions with a length, not parallel")
+        valid = across > 1e-9 * float(np.linalg.norm(up) * np.linalg.norm(view)) > 0
+        check(valid, f"camera looks along {self.view}, up is {self.up}", "directions with a length, not parallel")
 
     def frame(self) -> tuple[Numbers, Numbers, Numbers]:
         """Unit vectors right, up, view as seen in the picture: right = up x view, in a right-handed world view x up."""

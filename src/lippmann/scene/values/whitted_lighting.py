@@ -11,7 +11,7 @@ from lippmann.scene.values.whitted_numbers import Color, Vector, check, check_fi
 
 @dataclass(frozen=True)
 class ClassicLight:
-    """A lamp. ``center`` and ``radius`` (point, spot): an emissive sphere of that size is seen, radius 0 is unseen.
+    """A light source. ``center`` and ``radius`` (point, spot): an emissive sphere, invisible of radius 0.
 
     Shadows are hard, from the center, whatever the radius. ``direction`` (spot, directional) is the unit direction in
     which the light travels. A spot is full inside ``falloff_start`` degrees off its axis and falls linearly with the
@@ -36,8 +36,8 @@ class ClassicLight:
         check(math.isfinite(self.radius) and self.radius >= 0, f"a light's radius is {self.radius}", "0 or more")
         check(abs(math.hypot(*self.direction) - 1.0) < 1e-6, f"direction {self.direction}", "a unit vector")
         if self.attenuation is not None:
-            fair = all(math.isfinite(k) and k >= 0 for k in self.attenuation) and any(self.attenuation)
-            check(fair, f"attenuation {self.attenuation}", "factors are 0 or more and not all 0")
+            valid = all(math.isfinite(k) and k >= 0 for k in self.attenuation) and any(self.attenuation)
+            check(valid, f"attenuation {self.attenuation}", "factors are 0 or more and not all 0")
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class AmbientOcclusion:
 
 @dataclass(frozen=True)
 class Background:
-    """What a ray sees where it hits nothing.
+    """Colour of rays that hit nothing.
 
     ``solid``: ``color``. The gradients blend ``bottom_color`` to ``top_color`` by t = clamp((x . up - bottom_value) /
     (top_value - bottom_value)) with x the ray's direction ('sky-sphere') or its origin ('sky-plane'); ``up`` is used
@@ -97,7 +97,7 @@ class Fog:
 
 @dataclass(frozen=True)
 class Shading:
-    """How the whole scene is shaded.
+    """Shading options of the whole scene.
 
     ``mode`` 'full'; 'medium' without shadows and sky light; 'low' texture colour alone; 'lowest' white where anything
     is hit. ``shadow_filter``: surfaces that are not opaque dim the light behind them once per crossing (else it passes
@@ -117,5 +117,5 @@ class Shading:
 
     def __post_init__(self) -> None:
         check_finite("light_scale", self.light_scale)
-        fair = self.max_transparent_surfaces is None or self.max_transparent_surfaces >= 0
-        check(fair, f"max_transparent_surfaces is {self.max_transparent_surfaces}", "0 or more")
+        valid = self.max_transparent_surfaces is None or self.max_transparent_surfaces >= 0
+        check(valid, f"max_transparent_surfaces is {self.max_transparent_surfaces}", "0 or more")

@@ -10,9 +10,9 @@ Vector = tuple[float, float, float]
 Color = tuple[float, float, float]
 
 
-def check(good: bool, what: str, rule: str) -> None:
-    """Raise :class:`SceneError` unless ``good``."""
-    if not good:
+def check(valid: bool, what: str, rule: str) -> None:
+    """Raise :class:`SceneError` unless ``valid``."""
+    if not valid:
         raise SceneError(what, rule=rule)
 
 

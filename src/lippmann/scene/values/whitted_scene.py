@@ -1,7 +1,7 @@
-"""Scenes for the classic light models (Tachyon's and NFF's), as plain values: no reader and no renderer in sight.
+"""Scenes for the classic light models (Tachyon's and NFF's), as plain values, independent of readers and renderers.
 
 The readers ``tachyon`` and ``nff`` and the bundled scenes produce a :class:`ClassicScene`; the ``classic``
-integrator renders it. Primitives come in batches (``primitives.py``), materials and lights as small values.
+integrator renders it. Primitives come in batches (``whitted_shapes``), materials and lights as small values.
 :class:`lippmann.scene.whitted.builder.ClassicSceneBuilder` puts a scene together.
 
 World units are the file's own. Colours are linear RGB as written, with no range imposed. Tachyon's frame is
@@ -38,11 +38,11 @@ Rules = Literal["tachyon", "nff"]
 
 @dataclass(frozen=True, eq=False)
 class ClassicScene:
-    """All that a Tachyon or NFF file said.
+    """The content of a Tachyon or NFF file.
 
     ``rules`` names the light model. ``clip_groups`` are arrays ``(k, 4)``: of a primitive in group i, points with
     a x + b y + c z <= d are kept for all its planes (a, b, c, d). ``resolution`` (width, height) is the picture size
-    that the file asks for. ``notes`` are the reader's one-line remarks: what it could not honour and what it assumed.
+    that the file asks for. ``notes`` are one-line remarks of the reader: features that it ignored, and its assumptions.
     """
 
     name: str
@@ -69,8 +69,8 @@ class ClassicScene:
 
     def __post_init__(self) -> None:
         for planes in self.clip_groups:
-            fair = planes.ndim == 2 and planes.shape[1] == 4 and bool(np.isfinite(planes).all())
-            check(fair, f"a clip group of shape {planes.shape}", "rows of four finite numbers")
+            valid = planes.ndim == 2 and planes.shape[1] == 4 and bool(np.isfinite(planes).all())
+            check(valid, f"a clip group of shape {planes.shape}", "rows of four finite numbers")
             planes.setflags(write=False)
         groups, materials = len(self.clip_groups), len(self.materials)
         for batch in self.batches():
@@ -92,7 +92,7 @@ class ClassicScene:
         return {batch.kind: len(batch) for batch in self.batches()}
 
     def bounds(self) -> Numbers | None:
-        """The box ``(2, 3)`` around all finite primitives, before clipping, without lamps; None for none."""
+        """The box ``(2, 3)`` around all finite primitives, before clipping, without light sources; None for none."""
         boxes = [box for box in (batch.bounds() for batch in self.batches()) if box is not None]
         if not boxes:
             return None

@@ -9,6 +9,7 @@ read-only. Lengths are world units; directions and normals are unit vectors unle
 from __future__ import annotations
 
 from dataclasses import dataclass, field, fields
+from itertools import product
 from typing import ClassVar
 
 import numpy as np
@@ -35,7 +36,7 @@ def _no_flags() -> Flags:
 
 @dataclass(frozen=True, eq=False)
 class Batch:
-    """What all kinds share. ``len(batch)`` is the number of primitives.
+    """Fields common to all kinds. ``len(batch)`` is the number of primitives.
 
     Raises
     ------
@@ -74,9 +75,9 @@ class Batch:
         """Lowest and highest corners ``(n, 3)`` of the boxes around the primitives, of kinds that have an end."""
         raise NotImplementedError  # every finite kind answers; kinds without end override bounds()
 
-    def _require(self, good: Flags | np.bool_, rule: str) -> None:
-        if not np.all(good):
-            first = int(np.argmin(np.atleast_1d(good)))
+    def _require(self, valid: Flags | np.bool_, rule: str) -> None:
+        if not np.all(valid):
+            first = int(np.argmin(np.atleast_1d(valid)))
             raise SceneError(f"{self.kind} {first} is impossible", rule=rule)
 
 
@@ -125,8 +126,8 @@ class Tubes(Batch):
     def __post_init__(self) -> None:
         super().__post_init__()
         self._require((self.base != self.apex).any(axis=1), "base and apex are different points")
-        fair = (self.base_radius >= 0) & (self.apex_radius >= 0) & (self.base_radius + self.apex_radius > 0)
-        self._require(fair, "radii are not negative, and not both zero")
+        valid = (self.base_radius >= 0) & (self.apex_radius >= 0) & (self.base_radius + self.apex_radius > 0)
+        self._require(valid, "radii are not negative, and not both zero")
 
     def extents(self) -> tuple[Numbers, Numbers]:
         axis = self.apex - self.base
@@ -194,6 +195,11 @@ class Boxes(Batch):
 
     def extents(self) -> tuple[Numbers, Numbers]:
         return self.minimum, self.maximum
+
+    def corners(self) -> Numbers:
+        """Corners ``(n, 8, 3)``; bits 2, 1 and 0 of a corner's number choose the maximum of x, y and z."""
+        ends = np.stack([self.minimum, self.maximum], axis=1)
+        return np.stack([ends[:, [x, y, z], [0, 1, 2]] for x, y, z in product((0, 1), repeat=3)], axis=1)
 
 
 @dataclass(frozen=True, eq=False)

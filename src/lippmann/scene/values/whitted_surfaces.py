@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,19 +24,7 @@ TextureKind = Literal[
     "planar-image",
     "volume-image",
 ]
-TEXTURE_KINDS: tuple[TextureKind, ...] = (
-    "constant",
-    "checker",
-    "grit",
-    "marble",
-    "wood",
-    "noise",
-    "cylindrical-checker",
-    "cylindrical-image",
-    "spherical-image",
-    "planar-image",
-    "volume-image",
-)
+TEXTURE_KINDS: tuple[TextureKind, ...] = get_args(TextureKind)
 """Texture kinds in the order of Tachyon's TEXFUNC numbers 0 to 10."""
 
 
@@ -52,8 +40,8 @@ class ClassicImage:
     texels: NDArray[np.uint8]
 
     def __post_init__(self) -> None:
-        fair = self.texels.ndim == 4 and self.texels.shape[3] == 3 and self.texels.dtype == np.uint8
-        check(fair and self.texels.size > 0, f"image '{self.name}' is no RGB picture or volume", "")
+        valid = self.texels.ndim == 4 and self.texels.shape[3] == 3 and self.texels.dtype == np.uint8
+        check(valid and self.texels.size > 0, f"image '{self.name}' is no RGB picture or volume", "")
         self.texels.setflags(write=False)
 
 

@@ -1,6 +1,6 @@
-"""Triangles in place of the exact shapes of classic scenes, in the file's own coordinates.
+"""Tessellation of the exact shapes of classic scenes, in the file's own coordinates.
 
-How fine they are follows from how many there are: one ball among few is smoother than one among thousands.
+The more shapes of a kind a scene has, the coarser each one is, so that the number of triangles stays within a budget.
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ from lippmann.scene.values.whitted_scene import ClassicScene
 from lippmann.scene.values.whitted_shapes import Batch, Numbers, Spheres, Tubes
 from lippmann.scene.values.whitted_surfaces import ClassicTexture
 
-Whole = NDArray[np.int64]
+Indices = NDArray[np.int64]
 #: Positions, faces and normals.
-Made = tuple[Numbers, Whole, "Numbers | None"]
+Arrays = tuple[Numbers, Indices, "Numbers | None"]
 
 #: Triangles that all spheres together, and all tubes together, may have.
 _BUDGET = 1_500_000
@@ -39,7 +39,7 @@ class Patch:
     kind: str
     material: int
     positions: Numbers
-    faces: Whole
+    faces: Indices
     normals: Numbers | None = None
     uvs: Numbers | None = None
     colors: Numbers | None = None
@@ -49,7 +49,7 @@ def patches(scene: ClassicScene, bounds: Numbers) -> Iterator[Patch]:
     """All shapes of a scene; ``bounds (2, 3)`` tell how far endless ones reach."""
     reach = _REACH * max(float(np.linalg.norm(bounds[1] - bounds[0])), 1e-3)
     middle = bounds.mean(axis=0)
-    makers: tuple[tuple[Batch, Callable[[Whole], Made]], ...] = (
+    makers: tuple[tuple[Batch, Callable[[Indices], Arrays]], ...] = (
         (scene.spheres, lambda rows: _spheres(scene, rows)),
         (scene.tubes, lambda rows: _tubes(scene.tubes, rows, _sides(len(scene.tubes)))),
         (scene.cylinders, lambda rows: _cylinders(scene, rows, middle, reach)),
@@ -62,7 +62,7 @@ def patches(scene: ClassicScene, bounds: Numbers) -> Iterator[Patch]:
         for material, group, colored in _groups(batch):
             rows = _rows(batch, material, group, colored)
             positions, faces, normals = make(rows)
-            faces = _kept(positions, faces, scene.clip_groups[group] if group >= 0 else None)
+            faces = _clip(positions, faces, scene.clip_groups[group] if group >= 0 else None)
             if not len(faces):
                 continue
             texture = scene.materials[material].texture
@@ -78,20 +78,20 @@ def _groups(batch: Batch) -> list[tuple[int, int, bool]]:
     return list(dict.fromkeys(keys))
 
 
-def _rows(batch: Batch, material: int, group: int, colored: bool) -> Whole:
-    chosen = (batch.material == material) & (batch.clip_group == group)
+def _rows(batch: Batch, material: int, group: int, colored: bool) -> Indices:
+    mask = (batch.material == material) & (batch.clip_group == group)
     if hasattr(batch, "colored"):
-        chosen &= batch.colored == colored
-    return np.flatnonzero(chosen)
+        mask &= batch.colored == colored
+    return np.flatnonzero(mask)
 
 
-def _kept(positions: Numbers, faces: Whole, planes: Numbers | None) -> Whole:
-    """Faces whose middle the clip planes keep."""
+def _clip(positions: Numbers, faces: Indices, planes: Numbers | None) -> Indices:
+    """Faces whose centroid the clip planes keep."""
     if planes is None:
         return faces
     centers = positions[faces].mean(axis=1)
-    kept: Whole = faces[(centers @ planes[:, :3].T <= planes[:, 3]).all(axis=1)]
-    return kept
+    inside: Indices = faces[(centers @ planes[:, :3].T <= planes[:, 3]).all(axis=1)]
+    return inside
 
 
 def _uvs(texture: ClassicTexture, positions: Numbers) -> Numbers | None:
@@ -104,23 +104,23 @@ def _uvs(texture: ClassicTexture, positions: Numbers) -> Numbers | None:
     return np.stack([u, v], axis=-1)
 
 
-def _repeated(positions: Numbers, faces: Whole) -> tuple[Numbers, Whole]:
-    """Shapes ``(n, k, 3)`` of like topology as one."""
+def _merge_copies(positions: Numbers, faces: Indices) -> tuple[Numbers, Indices]:
+    """One mesh of ``n`` copies ``(n, k, 3)`` of a shape with the same faces."""
     count, corners = positions.shape[:2]
     all_faces = faces[None] + (np.arange(count) * corners)[:, None, None]
     return positions.reshape(-1, 3), all_faces.reshape(-1, 3)
 
 
-def _spheres(scene: ClassicScene, rows: Whole) -> Made:
+def _spheres(scene: ClassicScene, rows: Indices) -> Arrays:
     batch: Spheres = scene.spheres
     level = next((n for n in range(_FINEST_SPHERE, 0, -1) if len(batch) * 20 * 4**n <= _BUDGET), 1)
     points, faces = icosphere(level)
     placed = batch.centers[rows, None] + points * batch.radii[rows, None, None]
-    positions, all_faces = _repeated(placed, faces)
+    positions, all_faces = _merge_copies(placed, faces)
     return positions, all_faces, np.tile(points, (len(rows), 1))
 
 
-def icosphere(level: int) -> tuple[Numbers, Whole]:
+def icosphere(level: int) -> tuple[Numbers, Indices]:
     """Points on the unit sphere and faces: an icosahedron, each face cut into four ``level`` times."""
     golden = (1.0 + 5.0**0.5) / 2.0
     corners = [p for a, b in product((-1.0, 1.0), (-golden, golden)) for p in ((0.0, a, b), (a, b, 0.0), (b, 0.0, a))]
@@ -171,14 +171,14 @@ def _circle(axes: Numbers, sides: int) -> Numbers:
     return u[:, None] * np.cos(angle)[:, None] + v[:, None] * np.sin(angle)[:, None]
 
 
-def _band(sides: int) -> Whole:
+def _band(sides: int) -> Indices:
     """Faces between two circles of points, the first ones first."""
     i = np.arange(sides)
     j = (i + 1) % sides
     return np.concatenate([np.stack([i, j, j + sides], axis=1), np.stack([i, j + sides, i + sides], axis=1)])
 
 
-def _tubes(batch: Tubes, rows: Whole, sides: int) -> Made:
+def _tubes(batch: Tubes, rows: Indices, sides: int) -> Arrays:
     base, apex = batch.base[rows], batch.apex[rows]
     low, high = batch.base_radius[rows], batch.apex_radius[rows]
     axes = apex - base
@@ -186,14 +186,14 @@ def _tubes(batch: Tubes, rows: Whole, sides: int) -> Made:
     axes = axes / length[:, None]
     around = _circle(axes, sides)
     rings = [base[:, None] + around * low[:, None, None], apex[:, None] + around * high[:, None, None]]
-    positions, faces = _repeated(np.concatenate(rings, axis=1), _band(sides))
+    positions, faces = _merge_copies(np.concatenate(rings, axis=1), _band(sides))
     slope = ((high - low) / length)[:, None, None]
     normal = around - axes[:, None] * slope
     normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
     return positions, faces, np.concatenate([normal, normal], axis=1).reshape(-1, 3)
 
 
-def _cylinders(scene: ClassicScene, rows: Whole, middle: Numbers, reach: float) -> Made:
+def _cylinders(scene: ClassicScene, rows: Indices, middle: Numbers, reach: float) -> Arrays:
     batch = scene.cylinders
     along = ((middle - batch.centers[rows]) * batch.axes[rows]).sum(axis=1, keepdims=True)
     near = batch.centers[rows] + batch.axes[rows] * along
@@ -209,39 +209,37 @@ def _cylinders(scene: ClassicScene, rows: Whole, middle: Numbers, reach: float) 
     return _tubes(tubes, np.arange(len(rows)), _SIDES[1])
 
 
-def _rings(scene: ClassicScene, rows: Whole) -> Made:
+def _rings(scene: ClassicScene, rows: Indices) -> Arrays:
     batch = scene.rings
     sides = _sides(len(batch))
     around = _circle(batch.normals[rows], sides)
     center = batch.centers[rows, None]
     circles = [center + around * radius[rows, None, None] for radius in (batch.outer, batch.inner)]
-    positions, faces = _repeated(np.concatenate(circles, axis=1), _band(sides))
+    positions, faces = _merge_copies(np.concatenate(circles, axis=1), _band(sides))
     return positions, faces, None
 
 
-def _planes(scene: ClassicScene, rows: Whole, middle: Numbers, reach: float) -> Made:
+def _planes(scene: ClassicScene, rows: Indices, middle: Numbers, reach: float) -> Arrays:
     batch = scene.planes
     u, v = _frame(batch.normals[rows])
     height = ((middle - batch.centers[rows]) * batch.normals[rows]).sum(axis=1, keepdims=True)
     foot = middle - batch.normals[rows] * height
     corners = [foot + (a * u + b * v) * reach for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
-    positions, faces = _repeated(np.stack(corners, axis=1), np.array([(0, 1, 2), (0, 2, 3)]))
+    positions, faces = _merge_copies(np.stack(corners, axis=1), np.array([(0, 1, 2), (0, 2, 3)]))
     return positions, faces, None
 
 
-def _boxes(scene: ClassicScene, rows: Whole) -> Made:
-    batch = scene.boxes
-    corners = np.stack([batch.minimum[rows], batch.maximum[rows]], axis=1)
-    points = np.stack([corners[:, [x, y, z], [0, 1, 2]] for x, y, z in product((0, 1), repeat=3)], axis=1)
+def _boxes(scene: ClassicScene, rows: Indices) -> Arrays:
+    points = scene.boxes.corners()[rows]
     sides = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
     # Corners are not shared, so that a face keeps its own pictures.
     placed = points[:, [corner for side in sides for corner in side]]
     faces = np.concatenate([np.array([(0, 1, 2), (0, 2, 3)]) + 4 * n for n in range(6)])
-    positions, all_faces = _repeated(placed, faces)
+    positions, all_faces = _merge_copies(placed, faces)
     return positions, all_faces, None
 
 
-def _triangles(scene: ClassicScene, rows: Whole) -> Made:
+def _triangles(scene: ClassicScene, rows: Indices) -> Arrays:
     batch = scene.triangles
     positions = batch.positions[rows].reshape(-1, 3)
     faces = np.arange(len(positions)).reshape(-1, 3)

@@ -2,7 +2,8 @@
 
 ``docs/reference/whitted.md`` holds the mapping in words. Colours and pictures of classic scenes are display codes; they
 are taken for sRGB, so that the physical picture, coded by that curve, looks alike; light adds up as numbers, so its
-colours stay. Lamps get a size and fall with the square of the distance, as bright as before in the middle of the scene.
+colours stay. Light sources get a radius and inverse-square falloff; in the middle of the scene they are as bright as
+before.
 Round shapes become fine meshes, endless ones large ones.
 """
 
@@ -36,8 +37,8 @@ from lippmann.scene.whitted.world_frame import world_bounds, world_from_scene
 
 Numbers = NDArray[np.float64]
 
-#: Radius of lamps that have none, as a share of their distance from the middle of the scene.
-_LAMP_SIZE = 0.02
+#: Radius of light sources that have none, as a fraction of their distance from the middle of the scene.
+_LIGHT_RADIUS = 0.02
 #: Highlights of this exponent and above count as a polish without blur.
 _SHARP = 10000.0
 _LEAST_ROUGHNESS = 0.03
@@ -51,23 +52,23 @@ def to_physical(scene: ClassicScene, cameras: Sequence[Camera] = ()) -> SceneDes
     middle = (world_bounds(scene, world_from_scene(scene)) if has_end else bounds).mean(axis=0)
     meshes: list[Mesh] = []
     materials: list[Material] = []
-    places: dict[tuple[int, str], int] = {}
-    images = [_Pictures(image.name, image.texels) for image in scene.images]
+    indices: dict[tuple[int, str], int] = {}
+    images = [_ImageSource(image.name, image.texels) for image in scene.images]
     notes = list(scene.notes)
     for patch in patches(scene, bounds):
         source = scene.materials[patch.material]
         key = patch.material, patch.kind
-        if key not in places:
-            places[key] = len(materials)
+        if key not in indices:
+            indices[key] = len(materials)
             materials.append(_material(source, patch, images, scene.rules == "nff"))
-        meshes.append(_mesh(patch, places[key], world_from_scene(scene)))
+        meshes.append(_mesh(patch, indices[key], world_from_scene(scene)))
     notes += _remarks(scene)
     return SceneDescription(
         name=scene.name,
         meshes=meshes,
         materials=materials,
         instances=[Instance(number, np.eye(4)) for number in range(len(meshes))],
-        lights=[_lamp(lamp, scene, middle) for lamp in scene.lights if max(lamp.color) > 0],
+        lights=[_convert_light(light, scene, middle) for light in scene.lights if max(light.color) > 0],
         cameras=tuple(cameras),
         environment=_surroundings(scene),
         background=_linear(scene.background.color) if scene.background.kind == "solid" else None,
@@ -76,8 +77,8 @@ def to_physical(scene: ClassicScene, cameras: Sequence[Camera] = ()) -> SceneDes
 
 
 @dataclass(frozen=True, eq=False)
-class _Pictures:
-    """A classic image, and the description's of it."""
+class _ImageSource:
+    """A classic image as an :class:`Image`, and its mean colour."""
 
     name: str
     texels: NDArray[np.uint8]
@@ -93,7 +94,7 @@ class _Pictures:
 
 
 def _extent(scene: ClassicScene) -> Numbers:
-    """Box around the scene, its camera and its lamps, in the file's own coordinates."""
+    """Box around the scene, its camera and its light sources, in the file's own coordinates."""
     points = [np.array(scene.camera.center), *(np.array(light.center) for light in scene.lights)]
     if any(batch.bounds() is not None for batch in scene.batches()):
         points += list(world_bounds(scene, world_from_scene(scene)))
@@ -111,7 +112,7 @@ def _scaled(color: Color, factor: float) -> Color:
     return r, g, b
 
 
-def _material(source: ClassicMaterial, patch: Patch, images: Sequence[_Pictures], refracts: bool) -> Material:
+def _material(source: ClassicMaterial, patch: Patch, images: Sequence[_ImageSource], refracts: bool) -> Material:
     texture, code = None, source.color
     if source.texture.image is not None:
         picture = images[source.texture.image]
@@ -126,7 +127,7 @@ def _material(source: ClassicMaterial, patch: Patch, images: Sequence[_Pictures]
     diffuse, mirror = max(source.diffuse, 0.0), min(max(source.specular, 0.0), 1.0)
     glows = source.ambient > source.diffuse
     whole = diffuse + mirror
-    made = Material(
+    opaque = Material(
         base_color=_scaled(color, whole),
         base_color_texture=texture if whole > 0 else None,
         metallic=mirror / whole if whole > 0 else 0.0,
@@ -137,10 +138,10 @@ def _material(source: ClassicMaterial, patch: Patch, images: Sequence[_Pictures]
         double_sided=True,
     )
     if source.opacity >= 1.0:
-        return made
+        return opaque
     if refracts and source.ior > 1.0:
         return replace(
-            made,
+            opaque,
             ior=source.ior,
             transmission=1.0 - source.opacity,
             thickness=1.0,
@@ -148,10 +149,10 @@ def _material(source: ClassicMaterial, patch: Patch, images: Sequence[_Pictures]
             metallic=0.0,
             specular=1.0,
         )
-    return replace(made, alpha=max(source.opacity, 0.0), alpha_mode="blend")
+    return replace(opaque, alpha=max(source.opacity, 0.0), alpha_mode="blend")
 
 
-#: What procedural textures look like from far away, as display codes.
+#: Mean colours of procedural textures, as display codes.
 _MEAN_COLORS: dict[str, Color] = {
     "checker": (0.5, 0.2, 0.5),
     "cylindrical-checker": (0.5, 0.2, 0.5),
@@ -161,7 +162,7 @@ _MEAN_COLORS: dict[str, Color] = {
 
 
 def _roughness(source: ClassicMaterial) -> float:
-    """Of a highlight's exponent n: alpha = sqrt(2 / (n + 2)) (Walter et al. 2007), and glTF's roughness its root."""
+    """glTF roughness, sqrt(alpha), of a highlight of exponent n: alpha = sqrt(2 / (n + 2)) (Walter et al. 2007)."""
     if source.phong <= 0 or source.phong_size >= _SHARP:
         return 1.0 if source.phong <= 0 else _LEAST_ROUGHNESS
     return float(max((2.0 / (source.phong_size + 2.0)) ** 0.25, _LEAST_ROUGHNESS))
@@ -185,23 +186,23 @@ def _mesh(patch: Patch, material: int, matrix: Numbers) -> Mesh:
     )
 
 
-def _lamp(lamp: ClassicLight, scene: ClassicScene, middle: Numbers) -> Light:
-    """Its intensity gives a surface at the middle of the scene the same light as the classic model."""
+def _convert_light(light: ClassicLight, scene: ClassicScene, middle: Numbers) -> Light:
+    """The physical light that illuminates a surface in the middle of the scene as the classic model does."""
     scale = scene.shading.light_scale
     matrix = np.eye(4)
-    matrix[:3, :3] = _looking_along(world_from_scene(scene)[:3, :3] @ np.array(lamp.direction))
-    matrix[:3, 3] = world_from_scene(scene)[:3, :3] @ np.array(lamp.center)
-    color = lamp.color
-    if lamp.kind == "directional":
+    matrix[:3, :3] = _looking_along(world_from_scene(scene)[:3, :3] @ np.array(light.direction))
+    matrix[:3, 3] = world_from_scene(scene)[:3, :3] @ np.array(light.center)
+    color = light.color
+    if light.kind == "directional":
         return Light("directional", _times(color, pi * scale), matrix)
-    distance = max(float(np.linalg.norm(np.array(lamp.center) - middle)), 1e-6)
-    c, q1, q2 = lamp.attenuation or (1.0, 0.0, 0.0)
+    distance = max(float(np.linalg.norm(np.array(light.center) - middle)), 1e-6)
+    c, q1, q2 = light.attenuation or (1.0, 0.0, 0.0)
     intensity = pi * scale * distance**2 / (c + (q1 + q2 * distance) * distance)
-    radius = max(lamp.radius, _LAMP_SIZE * distance)
-    if lamp.kind == "point":
+    radius = max(light.radius, _LIGHT_RADIUS * distance)
+    if light.kind == "point":
         return Light("point", _times(color, intensity), matrix, radius=radius)
-    outer = min(radians(lamp.falloff_end), pi / 2)
-    inner = min(radians(lamp.falloff_start), 0.999 * outer)
+    outer = min(radians(light.falloff_end), pi / 2)
+    inner = min(radians(light.falloff_start), 0.999 * outer)
     return Light("spot", _times(color, intensity), matrix, inner_angle=inner, outer_angle=outer, radius=radius)
 
 
@@ -244,7 +245,7 @@ def _gradient(scene: ClassicScene) -> NDArray[np.float32]:
 
 
 def _remarks(scene: ClassicScene) -> Iterator[str]:
-    """What the physical form leaves out, one line each."""
+    """Features that the physical form ignores, one line each."""
     kinds = sorted({m.texture.kind for m in scene.materials} - {"constant", "planar-image"})
     if kinds:
         yield f"textures of kind {', '.join(kinds)} show their mean colour in physically based light"

@@ -1,4 +1,4 @@
-"""Classic scenes as the rest of the program sees them: in a right-handed world, with cameras and bounds.
+"""Classic scenes in the right-handed world of the rest of the program: transformation, bounds, camera.
 
 A left-handed scene (Tachyon's) lies in the world with its z negated; its own numbers stay as the file has them, and the
 classic integrator negates the z of rays instead. So a display's place in the world is a rotation without mirroring, and
@@ -8,7 +8,6 @@ the picture comes out as the format's own program shows it.
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import product
 from math import atan, pi
 
 import numpy as np
@@ -39,7 +38,7 @@ def world_bounds(scene: ClassicScene, frame: Matrix | None = None) -> Numbers:
     """
     matrix = world_from_scene(scene) if frame is None else frame @ world_from_scene(scene)
     finite: tuple[Batch, ...] = (scene.spheres, scene.tubes, scene.rings, scene.triangles)
-    corners = [np.stack(_moved(batch, matrix).extents()) for batch in (*finite, scene.boxes) if len(batch)]
+    corners = [np.stack(_transform(batch, matrix).extents()) for batch in (*finite, scene.boxes) if len(batch)]
     if not corners:
         raise SceneError(
             "the scene has no extent that could be measured",
@@ -57,24 +56,24 @@ def world_bounds(scene: ClassicScene, frame: Matrix | None = None) -> Numbers:
 def world_camera(scene: ClassicScene, name: str = "camera") -> Camera:
     """The scene's own camera in the world.
 
-    What only the classic camera can do is left out: an off-centre window, a fisheye's projection, depth of field.
+    Left out, for only the classic camera has them: an off-centre window, a fisheye's projection, depth of field.
     """
-    own = scene.camera
-    right, up, view = own.frame()
+    source = scene.camera
+    right, up, view = source.frame()
     matrix = np.eye(4)
     matrix[:3, :3] = np.stack([right, up, -view], axis=1)
-    matrix[:3, 3] = own.center
+    matrix[:3, 3] = source.center
     matrix = world_from_scene(scene) @ matrix
-    left, right_edge, bottom, top = own.window(*scene.resolution)
+    left, right_edge, bottom, top = source.window(*scene.resolution)
     width, height = abs(right_edge - left), abs(top - bottom)
-    if own.projection == "orthographic":
+    if source.projection == "orthographic":
         return Camera(name, matrix, height=height, aspect=width / height)
-    field = height if own.projection == "fisheye" else 2 * atan(height / 2)
+    field = height if source.projection == "fisheye" else 2 * atan(height / 2)
     return Camera(name, matrix, fov_y=min(field, _WIDEST_FIELD), aspect=width / height)
 
 
-def _moved(batch: Batch, matrix: Matrix) -> Batch:
-    """A batch under a similarity."""
+def _transform(batch: Batch, matrix: Matrix) -> Batch:
+    """A batch under a similarity; boxes become the boxes around them."""
     scale = float(np.linalg.norm(matrix[:3, 0]))
 
     def point(points: Numbers) -> Numbers:
@@ -102,9 +101,7 @@ def _moved(batch: Batch, matrix: Matrix) -> Batch:
             outer=batch.outer * scale,
         )
     if isinstance(batch, Boxes):
-        corners = np.stack([batch.minimum, batch.maximum], axis=1)
-        points = np.stack([corners[:, [x, y, z], [0, 1, 2]] for x, y, z in product((0, 1), repeat=3)], axis=1)
-        moved = point(points)
-        return replace(batch, minimum=moved.min(axis=1), maximum=moved.max(axis=1))
+        corners = point(batch.corners())
+        return replace(batch, minimum=corners.min(axis=1), maximum=corners.max(axis=1))
     assert isinstance(batch, Triangles)
     return replace(batch, positions=point(batch.positions))

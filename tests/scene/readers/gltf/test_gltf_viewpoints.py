@@ -1,4 +1,4 @@
-"""Cameras and lamps."""
+"""Cameras and light sources."""
 
 from __future__ import annotations
 

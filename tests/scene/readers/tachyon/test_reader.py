@@ -28,7 +28,7 @@ def read(tmp_path):
 
 
 def test_numbers_of_the_shared_scenes(shared_scenes):
-    """The counts that the program itself prints (it counts lamps, and no planes)."""
+    """The counts that the program itself prints (it counts lights, and no planes)."""
     expected = {
         "2balls": 5, "attenuation": 1, "clipplanes": 5, "fisheye": 5, "fog": 5, "gears_s2": 4583, "imagedef": 6,
         "lscapes": 206, "polycyl": 17, "room": 22, "smallballs": 94, "spotlight": 4, "teapot": 2330, "texfree": 5,

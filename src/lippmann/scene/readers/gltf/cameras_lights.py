@@ -1,4 +1,4 @@
-"""Cameras, and the lamps of KHR_lights_punctual."""
+"""Cameras, and the light sources of KHR_lights_punctual."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _SMALLEST_CONE = 1e-3  # radians; a thinner one would light nothing
 
 
 def read_camera(fields: Fields, node: Fields, world: Matrix) -> Camera:
-    """The camera that ``node``, standing at ``world``, carries.
+    """The camera on ``node``, whose matrix is ``world``.
 
     ``extras.focus_distance`` of the camera, else of its node, gives the focus distance in world units; glTF itself has
     none. Near and far planes bound no ray and are left out.
@@ -44,7 +44,7 @@ def read_camera(fields: Fields, node: Fields, world: Matrix) -> Camera:
 
 
 def _focus_distance(fields: Fields) -> float | None:
-    # Anything may stand under extras, so what is no distance is another program's business.
+    # Extras may hold anything: a value that is no distance is another program's.
     extras = fields.values.get("extras")
     value = extras.get("focus_distance") if isinstance(extras, dict) else None
     if isinstance(value, bool) or not isinstance(value, (int, float)):
@@ -53,15 +53,15 @@ def _focus_distance(fields: Fields) -> float | None:
 
 
 def read_light(node: Fields, world: Matrix, document: Document) -> Light | None:
-    """The lamp that ``node``, standing at ``world``, carries, if any.
+    """The light source on ``node``, whose matrix is ``world``; None without one.
 
-    glTF measures lamps in candela and lux. Their numbers are taken as W/sr and W/m^2: the scene's other radiances
+    glTF measures light in candela and lux. Their numbers are taken as W/sr and W/m^2: the scene's other radiances
     (emission, the environment) have no absolute scale either, and exporters write numbers of that size.
 
     Raises
     ------
     SceneError
-        A lamp that does not exist or is of unknown type, or a cone that is none.
+        A light that does not exist or is of unknown type, or an impossible cone.
     """
     extension = node.extension("KHR_lights_punctual")
     if extension is None:

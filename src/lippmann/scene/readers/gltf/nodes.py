@@ -203,7 +203,7 @@ def normal_matrices(linear: Matrix) -> Matrix:
 def rigid(matrix: Matrix) -> Matrix:
     """Position and orientation of a finite ``(4, 4)`` matrix without its scale, shear and mirroring.
 
-    The z axis keeps its direction and the y axis its side, as a camera and a lamp need; an axis scaled to nothing
+    The z axis keeps its direction and the y axis its side, as cameras and light sources need; an axis scaled to nothing
     is replaced by one that fits.
     """
     z = _unit(matrix[:3, 2], np.array([0.0, 0.0, 1.0]))
