@@ -6,7 +6,6 @@ it, the working directory among them. A library runs code as it is loaded: only 
 
 from __future__ import annotations
 
-import difflib
 import re
 from collections.abc import Mapping
 from functools import cache
@@ -14,6 +13,7 @@ from importlib.machinery import PathFinder
 from pathlib import Path
 
 from lippmann.errors import EngineError, SceneError
+from lippmann.scene.parsing.name_hints import closest_name_hint
 
 _PLAIN = re.compile(r"\w+", re.ASCII)
 #: A conductor without a table: a perfect mirror.
@@ -24,19 +24,18 @@ def check_plugin(name: str, where: str) -> None:
     """Raise :class:`SceneError` if the installed Mitsuba has no plugin ``name``."""
     known = _plugins()
     if name not in known:
-        close = difflib.get_close_matches(name, known, n=1)
         raise SceneError(
             f"plugin '{name[:80]}' is unknown",
             where=where,
             rule="scene files name plugins of the installed Mitsuba",
-            fix=f"is '{close[0]}' meant?" if close else "",
+            fix=closest_name_hint(name, known),
         )
 
 
 def check_plugins_of(values: Mapping[str, object], where: str) -> None:
     """Raise :class:`SceneError` if a dictionary for ``mitsuba.load_dict`` names a plugin that lies elsewhere.
 
-    Plugins that the caller has registered in this process have no library, and are his to name.
+    Plugins that the caller has registered in this process have no library, and may be named.
     """
     stack: list[Mapping[str, object]] = [values]
     while stack:
@@ -51,12 +50,11 @@ def check_material(name: str, where: str) -> None:
     """Raise :class:`SceneError` if Mitsuba has no table of refractive indices called ``name``."""
     known = _materials()
     if name != _NO_MATERIAL and name not in known:
-        close = difflib.get_close_matches(name, known, n=1)
         raise SceneError(
             f"material '{name[:80]}' is unknown",
             where=where,
             rule="Mitsuba's own tables and 'none' are known",
-            fix=f"is '{close[0]}' meant?" if close else "",
+            fix=closest_name_hint(name, known),
         )
 
 
@@ -86,7 +84,7 @@ def _materials() -> frozenset[str]:
 
 @cache
 def package_folder() -> Path:
-    """Where Mitsuba is installed; it is not loaded for this.
+    """Folder of the installed Mitsuba, which is not loaded for this.
 
     Raises
     ------

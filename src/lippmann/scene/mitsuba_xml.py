@@ -76,8 +76,8 @@ class MitsubaXml:
 
     def origin(self, line: int) -> str:
         """The file and line that a line of :meth:`text`, counted from 1, comes from; the root's if it has none."""
-        found = next((origin for _, origin in islice(self._lines({}), line - 1, line)), "")
-        return found or self.root._origin
+        origin = next((origin for _, origin in islice(self._lines({}), line - 1, line)), "")
+        return origin or self.root._origin
 
     def _lines(self, places: Mapping[str, str]) -> Iterator[tuple[str, str]]:
         stack: list[XmlElement | str] = [self.root]
@@ -88,8 +88,8 @@ class MitsubaXml:
                 continue
             words = [element.tag]
             for name, value in element.attributes:
-                shown = places.get(value, value) if name == element.file else value
-                words.append(f"{name}={quoteattr(shown.replace('$', _ESCAPED_DOLLAR))}")
+                text = places.get(value, value) if name == element.file else value
+                words.append(f"{name}={quoteattr(text.replace('$', _ESCAPED_DOLLAR))}")
             yield f"<{' '.join(words)}>", element._origin
             stack += [element.tag, *reversed(element.children)]
 
@@ -145,7 +145,7 @@ class _Reader:
             if child.tag == "default":
                 self._declare(child, known)
             elif child.tag == "path":
-                value = self._substituted(child, known).get("value")
+                value = self._substitute(child, known).get("value")
                 paths.insert(0, self._find_folder(value, [path.parent, *paths, *folders], child._origin))
         return self._element(raw, path, parameters, [*paths, *folders], level, is_root=True)
 
@@ -159,7 +159,7 @@ class _Reader:
         *,
         is_root: bool = False,
     ) -> XmlElement:
-        element = self._substituted(raw, parameters)
+        element = self._substitute(raw, parameters)
         where = element._origin
         if kind := element.get("type"):
             check_plugin(kind, where)
@@ -168,7 +168,7 @@ class _Reader:
             if child.tag == "default":
                 self._declare(child, parameters)
             elif child.tag == "include":
-                children += self._included(self._substituted(child, parameters), path, parameters, folders, level)
+                children += self._include(self._substitute(child, parameters), path, parameters, folders, level)
             elif child.tag != "path":
                 children.append(self._element(child, path, parameters, folders, level))
             elif not is_root:
@@ -187,13 +187,13 @@ class _Reader:
             return element
         return XmlElement(element.tag, tuple(attributes.items()), tuple(children), named, where)
 
-    def _included(
+    def _include(
         self, include: XmlElement, path: Path, parameters: dict[str, str], folders: list[Path], level: int
     ) -> list[XmlElement]:
         """The elements that take the place of an ``<include>``."""
         name = include.get("filename")
-        found = self._find(name, [path.parent, *folders, self.folder], include._origin)
-        root = self.file(found, parameters, folders, Path(name.replace("\\", "/")).name, level=level + 1)
+        file = self._find(name, [path.parent, *folders, self.folder], include._origin)
+        root = self.file(file, parameters, folders, Path(name.replace("\\", "/")).name, level=level + 1)
         if root.get("type", "scene") == "scene" and root.tag == "scene":
             return [child for child in root.children if child.get("type") or child.tag in _NAMES]
         attributes = {key: value for key, value in root.attributes if key not in ("version", "name")}
@@ -217,22 +217,22 @@ class _Reader:
 
     def _declare(self, default: XmlElement, parameters: dict[str, str]) -> None:
         """Add a parameter; one that has a value keeps it."""
-        declared = self._substituted(default, parameters)
+        declared = self._substitute(default, parameters)
         if not declared.get("name"):
             raise SceneError("declares a parameter without a name", where=declared._origin)
         parameters.setdefault(declared.get("name"), declared.get("value"))
 
     @staticmethod
-    def _substituted(element: XmlElement, parameters: Mapping[str, str]) -> XmlElement:
+    def _substitute(element: XmlElement, parameters: Mapping[str, str]) -> XmlElement:
         if not any("$" in value for _, value in element.attributes):
             return element
-        attributes = tuple((name, _filled_in(value, parameters, element)) for name, value in element.attributes)
+        attributes = tuple((name, _fill_in(value, parameters, element)) for name, value in element.attributes)
         return XmlElement(element.tag, attributes, element.children, None, element._origin)
 
     def _key(self, name: str, folders: list[Path], where: str) -> str:
-        found = self._find(name, folders, where)
-        key = Path(relpath(found, self.folder)).as_posix()
-        self.files[key] = found
+        file = self._find(name, folders, where)
+        key = Path(relpath(file, self.folder)).as_posix()
+        self.files[key] = file
         return key
 
     def _find(self, name: str, folders: list[Path], where: str) -> Path:
@@ -290,7 +290,7 @@ def parse_xml(data: bytes, where: str) -> XmlElement:
     return children[0][0]
 
 
-def _filled_in(value: str, parameters: Mapping[str, str], element: XmlElement) -> str:
+def _fill_in(value: str, parameters: Mapping[str, str], element: XmlElement) -> str:
     """An attribute's value with its parameters replaced, longer names first; ``\\$`` stands for a dollar sign."""
     if "$" not in value:
         return value

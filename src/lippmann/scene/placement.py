@@ -1,4 +1,4 @@
-"""How a display stands in a scene: the similarity ``world_from_display``.
+"""Placement of a display in a scene: the similarity ``world_from_display``.
 
 The display frame is right-handed, in millimetres: origin at the array's centre in the lens plane, +x right, +y up,
 +z toward the viewer.
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from lippmann.display import Display
 from lippmann.errors import SceneError, UsageError
-from lippmann.scene.scene import box, find_camera
+from lippmann.scene.scene import box, box_corners, find_camera
 from lippmann.scene.values.description import Camera, Matrix
 
 Mode = Literal["fit", "camera", "display"]
@@ -47,7 +47,7 @@ _UNITS_PER_MM = (1e-30, 1e30)
 
 @dataclass(frozen=True)
 class PlacementOptions:
-    """How to place a display.
+    """Options of placing a display in a scene.
 
     Parameters
     ----------
@@ -106,7 +106,7 @@ class PlacementOptions:
 
 @dataclass(frozen=True, eq=False)
 class Placement:
-    """Where the display stands.
+    """Position, orientation and scale of a display in a scene.
 
     ``world_from_display`` is ``scale * rotation`` with a translation, 4x4; its scale is in world units per
     millimetre. ``depth_range`` is (back, front): the lowest and highest z of the scene's bounding box in millimetres
@@ -160,12 +160,12 @@ def place(
     mode = options.mode or ("camera" if options.camera or home_camera else "fit")
     warnings: list[str] = []
     if mode == "fit":
-        display_from_world = _fitted(bounds, display, options, warnings)
+        display_from_world = _fit(bounds, display, options, warnings)
     elif mode == "camera":
-        camera = _chosen(cameras, options.camera or home_camera)
-        display_from_world = _resized(_seen_by(camera, bounds, display, options), options)
+        camera = _choose_camera(cameras, options.camera or home_camera)
+        display_from_world = _resize(_place_by_camera(camera, bounds, display, options), options)
     else:
-        display_from_world = _resized(np.eye(4), options)
+        display_from_world = _resize(np.eye(4), options)
     display_from_world = _translation(options.shift) @ display_from_world
     return stand(_inverse(display_from_world), bounds, display, mode=mode, bounds_in=bounds_in, warnings=warnings)
 
@@ -179,21 +179,21 @@ def stand(
     bounds_in: Callable[[Matrix], Bounds] | None = None,
     warnings: Sequence[str] = (),
 ) -> Placement:
-    """The placement of a display whose place is known already: how deep the scene lies there, and what to warn of.
+    """The placement of a display at a given place, with the depth range of the scene and warnings.
 
     Parameters as of :func:`place`; ``warnings`` come first among those of the placement.
     """
     display_from_world = _inverse(world_from_display)
-    corners = _carried(display_from_world, _corners(bounds))
+    corners = _transform_points(display_from_world, box_corners(bounds))
     if bounds_in is not None:
-        corners = _corners(bounds_in(display_from_world))
+        corners = box_corners(bounds_in(display_from_world))
     back, front = float(corners[:, 2].min()), float(corners[:, 2].max())
     near, far = display.resolvable_depth
-    said = (*warnings, *_warnings(corners, display))
-    return Placement(world_from_display, (back, front), (far, near), mode, said)
+    warnings = (*warnings, *_find_warnings(corners, display))
+    return Placement(world_from_display, (back, front), (far, near), mode, warnings)
 
 
-def _chosen(cameras: Sequence[Camera], name: str | None) -> Camera:
+def _choose_camera(cameras: Sequence[Camera], name: str | None) -> Camera:
     if name is not None:
         return find_camera(cameras, name)
     if not cameras:
@@ -201,15 +201,15 @@ def _chosen(cameras: Sequence[Camera], name: str | None) -> Camera:
     return cameras[0]
 
 
-def _fitted(bounds: Bounds, display: Display, options: PlacementOptions, warnings: list[str]) -> Matrix:
+def _fit(bounds: Bounds, display: Display, options: PlacementOptions, warnings: list[str]) -> Matrix:
     """``display_from_world`` that puts the turned box into the panel and the display's depth.
 
     In front of the lens plane lies ``pop_out`` of the depth, but no more than the aperture lets through: the rest of
     it moves behind.
     """
-    turned = _carried(_rotation(options.turn), _corners(bounds))
-    low, high = turned.min(axis=0), turned.max(axis=0)
-    width, height, depth = _extents(turned)
+    corners = _transform_points(_rotation(options.turn), box_corners(bounds))
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    width, height, depth = _extents(corners)
     pop_out = POP_OUT if options.pop_out is None else options.pop_out
 
     def largest(fill: float) -> float:
@@ -221,11 +221,11 @@ def _fitted(bounds: Bounds, display: Display, options: PlacementOptions, warning
     in_depth = _largest_in_depth(depth, pop_out, display)
     least = largest(LEAST_FILL) if width > 0.0 or height > 0.0 else 0.0  # a line toward the viewer has no width
     scale = options.scale * min(largest(FILL), max(in_depth, least))
-    wanted = pop_out * depth * scale
-    front = min(wanted, display.aperture_distance)
-    if options.pop_out is not None and front < wanted * (1.0 - 1e-9):
+    full_front = pop_out * depth * scale
+    front = min(full_front, display.aperture_distance)
+    if options.pop_out is not None and front < full_front * (1.0 - 1e-9):
         warnings.append(
-            f"{front:.3g} mm of the scene lie in front of the lens plane instead of {wanted:.3g}: "
+            f"{front:.3g} mm of the scene lie in front of the lens plane instead of {full_front:.3g}: "
             f"recorded rays begin {display.aperture_distance:g} mm in front of it"
         )
     anchor = np.array([(low[0] + high[0]) / 2.0, (low[1] + high[1]) / 2.0, high[2]])
@@ -241,7 +241,7 @@ def _extents(points: Bounds) -> Vector:
 
 
 def _largest_in_window(size: float, window: float, depth: float, pop_out: float, display: Display) -> float:
-    """Largest scale s for which the box's front face, the nearest to the viewer, fits the panel as he sees it.
+    """Largest scale s for which the box's front face, the nearest to the viewer, fits the panel from the eye.
 
     Seen from (0, 0, D) the panel's window narrows as 1 - z / D. The front face lies at f = min(pop_out depth s,
     aperture distance), so s size <= window (1 - f / D) holds if it does for either term.
@@ -272,14 +272,14 @@ def _largest_in_depth(depth: float, pop_out: float, display: Display) -> float:
     return min(by_front, (aperture - far) / depth)
 
 
-def _seen_by(camera: Camera, bounds: Bounds, display: Display, options: PlacementOptions) -> Matrix:
+def _place_by_camera(camera: Camera, bounds: Bounds, display: Display, options: PlacementOptions) -> Matrix:
     """``display_from_world`` that makes the camera's plane of focus the lens plane.
 
     The viewing distance finite: the camera's eye becomes the viewing point. Infinite: the largest part of the camera's
     picture that has the panel's shape fills the panel. An orthographic camera has no eye, so the latter holds for it.
     """
-    frame = _rigid(camera)
-    in_camera = _carried(_inverse(frame), _corners(bounds))
+    frame = _remove_scale(camera)
+    in_camera = _transform_points(_inverse(frame), box_corners(bounds))
     farthest, nearest = -float(in_camera[:, 2].min()), max(-float(in_camera[:, 2].max()), 0.0)
     if farthest <= 0.0:
         raise SceneError(
@@ -318,7 +318,7 @@ def _units_per_mm(camera: Camera, focus: float, display: Display) -> float:
     return min(height * camera.aspect / display.size_mm[0], height / display.size_mm[1])
 
 
-def _rigid(camera: Camera) -> Matrix:
+def _remove_scale(camera: Camera) -> Matrix:
     """``world_from_camera`` without the scale, shear or mirroring that a file's nodes may carry.
 
     Direction and upright are kept; +x follows from them.
@@ -336,22 +336,22 @@ def _rigid(camera: Camera) -> Matrix:
     return rigid
 
 
-def _resized(display_from_world: Matrix, options: PlacementOptions) -> Matrix:
+def _resize(display_from_world: Matrix, options: PlacementOptions) -> Matrix:
     """Turned and scaled about the middle of the lens plane."""
     return _scaling(options.scale) @ _rotation(options.turn) @ display_from_world
 
 
-def _warnings(corners: Bounds, display: Display) -> list[str]:
+def _find_warnings(corners: Bounds, display: Display) -> list[str]:
     low, high = corners.min(axis=0), corners.max(axis=0)
     near, far = display.resolvable_depth
-    found = []
+    warnings = []
     if high[2] > display.aperture_distance + 1e-6:
-        found.append(
+        warnings.append(
             f"the scene reaches {high[2]:.3g} mm in front of the lens plane; recorded rays begin at "
             f"{display.aperture_distance:g} mm, what lies nearer is cut off"
         )
     if high[2] > near + 1e-6 or low[2] < far - 1e-6:
-        found.append(
+        warnings.append(
             f"the scene reaches from {low[2]:.3g} to {high[2]:.3g} mm; the display resolves "
             f"{far:.3g} to {near:.3g} mm, what lies beyond is blurred"
         )
@@ -359,17 +359,11 @@ def _warnings(corners: Bounds, display: Display) -> list[str]:
     reach = max(abs(float(low[2])), abs(float(high[2]))) * np.tan(np.radians(display.field_of_view / 2.0))
     window = half * np.maximum(1.0, 1.0 - min(float(low[2]), 0.0) / display.viewing_distance) + reach
     if (low[:2] > window).any() or (high[:2] < -window).any():
-        found.append("the scene lies beside the panel: nothing of it will be seen")
-    return found
+        warnings.append("the scene lies beside the panel: nothing of it will be seen")
+    return warnings
 
 
-def _corners(bounds: Bounds) -> Bounds:
-    low, high = np.asarray(bounds, np.float64)
-    grid = np.stack(np.meshgrid([0, 1], [0, 1], [0, 1], indexing="ij"), axis=-1).reshape(-1, 3)
-    return np.asarray(np.where(grid == 0, low, high), np.float64)
-
-
-def _carried(matrix: Matrix, points: Bounds) -> Bounds:
+def _transform_points(matrix: Matrix, points: Bounds) -> Bounds:
     return np.asarray(points @ matrix[:3, :3].T + matrix[:3, 3], np.float64)
 
 

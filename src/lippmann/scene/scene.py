@@ -1,8 +1,7 @@
-"""The scene that everything else works with: what was read, how it is lit, where it lies."""
+"""Scenes, ready to be placed and rendered: their content, light, cameras and bounds."""
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
@@ -12,6 +11,7 @@ from numpy.typing import NDArray
 from lippmann.errors import SceneError
 from lippmann.runtime.cached_property import cached_property
 from lippmann.scene.mitsuba_source import MitsubaSource
+from lippmann.scene.parsing.name_hints import closest_name_hint
 from lippmann.scene.values.description import Camera, Color, Environment, Material, Matrix, Mesh, SceneDescription
 from lippmann.scene.values.whitted_scene import ClassicScene
 from lippmann.scene.whitted.world_frame import world_bounds
@@ -92,7 +92,7 @@ class Scene:
             return world_bounds(self.classic, frame)
         if isinstance(self.description, SceneDescription):
             return bounds_of(self.description, frame)
-        corners = _box_corners(np.asarray(self.bounds)) @ frame[:3, :3].T + frame[:3, 3]
+        corners = box_corners(self.bounds) @ frame[:3, :3].T + frame[:3, 3]
         return np.stack([corners.min(axis=0), corners.max(axis=0)])
 
     @cached_property
@@ -129,7 +129,7 @@ class Scene:
 
     @property
     def background(self) -> Color | None:
-        """What is seen where nothing is hit; None for the environment itself (black without one)."""
+        """Colour seen where nothing is hit; None for the environment itself (black without one)."""
         if self.physical.background is not None or not self.in_studio:
             return self.physical.background
         from lippmann.scene.studio_light import BACKDROP
@@ -138,9 +138,9 @@ class Scene:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What the reader could not honour and what was assumed, one line each."""
-        read = () if isinstance(self.physical, MitsubaSource) else tuple(self.physical.notes)
-        return (*read, STUDIO_NOTE) if self.in_studio else read
+        """Features that the reader ignored, and its assumptions, one line each."""
+        notes = () if isinstance(self.physical, MitsubaSource) else tuple(self.physical.notes)
+        return (*notes, STUDIO_NOTE) if self.in_studio else notes
 
     def camera(self, name: str | None = None) -> Camera:
         """A camera by name; without one the first, or for a scene without cameras one that frames it from +z.
@@ -169,12 +169,11 @@ def find_camera(cameras: Sequence[Camera], name: str) -> Camera:
         if camera.name == name:
             return camera
     names = [camera.name for camera in cameras]
-    close = difflib.get_close_matches(name, names, n=1)
     raise SceneError(
         f"no camera is named '{name}'",
         parameter="camera",
         rule=f"the scene has {', '.join(repr(known) for known in names)}" if names else "the scene has no cameras",
-        fix=f"is '{close[0]}' meant?" if close else "",
+        fix=closest_name_hint(name, names),
     )
 
 
@@ -230,7 +229,8 @@ def bounds_of(description: SceneDescription, frame: Matrix | None = None) -> Bou
     for mesh, places in description.placements.items():
         points = used[mesh]
         if len(points) and len(places):
-            boxes.append(_box_of_copies(points if exact else _box_corners(points), places, frame))
+            points = points if exact else box_corners(np.stack([points.min(axis=0), points.max(axis=0)]))
+            boxes.append(_box_of_copies(points, places, frame))
     if not boxes:
         raise SceneError("the scene holds no triangles", where=description.name, rule="there must be something to see")
     return np.stack([np.min(boxes, axis=0)[0], np.max(boxes, axis=0)[1]])
@@ -243,8 +243,8 @@ def _box_of_copies(points: Bounds, world_from_points: Matrix, frame: Matrix | No
     for start in range(0, len(world_from_points), step):
         matrices = world_from_points[start : start + step]
         matrices = matrices if frame is None else frame @ matrices
-        moved = points @ matrices[:, :3, :3].transpose(0, 2, 1) + matrices[:, None, :3, 3]
-        low, high = np.minimum(low, moved.min(axis=(0, 1))), np.maximum(high, moved.max(axis=(0, 1)))
+        copies = points @ matrices[:, :3, :3].transpose(0, 2, 1) + matrices[:, None, :3, 3]
+        low, high = np.minimum(low, copies.min(axis=(0, 1))), np.maximum(high, copies.max(axis=(0, 1)))
     return np.stack([low, high])
 
 
@@ -254,9 +254,10 @@ def _used_positions(mesh: Mesh) -> Bounds:
     return np.asarray(mesh.positions[used], np.float64)
 
 
-def _box_corners(points: Bounds) -> Bounds:
-    low, high = points.min(axis=0), points.max(axis=0)
-    return np.array([[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])])
+def box_corners(bounds: Bounds) -> Bounds:
+    """Corners ``(8, 3)`` of a box ``(2, 3)``."""
+    (x0, y0, z0), (x1, y1, z1) = np.asarray(bounds, np.float64)
+    return np.array([[x, y, z] for x in (x0, x1) for y in (y0, y1) for z in (z0, z1)])
 
 
 def has_lights(description: SceneDescription) -> bool:
@@ -274,7 +275,7 @@ def has_lights(description: SceneDescription) -> bool:
 
 
 def checked(description: SceneDescription, where: str) -> SceneDescription:
-    """The description itself, once it is known to be sound.
+    """Check a description and return it.
 
     Raises
     ------

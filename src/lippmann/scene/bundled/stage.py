@@ -64,13 +64,8 @@ class Stage:
 
     def in_display(self, points: ArrayLike) -> NDArray[np.float64]:
         """Carry points ``(..., 3)`` of the scene into the display frame: z > 0 lies before the lens plane."""
-        moved: NDArray[np.float64] = (np.asarray(points, dtype=np.float64) - self.target) @ self.rotation * self.unit
-        return moved
-
-    @property
-    def picture_height(self) -> float:
-        """Height of the paper's display in scene units."""
-        return PICTURE_HEIGHT / self.unit
+        offsets: NDArray[np.float64] = np.asarray(points, dtype=np.float64) - self.target
+        return offsets @ self.rotation * self.unit
 
     @property
     def eye(self) -> Point:

@@ -14,7 +14,7 @@ def triangulate(points: Points, corners: Integers, sizes: Integers) -> tuple[Int
     """Cut simple polygons into triangles that keep their winding.
 
     Convex polygons become fans; the others are cut into ears by ``mapbox_earcut`` in the plane of their Newell normal.
-    What a polygon that crosses itself becomes is left open; one without area may become nothing.
+    The result for a polygon that crosses itself is undefined; one without area may become nothing.
 
     Parameters
     ----------
@@ -88,5 +88,5 @@ def _cut_ears(outline: Points) -> Integers:
     """Triangles ``(m, 3)`` of a counter-clockwise outline ``(k, 2)``, counter-clockwise, as indices into 0 to k - 1."""
     import mapbox_earcut
 
-    found = mapbox_earcut.triangulate_float64(np.ascontiguousarray(outline), np.array([len(outline)], np.uint32))
-    return np.asarray(found, np.int64).reshape(-1, 3)
+    triangles = mapbox_earcut.triangulate_float64(np.ascontiguousarray(outline), np.array([len(outline)], np.uint32))
+    return np.asarray(triangles, np.int64).reshape(-1, 3)

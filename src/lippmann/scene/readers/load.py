@@ -1,8 +1,7 @@
-"""Any scene, from a file, a name or a Python object: :func:`load_scene`."""
+"""Scenes from files, names of bundled scenes or Python objects: :func:`load_scene`."""
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Mapping
 from dataclasses import replace
 from importlib import import_module
@@ -13,6 +12,7 @@ import numpy as np
 from lippmann.errors import SceneError, UsageError
 from lippmann.scene.mitsuba_source import MitsubaSource
 from lippmann.scene.parsing.files import read_bytes
+from lippmann.scene.parsing.name_hints import closest_name_hint
 from lippmann.scene.scene import Scene, checked, lit
 from lippmann.scene.values.description import Camera, Color, Environment, SceneDescription
 from lippmann.scene.values.whitted_lighting import Background
@@ -112,11 +112,10 @@ def _from_name(source: str | Path, allow_outside: bool) -> Scene:
         if source in bundled.names():
             return _from_library(source)
         if not path.exists():
-            close = difflib.get_close_matches(source, bundled.names(), n=1)
             raise SceneError(
                 f"no bundled scene or file is named '{source}'",
                 rule=f"bundled are {', '.join(bundled.names())}",
-                fix=f"is '{close[0]}' meant?" if close else "",
+                fix=closest_name_hint(source, bundled.names()),
             )
     reader = _READERS.get(suffix)
     by_content = _suffix_by_content(path)
@@ -140,7 +139,7 @@ def _from_name(source: str | Path, allow_outside: bool) -> Scene:
 
 
 def _suffix_by_content(path: Path) -> str | None:
-    """The kind of file that the first bytes give away, where they do."""
+    """The suffix that the first bytes of a file imply; None if they imply none."""
     head = read_bytes(path, 64).removeprefix(b"\xef\xbb\xbf").lstrip()
     return next((suffix for beginning, suffix in _BEGINNINGS.items() if head.startswith(beginning)), None)
 
@@ -148,13 +147,13 @@ def _suffix_by_content(path: Path) -> str | None:
 def _from_library(name: str) -> Scene:
     from lippmann.scene import bundled
 
-    made = bundled.make(name)
-    classic = made if isinstance(made, ClassicScene) else bundled.make_classic(name)
+    content = bundled.make(name)
+    classic = content if isinstance(content, ClassicScene) else bundled.make_classic(name)
     # The paper renders its scenes with this ray depth.
     classic = replace(classic, camera=replace(classic.camera, ray_depth=_PAPER_DEPTH))
-    if isinstance(made, ClassicScene):
+    if isinstance(content, ClassicScene):
         return _classic(classic, bundled.stage_of(name).camera())
-    description = checked(made, name)
+    description = checked(content, name)
     home = description.cameras[0].name if description.cameras else None
     return Scene(name, description, home_camera=home, classic=classic)
 

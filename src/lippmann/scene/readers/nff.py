@@ -224,11 +224,11 @@ class _NffReader:
         triangles, owner = triangulate(corners[:, :3], np.arange(len(corners)), sizes)
         positions = corners[triangles, :3]
         area = np.linalg.norm(np.cross(positions[:, 1] - positions[:, 0], positions[:, 2] - positions[:, 0]), axis=1)
-        kept = area > 0
-        if not kept.all():
-            builder.notes.append(f"{int((~kept).sum())} triangles without area cannot be seen and are left out")
+        visible = area > 0
+        if not visible.all():
+            builder.notes.append(f"{int((~visible).sum())} triangles without area cannot be seen and are left out")
         builder.triangles(
-            positions[kept],
-            material[np.array(polygons.materials)[owner]][kept],
-            normals=corners[triangles, 3:][kept] if corners.shape[1] == 6 else None,
+            positions[visible],
+            material[np.array(polygons.materials)[owner]][visible],
+            normals=corners[triangles, 3:][visible] if corners.shape[1] == 6 else None,
         )

@@ -2,7 +2,7 @@
 
 Read from the format's description (Wavefront, "Object Files", Advanced Visualizer manual, appendix B1). The reader is
 Lippmann's own because the ones on offer either drop most of MTL (trimesh, Mitsuba) or have no release for current
-Python (tinyobjloader). Materials are mapped in ``mtl_material.py``.
+Python (tinyobjloader). Materials are mapped in ``mtl_to_pbr.py``.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ _SILENT |= {"bevel", "c_interp", "d_interp", "lod", "maplib", "usemap", "shadow_
 
 @dataclass
 class _Statements:
-    """An OBJ file taken apart, before any number is read."""
+    """The statements of an OBJ file by keyword, before any number is read."""
 
     positions: Lines = field(default_factory=Lines)
     uvs: Lines = field(default_factory=Lines)
@@ -48,7 +48,7 @@ class _Statements:
     faces: Lines = field(default_factory=Lines)
     libraries: Lines = field(default_factory=Lines)
     materials: list[str] = field(default_factory=lambda: [""])
-    # (first face, value): what holds from that face on
+    # (first face, value), which holds up to the next run
     material_runs: list[tuple[int, int]] = field(default_factory=lambda: [(0, 0)])
     smoothing_runs: list[tuple[int, int]] = field(default_factory=lambda: [(0, 0)])
     ignored: dict[str, int] = field(default_factory=dict)
@@ -82,7 +82,7 @@ def read_obj(path: Path, *, allow_outside: bool = False) -> SceneDescription:
         The file is missing, cut short or malformed; an index, library or texture is not there.
     """
     where = path.name
-    statements = _take_apart(decode_text(read_bytes(path), where), where)
+    statements = _split_statements(decode_text(read_bytes(path), where), where)
     if not statements.faces.bodies:
         fix = "points and lines alone cannot be rendered" if statements.positions.bodies else "is it an OBJ file?"
         raise SceneError("holds no faces", where=where, fix=fix)
@@ -110,12 +110,17 @@ def read_obj(path: Path, *, allow_outside: bool = False) -> SceneDescription:
     )
 
 
-def _take_apart(text: str, where: str) -> _Statements:
+def _split_statements(text: str, where: str) -> _Statements:
     """Sort the lines by keyword. The only pass over the file in Python, so it does as little as it can."""
-    found = _Statements()
+    statements = _Statements()
     numeric = {
         keyword: (lines.bodies.append, lines.numbers.append)
-        for keyword, lines in (("v", found.positions), ("vt", found.uvs), ("vn", found.normals), ("f", found.faces))
+        for keyword, lines in (
+            ("v", statements.positions),
+            ("vt", statements.uvs),
+            ("vn", statements.normals),
+            ("f", statements.faces),
+        )
     }
     material_index = {"": 0}
     for number, line in _logical_lines(text, where) if "\\" in text else enumerate(text.split("\n"), 1):
@@ -127,7 +132,7 @@ def _take_apart(text: str, where: str) -> _Statements:
             if "#" in body:
                 body = body.split("#", 1)[0]
             if "-" in body and key == "f":
-                counts = (len(found.positions.bodies), len(found.uvs.bodies), len(found.normals.bodies))
+                counts = (len(statements.positions.bodies), len(statements.uvs.bodies), len(statements.normals.bodies))
                 body = _absolute(body, counts, f"{where}:{number}")
             add_body, add_number = numeric[key]
             add_body(body)
@@ -135,31 +140,31 @@ def _take_apart(text: str, where: str) -> _Statements:
         elif key == "usemtl":
             name = body.strip()
             index = material_index.setdefault(name, len(material_index))
-            if index == len(found.materials):
-                found.materials.append(name)
-            found.material_runs.append((len(found.faces.bodies), index))
+            if index == len(statements.materials):
+                statements.materials.append(name)
+            statements.material_runs.append((len(statements.faces.bodies), index))
         elif key == "s":
-            found.smoothing_runs.append((len(found.faces.bodies), _smoothing_group(body)))
+            statements.smoothing_runs.append((len(statements.faces.bodies), _smoothing_group(body)))
         elif key == "mtllib":
-            found.libraries.add(body.strip(), number)
+            statements.libraries.add(body.strip(), number)
         elif key[0] != "#" and key not in _SILENT:
             what = _UNSUPPORTED.get(key, f"statements '{key[:40]}'")
-            found.ignored[what] = found.ignored.get(what, 0) + 1
-    return found
+            statements.ignored[what] = statements.ignored.get(what, 0) + 1
+    return statements
 
 
 def _logical_lines(text: str, where: str) -> Iterator[tuple[int, str]]:
     """Lines with the number they begin on; one that ends in a backslash goes on with the next."""
-    carried, start = "", 0
+    continued, start = "", 0
     number = 0
     for number, line in enumerate(text.split("\n"), 1):
         start = start or number
         if line.endswith(("\\", "\\\r")):
-            carried += line.rstrip("\r")[:-1] + " "
+            continued += line.rstrip("\r")[:-1] + " "
             continue
-        yield start, carried + line
-        carried, start = "", 0
-    if carried:
+        yield start, continued + line
+        continued, start = "", 0
+    if continued:
         raise SceneError("the file ends in a continued line", where=f"{where}:{number}", fix="is it cut short?")
 
 
@@ -194,7 +199,7 @@ def _absolute(body: str, counts: tuple[int, int, int], where: str) -> str:
 
 
 def _per_face(runs: Sequence[tuple[int, int]], count: int) -> Integers:
-    """What holds for each face, from the places where it changes."""
+    """Value of each face, from runs ``(first face, value)``."""
     first = np.array([start for start, _ in runs] + [count])
     return np.repeat(np.array([value for _, value in runs], np.int64), np.diff(first))
 

@@ -98,8 +98,8 @@ def read_ply(path: Path, *, allow_outside: bool = False) -> SceneDescription:
     notes = [UP_NOTE]
     texture = None
     if header.textures:
-        found = resolve(path.parent, header.textures[0], where=where, what="texture", allow_outside=allow_outside)
-        texture = Texture(read_image(found, where=where), srgb=True)
+        image = resolve(path.parent, header.textures[0], where=where, what="texture", allow_outside=allow_outside)
+        texture = Texture(read_image(image, where=where), srgb=True)
         if len(header.textures) > 1:
             notes.append(f"only the first of {len(header.textures)} textures is used")
     mesh = _mesh(columns, {element.name: element for element in header.elements}, path.stem, where)
@@ -178,9 +178,9 @@ def _read_body(data: bytes, header: _Header, where: str) -> dict[str, Columns]:
     return columns
 
 
-def _cut_short(element: _Element, found: int, where: str) -> SceneError:
+def _cut_short(element: _Element, count: int, where: str) -> SceneError:
     return SceneError(
-        f"ends after {found} of {element.count} entries of '{element.name}'", where=where, fix="is it cut short?"
+        f"ends after {count} of {element.count} entries of '{element.name}'", where=where, fix="is it cut short?"
     )
 
 
@@ -311,9 +311,9 @@ def _mixed_columns(element: _Element, data: bytes, start: int, order: str, where
 
 def _outline(columns: Mapping[str, Columns], where: str) -> _Lists:
     for name in ("vertex_indices", "vertex_index"):
-        found = columns.get("face", {}).get(name)
-        if isinstance(found, _Lists):
-            return found
+        outline = columns.get("face", {}).get(name)
+        if isinstance(outline, _Lists):
+            return outline
     if "tristrips" in columns:
         raise SceneError("holds triangle strips", where=where, rule="only faces are read", fix="convert it to faces")
     return _Lists(np.zeros(0), np.zeros(0, np.int64))
@@ -341,8 +341,8 @@ def _mesh(columns: Mapping[str, Columns], elements: Mapping[str, _Element], name
         )
     places, owners = triangulate(positions, corners, outline.sizes[keep])
     faces = corners[places]
-    normals = _stacked(vertex, ("nx", "ny", "nz"))
-    uvs = next((found for names in _UV_NAMES if (found := _stacked(vertex, names)) is not None), None)
+    normals = _stack(vertex, ("nx", "ny", "nz"))
+    uvs = next((pair for names in _UV_NAMES if (pair := _stack(vertex, names)) is not None), None)
     colors = _colors(columns["vertex"], elements["vertex"])
     per_corner = _corner_uvs(columns["face"], outline, keep)
     face_colors = _colors(columns["face"], elements["face"])
@@ -366,16 +366,16 @@ def _mesh(columns: Mapping[str, Columns], elements: Mapping[str, _Element], name
     )
 
 
-def _stacked(columns: Mapping[str, Numbers], names: tuple[str, ...]) -> Numbers | None:
+def _stack(columns: Mapping[str, Numbers], names: tuple[str, ...]) -> Numbers | None:
     return np.stack([columns[name] for name in names], axis=-1) if columns.keys() >= set(names) else None
 
 
 def _corner_uvs(face: Columns, outline: _Lists, keep: NDArray[np.bool_]) -> Numbers | None:
     """uvs ``(corners, 2)`` of the faces in ``keep``, where the file gives one pair per corner."""
-    found = face.get("texcoord")
-    if not isinstance(found, _Lists) or not (found.sizes == 2 * outline.sizes).all():
+    texcoords = face.get("texcoord")
+    if not isinstance(texcoords, _Lists) or not (texcoords.sizes == 2 * outline.sizes).all():
         return None
-    return found.values.reshape(-1, 2)[np.repeat(keep, outline.sizes)]
+    return texcoords.values.reshape(-1, 2)[np.repeat(keep, outline.sizes)]
 
 
 def _colors(columns: Columns, element: _Element) -> NDArray[np.float32] | None:

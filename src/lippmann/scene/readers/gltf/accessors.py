@@ -98,7 +98,7 @@ class Accessors:
             fields = self.document.all("accessors")[index]
             normalized = self._check(fields, storage)
             raw = self._elements(fields)
-            self._floats[key] = _normalize(raw) if normalized else _quieted(raw.astype(np.float32))
+            self._floats[key] = _normalize(raw) if normalized else _canonicalize_nan(raw.astype(np.float32))
         return self._floats[key]
 
     def integers(self, index: int, storage: Storage) -> NDArray[np.uint32]:
@@ -141,9 +141,9 @@ class Accessors:
         else:
             raise fields.error("count", f"an accessor without bufferView has at most {_MOST_ZEROS} elements")
         sparse = fields.child("sparse")
-        return elements if sparse is None else self._replaced(elements, sparse)
+        return elements if sparse is None else self._apply_sparse(elements, sparse)
 
-    def _replaced(self, elements: NDArray[np.generic], sparse: Fields) -> NDArray[np.generic]:
+    def _apply_sparse(self, elements: NDArray[np.generic], sparse: Fields) -> NDArray[np.generic]:
         """A copy of ``elements`` with the sparse ones put in."""
         count = sparse.integer("count")
         if count > len(elements):
@@ -159,9 +159,9 @@ class Accessors:
         if count and places.max() >= len(elements):
             raise sparse.error("indices", f"{places.max()} points beyond the accessor's {len(elements)} elements")
         value_view = self.document.required_reference(values, "bufferView", "bufferViews")
-        replaced = elements.copy()
-        replaced[places] = self._strided(values, value_view, count, elements.shape[1], elements.dtype)
-        return replaced
+        result = elements.copy()
+        result[places] = self._strided(values, value_view, count, elements.shape[1], elements.dtype)
+        return result
 
     def _strided(
         self, fields: Fields, view: int, count: int, width: int, dtype: np.dtype[np.generic]
@@ -183,8 +183,8 @@ class Accessors:
         return np.ndarray((count, width), dtype, buffer=data, offset=offset, strides=(step, dtype.itemsize))
 
 
-def _quieted(values: FloatArray) -> FloatArray:
-    """The same with one kind of NaN: there is another, of which the processor remarks whenever it converts one."""
+def _canonicalize_nan(values: FloatArray) -> FloatArray:
+    """The same with quiet NaNs only: converting a signalling one raises a floating-point warning."""
     missing = np.isnan(values)
     return np.where(missing, np.float32(np.nan), values) if missing.any() else values
 

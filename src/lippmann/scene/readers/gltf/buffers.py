@@ -92,15 +92,15 @@ class Buffers:
         uri = fields.text("uri")
         if uri is not None:
             data, name = read_uri(self._document, uri, fields.place, "buffer")
-            found = memoryview(data)
+            content = memoryview(data)
         elif index == 0 and self._document.binary_chunk is not None:
-            found, name = self._document.binary_chunk, "binary chunk"
+            content, name = self._document.binary_chunk, "binary chunk"
         else:
             raise fields.error("uri", "only the first buffer of a .glb file does without one")
-        if len(found) < length:
+        if len(content) < length:
             raise SceneError(
-                f"{fields.place} ({name}) holds {len(found)} of {length} bytes",
+                f"{fields.place} ({name}) holds {len(content)} of {length} bytes",
                 where=self._document.file,
                 fix="copy it anew",
             )
-        return found[:length]
+        return content[:length]

@@ -34,8 +34,8 @@ class Fields:
     def error(self, key: str, rule: str) -> SceneError:
         """The error that member ``key`` breaks ``rule``."""
         value = self.values.get(key)
-        found = "is missing" if value is None else f"is {_shortened(value)}"
-        return SceneError(f"{self._place_of(key)} {found}", where=self.file, rule=rule)
+        state = "is missing" if value is None else f"is {_shorten(value)}"
+        return SceneError(f"{self._place_of(key)} {state}", where=self.file, rule=rule)
 
     def has(self, key: str) -> bool:
         """Whether the member is there."""
@@ -110,21 +110,21 @@ class Fields:
 
     def children(self, key: str) -> list[Fields]:
         """A list of objects; empty where absent."""
-        found = []
+        children = []
         for i, value in enumerate(self._list(key)):
             if not isinstance(value, dict):
                 raise self.error(key, "a list of objects belongs here")
-            found.append(Fields(value, f"{self._place_of(key)}[{i}]", self.file))
-        return found
+            children.append(Fields(value, f"{self._place_of(key)}[{i}]", self.file))
+        return children
 
     def texts(self, key: str) -> list[str]:
         """A list of strings; empty where absent."""
-        found = []
+        texts = []
         for value in self._list(key):
             if not isinstance(value, str):
                 raise self.error(key, "a list of strings belongs here")
-            found.append(value)
-        return found
+            texts.append(value)
+        return texts
 
     def extension(self, name: str) -> Fields | None:
         """The object that extension ``name`` adds, or None where absent."""
@@ -158,7 +158,7 @@ class Fields:
         return f"{self.place}.{key}" if self.place else key
 
 
-def _shortened(value: object) -> str:
+def _shorten(value: object) -> str:
     if isinstance(value, dict):
         return "an object"
     if isinstance(value, list) and (len(value) > 16 or any(isinstance(item, (dict, list)) for item in value)):

@@ -149,53 +149,53 @@ class Materials:
         }
 
     def _interior(self, fields: Fields) -> _Interior:
-        found: _Interior = {}
+        interior: _Interior = {}
         ior = fields.extension("KHR_materials_ior")
         if ior is not None:
             value = ior.number("ior", 1.5)
             if value != 0.0 and value < 1.0:
                 raise ior.error("ior", "it must be 1 or more, or 0")
-            found["ior"] = min(value, _ENDLESS_IOR) or _ENDLESS_IOR
+            interior["ior"] = min(value, _ENDLESS_IOR) or _ENDLESS_IOR
         transmission = fields.extension("KHR_materials_transmission")
         if transmission is not None:
-            found["transmission"] = self._fraction(transmission, "transmissionFactor", 0.0)
-            found["transmission_texture"] = self.textures.read(transmission, "transmissionTexture")
+            interior["transmission"] = self._fraction(transmission, "transmissionFactor", 0.0)
+            interior["transmission_texture"] = self.textures.read(transmission, "transmissionTexture")
         volume = fields.extension("KHR_materials_volume")
         if volume is not None:
-            found["thickness"] = volume.number("thicknessFactor", 0.0, minimum=0.0)
-            found["thickness_texture"] = self.textures.read(volume, "thicknessTexture")
-            found["attenuation_color"] = self._color(volume, "attenuationColor", _WHITE)
+            interior["thickness"] = volume.number("thicknessFactor", 0.0, minimum=0.0)
+            interior["thickness_texture"] = self.textures.read(volume, "thicknessTexture")
+            interior["attenuation_color"] = self._color(volume, "attenuationColor", _WHITE)
             distance = volume.optional_number("attenuationDistance")
             if distance is not None:
                 if distance <= 0.0:
                     raise volume.error("attenuationDistance", "it must be above 0")
-                found["attenuation_distance"] = distance
-        return found
+                interior["attenuation_distance"] = distance
+        return interior
 
     def _layers(self, fields: Fields) -> _Layers:
-        found: _Layers = {}
+        layers: _Layers = {}
         specular = fields.extension("KHR_materials_specular")
         if specular is not None:
-            found["specular"] = self._fraction(specular, "specularFactor", 1.0)
-            found["specular_texture"] = self.textures.read(specular, "specularTexture")
-            found["specular_color"] = self._color(specular, "specularColorFactor", _WHITE, most=LARGEST_NUMBER)
-            found["specular_color_texture"] = self.textures.read(specular, "specularColorTexture", srgb=True)
+            layers["specular"] = self._fraction(specular, "specularFactor", 1.0)
+            layers["specular_texture"] = self.textures.read(specular, "specularTexture")
+            layers["specular_color"] = self._color(specular, "specularColorFactor", _WHITE, most=LARGEST_NUMBER)
+            layers["specular_color_texture"] = self.textures.read(specular, "specularColorTexture", srgb=True)
         coat = fields.extension("KHR_materials_clearcoat")
         if coat is not None:
-            found["clearcoat"] = self._fraction(coat, "clearcoatFactor", 0.0)
-            found["clearcoat_texture"] = self.textures.read(coat, "clearcoatTexture")
-            found["clearcoat_roughness"] = self._fraction(coat, "clearcoatRoughnessFactor", 0.0)
-            found["clearcoat_roughness_texture"] = self.textures.read(coat, "clearcoatRoughnessTexture")
-            found["clearcoat_normal_texture"] = self.textures.read(coat, "clearcoatNormalTexture")
+            layers["clearcoat"] = self._fraction(coat, "clearcoatFactor", 0.0)
+            layers["clearcoat_texture"] = self.textures.read(coat, "clearcoatTexture")
+            layers["clearcoat_roughness"] = self._fraction(coat, "clearcoatRoughnessFactor", 0.0)
+            layers["clearcoat_roughness_texture"] = self.textures.read(coat, "clearcoatRoughnessTexture")
+            layers["clearcoat_normal_texture"] = self.textures.read(coat, "clearcoatNormalTexture")
             normal = coat.child("clearcoatNormalTexture")
-            found["clearcoat_normal_scale"] = 1.0 if normal is None else normal.number("scale", 1.0)
+            layers["clearcoat_normal_scale"] = 1.0 if normal is None else normal.number("scale", 1.0)
         sheen = fields.extension("KHR_materials_sheen")
         if sheen is not None:
-            found["sheen_color"] = self._color(sheen, "sheenColorFactor", _BLACK)
-            found["sheen_color_texture"] = self.textures.read(sheen, "sheenColorTexture", srgb=True)
-            found["sheen_roughness"] = self._fraction(sheen, "sheenRoughnessFactor", 0.0)
-            found["sheen_roughness_texture"] = self.textures.read(sheen, "sheenRoughnessTexture")
-        return found
+            layers["sheen_color"] = self._color(sheen, "sheenColorFactor", _BLACK)
+            layers["sheen_color_texture"] = self.textures.read(sheen, "sheenColorTexture", srgb=True)
+            layers["sheen_roughness"] = self._fraction(sheen, "sheenRoughnessFactor", 0.0)
+            layers["sheen_roughness_texture"] = self.textures.read(sheen, "sheenRoughnessTexture")
+        return layers
 
     def _color(self, fields: Fields, key: str, default: Color, *, most: float = 1.0) -> Color:
         red, green, blue = self._fractions(fields, key, default, most=most)

@@ -33,9 +33,9 @@ class Meshes:
     _geometries: dict[_Key, Geometry | None] = field(default_factory=dict)
 
     def posed(self, document: Document, primitives: Primitives) -> Meshes:
-        """To read the meshes of the same file as other nodes show them; what keeps its shape is kept."""
-        kept = {key: geometry for key, geometry in self._geometries.items() if key[2:] == ((), None)}
-        return Meshes(document, primitives, self.materials, _geometries=kept)
+        """Meshes of the same file as other nodes show them; geometry without skin or morph weights is shared."""
+        unskinned = {key: geometry for key, geometry in self._geometries.items() if key[2:] == ((), None)}
+        return Meshes(document, primitives, self.materials, _geometries=unskinned)
 
     def places(self, index: int, node: Fields, skin: Skin | None) -> list[int]:
         """The places in :attr:`read` of the primitives of ``meshes[index]``, as ``node`` shows it.
@@ -54,7 +54,7 @@ class Meshes:
 
     def _read(self, fields: Fields, weights: tuple[float, ...], skin: Skin | None) -> list[int]:
         primitives = fields.children("primitives")
-        found: list[int] = []
+        places: list[int] = []
         for primitive in primitives:
             key = _key(primitive, weights, skin)
             if key not in self._geometries:
@@ -66,20 +66,20 @@ class Meshes:
             if (key, material) not in self._places:
                 self._places[key, material] = len(self.read)
                 name = fields.text("name") or fields.place
-                name = name if len(primitives) == 1 else f"{name}/{len(found)}"
+                name = name if len(primitives) == 1 else f"{name}/{len(places)}"
                 self.read.append(self._mesh(name, geometry, material, primitive))
-            found.append(self._places[key, material])
-        return found
+            places.append(self._places[key, material])
+        return places
 
     def _mesh(self, name: str, geometry: Geometry, material: int, primitive: Fields) -> Mesh:
-        wanted = _uv_sets(self.materials.read[material])
+        uv_sets = _uv_sets(self.materials.read[material])
         uvs = geometry.uvs
-        if wanted > len(uvs):
+        if uv_sets > len(uvs):
             self.document.notes.add(
                 "a texture wants coordinates that its mesh lacks; one texel covers all of it", primitive.place
             )
             missing: FloatArray = np.zeros((len(geometry.positions), 2), np.float32)
-            uvs += (missing,) * (wanted - len(uvs))
+            uvs += (missing,) * (uv_sets - len(uvs))
         return Mesh(name, geometry.positions, geometry.faces, material, geometry.normals, uvs, geometry.colors)
 
 

@@ -49,12 +49,12 @@ class Nodes:
         """
         nodes = self._document.all("nodes")
         stack = [(index, True) for index in reversed(self._roots())]
-        seen: set[int] = set()
+        visited: set[int] = set()
         while stack:
             index, visible = stack.pop()
-            if index in seen:  # a scene may list a node beside its parent
+            if index in visited:  # a scene may list a node beside its parent
                 continue
-            seen.add(index)
+            visited.add(index)
             visibility = nodes[index].extension("KHR_node_visibility")
             visible = visible and (visibility is None or visibility.flag("visible", default=True))
             yield index, visible
@@ -104,14 +104,14 @@ def _local_matrices(nodes: list[Fields]) -> Matrix:
     """``parent_from_node`` ``(n, 4, 4)``: each node's matrix, or its scale, then rotation, then translation."""
     translations, rotations, scales = np.zeros((len(nodes), 3)), np.zeros((len(nodes), 4)), np.ones((len(nodes), 3))
     rotations[:, 3] = 1.0
-    given: dict[int, Matrix] = {}
+    explicit: dict[int, Matrix] = {}
     for index, fields in enumerate(nodes):
         columns = fields.numbers("matrix", 16)
         if columns is not None:
-            given[index] = np.array(columns).reshape(4, 4).T
-            if not np.allclose(given[index][3], (0.0, 0.0, 0.0, 1.0), rtol=0.0, atol=1e-6):
+            explicit[index] = np.array(columns).reshape(4, 4).T
+            if not np.allclose(explicit[index][3], (0.0, 0.0, 0.0, 1.0), rtol=0.0, atol=1e-6):
                 raise fields.error("matrix", "its last row must be 0, 0, 0, 1")
-            given[index][3] = (0.0, 0.0, 0.0, 1.0)
+            explicit[index][3] = (0.0, 0.0, 0.0, 1.0)
             continue
         for key, values in (("translation", translations), ("rotation", rotations), ("scale", scales)):
             numbers = fields.numbers(key, values.shape[1])
@@ -120,7 +120,7 @@ def _local_matrices(nodes: list[Fields]) -> Matrix:
         if not rotations[index].any():
             raise _no_rotation(fields, "rotation")
     matrices = compose(translations, rotations, scales)
-    for index, matrix in given.items():
+    for index, matrix in explicit.items():
         matrices[index] = matrix
     return matrices
 
@@ -141,7 +141,7 @@ def instance_matrices(node: Fields, document: Document, accessors: Accessors) ->
     attributes = None if instancing is None else instancing.child("attributes")
     if attributes is None:
         return np.eye(4)[None]
-    found: dict[str, Matrix] = {}
+    values_of: dict[str, Matrix] = {}
     for key, kind in (
         ("TRANSLATION", storage.TRANSLATION),
         ("ROTATION", storage.ROTATION),
@@ -149,17 +149,19 @@ def instance_matrices(node: Fields, document: Document, accessors: Accessors) ->
     ):
         index = document.reference(attributes, key, "accessors")
         if index is not None:
-            found[key] = accessors.floats(index, kind).astype(np.float64)
-            if not np.isfinite(found[key]).all():
+            values_of[key] = accessors.floats(index, kind).astype(np.float64)
+            if not np.isfinite(values_of[key]).all():
                 raise attributes.error(key, "its values must be finite")
-    counts = {len(values) for values in found.values()}
+    counts = {len(values) for values in values_of.values()}
     if len(counts) > 1:
         raise document.error(f"the accessors of {attributes.place} differ in length", rule="one element per copy")
     count = counts.pop() if counts else 1
-    rotations = found.get("ROTATION", np.tile([0.0, 0.0, 0.0, 1.0], (count, 1)))
+    rotations = values_of.get("ROTATION", np.tile([0.0, 0.0, 0.0, 1.0], (count, 1)))
     if not rotations.any(axis=1).all():
         raise _no_rotation(attributes, "ROTATION")
-    return compose(found.get("TRANSLATION", np.zeros((count, 3))), rotations, found.get("SCALE", np.ones((count, 3))))
+    return compose(
+        values_of.get("TRANSLATION", np.zeros((count, 3))), rotations, values_of.get("SCALE", np.ones((count, 3)))
+    )
 
 
 def compose(translations: Matrix, quaternions: Matrix, scales: Matrix) -> Matrix:
@@ -181,23 +183,23 @@ def compose(translations: Matrix, quaternions: Matrix, scales: Matrix) -> Matrix
 
 
 def ranks(matrices: Matrix) -> NDArray[np.int64]:
-    """How many dimensions each of ``(k, 4, 4)`` finite matrices leaves of a solid: 3, or 2 when it flattens it."""
+    """Ranks of the linear parts of finite matrices ``(k, 4, 4)``: 3, or 2 for one that flattens solids."""
     values = np.linalg.svd(matrices[:, :3, :3], compute_uv=False)
-    kept: NDArray[np.int64] = (values > _FLAT * values[:, :1]).sum(axis=1)
-    return kept
+    rank: NDArray[np.int64] = (values > _FLAT * values[:, :1]).sum(axis=1)
+    return rank
 
 
 def normal_matrices(linear: Matrix) -> Matrix:
-    """What turns normals when points are turned by ``(..., 3, 3)`` matrices, singular or not; lengths are not kept.
+    """Matrices that transform normals where ``linear`` ``(..., 3, 3)`` transforms points; lengths are not kept.
 
-    The matrix of cofactors is the inverse transpose times the determinant, whose sign must not count: a mirrored
-    body keeps its outside.
+    The matrix of cofactors is the inverse transpose times the determinant, and exists for singular matrices, too. The
+    determinant's sign is removed: a mirrored body keeps its outside.
     """
     first, second, third = linear[..., 0, :], linear[..., 1, :], linear[..., 2, :]
     cofactors = np.stack([np.cross(second, third), np.cross(third, first), np.cross(first, second)], axis=-2)
     determinants = (first * cofactors[..., 0, :]).sum(axis=-1)
-    turned: Matrix = np.where(determinants < 0.0, -1.0, 1.0)[..., None, None] * cofactors
-    return turned
+    matrices: Matrix = np.where(determinants < 0.0, -1.0, 1.0)[..., None, None] * cofactors
+    return matrices
 
 
 def rigid(matrix: Matrix) -> Matrix:

@@ -70,10 +70,10 @@ class Primitives:
         colors = self._vertex_data(attributes, "COLOR_0", storage.COLOR, len(positions))
         vertices = Geometry(positions, faces, normals, uvs, colors)
         if any(weights):
-            vertices = self._morphed(vertices, primitive, weights)
+            vertices = self._morph(vertices, primitive, weights)
         if skin is not None:
-            vertices = self._skinned(vertices, attributes, skin)
-        return self._cleaned(vertices, primitive)
+            vertices = self._skin(vertices, attributes, skin)
+        return self._clean(vertices, primitive)
 
     def _faces(self, primitive: Fields, mode: int, count: int) -> IndexArray:
         """Triangles ``(m, 3)`` of any of the three modes; those that name a vertex twice are left out."""
@@ -100,10 +100,10 @@ class Primitives:
         return faces if proper.all() else faces[proper]
 
     def _uvs(self, attributes: Fields, count: int) -> tuple[FloatArray, ...]:
-        found: list[FloatArray] = []
-        while (uvs := self._vertex_data(attributes, f"TEXCOORD_{len(found)}", storage.TEXCOORD, count)) is not None:
-            found.append(uvs)
-        return tuple(found)
+        sets: list[FloatArray] = []
+        while (uvs := self._vertex_data(attributes, f"TEXCOORD_{len(sets)}", storage.TEXCOORD, count)) is not None:
+            sets.append(uvs)
+        return tuple(sets)
 
     def _vertex_data(self, attributes: Fields, key: str, kind: Storage, count: int) -> FloatArray | None:
         """One attribute as float32, with as many elements as there are vertices; None where absent."""
@@ -118,7 +118,7 @@ class Primitives:
             )
         return index
 
-    def _morphed(self, vertices: Geometry, primitive: Fields, weights: tuple[float, ...]) -> Geometry:
+    def _morph(self, vertices: Geometry, primitive: Fields, weights: tuple[float, ...]) -> Geometry:
         """Vertices with the weighted changes of the morph targets added."""
         targets = primitive.children("targets")
         if len(targets) != len(weights):
@@ -127,7 +127,7 @@ class Primitives:
             )
         count = len(vertices.positions)
 
-        def changed(values: FloatArray, key: str, kind: Storage) -> FloatArray:
+        def apply_targets(values: FloatArray, key: str, kind: Storage) -> FloatArray:
             total = values
             for target, weight in zip(targets, weights, strict=True):
                 change = self._vertex_data(target, key, kind, count) if weight else None
@@ -139,14 +139,16 @@ class Primitives:
 
         with np.errstate(over="ignore", invalid="ignore"):  # positions are checked to be finite in the end
             return Geometry(
-                changed(vertices.positions, "POSITION", storage.POSITION_CHANGE),
+                apply_targets(vertices.positions, "POSITION", storage.POSITION_CHANGE),
                 vertices.faces,
-                None if vertices.normals is None else changed(vertices.normals, "NORMAL", storage.NORMAL_CHANGE),
-                tuple(changed(uvs, f"TEXCOORD_{i}", storage.TEXCOORD_CHANGE) for i, uvs in enumerate(vertices.uvs)),
-                None if vertices.colors is None else changed(vertices.colors, "COLOR_0", storage.COLOR_CHANGE),
+                None if vertices.normals is None else apply_targets(vertices.normals, "NORMAL", storage.NORMAL_CHANGE),
+                tuple(
+                    apply_targets(uvs, f"TEXCOORD_{i}", storage.TEXCOORD_CHANGE) for i, uvs in enumerate(vertices.uvs)
+                ),
+                None if vertices.colors is None else apply_targets(vertices.colors, "COLOR_0", storage.COLOR_CHANGE),
             )
 
-    def _skinned(self, vertices: Geometry, attributes: Fields, skin: Skin) -> Geometry:
+    def _skin(self, vertices: Geometry, attributes: Fields, skin: Skin) -> Geometry:
         """Vertices in the world, each placed by the joints that hold it."""
         count = len(vertices.positions)
         joint_sets: list[IndexArray] = []
@@ -169,7 +171,7 @@ class Primitives:
         faces = vertices.faces[:, ::-1] if mirrored else vertices.faces
         return Geometry(positions, np.ascontiguousarray(faces), normals, vertices.uvs, vertices.colors)
 
-    def _cleaned(self, vertices: Geometry, primitive: Fields) -> Geometry:
+    def _clean(self, vertices: Geometry, primitive: Fields) -> Geometry:
         """Only vertices that a triangle uses, all of them finite, with normals of unit length."""
         used = np.zeros(len(vertices.positions), bool)
         used[vertices.faces] = True
@@ -188,16 +190,16 @@ class Primitives:
             raise self.document.error(f"vertex {vertex} of {primitive.place} is not finite", rule="positions must be")
         normals = vertices.normals
         if normals is not None:
-            normals, mended = unit_normals(normals, vertices.positions, vertices.faces)
-            if mended:
+            normals, repaired = unit_normals(normals, vertices.positions, vertices.faces)
+            if repaired:
                 self.document.notes.add("normals without a direction were taken from the triangles", primitive.place)
-        uvs = tuple(self._finite(values, "texture coordinates", primitive) for values in vertices.uvs)
+        uvs = tuple(self._zero_nonfinite(values, "texture coordinates", primitive) for values in vertices.uvs)
         colors = vertices.colors
         if colors is not None:
-            colors = np.clip(self._finite(colors, "colours", primitive), 0.0, 1.0)
+            colors = np.clip(self._zero_nonfinite(colors, "colours", primitive), 0.0, 1.0)
         return Geometry(vertices.positions, vertices.faces, normals, uvs, colors)
 
-    def _finite(self, values: FloatArray, what: str, primitive: Fields) -> FloatArray:
+    def _zero_nonfinite(self, values: FloatArray, what: str, primitive: Fields) -> FloatArray:
         finite = np.isfinite(values)
         if finite.all():
             return values

@@ -1,4 +1,4 @@
-"""A glTF file into a scene description."""
+"""Reader of glTF files: a document becomes a scene description."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ class _Placements:
 
 @dataclass(frozen=True, eq=False)
 class Contents:
-    """A file taken apart: what is read once (bytes, materials), and what its nodes bring into the scene."""
+    """The content of a file: data that is read once (bytes, materials), and the objects that its nodes place."""
 
     document: Document
     accessors: Accessors
@@ -69,7 +69,7 @@ class Contents:
 
     @classmethod
     def of(cls, document: Document) -> Contents:
-        """Of a file as it stands at rest."""
+        """Contents of a file at rest."""
         buffers = Buffers(document)
         accessors = Accessors(document, buffers)
         materials = Materials(document, Textures(document, buffers))
@@ -77,7 +77,7 @@ class Contents:
         return cls(document, accessors, Nodes(document), meshes)
 
     def posed(self, nodes: list[Fields]) -> Contents:
-        """Of the same file with other ``nodes``; bytes, materials and meshes that no joint holds are not read again."""
+        """Contents of the same file with other ``nodes``; bytes, materials and meshes without skin are shared."""
         document = self.document.with_nodes(nodes)
         meshes = self.meshes.posed(document, Primitives(document, self.accessors))
         return Contents(document, self.accessors, Nodes(document), meshes)
@@ -92,7 +92,7 @@ class Contents:
         """
         for index, visible in self.nodes.shown():
             self._add(index, visible=visible)
-        meshes, instances = _placed(self.meshes.read, self.placements, self.document)
+        meshes, instances = _instantiate(self.meshes.read, self.placements, self.document)
         if not instances:
             raise self.document.error(
                 "the file shows no triangles", rule="a scene needs a mesh on a node of its default scene"
@@ -136,7 +136,7 @@ class Contents:
         self.placements.extend(_Placements(place, worlds, node) for place in places)
 
 
-def _placed(
+def _instantiate(
     meshes: list[Mesh], placements: list[_Placements], document: Document
 ) -> tuple[tuple[Mesh, ...], tuple[Instance, ...]]:
     """Meshes and their instances.
@@ -146,28 +146,28 @@ def _placed(
     reaches = [np.abs(mesh.positions).max(axis=0).astype(np.float64) for mesh in meshes]
     copies: list[Mesh] = []
     instances: list[Instance] = []
-    for placed, kept in zip(placements, _ranks(placements, document), strict=True):
-        farthest = np.abs(placed.worlds[:, :3, :3]) @ reaches[placed.mesh] + np.abs(placed.worlds[:, :3, 3])
+    for placement, copy_ranks in zip(placements, _ranks(placements, document), strict=True):
+        farthest = np.abs(placement.worlds[:, :3, :3]) @ reaches[placement.mesh] + np.abs(placement.worlds[:, :3, 3])
         if (farthest > np.finfo(np.float32).max).any():
             raise document.error(
-                f"{placed.node.place} puts its mesh beyond all bounds", rule="positions must be finite"
+                f"{placement.node.place} puts its mesh beyond all bounds", rule="positions must be finite"
             )
-        solid = kept == 3
+        solid = copy_ranks == 3
         if solid.any():
-            worlds = placed.worlds if solid.all() else placed.worlds[solid]
-            instances.append(Instance(placed.mesh, worlds[0] if len(worlds) == 1 else worlds))
-        for world, rank in zip(placed.worlds[~solid], kept[~solid], strict=True):
+            worlds = placement.worlds if solid.all() else placement.worlds[solid]
+            instances.append(Instance(placement.mesh, worlds[0] if len(worlds) == 1 else worlds))
+        for world, rank in zip(placement.worlds[~solid], copy_ranks[~solid], strict=True):
             if rank == 2:
                 instances.append(Instance(len(meshes) + len(copies), np.eye(4)))
-                copies.append(_flattened(meshes[placed.mesh], world))
+                copies.append(_flatten(meshes[placement.mesh], world))
             else:
-                document.notes.add("a mesh that is scaled to nothing is left out", placed.node.place)
+                document.notes.add("a mesh that is scaled to nothing is left out", placement.node.place)
     return (*meshes, *copies), tuple(instances)
 
 
 def _ranks(placements: list[_Placements], document: Document) -> list[NDArray[np.int64]]:
-    """The ranks of all matrices, found at one go, which many single ones would make slow."""
-    counts = np.array([len(placed.worlds) for placed in placements], np.int64)
+    """Ranks of all matrices, in one call because many single ones are slow."""
+    counts = np.array([len(placement.worlds) for placement in placements], np.int64)
     if counts.sum() > _MOST_INSTANCES:
         first = placements[int(np.argmax(np.cumsum(counts) > _MOST_INSTANCES))]
         raise document.error(
@@ -176,9 +176,10 @@ def _ranks(placements: list[_Placements], document: Document) -> list[NDArray[np
         )
     if not placements:
         return []
-    return np.split(ranks(np.concatenate([placed.worlds for placed in placements])), np.cumsum(counts)[:-1])
+    return np.split(ranks(np.concatenate([placement.worlds for placement in placements])), np.cumsum(counts)[:-1])
 
 
-def _flattened(mesh: Mesh, world: Matrix) -> Mesh:
+def _flatten(mesh: Mesh, world: Matrix) -> Mesh:
+    """The mesh in world coordinates."""
     positions = (mesh.positions @ world[:3, :3].T + world[:3, 3]).astype(np.float32)
     return replace(mesh, positions=positions, normals=None)

@@ -1,4 +1,4 @@
-"""Skins: where the joints stand that hold a mesh, what they do to its vertices and normals, and normals mended."""
+"""Skins: joint matrices, linear blend skinning of vertices and normals, and repair of normals."""
 
 from __future__ import annotations
 
@@ -84,12 +84,12 @@ def deform(
         for k in range(joints.shape[1]):
             blended += shares[:, k, None, None] * matrices[joints[:, k], :3]
         linear = blended[:, :, :3]
-        moved = np.einsum("nij,nj->ni", linear, positions) + blended[:, :, 3]
+        skinned = np.einsum("nij,nj->ni", linear, positions) + blended[:, :, 3]
         mirrored = bool((np.linalg.det(linear) < 0.0).mean() > 0.5)
-        turned = None
+        skinned_normals = None
         if normals is not None:
-            turned = np.einsum("nij,nj->ni", normal_matrices(linear), normals).astype(np.float32)
-        return moved.astype(np.float32), turned, mirrored
+            skinned_normals = np.einsum("nij,nj->ni", normal_matrices(linear), normals).astype(np.float32)
+        return skinned.astype(np.float32), skinned_normals, mirrored
 
 
 def unit_normals(normals: FloatArray, positions: FloatArray, faces: IndexArray) -> tuple[FloatArray, bool]:

@@ -1,11 +1,11 @@
-"""A glTF file that moves: its scene at any moment of one of its animations."""
+"""Animated glTF files: the scene at any time of one of the animations."""
 
 from __future__ import annotations
 
-import difflib
 from pathlib import Path
 
 from lippmann.errors import SceneError
+from lippmann.scene.parsing.name_hints import closest_name_hint
 from lippmann.scene.readers.gltf.document import check_extensions, open_document
 from lippmann.scene.readers.gltf.json_fields import Fields
 from lippmann.scene.readers.gltf.reader import Contents
@@ -14,7 +14,7 @@ from lippmann.scene.values.description import SceneDescription
 
 
 class MovingGltf:
-    """The file, opened once; bytes, pictures and meshes that stay the same are kept from moment to moment.
+    """An animated glTF file, opened once; bytes, images and meshes that do not change are shared by all times.
 
     Parameters
     ----------
@@ -26,7 +26,7 @@ class MovingGltf:
     Attributes
     ----------
     animation:
-        The one that is played.
+        The animation that is played.
 
     Raises
     ------
@@ -40,14 +40,14 @@ class MovingGltf:
         self._name = path.stem
         self._contents = Contents.of(document)
         self._at_rest = document.all("nodes")
-        self.animation = _chosen(read_animations(document, self._contents.accessors), animation, document.file)
+        self.animation = _choose(read_animations(document, self._contents.accessors), animation, document.file)
         known = len(document.root.children("animations"))
         if known > 1 and animation is None:
             document.notes.add(f"of {known} animations '{self.animation.name}' is played")
 
     @property
     def content(self) -> object:
-        """All that the animation is made of, as plain values; pictures beside the file are in the scene itself."""
+        """All values that the animation depends on, but for image files, which belong to the scene."""
         return self._contents.document.root.values, self._contents.accessors.buffers.all(), self.animation.name
 
     @property
@@ -65,16 +65,16 @@ class MovingGltf:
         """
         nodes = list(self._at_rest)
         for target, value in self.animation.at(seconds).items():
-            nodes[target[0]] = _moved(nodes[target[0]], target, value)
+            nodes[target[0]] = _replace_value(nodes[target[0]], target, value)
         self._contents = self._contents.posed(nodes)
         return self._contents.description(self._name)
 
 
-def _moved(node: Fields, target: Target, value: Floats) -> Fields:
+def _replace_value(node: Fields, target: Target, value: Floats) -> Fields:
     return Fields({**node.values, target[1]: value.tolist()}, node.place, node.file)
 
 
-def _chosen(animations: tuple[Animation, ...], name: str | None, file: str) -> Animation:
+def _choose(animations: tuple[Animation, ...], name: str | None, file: str) -> Animation:
     if not animations:
         raise SceneError("the file has no animation", where=file, fix="leave frames=... out")
     if name is None:
@@ -83,10 +83,9 @@ def _chosen(animations: tuple[Animation, ...], name: str | None, file: str) -> A
         if animation.name == name:
             return animation
     known = [animation.name for animation in animations]
-    close = difflib.get_close_matches(name, known, n=1)
     raise SceneError(
         f"no animation is named '{name}'",
         where=file,
         rule=f"the file has {', '.join(repr(one) for one in known)}",
-        fix=f"is '{close[0]}' meant?" if close else "",
+        fix=closest_name_hint(name, known),
     )

@@ -1,4 +1,4 @@
-"""Animations: what their channels say of the nodes at a moment (glTF 2.0, section 3.11 and appendix C)."""
+"""Animations: values of the nodes' properties at a time (glTF 2.0, section 3.11 and appendix C)."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Floats = NDArray[np.float64]
 Path = Literal["translation", "rotation", "scale", "weights"]
 Interpolation = Literal["LINEAR", "STEP", "CUBICSPLINE"]
 
-#: A node by its number, and what of it moves.
+#: Index of a node, and the property of it that is animated.
 Target = tuple[int, Path]
 
 _STORAGE: dict[str, Storage] = {
@@ -35,7 +35,7 @@ _CLOSE = 0.9995
 
 @dataclass(frozen=True, eq=False)
 class Sampler:
-    """Values between keys.
+    """Interpolated keyframes.
 
     Attributes
     ----------
@@ -64,9 +64,9 @@ class Sampler:
         length = float(self.times[after] - self.times[before])
         share = (seconds - float(self.times[before])) / length
         if self.interpolation == "CUBICSPLINE":
-            return self._unit(_hermite(self.values[before], self.values[after], share, length))
+            return self._unit(_interpolate_hermite(self.values[before], self.values[after], share, length))
         if self.turning:
-            return _along_arc(self._unit(self._value(before)), self._unit(self._value(after)), share)
+            return _slerp(self._unit(self._value(before)), self._unit(self._value(after)), share)
         return (1.0 - share) * self._value(before) + share * self._value(after)
 
     def _value(self, key: int) -> Floats:
@@ -81,19 +81,19 @@ class Sampler:
         return value / length if length > 0.0 else np.array([0.0, 0.0, 0.0, 1.0])
 
 
-def _hermite(before: Floats, after: Floats, share: float, length: float) -> Floats:
+def _interpolate_hermite(before: Floats, after: Floats, share: float, length: float) -> Floats:
     """Cubic Hermite spline between two keys ``(3, width)`` (appendix C.5)."""
     s, s2, s3 = share, share**2, share**3
-    found: Floats = (
+    value: Floats = (
         (2 * s3 - 3 * s2 + 1) * before[1]
         + length * (s3 - 2 * s2 + s) * before[2]
         + (-2 * s3 + 3 * s2) * after[1]
         + length * (s3 - s2) * after[0]
     )
-    return found
+    return value
 
 
-def _along_arc(before: Floats, after: Floats, share: float) -> Floats:
+def _slerp(before: Floats, after: Floats, share: float) -> Floats:
     """Spherical linear interpolation of unit quaternions, the shorter way round (appendix C.4)."""
     cosine = float(before @ after)
     if cosine < 0.0:
@@ -102,13 +102,13 @@ def _along_arc(before: Floats, after: Floats, share: float) -> Floats:
         blended = (1.0 - share) * before + share * after
         return blended / float(np.linalg.norm(blended))
     angle = float(np.arccos(min(cosine, 1.0)))
-    found: Floats = (np.sin((1.0 - share) * angle) * before + np.sin(share * angle) * after) / np.sin(angle)
-    return found
+    value: Floats = (np.sin((1.0 - share) * angle) * before + np.sin(share * angle) * after) / np.sin(angle)
+    return value
 
 
 @dataclass(frozen=True, eq=False)
 class Animation:
-    """One animation of a file: a sampler for everything that moves."""
+    """One animation of a file: a sampler for each target."""
 
     name: str
     samplers: Mapping[Target, Sampler]
@@ -119,7 +119,7 @@ class Animation:
         return max((float(sampler.times[-1]) for sampler in self.samplers.values()), default=0.0)
 
     def at(self, seconds: float) -> dict[Target, Floats]:
-        """What moves, at a time."""
+        """Values of all targets at a time."""
         return {target: sampler.at(seconds) for target, sampler in self.samplers.items()}
 
 
@@ -140,7 +140,7 @@ def read_animations(document: Document, accessors: Accessors) -> tuple[Animation
 
 
 def _read(fields: Fields, number: int, document: Document, accessors: Accessors) -> Animation:
-    found: dict[Target, Sampler] = {}
+    by_target: dict[Target, Sampler] = {}
     samplers = fields.children("samplers")
     for channel in fields.children("channels"):
         target = channel.child("target")
@@ -161,10 +161,10 @@ def _read(fields: Fields, number: int, document: Document, accessors: Accessors)
         if index >= len(samplers):
             raise channel.error("sampler", f"there are {len(samplers)} samplers, counted from 0")
         key: Target = (node, path)  # type: ignore[assignment]
-        if key in found:
+        if key in by_target:
             raise target.error("path", f"another channel moves the {path} of nodes[{node}]")
-        found[key] = _read_sampler(samplers[index], path, document, accessors)
-    return Animation(fields.text("name") or f"animations[{number}]", found)
+        by_target[key] = _read_sampler(samplers[index], path, document, accessors)
+    return Animation(fields.text("name") or f"animations[{number}]", by_target)
 
 
 def _read_sampler(fields: Fields, path: str, document: Document, accessors: Accessors) -> Sampler:

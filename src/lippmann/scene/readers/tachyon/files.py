@@ -47,7 +47,7 @@ class SceneFiles:
             name = os.path.relpath(holder.parent / name, self.folder)
         return resolve(self.folder, name, where=where, what=what, allow_outside=self._allow_outside)
 
-    def shown(self, path: Path) -> str:
+    def relative_name(self, path: Path) -> str:
         """A file's name as errors give it: seen from the scene's folder."""
         return Path(os.path.relpath(path, self.folder)).as_posix()
 
@@ -59,11 +59,13 @@ class SceneFiles:
         SceneError
             The file is unreadable, empty or not text, or one file too many.
         """
-        words = Words.of_file(path, self.shown(path), comment=comment, single=True)
+        words = Words.of_file(path, self.relative_name(path), comment=comment, single=True)
         self._words_left -= words.left
         if self._words_left < 0:
             raise SceneError(
-                f"'{self.shown(path)}' is one file too many", where=where, rule=f"at most {_MOST_WORDS} words in all"
+                f"'{self.relative_name(path)}' is one file too many",
+                where=where,
+                rule=f"at most {_MOST_WORDS} words in all",
             )
         return words
 

@@ -195,7 +195,7 @@ class _SceneReader:
         path = self._files.find(
             words.name("the name of a file"), self._open_files[-1], where=where, what="included file"
         )
-        shown = self._files.shown(path)
+        shown = self._files.relative_name(path)
         if any(path.samefile(other) for other in self._open_files):
             raise SceneError(f"'{shown}' includes itself", where=where, rule="includes may not run in a circle")
         self._includes += 1

@@ -158,11 +158,11 @@ class ShapeReader:
             inner.integer(3, 3)
             corners.append(inner.numbers(3, 3))
         if corners:
-            turned = (np.array(corners) * scale) @ _rotation(turn).T + center
-            self._triangles(turned[:, [1, 0, 2]], material, None, None)
+            triangles = (np.array(corners) * scale) @ _rotation(turn).T + center
+            self._triangles(triangles[:, [1, 0, 2]], material, None, None)
 
     def finish(self) -> None:
-        """Hands all rows to the builder, and notes what was left out."""
+        """Hand all rows to the builder, and note the primitives left out."""
         build = self._builder
         for kind, rows in self._rows.items():
             table = np.array(rows, np.float64)
@@ -217,16 +217,16 @@ class ShapeReader:
         colors: Numbers | None,
         clip_group: NDArray[np.int32] | None = None,
     ) -> None:
-        """Adds triangles without those that have no extent."""
+        """Add triangles without those that have no extent."""
         edges = corners - np.roll(corners, 1, axis=1)
-        kept = (np.linalg.norm(edges, axis=2) >= _SHORTEST_EDGE).all(axis=1)
-        self._visible(bool(kept.all()), "triangles with corners that coincide", int((~kept).sum()))
+        proper = (np.linalg.norm(edges, axis=2) >= _SHORTEST_EDGE).all(axis=1)
+        self._visible(bool(proper.all()), "triangles with corners that coincide", int((~proper).sum()))
         self._builder.triangles(
-            corners[kept],
-            np.broadcast_to(material, len(corners))[kept],
-            normals=None if normals is None else normals[kept],
-            colors=None if colors is None else colors[kept],
-            clip_group=np.broadcast_to(self.clip_group if clip_group is None else clip_group, len(corners))[kept],
+            corners[proper],
+            np.broadcast_to(material, len(corners))[proper],
+            normals=None if normals is None else normals[proper],
+            colors=None if colors is None else colors[proper],
+            clip_group=np.broadcast_to(self.clip_group if clip_group is None else clip_group, len(corners))[proper],
         )
 
 
