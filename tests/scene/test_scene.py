@@ -7,7 +7,15 @@ import pytest
 
 from lippmann.errors import SceneError
 from lippmann.scene import scene as scene_module
-from lippmann.scene.scene import STUDIO_NOTE, Scene, bounds_of, checked, find_camera, framing_camera, lit
+from lippmann.scene.scene import (
+    STUDIO_NOTE,
+    Scene,
+    bounds_of,
+    check_description,
+    find_camera,
+    framing_camera,
+    override_light,
+)
 from lippmann.scene.studio_light import BACKDROP, studio
 from lippmann.scene.values.description import Camera, Environment, Instance, Light, Material, Mesh, SceneDescription
 
@@ -98,10 +106,10 @@ def test_light_that_does_not_count():
 
 def test_the_callers_light_takes_the_place_of_the_files():
     sky = Environment(np.ones((2, 4, 3), np.float32))
-    scene = Scene("s", lit(describe(environment=studio(), background=(1, 0, 0)), sky, (0, 0, 0)))
+    scene = Scene("s", override_light(describe(environment=studio(), background=(1, 0, 0)), sky, (0, 0, 0)))
     assert scene.environment is sky
     assert scene.background == (0, 0, 0)
-    scene = Scene("s", lit(describe(), None, (0, 1, 0)))
+    scene = Scene("s", override_light(describe(), None, (0, 1, 0)))
     assert (scene.background, scene.environment) == ((0, 1, 0), studio())
 
 
@@ -165,7 +173,7 @@ def test_boxes_that_are_none(bounds, message):
 )
 def test_unsound_descriptions(description, message):
     with pytest.raises(SceneError, match=message) as caught:
-        checked(description, "f")
+        check_description(description, "f")
     assert "\n" not in str(caught.value)
 
 

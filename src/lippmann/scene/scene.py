@@ -274,7 +274,7 @@ def has_lights(description: SceneDescription) -> bool:
     )
 
 
-def checked(description: SceneDescription, where: str) -> SceneDescription:
+def check_description(description: SceneDescription, where: str) -> SceneDescription:
     """Check a description and return it.
 
     Raises
@@ -328,10 +328,10 @@ def _check_material(material: Material, where: str) -> None:
         )
 
 
-def lit(
+def override_light(
     description: SceneDescription | MitsubaSource, environment: Environment | None, background: Color | None
 ) -> SceneDescription | MitsubaSource:
-    """The description with the caller's environment and background, where given, in place of its own."""
+    """The description with its environment and background replaced, where others are given."""
     if environment is not None:
         description = replace(description, environment=environment)
     if background is not None:

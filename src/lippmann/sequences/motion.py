@@ -14,7 +14,7 @@ import numpy as np
 from lippmann.errors import UsageError
 from lippmann.scene.placement import Bounds
 from lippmann.scene.readers.load import kind_of_file, load_scene
-from lippmann.scene.scene import Scene, checked, find_camera, lit
+from lippmann.scene.scene import Scene, check_description, find_camera, override_light
 from lippmann.scene.values.description import Camera, Environment
 from lippmann.scene.values.whitted_camera import CameraPose
 from lippmann.scene.values.whitted_scene import ClassicScene
@@ -113,9 +113,9 @@ class GltfMotion(Motion):
         return np.stack([np.min(boxes, axis=0)[0], np.max(boxes, axis=0)[1]])
 
     def _at(self, seconds: float) -> Scene:
-        description = checked(self._moving.at(seconds), self._file)
+        description = check_description(self._moving.at(seconds), self._file)
         physical = self._first.physical
-        return replace(self._first, description=lit(description, physical.environment, physical.background))
+        return replace(self._first, description=override_light(description, physical.environment, physical.background))
 
 
 class Flight(Motion):

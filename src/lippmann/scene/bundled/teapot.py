@@ -75,8 +75,8 @@ def pot_from_newell() -> Matrix:
 def tiles(*, light: bool) -> tuple[NDArray[np.float64], NDArray[np.uint32]]:
     """Return the floor's light or dark tiles as triangles facing up: positions ``(4 t, 3)``, faces ``(2 t, 3)``."""
     row, column = np.divmod(np.arange(LAYOUT.rows * LAYOUT.columns), LAYOUT.columns)
-    chosen = (row + column) % 2 == (0 if light else 1)
-    corner = np.stack([column - LAYOUT.columns / 2, np.zeros(len(row)), row - LAYOUT.rows / 2], axis=1)[chosen]
+    mask = (row + column) % 2 == (0 if light else 1)
+    corner = np.stack([column - LAYOUT.columns / 2, np.zeros(len(row)), row - LAYOUT.rows / 2], axis=1)[mask]
     around = np.array([(0, 0, 0), (0, 0, 1), (1, 0, 1), (1, 0, 0)])
     positions = (corner[:, None, :] + around) * LAYOUT.tile + (0.0, 0.0, LAYOUT.floor_shift)
     faces = 4 * np.arange(len(corner))[:, None, None] + np.array([(0, 1, 2), (0, 2, 3)])

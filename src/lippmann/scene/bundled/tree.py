@@ -83,12 +83,12 @@ def grow(layout: Layout = LAYOUT) -> Branches:
     base, direction = np.zeros((1, 3)), np.array([(0.0, 1.0, 0.0)])
     side = np.array([(np.cos(turn), 0.0, np.sin(turn))])
     length, radius = np.full(1, layout.trunk), layout.radius
-    grown: list[tuple[Points, Points, Points, Points]] = []
+    generations: list[tuple[Points, Points, Points, Points]] = []
     count = 0
     for _ in range(layout.generations):
         apex = base + direction * length[:, None]
         tip = radius * layout.taper
-        grown.append((base, apex, np.full(len(base), radius), np.full(len(base), tip)))
+        generations.append((base, apex, np.full(len(base), radius), np.full(len(base), tip)))
         golden = GOLDEN_ANGLE * (count + np.arange(len(base)))
         count += len(base)
         third = np.cross(direction, side)
@@ -101,7 +101,7 @@ def grow(layout: Layout = LAYOUT) -> Branches:
         direction, side = children.reshape(-1, 3), sides.reshape(-1, 3)
         length = (length[:, None] * layout.lengths).reshape(-1)
         radius = tip
-    return Branches(*(np.concatenate(column) for column in zip(*grown, strict=True)))
+    return Branches(*(np.concatenate(column) for column in zip(*generations, strict=True)))
 
 
 def make() -> ClassicScene:

@@ -1,4 +1,4 @@
-"""Arithmetic on the texels of images: channels taken, packed, and heights turned into normals."""
+"""Arithmetic on the texels of images: channels extracted and packed, and normal maps made of height maps."""
 
 from __future__ import annotations
 
@@ -33,14 +33,14 @@ def scalar(image: Image, channel: str) -> Plane:
     return np.asarray(pixels[..., :3] @ np.array([0.2126, 0.7152, 0.0722], np.float32), np.float32)
 
 
-def packed(*planes: Plane | None, name: str) -> Image:
+def pack_channels(*planes: Plane | None, name: str) -> Image:
     """An RGB image of three planes, white where a plane is None; smaller planes are enlarged to the largest."""
-    given = [plane for plane in planes if plane is not None]
-    height, width = max(plane.shape[0] for plane in given), max(plane.shape[1] for plane in given)
+    present = [plane for plane in planes if plane is not None]
+    height, width = max(plane.shape[0] for plane in present), max(plane.shape[1] for plane in present)
     pixels = np.ones((height, width, 3), np.float32)
     for channel, plane in enumerate(planes):
         if plane is not None:
-            pixels[..., channel] = resized(plane, (height, width))
+            pixels[..., channel] = resize(plane, (height, width))
     return Image(name, pixels)
 
 
@@ -50,7 +50,7 @@ def with_alpha(image: Image | None, alpha: Plane, name: str) -> Image:
     if color.shape[2] == 1:
         color = np.repeat(color, 3, axis=2)
     shape = (max(color.shape[0], alpha.shape[0]), max(color.shape[1], alpha.shape[1]))
-    planes = [resized(plane, shape) for plane in (*np.moveaxis(color[..., :3], -1, 0), alpha)]
+    planes = [resize(plane, shape) for plane in (*np.moveaxis(color[..., :3], -1, 0), alpha)]
     coded = np.rint(np.stack(planes, axis=-1) * 255.0).astype(np.uint8)
     return Image(image.name if image else name, coded)
 
@@ -60,8 +60,8 @@ def without_alpha(image: Image) -> Image:
     return replace(image, pixels=np.ascontiguousarray(image.pixels[..., :3]))
 
 
-def resized(plane: Plane, shape: tuple[int, int]) -> Plane:
-    """``plane`` in another size, bilinear."""
+def resize(plane: Plane, shape: tuple[int, int]) -> Plane:
+    """``plane`` resampled to ``shape`` by bilinear interpolation."""
     if plane.shape == shape:
         return plane
     from PIL import Image as Pillow

@@ -104,8 +104,8 @@ class Words:
         word = self._words[index] if index < self._count else ""
         if len(word) > _LONGEST_SHOWN:
             word = word[:_LONGEST_SHOWN] + "..."
-        shown = "".join(c if c.isprintable() else ascii(c)[1:-1] for c in word)
-        what = f"found '{shown}'" if word else "the file ends too early"
+        text = "".join(c if c.isprintable() else ascii(c)[1:-1] for c in word)
+        what = f"found '{text}'" if word else "the file ends too early"
         return SceneError(what, where=self.place(back), rule=f"expected {expected}", fix=fix)
 
     def keyword(self, name: str) -> None:

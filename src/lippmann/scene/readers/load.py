@@ -13,7 +13,7 @@ from lippmann.errors import SceneError, UsageError
 from lippmann.scene.mitsuba_source import MitsubaSource
 from lippmann.scene.parsing.files import read_bytes
 from lippmann.scene.parsing.name_hints import closest_name_hint
-from lippmann.scene.scene import Scene, checked, lit
+from lippmann.scene.scene import Scene, check_description, override_light
 from lippmann.scene.values.description import Camera, Color, Environment, SceneDescription
 from lippmann.scene.values.whitted_lighting import Background
 from lippmann.scene.values.whitted_scene import ClassicScene
@@ -81,7 +81,7 @@ def load_scene(
     if scene.is_classic and sky is None:
         return replace(scene, studio=studio)
     # The classic light models know no surroundings: who asks for them gets the physical form.
-    return replace(scene, description=lit(scene.physical, sky, color), studio=studio)
+    return replace(scene, description=override_light(scene.physical, sky, color), studio=studio)
 
 
 def known_suffixes() -> tuple[str, ...]:
@@ -134,7 +134,7 @@ def _from_name(source: str | Path, allow_outside: bool) -> Scene:
     if isinstance(description, ClassicScene):
         return _classic(description, world_camera(description))
     if isinstance(description, SceneDescription):
-        checked(description, path.name)
+        check_description(description, path.name)
     return Scene(description.name, description)
 
 
@@ -153,7 +153,7 @@ def _from_library(name: str) -> Scene:
     classic = replace(classic, camera=replace(classic.camera, ray_depth=_PAPER_DEPTH))
     if isinstance(content, ClassicScene):
         return _classic(classic, bundled.stage_of(name).camera())
-    description = checked(content, name)
+    description = check_description(content, name)
     home = description.cameras[0].name if description.cameras else None
     return Scene(name, description, home_camera=home, classic=classic)
 
@@ -168,7 +168,7 @@ def _from_object(source: object) -> Scene:
     if isinstance(source, ClassicScene):
         return _classic(source, world_camera(source))
     if isinstance(source, SceneDescription):
-        return Scene(source.name, checked(source, source.name))
+        return Scene(source.name, check_description(source, source.name))
     if isinstance(source, MitsubaSource):
         return Scene(source.name, source)
     if isinstance(source, Mapping):
@@ -186,7 +186,7 @@ def _from_object(source: object) -> Scene:
             rule="a path, a bundled scene's name, or a scene of Mitsuba, trimesh or PyVista is",
         )
     description = adapter(source)
-    return Scene(description.name, checked(description, description.name))
+    return Scene(description.name, check_description(description, description.name))
 
 
 def _environment(environment: str | Path | Environment | None) -> Environment | None:

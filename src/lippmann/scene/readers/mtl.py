@@ -1,4 +1,4 @@
-"""Material libraries (``.mtl``) taken apart: statements and their arguments, not yet their meaning.
+"""Parser of material libraries (``.mtl``): statements and their arguments, without their meaning.
 
 Formats: Wavefront, "MTL material format" (1995), and the physically based additions that Blender and others write
 (Pr, Pm, Ps, Pc, Pcr and their maps).
@@ -33,9 +33,9 @@ _NUMBERS = {
 }
 _MAPS = {"map_kd", "map_ks", "map_ke", "map_ns", "map_d", "map_tr", "map_pr", "map_pm", "map_ps", "map_pc", "map_pcr"}
 _MAPS |= {"bump", "norm"}
-_SAME = {"map_bump": "bump", "map_norm": "norm", "norm_map": "norm", "map_opacity": "map_d", "pcr_map": "map_pcr"}
+_ALIASES = {"map_bump": "bump", "map_norm": "norm", "norm_map": "norm", "map_opacity": "map_d", "pcr_map": "map_pcr"}
 # Ambient light and its map belong to a model of light in which light does not bounce; the rest are switches.
-_MEANINGLESS = {"ka", "map_ka", "map_aat", "sharpness", "km"}
+_NO_EFFECT = {"ka", "map_ka", "map_aat", "sharpness", "km"}
 # option -> arguments it takes: least, most
 _OPTIONS = {
     "-blendu": (1, 1),
@@ -71,12 +71,12 @@ class MapReference:
 
 @dataclass
 class MtlRecord:
-    """One material as written: numbers and maps by keyword in lower case, and the keywords left unread."""
+    """One material as written: numbers and maps by keyword in lower case, and the keywords that are ignored."""
 
     name: str
     numbers: dict[str, tuple[float, ...]] = field(default_factory=dict)
     maps: dict[str, MapReference] = field(default_factory=dict)
-    unread: list[str] = field(default_factory=list)
+    ignored: list[str] = field(default_factory=list)
 
     def scalar(self, key: str, default: float) -> float:
         return self.numbers[key][0] if key in self.numbers else default
@@ -109,7 +109,7 @@ def parse_mtl(path: Path) -> dict[str, MtlRecord]:
         elif current is None:
             raise SceneError(f"'{words[0][:40]}' before any newmtl", where=where, fix="is it an MTL file?")
         else:
-            _read_statement(current, _SAME.get(key, key), words[0], body, where)
+            _read_statement(current, _ALIASES.get(key, key), words[0], body, where)
     return records
 
 
@@ -117,19 +117,19 @@ def _read_statement(record: MtlRecord, key: str, written: str, body: str, where:
     if key in _NUMBERS:
         values = _numbers(body, key, written, where)
         if values is None:
-            record.unread.append(written)
+            record.ignored.append(written)
         else:
             record.numbers[key] = values
     elif key == "d":
         words = body.split("#", 1)[0].split()
         if words[:1] == ["-halo"]:  # fades towards the silhouette: a trick of shading, not of light
-            record.unread.append("d -halo")
+            record.ignored.append("d -halo")
         else:
             record.numbers["d"] = _finite(words[:1], written, where)
     elif key in _MAPS:
         record.maps[key] = _map(body, written, where)
-    elif key not in _MEANINGLESS:
-        record.unread.append(written)
+    elif key not in _NO_EFFECT:
+        record.ignored.append(written)
 
 
 def _numbers(body: str, key: str, written: str, where: str) -> tuple[float, ...] | None:
@@ -161,15 +161,15 @@ def _map(body: str, written: str, where: str) -> MapReference:
         if option not in _OPTIONS:
             break  # a file name may begin with "-"
         least, most = _OPTIONS[option]
-        taken = 0
+        count = 0
         # At least one word must be left for the name.
-        while taken < most and taken + 2 < len(words) and (taken < least or _is_number(words[taken + 1])):
-            taken += 1
-        arguments = tuple(words[1 : 1 + taken])
-        if taken < least or (option in _NUMERIC_OPTIONS and not all(_is_number(word) for word in arguments)):
+        while count < most and count + 2 < len(words) and (count < least or _is_number(words[count + 1])):
+            count += 1
+        arguments = tuple(words[1 : 1 + count])
+        if count < least or (option in _NUMERIC_OPTIONS and not all(_is_number(word) for word in arguments)):
             raise SceneError(f"'{written} {body[:60]}'", where=where, rule=f"{option} takes {least} to {most} values")
         options[option] = arguments
-        rest = rest.split(None, 1 + taken)[-1]
+        rest = rest.split(None, 1 + count)[-1]
     if not rest:
         raise SceneError(f"{written} without a file", where=where)
     return MapReference(rest, where, options)

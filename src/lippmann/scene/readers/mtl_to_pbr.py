@@ -50,8 +50,8 @@ class MaterialMapper:
         SceneError
             A texture is missing or damaged; the error names the file and line that ask for it.
         """
-        if record.unread:
-            self._note(record, f"not honoured: {', '.join(dict.fromkeys(record.unread))}")
+        if record.ignored:
+            self._note(record, f"not honoured: {', '.join(dict.fromkeys(record.ignored))}")
         illum = int(record.scalar("illum", 2))
         diffuse = self._tint(record, "kd", "map_kd", 0.8)
         material = Material(
@@ -85,13 +85,13 @@ class MaterialMapper:
             return replace(
                 material,
                 metallic=1.0,
-                base_color=_clipped(color),
+                base_color=_clip(color),
                 base_color_texture=self._color_map(record, "map_ks"),
             )
         return replace(
             material,
             specular=min(strength / _ORDINARY_SPECULAR, 1.0),
-            specular_color=_clipped((color[0] / strength, color[1] / strength, color[2] / strength)),
+            specular_color=_clip((color[0] / strength, color[1] / strength, color[2] / strength)),
             specular_color_texture=self._color_map(record, "map_ks"),
         )
 
@@ -113,7 +113,7 @@ class MaterialMapper:
             dark = max(material.base_color) <= _BLACK
             return replace(
                 material,
-                base_color=_clipped(tint) if dark else material.base_color,
+                base_color=_clip(tint) if dark else material.base_color,
                 base_color_texture=texture,
                 transmission=1.0 - opacity if opacity < 1.0 else min(max(tint), 1.0),
                 thickness=1.0 if illum in _REFRACTING else 0.0,
@@ -176,7 +176,7 @@ class MaterialMapper:
         if reference is None:
             return None
         return replace(
-            self._texture(reference, srgb=False), image=texture_maps.packed(None, *planes, name=reference.file)
+            self._texture(reference, srgb=False), image=texture_maps.pack_channels(None, *planes, name=reference.file)
         )
 
     def _color_map(self, record: MtlRecord, key: str) -> Texture | None:
@@ -190,7 +190,7 @@ class MaterialMapper:
         texture = self._texture(reference, srgb=False)
         plane = texture_maps.scalar(texture.image, _channel(reference))
         planes = [plane if index == channel else None for index in range(3)]
-        return replace(texture, image=texture_maps.packed(*planes, name=reference.file))
+        return replace(texture, image=texture_maps.pack_channels(*planes, name=reference.file))
 
     def _tint(self, record: MtlRecord, key: str, map_key: str, default: float, *, clip: bool = True) -> Color:
         """A factor. One of zero beside its map would hide the map, which no exporter that writes it means."""
@@ -199,7 +199,7 @@ class MaterialMapper:
             color = (1.0, 1.0, 1.0)
         if clip and max(color) > 1.0:
             self._note(record, f"{key.capitalize()} above 1 is taken as 1")
-        return _clipped(color, 1.0 if clip else np.inf)
+        return _clip(color, 1.0 if clip else np.inf)
 
     def _texture(self, reference: MapReference, *, srgb: bool) -> Texture:
         path = resolve(
@@ -207,11 +207,11 @@ class MaterialMapper:
         )
         if path not in self._images:
             self._images[path] = read_image(path, where=reference.where)
-        unread = sorted(set(reference.options) & {"-mm", "-t", "-cc"})
-        if unread:
-            self._note_once(f"{reference.where}: not honoured: {', '.join(unread)}")
-        clamped = reference.options.get("-clamp", ("off",))[0].lower() == "on"
-        wrap: Wrap = "clamp" if clamped else "repeat"
+        ignored = sorted(set(reference.options) & {"-mm", "-t", "-cc"})
+        if ignored:
+            self._note_once(f"{reference.where}: not honoured: {', '.join(ignored)}")
+        is_clamped = reference.options.get("-clamp", ("off",))[0].lower() == "on"
+        wrap: Wrap = "clamp" if is_clamped else "repeat"
         return Texture(
             image=self._images[path], srgb=srgb, wrap_u=wrap, wrap_v=wrap, uv_transform=_uv_transform(reference)
         )
@@ -224,7 +224,7 @@ class MaterialMapper:
             self.notes.append(note)
 
 
-def _clipped(color: Color, top: float = 1.0) -> Color:
+def _clip(color: Color, top: float = 1.0) -> Color:
     red, green, blue = (min(max(value, 0.0), top) for value in color)
     return (red, green, blue)
 

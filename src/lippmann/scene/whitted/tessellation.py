@@ -115,8 +115,8 @@ def _spheres(scene: ClassicScene, rows: Indices) -> Arrays:
     batch: Spheres = scene.spheres
     level = next((n for n in range(_FINEST_SPHERE, 0, -1) if len(batch) * 20 * 4**n <= _BUDGET), 1)
     points, faces = icosphere(level)
-    placed = batch.centers[rows, None] + points * batch.radii[rows, None, None]
-    positions, all_faces = _merge_copies(placed, faces)
+    copies = batch.centers[rows, None] + points * batch.radii[rows, None, None]
+    positions, all_faces = _merge_copies(copies, faces)
     return positions, all_faces, np.tile(points, (len(rows), 1))
 
 
@@ -233,9 +233,9 @@ def _boxes(scene: ClassicScene, rows: Indices) -> Arrays:
     points = scene.boxes.corners()[rows]
     sides = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
     # Corners are not shared, so that a face keeps its own pictures.
-    placed = points[:, [corner for side in sides for corner in side]]
+    corners = points[:, [corner for side in sides for corner in side]]
     faces = np.concatenate([np.array([(0, 1, 2), (0, 2, 3)]) + 4 * n for n in range(6)])
-    positions, all_faces = _merge_copies(placed, faces)
+    positions, all_faces = _merge_copies(corners, faces)
     return positions, all_faces, None
 
 

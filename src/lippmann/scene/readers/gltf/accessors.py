@@ -112,18 +112,20 @@ class Accessors:
         if fields.text("type") not in storage.shapes:
             raise fields.error("type", f"{' or '.join(storage.shapes)} belongs here")
         component = fields.integer("componentType")
-        marked = fields.flag("normalized")
+        is_normalized = fields.flag("normalized")
         plain, normalized = storage.plain, storage.normalized
         if self._is_quantized:
             plain, normalized = plain | storage.quantized_plain, normalized | storage.quantized_normalized
         # Marking floats as normalised is an error that changes nothing.
-        if component in plain and (not marked or component == _FLOAT):
+        if component in plain and (not is_normalized or component == _FLOAT):
             return False
-        if component in normalized and (marked or storage.always_normalized):
+        if component in normalized and (is_normalized or storage.always_normalized):
             return True
         allowed = [_COMPONENT_NAMES[code] for code in sorted(plain)]
         allowed += [f"normalised {_COMPONENT_NAMES[code]}" for code in sorted(normalized)]
-        raise fields.error("componentType", f"{', '.join(allowed)} belongs here (normalized is {str(marked).lower()})")
+        raise fields.error(
+            "componentType", f"{', '.join(allowed)} belongs here (normalized is {str(is_normalized).lower()})"
+        )
 
     @property
     def _is_quantized(self) -> bool:

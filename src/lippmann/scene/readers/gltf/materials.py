@@ -205,16 +205,16 @@ class Materials:
         self, fields: Fields, key: str, default: tuple[float, ...], *, most: float = 1.0
     ) -> tuple[float, ...]:
         values = fields.numbers(key, len(default))
-        return default if values is None else tuple(self._limited(fields, value, most) for value in values)
+        return default if values is None else tuple(self._clamp(fields, value, most) for value in values)
 
     def _fraction(self, fields: Fields, key: str, default: float) -> float:
-        return self._limited(fields, fields.number(key, default), 1.0)
+        return self._clamp(fields, fields.number(key, default), 1.0)
 
-    def _limited(self, fields: Fields, value: float, most: float) -> float:
-        limited = min(max(value, 0.0), most)
-        if limited != value:
+    def _clamp(self, fields: Fields, value: float, most: float) -> float:
+        clamped = min(max(value, 0.0), most)
+        if clamped != value:
             self.document.notes.add("material factors outside [0, 1] were cut to it", fields.place)
-        return limited
+        return clamped
 
 
 def _with_specular_glossiness(

@@ -1,4 +1,4 @@
-"""The node tree: which nodes are shown, where each stands in the world, and the 4x4 matrices (float64) that say so."""
+"""The node hierarchy: traversal of the default scene, and world matrices (4x4 float64)."""
 
 from __future__ import annotations
 
@@ -42,8 +42,8 @@ class Nodes:
                     )
                 self._parents[child] = index
 
-    def shown(self) -> Iterator[tuple[int, bool]]:
-        """The nodes of the default scene, parents first, and whether what they carry is visible.
+    def traverse(self) -> Iterator[tuple[int, bool]]:
+        """The nodes of the default scene, parents first, and whether each is visible.
 
         Without a default scene it is the first one; without any scene, all nodes.
         """

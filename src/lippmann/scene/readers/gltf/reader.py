@@ -90,7 +90,7 @@ class Contents:
         SceneError
             See :func:`read_gltf`.
         """
-        for index, visible in self.nodes.shown():
+        for index, visible in self.nodes.traverse():
             self._add(index, visible=visible)
         meshes, instances = _instantiate(self.meshes.read, self.placements, self.document)
         if not instances:

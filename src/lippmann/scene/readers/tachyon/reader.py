@@ -195,13 +195,13 @@ class _SceneReader:
         path = self._files.find(
             words.name("the name of a file"), self._open_files[-1], where=where, what="included file"
         )
-        shown = self._files.relative_name(path)
+        included = self._files.relative_name(path)
         if any(path.samefile(other) for other in self._open_files):
-            raise SceneError(f"'{shown}' includes itself", where=where, rule="includes may not run in a circle")
+            raise SceneError(f"'{included}' includes itself", where=where, rule="includes may not run in a circle")
         self._includes += 1
         if len(self._open_files) > _DEEPEST_INCLUDE or self._includes > _MOST_INCLUDES:
             limits = f"at most {_DEEPEST_INCLUDE} deep and {_MOST_INCLUDES} in all"
-            raise SceneError(f"'{shown}' is one include too many", where=where, rule=limits)
+            raise SceneError(f"'{included}' is one include too many", where=where, rule=limits)
         self._read_items(self._files.words(path, comment=_COMMENT, where=where), path)
 
     def _read_camera(self, words: Words) -> None:

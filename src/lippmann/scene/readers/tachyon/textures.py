@@ -59,12 +59,12 @@ class TextureTable:
     def define(self, words: Words, holder: Path) -> None:
         """``TEXDEF name <body>``."""
         name = words.name("a name for the texture")
-        self._keep(name, self.body(words, holder), words)
+        self._store(name, self.body(words, holder), words)
 
     def alias(self, words: Words) -> None:
         """``TEXALIAS newname oldname``."""
         name = words.name("a name for the texture")
-        self._keep(name, self._named(words), words)
+        self._store(name, self._named(words), words)
 
     def body(self, words: Words, holder: Path) -> int:
         """A texture body with colour and function."""
@@ -102,11 +102,11 @@ class TextureTable:
         self._images[name] = self._builder.image(image)
 
     def finish(self) -> None:
-        """Notes what was assumed, in one line per kind of remark."""
+        """Note assumptions, in one line per kind of remark."""
         for remark, places in self._remarks.items():
-            shown = ", ".join(f"'{name}' ({where})" for name, where in islice(places.items(), _MOST_NAMES))
+            listed = ", ".join(f"'{name}' ({where})" for name, where in islice(places.items(), _MOST_NAMES))
             more = f" and {len(places) - _MOST_NAMES} more" if len(places) > _MOST_NAMES else ""
-            self._builder.notes.append(f"{shown}{more}: {remark}")
+            self._builder.notes.append(f"{listed}{more}: {remark}")
 
     def _named(self, words: Words) -> int:
         name = words.peek()
@@ -119,7 +119,7 @@ class TextureTable:
         words.take()
         return self.default()
 
-    def _keep(self, name: str, material: int, words: Words) -> None:
+    def _store(self, name: str, material: int, words: Words) -> None:
         if self._textures.setdefault(name, material) != material:
             self._remark("textures are defined again; the first ones are kept", name, words.place(back=1))
 
