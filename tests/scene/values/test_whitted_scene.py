@@ -87,6 +87,14 @@ def test_mesh_shares_vertices():
     assert triangles.colored.all()
 
 
+def test_corners_of_a_box_run_through_z_first():
+    builder = ClassicSceneBuilder("box")
+    builder.boxes((1, 2, 3), (4, 5, 6), builder.material(ClassicMaterial()))
+    corners = builder.build().boxes.corners()
+    expected = [(1, 2, 3), (1, 2, 6), (1, 5, 3), (1, 5, 6), (4, 2, 3), (4, 2, 6), (4, 5, 3), (4, 5, 6)]
+    np.testing.assert_array_equal(corners, [expected])
+
+
 def test_scene_without_finite_primitives_has_no_bounds():
     builder = ClassicSceneBuilder("plane")
     builder.planes([0, 0, 0], [0, 1, 0], builder.material(ClassicMaterial()))
