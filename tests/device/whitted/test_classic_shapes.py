@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from lippmann.device.whitted.bvh import GRID, LEAF, make_bvh
-from lippmann.device.whitted.shape_table import MOST_LISTED_SHAPES, Column, make_shape_table
+from lippmann.device.whitted.shape_table import MOST_LISTED_SHAPES, Column, Kind, make_shape_table
+from lippmann.scene.values.whitted_camera import ClassicCamera
 from lippmann.scene.values.whitted_lighting import ClassicLight
 from lippmann.scene.values.whitted_scene import ClassicScene
 from lippmann.scene.values.whitted_surfaces import ClassicMaterial
@@ -267,6 +268,31 @@ def test_tubes_are_rows_about_their_middle():
     assert row[:3].tolist() == [0, 0, 2]
     assert [row[c] for c in (Column.K0, Column.K1, Column.K2)] == [4, 1, 1.25]
     assert (row[Column.LOW], row[Column.HIGH], row[Column.PASSES]) == (-2, 2, 0.5)
+
+
+@pytest.mark.parametrize("others", [5, 100])
+def test_a_sphere_that_dwarfs_the_scene_is_listed_as_huge(others):
+    """It would spread the hierarchy's grid so far that all others fall into one cell."""
+    rng = np.random.default_rng(3)
+    builder = ClassicSceneBuilder("sky", handedness="right")
+    material = builder.material(OPAQUE)
+    builder.spheres(np.array([(0, 0, 0)]), 2e6, material)
+    builder.tubes(rng.uniform(-5, 5, (others, 3)), rng.uniform(6, 9, (others, 3)), 0.3, material)
+    builder.spheres(rng.uniform(-5, 5, (others, 3)), 1.0, material)
+    table = make_shape_table(builder.build())
+    huge = np.flatnonzero(table.rows[:, Column.KIND] == Kind.HUGE_SPHERE)
+    assert huge.tolist() == [table.listed_rows.start if others == 100 else 2 * others]
+    assert table.rows[huge[0], Column.K1] == 2e6
+    assert np.abs(table.boxes).max(initial=0) < 20
+
+
+def test_a_planet_alone_is_huge_for_who_stands_on_it():
+    for height, is_huge in ((10.0, True), (3e6, False)):
+        builder = ClassicSceneBuilder("planet", handedness="right")
+        builder.spheres(np.array([(0, -2e6, 0)]), 2e6, builder.material(OPAQUE))
+        camera = ClassicCamera(center=(0.0, height, 0.0), view=(0.0, 0.0, -1.0), up=(0.0, 1.0, 0.0))
+        (row,) = make_shape_table(builder.build(camera=camera)).rows
+        assert (row[Column.KIND] == Kind.HUGE_SPHERE) == is_huge
 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 17, 500])

@@ -3,82 +3,43 @@ that show each texture, primitive and mode."""
 
 from __future__ import annotations
 
-import re
 import shutil
-import subprocess
 
-import numpy as np
 import pytest
-
-from lippmann import api
 
 pytestmark = [
     pytest.mark.usefixtures("engine"),
     pytest.mark.skipif(shutil.which("tachyon") is None, reason="the program tachyon is not installed"),
 ]
 
-SIZE = 128
-#: Colours of neighbours that differ more than this are an edge: a hair's breadth decides what a ray meets there.
-EDGE = 0.04
 SCENES = [
     *("teapot", "room", "smallballs", "tree_fcyl", "gears_s2", "spotlight", "attenuation", "fog", "polycyl"),
     *("transtest", "clipplanes", "fisheye", "lscapes"),
 ]
 
 
-def tachyon(folder, name, out, *options):
-    """Tachyon's picture ``(SIZE, SIZE, 3)`` in [0, 1], from 16-bit values."""
-    command = ["tachyon", name, "-numthreads", "2", "-res", str(SIZE), str(SIZE), "-o", str(out), "-format", "PPM48"]
-    subprocess.run([*command, *options], cwd=folder, check=True, stdout=subprocess.DEVNULL, timeout=120)
-    data = out.read_bytes()
-    header = re.match(rb"P6\s+(\d+)\s+(\d+)\s+65535\s", data)
-    assert header is not None
-    assert (int(header[1]), int(header[2])) == (SIZE, SIZE)
-    return np.frombuffer(data[header.end() :], ">u2").reshape(SIZE, SIZE, 3) / 65535.0
-
-
-def ours(path, spp=1):
-    preview = api.preview(api.load_scene(path), (SIZE, SIZE), spp=spp)
-    assert preview.provenance.integrator == "classic"
-    assert preview.provenance.transfer == "linear"
-    return np.clip(preview.pixels, 0, 1)
-
-
-def psnr(a, b, mask=None):
-    error = (a - b) ** 2
-    if mask is not None:
-        error = error[mask]
-    return -10 * np.log10(max(error.mean(), 1e-12))
-
-
-def off_edges(picture):
-    """Pixels whose eight neighbours have nearly their colour."""
-    padded = np.pad(picture, ((1, 1), (1, 1), (0, 0)), mode="edge")
-    around = [padded[y : y + SIZE, x : x + SIZE] for y in range(3) for x in range(3)]
-    return (np.max(around, axis=0) - np.min(around, axis=0)).max(axis=-1) < EDGE
-
-
-def check(mine, reference, total, smooth):
-    assert psnr(mine, reference) >= total
-    mask = off_edges(reference) & off_edges(mine)
+def check(tachyon, mine, reference, total, smooth):
+    agreement = tachyon.psnr(mine, reference)
+    assert agreement >= total
+    mask = tachyon.off_edges(mine, reference)
     if mask.any():  # a picture may be all texture
-        assert psnr(mine, reference, mask) >= smooth
-    assert psnr(mine[:, ::-1], reference) < psnr(mine, reference)  # same orientation
-    assert psnr(mine[::-1], reference) < psnr(mine, reference)
+        assert tachyon.psnr(mine, reference, mask) >= smooth
+    assert tachyon.psnr(mine[:, ::-1], reference) < agreement  # same orientation
+    assert tachyon.psnr(mine[::-1], reference) < agreement
 
 
 @pytest.mark.parametrize("name", SCENES)
-def test_real_scenes(shared_scenes, tmp_path, name):
+def test_real_scenes(tachyon, shared_scenes, tmp_path, name):
     folder = shared_scenes / "tachyon"
-    reference = tachyon(folder, f"{name}.dat", tmp_path / "t.ppm", "-aasamples", "0")
+    reference = tachyon.picture(folder, f"{name}.dat", tmp_path / "t.ppm", "-aasamples", "0")
     # Textured ground far away, and what mirrors show of it, turns on the last digit of a float.
-    check(ours(folder / f"{name}.dat"), reference, 32, 40)
+    check(tachyon, tachyon.ours(folder / f"{name}.dat"), reference, 32, 40)
 
 
-def test_antialiasing_of_the_file(shared_scenes, tmp_path):
+def test_antialiasing_of_the_file(tachyon, shared_scenes, tmp_path):
     folder = shared_scenes / "tachyon"
-    reference = tachyon(folder, "fog.dat", tmp_path / "t.ppm")  # ANTIALIASING 8
-    assert psnr(ours(folder / "fog.dat", spp=None), reference) > 32
+    reference = tachyon.picture(folder, "fog.dat", tmp_path / "t.ppm")  # ANTIALIASING 8
+    assert tachyon.psnr(tachyon.ours(folder / "fog.dat", spp=None), reference) > 32
 
 
 HEAD = """BEGIN_SCENE RESOLUTION 64 64
@@ -159,7 +120,7 @@ BESIDE = {
 
 
 @pytest.mark.parametrize("name", BESIDE)
-def test_each_feature(tmp_path, name):
+def test_each_feature(tachyon, tmp_path, name):
     body = BESIDE[name]
     orthographic = name == "orthographic"
     head = HEAD.format(
@@ -168,11 +129,11 @@ def test_each_feature(tmp_path, name):
         depth=1 if name == "depth 1" else 5,
     )
     (tmp_path / "scene.dat").write_text(f"{head}{body}END_SCENE\n")
-    reference = tachyon(tmp_path, "scene.dat", tmp_path / "t.ppm")
-    check(ours(tmp_path / "scene.dat"), reference, 32, 40)
+    reference = tachyon.picture(tmp_path, "scene.dat", tmp_path / "t.ppm")
+    check(tachyon, tachyon.ours(tmp_path / "scene.dat"), reference, 32, 40)
 
 
-def test_depth_of_field(tmp_path):
+def test_depth_of_field(tachyon, tmp_path):
     """Random in both programs: what lies at distance 1 is sharp, the rest equally blurred."""
     head = HEAD.format(projection="PROJECTION PERSPECTIVE_DOF FOCALLENGTH 1 APERTURE 0.3", zoom=1.2, depth=3)
     near = (
@@ -181,20 +142,20 @@ def test_depth_of_field(tmp_path):
     (tmp_path / "scene.dat").write_text(
         f"{head.replace('ANTIALIASING 0', 'ANTIALIASING 99')}{LAMPS}{near}{SHAPES}END_SCENE\n"
     )
-    reference = tachyon(tmp_path, "scene.dat", tmp_path / "t.ppm")
-    mine = ours(tmp_path / "scene.dat", spp=None)
-    assert psnr(mine, reference) > 30
-    assert psnr(ours(tmp_path / "scene.dat"), reference) < 25  # one sample: sharp everywhere
+    reference = tachyon.picture(tmp_path, "scene.dat", tmp_path / "t.ppm")
+    mine = tachyon.ours(tmp_path / "scene.dat", spp=None)
+    assert tachyon.psnr(mine, reference) > 30
+    assert tachyon.psnr(tachyon.ours(tmp_path / "scene.dat"), reference) < 25  # one sample: sharp everywhere
 
 
-def test_sky_light(tmp_path):
+def test_sky_light(tachyon, tmp_path):
     """Random in both programs, Tachyon taking the same 64 directions for every pixel: a mean is 0.03 off at most."""
     mode = "SHADER_MODE FULL AMBIENT_OCCLUSION AMBIENT_COLOR 0.6 0.6 0.6 RESCALE_DIRECT 0.5 SAMPLES 64 END_SHADER_MODE"
     head = HEAD.format(projection="", zoom=1.2, depth=3)
     plain = FLOOR.replace("TEXFUNC 1 CENTER 0.1 0.2 0.1 ROTATE 0 0 0 SCALE 1 1 1", "TEXFUNC 0")
     (tmp_path / "scene.dat").write_text(f"{head}{LAMPS}{GREY} {mode} {plain}{SHAPES}END_SCENE\n")
-    reference = tachyon(tmp_path, "scene.dat", tmp_path / "t.ppm")
-    mine = ours(tmp_path / "scene.dat")
-    mask = off_edges(reference)
+    reference = tachyon.picture(tmp_path, "scene.dat", tmp_path / "t.ppm")
+    mine = tachyon.ours(tmp_path / "scene.dat")
+    mask = tachyon.off_edges(reference)
     assert abs((mine - reference)[mask].mean()) < 0.03
-    assert psnr(mine, reference) > 27
+    assert tachyon.psnr(mine, reference) > 27

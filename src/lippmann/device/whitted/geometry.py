@@ -154,12 +154,20 @@ class Geometry:
         kinds = {Kind(int(kind)) for kind in np.unique(self._table.rows[: self._table.light_rows.start, Column.KIND])}
         q = p - row.center
         n, face, refined, size = mi.Vector3f(0), mi.Vector3f(0), mi.Point3f(p), dr.max(dr.abs(q))
-        ways = {Kind.SPHERE: _on_sphere, Kind.QUADRIC: _on_quadric, Kind.FLAT: _on_flat, Kind.BOX: _on_box}
+        ways = {
+            Kind.SPHERE: _on_sphere,
+            Kind.QUADRIC: _on_quadric,
+            Kind.FLAT: _on_flat,
+            Kind.BOX: _on_box,
+            Kind.HUGE_SPHERE: _on_huge_sphere,
+        }
         for kind in sorted(kinds):
             this = row.kind == float(kind)
-            kind_n, kind_face, kind_p = ways[kind](row, q)
+            kind_n, kind_face, kind_p = ways[kind](row, p if kind is Kind.HUGE_SPHERE else q)
             n, face = dr.select(this, kind_n, n), dr.select(this, kind_face, face)
             refined = dr.select(this, kind_p, refined)
+            if kind is Kind.HUGE_SPHERE:  # double precision: the error is that of the point's own coordinates
+                size = dr.select(this, 0, size)
         n = dr.select(dr.dot(n, d) > 0, -n, n)
         lift = _LIFT * dr.maximum(size, dr.max(dr.abs(p)))
         return Surface(refined, n, face, lift, mi.UInt32(row.material), mi.Color3f(0), mi.Bool(False))
@@ -169,6 +177,15 @@ def _on_sphere(row: Row, q: Any) -> tuple[Any, Any, Any]:
     """Normal to shade with, true normal and point, all for the point of the sphere next to ``q``."""
     n = dr.normalize(q)
     return n, n, row.center + n * dr.sqrt(row.k0)
+
+
+def _on_huge_sphere(row: Row, p: Any) -> tuple[Any, Any, Any]:
+    """As :func:`_on_sphere`, for the point itself and in double precision."""
+    exact = mi.Vector3d(p)
+    q = exact - mi.Vector3d(row.center)
+    distance = dr.norm(q)
+    n = mi.Vector3f(q / distance)
+    return n, n, mi.Point3f(exact + q * (row.k1 / distance - 1))
 
 
 def _on_quadric(row: Row, q: Any) -> tuple[Any, Any, Any]:

@@ -93,7 +93,13 @@ def crossings(kinds: Collection[Kind], inside_only: bool, row: Row, o: Any, d: A
     ways = set(kinds)
     if Kind.QUADRIC in ways:
         ways.discard(Kind.SPHERE)
-    formulas = {Kind.SPHERE: _sphere, Kind.QUADRIC: _quadric, Kind.BOX: _box, Kind.FLAT: _flat}
+    formulas = {
+        Kind.SPHERE: _sphere,
+        Kind.QUADRIC: _quadric,
+        Kind.BOX: _box,
+        Kind.FLAT: _flat,
+        Kind.HUGE_SPHERE: _huge_sphere,
+    }
     found = {kind: formulas[kind](inside_only, row, o, d) for kind in sorted(ways)}
     merged = found.pop(max(found))
     merged += [Crossing(mi.Float(dr.inf), mi.Bool(False))] * (max(map(len, [merged, *found.values()])) - len(merged))
@@ -117,6 +123,19 @@ def _sphere(inside_only: bool, row: Row, o: Any, d: Any) -> list[Crossing]:
     good = discriminant > 0
     entering = good & (row.inside == 0) if inside_only else good
     return [Crossing(to_foot - half, entering), Crossing(to_foot + half, good)]
+
+
+def _huge_sphere(inside_only: bool, row: Row, o: Any, d: Any) -> list[Crossing]:
+    """As :func:`_sphere`, in double precision: a millionth of the radius may be the whole scene."""
+    to_center, along = mi.Vector3d(row.center) - mi.Vector3d(o), mi.Vector3d(d)
+    squared = dr.squared_norm(along)
+    to_foot = dr.dot(to_center, along) / squared
+    foot = along * to_foot - to_center
+    discriminant = (mi.Float64(row.k1) * row.k1 - dr.dot(foot, foot)) / squared
+    half = dr.sqrt(discriminant)
+    good = mi.Bool(discriminant > 0)
+    entering = good & (row.inside == 0) if inside_only else good
+    return [Crossing(mi.Float(to_foot - half), entering), Crossing(mi.Float(to_foot + half), good)]
 
 
 def _quadric(inside_only: bool, row: Row, o: Any, d: Any) -> list[Crossing]:

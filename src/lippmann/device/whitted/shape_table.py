@@ -8,6 +8,9 @@ A sphere has k2 = k1 = 0, k0 = r^2; a cylinder k2 = 1, k1 = 0, k0 = r^2; a cone 
 grows by s per unit of h has k2 = 1 + s^2, k1 = r s, k0 = r^2. Rings and planes are flat: q . axis = 0 with
 inner^2 < |q|^2 < outer^2, a plane being a ring without hole or rim. A box has its lowest corner for center and its
 highest for axis.
+
+A sphere that dwarfs the rest of the scene, a planet or a sky, has a kind of its own: it is tested in double precision
+(k1 = r), and kept out of the hierarchy, whose grid would spread over it.
 """
 
 from __future__ import annotations
@@ -28,6 +31,8 @@ MOST_LISTED_SPHERES = 12
 MOST_TRACED_SPHERES = 512
 #: Up to this many other shapes with an end are tested one by one.
 MOST_LISTED_SHAPES = 48
+#: A sphere this many times as large as half of the other shapes, or as the camera's distance from it, is huge.
+HUGE = 1000.0
 #: Opacity from which a surface blocks light altogether (Tachyon).
 _CASTS_SHADOW = 0.99999
 
@@ -39,6 +44,7 @@ class Kind(IntEnum):
     QUADRIC = 1
     BOX = 2
     FLAT = 3
+    HUGE_SPHERE = 4
 
 
 class Column(IntEnum):
@@ -100,9 +106,12 @@ def make_shape_table(scene: ClassicScene) -> ShapeTable:
         (scene.boxes, _boxes(scene.boxes)),
     )
     unbounded, _ = _joined(scene, (scene.cylinders, _cylinders(scene.cylinders)), (scene.planes, _planes(scene.planes)))
+    huge = _huge(scene, bounded, boxes)
+    bounded[huge, Column.KIND], bounded[huge, Column.K1] = Kind.HUGE_SPHERE, np.sqrt(bounded[huge, Column.K0])
     traced = _traced(bounded)
-    others, other_boxes = bounded[~traced], boxes[~traced]
+    others, other_boxes = bounded[~traced & ~huge], boxes[~traced & ~huge]
     apart = len(others) > MOST_LISTED_SHAPES
+    unbounded = np.concatenate([bounded[huge], unbounded])
     walked, listed = (others, unbounded) if apart else (others[:0], np.concatenate([others, unbounded]))
     lights = _light_spheres(scene)
     rows = np.concatenate([bounded[traced], walked, listed, lights])
@@ -131,6 +140,17 @@ def _traced(rows: Numbers) -> NDArray[np.bool_]:
     plain = (rows[:, Column.KIND] == Kind.SPHERE) & (rows[:, Column.CLIP] < 0) & (rows[:, Column.INSIDE] == 0)
     plain &= rows[:, Column.PASSES] == 0
     return plain if MOST_LISTED_SPHERES < plain.sum() <= MOST_TRACED_SPHERES else np.zeros(len(rows), bool)
+
+
+def _huge(scene: ClassicScene, rows: Numbers, boxes: Numbers) -> NDArray[np.bool_]:
+    """Which rows ``(n, 16)`` with boxes ``(n, 2, 3)`` are huge spheres."""
+    corners = scene.triangles.positions
+    extents = np.concatenate([np.ptp(boxes, axis=1).max(axis=1), np.ptp(corners, axis=1).max(axis=1, initial=0.0)])
+    radii = np.sqrt(np.maximum(rows[:, Column.K0], 0.0))
+    above = np.abs(np.linalg.norm(rows[:, :3] - np.asarray(scene.camera.center), axis=1) - radii)
+    usual = np.median(extents) / 2.0 if len(extents) > 1 else np.inf
+    smallest = np.minimum(above, usual)
+    return np.asarray((rows[:, Column.KIND] == Kind.SPHERE) & (radii > HUGE * smallest))
 
 
 def _joined(scene: ClassicScene, *parts: tuple[Batch, Numbers]) -> tuple[Numbers, Numbers]:
