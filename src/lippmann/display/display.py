@@ -31,7 +31,7 @@ from lippmann.errors import DisplayError
 from lippmann.json_values import JsonObject
 from lippmann.runtime.cached_property import cached_property
 
-#: How an infinite viewing distance is written in files.
+#: Infinite viewing distances in files.
 INFINITE = "infinite"
 
 Vector = tuple[Array, Array, Array]

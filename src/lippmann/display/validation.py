@@ -1,4 +1,4 @@
-"""Checks that the parts of a display share; each failure is one :class:`DisplayError` that names the key."""
+"""Checks of values, shared by the parts of a display; each failure is one :class:`DisplayError` that names the key."""
 
 from __future__ import annotations
 

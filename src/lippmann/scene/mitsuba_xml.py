@@ -31,7 +31,7 @@ MOST_LEVELS = 100
 
 _ESCAPED_DOLLAR = "\\$"
 _PARAMETER = re.compile(r"(?<!\\)\$(\w*)", re.ASCII)
-#: What Mitsuba takes over of an included scene: its objects, and other names for them.
+#: Elements without a type that Mitsuba copies from an included scene, beside its objects: other names for them.
 _NAMES = ("alias", "ref")
 
 

@@ -12,7 +12,7 @@ from lippmann.scene.values.description import Color, Environment
 
 NAME = "studio"
 
-#: What is seen behind a scene that the studio lights. Even, because a panel shows nothing at infinite depth sharply:
+#: Backdrop of a scene that the studio lights. Even, because a panel shows nothing at infinite depth sharply:
 #: the soft boxes themselves would only smear. A middle grey stands apart from black and white objects alike.
 BACKDROP: Color = (0.18, 0.18, 0.18)
 
@@ -27,8 +27,8 @@ _CALIBRATION_TILT = 30.0
 
 @dataclass(frozen=True)
 class _SoftBox:
-    """A bright rectangle far away: where it hangs (degrees: right of the viewer's own direction, above the horizon),
-    half its width and height (degrees) and its radiance before scaling. Its edges fade over a fifth of its size."""
+    """A bright rectangle at infinity: azimuth to the right of the viewer's own direction, elevation, half its width and
+    height (degrees), and its radiance before scaling. Its edges fade over a fifth of its size."""
 
     azimuth: float
     elevation: float
@@ -70,7 +70,7 @@ def studio() -> Environment:
 def directions_of(height: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Unit directions ``(height, 2 height, 3)`` and solid angles (sr) of the texels of an environment.
 
-    Row 0 lies at +y and the middle column at -z, ahead of a viewer who looks that way; columns run to his right (+x).
+    Row 0 lies at +y and the middle column at -z, ahead of a viewer who looks that way; columns run to the right (+x).
     """
     theta = np.pi * (np.arange(height) + 0.5) / height
     phi = np.pi * (np.arange(2 * height) + 0.5) / height
@@ -85,7 +85,7 @@ def directions_of(height: int) -> tuple[NDArray[np.float64], NDArray[np.float64]
 
 
 def _coverage(box: _SoftBox, directions: NDArray[np.float64]) -> NDArray[np.float64]:
-    """How much of the box each direction sees, 0 to 1: its shape on a plane in front of it."""
+    """Coverage of each direction by the box, 0 to 1: its shape on a plane in front of it."""
     azimuth, elevation = np.radians(box.azimuth), np.radians(box.elevation)
     right = np.array([np.cos(azimuth), 0.0, -np.sin(azimuth)])
     center = np.array([np.sin(azimuth) * np.cos(elevation), np.sin(elevation), np.cos(azimuth) * np.cos(elevation)])

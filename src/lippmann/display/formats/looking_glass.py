@@ -9,10 +9,10 @@ The formula of such a file, with x and y in [0, 1] from the lower left corner of
     view = 1 - (phase mod 1)                                    0 is the leftmost camera, 1 the rightmost
 
 The phase mod 1 is the place of a sub-pixel under its lens, from the left edge (0) to the right (1): in millimetres the
-micro-images are 25.4 / pitch wide and lean by -atan(1 / slope). What lies on the right under a lens is seen from the
-left, so a lens itself turns the order round; that is what ``invView`` = 1 says.
+micro-images are 25.4 / pitch wide and lean by -atan(1 / slope). A sub-pixel on the right under a lens is seen from
+the left, so the lens itself reverses the order; ``invView`` = 1 means that.
 
-The file says neither gap nor viewing distance. The gap is that of lenses whose field is ``viewCone`` for an eye that
+The file holds neither gap nor viewing distance. The gap is that of lenses whose field is ``viewCone`` for an eye that
 moves sideways, as the cameras of the views do; the directions in it are even in the tangent, as an ideal lens's are.
 The viewing distance is that of the camera which the vendor documents: the panel fills 14 degrees of its height.
 """

@@ -11,10 +11,10 @@ the lenses, and (dx, dy) the place of a sub-pixel from the middle of its pixel, 
 The same in pixels, as it is computed here: a sub-pixel ``u`` pixels from the left edge and ``w`` above the lower one
 has the phase ``u A + w B - center`` with A = (pitch / DPI) cos(atan(1 / slope)) and B = A / slope.
 
-The phase mod 1 is the place of the sub-pixel under its lens, from the left edge (0) to the right (1). What lies on the
-right under a lens is seen from the left: the view is 1 - (phase mod 1), from 0, the leftmost, to 1.
+The phase mod 1 is the place of the sub-pixel under its lens, from the left edge (0) to the right (1). A
+sub-pixel on the right under a lens is seen from the left: the view is 1 - (phase mod 1), from 0, the leftmost, to 1.
 
-A slope is that of the phase: the lenses lean by -atan(1 / slope) from the vertical. Infinite stands for upright ones.
+The slope is that of the phase: lenses lean by -atan(1 / slope) from the vertical. It is infinite for upright lenses.
 """
 
 from __future__ import annotations

@@ -24,7 +24,7 @@ from lippmann.display.panel import Panel
 from lippmann.display.validation import MAXIMUM_COUNT, finite, number, refuse_unknown
 from lippmann.errors import DisplayError
 
-#: What a print is described by, as people write it.
+#: Keys of the short form of a print.
 KEYS = ("lpi", "print-lpi", "ppi", "size", "viewing-distance", "thickness", "index", "field")
 
 _NUMBERS = ("lpi", "print-lpi", "ppi", "index", "field")

@@ -1,6 +1,6 @@
-"""How the bundled scenes stand before the display.
+"""Placement of the bundled scenes in the display.
 
-A :class:`Stage` says which point of the scene sits in the middle of the lens plane, from where one looks at it, and how
+A :class:`Stage` holds the point of the scene in the middle of the lens plane, the direction of view, and the scale: how
 many millimetres of the paper's display (its Table I: 512 x 512 pixels of 0.264583 mm under 64 lenses of 8 pixels, gap
 6.8 mm) one unit of the scene is. Its camera's picture is as high in the lens plane as that display, so placing the
 display by the camera puts the scene into it at that scale.
@@ -29,7 +29,7 @@ DEPTH_RANGE = (-54.4, 10.0)
 
 @dataclass(frozen=True)
 class Stage:
-    """A point of the scene in the middle of the lens plane, and how it is seen.
+    """The point of a scene in the middle of the lens plane, the direction of view, and the scale.
 
     ``target`` (scene units) is that point; ``elevation`` and ``azimuth`` (degrees) tell how far the eye is raised above
     the horizon and turned about the vertical +y (0: the eye looks along -z; positive: it has moved toward +x).
@@ -63,7 +63,7 @@ class Stage:
         return matrix
 
     def in_display(self, points: ArrayLike) -> NDArray[np.float64]:
-        """Carry points ``(..., 3)`` of the scene into the display frame: z > 0 lies before the lens plane."""
+        """Transform points ``(..., 3)`` of the scene into the display frame: z > 0 lies in front of the lens plane."""
         offsets: NDArray[np.float64] = np.asarray(points, dtype=np.float64) - self.target
         return offsets @ self.rotation * self.unit
 

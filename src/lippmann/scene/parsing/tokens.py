@@ -1,4 +1,4 @@
-"""Text scene files as a run of words: a cursor that reads keywords and numbers and knows the line when one is wrong."""
+"""Words of text scene files: a cursor that reads keywords and numbers, and names the line of an error."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ FLOAT_LIMIT = float(np.finfo(np.float32).max)
 
 
 class Words:
-    """The words of one file and how far they are read.
+    """The words of one file, with a cursor.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ class Words:
         self._text = comment.sub("", text)
         self._words = self._text.split()
         self._count = len(self._words)
-        self._words.extend([""] * 4)  # so that reading past the end meets words that are nothing
+        self._words.extend([""] * 4)  # reading past the end gives empty words
         self._at = 0
         self._single = single
 
@@ -65,7 +65,7 @@ class Words:
 
     @property
     def left(self) -> int:
-        """How many words are still unread."""
+        """Number of unread words."""
         return self._count - self._at
 
     def peek(self) -> str:
@@ -89,7 +89,7 @@ class Words:
 
     @cached_property
     def _offsets(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Where words start and lines end in the text; found only once somebody asks for a line."""
+        """Offsets of words and of line breaks in the text; computed when a line number is first needed."""
         starts = (match.start() for match in _WORD.finditer(self._text))
         breaks = (match.start() for match in _BREAK.finditer(self._text))
         return np.fromiter(starts, np.int64), np.fromiter(breaks, np.int64)
@@ -109,13 +109,13 @@ class Words:
         return SceneError(what, where=self.place(back), rule=f"expected {expected}", fix=fix)
 
     def keyword(self, name: str) -> None:
-        """Reads ``name`` (given in capitals, found in any case)."""
+        """Read ``name`` (given in capitals, found in any case)."""
         if self._words[self._at].upper() != name:
             raise self.wrong(name)
         self._at += 1
 
     def has(self, name: str) -> bool:
-        """Reads ``name`` if it comes next, and says whether it did."""
+        """Read ``name`` if it comes next; whether it did."""
         if self._words[self._at].upper() != name:
             return False
         self._at += 1
@@ -154,10 +154,10 @@ class Words:
                 return x, y, z
         return self.number(), self.number(), self.number()  # the one that is wrong says so
 
-    def check(self, good: Callable[[float], bool], rule: str, keyword: str = "") -> float:
-        """A number for which ``good`` holds; ``rule`` says what it must be."""
+    def check(self, is_valid: Callable[[float], bool], rule: str, keyword: str = "") -> float:
+        """A number for which ``is_valid`` holds; ``rule`` names the condition for the error."""
         value = self.number(keyword)
-        if not good(value):
+        if not is_valid(value):
             raise self.wrong(rule, back=1)
         return value
 

@@ -1,4 +1,4 @@
-"""Pictures of the surroundings as light: OpenEXR (``.exr``) and Radiance (``.hdr``)."""
+"""Environment maps: OpenEXR (``.exr``) and Radiance (``.hdr``)."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from lippmann.scene.parsing.files import read_bytes
 from lippmann.scene.values.description import Environment
 
 _HDR_MAGICS = (b"#?RADIANCE", b"#?RGBE")
-#: What follows the header's first empty line.
+#: The size, after the header's first empty line.
 _HDR_SIZE = re.compile(rb"[-+]Y +([0-9]{1,9}) +[-+]X +([0-9]{1,9})\s")
 
 #: Channels of red, green and blue: luminance alone is grey.

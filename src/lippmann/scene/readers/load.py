@@ -35,7 +35,7 @@ _READERS = {
     ".xml": "lippmann.scene.mitsuba_source:read_mitsuba",
 }
 
-# How a file begins -> the suffix that goes with it, where the beginning leaves no doubt.
+# First bytes of a file -> its suffix, for unmistakable formats.
 _BEGINNINGS = {b"glTF": ".glb", b"ply\n": ".ply", b"ply\r": ".ply", b"<": ".xml", b"{": ".gltf"}
 
 

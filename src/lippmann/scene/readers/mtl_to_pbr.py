@@ -1,4 +1,4 @@
-"""What an MTL material means in metallic-roughness terms; ``docs/reference/scenes.md`` gives the mapping as a table."""
+"""MTL materials in metallic-roughness terms; ``docs/reference/scenes.md`` gives the mapping as a table."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class MaterialMapper:
     Attributes
     ----------
     notes:
-        What could not be honoured, one line each.
+        Statements that were ignored, one line each.
     """
 
     def __init__(self, folder: Path, *, allow_outside: bool) -> None:

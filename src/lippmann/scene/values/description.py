@@ -167,7 +167,7 @@ class Camera:
 class Environment:
     """Light from far away: an equirectangular image ``(h, w, 3)`` of float32 linear radiance.
 
-    Row 0 lies at +y (up), the middle column at -z, ahead of a viewer who looks that way; columns run to his right (+x).
+    Row 0 lies at +y (up), the middle column at -z, ahead of a viewer who looks that way; columns run to the right (+x).
     """
 
     pixels: FloatArray

@@ -88,7 +88,7 @@ class ClassicScene:
         return (self.spheres, self.tubes, self.cylinders, self.rings, self.boxes, self.planes, self.triangles)
 
     def counts(self) -> dict[str, int]:
-        """How many primitives of each kind ('sphere', 'tube', 'cylinder', 'ring', 'box', 'plane', 'triangle')."""
+        """Number of primitives of each kind ('sphere', 'tube', 'cylinder', 'ring', 'box', 'plane', 'triangle')."""
         return {batch.kind: len(batch) for batch in self.batches()}
 
     def bounds(self) -> Numbers | None:

@@ -100,6 +100,6 @@ def _key(primitive: Fields, weights: tuple[float, ...], skin: Skin | None) -> _K
 
 
 def _uv_sets(material: Material) -> int:
-    """How many sets of texture coordinates the textures of a material reach for."""
+    """Number of texture coordinate sets that the textures of a material need."""
     textures = [value for value in vars(material).values() if isinstance(value, Texture)]
     return max((texture.uv_set + 1 for texture in textures), default=0)
