@@ -7,7 +7,7 @@ import pytest
 from PIL import Image as Pillow
 
 from lippmann.errors import SceneError
-from lippmann.scene.parsing.files import decode_image, decode_text, read_bytes, read_image, resolve
+from lippmann.scene.parsing.files import MissingFileError, decode_image, decode_text, read_bytes, read_image, resolve
 
 
 def find(folder, name, **options):
@@ -54,6 +54,15 @@ def test_a_missing_file_is_named_with_its_likely_meaning(folder):
         find(folder, "a" * 5000)
 
 
+def test_a_scene_file_is_not_the_answer_to_a_missing_asset(folder):
+    (folder / "long_name_of_scene.gltf").write_bytes(b"x")
+    with pytest.raises(MissingFileError) as caught:
+        find(folder, "long_name_of_scene.bin", what="buffer")
+    assert str(caught.value) == "scene.obj:3: buffer 'long_name_of_scene.bin' is not there"
+    with pytest.raises(SceneError, match=r"is 'long_name_of_scene\.gltf' meant\?"):
+        read_bytes(folder / "long_name_of_scene.glt")
+
+
 def test_files_that_cannot_be_read(tmp_path):
     with pytest.raises(SceneError, match="no such file"):
         read_bytes(tmp_path / "none.obj")
@@ -69,8 +78,12 @@ def test_files_that_cannot_be_read(tmp_path):
 def test_text_in_old_and_new_coding():
     assert decode_text("\ufeffé".encode(), "x") == "é"
     assert decode_text("é".encode("latin-1"), "x") == "é"
+    assert decode_text("\ufeffv 1 é".encode("utf-16-be"), "x") == "v 1 é"
+    assert decode_text("\ufeffv 1 é".encode("utf-16-le"), "x") == "v 1 é"
     with pytest.raises(SceneError, match="is not a text file"):
         decode_text(b"v 1\0\0", "x.obj")
+    with pytest.raises(SceneError, match="is no text in UTF-16"):
+        decode_text(b"\xff\xfev", "x.obj")
 
 
 def encoded(picture, kind="PNG"):

@@ -89,6 +89,16 @@ def test_foreign_and_damaged_files(save, name, data, message):
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.parametrize(
+    ("mtl", "seen"), [("d 0", False), ("Tr 0\nd 0", False), ("d 0.01", True), ("Tr 1", True), ("d 0\nillum 7", True)]
+)
+def test_a_material_that_makes_its_mesh_vanish_is_named(save, mtl, seen):
+    save("m.mtl", f"newmtl film\n{mtl}\n".encode())
+    scene = load_scene(save("a.obj", ("mtllib m.mtl\n" + OBJ.replace("f ", "usemtl film\nf ", 1)).encode()))
+    expected = "material 'film': opacity 0, so that nothing is seen of what has it"
+    assert (expected in scene.notes) == (not seen)
+
+
 @pytest.mark.parametrize("suffix", known_suffixes())
 def test_files_that_are_missing_or_unreadable(tmp_path, suffix):
     with pytest.raises(SceneError, match="no such file"):

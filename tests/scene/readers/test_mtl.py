@@ -71,6 +71,43 @@ def test_physically_based_statements_win(material):
     assert (found.sheen_color, found.sheen_roughness) == ((0.2, 0.2, 0.2), 0.5)
 
 
+@pytest.mark.parametrize(
+    ("library", "opacities"),
+    [
+        ("newmtl m\nTr 1\n", [1.0]),  # as MeshLab writes every opaque material
+        ("newmtl m\nTr 0\n", [1.0]),
+        ("newmtl m\nTr 0.25\n", [0.75]),
+        ("newmtl m\nd 0\nTr 1\n", [0.0]),  # both agree
+        ("newmtl m\nd 1\nTr 1\n", [1.0]),
+        ("newmtl m\nTr 1\nnewmtl n\nTr 0.25\n", [1.0, 0.25]),  # one library speaks one language
+        ("newmtl m\nTr 1\nnewmtl n\nTr 0\nnewmtl o\nTr 0\n", [0.0, 1.0, 1.0]),
+        ("# Converted by Meshlab Group\nnewmtl m\nTr 0.25\n", [0.25]),
+    ],
+)
+def test_tr_is_what_its_writer_means(tmp_path, library, opacities):
+    (tmp_path / "m.mtl").write_text(library)
+    names = [line.split()[1] for line in library.splitlines() if line.startswith("newmtl")]
+    faces = "".join(f"usemtl {name}\nf 1/1 2/2 3/3\n" for name in names)
+    (tmp_path / "m.obj").write_text("mtllib m.mtl\n" + TRIANGLE + faces)
+    scene = read_obj(tmp_path / "m.obj")
+    assert [material.alpha for material in scene.materials] == pytest.approx(opacities)
+
+
+def test_the_other_meaning_of_tr_is_noted_once(material):
+    assert material("Tr 1\nnewmtl n\nTr 1\n", notes=True) == ["m.mtl: Tr is taken as opacity, as MeshLab writes it"]
+    assert material("Tr 0\n", notes=True) == []
+
+
+def test_clear_glass_may_have_tr_of_one(material):
+    found = material("Tr 1\nillum 7\nTf 1 1 1\n")
+    assert (found.transmission, found.alpha) == (1.0, 1.0)
+
+
+def test_a_comment_after_a_texture(material, picture):
+    picture("wood.png", np.full((2, 2, 3), 100))
+    assert material("map_Kd wood.png # of the door\n").base_color_texture.image.pixels[0, 0, 0] == 100
+
+
 def test_emission_may_exceed_one(material):
     assert material("Ke 5 4 3\n").emission == (5.0, 4.0, 3.0)
 

@@ -150,6 +150,41 @@ def test_an_unknown_material_is_noted(read):
     assert scene.materials[0].name == "gold"
 
 
+def test_a_missing_library_leaves_a_grey_model_and_a_note(read):
+    scene = read("mtllib none.mtl\n" + SQUARE + "usemtl gold\nf 1 2 3\nusemtl tin\nf 1 3 4\n")
+    assert scene.notes == ["model.obj:1: material library 'none.mtl' is not there: its materials are plain grey"]
+    assert [material.base_color for material in scene.materials] == [(0.7, 0.7, 0.7)] * 2
+    scene = read("mtllib modle.mat red.mtl\n" + SQUARE + "usemtl red\nf 1 2 3\n", red__mtl="newmtl red\nKd 1 0 0\n")
+    assert scene.materials[0].base_color == (1, 0, 0)
+    assert scene.notes == ["model.obj:1: material library 'modle.mat' is not there: its materials are plain grey"]
+
+
+def test_the_note_on_a_missing_library_names_the_one_that_may_be_meant(read):
+    (note,) = read("mtllib coluors.mtl\n" + SQUARE + "f 1 2 3\n", colours__mtl="newmtl a\n").notes
+    assert note.endswith("is not there (is 'colours.mtl' meant?): its materials are plain grey")
+
+
+def test_comments_after_names(read):
+    mtl = "newmtl red # not the other one\nKd 1 0 0\nnewmtl Material#2\nKd 0 1 0\n"
+    text = (
+        "mtllib my colours.mtl # of the house\n" + SQUARE + "usemtl red # here\nf 1 2 3\nusemtl Material#2\nf 1 3 4\n"
+    )
+    scene = read(text, **{"my colours__mtl": mtl})
+    assert [material.base_color for material in scene.materials] == [(1, 0, 0), (0, 1, 0)]
+    assert not scene.notes
+
+
+def test_a_library_with_a_number_sign_in_its_name(read):
+    scene = read("mtllib a #1.mtl\n" + SQUARE + "usemtl a\nf 1 2 3\n", **{"a #1__mtl": "newmtl a\nKd 1 0 0\n"})
+    assert scene.materials[0].base_color == (1, 0, 0)
+
+
+def test_text_in_utf_16(tmp_path):
+    path = tmp_path / "model.obj"
+    path.write_bytes(("\ufeff" + SQUARE + "f 1 2 3\n").encode("utf-16-be"))
+    assert len(read_obj(path).meshes[0].faces) == 1
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [
@@ -179,7 +214,7 @@ def test_an_unknown_material_is_noted(read):
         ("# nothing\n", r"model\.obj: holds no faces; is it an OBJ file\?"),
         ("<html>\n", r"model\.obj: holds no faces; is it an OBJ file\?"),
         (SQUARE + "f 1 2 \\", r"model\.obj:5: the file ends in a continued line"),
-        (SQUARE + "mtllib none.mtl\nf 1 2 3\n", r"model\.obj:5: material library 'none\.mtl' is not there"),
+        (SQUARE + "mtllib ../none.mtl\nf 1 2 3\n", r"model\.obj:5: material library '\.\./none\.mtl' lies outside"),
         ("\0\0\0\0", r"model\.obj: is not a text file"),
         ("", r"model\.obj: the file is empty"),
     ],

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import codecs
 import difflib
 import io
+import re
 from collections.abc import Sequence
 from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import TYPE_CHECKING
@@ -17,6 +19,14 @@ from lippmann.scene.values.description import Image
 
 if TYPE_CHECKING:
     from PIL import Image as Pillow
+
+
+#: Endings of files that name other files.
+_NAMING_FILES = frozenset({".dat", ".glb", ".gltf", ".mtl", ".nff", ".obj", ".ply", ".stl", ".xml"})
+
+
+class MissingFileError(SceneError):
+    """A file that a scene file names and that is not there."""
 
 
 def read_bytes(path: Path, most: int = -1) -> bytes:
@@ -43,13 +53,18 @@ def read_bytes(path: Path, most: int = -1) -> bytes:
 
 
 def decode_text(data: bytes, where: str) -> str:
-    """The text of an OBJ, MTL or similar file: UTF-8, else Latin-1, which old exporters wrote.
+    """The text of an OBJ, MTL or similar file: UTF-16 with a byte order mark, UTF-8, else Latin-1 of old exporters.
 
     Raises
     ------
     SceneError
         The bytes are not text.
     """
+    if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        try:
+            return data.decode("utf-16")
+        except UnicodeDecodeError:
+            raise SceneError("is no text in UTF-16, as which it begins", where=where) from None
     if b"\0" in data[:4096]:
         raise SceneError("is not a text file", where=where, rule="this format is plain text")
     try:
@@ -61,6 +76,24 @@ def decode_text(data: bytes, where: str) -> str:
 def resolve(folder: Path, name: str, *, where: str, what: str, allow_outside: bool) -> Path:
     """The file that ``name`` means, seen from ``folder``, in which it must lie; see :func:`find_file`."""
     return find_file(name, [folder], folder, where=where, what=what, allow_outside=allow_outside)
+
+
+def resolve_line(folder: Path, body: str, *, where: str, what: str, allow_outside: bool) -> Path:
+    """The file that the rest of a line names: all of it, spaces and all, or what stands before a comment.
+
+    Raises
+    ------
+    MissingFileError, SceneError
+        See :func:`find_file`.
+    """
+    plain = uncommented(body)
+    name = body if plain == body or is_file(folder / body) else plain
+    return resolve(folder, name, where=where, what=what, allow_outside=allow_outside)
+
+
+def uncommented(body: str) -> str:
+    """The rest of a line without the comment at its end: ``#`` begins one only after a space."""
+    return re.split(r"\s#", body, maxsplit=1)[0].rstrip()
 
 
 def find_file(
@@ -81,8 +114,10 @@ def find_file(
 
     Raises
     ------
+    MissingFileError
+        No such file.
     SceneError
-        No such file, or it lies outside ``scene_folder`` and ``allow_outside`` is false.
+        It lies outside ``scene_folder`` and ``allow_outside`` is false.
     """
     plain = name.replace("\\", "/")
     absolute = _is_absolute(name)
@@ -99,7 +134,9 @@ def find_file(
                 return beside
     if not allowed and any(_lies_in(candidate, scene_folder) is False for candidate in candidates):
         raise _outside(name, where, what)
-    raise SceneError(f"{what} '{name}' is not there", where=where, fix=_near_miss(allowed[0]) if allowed else "")
+    raise MissingFileError(
+        f"{what} '{name}' is not there", where=where, fix=_near_miss(allowed[0], asset=True) if allowed else ""
+    )
 
 
 def find_folder(
@@ -160,10 +197,16 @@ def is_folder(path: Path) -> bool:
         return False
 
 
-def _near_miss(path: Path) -> str:
-    """A hint at the file that was meant: other case, or a slip of the pen."""
+def _near_miss(path: Path, *, asset: bool = False) -> str:
+    """A hint at the file that was meant: other case, or a slip of the pen.
+
+    An ``asset`` is named by a scene file: another file that names files is not what was meant, unless its ending is
+    the same.
+    """
+    foreign = _NAMING_FILES - {path.suffix.lower()} if asset else frozenset()
     try:
-        names = sorted(entry.name for entry in path.parent.iterdir() if entry.is_file())
+        entries = [Path(entry.name) for entry in path.parent.iterdir() if entry.is_file()]
+        names = sorted(entry.name for entry in entries if entry.suffix.lower() not in foreign)
     except OSError:
         return f"there is no folder '{path.parent}'"
     folded = {name.casefold(): name for name in names}

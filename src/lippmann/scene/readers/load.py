@@ -14,7 +14,7 @@ from lippmann.scene.mitsuba_source import MitsubaSource
 from lippmann.scene.parsing.files import read_bytes
 from lippmann.scene.parsing.name_hints import closest_name_hint
 from lippmann.scene.scene import Scene, check_description, override_light
-from lippmann.scene.values.description import Camera, Color, Environment, SceneDescription
+from lippmann.scene.values.description import Camera, Color, Environment, Material, SceneDescription
 from lippmann.scene.values.whitted_lighting import Background
 from lippmann.scene.values.whitted_scene import ClassicScene
 from lippmann.scene.whitted.world_frame import world_camera
@@ -134,8 +134,27 @@ def _from_name(source: str | Path, allow_outside: bool) -> Scene:
     if isinstance(description, ClassicScene):
         return _classic(description, world_camera(description))
     if isinstance(description, SceneDescription):
-        check_description(description, path.name)
+        description = _with_remarks(check_description(description, path.name))
     return Scene(description.name, description)
+
+
+def _with_remarks(description: SceneDescription) -> SceneDescription:
+    """The description with a note on materials that nobody can see: a file that was meant so is rare."""
+    used = sorted({description.meshes[mesh].material for mesh in description.placements})
+    invisible = [index for index in used if _is_invisible(description.materials[index])]
+    if not invisible:
+        return description
+    name = description.materials[invisible[0]].name or f"number {invisible[0]}"
+    others = f" and {len(invisible) - 1} more" if len(invisible) > 1 else ""
+    note = f"material '{name}'{others}: opacity 0, so that nothing is seen of what has it"
+    return replace(description, notes=(*description.notes, note))
+
+
+def _is_invisible(material: Material) -> bool:
+    """Whether nothing is seen of a surface: textures and vertex colours can only lower its opacity further."""
+    if material.alpha_mode == "mask":
+        return material.alpha < material.alpha_cutoff
+    return material.alpha_mode == "blend" and material.alpha <= 0.0
 
 
 def _suffix_by_content(path: Path) -> str | None:

@@ -6,14 +6,14 @@ Formats: Wavefront, "MTL material format" (1995), and the physically based addit
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
 from lippmann.errors import SceneError
-from lippmann.scene.parsing.files import decode_text, read_bytes
+from lippmann.scene.parsing.files import decode_text, read_bytes, uncommented
 
 # keyword (lower case) -> numbers it takes: least, most
 _NUMBERS = {
@@ -52,6 +52,10 @@ _OPTIONS = {
     "-texres": (1, 1),
     "-type": (1, 1),
 }
+# Models of light (``illum``) in which transparency refracts or mirrors.
+_GLASS = {4, 6, 7, 9}
+# What begins the libraries that MeshLab writes.
+_MESHLAB = "Converted by Meshlab Group"
 _NUMERIC_OPTIONS = {"-bm", "-boost", "-mm", "-o", "-s", "-t"}
 
 
@@ -77,6 +81,12 @@ class MtlRecord:
     numbers: dict[str, tuple[float, ...]] = field(default_factory=dict)
     maps: dict[str, MapReference] = field(default_factory=dict)
     ignored: list[str] = field(default_factory=list)
+    remark: str = ""
+
+    @property
+    def is_glass_model(self) -> bool:
+        """Whether its model of light is one of glass."""
+        return int(self.scalar("illum", 2)) in _GLASS
 
     def scalar(self, key: str, default: float) -> float:
         return self.numbers[key][0] if key in self.numbers else default
@@ -96,8 +106,10 @@ def parse_mtl(path: Path) -> dict[str, MtlRecord]:
         The file is not text, a statement comes before any material, or its arguments are no finite numbers.
     """
     records: dict[str, MtlRecord] = {}
+    commented: dict[str, MtlRecord] = {}
     current: MtlRecord | None = None
-    for number, line in enumerate(decode_text(read_bytes(path), path.name).split("\n"), 1):
+    text = decode_text(read_bytes(path), path.name)
+    for number, line in enumerate(text.split("\n"), 1):
         words = line.split(None, 1)
         if not words or words[0].startswith("#"):
             continue
@@ -106,11 +118,31 @@ def parse_mtl(path: Path) -> dict[str, MtlRecord]:
         if key == "newmtl":
             current = MtlRecord(body)
             records.setdefault(body, current)
+            commented.setdefault(uncommented(body), current)
         elif current is None:
             raise SceneError(f"'{words[0][:40]}' before any newmtl", where=where, fix="is it an MTL file?")
         else:
             _read_statement(current, _ALIASES.get(key, key), words[0], body, where)
-    return records
+    if _MESHLAB in text or _tr_is_opacity(records.values()):
+        for record in records.values():
+            if "tr" in record.numbers:
+                record.numbers.setdefault("d", record.numbers.pop("tr"))
+                record.remark = f"{path.name}: Tr is taken as opacity, as MeshLab writes it"
+    return commented | records
+
+
+def _tr_is_opacity(records: Iterable[MtlRecord]) -> bool:
+    """Whether ``Tr`` says how opaque the materials of a library are, as with MeshLab, rather than how transparent.
+
+    Nobody writes a library of invisible materials: 1 means opaque where it is more frequent than 0. Glass, which is
+    seen with either, has no say.
+    """
+    values = [record.scalar("tr", 0.0) for record in records if _only_tr(record) and not record.is_glass_model]
+    return values.count(1.0) > values.count(0.0)
+
+
+def _only_tr(record: MtlRecord) -> bool:
+    return "tr" in record.numbers and "d" not in record.numbers
 
 
 def _read_statement(record: MtlRecord, key: str, written: str, body: str, where: str) -> None:

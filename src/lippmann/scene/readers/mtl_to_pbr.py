@@ -9,13 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.scene.parsing import texture_maps
-from lippmann.scene.parsing.files import read_image, resolve
+from lippmann.scene.parsing.files import read_image, resolve_line
 from lippmann.scene.readers.mtl import MapReference, MtlRecord
 from lippmann.scene.values.description import Color, Image, Material, Texture, Wrap
 
 # Reflection, refraction models of the "illum" statement.
 _COLOR_ONLY, _DIFFUSE_ONLY = 0, 1
-_GLASS = {4, 6, 7, 9}
 _REFRACTING = {6, 7}
 # Exporters of principled materials write 0.5 for an ordinary dielectric (4 % at normal incidence).
 _ORDINARY_SPECULAR = 0.5
@@ -50,6 +49,8 @@ class MaterialMapper:
         SceneError
             A texture is missing or damaged; the error names the file and line that ask for it.
         """
+        if record.remark:
+            self._note_once(record.remark)
         if record.ignored:
             self._note(record, f"not honoured: {', '.join(dict.fromkeys(record.ignored))}")
         illum = int(record.scalar("illum", 2))
@@ -202,7 +203,7 @@ class MaterialMapper:
         return _clip(color, 1.0 if clip else np.inf)
 
     def _texture(self, reference: MapReference, *, srgb: bool) -> Texture:
-        path = resolve(
+        path = resolve_line(
             self._folder, reference.file, where=reference.where, what="texture", allow_outside=self._allow_outside
         )
         if path not in self._images:
@@ -240,7 +241,7 @@ def _is_glass(record: MtlRecord, illum: int) -> bool:
     Many exporters write illum 4 and a white Tf for everything, so an opaque material is glass only where its model
     refracts and nothing else is left of it: black Kd beside a bright Tf.
     """
-    if illum not in _GLASS or "map_d" in record.maps:
+    if not record.is_glass_model or "map_d" in record.maps:
         return False
     hollow = "map_kd" not in record.maps and max(record.color("kd", 0.8)) <= _BLACK and max(record.color("tf", 0.0)) > 0
     return _opacity(record) < 1.0 or (illum in _REFRACTING and hollow)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from lippmann.color.transfer import decode_srgb
 from lippmann.errors import SceneError
-from lippmann.scene.parsing.files import decode_text, is_file, read_bytes, resolve
+from lippmann.scene.parsing.files import MissingFileError, decode_text, is_file, read_bytes, resolve, uncommented
 from lippmann.scene.parsing.triangulation import triangulate
 from lippmann.scene.readers.mtl import MtlRecord, parse_mtl
 from lippmann.scene.readers.mtl_to_pbr import MaterialMapper
@@ -79,7 +79,7 @@ def read_obj(path: Path, *, allow_outside: bool = False) -> SceneDescription:
     Raises
     ------
     SceneError
-        The file is missing, cut short or malformed; an index, library or texture is not there.
+        The file is missing, cut short or malformed; an index or texture is not there.
     """
     where = path.name
     statements = _split_statements(decode_text(read_bytes(path), where), where)
@@ -87,7 +87,7 @@ def read_obj(path: Path, *, allow_outside: bool = False) -> SceneDescription:
         fix = "points and lines alone cannot be rendered" if statements.positions.bodies else "is it an OBJ file?"
         raise SceneError("holds no faces", where=where, fix=fix)
     geometry = _assemble(statements, where)
-    records = _read_libraries(statements.libraries, path, allow_outside)
+    records, missing = _read_libraries(statements.libraries, path, allow_outside)
     mapper = MaterialMapper(path.parent, allow_outside=allow_outside)
     meshes: list[Mesh] = []
     materials: list[Material] = []
@@ -96,8 +96,8 @@ def read_obj(path: Path, *, allow_outside: bool = False) -> SceneDescription:
         rows = np.flatnonzero(geometry.material_of == index)
         if len(rows) == 0:
             continue
-        record = records.get(name)
-        if record is None and name:
+        record = records.get(name) or records.get(uncommented(name))
+        if record is None and name and not missing:
             notes.append(f"material '{name}' is in no material library: taken as plain grey")
         materials.append(mapper.material(record) if record else mapper.default(name))
         meshes.append(_mesh(geometry, rows, name or path.stem, len(materials) - 1))
@@ -106,7 +106,7 @@ def read_obj(path: Path, *, allow_outside: bool = False) -> SceneDescription:
         meshes=meshes,
         materials=materials,
         instances=[Instance(index, np.eye(4)) for index in range(len(meshes))],
-        notes=[*notes, *mapper.notes],
+        notes=[*missing, *notes, *mapper.notes],
     )
 
 
@@ -306,17 +306,24 @@ def _mesh(geometry: _Geometry, rows: Integers, name: str, material: int) -> Mesh
     )
 
 
-def _read_libraries(libraries: Lines, path: Path, allow_outside: bool) -> dict[str, MtlRecord]:
-    """All materials of all libraries; a name defined twice keeps its first meaning."""
+def _read_libraries(libraries: Lines, path: Path, allow_outside: bool) -> tuple[dict[str, MtlRecord], list[str]]:
+    """All materials of all libraries, the first of each name, and notes on the libraries that are not there."""
     records: dict[str, MtlRecord] = {}
+    notes: list[str] = []
     for body, number in zip(libraries.bodies, libraries.numbers, strict=True):
         if not body:
             continue
         where = f"{path.name}:{number}"
         # One name with spaces, or several names: only the folder can tell.
-        names = [body] if len(body.split()) == 1 or is_file(path.parent / body) else body.split()
-        for name in names:
-            library = resolve(path.parent, name, where=where, what="material library", allow_outside=allow_outside)
+        plain = uncommented(body)
+        whole = next((name for name in (body, plain) if is_file(path.parent / name)), None)
+        for name in [whole] if whole else plain.split():
+            try:
+                library = resolve(path.parent, name, where=where, what="material library", allow_outside=allow_outside)
+            except MissingFileError as error:
+                hint = f" ({error.fix})" if error.fix else ""
+                notes.append(f"{where}: {error.what}{hint}: its materials are plain grey")
+                continue
             for key, record in parse_mtl(library).items():
                 records.setdefault(key, record)
-    return records
+    return records, notes
