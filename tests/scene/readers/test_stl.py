@@ -46,6 +46,27 @@ def test_several_solids(read):
     assert len(read(text_file(3)).meshes[0].faces) == 6
 
 
+@pytest.mark.parametrize(
+    "data",
+    [
+        text_file().replace(b" facet", b"# facet of vertex 1 2 3\n // so it is\n facet"),
+        text_file().replace(b"\n", b" # endfacet\n"),
+        text_file().replace(b"facet normal 0 0 1", b"facet"),
+        text_file().replace(b"facet normal 0 0 1", b"facet normal"),
+        text_file().replace(b"facet normal 0 0 1", b"facet normal -nan(ind) nan 0"),
+        text_file().replace(b"solid a name", b"solid facet vertex 1 2 3"),
+        text_file().replace(b"\n", b"\r\n"),
+        text_file().upper(),
+        b"solid x\n" + b" ".join(text_file().split(b"\n")[1:-2]) + b"\nendsolid x\n",
+        b"\xef\xbb\xbf" + text_file(),
+        b"# made by a test\n" + text_file(),
+    ],
+)
+def test_text_as_writers_write_it(read, data):
+    (mesh,) = read(data).meshes
+    assert (mesh.positions[mesh.faces] == TRIANGLES).all()
+
+
 @pytest.mark.parametrize("data", [text_file(), binary_file()])
 def test_every_cut_short_file_is_refused(read, data):
     for end in range(1, len(data.rstrip()) - len(b" a name")):
@@ -63,8 +84,13 @@ def test_every_cut_short_file_is_refused(read, data):
         (binary_file()[:-1], "is it cut short"),
         (b"\0" * 84, "holds no facets"),
         (b"solid\nendsolid\n", "holds no facets"),
-        (text_file().replace(b"0.000000e+00 0.000000e+00 2.0", b"0 x 2.0"), "cannot be read"),
-        (text_file().replace(b"0.000000e+00 0.000000e+00 2.0", b"0 2.0"), "cannot be read"),
+        (text_file().replace(b"0.000000e+00 0.000000e+00 2.0", b"0 x 2.0"), "a vertex is no number .*'x'"),
+        (text_file().replace(b"0.000000e+00 0.000000e+00 2.000000e+00", b"0 2.0"), r"a vertex is no number"),
+        (
+            text_file().replace(b"   vertex 0.000000e+00 0.000000e+00 2", b"   v 2"),
+            r"model\.stl:9: facet with 2 vertices",
+        ),
+        (text_file().replace(b"  endloop\n endfacet\nends", b"  endloop\nends"), "ends within a facet"),
         (text_file().replace(b"endsolid a name", b""), "has 1 'solid' and 0 'endsolid'"),
     ],
 )

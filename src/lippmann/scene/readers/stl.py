@@ -1,10 +1,12 @@
-"""Stereolithography files (``.stl``), text and binary, read with trimesh."""
+"""Stereolithography files (``.stl``), text and binary.
+
+Read from the format's description (3D Systems, "Stereolithography Interface Specification", 1988). The reader is
+Lippmann's own because trimesh's takes comments and facets without normals for damage.
+"""
 
 from __future__ import annotations
 
-import io
 import re
-import warnings
 from pathlib import Path
 
 import numpy as np
@@ -12,9 +14,18 @@ import numpy as np
 from lippmann.errors import SceneError
 from lippmann.scene.parsing.files import decode_text, read_bytes
 from lippmann.scene.readers.ply import UP_NOTE
-from lippmann.scene.values.description import Instance, Material, Mesh, SceneDescription
+from lippmann.scene.values.description import FloatArray, Instance, Material, Mesh, SceneDescription
 
-_HEADER, _FACET = 84, 50  # bytes
+_HEADER = 84  # bytes
+#: A facet: its normal, which nobody needs, three vertices, and a number without meaning.
+_FACET = np.dtype([("normal", "<f4", 3), ("vertices", "<f4", (3, 3)), ("attribute", "<u2")])
+
+# Lines that hold names or remarks: free text in which any word may stand.
+_REMARK = re.compile(r"(?m)^[ \t]*(?:(?:end)?solid\b|#|//|;).*$|(?:[ \t]#|//|;).*$")
+#: The first statement, after a byte order mark and remarks.
+_SOLID = re.compile(rb"(?m)^(?:\xef\xbb\xbf)?\s*solid\b")
+_LONGEST_REMARKS = 4096
+_VERTEX = re.compile(r"\bvertex\s+(\S+)\s+(\S+)\s+(\S+)")
 
 
 def read_stl(path: Path, *, allow_outside: bool = False) -> SceneDescription:
@@ -29,13 +40,8 @@ def read_stl(path: Path, *, allow_outside: bool = False) -> SceneDescription:
     where = path.name
     data = read_bytes(path)
     notes = [UP_NOTE]
-    if _is_binary(data):
-        _check_binary(data, where)
-        positions = _positions(data, "stl", where)
-    else:
-        _check_text(data, where)
-        # In one encoding: trimesh guesses with libraries that need not be there.
-        positions = _positions(decode_text(data, where).encode("utf-8"), "stl_ascii", where)
+    binary = _is_binary(data)
+    positions = _binary_positions(data, where) if binary else _text_positions(decode_text(data, where), where)
     if len(positions) == 0:
         raise SceneError("holds no facets", where=where)
     material = Material(path.stem, base_color=(0.7, 0.7, 0.7), roughness=0.6, double_sided=True)
@@ -45,15 +51,15 @@ def read_stl(path: Path, *, allow_outside: bool = False) -> SceneDescription:
 
 
 def _is_binary(data: bytes) -> bool:
-    """Binary files may begin with "solid" too: what follows tells."""
-    return not (data.lstrip()[:5].lower() == b"solid" and b"\0" not in data[:_HEADER])
+    """Binary files may begin with "solid" too: the number of facets that follows has a byte of 0."""
+    return b"\0" in data[:_HEADER] or _SOLID.search(data[:_LONGEST_REMARKS].lower()) is None
 
 
-def _check_binary(data: bytes, where: str) -> None:
+def _binary_positions(data: bytes, where: str) -> FloatArray:
     if len(data) < _HEADER:
         raise SceneError("is no STL file", where=where, rule=f"it begins with 'solid' or has {_HEADER} bytes of header")
     count = int.from_bytes(data[80:84], "little")
-    expected = _HEADER + _FACET * count
+    expected = _HEADER + _FACET.itemsize * count
     if len(data) != expected:
         raise SceneError(
             f"has {len(data)} bytes, and its header speaks of {count} facets",
@@ -61,31 +67,34 @@ def _check_binary(data: bytes, where: str) -> None:
             rule=f"they take {expected} bytes",
             fix="is it cut short, or no STL file?",
         )
+    facets = np.frombuffer(data, _FACET, count, _HEADER)
+    return np.ascontiguousarray(facets["vertices"].reshape(-1, 3), np.float32)
 
 
-def _check_text(data: bytes, where: str) -> None:
-    text = data.lower()
-    opened, closed = len(re.findall(rb"(?m)^\s*solid\b", text)), len(re.findall(rb"(?m)^\s*endsolid\b", text))
+def _text_positions(text: str, where: str) -> FloatArray:
+    """Vertices ``(3 facets, 3)``; words other than vertices, such as normals, are not looked at."""
+    text = text.lower()
+    opened, closed = len(re.findall(r"(?m)^\s*solid\b", text)), len(re.findall(r"(?m)^\s*endsolid\b", text))
     if opened != closed:
         raise SceneError(f"has {opened} 'solid' and {closed} 'endsolid'", where=where, fix="is it cut short?")
-    facets, vertices = len(re.findall(rb"\bfacet\s+normal\b", text)), len(re.findall(rb"(?m)^\s*vertex\b", text))
-    if vertices != 3 * facets:
-        raise SceneError(f"has {vertices} vertices in {facets} facets", where=where, rule="a facet has three")
-
-
-def _positions(data: bytes, kind: str, where: str) -> np.ndarray:
-    import trimesh
-
-    log = trimesh.util.log
-    before, log.disabled = log.disabled, True  # it logs what it makes of damaged normals, which nobody uses
+    # A space for each remark keeps the lines, and with them their numbers.
+    text = _REMARK.sub(" ", text)
+    facets = text.split("endfacet")
+    if "facet" in facets.pop():
+        raise SceneError("ends within a facet", where=where, fix="is it cut short?")
+    wrong = next((index for index, facet in enumerate(facets) if facet.count("vertex") != 3), None)
+    if wrong is not None:
+        before = "".join(facets[:wrong]) + facets[wrong][: -len(facets[wrong].lstrip()) or None]
+        raise SceneError(
+            f"facet with {facets[wrong].count('vertex')} vertices",
+            where=f"{where}:{before.count(chr(10)) + 1}",
+            rule="a facet has three",
+        )
+    words = [word for vertex in _VERTEX.findall(text) for word in vertex]
+    if len(words) != 9 * len(facets):
+        raise SceneError("a vertex has fewer than three numbers", where=where, fix="is it cut short?")
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("error")  # NumPy only warns of a word that is no number
-            loaded = trimesh.load_scene(io.BytesIO(data), file_type=kind, process=False)
-    except (ValueError, TypeError, KeyError, IndexError, Warning, trimesh.exchange.stl.HeaderError) as error:
-        raise SceneError(f"cannot be read ({error})", where=where) from None
-    finally:
-        log.disabled = before
-    pieces = [np.asarray(mesh.triangles).reshape(-1, 3) for mesh in loaded.geometry.values()]
-    with np.errstate(over="ignore"):  # infinite places are refused with those of all formats
-        return np.concatenate([np.zeros((0, 3)), *pieces]).astype(np.float32)
+        with np.errstate(over="ignore"):  # infinite places are refused with those of all formats
+            return np.array(words, np.float64).reshape(-1, 3).astype(np.float32)
+    except ValueError as error:
+        raise SceneError(f"a vertex is no number ({error})", where=where) from None
