@@ -104,6 +104,35 @@ def test_faces_without_area_in_their_list(read):
     assert len(read(binary_file("<", [(0, 1), (0, 1, 2), ()])).meshes[0].faces) == 1
 
 
+@pytest.mark.parametrize(
+    "data",
+    [
+        text_file().replace(b"2 0.5 0", b"# the last one:\n2 0.5 0 # here"),
+        text_file().replace(b"2 0.5 0", b"comment the last one:\n\n2 0.5 0"),
+        text_file().replace(b"\n", b"\r\n"),
+    ],
+)
+def test_text_with_remarks(read, data):
+    assert read(data).meshes[0].positions.tolist() == [list(map(float, vertex)) for vertex in VERTICES]
+
+
+def test_a_foreign_line_before_the_elements_is_noted(read):
+    scene = read(text_file().replace(b"element vertex", b"Created by a program, source file: \nelement vertex"))
+    line = "model.ply:3: 'Created by a program, source file:' is no line of a PLY header, and is passed over"
+    assert line in scene.notes
+    with pytest.raises(SceneError, match=r"model\.ply:4: header line 'proprety float x'"):
+        read(text_file().replace(b"property float x", b"proprety float x"))
+
+
+def test_properties_that_fill_gaps_may_share_a_name(read):
+    gap = "property uchar gap\n"
+    data = header("ascii", vertex=gap + gap, faces=1).encode() + b"0 0 0 7 8\n1 0 0 7 8\n0 1 0 7 8\n" * 2
+    mesh = read(data.replace(b"vertex 5", b"vertex 6") + b"3 0 1 2\n").meshes[0]
+    assert mesh.positions.tolist()[:3] == [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
+    with pytest.raises(SceneError, match="'vertex' has a property twice"):
+        read(text_file().replace(b"property float y", b"property float x"))
+
+
 @pytest.mark.parametrize("data", [text_file(), binary_file()])
 def test_every_cut_short_file_is_refused(read, data):
     last = data.rstrip(b"\n")

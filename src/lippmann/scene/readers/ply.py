@@ -6,8 +6,9 @@ files that mix triangles and larger polygons, which is what modelling programs w
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -17,25 +18,15 @@ from lippmann.color.transfer import decode_srgb
 from lippmann.errors import SceneError
 from lippmann.scene.parsing.files import read_bytes, read_image, resolve
 from lippmann.scene.parsing.triangulation import triangulate
+from lippmann.scene.readers.ply_header import Element, Header, read_header
 from lippmann.scene.values.description import Instance, Material, Mesh, SceneDescription, Texture
 
 UP_NOTE = "up is taken as +y, for nothing in the data says it (turn 0,-90 sets a model upright whose up is +z)"
 
-_TYPES = {
-    **dict.fromkeys(("char", "int8"), "i1"),
-    **dict.fromkeys(("uchar", "uint8"), "u1"),
-    **dict.fromkeys(("short", "int16"), "i2"),
-    **dict.fromkeys(("ushort", "uint16"), "u2"),
-    **dict.fromkeys(("int", "int32"), "i4"),
-    **dict.fromkeys(("uint", "uint32"), "u4"),
-    **dict.fromkeys(("float", "float32"), "f4"),
-    **dict.fromkeys(("double", "float64"), "f8"),
-}
+# Numbers may be followed by remarks, as in the header.
+_REMARK = re.compile(rb"(?m)^[ \t]*comment\b.*$|#.*$")
 _UV_NAMES = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"))
-_BYTE_ORDERS = {"binary_little_endian": "<", "binary_big_endian": ">"}
 
-#: Digits of a number of entries; no file has room for more.
-_LONGEST_COUNT = 18
 #: More vertices than any file has.
 _MOST_VERTICES = 1 << 53
 
@@ -54,29 +45,6 @@ class _Lists:
 Columns = Mapping[str, "Numbers | _Lists"]
 
 
-@dataclass(frozen=True)
-class _Property:
-    name: str
-    type: str
-    count_type: str | None  # of a list, None for a scalar
-
-
-@dataclass
-class _Element:
-    name: str
-    count: int
-    properties: list[_Property] = field(default_factory=list)
-
-
-@dataclass
-class _Header:
-    elements: list[_Element] = field(default_factory=list)
-    textures: list[str] = field(default_factory=list)
-    order: str | None = None  # "<" or ">" if binary, None if text
-    end: int = 0
-    lines: int = 0
-
-
 def read_ply(path: Path, *, allow_outside: bool = False) -> SceneDescription:
     """Read a PLY mesh with its vertex normals, colours and texture coordinates.
 
@@ -89,13 +57,13 @@ def read_ply(path: Path, *, allow_outside: bool = False) -> SceneDescription:
     """
     where = path.name
     data = read_bytes(path)
-    header = _read_header(data, where)
+    header = read_header(data, where)
     columns = _read_body(data, header, where)
     if not all(isinstance(columns.get("vertex", {}).get(axis), np.ndarray) for axis in "xyz"):
         raise SceneError("holds no vertices with x, y and z", where=where)
     if not len(_outline(columns, where).sizes):
         raise SceneError("holds no faces", where=where, fix="a cloud of points must be meshed first")
-    notes = [UP_NOTE]
+    notes = [UP_NOTE, *header.notes]
     texture = None
     if header.textures:
         image = resolve(path.parent, header.textures[0], where=where, what="texture", allow_outside=allow_outside)
@@ -111,60 +79,12 @@ def read_ply(path: Path, *, allow_outside: bool = False) -> SceneDescription:
     return SceneDescription(path.stem, [mesh], [material], [Instance(0, np.eye(4))], notes=notes)
 
 
-def _read_header(data: bytes, where: str) -> _Header:
-    if not data.startswith((b"ply\n", b"ply\r")):
-        raise SceneError("is no PLY file", where=where, rule="one begins with the line 'ply'")
-    header = _Header()
-    form = ""
-    position, number = 0, 0
-    while True:
-        stop = data.find(b"\n", position)
-        if stop < 0:
-            raise SceneError("the header has no end", where=where, rule="it ends with 'end_header'")
-        line = data[position:stop].decode("latin-1").strip()
-        position, number = stop + 1, number + 1
-        words = line.split()
-        if not words or words[0] in ("ply", "obj_info"):
-            continue
-        if words[0] == "end_header":
-            break
-        if words[0] == "comment":
-            if len(words) > 2 and words[1].lower() == "texturefile":
-                header.textures.append(line.split(None, 2)[2])
-            continue
-        if words[0] == "format":
-            form = words[1] if len(words) > 1 else ""
-        else:
-            _read_declaration(header, words, f"{where}:{number}")
-    if form != "ascii" and form not in _BYTE_ORDERS:
-        raise SceneError(f"format '{form}'", where=where, rule=f"known are ascii, {', '.join(_BYTE_ORDERS)}")
-    for element in header.elements:
-        if len({each.name for each in element.properties}) < len(element.properties):
-            raise SceneError(f"'{element.name[:40]}' has a property twice", where=where, rule="names tell them apart")
-    header.order, header.end, header.lines = _BYTE_ORDERS.get(form), position, number
-    return header
-
-
-def _read_declaration(header: _Header, words: list[str], where: str) -> None:
-    match words:
-        case ["element", name, count] if count.isdecimal() and len(count) <= _LONGEST_COUNT:
-            header.elements.append(_Element(name, int(count)))
-        case ["property", "list", count, kind, name] if (
-            header.elements and {count, kind} <= _TYPES.keys() and _TYPES[count][0] in "iu"
-        ):
-            header.elements[-1].properties.append(_Property(name, _TYPES[kind], _TYPES[count]))
-        case ["property", kind, name] if header.elements and kind in _TYPES:
-            header.elements[-1].properties.append(_Property(name, _TYPES[kind], None))
-        case _:
-            raise SceneError(f"header line '{' '.join(words)[:60]}'", where=where, rule="no such line in a PLY header")
-
-
-def _read_body(data: bytes, header: _Header, where: str) -> dict[str, Columns]:
+def _read_body(data: bytes, header: Header, where: str) -> dict[str, Columns]:
     columns: dict[str, Columns] = {}
     position = header.end
     lines: list[bytes] = []
     if header.order is None:
-        lines = [line for line in data[header.end :].split(b"\n") if line.strip()]
+        lines = _text_rows(data[header.end :])
         position = 0
     for element in header.elements:
         if header.order is None:
@@ -178,13 +98,20 @@ def _read_body(data: bytes, header: _Header, where: str) -> dict[str, Columns]:
     return columns
 
 
-def _cut_short(element: _Element, count: int, where: str) -> SceneError:
+def _text_rows(body: bytes) -> list[bytes]:
+    """The lines of numbers, without empty ones and remarks."""
+    if b"#" in body or b"comment" in body:
+        body = _REMARK.sub(b"", body)
+    return [line for line in body.split(b"\n") if line.strip()]
+
+
+def _cut_short(element: Element, count: int, where: str) -> SceneError:
     return SceneError(
         f"ends after {count} of {element.count} entries of '{element.name}'", where=where, fix="is it cut short?"
     )
 
 
-def _text_columns(element: _Element, rows: list[bytes], where: str) -> Columns:
+def _text_columns(element: Element, rows: list[bytes], where: str) -> Columns:
     try:
         table = [[float(word) for word in row.split()] for row in rows]
     except ValueError as error:
@@ -214,14 +141,14 @@ def _text_columns(element: _Element, rows: list[bytes], where: str) -> Columns:
     return columns
 
 
-def _short_row(element: _Element, number: int, where: str) -> SceneError:
+def _short_row(element: Element, number: int, where: str) -> SceneError:
     return SceneError(
         f"entry {number} of '{element.name}' has too few numbers", where=where, fix="is the file cut short?"
     )
 
 
 @np.errstate(invalid="ignore")  # of damaged floats, which are looked at where they are used
-def _binary_columns(element: _Element, data: bytes, start: int, order: str, where: str) -> tuple[Columns, int]:
+def _binary_columns(element: Element, data: bytes, start: int, order: str, where: str) -> tuple[Columns, int]:
     """The element's columns and where the next element begins."""
     if not element.properties or element.count == 0:
         return {}, start
@@ -251,7 +178,7 @@ def _binary_columns(element: _Element, data: bytes, start: int, order: str, wher
     return _mixed_columns(element, data, start, order, where)
 
 
-def _sizes_at(element: _Element, data: bytes, start: int, order: str, where: str) -> dict[int, int]:
+def _sizes_at(element: Element, data: bytes, start: int, order: str, where: str) -> dict[int, int]:
     """The size of each list of the entry at ``start``, by the number of its property."""
     sizes: dict[int, int] = {}
     place = start
@@ -271,7 +198,7 @@ def _sizes_at(element: _Element, data: bytes, start: int, order: str, where: str
     return sizes
 
 
-def _mixed_columns(element: _Element, data: bytes, start: int, order: str, where: str) -> tuple[Columns, int]:
+def _mixed_columns(element: Element, data: bytes, start: int, order: str, where: str) -> tuple[Columns, int]:
     """Entries of different lengths: one after the other to find their places, then each column in one go."""
     endian = "little" if order == "<" else "big"
     shapes = [
@@ -320,7 +247,7 @@ def _outline(columns: Mapping[str, Columns], where: str) -> _Lists:
 
 
 @np.errstate(over="ignore")  # a number too large for a float is an infinite one, which is refused
-def _mesh(columns: Mapping[str, Columns], elements: Mapping[str, _Element], name: str, where: str) -> Mesh:
+def _mesh(columns: Mapping[str, Columns], elements: Mapping[str, Element], name: str, where: str) -> Mesh:
     vertex = {key: column for key, column in columns["vertex"].items() if isinstance(column, np.ndarray)}
     positions = np.stack([vertex[axis] for axis in "xyz"], axis=-1)
     outline = _outline(columns, where)
@@ -378,7 +305,7 @@ def _corner_uvs(face: Columns, outline: _Lists, keep: NDArray[np.bool_]) -> Numb
     return texcoords.values.reshape(-1, 2)[np.repeat(keep, outline.sizes)]
 
 
-def _colors(columns: Columns, element: _Element) -> NDArray[np.float32] | None:
+def _colors(columns: Columns, element: Element) -> NDArray[np.float32] | None:
     """Linear RGB(A); bytes count to 255, other whole numbers to 255 or 65535 by their type, reals to 1."""
     scalars = {each.name: each.type for each in element.properties if each.count_type is None}
     names = [name for name in ("red", "green", "blue", "alpha") if name in scalars]
