@@ -45,6 +45,7 @@ def load_scene(
     environment: str | Path | Environment | None = None,
     background: tuple[float, float, float] | None = None,
     allow_outside: bool = False,
+    multiple_scattering: bool = True,
 ) -> Scene:
     """Load a scene from a file, a bundled scene's name, or an object of another library.
 
@@ -61,13 +62,22 @@ def load_scene(
         Linear RGB seen where nothing is hit; None leaves the environment visible.
     allow_outside:
         Let the file refer to files outside its own folder.
+    multiple_scattering:
+        Give back the light that rough surfaces reflect more than once between microfacets. False: as dark as glTF's
+        formulas make them.
 
     Raises
     ------
     SceneError
         If the file is missing, damaged, foreign, or beyond what can be rendered.
     """
-    return _load_scene(source, environment=environment, background=background, allow_outside=allow_outside)
+    return _load_scene(
+        source,
+        environment=environment,
+        background=background,
+        allow_outside=allow_outside,
+        multiple_scattering=multiple_scattering,
+    )
 
 
 def render(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import trimesh
 
 from lippmann.image import read_picture
 
@@ -50,6 +51,21 @@ def test_memory_does_not_change_the_picture(lippmann, tmp_path, engine):
         assert lippmann(*words).code == 0
     a, b = (read_picture(tmp_path / f"{name}.exr").pixels for name in ("a", "b"))
     assert np.array_equal(a, b)
+
+
+def test_single_scattering_darkens_rough_metal_and_is_told(lippmann, tmp_path, engine):
+    ball = trimesh.creation.icosphere(3)
+    rough = trimesh.visual.material.PBRMaterial(metallicFactor=1.0, roughnessFactor=1.0, baseColorFactor=[255] * 4)
+    ball.visual = trimesh.visual.TextureVisuals(material=rough)
+    ball.export(tmp_path / "ball.glb")
+    means = []
+    for name, words in (("both", ()), ("single", ("--single-scattering",))):
+        out = tmp_path / f"{name}.exr"
+        assert lippmann("render", tmp_path / "ball.glb", "--spp", 4, "-o", out, *words).code == 0
+        picture = read_picture(out)
+        means.append(picture.pixels.mean())
+        assert any("single scattering" in note for note in picture.provenance.notes) == (name == "single")
+    assert means[1] < 0.95 * means[0]
 
 
 def test_quiet_says_nothing(lippmann, tmp_path, engine):

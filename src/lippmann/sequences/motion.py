@@ -7,7 +7,6 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -15,7 +14,7 @@ from lippmann.errors import UsageError
 from lippmann.scene.placement import Bounds
 from lippmann.scene.readers.load import kind_of_file, load_scene
 from lippmann.scene.scene import Scene, check_description, find_camera, override_light
-from lippmann.scene.values.description import Camera, Environment
+from lippmann.scene.values.description import Camera, Environment, SceneDescription
 from lippmann.scene.values.whitted_camera import CameraPose
 from lippmann.scene.values.whitted_scene import ClassicScene
 from lippmann.scene.whitted.world_frame import world_camera
@@ -65,7 +64,7 @@ class GltfMotion(Motion):
         Frames per second of the animation's own time, which begins at 0.
     animation:
         Its name; ``None`` for the file's first.
-    environment, background, allow_outside:
+    environment, background, allow_outside, multiple_scattering:
         As of :func:`lippmann.scene.readers.load.load_scene`.
 
     Raises
@@ -83,6 +82,7 @@ class GltfMotion(Motion):
         environment: str | Path | Environment | None = None,
         background: tuple[float, float, float] | None = None,
         allow_outside: bool = False,
+        multiple_scattering: bool = True,
     ) -> None:
         from lippmann.scene.readers.gltf_animation.animated_file import MovingGltf
 
@@ -92,7 +92,12 @@ class GltfMotion(Motion):
         self._fps = fps
         self._moving = MovingGltf(path, animation=animation, allow_outside=allow_outside)
         # Surroundings and background are read once, with the first frame.
-        self._first = load_scene(self._moving.at(0.0), environment=environment, background=background)
+        self._first = load_scene(
+            self._moving.at(0.0),
+            environment=environment,
+            background=background,
+            multiple_scattering=multiple_scattering,
+        )
 
     @property
     def count(self) -> int:
@@ -113,8 +118,12 @@ class GltfMotion(Motion):
         return np.stack([np.min(boxes, axis=0)[0], np.max(boxes, axis=0)[1]])
 
     def _at(self, seconds: float) -> Scene:
-        description = check_description(self._moving.at(seconds), self._file)
         physical = self._first.physical
+        assert isinstance(physical, SceneDescription)
+        description = replace(
+            check_description(self._moving.at(seconds), self._file),
+            multiple_scattering=physical.multiple_scattering,
+        )
         return replace(self._first, description=override_light(description, physical.environment, physical.background))
 
 
@@ -169,6 +178,7 @@ def open_motion(
     environment: str | Path | Environment | None = None,
     background: tuple[float, float, float] | None = None,
     allow_outside: bool = False,
+    multiple_scattering: bool = True,
 ) -> Motion:
     """What moves in a scene file.
 
@@ -178,7 +188,7 @@ def open_motion(
         Of a glTF file, see :class:`GltfMotion`.
     camera_path:
         A Tachyon ``.cam`` file: the display flies along it.
-    environment, background, allow_outside:
+    environment, background, allow_outside, multiple_scattering:
         As of :func:`lippmann.scene.readers.load.load_scene`.
 
     Raises
@@ -188,18 +198,20 @@ def open_motion(
     UsageError
         Nothing moves in a scene of this kind, or options contradict each other.
     """
-    options: dict[str, Any] = {
-        "environment": environment,
-        "background": background,
-        "allow_outside": allow_outside,
-    }
     if camera_path is not None:
         for name, value in (("animation", animation), ("fps", fps)):
             if value is not None:
                 raise UsageError("a camera path has one pose a frame", parameter=name, fix="leave it out")
         from lippmann.scene.readers.tachyon.reader import read_cam
 
-        return Flight(load_scene(source, **options), read_cam(camera_path))
+        scene = load_scene(
+            source,
+            environment=environment,
+            background=background,
+            allow_outside=allow_outside,
+            multiple_scattering=multiple_scattering,
+        )
+        return Flight(scene, read_cam(camera_path))
     if kind_of_file(source) not in (".glb", ".gltf"):
         raise UsageError(
             f"nothing moves in '{source}'",
@@ -207,4 +219,12 @@ def open_motion(
             rule="glTF files have animations; Tachyon and NFF scenes are flown through",
             fix="add camera_path=FILE.cam for a flight",
         )
-    return GltfMotion(Path(source), fps=FRAMES_PER_SECOND if fps is None else fps, animation=animation, **options)
+    return GltfMotion(
+        Path(source),
+        fps=FRAMES_PER_SECOND if fps is None else fps,
+        animation=animation,
+        environment=environment,
+        background=background,
+        allow_outside=allow_outside,
+        multiple_scattering=multiple_scattering,
+    )

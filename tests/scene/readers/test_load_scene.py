@@ -161,6 +161,17 @@ def test_light_and_background():
     assert load_scene(triangle(environment=studio()), environment=sky).environment is sky
 
 
+def test_single_scattering_is_noted(save):
+    assert load_scene(triangle()).physical.multiple_scattering
+    scene = load_scene(triangle(), multiple_scattering=False)
+    assert not scene.physical.multiple_scattering
+    assert any("single scattering" in note for note in scene.notes)
+    classic = load_scene("teapot", multiple_scattering=False)
+    assert not classic.is_classic
+    with pytest.raises(UsageError, match=r"multiple_scattering: .*leave it out"):
+        load_scene(save("a.xml", XML.encode()), multiple_scattering=False)
+
+
 @pytest.mark.parametrize("background", [(1, 2), (0, 0, -1), (0, 0, np.nan), (1, 1, 1, 1)])
 def test_backgrounds_that_are_no_colour(background):
     with pytest.raises(UsageError, match=r"background: .*three numbers of 0 or more"):

@@ -35,6 +35,7 @@ def plan(
     environment: options.Environment = None,
     background: options.Background = None,
     allow_outside: options.AllowOutside = False,
+    single_scattering: options.SingleScattering = False,
     device: options.Device = "auto",
     threads: options.Threads = None,
     memory: options.Memory = None,
@@ -60,7 +61,7 @@ def plan(
         threads=threads,
         memory=parse.memory(memory),
     )
-    source = SceneSource(scene, environment, parse.color(background), allow_outside)
+    source = SceneSource(scene, environment, parse.color(background), allow_outside, single_scattering)
     with console.progress() as progress:
         loaded = source.load()
         found = forecast(loaded, load_display(display), request, progress)

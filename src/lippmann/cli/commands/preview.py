@@ -26,6 +26,7 @@ def preview(
     environment: options.Environment = None,
     background: options.Background = None,
     allow_outside: options.AllowOutside = False,
+    single_scattering: options.SingleScattering = False,
     bits: options.Bits = None,
     device: options.Device = "auto",
     threads: options.Threads = None,
@@ -52,7 +53,7 @@ def preview(
         threads=threads,
         memory=parse.memory(memory),
     )
-    source = SceneSource(scene, environment, parse.color(background), allow_outside)
+    source = SceneSource(scene, environment, parse.color(background), allow_outside, single_scattering)
     with console.progress() as progress:
         started = time.perf_counter()
         loaded = source.load()

@@ -73,6 +73,7 @@ def render(
     environment: options.Environment = None,
     background: options.Background = None,
     allow_outside: options.AllowOutside = False,
+    single_scattering: options.SingleScattering = False,
     lpi: printing.Lpi = None,
     print_lpi: printing.PrintLpi = None,
     ppi: printing.Ppi = None,
@@ -139,7 +140,7 @@ def render(
         threads=threads,
         memory=parse.memory(memory),
     )
-    source = SceneSource(scene, environment, parse.color(background), allow_outside)
+    source = SceneSource(scene, environment, parse.color(background), allow_outside, single_scattering)
     wanted = sequence.Wanted(frames, fps, animation, camera_path, video, eye)
     on_cluster = clusters.ClusterOptions(cluster, tls_ca, tls_cert, tls_key)
     if wanted:

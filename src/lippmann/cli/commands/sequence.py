@@ -134,6 +134,7 @@ def render_frames(
         environment=source.environment,
         background=source.background,
         allow_outside=source.allow_outside,
+        multiple_scattering=not source.single_scattering,
     )
     frames = chosen.of(motion)
     path_of = numbered(output, len(frames))

@@ -21,6 +21,7 @@ _OTHERWISE = {
     "mode": "--place",
     "layout": "--as",
     "grid": "--views",
+    "multiple_scattering": "--single-scattering",
 }
 #: ``name="value"``, ``name=True``, ``name=3.5`` or, for any value, ``name=...``.
 _SETTING = re.compile(r"\b([a-z_]+)=(?:\"([^\"]*)\"|(\.\.\.|[\w+-]+(?:\.\w+)*))")

@@ -60,6 +60,13 @@ Background = Annotated[
 AllowOutside = Annotated[
     bool, typer.Option("--allow-outside", help="Let a scene file refer to files outside its own folder.")
 ]
+SingleScattering = Annotated[
+    bool,
+    typer.Option(
+        "--single-scattering",
+        help="Shade rough metal and glass exactly by glTF's formulas, which lose light between microfacets.",
+    ),
+]
 Method = Annotated[
     choices.Method,
     typer.Option(

@@ -12,12 +12,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class SceneSource:
-    """A scene's file or name, and the options ``--environment``, ``--background`` and ``--allow-outside``."""
+    """A scene's file or name, and the options that change what is read of it."""
 
     name: str
     environment: Path | None = None
     background: tuple[float, float, float] | None = None
     allow_outside: bool = False
+    single_scattering: bool = False
 
     def load(self) -> Scene:
         """The scene.
@@ -34,4 +35,5 @@ class SceneSource:
             environment=self.environment,
             background=self.background,
             allow_outside=self.allow_outside,
+            multiple_scattering=not self.single_scattering,
         )

@@ -17,6 +17,37 @@ class NormalMap:
 
 
 @dataclass(eq=False)
+class Anisotropy:
+    """KHR_materials_anisotropy: ``strength`` in [0, 1], and the cosine and sine of its ``rotation``.
+
+    ``lookup`` of texels whose red and green are a direction in the tangent plane and whose blue scales the strength.
+    """
+
+    strength: Signal
+    cosine: Signal
+    sine: Signal
+    lookup: Any = None
+
+
+@dataclass(eq=False)
+class ThinFilm:
+    """KHR_materials_iridescence: ``share`` of the surface under a film, its ``ior``, its thickness in nanometres.
+
+    The thickness is ``thinnest`` plus ``range`` times ``texture`` (1 without one).
+    """
+
+    share: Signal
+    ior: Signal
+    thinnest: Signal
+    range: Signal
+    texture: Signal
+
+    def thickness(self, place: Place) -> Any:
+        """In nanometres at a point."""
+        return self.thinnest.eval(place) + self.range.eval(place) * self.texture.eval(place)
+
+
+@dataclass(eq=False)
 class SurfaceModel:
     """A surface that may be metal, plastic, cloth, glass or a mixture. None switches a feature off, at no cost.
 
@@ -38,6 +69,12 @@ class SurfaceModel:
     gloss_albedo, sheen_albedo:
         Textures over (cosine, roughness) of the light that a microfacet lobe and white sheen send back; see
         :mod:`~lippmann.device.pbr.microfacet`. The former is needed wherever light is scattered below an interface.
+    interface_albedo:
+        Texture of the light that a rough refracting interface loses; needed for solids that compensate.
+    compensates:
+        Whether light that is reflected more than once between microfacets is given back (Turquin 2019).
+    anisotropy, film:
+        KHR_materials_anisotropy and KHR_materials_iridescence.
     opacity, opacity_cutoff:
         Share of the surface that is there; with a cutoff all or nothing.
     tinted, faded:
@@ -48,6 +85,8 @@ class SurfaceModel:
     roughness: Signal
     ior: Signal
     gloss_albedo: Any = None
+    interface_albedo: Any = None
+    compensates: bool = True
     metallic: Signal | None = None
     metal: bool = False
     dull: bool = False
@@ -62,6 +101,8 @@ class SurfaceModel:
     sheen_color: Signal | None = None
     sheen_roughness: Signal | None = None
     sheen_albedo: Any = None
+    anisotropy: Anisotropy | None = None
+    film: ThinFilm | None = None
     opacity: Signal | None = None
     opacity_cutoff: Signal | None = None
     tinted: bool = False
@@ -104,20 +145,28 @@ class SurfaceModel:
 
 @dataclass(eq=False)
 class Lobe:
-    """A microfacet lobe seen from one direction: ``wi`` in the frame of its own normal (None: the surface's)."""
+    """A microfacet lobe seen from one direction: ``wi`` in the frame of its own normal (None: the surface's).
+
+    ``tilted`` says that the normal may differ from the surface's; ``alpha`` is the width along the frame's x and y.
+    """
 
     frame: Any
     wi: Any
     alpha: Any
+    tilted: bool = False
 
 
 @dataclass(eq=False)
 class Coat:
-    """The clear coat: ``weight`` of its reflection over what lies below, ``chance`` of being drawn."""
+    """The clear coat: ``weight`` of its reflection over what lies below, ``chance`` of being sampled.
+
+    ``gain`` compensates for its multiple scattering.
+    """
 
     lobe: Lobe
     weight: Any
     chance: Any
+    gain: Any
 
 
 @dataclass(eq=False)
@@ -133,7 +182,9 @@ class Sheen:
 class Point:
     """All that scattering at one surface point needs, whatever the outgoing direction.
 
-    ``below`` is the share of light that the interface does not reflect.
+    ``below`` is the share of light that the interface does not reflect. ``metal_gain`` and ``gain`` compensate for the
+    light that microfacets of metal and of the dielectric interface reflect more than once. ``film`` is the share of the
+    surface under a thin film, with its index and thickness.
     """
 
     flip: Any
@@ -146,5 +197,8 @@ class Point:
     specular: Any
     below: Any = None
     diffuse_chance: Any = None
+    metal_gain: Any = 1
+    gain: Any = 1
+    film: tuple[Any, Any, Any] | None = None
     sheen: Sheen | None = None
     coat: Coat | None = None

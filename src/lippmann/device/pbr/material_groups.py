@@ -35,6 +35,9 @@ _USES: dict[str, tuple[tuple[int, ...], ...]] = {
     "clearcoat_roughness_texture": ((1,),),
     "sheen_color_texture": ((0, 1, 2),),
     "sheen_roughness_texture": ((3,),),
+    "anisotropy_texture": ((0, 1, 2),),
+    "iridescence_texture": ((0,),),
+    "iridescence_thickness_texture": ((1,),),
 }
 
 
@@ -59,6 +62,8 @@ class Structure:
     solid: bool
     clearcoat: bool
     sheen: bool
+    anisotropic: bool
+    iridescent: bool
     opacity: Literal["full", "mask", "blend"]
 
 
@@ -97,7 +102,9 @@ def structure_of(m: Material, faded: bool, store: TextureStore) -> Structure:
     sheen = any(m.sheen_color)
     solid = is_solid(m) and metallic != 1
     smooth = roughness is not None and roughness <= SMOOTH_ROUGHNESS
-    bare = smooth and not (clearcoat or sheen or m.normal_texture)
+    anisotropic = m.anisotropy > 0
+    iridescent = value(m.iridescence_texture, 0, m.iridescence) != 0
+    bare = smooth and not (clearcoat or sheen or m.normal_texture or anisotropic or iridescent)
     kind: Kind = "surface"
     if m.unlit:
         kind = "lamp"
@@ -114,6 +121,8 @@ def structure_of(m: Material, faded: bool, store: TextureStore) -> Structure:
         solid=solid,
         clearcoat=clearcoat,
         sheen=sheen,
+        anisotropic=anisotropic,
+        iridescent=iridescent,
         opacity="full" if whole else "mask" if m.alpha_mode == "mask" else "blend",
     )
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from lippmann.device.pbr import material_groups, microfacet
 from lippmann.device.pbr.gltf_bsdf import surface_bsdf
-from lippmann.device.pbr.gltf_bsdf_parameters import NormalMap, SurfaceModel
+from lippmann.device.pbr.gltf_bsdf_parameters import Anisotropy, NormalMap, SurfaceModel, ThinFilm
 from lippmann.device.pbr.lookup_texture import signal_texture
 from lippmann.device.pbr.material_groups import Kind, Structure, Variant
 from lippmann.device.pbr.texture_lookup import Signal, numbers, uv_attribute
@@ -51,10 +51,18 @@ class Finish:
     absorption: Color | None
 
 
-def make_finishes(materials: Sequence[Material], variants: Sequence[Variant], store: TextureStore) -> list[Finish]:
-    """Finishes that together hold every variant once."""
+def make_finishes(
+    materials: Sequence[Material], variants: Sequence[Variant], store: TextureStore, *, compensates: bool = True
+) -> list[Finish]:
+    """Finishes that together hold every variant once.
+
+    ``compensates`` says whether light that is reflected more than once between microfacets is given back.
+    """
     groups = material_groups.group(materials, variants, store)
-    finishes = [_Maker([materials[variant.material] for variant in group], group, store).finish() for group in groups]
+    finishes = [
+        _Maker([materials[variant.material] for variant in group], group, store, compensates).finish()
+        for group in groups
+    ]
     store.finish()
     return finishes
 
@@ -62,7 +70,10 @@ def make_finishes(materials: Sequence[Material], variants: Sequence[Variant], st
 class _Maker:
     """Makes the plugin of one family."""
 
-    def __init__(self, members: list[Material], variants: list[Variant], store: TextureStore) -> None:
+    def __init__(
+        self, members: list[Material], variants: list[Variant], store: TextureStore, compensates: bool
+    ) -> None:
+        self._compensates = compensates
         self._members = members
         self._variants = variants
         self._store = store
@@ -99,12 +110,15 @@ class _Maker:
             metal=structure.metal == "all",
             dull=structure.dull,
             solid=structure.solid,
+            compensates=self._compensates,
             normal=self._normal_map("normal"),
             tinted=variant.tinted,
             faded=variant.faded,
         )
-        if structure.metal != "all" and not structure.dull:
+        if structure.metal != "none" or not structure.dull or structure.clearcoat:
             model.gloss_albedo = self._store.table("gloss", microfacet.gloss_albedo_table)
+        if structure.solid and self._compensates:
+            model.interface_albedo = self._store.table("interface", microfacet.interface_albedo_table)
         if structure.opacity != "full":
             model.opacity = self._channel("alpha", 3, "base_color_texture")
         if structure.opacity == "mask":
@@ -124,7 +138,33 @@ class _Maker:
             model.sheen_color = self._color("sheen_color")
             model.sheen_roughness = self._channel("sheen_roughness", 3)
             model.sheen_albedo = self._store.table("sheen", microfacet.sheen_albedo_table)
+        if structure.anisotropic:
+            model.anisotropy = self._anisotropy()
+        if structure.iridescent:
+            model.film = self._film()
         return model
+
+    def _anisotropy(self) -> Anisotropy:
+        rotation = self._numbers("anisotropy_rotation")
+        textures = self._textures("anisotropy_texture")
+        return Anisotropy(
+            strength=Signal(numbers(self._numbers("anisotropy"))),
+            cosine=Signal(numbers(np.cos(rotation))),
+            sine=Signal(numbers(np.sin(rotation))),
+            lookup=None if textures[0] is None else self._store.normals(textures, self._uv),
+        )
+
+    def _film(self) -> ThinFilm:
+        thinnest, thickest = (self._numbers(f"iridescence_thickness_{end}imum") for end in ("min", "max"))
+        return ThinFilm(
+            share=self._channel("iridescence", 0),
+            ior=Signal(numbers(self._numbers("iridescence_ior"))),
+            thinnest=Signal(numbers(thinnest)),
+            range=Signal(numbers(thickest - thinnest)),
+            texture=self._store.channel(
+                self._textures("iridescence_thickness_texture"), 1, np.ones(len(thinnest)), self._uv
+            ),
+        )
 
     def _emission(self, model: SurfaceModel) -> Emission:
         first = self._members[0]
@@ -154,10 +194,16 @@ class _Maker:
 
 
 def _uv_sets(m: Material) -> tuple[int, ...]:
-    """Sets in use, the mesh's own first: a normal map needs its tangents, and a lamp is drawn by nothing else."""
+    """Sets in use, the mesh's own first: normal maps need its tangents, and emitters are sampled by it."""
     textures = material_groups.textures_of(m)
-    preferred = ("normal_texture", "clearcoat_normal_texture", "emission_texture", "base_color_texture")
-    first = [textures[name].uv_set for name in preferred if name in textures]
+    preferred = (
+        "normal_texture",
+        "anisotropy_texture",
+        "clearcoat_normal_texture",
+        "emission_texture",
+        "base_color_texture",
+    )
+    first = [textures[f"{name}_texture"].uv_set for name in preferred if f"{name}_texture" in textures]
     return tuple(dict.fromkeys([*first, *(texture.uv_set for texture in textures.values())]))
 
 

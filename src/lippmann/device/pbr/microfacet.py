@@ -1,25 +1,34 @@
 """Formulas of glTF's surface model: Fresnel, GGX and Charlie lobes, and how to draw directions from them.
 
-All directions live in a local frame whose z axis is the surface normal; ``alpha`` is the square of glTF's roughness.
-The functions take Dr.Jit arrays and are recorded into kernels.
+All directions live in a local frame whose z axis is the surface normal; ``alpha`` is the GGX width along x and y, for
+isotropic surfaces the square of glTF's roughness twice. The functions take Dr.Jit arrays and are recorded into kernels.
 
 Sources: the Khronos glTF 2.0 specification, appendix B, and its ``KHR_materials_*`` extensions, which build on Walter
-et al. 2007 (microfacets), Heitz 2014 (height-correlated masking), Schlick 1994, and Estevez and Kulla 2017 (sheen).
+et al. 2007 (microfacets), Heitz 2014 (height-correlated masking, anisotropy), Schlick 1994, and Estevez and Kulla 2017
+(sheen). The tables of directional albedo serve the compensation of multiple scattering (Turquin 2019).
 """
 
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from lippmann.device.types import Float, Point2f, Vector3f
+
 #: Smallest ``alpha``: below it single precision cannot resolve the lobe, and it looks like a mirror anyway.
 MIN_ALPHA = 1e-3
+#: Smallest index of refraction of a solid: at exactly 1 the half vector of light that passes straight through vanishes.
+MIN_IOR = 1.001
+#: Square roots of the head-on reflectances, (ior - 1) / (ior + 1), that :func:`interface_albedo_table` knows.
+#: Dense near 0, where total reflection from inside sets in.
+INTERFACE_F0 = tuple(0.96 * (step / 12) ** 2 for step in range(13))
+#: Roughnesses of that table.
+INTERFACE_ROWS = 16
 
 
-def schlick_weight(cosine: Any) -> Any:
+def schlick_weight(cosine: Float) -> Float:
     """``(1 - cosine)^5``, the weight of grazing reflectance."""
     import drjit as dr
 
@@ -27,76 +36,142 @@ def schlick_weight(cosine: Any) -> Any:
     return dr.square(dr.square(m)) * m
 
 
-def ggx_density(h: Any, alpha: Any) -> Any:
+def ggx_density(h: Vector3f, alpha: Point2f) -> Float:
     """Density of microfacet normals D(h), written without the difference ``1 - (n.h)^2`` that loses small alphas."""
     import drjit as dr
 
-    a2 = dr.square(alpha)
-    spread = dr.fma(a2, dr.square(h.z), dr.square(h.x) + dr.square(h.y))
-    return a2 / (dr.pi * dr.square(spread))
+    stretch = alpha.x / alpha.y
+    spread = dr.square(h.x) / stretch + dr.square(h.y) * stretch + alpha.x * alpha.y * dr.square(h.z)
+    return alpha.x * alpha.y / (dr.pi * dr.square(spread))
 
 
-def _smith_root(cosine: Any, alpha: Any) -> Any:
+def _smith_root(w: Vector3f, alpha: Point2f) -> Float:
     import drjit as dr
 
-    a2 = dr.square(alpha)
-    return dr.sqrt(dr.fma(1 - a2, dr.square(cosine), a2))
+    return dr.sqrt(dr.square(alpha.x * w.x) + dr.square(alpha.y * w.y) + dr.square(w.z))
 
 
-def ggx_visibility(cos_i: Any, cos_o: Any, alpha: Any) -> Any:
+def ggx_visibility(wi: Vector3f, wo: Vector3f, alpha: Point2f) -> Float:
     """Height-correlated masking and shadowing over ``4 cos_i cos_o`` (glTF's V)."""
-    return 0.5 / (cos_o * _smith_root(cos_i, alpha) + cos_i * _smith_root(cos_o, alpha))
+    return 0.5 / (wo.z * _smith_root(wi, alpha) + wi.z * _smith_root(wo, alpha))
 
 
-def ggx_masking(cosine: Any, alpha: Any) -> Any:
-    """Smith's masking G1 of one direction."""
-    return 2 * cosine / (cosine + _smith_root(cosine, alpha))
+def ggx_masking(w: Vector3f, alpha: Point2f) -> Float:
+    """Smith's masking G1 of one direction above the surface."""
+    return 2 * w.z / (w.z + _smith_root(w, alpha))
 
 
-def visible_normal_pdf(cos_i: Any, i_dot_h: Any, density: Any, alpha: Any) -> Any:
+def visible_normal_pdf(wi: Vector3f, i_dot_h: Float, density: Float, alpha: Point2f) -> Float:
     """Density of :func:`sample_visible_normal`, per solid angle of h."""
-    return 2 * i_dot_h * density / (cos_i + _smith_root(cos_i, alpha))
+    return 2 * i_dot_h * density / (wi.z + _smith_root(wi, alpha))
 
 
-def sample_visible_normal(wi: Any, alpha: Any, sample: Any) -> Any:
+def sample_visible_normal(wi: Vector3f, alpha: Point2f, sample: Point2f) -> Vector3f:
     """A microfacet normal among those that ``wi`` sees (Dupuy and Benyoub 2023, spherical caps)."""
     import drjit as dr
 
-    stretched = dr.normalize(type(wi)(wi.x * alpha, wi.y * alpha, wi.z))
+    stretched = dr.normalize(type(wi)(wi.x * alpha.x, wi.y * alpha.y, wi.z))
     sin_phi, cos_phi = dr.sincos(2 * dr.pi * sample.x)
     z = dr.fma(1 - sample.y, 1 + stretched.z, -stretched.z)
     radius = dr.safe_sqrt(1 - dr.square(z))
     h = type(wi)(radius * cos_phi, radius * sin_phi, z) + stretched
-    return dr.normalize(type(wi)(h.x * alpha, h.y * alpha, dr.maximum(h.z, 0)))
+    return dr.normalize(type(wi)(h.x * alpha.x, h.y * alpha.y, dr.maximum(h.z, 0)))
 
 
-def gloss_albedo_table(columns: int = 64, rows: int = 32, steps: int = 32) -> NDArray[np.float32]:
+#: Roughnesses of :func:`gloss_albedo_table`.
+GLOSS_ROWS = 32
+
+
+def roughness_row(alpha: Point2f, rows: int) -> Float:
+    """Place of a GGX lobe among ``rows`` texels of a table, in texels: between the first's centre and the last's.
+
+    An anisotropic lobe stands where an isotropic one of its root mean square width does.
+    """
+    import drjit as dr
+
+    return dr.power((dr.square(alpha.x) + dr.square(alpha.y)) / 2, 0.25) * (rows - 1) + 0.5
+
+
+def gloss_albedo_table(columns: int = 64, rows: int = GLOSS_ROWS, steps: int = 32) -> NDArray[np.float32]:
     """Light that a GGX lobe reflects, ``(rows, columns, 3)``: rows along roughness, columns along the cosine.
 
     With Schlick's Fresnel factor of head-on reflectance f0 it is ``f0 * first + second`` of the first two channels
-    (the third is idle). Texel centres; ``steps`` squared draws of microfacets each. Needs a running engine.
+    (the third is idle). Cosines at texel centres, roughness from 0 to 1; ``steps`` squared samples of microfacets each.
+    Needs a running engine.
     """
     import drjit as dr
     import mitsuba as mi
 
-    across, down, even = ((np.arange(count) + 0.5) / count for count in (columns, rows, steps))
-    roughness, cos_i, u, v = (
+    wi, alpha, sample = _grid(columns, rows, steps)
+    h = sample_visible_normal(wi, alpha, sample)
+    cosine = dr.dot(wi, h)
+    weight = _reflected(wi, h, alpha)
+    grazing = weight * schlick_weight(cosine)
+    idle = dr.zeros(mi.Float, dr.width(weight))
+    return np.stack([_means(part, rows, columns) for part in (weight - grazing, grazing, idle)], axis=-1)
+
+
+def _grid(columns: int, rows: int, steps: int) -> tuple[Vector3f, Point2f, Point2f]:
+    """Directions and widths at the texels of an albedo table, ``steps`` squared samples each.
+
+    Cosines lie at texel centres, roughness runs from 0 in the first row to 1 in the last: see :func:`roughness_row`.
+    """
+    import drjit as dr
+    import mitsuba as mi
+
+    across, even = ((np.arange(count) + 0.5) / count for count in (columns, steps))
+    down = np.linspace(0, 1, rows)
+    roughness, cosine, u, v = (
         mi.Float(part.ravel().astype(np.float32)) for part in np.meshgrid(down, across, even, even, indexing="ij")
     )
     alpha = dr.maximum(dr.square(roughness), MIN_ALPHA)
-    wi = mi.Vector3f(dr.sqrt(1 - dr.square(cos_i)), 0, cos_i)
-    h = sample_visible_normal(wi, alpha, mi.Point2f(u, v))
+    return mi.Vector3f(dr.sqrt(1 - dr.square(cosine)), 0, cosine), mi.Point2f(alpha), mi.Point2f(u, v)
+
+
+def _means(values: Float, rows: int, columns: int) -> NDArray[np.float32]:
+    """Mean of the samples of each texel, ``(rows, columns)``."""
+    import drjit as dr
+
+    steps = dr.width(values) // (rows * columns)
+    return np.array(dr.block_sum(values, steps) / steps, dtype=np.float32).reshape(rows, columns)
+
+
+def _reflected(wi: Vector3f, h: Vector3f, alpha: Point2f) -> Float:
+    """Weight of the reflection at a sampled microfacet: G2 / G1, 0 below the surface."""
+    import drjit as dr
+
+    wo = h * (2 * dr.dot(wi, h)) - wi
+    # The visibility over what the density of visible normals already holds of it.
+    weight = ggx_visibility(wi, wo, alpha) * 4 * wi.z * wo.z / ggx_masking(wi, alpha)
+    return dr.select(wo.z > 0, weight, 0)
+
+
+def interface_albedo_table(columns: int = 32, rows: int = INTERFACE_ROWS, steps: int = 16) -> NDArray[np.float32]:
+    """Share of light that a rough refracting interface reflects or lets through, ``(2 n rows, columns, 1)``.
+
+    The rest is lost to microfacets that send light to the wrong side. One block of ``rows`` (along roughness) by
+    ``columns`` (along the cosine) for each of the n :data:`INTERFACE_F0` seen from outside, then from inside. Cosines
+    at texel centres, roughness from 0 to 1; ``steps`` squared samples of microfacets each. Needs a running engine.
+    """
+    import drjit as dr
+    import mitsuba as mi
+
+    wi, alpha, sample = _grid(columns, rows, steps)
+    h = sample_visible_normal(wi, alpha, sample)
     cosine = dr.dot(wi, h)
-    cos_o = 2 * cosine * h.z - cos_i
-    # Draws weigh G2 / G1: the visibility over what the density of visible normals already holds of it.
-    weight = ggx_visibility(cos_i, cos_o, alpha) * 4 * cos_i * cos_o / ggx_masking(cos_i, alpha)
-    weight = dr.select(cos_o > 0, weight, 0)
-    grazing = weight * schlick_weight(cosine)
-    sums = [dr.block_sum(part, steps**2) / steps**2 for part in (weight - grazing, grazing, dr.zeros(mi.Float, len(u)))]
-    return np.stack([np.array(part, dtype=np.float32).reshape(rows, columns) for part in sums], axis=-1)
+    reflected = _reflected(wi, h, alpha)
+    blocks = []
+    for inside in (False, True):
+        for root in INTERFACE_F0:
+            ior = max((1 + root) / (1 - root), MIN_IOR)
+            fresnel, cos_t, _, eta_ti = mi.fresnel(cosine, mi.Float(1 / ior if inside else ior))
+            wo = mi.refract(wi, mi.Normal3f(h), cos_t, eta_ti)
+            through = dr.select(wo.z < 0, ggx_masking(mi.Vector3f(wo.x, wo.y, dr.abs(wo.z)), alpha), 0)
+            blocks.append(_means(fresnel * reflected + (1 - fresnel) * through, rows, columns))
+    return np.concatenate(blocks)[..., None]
 
 
-def charlie_density(cos_h: Any, alpha: Any) -> Any:
+def charlie_density(cos_h: Float, alpha: Float) -> Float:
     """Density of the fibres of a cloth (KHR_materials_sheen)."""
     import drjit as dr
 
@@ -108,19 +183,19 @@ def charlie_density(cos_h: Any, alpha: Any) -> Any:
 _CHARLIE_FIT = ((21.5473, 25.3245), (3.82987, 3.32435), (0.19823, 0.16801), (-1.97760, -1.27393), (-4.32054, -4.85967))
 
 
-def _charlie_lambda(cosine: Any, alpha: Any) -> Any:
+def _charlie_lambda(cosine: Float, alpha: Float) -> Float:
     import drjit as dr
 
     t = dr.square(1 - alpha)
     a, b, c, d, e = (dr.fma(t, smooth - rough, rough) for rough, smooth in _CHARLIE_FIT)
 
-    def fit(x: Any) -> Any:
+    def fit(x: Float) -> Float:
         return a / (1 + b * dr.power(dr.maximum(x, 1e-6), c)) + d * x + e
 
     return dr.select(cosine < 0.5, dr.exp(fit(cosine)), dr.exp(2 * fit(0.5) - fit(1 - cosine)))
 
 
-def charlie_visibility(cos_i: Any, cos_o: Any, alpha: Any) -> Any:
+def charlie_visibility(cos_i: Float, cos_o: Float, alpha: Float) -> Float:
     """Masking and shadowing of cloth over ``4 cos_i cos_o``."""
     return 1 / ((1 + _charlie_lambda(cos_i, alpha) + _charlie_lambda(cos_o, alpha)) * 4 * cos_i * cos_o)
 

@@ -167,7 +167,8 @@ def _variant(description: SceneDescription, mesh: int) -> Variant:
 
 def _finishes(description: SceneDescription, meshes: Sequence[int]) -> dict[Variant, Finish]:
     variants = [_variant(description, mesh) for mesh in meshes]
-    made = make_finishes(description.materials, variants, TextureStore())
+    compensates = description.multiple_scattering
+    made = make_finishes(description.materials, variants, TextureStore(), compensates=compensates)
     return {variant: finish for finish in made for variant in finish.members}
 
 

@@ -53,7 +53,7 @@ class Piece:
 
 def has_volume(matrices: Matrix) -> NDArray[np.bool_]:
     """Whether placements ``(k, 4, 4)`` keep volume: a flat or singular one shows nothing."""
-    finite = np.isfinite(matrices).all(axis=(1, 2))
+    finite = np.asarray(np.isfinite(matrices).all(axis=(1, 2)))
     linear = np.where(finite[:, None, None], matrices[:, :3, :3], 0.0)
     return np.asarray(finite & (np.abs(np.linalg.det(linear)) > 0))
 
@@ -80,7 +80,7 @@ def make_shapes(
     # Meshes that are always placed together, as the primitives of one glTF mesh are, share their instances.
     together: dict[tuple[bool, bytes], list[Piece]] = {}
     for dress, matrices in placements:
-        key = _is_instantiable(dress), hashlib.sha256(np.ascontiguousarray(matrices)).digest()
+        key = _is_instantiable(dress), hashlib.sha256(np.ascontiguousarray(matrices).data).digest()
         together.setdefault(key, []).append(Piece(dress, matrices))
     groups = {number: _copied(pieces) for number, pieces in enumerate(together.values())}
     instanced = choose_instances(groups, memory, name=name)

@@ -48,6 +48,7 @@ def load_scene(
     environment: str | Path | Environment | None = None,
     background: Color | None = None,
     allow_outside: bool = False,
+    multiple_scattering: bool = True,
 ) -> Scene:
     """Load a scene.
 
@@ -64,13 +65,17 @@ def load_scene(
         Linear RGB seen where nothing is hit; None for the environment (for the studio a grey backdrop).
     allow_outside:
         Let the scene file name files outside its own folder.
+    multiple_scattering:
+        Give back the light that rough surfaces reflect more than once between microfacets. False: as dark as glTF's
+        formulas make them.
 
     Raises
     ------
     SceneError
         The scene or something it needs is missing, damaged, foreign, or has nothing to see.
     UsageError
-        The background is no colour, or ``source`` is an object that is not understood.
+        The background is no colour, ``source`` is an object that is not understood, or materials that Mitsuba
+        describes are to be changed.
     """
     sky = _environment(environment)
     color = _background(background)
@@ -78,10 +83,26 @@ def load_scene(
     studio = scene.studio and str(environment) != NO_ENVIRONMENT
     if scene.classic is not None and color is not None:
         scene = replace(scene, classic=replace(scene.classic, background=Background(color=color)))
-    if scene.is_classic and sky is None:
+    if scene.is_classic and sky is None and multiple_scattering:
         return replace(scene, studio=studio)
-    # The classic light models know no surroundings: who asks for them gets the physical form.
-    return replace(scene, description=override_light(scene.physical, sky, color), studio=studio)
+    # The classic light models know neither surroundings nor microfacets: who asks for them gets the physical form.
+    description = override_light(scene.physical, sky, color)
+    if not multiple_scattering:
+        description = _single_scattering(description)
+    return replace(scene, description=description, studio=studio)
+
+
+def _single_scattering(description: SceneDescription | MitsubaSource) -> SceneDescription:
+    if isinstance(description, MitsubaSource):
+        raise UsageError(
+            "a scene of Mitsuba's has materials of its own",
+            where=description.name,
+            parameter="multiple_scattering",
+            rule="it is for materials in glTF's terms",
+            fix="leave it out",
+        )
+    remark = "single scattering between microfacets: rough metal and glass are darker than they would be"
+    return replace(description, multiple_scattering=False, notes=(*description.notes, remark))
 
 
 def known_suffixes() -> tuple[str, ...]:

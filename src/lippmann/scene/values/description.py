@@ -58,7 +58,10 @@ class Material:
     A factor multiplies its texture where both are given. ``base_color_texture`` carries alpha in its fourth channel;
     ``metallic_roughness_texture`` carries roughness in G and metallic in B; single-channel textures name the channel
     that the extension fixes (transmission R, specular A, clearcoat R, clearcoat roughness G, sheen roughness A,
-    thickness G). Colours of light (``emission``) are radiances; all others lie in [0, 1].
+    thickness G, iridescence R, its thickness G). Colours of light (``emission``) are radiances; all others lie in
+    [0, 1]. ``anisotropy`` is a strength in [0, 1], its ``rotation`` in radians from +u toward the top of the picture;
+    its texture holds a direction in RG and a strength in B. The thin film of ``iridescence`` is some nanometres thick:
+    from minimum to maximum as its texture says, the maximum without one.
     """
 
     name: str = ""
@@ -97,6 +100,15 @@ class Material:
     sheen_color_texture: Texture | None = None
     sheen_roughness: float = 0.0
     sheen_roughness_texture: Texture | None = None
+    anisotropy: float = 0.0
+    anisotropy_rotation: float = 0.0
+    anisotropy_texture: Texture | None = None
+    iridescence: float = 0.0
+    iridescence_texture: Texture | None = None
+    iridescence_ior: float = 1.3
+    iridescence_thickness_minimum: float = 100.0
+    iridescence_thickness_maximum: float = 400.0
+    iridescence_thickness_texture: Texture | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,6 +193,8 @@ class SceneDescription:
 
     ``background`` is the colour seen where nothing is hit (None: the environment itself, black without one).
     ``notes`` are one-line remarks of the reader: features that it ignored, and its assumptions.
+    ``multiple_scattering`` gives back the light that rough surfaces reflect more than once between microfacets; without
+    it they are as dark as glTF's formulas make them.
     """
 
     name: str
@@ -192,6 +206,7 @@ class SceneDescription:
     environment: Environment | None = None
     background: Color | None = None
     notes: Sequence[str] = ()
+    multiple_scattering: bool = True
 
     @cached_property
     def placements(self) -> Mapping[int, Matrix]:

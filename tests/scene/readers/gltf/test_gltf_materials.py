@@ -152,6 +152,36 @@ def test_specular_clearcoat_and_sheen(material):
     }
 
 
+def test_anisotropy_and_iridescence(material):
+    found = material(
+        extensions={
+            "KHR_materials_anisotropy": {
+                "anisotropyStrength": 0.6,
+                "anisotropyRotation": 1.57,
+                "anisotropyTexture": {"index": 0},
+            },
+            "KHR_materials_iridescence": {
+                "iridescenceFactor": 0.9,
+                "iridescenceTexture": {"index": 0},
+                "iridescenceIor": 1.4,
+                "iridescenceThicknessMinimum": 120,
+                "iridescenceThicknessMaximum": 600,
+                "iridescenceThicknessTexture": {"index": 1},
+            },
+        }
+    )
+    assert (found.anisotropy, found.anisotropy_rotation) == (0.6, 1.57)
+    assert (found.iridescence, found.iridescence_ior) == (0.9, 1.4)
+    assert (found.iridescence_thickness_minimum, found.iridescence_thickness_maximum) == (120, 600)
+    textures = found.anisotropy_texture, found.iridescence_texture, found.iridescence_thickness_texture
+    assert not any(texture.srgb for texture in textures)
+
+
+def test_anisotropy_and_iridescence_are_off_by_default(material):
+    plain = material(extensions={"KHR_materials_anisotropy": {}, "KHR_materials_iridescence": {}})
+    assert (plain.anisotropy, plain.iridescence, plain.iridescence_ior) == (0, 0, 1.3)
+
+
 def test_only_materials_in_use_are_read(writer, read):
     writer.add("materials", normalTexture={"index": 99})
     writer.add("materials", name="used")

@@ -68,6 +68,18 @@ class _Layers(TypedDict, total=False):
     sheen_roughness_texture: Texture | None
 
 
+class _Gloss(TypedDict, total=False):
+    anisotropy: float
+    anisotropy_rotation: float
+    anisotropy_texture: Texture | None
+    iridescence: float
+    iridescence_texture: Texture | None
+    iridescence_ior: float
+    iridescence_thickness_minimum: float
+    iridescence_thickness_maximum: float
+    iridescence_thickness_texture: Texture | None
+
+
 @dataclass(frozen=True, eq=False)
 class Materials:
     """The materials of a document; only those that are used are read, in the order of their first use."""
@@ -101,6 +113,7 @@ class Materials:
             **self._surface(fields),
             **self._interior(fields),
             **self._layers(fields),
+            **self._gloss(fields),
         )
         return material if archived is None else self._as_specular_glossiness(material, archived)
 
@@ -196,6 +209,23 @@ class Materials:
             layers["sheen_roughness"] = self._fraction(sheen, "sheenRoughnessFactor", 0.0)
             layers["sheen_roughness_texture"] = self.textures.read(sheen, "sheenRoughnessTexture")
         return layers
+
+    def _gloss(self, fields: Fields) -> _Gloss:
+        gloss: _Gloss = {}
+        anisotropy = fields.extension("KHR_materials_anisotropy")
+        if anisotropy is not None:
+            gloss["anisotropy"] = self._fraction(anisotropy, "anisotropyStrength", 0.0)
+            gloss["anisotropy_rotation"] = anisotropy.number("anisotropyRotation", 0.0)
+            gloss["anisotropy_texture"] = self.textures.read(anisotropy, "anisotropyTexture")
+        film = fields.extension("KHR_materials_iridescence")
+        if film is not None:
+            gloss["iridescence"] = self._fraction(film, "iridescenceFactor", 0.0)
+            gloss["iridescence_texture"] = self.textures.read(film, "iridescenceTexture")
+            gloss["iridescence_ior"] = film.number("iridescenceIor", 1.3, minimum=1.0)
+            gloss["iridescence_thickness_minimum"] = film.number("iridescenceThicknessMinimum", 100.0, minimum=0.0)
+            gloss["iridescence_thickness_maximum"] = film.number("iridescenceThicknessMaximum", 400.0, minimum=0.0)
+            gloss["iridescence_thickness_texture"] = self.textures.read(film, "iridescenceThicknessTexture")
+        return gloss
 
     def _color(self, fields: Fields, key: str, default: Color, *, most: float = 1.0) -> Color:
         red, green, blue = self._fractions(fields, key, default, most=most)
