@@ -114,7 +114,7 @@ def test_truncated_glb_is_refused(writer, read, kept):
         (b"{}", "asset is missing"),
         (b'{"asset": {}}', "asset.version is missing"),
         (b'{"asset": 3}', "an object belongs here"),
-        (b'{"asset": {"version": "1.0"}}', 'asset.version is "1.0"'),
+        (b'{"asset": {"version": "3.0"}}', 'asset.version is "3.0"'),
         (b'{"asset": {"version": "2.1", "minVersion": "2.1"}}', 'asset.minVersion is "2.1"'),
         (b'{"asset": {"version": "2.0"}, "nodes": {}}', "nodes is an object; a list belongs here"),
         (b'{"asset": {"version": "2.0"}, "nodes": [3]}', "a list of objects belongs here"),
@@ -134,7 +134,7 @@ def test_a_later_minor_version_is_read_when_two_suffices(writer, read):
 @pytest.mark.parametrize(
     ("offset", "value", "words"),
     [
-        (4, 1, "binary glTF of version 1"),
+        (4, 3, "binary glTF of version 3"),
         (8, 2**32 - 1, "cut short"),
         (12, 2**32 - 1, "a chunk of 4294967295 bytes"),
         (12, 2**31, "a chunk of"),
@@ -225,16 +225,90 @@ def test_only_the_first_buffer_lives_in_the_binary_chunk(writer, read):
     assert "buffers[0].uri is missing" in _refusal(read, json.dumps(text).encode(), "scene.gltf")
 
 
-@pytest.mark.parametrize("name", ["KHR_draco_mesh_compression", "KHR_texture_basisu", "EXT_meshopt_compression"])
-def test_required_extension_that_is_not_understood_is_named(writer, read, name):
+@pytest.mark.parametrize(
+    ("name", "tool"),
+    [
+        ("KHR_draco_mesh_compression", "decompress it with 'gltf-transform cp in.glb out.glb'"),
+        ("EXT_meshopt_compression", "decompress it with 'gltf-transform cp in.glb out.glb'"),
+        ("KHR_texture_basisu", "convert its textures with 'gltf-transform ktxdecompress in.glb out.glb'"),
+        ("ACME_gizmo", "export the scene without it"),
+    ],
+)
+def test_required_extension_that_is_not_understood_is_named_with_its_remedy(writer, read, name, tool):
     writer.triangle().json["extensionsRequired"] = [name]
-    assert f"requires the glTF extension {name}" in _refusal(read, writer)
+    rule = "it is not understood"
+    assert _refusal(read, writer) == f"scene.glb: the file requires the glTF extension {name}; {rule}; {tool}"
+
+
+@pytest.mark.parametrize("name", ["KHR_techniques_webgl", "KHR_technique_webgl", "KHR_materials_common", "KHR_blend"])
+def test_materials_of_former_extensions_are_plain(writer, read, name):
+    writer.triangle().json |= {"extensionsRequired": [name], "extensionsUsed": [name]}
+    (note,) = read(writer).notes
+    assert note.startswith(f"materials of the glTF extension {name} are shown as plain ones; convert it with")
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        {"asset": {"version": "1.0"}},
+        {"asset": {"version": "1.0.1"}, "meshes": {}},
+        {"asset": {"version": "0.8"}},
+        {"asset": {"version": 1}, "meshes": {"mesh": {}}},
+        {"asset": {}, "meshes": {"mesh": {}}},
+        {"meshes": {"mesh": {}}},
+        struct.pack("<4sIIII", b"glTF", 1, 20, 0, 0),
+    ],
+)
+def test_version_1_is_told_with_the_tool_that_converts_it(read, text):
+    data = text if isinstance(text, bytes) else json.dumps(text).encode()
+    tool = "convert it with 'gltf-pipeline -i in.gltf -o out.glb'"
+    assert _refusal(read, data, "s.gltf") == f"s.gltf: the file is glTF 1.0; glTF 2.0 is understood; {tool}"
+
+
+def _compressed(writer, extension, **accessor):
+    writer.triangle().json["meshes"][0]["primitives"][0]["extensions"] = {extension: {"bufferView": 0}}
+    writer.json["extensionsUsed"] = [extension]
+    writer.json["accessors"][0].update(accessor)
+    return writer
+
+
+def test_draco_that_is_used_and_not_required(writer, read):
+    name = "KHR_draco_mesh_compression"
+    scene = read(_compressed(writer, name))
+    assert scene.notes == (f"the glTF extension {name} is not understood; the uncompressed data beside it is read",)
+    del writer.json["accessors"][0]["bufferView"]
+    assert _refusal(read, writer).startswith(
+        f"scene.glb: meshes[0].primitives[0] is compressed by Draco with the glTF extension {name}; "
+        "it is not understood, and the file holds no uncompressed copy; decompress it with"
+    )
+
+
+def test_a_buffer_that_meshopt_alone_fills(writer, read):
+    writer.triangle().json["buffers"] = [
+        {"byteLength": 36},
+        {"byteLength": 36, "extensions": {"EXT_meshopt_compression": {"fallback": True}}},
+    ]
+    writer.json["bufferViews"][0]["buffer"] = 1
+    assert "buffers[1] is compressed with the glTF extension EXT_meshopt_compression" in _refusal(read, writer)
+
+
+def test_a_missing_buffer_is_not_answered_with_the_file_itself(writer, tmp_path):
+    path = writer.triangle().gltf_and_bin(tmp_path)
+    (tmp_path / "scene.bin").unlink()
+    with pytest.raises(SceneError, match=r"^scene\.gltf: buffer 'scene\.bin' is not there$"):
+        read_gltf(path)
+
+
+def test_pointers_of_animations_are_named(writer, read):
+    writer.triangle().json["extensionsUsed"] = ["KHR_animation_pointer"]
+    expected = "animations of materials, lights and cameras (KHR_animation_pointer) are not followed"
+    assert read(writer).notes == (expected,)
 
 
 def test_used_extension_that_is_not_understood_is_noted(writer, read):
-    writer.triangle().json["extensionsUsed"] = ["KHR_materials_iridescence", "KHR_materials_ior", "KHR_xmp_json_ld"]
+    writer.triangle().json["extensionsUsed"] = ["KHR_materials_dispersion", "KHR_materials_ior", "KHR_xmp_json_ld"]
     assert read(writer).notes == (
-        "the glTF extension KHR_materials_iridescence is not understood; what it adds is left out",
+        "the glTF extension KHR_materials_dispersion is not understood; what it adds is left out",
     )
 
 

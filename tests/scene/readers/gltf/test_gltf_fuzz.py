@@ -64,6 +64,13 @@ def _rich(writer):
     writer.node(mesh=mesh, skin=0, extensions={"KHR_lights_punctual": {"light": 0}})
     instancing = {"attributes": {"TRANSLATION": writer.accessor([[0, 0, 1], [0, 0, 2]])}}
     writer.node(mesh=mesh, extensions={"EXT_mesh_gpu_instancing": instancing})
+    for mode in (0, 2):
+        thin = {
+            "POSITION": writer.accessor([[0, 0, 2], [1, 0, 2], [0, 1, 2]]),
+            "COLOR_0": writer.accessor([[1, 0, 0]] * 3),
+        }
+        indices = writer.accessor([0, 1, 2, 1], "u1")
+        writer.node(mesh=writer.add("meshes", primitives=[{"attributes": thin, "mode": mode, "indices": indices}]))
     return writer
 
 
@@ -80,7 +87,7 @@ def _is_sound(path: Path) -> None:
     for mesh in scene.meshes:
         count = len(mesh.positions)
         assert mesh.faces.shape[1] == 3
-        assert mesh.faces.max() < count
+        assert (mesh.faces < count).all()
         assert np.isfinite(mesh.positions).all()
         assert 0 <= mesh.material < len(scene.materials)
         for values in (mesh.normals, mesh.colors, *mesh.uvs):
@@ -104,9 +111,9 @@ def original(writer_class):
 
 def test_the_unchanged_scene_is_read(glb, read):
     scene = read(glb)
-    assert (len(scene.meshes), len(scene.lights), len(scene.cameras)) == (2, 1, 1)
-    assert sum(len(places) for places in scene.placements.values()) == 4
-    assert scene.notes == ()
+    assert (len(scene.meshes), len(scene.lights), len(scene.cameras)) == (4, 1, 1)
+    assert sum(len(places) for places in scene.placements.values()) == 6
+    assert [note.split(" are drawn")[0] for note in scene.notes] == ["points", "lines"]
 
 
 @SETTINGS

@@ -36,12 +36,67 @@ def test_strips_and_fans_too_short_for_a_triangle_hold_none(writer, read, mode, 
     assert "shows no triangles" in _refusal(read, writer)
 
 
-@pytest.mark.parametrize("mode", [0, 1, 2, 3])
-def test_points_and_lines_are_noted(writer, read, mode):
-    writer.triangle().triangle(mode=mode)
+@pytest.mark.parametrize(
+    ("mode", "lines"), [(1, [(0, 1), (2, 3)]), (2, [(0, 1), (1, 2), (2, 3), (3, 0)]), (3, [(0, 1), (1, 2), (2, 3)])]
+)
+def test_lines_are_rods(writer, read, mode, lines):
+    scene = read(writer.triangle(positions=SQUARE[:4], mode=mode))
+    (mesh,) = scene.meshes
+    radius = 0.0025 * 2**0.5  # of the diagonal of the square
+    assert scene.notes == (f"lines are drawn as rods of radius {radius:.3g}, 0.25% of the scene's diagonal",)
+    for rod, (start, end) in zip(np.split(mesh.positions, len(lines)), lines, strict=True):
+        np.testing.assert_allclose(rod.mean(axis=0), np.mean([SQUARE[start], SQUARE[end]], axis=0), atol=1e-6)
+        near = np.linalg.norm(rod - SQUARE[start], axis=1) < 0.5
+        np.testing.assert_allclose(np.linalg.norm(rod[near] - SQUARE[start], axis=1), radius, rtol=1e-4)
+
+
+def test_points_are_balls_with_the_colours_of_their_vertices(writer, read):
+    colors = writer.accessor([[1, 0, 0], [0, 1, 0], [0, 0, 1]])
+    scene = read(writer.triangle(mode=0, attributes={"COLOR_0": colors}))
+    (mesh,) = scene.meshes
+    assert mesh.faces.shape == (3 * 32, 3)
+    for color, place in zip(np.eye(3), [[0, 0, 0], [1, 0, 0], [0, 1, 0]], strict=True):
+        mine = mesh.positions[(mesh.colors == color).all(axis=1)]
+        np.testing.assert_allclose(np.linalg.norm(mine - place, axis=1), 0.005 * 2**0.5, rtol=1e-4)
+    assert scene.notes == ("points are drawn as balls of radius 0.00707, 0.50% of the scene's diagonal",)
+
+
+def test_points_stand_where_all_nodes_place_them_at_one_size(writer, read):
+    mesh = writer.mesh(mode=0)
+    writer.node(mesh=mesh, scale=[10, 1, 1])
+    writer.node(mesh=mesh, translation=[0, 5, 0])
+    flat = writer.node(mesh=writer.mesh(), scale=[100, 0, 1])
     scene = read(writer)
-    assert len(scene.meshes) == 1
-    assert scene.notes == ("points and lines are not rendered (meshes[1].primitives[0])",)
+    (place,) = {instance.mesh for instance in scene.instances} - {len(scene.meshes) - 1}
+    balls = np.split(scene.meshes[place].positions, 6)
+    places = [[0, 0, 0], [10, 0, 0], [0, 1, 0], [0, 5, 0], [1, 5, 0], [0, 6, 0]]
+    np.testing.assert_allclose([ball.mean(axis=0) for ball in balls], places, atol=1e-5)
+    for ball, middle in zip(balls, places, strict=True):
+        radius = 0.005 * (100**2 + 6**2) ** 0.5
+        np.testing.assert_allclose(np.linalg.norm(ball - middle, axis=1), radius, rtol=1e-5)
+    assert flat == 2
+
+
+@pytest.mark.parametrize("lit", [False, True])
+def test_points_without_normals_show_colour_and_emission_unshaded(writer, read, lit):
+    writer.add("materials", pbrMetallicRoughness={"baseColorFactor": [0.5, 0.25, 0, 1]}, emissiveFactor=[0, 0.5, 0.75])
+    attributes = {"NORMAL": writer.accessor([[0, 0, 1]] * 3)} if lit else {}
+    writer.triangle(material=0, mode=0, attributes=attributes).triangle(material=0)
+    scene = read(writer)
+    points, triangle = (scene.materials[mesh.material] for mesh in scene.meshes)
+    assert (triangle.unlit, triangle.base_color) == (False, (0.5, 0.25, 0))
+    assert (points.unlit, points.base_color) == (not lit, (0.5, 0.25, 0) if lit else (0.5, 0.75, 0.75))
+
+
+def test_lines_of_no_length_are_nothing_to_see(writer, read):
+    assert "shows no triangles, lines or points" in _refusal(read, writer.triangle(positions=[[1, 1, 1]] * 2, mode=1))
+
+
+def test_too_many_points_are_refused(writer, read):
+    count = (1 << 20) + 1
+    accessor = writer.add("accessors", componentType=5126, count=count, type="VEC3")
+    writer.node(mesh=writer.add("meshes", primitives=[{"attributes": {"POSITION": accessor}, "mode": 0}]))
+    assert f"the file shows {count} points and lines; up to {count - 1} are drawn" in _refusal(read, writer)
 
 
 def test_strips_lose_the_triangles_that_only_turn_corners(writer, read):
@@ -154,6 +209,9 @@ def test_bad_primitives_are_refused(writer, read, changes, words):
 def test_indices_must_make_whole_triangles_and_be_unsigned(writer, read):
     writer.triangle(indices=writer.accessor([0, 1, 2, 0], "u2"))
     assert "has 4 corners; triangles have 3 each" in _refusal(read, writer)
+    writer.json["meshes"][0]["primitives"][0] |= {"mode": 1, "indices": writer.accessor([0, 1, 2], "u2")}
+    del writer.json["buffers"]
+    assert "has 3 corners; lines have 2 each" in _refusal(read, writer)
     writer.json["meshes"][0]["primitives"][0]["indices"] = writer.accessor([0, 1, 2], "i2")
     del writer.json["buffers"]
     assert "UNSIGNED_SHORT" in _refusal(read, writer)

@@ -9,7 +9,7 @@ from urllib.parse import unquote
 
 from lippmann.errors import SceneError
 from lippmann.scene.parsing.files import read_bytes, resolve
-from lippmann.scene.readers.gltf.document import Document
+from lippmann.scene.readers.gltf.document import MESHOPT, Document, not_decompressed
 
 _SCHEME = re.compile(r"[A-Za-z][A-Za-z0-9+.-]+:")  # two letters or more: "C:" is a Windows drive
 
@@ -96,6 +96,9 @@ class Buffers:
         elif index == 0 and self._document.binary_chunk is not None:
             content, name = self._document.binary_chunk, "binary chunk"
         else:
+            for extension in MESHOPT:
+                if fields.extension(extension) is not None:
+                    raise not_decompressed(self._document, extension, f"{fields.place} is compressed")
             raise fields.error("uri", "only the first buffer of a .glb file does without one")
         if len(content) < length:
             raise SceneError(

@@ -40,9 +40,11 @@ _UNDERSTOOD = frozenset(
         "EXT_texture_avif",
         "EXT_texture_webp",
         "KHR_lights_punctual",
+        "KHR_materials_anisotropy",
         "KHR_materials_clearcoat",
         "KHR_materials_emissive_strength",
         "KHR_materials_ior",
+        "KHR_materials_iridescence",
         "KHR_materials_pbrSpecularGlossiness",
         "KHR_materials_sheen",
         "KHR_materials_specular",
@@ -58,6 +60,26 @@ _UNDERSTOOD = frozenset(
 
 # They say nothing about what is seen while the scene stands still.
 _SILENT = frozenset({"KHR_xmp", "KHR_xmp_json_ld", "KHR_node_selectability", "KHR_node_hoverability"})
+
+# It moves what stands still in a scene at rest.
+_POINTER = "KHR_animation_pointer"
+
+DRACO = "KHR_draco_mesh_compression"
+
+# Surfaces as programs of shaders, and others that glTF 2.0 has no terms for: the meshes are read without them.
+_FORMER_MATERIALS = frozenset({"KHR_blend", "KHR_materials_common", "KHR_technique_webgl", "KHR_techniques_webgl"})
+
+# Tools that write the same scene without an extension.
+_UPGRADE = "convert it with 'gltf-pipeline -i in.gltf -o out.glb'"
+_DECOMPRESS = "decompress it with 'gltf-transform cp in.glb out.glb'"
+_REMEDIES = {
+    DRACO: _DECOMPRESS,
+    "EXT_meshopt_compression": _DECOMPRESS,
+    "KHR_meshopt_compression": _DECOMPRESS,
+    "KHR_texture_basisu": "convert its textures with 'gltf-transform ktxdecompress in.glb out.glb'",
+}
+#: Extensions of compressed buffers; the file may hold the same bytes uncompressed, too.
+MESHOPT = ("EXT_meshopt_compression", "KHR_meshopt_compression")
 
 _PICTURE_FORMATS = {"EXT_texture_webp": "webp", "EXT_texture_avif": "avif"}
 
@@ -167,6 +189,8 @@ def _chunks(data: bytes, file: str) -> tuple[memoryview, memoryview | None]:
     if len(data) < _HEADER.size:
         raise SceneError(f"the file ends after {len(data)} bytes", where=file, rule="a glb header has 12")
     _, version, length = _HEADER.unpack_from(data)
+    if version == 1:
+        raise _version_1(file)
     if version != 2:
         raise SceneError(f"binary glTF of version {version}", where=file, rule="version 2 is understood")
     if length > len(data):
@@ -213,13 +237,24 @@ def _parse(text: memoryview, file: str) -> Fields:
 
 def _check_version(root: Fields) -> None:
     asset = root.child("asset")
-    if asset is None:
-        raise root.error("asset", "every glTF file says its version there")
+    # Version 1 names its objects where version 2 counts them; many of its writers left the version out.
+    if asset is None or asset.values.get("version") in (None, 1):
+        if isinstance(root.values.get("meshes"), dict):
+            raise _version_1(root.file)
+        if asset is None:
+            raise root.error("asset", "every glTF file says its version there")
     # minVersion, where given, is what a reader must understand; version is what the file was written for.
     key = "minVersion" if asset.has("minVersion") else "version"
+    version = asset.values.get(key)
+    if str(version).startswith(("0.", "1.")):
+        raise _version_1(root.file)
     version = asset.text(key)
     if version is None or version.split(".")[0] != "2" or (key == "minVersion" and version != "2.0"):
         raise asset.error(key, "glTF 2.0 is understood")
+
+
+def _version_1(file: str) -> SceneError:
+    return SceneError("the file is glTF 1.0", where=file, rule="glTF 2.0 is understood", fix=_UPGRADE)
 
 
 def texture_extension_is_readable(name: str) -> bool:
@@ -237,19 +272,38 @@ def check_extensions(document: Document) -> None:
     SceneError
         ``extensionsRequired`` names an extension that is not understood.
     """
-    required = document.root.texts("extensionsRequired")
-    for name in required:
-        if not _is_understood(name) and name not in _SILENT:
+    for name in document.root.texts("extensionsRequired"):
+        if not _is_understood(name) and name not in _SILENT | _FORMER_MATERIALS | {_POINTER}:
             raise document.error(
                 f"the file requires the glTF extension {name}",
                 rule="it is not understood",
-                fix="export the scene without it",
+                fix=_REMEDIES.get(name, "export the scene without it"),
             )
     for name in document.root.texts("extensionsUsed"):
         if name == "KHR_materials_variants":
             document.notes.add("of the material variants the default one is shown")
         if not _is_understood(name) and name not in _SILENT:
-            document.notes.add(f"the glTF extension {name} is not understood; what it adds is left out")
+            document.notes.add(_remark(name))
+
+
+def _remark(extension: str) -> str:
+    """What becomes of an extension that the file uses, does not require, and that is not understood."""
+    if extension in (DRACO, *MESHOPT):
+        return f"the glTF extension {extension} is not understood; the uncompressed data beside it is read"
+    if extension in _FORMER_MATERIALS:
+        return f"materials of the glTF extension {extension} are shown as plain ones; {_UPGRADE}"
+    if extension == _POINTER:
+        return f"animations of materials, lights and cameras ({extension}) are not followed"
+    return f"the glTF extension {extension} is not understood; what it adds is left out"
+
+
+def not_decompressed(document: Document, extension: str, what: str) -> SceneError:
+    """The error that data is only there in the compressed form of an extension."""
+    return document.error(
+        f"{what} with the glTF extension {extension}",
+        rule="it is not understood, and the file holds no uncompressed copy",
+        fix=_REMEDIES[extension],
+    )
 
 
 def _is_understood(name: str) -> bool:

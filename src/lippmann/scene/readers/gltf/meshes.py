@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from lippmann.scene.parsing import points_lines
 from lippmann.scene.readers.gltf.document import Document
 from lippmann.scene.readers.gltf.json_fields import Fields
 from lippmann.scene.readers.gltf.materials import Materials
@@ -21,7 +22,8 @@ _Key = tuple[Hashable, ...]
 class Meshes:
     """The meshes of a document as they are asked for; a primitive becomes one mesh of one material.
 
-    Primitives of the same data and material share a mesh; those of the same data share their arrays.
+    Primitives of the same data and material share a mesh; those of the same data share their arrays. Of lines, a mesh's
+    ``faces`` are ``(m, 2)``, of points ``(m, 1)``.
     """
 
     document: Document
@@ -31,11 +33,12 @@ class Meshes:
     _places: dict[tuple[_Key, int], int] = field(default_factory=dict)
     _by_mesh: dict[_Key, list[int]] = field(default_factory=dict)
     _geometries: dict[_Key, Geometry | None] = field(default_factory=dict)
+    _unshaded: dict[int, int] = field(default_factory=dict)
 
     def posed(self, document: Document, primitives: Primitives) -> Meshes:
         """Meshes of the same file as other nodes show them; geometry without skin or morph weights is shared."""
         unskinned = {key: geometry for key, geometry in self._geometries.items() if key[2:] == ((), None)}
-        return Meshes(document, primitives, self.materials, _geometries=unskinned)
+        return Meshes(document, primitives, self.materials, _geometries=unskinned, _unshaded=self._unshaded)
 
     def places(self, index: int, node: Fields, skin: Skin | None) -> list[int]:
         """The places in :attr:`read` of the primitives of ``meshes[index]``, as ``node`` shows it.
@@ -63,6 +66,8 @@ class Meshes:
             if geometry is None:
                 continue
             material = self.materials.place(self.document.reference(primitive, "material", "materials"))
+            if geometry.faces.shape[1] < 3 and not _has_normals(primitive):
+                material = self._without_shading(material)
             if (key, material) not in self._places:
                 self._places[key, material] = len(self.read)
                 name = fields.text("name") or fields.place
@@ -70,6 +75,13 @@ class Meshes:
                 self.read.append(self._mesh(name, geometry, material, primitive))
             places.append(self._places[key, material])
         return places
+
+    def _without_shading(self, material: int) -> int:
+        """The index of the same material as points and lines without normals show it."""
+        if material not in self._unshaded:
+            self._unshaded[material] = len(self.materials.read)
+            self.materials.read.append(points_lines.as_material(self.materials.read[material]))
+        return self._unshaded[material]
 
     def _mesh(self, name: str, geometry: Geometry, material: int, primitive: Fields) -> Mesh:
         uv_sets = _uv_sets(self.materials.read[material])
@@ -81,6 +93,11 @@ class Meshes:
             missing: FloatArray = np.zeros((len(geometry.positions), 2), np.float32)
             uvs += (missing,) * (uv_sets - len(uvs))
         return Mesh(name, geometry.positions, geometry.faces, material, geometry.normals, uvs, geometry.colors)
+
+
+def _has_normals(primitive: Fields) -> bool:
+    attributes = primitive.child("attributes")
+    return attributes is not None and attributes.has("NORMAL")
 
 
 def _weights(fields: Fields) -> tuple[float, ...]:

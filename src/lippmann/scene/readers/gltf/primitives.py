@@ -1,4 +1,4 @@
-"""Mesh primitives: accessors into triangles, morphed and skinned as the file stands at rest."""
+"""Mesh primitives: accessors into triangles, lines and points, morphed and skinned as the file stands at rest."""
 
 from __future__ import annotations
 
@@ -8,17 +8,20 @@ import numpy as np
 
 from lippmann.scene.readers.gltf import accessors as storage
 from lippmann.scene.readers.gltf.accessors import Accessors, Storage
-from lippmann.scene.readers.gltf.document import Document
+from lippmann.scene.readers.gltf.document import DRACO, Document, not_decompressed
 from lippmann.scene.readers.gltf.json_fields import Fields
 from lippmann.scene.readers.gltf.skinning import Skin, deform, unit_normals
 from lippmann.scene.values.description import FloatArray, IndexArray
 
-_TRIANGLES, _TRIANGLE_STRIP, _TRIANGLE_FAN = 4, 5, 6
+_POINTS, _LINES, _LINE_LOOP, _LINE_STRIP, _TRIANGLES, _TRIANGLE_STRIP, _TRIANGLE_FAN = range(7)
 
 
 @dataclass(frozen=True, eq=False)
 class Geometry:
-    """Triangles without a material; arrays as in :class:`lippmann.scene.values.description.Mesh`."""
+    """Triangles without a material; arrays as in :class:`lippmann.scene.values.description.Mesh`.
+
+    Of lines, ``faces`` is ``(m, 2)``, of points ``(m, 1)``; those have no ``normals``.
+    """
 
     positions: FloatArray
     faces: IndexArray
@@ -35,7 +38,7 @@ class Primitives:
     accessors: Accessors
 
     def read(self, primitive: Fields, weights: tuple[float, ...], skin: Skin | None) -> Geometry | None:
-        """The triangles of a primitive, or None if it has none.
+        """The triangles, lines or points of a primitive, or None if it has none.
 
         Parameters
         ----------
@@ -54,18 +57,18 @@ class Primitives:
         mode = _TRIANGLES if mode is None else mode
         if mode > _TRIANGLE_FAN:
             raise primitive.error("mode", "0 to 6 belongs here")
-        if mode < _TRIANGLES:
-            self.document.notes.add("points and lines are not rendered", primitive.place)
-            return None
         position = None if attributes is None else self.document.reference(attributes, "POSITION", "accessors")
         if attributes is None or position is None:
             self.document.notes.add("a primitive without vertex positions is left out", primitive.place)
             return None
+        self._check_compression(primitive, position)
         positions = self.accessors.floats(position, storage.POSITION)
         faces = self._faces(primitive, mode, len(positions))
         if not len(faces):
             return None
-        normals = self._vertex_data(attributes, "NORMAL", storage.NORMAL, len(positions))
+        normals = None
+        if mode >= _TRIANGLES:
+            normals = self._vertex_data(attributes, "NORMAL", storage.NORMAL, len(positions))
         uvs = self._uvs(attributes, len(positions))
         colors = self._vertex_data(attributes, "COLOR_0", storage.COLOR, len(positions))
         vertices = Geometry(positions, faces, normals, uvs, colors)
@@ -76,7 +79,7 @@ class Primitives:
         return self._clean(vertices, primitive)
 
     def _faces(self, primitive: Fields, mode: int, count: int) -> IndexArray:
-        """Triangles ``(m, 3)`` of any of the three modes; those that name a vertex twice are left out."""
+        """Triangles ``(m, 3)``, lines ``(m, 2)`` or points ``(m, 1)``; those that name a vertex twice are left out."""
         index = self.document.reference(primitive, "indices", "accessors")
         if index is None:
             corners = np.arange(count, dtype=np.uint32)
@@ -87,17 +90,33 @@ class Primitives:
                     f"{primitive.place}.indices name vertex {corners.max()}",
                     rule=f"there are {count}, counted from 0",
                 )
-        if mode == _TRIANGLES:
-            if len(corners) % 3:
-                raise self.document.error(f"{primitive.place} has {len(corners)} corners", rule="triangles have 3 each")
-            faces = corners.reshape(-1, 3)
+        if mode in (_POINTS, _LINES, _TRIANGLES):
+            size, what = {_POINTS: (1, "points"), _LINES: (2, "lines"), _TRIANGLES: (3, "triangles")}[mode]
+            if len(corners) % size:
+                raise self.document.error(
+                    f"{primitive.place} has {len(corners)} corners", rule=f"{what} have {size} each"
+                )
+            faces = corners.reshape(-1, size)
+        elif mode == _LINE_STRIP:
+            faces = np.column_stack([corners[:-1], corners[1:]])
+        elif mode == _LINE_LOOP:
+            faces = np.column_stack([corners, np.roll(corners, -1)])
         elif mode == _TRIANGLE_STRIP:
             faces = np.column_stack([corners[:-2], corners[1:-1], corners[2:]])
             faces[1::2] = faces[1::2, [0, 2, 1]]  # every second triangle of a strip turns the other way round
         else:
             faces = np.column_stack([corners[1:-1], corners[2:], np.broadcast_to(corners[:1], corners[2:].shape)])
-        proper = (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])
+        if faces.shape[1] == 1:
+            return faces
+        proper = (faces != np.roll(faces, -1, axis=1)).all(axis=1)
         return faces if proper.all() else faces[proper]
+
+    def _check_compression(self, primitive: Fields, position: int) -> None:
+        """Refuse a primitive whose vertices are compressed and given in no other way."""
+        compressed = primitive.extension(DRACO) is not None
+        accessor = self.document.all("accessors")[position]
+        if compressed and not accessor.has("bufferView") and not accessor.has("sparse"):
+            raise not_decompressed(self.document, DRACO, f"{primitive.place} is compressed by Draco")
 
     def _uvs(self, attributes: Fields, count: int) -> tuple[FloatArray, ...]:
         sets: list[FloatArray] = []

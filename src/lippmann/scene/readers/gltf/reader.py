@@ -16,6 +16,7 @@ from lippmann.scene.readers.gltf.json_fields import Fields
 from lippmann.scene.readers.gltf.materials import Materials
 from lippmann.scene.readers.gltf.meshes import Meshes
 from lippmann.scene.readers.gltf.nodes import Nodes, instance_matrices, ranks
+from lippmann.scene.readers.gltf.points_lines import draw_points_and_lines
 from lippmann.scene.readers.gltf.primitives import Primitives
 from lippmann.scene.readers.gltf.skinning import read_skin
 from lippmann.scene.readers.gltf.textures import Textures
@@ -95,7 +96,8 @@ class Contents:
         meshes, instances = _instantiate(self.meshes.read, self.placements, self.document)
         if not instances:
             raise self.document.error(
-                "the file shows no triangles", rule="a scene needs a mesh on a node of its default scene"
+                "the file shows no triangles, lines or points",
+                rule="a scene needs a mesh on a node of its default scene",
             )
         return SceneDescription(
             name=name,
@@ -142,16 +144,14 @@ def _instantiate(
     """Meshes and their instances.
 
     A matrix that flattens its mesh cannot be inverted, which renderers do; that mesh gets a flattened copy instead.
+    Points and lines become solids in the world.
     """
-    reaches = [np.abs(mesh.positions).max(axis=0).astype(np.float64) for mesh in meshes]
+    _check_count(placements, document)
+    _check_reach(meshes, placements, document)
     copies: list[Mesh] = []
     instances: list[Instance] = []
-    for placement, copy_ranks in zip(placements, _ranks(placements, document), strict=True):
-        farthest = np.abs(placement.worlds[:, :3, :3]) @ reaches[placement.mesh] + np.abs(placement.worlds[:, :3, 3])
-        if (farthest > np.finfo(np.float32).max).any():
-            raise document.error(
-                f"{placement.node.place} puts its mesh beyond all bounds", rule="positions must be finite"
-            )
+    triangles = [placement for placement in placements if meshes[placement.mesh].faces.shape[1] == 3]
+    for placement, copy_ranks in zip(triangles, _ranks(triangles), strict=True):
         solid = copy_ranks == 3
         if solid.any():
             worlds = placement.worlds if solid.all() else placement.worlds[solid]
@@ -162,11 +162,23 @@ def _instantiate(
                 copies.append(_flatten(meshes[placement.mesh], world))
             else:
                 document.notes.add("a mesh that is scaled to nothing is left out", placement.node.place)
-    return (*meshes, *copies), tuple(instances)
+    worlds = [(placement.mesh, placement.worlds) for placement in placements]
+    drawn = draw_points_and_lines(meshes, worlds, document)
+    instances += [Instance(mesh, np.eye(4)) for mesh, solids in drawn.items() if len(solids.faces)]
+    return (*(drawn.get(index, mesh) for index, mesh in enumerate(meshes)), *copies), tuple(instances)
 
 
-def _ranks(placements: list[_Placements], document: Document) -> list[NDArray[np.int64]]:
-    """Ranks of all matrices, in one call because many single ones are slow."""
+def _check_reach(meshes: list[Mesh], placements: list[_Placements], document: Document) -> None:
+    reaches = [np.abs(mesh.positions).max(axis=0).astype(np.float64) for mesh in meshes]
+    for placement in placements:
+        farthest = np.abs(placement.worlds[:, :3, :3]) @ reaches[placement.mesh] + np.abs(placement.worlds[:, :3, 3])
+        if (farthest > np.finfo(np.float32).max).any():
+            raise document.error(
+                f"{placement.node.place} puts its mesh beyond all bounds", rule="positions must be finite"
+            )
+
+
+def _check_count(placements: list[_Placements], document: Document) -> None:
     counts = np.array([len(placement.worlds) for placement in placements], np.int64)
     if counts.sum() > _MOST_INSTANCES:
         first = placements[int(np.argmax(np.cumsum(counts) > _MOST_INSTANCES))]
@@ -174,9 +186,14 @@ def _ranks(placements: list[_Placements], document: Document) -> list[NDArray[np
             f"{first.node.place} brings the copies of meshes to more than {_MOST_INSTANCES}",
             rule="so many may be placed",
         )
+
+
+def _ranks(placements: list[_Placements]) -> list[NDArray[np.int64]]:
+    """Ranks of all matrices, in one call because many single ones are slow."""
     if not placements:
         return []
-    return np.split(ranks(np.concatenate([placement.worlds for placement in placements])), np.cumsum(counts)[:-1])
+    ends = np.cumsum([len(placement.worlds) for placement in placements])
+    return np.split(ranks(np.concatenate([placement.worlds for placement in placements])), ends[:-1])
 
 
 def _flatten(mesh: Mesh, world: Matrix) -> Mesh:

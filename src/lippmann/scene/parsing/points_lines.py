@@ -1,0 +1,161 @@
+"""Points and lines as thin solids: balls and rods of triangles, as wide as the scene's extent makes them visible."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lippmann.scene.values.description import FloatArray, IndexArray, Material, Mesh
+
+#: Radii of points and of lines over the diagonal of the scene's box: one part in 200 is as wide as half a lens of a
+#: display of 100 lenses.
+POINT_RADIUS, LINE_RADIUS = 0.005, 0.0025
+
+#: More points or lines than that are not drawn: each is a dozen triangles.
+MOST = 1 << 20
+
+# Up to so many, points are balls of 32 triangles, and lines have 6 sides; of more, which are thinner, 8 and 3.
+_MOST_ROUND = 20_000
+
+Points = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class Solids:
+    """Triangles ``(m, 3)`` of vertices ``(n, 3)`` with unit normals; ``sources`` ``(n,)`` is each vertex's point."""
+
+    positions: FloatArray
+    normals: FloatArray
+    faces: IndexArray
+    sources: Integers
+
+
+def radius(diagonal: float, count: int, *, lines: bool) -> float:
+    """Radius of points or lines in a box of a ``diagonal``: less where there are so many that they would touch.
+
+    ``count`` points spread over a surface lie about ``diagonal / sqrt(count)`` from each other.
+    """
+    share = LINE_RADIUS if lines else POINT_RADIUS
+    crowd = share * 100.0 / max(count, 1) ** 0.5
+    return min(share, crowd) * (diagonal if diagonal > 0.0 else 1.0)
+
+
+def as_material(material: Material) -> Material:
+    """How points and lines without normals show a material: its base colour and emission, without shading.
+
+    glTF 2.0, section 3.9.7 ("Point and Line Materials"), says so.
+    """
+    red, green, blue = (
+        min(base + glow, 1.0) for base, glow in zip(material.base_color, material.emission, strict=True)
+    )
+    return Material(
+        name=material.name,
+        base_color=(red, green, blue),
+        base_color_texture=material.base_color_texture,
+        alpha=material.alpha,
+        alpha_mode=material.alpha_mode,
+        alpha_cutoff=material.alpha_cutoff,
+        double_sided=True,
+        unlit=True,
+    )
+
+
+def as_mesh(thin: Mesh, world_from_mesh: Points, width: float, material: int) -> Mesh:
+    """The mesh of solids, in the world, of a mesh whose ``faces`` are points ``(m, 1)`` or lines ``(m, 2)``.
+
+    Parameters
+    ----------
+    world_from_mesh:
+        ``(k, 4, 4)``, one for each copy.
+    width:
+        Radius in the world.
+    material:
+        Index of the solids' material.
+    """
+    points = thin.positions @ world_from_mesh[:, :3, :3].transpose(0, 2, 1) + world_from_mesh[:, None, :3, 3]
+    step = len(thin.positions)
+    elements = (thin.faces.astype(np.int64) + step * np.arange(len(points))[:, None, None]).reshape(
+        -1, thin.faces.shape[1]
+    )
+    drawn = (balls if elements.shape[1] == 1 else rods)(points.reshape(-1, 3), elements, width)
+    sources = drawn.sources % step
+    return Mesh(
+        thin.name,
+        drawn.positions,
+        drawn.faces,
+        material,
+        drawn.normals,
+        tuple(uvs[sources] for uvs in thin.uvs),
+        None if thin.colors is None else thin.colors[sources],
+    )
+
+
+def balls(points: Points, elements: Integers, width: float) -> Solids:
+    """A ball of radius ``width`` about each of ``points`` ``(n, 3)`` that ``elements`` ``(m, 1)`` names."""
+    corners, triangles = _ball(2 if len(elements) <= _MOST_ROUND else 1)
+    sources = np.repeat(elements[:, 0], len(corners))
+    normals: FloatArray = np.tile(corners.astype(np.float32), (len(elements), 1))
+    return Solids(
+        points.astype(np.float32)[sources] + np.float32(width) * normals,
+        normals,
+        _repeated(triangles, len(elements), len(corners)),
+        sources,
+    )
+
+
+def rods(points: Points, elements: Integers, width: float) -> Solids:
+    """An open prism of radius ``width`` about each line ``elements`` ``(m, 2)`` between two of ``points`` ``(n, 3)``.
+
+    Lines of no length are left out.
+    """
+    ends = points[elements]
+    along = ends[:, 1] - ends[:, 0]
+    length = np.linalg.norm(along, axis=1)
+    elements, along = elements[length > 0.0], (along / np.where(length > 0.0, length, 1.0)[:, None])[length > 0.0]
+    # Across each line, from the axis that is least along it.
+    axis = np.eye(3)[np.abs(along).argmin(axis=1)]
+    first = np.cross(along, axis)
+    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    second = np.cross(along, first)
+    sides = 6 if len(elements) <= _MOST_ROUND else 3
+    angles = 2.0 * np.pi * np.arange(sides) / sides
+    around = np.cos(angles)[:, None] * first[:, None] + np.sin(angles)[:, None] * second[:, None]
+    normals: FloatArray = np.concatenate([around, around], axis=1).reshape(-1, 3).astype(np.float32)
+    sources = np.repeat(elements.ravel(), sides)
+    here = np.arange(sides)
+    ahead = (here + 1) % sides
+    triangles = np.concatenate(
+        [np.stack([here, ahead, ahead + sides], axis=1), np.stack([here, ahead + sides, here + sides], axis=1)]
+    )
+    return Solids(
+        points.astype(np.float32)[sources] + np.float32(width) * normals,
+        normals,
+        _repeated(triangles, len(elements), 2 * sides),
+        sources,
+    )
+
+
+def _repeated(triangles: Integers, count: int, step: int) -> IndexArray:
+    """``triangles`` of ``step`` vertices, ``count`` times one after the other."""
+    faces: IndexArray = (triangles + step * np.arange(count)[:, None, None]).reshape(-1, 3).astype(np.uint32)
+    return faces
+
+
+def _ball(detail: int) -> tuple[Points, Integers]:
+    """Unit vectors and counter-clockwise triangles of an octahedron, cut into four ``detail`` - 1 times."""
+    corners = np.concatenate([np.eye(3), -np.eye(3)])
+    triangles = np.array([[0, 1, 2], [1, 3, 2], [3, 4, 2], [4, 0, 2], [1, 0, 5], [3, 1, 5], [4, 3, 5], [0, 4, 5]])
+    for _ in range(detail - 1):
+        ends = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+        edges, place = np.unique(ends, axis=0, return_inverse=True)
+        middles = corners[edges].sum(axis=1)
+        ab, bc, ca = (len(corners) + place.reshape(-1, 3)).T
+        a, b, c = triangles.T
+        corners = np.concatenate([corners, middles / np.linalg.norm(middles, axis=1, keepdims=True)])
+        triangles = np.concatenate(
+            [np.stack(three, axis=1) for three in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))]
+        )
+    return corners, triangles

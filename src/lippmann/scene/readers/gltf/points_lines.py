@@ -1,0 +1,69 @@
+"""Points and lines of a glTF file, drawn as thin solids where its nodes place them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from lippmann.scene.parsing.points_lines import MOST, as_mesh, radius
+from lippmann.scene.readers.gltf.document import Document
+from lippmann.scene.values.description import Matrix, Mesh
+
+_KINDS = {1: "points are drawn as balls", 2: "lines are drawn as rods"}
+
+
+def draw_points_and_lines(
+    meshes: Sequence[Mesh], placements: Sequence[tuple[int, Matrix]], document: Document
+) -> dict[int, Mesh]:
+    """The meshes of points and lines made solid: all copies of each in one mesh of triangles, in the world.
+
+    Parameters
+    ----------
+    meshes:
+        All meshes; ``faces`` is ``(m, 1)`` of points, ``(m, 2)`` of lines.
+    placements:
+        Indices of meshes with matrices ``(k, 4, 4)`` of copies; those of triangles add to the scene's extent.
+
+    Returns
+    -------
+    dict
+        The solid meshes by index; nothing is left of lines without length.
+
+    Raises
+    ------
+    SceneError
+        The file shows more than :data:`~lippmann.scene.parsing.points_lines.MOST` of them.
+    """
+    stacks: dict[int, list[Matrix]] = {}
+    for mesh, worlds in placements:
+        if meshes[mesh].faces.shape[1] in _KINDS:
+            stacks.setdefault(mesh, []).append(worlds)
+    if not stacks:
+        return {}
+    counts = {mesh: len(meshes[mesh].faces) * sum(map(len, stack)) for mesh, stack in stacks.items()}
+    if sum(counts.values()) > MOST:
+        raise document.error(f"the file shows {sum(counts.values())} points and lines", rule=f"up to {MOST} are drawn")
+    diagonal = _diagonal(meshes, placements)
+    drawn: dict[int, Mesh] = {}
+    for size, remark in _KINDS.items():
+        chosen = [mesh for mesh in stacks if meshes[mesh].faces.shape[1] == size]
+        if not chosen:
+            continue
+        width = radius(diagonal, sum(counts[mesh] for mesh in chosen), lines=size == 2)
+        document.notes.add(f"{remark} of radius {width:.3g}, {width / (diagonal or 1.0):.2%} of the scene's diagonal")
+        for mesh in chosen:
+            drawn[mesh] = as_mesh(meshes[mesh], np.concatenate(stacks[mesh]), width, meshes[mesh].material)
+    return drawn
+
+
+def _diagonal(meshes: Sequence[Mesh], placements: Sequence[tuple[int, Matrix]]) -> float:
+    """Length of the diagonal of a box about all copies of all meshes."""
+    low, high = np.full(3, np.inf), np.full(3, -np.inf)
+    for mesh, worlds in placements:
+        positions = meshes[mesh].positions
+        least, most = positions.min(axis=0).astype(np.float64), positions.max(axis=0).astype(np.float64)
+        middles = worlds[:, :3, :3] @ ((least + most) / 2.0) + worlds[:, :3, 3]
+        halves = np.abs(worlds[:, :3, :3]) @ ((most - least) / 2.0)
+        low, high = np.minimum(low, (middles - halves).min(axis=0)), np.maximum(high, (middles + halves).max(axis=0))
+    return float(np.linalg.norm(high - low))
