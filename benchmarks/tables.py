@@ -13,7 +13,7 @@ from typing import Any
 import equal_error_tables
 import estimate_coverage_tables
 import goals_tables
-from harness import RESULTS
+from harness import RESULTS, saved
 
 README = Path(__file__).parent.parent / "README.md"
 BEGIN, END = "<!-- methods -->", "<!-- /methods -->"
@@ -39,6 +39,7 @@ def main() -> None:
             if name in QUILTS_PAGE_TABLES:
                 _into_page(QUILTS_PAGE, name, QUILTS_PAGE_TABLES[name](result))
     PAGE.write_text("\n".join(sections))
+    _into_page(MATERIALS_PAGE, "furnace", _furnace(saved("furnace")))
 
 
 def _machine(machine: dict[str, Any]) -> str:
@@ -245,6 +246,25 @@ micro-images. [Reprojection](reprojection.md) says what the ways mean."""
 
 QUILTS_PAGE = Path(__file__).parent.parent / "docs" / "background" / "quilts.md"
 QUILTS_PAGE_TABLES = {"weave": _weave_with_picture, "cycles": _cycles_rows}
+
+
+MATERIALS_PAGE = PAGE.parent.parent / "reference" / "materials.md"
+
+
+def _furnace(result: dict[str, Any]) -> list[str]:
+    """Furnaces, for the page of materials."""
+
+    def shares(values: list[float]) -> str:
+        return " | ".join(f"{value:.1%}" for value in values)
+
+    angles = " | ".join(f"{cosine:g}" for cosine in result["cosines"])
+    head = f"| surface, white | {angles} | single scattering: {angles} |\n|{'---|' * (1 + 2 * len(result['cosines']))}"
+    surfaces = [
+        f"| {name} | {shares(row['compensated'])} | {shares(row['single'])} |"
+        for name, row in result["surfaces"].items()
+    ]
+    balls = [f"| {name} | {row['compensated']:.1%} | {row['single']:.1%} |" for name, row in result["balls"].items()]
+    return [head, *surfaces, "", "| whole body | kept | single scattering |", "|---|---|---|", *balls]
 
 
 def _cluster(result: dict[str, Any]) -> str:

@@ -199,6 +199,20 @@ def test_absorbing_bodies_are_not_instanced(build, parts):
     assert [shape.is_mesh() for shape in built.mitsuba.shapes()] == [True]
 
 
+def test_the_meshs_own_coordinates_are_those_that_tangents_and_emitters_need():
+    from lippmann.device.pbr.materials import _uv_sets
+
+    def texture(uv_set):
+        return Texture(Image("t", np.zeros((2, 2, 3), np.uint8)), srgb=False, uv_set=uv_set)
+
+    material = Material(base_color_texture=texture(0), emission_texture=texture(1), normal_texture=texture(2))
+    assert _uv_sets(material) == (2, 1, 0)
+    assert _uv_sets(replace(material, normal_texture=None)) == (1, 0)
+    assert _uv_sets(replace(material, normal_texture=None, anisotropy_texture=texture(3))) == (3, 1, 0)
+    assert _uv_sets(replace(material, normal_texture=None, anisotropy=0.5)) == (0, 1)
+    assert _uv_sets(Material()) == ()
+
+
 # ---- mirrors ----
 
 

@@ -357,7 +357,7 @@ def test_sheen_formula(build, parts):
 
     hidden = tint.max() * np.maximum(albedo(wi), albedo(wo))
     expected = (0.5 / np.pi * wo[:, 2] * (1 - hidden))[:, None] + charlie(wi, wo, 0.36)[:, None] * tint
-    value, _ = evaluate(bsdf_of(build, parts, cloth), wi, wo)
+    value, _ = evaluate(bsdf_of(build, parts, cloth, exact=True), wi, wo)
     np.testing.assert_allclose(value, expected, rtol=0.02, atol=1e-3)
 
 
@@ -414,6 +414,27 @@ def test_bump_seen_from_behind_is_a_dent(build, look, parts):
     built = build(parts.describe([parts.square()], [Material(normal_texture=normal_texture(TILT))]))
     seen = look.attribute(built, "normal", 0.1, 0.1, z=-5.0, toward=1.0)
     np.testing.assert_allclose(seen, [-TILT], atol=1e-5)
+
+
+@pytest.mark.parametrize("rotation", [0.0, 0.5, np.pi / 2])
+def test_brushed_metal_spreads_light_along_its_direction(build, look, parts, rotation):
+    """Its direction is told by the texture coordinates, which all triangles of a mesh carry without any texture."""
+    metal = Material(base_color=(1, 1, 1), metallic=1.0, roughness=0.2, anisotropy=1.0, anisotropy_rotation=rotation)
+    built = build(parts.describe([parts.square()], [metal]))
+    import mitsuba as mi
+
+    x, y = np.meshgrid(np.linspace(-0.9, 0.9, 7), np.linspace(-0.85, 0.95, 7))
+    si = look.hit(built, x.ravel(), y.ravel())
+    along, across = (
+        np.array([np.sin(0.6) * np.cos(angle), np.sin(0.6) * np.sin(angle), np.cos(0.6)])
+        for angle in (rotation, rotation + np.pi / 2)
+    )
+    bright, dark = (
+        np.array(si.bsdf().eval(mi.BSDFContext(), si, si.to_local(mi.Vector3f(*map(float, wo)))))[0]
+        for wo in (along, across)
+    )
+    np.testing.assert_allclose(bright, bright[0], rtol=1e-3)
+    assert (bright > 50 * dark).all()
 
 
 def test_mapped_normal_shades_as_a_turned_surface(build, look, parts):

@@ -69,6 +69,13 @@ def test_rough_clear_coat_keeps_all_light(kept, coated):
     np.testing.assert_allclose(kept(replace(coated, clearcoat=1.0, clearcoat_roughness=1.0), 0.5), 1, atol=0.02)
 
 
+@pytest.mark.parametrize("roughness", [0.2, 0.5, 1.0])
+def test_white_cloth_keeps_all_light(kept, roughness):
+    cloth = replace(WHITE, sheen_color=(1.0, 1.0, 1.0), sheen_roughness=roughness)
+    for cosine in (0.95, 0.4):
+        np.testing.assert_allclose(kept(cloth, cosine), 1, atol=0.03)
+
+
 def test_coloured_rough_metal_gets_deeper_not_darker(kept):
     """Each further reflection takes on the colour once more."""
     copper = Material(base_color=(0.9, 0.5, 0.3), metallic=1.0, roughness=1.0)

@@ -239,7 +239,10 @@ def _bsdf_class(variant: str) -> Any:
 
         def _under_cloth(self, sheen: Sheen, value: Any, cos_i: Any, cos_o: Any, cos_h: Any) -> Any:
             """``value`` dimmed by the fibres above it, and their own light."""
-            hidden = dr.max(sheen.color) * dr.maximum(sheen.albedo(cos_i), sheen.albedo(cos_o))
+            hidden = sheen.albedo(cos_i)
+            if not self.model.compensates:  # glTF takes the larger share of the two directions, and so loses light
+                hidden = dr.maximum(hidden, sheen.albedo(cos_o))
+            hidden *= dr.max(sheen.color)
             fibres = microfacet.charlie_density(cos_h, sheen.alpha)
             fibres *= microfacet.charlie_visibility(cos_i, cos_o, sheen.alpha) * cos_o
             return value * (1 - hidden) + sheen.color * fibres

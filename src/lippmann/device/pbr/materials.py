@@ -203,7 +203,9 @@ def _uv_sets(m: Material) -> tuple[int, ...]:
         "emission_texture",
         "base_color_texture",
     )
-    first = [textures[f"{name}_texture"].uv_set for name in preferred if f"{name}_texture" in textures]
+    first = [textures[name].uv_set for name in preferred if name in textures]
+    if m.anisotropy > 0 and not ("normal_texture" in textures or "anisotropy_texture" in textures):
+        first.insert(0, 0)  # its direction is told by tangents, too, even where there is no texture at all
     return tuple(dict.fromkeys([*first, *(texture.uv_set for texture in textures.values())]))
 
 
