@@ -137,12 +137,12 @@ def test_points_and_lines_are_drawn(read):
     ]
     points, _, red, blue = (mesh.positions for mesh in scene.meshes)
     for ball, middle in zip(np.split(points, 2), [(0, 0, 0), (1, 1, 0)], strict=True):
-        assert np.linalg.norm(ball - middle, axis=1) == pytest.approx(np.full(len(ball), 0.005 * 2**0.5), rel=1e-4)
+        assert np.linalg.norm(ball - middle, axis=1) == pytest.approx(np.full(len(ball), 0.01 * 2**0.5), rel=1e-4)
     middles = [rod.mean(axis=0) for rod in [*np.split(red, 2), blue]]
     assert np.array(middles) == pytest.approx(np.array([(0.5, 0, 0), (0.5, 0.5, 0), (0.5, 1, 0)]), abs=1e-6)
     assert scene.notes == [
-        "points are drawn as balls of radius 0.00707, 0.50% of the scene's diagonal",
-        "lines are drawn as rods of radius 0.00354, 0.25% of the scene's diagonal",
+        "points are drawn as balls of radius 0.0141, 1.00% of the scene's diagonal",
+        "lines are drawn as rods of radius 0.00707, 0.50% of the scene's diagonal",
     ]
 
 

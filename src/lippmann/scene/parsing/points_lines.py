@@ -9,9 +9,8 @@ from numpy.typing import NDArray
 
 from lippmann.scene.values.description import FloatArray, IndexArray, Material, Mesh
 
-#: Radii of points and of lines over the diagonal of the scene's box: one part in 200 is as wide as half a lens of a
-#: display of 100 lenses.
-POINT_RADIUS, LINE_RADIUS = 0.005, 0.0025
+#: Radii of points and of lines over the diagonal of the scene's box: of 64 lenses, one shows the width of a line.
+POINT_RADIUS, LINE_RADIUS = 0.01, 0.005
 
 #: More points or lines than that are not drawn: each is a dozen triangles.
 MOST = 1 << 20
@@ -39,7 +38,7 @@ def radius(diagonal: float, count: int, *, lines: bool) -> float:
     ``count`` points spread over a surface lie about ``diagonal / sqrt(count)`` from each other.
     """
     share = LINE_RADIUS if lines else POINT_RADIUS
-    crowd = share * 100.0 / max(count, 1) ** 0.5
+    crowd = share * 50.0 / max(count, 1) ** 0.5
     return min(share, crowd) * (diagonal if diagonal > 0.0 else 1.0)
 
 
