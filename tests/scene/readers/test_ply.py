@@ -173,6 +173,15 @@ def test_a_cloud_of_points_is_drawn_as_balls(read, colored):
     assert (mesh.colors is not None) == colored
 
 
+def test_of_too_many_points_some_are_drawn(read, monkeypatch):
+    monkeypatch.setattr("lippmann.scene.readers.ply.MOST", 2)
+    scene = read((header("ascii", faces=0) + "".join(f"{x} {y} {z}\n" for x, y, z in VERTICES)).encode())
+    assert scene.notes[1] == "of 5 points one in 3 is drawn"
+    balls = np.split(scene.meshes[0].positions, 2)
+    middles = np.array([ball.mean(axis=0) for ball in balls])
+    assert middles == pytest.approx(np.array([VERTICES[0], VERTICES[3]], float), abs=1e-6)
+
+
 @pytest.mark.parametrize("data", [text_file(), binary_file()])
 def test_every_cut_short_file_is_refused(read, data):
     last = data.rstrip(b"\n")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,8 +12,8 @@ from lippmann.scene.values.description import FloatArray, IndexArray, Material, 
 #: Radii of points and of lines over the diagonal of the scene's box: of 64 lenses, one shows the width of a line.
 POINT_RADIUS, LINE_RADIUS = 0.01, 0.005
 
-#: More points or lines than that are not drawn: each is a dozen triangles.
-MOST = 1 << 20
+#: More points or lines than that are not drawn: each is six or eight triangles.
+MOST = 1 << 18
 
 # Up to so many, points are balls of 32 triangles, and lines have 6 sides; of more, which are thinner, 8 and 3.
 _MOST_ROUND = 20_000
@@ -59,6 +59,18 @@ def as_material(material: Material) -> Material:
         alpha_cutoff=material.alpha_cutoff,
         double_sided=True,
         unlit=True,
+    )
+
+
+def thinned(points: Mesh, step: int) -> Mesh:
+    """One in ``step`` of the points of a mesh whose ``faces`` are ``(m, 1)``."""
+    chosen = points.faces[::step, 0]
+    return replace(
+        points,
+        positions=points.positions[chosen],
+        faces=np.arange(len(chosen), dtype=np.uint32)[:, None],
+        uvs=tuple(uvs[chosen] for uvs in points.uvs),
+        colors=None if points.colors is None else points.colors[chosen],
     )
 
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from lippmann.color.transfer import decode_srgb
 from lippmann.errors import SceneError
 from lippmann.scene.parsing.files import read_bytes, read_image, resolve
-from lippmann.scene.parsing.points_lines import MOST, as_mesh, radius
+from lippmann.scene.parsing.points_lines import MOST, as_mesh, radius, thinned
 from lippmann.scene.parsing.triangulation import triangulate
 from lippmann.scene.readers.ply_header import Element, Header, read_header
 from lippmann.scene.values.description import Instance, Material, Mesh, SceneDescription, Texture
@@ -88,16 +88,15 @@ def _cloud(vertex: Columns, element: Element, name: str, notes: list[str], where
     positions = np.stack([np.asarray(vertex[axis]) for axis in "xyz"], axis=-1)
     if not len(positions):
         raise SceneError("holds no vertices", where=where)
-    if len(positions) > MOST:
-        raise SceneError(
-            f"is a cloud of {len(positions)} points", where=where, rule=f"up to {MOST} are drawn", fix="mesh it first"
-        )
     _check_finite(positions, where)
     colors = _colors(vertex, element)
     points = np.arange(len(positions), dtype=np.uint32)[:, None]
     thin = Mesh(name, positions.astype(np.float32), points, 0, None, (), colors)
+    if (step := -(-len(points) // MOST)) > 1:
+        notes = [*notes, f"of {len(points)} points one in {step} is drawn"]
+        thin = thinned(thin, step)
     diagonal = float(np.linalg.norm(np.ptp(thin.positions.astype(np.float64), axis=0)))
-    width = radius(diagonal, len(points), lines=False)
+    width = radius(diagonal, len(thin.faces), lines=False)
     plain = (0.7, 0.7, 0.7) if colors is None else (1.0, 1.0, 1.0)
     material = Material(name, base_color=plain, roughness=0.6, double_sided=True, unlit=colors is not None)
     note = f"points are drawn as balls of radius {width:.3g}, {width / (diagonal or 1.0):.2%} of the scene's diagonal"

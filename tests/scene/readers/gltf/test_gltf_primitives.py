@@ -92,11 +92,24 @@ def test_lines_of_no_length_are_nothing_to_see(writer, read):
     assert "shows no triangles, lines or points" in _refusal(read, writer.triangle(positions=[[1, 1, 1]] * 2, mode=1))
 
 
-def test_too_many_points_are_refused(writer, read):
-    count = (1 << 20) + 1
-    accessor = writer.add("accessors", componentType=5126, count=count, type="VEC3")
-    writer.node(mesh=writer.add("meshes", primitives=[{"attributes": {"POSITION": accessor}, "mode": 0}]))
-    assert f"the file shows {count} points and lines; up to {count - 1} are drawn" in _refusal(read, writer)
+def test_of_too_many_points_some_are_drawn(writer, read, monkeypatch):
+    monkeypatch.setattr("lippmann.scene.readers.gltf.points_lines.MOST", 2)
+    colors = writer.accessor(np.eye(4, dtype="f4")[[0, 1, 2, 3, 0]])
+    scene = read(writer.triangle(positions=SQUARE, mode=0, attributes={"COLOR_0": colors}))
+    assert scene.notes[0] == "of 5 points one in 3 is drawn"
+    balls = np.split(scene.meshes[0].positions, 2)
+    np.testing.assert_allclose([ball.mean(axis=0) for ball in balls], [SQUARE[0], SQUARE[3]], atol=1e-6)
+    assert {tuple(color) for color in scene.meshes[0].colors.tolist()} == {(1, 0, 0, 0), (0, 0, 0, 1)}
+
+
+def test_too_many_lines_or_copies_are_refused(writer, read, monkeypatch):
+    monkeypatch.setattr("lippmann.scene.readers.gltf.points_lines.MOST", 2)
+    assert "the file shows 3 points or lines; up to 2 are drawn" in _refusal(read, writer.triangle(mode=2))
+    writer.json["meshes"][0]["primitives"][0]["mode"] = 0
+    del writer.json["buffers"]
+    places = writer.accessor([[0, 0, 0]] * 3)
+    writer.json["nodes"][0]["extensions"] = {"EXT_mesh_gpu_instancing": {"attributes": {"TRANSLATION": places}}}
+    assert "the file shows 9 points or lines; up to 2 are drawn" in _refusal(read, writer)
 
 
 def test_strips_lose_the_triangles_that_only_turn_corners(writer, read):
