@@ -213,7 +213,7 @@ def _texture() -> bytes:
 
 
 def _scene() -> tuple[dict[str, Any], bytes]:
-    """A skinned, morphed, animated triangle with texture, a sparse accessor, a lamp and a camera."""
+    """A skinned, morphed, animated triangle with texture, points, lines, a sparse accessor, a light and a camera."""
     corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], "<f4")
     parts: list[tuple[Any, str | None]] = [
         (corners, "VEC3"),
@@ -259,13 +259,18 @@ def _scene() -> tuple[dict[str, Any], bytes]:
         "asset": {"version": "2.0"},
         "scene": 0,
         "scenes": [{"nodes": [0, 2, 3]}],
-        "extensionsUsed": ["KHR_lights_punctual", "KHR_materials_clearcoat", "KHR_materials_ior"],
+        "extensionsUsed": [
+            "KHR_lights_punctual",
+            "KHR_materials_clearcoat",
+            "KHR_materials_ior",
+            "KHR_draco_mesh_compression",
+        ],
         "extensions": {"KHR_lights_punctual": {"lights": [lamp]}},
         "nodes": [
             {"mesh": 0, "skin": 0, "children": [1], "weights": [0.5]},
             {"translation": [0, 0, 1], "rotation": [0, 0, 0, 1], "scale": [1, 1, 1]},
             {"camera": 0, "matrix": [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 5, 1]},
-            {"extensions": {"KHR_lights_punctual": {"light": 0}}},
+            {"extensions": {"KHR_lights_punctual": {"light": 0}}, "mesh": 1},
         ],
         "cameras": [{"type": "perspective", "perspective": {"yfov": 0.6, "znear": 0.1, "aspectRatio": 1.5}}],
         "skins": [{"joints": [1], "inverseBindMatrices": 6}],
@@ -274,7 +279,8 @@ def _scene() -> tuple[dict[str, Any], bytes]:
                 "primitives": [
                     {"attributes": attributes, "indices": 3, "material": 0, "mode": 4, "targets": [{"POSITION": 10}]}
                 ]
-            }
+            },
+            {"primitives": [{"attributes": {"POSITION": 0, "COLOR_0": 1}, "mode": mode} for mode in (0, 2, 3)]},
         ],
         "materials": [material],
         "textures": [{"source": 0, "sampler": 0}],

@@ -15,16 +15,23 @@ Transfer-Encoding: chunked Expect: 100-continue If-Match: /pictures/0/manifest.j
 /pictures/999/manifest.json ../ %2e%2e /assets/viewer.js TOKEN
 """
 
+_GLTF = """
+KHR_draco_mesh_compression EXT_meshopt_compression KHR_texture_basisu KHR_techniques_webgl KHR_animation_pointer
+EXT_mesh_gpu_instancing extensionsRequired "mode":0 "mode":1 "mode":2 "mode":3 "version":"1.0"
+"""
+
 _WORDS = {
+    "gltf": _GLTF,
+    "glb": _GLTF,
     "obj": """
 v vt vn f l p o g s usemtl mtllib newmtl map_Kd map_Ks map_d bump refl Kd Ks d Tr illum Ns Pr Pm -s -o -mm -bm -clamp on
-t.png s.mtl 1/2/3 1//2 -1
+t.png s.mtl 1/2/3 1//2 -1 # none.mtl Meshlab
 """,
     "ply": """
 ply format ascii binary_little_endian binary_big_endian 1.0 element vertex face property list char uchar short ushort
-int uint float double end_header comment obj_info tristrips TextureFile t.png
+int uint float double end_header comment obj_info tristrips TextureFile t.png # -1 gap red green blue
 """,
-    "stl": "solid facet normal outer loop vertex endloop endfacet endsolid",
+    "stl": "solid facet normal outer loop vertex endloop endfacet endsolid # // ; nan",
     "tachyon": """
 BEGIN_SCENE END_SCENE CAMERA END_CAMERA TEXTURE TEXDEF TEXALIAS INCLUDE IMAGEDEF s.dat red # SPHERE CYLINDER FCYLINDER
 PLANE RING TRI STRI BOX SCAPE VERTEXARRAY POLYCYLINDER EXTBOX SCALARVOL

@@ -56,7 +56,7 @@ def test_copies_keep_their_colours_and_coordinates():
 
 
 def test_radii_follow_the_extent_and_shrink_in_crowds():
-    assert radius(200.0, 9, lines=False) == pytest.approx(1.0)
-    assert radius(200.0, 9, lines=True) == pytest.approx(0.5)
+    assert radius(200.0, 9, lines=False) == pytest.approx(2.0)
+    assert radius(200.0, 9, lines=True) == pytest.approx(1.0)
     assert radius(200.0, 1_000_000, lines=False) == pytest.approx(0.1)
-    assert radius(0.0, 1, lines=False) == pytest.approx(0.005)
+    assert radius(0.0, 1, lines=False) == pytest.approx(0.01)

@@ -120,13 +120,35 @@ def test_layout_of_lines(read):
     assert corner_positions(mesh)[0].tolist() == [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
 
 
-def test_lines_and_points_are_counted_in_a_note(read):
-    scene = read(SQUARE + "l 1 2\nl 2 3\np 1\nmystery 3\nf 1 2 3\n")
-    assert scene.notes == [
-        "2 lines are not rendered",
-        "1 points are not rendered",
-        "1 statements 'mystery' are not rendered",
+def test_what_cannot_be_drawn_is_counted_in_a_note(read):
+    scene = read(SQUARE + "curv 0 1 1 2\ncurv 0 1 2 3\nmystery 3\nf 1 2 3\n")
+    assert scene.notes == ["2 curves are not rendered", "1 statements 'mystery' are not rendered"]
+
+
+def test_points_and_lines_are_drawn(read):
+    text = "mtllib m.mtl\n" + SQUARE + "p 1 3\nusemtl red\nl 1/1 2 -1\nf 1 2 3\nusemtl blue\nl 2 2\nl 3 4\n"
+    scene = read(text, m__mtl="newmtl red\nKd 1 0 0\nnewmtl blue\nKd 0 0 1\n")
+    found = [(mesh.name, scene.materials[mesh.material]) for mesh in scene.meshes]
+    assert [(name, material.base_color, material.unlit) for name, material in found] == [
+        ("points", (0.7, 0.7, 0.7), True),
+        ("red", (1, 0, 0), False),
+        ("lines", (1, 0, 0), True),
+        ("lines", (0, 0, 1), True),
     ]
+    points, _, red, blue = (mesh.positions for mesh in scene.meshes)
+    for ball, middle in zip(np.split(points, 2), [(0, 0, 0), (1, 1, 0)], strict=True):
+        assert np.linalg.norm(ball - middle, axis=1) == pytest.approx(np.full(len(ball), 0.01 * 2**0.5), rel=1e-4)
+    middles = [rod.mean(axis=0) for rod in [*np.split(red, 2), blue]]
+    assert np.array(middles) == pytest.approx(np.array([(0.5, 0, 0), (0.5, 0.5, 0), (0.5, 1, 0)]), abs=1e-6)
+    assert scene.notes == [
+        "points are drawn as balls of radius 0.0141, 1.00% of the scene's diagonal",
+        "lines are drawn as rods of radius 0.00707, 0.50% of the scene's diagonal",
+    ]
+
+
+def test_points_alone_make_a_scene_and_keep_their_colours(read):
+    (mesh,) = read("v 0 0 0 1 0 0\nv 1 0 0 0 1 0\np 1\np 2\n").meshes
+    assert {tuple(color) for color in mesh.colors.tolist()} == {(1, 0, 0), (0, 1, 0)}
 
 
 def test_faces_are_gathered_by_material(read):
@@ -200,7 +222,7 @@ def test_text_in_utf_16(tmp_path):
         (SQUARE + "f 1 2 3\nf 1 2 0\n", r"model\.obj:6: face uses vertex 0"),
         (SQUARE + "f 1/1 2/1 3/1\n", r"model\.obj:5: face uses texture coordinate 1; the file has no texture"),
         (SQUARE + "vn 0 0 1\nf 1//1 2//2 3//1\n", r"model\.obj:6: face uses normal 2; the file has 1 to 1"),
-        (SQUARE + "f -1 -2 -5\n", r"model\.obj:5: face counts back 5 entries of 4"),
+        (SQUARE + "f -1 -2 -5\n", r"model\.obj:5: index -5 counts back beyond the first of 4 entries"),
         (SQUARE + "f 1 2\n", r"model\.obj:5: face with 2 corners"),
         (SQUARE + "f 1 2 3\nf 1 2 x\n", r"model\.obj:6: face corner 'x'; it is v, v/vt"),
         (SQUARE + "f 1 2 3\nf -1 2 x\n", r"model\.obj:6: face corner 'x'"),
@@ -210,9 +232,14 @@ def test_text_in_utf_16(tmp_path):
             SQUARE + "f 1 2 99999999999999999999\n",
             r"model\.obj:5: face .*9{8}|model\.obj:5: face uses vertex 9223372036854775807",
         ),
-        (SQUARE, r"model\.obj: holds no faces; points and lines"),
-        ("# nothing\n", r"model\.obj: holds no faces; is it an OBJ file\?"),
-        ("<html>\n", r"model\.obj: holds no faces; is it an OBJ file\?"),
+        (SQUARE, r"model\.obj: holds no faces, lines or points; points are drawn where 'p' names them"),
+        (SQUARE + "l 1 1\n", r"model\.obj: holds nothing but lines without length"),
+        (SQUARE + "f 1 2 3\np 5\n", r"model\.obj:6: '5' is no vertex; the file has 1 to 4"),
+        (SQUARE + "f 1 2 3\nl 1 x\n", r"model\.obj:6: 'x' is no vertex; the file has 1 to 4"),
+        (SQUARE + "f 1 2 3\nl 1 -5\n", r"model\.obj:6: index -5 counts back beyond the first of 4 entries"),
+        ("p 1\n", r"model\.obj:1: '1' is no vertex; the file has no vertex"),
+        ("# nothing\n", r"model\.obj: holds no faces, lines or points; is it an OBJ file\?"),
+        ("<html>\n", r"model\.obj: holds no faces, lines or points; is it an OBJ file\?"),
         (SQUARE + "f 1 2 \\", r"model\.obj:5: the file ends in a continued line"),
         (SQUARE + "mtllib ../none.mtl\nf 1 2 3\n", r"model\.obj:5: material library '\.\./none\.mtl' lies outside"),
         ("\0\0\0\0", r"model\.obj: is not a text file"),

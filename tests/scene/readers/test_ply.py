@@ -133,6 +133,55 @@ def test_properties_that_fill_gaps_may_share_a_name(read):
         read(text_file().replace(b"property float y", b"property float x"))
 
 
+def strips(*lists):
+    rows = "\n".join(" ".join(map(str, vertex)) for vertex in VERTICES)
+    lines = "\n".join(f"{len(one)} " + " ".join(map(str, one)) for one in lists)
+    return (header("ascii", faces=len(lists)).replace("face", "tristrips") + rows + "\n" + lines + "\n").encode()
+
+
+@pytest.mark.parametrize(
+    ("lists", "faces"),
+    [
+        ([[0, 1, 3, 2, 4]], [[0, 1, 3], [3, 1, 2], [3, 2, 4]]),
+        ([[0, 1, 3, -1, 1, 2, 3, 4]], [[0, 1, 3], [1, 2, 3], [3, 2, 4]]),
+        ([[0, 1, 3], [1, 2, 3, 4]], [[0, 1, 3], [1, 2, 3], [3, 2, 4]]),
+        ([[], [0, 1], [0, 1, 1, 2, 3, -1]], [[1, 2, 3]]),
+    ],
+)
+def test_triangle_strips(read, lists, faces):
+    assert read(strips(*lists)).meshes[0].faces.tolist() == faces
+
+
+def test_strips_name_vertices_that_there_are(read):
+    for wrong in (5, -2):
+        with pytest.raises(SceneError, match=f"a face uses vertex {wrong}"):
+            read(strips([0, 1, wrong]))
+
+
+@pytest.mark.parametrize("colored", [False, True])
+def test_a_cloud_of_points_is_drawn_as_balls(read, colored):
+    colors = "property uchar red\nproperty uchar green\nproperty uchar blue\n" if colored else ""
+    rows = "".join(f"{x} {y} {z}{' 255 0 0' if colored else ''}\n" for x, y, z in VERTICES)
+    scene = read((header("ascii", vertex=colors, faces=0) + rows).encode())
+    (mesh,) = scene.meshes
+    balls = np.split(mesh.positions, 5)
+    diagonal = 5**0.5
+    for ball, vertex in zip(balls, VERTICES, strict=True):
+        assert np.linalg.norm(ball - vertex, axis=1) == pytest.approx(np.full(len(ball), 0.01 * diagonal), rel=1e-4)
+    assert scene.notes[1] == "points are drawn as balls of radius 0.0224, 1.00% of the scene's diagonal"
+    assert scene.materials[0].unlit == colored
+    assert (mesh.colors is not None) == colored
+
+
+def test_of_too_many_points_some_are_drawn(read, monkeypatch):
+    monkeypatch.setattr("lippmann.scene.readers.ply.MOST", 2)
+    scene = read((header("ascii", faces=0) + "".join(f"{x} {y} {z}\n" for x, y, z in VERTICES)).encode())
+    assert scene.notes[1] == "of 5 points one in 3 is drawn"
+    balls = np.split(scene.meshes[0].positions, 2)
+    middles = np.array([ball.mean(axis=0) for ball in balls])
+    assert middles == pytest.approx(np.array([VERTICES[0], VERTICES[3]], float), abs=1e-6)
+
+
 @pytest.mark.parametrize("data", [text_file(), binary_file()])
 def test_every_cut_short_file_is_refused(read, data):
     last = data.rstrip(b"\n")
@@ -152,7 +201,8 @@ def test_every_cut_short_file_is_refused(read, data):
         (b"ply\nformat ascii 1.0\nelement vertex x\nend_header\n", r"model\.ply:3: header line 'element vertex x'"),
         (b"ply\nformat ascii 1.0\nproperty float x\nend_header\n", r"model\.ply:3: header line 'property float x'"),
         (b"ply\nformat ascii 1.0\nend_header\n", r"holds no vertices with x, y and z"),
-        (header("ascii", faces=0).encode() + b"0 0 0\n" * 5, r"holds no faces; a cloud of points"),
+        (header("ascii", faces=0, vertices=0).encode(), r"model\.ply: holds no vertices$"),
+        (header("ascii", faces=0).encode() + b"0 0 inf\n" * 5, r"vertex 0 is \[0\.0, 0\.0, inf\]"),
         (text_file([(0, 1, 5)]), r"a face uses vertex 5; the file has 0 to 4"),
         (text_file([(0, 1, -1)]), r"a face uses vertex -1"),
         (text_file([(0, 1)]), r"holds no faces with three corners"),
@@ -162,11 +212,6 @@ def test_every_cut_short_file_is_refused(read, data):
         (binary_file()[:-1], r"ends after 1 of 2 entries of 'face'; is it cut short\?"),
         (binary_file().replace(b"\x04\0\0\0\0", b"\xff\0\0\0\0"), r"ends after 0 of 2 entries of 'face'"),
         (header("ascii", faces=1).replace("float z", "list uchar float z").encode() + b"0 0 1 0\n" * 6, "x, y and z"),
-        (
-            b"ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\n"
-            b"element tristrips 1\nproperty list int int vertex_indices\nend_header\n0 0 0\n3 0 0 0\n",
-            r"holds triangle strips",
-        ),
     ],
 )
 def test_bad_files(read, data, message):

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.scene.values.description import FloatArray, IndexArray, Material, Mesh
 
-#: Radii of points and of lines over the diagonal of the scene's box: one part in 200 is as wide as half a lens of a
-#: display of 100 lenses.
-POINT_RADIUS, LINE_RADIUS = 0.005, 0.0025
+#: Radii of points and of lines over the diagonal of the scene's box: of 64 lenses, one shows the width of a line.
+POINT_RADIUS, LINE_RADIUS = 0.01, 0.005
 
-#: More points or lines than that are not drawn: each is a dozen triangles.
-MOST = 1 << 20
+#: More points or lines than that are not drawn: each is six or eight triangles.
+MOST = 1 << 18
 
 # Up to so many, points are balls of 32 triangles, and lines have 6 sides; of more, which are thinner, 8 and 3.
 _MOST_ROUND = 20_000
@@ -39,7 +38,7 @@ def radius(diagonal: float, count: int, *, lines: bool) -> float:
     ``count`` points spread over a surface lie about ``diagonal / sqrt(count)`` from each other.
     """
     share = LINE_RADIUS if lines else POINT_RADIUS
-    crowd = share * 100.0 / max(count, 1) ** 0.5
+    crowd = share * 50.0 / max(count, 1) ** 0.5
     return min(share, crowd) * (diagonal if diagonal > 0.0 else 1.0)
 
 
@@ -60,6 +59,18 @@ def as_material(material: Material) -> Material:
         alpha_cutoff=material.alpha_cutoff,
         double_sided=True,
         unlit=True,
+    )
+
+
+def thinned(points: Mesh, step: int) -> Mesh:
+    """One in ``step`` of the points of a mesh whose ``faces`` are ``(m, 1)``."""
+    chosen = points.faces[::step, 0]
+    return replace(
+        points,
+        positions=points.positions[chosen],
+        faces=np.arange(len(chosen), dtype=np.uint32)[:, None],
+        uvs=tuple(uvs[chosen] for uvs in points.uvs),
+        colors=None if points.colors is None else points.colors[chosen],
     )
 
 

@@ -8,7 +8,7 @@ Python (tinyobjloader). Materials are mapped in ``mtl_to_pbr.py``.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -17,16 +17,16 @@ from numpy.typing import NDArray
 from lippmann.color.transfer import decode_srgb
 from lippmann.errors import SceneError
 from lippmann.scene.parsing.files import MissingFileError, decode_text, is_file, read_bytes, resolve, uncommented
+from lippmann.scene.parsing.points_lines import as_material
 from lippmann.scene.parsing.triangulation import triangulate
 from lippmann.scene.readers.mtl import MtlRecord, parse_mtl
 from lippmann.scene.readers.mtl_to_pbr import MaterialMapper
+from lippmann.scene.readers.obj_points_lines import draw_points_and_lines
 from lippmann.scene.readers.obj_tables import Integers, Lines, Points, check_range, read_corners, read_table
 from lippmann.scene.values.description import Instance, Material, Mesh, SceneDescription
 
 # Curves, surfaces and display hints: drawn by no renderer of triangles.
 _UNSUPPORTED = {
-    "p": "points",
-    "l": "lines",
     "curv": "curves",
     "curv2": "curves",
     "surf": "free-form surfaces",
@@ -46,10 +46,14 @@ class _Statements:
     uvs: Lines = field(default_factory=Lines)
     normals: Lines = field(default_factory=Lines)
     faces: Lines = field(default_factory=Lines)
+    points: Lines = field(default_factory=Lines)
+    lines: Lines = field(default_factory=Lines)
     libraries: Lines = field(default_factory=Lines)
     materials: list[str] = field(default_factory=lambda: [""])
-    # (first face, value), which holds up to the next run
+    # (first face, point or line; value), which holds up to the next run
     material_runs: list[tuple[int, int]] = field(default_factory=lambda: [(0, 0)])
+    point_material_runs: list[tuple[int, int]] = field(default_factory=lambda: [(0, 0)])
+    line_material_runs: list[tuple[int, int]] = field(default_factory=lambda: [(0, 0)])
     smoothing_runs: list[tuple[int, int]] = field(default_factory=lambda: [(0, 0)])
     ignored: dict[str, int] = field(default_factory=dict)
 
@@ -83,30 +87,39 @@ def read_obj(path: Path, *, allow_outside: bool = False) -> SceneDescription:
     """
     where = path.name
     statements = _split_statements(decode_text(read_bytes(path), where), where)
-    if not statements.faces.bodies:
-        fix = "points and lines alone cannot be rendered" if statements.positions.bodies else "is it an OBJ file?"
-        raise SceneError("holds no faces", where=where, fix=fix)
+    if not (statements.faces.bodies or statements.points.bodies or statements.lines.bodies):
+        fix = "points are drawn where 'p' names them" if statements.positions.bodies else "is it an OBJ file?"
+        raise SceneError("holds no faces, lines or points", where=where, fix=fix)
     geometry = _assemble(statements, where)
     records, missing = _read_libraries(statements.libraries, path, allow_outside)
     mapper = MaterialMapper(path.parent, allow_outside=allow_outside)
     meshes: list[Mesh] = []
     materials: list[Material] = []
     notes = [f"{count} {what} are not rendered" for what, count in statements.ignored.items()]
+    thin, sizes = _draw_points_and_lines(statements, geometry, where)
     for index, name in enumerate(statements.materials):
         rows = np.flatnonzero(geometry.material_of == index)
-        if len(rows) == 0:
+        solids = [mesh for mesh in thin if mesh.material == index]
+        if len(rows) == 0 and not solids:
             continue
         record = records.get(name) or records.get(uncommented(name))
         if record is None and name and not missing:
             notes.append(f"material '{name}' is in no material library: taken as plain grey")
-        materials.append(mapper.material(record) if record else mapper.default(name))
-        meshes.append(_mesh(geometry, rows, name or path.stem, len(materials) - 1))
+        material = mapper.material(record) if record else mapper.default(name)
+        if len(rows):
+            materials.append(material)
+            meshes.append(_mesh(geometry, rows, name or path.stem, len(materials) - 1))
+        if solids:
+            materials.append(as_material(material))
+            meshes += [replace(mesh, material=len(materials) - 1) for mesh in solids]
+    if not meshes:
+        raise SceneError("holds nothing but lines without length", where=where)
     return SceneDescription(
         name=path.stem,
         meshes=meshes,
         materials=materials,
         instances=[Instance(index, np.eye(4)) for index in range(len(meshes))],
-        notes=[*missing, *notes, *mapper.notes],
+        notes=[*missing, *notes, *sizes, *mapper.notes],
     )
 
 
@@ -120,6 +133,8 @@ def _split_statements(text: str, where: str) -> _Statements:
             ("vt", statements.uvs),
             ("vn", statements.normals),
             ("f", statements.faces),
+            ("p", statements.points),
+            ("l", statements.lines),
         )
     }
     material_index = {"": 0}
@@ -131,7 +146,7 @@ def _split_statements(text: str, where: str) -> _Statements:
         if key in numeric:
             if "#" in body:
                 body = body.split("#", 1)[0]
-            if "-" in body and key == "f":
+            if "-" in body and key in "fpl":
                 counts = (len(statements.positions.bodies), len(statements.uvs.bodies), len(statements.normals.bodies))
                 body = _absolute(body, counts, f"{where}:{number}")
             add_body, add_number = numeric[key]
@@ -143,6 +158,8 @@ def _split_statements(text: str, where: str) -> _Statements:
             if index == len(statements.materials):
                 statements.materials.append(name)
             statements.material_runs.append((len(statements.faces.bodies), index))
+            statements.point_material_runs.append((len(statements.points.bodies), index))
+            statements.line_material_runs.append((len(statements.lines.bodies), index))
         elif key == "s":
             statements.smoothing_runs.append((len(statements.faces.bodies), _smoothing_group(body)))
         elif key == "mtllib":
@@ -190,9 +207,9 @@ def _absolute(body: str, counts: tuple[int, int, int], where: str) -> str:
                 places[slot] = counts[slot] + 1 + place
                 if places[slot] < 1:
                     raise SceneError(
-                        f"face counts back {-place} entries of {counts[slot]}",
+                        f"index {place} counts back beyond the first of {counts[slot]} entries",
                         where=where,
-                        rule="a negative index counts back from the last entry before the face",
+                        rule="a negative index counts back from the last entry before it",
                     )
         corners.append("/".join(str(place) if word else "" for place, word in zip(places, words, strict=True)))
     return " ".join(corners)
@@ -230,6 +247,18 @@ def _assemble(statements: _Statements, where: str) -> _Geometry:
     )
     _complete_normals(geometry, _per_face(statements.smoothing_runs, len(sizes))[owners])
     return geometry
+
+
+def _draw_points_and_lines(statements: _Statements, geometry: _Geometry, where: str) -> tuple[list[Mesh], list[str]]:
+    points = _per_face(statements.point_material_runs, len(statements.points.bodies))
+    lines = _per_face(statements.line_material_runs, len(statements.lines.bodies))
+    pairs = ((statements.points, points), (statements.lines, lines))
+    return draw_points_and_lines(pairs, geometry.positions, _linear_colors(geometry), where)
+
+
+def _linear_colors(geometry: _Geometry) -> Points | None:
+    """Colours of all vertices, from sRGB codes."""
+    return None if geometry.colors is None else decode_srgb(np.clip(geometry.colors, 0.0, 1.0))
 
 
 def _complete_normals(geometry: _Geometry, smoothing: Integers) -> None:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from lippmann.color.transfer import decode_srgb
 from lippmann.errors import SceneError
 from lippmann.scene.parsing.files import read_bytes, read_image, resolve
+from lippmann.scene.parsing.points_lines import MOST, as_mesh, radius, thinned
 from lippmann.scene.parsing.triangulation import triangulate
 from lippmann.scene.readers.ply_header import Element, Header, read_header
 from lippmann.scene.values.description import Instance, Material, Mesh, SceneDescription, Texture
@@ -46,14 +47,15 @@ Columns = Mapping[str, "Numbers | _Lists"]
 
 
 def read_ply(path: Path, *, allow_outside: bool = False) -> SceneDescription:
-    """Read a PLY mesh with its vertex normals, colours and texture coordinates.
+    """Read a PLY mesh with its vertex normals, colours and texture coordinates, or a cloud of points.
 
-    Colours are taken as sRGB-coded. Without normals the facets are flat.
+    Colours are taken as sRGB-coded. Without normals the facets are flat. Points become balls, unshaded where they
+    have colours.
 
     Raises
     ------
     SceneError
-        The file is missing, foreign, cut short, or holds no faces; its texture is not there.
+        The file is missing, foreign, cut short, or holds no vertices; its texture is not there.
     """
     where = path.name
     data = read_bytes(path)
@@ -61,22 +63,53 @@ def read_ply(path: Path, *, allow_outside: bool = False) -> SceneDescription:
     columns = _read_body(data, header, where)
     if not all(isinstance(columns.get("vertex", {}).get(axis), np.ndarray) for axis in "xyz"):
         raise SceneError("holds no vertices with x, y and z", where=where)
-    if not len(_outline(columns, where).sizes):
-        raise SceneError("holds no faces", where=where, fix="a cloud of points must be meshed first")
     notes = [UP_NOTE, *header.notes]
+    elements = {element.name: element for element in header.elements}
+    outline = _outline(columns, where)
+    if not len(outline.sizes):
+        return _cloud(columns["vertex"], elements["vertex"], path.stem, notes, where)
     texture = None
     if header.textures:
         image = resolve(path.parent, header.textures[0], where=where, what="texture", allow_outside=allow_outside)
         texture = Texture(read_image(image, where=where), srgb=True)
         if len(header.textures) > 1:
             notes.append(f"only the first of {len(header.textures)} textures is used")
-    mesh = _mesh(columns, {element.name: element for element in header.elements}, path.stem, where)
+    mesh = _mesh(columns, elements, outline, path.stem, where)
     if texture is not None and not mesh.uvs:
         notes.append("the texture is not used: the file gives no texture coordinates")
         texture = None
     plain = (1.0, 1.0, 1.0) if texture is not None or mesh.colors is not None else (0.7, 0.7, 0.7)
     material = Material(path.stem, base_color=plain, base_color_texture=texture, roughness=0.6, double_sided=True)
     return SceneDescription(path.stem, [mesh], [material], [Instance(0, np.eye(4))], notes=notes)
+
+
+def _cloud(vertex: Columns, element: Element, name: str, notes: list[str], where: str) -> SceneDescription:
+    """Points as balls; nearly all such files come from scanners, which record the light with the colour."""
+    positions = np.stack([np.asarray(vertex[axis]) for axis in "xyz"], axis=-1)
+    if not len(positions):
+        raise SceneError("holds no vertices", where=where)
+    _check_finite(positions, where)
+    colors = _colors(vertex, element)
+    points = np.arange(len(positions), dtype=np.uint32)[:, None]
+    thin = Mesh(name, positions.astype(np.float32), points, 0, None, (), colors)
+    if (step := -(-len(points) // MOST)) > 1:
+        notes = [*notes, f"of {len(points)} points one in {step} is drawn"]
+        thin = thinned(thin, step)
+    diagonal = float(np.linalg.norm(np.ptp(thin.positions.astype(np.float64), axis=0)))
+    width = radius(diagonal, len(thin.faces), lines=False)
+    plain = (0.7, 0.7, 0.7) if colors is None else (1.0, 1.0, 1.0)
+    material = Material(name, base_color=plain, roughness=0.6, double_sided=True, unlit=colors is not None)
+    note = f"points are drawn as balls of radius {width:.3g}, {width / (diagonal or 1.0):.2%} of the scene's diagonal"
+    mesh = as_mesh(thin, np.eye(4)[None], width, 0)
+    return SceneDescription(name, [mesh], [material], [Instance(0, np.eye(4))], notes=[*notes, note])
+
+
+def _check_finite(positions: Numbers, where: str) -> None:
+    if not (finite := np.isfinite(positions.astype(np.float32)).all(axis=1)).all():
+        bad = int(np.argmin(finite))
+        raise SceneError(
+            f"vertex {bad} is {positions[bad].tolist()}", where=where, rule="coordinates must be finite numbers"
+        )
 
 
 def _read_body(data: bytes, header: Header, where: str) -> dict[str, Columns]:
@@ -241,16 +274,37 @@ def _outline(columns: Mapping[str, Columns], where: str) -> _Lists:
         outline = columns.get("face", {}).get(name)
         if isinstance(outline, _Lists):
             return outline
-    if "tristrips" in columns:
-        raise SceneError("holds triangle strips", where=where, rule="only faces are read", fix="convert it to faces")
+        strips = columns.get("tristrips", {}).get(name)
+        if isinstance(strips, _Lists):
+            return _triangles_of_strips(strips)
     return _Lists(np.zeros(0), np.zeros(0, np.int64))
 
 
+def _triangles_of_strips(strips: _Lists) -> _Lists:
+    """Triangles of strips; -1 begins a strip anew, and every second triangle turns the other way round."""
+    values = strips.values
+    order = np.arange(len(values))
+    ends = values == -1
+    starts = np.ones(len(values), bool)
+    starts[1:] = ends[:-1]
+    first = np.cumsum(strips.sizes) - strips.sizes
+    starts[first[strips.sizes > 0]] = True
+    begin = np.maximum.accumulate(np.where(starts, order, 0))
+    # A triangle for each vertex that has two before it in its strip.
+    last = np.flatnonzero(~ends & (order - begin >= 2))
+    odd = (last - begin[last]) % 2 == 1
+    corners = np.stack([values[last - 2], values[last - 1], values[last]], axis=1)
+    corners[odd] = corners[odd][:, [1, 0, 2]]
+    proper = (corners != np.roll(corners, 1, axis=1)).all(axis=1)
+    return _Lists(corners[proper].ravel(), np.full(int(proper.sum()), 3, np.int64))
+
+
 @np.errstate(over="ignore")  # a number too large for a float is an infinite one, which is refused
-def _mesh(columns: Mapping[str, Columns], elements: Mapping[str, Element], name: str, where: str) -> Mesh:
+def _mesh(
+    columns: Mapping[str, Columns], elements: Mapping[str, Element], outline: _Lists, name: str, where: str
+) -> Mesh:
     vertex = {key: column for key, column in columns["vertex"].items() if isinstance(column, np.ndarray)}
     positions = np.stack([vertex[axis] for axis in "xyz"], axis=-1)
-    outline = _outline(columns, where)
     keep = outline.sizes >= 3
     numbers = outline.values[np.repeat(keep, outline.sizes)]
     if not (np.abs(numbers) < _MOST_VERTICES).all():
@@ -261,18 +315,15 @@ def _mesh(columns: Mapping[str, Columns], elements: Mapping[str, Element], name:
     if corners.min() < 0 or corners.max() >= len(positions):
         bad = corners.min() if corners.min() < 0 else corners.max()
         raise SceneError(f"a face uses vertex {bad}", where=where, rule=f"the file has 0 to {len(positions) - 1}")
-    if not (finite := np.isfinite(positions.astype(np.float32)).all(axis=1)).all():
-        bad = int(np.argmin(finite))
-        raise SceneError(
-            f"vertex {bad} is {positions[bad].tolist()}", where=where, rule="coordinates must be finite numbers"
-        )
+    _check_finite(positions, where)
     places, owners = triangulate(positions, corners, outline.sizes[keep])
     faces = corners[places]
     normals = _stack(vertex, ("nx", "ny", "nz"))
     uvs = next((pair for names in _UV_NAMES if (pair := _stack(vertex, names)) is not None), None)
     colors = _colors(columns["vertex"], elements["vertex"])
-    per_corner = _corner_uvs(columns["face"], outline, keep)
-    face_colors = _colors(columns["face"], elements["face"])
+    face = columns.get("face", {})
+    per_corner = _corner_uvs(face, outline, keep)
+    face_colors = _colors(face, elements["face"]) if face else None
     if per_corner is not None or (face_colors is not None and colors is None):
         # What belongs to a corner or a face needs vertices that no other face shares.
         flat = faces.ravel()

@@ -42,8 +42,8 @@ def test_strips_and_fans_too_short_for_a_triangle_hold_none(writer, read, mode, 
 def test_lines_are_rods(writer, read, mode, lines):
     scene = read(writer.triangle(positions=SQUARE[:4], mode=mode))
     (mesh,) = scene.meshes
-    radius = 0.0025 * 2**0.5  # of the diagonal of the square
-    assert scene.notes == (f"lines are drawn as rods of radius {radius:.3g}, 0.25% of the scene's diagonal",)
+    radius = 0.005 * 2**0.5  # of the diagonal of the square
+    assert scene.notes == (f"lines are drawn as rods of radius {radius:.3g}, 0.50% of the scene's diagonal",)
     for rod, (start, end) in zip(np.split(mesh.positions, len(lines)), lines, strict=True):
         np.testing.assert_allclose(rod.mean(axis=0), np.mean([SQUARE[start], SQUARE[end]], axis=0), atol=1e-6)
         near = np.linalg.norm(rod - SQUARE[start], axis=1) < 0.5
@@ -57,8 +57,8 @@ def test_points_are_balls_with_the_colours_of_their_vertices(writer, read):
     assert mesh.faces.shape == (3 * 32, 3)
     for color, place in zip(np.eye(3), [[0, 0, 0], [1, 0, 0], [0, 1, 0]], strict=True):
         mine = mesh.positions[(mesh.colors == color).all(axis=1)]
-        np.testing.assert_allclose(np.linalg.norm(mine - place, axis=1), 0.005 * 2**0.5, rtol=1e-4)
-    assert scene.notes == ("points are drawn as balls of radius 0.00707, 0.50% of the scene's diagonal",)
+        np.testing.assert_allclose(np.linalg.norm(mine - place, axis=1), 0.01 * 2**0.5, rtol=1e-4)
+    assert scene.notes == ("points are drawn as balls of radius 0.0141, 1.00% of the scene's diagonal",)
 
 
 def test_points_stand_where_all_nodes_place_them_at_one_size(writer, read):
@@ -72,7 +72,7 @@ def test_points_stand_where_all_nodes_place_them_at_one_size(writer, read):
     places = [[0, 0, 0], [10, 0, 0], [0, 1, 0], [0, 5, 0], [1, 5, 0], [0, 6, 0]]
     np.testing.assert_allclose([ball.mean(axis=0) for ball in balls], places, atol=1e-5)
     for ball, middle in zip(balls, places, strict=True):
-        radius = 0.005 * (100**2 + 6**2) ** 0.5
+        radius = 0.01 * (100**2 + 6**2) ** 0.5
         np.testing.assert_allclose(np.linalg.norm(ball - middle, axis=1), radius, rtol=1e-5)
     assert flat == 2
 
@@ -92,11 +92,24 @@ def test_lines_of_no_length_are_nothing_to_see(writer, read):
     assert "shows no triangles, lines or points" in _refusal(read, writer.triangle(positions=[[1, 1, 1]] * 2, mode=1))
 
 
-def test_too_many_points_are_refused(writer, read):
-    count = (1 << 20) + 1
-    accessor = writer.add("accessors", componentType=5126, count=count, type="VEC3")
-    writer.node(mesh=writer.add("meshes", primitives=[{"attributes": {"POSITION": accessor}, "mode": 0}]))
-    assert f"the file shows {count} points and lines; up to {count - 1} are drawn" in _refusal(read, writer)
+def test_of_too_many_points_some_are_drawn(writer, read, monkeypatch):
+    monkeypatch.setattr("lippmann.scene.readers.gltf.points_lines.MOST", 2)
+    colors = writer.accessor(np.eye(4, dtype="f4")[[0, 1, 2, 3, 0]])
+    scene = read(writer.triangle(positions=SQUARE, mode=0, attributes={"COLOR_0": colors}))
+    assert scene.notes[0] == "of 5 points one in 3 is drawn"
+    balls = np.split(scene.meshes[0].positions, 2)
+    np.testing.assert_allclose([ball.mean(axis=0) for ball in balls], [SQUARE[0], SQUARE[3]], atol=1e-6)
+    assert {tuple(color) for color in scene.meshes[0].colors.tolist()} == {(1, 0, 0, 0), (0, 0, 0, 1)}
+
+
+def test_too_many_lines_or_copies_are_refused(writer, read, monkeypatch):
+    monkeypatch.setattr("lippmann.scene.readers.gltf.points_lines.MOST", 2)
+    assert "the file shows 3 points or lines; up to 2 are drawn" in _refusal(read, writer.triangle(mode=2))
+    writer.json["meshes"][0]["primitives"][0]["mode"] = 0
+    del writer.json["buffers"]
+    places = writer.accessor([[0, 0, 0]] * 3)
+    writer.json["nodes"][0]["extensions"] = {"EXT_mesh_gpu_instancing": {"attributes": {"TRANSLATION": places}}}
+    assert "the file shows 9 points or lines; up to 2 are drawn" in _refusal(read, writer)
 
 
 def test_strips_lose_the_triangles_that_only_turn_corners(writer, read):

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from lippmann.scene.parsing.points_lines import MOST, as_mesh, radius
+from lippmann.scene.parsing.points_lines import MOST, as_mesh, radius, thinned
 from lippmann.scene.readers.gltf.document import Document
 from lippmann.scene.values.description import Matrix, Mesh
 
@@ -33,7 +33,8 @@ def draw_points_and_lines(
     Raises
     ------
     SceneError
-        The file shows more than :data:`~lippmann.scene.parsing.points_lines.MOST` of them.
+        The file shows more than :data:`~lippmann.scene.parsing.points_lines.MOST` lines, or copies of points. Of more
+        points than that, some are drawn, with a note.
     """
     stacks: dict[int, list[Matrix]] = {}
     for mesh, worlds in placements:
@@ -41,19 +42,24 @@ def draw_points_and_lines(
             stacks.setdefault(mesh, []).append(worlds)
     if not stacks:
         return {}
-    counts = {mesh: len(meshes[mesh].faces) * sum(map(len, stack)) for mesh, stack in stacks.items()}
-    if sum(counts.values()) > MOST:
-        raise document.error(f"the file shows {sum(counts.values())} points and lines", rule=f"up to {MOST} are drawn")
+    copies = {mesh: sum(map(len, stack)) for mesh, stack in stacks.items()}
     diagonal = _diagonal(meshes, placements)
     drawn: dict[int, Mesh] = {}
     for size, remark in _KINDS.items():
-        chosen = [mesh for mesh in stacks if meshes[mesh].faces.shape[1] == size]
+        chosen = {mesh: meshes[mesh] for mesh in stacks if meshes[mesh].faces.shape[1] == size}
         if not chosen:
             continue
-        width = radius(diagonal, sum(counts[mesh] for mesh in chosen), lines=size == 2)
+        count = sum(len(thin.faces) * copies[mesh] for mesh, thin in chosen.items())
+        if count > MOST:
+            if size == 2 or sum(copies[mesh] for mesh in chosen) > MOST:
+                raise document.error(f"the file shows {count} points or lines", rule=f"up to {MOST} are drawn")
+            step = -(-count // MOST)
+            document.notes.add(f"of {count} points one in {step} is drawn")
+            chosen = {mesh: thinned(thin, step) for mesh, thin in chosen.items()}
+        width = radius(diagonal, min(count, MOST), lines=size == 2)
         document.notes.add(f"{remark} of radius {width:.3g}, {width / (diagonal or 1.0):.2%} of the scene's diagonal")
-        for mesh in chosen:
-            drawn[mesh] = as_mesh(meshes[mesh], np.concatenate(stacks[mesh]), width, meshes[mesh].material)
+        for mesh, thin in chosen.items():
+            drawn[mesh] = as_mesh(thin, np.concatenate(stacks[mesh]), width, thin.material)
     return drawn
 
 
