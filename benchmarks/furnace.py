@@ -3,8 +3,8 @@
 python benchmarks/furnace.py
 
 A surface that absorbs nothing keeps all light. Directions are sampled by the material's own plugin, whose weights have
-the kept share for their mean; the light that enters a denser body is counted, not its radiance. Glass is also tried as a
-whole ball, whose paths cross many interfaces. ``single`` is glTF's formula as it stands (``--single-scattering``).
+the kept share for their mean; the light that enters a denser body is counted, not its radiance. Glass is also tried as
+a whole ball, whose paths cross many interfaces. ``single`` is glTF's formula as it stands (``--single-scattering``).
 """
 
 from __future__ import annotations
