@@ -19,6 +19,9 @@ Transfer = Literal["srgb", "linear"]
 
 FloatArray = NDArray[np.float32]
 
+#: The sRGB curve: a line of this slope up to the threshold, then a power of this exponent, scaled and offset.
+SRGB_THRESHOLD, SRGB_SLOPE, SRGB_EXPONENT, SRGB_OFFSET = 0.0031308, 12.92, 2.4, 0.055
+
 #: Values coded at a time: keeps the temporary arrays small beside the picture.
 _BLOCK = 1 << 22
 
@@ -26,7 +29,8 @@ _BLOCK = 1 << 22
 def encode_srgb(linear: NDArray[np.floating]) -> NDArray[np.floating]:
     """sRGB-coded values in [0, 1] of linear values, which are clipped to [0, 1]; same shape and precision."""
     value: NDArray[np.floating] = np.clip(linear, 0, 1)
-    return np.where(value <= 0.0031308, 12.92 * value, 1.055 * value ** (1 / 2.4) - 0.055)
+    curve = (1 + SRGB_OFFSET) * value ** (1 / SRGB_EXPONENT) - SRGB_OFFSET
+    return np.where(value <= SRGB_THRESHOLD, SRGB_SLOPE * value, curve)
 
 
 def encode(linear: NDArray[np.floating], transfer: Transfer) -> NDArray[np.floating]:
@@ -38,7 +42,8 @@ def decode_srgb(coded: ArrayLike) -> NDArray[np.float64]:
     """Linear values of sRGB-coded ones; same shape. The curve's line goes on below 0, its power above 1."""
     value = np.asarray(coded, np.float64)
     # The floor keeps the power, computed for every value, from roots of negative numbers.
-    return np.where(value <= 0.04045, value / 12.92, ((np.maximum(value, 0.0) + 0.055) / 1.055) ** 2.4)
+    curve = ((np.maximum(value, 0.0) + SRGB_OFFSET) / (1 + SRGB_OFFSET)) ** SRGB_EXPONENT
+    return np.where(value <= 0.04045, value / SRGB_SLOPE, curve)
 
 
 def coding_slope(linear: NDArray[np.floating], transfer: Transfer = "srgb") -> NDArray[np.float32]:
@@ -46,8 +51,9 @@ def coding_slope(linear: NDArray[np.floating], transfer: Transfer = "srgb") -> N
     inside = (linear >= 0) & (linear <= 1)
     if transfer == "linear":
         return inside.astype(np.float32)
-    x = np.clip(linear, 0.0031308, 1)
-    slope = np.where(linear <= 0.0031308, 12.92, (1.055 / 2.4) * x ** (1 / 2.4 - 1))
+    x = np.clip(linear, SRGB_THRESHOLD, 1)
+    power = (1 + SRGB_OFFSET) / SRGB_EXPONENT * x ** (1 / SRGB_EXPONENT - 1)
+    slope = np.where(linear <= SRGB_THRESHOLD, SRGB_SLOPE, power)
     return np.where(inside, slope, 0).astype(np.float32)
 
 

@@ -6,30 +6,30 @@ a metre wide, its lens boundaries must be hit to a small part of a pixel, and si
 
 from __future__ import annotations
 
-from typing import Any
-
 import drjit as dr
+
+from lippmann.device.types import Array, Bool
 
 
 class DeviceOps:
     """Array operations on Dr.Jit arrays, by the names of :class:`lippmann.display.array_ops.ArrayOps`."""
 
-    def floor(self, x: Any, /) -> Any:
+    def floor(self, x: Array, /) -> Array:
         return dr.floor(x)
 
-    def abs(self, x: Any, /) -> Any:
+    def abs(self, x: Array, /) -> Array:
         return dr.abs(x)
 
-    def sqrt(self, x: Any, /) -> Any:
+    def sqrt(self, x: Array, /) -> Array:
         return dr.sqrt(x)
 
-    def minimum(self, a: Any, b: Any, /) -> Any:
+    def minimum(self, a: Array, b: Array, /) -> Array:
         return dr.minimum(a, b)
 
-    def maximum(self, a: Any, b: Any, /) -> Any:
+    def maximum(self, a: Array, b: Array, /) -> Array:
         return dr.maximum(a, b)
 
-    def where(self, condition: Any, a: Any, b: Any, /) -> Any:
+    def where(self, condition: Bool, a: Array, b: Array, /) -> Array:
         return dr.select(condition, a, b)
 
 

@@ -10,16 +10,17 @@ every elementary interval, and each single point is uniform in [0, 1)^2.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import drjit as dr
 import mitsuba as mi
+
+from lippmann.device.types import Float, Point2f, UInt32
 
 #: Sample dimension that places a sample in its pixel; integrators use those above.
 PIXEL_DIMENSION = 0
 
 
-def hash32(x: Any) -> Any:
+def hash32(x: UInt32) -> UInt32:
     """A bijective mixing of 32 bits (the "lowbias32" finaliser found by Wellons)."""
     x = x ^ (x >> 16)
     x = x * 0x21F0AAAD
@@ -28,7 +29,7 @@ def hash32(x: Any) -> Any:
     return x ^ (x >> 15)
 
 
-def _permute_low_to_high(x: Any, seed: Any) -> Any:
+def _permute_low_to_high(x: UInt32, seed: UInt32) -> UInt32:
     """Owen-scramble bit-reversed values: each bit is flipped by a hash of the bits below it."""
     x = x ^ (x * 0x3D20ADEA)
     x = x + seed
@@ -37,14 +38,14 @@ def _permute_low_to_high(x: Any, seed: Any) -> Any:
     return x ^ (x * 0x53A22864)
 
 
-def _second_dimension(index: Any) -> Any:
+def _second_dimension(index: UInt32) -> UInt32:
     """Bit-reversed second Sobol' coordinate of ``index``: the Pascal matrix mod 2, one Kronecker factor at a time."""
     for shift, mask in ((1, 0x55555555), (2, 0x33333333), (4, 0x0F0F0F0F), (8, 0x00FF00FF), (16, 0x0000FFFF)):
         index = index ^ ((index >> shift) & mask)
     return index
 
 
-def _unit_float(bits: Any) -> Any:
+def _unit_float(bits: UInt32) -> Float:
     return mi.Float(bits >> 8) * 2.0**-24
 
 
@@ -52,28 +53,28 @@ def _unit_float(bits: Any) -> Any:
 class SampleStream:
     """The samples of one wavefront: lane-wise pixel ``key`` (hashed with the seed) and sample ``index``."""
 
-    key: Any
-    index: Any
+    key: UInt32
+    index: UInt32
 
     @staticmethod
-    def of_pixels(pixel: Any, index: Any, seed: Any) -> SampleStream:
+    def of_pixels(pixel: UInt32, index: UInt32, seed: UInt32) -> SampleStream:
         """Streams for linear pixel numbers ``pixel`` and sample numbers ``index`` (UInt32), under one ``seed``."""
         return SampleStream(hash32(pixel ^ hash32(seed ^ mi.UInt32(0x9E3779B9))), mi.UInt32(index))
 
-    def at(self, index: Any) -> SampleStream:
+    def at(self, index: UInt32) -> SampleStream:
         """The same pixels' points of the samples with the numbers ``index`` (UInt32)."""
         return SampleStream(self.key, index)
 
-    def _shuffled(self, dimension: Any) -> tuple[Any, Any]:
+    def _shuffled(self, dimension: UInt32) -> tuple[UInt32, UInt32]:
         seed = hash32(self.key + mi.UInt32(dimension) * 0x9E3779B9)
         return dr.brev(_permute_low_to_high(dr.brev(self.index), seed)), seed
 
-    def next_1d(self, dimension: Any) -> Any:
+    def next_1d(self, dimension: UInt32) -> Float:
         """A number in [0, 1) for ``dimension``."""
         index, seed = self._shuffled(dimension)
         return _unit_float(dr.brev(_permute_low_to_high(index, hash32(seed ^ 0x68BC21EB))))
 
-    def next_2d(self, dimension: Any) -> Any:
+    def next_2d(self, dimension: UInt32) -> Point2f:
         """A point in [0, 1)^2 for ``dimension``."""
         index, seed = self._shuffled(dimension)
         return mi.Point2f(

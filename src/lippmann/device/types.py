@@ -26,14 +26,21 @@ Point2f: TypeAlias = Any
 Point3f: TypeAlias = Any
 #: ``mi.Vector3f``: directions and offsets.
 Vector3f: TypeAlias = Any
+#: ``mi.Vector4f``: four numbers, as tables are read.
+Vector4f: TypeAlias = Any
 #: ``mi.Vector3d``: directions and offsets in double precision.
 Vector3d: TypeAlias = Any
 #: ``mi.Normal3f``: surface normals.
 Normal3f: TypeAlias = Any
 #: ``mi.Color3f``: linear RGB.
 Color3f: TypeAlias = Any
+#: ``mi.Float`` or ``mi.Color3f``: one channel of a texture, or three.
+FloatOrColor: TypeAlias = Any
 #: ``mi.Spectrum``: radiance, throughput or reflectance; linear RGB in every variant used here.
 Spectrum: TypeAlias = Any
+
+#: Any array of Dr.Jit's; functions that take one return the same kind.
+Array: TypeAlias = Any
 
 #: ``mi.Ray3f``: a ray with origin ``o``, unit direction ``d`` and extent ``maxt``.
 Ray3f: TypeAlias = Any
@@ -48,9 +55,24 @@ DirectionSample3f: TypeAlias = Any
 #: ``mi.BSDFSample3f``: a sampled direction of scattering.
 BSDFSample3f: TypeAlias = Any
 
+#: ``mi.BSDFContext``: which components and kind of transport a BSDF is asked for.
+BSDFContext: TypeAlias = Any
+#: ``mi.BoundingBox3f``: an axis-aligned box.
+BoundingBox3f: TypeAlias = Any
+#: ``mi.Frame3f``: a local frame, z along the normal.
+Frame3f: TypeAlias = Any
+
 #: ``mi.BSDFPtr``: the material of a surface.
 BSDFPtr: TypeAlias = Any
 #: ``mi.ShapePtr``: a shape of the scene.
 ShapePtr: TypeAlias = Any
+#: ``mi.BSDF``, ``mi.Emitter``, ``mi.Texture``, ``mi.Shape`` and ``mi.Mesh``: plugins of a scene.
+BSDF: TypeAlias = Any
+Emitter: TypeAlias = Any
+MitsubaTexture: TypeAlias = Any
+Shape: TypeAlias = Any
+Mesh: TypeAlias = Any
+#: ``mi.Properties``: parameters of a plugin.
+Properties: TypeAlias = Any
 #: ``mi.Scene``: shapes, emitters and their acceleration structure.
 MitsubaScene: TypeAlias = Any

@@ -42,6 +42,10 @@ def test_what_cannot_be_instanced_is_merged_or_refused():
         choose_instances(lamp, lamp[0].bytes_once)
 
 
+def test_a_scene_without_copies_is_never_refused():
+    assert choose_instances({0: mesh(10**6, 1), 1: mesh(10**6, 1)}, 1) == set()
+
+
 def test_a_scene_that_fits_no_way_is_refused_in_one_line():
     with pytest.raises(SceneError) as refusal:
         choose_instances({0: mesh(300, 2_000_000)}, 1 << 30, name="crowd.glb")
@@ -67,4 +71,5 @@ def test_the_choice_keeps_to_memory_and_to_the_number_of_instances(meshes, memor
         return
     assert all(meshes[key].instantiable and meshes[key].copies > 1 for key in chosen)
     assert sum(meshes[key].copies for key in chosen) <= MOST_INSTANCES
-    assert sum(each.bytes_once * (1 if key in chosen else each.copies) for key, each in meshes.items()) <= memory
+    need = sum(each.bytes_once * (1 if key in chosen else each.copies) for key, each in meshes.items())
+    assert need <= max(memory, sum(each.bytes_once for each in meshes.values()))

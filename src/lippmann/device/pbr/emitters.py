@@ -5,13 +5,25 @@ from __future__ import annotations
 import functools
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.device.pbr.materials import Emission
-from lippmann.device.pbr.texture_lookup import Place, Signal, numbers
+from lippmann.device.pbr.texture_lookup import Place, Signal, Table, numbers
+from lippmann.device.types import (
+    Bool,
+    BoundingBox3f,
+    Color3f,
+    DirectionSample3f,
+    Emitter,
+    Float,
+    Interaction3f,
+    Point2f,
+    Properties,
+    SurfaceInteraction3f,
+    Vector3f,
+)
 from lippmann.errors import SceneError
 from lippmann.scene.values.description import Environment, Light
 
@@ -21,7 +33,7 @@ MIN_PENUMBRA = 1e-3
 MAX_EXACT_ROWS = 512
 
 
-def light_object(light: Light) -> Any:
+def light_object(light: Light) -> Emitter:
     """The Mitsuba object of a lamp: an emitter, or a glowing sphere where the lamp has a radius.
 
     Raises
@@ -65,7 +77,7 @@ def _placement(light: Light, name: str) -> tuple[NDArray[np.float64], NDArray[np
     return matrix[:3, 3], axis / length
 
 
-def environment_object(environment: Environment) -> Any:
+def environment_object(environment: Environment) -> Emitter:
     """The Mitsuba emitter of the surroundings.
 
     The picture's middle column lies in direction -z of the environment's frame and u grows towards +x, as for a viewer
@@ -107,7 +119,7 @@ def _rows_for_mitsuba(pixels: NDArray[np.float32]) -> NDArray[np.float32]:
     return rows
 
 
-def glow(emission: Emission) -> Any:
+def glow(emission: Emission) -> Emitter:
     """The emitter of a glowing surface, to be attached to its shape."""
     return _surface_emitter(emission.radiance, emission.two_sided, emission=emission)
 
@@ -120,7 +132,7 @@ class Cone:
     inner: float
     outer: float
 
-    def share(self, direction: Any) -> Any:
+    def share(self, direction: Vector3f) -> Float:
         """Share of light in a world direction, falling evenly with the angle as Mitsuba's ``spot`` does."""
         import drjit as dr
         import mitsuba as mi
@@ -131,18 +143,20 @@ class Cone:
 
 def _surface_emitter(
     radiance: Signal, two_sided: bool, cone: Cone | None = None, emission: Emission | None = None
-) -> Any:
+) -> Emitter:
     import mitsuba as mi
 
     plain = emission is None or (emission.model is None and not emission.tinted)
     if plain and cone is None and not two_sided and radiance.lookup is None:
+        assert radiance.factor is not None
+        assert not isinstance(radiance.factor, Table)
         value = [float(channel[0]) for channel in radiance.factor]
         return mi.load_dict({"type": "area", "radiance": {"type": "rgb", "value": value}})
     return _emitter_class(mi.variant())(mi.Properties("lippmann_glow"), radiance, two_sided, cone, emission)
 
 
 @functools.cache
-def _emitter_class(variant: str) -> Any:
+def _emitter_class(variant: str) -> type[Emitter]:
     """The plugin class of one variant: Mitsuba's base classes differ between them."""
     import drjit as dr
     import mitsuba as mi
@@ -158,7 +172,7 @@ def _emitter_class(variant: str) -> Any:
         """
 
         def __init__(
-            self, props: Any, radiance: Signal, two_sided: bool, cone: Cone | None, emission: Emission | None
+            self, props: Properties, radiance: Signal, two_sided: bool, cone: Cone | None, emission: Emission | None
         ) -> None:
             super().__init__(props)
             self.m_flags = mi.EmitterFlags.Surface | mi.EmitterFlags.SpatiallyVarying
@@ -172,7 +186,7 @@ def _emitter_class(variant: str) -> Any:
             )
             self.drawn = radiance.follows_uv_only and covered and not self.tinted
 
-        def _radiance(self, si: Any, cosine: Any, direction: Any, active: Any) -> Any:
+        def _radiance(self, si: SurfaceInteraction3f, cosine: Float, direction: Vector3f, active: Bool) -> Color3f:
             place = Place(si, active)
             value = self.radiance.eval(place)
             if self.tinted:
@@ -183,10 +197,12 @@ def _emitter_class(variant: str) -> Any:
                 value = value * self.cone.share(direction)
             return mi.Color3f(value) & (active & ((cosine != 0) if self.two_sided else (cosine > 0)))
 
-        def eval(self, si: Any, active: Any = True) -> Any:
+        def eval(self, si: SurfaceInteraction3f, active: Bool = True) -> Color3f:
             return self._radiance(si, si.wi.z, si.to_world(si.wi), active)
 
-        def sample_direction(self, it: Any, sample: Any, active: Any = True) -> Any:
+        def sample_direction(
+            self, it: Interaction3f, sample: Point2f, active: Bool = True
+        ) -> tuple[DirectionSample3f, Color3f]:
             if not self.drawn:
                 return dr.zeros(mi.DirectionSample3f), mi.Color3f(0)
             ds = self.get_shape().sample_direction(it, sample, active)
@@ -194,20 +210,20 @@ def _emitter_class(variant: str) -> Any:
             value = self.eval_direction(it, ds, active & (ds.pdf > 0))
             return ds, dr.select(ds.pdf > 0, value / ds.pdf, 0)
 
-        def pdf_direction(self, it: Any, ds: Any, active: Any = True) -> Any:
+        def pdf_direction(self, it: Interaction3f, ds: DirectionSample3f, active: Bool = True) -> Float:
             if not self.drawn:
                 return mi.Float(0)
             facing = dr.dot(ds.d, ds.n)
             pdf = self.get_shape().pdf_direction(it, ds, active)
             return pdf & (active & ((facing != 0) if self.two_sided else (facing < 0)))
 
-        def eval_direction(self, it: Any, ds: Any, active: Any = True) -> Any:
+        def eval_direction(self, it: Interaction3f, ds: DirectionSample3f, active: Bool = True) -> Color3f:
             del it
             si = dr.zeros(mi.SurfaceInteraction3f)
             si.uv = ds.uv
             return self._radiance(si, -dr.dot(ds.d, ds.n), -ds.d, active)
 
-        def bbox(self) -> Any:
+        def bbox(self) -> BoundingBox3f:
             return self.get_shape().bbox()
 
         def to_string(self) -> str:

@@ -15,14 +15,27 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable
-from typing import Any
 
 from lippmann.device.pbr import microfacet
 from lippmann.device.pbr.gltf_bsdf_parameters import Lobe, Point, Sheen, SurfaceModel
 from lippmann.device.pbr.texture_lookup import Place
+from lippmann.device.types import (
+    BSDF,
+    Bool,
+    BSDFContext,
+    BSDFSample3f,
+    Color3f,
+    Float,
+    Point2f,
+    Properties,
+    Spectrum,
+    SurfaceInteraction3f,
+    UInt32,
+    Vector3f,
+)
 
 
-def surface_bsdf(model: SurfaceModel) -> Any:
+def surface_bsdf(model: SurfaceModel) -> BSDF:
     """A ``mi.BSDF`` that evaluates ``model``, for the variant that is set."""
     import mitsuba as mi
 
@@ -30,7 +43,7 @@ def surface_bsdf(model: SurfaceModel) -> Any:
 
 
 @functools.cache
-def _bsdf_class(variant: str) -> Any:
+def _bsdf_class(variant: str) -> type[BSDF]:
     """The plugin class of one variant: Mitsuba's base classes differ between them."""
     import drjit as dr
     import mitsuba as mi
@@ -47,7 +60,7 @@ def _bsdf_class(variant: str) -> Any:
     class SurfaceBSDF(mi.BSDF):  # type: ignore[misc, unused-ignore]
         """See the module."""
 
-        def __init__(self, props: Any, model: SurfaceModel) -> None:
+        def __init__(self, props: Properties, model: SurfaceModel) -> None:
             super().__init__(props)
             self.model = model
             present = {
@@ -62,7 +75,9 @@ def _bsdf_class(variant: str) -> Any:
 
         # ---- what integrators call ----
 
-        def sample(self, ctx: Any, si: Any, sample1: Any, sample2: Any, active: Any = True) -> Any:
+        def sample(
+            self, ctx: BSDFContext, si: SurfaceInteraction3f, sample1: Float, sample2: Point2f, active: Bool = True
+        ) -> tuple[BSDFSample3f, Color3f]:
             del ctx
             place = Place(si, active)
             opacity = None if self.model.opacity is None else self.model.coverage(place)
@@ -72,7 +87,7 @@ def _bsdf_class(variant: str) -> Any:
             value, pdf = self._scatter(point, wo)
             pdf = dr.select(possible, pdf, 0)
             weight = dr.select(pdf > 0, value / pdf, 0)
-            eta: Any = dr.select(kind == transmitting, point.eta, 1) if self.model.solid else mi.Float(1)
+            eta: Float = dr.select(kind == transmitting, point.eta, 1) if self.model.solid else mi.Float(1)
             if opacity is not None:
                 passes = sample1 >= opacity
                 wo, pdf = dr.select(passes, -si.wi, wo), dr.select(passes, 1 - opacity, pdf * opacity)
@@ -84,7 +99,9 @@ def _bsdf_class(variant: str) -> Any:
                 bs.sampled_component = dr.select(kind == flag, index, bs.sampled_component)
             return bs, weight & active
 
-        def eval_pdf(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
+        def eval_pdf(
+            self, ctx: BSDFContext, si: SurfaceInteraction3f, wo: Vector3f, active: Bool = True
+        ) -> tuple[Color3f, Float]:
             del ctx
             place = Place(si, active)
             value, pdf = self._scatter(surface_point(self.model, place), wo)
@@ -93,27 +110,27 @@ def _bsdf_class(variant: str) -> Any:
                 value, pdf = value * opacity, pdf * opacity
             return value & active, pdf & active
 
-        def eval(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
+        def eval(self, ctx: BSDFContext, si: SurfaceInteraction3f, wo: Vector3f, active: Bool = True) -> Color3f:
             return self.eval_pdf(ctx, si, wo, active)[0]
 
-        def pdf(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
+        def pdf(self, ctx: BSDFContext, si: SurfaceInteraction3f, wo: Vector3f, active: Bool = True) -> Float:
             return self.eval_pdf(ctx, si, wo, active)[1]
 
-        def eval_null_transmission(self, si: Any, active: Any = True) -> Any:
+        def eval_null_transmission(self, si: SurfaceInteraction3f, active: Bool = True) -> Color3f:
             if self.model.opacity is None:
                 return mi.Color3f(0)
             return mi.Color3f(1 - self.model.coverage(Place(si, active))) & active
 
-        def eval_diffuse_reflectance(self, si: Any, active: Any = True) -> Any:
+        def eval_diffuse_reflectance(self, si: SurfaceInteraction3f, active: Bool = True) -> Color3f:
             place = Place(si, active)
             share = (1 - self.model.metalness(place)) * (1 - self.model.clarity(place))
             return (self.model.base(place) * share) & active
 
-        def has_attribute(self, name: str, active: Any = True) -> Any:
+        def has_attribute(self, name: str, active: Bool = True) -> Bool:
             del active
             return mi.Bool(name in ("base_color", "normal", "roughness", "metallic", "transmission"))
 
-        def eval_attribute_1(self, name: str, si: Any, active: Any = True) -> Any:
+        def eval_attribute_1(self, name: str, si: SurfaceInteraction3f, active: Bool = True) -> Float:
             values = {
                 "roughness": self.model.roughness.eval,
                 "metallic": self.model.metalness,
@@ -121,7 +138,7 @@ def _bsdf_class(variant: str) -> Any:
             }
             return (values[name](Place(si, active)) & active) if name in values else mi.Float(0)
 
-        def eval_attribute_3(self, name: str, si: Any, active: Any = True) -> Any:
+        def eval_attribute_3(self, name: str, si: SurfaceInteraction3f, active: Bool = True) -> Color3f:
             if name == "base_color":
                 return self.model.base(Place(si, active)) & active
             if name == "normal":  # in world space, on the viewer's side
@@ -130,7 +147,7 @@ def _bsdf_class(variant: str) -> Any:
                 return mi.Color3f(si.to_world(mi.Vector3f(n.x, n.y, n.z * flip))) & active
             return mi.Color3f(0)
 
-        def eval_attribute(self, name: str, si: Any, active: Any = True) -> Any:
+        def eval_attribute(self, name: str, si: SurfaceInteraction3f, active: Bool = True) -> Color3f:
             return self.eval_attribute_3(name, si, active)
 
         def to_string(self) -> str:
@@ -138,7 +155,7 @@ def _bsdf_class(variant: str) -> Any:
 
         # ---- scattering ----
 
-        def _draw(self, point: Point, u: Any, sample: Any) -> tuple[Any, Any, Any]:
+        def _draw(self, point: Point, u: Float, sample: Point2f) -> tuple[Vector3f, UInt32, Bool]:
             """An outgoing direction in the surface's frame, the flag of its lobe, and whether light can go there.
 
             A microfacet may send light to the wrong side of its lobe's plane; such a sample counts as absorbed.
@@ -175,7 +192,7 @@ def _bsdf_class(variant: str) -> Any:
             height = dr.abs(world.z) * dr.select(kind == transmitting, -point.flip, point.flip)
             return mi.Vector3f(world.x, world.y, height), kind, possible | diffuse
 
-        def _scatter(self, point: Point, wo: Any) -> tuple[Any, Any]:
+        def _scatter(self, point: Point, wo: Vector3f) -> tuple[Color3f, Float]:
             """BSDF times cosine, and the density of :meth:`_draw`, for ``wo`` in the surface's frame."""
             wo = mi.Vector3f(wo.x, wo.y, wo.z * point.flip)
             above = wo.z > 0
@@ -187,20 +204,23 @@ def _bsdf_class(variant: str) -> Any:
                 pdf = dr.lerp(pdf, gloss_pdf & above, coat.chance)
             return value, pdf
 
-        def _folded(self, lobe: Lobe, wo: Any, scatter: Callable[[Any], tuple[Any, Any]]) -> tuple[Any, Any]:
+        def _folded(
+            self, lobe: Lobe, wo: Vector3f, scatter: Callable[[Vector3f], tuple[Color3f, Float]]
+        ) -> tuple[Color3f, Float]:
             """Value and density of a lobe, with what a tilted one sends through the surface folded back about it."""
             wo_local = wo if lobe.frame is None else lobe.frame.to_local(wo)
             value, pdf = scatter(wo_local)
             if lobe.tilted:
+                assert lobe.frame is not None
                 folded_value, folded_pdf = scatter(lobe.frame.to_local(mi.Vector3f(wo.x, wo.y, -wo.z)))
                 value, pdf = value + folded_value, pdf + folded_pdf
             return value, pdf
 
-        def _coat_gloss(self, lobe: Lobe, wo: Any) -> tuple[Any, Any]:
+        def _coat_gloss(self, lobe: Lobe, wo: Vector3f) -> tuple[Float, Float]:
             gloss, pdf, _, _ = self._gloss(lobe, wo)
             return gloss & (wo.z > 0), pdf & (wo.z > 0)
 
-        def _gloss(self, lobe: Lobe, wo: Any) -> tuple[Any, Any, Any, Any]:
+        def _gloss(self, lobe: Lobe, wo: Vector3f) -> tuple[Float, Float, Float, Vector3f]:
             """Microfacet reflection without Fresnel factor, times cosine: value, density, cosine at h, h."""
             h = dr.normalize(lobe.wi + wo)
             cosine = dr.dot(lobe.wi, h)
@@ -209,7 +229,7 @@ def _bsdf_class(variant: str) -> Any:
             pdf = microfacet.visible_normal_pdf(lobe.wi, cosine, facets, lobe.alpha) / (4 * cosine)
             return value, pdf, cosine, h
 
-        def _body(self, point: Point, wo: Any, above: Any) -> tuple[Any, Any]:
+        def _body(self, point: Point, wo: Vector3f, above: Bool) -> tuple[Color3f, Float]:
             """All below the clear coat; ``wo`` is in the lobe's frame and leaves ``above`` the surface or below it."""
             m, lobe = self.model, point.lobe
             seen = (lobe.wi.z > 0) & ((wo.z > 0) == above) & (wo.z != 0)
@@ -237,7 +257,7 @@ def _bsdf_class(variant: str) -> Any:
             through_pdf = (1 - point.diffuse_chance) * (1 - reflects) * gloss_pdf
             return dr.select(above, value, through) & seen, dr.select(above, pdf, through_pdf) & seen
 
-        def _under_cloth(self, sheen: Sheen, value: Any, cos_i: Any, cos_o: Any, cos_h: Any) -> Any:
+        def _under_cloth(self, sheen: Sheen, value: Spectrum, cos_i: Float, cos_o: Float, cos_h: Float) -> Color3f:
             """``value`` dimmed by the fibres above it, and their own light."""
             hidden = sheen.albedo(cos_i)
             if not self.model.compensates:  # glTF takes the larger share of the two directions, and so loses light
@@ -247,7 +267,7 @@ def _bsdf_class(variant: str) -> Any:
             fibres *= microfacet.charlie_visibility(cos_i, cos_o, sheen.alpha) * cos_o
             return value * (1 - hidden) + sheen.color * fibres
 
-        def _refraction(self, point: Point, wo: Any) -> tuple[Any, Any, Any]:
+        def _refraction(self, point: Point, wo: Vector3f) -> tuple[Float, Float, Float]:
             """Rough refraction (Walter et al. 2007, eq. 21) without Fresnel factor: value, density, cosine at h."""
             wi, alpha = point.lobe.wi, point.lobe.alpha
             h = dr.normalize(wi + wo * point.eta)

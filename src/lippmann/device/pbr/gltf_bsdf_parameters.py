@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
-from lippmann.device.pbr.texture_lookup import Place, Signal
+from lippmann.device.pbr.texture_lookup import Lookup, Place, Signal
+from lippmann.device.types import Color3f, Float, Frame3f, MitsubaTexture, Point2f, Vector3f
 
 
 @dataclass(eq=False)
 class NormalMap:
     """A tangent-space normal map: ``lookup`` of its texels, ``scale`` of its normals' x and y."""
 
-    lookup: Any
+    lookup: Lookup
     scale: Signal
 
 
@@ -26,7 +27,7 @@ class Anisotropy:
     strength: Signal
     cosine: Signal
     sine: Signal
-    lookup: Any = None
+    lookup: Lookup | None = None
 
 
 @dataclass(eq=False)
@@ -42,7 +43,7 @@ class ThinFilm:
     range: Signal
     texture: Signal
 
-    def thickness(self, place: Place) -> Any:
+    def thickness(self, place: Place) -> Float:
         """In nanometres at a point."""
         return self.thinnest.eval(place) + self.range.eval(place) * self.texture.eval(place)
 
@@ -84,8 +85,8 @@ class SurfaceModel:
     base_color: Signal
     roughness: Signal
     ior: Signal
-    gloss_albedo: Any = None
-    interface_albedo: Any = None
+    gloss_albedo: MitsubaTexture | None = None
+    interface_albedo: MitsubaTexture | None = None
     compensates: bool = True
     metallic: Signal | None = None
     metal: bool = False
@@ -100,7 +101,7 @@ class SurfaceModel:
     clearcoat_normal: NormalMap | None = None
     sheen_color: Signal | None = None
     sheen_roughness: Signal | None = None
-    sheen_albedo: Any = None
+    sheen_albedo: MitsubaTexture | None = None
     anisotropy: Anisotropy | None = None
     film: ThinFilm | None = None
     opacity: Signal | None = None
@@ -108,12 +109,12 @@ class SurfaceModel:
     tinted: bool = False
     faded: bool = False
 
-    def base(self, place: Place) -> Any:
+    def base(self, place: Place) -> Color3f:
         """Base colour at a point."""
         color = self.base_color.eval(place)
         return color * place.color if self.tinted else color
 
-    def coverage(self, place: Place) -> Any:
+    def coverage(self, place: Place) -> Float:
         """Opacity at a point, in [0, 1]; only where the model has one."""
         import drjit as dr
         import mitsuba as mi
@@ -126,7 +127,7 @@ class SurfaceModel:
             return dr.select(alpha >= self.opacity_cutoff.eval(place), mi.Float(1), 0)
         return dr.clip(alpha, 0, 1)
 
-    def metalness(self, place: Place) -> Any:
+    def metalness(self, place: Place) -> Float:
         """Share of metal at a point."""
         import drjit as dr
         import mitsuba as mi
@@ -135,7 +136,7 @@ class SurfaceModel:
             return mi.Float(1 if self.metal else 0)
         return dr.clip(self.metallic.eval(place), 0, 1)
 
-    def clarity(self, place: Place) -> Any:
+    def clarity(self, place: Place) -> Float:
         """Share of light that enters rather than being scattered diffusely, at a point."""
         import drjit as dr
         import mitsuba as mi
@@ -150,9 +151,9 @@ class Lobe:
     ``tilted`` says that the normal may differ from the surface's; ``alpha`` is the width along the frame's x and y.
     """
 
-    frame: Any
-    wi: Any
-    alpha: Any
+    frame: Frame3f | None
+    wi: Vector3f
+    alpha: Point2f
     tilted: bool = False
 
 
@@ -164,18 +165,18 @@ class Coat:
     """
 
     lobe: Lobe
-    weight: Any
-    chance: Any
-    gain: Any
+    weight: Float
+    chance: Float
+    gain: Float
 
 
 @dataclass(eq=False)
 class Sheen:
     """Cloth fibres above the body: ``albedo`` maps a cosine to the light that white ones send back."""
 
-    color: Any
-    alpha: Any
-    albedo: Any
+    color: Color3f
+    alpha: Float
+    albedo: Callable[[Float], Float]
 
 
 @dataclass(eq=False)
@@ -187,18 +188,18 @@ class Point:
     surface under a thin film, with its index and thickness.
     """
 
-    flip: Any
+    flip: Float
     lobe: Lobe
-    base: Any
-    metallic: Any
-    transmission: Any
-    eta: Any
-    f0: Any
-    specular: Any
-    below: Any = None
-    diffuse_chance: Any = None
-    metal_gain: Any = 1
-    gain: Any = 1
-    film: tuple[Any, Any, Any] | None = None
+    base: Color3f
+    metallic: Float
+    transmission: Float
+    eta: Float
+    f0: Color3f
+    specular: Float
+    below: Float = None
+    diffuse_chance: Float = None
+    metal_gain: Color3f = 1
+    gain: Float = 1
+    film: tuple[Float, Float, Float] | None = None
     sheen: Sheen | None = None
     coat: Coat | None = None

@@ -56,14 +56,14 @@ def choose_instances(meshes: Mapping[K, CopiedMesh], memory: int, *, name: str =
     meshes:
         The meshes of a scene.
     memory:
-        Bytes that the built scene may take.
+        Bytes that copies may fill; the meshes themselves are there already and are taken as they are.
     name:
         Name of the scene, for the error.
 
     Raises
     ------
     SceneError
-        The scene does not fit the memory, whatever is instanced.
+        The copies do not fit the memory, whatever is instanced.
     """
     chosen: set[K] = set()
     count = 0
@@ -83,7 +83,7 @@ def choose_instances(meshes: Mapping[K, CopiedMesh], memory: int, *, name: str =
             chosen.add(key)
             count += mesh.copies
             need -= mesh.bytes_saved
-    if need > memory:
+    if need > max(memory, sum(mesh.bytes_once for mesh in meshes.values())):
         triangles = sum(mesh.triangles * mesh.copies for mesh in meshes.values())
         copies = sum(mesh.copies for mesh in meshes.values())
         raise SceneError(

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +19,7 @@ from lippmann.device.pbr.lookup_texture import signal_texture
 from lippmann.device.pbr.material_groups import Kind, Structure, Variant
 from lippmann.device.pbr.texture_lookup import Signal, numbers, uv_attribute
 from lippmann.device.pbr.textures import TextureStore
+from lippmann.device.types import BSDF
 from lippmann.scene.values.description import Color, Material, Texture
 
 
@@ -42,7 +42,7 @@ class Finish:
     world unit inside the body, None for no body or a clear one.
     """
 
-    bsdf: Any
+    bsdf: BSDF
     members: dict[Variant, int]
     uv_sets: tuple[int, ...]
     tinted: bool
@@ -84,7 +84,7 @@ class _Maker:
     def finish(self) -> Finish:
         first, variant = self._members[0], self._variants[0]
         model = self._model()
-        makers: dict[Kind, Callable[[], Any]] = {
+        makers: dict[Kind, Callable[[], BSDF]] = {
             "surface": lambda: surface_bsdf(model),
             "lamp": lambda: surface_bsdf(_black(model)),
             "mirror": lambda: _masked(_mirror(model), model),
@@ -222,7 +222,7 @@ def _black(model: SurfaceModel) -> SurfaceModel:
     )
 
 
-def _mirror(model: SurfaceModel) -> Any:
+def _mirror(model: SurfaceModel) -> BSDF:
     import mitsuba as mi
 
     tint = signal_texture(model, "metal")
@@ -230,14 +230,14 @@ def _mirror(model: SurfaceModel) -> Any:
     return mi.load_dict({"type": "twosided", "bsdf": conductor})
 
 
-def _glass(plugin: str, model: SurfaceModel, m: Material) -> Any:
+def _glass(plugin: str, model: SurfaceModel, m: Material) -> BSDF:
     import mitsuba as mi
 
     tint = signal_texture(model, "base")
     return mi.load_dict({"type": plugin, "int_ior": m.ior, "ext_ior": 1.0, "specular_transmittance": tint})
 
 
-def _masked(bsdf: Any, model: SurfaceModel) -> Any:
+def _masked(bsdf: BSDF, model: SurfaceModel) -> BSDF:
     import mitsuba as mi
 
     if model.opacity is None:

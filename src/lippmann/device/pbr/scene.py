@@ -7,7 +7,6 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -16,6 +15,7 @@ from lippmann.device.pbr.material_groups import Variant
 from lippmann.device.pbr.materials import Finish, make_finishes
 from lippmann.device.pbr.shapes import Dress, has_volume, make_shapes
 from lippmann.device.pbr.textures import TextureStore
+from lippmann.device.types import BSDF, Emitter, MitsubaScene, Shape
 from lippmann.errors import SceneError
 from lippmann.runtime import engine as engines
 from lippmann.runtime import machine
@@ -48,7 +48,7 @@ class BuiltScene:
         or on ``load`` for a scene of Mitsuba's own.
     """
 
-    mitsuba: Any
+    mitsuba: MitsubaScene
     background: Color | None
     absorption: Mapping[int, Color]
     has_null: bool
@@ -68,7 +68,7 @@ def build(scene: Scene, engine: engines.Engine | None = None, *, memory: int | N
     Raises
     ------
     SceneError
-        Mitsuba refuses the scene, it shows nothing, it does not fit the memory, or a lamp or environment
+        Mitsuba refuses the scene, it shows nothing, it does not fit the memory, or a light or environment
         has values that mean nothing.
     EngineError
         The engine cannot be started.
@@ -89,7 +89,7 @@ def build_description(description: SceneDescription, *, memory: int | None = Non
     Raises
     ------
     SceneError
-        Nothing to see, no room in the memory, or a lamp or environment has values that mean nothing.
+        Nothing to see, no room in the memory, or a light or environment has values that mean nothing.
     """
     seconds: dict[str, float] = {}
     notes: list[str] = []
@@ -106,11 +106,11 @@ def build_description(description: SceneDescription, *, memory: int | None = Non
         available = machine.available_memory() if memory is None else memory
         shapes, shape_finishes = make_shapes(dressed, available, name=description.name)
     with _timed(seconds, "lights"):
-        lamps = [light_object(light) for light in description.lights if max(light.color) > 0]
+        lights = [light_object(light) for light in description.lights if max(light.color) > 0]
         if description.environment is not None:
-            lamps.append(environment_object(description.environment))
+            lights.append(environment_object(description.environment))
     with _timed(seconds, "acceleration"):
-        scene = _assemble(shapes, lamps)
+        scene = _assemble(shapes, lights)
     return BuiltScene(
         mitsuba=scene,
         background=description.background,
@@ -192,18 +192,18 @@ def _texture_notes(description: SceneDescription, finishes: Mapping[Variant, Fin
     ]
 
 
-def _assemble(shapes: Sequence[Any], lamps: Sequence[Any]) -> Any:
+def _assemble(shapes: Sequence[Shape], lights: Sequence[Emitter]) -> MitsubaScene:
     import mitsuba as mi
 
     # Embree's fast mode loses a quarter of the rays that run parallel to an axis but for rounding, along edges: as all
     # rays of a lenticular sheet may, across its height. The robust mode costs about a tenth of the rays' rate.
-    parts: dict[str, Any] = {"type": "scene", "embree_use_robust_intersections": True}
+    parts: dict[str, object] = {"type": "scene", "embree_use_robust_intersections": True}
     parts |= {f"shape_{number}": shape for number, shape in enumerate(shapes)}
-    parts |= {f"lamp_{number}": lamp for number, lamp in enumerate(lamps)}
+    parts |= {f"light_{number}": light for number, light in enumerate(lights)}
     return mi.load_dict(parts, optimize=False)
 
 
-def _absorption(scene: Any, shapes: Sequence[Any], finishes: Sequence[Finish | None]) -> dict[int, Color]:
+def _absorption(scene: MitsubaScene, shapes: Sequence[Shape], finishes: Sequence[Finish | None]) -> dict[int, Color]:
     # Mitsuba may order its shapes as it likes; equality of its Python objects is identity.
     positions = list(scene.shapes())
     return {
@@ -213,7 +213,7 @@ def _absorption(scene: Any, shapes: Sequence[Any], finishes: Sequence[Finish | N
     }
 
 
-def _is_null(bsdf: Any) -> bool:
+def _is_null(bsdf: BSDF) -> bool:
     import mitsuba as mi
 
     return bool(mi.has_flag(bsdf.flags(), mi.BSDFFlags.Null))

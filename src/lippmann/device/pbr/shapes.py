@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +19,10 @@ from lippmann.device.pbr.instancing import CopiedMesh, choose_instances
 from lippmann.device.pbr.material_groups import Variant
 from lippmann.device.pbr.materials import Finish
 from lippmann.device.pbr.texture_lookup import ALPHA_ATTRIBUTE, COLOR_ATTRIBUTE, MEMBER_ATTRIBUTE, uv_attribute
+from lippmann.device.types import Float, Shape
 from lippmann.scene.values.description import FloatArray, IndexArray, Matrix, Mesh
+
+Number = TypeVar("Number", bound=np.generic)
 
 #: Vertices that are transformed at a time, which bounds the memory of double-precision intermediates.
 _VERTICES_AT_A_TIME = 1 << 20
@@ -46,7 +49,7 @@ class Piece:
         """Vertices of all copies."""
         return len(self.world_from_mesh) * len(self.dress.mesh.positions)
 
-    def per_copy(self, values: NDArray[Any]) -> NDArray[Any]:
+    def per_copy(self, values: NDArray[Number]) -> NDArray[Number]:
         """Values of one mesh, once per copy."""
         return np.tile(values, (len(self.world_from_mesh), *[1] * (values.ndim - 1)))
 
@@ -60,7 +63,7 @@ def has_volume(matrices: Matrix) -> NDArray[np.bool_]:
 
 def make_shapes(
     placements: Sequence[tuple[Dress, Matrix]], memory: int, *, name: str = ""
-) -> tuple[list[Any], list[Finish | None]]:
+) -> tuple[list[Shape], list[Finish | None]]:
     """Mitsuba shapes of all meshes, groups among them; and of each its finish, None for instances and groups.
 
     Parameters
@@ -85,7 +88,7 @@ def make_shapes(
     groups = {number: _copied(pieces) for number, pieces in enumerate(together.values())}
     instanced = choose_instances(groups, memory, name=name)
     merged = [piece for number, pieces in enumerate(together.values()) if number not in instanced for piece in pieces]
-    shapes: list[Any] = []
+    shapes: list[Shape] = []
     finishes: list[Finish | None] = []
     for shape, finish in _merged(merged):
         shapes.append(shape)
@@ -113,7 +116,7 @@ def _copied(pieces: Sequence[Piece]) -> CopiedMesh:
     )
 
 
-def _instances(dresses: Sequence[Dress], matrices: Matrix) -> list[Any]:
+def _instances(dresses: Sequence[Dress], matrices: Matrix) -> list[Shape]:
     import mitsuba as mi
 
     local = [Piece(dress, np.eye(4)[None]) for dress in dresses]
@@ -127,7 +130,7 @@ def _instances(dresses: Sequence[Dress], matrices: Matrix) -> list[Any]:
     ]
 
 
-def _merged(pieces: Iterable[Piece]) -> list[tuple[Any, Finish]]:
+def _merged(pieces: Iterable[Piece]) -> list[tuple[Shape, Finish]]:
     """One shape per finish and kind of normals."""
     groups: dict[tuple[int, bool], list[Piece]] = {}
     for piece in pieces:
@@ -136,7 +139,7 @@ def _merged(pieces: Iterable[Piece]) -> list[tuple[Any, Finish]]:
     return [(_mesh_shape(group), group[0].dress.finish) for group in groups.values()]
 
 
-def _mesh_shape(pieces: Sequence[Piece]) -> Any:
+def _mesh_shape(pieces: Sequence[Piece]) -> Shape:
     """One Mitsuba mesh of pieces that share a finish."""
     import mitsuba as mi
 
@@ -152,7 +155,7 @@ def _mesh_shape(pieces: Sequence[Piece]) -> Any:
     )
     textured = bool(finish.uv_sets)
     name = pieces[0].dress.mesh.name
-    mesh: Any = mi.Mesh(
+    mesh: Shape = mi.Mesh(
         name, int(starts[-1]), len(faces), props, has_vertex_normals=smooth, has_vertex_texcoords=textured
     )
     params = mi.traverse(mesh)
@@ -168,15 +171,15 @@ def _mesh_shape(pieces: Sequence[Piece]) -> Any:
     return mesh
 
 
-def _device(parts: Sequence[NDArray[Any]]) -> Any:
+def _device(parts: Sequence[FloatArray]) -> Float:
     import mitsuba as mi
 
     return mi.Float(np.concatenate(parts).astype(np.float32, copy=False).ravel())
 
 
-def _attributes(pieces: Sequence[Piece], finish: Finish) -> Mapping[str, NDArray[Any]]:
+def _attributes(pieces: Sequence[Piece], finish: Finish) -> Mapping[str, NDArray[np.generic]]:
     """What finish and meshes say per vertex or face beyond position, normal and the first uv set."""
-    attributes: dict[str, NDArray[Any]] = {}
+    attributes: dict[str, NDArray[np.generic]] = {}
     if finish.tinted:
         attributes[COLOR_ATTRIBUTE] = np.concatenate([_colors(piece)[:, :3] for piece in pieces])
     if finish.faded:

@@ -118,12 +118,14 @@ def mapped_normal(normal_map: NormalMap | None, place: Place, flip: Float) -> Ve
 def _sheen(model: SurfaceModel, place: Place) -> Sheen:
     assert model.sheen_color is not None
     assert model.sheen_roughness is not None
+    table = model.sheen_albedo
+    assert table is not None
     roughness = dr.clip(model.sheen_roughness.eval(place), 0, 1)
 
     def albedo(cosine: Float) -> Float:
         at = dr.zeros(mi.SurfaceInteraction3f)
         at.uv = mi.Point2f(cosine, roughness)
-        return model.sheen_albedo.eval_1(at)
+        return table.eval_1(at)
 
     alpha = dr.maximum(dr.square(roughness), microfacet.MIN_ALPHA)
     return Sheen(model.sheen_color.eval(place), alpha, albedo)
@@ -170,6 +172,7 @@ def _weigh_lobes(model: SurfaceModel, point: Point, place: Place, outside: Bool)
 
 def _gloss_albedo(model: SurfaceModel, lobe: Lobe) -> Color3f:
     """Light that the lobe reflects: its share of head-on reflectance, and the rest."""
+    assert model.gloss_albedo is not None
     at = dr.zeros(mi.SurfaceInteraction3f)
     rows = microfacet.GLOSS_ROWS
     at.uv = mi.Point2f(lobe.wi.z, microfacet.roughness_row(lobe.alpha, rows) / rows)
@@ -178,7 +181,8 @@ def _gloss_albedo(model: SurfaceModel, lobe: Lobe) -> Color3f:
 
 def _interface_albedo(model: SurfaceModel, point: Point, outside: Bool) -> Float:
     """Share of light that a rough interface of a solid reflects or lets through at its first encounter."""
-    known, rows = len(microfacet.INTERFACE_F0), microfacet.INTERFACE_ROWS
+    known, rows, table = len(microfacet.INTERFACE_F0), microfacet.INTERFACE_ROWS, model.interface_albedo
+    assert table is not None
     ior = dr.select(outside, point.eta, dr.rcp(point.eta))
     root = (ior - 1) / (ior + 1)
     place = dr.minimum(dr.sqrt(root / microfacet.INTERFACE_F0[-1]) * (known - 1), known - 1.0001)
@@ -189,7 +193,7 @@ def _interface_albedo(model: SurfaceModel, point: Point, outside: Bool) -> Float
     def albedo(block: Float) -> Float:
         start = block * rows + dr.select(outside, mi.Float(0), known * rows)
         at.uv = mi.Point2f(point.lobe.wi.z, (start + row) / (2 * known * rows))
-        return model.interface_albedo.eval_1(at)
+        return table.eval_1(at)
 
     return dr.lerp(albedo(first), albedo(first + 1), place - first)
 

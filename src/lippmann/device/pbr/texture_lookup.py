@@ -8,11 +8,21 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from lippmann.device.types import (
+    Array,
+    Bool,
+    Color3f,
+    Float,
+    FloatOrColor,
+    MitsubaTexture,
+    Point2f,
+    SurfaceInteraction3f,
+    UInt32,
+)
 from lippmann.scene.values.description import Filter, Wrap
 
 #: Mesh attributes that carry a triangle's member number, and vertex colours with their alpha.
@@ -27,13 +37,13 @@ def uv_attribute(uv_set: int) -> str:
 class Place:
     """A surface point (``mi.SurfaceInteraction3f``), with what its mesh says there looked up once."""
 
-    def __init__(self, si: Any, active: Any) -> None:
+    def __init__(self, si: SurfaceInteraction3f, active: Bool) -> None:
         self.si = si
         self.active = active
-        self._found: dict[str, Any] = {}
+        self._found: dict[str, Array] = {}
 
     @property
-    def member(self) -> Any:
+    def member(self) -> UInt32:
         """Number in the family (UInt32)."""
         import mitsuba as mi
 
@@ -43,16 +53,16 @@ class Place:
         return self._found[MEMBER_ATTRIBUTE]
 
     @property
-    def color(self) -> Any:
+    def color(self) -> Color3f:
         """Vertex colour."""
         return self.si.shape.eval_attribute_3(COLOR_ATTRIBUTE, self.si, self.active)
 
     @property
-    def alpha(self) -> Any:
+    def alpha(self) -> Float:
         """Vertex alpha."""
         return self.si.shape.eval_attribute_1(ALPHA_ATTRIBUTE, self.si, self.active)
 
-    def uv(self, attribute: str | None) -> Any:
+    def uv(self, attribute: str | None) -> Point2f:
         """Texture coordinates: the mesh's own, or those in an attribute."""
         import mitsuba as mi
 
@@ -71,10 +81,10 @@ class Place:
 class Table:
     """One value per member: ``channels`` numbers each, in a row."""
 
-    values: Any
+    values: FloatOrColor
     channels: int = 1
 
-    def at(self, place: Place) -> Any:
+    def at(self, place: Place) -> FloatOrColor:
         import drjit as dr
         import mitsuba as mi
 
@@ -82,7 +92,7 @@ class Table:
         return dr.gather(kind, self.values, place.member, place.active)
 
 
-def numbers(values: Sequence[float] | NDArray[np.float64]) -> Any:
+def numbers(values: Sequence[float] | NDArray[np.float64]) -> Table | FloatOrColor:
     """A factor of one member, or a table of several: ``(n,)`` scalars or ``(n, 3)`` colours.
 
     Kernels read them as data, so that materials of the same make share one kernel.
@@ -98,7 +108,7 @@ def numbers(values: Sequence[float] | NDArray[np.float64]) -> Any:
     return dr.opaque(mi.Float, float(array[0]))
 
 
-def _at(value: Any, place: Place) -> Any:
+def _at(value: Table | FloatOrColor, place: Place) -> FloatOrColor:
     return value.at(place) if isinstance(value, Table) else value
 
 
@@ -109,9 +119,9 @@ class Sampler:
     wraps: tuple[Wrap, Wrap]
     filter: Filter
     attribute: str | None
-    transform: tuple[Any, ...] | None
+    transform: tuple[Table | Float, ...] | None
 
-    def uv(self, place: Place) -> Any:
+    def uv(self, place: Place) -> Point2f:
         """Coordinates after the transform, not yet wrapped."""
         import drjit as dr
         import mitsuba as mi
@@ -123,7 +133,7 @@ class Sampler:
         return mi.Point2f(dr.fma(a, uv.x, dr.fma(b, uv.y, c)), dr.fma(d, uv.x, dr.fma(e, uv.y, f)))
 
 
-def _fold(x: Any, wrap: Wrap, texels: Any) -> Any:
+def _fold(x: Float, wrap: Wrap, texels: Float) -> Float:
     """Bring a coordinate into [0, 1] so that a lookup that repeats beyond it sees what ``wrap`` asks for.
 
     Half a texel from a border, interpolation sees the border texel alone: what clamping and mirroring mean there.
@@ -142,12 +152,12 @@ def _fold(x: Any, wrap: Wrap, texels: Any) -> Any:
 class Bitmap:
     """One picture for all: Mitsuba's own texture, which repeats where the wrap modes of the axes differ."""
 
-    texture: Any
+    texture: MitsubaTexture
     channels: int
     sampler: Sampler
     size: tuple[int, int]
 
-    def eval(self, place: Place) -> Any:
+    def eval(self, place: Place) -> FloatOrColor:
         """``Color3f`` or ``Float``, by the number of channels."""
         import mitsuba as mi
 
@@ -166,8 +176,8 @@ class Bitmap:
 class TexelPool:
     """The texels of many pictures in one row, four 8-bit channels to a number; ``linear`` decodes sRGB codes."""
 
-    texels: Any
-    linear: Any
+    texels: UInt32
+    linear: Float
 
 
 @dataclass(eq=False)
@@ -182,7 +192,7 @@ class PooledBitmap:
     coded: bool
     sampler: Sampler
 
-    def eval(self, place: Place) -> Any:
+    def eval(self, place: Place) -> FloatOrColor:
         """``Color3f`` or ``Float``, by the number of channels shown."""
         import drjit as dr
         import mitsuba as mi
@@ -201,7 +211,7 @@ class PooledBitmap:
         lower = dr.lerp(self._texel(left, bottom, place), self._texel(right, bottom, place), share.x)
         return dr.lerp(upper, lower, share.y)
 
-    def _texel(self, column: Any, row: Any, place: Place) -> Any:
+    def _texel(self, column: Float, row: Float, place: Place) -> FloatOrColor:
         import drjit as dr
         import mitsuba as mi
 
@@ -222,10 +232,10 @@ Lookup = Bitmap | PooledBitmap
 class Signal:
     """``factor`` times ``lookup`` at a surface point; None stands for 1. Both are never None."""
 
-    factor: Any
-    lookup: Any = None
+    factor: Table | FloatOrColor | None
+    lookup: Lookup | None = None
 
-    def eval(self, place: Place) -> Any:
+    def eval(self, place: Place) -> FloatOrColor:
         factor = _at(self.factor, place)
         if self.lookup is None:
             return factor

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.color.transfer import decode_srgb
 from lippmann.device.pbr.texture_lookup import Bitmap, Lookup, PooledBitmap, Sampler, Signal, Table, TexelPool, numbers
+from lippmann.device.types import MitsubaTexture
 from lippmann.scene.values.description import Image, Texture
 
 #: Which mesh attribute carries a uv set; sets that are not in it are the mesh's own.
@@ -25,8 +25,8 @@ class TextureStore:
     """
 
     def __init__(self) -> None:
-        self._bitmaps: dict[tuple[object, ...], Any] = {}
-        self._tables: dict[str, Any] = {}
+        self._bitmaps: dict[tuple[object, ...], MitsubaTexture] = {}
+        self._tables: dict[str, MitsubaTexture] = {}
         self._constants: dict[tuple[object, ...], NDArray[np.float64] | None] = {}
         self._images: dict[int, Image] = {}  # keeps them alive, so that their ids stay theirs
         self._pool = TexelPool(None, None)
@@ -50,7 +50,7 @@ class TextureStore:
         """The lookup of normal maps."""
         return self._lookup(textures, (0, 1, 2), uv)
 
-    def table(self, name: str, make: Callable[[], NDArray[np.float32]]) -> Any:
+    def table(self, name: str, make: Callable[[], NDArray[np.float32]]) -> MitsubaTexture:
         """A function over the unit square, sampled at texel centres: ``make`` gives ``(rows, columns, 1 or 3)``."""
         if name not in self._tables:
             self._tables[name] = _upload(make(), coded=False, filtering="linear", wrap="clamp")
@@ -150,7 +150,7 @@ def sampler_key(texture: Texture) -> tuple[object, ...]:
     return (texture.srgb, texture.wrap_u, texture.wrap_v, texture.filter, texture.uv_set)
 
 
-def _upload(texels: NDArray[np.generic], coded: bool, filtering: str, wrap: str) -> Any:
+def _upload(texels: NDArray[np.generic], coded: bool, filtering: str, wrap: str) -> MitsubaTexture:
     import mitsuba as mi
 
     if coded and texels.dtype != np.uint8:

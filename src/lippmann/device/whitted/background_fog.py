@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import drjit as dr
 import mitsuba as mi
 
+from lippmann.device.types import Color3f, Float, Point3f, Vector3f
 from lippmann.scene.values.whitted_lighting import Background, Fog
 
 
-def background_color(background: Background, o: Any, d: Any) -> Any:
+def background_color(background: Background, o: Point3f, d: Vector3f) -> Color3f:
     """Colour of the background for rays from ``o`` along ``d``."""
     if background.kind == "solid":
         return mi.Color3f(*background.color)
@@ -20,7 +19,7 @@ def background_color(background: Background, o: Any, d: Any) -> Any:
     return share * mi.Color3f(*background.top_color) + (1 - share) * mi.Color3f(*background.bottom_color)
 
 
-def clearness(fog: Fog, distance: Any) -> Any:
+def clearness(fog: Fog, distance: Float) -> Float:
     """Share of what lies at ``distance`` that is seen through the fog."""
     if fog.kind == "linear":
         share = (fog.end - distance) * (1 / (fog.end - fog.start))

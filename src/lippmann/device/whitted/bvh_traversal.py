@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from lippmann.device.types import Bool, Float, Point3f, UInt32, Vector3f
 from lippmann.device.whitted.bvh import GRID, LEAF, make_bvh
 from lippmann.device.whitted.clip_planes import Clipping
 from lippmann.device.whitted.intersections import Row, crossings, fetch, literal, reciprocal, slab
@@ -33,7 +32,7 @@ class ShapeTracer:
             self._bvh = make_bvh(table.boxes)
             self._nodes = mi.UInt32(self._bvh.nodes.ravel())
 
-    def closest(self, o: Any, d: Any, t: Any, index: Any, active: Any) -> tuple[Any, Any]:
+    def closest(self, o: Point3f, d: Vector3f, t: Float, index: UInt32, active: Bool) -> tuple[Float, UInt32]:
         """Distance and row of the nearest crossing before ``t``; where there is none, ``t`` and ``index``."""
         for rows in (self._table.listed_rows, self._table.light_rows):
             if len(rows) <= MOST_LITERAL:
@@ -46,7 +45,7 @@ class ShapeTracer:
             t, index = self._nearest_walked(o, d, t, index, active)
         return t, index
 
-    def passing(self, o: Any, d: Any, t: Any, light: Any) -> Any:
+    def passing(self, o: Point3f, d: Vector3f, t: Float, light: Float) -> Float:
         """What remains of ``light`` past all shapes crossed before ``t``."""
         rows = self._table.listed_rows
         if len(rows) <= MOST_LITERAL:
@@ -60,7 +59,7 @@ class ShapeTracer:
         return light
 
     @dr.syntax
-    def _nearest_walked(self, o: Any, d: Any, t: Any, index: Any, active: Any) -> tuple[Any, Any]:
+    def _nearest_walked(self, o: Point3f, d: Vector3f, t: Float, index: UInt32, active: Bool) -> tuple[Float, UInt32]:
         kinds = self._kinds(self._table.walked_rows)
         foot, og, inverse, node, end = self._start(o, d)
         node = dr.select(active, node, end)
@@ -73,7 +72,9 @@ class ShapeTracer:
         return t, index
 
     @dr.syntax
-    def _nearest_of_list(self, rows: range, o: Any, d: Any, t: Any, index: Any, active: Any) -> tuple[Any, Any]:
+    def _nearest_of_list(
+        self, rows: range, o: Point3f, d: Vector3f, t: Float, index: UInt32, active: Bool
+    ) -> tuple[Float, UInt32]:
         kinds = self._kinds(rows)
         number = mi.UInt32(rows.start)
         while dr.hint(active & (number < rows.stop), label="listed shapes"):
@@ -81,7 +82,9 @@ class ShapeTracer:
             number += 1
         return t, index
 
-    def _nearer(self, kinds: set[Kind], row: Row, number: Any, o: Any, d: Any, t: Any, index: Any) -> tuple[Any, Any]:
+    def _nearer(
+        self, kinds: set[Kind], row: Row, number: UInt32, o: Point3f, d: Vector3f, t: Float, index: UInt32
+    ) -> tuple[Float, UInt32]:
         for crossing in reversed(crossings(kinds, self._inside_only, row, o, d)):
             good = crossing.good & (crossing.t > 0) & (crossing.t < t)
             if self._clipping is not None:
@@ -91,7 +94,7 @@ class ShapeTracer:
         return t, index
 
     @dr.syntax
-    def _past_walked(self, o: Any, d: Any, t: Any, light: Any) -> Any:
+    def _past_walked(self, o: Point3f, d: Vector3f, t: Float, light: Float) -> Float:
         kinds = self._kinds(self._table.walked_rows)
         foot, og, inverse, node, end = self._start(o, d)
         while dr.hint((node < end) & (light > 0), label="shadows of shapes"):
@@ -103,7 +106,7 @@ class ShapeTracer:
         return light
 
     @dr.syntax
-    def _past_list(self, rows: range, o: Any, d: Any, t: Any, light: Any) -> Any:
+    def _past_list(self, rows: range, o: Point3f, d: Vector3f, t: Float, light: Float) -> Float:
         kinds = self._kinds(rows)
         number = mi.UInt32(rows.start)
         while dr.hint((light > 0) & (number < rows.stop), label="shadows of listed shapes"):
@@ -111,7 +114,7 @@ class ShapeTracer:
             number += 1
         return light
 
-    def _past(self, kinds: set[Kind], row: Row, o: Any, d: Any, t: Any, light: Any) -> Any:
+    def _past(self, kinds: set[Kind], row: Row, o: Point3f, d: Vector3f, t: Float, light: Float) -> Float:
         for crossing in crossings(kinds, self._inside_only, row, o, d):
             good = crossing.good & (crossing.t > 0) & (crossing.t < t)
             if self._clipping is not None:
@@ -123,7 +126,7 @@ class ShapeTracer:
     def _kinds(self, rows: range) -> set[Kind]:
         return {Kind(int(kind)) for kind in np.unique(self._table.rows[rows.start : rows.stop, Column.KIND])}
 
-    def _start(self, o: Any, d: Any) -> tuple[Any, Any, Any, Any, Any]:
+    def _start(self, o: Point3f, d: Vector3f) -> tuple[Float, Vector3f, Vector3f, UInt32, UInt32]:
         """A ray on the grid of the hierarchy, counted from its point nearest to the middle: distance of that point,
         its place, the reciprocal direction, and the first entry and the end of the layout to walk."""
         bvh = self._bvh
@@ -135,7 +138,9 @@ class ShapeTracer:
         octant += dr.select(d.y < 0, mi.UInt32(2), mi.UInt32(0)) + dr.select(d.z < 0, mi.UInt32(4), mi.UInt32(0))
         return foot, place, reciprocal(d * per_step), octant * bvh.count, (octant + 1) * bvh.count
 
-    def _meets(self, node: Any, place: Any, inverse: Any, nearest: Any, farthest: Any) -> tuple[Any, Any]:
+    def _meets(
+        self, node: UInt32, place: Vector3f, inverse: Vector3f, nearest: Float, farthest: Float
+    ) -> tuple[Bool, UInt32]:
         """Whether a ray meets a node's box between two distances, and the node's last word."""
         words = dr.gather(mi.Vector4u, self._nodes, node)
         low = mi.Vector3f(*(mi.Float(words[axis] & 0xFFFF) for axis in range(3)))

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from lippmann.device.types import Bool, Float, Point3f
 from lippmann.scene.values.whitted_shapes import Numbers
 
 
@@ -23,7 +23,7 @@ class Clipping:
         self._starts = mi.UInt32((1 + np.cumsum([0, 0, *sizes])[:-1]).astype(np.uint32))
         self._sizes = mi.UInt32(np.array([0, *sizes], np.uint32))
 
-    def keeps(self, group: Any, p: Any, active: Any) -> Any:
+    def keeps(self, group: Float, p: Point3f, active: Bool) -> Bool:
         """Whether point ``p`` of a shape in ``group`` (a whole number, or an array of them; -1 for none) is kept."""
         if isinstance(group, float):
             kept = mi.Bool(active)
@@ -33,7 +33,7 @@ class Clipping:
         return self._looked_up(group, p, active)
 
     @dr.syntax
-    def _looked_up(self, group: Any, p: Any, active: Any) -> Any:
+    def _looked_up(self, group: Float, p: Point3f, active: Bool) -> Bool:
         slot = mi.UInt32(mi.Int32(group) + 1)
         plane = dr.gather(mi.UInt32, self._starts, slot, active)
         end = plane + dr.gather(mi.UInt32, self._sizes, slot, active)

@@ -9,13 +9,25 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from lippmann.device.types import (
+    Bool,
+    Float,
+    Mesh,
+    MitsubaScene,
+    Point2f,
+    Point3f,
+    PreliminaryIntersection3f,
+    Ray3f,
+    Shape,
+    UInt32,
+    Vector3f,
+)
 from lippmann.device.whitted.clip_planes import Clipping
 from lippmann.device.whitted.shape_table import ShapeTable, passing
 from lippmann.scene.values.whitted_scene import ClassicScene
@@ -71,7 +83,7 @@ class EngineTracer:
         self._passes = mi.Float(shares.astype(np.float32)) if self._airy else None
         self._groups = mi.Float(groups.astype(np.float32)) if self._clips else None
 
-    def closest(self, o: Any, d: Any, t: Any, active: Any, coherent: Any) -> tuple[Any, Any, Any]:
+    def closest(self, o: Point3f, d: Vector3f, t: Float, active: Bool, coherent: Bool) -> tuple[Float, UInt32, Point2f]:
         """Distance, index and barycentric coordinates of the nearest hit before ``t``; ``t`` and ``NONE`` without."""
         if self._all is None:
             return t, mi.UInt32(dr.full(mi.UInt32, _NONE)), mi.Point2f(0)
@@ -84,7 +96,7 @@ class EngineTracer:
         return dr.select(hit, pi.t, t), dr.select(hit, self._index(self._all, pi), _NONE), pi.prim_uv
 
     @dr.syntax
-    def _closest_kept(self, o: Any, d: Any, t: Any, active: Any) -> tuple[Any, Any, Any]:
+    def _closest_kept(self, o: Point3f, d: Vector3f, t: Float, active: Bool) -> tuple[Float, UInt32, Point2f]:
         """As :meth:`closest`, behind what is clipped away."""
         index, uv, distance = mi.UInt32(_NONE), mi.Point2f(0), mi.Float(t)
         start = mi.Float(0)
@@ -105,7 +117,7 @@ class EngineTracer:
             active &= ~kept & (crossed < MAX_CROSSINGS)
         return distance, index, uv
 
-    def passing(self, o: Any, d: Any, t: Any, light: Any) -> Any:
+    def passing(self, o: Point3f, d: Vector3f, t: Float, light: Float) -> Float:
         """What remains of ``light`` past all surfaces before ``t``."""
         if self._all is None:
             return light
@@ -115,7 +127,7 @@ class EngineTracer:
         return self._filtered(o, d, t, light) if self._airy else light
 
     @dr.syntax
-    def _filtered(self, o: Any, d: Any, t: Any, light: Any) -> Any:
+    def _filtered(self, o: Point3f, d: Vector3f, t: Float, light: Float) -> Float:
         """Light past each surface in turn."""
         start = mi.Float(0)
         crossed = mi.UInt32(0)
@@ -137,7 +149,7 @@ class EngineTracer:
             active &= (light > 0) & (crossed < MAX_CROSSINGS)
         return light
 
-    def _index(self, scene: Any, pi: Any) -> Any:
+    def _index(self, scene: MitsubaScene, pi: PreliminaryIntersection3f) -> UInt32:
         if self._starts is None:
             return pi.prim_index
         return dr.gather(mi.UInt32, self._starts, dr.reinterpret_array(mi.UInt32, pi.shape)) + pi.prim_index
@@ -146,13 +158,13 @@ class EngineTracer:
 _NONE = 0xFFFFFFFF
 
 
-def _past(o: Any, d: Any, t: Any) -> Any:
+def _past(o: Point3f, d: Vector3f, t: Float) -> Ray3f:
     """A distance just beyond ``t``: by more than what rounding may have made of the hit."""
     size = dr.maximum(dr.max(dr.abs(o)), t)
     return t + size * _STEP
 
 
-def _scene(shapes: Sequence[Any]) -> Any:
+def _scene(shapes: Sequence[Shape]) -> MitsubaScene:
     if not shapes:
         return None
     # Robust: else level rays slip through the edge between two triangles.
@@ -160,7 +172,7 @@ def _scene(shapes: Sequence[Any]) -> Any:
     return mi.load_dict({"type": "scene", "embree_use_robust_intersections": True, **named})
 
 
-def _starts(parts: Sequence[tuple[Any, int]]) -> Any:
+def _starts(parts: Sequence[tuple[Shape, int]]) -> UInt32:
     """Index of the first primitive of each shape, by the shape's number in the engine; None where all begin at 0."""
     if all(start == 0 for _, start in parts):
         return None
@@ -170,9 +182,9 @@ def _starts(parts: Sequence[tuple[Any, int]]) -> Any:
     return mi.UInt32(starts)
 
 
-def _mesh(name: str, positions: NDArray[np.float64]) -> Any:
+def _mesh(name: str, positions: NDArray[np.float64]) -> Mesh:
     """Triangles ``(n, 3, 3)`` that share no corners."""
-    mesh: Any = mi.Mesh(name, 3 * len(positions), len(positions))
+    mesh: Mesh = mi.Mesh(name, 3 * len(positions), len(positions))
     params = mi.traverse(mesh)
     params["vertex_positions"] = mi.Float(positions.astype(np.float32).ravel())
     params["faces"] = dr.arange(mi.UInt32, 3 * len(positions))
@@ -180,7 +192,7 @@ def _mesh(name: str, positions: NDArray[np.float64]) -> Any:
     return mesh
 
 
-def _spheres(table: ShapeTable) -> list[Any]:
+def _spheres(table: ShapeTable) -> list[Shape]:
     """One shape each: what costs time with many shapes is asking them for their surface, which is not done here."""
     bsdf = mi.load_dict({"type": "diffuse"})
     return [

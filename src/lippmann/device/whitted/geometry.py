@@ -7,18 +7,19 @@ the shape table, lights last.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from lippmann.device.types import Bool, Color3f, Float, Point2f, Point3f, UInt32, Vector3f
 from lippmann.device.whitted.bvh_traversal import ShapeTracer
 from lippmann.device.whitted.clip_planes import Clipping
 from lippmann.device.whitted.embree_tracer import EngineTracer, triangle_order
 from lippmann.device.whitted.intersections import Row, fetch, xyz
 from lippmann.device.whitted.shape_table import Column, Kind, make_shape_table
 from lippmann.scene.values.whitted_scene import ClassicScene
+from lippmann.scene.values.whitted_shapes import Numbers
 
 #: Index of a ray that hits nothing.
 NONE = 0xFFFFFFFF
@@ -32,9 +33,9 @@ _LIFT = 1e-5
 class Hit:
     """Distance ``t``, ``index`` (``NONE``: nothing), barycentric ``uv`` on triangles."""
 
-    t: Any
-    index: Any
-    uv: Any
+    t: Float
+    index: UInt32
+    uv: Point2f
 
 
 @dataclass
@@ -46,15 +47,15 @@ class Surface:
     interpolated colour where ``colored``.
     """
 
-    p: Any
-    n: Any
-    face: Any
-    lift: Any
-    material: Any
-    color: Any
-    colored: Any
+    p: Point3f
+    n: Vector3f
+    face: Vector3f
+    lift: Float
+    material: UInt32
+    color: Color3f
+    colored: Bool
 
-    def start(self, direction: Any) -> Any:
+    def start(self, direction: Vector3f) -> Point3f:
         """Where a ray into ``direction`` begins: just off the surface, on the side that it leaves to."""
         return self.p + self.face * dr.copysign(self.lift, dr.dot(self.face, direction))
 
@@ -95,19 +96,19 @@ class Geometry:
         if self._colored:
             self._colors = _corner_table(batch.colors[order])
 
-    def closest(self, o: Any, d: Any, active: Any, coherent: Any = False) -> Hit:
+    def closest(self, o: Point3f, d: Vector3f, active: Bool, coherent: Bool = False) -> Hit:
         """The nearest hit of rays from ``o`` along unit ``d``."""
         t, index, uv = self._engine.closest(o, d, mi.Float(FAR), active, coherent)
         beyond = mi.UInt32(NONE)
         nearer, row = self._shapes.closest(o, d, t, beyond, active)
         return Hit(nearer, dr.select(row == NONE, index, row + self._triangles), uv)
 
-    def passing(self, o: Any, d: Any, t: Any, active: Any) -> Any:
+    def passing(self, o: Point3f, d: Vector3f, t: Float, active: Bool) -> Float:
         """Share of light that gets from ``o`` as far as ``t`` along ``d``; 0 where not active."""
         light = dr.select(active, mi.Float(1), mi.Float(0))
         return self._engine.passing(o, d, t, self._shapes.passing(o, d, t, light))
 
-    def find_light(self, hit: Hit) -> tuple[Any, Any]:
+    def find_light(self, hit: Hit) -> tuple[Bool, UInt32]:
         """Whether a hit is the visible sphere of a light source, and that light's index."""
         if not self._table.lights:
             return mi.Bool(False), mi.UInt32(0)
@@ -115,7 +116,7 @@ class Geometry:
         is_light = (hit.index >= first) & (hit.index != NONE)
         return is_light, dr.gather(mi.UInt32, self._lights, hit.index - first, is_light)
 
-    def surface(self, hit: Hit, o: Any, d: Any, active: Any) -> Surface:
+    def surface(self, hit: Hit, o: Point3f, d: Vector3f, active: Bool) -> Surface:
         """How the surface lies that a ray from ``o`` along ``d`` hits; not for light sources."""
         p = o + d * hit.t
         if not self._table.light_rows.start:
@@ -132,7 +133,7 @@ class Geometry:
             )
         )
 
-    def _triangle(self, hit: Hit, p: Any, d: Any, active: Any) -> Surface:
+    def _triangle(self, hit: Hit, p: Point3f, d: Vector3f, active: Bool) -> Surface:
         plane = dr.gather(mi.Vector4f, self._faces, 2 * hit.index, active)
         rest = dr.gather(mi.Vector4f, self._faces, 2 * hit.index + 1, active)
         face = xyz(plane)
@@ -149,7 +150,7 @@ class Geometry:
         lift = _LIFT * dr.maximum(rest.z, dr.max(dr.abs(p)))
         return Surface(p, n, face, lift, mi.UInt32(rest.x), color, colored)
 
-    def _shape(self, index: Any, p: Any, d: Any, active: Any) -> Surface:
+    def _shape(self, index: UInt32, p: Point3f, d: Vector3f, active: Bool) -> Surface:
         row = fetch(self._shapes.rows, index, active)
         kinds = {Kind(int(kind)) for kind in np.unique(self._table.rows[: self._table.light_rows.start, Column.KIND])}
         q = p - row.center
@@ -173,13 +174,13 @@ class Geometry:
         return Surface(refined, n, face, lift, mi.UInt32(row.material), mi.Color3f(0), mi.Bool(False))
 
 
-def _on_sphere(row: Row, q: Any) -> tuple[Any, Any, Any]:
+def _on_sphere(row: Row, q: Vector3f) -> tuple[Vector3f, Vector3f, Point3f]:
     """Normal to shade with, true normal and point, all for the point of the sphere next to ``q``."""
     n = dr.normalize(q)
     return n, n, row.center + n * dr.sqrt(row.k0)
 
 
-def _on_huge_sphere(row: Row, p: Any) -> tuple[Any, Any, Any]:
+def _on_huge_sphere(row: Row, p: Point3f) -> tuple[Vector3f, Vector3f, Point3f]:
     """As :func:`_on_sphere`, for the point itself and in double precision."""
     exact = mi.Vector3d(p)
     q = exact - mi.Vector3d(row.center)
@@ -188,7 +189,7 @@ def _on_huge_sphere(row: Row, p: Any) -> tuple[Any, Any, Any]:
     return n, n, mi.Point3f(exact + q * (row.k1 / distance - 1))
 
 
-def _on_quadric(row: Row, q: Any) -> tuple[Any, Any, Any]:
+def _on_quadric(row: Row, q: Vector3f) -> tuple[Vector3f, Vector3f, Point3f]:
     h = dr.dot(q, row.axis)
     gradient = q - row.axis * (row.k2 * h + row.k1)
     value = dr.dot(q, q) - (row.k2 * h + 2 * row.k1) * h - row.k0
@@ -197,11 +198,11 @@ def _on_quadric(row: Row, q: Any) -> tuple[Any, Any, Any]:
     return n, n, row.center + q - gradient * (value / (2 * squared))
 
 
-def _on_flat(row: Row, q: Any) -> tuple[Any, Any, Any]:
+def _on_flat(row: Row, q: Vector3f) -> tuple[Vector3f, Vector3f, Point3f]:
     return row.axis, row.axis, row.center + q - row.axis * dr.dot(q, row.axis)
 
 
-def _on_box(row: Row, q: Any) -> tuple[Any, Any, Any]:
+def _on_box(row: Row, q: Vector3f) -> tuple[Vector3f, Vector3f, Point3f]:
     """Tachyon shades a box by the axis along which the point lies farthest from the middle, whatever the proportions.
 
     Along two or three axes at once where it lies equally far.
@@ -220,13 +221,13 @@ def _on_box(row: Row, q: Any) -> tuple[Any, Any, Any]:
     return n, face, row.center + q
 
 
-def _corner_table(values: Any) -> Any:
+def _corner_table(values: Numbers) -> Float:
     """Vectors at three corners ``(n, 3, 3)`` as rows of four."""
     rows = np.zeros((len(values), 3, 4), np.float32)
     rows[:, :, :3] = values
     return mi.Float(rows.ravel())
 
 
-def _interpolated(table: Any, index: Any, u: Any, v: Any, active: Any) -> Any:
+def _interpolated(table: Float, index: UInt32, u: Float, v: Float, active: Bool) -> Vector3f:
     a, b, c = (xyz(dr.gather(mi.Vector4f, table, 3 * index + corner, active)) for corner in range(3))
     return a * (1 - u - v) + b * u + c * v

@@ -10,13 +10,13 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import dataclass
-from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from lippmann.device.types import Bool, Float, Point3f, UInt32, Vector3f, Vector4f
 from lippmann.device.whitted.shape_table import Column, Kind
 
 #: Direction components below this are taken for it: their reciprocal stays finite.
@@ -27,29 +27,29 @@ _SMALLEST = 1e-20
 class Row:
     """One row of the shape table; each field is a number or a device array."""
 
-    center: Any
-    axis: Any
-    k0: Any
-    k1: Any
-    k2: Any
-    kind: Any
-    material: Any
-    clip: Any
-    low: Any
-    high: Any
-    inside: Any
-    passes: Any
+    center: Vector3f
+    axis: Vector3f
+    k0: Float
+    k1: Float
+    k2: Float
+    kind: Float
+    material: Float
+    clip: Float
+    low: Float
+    high: Float
+    inside: Float
+    passes: Float
 
 
 @dataclass
 class Crossing:
     """A distance and whether the ray does cross the shape there."""
 
-    t: Any
-    good: Any
+    t: Float
+    good: Bool
 
 
-def fetch(rows: Any, index: Any, active: Any) -> Row:
+def fetch(rows: Float, index: UInt32, active: Bool) -> Row:
     """Row ``index`` of a flat table."""
     first = index * 4
     a = dr.gather(mi.Vector4f, rows, first, active)
@@ -67,24 +67,24 @@ def literal(row: NDArray[np.float32]) -> Row:
     return Row(center, axis, *rest)
 
 
-def xyz(v: Any) -> Any:
+def xyz(v: Vector4f) -> Vector3f:
     """The first three of four."""
     return mi.Vector3f(v.x, v.y, v.z)
 
 
-def reciprocal(d: Any) -> Any:
+def reciprocal(d: Vector3f) -> Vector3f:
     """One over each component of a direction, never infinite."""
     return dr.rcp(dr.select(dr.abs(d) < _SMALLEST, dr.copysign(mi.Vector3f(_SMALLEST), d), d))
 
 
-def slab(low: Any, high: Any, o: Any, inverse: Any) -> tuple[Any, Any]:
+def slab(low: Vector3f, high: Vector3f, o: Point3f, inverse: Vector3f) -> tuple[Float, Float]:
     """Distances at which a ray enters and leaves a box along the axes; it misses where the second is smaller."""
     a, b = (low - o) * inverse, (high - o) * inverse
     near, far = dr.minimum(a, b), dr.maximum(a, b)
     return dr.maximum(dr.maximum(near.x, near.y), near.z), dr.minimum(dr.minimum(far.x, far.y), far.z)
 
 
-def crossings(kinds: Collection[Kind], inside_only: bool, row: Row, o: Any, d: Any) -> list[Crossing]:
+def crossings(kinds: Collection[Kind], inside_only: bool, row: Row, o: Point3f, d: Vector3f) -> list[Crossing]:
     """All crossings of a ray with a shape of one of ``kinds``, at any distance, the nearer first.
 
     ``inside_only`` says that some shapes may be seen from within alone.
@@ -114,7 +114,7 @@ def crossings(kinds: Collection[Kind], inside_only: bool, row: Row, o: Any, d: A
     return merged
 
 
-def _sphere(inside_only: bool, row: Row, o: Any, d: Any) -> list[Crossing]:
+def _sphere(inside_only: bool, row: Row, o: Point3f, d: Vector3f) -> list[Crossing]:
     to_center = row.center - o
     to_foot = dr.dot(to_center, d)
     foot = d * to_foot - to_center
@@ -125,7 +125,7 @@ def _sphere(inside_only: bool, row: Row, o: Any, d: Any) -> list[Crossing]:
     return [Crossing(to_foot - half, entering), Crossing(to_foot + half, good)]
 
 
-def _huge_sphere(inside_only: bool, row: Row, o: Any, d: Any) -> list[Crossing]:
+def _huge_sphere(inside_only: bool, row: Row, o: Point3f, d: Vector3f) -> list[Crossing]:
     """As :func:`_sphere`, in double precision: a millionth of the radius may be the whole scene."""
     to_center, along = mi.Vector3d(row.center) - mi.Vector3d(o), mi.Vector3d(d)
     squared = dr.squared_norm(along)
@@ -138,7 +138,7 @@ def _huge_sphere(inside_only: bool, row: Row, o: Any, d: Any) -> list[Crossing]:
     return [Crossing(mi.Float(to_foot - half), entering), Crossing(mi.Float(to_foot + half), good)]
 
 
-def _quadric(inside_only: bool, row: Row, o: Any, d: Any) -> list[Crossing]:
+def _quadric(inside_only: bool, row: Row, o: Point3f, d: Vector3f) -> list[Crossing]:
     to_center = row.center - o
     to_foot = dr.dot(to_center, d)
     foot = d * to_foot - to_center
@@ -161,7 +161,7 @@ def _quadric(inside_only: bool, row: Row, o: Any, d: Any) -> list[Crossing]:
     return found
 
 
-def _box(inside_only: bool, row: Row, o: Any, d: Any) -> list[Crossing]:
+def _box(inside_only: bool, row: Row, o: Point3f, d: Vector3f) -> list[Crossing]:
     # A ray along a face counts as inside.
     along = dr.abs(d) < _SMALLEST
     between = (o >= row.center) & (o <= row.axis)
@@ -174,7 +174,7 @@ def _box(inside_only: bool, row: Row, o: Any, d: Any) -> list[Crossing]:
     return [Crossing(enter, enter <= leave), Crossing(leave, enter <= leave)]
 
 
-def _flat(inside_only: bool, row: Row, o: Any, d: Any) -> list[Crossing]:
+def _flat(inside_only: bool, row: Row, o: Point3f, d: Vector3f) -> list[Crossing]:
     t = dr.dot(row.center - o, row.axis) / dr.dot(d, row.axis)
     if isinstance(row.k1, float) and row.k1 == np.inf:
         return [Crossing(t, dr.isfinite(t))]

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from lippmann.device.types import Bool, Color3f, Float, UInt32
 from lippmann.device.whitted.intersections import xyz
 from lippmann.scene.values.whitted_surfaces import ClassicMaterial
 
@@ -21,19 +21,19 @@ LEAST = 0.001959
 class Finish:
     """A material at a hit; fields as those of :class:`ClassicMaterial`."""
 
-    color: Any
-    ambient: Any
-    diffuse: Any
-    specular: Any
-    opacity: Any
-    phong: Any
-    phong_size: Any
-    metal: Any
-    texture: Any
-    raster3d: Any
-    outline: Any
-    outline_width: Any
-    ior: Any
+    color: Color3f
+    ambient: Float
+    diffuse: Float
+    specular: Float
+    opacity: Float
+    phong: Float
+    phong_size: Float
+    metal: Bool
+    texture: UInt32
+    raster3d: Bool
+    outline: Float
+    outline_width: Float
+    ior: Float
 
 
 class MaterialTable:
@@ -63,7 +63,7 @@ class MaterialTable:
         self.outlined = some(lambda m: m.outline > 0)
         self.raster3d = some(lambda m: m.raster3d)
 
-    def fetch(self, index: Any, active: Any) -> Finish:
+    def fetch(self, index: UInt32, active: Bool) -> Finish:
         """The material of each lane."""
         a, b, c, d = (dr.gather(mi.Vector4f, self._rows, 4 * index + part, active) for part in range(4))
         return Finish(

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import radians
-from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 
 from lippmann.device.sobol import SampleStream
+from lippmann.device.types import Bool, Color3f, Float, Point3f, UInt32, Vector3f
 from lippmann.device.whitted.geometry import FAR, Geometry, Surface
 from lippmann.device.whitted.intersections import xyz
 from lippmann.device.whitted.materials import LEAST, Finish, MaterialTable
@@ -26,10 +26,10 @@ _SKY_DIMENSION = 8
 class Illumination:
     """Light from one source at a point: unit direction ``toward`` it, its ``distance``, its ``strength`` there."""
 
-    toward: Any
-    distance: Any
-    strength: Any
-    color: Any
+    toward: Vector3f
+    distance: Float
+    strength: Float
+    color: Color3f
 
 
 class LightTable:
@@ -43,11 +43,11 @@ class LightTable:
         self._attenuated = any(light.attenuation is not None for light in lights)
         self._spots = any(light.kind == "spot" for light in lights)
 
-    def color(self, index: Any, active: Any) -> Any:
+    def color(self, index: UInt32, active: Bool) -> Color3f:
         """Colour of the visible sphere of a light source."""
         return mi.Color3f(xyz(dr.gather(mi.Vector4f, self._rows, 4 * index + 1, active)))
 
-    def illuminate(self, index: Any, p: Any, n: Any) -> Illumination:
+    def illuminate(self, index: UInt32, p: Point3f, n: Vector3f) -> Illumination:
         """Illumination of ``p`` by a light source; its strength includes the cosine to ``n`` and may be negative."""
         a = dr.gather(mi.Vector4f, self._rows, 4 * index)
         b = dr.gather(mi.Vector4f, self._rows, 4 * index + 1)
@@ -88,8 +88,15 @@ class Shader:
         self._sky: AmbientOcclusion | None = scene.ambient_occlusion if self._shadows else None
 
     def light(
-        self, surface: Surface, finish: Finish, color: Any, d: Any, stream: SampleStream, hits: Any, active: Any
-    ) -> tuple[Any, Any, Any]:
+        self,
+        surface: Surface,
+        finish: Finish,
+        color: Color3f,
+        d: Vector3f,
+        stream: SampleStream,
+        hits: UInt32,
+        active: Bool,
+    ) -> tuple[Color3f, Bool, UInt32]:
         """Colour that the surface sends back along -``d`` by itself, whether a highlight is in it, and shadow rays."""
         diffuse, highlight, shadow = self._direct_light(surface, finish, color, d, active)
         if self._sky is not None:
@@ -106,11 +113,13 @@ class Shader:
             shines = dr.max(highlight) > 0
         return result, shines, shadow
 
-    def _sees_light(self, finish: Finish) -> Any:
+    def _sees_light(self, finish: Finish) -> Bool:
         return (finish.diffuse > LEAST) | (finish.phong > LEAST)
 
     @dr.syntax
-    def _direct_light(self, surface: Surface, finish: Finish, color: Any, d: Any, active: Any) -> tuple[Any, Any, Any]:
+    def _direct_light(
+        self, surface: Surface, finish: Finish, color: Color3f, d: Vector3f, active: Bool
+    ) -> tuple[Color3f, Color3f, UInt32]:
         diffuse, highlight, shadow = mi.Color3f(0), mi.Color3f(0), mi.UInt32(0)
         index = mi.UInt32(0)
         p, n, face, lift = surface.p, surface.n, surface.face, surface.lift
@@ -135,7 +144,7 @@ class Shader:
             index += 1
         return diffuse, highlight, shadow
 
-    def _peak(self, toward: Any, n: Any, d: Any, exponent: Any) -> Any:
+    def _peak(self, toward: Vector3f, n: Vector3f, d: Vector3f, exponent: Float) -> Float:
         """Shape of a highlight, 0 to 1."""
         if self._shading.highlight == "phong":
             mirrored = n * (2 * dr.dot(n, toward)) - toward
@@ -147,8 +156,8 @@ class Shader:
 
     @dr.syntax
     def _open_sky(
-        self, samples: int, surface: Surface, stream: SampleStream, hits: Any, active: Any
-    ) -> tuple[Any, Any]:
+        self, samples: int, surface: Surface, stream: SampleStream, hits: UInt32, active: Bool
+    ) -> tuple[Float, UInt32]:
         """Twice the mean of the cosine over the half sphere, where it is open; shadow rays."""
         total, shadow, number = mi.Float(0), mi.UInt32(0), mi.UInt32(0)
         p, n, face, lift = surface.p, surface.n, surface.face, surface.lift
@@ -164,7 +173,7 @@ class Shader:
         return total * (2 / samples), shadow
 
 
-def _outline(surface: Surface, finish: Finish, d: Any) -> Any:
+def _outline(surface: Surface, finish: Finish, d: Vector3f) -> Float:
     """Factor that darkens diffuse light toward silhouettes."""
     edge = dr.maximum(1 - dr.square(dr.dot(surface.n, d)), 0)
     share = 1 - dr.power(edge, (1 - finish.outline_width) * 32)

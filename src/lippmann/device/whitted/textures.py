@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import pi
-from typing import Any
 
 import drjit as dr
 import mitsuba as mi
@@ -12,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.device.sobol import hash32
+from lippmann.device.types import Bool, Color3f, Float, Point3f, UInt32, Vector3f
 from lippmann.device.whitted.intersections import xyz
 from lippmann.scene.values.whitted_surfaces import (
     TEXTURE_KINDS,
@@ -51,7 +51,7 @@ class TextureTable:
         if {"marble", "noise"} & set(self.kinds):
             self._noise = Noise()
 
-    def color(self, number: Any, color: Any, p: Any, path: Any, active: Any) -> Any:
+    def color(self, number: UInt32, color: Color3f, p: Point3f, path: Float, active: Bool) -> Color3f:
         """Colour at ``p`` of texture ``number`` (Int32, -1: ``color`` itself); ``path`` is the way the ray has come."""
         if not self.kinds:
             return color
@@ -69,7 +69,9 @@ class TextureTable:
             color = dr.select(this, value, color)
         return color
 
-    def _procedure(self, name: TextureKind, color: Any, p: Any, q: Any, scale: Any, active: Any) -> Any:
+    def _procedure(
+        self, name: TextureKind, color: Color3f, p: Point3f, q: Vector3f, scale: Vector3f, active: Bool
+    ) -> Color3f:
         if name == "checker":
             return _checker(q)
         if name == "cylindrical-checker":
@@ -85,15 +87,15 @@ class TextureTable:
     def _image(
         self,
         name: TextureKind,
-        index: Any,
-        image: Any,
-        q: Any,
-        scale: Any,
-        rotate: Any,
-        largest: Any,
-        path: Any,
-        on: Any,
-    ) -> Any:
+        index: UInt32,
+        image: UInt32,
+        q: Vector3f,
+        scale: Vector3f,
+        rotate: Vector3f,
+        largest: Float,
+        path: Float,
+        on: Bool,
+    ) -> Color3f:
         reduction = _BLUR * path * largest
         w = mi.Float(0)
         if name in ("planar-image", "volume-image"):
@@ -125,33 +127,33 @@ def _row(texture: ClassicTexture) -> list[float]:
     ]
 
 
-def _fraction(x: Any) -> Any:
+def _fraction(x: Float) -> Float:
     return x - dr.floor(x)
 
 
-def _either(odd: Any, first: tuple[float, float, float], second: tuple[float, float, float]) -> Any:
+def _either(odd: Bool, first: tuple[float, float, float], second: tuple[float, float, float]) -> Color3f:
     return dr.select(odd, mi.Color3f(*first), mi.Color3f(*second))
 
 
-def _checker(q: Any) -> Any:
+def _checker(q: Vector3f) -> Color3f:
     cells = mi.Vector3u(*(mi.UInt32(dr.abs(c) * 3 + 0.5) for c in (q.x, q.y, q.z)))
     return _either(((cells.x + cells.y + cells.z) & 1) == 1, _ORANGE, _BLUE)
 
 
-def _cylindrical_checker(q: Any) -> Any:
+def _cylindrical_checker(q: Vector3f) -> Color3f:
     u = mi.UInt32(dr.abs(_around(q.x, q.y)) * 18)
     v = mi.UInt32(dr.abs(q.z) * 10)
     return _either(((u + v) & 1) == 1, _ORANGE, _BLUE)
 
 
-def _wood(q: Any) -> Any:
+def _wood(q: Vector3f) -> Color3f:
     angle = dr.select(q.z == 0, pi / 2, dr.atan(q.x / q.z))
     radius = dr.sqrt(q.x * q.x + q.z * q.z) + 3 * dr.sin(20 * angle + q.y / 150)
     # Below the first ring all is wood.
     return _either((mi.UInt32(dr.maximum(radius + 0.5, 0)) % 60) < 40, _GREEN, _BLACK)
 
 
-def _marble(p: Any, noise: Any) -> Any:
+def _marble(p: Point3f, noise: Float) -> Color3f:
     d = p.x + 0.0006 * noise
     whole = mi.Int32(d)
     d = d * mi.Float(whole - dr.trunc(mi.Float(whole) / 25) * 25)
@@ -159,14 +161,14 @@ def _marble(p: Any, noise: Any) -> Any:
     return mi.Color3f((1 + dr.sin(shade * 6.28)) / 2, (1 + dr.sin(shade * 16.28)) / 2, (1 + dr.cos(shade * 30.28)) / 2)
 
 
-def _around(x: Any, y: Any) -> Any:
+def _around(x: Float, y: Float) -> Float:
     """Angle in the plane from +x, in turns from 0 to 1."""
     # An arc cosine would lose half the digits near +x and -x, several texels of a large picture.
     turn = dr.atan2(dr.abs(y), x) * (0.5 / pi)
     return dr.select(y < 0, 1 - turn, turn)
 
 
-def _scatter(p: Any) -> Any:
+def _scatter(p: Point3f) -> Float:
     """A number in [0, 1) that depends on every bit of the point: grit looks random and is always the same."""
     bits = [dr.reinterpret_array(mi.UInt32, mi.Float(c)) for c in (p.x, p.y, p.z)]
     mixed = hash32(bits[0] ^ hash32(bits[1] ^ hash32(bits[2])))
@@ -214,7 +216,7 @@ class ImageTable:
         self._count = mi.UInt32(np.array(counts, np.uint32))
         self._volumes = any(image.texels.shape[0] > 1 for image in images)
 
-    def lookup(self, image: Any, u: Any, v: Any, w: Any, reduction: Any, active: Any) -> Any:
+    def lookup(self, image: UInt32, u: Float, v: Float, w: Float, reduction: Float, active: Bool) -> Color3f:
         """Colour of ``image`` (number) at u, v, w in [0, 1]; ``reduction`` 0 takes the picture, 1 its smallest copy."""
         first = dr.gather(mi.UInt32, self._first, image, active)
         count = dr.gather(mi.UInt32, self._count, image, active)
@@ -228,7 +230,7 @@ class ImageTable:
         b = self._sample(first + upper, u, v, w, active)
         return a + (b - a) * share
 
-    def _sample(self, level: Any, u: Any, v: Any, w: Any, active: Any) -> Any:
+    def _sample(self, level: UInt32, u: Float, v: Float, w: Float, active: Bool) -> Color3f:
         """Between the nearest texels of one copy."""
         start, width, height, depth = (dr.gather(mi.UInt32, self._levels, 4 * level + k, active) for k in range(4))
         (x, fx), (y, fy), (z, fz) = (_place(c, size) for c, size in ((u, width), (v, height), (w, depth)))
@@ -236,11 +238,11 @@ class ImageTable:
         next_y = dr.minimum(y + 1, height - 1)
         next_z = dr.minimum(z + 1, depth - 1)
 
-        def texel(column: Any, row: Any, layer: Any) -> Any:
+        def texel(column: UInt32, row: UInt32, layer: UInt32) -> Color3f:
             packed = dr.gather(mi.UInt32, self._texels, start + (layer * height + row) * width + column, active)
             return mi.Color3f(packed & 255, (packed >> 8) & 255, packed >> 16)
 
-        def layer_color(layer: Any) -> Any:
+        def layer_color(layer: UInt32) -> Color3f:
             lower = _between(texel(x, y, layer), texel(next_x, y, layer), fx)
             upper = _between(texel(x, next_y, layer), texel(next_x, next_y, layer), fx)
             return _between(lower, upper, fy)
@@ -251,14 +253,14 @@ class ImageTable:
         return color * (1 / 255)
 
 
-def _place(coordinate: Any, size: Any) -> tuple[Any, Any]:
+def _place(coordinate: Float, size: UInt32) -> tuple[UInt32, Float]:
     """Texel below a coordinate in [0, 1], and the way to the next one."""
     place = coordinate * (mi.Float(size) - 1)
     below = dr.minimum(mi.UInt32(place), size - 1)
     return below, place - mi.Float(below)
 
 
-def _between(a: Any, b: Any, share: Any) -> Any:
+def _between(a: Color3f, b: Color3f, share: Float) -> Color3f:
     return a + (b - a) * share
 
 
@@ -287,7 +289,7 @@ class Noise:
     def __init__(self) -> None:
         self._values = mi.Int32(lattice())
 
-    def at(self, p: Any, active: Any) -> Any:
+    def at(self, p: Point3f, active: Bool) -> Float:
         """Noise at points: whole numbers from 0 to 12000, mirrored about the planes through the origin.
 
         Cells join up along z into the next row, as they lie in memory; each step of the interpolation is cut to a
@@ -298,10 +300,10 @@ class Noise:
         share = p - mi.Vector3f(whole)
         cell = (whole.x % _NOISE_SIDE * _NOISE_SIDE + whole.y % _NOISE_SIDE) * _NOISE_SIDE + whole.z % _NOISE_SIDE
 
-        def value(x: int, y: int, z: int) -> Any:
+        def value(x: int, y: int, z: int) -> Float:
             return dr.gather(mi.Int32, self._values, cell + (x * _NOISE_SIDE + y) * _NOISE_SIDE + z, active)
 
-        def between(a: Any, b: Any, part: Any) -> Any:
+        def between(a: Float, b: Float, part: Float) -> Float:
             return a + mi.Int32(mi.Float(b - a) * part)
 
         along_x = [[between(value(0, y, z), value(1, y, z), share.x) for z in (0, 1)] for y in (0, 1)]

@@ -7,18 +7,19 @@ itself, neighbours could be treated differently, and the seam between them would
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from lippmann.device.types import Float, Point2f, Ray3f, UInt32
 from lippmann.rendering.denoise.cost_model import effort_of, traced_work
 from lippmann.rendering.denoise.oidn import Effort
 from lippmann.rendering.film.wavefront import trace_frame
 from lippmann.rendering.film.wavefront_plan import make_plan
 from lippmann.rendering.request.render_request import RenderRequest
+from lippmann.rendering.transport.integrator import Integrator
 from lippmann.rendering.transport.ray_source import DisplayRays
 
 #: Pixels looked at along each side of the picture, and samples of each.
@@ -51,12 +52,12 @@ class ScatteredRays:
             for count, side in ((self.width, source.width), (self.height, source.height))
         )
 
-    def rays(self, column: Any, row: Any, channel: Any, jitter: Any) -> Any:
+    def rays(self, column: Float, row: Float, channel: UInt32, jitter: Point2f) -> Ray3f:
         column, row = dr.gather(mi.UInt32, self._columns, column), dr.gather(mi.UInt32, self._rows, row)
         return self._source.rays(column, row, channel, jitter)
 
 
-def survey(integrator: Any, source: DisplayRays, request: RenderRequest) -> Treatment:
+def survey(integrator: Integrator, source: DisplayRays, request: RenderRequest) -> Treatment:
     """What suits the picture as a whole: the same for the same picture, whoever looks."""
     few, box = ScatteredRays(source), request.box_filter
     samples = min(request.samples, SAMPLES) if box else 1

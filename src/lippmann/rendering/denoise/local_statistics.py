@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,7 @@ Floats = NDArray[np.float32]
 Halves = tuple[Floats, Floats]
 
 
-def measured(rows: Any, *pictures: Halves, transfer: Transfer, bands: Bands) -> tuple[Floats, Floats]:
+def measured(rows: Callable[..., None], *pictures: Halves, transfer: Transfer, bands: Bands) -> tuple[Floats, Floats]:
     """The two measures, ``(H, W)`` each, that compiled ``rows`` take of pictures, between codes.
 
     Each picture is two halves, ``(H, W, 3)`` linear; the slope of the code is that of the last one's mean. Beyond white

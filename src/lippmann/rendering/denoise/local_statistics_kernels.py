@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lippmann.runtime.numba_jit import compiled
+
+#: Pictures and their rows.
+RealArray: TypeAlias = NDArray[np.floating]
 
 #: Sums that run down a picture begin anew after so many rows, wherever bands begin: all round alike.
 _BLOCK = 64
 
 
 @compiled
-def row_mean_rows(first: int, last: int, values: Any, radius: int, mean: Any) -> None:
+def row_mean_rows(first: int, last: int, values: RealArray, radius: int, mean: RealArray) -> None:
     """Rows ``[first, last)`` of ``mean``: that of the ``radius`` pixels to either side in ``values``, both ``(H, W)``.
 
     Cut at the edges.
@@ -32,7 +36,7 @@ def row_mean_rows(first: int, last: int, values: Any, radius: int, mean: Any) ->
 
 
 @compiled
-def column_mean_rows(first: int, last: int, values: Any, radius: int, mean: Any) -> None:
+def column_mean_rows(first: int, last: int, values: RealArray, radius: int, mean: RealArray) -> None:
     """Rows ``[first, last)`` of ``mean``: that of the ``radius`` pixels above and below in ``values``, cut likewise."""
     height, width = values.shape
     totals = np.zeros(width, dtype=np.float64)
@@ -57,7 +61,15 @@ def column_mean_rows(first: int, last: int, values: Any, radius: int, mean: Any)
 
 @compiled
 def judged_rows(
-    first: int, last: int, noisy: Any, other: Any, clean: Any, other_clean: Any, slope: Any, noise: Any, error: Any
+    first: int,
+    last: int,
+    noisy: RealArray,
+    other: RealArray,
+    clean: RealArray,
+    other_clean: RealArray,
+    slope: RealArray,
+    noise: RealArray,
+    error: RealArray,
 ) -> None:
     """Rows ``[first, last)`` of what is measured of a picture's halves, ``(H, W)``, between codes.
 
@@ -82,15 +94,15 @@ def judged_rows(
 def compared_rows(
     first: int,
     last: int,
-    noisy: Any,
-    other: Any,
-    clean: Any,
-    other_clean: Any,
-    shared: Any,
-    other_shared: Any,
-    slope: Any,
-    gain: Any,
-    apart: Any,
+    noisy: RealArray,
+    other: RealArray,
+    clean: RealArray,
+    other_clean: RealArray,
+    shared: RealArray,
+    other_shared: RealArray,
+    slope: RealArray,
+    gain: RealArray,
+    apart: RealArray,
 ) -> None:
     """Rows ``[first, last)`` of how a picture's ``clean`` halves compare with its ``shared`` ones, ``(H, W)``.
 

@@ -6,7 +6,8 @@ it which edges are the scene's. It runs on the CPU, with threads of its own besi
 
 from __future__ import annotations
 
-from typing import Any, Literal, get_args
+from types import ModuleType
+from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,9 @@ from numpy.typing import NDArray
 from lippmann.errors import EngineError, UsageError
 from lippmann.runtime import machine
 from lippmann.runtime.engine_lock import exclusive
+
+if TYPE_CHECKING:
+    from pyoidn import Device as OidnDevice
 
 FloatArray = NDArray[np.float32]
 Effort = Literal["high", "fast"]
@@ -25,13 +29,13 @@ _QUALITY = {"high": "OIDN_QUALITY_HIGH", "fast": "OIDN_QUALITY_FAST"}
 #: The network halves pictures four times: the pixels of such squares are seen together.
 NETWORK_STEP = 16
 
-_devices: dict[int, Any] = {}
+_devices: dict[int, OidnDevice] = {}
 
 
 def denoise(
-    color: NDArray[Any],
-    albedo: NDArray[Any] | None = None,
-    normal: NDArray[Any] | None = None,
+    color: NDArray[np.generic],
+    albedo: NDArray[np.generic] | None = None,
+    normal: NDArray[np.generic] | None = None,
     *,
     hdr: bool = True,
     clean_guides: bool = False,
@@ -111,12 +115,14 @@ def _turned(image: FloatArray) -> FloatArray:
     return np.pad(image[::-1, ::-1], before, mode="reflect")
 
 
-def clean_guide(guide: NDArray[Any], kind: Literal["albedo", "normal"], *, threads: int | None = None) -> FloatArray:
+def clean_guide(
+    guide: NDArray[np.generic], kind: Literal["albedo", "normal"], *, threads: int | None = None
+) -> FloatArray:
     """A guide without its noise, so that ``clean_guides`` holds. As :func:`denoise`."""
     return _filtered({kind: _picture(guide, kind)}, {}, "high", threads)
 
 
-def _picture(values: NDArray[Any], name: str) -> FloatArray:
+def _picture(values: NDArray[np.generic], name: str) -> FloatArray:
     """Packed float32, as the C library wants it."""
     array = np.ascontiguousarray(values, dtype=np.float32)
     if array.ndim != 3 or array.shape[2] != 3 or 0 in array.shape:
@@ -156,7 +162,7 @@ def _filtered(
     return output
 
 
-def load_denoiser() -> Any:
+def load_denoiser() -> ModuleType:
     """The library, so that it is known to be there before anything is rendered.
 
     Raises
@@ -170,7 +176,8 @@ def load_denoiser() -> Any:
         raise UsageError(
             "Open Image Denoise is not installed", parameter="denoise", fix='install it: pip install "pyoidn>=2.5"'
         ) from None
-    return pyoidn
+    module: ModuleType = pyoidn
+    return module
 
 
 def denoiser_version() -> str | None:
@@ -187,7 +194,7 @@ def denoiser_version() -> str | None:
     return f"{'.'.join(map(str, numbers))} (pyoidn {version('pyoidn')})"
 
 
-def _device(pyoidn: Any, threads: int) -> Any:
+def _device(pyoidn: ModuleType, threads: int) -> OidnDevice:
     """A device of so many threads, made once: that takes longer than a small picture."""
     if threads not in _devices:
         device = pyoidn.Device(pyoidn.OIDN_DEVICE_TYPE_CPU)
@@ -200,7 +207,7 @@ def _device(pyoidn: Any, threads: int) -> Any:
     return _devices[threads]
 
 
-def _check(device: Any) -> None:
+def _check(device: OidnDevice) -> None:
     message = device.get_error()
     if message:
         raise EngineError(f"Open Image Denoise fails: {message}", parameter="denoise", fix='render with denoise="none"')

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
@@ -19,9 +17,9 @@ EDGE = 2
 
 
 def denoise_seen(
-    color: NDArray[Any],
-    albedo: NDArray[Any],
-    normal: NDArray[Any],
+    color: NDArray[np.generic],
+    albedo: NDArray[np.generic],
+    normal: NDArray[np.generic],
     *,
     exposure: float | None = None,
     effort: Effort = "high",

@@ -13,7 +13,7 @@ its place under the next lens. The guides tell that before any light is denoised
 
 from __future__ import annotations
 
-from typing import Any, Literal, get_args
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,7 +36,7 @@ _NORMAL_WEIGHT = 0.5
 
 
 def denoise_views(
-    pixels: NDArray[Any],
+    pixels: NDArray[np.generic],
     display: Display,
     guides: Guides | None = None,
     *,
@@ -125,7 +125,7 @@ def _view_shape(display: Display) -> tuple[int, ...]:
 
 
 def _by_views(
-    layers: list[NDArray[Any]], display: Display, effort: Effort, turned: bool, threads: int | None
+    layers: list[NDArray[np.generic]], display: Display, effort: Effort, turned: bool, threads: int | None
 ) -> FloatArray:
     if not has_exact_views(display):
         raise UsageError(
@@ -142,7 +142,7 @@ def _by_views(
     return permutation.join(micro_images_as_views(result, display))
 
 
-def _denoised(layers: list[NDArray[Any]], effort: Effort, turned: bool, threads: int | None) -> FloatArray:
+def _denoised(layers: list[NDArray[np.generic]], effort: Effort, turned: bool, threads: int | None) -> FloatArray:
     color, *guides = layers
     if not guides:
         return denoise(color, effort=effort, turned=turned, threads=threads)

@@ -18,7 +18,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import drjit as dr
 import mitsuba as mi
@@ -26,6 +25,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.color.transfer import Transfer
+from lippmann.device.transfer import encode
+from lippmann.device.types import Bool, Color3f, Float
 
 Floats = NDArray[np.float32]
 
@@ -76,18 +77,18 @@ def error_of_batches(sums: Floats, taken: Sequence[int], transfer: Transfer) -> 
 class _Batches:
     """Sums (``mi.Color3f``) and counts (``mi.Float``, one for all pixels) of all batches of some pixels."""
 
-    sums: list[Any]
-    counts: list[Any]
+    sums: list[Color3f]
+    counts: list[Float]
     transfer: Transfer
 
     def __post_init__(self) -> None:
         self.total = sum(self.sums[1:], self.sums[0])
         self.count = sum(self.counts[1:], self.counts[0])
 
-    def jackknife(self) -> tuple[Any, Any]:
+    def jackknife(self) -> tuple[Float, Float]:
         """Squared error by leaving out one batch at a time, and what of it is lone."""
         without = [
-            self._code((self.total - value) / dr.maximum(self.count - count, 1))
+            encode((self.total - value) / dr.maximum(self.count - count, 1), self.transfer)
             for value, count in zip(self.sums, self.counts, strict=True)
         ]
         # Batches that hold nothing change nothing: they are no witnesses.
@@ -104,7 +105,7 @@ class _Batches:
         decides = (largest > LONE_SHARE * spread) & (largest > LONE_STEP * LONE_STEP / 3)
         return error, dr.select(decides, error, 0)
 
-    def evenness(self) -> Any:
+    def evenness(self) -> Float:
         """What the streams differ by less what halves mixed of both differ by."""
         streams, _ = self._difference(range(len(self.sums) // 2))
         mixed, number = mi.Float(0), mi.Float(0)
@@ -118,22 +119,16 @@ class _Batches:
         weight = (witnesses - 2) / dr.maximum(witnesses - 1, 1)
         return dr.select(number > 0, weight * (streams - mixed / dr.maximum(number, 1)), 0)
 
-    def _difference(self, members: Any) -> tuple[Any, Any]:
+    def _difference(self, members: Sequence[int]) -> tuple[Float, Bool]:
         """Squared error of the mean by the difference between ``members`` and the others; 0, False if one is empty."""
         some = sum((self.sums[k] for k in members), mi.Color3f(0))
         number = sum((self.counts[k] for k in members), mi.Float(0))
         rest = self.count - number
         known = (number > 0) & (rest > 0)
-        a = self._code(some / dr.maximum(number, 1))
-        b = self._code((self.total - some) / dr.maximum(rest, 1))
+        a = encode(some / dr.maximum(number, 1), self.transfer)
+        b = encode((self.total - some) / dr.maximum(rest, 1), self.transfer)
         size = dr.sum(dr.square(a - b)) / 3 * number * rest / dr.square(self.count)
         return dr.select(known, size, 0), known
-
-    def _code(self, linear: Any) -> Any:
-        value = dr.clip(linear, 0, 1)
-        if self.transfer == "linear":
-            return value
-        return dr.select(value <= 0.0031308, 12.92 * value, 1.055 * dr.power(dr.maximum(value, 1e-9), 1 / 2.4) - 0.055)
 
 
 def _mixed_halves(batches: int) -> list[tuple[int, ...]]:

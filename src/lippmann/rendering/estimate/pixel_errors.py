@@ -7,7 +7,6 @@ tiles.
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -85,11 +84,11 @@ class ErrorSums:
     apart: Real
 
     @classmethod
-    def none(cls, parts: int, pixels: NDArray[Any] | int = 0) -> ErrorSums:
+    def none(cls, parts: int, pixels: NDArray[np.generic] | int = 0) -> ErrorSums:
         """Sums of so many parts to which nothing was added yet, with ``pixels`` in each."""
         return cls(np.full(parts, pixels, dtype=np.float64), *np.zeros((4, parts)))
 
-    def add(self, owner: NDArray[Any], errors: PixelErrors) -> None:
+    def add(self, owner: NDArray[np.integer], errors: PixelErrors) -> None:
         """Add the estimates of some pixels, any shape, to the parts that ``owner`` names; not to their number."""
         owner = owner.ravel()
         uncertain = values = errors.values.astype(np.float64).ravel()
@@ -105,7 +104,7 @@ class ErrorSums:
             uncertain = uncertain - apart
         self.squares[:] += self._sum(owner, np.square(uncertain))
 
-    def add_sums(self, parts: NDArray[Any], sums: ErrorSums) -> None:
+    def add_sums(self, parts: NDArray[np.generic], sums: ErrorSums) -> None:
         """Add sums of the parts with these numbers, each at most once; their numbers of pixels, too."""
         self.pixels[parts] += sums.pixels
         self.values[parts] += sums.values
@@ -113,7 +112,7 @@ class ErrorSums:
         self.lone[parts] += sums.lone
         self.apart[parts] += sums.apart
 
-    def _sum(self, owner: NDArray[Any], values: Real) -> Real:
+    def _sum(self, owner: NDArray[np.integer], values: Real) -> Real:
         return np.asarray(np.bincount(owner, weights=values, minlength=len(self.pixels)), dtype=np.float64)
 
 

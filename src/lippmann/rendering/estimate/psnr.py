@@ -17,9 +17,9 @@ Three things stand between the estimates and a statement about a micro-image:
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
-from typing import Any
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,13 +52,13 @@ class Estimate:
     worst_high: float
     worst_lens: tuple[int, int]
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, object]:
         """All fields as JSON-able values, rounded to hundredths of a dB; :meth:`from_dict` reads them."""
         plain = asdict(self)
         return {name: list(v) if name == "worst_lens" else round(v, 2) for name, v in plain.items()}
 
     @classmethod
-    def from_dict(cls, plain: Mapping[str, Any]) -> Estimate:
+    def from_dict(cls, plain: Mapping[str, object]) -> Estimate:
         """What :meth:`to_dict` wrote.
 
         Raises
@@ -66,8 +66,9 @@ class Estimate:
         KeyError
             If a field is missing.
         """
-        values = {field.name: plain[field.name] for field in fields(cls)}
-        return cls(**values | {"worst_lens": tuple(values["worst_lens"])})
+        numbers = {field.name: cast("float", plain[field.name]) for field in fields(cls) if field.name != "worst_lens"}
+        column, row = cast("Sequence[int]", plain["worst_lens"])
+        return cls(**numbers, worst_lens=(column, row))
 
     def in_words(self, part: str = "micro-image") -> str:
         """One line for people; ``part`` is what a part of the picture that is judged by itself is called."""
@@ -110,7 +111,7 @@ class Parts:
     and hold no error.
     """
 
-    owner: NDArray[Any]
+    owner: NDArray[np.integer]
     rows: int
     columns: int
     known: int | NDArray[np.intp] = 0

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from lippmann.device.types import Color3f, Float, Vector3f
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.rendering.film.aov import to_numpy
 from lippmann.rendering.film.memory_model import FEATURE_BUFFERS
@@ -115,7 +116,7 @@ def _trace_tile(
     seed: int,
     box_filter: bool,
     z_from_world: NDArray[np.float64],
-) -> tuple[Any, Any, Any]:
+) -> tuple[Color3f, Vector3f, Float]:
     """Sums over the samples of one pass, for every pixel and channel: colours, world-space normals, and heights."""
     lanes = tile.rows * plan.width * plan.channels * run.count
     # Lanes are those of a picture.

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
+from lippmann.rendering.reprojection.common.array_types import IntArray
 from lippmann.rendering.reprojection.common.lens_map import LensField
 from lippmann.rendering.reprojection.common.point_image import BACKGROUND, MISSED, REPROJECTED, PointImage
 from lippmann.rendering.reprojection.common.thresholds import nearer
@@ -22,7 +21,7 @@ ON_BORDER = 1e-5
 
 
 @uncounted
-def carry(points: PointImage, beside: Beside, field: LensField, numbers: Any, step: int) -> None:
+def carry(points: PointImage, beside: Beside, field: LensField, numbers: IntArray, step: int) -> None:
     """Carry the points of the pixels ``numbers`` (linear, all settled) to the lenses ``step`` further on in the row.
 
     Each goes to the pixel nearest to its projection, if that has no traced colour. Where several meet, the nearest to

@@ -11,13 +11,12 @@ adds the background along the ray that hit the surface, without the surface's fa
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 
 from lippmann.device.sobol import SampleStream
-from lippmann.device.types import Bool, Color3f, Float, Ray3f, UInt32, Vector3f
+from lippmann.device.types import Array, Bool, Color3f, Float, Ray3f, UInt32, Vector3f
 from lippmann.device.whitted.background_fog import background_color, clearness
 from lippmann.device.whitted.geometry import FAR, NONE, Hit, Surface
 from lippmann.device.whitted.materials import LEAST, Finish
@@ -228,12 +227,12 @@ def _mirrored(v: Vector3f) -> Vector3f:
     return mi.Vector3f(v.x, v.y, -v.z)
 
 
-def _store(stack: dict[str, Any], entry: UInt32, ray: _Ray) -> None:
+def _store(stack: dict[str, Array], entry: UInt32, ray: _Ray) -> None:
     for name, column in stack.items():
         column[entry] = getattr(ray, name)
 
 
-def _load(stack: dict[str, Any], entry: UInt32) -> _Ray:
+def _load(stack: dict[str, Array], entry: UInt32) -> _Ray:
     return _Ray(**{name: column[entry] for name, column in stack.items()})
 
 

@@ -13,13 +13,14 @@ is not taken.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.rendering.reprojection.arrays.bilinear import color_at, is_trusted
 from lippmann.rendering.reprojection.arrays.epipolar_march import look_along
+from lippmann.rendering.reprojection.common.array_types import BoolArray, RealArray
 from lippmann.rendering.reprojection.common.lens_map import LensField
 from lippmann.rendering.reprojection.common.point_image import BACKGROUND, REPROJECTED, TRACED, PointImage
 from lippmann.rendering.reprojection.common.thresholds import (
@@ -86,8 +87,8 @@ def gather(
     field: LensField,
     gathering: Gathering,
     rules: Rules,
-    nearest: Any,
-    unsettled: Any,
+    nearest: RealArray,
+    unsettled: BoolArray,
 ) -> None:
     """Give the pixels of the targets the points of their sources.
 
@@ -117,12 +118,12 @@ def _gather_pixel(
     field: LensField,
     gathering: Gathering,
     rules: Rules,
-    nearest: Any,
+    nearest: RealArray,
     row: int,
     column: int,
-    depth: Any,
-    share: Any,
-    color: Any,
+    depth: RealArray,
+    share: RealArray,
+    color: RealArray,
 ) -> bool:
     lens = field.lens[row, column]
     front = 0.0

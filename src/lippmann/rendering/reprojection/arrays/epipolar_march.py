@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from lippmann.rendering.reprojection.arrays.bilinear import Place, place_at
+from lippmann.rendering.reprojection.common.array_types import IntArray, RealArray
 from lippmann.rendering.reprojection.common.lens_map import LensField
 from lippmann.rendering.reprojection.common.point_image import BACKGROUND, PointImage
 from lippmann.rendering.reprojection.common.thresholds import ONE_SURFACE, alike, nearer
@@ -20,7 +19,7 @@ MOST_HALVINGS = 8
 
 @uncounted
 def mark_nearest(
-    first_row: int, last_row: int, points: PointImage, field: LensField, target: Any, nearest: Any
+    first_row: int, last_row: int, points: PointImage, field: LensField, target: IntArray, nearest: RealArray
 ) -> None:
     """Enter into ``nearest (H, W)`` the disparity of the nearest point in the 3x3 pixels around each pixel.
 
@@ -44,7 +43,7 @@ def mark_nearest(
 def look_along(
     points: PointImage,
     field: LensField,
-    nearest: Any,
+    nearest: RealArray,
     source: int,
     x: float,
     y: float,

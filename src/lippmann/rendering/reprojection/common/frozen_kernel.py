@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import gc
 from collections.abc import Callable
-from typing import Any
 
 import drjit as dr
 import mitsuba as mi
+
+from lippmann.device.types import Array
 
 #: Integrators are shallow; what lies deeper belongs to others.
 _DEEPEST = 12
@@ -28,13 +29,13 @@ class Frozen:
         An object through whose attributes all other device arrays are reached that the kernel reads.
     """
 
-    def __init__(self, kernel: Callable[..., Any], reads: object) -> None:
-        state: list[Any] = []
+    def __init__(self, kernel: Callable[..., Array | tuple[Array, ...]], reads: object) -> None:
+        state: list[Array] = []
         _collect(reads, state, set(), 0)
         dr.make_opaque(state)
         self._recorded = dr.freeze(kernel, state_fn=lambda *_, **__: state)
 
-    def __call__(self, *arguments: Any) -> Any:
+    def __call__(self, *arguments: Array) -> Array:
         # The cyclic collector may free arrays of an earlier picture at any moment. Dr.Jit cannot record that, and
         # aborts the process.
         enabled = gc.isenabled()
@@ -51,7 +52,7 @@ class Frozen:
         return int(self._recorded.n_recordings)
 
 
-def _collect(value: Any, found: list[Any], seen: set[int], depth: int) -> None:
+def _collect(value: object, found: list[Array], seen: set[int], depth: int) -> None:
     if id(value) in seen or depth > _DEEPEST:
         return
     seen.add(id(value))

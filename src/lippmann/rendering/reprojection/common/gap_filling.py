@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.rendering.reprojection.common import gap_kernels
+from lippmann.rendering.reprojection.common.array_types import BoolArray, IntArray
 from lippmann.rendering.reprojection.common.pixel_tracer import Pixels, PixelTracer
 from lippmann.rendering.reprojection.common.point_image import MISSED, WANTED, PointImage
 from lippmann.rendering.reprojection.common.thresholds import Rules
@@ -51,7 +51,7 @@ class Gaps:
         self._settled = settled
         self._counts = np.zeros(height, dtype=np.int64)
 
-    def trace_samples(self, also: Any = None) -> None:
+    def trace_samples(self, also: BoolArray | tuple[slice, IntArray] | None = None) -> None:
         """Trace some pixels of each missed stretch in the unsettled runs, and all that are wanted already.
 
         ``also`` is an index of ``unsettled``: more runs with wanted pixels, which are not being made yet.

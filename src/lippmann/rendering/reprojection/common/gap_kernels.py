@@ -12,10 +12,9 @@ A *run* is a row of one micro-image: pixels of a row that have one lens. Run k o
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
+from lippmann.rendering.reprojection.common.array_types import BoolArray, IntArray
 from lippmann.rendering.reprojection.common.point_image import INTERPOLATED, MISSED, REPROJECTED, WANTED, PointImage
 from lippmann.rendering.reprojection.common.thresholds import Rules, alike, color_difference
 from lippmann.runtime.numba_jit import inlined, uncounted
@@ -39,9 +38,9 @@ def scatter_samples(
     first_row: int,
     last_row: int,
     points: PointImage,
-    first: Any,
-    unsettled: Any,
-    counts: Any,
+    first: IntArray,
+    unsettled: BoolArray,
+    counts: IntArray,
     rules: Rules,
 ) -> None:
     """Want some of the missed pixels, ``longest_gap`` apart at most.
@@ -90,9 +89,9 @@ def bridge(
     first_row: int,
     last_row: int,
     points: PointImage,
-    first: Any,
-    unsettled: Any,
-    counts: Any,
+    first: IntArray,
+    unsettled: BoolArray,
+    counts: IntArray,
     rules: Rules,
     otherwise: int,
 ) -> None:
@@ -192,7 +191,9 @@ def _take_nearest(points: PointImage, row: int, begin: int, end: int, start: int
 
 
 @uncounted
-def average(first: int, last: int, points: PointImage, numbers: Any, left: Any, right: Any, rules: Rules) -> None:
+def average(
+    first: int, last: int, points: PointImage, numbers: IntArray, left: IntArray, right: IntArray, rules: Rules
+) -> None:
     """Give each pixel of the list ``numbers`` the mean colour of its corresponding pixels under the neighbouring
     lenses, ``left`` and ``right`` (linear numbers, -1 for none), or of the one that there is.
 
@@ -228,11 +229,11 @@ def list_pixels(
     first_row: int,
     last_row: int,
     points: PointImage,
-    first: Any,
-    unsettled: Any,
+    first: IntArray,
+    unsettled: BoolArray,
     status: int,
-    starts: Any,
-    numbers: Any,
+    starts: IntArray,
+    numbers: IntArray,
 ) -> None:
     """Enter the linear numbers of the pixels of one ``status`` into ``numbers``, each row's from ``starts (H,)`` on."""
     width = points.status.shape[1]
@@ -248,7 +249,13 @@ def list_pixels(
 
 @uncounted
 def count_pixels(
-    first_row: int, last_row: int, points: PointImage, first: Any, unsettled: Any, status: int, counts: Any
+    first_row: int,
+    last_row: int,
+    points: PointImage,
+    first: IntArray,
+    unsettled: BoolArray,
+    status: int,
+    counts: IntArray,
 ) -> None:
     """How many pixels of one ``status`` each row holds."""
     for row in range(first_row, last_row):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from typing import Any
 
 import drjit as dr
 import mitsuba as mi
@@ -11,8 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.device.sobol import PIXEL_DIMENSION, SampleStream
+from lippmann.device.types import Array, Float, Ray3f, UInt32
 from lippmann.rendering.film.sample_batches import SEED_STEP, STREAMS
 from lippmann.rendering.film.wavefront import RayTotals, compile_seconds, divide
+from lippmann.rendering.reprojection.common.array_types import BoolArray, IntArray, RealArray
 from lippmann.rendering.reprojection.common.frozen_kernel import Frozen
 from lippmann.rendering.reprojection.common.point_image import BACKGROUND, SMALLEST_HEIGHT, TRACED, PointImage
 from lippmann.rendering.transport.integrator import ReusableIntegrator
@@ -74,7 +75,7 @@ class PixelTracer:
             self.seconds_trace += time.perf_counter() - started - compiling
             self._bands.pixels(_enter, len(part), points, part, self._samples, *found)
 
-    def _trace(self, numbers: Pixels) -> tuple[NDArray[Any], ...]:
+    def _trace(self, numbers: Pixels) -> tuple[NDArray[np.generic], ...]:
         """Red, green, blue, disparity and whether it is fragile of all samples, pixel by pixel."""
         pixel = mi.UInt32(_aligned(numbers))
         sample = mi.UInt32(0)
@@ -92,7 +93,7 @@ class PixelTracer:
         self.rays.discarded += lanes - _total(finite)
         return tuple(np.asarray(part) for part in (*radiance, disparity, fragile))
 
-    def _sample(self, pixel: Any, sample: Any, seed: Any) -> tuple[Any, ...]:
+    def _sample(self, pixel: UInt32, sample: UInt32, seed: UInt32) -> tuple[Array, ...]:
         row, column = divide(pixel, self._source.width)
         number, of_stream = divide(sample, STREAMS)
         stream = SampleStream.of_pixels(pixel, number, seed + of_stream * SEED_STEP)
@@ -111,7 +112,7 @@ class PixelTracer:
             dr.select(first.view_dependent, one, none),
         )
 
-    def _disparity(self, ray: Any, distance: Any) -> Any:
+    def _disparity(self, ray: Ray3f, distance: Float) -> Float:
         """Gap over the height of the point at ``distance`` along ``ray``."""
         hit = dr.isfinite(distance)
         p = ray(dr.select(hit, distance, 0))
@@ -133,7 +134,7 @@ def _aligned(numbers: Pixels) -> Pixels:
     return copy
 
 
-def _total(counts: Any) -> int:
+def _total(counts: IntArray) -> int:
     """The sum over all lanes. For short lists a sum on the device would take longer than the tracing."""
     return int(np.asarray(counts).sum(dtype=np.uint64))
 
@@ -143,13 +144,13 @@ def _enter(
     first: int,
     last: int,
     points: PointImage,
-    numbers: Any,
+    numbers: IntArray,
     samples: int,
-    red: Any,
-    green: Any,
-    blue: Any,
-    disparity: Any,
-    fragile: Any,
+    red: RealArray,
+    green: RealArray,
+    blue: RealArray,
+    disparity: RealArray,
+    fragile: BoolArray,
 ) -> None:
     width = points.status.shape[1]
     for i in range(first, last):

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from lippmann.display import Display
+from lippmann.rendering.reprojection.common.array_types import RealArray
 from lippmann.rendering.reprojection.common.schedule import few_lenses
 from lippmann.runtime.numba_jit import inlined
 
@@ -87,7 +88,7 @@ def coded_value(value: float, coded: bool) -> float:
 
 
 @inlined
-def color_difference(color: Any, row: int, column: int, other_row: int, other_column: int, coded: bool) -> float:
+def color_difference(color: RealArray, row: int, column: int, other_row: int, other_column: int, coded: bool) -> float:
     """Largest difference of a channel between two pixels."""
     largest = 0.0
     for channel in range(3):

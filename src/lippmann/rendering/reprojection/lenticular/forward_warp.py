@@ -12,11 +12,12 @@ what the probes around it have met is not taken.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from lippmann.rendering.reprojection.common.array_types import BoolArray, IntArray, RealArray
 from lippmann.rendering.reprojection.common.epipolar_rows import Rows
 from lippmann.rendering.reprojection.common.point_image import BACKGROUND, REPROJECTED, TRACED, PointImage
 from lippmann.rendering.reprojection.common.thresholds import (
@@ -65,11 +66,11 @@ def receive(
     last_row: int,
     points: PointImage,
     rows: Rows,
-    targets: Any,
-    sources: Any,
+    targets: IntArray,
+    sources: IntArray,
     rules: Rules,
     lines: Lines,
-    unsettled: Any,
+    unsettled: BoolArray,
 ) -> None:
     """Give the micro-images ``targets (n,)`` the points of ``sources (n, 2)``, to the left and right (-1: none).
 
@@ -93,13 +94,13 @@ def _receive(
     last_row: int,
     points: PointImage,
     rows: Rows,
-    targets: Any,
+    targets: IntArray,
     rules: Rules,
     lines: Lines,
-    unsettled: Any,
-    where: Any,
-    shifts: Any,
-    limits: Any,
+    unsettled: BoolArray,
+    where: IntArray,
+    shifts: RealArray,
+    limits: RealArray,
     scratch: Scratch,
 ) -> None:
     for row in range(first_row, last_row):
@@ -185,7 +186,7 @@ def probe_column(rows: Rows, row: int, lens: int, number: int, probe_rows: int) 
 
 @inlined
 def probed_limits(
-    points: PointImage, rows: Rows, row: int, lens: int, probe_rows: int, limits: Any, entry: int
+    points: PointImage, rows: Rows, row: int, lens: int, probe_rows: int, limits: RealArray, entry: int
 ) -> None:
     """What the probes above and below ``row`` say of the stretches of a micro-image before, between and after them.
 
@@ -227,10 +228,10 @@ def settle(
     lens: int,
     scratch: Scratch,
     weight: float,
-    limits: Any,
+    limits: RealArray,
     entry: int,
     rules: Rules,
-    unsettled: Any,
+    unsettled: BoolArray,
 ) -> None:
     """Decide what the pixels of one row of a micro-image take of the points drawn from its left and right source."""
     s, piece, part, hidden = scratch.disparity, scratch.piece, scratch.part, scratch.hidden

@@ -7,11 +7,12 @@ where it shows the same point.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from lippmann.rendering.reprojection.common.array_types import IntArray, RealArray
 from lippmann.rendering.reprojection.common.epipolar_rows import Rows
 from lippmann.rendering.reprojection.common.point_image import REPROJECTED, TRACED, PointImage
 from lippmann.rendering.reprojection.common.thresholds import (
@@ -51,7 +52,7 @@ class Lines(NamedTuple):
 
 @uncounted
 def find_plain(
-    first_row: int, last_row: int, points: PointImage, rows: Rows, lenses: Any, rules: Rules, lines: Lines
+    first_row: int, last_row: int, points: PointImage, rows: Rows, lenses: IntArray, rules: Rules, lines: Lines
 ) -> None:
     """Enter the plain rows of the micro-images ``lenses`` into ``lines``."""
     for row in range(first_row, last_row):
@@ -88,8 +89,8 @@ def draw_plain(
     points: PointImage,
     row: int,
     has_probes: bool,
-    where: Any,
-    shifts: Any,
+    where: IntArray,
+    shifts: RealArray,
     t: int,
     rules: Rules,
     lines: Lines,
@@ -188,7 +189,7 @@ def _copy_shifted(
     b_last: int,
     b_first: float,
     b_step: float,
-    weight: Any,
+    weight: np.float32,
 ) -> tuple[int, int]:
     """Blend colours of two sources whose pixels lie as far apart in the target as in themselves, to a tenth of one.
 
@@ -231,7 +232,7 @@ def _copy_shifted(
 
 
 @compiled
-def prepare(rows: Rows, targets: Any, sources: Any) -> tuple[Any, Any]:
+def prepare(rows: Rows, targets: IntArray, sources: IntArray) -> tuple[IntArray, RealArray]:
     """What :func:`draw_plain` needs of each target with sources on both sides, said once for all rows.
 
     Returns

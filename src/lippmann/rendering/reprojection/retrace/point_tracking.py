@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
+from lippmann.rendering.reprojection.common.array_types import BoolArray, IntArray
 from lippmann.rendering.reprojection.common.lens_map import LensField
 from lippmann.rendering.reprojection.common.point_image import BACKGROUND, TRACED, PointImage
 from lippmann.rendering.reprojection.common.thresholds import ONE_POINT, Rules, alike, color_difference, nearer
@@ -14,7 +13,7 @@ from lippmann.runtime.numba_jit import uncounted
 
 @uncounted
 def follow_points(
-    points: PointImage, field: LensField, neighbors: Any, numbers: Any, rules: Rules, wanted: Any
+    points: PointImage, field: LensField, neighbors: IntArray, numbers: IntArray, rules: Rules, wanted: BoolArray
 ) -> None:
     """Set ``wanted (H, W)`` for untraced pixels under the ``neighbors (lenses, n)`` that should show the points of the
     pixels ``numbers``, and do not.

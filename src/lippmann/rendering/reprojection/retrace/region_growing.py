@@ -10,10 +10,10 @@ It works for every lens layout: it only needs to know which lens a pixel belongs
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
+from numpy.typing import NDArray
 
+from lippmann.rendering.reprojection.common.array_types import BoolArray, IntArray, RealArray
 from lippmann.rendering.reprojection.common.epipolar_rows import Rows
 from lippmann.rendering.reprojection.common.point_image import BACKGROUND, TRACED, PointImage
 from lippmann.rendering.reprojection.common.thresholds import coded_value, color_difference, nearer
@@ -29,7 +29,7 @@ _BEHIND = 0.05
 
 @uncounted
 def mark_edges(
-    first_row: int, last_row: int, points: PointImage, lens: Any, tolerance: float, coded: bool, wanted: Any
+    first_row: int, last_row: int, points: PointImage, lens: IntArray, tolerance: float, coded: bool, wanted: BoolArray
 ) -> None:
     """Set ``wanted (H, W)`` for untraced pixels that differ from a neighbour under the same lens.
 
@@ -53,7 +53,9 @@ def mark_edges(
 
 
 @compiled
-def surprises(points: PointImage, numbers: Any, expected: Any, tolerance: float, coded: bool) -> Any:
+def surprises(
+    points: PointImage, numbers: IntArray, expected: RealArray, tolerance: float, coded: bool
+) -> NDArray[np.uint32]:
     """Those of the pixels ``numbers`` whose colour is not what was ``expected (n, 3)``."""
     width = points.status.shape[1]
     found = np.empty(len(numbers), np.uint32)
@@ -71,7 +73,7 @@ def surprises(points: PointImage, numbers: Any, expected: Any, tolerance: float,
 
 
 @uncounted
-def surround(points: PointImage, lens: Any, surprised: Any, wanted: Any) -> None:
+def surround(points: PointImage, lens: IntArray, surprised: IntArray, wanted: BoolArray) -> None:
     """Set ``wanted`` for the untraced pixels near to the pixels ``surprised``, under the same lens."""
     height, width = points.status.shape
     for i in range(len(surprised)):
@@ -83,7 +85,7 @@ def surround(points: PointImage, lens: Any, surprised: Any, wanted: Any) -> None
 
 
 @compiled
-def look_around(points: PointImage, reach: int, rows: int, share: int, around: Any, wanted: Any) -> None:
+def look_around(points: PointImage, reach: int, rows: int, share: int, around: IntArray, wanted: BoolArray) -> None:
     """Set ``wanted`` for a few untraced pixels, one in ``share``, in the wider surroundings of the pixels ``around``.
 
     These are the micro-image, which is about ``reach`` columns wide, and those beside it, so many ``rows`` up and down.
@@ -105,7 +107,7 @@ def look_around(points: PointImage, reach: int, rows: int, share: int, around: A
 
 
 @uncounted
-def follow_across(points: PointImage, rows: Rows, surprised: Any, lens: Any, wanted: Any) -> None:
+def follow_across(points: PointImage, rows: Rows, surprised: IntArray, lens: IntArray, wanted: BoolArray) -> None:
     """Set ``wanted`` for the untraced pixels under the two neighbouring lenses where the points of the pixels
     ``surprised`` should be seen, if what is shown there lies behind them. For straight lenticular displays."""
     width = points.status.shape[1]
