@@ -105,7 +105,9 @@ def _cloud(vertex: Columns, element: Element, name: str, notes: list[str], where
 
 
 def _check_finite(positions: Numbers, where: str) -> None:
-    if not (finite := np.isfinite(positions.astype(np.float32)).all(axis=1)).all():
+    with np.errstate(over="ignore", invalid="ignore"):  # a number too large for a float is an infinite one
+        finite = np.isfinite(positions.astype(np.float32)).all(axis=1)
+    if not finite.all():
         bad = int(np.argmin(finite))
         raise SceneError(
             f"vertex {bad} is {positions[bad].tolist()}", where=where, rule="coordinates must be finite numbers"
@@ -299,7 +301,7 @@ def _triangles_of_strips(strips: _Lists) -> _Lists:
     return _Lists(corners[proper].ravel(), np.full(int(proper.sum()), 3, np.int64))
 
 
-@np.errstate(over="ignore")  # a number too large for a float is an infinite one, which is refused
+@np.errstate(over="ignore")  # of normals and coordinates of textures
 def _mesh(
     columns: Mapping[str, Columns], elements: Mapping[str, Element], outline: _Lists, name: str, where: str
 ) -> Mesh:
