@@ -6,6 +6,7 @@ import json
 import os
 import re
 import subprocess
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -97,8 +98,9 @@ def _is_scene(path: Path) -> bool:
 def validities(folder: Path, files: Sequence[Path], name: str, validator: Path | None) -> dict[str, Validity]:
     """Which files are valid and show triangles, by their names within ``folder``."""
     broken = re.compile(SETS[name].broken if name in SETS else Set.broken)
-    gltf = [path for path in files if path.suffix.lower() in (".gltf", ".glb")]
-    verdicts = {} if validator is None else _validate(gltf, validator)
+    verdicts = _load_with_mitsuba([path for path in files if path.suffix.lower() == ".xml"])
+    if validator is not None:
+        verdicts |= _validate([path for path in files if path.suffix.lower() in (".gltf", ".glb")], validator)
     judged = {}
     included = _included(files)
     for path in files:
@@ -231,3 +233,34 @@ def _why(errors: list[str]) -> str:
     if not errors:
         return ""
     return INCOMPLETE if errors == ["IO_ERROR"] else "errors by Khronos' validator"
+
+
+_LOADER = """
+import json, sys
+import mitsuba
+
+mitsuba.set_variant("scalar_rgb")
+mitsuba.set_log_level(mitsuba.LogLevel.Error)
+for line in sys.stdin:
+    why = ""
+    try:
+        mitsuba.load_file(line.strip())
+    except Exception:
+        why = "Mitsuba itself refuses it"
+    print(json.dumps([line.strip(), why]), flush=True)
+"""
+
+
+def _load_with_mitsuba(files: Sequence[Path]) -> dict[str, str]:
+    """Why XML files are not valid, by Mitsuba; empty for those that it loads."""
+    if not files:
+        return {}
+    done = subprocess.run(
+        [sys.executable, "-c", _LOADER],
+        input="\n".join(map(str, files)),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        text=True,
+        check=True,
+    )
+    return dict(map(json.loads, done.stdout.splitlines()))
