@@ -29,10 +29,10 @@ import time
 from collections import Counter, defaultdict
 from collections.abc import Iterator
 from contextlib import suppress
-from pathlib import Path
+from pathlib import Path, PureWindowsPath
 from typing import Any
 
-from conformance_sets import SETS, Validity, scene_files, validities
+from conformance_sets import INCOMPLETE, SETS, Validity, scene_files, validities
 from harness import save, saved
 
 WORKER = Path(__file__).with_name("conformance_worker.py")
@@ -72,6 +72,7 @@ def main() -> None:
             parser.error(f"no scene files below {folder}")
         valid = validities(folder, files, name, options.validator)
         reports = list(_reports(folder, name, files, options))
+        valid |= _incomplete(folder, reports)
         results[name] = summarise(reports, valid)
         faults += sum(results[name]["outcomes"].get(kind, 0) for kind in FAULTS)
         if options.details is not None:
@@ -87,6 +88,17 @@ def main() -> None:
         },
     )
     sys.exit(1 if faults else 0)
+
+
+def _incomplete(folder: Path, reports: list[dict[str, Any]]) -> dict[str, Validity]:
+    """The files that were refused for want of a file that lies nowhere in the set."""
+    present = {path.name.casefold() for path in folder.rglob("*")}
+    found = {}
+    for report in reports:
+        named = re.search(r"'([^']+)' is not there", report.get("line", ""))
+        if named is not None and PureWindowsPath(named[1]).name.casefold() not in present:
+            found[report["file"]] = Validity(False, INCOMPLETE)
+    return found
 
 
 def summarise(reports: list[dict[str, Any]], valid: dict[str, Validity]) -> dict[str, Any]:

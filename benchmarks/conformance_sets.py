@@ -6,6 +6,7 @@ import json
 import os
 import re
 import subprocess
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -36,7 +37,7 @@ class Set:
 
 
 _MAGNUM_BROKEN = (
-    r"-invalid|/invalid-|/(format-(missing|too-late|unsupported)|extra-token-.*|integer-literal-(invalid|too-large)"
+    r"-invalid|/invalid-|/(format-(missing|too-late|unsupported)|extra-token-.*|integer-literal-(at-file-end|invalid|too-large)"
     r"|incomplete-face-specification|positions-(missing|not-all|unsupported-type)|unsupported-face-size"
     r"|unexpected-property|unknown-(element|line)|custom-components-duplicate)\.ply$"
 )
@@ -71,6 +72,10 @@ SETS = {
 }
 
 
+#: Why a file is not valid that names one that its set lacks.
+INCOMPLETE = "a file that it names is missing"
+
+
 @dataclass(frozen=True)
 class Validity:
     """Whether a file is valid and shows triangles; if not, ``why``."""
@@ -93,8 +98,9 @@ def _is_scene(path: Path) -> bool:
 def validities(folder: Path, files: Sequence[Path], name: str, validator: Path | None) -> dict[str, Validity]:
     """Which files are valid and show triangles, by their names within ``folder``."""
     broken = re.compile(SETS[name].broken if name in SETS else Set.broken)
-    gltf = [path for path in files if path.suffix.lower() in (".gltf", ".glb")]
-    verdicts = {} if validator is None else _validate(gltf, validator)
+    verdicts = _load_with_mitsuba([path for path in files if path.suffix.lower() == ".xml"])
+    if validator is not None:
+        verdicts |= _validate([path for path in files if path.suffix.lower() in (".gltf", ".glb")], validator)
     judged = {}
     included = _included(files)
     for path in files:
@@ -139,7 +145,8 @@ def _without_triangles(path: Path) -> str | None:
 
 def _without_shown_triangles(data: bytes) -> str | None:
     try:
-        text = data[20 : 20 + int.from_bytes(data[12:16], "little")] if data[:4] == b"glTF" else data
+        binary = data[:4] == b"glTF"
+        text = data[20 : 20 + int.from_bytes(data[12:16], "little")] if binary else data
         root: dict[str, Any] = json.loads(text.decode("utf-8-sig"))
         version = str(root["asset"].get("version", "1.0"))
         if version.startswith(("0.", "1.")):
@@ -151,22 +158,26 @@ def _without_shown_triangles(data: bytes) -> str | None:
         for _ in range(10 * len(nodes) + 10):
             if not stack:
                 return "without triangles in its scene"
-            node = nodes[stack.pop()]
+            node = nodes[int(stack.pop())]
             stack += node.get("children", [])
             primitives = meshes[node["mesh"]]["primitives"] if "mesh" in node else []
-            if any(each.get("mode", 4) >= 4 and _has_positions(each, root) for each in primitives):
+            if any(each.get("mode", 4) >= 4 and _has_positions(each, root, binary) for each in primitives):
                 return None
     except (ValueError, KeyError, IndexError, TypeError, AttributeError):
         pass
     return None
 
 
-def _has_positions(primitive: dict[str, Any], root: dict[str, Any]) -> bool:
+def _has_positions(primitive: dict[str, Any], root: dict[str, Any], binary: bool) -> bool:
     """Whether there are bytes behind the positions: else all of them are zero."""
     if "KHR_draco_mesh_compression" in primitive.get("extensions", {}):
         return True
-    accessor = root["accessors"][primitive["attributes"]["POSITION"]]
-    return accessor["count"] > 2 and ("bufferView" in accessor or "sparse" in accessor)
+    accessor = root["accessors"][int(primitive["attributes"]["POSITION"])]
+    if accessor["count"] < 3 or "bufferView" not in accessor:
+        return accessor["count"] > 2 and "sparse" in accessor
+    view = root["bufferViews"][int(accessor["bufferView"])]
+    buffer = int(view["buffer"])
+    return "extensions" in view or "uri" in root["buffers"][buffer] or (binary and buffer == 0)
 
 
 #: Errors of Khronos' validator that leave the geometry whole: wrong bounds, weights whose sum is not quite 1.
@@ -221,4 +232,35 @@ def _validate(files: Sequence[Path], folder: Path) -> dict[str, str]:
 def _why(errors: list[str]) -> str:
     if not errors:
         return ""
-    return "a file that it names is missing" if errors == ["IO_ERROR"] else "errors by Khronos' validator"
+    return INCOMPLETE if errors == ["IO_ERROR"] else "errors by Khronos' validator"
+
+
+_LOADER = """
+import json, sys
+import mitsuba
+
+mitsuba.set_variant("scalar_rgb")
+mitsuba.set_log_level(mitsuba.LogLevel.Error)
+for line in sys.stdin:
+    why = ""
+    try:
+        mitsuba.load_file(line.strip())
+    except Exception:
+        why = "Mitsuba itself refuses it"
+    print(json.dumps([line.strip(), why]), flush=True)
+"""
+
+
+def _load_with_mitsuba(files: Sequence[Path]) -> dict[str, str]:
+    """Why XML files are not valid, by Mitsuba; empty for those that it loads."""
+    if not files:
+        return {}
+    done = subprocess.run(
+        [sys.executable, "-c", _LOADER],
+        input="\n".join(map(str, files)),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        text=True,
+        check=True,
+    )
+    return dict(map(json.loads, done.stdout.splitlines()))

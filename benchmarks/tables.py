@@ -10,6 +10,7 @@ import statistics
 from pathlib import Path
 from typing import Any
 
+import conformance_tables
 import equal_error_tables
 import estimate_coverage_tables
 import goals_tables
@@ -395,6 +396,7 @@ SECTIONS = {
     "viewer": _viewer,
     "cluster": _cluster,
     "fuzz": _fuzz,
+    "conformance": conformance_tables.describe,
 }
 
 if __name__ == "__main__":

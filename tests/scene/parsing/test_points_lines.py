@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from lippmann.scene.parsing.points_lines import as_mesh, balls, radius, rods
+from lippmann.scene.parsing.points_lines import as_mesh, balls, rods, width_of
 from lippmann.scene.values.description import Mesh
 
 POINTS = np.array([[0.0, 0.0, 0.0], [5.0, 1.0, -2.0], [5.0, 1.0, 7.0]])
@@ -56,7 +56,7 @@ def test_copies_keep_their_colours_and_coordinates():
 
 
 def test_radii_follow_the_extent_and_shrink_in_crowds():
-    assert radius(200.0, 9, lines=False) == pytest.approx(2.0)
-    assert radius(200.0, 9, lines=True) == pytest.approx(1.0)
-    assert radius(200.0, 1_000_000, lines=False) == pytest.approx(0.1)
-    assert radius(0.0, 1, lines=False) == pytest.approx(0.01)
+    assert width_of(200.0, 9, lines=False).radius == pytest.approx(2.0)
+    assert width_of(200.0, 9, lines=True).radius == pytest.approx(1.0)
+    assert width_of(200.0, 1_000_000, lines=False).radius == pytest.approx(0.1)
+    assert width_of(0.0, 1, lines=False).radius == pytest.approx(0.01)

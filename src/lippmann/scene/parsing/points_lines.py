@@ -32,14 +32,23 @@ class Solids:
     sources: Integers
 
 
-def radius(diagonal: float, count: int, *, lines: bool) -> float:
-    """Radius of points or lines in a box of a ``diagonal``: less where there are so many that they would touch.
+@dataclass(frozen=True)
+class Width:
+    """How wide points or lines are drawn: their radius, and the note that says so."""
+
+    radius: float
+    note: str
+
+
+def width_of(diagonal: float, count: int, *, lines: bool) -> Width:
+    """Width of points or lines in a box of a ``diagonal``: less where there are so many that they would touch.
 
     ``count`` points spread over a surface lie about ``diagonal / sqrt(count)`` from each other.
     """
-    share = LINE_RADIUS if lines else POINT_RADIUS
-    crowd = share * 50.0 / max(count, 1) ** 0.5
-    return min(share, crowd) * (diagonal if diagonal > 0.0 else 1.0)
+    most = LINE_RADIUS if lines else POINT_RADIUS
+    share = min(most, 50.0 * most / max(count, 1) ** 0.5)
+    what = "lines are drawn as rods" if lines else "points are drawn as balls"
+    return Width(share * (diagonal or 1.0), f"{what} of a radius of {share:.2%} of the scene's diagonal")
 
 
 def as_material(material: Material) -> Material:

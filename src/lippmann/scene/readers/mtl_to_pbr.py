@@ -20,6 +20,8 @@ _REFRACTING = {6, 7}
 _ORDINARY_SPECULAR = 0.5
 _SHEEN_ROUGHNESS = 0.5  # the format has no word for it
 _BLACK = 1e-3
+# Slopes beyond it are walls; their squares stay within single precision.
+_STEEPEST = 1e6
 
 
 class MaterialMapper:
@@ -137,7 +139,7 @@ class MaterialMapper:
         reference = record.maps.get("norm") or record.maps.get("bump")
         if reference is None:
             return material
-        strength = reference.numbers("-bm", (1.0,))[0]
+        strength = min(max(reference.numbers("-bm", (1.0,))[0], -_STEEPEST), _STEEPEST)
         texture = self._texture(reference, srgb=False)
         if "norm" in record.maps or texture_maps.looks_like_normals(texture.image):
             return replace(material, normal_texture=texture, normal_scale=strength)

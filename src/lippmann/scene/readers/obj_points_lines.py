@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from lippmann.errors import SceneError
-from lippmann.scene.parsing.points_lines import MOST, as_mesh, radius
+from lippmann.scene.parsing.points_lines import MOST, as_mesh, width_of
 from lippmann.scene.readers.obj_tables import Integers, Lines, Points
 from lippmann.scene.values.description import Mesh
 
@@ -44,7 +44,8 @@ def draw_points_and_lines(
             continue
         if len(elements) > MOST:
             raise SceneError(f"holds {len(elements)} {what}", where=where, rule=f"up to {MOST} are drawn")
-        width = radius(diagonal, len(elements), lines=size == 2)
+        width = width_of(diagonal, len(elements), lines=size == 2)
+        notes.append(width.note)
         for material in np.unique(materials[owners]):
             mine = elements[materials[owners] == material]
             used, places = np.unique(mine, return_inverse=True)
@@ -55,10 +56,7 @@ def draw_points_and_lines(
                 int(material),
                 colors=None if colors is None else colors[used].astype(np.float32),
             )
-            meshes.append(as_mesh(thin, np.eye(4)[None], width, int(material)))
-        solid = {"points": "balls", "lines": "rods"}[what]
-        share = width / (diagonal or 1.0)
-        notes.append(f"{what} are drawn as {solid} of radius {width:.3g}, {share:.2%} of the scene's diagonal")
+            meshes.append(as_mesh(thin, np.eye(4)[None], width.radius, int(material)))
     return [mesh for mesh in meshes if len(mesh.faces)], notes
 
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from lippmann.color.transfer import decode_srgb
 from lippmann.errors import SceneError
 from lippmann.scene.parsing.files import read_bytes, read_image, resolve
-from lippmann.scene.parsing.points_lines import MOST, as_mesh, radius, thinned
+from lippmann.scene.parsing.points_lines import MOST, as_mesh, thinned, width_of
 from lippmann.scene.parsing.triangulation import triangulate
 from lippmann.scene.readers.ply_header import Element, Header, read_header
 from lippmann.scene.values.description import Instance, Material, Mesh, SceneDescription, Texture
@@ -96,16 +96,17 @@ def _cloud(vertex: Columns, element: Element, name: str, notes: list[str], where
         notes = [*notes, f"of {len(points)} points one in {step} is drawn"]
         thin = thinned(thin, step)
     diagonal = float(np.linalg.norm(np.ptp(thin.positions.astype(np.float64), axis=0)))
-    width = radius(diagonal, len(thin.faces), lines=False)
+    width = width_of(diagonal, len(thin.faces), lines=False)
     plain = (0.7, 0.7, 0.7) if colors is None else (1.0, 1.0, 1.0)
     material = Material(name, base_color=plain, roughness=0.6, double_sided=True, unlit=colors is not None)
-    note = f"points are drawn as balls of radius {width:.3g}, {width / (diagonal or 1.0):.2%} of the scene's diagonal"
-    mesh = as_mesh(thin, np.eye(4)[None], width, 0)
-    return SceneDescription(name, [mesh], [material], [Instance(0, np.eye(4))], notes=[*notes, note])
+    mesh = as_mesh(thin, np.eye(4)[None], width.radius, 0)
+    return SceneDescription(name, [mesh], [material], [Instance(0, np.eye(4))], notes=[*notes, width.note])
 
 
 def _check_finite(positions: Numbers, where: str) -> None:
-    if not (finite := np.isfinite(positions.astype(np.float32)).all(axis=1)).all():
+    with np.errstate(over="ignore", invalid="ignore"):  # a number too large for a float is an infinite one
+        finite = np.isfinite(positions.astype(np.float32)).all(axis=1)
+    if not finite.all():
         bad = int(np.argmin(finite))
         raise SceneError(
             f"vertex {bad} is {positions[bad].tolist()}", where=where, rule="coordinates must be finite numbers"
@@ -299,7 +300,7 @@ def _triangles_of_strips(strips: _Lists) -> _Lists:
     return _Lists(corners[proper].ravel(), np.full(int(proper.sum()), 3, np.int64))
 
 
-@np.errstate(over="ignore")  # a number too large for a float is an infinite one, which is refused
+@np.errstate(over="ignore")  # of normals and coordinates of textures
 def _mesh(
     columns: Mapping[str, Columns], elements: Mapping[str, Element], outline: _Lists, name: str, where: str
 ) -> Mesh:

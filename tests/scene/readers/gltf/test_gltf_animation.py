@@ -156,6 +156,18 @@ def test_what_stays_the_same_is_kept(writer, moving):
     assert first.materials == second.materials
 
 
+def test_points_do_not_grow_with_the_scene(writer, moving):
+    animated(writer, "translation", [0, 1], [[0, 0, 0], [0, 8, 0]])
+    writer.node(mesh=writer.mesh(mode=0))
+    found = moving(writer)
+    before, after = found.at(0.0), found.at(1.0)
+    np.testing.assert_array_equal(after.meshes[1].positions, before.meshes[1].positions)
+    # Whoever renders the last time first gets the same.
+    np.testing.assert_array_equal(moving(writer).at(1.0).meshes[1].positions, before.meshes[1].positions)
+    assert after.notes == before.notes
+    assert after.notes[-1].startswith("points are drawn as balls")
+
+
 def test_the_first_animation_is_played_unless_another_is_named(writer, moving):
     animated(writer, "translation", [0, 1], [[0, 0, 0], [1, 0, 0]])
     writer.json["animations"].append({**writer.json["animations"][0], "name": "other"})

@@ -3,18 +3,35 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
-from lippmann.scene.parsing.points_lines import MOST, as_mesh, radius, thinned
+from lippmann.scene.parsing.points_lines import MOST, as_mesh, thinned, width_of
 from lippmann.scene.readers.gltf.document import Document
 from lippmann.scene.values.description import Matrix, Mesh
 
-_KINDS = {1: "points are drawn as balls", 2: "lines are drawn as rods"}
+_POINTS, _LINES = 1, 2  # vertices each
+
+
+@dataclass
+class ThinWidth:
+    """What the width of points and lines goes by: the diagonal of the scene's box, as it is when first drawn.
+
+    All times of an animation share that of the scene at rest, for points that grow with a box would pulsate.
+    """
+
+    diagonal: float | None = None
+
+
+def has_points_or_lines(document: Document) -> bool:
+    """Whether any mesh of a file holds points or lines."""
+    primitives = (primitive for mesh in document.all("meshes") for primitive in mesh.children("primitives"))
+    return any(primitive.optional_integer("mode") in range(4) for primitive in primitives)
 
 
 def draw_points_and_lines(
-    meshes: Sequence[Mesh], placements: Sequence[tuple[int, Matrix]], document: Document
+    meshes: Sequence[Mesh], placements: Sequence[tuple[int, Matrix]], thin_width: ThinWidth, document: Document
 ) -> dict[int, Mesh]:
     """The meshes of points and lines made solid: all copies of each in one mesh of triangles, in the world.
 
@@ -24,6 +41,8 @@ def draw_points_and_lines(
         All meshes; ``faces`` is ``(m, 1)`` of points, ``(m, 2)`` of lines.
     placements:
         Indices of meshes with matrices ``(k, 4, 4)`` of copies; those of triangles add to the scene's extent.
+    thin_width:
+        Remembers the scene's extent.
 
     Returns
     -------
@@ -38,28 +57,29 @@ def draw_points_and_lines(
     """
     stacks: dict[int, list[Matrix]] = {}
     for mesh, worlds in placements:
-        if meshes[mesh].faces.shape[1] in _KINDS:
+        if meshes[mesh].faces.shape[1] in (_POINTS, _LINES):
             stacks.setdefault(mesh, []).append(worlds)
     if not stacks:
         return {}
     copies = {mesh: sum(map(len, stack)) for mesh, stack in stacks.items()}
-    diagonal = _diagonal(meshes, placements)
+    if thin_width.diagonal is None:
+        thin_width.diagonal = _diagonal(meshes, placements)
     drawn: dict[int, Mesh] = {}
-    for size, remark in _KINDS.items():
+    for size in (_POINTS, _LINES):
         chosen = {mesh: meshes[mesh] for mesh in stacks if meshes[mesh].faces.shape[1] == size}
         if not chosen:
             continue
         count = sum(len(thin.faces) * copies[mesh] for mesh, thin in chosen.items())
         if count > MOST:
-            if size == 2 or sum(copies[mesh] for mesh in chosen) > MOST:
+            if size == _LINES or sum(copies[mesh] for mesh in chosen) > MOST:
                 raise document.error(f"the file shows {count} points or lines", rule=f"up to {MOST} are drawn")
             step = -(-count // MOST)
             document.notes.add(f"of {count} points one in {step} is drawn")
             chosen = {mesh: thinned(thin, step) for mesh, thin in chosen.items()}
-        width = radius(diagonal, min(count, MOST), lines=size == 2)
-        document.notes.add(f"{remark} of radius {width:.3g}, {width / (diagonal or 1.0):.2%} of the scene's diagonal")
+        width = width_of(thin_width.diagonal, min(count, MOST), lines=size == _LINES)
+        document.notes.add(width.note)
         for mesh, thin in chosen.items():
-            drawn[mesh] = as_mesh(thin, np.concatenate(stacks[mesh]), width, thin.material)
+            drawn[mesh] = as_mesh(thin, np.concatenate(stacks[mesh]), width.radius, thin.material)
     return drawn
 
 

@@ -16,7 +16,7 @@ from lippmann.scene.readers.gltf.json_fields import Fields
 from lippmann.scene.readers.gltf.materials import Materials
 from lippmann.scene.readers.gltf.meshes import Meshes
 from lippmann.scene.readers.gltf.nodes import Nodes, instance_matrices, ranks
-from lippmann.scene.readers.gltf.points_lines import draw_points_and_lines
+from lippmann.scene.readers.gltf.points_lines import ThinWidth, draw_points_and_lines
 from lippmann.scene.readers.gltf.primitives import Primitives
 from lippmann.scene.readers.gltf.skinning import read_skin
 from lippmann.scene.readers.gltf.textures import Textures
@@ -67,6 +67,7 @@ class Contents:
     placements: list[_Placements] = field(default_factory=list)
     lights: list[Light] = field(default_factory=list)
     cameras: list[Camera] = field(default_factory=list)
+    thin_width: ThinWidth = field(default_factory=ThinWidth)
 
     @classmethod
     def of(cls, document: Document) -> Contents:
@@ -81,7 +82,7 @@ class Contents:
         """Contents of the same file with other ``nodes``; bytes, materials and meshes without skin are shared."""
         document = self.document.with_nodes(nodes)
         meshes = self.meshes.posed(document, Primitives(document, self.accessors))
-        return Contents(document, self.accessors, Nodes(document), meshes)
+        return Contents(document, self.accessors, Nodes(document), meshes, thin_width=self.thin_width)
 
     def description(self, name: str) -> SceneDescription:
         """The scene that the nodes make; to be asked for once.
@@ -93,7 +94,7 @@ class Contents:
         """
         for index, visible in self.nodes.traverse():
             self._add(index, visible=visible)
-        meshes, instances = _instantiate(self.meshes.read, self.placements, self.document)
+        meshes, instances = _instantiate(self.meshes.read, self.placements, self.thin_width, self.document)
         if not instances:
             raise self.document.error(
                 "the file shows no triangles, lines or points",
@@ -139,7 +140,7 @@ class Contents:
 
 
 def _instantiate(
-    meshes: list[Mesh], placements: list[_Placements], document: Document
+    meshes: list[Mesh], placements: list[_Placements], thin_width: ThinWidth, document: Document
 ) -> tuple[tuple[Mesh, ...], tuple[Instance, ...]]:
     """Meshes and their instances.
 
@@ -163,7 +164,7 @@ def _instantiate(
             else:
                 document.notes.add("a mesh that is scaled to nothing is left out", placement.node.place)
     worlds = [(placement.mesh, placement.worlds) for placement in placements]
-    drawn = draw_points_and_lines(meshes, worlds, document)
+    drawn = draw_points_and_lines(meshes, worlds, thin_width, document)
     instances += [Instance(mesh, np.eye(4)) for mesh, solids in drawn.items() if len(solids.faces)]
     return (*(drawn.get(index, mesh) for index, mesh in enumerate(meshes)), *copies), tuple(instances)
 

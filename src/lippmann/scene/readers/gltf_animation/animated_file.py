@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from pathlib import Path
 
 from lippmann.errors import SceneError
 from lippmann.scene.parsing.name_hints import closest_name_hint
 from lippmann.scene.readers.gltf.document import check_extensions, open_document
 from lippmann.scene.readers.gltf.json_fields import Fields
+from lippmann.scene.readers.gltf.points_lines import has_points_or_lines
 from lippmann.scene.readers.gltf.reader import Contents
 from lippmann.scene.readers.gltf_animation.keyframes import Animation, Floats, Target, read_animations
 from lippmann.scene.values.description import SceneDescription
@@ -40,6 +42,10 @@ class MovingGltf:
         self._name = path.stem
         self._contents = Contents.of(document)
         self._at_rest = document.all("nodes")
+        if has_points_or_lines(document):
+            # The scene at rest says how wide they are. What else is wrong with it is told of the times asked for.
+            with suppress(SceneError):
+                self._contents.description(self._name)
         self.animation = _choose(read_animations(document, self._contents.accessors), animation, document.file)
         known = len(document.root.children("animations"))
         if known > 1 and animation is None:
