@@ -65,18 +65,18 @@ class SampleStream:
         """The same pixels' points of the samples with the numbers ``index`` (UInt32)."""
         return SampleStream(self.key, index)
 
-    def _shuffled(self, dimension: UInt32) -> tuple[UInt32, UInt32]:
+    def _shuffle(self, dimension: UInt32) -> tuple[UInt32, UInt32]:
         seed = hash32(self.key + mi.UInt32(dimension) * 0x9E3779B9)
         return dr.brev(_permute_low_to_high(dr.brev(self.index), seed)), seed
 
     def next_1d(self, dimension: UInt32) -> Float:
         """A number in [0, 1) for ``dimension``."""
-        index, seed = self._shuffled(dimension)
+        index, seed = self._shuffle(dimension)
         return _unit_float(dr.brev(_permute_low_to_high(index, hash32(seed ^ 0x68BC21EB))))
 
     def next_2d(self, dimension: UInt32) -> Point2f:
         """A point in [0, 1)^2 for ``dimension``."""
-        index, seed = self._shuffled(dimension)
+        index, seed = self._shuffle(dimension)
         return mi.Point2f(
             _unit_float(dr.brev(_permute_low_to_high(index, hash32(seed ^ 0x68BC21EB)))),
             _unit_float(dr.brev(_permute_low_to_high(_second_dimension(index), hash32(seed ^ 0x02E5BE93)))),

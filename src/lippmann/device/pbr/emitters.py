@@ -1,4 +1,4 @@
-"""Lamps, glowing surfaces and surroundings as Mitsuba emitters."""
+"""Light sources, glowing surfaces and environments as Mitsuba emitters."""
 
 from __future__ import annotations
 
@@ -34,19 +34,19 @@ MAX_EXACT_ROWS = 512
 
 
 def light_object(light: Light) -> Emitter:
-    """The Mitsuba object of a lamp: an emitter, or a glowing sphere where the lamp has a radius.
+    """The Mitsuba object of a light source: an emitter, or a glowing sphere where it has a radius.
 
     Raises
     ------
     SceneError
-        The lamp has no direction, or a negative or infinite colour.
+        The light has no direction, or a negative or infinite colour.
     """
     import mitsuba as mi
 
     color = np.asarray(light.color, dtype=np.float64)
     name = light.name or light.kind
     if not np.all(np.isfinite(color)) or np.any(color < 0):
-        raise SceneError(f"lamp '{name}' has colour {tuple(light.color)}", rule="colours are finite and not negative")
+        raise SceneError(f"light '{name}' has colour {tuple(light.color)}", rule="colours are finite and not negative")
     position, axis = _placement(light, name)
     rgb = {"type": "rgb", "value": color.tolist()}
     if light.kind == "directional":
@@ -72,7 +72,7 @@ def _placement(light: Light, name: str) -> tuple[NDArray[np.float64], NDArray[np
     length = float(np.linalg.norm(axis))
     if not np.all(np.isfinite(matrix)) or length == 0:
         raise SceneError(
-            f"lamp '{name}' has a placement without direction", rule="its matrix must be finite and regular"
+            f"light '{name}' has a placement without direction", rule="its matrix must be finite and regular"
         )
     return matrix[:3, 3], axis / length
 
@@ -126,7 +126,7 @@ def glow(emission: Emission) -> Emitter:
 
 @dataclass(frozen=True)
 class Cone:
-    """Limits a lamp to directions near an axis: full inside ``inner`` (radians), none outside ``outer``."""
+    """Limits a light to directions near an axis: full inside ``inner`` (radians), none outside ``outer``."""
 
     axis: tuple[float, float, float]
     inner: float
@@ -166,9 +166,9 @@ def _emitter_class(variant: str) -> type[Emitter]:
     class GlowEmitter(mi.Emitter):  # type: ignore[misc, unused-ignore]
         """Area light with texture, two sides, holes or a cone.
 
-        Mitsuba's ``area`` draws points of a textured light by its texels, which goes wrong where texture coordinates
-        overlap or leave the unit square; this one draws them evenly over the surface. What depends on more than
-        texture coordinates cannot be evaluated at drawn points: such lights are found by scattered rays only.
+        Mitsuba's ``area`` samples points of a textured light by its texels, which goes wrong where texture coordinates
+        overlap or leave the unit square; this one samples them evenly over the surface. Radiance that depends on more
+        than texture coordinates cannot be evaluated at sampled points: scattered rays alone find such lights.
         """
 
         def __init__(
@@ -184,7 +184,7 @@ def _emitter_class(variant: str) -> type[Emitter]:
             covered = self.model is None or (
                 self.model.opacity is not None and self.model.opacity.follows_uv_only and not self.model.faded
             )
-            self.drawn = radiance.follows_uv_only and covered and not self.tinted
+            self.is_sampled = radiance.follows_uv_only and covered and not self.tinted
 
         def _radiance(self, si: SurfaceInteraction3f, cosine: Float, direction: Vector3f, active: Bool) -> Color3f:
             place = Place(si, active)
@@ -203,7 +203,7 @@ def _emitter_class(variant: str) -> type[Emitter]:
         def sample_direction(
             self, it: Interaction3f, sample: Point2f, active: Bool = True
         ) -> tuple[DirectionSample3f, Color3f]:
-            if not self.drawn:
+            if not self.is_sampled:
                 return dr.zeros(mi.DirectionSample3f), mi.Color3f(0)
             ds = self.get_shape().sample_direction(it, sample, active)
             ds.emitter = mi.EmitterPtr(self)
@@ -211,7 +211,7 @@ def _emitter_class(variant: str) -> type[Emitter]:
             return ds, dr.select(ds.pdf > 0, value / ds.pdf, 0)
 
         def pdf_direction(self, it: Interaction3f, ds: DirectionSample3f, active: Bool = True) -> Float:
-            if not self.drawn:
+            if not self.is_sampled:
                 return mi.Float(0)
             facing = dr.dot(ds.d, ds.n)
             pdf = self.get_shape().pdf_direction(it, ds, active)

@@ -83,7 +83,7 @@ def _bsdf_class(variant: str) -> type[BSDF]:
             opacity = None if self.model.opacity is None else self.model.coverage(place)
             u = sample1 if opacity is None else dr.minimum(sample1 / opacity, 1)
             point = surface_point(self.model, place)
-            wo, kind, possible = self._draw(point, u, sample2)
+            wo, kind, possible = self._sample_lobes(point, u, sample2)
             value, pdf = self._scatter(point, wo)
             pdf = dr.select(possible, pdf, 0)
             weight = dr.select(pdf > 0, value / pdf, 0)
@@ -155,7 +155,7 @@ def _bsdf_class(variant: str) -> type[BSDF]:
 
         # ---- scattering ----
 
-        def _draw(self, point: Point, u: Float, sample: Point2f) -> tuple[Vector3f, UInt32, Bool]:
+        def _sample_lobes(self, point: Point, u: Float, sample: Point2f) -> tuple[Vector3f, UInt32, Bool]:
             """An outgoing direction in the surface's frame, the flag of its lobe, and whether light can go there.
 
             A microfacet may send light to the wrong side of its lobe's plane; such a sample counts as absorbed.
@@ -193,18 +193,18 @@ def _bsdf_class(variant: str) -> type[BSDF]:
             return mi.Vector3f(world.x, world.y, height), kind, possible | diffuse
 
         def _scatter(self, point: Point, wo: Vector3f) -> tuple[Color3f, Float]:
-            """BSDF times cosine, and the density of :meth:`_draw`, for ``wo`` in the surface's frame."""
+            """BSDF times cosine, and the density of :meth:`_sample_lobes`, for ``wo`` in the surface's frame."""
             wo = mi.Vector3f(wo.x, wo.y, wo.z * point.flip)
             above = wo.z > 0
-            value, pdf = self._folded(point.lobe, wo, lambda way: self._body(point, way, above))
+            value, pdf = self._fold_below(point.lobe, wo, lambda way: self._body(point, way, above))
             coat = point.coat
             if coat is not None:
-                gloss, gloss_pdf = self._folded(coat.lobe, wo, lambda way: self._coat_gloss(coat.lobe, way))
+                gloss, gloss_pdf = self._fold_below(coat.lobe, wo, lambda way: self._coat_gloss(coat.lobe, way))
                 value = value * (1 - coat.weight) + (gloss * (coat.gain * coat.weight) & above)
                 pdf = dr.lerp(pdf, gloss_pdf & above, coat.chance)
             return value, pdf
 
-        def _folded(
+        def _fold_below(
             self, lobe: Lobe, wo: Vector3f, scatter: Callable[[Vector3f], tuple[Color3f, Float]]
         ) -> tuple[Color3f, Float]:
             """Value and density of a lobe, with what a tilted one sends through the surface folded back about it."""

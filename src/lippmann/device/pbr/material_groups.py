@@ -21,7 +21,7 @@ MIN_ATTENUATION = 1e-4
 #: textures of their own, but spares every frame the cost of as many plugins and shapes.
 MIN_POOLED = 8
 
-Kind = Literal["surface", "glass", "pane", "mirror", "lamp"]
+Kind = Literal["surface", "glass", "pane", "mirror", "unlit"]
 
 #: Channels that each texture is read by, apart from normal maps, which are always looked up.
 _USES: dict[str, tuple[tuple[int, ...], ...]] = {
@@ -107,7 +107,7 @@ def structure_of(m: Material, faded: bool, store: TextureStore) -> Structure:
     bare = smooth and not (clearcoat or sheen or m.normal_texture or anisotropic or iridescent)
     kind: Kind = "surface"
     if m.unlit:
-        kind = "lamp"
+        kind = "unlit"
     elif bare and metallic == 1:
         kind = "mirror"
     elif bare and metallic == 0 and transmission == 1 and plain_specular and m.ior >= 1:

@@ -86,10 +86,10 @@ class _Maker:
         model = self._model()
         makers: dict[Kind, Callable[[], BSDF]] = {
             "surface": lambda: surface_bsdf(model),
-            "lamp": lambda: surface_bsdf(_black(model)),
-            "mirror": lambda: _masked(_mirror(model), model),
-            "glass": lambda: _masked(_glass("dielectric", model, first), model),
-            "pane": lambda: _masked(_glass("thindielectric", model, first), model),
+            "unlit": lambda: surface_bsdf(_black(model)),
+            "mirror": lambda: _mask(_mirror(model), model),
+            "glass": lambda: _mask(_glass("dielectric", model, first), model),
+            "pane": lambda: _mask(_glass("thindielectric", model, first), model),
         }
         return Finish(
             bsdf=makers[self._structure.kind](),
@@ -237,7 +237,7 @@ def _glass(plugin: str, model: SurfaceModel, m: Material) -> BSDF:
     return mi.load_dict({"type": plugin, "int_ior": m.ior, "ext_ior": 1.0, "specular_transmittance": tint})
 
 
-def _masked(bsdf: BSDF, model: SurfaceModel) -> BSDF:
+def _mask(bsdf: BSDF, model: SurfaceModel) -> BSDF:
     import mitsuba as mi
 
     if model.opacity is None:

@@ -1,4 +1,4 @@
-"""Formulas of glTF's surface model: Fresnel, GGX and Charlie lobes, and how to draw directions from them.
+"""Formulas of glTF's surface model: Fresnel, GGX and Charlie lobes, and how to sample directions from them.
 
 All directions live in a local frame whose z axis is the surface normal; ``alpha`` is the GGX width along x and y, for
 isotropic surfaces the square of glTF's roughness twice. The functions take Dr.Jit arrays and are recorded into kernels.
@@ -105,7 +105,7 @@ def gloss_albedo_table(columns: int = 64, rows: int = GLOSS_ROWS, steps: int = 3
     wi, alpha, sample = _grid(columns, rows, steps)
     h = sample_visible_normal(wi, alpha, sample)
     cosine = dr.dot(wi, h)
-    weight = _reflected(wi, h, alpha)
+    weight = _reflection_weight(wi, h, alpha)
     grazing = weight * schlick_weight(cosine)
     idle = dr.zeros(mi.Float, dr.width(weight))
     return np.stack([_means(part, rows, columns) for part in (weight - grazing, grazing, idle)], axis=-1)
@@ -136,7 +136,7 @@ def _means(values: Float, rows: int, columns: int) -> NDArray[np.float32]:
     return np.array(dr.block_sum(values, steps) / steps, dtype=np.float32).reshape(rows, columns)
 
 
-def _reflected(wi: Vector3f, h: Vector3f, alpha: Point2f) -> Float:
+def _reflection_weight(wi: Vector3f, h: Vector3f, alpha: Point2f) -> Float:
     """Weight of the reflection at a sampled microfacet: G2 / G1, 0 below the surface."""
     import drjit as dr
 
@@ -159,7 +159,7 @@ def interface_albedo_table(columns: int = 32, rows: int = INTERFACE_ROWS, steps:
     wi, alpha, sample = _grid(columns, rows, steps)
     h = sample_visible_normal(wi, alpha, sample)
     cosine = dr.dot(wi, h)
-    reflected = _reflected(wi, h, alpha)
+    reflected = _reflection_weight(wi, h, alpha)
     blocks = []
     for inside in (False, True):
         for root in INTERFACE_F0:

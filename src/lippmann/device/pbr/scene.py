@@ -98,18 +98,18 @@ def build_description(description: SceneDescription, *, memory: int | None = Non
         raise SceneError(
             "the scene has no geometry", where=description.name, rule="there must be at least one triangle"
         )
-    with _timed(seconds, "materials"):
+    with _time_stage(seconds, "materials"):
         finishes = _finishes(description, list(placed))
         notes += _texture_notes(description, finishes)
-    with _timed(seconds, "shapes"):
+    with _time_stage(seconds, "shapes"):
         dressed = [(_dress(description, mesh, finishes), matrices) for mesh, matrices in placed.items()]
         available = machine.available_memory() if memory is None else memory
         shapes, shape_finishes = make_shapes(dressed, available, name=description.name)
-    with _timed(seconds, "lights"):
+    with _time_stage(seconds, "lights"):
         lights = [light_object(light) for light in description.lights if max(light.color) > 0]
         if description.environment is not None:
             lights.append(environment_object(description.environment))
-    with _timed(seconds, "acceleration"):
+    with _time_stage(seconds, "acceleration"):
         scene = _assemble(shapes, lights)
     return BuiltScene(
         mitsuba=scene,
@@ -123,7 +123,7 @@ def build_description(description: SceneDescription, *, memory: int | None = Non
 
 def _build_source(source: MitsubaSource, scene: Scene) -> BuiltScene:
     seconds: dict[str, float] = {}
-    with _timed(seconds, "load"):
+    with _time_stage(seconds, "load"):
         loaded = source.scene()
         if scene.environment is not None:
             loaded = with_sky(loaded, environment_object(scene.environment))
@@ -134,7 +134,7 @@ def _build_source(source: MitsubaSource, scene: Scene) -> BuiltScene:
 
 
 @contextmanager
-def _timed(seconds: dict[str, float], stage: str) -> Iterator[None]:
+def _time_stage(seconds: dict[str, float], stage: str) -> Iterator[None]:
     started = time.perf_counter()
     yield
     seconds[stage] = time.perf_counter() - started

@@ -85,12 +85,12 @@ def make_shapes(
     for dress, matrices in placements:
         key = _is_instantiable(dress), hashlib.sha256(np.ascontiguousarray(matrices).data).digest()
         together.setdefault(key, []).append(Piece(dress, matrices))
-    groups = {number: _copied(pieces) for number, pieces in enumerate(together.values())}
+    groups = {number: _count_copies(pieces) for number, pieces in enumerate(together.values())}
     instanced = choose_instances(groups, memory, name=name)
     merged = [piece for number, pieces in enumerate(together.values()) if number not in instanced for piece in pieces]
     shapes: list[Shape] = []
     finishes: list[Finish | None] = []
-    for shape, finish in _merged(merged):
+    for shape, finish in _merge(merged):
         shapes.append(shape)
         finishes.append(finish)
     for number, pieces in enumerate(together.values()):
@@ -106,7 +106,7 @@ def _is_instantiable(dress: Dress) -> bool:
     return dress.finish.emission is None and dress.finish.absorption is None
 
 
-def _copied(pieces: Sequence[Piece]) -> CopiedMesh:
+def _count_copies(pieces: Sequence[Piece]) -> CopiedMesh:
     meshes = [piece.dress.mesh for piece in pieces]
     return CopiedMesh(
         triangles=sum(len(mesh.faces) for mesh in meshes),
@@ -120,7 +120,7 @@ def _instances(dresses: Sequence[Dress], matrices: Matrix) -> list[Shape]:
     import mitsuba as mi
 
     local = [Piece(dress, np.eye(4)[None]) for dress in dresses]
-    group = {f"shape{number}": shape for number, (shape, _) in enumerate(_merged(local))}
+    group = {f"shape{number}": shape for number, (shape, _) in enumerate(_merge(local))}
     shapegroup = mi.load_dict({"type": "shapegroup", **group})
     places = [mi.ScalarTransform4f(np.asarray(matrix).tolist()) for matrix in matrices]
     # The scene has to hold the group, too: it is what the acceleration structure is made of.
@@ -130,7 +130,7 @@ def _instances(dresses: Sequence[Dress], matrices: Matrix) -> list[Shape]:
     ]
 
 
-def _merged(pieces: Iterable[Piece]) -> list[tuple[Shape, Finish]]:
+def _merge(pieces: Iterable[Piece]) -> list[tuple[Shape, Finish]]:
     """One shape per finish and kind of normals."""
     groups: dict[tuple[int, bool], list[Piece]] = {}
     for piece in pieces:
@@ -147,7 +147,7 @@ def _mesh_shape(pieces: Sequence[Piece]) -> Shape:
     smooth = pieces[0].dress.mesh.normals is not None
     props = mi.Properties()
     props["bsdf"] = finish.bsdf
-    if finish.emission is not None and any(_has_area(piece) for piece in pieces):  # Mitsuba draws points on it
+    if finish.emission is not None and any(_has_area(piece) for piece in pieces):  # Mitsuba samples points on it
         props["emitter"] = glow(finish.emission)
     starts = np.cumsum([0, *(piece.vertices for piece in pieces)])
     faces = np.concatenate(

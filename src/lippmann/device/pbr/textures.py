@@ -77,7 +77,7 @@ class TextureStore:
         import mitsuba as mi
 
         if self._pooled:
-            self._pool.texels = mi.UInt32(np.concatenate([_packed(self._images[key]) for key in self._pooled]))
+            self._pool.texels = mi.UInt32(np.concatenate([_pack_texels(self._images[key]) for key in self._pooled]))
             self._pool.linear = mi.Float(decode_srgb(np.arange(256) / 255).astype(np.float32))
 
     def _signal(
@@ -180,7 +180,7 @@ def _channels_of(image: Image, channels: tuple[int, ...]) -> NDArray[np.generic]
     return pixels[..., [0 if grey and channel < 3 else channel for channel in channels]]
 
 
-def _packed(image: Image) -> NDArray[np.uint32]:
+def _pack_texels(image: Image) -> NDArray[np.uint32]:
     """Texels of an 8-bit picture, red in the lowest byte; what is missing is full."""
     texels = np.full((*image.pixels.shape[:2], 4), 255, np.uint8)
     colors = image.pixels.shape[2]

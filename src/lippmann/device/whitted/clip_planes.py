@@ -30,10 +30,10 @@ class Clipping:
             for a, b, c, d in self._groups[int(group)] if group >= 0 else []:
                 kept &= a * p.x + b * p.y + c * p.z <= d
             return kept
-        return self._looked_up(group, p, active)
+        return self._look_up(group, p, active)
 
     @dr.syntax
-    def _looked_up(self, group: Float, p: Point3f, active: Bool) -> Bool:
+    def _look_up(self, group: Float, p: Point3f, active: Bool) -> Bool:
         slot = mi.UInt32(mi.Int32(group) + 1)
         plane = dr.gather(mi.UInt32, self._starts, slot, active)
         end = plane + dr.gather(mi.UInt32, self._sizes, slot, active)

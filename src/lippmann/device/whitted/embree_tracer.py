@@ -124,10 +124,10 @@ class EngineTracer:
         if not (self._airy and self._on_gpu) and self._solid is not None:
             ray = mi.Ray3f(mi.Point3f(o), mi.Vector3f(d), t, 0, [])
             light = dr.select(self._solid.ray_test(ray, coherent=False, active=light > 0), 0, light)
-        return self._filtered(o, d, t, light) if self._airy else light
+        return self._filter_light(o, d, t, light) if self._airy else light
 
     @dr.syntax
-    def _filtered(self, o: Point3f, d: Vector3f, t: Float, light: Float) -> Float:
+    def _filter_light(self, o: Point3f, d: Vector3f, t: Float, light: Float) -> Float:
         """Light past each surface in turn."""
         start = mi.Float(0)
         crossed = mi.UInt32(0)

@@ -141,12 +141,12 @@ class Geometry:
         u, v = hit.uv.x, hit.uv.y
         n = face
         if self._smooth:
-            n = dr.normalize(_interpolated(self._normals, hit.index, u, v, active))
+            n = dr.normalize(_interpolate(self._normals, hit.index, u, v, active))
         n = dr.select(dr.dot(face, d) > 0, -n, n)
         color, colored = mi.Color3f(0), mi.Bool(False)
         if self._colored:
             colored = rest.y > 0
-            color = mi.Color3f(_interpolated(self._colors, hit.index, u, v, active & colored))
+            color = mi.Color3f(_interpolate(self._colors, hit.index, u, v, active & colored))
         lift = _LIFT * dr.maximum(rest.z, dr.max(dr.abs(p)))
         return Surface(p, n, face, lift, mi.UInt32(rest.x), color, colored)
 
@@ -228,6 +228,6 @@ def _corner_table(values: Numbers) -> Float:
     return mi.Float(rows.ravel())
 
 
-def _interpolated(table: Float, index: UInt32, u: Float, v: Float, active: Bool) -> Vector3f:
+def _interpolate(table: Float, index: UInt32, u: Float, v: Float, active: Bool) -> Vector3f:
     a, b, c = (xyz(dr.gather(mi.Vector4f, table, 3 * index + corner, active)) for corner in range(3))
     return a * (1 - u - v) + b * u + c * v

@@ -98,17 +98,17 @@ class ShapeTable:
 
 def make_shape_table(scene: ClassicScene) -> ShapeTable:
     """All exact shapes of a scene; triangles are none."""
-    bounded, boxes = _joined(
+    bounded, boxes = _join(
         scene,
         (scene.spheres, _spheres(scene.spheres)),
         (scene.tubes, _tubes(scene.tubes)),
         (scene.rings, _rings(scene.rings)),
         (scene.boxes, _boxes(scene.boxes)),
     )
-    unbounded, _ = _joined(scene, (scene.cylinders, _cylinders(scene.cylinders)), (scene.planes, _planes(scene.planes)))
+    unbounded, _ = _join(scene, (scene.cylinders, _cylinders(scene.cylinders)), (scene.planes, _planes(scene.planes)))
     huge = _huge(scene, bounded, boxes)
     bounded[huge, Column.KIND], bounded[huge, Column.K1] = Kind.HUGE_SPHERE, np.sqrt(bounded[huge, Column.K0])
-    traced = _traced(bounded)
+    traced = _choose_traced(bounded)
     others, other_boxes = bounded[~traced & ~huge], boxes[~traced & ~huge]
     apart = len(others) > MOST_LISTED_SHAPES
     unbounded = np.concatenate([bounded[huge], unbounded])
@@ -135,7 +135,7 @@ def passing(scene: ClassicScene) -> Numbers:
     return np.array(shares or [0.0])
 
 
-def _traced(rows: Numbers) -> NDArray[np.bool_]:
+def _choose_traced(rows: Numbers) -> NDArray[np.bool_]:
     """Which rows are spheres for the engine to trace: solid, unclipped, seen from both sides."""
     plain = (rows[:, Column.KIND] == Kind.SPHERE) & (rows[:, Column.CLIP] < 0) & (rows[:, Column.INSIDE] == 0)
     plain &= rows[:, Column.PASSES] == 0
@@ -153,7 +153,7 @@ def _huge(scene: ClassicScene, rows: Numbers, boxes: Numbers) -> NDArray[np.bool
     return np.asarray((rows[:, Column.KIND] == Kind.SPHERE) & (radii > HUGE * smallest))
 
 
-def _joined(scene: ClassicScene, *parts: tuple[Batch, Numbers]) -> tuple[Numbers, Numbers]:
+def _join(scene: ClassicScene, *parts: tuple[Batch, Numbers]) -> tuple[Numbers, Numbers]:
     """Rows of all parts with material, clip group and light that passes, and the boxes of those that have an end."""
     shares = passing(scene)
     boxes = [np.zeros((0, 2, 3))]

@@ -271,12 +271,12 @@ def lattice() -> NDArray[np.int32]:
     value stands in.
     """
     count = _NOISE_SIDE**3
-    drawn = np.empty(count)
+    uniform = np.empty(count)
     state = _NOISE_SEED
     for number in range(count):
         state = state * _NOISE_MULTIPLIER % 2**32
-        drawn[number] = state / 2**32
-    values = (drawn * _NOISE_HIGHEST).astype(np.int32).reshape(_NOISE_SIDE, _NOISE_SIDE, _NOISE_SIDE)
+        uniform[number] = state / 2**32
+    values = (uniform * _NOISE_HIGHEST).astype(np.int32).reshape(_NOISE_SIDE, _NOISE_SIDE, _NOISE_SIDE)
     for axis in range(3):
         np.moveaxis(values, axis, 0)[-1] = np.moveaxis(values, axis, 0)[0]
     flat = values.ravel()

@@ -35,7 +35,7 @@ def even_background(built: BuiltScene | BuiltClassic, request: RenderRequest) ->
 
 
 def scene_corners(built: BuiltScene, display_from_world: NDArray[np.float64]) -> NDArray[np.float64]:
-    """``(8, 3)`` corners in mm of a box that holds everything which a ray can meet, lamps included."""
+    """``(8, 3)`` corners in mm of a box that holds everything which a ray can meet, light sources included."""
     box = built.mitsuba.bbox()
     low, high = np.array(box.min, dtype=np.float64), np.array(box.max, dtype=np.float64)
     corners = np.array(list(itertools.product(*zip(low, high, strict=True))))

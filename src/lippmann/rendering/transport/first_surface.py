@@ -227,11 +227,11 @@ class WhittedSurfaces:
 
     def first_hit(self, ray: Ray3f) -> SurfaceHit:
         """The first surface that ``ray`` hits."""
-        return self._first_hit(self._turned(mi.Vector3f(ray.o)), self._turned(mi.Vector3f(ray.d)))
+        return self._first_hit(self._mirror(mi.Vector3f(ray.o)), self._mirror(mi.Vector3f(ray.d)))
 
     def features(self, ray: Ray3f) -> tuple[Color3f, Normal3f, Float]:
         """As :meth:`Surfaces.features`, of the first surface whatever it is."""
-        o, d = self._turned(mi.Vector3f(ray.o)), self._turned(mi.Vector3f(ray.d))
+        o, d = self._mirror(mi.Vector3f(ray.o)), self._mirror(mi.Vector3f(ray.d))
         first = self._first_hit(o, d)
         behind = dr.clip(background_color(self._built.scene.background, o, d), 0, 1)
         distance = dr.select(first.hit, dr.norm(mi.Point3f(first.p) - mi.Point3f(ray.o)), ENVIRONMENT_DISTANCE)
@@ -256,12 +256,12 @@ class WhittedSurfaces:
         single = closest.index - self._triangles + self._materials
         return SurfaceHit(
             hit,
-            dr.select(hit, mi.Point3f(self._turned(dr.select(is_light, p, mi.Vector3f(surface.p)))), 0),
-            dr.select(hit, self._turned(n), 0),
+            dr.select(hit, mi.Point3f(self._mirror(dr.select(is_light, p, mi.Vector3f(surface.p)))), 0),
+            dr.select(hit, self._mirror(n), 0),
             dr.select(on_surface, dr.clip(color, 0, 1), 0),
             dr.select(closest.index < self._triangles, surface.material, single),
         )
 
-    def _turned(self, v: Vector3f) -> Vector3f:
+    def _mirror(self, v: Vector3f) -> Vector3f:
         """``v`` from the right-handed world to the scene's own frame, or back."""
         return mi.Vector3f(v.x, v.y, -v.z) if self._mirrored else v

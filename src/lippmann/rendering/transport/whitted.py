@@ -60,7 +60,7 @@ class WhittedIntegrator:
         self.depth = depth
         self._built = built
         self._scene = built.scene
-        self._mirrored = built.scene.handedness == "left"
+        self._mirror = built.scene.handedness == "left"
         self._nff = built.scene.rules == "nff"
         shading = built.scene.shading
         self._plain = shading.mode in ("low", "lowest")
@@ -82,8 +82,8 @@ class WhittedIntegrator:
         Surfaces with reflection, transmission, a highlight or an outline are view-dependent.
         """
         o, d = mi.Vector3f(ray.o), mi.Vector3f(ray.d)
-        if self._mirrored:
-            o, d = _mirrored(o), _mirrored(d)
+        if self._mirror:
+            o, d = _mirror(o), _mirror(d)
         active = mi.Bool(active)
         surfaces = mi.UInt32(self._scene.shading.max_transparent_surfaces or 0)
         primary = _Ray(o, d, mi.Float(1), mi.UInt32(self.depth), mi.Float(0), surfaces)
@@ -152,7 +152,7 @@ class WhittedIntegrator:
             if shading.mode == "lowest":
                 color, light_color, background = mi.Color3f(1), mi.Color3f(1), mi.Color3f(0)
             radiance = dr.select(on_surface, color, dr.select(is_light, light_color, background))
-            return radiance * ray.weight, mi.UInt32(0), mi.Bool(False), (_dropped(ray), _dropped(ray))
+            return radiance * ray.weight, mi.UInt32(0), mi.Bool(False), (_drop_throughput(ray), _drop_throughput(ray))
 
         local, glossy, shadow = built.shader.light(surface, finish, color, ray.d, stream, hits, on_surface)
         skipped = mi.Bool(False)
@@ -168,7 +168,7 @@ class WhittedIntegrator:
 
         direction = ray.d
         if self._nff:
-            direction, total = _refracted(surface, finish, ray.d)
+            direction, total = _refract(surface, finish, ray.d)
             reflected_share += dr.select(total, transmitted_share, 0)
             transmitted_share = dr.select(total, 0, transmitted_share)
         transmitted_share = dr.select(skipped, 1, transmitted_share)
@@ -223,7 +223,7 @@ class WhittedIntegrator:
 _RASTER3D_PI = 3.1415926
 
 
-def _mirrored(v: Vector3f) -> Vector3f:
+def _mirror(v: Vector3f) -> Vector3f:
     return mi.Vector3f(v.x, v.y, -v.z)
 
 
@@ -240,7 +240,7 @@ def _distance(hit: Hit, active: Bool) -> Float:
     return dr.select(active & (hit.index != NONE), hit.t, dr.inf)
 
 
-def _dropped(ray: _Ray) -> _Ray:
+def _drop_throughput(ray: _Ray) -> _Ray:
     return _Ray(ray.o, ray.d, mi.Float(0), ray.depth, ray.path, ray.surfaces)
 
 
@@ -248,7 +248,7 @@ def _either(condition: Bool, a: _Ray, b: _Ray) -> _Ray:
     return _Ray(*(dr.select(condition, getattr(a, f.name), getattr(b, f.name)) for f in fields(_Ray)))
 
 
-def _refracted(surface: Surface, finish: Finish, d: Vector3f) -> tuple[Vector3f, Bool]:
+def _refract(surface: Surface, finish: Finish, d: Vector3f) -> tuple[Vector3f, Bool]:
     """Direction of the refracted ray by Snell's law, and whether there is total internal reflection instead."""
     ratio = dr.select(dr.dot(surface.face, d) < 0, dr.rcp(finish.ior), finish.ior)
     cosine = -dr.dot(surface.n, d)
