@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from lippmann.errors import MemoryLimitError
 from lippmann.rendering.film.memory_model import BYTES_PER_LANE, PICTURE
-from lippmann.rendering.film.wavefront_plan import make_plan
+from lippmann.rendering.film.wavefront_plan import cut_batches, equal_length, make_plan
 
 
 @settings(deadline=None, max_examples=60)
@@ -47,3 +47,34 @@ def test_an_8k_picture_of_four_samples_fits_two_gigabytes():
 def test_too_little_memory_says_how_much_is_needed():
     with pytest.raises(MemoryLimitError, match=r"memory: .* too small .* it needs \d+ MiB; raise the limit"):
         make_plan(4096, 4096, 1, memory=2**20)
+
+
+@given(total=st.integers(1, 10**6), most=st.integers(-3, 10**6))
+def test_equal_parts_are_few_and_no_longer_than_allowed(total, most):
+    length = equal_length(total, most)
+    assert 1 <= length <= max(1, min(total, most))
+    parts = -(-total // length)
+    assert parts == -(-total // max(1, min(total, most)))
+    assert length * parts - total < parts  # no part is shorter than the others by more than the rest of the division
+
+
+@settings(max_examples=200)
+@given(
+    pixels=st.integers(1, 40),
+    starts=st.lists(st.integers(0, 9), min_size=1, max_size=5),
+    count=st.integers(1, 12),
+    lanes=st.integers(1, 300),
+)
+def test_every_sample_of_every_batch_once(pixels, starts, count, lanes):
+    batches = tuple(range(len(starts)))
+    seen = [
+        (pixel, batch, start + sample)
+        for run in cut_batches(pixels, batches, tuple(starts), count, lanes)
+        for pixel in range(run.first, run.last)
+        for batch, start in zip(run.batches, run.starts, strict=True)
+        for sample in range(run.count)
+    ]
+    expected = [(p, b, starts[b] + s) for p in range(pixels) for b in batches for s in range(count)]
+    assert sorted(seen) == sorted(expected)
+    for run in cut_batches(pixels, batches, tuple(starts), count, lanes):
+        assert (run.last - run.first) * len(run.batches) * run.count <= lanes

@@ -35,7 +35,7 @@ Integrator = Annotated[
     choices.Integrator,
     typer.Option(
         "--integrator",
-        help="path (all light), direct (light sources and sky only), classic (light of Tachyon and NFF scenes), or normal, "
+        help="path (all light), direct (emitters and sky only), classic (light of Tachyon and NFF scenes), or normal, "
         "depth, position, albedo. By default what the scene was made for.",
     ),
 ]

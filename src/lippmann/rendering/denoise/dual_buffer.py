@@ -15,8 +15,8 @@ be what they show, whatever a denoiser does. The other half has a say in both, b
 so that it can still judge.
 
 Errors are small and the curve of the codes is taken as straight, but for pixels that the denoiser made far brighter
-than the samples show, as it does beside emitters: where that is beyond white, the curve is cut off, and in the dark it is
-steep. There the step of the code from what the samples show counts.
+than the samples show, as it does beside emitters: where that is beyond white, the curve is cut off, and in the dark it
+is steep. There the step of the code from what the samples show counts.
 """
 
 from __future__ import annotations

@@ -24,8 +24,8 @@ Floats = NDArray[np.float32]
 
 #: How far the neighbourhood reaches, in pixels to each side: in a smaller one the sum rarely says anything for sure.
 REACH = 32
-#: Standard deviations that the sum must exceed. With one a room in which few paths find the emitter lost up to 1 dB: where
-#: none has found it, what is too dark seems to be right.
+#: Standard deviations that the sum must exceed. With one a room in which few paths find the emitter lost up to 1 dB:
+#: where none has found it, what is too dark seems to be right.
 _DEVIATIONS = 3.0
 #: Both are alike: then there is nothing to choose.
 _NOTHING = 1e-12

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 
 import drjit as dr
 import mitsuba as mi
@@ -27,6 +26,7 @@ from lippmann.rendering.estimate.jackknife import error_of_batches
 from lippmann.rendering.estimate.pixel_errors import OWN_NOISE, PixelErrors
 from lippmann.rendering.film import memory_model
 from lippmann.rendering.film.wavefront import Frame, RayTotals, compile_seconds, divide, evaluated
+from lippmann.rendering.film.wavefront_plan import Run, cut_batches
 from lippmann.rendering.transport.integrator import Integrator
 from lippmann.rendering.transport.ray_source import RaySource, pixel_number
 
@@ -43,21 +43,6 @@ _PROBE_SIZES, _PROBE_SECONDS = (1 << 14, 1 << 16, 1 << 18), 0.05
 _LAUNCH_SIZE = 64
 #: Seeds of the streams: the user's, each changed by another odd multiple of the golden ratio's 32 bits.
 SEED_STEP = 0x9E3779B9
-
-
-@dataclass(frozen=True)
-class _Run:
-    """One wavefront: ``count`` samples in each of ``batches`` for the pixels ``first`` to ``last``.
-
-    ``starts``: the number of the first sample of each batch in its stream. ``step``: from pixel to pixel.
-    """
-
-    first: int
-    last: int
-    batches: tuple[int, ...]
-    starts: tuple[int, ...]
-    count: int
-    step: int = 1
 
 
 class FullInBatches:
@@ -177,7 +162,7 @@ class FullInBatches:
         """Of one sample of each of so many pixels, if the picture has them."""
         pixels = min(pixels, self._sums.shape[1])
         started = time.perf_counter()
-        self._trace(_Run(0, pixels, (0,), (0,), 1, self._sums.shape[1] // pixels))
+        self._trace(Run(0, pixels, (0,), (0,), 1, self._sums.shape[1] // pixels))
         return time.perf_counter() - started
 
     def picture(self) -> Floats:
@@ -217,7 +202,7 @@ class FullInBatches:
         """``(batches, pixels, 3)``: the sums of what the picture shows."""
         return self._sums
 
-    def _runs(self, samples: int) -> Iterator[_Run]:
+    def _runs(self, samples: int) -> Iterator[Run]:
         """Wavefronts that take ``samples`` more of every pixel."""
         number = len(self._sums)
         per_stream = number // STREAMS
@@ -232,27 +217,10 @@ class FullInBatches:
                 starts.append(had[batch // per_stream])
                 had[batch // per_stream] += count
             if batches and count:
-                yield from self._cut(batches, tuple(starts), count)
+                pixels, lanes = self._sums.shape[1], self._lanes // self._source.channels
+                yield from cut_batches(pixels, batches, tuple(starts), count, lanes)
 
-    def _cut(self, batches: tuple[int, ...], starts: tuple[int, ...], count: int) -> Iterator[_Run]:
-        """The same work in wavefronts of about equally many lanes."""
-        pixels, lanes = self._sums.shape[1], self._lanes // self._source.channels
-        per_run = max(1, min(pixels, lanes // (count * len(batches)) or lanes // count or lanes))
-        per_run = -(-pixels // -(-pixels // per_run))
-        together = max(1, min(len(batches), lanes // (per_run * count)))
-        length = max(1, min(count, lanes // per_run))
-        for first in range(0, pixels, per_run):
-            for b in range(0, len(batches), together):
-                for before in range(0, count, length):
-                    yield _Run(
-                        first,
-                        min(first + per_run, pixels),
-                        batches[b : b + together],
-                        tuple(start + before for start in starts[b : b + together]),
-                        min(length, count - before),
-                    )
-
-    def _trace(self, run: _Run) -> Floats:
+    def _trace(self, run: Run) -> Floats:
         """Sums over the samples of a run, ``(pixels, batches of the run, 3)``.
 
         Lanes are ordered pixel, then channel, then batch, then sample. What differs from run to run is opaque to the

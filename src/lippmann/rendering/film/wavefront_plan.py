@@ -1,7 +1,8 @@
 """Cutting a picture into pieces of work that fit the memory.
 
 A tile is a band of whole rows; a pass is a run of samples of every pixel in it. Tile and pass together make one
-wavefront. All bands of a plan but the last are equally tall, so that one compiled kernel serves them all.
+wavefront. A run is a wavefront of a picture whose samples are gathered in batches: some pixels, some samples of some
+batches. Wavefronts of a picture are about equally large, so that one compiled kernel serves them all.
 """
 
 from __future__ import annotations
@@ -27,6 +28,21 @@ class Pass:
 
     first: int
     count: int
+
+
+@dataclass(frozen=True)
+class Run:
+    """One wavefront of batches: ``count`` samples in each of ``batches`` for the pixels ``first`` to ``last``.
+
+    ``starts``: the number of the first sample of each batch in its stream. ``step``: from pixel to pixel.
+    """
+
+    first: int
+    last: int
+    batches: tuple[int, ...]
+    starts: tuple[int, ...]
+    count: int
+    step: int = 1
 
 
 @dataclass(frozen=True)
@@ -87,10 +103,42 @@ def make_plan(
     needed = max(row_lanes, min(SMALLEST_LANES, row_lanes * height * samples))
     most = lanes_within(memory, kept + width * height * PICTURE, needed, f"{width}x{height} pixels", preferred_lanes)
     most = max(most, row_lanes)
-    run = max(1, min(samples, most // row_lanes))
-    passes = -(-samples // run)
-    run = -(-samples // passes)  # equal passes, so that the last is not a stub with a kernel of its own
-    rows = max(1, min(height, most // (row_lanes * run)))
-    bands = -(-height // rows)
-    rows = -(-height // bands)
+    run = equal_length(samples, most // row_lanes)
+    rows = equal_length(height, most // (row_lanes * run))
     return Plan(width, height, channels, samples, rows, run)
+
+
+def cut_batches(
+    pixels: int, batches: tuple[int, ...], starts: tuple[int, ...], count: int, lanes: int
+) -> Iterator[Run]:
+    """Divide ``count`` samples of each of ``batches`` for all pixels into wavefronts of at most about ``lanes`` lanes.
+
+    Parameters
+    ----------
+    starts:
+        Number of the first sample of each batch in its stream.
+    lanes:
+        Lanes of one colour channel.
+    """
+    per_run = equal_length(pixels, lanes // (count * len(batches)) or lanes // count or lanes)
+    together = max(1, min(len(batches), lanes // (per_run * count)))
+    length = max(1, min(count, lanes // per_run))
+    for first in range(0, pixels, per_run):
+        for batch in range(0, len(batches), together):
+            for before in range(0, count, length):
+                yield Run(
+                    first,
+                    min(first + per_run, pixels),
+                    batches[batch : batch + together],
+                    tuple(start + before for start in starts[batch : batch + together]),
+                    min(length, count - before),
+                )
+
+
+def equal_length(total: int, most: int) -> int:
+    """Length of the fewest equal parts of ``total`` that are not longer than ``most`` (taken for 1 if less).
+
+    Equal parts, so that the last is not a stub with a kernel of its own.
+    """
+    parts = -(-total // max(1, min(total, most)))
+    return -(-total // parts)
