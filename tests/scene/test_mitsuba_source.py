@@ -163,14 +163,52 @@ def test_outside_files_need_leave(save, tmp_path):
     load_scene(path, allow_outside=True)
 
 
-def test_the_engine_has_to_run_first(save):
+def test_whoever_asks_for_cameras_starts_the_engine(save):
     code = (
-        "from lippmann.scene.readers.load import load_scene\nfrom lippmann.errors import EngineError\n"
-        f"scene = load_scene({str(save(EMITTER))!r})\n"
-        "try:\n    scene.bounds\nexcept EngineError as error:\n    print(error)"
+        "from lippmann.scene.readers.load import load_scene\n"
+        f"scene = load_scene({str(save(EMITTER + CAMERA))!r})\n"
+        "print([camera.name for camera in scene.cameras], scene.bounds.tolist())"
     )
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert "the engine has not been started" in run.stdout
+    assert run.stdout == "['eye'] [[-1.0, -1.0, -1.0], [1.0, 1.0, 1.0]]\n"
+
+
+def test_a_scene_that_brings_a_sensor_is_placed_by_it(save, engine):
+    import mitsuba as mi
+
+    with_sensor, without = load_scene(save(EMITTER + CAMERA)), load_scene(save(EMITTER, "plain.xml"))
+    assert (with_sensor.display_camera, without.display_camera) == ("eye", None)
+    parts = {"type": "scene", "body": {"type": "cube"}}
+    assert load_scene(parts).display_camera is None
+    assert load_scene({**parts, "view": {"type": "thinlens", "aperture_radius": 0.1}}).display_camera == "view"
+    assert load_scene({**parts, "view": mi.load_dict({"type": "orthographic"})}).display_camera == "view"
+    assert load_scene(mi.load_dict({**parts, "view": {"type": "perspective"}})).display_camera == "view"
+    assert load_scene(mi.load_dict(parts)).display_camera is None
+    assert load_scene(save(EMITTER + '<sensor type="irradiancemeter"/>', "meter.xml")).display_camera is None
+
+
+@pytest.mark.parametrize("scale", [(3.0, 3.0), (2.0, 1.0)])
+def test_an_orthographic_sensor_with_a_scale_sees_what_mitsuba_sees(save, engine, scale):
+    from lippmann import api
+
+    x, y = scale
+    sensor = (
+        f'<sensor type="orthographic"><transform name="to_world"><scale x="{x}" y="{y}"/>'
+        '<lookat origin="0,0,5" target="0,0,0" up="0,1,0"/></transform>'
+        '<film type="hdrfilm"><integer name="width" value="64"/><integer name="height" value="96"/></film></sensor>'
+    )
+    square = '<shape type="rectangle"><emitter type="area"><rgb name="radiance" value="3"/></emitter></shape>'
+    import mitsuba as mi
+
+    scene = load_scene(save(square + sensor))
+    loaded = scene.description.scene()
+    reference = np.array(mi.render(loaded, integrator=mi.load_dict({"type": "path"}), spp=64))
+    (camera,) = scene.cameras
+    width = 96 * camera.aspect  # our pixels are square
+    ours = api.preview(scene, (round(width), 96), spp=16).pixels
+    lit = (reference[..., 0] > 1.5).mean(), (ours[..., 0] > 1.5).mean()
+    assert lit[1] == pytest.approx(lit[0], abs=0.02)
+    assert lit[0] == pytest.approx(4 / (4 * x * y * 1.5), abs=0.02)
 
 
 def test_a_source_is_a_plain_value():

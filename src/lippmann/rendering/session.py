@@ -103,7 +103,7 @@ class Session:
             display,
             cameras=scene.cameras,
             options=placement,
-            home_camera=scene.home_camera,
+            home_camera=scene.display_camera,
             bounds_in=scene.bounds_in,
         )
 

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.errors import EngineError, SceneError
+from lippmann.errors import SceneError
 from lippmann.runtime.engine_lock import exclusive
 from lippmann.scene.mitsuba_plugins import check_plugins_of
 from lippmann.scene.mitsuba_xml import MitsubaXml, read_mitsuba_xml
@@ -51,7 +51,7 @@ class MitsubaSource:
         Raises
         ------
         EngineError
-            The engine has not been started.
+            The engine cannot be started.
         SceneError
             Mitsuba refuses the scene, or a loaded one belongs to another variant.
         """
@@ -151,13 +151,14 @@ def with_sky(scene: mi.Scene, sky: mi.Emitter) -> mi.Scene:
 
 
 def _variant() -> str:
+    """The variant that runs; the engine is started by itself where none does."""
     import sys
+
+    from lippmann.runtime import engine
 
     mitsuba = sys.modules.get("mitsuba")
     variant = mitsuba.variant() if mitsuba is not None else None
-    if not isinstance(variant, str):
-        raise EngineError("the engine has not been started", fix="call lippmann.runtime.engine.start() first")
-    return variant
+    return variant if isinstance(variant, str) else engine.start().variant
 
 
 def _camera(sensor: mi.Sensor, name: str) -> Camera | None:
@@ -173,9 +174,9 @@ def _camera(sensor: mi.Sensor, name: str) -> Camera | None:
         fov_y = float(2.0 * np.arctan(half_width / aspect))
         return Camera(name, world_from_camera, fov_y=fov_y, aspect=aspect, focus_distance=focus)
     if "Orthographic" in sensor.class_name():
-        # The picture spans [-1, 1] across, in units of the transform's own scale.
-        height_in_world = 2.0 * float(np.linalg.norm(world_from_camera[:3, 0])) / aspect
-        return Camera(name, world_from_camera, height=height_in_world, aspect=aspect)
+        # The picture spans [-1, 1] across, in units of the transform's own scale along each axis.
+        across, up = (float(np.linalg.norm(world_from_camera[:3, axis])) for axis in (0, 1))
+        return Camera(name, world_from_camera, height=2.0 * up / aspect, aspect=aspect * across / up)
     return None
 
 

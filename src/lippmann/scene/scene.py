@@ -43,7 +43,7 @@ class Scene:
     ``studio`` says whether the built-in studio may light a scene that has no lights.
 
     A scene from Mitsuba knows its ``bounds``, ``cameras``, ``lights`` and hence ``environment``, ``background`` and
-    ``notes`` only once the engine has started: asked before, they raise :class:`EngineError`.
+    ``notes`` only once the engine has started: asked before, they start it.
     """
 
     name: str
@@ -103,6 +103,16 @@ class Scene:
         if isinstance(self.description, MitsubaSource):
             return self.description.cameras()
         return tuple(self.description.cameras)
+
+    @property
+    def display_camera(self) -> str | None:
+        """Name of the camera that places a display where nothing else is said; None: the scene is fitted.
+
+        That is the home camera, and for a scene of Mitsuba's the first sensor that it brings.
+        """
+        if self.home_camera is not None or not isinstance(self.description, MitsubaSource):
+            return self.home_camera
+        return self.cameras[0].name if self.cameras else None
 
     @cached_property
     def has_lights(self) -> bool:

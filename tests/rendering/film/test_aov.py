@@ -215,7 +215,7 @@ def test_placements_of_a_mesh_kept_once_are_shapes_of_their_own():
     mesh = Mesh("ball", ball.vertices.astype(np.float32), ball.faces.astype(np.uint32), 0)
     places = [WORLD_FROM_DISPLAY @ [[1, 0, 0, x], [0, 1, 0, 0], [0, 0, 1, -3], [0, 0, 0, 1]] for x in (-5.0, 5.0)]
     scene = SceneDescription("balls", [mesh], [Material()], [Instance(0, place) for place in places])
-    built = build_description(scene, memory=6 << 20)  # two of them would not fit
+    built = build_description(scene, memory=4 << 20)  # two of them would not fit
     assert len(built.mitsuba.shapes()) == 2  # the mesh itself is kept once, out of sight
     layers = traced(built)
     seen, x = layers["shape"] >= 0, layers["position"][..., 0]

@@ -256,7 +256,14 @@ class CameraRays:
         else:
             half = (self.camera.height or 2.0) / 2
             origin, direction = (x * half, y * half, zero), (zero, zero, zero - 1)
-        return world_ray(np.asarray(self.camera.world_from_camera, dtype=np.float64), origin, direction)
+        return world_ray(_without_scale(self.camera.world_from_camera), origin, direction)
+
+
+def _without_scale(world_from_camera: Matrix) -> Matrix:
+    """The frame of a camera: a file's nodes may carry scales, but its field is told in world units."""
+    matrix = np.array(world_from_camera, dtype=np.float64)
+    matrix[:3, :3] /= np.linalg.norm(matrix[:3, :3], axis=0)
+    return matrix
 
 
 def world_ray(
