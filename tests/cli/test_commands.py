@@ -68,6 +68,15 @@ def test_single_scattering_darkens_rough_metal_and_is_told(lippmann, tmp_path, e
     assert means[1] < 0.95 * means[0]
 
 
+def test_an_empty_picture_is_told(lippmann, tmp_path, engine):
+    words = ("render", "teapot", "--spp", 1, "--place", "fit", "-o", tmp_path / "a.png")
+    done = lippmann(*words, "--shift", "500,0,0")
+    assert done.code == 0
+    assert "the picture is nearly empty (nothing)" in done.err
+    assert any("nearly empty" in note for note in read_picture(tmp_path / "a.png").provenance.notes)
+    assert "empty" not in lippmann(*words).err
+
+
 def test_quiet_says_nothing(lippmann, tmp_path, engine):
     done = lippmann("render", "teapot", "--integrator", "normal", "--spp", 1, "-q", "-o", tmp_path / "a.png")
     assert (done.code, done.out, done.err) == (0, "", "")

@@ -379,3 +379,22 @@ def test_options_that_cannot_be(fields, message):
 def test_scenes_without_extent(mode, bounds, message):
     with pytest.raises(SceneError, match=message):
         place(bounds, display(), options=options(mode=mode))
+
+
+@pytest.mark.parametrize(("thin", "said"), [(0, "side"), (1, "top")])
+def test_a_flat_scene_seen_edge_on_is_turned(thin, said):
+    size = np.array([20.0, 30.0, 40.0])
+    size[thin] = 1e-9
+    bounds = np.stack([-size / 2, size / 2])
+    placement = place(bounds, display())
+    assert any(f"turned to show its {said}" in warning for warning in placement.warnings)
+    assert placement.depth_range[1] - placement.depth_range[0] < 1e-6
+    normal = np.linalg.inv(placement.world_from_display)[:3, thin]
+    np.testing.assert_allclose(normal / np.linalg.norm(normal), (0, 0, 1), atol=1e-9)
+    turned = place(bounds, display(), options=PlacementOptions(turn=(0.0, 0.0, 90.0)))
+    assert not any("edge-on" in warning for warning in turned.warnings)
+
+
+def test_a_flat_scene_seen_from_its_face_stays():
+    bounds = np.array([[-10.0, -15.0, 0.0], [10.0, 15.0, 1e-9]])
+    assert not place(bounds, display()).warnings

@@ -11,10 +11,12 @@ from lippmann.scene.scene import (
     STUDIO_NOTE,
     Scene,
     bounds_of,
+    box_corners,
     check_description,
     find_camera,
     framing_camera,
     override_light,
+    thin_axis,
 )
 from lippmann.scene.studio_light import BACKDROP, studio
 from lippmann.scene.values.description import Camera, Environment, Instance, Light, Material, Mesh, SceneDescription
@@ -191,3 +193,23 @@ def test_bounds_in_another_frame_are_those_of_the_vertices():
     scene = Scene("triangle", describe())
     corners = np.array([[0, 0, 0], [2, 0, 0], [0, 1, 0]]) @ eighth[:3, :3].T + eighth[:3, 3]
     assert scene.bounds_in(eighth) == pytest.approx(np.stack([corners.min(axis=0), corners.max(axis=0)]))
+
+
+@pytest.mark.parametrize(("thin", "toward"), [(0, (1, 0, 0)), (1, (0, 1, 0)), (2, (0, 0, 1))])
+def test_a_flat_scene_is_framed_from_its_face(thin, toward):
+    size = np.array([2.0, 3.0, 4.0])
+    size[thin] = 0.0
+    bounds = np.stack([-size / 2, size / 2]) + np.array([1.0, -2.0, 0.5])
+    camera = framing_camera(bounds)
+    frame = camera.world_from_camera
+    np.testing.assert_allclose(frame[:3, 2], toward, atol=1e-12)
+    assert np.linalg.det(frame[:3, :3]) == pytest.approx(1.0)
+    corners = (box_corners(bounds) - frame[:3, 3]) @ frame[:3, :3]
+    assert (np.abs(corners[:, :2]) / -corners[:, 2:] <= np.tan(camera.fov_y / 2)).all()
+    assert thin_axis(bounds) == (None if thin == 2 else thin)
+
+
+def test_scenes_with_a_depth_are_framed_from_the_front():
+    for size in ((2.0, 3.0, 4.0), (0.1, 3.0, 4.0), (0.0, 0.0, 2.0), (0.0, 1.0, 0.001)):
+        bounds = np.stack([-np.array(size) / 2, np.array(size) / 2])
+        np.testing.assert_allclose(framing_camera(bounds).world_from_camera[:3, 2], (0, 0, 1))

@@ -18,6 +18,7 @@ from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.rendering.denoise.oidn import load_denoiser
 from lippmann.rendering.estimate.psnr import Estimate
 from lippmann.rendering.film.wavefront_plan import make_plan
+from lippmann.rendering.request.region_of_interest import even_background
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.runtime import engine as engines
 from lippmann.runtime import machine
@@ -129,11 +130,15 @@ class Session:
         method: str | None = None,
         estimate: Estimate | None = None,
         notes: tuple[str, ...] = (),
+        has_pixels: bool = True,
     ) -> Provenance:
-        """How a picture of ``frame`` was made, for its file; ``method`` is the request's where it is None."""
+        """How a picture of ``frame`` was made, for its file; ``method`` is the request's where it is None.
+
+        ``has_pixels`` says that the frame holds the picture, not its size alone.
+        """
         request = self.request
         height, width = frame.pixels.shape[:2]
-        rays = frame.rays
+        rays, work = frame.rays, height * width * samples * request.channels
         return Provenance(
             method=method or request.method,
             integrator=request.integrator,
@@ -145,14 +150,24 @@ class Session:
             transfer=request.transfer,
             version=VERSION,
             device=self.engine.gpu_name or "cpu",
-            traced_fraction=rays.primary / (height * width * samples * request.channels),
+            traced_fraction=rays.primary / work,
             pixel_shares=frame.shares,
             rays={"primary": rays.primary, "shadow": rays.shadow, "secondary": rays.secondary},
             seconds=_stage_seconds(self.watch, frame),
             estimate=None if estimate is None else estimate.to_dict(),
             options=dict(options),
-            notes=(*self.notes, *notes, *_frame_notes(frame)),
+            notes=(*self.notes, *notes, *_frame_notes(frame), *self._warn_of_emptiness(frame, work, has_pixels)),
         )
+
+    def _warn_of_emptiness(self, frame: Frame, work: int, has_pixels: bool) -> tuple[str, ...]:
+        from lippmann.rendering.film.seen_share import nothing_seen, seen_share
+
+        if self.request.integrator not in ("path", "direct", "classic"):
+            return ()
+        background = even_background(self.built, self.request)
+        if not has_pixels and background is not None and max(background) == 0.0:
+            return ()  # glowing surfaces before a black background send no rays on
+        return nothing_seen(seen_share(frame.pixels if has_pixels else None, background, frame.rays, work))
 
     @property
     def notes(self) -> tuple[str, ...]:

@@ -7,7 +7,7 @@ The display frame is right-handed, in millimetres: origin at the array's centre 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
 import numpy as np
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from lippmann.display import Display
 from lippmann.errors import SceneError, UsageError
-from lippmann.scene.scene import box, box_corners, find_camera
+from lippmann.scene.scene import box, box_corners, find_camera, thin_axis
 from lippmann.scene.values.description import Camera, Matrix
 
 Mode = Literal["fit", "camera", "display"]
@@ -160,6 +160,7 @@ def place(
     mode = options.mode or ("camera" if options.camera or home_camera else "fit")
     warnings: list[str] = []
     if mode == "fit":
+        options = _face_viewer(bounds, options, warnings)
         display_from_world = _fit(bounds, display, options, warnings)
     elif mode == "camera":
         camera = _choose_camera(cameras, options.camera or home_camera)
@@ -191,6 +192,15 @@ def stand(
     near, far = display.resolvable_depth
     warnings = (*warnings, *_find_warnings(corners, display))
     return Placement(world_from_display, (back, front), (far, near), mode, warnings)
+
+
+def _face_viewer(bounds: Bounds, options: PlacementOptions, warnings: list[str]) -> PlacementOptions:
+    """The options, with a turn for a flat scene that would be seen edge-on, unless a turn was asked for."""
+    thin = thin_axis(bounds)
+    if thin is None or any(options.turn):
+        return options
+    warnings.append(f"the scene is flat and would be seen edge-on: turned to show its {'side' if thin == 0 else 'top'}")
+    return replace(options, turn=(-90.0, 0.0, 0.0) if thin == 0 else (0.0, 90.0, 0.0))
 
 
 def _choose_camera(cameras: Sequence[Camera], name: str | None) -> Camera:

@@ -26,6 +26,8 @@ _EXACT_VERTICES = 20_000_000
 # Points of copies that are transformed at a time.
 _POINTS_AT_A_TIME = 1 << 20
 _FRAMING_FOV = np.radians(30.0)
+# A scene is flat along an axis where it is thinner than this share of its other sides.
+_FLAT = 0.01
 
 # A box smaller than this share of its largest coordinate is a single point: a rotation's rounding, a few units in the
 # last place of double precision, leaves nothing of its extent.
@@ -187,8 +189,21 @@ def find_camera(cameras: Sequence[Camera], name: str) -> Camera:
     )
 
 
+def thin_axis(bounds: Bounds) -> int | None:
+    """The axis, 0 for x or 1 for y, along which a scene is flat, so that it is seen edge-on from +z; None if it is not.
+
+    Flat is a box less than a hundredth as thick as it is wide along both other axes; a line is not.
+    """
+    _, size = box(bounds)
+    axis = int(np.argmin(size))
+    narrow, wide = sorted(np.delete(size, axis))
+    return axis if axis != 2 and size[axis] < _FLAT * narrow and narrow > _FLAT * wide else None
+
+
 def framing_camera(bounds: Bounds) -> Camera:
     """A camera on the +z side that sees the whole box in a square picture, focused on its middle.
+
+    A flat scene that would be seen edge-on is looked at from +x or +y instead, whichever shows its face.
 
     Raises
     ------
@@ -196,10 +211,16 @@ def framing_camera(bounds: Bounds) -> Camera:
         The box has no size, or is not finite.
     """
     center, size = box(bounds)
+    thin = thin_axis(bounds)
+    # The camera's axes x, y and z (toward it) in the world: from +z, from +x, or from +y with -z up.
+    axes = {None: (0, 1, 2), 0: (2, 1, 0), 1: (0, 2, 1)}[thin]
+    signs = {None: (1.0, 1.0, 1.0), 0: (-1.0, 1.0, 1.0), 1: (1.0, -1.0, 1.0)}[thin]
+    across, up, toward = axes
     half = np.tan(_FRAMING_FOV / 2.0)
-    distance = max(size[:2].max() / 2.0 / half, 1e-3 * size.max()) * 1.05 + size[2] / 2.0
+    distance = max(size[[across, up]].max() / 2.0 / half, 1e-3 * size.max()) * 1.05 + size[toward] / 2.0
     world_from_camera = np.eye(4)
-    world_from_camera[:3, 3] = center + np.array([0.0, 0.0, distance])
+    world_from_camera[:3, :3] = np.eye(3)[:, axes] * signs
+    world_from_camera[:3, 3] = center + distance * world_from_camera[:3, 2]
     return Camera("framing", world_from_camera, fov_y=float(_FRAMING_FOV), focus_distance=float(distance))
 
 

@@ -246,6 +246,7 @@ def _summed(prepared: Prepared, store: TileStore) -> Provenance:
             **placed_options(job.request, prepared.placement),
         },
         notes=tuple(notes),
+        has_pixels=False,
     )
 
 
