@@ -90,16 +90,10 @@ def _measure(case: Case, name: str) -> Iterator[dict[str, Any]]:
 
 def _quality(full: Any, image: Any) -> dict[str, float]:
     """The paper's average, and the worst micro-image, against full tracing."""
-    from lippmann.metrics.mse_psnr import low_percentile, micro_image_means, psnr, squared_errors
-    from lippmann.metrics.paper import paper_figures
+    from lippmann.metrics import compare
 
-    errors = squared_errors(full, image)
-    worst = low_percentile(*micro_image_means(errors, full.display), 0.0)
-    return {
-        "paper_mean_psnr": paper_figures(full, image).mean_psnr,
-        "psnr": psnr(float(errors.mean())),
-        "worst_psnr": worst.psnr,
-    }
+    found = compare(full, image)
+    return {"paper_mean_psnr": found.paper.mean_psnr, "psnr": found.psnr, "worst_psnr": found.worst.psnr}
 
 
 if __name__ == "__main__":

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 
 import pytest
+from PIL import Image
 
 from lippmann.image import read_picture
 from lippmann.quilts.files import read_quilt
@@ -106,3 +107,14 @@ def test_bad_input_is_one_line_and_code_2(lippmann, tmp_path):
     assert "unknown display" in refused("plan", "teapot", "-d", "lkg", "--quiet")
     assert "no amount of memory" in refused("plan", "teapot", "--memory", "much", "--quiet")
     assert not list(tmp_path.iterdir())
+
+
+def test_a_zarr_quilt_is_replaced_as_other_files_are(lippmann, tmp_path):
+    views, output = tmp_path / "views", tmp_path / "a_qs2x1.zarr"
+    views.mkdir()
+    for number in range(2):
+        Image.new("RGB", (128, 256), (number, 0, 255)).save(views / f"{number}.png")
+    for _ in range(2):
+        packed = lippmann("quilt", "pack", views, "-o", output)
+        assert packed.code == 0, packed.err
+    assert output.is_dir()

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from lippmann.metrics import paper_figures, paper_psnr, paper_rmse
+from lippmann.metrics import compare, paper_psnr, paper_rmse
 
 
 def test_the_printed_numbers_belong_together():
@@ -30,7 +30,7 @@ def test_figures_are_per_lens_and_averaged_over_lenses_with_an_error(display, pi
     changed = codes.copy()
     changed[:, 0:8] += 2 / 255  # lens 0: error 4 in every value
     changed[0:16, 8:16, 0] += 6 / 255  # lens 1: 36 in a sixth of the values
-    figures = paper_figures(picture(plain, codes), picture(plain, changed))
+    figures = compare(picture(plain, codes), picture(plain, changed)).paper
     np.testing.assert_allclose(figures.rmse, [[4, 6, 0, 0, 0, 0, 0, 0]])
     assert figures.unchanged == 6
     assert figures.mean_rmse == pytest.approx(10 / 8)
@@ -40,6 +40,6 @@ def test_figures_are_per_lens_and_averaged_over_lenses_with_an_error(display, pi
 
 def test_values_are_rounded_to_whole_codes(display, picture):
     plain = display()
-    figures = paper_figures(picture(plain, 100.2 / 255), picture(plain, 99.8 / 255))
+    figures = compare(picture(plain, 100.2 / 255), picture(plain, 99.8 / 255)).paper
     assert figures.mean_psnr == math.inf
     assert figures.unchanged == 8

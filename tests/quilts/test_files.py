@@ -111,13 +111,32 @@ def test_a_quilt_is_held_as_it_is_stored(tmp_path, bits, stored):
     np.testing.assert_array_equal(packed.values, quilt.values)
 
 
-def test_views_of_several_depths_become_linear(folder):
+@pytest.mark.parametrize("deep_view", [0, 5, 47])
+def test_views_of_several_depths_become_linear(folder, deep_view):
     deep = encoding.stored_values(np.full((64, 48, 3), 0.25, np.float32), "uint16", "srgb")
-    encoding.encode_values(folder / "shot2_000.png", "png", {"": deep}, transfer="srgb")
+    encoding.encode_values(folder / f"shot2_{deep_view:03}.png", "png", {"": deep}, transfer="srgb")
     quilt = read_views(folder, LAYOUT)
     assert (quilt.values.dtype, quilt.stored) == ("float32", "float32")
-    np.testing.assert_allclose(quilt.view(0), 0.25, atol=1e-4)
-    np.testing.assert_array_equal(quilt.view(1), encoding.linear_values(codes_of(1), "srgb"))
+    for number in range(LAYOUT.views):
+        expected = 0.25 if number == deep_view else encoding.linear_values(codes_of(number), "srgb")
+        np.testing.assert_allclose(quilt.view(number), expected, atol=1e-4 if number == deep_view else 0)
+
+
+@pytest.mark.parametrize("ending", [".png", ".jpg", ".tif"])
+def test_every_view_is_opened_once(tmp_path, monkeypatch, ending):
+    made = tmp_path / "views"
+    made.mkdir()
+    for number in range(3):
+        Image.fromarray(codes_of(number)).save(made / f"{number}{ending}")
+    opened = []
+
+    def counted(function):
+        return lambda path, *more: (opened.append(path.name), function(path, *more))[1]
+
+    monkeypatch.setattr(quilt_files, "open_file", counted(quilt_files.open_file))
+    monkeypatch.setattr(quilt_files, "open_picture", counted(quilt_files.open_picture))
+    assert read_views(made).layout.views == 3
+    assert opened == [f"{number}{ending}" for number in range(3)]
 
 
 def test_more_than_can_be_held_is_refused_before_it_is_read(folder, monkeypatch):

@@ -4,8 +4,8 @@ from lippmann.metrics.comparison import Comparison, check_comparable, compare
 from lippmann.metrics.error_image import error_map
 from lippmann.metrics.flicker import Flicker
 from lippmann.metrics.mse_psnr import MicroImage, low_percentile, micro_image_means, psnr, squared_errors
-from lippmann.metrics.paper import PaperFigures, paper_figures, paper_psnr, paper_rmse
-from lippmann.metrics.silhouettes import Silhouettes, find_silhouettes
+from lippmann.metrics.paper import PaperFigures, paper_psnr, paper_rmse
+from lippmann.metrics.silhouettes import Silhouettes, SilhouetteShare, find_silhouettes
 from lippmann.metrics.structural_similarity import ViewSimilarity, ssim
 from lippmann.metrics.view_metrics import view_flicker, view_similarity
 
@@ -14,6 +14,7 @@ __all__ = [
     "Flicker",
     "MicroImage",
     "PaperFigures",
+    "SilhouetteShare",
     "Silhouettes",
     "ViewSimilarity",
     "check_comparable",
@@ -22,7 +23,6 @@ __all__ = [
     "find_silhouettes",
     "low_percentile",
     "micro_image_means",
-    "paper_figures",
     "paper_psnr",
     "paper_rmse",
     "psnr",

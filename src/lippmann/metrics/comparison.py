@@ -12,22 +12,16 @@ from numpy.typing import NDArray
 
 from lippmann.display import Display
 from lippmann.errors import PictureError
-from lippmann.image import IntegralImage, Picture
+from lippmann.image import Picture
 from lippmann.json_values import JsonObject, JsonValue
 from lippmann.metrics.flicker import Flicker
-from lippmann.metrics.mse_psnr import (
-    LOW_PERCENTILE,
-    MicroImage,
-    low_percentile,
-    micro_image_means,
-    psnr,
-    squared_errors,
-)
-from lippmann.metrics.paper import PaperFigures, paper_figures
-from lippmann.metrics.silhouettes import Silhouettes, find_silhouettes
+from lippmann.metrics.mse_psnr import LOW_PERCENTILE, MicroImage, low_percentile, psnr, squared_errors
+from lippmann.metrics.panel_sums import PanelSums
+from lippmann.metrics.paper import PaperFigures
+from lippmann.metrics.silhouettes import SilhouetteShare, depth_of, source_of
 from lippmann.metrics.structural_similarity import ViewSimilarity
-from lippmann.metrics.view_metrics import view_figures
-from lippmann.progress import ProgressCallback, silent
+from lippmann.metrics.view_metrics import ViewSums
+from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.runtime.cached_property import cached_property
 
 Real = NDArray[np.float64]
@@ -39,13 +33,17 @@ class Comparison:
 
     Parameters
     ----------
-    errors:
-        ``(H, W)``: squared difference of the coded values of each pixel, averaged over its channels.
+    reference, test:
+        The pictures.
+    mean_squared_error:
+        Mean squared error of all pixels and channels, coded values.
+    off_silhouettes_error:
+        The same over the pixels that lie on no silhouette; None if there are none.
     micro_image_errors, micro_image_pixels:
-        ``(lens_rows, lens_cols)``: mean of ``errors`` over each micro-image (NaN where a lens has no pixel), and its
+        ``(lens_rows, lens_cols)``: mean squared error of each micro-image (NaN where a lens has no pixel), and its
         pixels.
     silhouettes:
-        Where the reference has outlines.
+        How much of the reference lies on outlines.
     views:
         SSIM of the views.
     flicker:
@@ -56,18 +54,22 @@ class Comparison:
 
     reference: Picture
     test: Picture
-    errors: Real
+    mean_squared_error: float
+    off_silhouettes_error: float | None
     micro_image_errors: Real
     micro_image_pixels: NDArray[np.intp]
-    silhouettes: Silhouettes
+    silhouettes: SilhouetteShare
     views: ViewSimilarity
     flicker: Flicker | None
     paper: PaperFigures
 
     @cached_property
-    def mean_squared_error(self) -> float:
-        """Of all pixels and channels, coded values."""
-        return float(self.errors.mean())
+    def errors(self) -> Real:
+        """``(H, W)``: squared difference of the coded values of each pixel, averaged over its channels.
+
+        Computed when it is first asked for: all other figures take little memory, however large the panel.
+        """
+        return squared_errors(self.reference, self.test)
 
     @property
     def psnr(self) -> float:
@@ -89,11 +91,10 @@ class Comparison:
         """The micro-image that one in a hundred is not better than, see :func:`~lippmann.metrics.low_percentile`."""
         return low_percentile(self.micro_image_errors, self.micro_image_pixels, LOW_PERCENTILE)
 
-    @cached_property
+    @property
     def psnr_off_silhouettes(self) -> float | None:
         """PSNR in dB over the pixels that lie on no silhouette; None if there are none."""
-        off = ~self.silhouettes.mask
-        return psnr(float(self.errors[off].mean())) if off.any() else None
+        return None if self.off_silhouettes_error is None else psnr(self.off_silhouettes_error)
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -149,31 +150,58 @@ class Comparison:
             }
 
 
-def compare(reference: IntegralImage, test: IntegralImage, progress: ProgressCallback = silent) -> Comparison:
-    """Compare two pictures of the same display.
+def compare(reference: Picture, test: Picture, progress: ProgressCallback = silent) -> Comparison:
+    """Compare two pictures of the same display, in memory or read piece by piece.
 
     Coded values are compared (see :mod:`lippmann.metrics.mse_psnr`), all channels; silhouettes are the reference's.
+
+    Parameters
+    ----------
+    reference, test:
+        The pictures; some rows of each are read at a time.
+    progress:
+        Called after every block of rows.
 
     Raises
     ------
     PictureError
-        If the pictures have different sizes or displays.
+        If the pictures have different sizes or displays, or the file of one is damaged.
     """
     check_comparable(reference, test)
-    errors = squared_errors(reference, test)
-    means, pixels = micro_image_means(errors, reference.display)
-    similarity, flicker = view_figures(reference, test, progress)
+    panel = reference.display.panel
+    sums, views = PanelSums(reference, test), ViewSums(reference, test)
+    for rows in _in_step(sums.work(), views.work()):
+        progress(Progress("compare", rows, 2 * panel.height))
+    pixels = panel.width * panel.height
     return Comparison(
         reference,
         test,
-        errors,
-        means,
-        pixels,
-        find_silhouettes(reference),
-        similarity,
-        flicker,
-        paper_figures(reference, test),
+        mean_squared_error=float(sums.errors.sum()) / pixels,
+        off_silhouettes_error=sums.off_error / sums.off_pixels if sums.off_pixels else None,
+        micro_image_errors=sums.means(sums.errors),
+        micro_image_pixels=sums.pixels,
+        silhouettes=SilhouetteShare(1 - sums.off_pixels / pixels, source_of(depth_of(reference))),
+        views=views.similarity,
+        flicker=views.flicker,
+        paper=PaperFigures(sums.means(sums.paper_errors)),
     )
+
+
+def _in_step(*parts: Iterator[int]) -> Iterator[int]:
+    """Advance the part that has done the fewest rows, so that a piece of a file that all parts need is decoded once.
+
+    Parts yield the number of rows done; so does this, the sum over all parts.
+    """
+    done = dict.fromkeys(parts, 0)
+    running = set(parts)
+    while running:
+        part = min(running, key=lambda one: done[one])
+        rows = next(part, None)
+        if rows is None:
+            running.remove(part)
+        else:
+            done[part] = rows
+            yield sum(done.values())
 
 
 def check_comparable(reference: Picture, test: Picture) -> None:

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from lippmann.image import IntegralImage, Provenance
 from lippmann.image.micro_images import lens_indices
 from lippmann.metrics.comparison import Comparison
+from lippmann.metrics.silhouettes import find_silhouettes
 
 #: The root-mean-square error of a pixel (coded values, 0 to 1) that gets the brightest colour.
 BRIGHTEST = 0.25
@@ -39,7 +40,7 @@ def error_map(comparison: Comparison) -> IntegralImage:
     layers = {
         "error": errors.astype(np.float32),
         "micro_image_psnr": _psnr_of_pixels(comparison),
-        "silhouettes": comparison.silhouettes.mask.astype(np.float32),
+        "silhouettes": find_silhouettes(comparison.reference).mask.astype(np.float32),
     }
     provenance = Provenance(
         method="error map",

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from lippmann.color.transfer import Transfer, encode, linear_levels
 from lippmann.display import Display
-from lippmann.image import IntegralImage, Picture
+from lippmann.image import Picture
 from lippmann.image.micro_images import lens_indices, row_blocks
 
 Real = NDArray[np.float64]
@@ -68,9 +68,9 @@ def squared_differences(a: NDArray[Any], b: NDArray[Any]) -> Real:
     return sums
 
 
-def squared_errors(reference: IntegralImage, test: IntegralImage) -> Real:
+def squared_errors(reference: Picture, test: Picture) -> Real:
     """``(H, W)``: the squared difference of the coded values of each pixel, averaged over its three channels."""
-    height, width = reference.pixels.shape[:2]
+    height, width = reference.display.panel.height, reference.display.panel.width
     errors = np.empty((height, width))
     for rows in row_blocks(height, width):
         errors[slice(*rows)] = squared_differences(coded(reference, rows), coded(test, rows))

@@ -24,9 +24,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lippmann.color.transfer import Transfer, linear_levels, quantize
-from lippmann.image import IntegralImage
-from lippmann.image.micro_images import row_blocks
-from lippmann.metrics.mse_psnr import looked_up, micro_image_means, psnr, squared_differences
+from lippmann.metrics.mse_psnr import looked_up, psnr
 
 Real = NDArray[np.float64]
 
@@ -79,16 +77,6 @@ class PaperFigures:
         values = self.psnr
         finite = values[np.isfinite(values)]
         return float(finite.mean()) if finite.size else math.inf
-
-
-def paper_figures(reference: IntegralImage, test: IntegralImage) -> PaperFigures:
-    """The paper's figures of two pictures of one display, each coded with 8 bits as its own files are."""
-    height, width = reference.pixels.shape[:2]
-    errors = np.empty((height, width))
-    for first, last in row_blocks(height, width):
-        a, b = (paper_codes(picture.rows(first, last), picture.provenance.transfer) for picture in (reference, test))
-        errors[first:last] = squared_differences(a, b)
-    return PaperFigures(micro_image_means(errors, reference.display)[0])
 
 
 def paper_codes(values: NDArray[Any], transfer: Transfer) -> NDArray[np.float32]:

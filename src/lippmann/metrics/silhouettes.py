@@ -18,17 +18,19 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, Literal, Protocol
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.image import IntegralImage
-from lippmann.image.micro_images import Permutation
+from lippmann.image import Picture
+from lippmann.image.stored_values import Layer
+from lippmann.metrics.bands import Band, bands
 from lippmann.metrics.mse_psnr import coded
 
 Real = NDArray[np.float64]
 Flags = NDArray[np.bool_]
+Source = Literal["depth", "edges"]
 
 #: The layer that holds the height of what each pixel sees.
 DEPTH_LAYER = "depth"
@@ -40,50 +42,70 @@ DEPTH_JUMP = 2.0
 EDGE_JUMP = 0.1
 
 
+@dataclass(frozen=True)
+class SilhouetteShare:
+    """``share``: fraction of pixels on silhouettes, 0 to 1; ``source``: found by depths or by the picture's edges."""
+
+    share: float
+    source: Source
+
+
 @dataclass(frozen=True, eq=False)
 class Silhouettes:
     """``mask`` ``(H, W)``: pixels on silhouettes; ``source``: whether found in depths or in the picture's edges."""
 
     mask: Flags
-    source: Literal["depth", "edges"]
+    source: Source
 
     @property
     def share(self) -> float:
-        """The part of the pixels that lies on silhouettes."""
+        """Fraction of the pixels on silhouettes, 0 to 1."""
         return float(self.mask.mean())
 
 
-def find_silhouettes(image: IntegralImage) -> Silhouettes:
+def find_silhouettes(image: Picture) -> Silhouettes:
     """The silhouettes of a picture, by its layer ``depth`` if it has one, else by its strong edges."""
-    permutation = Permutation(image.display)
+    panel, depth = image.display.panel, depth_of(image)
+    mask = np.empty((panel.height, panel.width), dtype=np.bool_)
+    for band in bands(image.display):
+        mask[band.first : band.last] = mark_silhouettes(band, coded(image, (band.top, band.bottom)), depth)
+    return Silhouettes(mask, source_of(depth))
+
+
+def depth_of(image: Picture) -> Layer | None:
+    """Layer ``(H, W)`` of the depths that decide on a picture's silhouettes; None if its edges do."""
     depth = image.maps.get(DEPTH_LAYER)
-    if depth is not None and depth.ndim == 2:
-        seen = np.where(np.isfinite(depth), depth, np.nan).astype(np.float64)
-        limit = DEPTH_JUMP * image.display.lens_array.pitch
-        return Silhouettes(_jumps_between_neighbours(permutation, seen[..., None], limit), "depth")
-    return Silhouettes(edges_between_neighbours(permutation, coded(image)), "edges")
+    return depth if depth is not None and depth.ndim == 2 else None
 
 
-class Cutting(Protocol):
-    """What cuts ``(H, W, ...)`` values into micro-images ``(lens_rows, lens_cols, ny, nx, ...)``."""
-
-    def split(self, values: NDArray[Any]) -> NDArray[Any]:
-        """The micro-images; places without a pixel are zero."""
-        ...
+def source_of(depth: Layer | None) -> Source:
+    """How silhouettes are found with this layer of depths."""
+    return "edges" if depth is None else "depth"
 
 
-def edges_between_neighbours(cutting: Cutting, colors: Real) -> Flags:
-    """``(H, W)``: which pixels of coded ``(H, W, 3)`` differ strongly from a neighbour."""
-    return _jumps_between_neighbours(cutting, colors, EDGE_JUMP)
+def mark_silhouettes(band: Band, colors: Real, depth: Layer | None) -> Flags:
+    """Mask ``(rows, W)`` of the pixels on silhouettes in a band's own rows.
 
-
-def _jumps_between_neighbours(cutting: Cutting, values: Real, limit: float) -> Flags:
-    """``(H, W)``: which pixels of ``(H, W, channels)`` differ from a neighbour by more, see :func:`.mark_jumps`."""
+    Parameters
+    ----------
+    band:
+        The band.
+    colors:
+        ``(bottom - top, W, 3)``: coded values of the band's rows and their neighbours.
+    depth:
+        ``(H, W)``: depths of the whole panel, see :func:`depth_of`. None: edges are looked for.
+    """
     from lippmann.metrics import kernels
 
+    if depth is None:
+        values, limit = colors, EDGE_JUMP
+    else:
+        rows = depth[band.top : band.bottom]
+        values = np.where(np.isfinite(rows), rows, np.nan).astype(np.float64)[..., None]
+        limit = DEPTH_JUMP * band.display.lens_array.pitch
     shape = values.shape[:2]
     numbers = np.arange(1, math.prod(shape) + 1, dtype=np.int32).reshape(shape)
     marks = np.zeros(shape, dtype=np.bool_)
     flat = np.ascontiguousarray(values).reshape(-1, values.shape[2])
-    kernels.mark_jumps(flat, np.ascontiguousarray(cutting.split(numbers)), limit, marks.reshape(-1))
-    return marks
+    kernels.mark_jumps(flat, band.split(numbers), limit, marks.reshape(-1))
+    return marks[band.inner]

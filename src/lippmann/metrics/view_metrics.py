@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.image import IntegralImage, Picture
+from lippmann.image import Picture
 from lippmann.image.views import lens_rows, panel_rows_of_view_rows, pixels_of_view_rows, view_grid
 from lippmann.metrics.flicker import Flicker, FlickerSums
 from lippmann.metrics.mse_psnr import coded_values
@@ -29,14 +29,12 @@ Flags = NDArray[np.bool_]
 _BLOCK = 1 << 22
 
 
-def view_similarity(
-    reference: IntegralImage, test: IntegralImage, progress: ProgressCallback = silent
-) -> ViewSimilarity:
+def view_similarity(reference: Picture, test: Picture, progress: ProgressCallback = silent) -> ViewSimilarity:
     """SSIM of the views of two pictures of one display, on coded values."""
     return view_figures(reference, test, progress)[0]
 
 
-def view_flicker(reference: IntegralImage, test: IntegralImage) -> Flicker | None:
+def view_flicker(reference: Picture, test: Picture) -> Flicker | None:
     """The flicker of ``test`` against a reference of the same display; None if there is one view only.
 
     Neighbours are views side by side and, where there are rows of views, one above the other. Where lenses do not cover

@@ -10,7 +10,7 @@ import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, NamedTuple, cast
+from typing import TYPE_CHECKING, NamedTuple, cast
 
 import numpy as np
 
@@ -24,6 +24,9 @@ from lippmann.image.write import format_for, replacing_output
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.quilts.quilt import MOST_SIDE, Quilt, QuiltLayout, check_size, layout_of_name
 from lippmann.runtime.atomic_write import replacing_folder
+
+if TYPE_CHECKING:
+    from PIL import Image
 
 #: Endings of the picture files that are read; JPEG is not written.
 _JPEG = (".jpg", ".jpeg")
@@ -40,9 +43,9 @@ def read_quilt(path: Path) -> Quilt:
     """
     layout = layout_of_name(path)
     _check_ending(path)
-    file = _open(path)
-    check_size(*file.size, layout, str(path))
-    values = file.read()
+    with _open(path) as file:
+        check_size(*file.size, layout, str(path))
+        values = file.read()
     return Quilt(values, layout, cast(Stored, values.dtype.name))
 
 
@@ -70,23 +73,45 @@ def read_views(folder: Path, layout: QuiltLayout | None = None, *, progress: Pro
     if len(paths) != layout.views:
         rule = f"{layout.columns}x{layout.rows} views are {layout.views}"
         raise PictureError(f"it holds {len(paths)} views", where=str(folder), rule=rule)
-    width, height = _open(paths[0]).size
-    if width * height * layout.views > MOST_PIXELS:
-        rule = f"together they have at most {MOST_PIXELS} pixels"
-        raise PictureError(f"it holds {layout.views} views of {width} x {height} pixels", where=str(folder), rule=rule)
-    depths: set[Stored] = set()
-    for path in paths:
-        file = _open(path)
-        if file.size != (width, height):
-            rule = f"the first view, {paths[0].name}, has {width} x {height}"
-            raise PictureError(f"has {file.size[0]} x {file.size[1]} pixels", where=str(path), rule=rule)
-        depths.add(file.stored())
-    stored = depths.pop() if len(depths) == 1 else "float32"
-    quilt = Quilt(np.empty((height * layout.rows, width * layout.columns, 3), dtype=stored), layout, stored)
+    quilt = None
     for number, path in enumerate(paths):
-        quilt.view_values(number)[...] = converted_values(_open(path).read(), stored, "srgb")
+        with _open(path) as file:
+            if quilt is None:
+                _check_held(file.size, layout.views, folder)
+                quilt = _blank_quilt(file.size, layout, file.stored())
+            if file.size != quilt.view_size:
+                width, height = quilt.view_size
+                rule = f"the first view, {paths[0].name}, has {width} x {height}"
+                raise PictureError(f"has {file.size[0]} x {file.size[1]} pixels", where=str(path), rule=rule)
+            if quilt.stored not in (file.stored(), "float32"):
+                quilt = _linear_quilt(quilt, number)
+            values = file.read()
+        quilt.view_values(number)[...] = converted_values(values, quilt.stored, "srgb")
         progress(Progress("read", number + 1, layout.views))
+    assert quilt is not None  # there are views
     return quilt
+
+
+def _check_held(view_size: tuple[int, int], views: int, folder: Path) -> None:
+    """Raise :class:`PictureError` if so many views of ``(width, height)`` pixels are more than one picture can have."""
+    width, height = view_size
+    if width * height * views > MOST_PIXELS:
+        rule = f"together they have at most {MOST_PIXELS} pixels"
+        raise PictureError(f"it holds {views} views of {width} x {height} pixels", where=str(folder), rule=rule)
+
+
+def _blank_quilt(view_size: tuple[int, int], layout: QuiltLayout, stored: Stored) -> Quilt:
+    """A quilt whose values are not yet set."""
+    width, height = view_size
+    return Quilt(np.empty((height * layout.rows, width * layout.columns, 3), dtype=stored), layout, stored)
+
+
+def _linear_quilt(quilt: Quilt, views: int) -> Quilt:
+    """The quilt as linear floats, of which the first ``views`` views are set: they are of several depths."""
+    linear = _blank_quilt(quilt.view_size, quilt.layout, "float32")
+    for number in range(views):
+        linear.view_values(number)[...] = converted_values(quilt.view_values(number), "float32", "srgb")
+    return linear
 
 
 def write_quilt(quilt: Quilt, path: Path, *, bits: int | None = None) -> None:
@@ -211,22 +236,28 @@ class _OpenFile(NamedTuple):
     read: Callable[[], Values]
 
 
-def _open(path: Path) -> _OpenFile:
+@contextmanager
+def _open(path: Path) -> Iterator[_OpenFile]:
+    """The opened file with its header; errors of libraries about the file become :class:`PictureError`."""
     if path.suffix.lower() not in _JPEG:
         file = open_file(path)
         size = file.width, file.height
-        return _OpenFile(size, lambda: file.check_stored(file.stored), lambda: file.decode()[0])
-
-    def decode() -> Values:
-        with _opened_jpeg(path) as picture:
-            return np.asarray(picture if picture.mode == "RGB" else picture.convert("RGB"))
-
+        yield _OpenFile(size, lambda: file.check_stored(file.stored), lambda: file.decode()[0])
+        return
     with _opened_jpeg(path) as picture:
-        return _OpenFile((picture.width, picture.height), lambda: "uint8", decode)
+        size = picture.width, picture.height
+        yield _OpenFile(
+            size, lambda: "uint8", lambda: np.asarray(picture if picture.mode == "RGB" else picture.convert("RGB"))
+        )
+
+
+def _rgb_codes(picture: Image.Image) -> Values:
+    """``(H, W, 3)`` codes of a picture of Pillow's."""
+    return np.asarray(picture if picture.mode == "RGB" else picture.convert("RGB"))
 
 
 @contextmanager
-def _opened_jpeg(path: Path) -> Iterator[Any]:
+def _opened_jpeg(path: Path) -> Iterator[Image.Image]:
     """The opened JPEG, not yet decoded; errors of the library about the file become :class:`PictureError`."""
     from PIL import Image
 

@@ -34,27 +34,22 @@ def compare(
     """Compare a picture with a reference: PSNR, worst micro-images, SSIM of views, the paper's metrics."""
     from lippmann.image import IntegralImage
     from lippmann.image.streamed import open_picture
-    from lippmann.image.write import format_for
+    from lippmann.image.write import check_output, format_for
     from lippmann.metrics import compare as compare_pictures
     from lippmann.metrics import error_map
-    from lippmann.metrics.large import compare_large
     from lippmann.runtime.atomic_write import check_writable
 
     console = Console(quiet, as_json)
     if picture is not None:
-        format_for(picture, None)
-    for path in (table, picture):
-        if path is not None:
-            check_writable(path)
+        check_output(picture, format_for(picture)[0])
+    if table is not None:
+        check_writable(table)
     target = parse.display(display)
     first, second = (open_picture(path, display=target) for path in (reference, test))
+    if picture is not None and not (isinstance(first, IntegralImage) and isinstance(second, IntegralImage)):
+        raise UsageError("needs pictures that fit in memory", where="--map", fix="leave it out")
     with console.progress() as progress:
-        if isinstance(first, IntegralImage) and isinstance(second, IntegralImage):
-            comparison = compare_pictures(first, second, progress)
-        else:
-            if picture is not None:
-                raise UsageError("needs pictures that fit in memory", where="--map", fix="leave it out")
-            comparison = compare_large(first, second, progress)
+        comparison = compare_pictures(first, second, progress)
     if table is not None:
         _write_table(comparison, table)
     if picture is not None:

@@ -35,14 +35,12 @@ def preview(
     quiet: options.Quiet = False,
 ) -> None:
     """Render the plain picture that the scene's camera sees."""
-    from lippmann.image.write import format_for, write_plain_picture
+    from lippmann.image.write import check_output, format_for, write_plain_picture
     from lippmann.rendering.preview import render_preview
     from lippmann.rendering.request.render_request import RenderRequest
-    from lippmann.runtime.atomic_write import check_writable
 
     console = Console(quiet, as_json)
-    format_for(output, bits)
-    check_writable(output)
+    check_output(output, format_for(output, bits)[0])
     request = RenderRequest(
         integrator=integrator,
         depth=depth,

@@ -91,12 +91,11 @@ def render(
     quiet: options.Quiet = False,
 ) -> None:
     """Render a scene as a quilt: the views of cameras side by side before the display."""
-    from lippmann.image.write import format_for
+    from lippmann.image.write import check_output, format_for
     from lippmann.quilts.files import write_quilt
     from lippmann.quilts.quilt import Quilt, load_device, quilt_of_display
     from lippmann.rendering.quilt import render_quilt
     from lippmann.rendering.request.render_request import RenderRequest
-    from lippmann.runtime.atomic_write import check_writable
 
     console = Console(quiet, as_json)
     target = load_device(display)
@@ -104,8 +103,7 @@ def render(
     wanted = quilt_of_display(target, grid, None if size is None else parse.size(size, "--size"))
     path = output or Path(f"{Path(scene).stem}{wanted.layout.ending}.png")
     _check_name(path, wanted.layout.ending)
-    format_for(path, bits)
-    check_writable(path)
+    check_output(path, format_for(path, bits)[0])
     request = RenderRequest(
         method=method,
         integrator=integrator,
@@ -157,15 +155,13 @@ def pack(
     quiet: options.Quiet = False,
 ) -> None:
     """Put a folder of views into a quilt, the leftmost at the bottom left."""
-    from lippmann.image.write import format_for
+    from lippmann.image.write import check_output, format_for
     from lippmann.quilts.files import read_views, write_quilt
     from lippmann.quilts.quilt import layout_of_name
-    from lippmann.runtime.atomic_write import check_writable
 
     console = Console(quiet, as_json)
     layout = layout_of_name(output)
-    format_for(output, bits)
-    check_writable(output)
+    check_output(output, format_for(output, bits)[0])
     with console.progress() as progress:
         packed = read_views(folder, layout, progress=progress)
     write_quilt(packed, output, bits=bits)

@@ -102,10 +102,10 @@ def render(
     quiet: options.Quiet = False,
 ) -> None:
     """Render a scene into the native pixels of a display."""
-    from lippmann.image.write import format_for
+    from lippmann.image.write import check_output, format_for
     from lippmann.rendering.picture import render_picture
     from lippmann.rendering.request.render_request import RenderRequest
-    from lippmann.runtime.atomic_write import check_folder_writable, check_writable
+    from lippmann.runtime.atomic_write import check_folder_writable
 
     console = Console(quiet, as_json)
     target = printing.display_of(
@@ -148,13 +148,14 @@ def render(
         with on_cluster.runner(console, threads) as runner:
             sequence.render_frames(source, target, request, wanted, files, console, runner)
         return
-    _check_layers(layers, format_for(output, bits)[0], output)
+    name, _ = format_for(output, bits)
+    _check_layers(layers, name, output)
     if on_cluster or is_tiled(output, bits, target, request, resume=resume):
         _check_whole({"--maps": maps, "--marks": margin})
         with on_cluster.runner(console, threads) as runner:
             _render_tiled(source, target, request, output, console, bits=bits, resume=resume, runner=runner)
         return
-    check_writable(output)
+    check_output(output, name)
     if maps is not None:
         check_folder_writable(maps)
     with console.progress() as progress:
