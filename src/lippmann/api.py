@@ -17,7 +17,7 @@ import warnings
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from lippmann.display import Display, load_display
 from lippmann.progress import ProgressCallback, silent
@@ -98,6 +98,7 @@ def render(
     subpixels: bool = False,
     pixel_filter: PixelFilter = "auto",
     denoise: Denoiser = "auto",
+    exposure: float | Literal["auto"] = "auto",
     layers: bool = False,
     device: Device = "auto",
     threads: int | None = None,
@@ -156,6 +157,9 @@ def render(
     denoise:
         ``oidn`` denoises by Open Image Denoise with the effort that the traced rays deserve, ``oidn-fast`` and
         ``oidn-high`` with a given one, ``none`` not at all. ``auto`` (default): as the method needs it.
+    exposure:
+        Stops (EV) by which light is raised or lowered, -40 to 40. ``auto`` (default): 0, and for scenes with physical
+        light sources what brings the median of what is lit to mid-grey.
     layers:
         Add depth, position, normal, albedo and shape of what each pixel sees to the picture's maps. Default False.
     device:
@@ -197,6 +201,7 @@ def render(
         subpixels=subpixels,
         pixel_filter=pixel_filter,
         denoise=denoise,
+        exposure=exposure,
         layers=layers,
         device=device,
         threads=threads,

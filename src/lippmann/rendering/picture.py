@@ -80,6 +80,23 @@ def render_picture(
     return IntegralImage(frame.pixels, display, placement.world_from_display, provenance, maps)
 
 
+def choose_exposure(scene: Scene, display: Display, request: RenderRequest) -> float:
+    """The exposure in stops that a picture of ``scene`` gets by itself, without the picture.
+
+    Raises
+    ------
+    UsageError, SceneError, EngineError
+        As :func:`render_picture`.
+    """
+    session = open_session(scene, resolve(request, scene, display))
+    placement = session.place(display)
+    from lippmann.rendering.transport.ray_source import DisplayRays
+
+    source = DisplayRays(display, placement.world_from_display, session.request.subpixels)
+    session.integrator(source, placement.display_from_world)
+    return session.choices.get("exposure", 0.0)
+
+
 def traced_window(session: Session, display: Display, placement: Placement) -> PixelWindow | None:
     """The pixels that can see the scene, where the others are known without rays; None where all are traced.
 

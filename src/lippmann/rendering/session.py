@@ -79,6 +79,8 @@ class Session:
         Bytes that the picture may use.
     watch:
         Times the stages and reports them.
+    choices:
+        What was measured before the first ray of the picture, for its file.
     """
 
     scene: Scene
@@ -87,6 +89,7 @@ class Session:
     built: BuiltScene | BuiltClassic
     memory: int
     watch: Stopwatch
+    choices: dict[str, float] = field(default_factory=dict)
 
     def place(self, display: Display) -> Placement:
         """Where ``display`` stands in the scene.
@@ -119,7 +122,28 @@ class Session:
         frame_from_world:
             ``(4, 4)``: the frame in which surface properties are told.
         """
-        return self.watch.stage("build", lambda: _make_integrator(self.built, self.request, frame_from_world, source))
+        return self.watch.stage(
+            "build",
+            lambda: self._expose(_make_integrator(self.built, self.request, frame_from_world, source), source),
+        )
+
+    def _expose(self, integrator: Integrator, source: RaySource) -> Integrator:
+        from lippmann.rendering.film.exposure import gain_of, measure_exposure
+        from lippmann.rendering.transport.path import PathIntegrator
+
+        if not isinstance(integrator, PathIntegrator):
+            return integrator
+        exposure = self.request.exposure
+        if exposure == "auto":
+            exposure = measure_exposure(
+                integrator, source, even_background(self.built, self.request), self.request.seed
+            )
+        if exposure:
+            import mitsuba as mi
+
+            integrator.gain = mi.Float(gain_of(exposure))
+            self.choices["exposure"] = exposure
+        return integrator
 
     def provenance(
         self,
@@ -155,9 +179,20 @@ class Session:
             rays={"primary": rays.primary, "shadow": rays.shadow, "secondary": rays.secondary},
             seconds=_stage_seconds(self.watch, frame),
             estimate=None if estimate is None else estimate.to_dict(),
-            options=dict(options),
-            notes=(*self.notes, *notes, *_frame_notes(frame), *self._warn_of_emptiness(frame, work, has_pixels)),
+            options={**options, **self.choices},
+            notes=(
+                *self.notes,
+                *notes,
+                *self._exposure_notes(),
+                *_frame_notes(frame),
+                *self._warn_of_emptiness(frame, work, has_pixels),
+            ),
         )
+
+    def _exposure_notes(self) -> tuple[str, ...]:
+        if self.request.exposure != "auto" or "exposure" not in self.choices:
+            return ()
+        return (f"exposure {self.choices['exposure']:+.2f} EV: physical light, its median at mid-grey",)
 
     def _warn_of_emptiness(self, frame: Frame, work: int, has_pixels: bool) -> tuple[str, ...]:
         from lippmann.rendering.film.seen_share import nothing_seen, seen_share

@@ -126,6 +126,12 @@ class Scene:
         return has_lights(self.physical)
 
     @property
+    def has_physical_lights(self) -> bool:
+        """Whether the scene's light sources are told in physical units, so that its pictures need an exposure."""
+        description = self.description
+        return isinstance(description, SceneDescription) and description.physical_lights
+
+    @property
     def in_studio(self) -> bool:
         """Whether the built-in studio lights the scene, for want of other light."""
         return self.studio and not self.has_lights

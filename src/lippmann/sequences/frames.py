@@ -222,6 +222,7 @@ def render_frames(
     """The frames of :func:`render_sequence`, once it is known where the display stands."""
     from lippmann.rendering.picture import render_picture
 
+    request = hold_exposure(request, motion, display, where)
     for position, frame in enumerate(frames):
         report = _of_frame(progress, position, len(frames))
         image = render_picture(motion.scene(frame), display, replace(request, placement=where(frame)), report)
@@ -247,6 +248,7 @@ def render_tiled_frames(
     """The files of :func:`sequence_to_files`, once it is known where the display stands."""
     from lippmann.tiles.tiled_render import render_to_file
 
+    request = hold_exposure(request, motion, display, where)
     for position, frame in enumerate(frames):
         yield (
             frame,
@@ -272,6 +274,16 @@ def hold_choice(request: RenderRequest, method: str, denoise: str) -> RenderRequ
         They are not known.
     """
     return replace(request, method=cast("Method", method), denoise=cast("Denoiser", denoise))
+
+
+def hold_exposure(request: RenderRequest, motion: Motion, display: Display, where: Stand) -> RenderRequest:
+    """``request`` with the exposure that suits the motion's first frame, whichever frames are rendered."""
+    scene = motion.scene(0)
+    if request.exposure != "auto" or not scene.has_physical_lights:
+        return request
+    from lippmann.rendering.picture import choose_exposure
+
+    return replace(request, exposure=choose_exposure(scene, display, replace(request, placement=where(0))))
 
 
 def _of_frame(progress: ProgressCallback, position: int, frames: int) -> ProgressCallback:

@@ -60,6 +60,14 @@ Background = Annotated[
 AllowOutside = Annotated[
     bool, typer.Option("--allow-outside", help="Let a scene file refer to files outside its own folder.")
 ]
+Exposure = Annotated[
+    str,
+    typer.Option(
+        "--exposure",
+        help="Stops (EV) by which light is raised or lowered. auto: 0; for files with physical light sources what "
+        "brings the median of what is lit to mid-grey.",
+    ),
+]
 SingleScattering = Annotated[
     bool,
     typer.Option(

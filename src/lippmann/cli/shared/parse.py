@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from lippmann.errors import UsageError
 
@@ -52,6 +52,17 @@ def memory(text: str | None, option: str = "--memory") -> int | None:
     if amount <= 0:
         raise UsageError(f"'{text}' is no amount of memory", where=option, rule="a number with K, M or G, such as 2G")
     return amount
+
+
+def exposure(text: str) -> float | Literal["auto"]:
+    """Stops, or ``auto``."""
+    if text == "auto":
+        return "auto"
+    try:
+        value = float(text)
+    except ValueError:
+        raise UsageError(f"'{text}' will not do", where="--exposure", rule="auto, or a number of stops") from None
+    return value
 
 
 def color(text: str | None) -> tuple[float, float, float] | None:

@@ -8,14 +8,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import drjit as dr
-import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.device.types import Float, Point2f, Ray3f, UInt32
 from lippmann.rendering.denoise.cost_model import effort_of, traced_work
 from lippmann.rendering.denoise.oidn import Effort
+from lippmann.rendering.film.scattered_rays import ScatteredRays
 from lippmann.rendering.film.wavefront import trace_frame
 from lippmann.rendering.film.wavefront_plan import make_plan
 from lippmann.rendering.request.render_request import RenderRequest
@@ -40,26 +38,9 @@ class Treatment:
     exposure: float
 
 
-class ScatteredRays:
-    """Pixels spread evenly over a display, as a picture of their own."""
-
-    def __init__(self, source: DisplayRays) -> None:
-        self._source = source
-        self.channels = source.channels
-        self.width, self.height = (min(SIDE, side) for side in (source.width, source.height))
-        self._columns, self._rows = (
-            mi.UInt32((2 * np.arange(count) + 1) * side // (2 * count))
-            for count, side in ((self.width, source.width), (self.height, source.height))
-        )
-
-    def rays(self, column: Float, row: Float, channel: UInt32, jitter: Point2f) -> Ray3f:
-        column, row = dr.gather(mi.UInt32, self._columns, column), dr.gather(mi.UInt32, self._rows, row)
-        return self._source.rays(column, row, channel, jitter)
-
-
 def survey(integrator: Integrator, source: DisplayRays, request: RenderRequest) -> Treatment:
     """What suits the picture as a whole: the same for the same picture, whoever looks."""
-    few, box = ScatteredRays(source), request.box_filter
+    few, box = ScatteredRays(source, SIDE), request.box_filter
     samples = min(request.samples, SAMPLES) if box else 1
     plan = make_plan(few.width, few.height, samples, channels=few.channels, memory=MEMORY)
     frame = trace_frame(integrator, few, plan, seed=request.seed, box_filter=box)

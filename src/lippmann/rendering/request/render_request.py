@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
-from typing import TYPE_CHECKING, get_args
+from typing import TYPE_CHECKING, Literal, get_args
 
 from lippmann.color.transfer import Transfer
 from lippmann.errors import UsageError
@@ -18,6 +18,9 @@ if TYPE_CHECKING:
 DEFAULT_SPP = 16
 #: Surfaces per path where nothing is said.
 DEFAULT_DEPTH: dict[Integrator, int] = {"classic": 2, "path": 8, "direct": 1}
+
+#: Stops of the largest exposure, up or down.
+MOST_EXPOSURE = 40
 
 _WORDS = {
     "method": Method,
@@ -80,6 +83,9 @@ class RenderRequest:
         ``oidn`` denoises by Open Image Denoise with the effort that the traced rays deserve
         (:mod:`~lippmann.rendering.denoise.cost_model`), ``oidn-fast`` and ``oidn-high`` with a given one, ``none`` not
         at all.
+    exposure:
+        Stops (EV) by which light is raised or lowered, -40 to 40; "auto": 0, and for scenes with physical light sources
+        what brings the median of what is lit to mid-grey. The background's colour stays as it is.
     layers:
         Add depth, position, normal, albedo and shape of what each pixel sees to the picture's maps.
     placement:
@@ -108,6 +114,7 @@ class RenderRequest:
     subpixels: bool = False
     pixel_filter: PixelFilter = "auto"
     denoise: Denoiser = "auto"
+    exposure: float | Literal["auto"] = "auto"
     layers: bool = False
     placement: PlacementOptions | Placement = field(default_factory=PlacementOptions)
     device: Device = "auto"
@@ -131,6 +138,9 @@ class RenderRequest:
             value = getattr(self, name)
             if value is not None and not 0 < value <= 80:
                 raise UsageError(f"{value:g} dB will not do", parameter=name, rule="above 0 and at most 80 dB")
+        if self.exposure != "auto" and not -MOST_EXPOSURE <= self.exposure <= MOST_EXPOSURE:
+            rule = f"'auto', or stops from {-MOST_EXPOSURE} to {MOST_EXPOSURE}"
+            raise UsageError(f"{self.exposure!r} will not do", parameter="exposure", rule=rule)
         if self.max_time is not None and not 0 < self.max_time < float("inf"):
             raise UsageError(f"{self.max_time:g} s will not do", parameter="max_time", rule="seconds above 0")
 

@@ -42,7 +42,7 @@ def resolve(
     RenderRequest
         With an integrator, a pixel filter, a depth and a method; ``reason`` says why it is that method, if the user
         left it open. ``spp`` stays None where a quality or a time says when to stop, and ``denoise`` stays "auto" where
-        plain and pooled pictures compete.
+        plain and pooled pictures compete; ``exposure`` stays "auto" where it is to be measured.
 
     Raises
     ------
@@ -74,7 +74,17 @@ def _with_light(request: RenderRequest, scene: Scene, of_own_camera: bool) -> Re
         spp = DEFAULT_SPP if classic is None else 1 + (classic.camera.antialiasing if of_own_camera else 0)
     if pixel_filter == "auto":
         pixel_filter = "point" if classic is not None and spp == 1 else "box"
-    return replace(request, integrator=integrator, depth=depth, spp=spp, pixel_filter=pixel_filter)
+    exposure = request.exposure
+    if exposure == "auto" and not (integrator in POOLED_LIGHT and scene.has_physical_lights):
+        exposure = 0.0
+    if exposure and integrator not in POOLED_LIGHT:
+        raise UsageError(
+            f"the values of {integrator} are no amounts of light",
+            parameter="exposure",
+            rule=f"it is for {' and '.join(POOLED_LIGHT)}",
+            fix="leave it out",
+        )
+    return replace(request, integrator=integrator, depth=depth, spp=spp, pixel_filter=pixel_filter, exposure=exposure)
 
 
 def _with_method(request: RenderRequest) -> RenderRequest:

@@ -83,6 +83,8 @@ class PathIntegrator:
     ----------
     light_sampler:
         Samples the scene's emitters; at first by the scene's own weights.
+    gain:
+        Factor on the radiance, the background's apart; None for 1.
     """
 
     # Not a dataclass: Dr.Jit would take it for loop state and write its fields.
@@ -92,6 +94,7 @@ class PathIntegrator:
         self.depth = depth
         self.name = name
         self.light_sampler: LightSampler = SceneLightSampler(scene)
+        self.gain: Float | None = None
         emitters = scene.emitters()
         # A single delta emitter: more than one sample of it tells nothing more.
         self._single_delta = len(emitters) == 1 and bool(mi.has_flag(emitters[0].flags(), mi.EmitterFlags.Delta))
@@ -124,6 +127,9 @@ class PathIntegrator:
         vertex_samples = mi.UInt32(1)  # emitter samples taken there
         all_specular = mi.Bool(True)  # no emitter has been sampled yet
         samples_at_start, start = first_emitter_samples(stream.index)
+        shown_background = mi.Spectrum(0 if background is None else background)
+        if dr.hint(self.gain is not None, mode="scalar"):
+            shown_background /= self.gain  # a colour that is to be seen as it was said
 
         pi = scene.ray_intersect_preliminary(ray, coherent=True, active=active)
         first_distance = mi.Float(pi.t)
@@ -147,7 +153,7 @@ class PathIntegrator:
             weight = mis_weight(vertex_pdf, emitter_pdf)
             emission = ds.emitter.eval(si) * weight
             if dr.hint(background is not None, mode="scalar"):
-                emission = dr.select((depth == 0) & ~si.is_valid(), mi.Spectrum(background), emission)
+                emission = dr.select((depth == 0) & ~si.is_valid(), shown_background, emission)
             radiance += throughput * emission
 
             # ---- next-event estimation ----
@@ -202,6 +208,8 @@ class PathIntegrator:
             pi = scene.ray_intersect_preliminary(ray, coherent=False, active=active)
             secondary += dr.select(active, mi.UInt32(1), mi.UInt32(0))
 
+        if dr.hint(self.gain is not None, mode="scalar"):
+            radiance *= self.gain
         return radiance, RayCounts(secondary, shadow), FirstHit(first_distance, view_dependent)
 
     def direct_light(

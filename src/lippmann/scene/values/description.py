@@ -194,7 +194,8 @@ class SceneDescription:
     ``background`` is the colour seen where nothing is hit (None: the environment itself, black without one).
     ``notes`` are one-line remarks of the reader: features that it ignored, and its assumptions.
     ``multiple_scattering`` gives back the light that rough surfaces reflect more than once between microfacets; without
-    it they are as dark as glTF's formulas make them.
+    it they are as dark as glTF's formulas make them. ``physical_lights`` says that the file tells its light sources in
+    lux or candela.
     """
 
     name: str
@@ -207,6 +208,7 @@ class SceneDescription:
     background: Color | None = None
     notes: Sequence[str] = ()
     multiple_scattering: bool = True
+    physical_lights: bool = False
 
     @cached_property
     def placements(self) -> Mapping[int, Matrix]:

@@ -106,6 +106,7 @@ class Contents:
             materials=tuple(self.meshes.materials.read),
             instances=instances,
             lights=tuple(self.lights),
+            physical_lights=bool(self.lights),
             cameras=tuple(self.cameras),
             notes=self.document.notes.lines(),
         )

@@ -1,0 +1,103 @@
+"""Physical light is brought to mid-grey; a given exposure is kept; all ways of rendering agree."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from lippmann import api
+from lippmann.errors import UsageError
+from lippmann.image import read_picture
+from lippmann.scene.values.description import Instance, Light, Material, Mesh, SceneDescription
+
+pytestmark = pytest.mark.usefixtures("engine")
+
+SUN = 100_000.0  # lux
+
+
+def scene(*, physical=True, illuminance=SUN, **rest):
+    """A grey wall in the sun, slightly askew."""
+    corners = np.float32([(-10, -10, 0), (10, -10, 1), (10, 10, 1), (-10, 10, 0)])
+    wall = Mesh("wall", corners, np.uint32([(0, 1, 2), (0, 2, 3)]), 0)
+    light = Light("directional", (illuminance,) * 3, np.eye(4))
+    return api.load_scene(
+        SceneDescription(
+            "wall",
+            [wall],
+            [Material(base_color=(0.5, 0.5, 0.5), specular=0.0)],
+            [Instance(0, np.eye(4))],
+            lights=[light],
+            physical_lights=physical,
+            **rest,
+        )
+    )
+
+
+def picture(what, **options):
+    return api.render(what, "mla-square", spp=4, integrator="direct", method="full", **options)
+
+
+def test_the_median_of_what_is_lit_is_mid_grey():
+    image = picture(scene())
+    lit = image.pixels[image.pixels.max(-1) > 0].mean(-1)
+    assert np.median(lit) == pytest.approx(0.18, rel=0.02)
+    exposure = image.provenance.options["exposure"]
+    assert exposure == pytest.approx(np.log2(0.18 / (SUN * 0.5 / np.pi)), abs=0.05)
+    assert any(f"exposure {exposure:+.2f} EV" in note for note in image.provenance.notes)
+
+
+def test_an_exposure_that_is_given_is_kept():
+    plain = picture(scene(), exposure=0.0)
+    assert "exposure" not in plain.provenance.options
+    assert plain.pixels.max() > 10_000
+    raised = picture(scene(), exposure=-10.0)
+    np.testing.assert_allclose(raised.pixels, plain.pixels * 2.0**-10, rtol=1e-5)
+    assert raised.provenance.options["exposure"] == -10.0
+
+
+def test_light_that_is_not_physical_stays_as_it_is():
+    image = picture(scene(physical=False, illuminance=2.0))
+    assert "exposure" not in image.provenance.options
+    assert np.median(image.pixels[image.pixels.max(-1) > 0]) == pytest.approx(2.0 * 0.5 / np.pi, rel=0.02)
+
+
+def test_the_background_keeps_its_colour():
+    image = picture(scene(background=(0.25, 0.5, 0.75)), placement=api.PlacementOptions(scale=0.3))
+    np.testing.assert_allclose(image.pixels[0, 0], (0.25, 0.5, 0.75), rtol=1e-5)
+
+
+def test_previews_quilts_tiles_and_reuse_choose_alike(tmp_path):
+    whole = picture(scene())
+    preview = api.preview(scene(), (64, 64), spp=4, integrator="direct")
+    assert np.median(preview.pixels[preview.pixels.max(-1) > 0]) == pytest.approx(0.18, rel=0.05)
+    reused = api.render(scene(), "mla-square", spp=1, integrator="direct", method="lens-view")
+    assert reused.provenance.options["exposure"] == pytest.approx(whole.provenance.options["exposure"], abs=0.02)
+    path = tmp_path / "a.exr"
+    done = api.render_to_file(scene(), path, "mla-square", spp=4, integrator="direct", method="full")
+    assert done.provenance.options["exposure"] == whole.provenance.options["exposure"]
+    np.testing.assert_allclose(read_picture(path).pixels, whole.pixels, rtol=2e-3)
+
+
+def test_values_that_are_no_light_have_no_exposure():
+    with pytest.raises(UsageError, match=r"exposure: .*no amounts of light"):
+        api.render(scene(), "mla-square", integrator="normal", exposure=1.0)
+    with pytest.raises(UsageError, match=r"exposure: .*stops from -40 to 40"):
+        api.render(scene(), "mla-square", exposure=41.0)
+
+
+def test_a_sequence_keeps_the_exposure_of_the_motions_first_frame():
+    from lippmann.display import load_display
+    from lippmann.rendering.request.render_request import RenderRequest
+    from lippmann.scene.placement import place
+    from lippmann.sequences.frames import hold_exposure
+
+    class Sunset:
+        def scene(self, frame):
+            return scene(illuminance=SUN / 2**frame)
+
+    display = load_display("mla-square")
+    request = RenderRequest(integrator="direct", method="full", spp=4)
+    held = hold_exposure(request, Sunset(), display, lambda frame: place(scene().bounds, display))
+    assert held.exposure == picture(scene()).provenance.options["exposure"]
+    assert picture(Sunset().scene(3), exposure=held.exposure).pixels.max() < 0.05
+    assert hold_exposure(RenderRequest(exposure=2.0), Sunset(), display, place).exposure == 2.0
