@@ -17,7 +17,8 @@ Transfer-Encoding: chunked Expect: 100-continue If-Match: /pictures/0/manifest.j
 
 _GLTF = """
 KHR_draco_mesh_compression EXT_meshopt_compression KHR_texture_basisu KHR_techniques_webgl KHR_animation_pointer
-EXT_mesh_gpu_instancing extensionsRequired "mode":0 "mode":1 "mode":2 "mode":3 "version":"1.0"
+EXT_mesh_gpu_instancing extensionsRequired ATTRIBUTES TRIANGLES INDICES OCTAHEDRAL QUATERNION EXPONENTIAL
+"mode":0 "mode":1 "mode":2 "mode":3 "version":"1.0"
 """
 
 _WORDS = {

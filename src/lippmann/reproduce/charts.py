@@ -10,7 +10,9 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from lippmann.reproduce.html import Markup, element, escaped, raw
+from markupsafe import Markup
+
+from lippmann.reproduce.html import element, joined
 
 WIDTH, HEIGHT = 640, 400
 LEFT, RIGHT, TOP, BOTTOM = 68, 28, 40, 60
@@ -94,13 +96,13 @@ def key(entries: Sequence[tuple[str, str, str]]) -> Markup:
 def _key_entry(shape: str, class_: str, text: str) -> Markup:
     inside = _line(0, 8, 16, 8, f"series {class_}") if shape == "line" else _shape(8, 8, Mark(0, 0, shape, class_, ""))
     sign = element("svg", inside, viewBox="0 0 16 16", width=16, height=16, aria_hidden="true")
-    return element("li", sign, escaped(text))
+    return element("li", sign, text)
 
 
-def _svg(title: str, *inside: Markup) -> Markup:
+def _svg(title: str, *inside: str) -> Markup:
     return element(
         "svg",
-        element("title", escaped(title)),
+        element("title", title),
         *inside,
         viewBox=f"0 0 {WIDTH} {HEIGHT}",
         class_="chart",
@@ -131,11 +133,11 @@ def _path(line: Line, x: Axis, y: Axis) -> Markup:
         # A point between two gaps would not show without a length of its own.
         steps += [] if joined else ["h0.01"]
         joined = True
-    return element("path", element("title", escaped(line.title)), d="".join(steps), class_=f"series {line.class_}")
+    return element("path", element("title", line.title), d="".join(steps), class_=f"series {line.class_}")
 
 
 def _shape(x: float, y: float, mark: Mark) -> Markup:
-    title = element("title", escaped(mark.title)) if mark.title else raw()
+    title = element("title", mark.title) if mark.title else joined()
     class_ = f"mark {mark.class_}"
     if mark.shape == "circle":
         return element("circle", title, cx=f"{x:.1f}", cy=f"{y:.1f}", r=_R, class_=class_)
@@ -152,7 +154,7 @@ def _line(x1: float, y1: float, x2: float, y2: float, class_: str) -> Markup:
 
 
 def _text(x: float, y: float, text: str, anchor: str) -> Markup:
-    return element("text", escaped(text), x=f"{x:.1f}", y=f"{y:.1f}", text_anchor=anchor)
+    return element("text", text, x=f"{x:.1f}", y=f"{y:.1f}", text_anchor=anchor)
 
 
 def _px(axis: Axis, value: float) -> float:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from markupsafe import Markup
+
 from lippmann.metrics.error_image import BRIGHTEST
 from lippmann.reproduce import tables
 from lippmann.reproduce.experiment import Manner, Results, Run, Variant
-from lippmann.reproduce.html import Markup, element, escaped, figure, folded, paragraph
+from lippmann.reproduce.html import element, figure, folded, paragraph
 from lippmann.viewing import diagnostic_maps
 
 
@@ -21,7 +23,7 @@ def missed_figures(results: Results) -> list[Markup]:
     for position, scene in enumerate(results.runs):
         shown = _parts_of(results.of(scene, key))
         parts.append(_gallery(*shown) if position == 0 else folded(scene, _gallery(*shown)))
-    return [paragraph(escaped(text)), *parts]
+    return [paragraph(text), *parts]
 
 
 def scene_figures(results: Results) -> list[Markup]:
@@ -40,7 +42,7 @@ def scene_figures(results: Results) -> list[Markup]:
                 diagnostic_maps.replayed_codes(image), f"{scene}: before the display", f"the {scene} as an eye sees it"
             ),
         ]
-    return [paragraph(escaped(text)), _gallery(*shown)]
+    return [paragraph(text), _gallery(*shown)]
 
 
 def gloss_figures(results: Results) -> list[Markup]:
@@ -61,7 +63,7 @@ def gloss_figures(results: Results) -> list[Markup]:
         "Errors against full tracing, from none (black) to a root-mean-square difference of "
         f"{BRIGHTEST:g} of coded values and above (yellow), where respecting gloss changes most:"
     )
-    return [paragraph(escaped(text)), _gallery(*shown)]
+    return [paragraph(text), _gallery(*shown)]
 
 
 def _parts_of(run: Run) -> list[Markup]:
@@ -81,5 +83,5 @@ def _figure(codes: diagnostic_maps.Codes, caption: str, alt: str) -> Markup:
     return figure(diagnostic_maps.data_uri(codes), (width, height), caption, alt)
 
 
-def _gallery(*figures: Markup) -> Markup:
+def _gallery(*figures: str) -> Markup:
     return element("div", *figures, class_="figures")

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 
+from markupsafe import Markup
+
 from lippmann.reproduce import charts, tables
 from lippmann.reproduce import paper_values as printed
 from lippmann.reproduce.experiment import COMPARED, METHODS, Manner, Results, Variant
 from lippmann.reproduce.figures import gloss_figures, missed_figures, scene_figures
-from lippmann.reproduce.html import Markup, element, escaped, paragraph, raw, section
+from lippmann.reproduce.html import element, joined, paragraph, section
 from lippmann.reproduce.style import STYLE
 
 TITLE = "The paper's system, measured again"
@@ -24,13 +26,13 @@ _COLORS = {"lens-view": "a", "interpolated": "b"}
 def report_page(results: Results) -> str:
     """The whole page as HTML text; it refers to nothing outside itself."""
     sections = _sections(results)
-    links = [element("li", element("a", escaped(title), href=f"#{id_}")) for id_, title, _ in sections]
+    links = [element("li", element("a", title, href=f"#{id_}")) for id_, title, _ in sections]
     body = element(
         "body",
         element(
             "header",
-            element("h1", escaped(TITLE)),
-            paragraph(escaped(_conditions(results)), class_="soft"),
+            element("h1", TITLE),
+            paragraph(_conditions(results), class_="soft"),
             *(_facts(results, manner) for manner in _AT_THE_TOP),
             element("nav", element("ul", *links), aria_label="contents"),
         ),
@@ -39,7 +41,7 @@ def report_page(results: Results) -> str:
     head = element(
         "head",
         Markup('<meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">'),
-        element("title", escaped(f"Lippmann: {TITLE}")),
+        element("title", f"Lippmann: {TITLE}"),
         # A page without a picture of its own would ask the server for one.
         Markup('<link rel="icon" href="data:,">'),
         element("style", Markup(STYLE)),
@@ -83,9 +85,9 @@ def _facts(results: Results, manner: Manner) -> Markup:
         ("least mean PSNR of a scene", _decibels(least)),
         ("worst micro-image of all scenes", _decibels(worst)),
     )
-    cards = (element("div", element("dt", escaped(text)), element("dd", escaped(value))) for text, value in entries)
-    heading = element("h3", escaped(f"{manner.value}: interpolation"))
-    return raw(heading, element("dl", *cards, class_="facts"))
+    cards = (element("div", element("dt", text), element("dd", value)) for text, value in entries)
+    heading = element("h3", f"{manner.value}: interpolation")
+    return joined(heading, element("dl", *cards, class_="facts"))
 
 
 def _decibels(value: float) -> str:
@@ -106,7 +108,7 @@ def _time(results: Results) -> list[Markup]:
         f"{printed.TREE_COMPUTED_PERCENT} %. The scenes here are of the same kind and count as its own, not copies of "
         "them, and the machine is another: compare shares, not seconds. Negative savings are losses."
     )
-    return [paragraph(escaped(text)), *(tables.table_2(results, manner) for manner in Manner)]
+    return [paragraph(text), *(tables.table_2(results, manner) for manner in Manner)]
 
 
 def _quality(results: Results, scene: str) -> list[Markup]:
@@ -117,12 +119,12 @@ def _quality(results: Results, scene: str) -> list[Markup]:
         "and 13.5795 gives 36.802 dB."
     )
     return [
-        paragraph(escaped(text)),
+        paragraph(text),
         tables.table_3(results, scene),
-        element("h3", escaped(f"Lens by lens: {scene}, interpolated")),
+        element("h3", f"Lens by lens: {scene}, interpolated"),
         _lens_chart(results, scene),
-        element("h3", escaped("All scenes")),
-        paragraph(escaped("PSNR in dB against full tracing. Only the paper's mean is an average over lenses.")),
+        element("h3", "All scenes"),
+        paragraph("PSNR in dB against full tracing. Only the paper's mean is an average over lenses."),
         *(tables.quality_table(results, manner) for manner in Manner),
     ]
 
@@ -141,8 +143,8 @@ def _lens_chart(results: Results, scene: str) -> Markup:
     y = charts.Axis.around(values, "PSNR of the micro-image, dB")
     chart = charts.lines(drawn, x, y, title=f"PSNR of every micro-image of the {scene}", level=level)
     dashed = "" if level is None else f"Dashed: the paper's mean, {level:g} dB. "
-    note = escaped(f"{dashed}Gaps are micro-images without any error.")
-    return raw(chart, charts.key(entries), paragraph(note, class_="soft"))
+    note = f"{dashed}Gaps are micro-images without any error."
+    return joined(chart, charts.key(entries), paragraph(note, class_="soft"))
 
 
 def _ray_chart(results: Results) -> list[Markup]:
@@ -162,7 +164,7 @@ def _ray_chart(results: Results) -> list[Markup]:
         "after points costs more than the rays they spare."
     )
     chart = charts.scatter(marks, x, y, title="Share of rays against share of time")
-    return [paragraph(escaped(text)), chart, charts.key([(*_look(variant), variant.title) for variant in COMPARED])]
+    return [paragraph(text), chart, charts.key([(*_look(variant), variant.title) for variant in COMPARED])]
 
 
 def _look(variant: Variant) -> tuple[str, str]:
@@ -177,7 +179,7 @@ def _gloss(results: Results) -> list[Markup]:
         "wrong for the next. The paper reuses it all the same; the mode that respects gloss traces such pixels anew."
     )
     shown = (tables.gloss_table(results, method) for method in METHODS)
-    return [paragraph(escaped(text)), *shown, *gloss_figures(results)]
+    return [paragraph(text), *shown, *gloss_figures(results)]
 
 
 def _method(results: Results) -> list[Markup]:
@@ -192,4 +194,4 @@ def _method(results: Results) -> list[Markup]:
         "the 1st percentile and the worst are of micro-images; SSIM is that of Wang et al. (2004), of each view, "
         "averaged.",
     )
-    return [paragraph(escaped(text)) for text in texts]
+    return [paragraph(text) for text in texts]

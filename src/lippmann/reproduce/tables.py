@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+from markupsafe import Markup
+
 from lippmann.display import Display
 from lippmann.metrics import Comparison
 from lippmann.reproduce import paper_values
 from lippmann.reproduce.experiment import COMPARED, Manner, Results, Run, Variant
-from lippmann.reproduce.html import Markup, element, escaped, raw, table
+from lippmann.reproduce.html import element, table
 
 #: Stands where there is nothing to say.
 NOTHING = "-"
@@ -30,7 +32,7 @@ def table_1(display: Display) -> Markup:
         distance,
         f"{paper_values.RAY_DEPTH}",
     )
-    rows = [_cells(name, value, ours) for (name, value), ours in zip(paper_values.TABLE_I, here, strict=True)]
+    rows = [(name, value, ours) for (name, value), ours in zip(paper_values.TABLE_I, here, strict=True)]
     caption = f"The display of the experiments; here the preset {display.name}."
     return table(("", "Paper", "Here"), rows, caption=caption, wrap=True)
 
@@ -52,7 +54,7 @@ def table_2(results: Results, manner: Manner) -> Markup:
             shown += [percent(run.traced_share), percent(run.ray_share)]
         if manner is Manner.PAPER:
             shown.append(_printed_saving(scene))
-        rows.append(_cells(*shown))
+        rows.append(shown)
     note = ""
     if manner is Manner.PAPER and paper_values.TREE in results.runs:
         note = f". * The paper's own seconds come to {paper_values.TREE_COMPUTED_PERCENT} %"
@@ -84,12 +86,11 @@ def table_3(results: Results, scene: str) -> Markup:
         found = comparison(results.of(scene, variant.key))
         row = found.paper.psnr[0]
         shown = [float(row[lens]) for lens in lenses]
-        cells = _cells(variant.title, *map(decibels, shown), "", decibels(found.paper.mean_psnr))
-        cells[-2] = element("b", escaped(decibels(finite_mean(shown))))
-        rows.append(cells)
+        mean = element("b", decibels(finite_mean(shown)))
+        rows.append([variant.title, *map(decibels, shown), mean, decibels(found.paper.mean_psnr)])
     if scene == paper_values.TEAPOT:
         blank = [NOTHING] * len(lenses)
-        rows.append(_cells("the paper prints", *blank, f"{paper_values.TEAPOT_PSNR:g}", NOTHING))
+        rows.append(["the paper prints", *blank, f"{paper_values.TEAPOT_PSNR:g}", NOTHING])
     caption = (
         f"PSNR in dB of micro-images of the {scene} against full tracing, by the paper's formula. Lenses are counted "
         "from 0 at the left; a micro-image without error (=) has no part in the means."
@@ -108,7 +109,7 @@ def quality_table(results: Results, manner: Manner) -> Markup:
             found = comparison(results.of(scene, variant.key))
             figures = (found.paper.mean_psnr, found.psnr, found.percentile_1.psnr, found.worst.psnr)
             shown += [*map(decibels, figures), f"{found.views.mean:.4f}"]
-        rows.append(_cells(*shown))
+        rows.append(shown)
     spans = [("", 1), *((variant.method, 5) for variant in variants)]
     return table(head, rows, caption=manner.value, spans=spans)
 
@@ -121,7 +122,7 @@ def gloss_table(results: Results, method: str) -> Markup:
         before, after = (results.of(scene, key) for key in keys)
         rows.append(
             [
-                escaped(scene),
+                scene,
                 _change(decibels(comparison(before).psnr), decibels(comparison(after).psnr)),
                 _change(decibels(comparison(before).worst.psnr), decibels(comparison(after).worst.psnr)),
                 _change(percent(before.traced_share), percent(after.traced_share)),
@@ -159,9 +160,5 @@ def seconds(value: float) -> str:
     return f"{value:.3f}" if abs(value) < 10 else f"{value:.1f}"
 
 
-def _cells(*texts: str) -> list[Markup]:
-    return [escaped(text) for text in texts]
-
-
 def _change(before: str, after: str) -> Markup:
-    return raw(escaped(before), Markup(" <span class=soft>→</span> "), escaped(after))
+    return Markup("{} <span class=soft>→</span> {}").format(before, after)

@@ -229,7 +229,6 @@ def test_only_the_first_buffer_lives_in_the_binary_chunk(writer, read):
     ("name", "tool"),
     [
         ("KHR_draco_mesh_compression", "decompress it with 'gltf-transform cp in.glb out.glb'"),
-        ("EXT_meshopt_compression", "decompress it with 'gltf-transform cp in.glb out.glb'"),
         ("KHR_texture_basisu", "convert its textures with 'gltf-transform ktxdecompress in.glb out.glb'"),
         ("ACME_gizmo", "export the scene without it"),
     ],
@@ -281,15 +280,6 @@ def test_draco_that_is_used_and_not_required(writer, read):
         f"scene.glb: meshes[0].primitives[0] is compressed by Draco with the glTF extension {name}; "
         "it is not understood, and the file holds no uncompressed copy; decompress it with"
     )
-
-
-def test_a_buffer_that_meshopt_alone_fills(writer, read):
-    writer.triangle().json["buffers"] = [
-        {"byteLength": 36},
-        {"byteLength": 36, "extensions": {"EXT_meshopt_compression": {"fallback": True}}},
-    ]
-    writer.json["bufferViews"][0]["buffer"] = 1
-    assert "buffers[1] is compressed with the glTF extension EXT_meshopt_compression" in _refusal(read, writer)
 
 
 def test_a_missing_buffer_is_not_answered_with_the_file_itself(writer, tmp_path):

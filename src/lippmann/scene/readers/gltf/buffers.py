@@ -9,7 +9,9 @@ from urllib.parse import unquote
 
 from lippmann.errors import SceneError
 from lippmann.scene.parsing.files import read_bytes, resolve
-from lippmann.scene.readers.gltf.document import MESHOPT, Document, not_decompressed
+from lippmann.scene.readers.gltf.document import DECOMPRESS, MESHOPT, Document
+from lippmann.scene.readers.gltf.json_fields import Fields
+from lippmann.scene.readers.gltf.meshopt import MeshoptError, decompress
 
 _SCHEME = re.compile(r"[A-Za-z][A-Za-z0-9+.-]+:")  # two letters or more: "C:" is a Windows drive
 
@@ -58,20 +60,51 @@ class Buffers:
     def __init__(self, document: Document) -> None:
         self._document = document
         self._loaded: dict[int, memoryview] = {}
+        self._views: dict[int, memoryview] = {}
 
     def all(self) -> list[bytes]:
-        """Every buffer; raises as :meth:`view`."""
-        return [bytes(self._buffer(index)) for index in range(len(self._document.all("buffers")))]
+        """Every buffer that holds anything; raises as :meth:`view`."""
+        buffers = self._document.all("buffers")
+        return [bytes(self._buffer(index)) for index in range(len(buffers)) if not self._is_placeholder(index)]
 
     def view(self, index: int) -> tuple[memoryview, int | None]:
-        """The bytes of ``bufferViews[index]`` and its stride in bytes, if it has one.
+        """The bytes of ``bufferViews[index]``, decompressed, and its stride in bytes, if it has one.
 
         Raises
         ------
         SceneError
-            The view reaches beyond its buffer, or the buffer cannot be read.
+            The view reaches beyond its buffer, or the buffer cannot be read, or its compressed bytes are damaged.
         """
         fields = self._document.all("bufferViews")[index]
+        if index not in self._views:
+            compressed = next((how for name in MESHOPT if (how := fields.extension(name)) is not None), None)
+            self._views[index] = self._slice(fields) if compressed is None else self._decompress(fields, compressed)
+        return self._views[index], fields.optional_integer("byteStride")
+
+    def _is_placeholder(self, index: int) -> bool:
+        """Whether a buffer is there only because compressed views have to name one."""
+        used = self._document.root.texts("extensionsUsed")
+        has_chunk = index == 0 and self._document.binary_chunk is not None
+        return any(name in used for name in MESHOPT) and not (
+            has_chunk or self._document.all("buffers")[index].has("uri")
+        )
+
+    def _decompress(self, fields: Fields, compressed: Fields) -> memoryview:
+        count, stride = compressed.integer("count"), compressed.integer("byteStride")
+        mode = compressed.text("mode")
+        if mode is None:
+            raise compressed.error("mode", "it is required")
+        if fields.integer("byteLength") != count * stride:
+            raise fields.error("byteLength", f"{count} elements of {stride} bytes belong here")
+        data = bytes(self._slice(compressed))
+        try:
+            return memoryview(decompress(data, mode, compressed.text("filter") or "NONE", count, stride))
+        except MeshoptError as error:
+            if not self._is_placeholder(self._document.required_reference(fields, "buffer", "buffers")):
+                return self._slice(fields)
+            raise self._document.error(f"{fields.place} cannot be decompressed ({error})", fix=DECOMPRESS) from None
+
+    def _slice(self, fields: Fields) -> memoryview:
         buffer = self._buffer(self._document.required_reference(fields, "buffer", "buffers"))
         offset = fields.optional_integer("byteOffset") or 0
         length = fields.integer("byteLength")
@@ -79,7 +112,7 @@ class Buffers:
             raise self._document.error(
                 f"{fields.place} ends at byte {offset + length}", rule=f"its buffer holds {len(buffer)} bytes"
             )
-        return buffer[offset : offset + length], fields.optional_integer("byteStride")
+        return buffer[offset : offset + length]
 
     def _buffer(self, index: int) -> memoryview:
         if index not in self._loaded:
@@ -96,9 +129,6 @@ class Buffers:
         elif index == 0 and self._document.binary_chunk is not None:
             content, name = self._document.binary_chunk, "binary chunk"
         else:
-            for extension in MESHOPT:
-                if fields.extension(extension) is not None:
-                    raise not_decompressed(self._document, extension, f"{fields.place} is compressed")
             raise fields.error("uri", "only the first buffer of a .glb file does without one")
         if len(content) < length:
             raise SceneError(

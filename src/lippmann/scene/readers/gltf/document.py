@@ -37,6 +37,7 @@ _CHUNK_HEADER = struct.Struct("<II")
 _UNDERSTOOD = frozenset(
     {
         "EXT_mesh_gpu_instancing",
+        "EXT_meshopt_compression",
         "EXT_texture_avif",
         "EXT_texture_webp",
         "KHR_lights_punctual",
@@ -53,6 +54,7 @@ _UNDERSTOOD = frozenset(
         "KHR_materials_variants",
         "KHR_materials_volume",
         "KHR_mesh_quantization",
+        "KHR_meshopt_compression",
         "KHR_node_visibility",
         "KHR_texture_transform",
     }
@@ -71,14 +73,12 @@ _FORMER_MATERIALS = frozenset({"KHR_blend", "KHR_materials_common", "KHR_techniq
 
 # Tools that write the same scene without an extension.
 _UPGRADE = "convert it with 'gltf-pipeline -i in.gltf -o out.glb'"
-_DECOMPRESS = "decompress it with 'gltf-transform cp in.glb out.glb'"
+DECOMPRESS = "decompress it with 'gltf-transform cp in.glb out.glb'"
 _REMEDIES = {
-    DRACO: _DECOMPRESS,
-    "EXT_meshopt_compression": _DECOMPRESS,
-    "KHR_meshopt_compression": _DECOMPRESS,
+    DRACO: DECOMPRESS,
     "KHR_texture_basisu": "convert its textures with 'gltf-transform ktxdecompress in.glb out.glb'",
 }
-#: Extensions of compressed buffers; the file may hold the same bytes uncompressed, too.
+#: Extensions of compressed buffer views; the file may hold the same bytes uncompressed, too.
 MESHOPT = ("EXT_meshopt_compression", "KHR_meshopt_compression")
 
 _PICTURE_FORMATS = {"EXT_texture_webp": "webp", "EXT_texture_avif": "avif"}
@@ -288,22 +288,13 @@ def check_extensions(document: Document) -> None:
 
 def _remark(extension: str) -> str:
     """What becomes of an extension that the file uses, does not require, and that is not understood."""
-    if extension in (DRACO, *MESHOPT):
+    if extension == DRACO:
         return f"the glTF extension {extension} is not understood; the uncompressed data beside it is read"
     if extension in _FORMER_MATERIALS:
         return f"materials of the glTF extension {extension} are shown as plain ones; {_UPGRADE}"
     if extension == _POINTER:
         return f"animations of materials, lights and cameras ({extension}) are not followed"
     return f"the glTF extension {extension} is not understood; what it adds is left out"
-
-
-def not_decompressed(document: Document, extension: str, what: str) -> SceneError:
-    """The error that data is only there in the compressed form of an extension."""
-    return document.error(
-        f"{what} with the glTF extension {extension}",
-        rule="it is not understood, and the file holds no uncompressed copy",
-        fix=_REMEDIES[extension],
-    )
 
 
 def _is_understood(name: str) -> bool:

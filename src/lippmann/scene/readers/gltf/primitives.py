@@ -8,7 +8,7 @@ import numpy as np
 
 from lippmann.scene.readers.gltf import accessors as storage
 from lippmann.scene.readers.gltf.accessors import Accessors, Storage
-from lippmann.scene.readers.gltf.document import DRACO, Document, not_decompressed
+from lippmann.scene.readers.gltf.document import DECOMPRESS, DRACO, Document
 from lippmann.scene.readers.gltf.json_fields import Fields
 from lippmann.scene.readers.gltf.skinning import Skin, deform, unit_normals
 from lippmann.scene.values.description import FloatArray, IndexArray
@@ -116,7 +116,11 @@ class Primitives:
         compressed = primitive.extension(DRACO) is not None
         accessor = self.document.all("accessors")[position]
         if compressed and not accessor.has("bufferView") and not accessor.has("sparse"):
-            raise not_decompressed(self.document, DRACO, f"{primitive.place} is compressed by Draco")
+            raise self.document.error(
+                f"{primitive.place} is compressed by Draco with the glTF extension {DRACO}",
+                rule="it is not understood, and the file holds no uncompressed copy",
+                fix=DECOMPRESS,
+            )
 
     def _uvs(self, attributes: Fields, count: int) -> tuple[FloatArray, ...]:
         sets: list[FloatArray] = []
