@@ -39,6 +39,8 @@ WORKER = Path(__file__).with_name("conformance_worker.py")
 
 #: A display that shows so little of a scene that something must be wrong: share of its pixels.
 SHOWN = 0.01
+#: A mesh whose width or height is a smaller share of its longest side is flat, and seen from its edge.
+FLAT = 0.05
 #: Files that one worker renders; its compiled kernels and textures are gone with it.
 FILES_A_WORKER = 150
 #: Seconds between looks at what the worker takes.
@@ -123,7 +125,11 @@ def summarise(reports: list[dict[str, Any]], valid: dict[str, Validity]) -> dict
             reason: {"files": len(each), "example": each[0]["line"]}
             for reason, each in sorted(reasons.items(), key=lambda item: (-len(item[1]), item[0]))
         },
-        "shows_nothing": [report["file"] for report in rendered if report["shown"] < SHOWN],
+        "shows_nothing": {
+            report["file"]: "seen edge-on" if min(report["sides"][:2]) < FLAT else "small, or looked through"
+            for report in rendered
+            if report["shown"] < SHOWN
+        },
         "faults": [
             {"file": report["file"], "line": report["line"]} for report in reports if report["outcome"] in FAULTS
         ],

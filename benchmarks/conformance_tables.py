@@ -22,11 +22,11 @@ Every scene file of public sets, rendered for a display of 48x48 pixels with 4 s
 of processor time and {gigabytes:g} GB each. A fault is a traceback, a warning or the end of the process; everything
 else that is not rendered is refused in one line.
 
-A file counts as *valid* if it shows triangles and is sound. Of glTF files Khronos' own validator decides; its errors on
-bounds, weights and alignment alone do not count against a file. Files of other formats are valid unless their set names
-them as damaged. A file that names another one which its set lacks, or that is glTF 1.0, is not valid. Most inputs of
-tests of validators and readers are not valid, on purpose. Compressed files (Draco, meshopt) and files that require an
-unknown extension are valid.
+A file counts as *valid* if it shows triangles and is sound. Khronos' own validator decides for glTF 2.0, Mitsuba itself
+for its XML; errors of the validator on bounds, weights and alignment alone do not count against a file. Files of other
+formats are valid unless their set names them as damaged. Not valid are files that name another one which their set
+lacks, and glTF 1.0. Most inputs of the tests of validators and readers are not valid, on purpose. Files that require
+Draco or an extension that nobody knows are valid.
 
 Of {total["valid"]} valid files, {total["valid_rendered"]} are rendered ({share:.1%}).
 
@@ -79,8 +79,12 @@ def _missed_table(sets: dict[str, Any]) -> str:
 
 
 def _nothing(sets: dict[str, Any]) -> str:
-    files = [f"`{file.rpartition('/')[2]}` ({name})" for name, found in sets.items() for file in found["shows_nothing"]]
-    return (", ".join(files) or "none") + "."
+    by_cause: dict[str, list[str]] = {}
+    for name, found in sets.items():
+        for file, cause in found["shows_nothing"].items():
+            by_cause.setdefault(cause, []).append(f"`{file.rpartition('/')[2]}` ({name})")
+    told = (f"{cause}: {', '.join(files)}" for cause, files in sorted(by_cause.items()))
+    return ("; ".join(told) or "none") + "."
 
 
 def _cell(text: str) -> str:

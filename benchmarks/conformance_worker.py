@@ -40,6 +40,7 @@ def _render(request: dict[str, Any], display: lippmann.Display, memory: int) -> 
         scene = lippmann.load_scene(request["file"], allow_outside=request["allow_outside"])
         image = lippmann.render(scene, display, spp=SAMPLES, layers=True, denoise="none", memory=memory)
         shown = np.isfinite(image.maps["depth"])
+        sides = np.ptp(scene.bounds, axis=0)
         light = image.pixels[shown]
         if request["picture"] is not None:
             seen = lippmann.preview(scene, (PICTURE, PICTURE), spp=PICTURE_SAMPLES, memory=memory).pixels
@@ -47,6 +48,7 @@ def _render(request: dict[str, Any], display: lippmann.Display, memory: int) -> 
         return {
             "outcome": "rendered",
             "shown": round(float(shown.mean()), 4),
+            "sides": np.round(sides / sides.max(), 4).tolist(),
             "light": round(float(light.mean()), 5) if light.size else 0.0,
             "finite": bool(np.isfinite(image.pixels).all()),
             "notes": list(scene.notes),
