@@ -92,6 +92,18 @@ class TestIncludes:
         )
         assert [attributes.get("id") for _, attributes in elements(document)][1:] == ["c", "s7"]
 
+    def test_a_search_path_of_an_included_file_may_start_at_the_scene(self, save, tmp_path):
+        """As with Mitsuba: from the folder of the file that names it, else from that of the scene."""
+        (tmp_path / "scene" / "common").mkdir(parents=True)
+        (tmp_path / "scene" / "common" / "ball.ply").touch()
+        (tmp_path / "scene" / "parts").mkdir()
+        (tmp_path / "scene" / "parts" / "inner.xml").write_text(
+            '<scene version="3.0.0"><path value="common"/>'
+            '<shape type="ply"><string name="filename" value="ball.ply"/></shape></scene>'
+        )
+        document = read_mitsuba_xml(save('<include filename="parts/inner.xml"/>'))
+        assert list(document.files) == ["common/ball.ply"]
+
     def test_files_of_an_included_file(self, save, tmp_path):
         """Mitsuba looks for them from the scene's folder; beside the file that names them they are found, too."""
         save(MESH.format("a.ply") + MESH.format("b.ply"), "sub/inner.xml")

@@ -146,7 +146,8 @@ class _Reader:
                 self._declare(child, known)
             elif child.tag == "path":
                 value = self._substitute(child, known).get("value")
-                paths.insert(0, self._find_folder(value, [path.parent, *paths, *folders], child._origin))
+                near = [path.parent, *paths, *folders, self.folder]
+                paths.insert(0, self._find_folder(value, near, child._origin))
         return self._element(raw, path, parameters, [*paths, *folders], level, is_root=True)
 
     def _element(
