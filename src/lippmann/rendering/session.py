@@ -22,6 +22,7 @@ from lippmann.rendering.request.region_of_interest import even_background
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.runtime import engine as engines
 from lippmann.runtime import machine
+from lippmann.scene.camera_placement import CameraView, VisibleDepth
 from lippmann.scene.placement import Placement, place
 from lippmann.scene.scene import Scene
 from lippmann.scene.values.description import Matrix
@@ -109,7 +110,14 @@ class Session:
             options=placement,
             home_camera=scene.display_camera,
             bounds_in=scene.bounds_in,
+            is_unbounded=scene.is_unbounded,
+            probe=self._probe_depth,
         )
+
+    def _probe_depth(self, view: CameraView) -> VisibleDepth | None:
+        from lippmann.rendering.transport.depth_probe import probe_depth
+
+        return self.watch.stage("build", lambda: probe_depth(self.built, view))
 
     def integrator(self, source: RaySource, frame_from_world: Matrix) -> Integrator:
         """The integrator that the request names, for the built scene.

@@ -11,16 +11,15 @@ from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lippmann.display import Display
 from lippmann.errors import SceneError, UsageError
+from lippmann.scene.camera_placement import DepthProbe, place_by_camera
+from lippmann.scene.matrices import Bounds, Vector, inverse, rotation, scaling, transform_points, translation
 from lippmann.scene.scene import box, box_corners, find_camera, thin_axis
 from lippmann.scene.values.description import Camera, Matrix
 
 Mode = Literal["fit", "camera", "display"]
-Bounds = NDArray[np.float64]
-Vector = tuple[float, float, float]
 
 #: Share of the panel's width or height that a fitted scene fills if it is shallow.
 FILL = 0.95
@@ -39,10 +38,6 @@ _NOISE = 4.0 * float(np.finfo(np.float32).eps)
 
 #: No extent above this share of the largest one is noise, so that a small scene far from the origin has a size.
 _LARGEST_NOISE = 1e-3
-
-#: Scene units per millimetre of the display, least and most, as cameras give them: products of matrices with larger
-#: entries, and their inverses, overflow.
-_UNITS_PER_MM = (1e-30, 1e30)
 
 
 @dataclass(frozen=True)
@@ -65,8 +60,8 @@ class PlacementOptions:
     scale:
         Factor on the size at which the scene appears.
     pop_out:
-        Share of the scene's depth to lie in front of the lens plane, 0 to 1. None: a third when fitting, as the
-        camera focuses otherwise.
+        Share of the scene's depth to lie in front of the lens plane, 0 to 1; with a camera, of the depth that it
+        sees. None: a third when fitting, as the camera focuses otherwise.
 
     Raises
     ------
@@ -123,7 +118,7 @@ class Placement:
     @property
     def display_from_world(self) -> Matrix:
         """The inverse, 4x4."""
-        return _inverse(self.world_from_display)
+        return inverse(self.world_from_display)
 
 
 def place(
@@ -134,6 +129,8 @@ def place(
     options: PlacementOptions | None = None,
     home_camera: str | None = None,
     bounds_in: Callable[[Matrix], Bounds] | None = None,
+    is_unbounded: bool = False,
+    probe: DepthProbe | None = None,
 ) -> Placement:
     """Place a display in a scene.
 
@@ -148,9 +145,16 @@ def place(
     bounds_in:
         The scene's box in another frame (:meth:`lippmann.scene.scene.Scene.bounds_in`), for a depth range that is
         tight; without it the corners of ``bounds`` are carried over, which can only be too large.
+    is_unbounded:
+        Whether the scene holds more than ``bounds``, such as planes without end.
+    probe:
+        Tells how deep a camera sees, so that a display placed by it cuts nothing off and ``pop_out`` counts what is
+        seen; without it the corners of ``bounds`` stand in for what is seen.
 
     Raises
     ------
+    UsageError
+        With a camera, ``pop_out`` asks for more in front of the lens plane than recorded rays show.
     SceneError
         The box is a single point or not finite; the camera is not there, has the whole scene behind it, or a field that
         is no field or beyond numbers.
@@ -164,11 +168,21 @@ def place(
         display_from_world = _fit(bounds, display, options, warnings)
     elif mode == "camera":
         camera = _choose_camera(cameras, options.camera or home_camera)
-        display_from_world = _resize(_place_by_camera(camera, bounds, display, options), options)
+        by_camera = place_by_camera(
+            camera,
+            bounds,
+            display,
+            is_unbounded=is_unbounded,
+            pop_out=options.pop_out,
+            scale=options.scale,
+            probe=probe,
+            warnings=warnings,
+        )
+        display_from_world = _resize(by_camera, options)
     else:
         display_from_world = _resize(np.eye(4), options)
-    display_from_world = _translation(options.shift) @ display_from_world
-    return stand(_inverse(display_from_world), bounds, display, mode=mode, bounds_in=bounds_in, warnings=warnings)
+    display_from_world = translation(options.shift) @ display_from_world
+    return stand(inverse(display_from_world), bounds, display, mode=mode, bounds_in=bounds_in, warnings=warnings)
 
 
 def stand(
@@ -184,8 +198,8 @@ def stand(
 
     Parameters as of :func:`place`; ``warnings`` come first among those of the placement.
     """
-    display_from_world = _inverse(world_from_display)
-    corners = _transform_points(display_from_world, box_corners(bounds))
+    display_from_world = inverse(world_from_display)
+    corners = transform_points(display_from_world, box_corners(bounds))
     if bounds_in is not None:
         corners = box_corners(bounds_in(display_from_world))
     back, front = float(corners[:, 2].min()), float(corners[:, 2].max())
@@ -217,7 +231,7 @@ def _fit(bounds: Bounds, display: Display, options: PlacementOptions, warnings: 
     In front of the lens plane lies ``pop_out`` of the depth, but no more than the aperture lets through: the rest of
     it moves behind.
     """
-    corners = _transform_points(_rotation(options.turn), box_corners(bounds))
+    corners = transform_points(rotation(options.turn), box_corners(bounds))
     low, high = corners.min(axis=0), corners.max(axis=0)
     width, height, depth = _extents(corners)
     pop_out = POP_OUT if options.pop_out is None else options.pop_out
@@ -239,7 +253,7 @@ def _fit(bounds: Bounds, display: Display, options: PlacementOptions, warnings: 
             f"recorded rays begin {display.aperture_distance:g} mm in front of it"
         )
     anchor = np.array([(low[0] + high[0]) / 2.0, (low[1] + high[1]) / 2.0, high[2]])
-    return _translation((0.0, 0.0, front)) @ _scaling(scale) @ _translation(-anchor) @ _rotation(options.turn)
+    return translation((0.0, 0.0, front)) @ scaling(scale) @ translation(-anchor) @ rotation(options.turn)
 
 
 def _extents(points: Bounds) -> Vector:
@@ -282,73 +296,9 @@ def _largest_in_depth(depth: float, pop_out: float, display: Display) -> float:
     return min(by_front, (aperture - far) / depth)
 
 
-def _place_by_camera(camera: Camera, bounds: Bounds, display: Display, options: PlacementOptions) -> Matrix:
-    """``display_from_world`` that makes the camera's plane of focus the lens plane.
-
-    The viewing distance finite: the camera's eye becomes the viewing point. Infinite: the largest part of the camera's
-    picture that has the panel's shape fills the panel. An orthographic camera has no eye, so the latter holds for it.
-    """
-    frame = _remove_scale(camera)
-    in_camera = _transform_points(_inverse(frame), box_corners(bounds))
-    farthest, nearest = -float(in_camera[:, 2].min()), max(-float(in_camera[:, 2].max()), 0.0)
-    if farthest <= 0.0:
-        raise SceneError(
-            f"camera '{camera.name}' has the whole scene behind it", parameter="camera", fix="choose another, or fit"
-        )
-    if options.pop_out is not None:
-        focus = nearest + options.pop_out * (farthest - nearest)
-    elif camera.focus_distance is not None:
-        focus = camera.focus_distance
-    else:
-        center = -float(in_camera[:, 2].mean())
-        focus = center if center > 0.0 else (nearest + farthest) / 2.0
-    if not (np.isfinite(focus) and focus > 0.0):
-        raise SceneError(f"camera '{camera.name}' focuses at {focus:g}", parameter="camera", rule="a distance above 0")
-    units, (least, most) = _units_per_mm(camera, focus, display), _UNITS_PER_MM
-    if not least <= units <= most:
-        raise SceneError(
-            f"camera '{camera.name}' makes 1 mm of the display {units:g} scene units long",
-            parameter="camera",
-            rule=f"between {least:g} and {most:g}",
-        )
-    return _inverse(frame @ _translation((0.0, 0.0, -focus)) @ _scaling(units))
-
-
-def _units_per_mm(camera: Camera, focus: float, display: Display) -> float:
-    if camera.fov_y is not None:
-        if np.isfinite(display.viewing_distance):
-            return focus / display.viewing_distance
-        height = 2.0 * focus * float(np.tan(camera.fov_y / 2.0))
-    elif camera.height is not None:
-        height = camera.height
-    else:
-        raise SceneError(f"camera '{camera.name}' has neither an angle nor a height", parameter="camera")
-    if not (np.isfinite(height) and height > 0.0 and camera.aspect > 0.0):
-        raise SceneError(f"camera '{camera.name}' has a field {height:g} high", parameter="camera", rule="above 0")
-    return min(height * camera.aspect / display.size_mm[0], height / display.size_mm[1])
-
-
-def _remove_scale(camera: Camera) -> Matrix:
-    """``world_from_camera`` without the scale, shear or mirroring that a file's nodes may carry.
-
-    Direction and upright are kept; +x follows from them.
-    """
-    matrix = np.asarray(camera.world_from_camera, np.float64)
-    back, up = matrix[:3, 2], matrix[:3, 1]
-    right = np.cross(up, back)
-    lengths = np.linalg.norm(back), np.linalg.norm(right)
-    if not np.isfinite(matrix).all() or min(lengths) <= 0.0:
-        raise SceneError(f"camera '{camera.name}' has a transform that is not invertible", parameter="camera")
-    back, right = back / lengths[0], right / lengths[1]
-    rigid = np.eye(4)
-    rigid[:3, :3] = np.stack([right, np.cross(back, right), back], axis=-1)
-    rigid[:3, 3] = matrix[:3, 3]
-    return rigid
-
-
 def _resize(display_from_world: Matrix, options: PlacementOptions) -> Matrix:
     """Turned and scaled about the middle of the lens plane."""
-    return _scaling(options.scale) @ _rotation(options.turn) @ display_from_world
+    return scaling(options.scale) @ rotation(options.turn) @ display_from_world
 
 
 def _find_warnings(corners: Bounds, display: Display) -> list[str]:
@@ -371,32 +321,3 @@ def _find_warnings(corners: Bounds, display: Display) -> list[str]:
     if (low[:2] > window).any() or (high[:2] < -window).any():
         warnings.append("the scene lies beside the panel: nothing of it will be seen")
     return warnings
-
-
-def _transform_points(matrix: Matrix, points: Bounds) -> Bounds:
-    return np.asarray(points @ matrix[:3, :3].T + matrix[:3, 3], np.float64)
-
-
-def _inverse(matrix: Matrix) -> Matrix:
-    return np.asarray(np.linalg.inv(matrix), np.float64)
-
-
-def _translation(offset: Sequence[float] | Bounds) -> Matrix:
-    matrix = np.eye(4)
-    matrix[:3, 3] = offset
-    return matrix
-
-
-def _scaling(factor: float) -> Matrix:
-    return np.diag([factor, factor, factor, 1.0])
-
-
-def _rotation(turn: Vector) -> Matrix:
-    """Yaw about y, then pitch about x, then roll about z (degrees, right-handed)."""
-    (cy, cx, cz), (sy, sx, sz) = np.cos(np.radians(turn)), np.sin(np.radians(turn))
-    yaw = np.array([[cy, 0.0, sy], [0.0, 1.0, 0.0], [-sy, 0.0, cy]])
-    pitch = np.array([[1.0, 0.0, 0.0], [0.0, cx, -sx], [0.0, sx, cx]])
-    roll = np.array([[cz, -sz, 0.0], [sz, cz, 0.0], [0.0, 0.0, 1.0]])
-    matrix = np.eye(4)
-    matrix[:3, :3] = roll @ pitch @ yaw
-    return matrix

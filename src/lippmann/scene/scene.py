@@ -107,6 +107,12 @@ class Scene:
         return tuple(self.description.cameras)
 
     @property
+    def is_unbounded(self) -> bool:
+        """Whether there are shapes without end, which :attr:`bounds` leaves out."""
+        classic = self.classic if self.description is None else None
+        return classic is not None and bool(len(classic.planes) + len(classic.cylinders))
+
+    @property
     def display_camera(self) -> str | None:
         """Name of the camera that places a display where nothing else is said; None: the scene is fitted.
 

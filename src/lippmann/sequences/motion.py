@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from lippmann.errors import UsageError
-from lippmann.scene.placement import Bounds
+from lippmann.scene.matrices import Bounds
 from lippmann.scene.readers.load import kind_of_file, load_scene
 from lippmann.scene.scene import Scene, check_description, find_camera, override_light
 from lippmann.scene.values.description import Camera, Environment, SceneDescription

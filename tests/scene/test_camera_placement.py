@@ -1,0 +1,110 @@
+"""Displays placed by a camera show all that it sees; ``pop_out`` counts what is seen."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from lippmann import api
+from lippmann.display import load_display
+from lippmann.errors import UsageError
+from lippmann.scene.camera_placement import VisibleDepth, place_by_camera
+from lippmann.scene.matrices import inverse
+from lippmann.scene.values.description import Camera, Instance, Light, Material, Mesh, SceneDescription
+
+BOUNDS = np.array([[-5.0, -5.0, -30.0], [5.0, 5.0, -1.0]])
+EYE = Camera("eye", np.eye(4), fov_y=0.5, focus_distance=20.0)
+#: Seen from 300 mm; rays begin 10 mm before the lens plane.
+DISPLAY = dataclasses.replace(load_display("mla-square"), viewing_distance=300.0, aperture_distance=10.0)
+
+
+def lens_plane(display_from_world):
+    """Distance of the lens plane from the eye at the origin, world units."""
+    return -inverse(display_from_world)[2, 3]
+
+
+def seeing(near, far):
+    return lambda view: VisibleDepth(near, far)
+
+
+def test_a_focus_that_cuts_nothing_stays():
+    warnings = []
+    placed = place_by_camera(EYE, BOUNDS, DISPLAY, probe=seeing(19.8, 25.0), warnings=warnings)
+    assert lens_plane(placed) == pytest.approx(20.0)
+    assert not warnings
+
+
+def test_the_lens_plane_moves_until_nothing_seen_is_cut():
+    warnings = []
+    placed = place_by_camera(EYE, BOUNDS, DISPLAY, probe=seeing(12.0, 25.0), warnings=warnings)
+    front = (placed @ (0, 0, -12.0, 1))[2]
+    assert 9.9 < front < 10.0
+    assert len(warnings) == 1
+    assert "the lens plane moved from 20 to 12.4" in warnings[0]
+
+
+def test_enlarging_the_scene_leaves_less_room_before_the_lens_plane():
+    placed = place_by_camera(EYE, BOUNDS, DISPLAY, scale=2.0, probe=seeing(12.0, 25.0), warnings=[])
+    assert 2 * (placed @ (0, 0, -12.0, 1))[2] < 10.0
+
+
+def test_an_orthographic_camera_moves_its_lens_plane_too():
+    camera = Camera("flat", np.eye(4), height=10.0, focus_distance=20.0)
+    placed = place_by_camera(camera, BOUNDS, DISPLAY, probe=seeing(12.0, 25.0), warnings=[])
+    assert 9.9 < (placed @ (0, 0, -12.0, 1))[2] < 10.0
+
+
+def test_pop_out_is_the_share_of_what_is_seen():
+    deep = dataclasses.replace(DISPLAY, aperture_distance=200.0)
+    placed = place_by_camera(EYE, BOUNDS, deep, pop_out=0.25, probe=seeing(12.0, 20.0), warnings=[])
+    assert lens_plane(placed) == pytest.approx(14.0)
+
+
+def test_too_much_pop_out_is_refused_with_the_most_there_is():
+    with pytest.raises(
+        UsageError, match=r"0.5 of the visible depth .* 10 mm in front of it; ask for at most 0.05"
+    ) as no:
+        place_by_camera(EYE, BOUNDS, DISPLAY, pop_out=0.5, probe=seeing(12.0, 20.0), warnings=[])
+    assert no.value.parameter == "pop_out"
+
+
+def steps_scene():
+    """Four walls across the view, one behind the other like stairs: depths 6 to 12, seen alike; a floor far below."""
+    meshes = []
+    for number, depth in enumerate((6.0, 8.0, 10.0, 12.0)):
+        left = (-1.0 + 0.5 * number) * depth * 0.06
+        right = left + 0.5 * depth * 0.06
+        corners = np.float32([(left, -1, -depth), (right, -1, -depth), (right, 1, -depth), (left, 1, -depth)])
+        meshes.append(Mesh(f"step {number}", corners, np.uint32([(0, 1, 2), (0, 2, 3)]), 0))
+    floor = np.float32([(-90, -50, -900), (90, -50, -900), (90, -50, -1), (-90, -50, -1)])
+    meshes.append(Mesh("floor", floor, np.uint32([(0, 1, 2), (0, 2, 3)]), 0))
+    return api.load_scene(
+        SceneDescription(
+            "stairs",
+            meshes,
+            [Material(base_color=(0.6, 0.6, 0.6))],
+            [Instance(number, np.eye(4)) for number in range(len(meshes))],
+            lights=[Light("directional", (2.0, 2.0, 2.0), np.eye(4))],
+            cameras=[Camera("eye", np.eye(4), fov_y=0.2)],
+        )
+    )
+
+
+@pytest.mark.parametrize("pop_out", [0.2, 0.5, 0.8])
+def test_a_picture_shows_the_share_before_the_lens_plane_that_was_asked_for(engine, pop_out):
+    """Measured on what the display shows; the box around the scene is a hundred times as deep."""
+    display = dataclasses.replace(DISPLAY, aperture_distance=250.0)
+    options = api.PlacementOptions(mode="camera", pop_out=pop_out)
+    image = api.render(steps_scene(), display, placement=options, spp=1, integrator="direct", layers=True)
+    depth = image.maps["depth"]
+    status = np.isfinite(depth) & (image.maps["shape"] >= 0)
+    z = depth[status]
+    near, far = z.max(), np.quantile(z[z > -1e3], 0.02)
+    assert near / (near - far) == pytest.approx(pop_out, abs=0.05)
+
+
+def test_what_a_camera_sees_near_the_eye_is_not_cut_off(engine):
+    options = api.PlacementOptions(mode="camera")
+    image = api.render(steps_scene(), DISPLAY, placement=options, spp=1, integrator="depth", method="full")
+    assert any("the lens plane moved" in note for note in image.provenance.notes)
+    assert (image.world_from_display[2, 3], 6.0) == pytest.approx((-6.2, 6.0), abs=0.05)
