@@ -12,7 +12,7 @@ import pytest
 def test_nothing_heavy_is_loaded(code):
     check = (
         f"import sys\n{code}\n"
-        "heavy = {'mitsuba', 'drjit', 'numpy', 'PIL', 'OpenEXR', 'trimesh'} & set(sys.modules)\n"
+        "heavy = {'mitsuba', 'drjit', 'numpy', 'PIL', 'OpenEXR', 'trimesh', 'matplotlib'} & set(sys.modules)\n"
         "sys.exit(f'loaded {heavy}' if heavy else 0)"
     )
     done = subprocess.run([sys.executable, "-c", check], capture_output=True, text=True, check=False)

@@ -76,6 +76,16 @@ def test_the_page_refers_to_nothing_outside_itself(page, reader):
     assert "<script" not in page
 
 
+def test_names_are_unique_and_references_lead_to_them(page):
+    names, references = re.findall(r' id="([^"]+)"', page), re.findall(r' href="#([^"]+)"', page)
+    assert len(names) == len(set(names))
+    assert set(references) <= set(names)
+
+
+def test_the_page_is_the_same_every_time(page, results):
+    assert report_page(results) == page
+
+
 def test_links_lead_to_sections(reader):
     assert reader.targets
     assert {target[1:] for target in reader.targets} <= reader.ids

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import trimesh
 
 from lippmann.errors import SceneError
 from lippmann.scene.mitsuba_xml import MOST_INCLUDE_LEVELS, MOST_LEVELS, MitsubaXml, read_mitsuba_xml
@@ -91,6 +92,50 @@ class TestIncludes:
             save('<default name="there" value="c"/><include filename="inner.xml"/><shape type="cube" id="s$back"/>')
         )
         assert [attributes.get("id") for _, attributes in elements(document)][1:] == ["c", "s7"]
+
+    @pytest.mark.parametrize(
+        ("there", "mesh", "spectrum"),
+        [
+            (("", "sub", "sub/deep", "sub/own"), "m.ply", ["sub/own/r.spd", "sub/r.spd"]),
+            (("", "sub", "sub/deep"), "m.ply", ["r.spd", "sub/r.spd"]),
+            (("", "sub/deep", "sub/own"), "m.ply", ["sub/own/r.spd", "sub/own/r.spd"]),
+            (("", "sub/deep"), "m.ply", ["r.spd", "r.spd"]),
+        ],
+    )
+    def test_of_files_of_one_name_mitsubas_is_read(self, save, tmp_path, engine, there, mesh, spectrum):
+        """Meshes from the scene's folder; spectra from those of the files that include the one which names them."""
+        import mitsuba as mi
+
+        shape = (
+            '<shape type="ply"><string name="filename" value="m.ply"/><bsdf type="diffuse">'
+            '<spectrum name="reflectance" filename="r.spd"/></bsdf></shape>'
+        )
+        scene = save('<include filename="sub/inner.xml"/>')
+        for folder in ("sub/deep", "sub/own"):
+            (scene.parent / folder).mkdir(parents=True)
+        inner = f'<scene version="3.0.0"><path value="own"/>{shape}<include filename="deep/leaf.xml"/></scene>'
+        (scene.parent / "sub/inner.xml").write_text(inner)
+        (scene.parent / "sub/deep/leaf.xml").write_text(f'<scene version="3.0.0">{shape}</scene>')
+        for number, folder in enumerate(there, 1):
+            (scene.parent / folder / "r.spd").write_text(f"400 {number / 10}\n700 {number / 10}\n")
+            box = trimesh.creation.box([number] * 3)
+            box.export(scene.parent / folder / "m.ply")
+        document = read_mitsuba_xml(scene)
+        names = [attributes.get("value") or attributes.get("filename") for _, attributes in elements(document)]
+        found = [name for name in names if name and name.endswith((".ply", ".spd"))]
+        assert found == [mesh, spectrum[0], mesh, spectrum[1]]
+
+        def light(loaded):
+            return {
+                (round(float(np.ravel(shape.bbox().max.x)[0]), 4), round(float(np.ravel(value)[0]), 4))
+                for shape in loaded.shapes()
+                for key, value in mi.traverse(shape)
+                if "reflectance" in key
+            }
+
+        theirs = light(mi.load_file(str(scene)))
+        assert len(theirs) == len(set(spectrum))
+        assert light(load_scene(scene).description.scene()) == theirs
 
     def test_a_search_path_of_an_included_file_may_start_at_the_scene(self, save, tmp_path):
         """As with Mitsuba: from the folder of the file that names it, else from that of the scene."""

@@ -1,8 +1,8 @@
 """OpenEXR: float layers and text attributes.
 
-Pixels go through the OpenEXR library; headers are read here (OpenEXR file layout, openexr.com, "OpenEXR File Layout"),
-because the library's Python binding reads no header alone in all its versions and says of a truncated file no more
-than a line on standard output.
+Pixels go through the OpenEXR library, headers are read here (openexr.com, "OpenEXR File Layout"). The library's Python
+binding reads a header alone (``header_only``) without saying where the table of chunks begins, so that a file cut short
+would pass for whole. It also reads attributes of gigabytes into memory, and version 3.3.0 returns no parts.
 """
 
 from __future__ import annotations

@@ -64,10 +64,13 @@ Frame3f: TypeAlias = Any
 
 #: ``mi.BSDFPtr``: the material of a surface.
 BSDFPtr: TypeAlias = Any
+#: ``mi.MediumPtr``: the participating medium around a point.
+MediumPtr: TypeAlias = Any
 #: ``mi.ShapePtr``: a shape of the scene.
 ShapePtr: TypeAlias = Any
-#: ``mi.BSDF``, ``mi.Emitter``, ``mi.Texture``, ``mi.Shape`` and ``mi.Mesh``: plugins of a scene.
+#: ``mi.BSDF``, ``mi.Emitter``, ``mi.Medium``, ``mi.Texture``, ``mi.Shape`` and ``mi.Mesh``: plugins of a scene.
 BSDF: TypeAlias = Any
+Medium: TypeAlias = Any
 Emitter: TypeAlias = Any
 MitsubaTexture: TypeAlias = Any
 Shape: TypeAlias = Any

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -101,7 +100,7 @@ class Comparison:
         """What a reader of the figures should know, as sentences."""
         return tuple(_notes(self.reference, self.test))
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> JsonObject:
         """All figures but those of single micro-images as JSON-able values; an infinite PSNR is None."""
         worst_view = self.views.worst
         lenses = int(np.count_nonzero(self.micro_image_pixels))
@@ -134,7 +133,7 @@ class Comparison:
             "notes": list(self.notes),
         }
 
-    def rows(self) -> Iterator[dict[str, Any]]:
+    def rows(self) -> Iterator[dict[str, float]]:
         """The figures of every micro-image, lens row by lens row: what a CSV file holds. PSNR in dB may be infinite."""
         paper_psnr = self.paper.psnr
         for row, column in zip(*np.nonzero(self.micro_image_pixels), strict=True):
@@ -250,8 +249,9 @@ def _notes(reference: Picture, test: Picture) -> Iterator[str]:
         yield "the display stands at a different place in the scene"
 
 
-def _lens(found: MicroImage) -> dict[str, Any]:
-    return {"psnr": _finite(found.psnr), "lens": [found.column, found.row], "pixels": found.pixels}
+def _lens(micro_image: MicroImage) -> JsonObject:
+    place = [micro_image.column, micro_image.row]
+    return {"psnr": _finite(micro_image.psnr), "lens": place, "pixels": micro_image.pixels}
 
 
 def _finite(value: float | None) -> float | None:

@@ -3,20 +3,26 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
+from lippmann.image.stored_values import Indices, Values
 from lippmann.runtime.numba_jit import uncounted
+
+Real = NDArray[np.float64]
+Flags = NDArray[np.bool_]
 
 
 @uncounted
-def look_up(codes: Any, levels: Any, values: Any) -> None:
+def look_up(codes: Values, levels: NDArray[np.generic], values: NDArray[np.generic]) -> None:
     """``values = levels[codes]``, all of one dimension, a few times quicker than NumPy."""
     for k in range(len(codes)):
         values[k] = levels[codes[k]]
 
 
 @uncounted
-def gather(pixels: Any, row: Any, column: Any, found: Any, gathered: Any) -> None:
+def gather(pixels: Values, row: Indices, column: Indices, found: Flags, gathered: Values) -> None:
     """``gathered (H, W, 3) = pixels[row, column]`` where ``found``, else 0; the other three are ``(H, W)``."""
     for y in range(gathered.shape[0]):
         for x in range(gathered.shape[1]):
@@ -29,7 +35,7 @@ def gather(pixels: Any, row: Any, column: Any, found: Any, gathered: Any) -> Non
 
 
 @uncounted
-def add_changes(before: Any, seen_before: Any, after: Any, seen_after: Any, sums: Any) -> int:
+def add_changes(before: Real, seen_before: Flags, after: Real, seen_after: Flags, sums: Real) -> int:
     """How errors ``(H, W, 3)`` differ between two views, where ``(H, W)`` flags say that both have a pixel.
 
     Adds to ``sums`` the squared differences and half the squares of both; returns how many values that were.
@@ -50,7 +56,7 @@ def add_changes(before: Any, seen_before: Any, after: Any, seen_after: Any, sums
 
 
 @uncounted
-def mark_jumps(values: Any, at: Any, limit: float, marks: Any) -> None:
+def mark_jumps(values: Real, at: NDArray[np.int32], limit: float, marks: Flags) -> None:
     """Mark pixels that differ from a neighbour, along all four axes of the micro-images.
 
     Parameters

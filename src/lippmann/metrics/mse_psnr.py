@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,9 +19,11 @@ from lippmann.color.transfer import Transfer, encode, linear_levels
 from lippmann.display import Display
 from lippmann.image import Picture
 from lippmann.image.micro_images import lens_indices, row_blocks
+from lippmann.image.stored_values import Values
 
 Real = NDArray[np.float64]
 Scalar = TypeVar("Scalar", bound=np.generic)
+Float = TypeVar("Float", np.float32, np.float64)
 
 #: The share of micro-images that may be worse than the low percentile that is reported.
 LOW_PERCENTILE = 0.01
@@ -38,7 +40,7 @@ def coded(image: Picture, rows: tuple[int, int] | None = None) -> Real:
     return coded_values(image.held_rows(first, last), image.provenance.transfer)
 
 
-def coded_values(values: NDArray[Any], transfer: Transfer) -> Real:
+def coded_values(values: Values, transfer: Transfer) -> Real:
     """Coded values in [0, 1] of linear ones, or of codes of 8 or 16 bits, float64; same shape."""
     if values.dtype.kind == "u":
         return looked_up(values, _coded_levels(values.dtype, transfer))
@@ -46,12 +48,12 @@ def coded_values(values: NDArray[Any], transfer: Transfer) -> Real:
 
 
 @lru_cache(maxsize=4)
-def _coded_levels(dtype: np.dtype[Any], transfer: Transfer) -> Real:
+def _coded_levels(dtype: np.dtype[np.generic], transfer: Transfer) -> Real:
     """The coded values of all codes of a type."""
     return coded_values(linear_levels(dtype, transfer), transfer)
 
 
-def looked_up(codes: NDArray[Any], levels: NDArray[Scalar]) -> NDArray[Scalar]:
+def looked_up(codes: Values, levels: NDArray[Scalar]) -> NDArray[Scalar]:
     """``levels[codes]``: for pictures of codes a small part of the time that the curve takes."""
     from lippmann.metrics import kernels
 
@@ -60,7 +62,7 @@ def looked_up(codes: NDArray[Any], levels: NDArray[Scalar]) -> NDArray[Scalar]:
     return values
 
 
-def squared_differences(a: NDArray[Any], b: NDArray[Any]) -> Real:
+def squared_differences(a: NDArray[Float], b: NDArray[Float]) -> Real:
     """``(...)``: squared differences of ``(..., channels)`` values, averaged over the channels."""
     difference = a - b
     sums: Real = np.einsum("...c,...c->...", difference, difference).astype(np.float64)

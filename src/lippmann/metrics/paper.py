@@ -18,12 +18,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lippmann.color.transfer import Transfer, linear_levels, quantize
+from lippmann.image.stored_values import Values
 from lippmann.metrics.mse_psnr import looked_up, psnr
 
 Real = NDArray[np.float64]
@@ -79,14 +79,14 @@ class PaperFigures:
         return float(finite.mean()) if finite.size else math.inf
 
 
-def paper_codes(values: NDArray[Any], transfer: Transfer) -> NDArray[np.float32]:
+def paper_codes(values: Values, transfer: Transfer) -> NDArray[np.float32]:
     """8-bit codes of linear values, or of codes of 8 or 16 bits, as numbers that can be subtracted; same shape."""
     if values.dtype.kind == "u":
         return looked_up(values, _paper_levels(values.dtype, transfer))
-    return quantize(values, 8, transfer).astype(np.float32)
+    return quantize(values.astype(np.float32, copy=False), 8, transfer).astype(np.float32)
 
 
 @lru_cache(maxsize=4)
-def _paper_levels(dtype: np.dtype[Any], transfer: Transfer) -> NDArray[np.float32]:
+def _paper_levels(dtype: np.dtype[np.generic], transfer: Transfer) -> NDArray[np.float32]:
     """The 8-bit codes of all codes of a type."""
     return paper_codes(linear_levels(dtype, transfer), transfer)

@@ -12,7 +12,6 @@ the views (one pixel of every lens) that are judged, one by one.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -54,7 +53,7 @@ def ssim(reference: ArrayLike, test: ArrayLike, mask: Flags | None = None) -> fl
 
 
 def similarity_sum(
-    a: NDArray[Any], b: NDArray[Any], mask: Flags | None, windows: tuple[Real, Real]
+    a: NDArray[np.generic], b: NDArray[np.generic], mask: Flags | None, windows: tuple[Real, Real]
 ) -> tuple[float, int]:
     """The sum of SSIM over the windows of pictures ``(H, W, channels)``, and of how many values: see :func:`ssim`.
 

@@ -9,12 +9,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.image import Picture
+from lippmann.image.stored_values import Values
 from lippmann.image.views import lens_rows, panel_rows_of_view_rows, pixels_of_view_rows, view_grid
 from lippmann.metrics.flicker import Flicker, FlickerSums
 from lippmann.metrics.mse_psnr import coded_values
@@ -60,7 +60,7 @@ class _Lot:
     first: int
     last: int
     top: int
-    values: tuple[NDArray[Any], NDArray[Any]]
+    values: tuple[Values, Values]
 
 
 class ViewSums:

@@ -8,16 +8,18 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, TypeVar, cast
 
 from lippmann._version import VERSION
 from lippmann.display import Display
+from lippmann.errors import UsageError
 from lippmann.image.provenance import Provenance
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.rendering.denoise.oidn import load_denoiser
 from lippmann.rendering.estimate.psnr import Estimate
 from lippmann.rendering.film.wavefront_plan import make_plan
+from lippmann.rendering.request.choices import POOLED_LIGHT, REUSING
 from lippmann.rendering.request.region_of_interest import even_background
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.runtime import engine as engines
@@ -255,7 +257,24 @@ def open_session(
         load_denoiser()
     engine = watch.stage("load", lambda: engines.start(request.device, request.threads))
     built = watch.stage("build", lambda: _build(scene, request, memory))
+    request = _without_pooling(request, built)
     return Session(scene, request, engine, built, memory, watch)
+
+
+def _without_pooling(request: RenderRequest, built: BuiltScene | BuiltClassic) -> RenderRequest:
+    """The request for a scene that may have participating media, whose light lies on no surface to be shared."""
+    from lippmann.device.pbr import BuiltScene
+
+    if not (isinstance(built, BuiltScene) and built.has_media) or request.integrator not in POOLED_LIGHT:
+        return request
+    if request.method == "pooled" or request.method in REUSING:
+        raise UsageError(
+            f"{request.method} shares the light of surfaces",
+            parameter="method",
+            rule="this scene has participating media, whose light lies on none",
+            fix='use method="full"',
+        )
+    return replace(request, denoise="none") if request.denoise == "auto" else request
 
 
 def memory_limit(request: RenderRequest) -> int:
@@ -283,11 +302,14 @@ def _make_integrator(
     from lippmann.rendering.transport.path import PathIntegrator
     from lippmann.rendering.transport.scene_features import make_scene_features
     from lippmann.rendering.transport.surface_property import SurfaceIntegrator
+    from lippmann.rendering.transport.volume_path import VolumePathIntegrator
     from lippmann.rendering.transport.whitted import WhittedIntegrator
 
     if isinstance(built, BuiltClassic):
         return WhittedIntegrator(built, request.surfaces)
     if request.integrator in ("path", "direct"):
+        if built.has_media:
+            return VolumePathIntegrator(built.mitsuba, request.surfaces, request.integrator, built.background)
         features = make_scene_features(
             built.mitsuba, background=built.background, has_null=built.has_null, absorption=built.absorption
         )

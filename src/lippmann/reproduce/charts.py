@@ -1,4 +1,4 @@
-"""Two charts as inline SVG: rays against time, and PSNR from lens to lens.
+"""Two charts as inline SVG, drawn by Matplotlib: rays against time, and PSNR from lens to lens.
 
 Colours and fonts come from the page's style sheet by class names, so that the charts follow light and dark. Every mark
 carries its numbers as a ``<title>``, which browsers show on hovering and screen readers read.
@@ -6,49 +6,65 @@ carries its numbers as a ``<title>``, which browsers show on hovering and screen
 
 from __future__ import annotations
 
+import io
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
+from xml.etree import ElementTree
 
 from markupsafe import Markup
 
-from lippmann.reproduce.html import element, joined
+from lippmann.reproduce.html import element
+from lippmann.reproduce.plotting import import_matplotlib, plain_matplotlib
+
+if TYPE_CHECKING:
+    from matplotlib.artist import Artist
 
 WIDTH, HEIGHT = 640, 400
 LEFT, RIGHT, TOP, BOTTOM = 68, 28, 40, 60
 
-#: Radius of a mark.
-_R = 5.0
+#: Matplotlib's names of the shapes of marks, and their sizes in pixels.
+_MARKERS = {"circle": ("o", 10), "square": ("s", 10), "triangle": ("^", 12)}
+
+#: Width and height in pixels of a sign in a key.
+_SIGN = 16
+
+#: Size in pixels that text is placed by; the style sheet sets it.
+_FONT = 13
+
+_SVG, _XLINK = "{http://www.w3.org/2000/svg}", "{http://www.w3.org/1999/xlink}"
 
 
 @dataclass(frozen=True)
 class Axis:
-    """A linear axis from ``low`` to ``high`` with ticks every ``step``."""
+    """A linear axis from the first of its ``ticks`` to the last; ``unit`` follows every number."""
 
-    low: float
-    high: float
-    step: float
+    ticks: Sequence[float]
     title: str
     unit: str = ""
 
     @staticmethod
     def around(values: Sequence[float], title: str, unit: str = "", *, low: float | None = None) -> Axis:
-        """An axis of round numbers that holds all finite ``values``; with ``low`` it begins there."""
+        """An axis between round numbers that holds all finite ``values``; with ``low`` it holds that, too."""
+        import_matplotlib()
+        from matplotlib.ticker import MaxNLocator
+
         finite = [value for value in values if math.isfinite(value)] or [0.0, 1.0]
-        least = min(finite) if low is None else low
-        most = max(max(finite), least + 1e-6)
-        step = _round_step((most - least) / 5)
-        first = math.floor(least / step + 1e-9) * step if low is None else low
-        return Axis(first, first + math.ceil((most - first) / step - 1e-9) * step, step, title, unit)
+        least, most = min(finite) if low is None else low, max(finite)
+        ticks = MaxNLocator(nbins=5, steps=[1, 2, 5, 10]).tick_values(least, max(most, least + 0.1))
+        return Axis([float(tick) for tick in ticks], title, unit)
 
     @property
-    def ticks(self) -> list[float]:
-        count = round((self.high - self.low) / self.step)
-        return [self.low + k * self.step for k in range(count + 1)]
+    def ends(self) -> tuple[float, float]:
+        """The least and the largest value."""
+        return self.ticks[0], self.ticks[-1]
 
-    def part(self, value: float) -> float:
-        """Where on the axis ``value`` lies, from 0 to 1."""
-        return (value - self.low) / (self.high - self.low)
+    @property
+    def labels(self) -> list[str]:
+        """The ticks in words."""
+        return [f"{round(tick, 9) + 0.0:.10g}{self.unit}" for tick in self.ticks]
 
 
 @dataclass(frozen=True)
@@ -73,103 +89,135 @@ class Line:
 
 def scatter(marks: Sequence[Mark], x: Axis, y: Axis, *, title: str) -> Markup:
     """Marks over a grid, with the diagonal on which y equals x."""
-    end = min(x.high, y.high)
-    diagonal = _line(_px(x, 0), _py(y, 0), _px(x, end), _py(y, end), "diagonal")
-    drawn = [_shape(_px(x, mark.x), _py(y, mark.y), mark) for mark in marks]
-    return _svg(title, *_grid(x, y), diagonal, *drawn)
+    with plain_matplotlib(salt=title):
+        drawing = _chart(x, y)
+        end = min(x.ends[1], y.ends[1])
+        drawing.add_line([0, end], [0, end], "diagonal")
+        for mark in marks:
+            drawing.add_mark(mark)
+        return drawing.svg(element("title", title), class_="chart", role="img")
 
 
 def lines(drawn: Sequence[Line], x: Axis, y: Axis, *, title: str, level: float | None = None) -> Markup:
     """Lines over a grid, with a dashed one at the height ``level``."""
-    parts = [*_grid(x, y)]
-    if level is not None and y.low <= level <= y.high:
-        parts.append(_line(_px(x, x.low), _py(y, level), _px(x, x.high), _py(y, level), "diagonal"))
-    parts += [_path(line, x, y) for line in drawn]
-    return _svg(title, *parts)
+    with plain_matplotlib(salt=title):
+        drawing = _chart(x, y)
+        if level is not None and y.ends[0] <= level <= y.ends[1]:
+            drawing.add_line(x.ends, [level, level], "diagonal")
+        for line in drawn:
+            drawing.add_line(*_broken(line.points), f"series {line.class_}", line.title)
+        return drawing.svg(element("title", title), class_="chart", role="img")
 
 
 def key(entries: Sequence[tuple[str, str, str]]) -> Markup:
     """The legend of a chart: (shape, class, text) of each entry; the shape may also be ``line``."""
-    return element("ul", *(_key_entry(*entry) for entry in entries), class_="key")
+    return element("ul", *(element("li", _sign(shape, class_), text) for shape, class_, text in entries), class_="key")
 
 
-def _key_entry(shape: str, class_: str, text: str) -> Markup:
-    inside = _line(0, 8, 16, 8, f"series {class_}") if shape == "line" else _shape(8, 8, Mark(0, 0, shape, class_, ""))
-    sign = element("svg", inside, viewBox="0 0 16 16", width=16, height=16, aria_hidden="true")
-    return element("li", sign, text)
+def _sign(shape: str, class_: str) -> Markup:
+    with plain_matplotlib(salt=f"{shape} {class_}"):
+        drawing = _Drawing((_SIGN, _SIGN), (0, 0, 1, 1))
+        if shape == "line":
+            drawing.add_line([0, 1], [0.5, 0.5], f"series {class_}")
+        else:
+            drawing.add_mark(Mark(0.5, 0.5, shape, class_, ""))
+        return drawing.svg(width=_SIGN, height=_SIGN, aria_hidden="true")
 
 
-def _svg(title: str, *inside: str) -> Markup:
-    return element(
-        "svg",
-        element("title", title),
-        *inside,
-        viewBox=f"0 0 {WIDTH} {HEIGHT}",
-        class_="chart",
-        role="img",
-    )
-
-
-def _grid(x: Axis, y: Axis) -> list[Markup]:
-    left, right, bottom = LEFT, WIDTH - RIGHT, HEIGHT - BOTTOM
-    parts = []
-    for tick in y.ticks:
-        at = _py(y, tick)
-        parts += [_line(left, at, right, at, "grid"), _text(left - 8, at + 4, _number(tick) + y.unit, "end")]
-    for tick in x.ticks:
-        at = _px(x, tick)
-        parts += [_line(at, bottom, at, bottom + 4, "grid"), _text(at, bottom + 22, _number(tick) + x.unit, "middle")]
+def _chart(x: Axis, y: Axis) -> _Drawing:
+    """A drawing with the axes' grid, numbers and titles."""
+    place = LEFT / WIDTH, BOTTOM / HEIGHT, (WIDTH - LEFT - RIGHT) / WIDTH, (HEIGHT - TOP - BOTTOM) / HEIGHT
+    drawing = _Drawing((WIDTH, HEIGHT), place)
+    axes, figure = drawing.axes, drawing.figure
+    axes.set(xlim=x.ends, ylim=y.ends)
+    drawing.name(axes.hlines(y.ticks, *x.ends, clip_on=False), "grid")
+    axes.set_xticks(x.ticks, x.labels, fontsize=_FONT)
+    axes.set_yticks(y.ticks, y.labels, fontsize=_FONT)
+    axes.tick_params("x", length=4, pad=8)
+    axes.tick_params("y", length=0, pad=8)
+    for tick in axes.xaxis.get_major_ticks():
+        drawing.name(tick.tick1line, "grid")
     # Lettering grows on narrow screens, so a turned title beside the numbers would run into them.
-    return [*parts, _text(right, HEIGHT - 8, x.title, "end"), _text(0, 18, y.title, "start")]
+    figure.text(1 - RIGHT / WIDTH, 8 / HEIGHT, x.title, ha="right", fontsize=_FONT)
+    figure.text(0, 1 - 18 / HEIGHT, y.title, fontsize=_FONT)
+    return drawing
 
 
-def _path(line: Line, x: Axis, y: Axis) -> Markup:
-    steps, joined = [], False
-    for at, value in line.points:
-        if not math.isfinite(value):
-            joined = False
-            continue
-        steps.append(f"{'L' if joined else 'M'}{_px(x, at):.1f} {_py(y, value):.1f}")
-        # A point between two gaps would not show without a length of its own.
-        steps += [] if joined else ["h0.01"]
-        joined = True
-    return element("path", element("title", line.title), d="".join(steps), class_=f"series {line.class_}")
+def _broken(points: Sequence[tuple[float, float]]) -> tuple[list[float], list[float]]:
+    """Coordinates of a line, NaN at gaps. The first point of each piece comes twice: alone it would not show."""
+    xs: list[float] = []
+    ys: list[float] = []
+    joined = False
+    for x, y in points:
+        finite = math.isfinite(y)
+        for _ in range(2 if finite and not joined else 1):
+            xs.append(x)
+            ys.append(y if finite else math.nan)
+        joined = finite
+    return xs, ys
 
 
-def _shape(x: float, y: float, mark: Mark) -> Markup:
-    title = element("title", mark.title) if mark.title else joined()
-    class_ = f"mark {mark.class_}"
-    if mark.shape == "circle":
-        return element("circle", title, cx=f"{x:.1f}", cy=f"{y:.1f}", r=_R, class_=class_)
-    corners = {
-        "square": ((-1, -1), (1, -1), (1, 1), (-1, 1)),
-        "triangle": ((0, -1.2), (1.2, 0.9), (-1.2, 0.9)),
-    }[mark.shape]
-    points = " ".join(f"{x + dx * _R:.1f},{y + dy * _R:.1f}" for dx, dy in corners)
-    return element("polygon", title, points=points, class_=class_)
+class _Drawing:
+    """A figure with one pair of axes, from 0 to 1 at first; classes and titles of its parts are those of the page.
 
+    Parameters
+    ----------
+    size:
+        Width and height in pixels.
+    place:
+        Left, bottom, width and height of the axes, as fractions of the figure.
+    """
 
-def _line(x1: float, y1: float, x2: float, y2: float, class_: str) -> Markup:
-    return element("line", x1=f"{x1:.1f}", y1=f"{y1:.1f}", x2=f"{x2:.1f}", y2=f"{y2:.1f}", class_=class_)
+    def __init__(self, size: tuple[int, int], place: tuple[float, float, float, float]) -> None:
+        from matplotlib.figure import Figure
 
+        self._size = size
+        self._names: dict[str, tuple[str, str]] = {}
+        # At 72 dots per inch Matplotlib's points are pixels.
+        self.figure = Figure(figsize=(size[0] / 72, size[1] / 72), dpi=72, frameon=False)
+        self.axes = self.figure.add_axes(place, frameon=False, xlim=(0, 1), ylim=(0, 1), xticks=[], yticks=[])
 
-def _text(x: float, y: float, text: str, anchor: str) -> Markup:
-    return element("text", text, x=f"{x:.1f}", y=f"{y:.1f}", text_anchor=anchor)
+    def name(self, artist: Artist, class_: str, title: str = "") -> None:
+        """Give a part its class and the words that are shown on hovering."""
+        identifier = f"part-{len(self._names)}"
+        artist.set_gid(identifier)
+        self._names[identifier] = class_, title
 
+    def add_line(self, xs: Sequence[float], ys: Sequence[float], class_: str, title: str = "") -> None:
+        """Draw a line."""
+        (line,) = self.axes.plot(xs, ys, clip_on=False)
+        self.name(line, class_, title)
 
-def _px(axis: Axis, value: float) -> float:
-    return LEFT + axis.part(value) * (WIDTH - LEFT - RIGHT)
+    def add_mark(self, mark: Mark) -> None:
+        """Draw a mark."""
+        marker, size = _MARKERS[mark.shape]
+        (line,) = self.axes.plot(mark.x, mark.y, marker=marker, markersize=size, linestyle="none", clip_on=False)
+        self.name(line, f"mark {mark.class_}", mark.title)
 
+    def svg(self, *inside: Markup, **attributes: object) -> Markup:
+        """The drawing as an element of the page, which holds ``inside`` first."""
+        written = io.BytesIO()
+        self.figure.savefig(written, format="svg", metadata=dict.fromkeys(("Creator", "Date", "Format", "Type")))
+        root = ElementTree.fromstring(written.getvalue())
+        for part in root.iter():
+            self._adopt(part)
+        drawn = (Markup(ElementTree.tostring(part, "unicode", short_empty_elements=False)) for part in root.iter("g"))
+        width, height = self._size
+        return element("svg", *inside, next(drawn), viewBox=f"0 0 {width} {height}", **attributes)
 
-def _py(axis: Axis, value: float) -> float:
-    return HEIGHT - BOTTOM - axis.part(value) * (HEIGHT - TOP - BOTTOM)
-
-
-def _round_step(least: float) -> float:
-    """The smallest of 1, 2, 5 times a power of ten that is not below ``least``."""
-    power = 10.0 ** math.floor(math.log10(least))
-    return next(digit * power for digit in (1, 2, 5, 10) if digit * power >= least * (1 - 1e-9))
-
-
-def _number(value: float) -> str:
-    return f"{value:.10g}" if abs(value) > 1e-9 else "0"
+    def _adopt(self, part: ElementTree.Element) -> None:
+        """Make an element of Matplotlib's one of the page: its looks come from the style sheet, links stay in it."""
+        part.tag = part.tag.removeprefix(_SVG)
+        style = part.attrib.pop("style", "")
+        if anchor := re.search("text-anchor: (start|middle|end)", style):
+            part.set("text-anchor", anchor[1])
+        if target := part.attrib.pop(f"{_XLINK}href", ""):
+            part.set("href", target)
+        if part.tag == "g":
+            class_, title = self._names.get(part.attrib.pop("id", ""), ("", ""))
+            if class_:
+                part.set("class", class_)
+            if title:
+                words = ElementTree.Element(f"{_SVG}title")
+                words.text = title
+                part.insert(0, words)

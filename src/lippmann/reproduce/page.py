@@ -139,7 +139,7 @@ def _lens_chart(results: Results, scene: str) -> Markup:
         drawn.append(charts.Line(list(enumerate(row)), class_, manner.value))
         entries.append(("line", class_, manner.value))
     columns = results.experiment.display.lens_grid.columns
-    x = charts.Axis(0, columns, columns / 8, "Lens")
+    x = charts.Axis([columns * k / 8 for k in range(9)], "Lens")
     y = charts.Axis.around(values, "PSNR of the micro-image, dB")
     chart = charts.lines(drawn, x, y, title=f"PSNR of every micro-image of the {scene}", level=level)
     dashed = "" if level is None else f"Dashed: the paper's mean, {level:g} dB. "

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, cast
 
 from lippmann.display import Display, load_display
 from lippmann.image import IntegralImage
 from lippmann.progress import ProgressCallback, silent
 from lippmann.reproduce import paper_values
-from lippmann.reproduce.experiment import Experiment, Renderer, Variant, run_experiment
+from lippmann.reproduce.experiment import Experiment, Renderer, Results, Variant, run_experiment
 from lippmann.reproduce.page import report_page
 from lippmann.reproduce.summary import summary
 from lippmann.runtime.atomic_write import check_folder_writable, replacing_folder
@@ -36,7 +36,7 @@ def reproduce(
     device: str = "auto",
     threads: int | None = None,
     progress: ProgressCallback = silent,
-) -> dict[str, Any]:
+) -> Results:
     """Render the paper's scenes in all ways, compare them, and write the report and its figures into ``folder``.
 
     Parameters
@@ -50,8 +50,8 @@ def reproduce(
 
     Returns
     -------
-    dict
-        The figures, see :func:`~lippmann.reproduce.summary.summary`.
+    Results
+        All runs; :func:`~lippmann.reproduce.summary.summary` gives the figures that are written.
 
     Raises
     ------
@@ -63,12 +63,11 @@ def reproduce(
     check_folder_writable(folder)
     experiment = make_experiment(quick=quick)
     results = run_experiment(experiment, engine_renderer(experiment.display, device, threads), progress)
-    figures = summary(results)
     with replacing_folder(folder) as temporary:
         (temporary / PAGE).write_text(report_page(results), encoding="utf-8")
-        text = json.dumps(figures, indent=2, ensure_ascii=False, allow_nan=False)
+        text = json.dumps(summary(results), indent=2, ensure_ascii=False, allow_nan=False)
         (temporary / FIGURES).write_text(text + "\n", encoding="utf-8")
-    return figures
+    return results
 
 
 def make_experiment(*, quick: bool) -> Experiment:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
+from lippmann.json_values import JsonObject
 from lippmann.reproduce import paper_values
 from lippmann.reproduce.experiment import Results, Run
 
 
-def summary(results: Results) -> dict[str, Any]:
+def summary(results: Results) -> JsonObject:
     """All figures as JSON-able values; an infinite PSNR is None. What the paper prints is under ``printed``."""
     experiment = results.experiment
     reference = results.full(experiment.scenes[0]).image.provenance
@@ -32,9 +32,9 @@ def summary(results: Results) -> dict[str, Any]:
     }
 
 
-def _run(run: Run) -> dict[str, Any]:
+def _run(run: Run) -> JsonObject:
     provenance, variant = run.image.provenance, run.variant
-    values: dict[str, Any] = {
+    values: JsonObject = {
         "method": variant.method,
         "seconds": run.seconds,
         "rays": dict(provenance.rays),

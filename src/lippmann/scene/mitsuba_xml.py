@@ -117,6 +117,7 @@ class _Reader:
         self.folder = folder
         self.allow_outside = allow_outside
         self.files: dict[str, Path] = {}
+        self._scene_folders = [folder]  # where files of all kinds but spectra are looked up
         self._includes = 0
         self._version: tuple[str, bool] | None = None
 
@@ -128,7 +129,7 @@ class _Reader:
         parameters:
             Values by name, those of the files before included; what the file declares is added.
         folders:
-            Search paths that the including files have declared, the last one first.
+            Folders and search paths of the including files, the nearest one first.
         name:
             What messages call the file.
         """
@@ -148,6 +149,8 @@ class _Reader:
                 value = self._substitute(child, known).get("value")
                 near = [path.parent, *paths, *folders, self.folder]
                 paths.insert(0, self._find_folder(value, near, child._origin))
+        if level == 0:
+            self._scene_folders = [*paths, self.folder]
         return self._element(raw, path, parameters, [*paths, *folders], level, is_root=True)
 
     def _element(
@@ -175,13 +178,15 @@ class _Reader:
             elif not is_root:
                 raise SceneError("holds a search path", where=child._origin, rule="'path' stands in the root alone")
         attributes, named = dict(element.attributes), None
-        # Mitsuba looks for spectra while it parses, beside the file that names them; for all else when it has all.
+        # Mitsuba looks for spectra while it parses, from the files that include the one which names them; for all else
+        # when it has read all, from the scene's file. What it would not find may lie beside the file that names it.
         if element.tag == "spectrum" and attributes.get("filename"):
             named = "filename"
-            attributes[named] = self._key(attributes[named], [path.parent, *folders, self.folder], where)
+            attributes[named] = self._key(attributes[named], [*folders, self.folder, path.parent], where)
         elif element.tag == "string" and attributes.get("name") == "filename":
             named = "value"
-            attributes[named] = self._key(attributes.get(named, ""), [*folders, self.folder, path.parent], where)
+            searched = [*self._scene_folders, *folders, path.parent]
+            attributes[named] = self._key(attributes.get(named, ""), searched, where)
         elif element.tag == "string" and attributes.get("name") == "material":
             check_material(attributes.get("value", ""), where)
         if named is None and all(one is other for one, other in zip_longest(children, element.children)):
@@ -194,7 +199,8 @@ class _Reader:
         """The elements that take the place of an ``<include>``."""
         name = include.get("filename")
         file = self._find(name, [path.parent, *folders, self.folder], include._origin)
-        root = self.file(file, parameters, folders, Path(name.replace("\\", "/")).name, level=level + 1)
+        including = [path.parent, *folders]
+        root = self.file(file, parameters, including, Path(name.replace("\\", "/")).name, level=level + 1)
         if root.get("type", "scene") == "scene" and root.tag == "scene":
             return [child for child in root.children if child.get("type") or child.tag in _NAMES]
         attributes = {key: value for key, value in root.attributes if key not in ("version", "name")}

@@ -71,22 +71,27 @@ def reproduce(
     quiet: options.Quiet = False,
 ) -> None:
     """Reproduce the paper's tables and figures and write a report."""
+    from lippmann.reproduce.experiment import Manner, Variant
     from lippmann.reproduce.run import PAGE
     from lippmann.reproduce.run import reproduce as reproduce_paper
+    from lippmann.reproduce.summary import summary
+    from lippmann.reproduce.tables import comparison
 
     console = Console(quiet, as_json)
     with console.progress() as progress:
-        figures = reproduce_paper(output, quick=quick, device=device, threads=threads, progress=progress)
+        results = reproduce_paper(output, quick=quick, device=device, threads=threads, progress=progress)
     page = output / PAGE
-    lines = [f"{page}: {', '.join(figures['scenes'])}"]
-    for scene, runs in figures["scenes"].items():
-        paper, gloss = runs["interpolated-paper"], runs["interpolated-gloss"]
-        lines.append(
-            f"{scene:<12} interpolated as in the paper: {paper['saved_percent']:.0f} % of the time saved, "
-            f"{_report_decibels(paper['paper_mean_psnr'])}; gloss respected: {gloss['saved_percent']:.0f} %, "
-            f"{_report_decibels(gloss['paper_mean_psnr'])}"
+    lines = [f"{page}: {', '.join(results.runs)}"]
+    for scene in results.runs:
+        paper, gloss = (
+            results.of(scene, Variant("interpolated", manner).key) for manner in (Manner.PAPER, Manner.GLOSS)
         )
-    console.result({"output": str(page), **figures}, "\n".join(lines))
+        lines.append(
+            f"{scene:<12} interpolated as in the paper: {paper.saved_percent:.0f} % of the time saved, "
+            f"{_decibels(comparison(paper).paper.mean_psnr)}; gloss respected: {gloss.saved_percent:.0f} %, "
+            f"{_decibels(comparison(gloss).paper.mean_psnr)}"
+        )
+    console.result({"output": str(page), **summary(results)}, "\n".join(lines))
 
 
 def _write_table(comparison: Comparison, path: Path) -> None:
@@ -130,11 +135,6 @@ def _flicker_line(comparison: Comparison) -> str:
 
 def _decibels(value: float) -> str:
     return "infinite" if math.isinf(value) else f"{value:.2f} dB"
-
-
-def _report_decibels(value: float | None) -> str:
-    """A PSNR of the report, which holds an infinite one as None."""
-    return _decibels(math.inf if value is None else value)
 
 
 def _lens(micro_image: MicroImage) -> str:

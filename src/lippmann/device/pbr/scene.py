@@ -13,6 +13,7 @@ import numpy as np
 from lippmann.device.pbr.emitters import environment_object, light_object
 from lippmann.device.pbr.material_groups import Variant
 from lippmann.device.pbr.materials import Finish, make_finishes
+from lippmann.device.pbr.media import MEDIA_NOTE, has_media
 from lippmann.device.pbr.shapes import Dress, has_volume, make_shapes
 from lippmann.device.pbr.textures import TextureStore
 from lippmann.device.types import BSDF, Emitter, MitsubaScene, Shape
@@ -41,6 +42,8 @@ class BuiltScene:
         Whether some surface lets rays straight through: a cut-out, a blended surface, a thin pane.
     borrowed:
         Whether the ``mi.Scene`` is the caller's own, which nothing may change.
+    has_media:
+        Whether there are participating media.
     notes:
         What could not be honoured, one line each.
     seconds:
@@ -55,6 +58,7 @@ class BuiltScene:
     notes: tuple[str, ...]
     seconds: Mapping[str, float]
     borrowed: bool = False
+    has_media: bool = False
 
 
 def build(scene: Scene, engine: engines.Engine | None = None, *, memory: int | None = None) -> BuiltScene:
@@ -130,7 +134,9 @@ def _build_source(source: MitsubaSource, scene: Scene) -> BuiltScene:
     surfaces = [shape.bsdf() for shape in loaded.shapes()]
     # Shapes inside instanced groups are out of sight: they count as letting rays through, which only costs time.
     has_null = any(surface is None or _is_null(surface) for surface in surfaces)
-    return BuiltScene(loaded, scene.background, {}, has_null, (), seconds, source.is_borrowed)
+    with_media = has_media(loaded)
+    notes = (MEDIA_NOTE,) if with_media else ()
+    return BuiltScene(loaded, scene.background, {}, has_null, notes, seconds, source.is_borrowed, with_media)
 
 
 @contextmanager

@@ -29,8 +29,8 @@ _WORTH = 0.9
 
 def even_background(built: BuiltScene | BuiltClassic, request: RenderRequest) -> Color | None:
     """The one colour that rays see which meet nothing; None if there is no such colour."""
-    if request.integrator not in _SHOW_BACKGROUND:
-        return None
+    if request.integrator not in _SHOW_BACKGROUND or getattr(built, "has_media", False):
+        return None  # a medium may surround the scene
     return getattr(built, "background", None)
 
 
