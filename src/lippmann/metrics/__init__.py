@@ -1,4 +1,4 @@
-"""How far a picture is from a reference: the paper's figures and the standard ones."""
+"""Metrics of a picture against a reference: PSNR, SSIM, flicker, and those of the 2014 paper."""
 
 from lippmann.metrics.comparison import Comparison, check_comparable, compare
 from lippmann.metrics.error_image import error_map

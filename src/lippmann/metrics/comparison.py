@@ -1,4 +1,4 @@
-"""Two pictures of one display side by side, in figures."""
+"""All metrics of a picture against a reference of the same display."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ Real = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """How far ``test`` is from ``reference``; see :func:`compare`.
+    """Metrics of ``test`` against ``reference``, as :func:`compare` computes them.
 
     Parameters
     ----------
@@ -42,11 +42,11 @@ class Comparison:
         ``(lens_rows, lens_cols)``: mean squared error of each micro-image (NaN where a lens has no pixel), and its
         pixels.
     silhouettes:
-        How much of the reference lies on outlines.
+        Share of the reference's pixels that lie on outlines.
     views:
         SSIM of the views.
     flicker:
-        How the errors change from view to view; None if there is one view only.
+        Change of the errors from view to view; None if there is one view only.
     paper:
         The figures of the 2014 paper.
     """
@@ -87,7 +87,7 @@ class Comparison:
 
     @property
     def percentile_1(self) -> MicroImage:
-        """The micro-image that one in a hundred is not better than, see :func:`~lippmann.metrics.low_percentile`."""
+        """The micro-image at the 1st percentile of PSNR, see :func:`~lippmann.metrics.low_percentile`."""
         return low_percentile(self.micro_image_errors, self.micro_image_pixels, LOW_PERCENTILE)
 
     @property
@@ -97,11 +97,11 @@ class Comparison:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What a reader of the figures should know, as sentences."""
+        """Sentences on what may mislead a reader of the metrics."""
         return tuple(_notes(self.reference, self.test))
 
     def to_dict(self) -> JsonObject:
-        """All figures but those of single micro-images as JSON-able values; an infinite PSNR is None."""
+        """All metrics but those of single micro-images, as values for JSON; an infinite PSNR is None."""
         worst_view = self.views.worst
         lenses = int(np.count_nonzero(self.micro_image_pixels))
         return {
@@ -134,7 +134,7 @@ class Comparison:
         }
 
     def rows(self) -> Iterator[dict[str, float]]:
-        """The figures of every micro-image, lens row by lens row: what a CSV file holds. PSNR in dB may be infinite."""
+        """Metrics of every micro-image, lens row by lens row, as a CSV file holds them; PSNR in dB may be infinite."""
         paper_psnr = self.paper.psnr
         for row, column in zip(*np.nonzero(self.micro_image_pixels), strict=True):
             error = float(self.micro_image_errors[row, column])

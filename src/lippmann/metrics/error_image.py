@@ -1,4 +1,4 @@
-"""A picture of where two pictures differ."""
+"""The error map: a picture of the errors of another one."""
 
 from __future__ import annotations
 

@@ -1,15 +1,14 @@
-"""Flicker: how much a picture's errors change from one view to the next.
+"""Flicker: how much the errors of a picture change from one view to the next.
 
-An eye that moves before a display goes from view to view. An error that all views share is a blemish of the scene; one
-that differs from view to view flickers. So the errors of neighbouring views are compared: with e the difference between
-test and reference (coded values), flicker is the mean of (e[k + 1] - e[k])^2 over all pairs of neighbouring views, that
-is the mean squared difference of neighbouring views after what the reference's own neighbours differ by is taken away.
+An eye that moves before a display goes from view to view. An error that all views share is a blemish of the scene; an
+error that differs from view to view flickers. With e = test - reference (coded values), flicker is the mean of
+(e[k + 1] - e[k])^2 over all pairs of neighbouring views.
 
-Errors that know nothing of each other give twice the mean squared error; so half of the flicker, in dB, is on the scale
-of PSNR, and *share* is that half divided by the mean squared error of the same pixels: 0 where all views are wrong in
-the same way, 1 where each is by itself, 2 where neighbours are wrong to opposite sides.
+Independent errors give twice their mean squared error. Half of the flicker, in dB, is therefore on the scale of PSNR.
+*Share* is that half divided by the mean squared error of the same pixels: 0 if all views have the same errors, 1 if the
+errors of views are independent, 2 if those of neighbours are opposite.
 
-Noise of the reference counts like any other: it should be 10 dB better than what is judged.
+Noise of the reference counts, too: the reference should be 10 dB better than the picture under test.
 """
 
 from __future__ import annotations
@@ -34,19 +33,19 @@ class Flicker:
 
     @property
     def psnr(self) -> float:
-        """Half the squared change in dB: for errors that know nothing of each other the PSNR; infinite without any."""
+        """Half the squared change in dB, which is the PSNR of independent errors; infinite without any change."""
         return psnr(0.5 * self.squared)
 
     @property
     def share(self) -> float:
-        """Of the error, the part that changes from view to view: 0 to 2; 0 without any error."""
+        """Half the squared change over the squared error, 0 to 2; 0 without any error."""
         return 0.5 * self.squared / self.error if self.error else 0.0
 
 
 class FlickerSums:
-    """Sums for the flicker of views that come in the order of their rows, ``columns`` of them to a row.
+    """Sums for the flicker of views, which are added row by row with ``columns`` views each.
 
-    Neighbours are views side by side and, where there are rows of views, one above the other.
+    Neighbours are views side by side and, if there are rows of views, one above the other.
     """
 
     def __init__(self, columns: int) -> None:
@@ -57,16 +56,16 @@ class FlickerSums:
         self._count = 0
 
     def begin(self) -> None:
-        """The views begin anew, at other places."""
+        """Start again with the first view, for other pixels."""
         self._last, self._count = [], 0
 
-    def add(self, error: Real, found: Flags) -> None:
-        """The next view's errors ``(H, W, 3)`` and where there are any ``(H, W)``."""
+    def add(self, error: Real, present: Flags) -> None:
+        """Add the next view: its errors ``(H, W, 3)``, and the mask ``(H, W)`` of its pixels."""
         if self._last and self._count % self._columns:
-            self._pair(self._last[-1], (error, found))
+            self._pair(self._last[-1], (error, present))
         if len(self._last) == self._columns:
-            self._pair(self._last.pop(0), (error, found))
-        self._last.append((error, found))
+            self._pair(self._last.pop(0), (error, present))
+        self._last.append((error, present))
         self._count += 1
 
     def _pair(self, before: tuple[Real, Flags], after: tuple[Real, Flags]) -> None:

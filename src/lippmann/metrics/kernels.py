@@ -22,11 +22,11 @@ def look_up(codes: Values, levels: NDArray[np.generic], values: NDArray[np.gener
 
 
 @uncounted
-def gather(pixels: Values, row: Indices, column: Indices, found: Flags, gathered: Values) -> None:
-    """``gathered (H, W, 3) = pixels[row, column]`` where ``found``, else 0; the other three are ``(H, W)``."""
+def gather(pixels: Values, row: Indices, column: Indices, present: Flags, gathered: Values) -> None:
+    """``gathered (H, W, 3) = pixels[row, column]`` where ``present``, else 0; the other three are ``(H, W)``."""
     for y in range(gathered.shape[0]):
         for x in range(gathered.shape[1]):
-            if found[y, x]:
+            if present[y, x]:
                 for c in range(3):
                     gathered[y, x, c] = pixels[row[y, x], column[y, x], c]
             else:
@@ -35,15 +35,15 @@ def gather(pixels: Values, row: Indices, column: Indices, found: Flags, gathered
 
 
 @uncounted
-def add_changes(before: Real, seen_before: Flags, after: Real, seen_after: Flags, sums: Real) -> int:
-    """How errors ``(H, W, 3)`` differ between two views, where ``(H, W)`` flags say that both have a pixel.
+def add_changes(before: Real, present_before: Flags, after: Real, present_after: Flags, sums: Real) -> int:
+    """Change of the errors ``(H, W, 3)`` from one view to another, over the pixels that both have (``(H, W)`` masks).
 
-    Adds to ``sums`` the squared differences and half the squares of both; returns how many values that were.
+    Adds the squared differences and half the squares of both to ``sums``; returns the number of values.
     """
     squared, own, count = 0.0, 0.0, 0
     for row in range(before.shape[0]):
         for column in range(before.shape[1]):
-            if not (seen_before[row, column] and seen_after[row, column]):
+            if not (present_before[row, column] and present_after[row, column]):
                 continue
             for c in range(3):
                 one, other = before[row, column, c], after[row, column, c]

@@ -1,8 +1,8 @@
-"""Squared errors of what a panel shows, pooled over the picture or kept apart by micro-image.
+"""Squared errors of two pictures of a panel, pooled over the picture or by micro-image.
 
-Errors are taken between *coded* values in [0, 1]: what the display is driven with, so that a step means about the same
-to the eye in the dark and in the light. Each picture is coded by its own transfer (the sRGB curve, or none where the
-values are display codes already), as its files are; the values are not rounded to whole codes.
+Errors are differences of *coded* values in [0, 1], which drive the display: equal steps look about equal in the dark
+and in the light. Each picture is coded by its own transfer, as its files are: the sRGB curve, or none if its values are
+display codes already. Values are not rounded to whole codes.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ def coded(image: Picture, rows: tuple[int, int] | None = None) -> Real:
 def coded_values(values: Values, transfer: Transfer) -> Real:
     """Coded values in [0, 1] of linear ones, or of codes of 8 or 16 bits, float64; same shape."""
     if values.dtype.kind == "u":
-        return looked_up(values, _coded_levels(values.dtype, transfer))
+        return look_up_codes(values, _coded_levels(values.dtype, transfer))
     return np.asarray(encode(values.astype(np.float64), transfer))
 
 
@@ -53,8 +53,8 @@ def _coded_levels(dtype: np.dtype[np.generic], transfer: Transfer) -> Real:
     return coded_values(linear_levels(dtype, transfer), transfer)
 
 
-def looked_up(codes: Values, levels: NDArray[Scalar]) -> NDArray[Scalar]:
-    """``levels[codes]``: for pictures of codes a small part of the time that the curve takes."""
+def look_up_codes(codes: Values, levels: NDArray[Scalar]) -> NDArray[Scalar]:
+    """``levels[codes]``: much faster than the curve."""
     from lippmann.metrics import kernels
 
     values = np.empty(codes.shape, dtype=levels.dtype)
@@ -108,11 +108,15 @@ class MicroImage:
 
 
 def low_percentile(means: Real, counts: NDArray[np.intp], share: float) -> MicroImage:
-    """The micro-image that a ``share`` of them, itself included, is not better than; 0 gives the worst.
+    """Micro-image at a low percentile of PSNR, by the nearest-rank method.
 
-    The nearest-rank percentile: of n micro-images in the order of their PSNR the one in place ``ceil(share n)``, the
-    first in place 1, so that it is always one that can be looked at. ``means`` and ``counts`` are those of
-    :func:`micro_image_means` of squared errors.
+    Parameters
+    ----------
+    means, counts:
+        ``(lens_rows, lens_cols)``: mean squared errors and pixels, see :func:`micro_image_means`.
+    share:
+        Share of the micro-images that are not better, 0 to 1; 0 gives the worst. Of n micro-images in the order of
+        their PSNR, the result is number ``ceil(share n)``, counted from 1.
     """
     lenses = np.flatnonzero(counts)
     # A stable order: of equally bad ones the first counts.

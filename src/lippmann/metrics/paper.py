@@ -5,12 +5,12 @@ channels:
 
 - :func:`paper_rmse`, equation (1). The paper calls it RMSE, but it has no root: it is the *mean squared error*. Its own
   numbers say so: 13.5795 gives 36.802 dB. The name is kept, the formula is the paper's;
-- :func:`paper_psnr`, which takes that value as it is: ``10 log10(255^2 / paper_rmse)``;
-- their averages over the lenses. The mean of the PSNR is not the PSNR of the mean error: it is never below it, and it
-  hides a single bad lens among good ones.
+- :func:`paper_psnr` of that value: ``10 log10(255^2 / paper_rmse)``;
+- the averages of both over the lenses. The mean of the PSNR is not the PSNR of the mean error: it is never lower, and
+  it hides a single bad lens among good ones.
 
-A micro-image without any error has no finite PSNR. The paper does not say what becomes of it in the average; here the
-average goes over the others, which can only lower it, and says how many were left out.
+A micro-image without any error has no finite PSNR, and the paper does not say how it enters the average. Here the
+average goes over the other micro-images, which can only lower it; the number of those left out is stated.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from lippmann.color.transfer import Transfer, linear_levels, quantize
 from lippmann.image.stored_values import Values
-from lippmann.metrics.mse_psnr import looked_up, psnr
+from lippmann.metrics.mse_psnr import look_up_codes, psnr
 
 Real = NDArray[np.float64]
 
@@ -82,7 +82,7 @@ class PaperFigures:
 def paper_codes(values: Values, transfer: Transfer) -> NDArray[np.float32]:
     """8-bit codes of linear values, or of codes of 8 or 16 bits, as numbers that can be subtracted; same shape."""
     if values.dtype.kind == "u":
-        return looked_up(values, _paper_levels(values.dtype, transfer))
+        return look_up_codes(values, _paper_levels(values.dtype, transfer))
     return quantize(values.astype(np.float32, copy=False), 8, transfer).astype(np.float32)
 
 

@@ -1,17 +1,17 @@
-"""Where the outlines of things run through an integral image.
+"""Silhouettes: the pixels of an integral image that lie at outlines.
 
-At an outline a hair's breadth decides which of two surfaces a ray meets, so two right renderings may differ there as
-much as two wrong ones; figures *off silhouettes* leave such pixels out.
+At an outline a tiny shift decides which of two surfaces a ray meets. Two correct renderings may differ there as much as
+a correct and a wrong one, so metrics *off silhouettes* leave these pixels out.
 
-A pixel lies on a silhouette if it and a neighbour of it see different things. Neighbours are the pixels to the left,
-right, top and bottom in the same micro-image (neighbouring directions), and the pixels at the same place of the
-neighbouring micro-images (neighbouring points of one view); both of a pair are marked. Two pixels see different things
+A pixel lies on a silhouette if it and one of its neighbours see different things; both of the pair are marked. The
+neighbours of a pixel are the pixels to the left, right, top and bottom in the same micro-image (neighbouring
+directions), and the pixels at the same place of the neighbouring micro-images (neighbouring points of one view).
 
-- if the reference has a layer ``depth`` (height of the point seen over the lens plane in mm; not finite where nothing
-  is seen): if their heights differ by more than :data:`DEPTH_JUMP` lens pitches, or only one sees something. From lens
-  to lens that is a surface turned away by more than 63 degrees;
-- else, if a coded channel differs by more than :data:`EDGE_JUMP`: an edge of the picture, be it an outline, a shadow or
-  a texture.
+- If the reference has a layer ``depth`` (height of the visible point over the lens plane in mm; not finite where there
+  is none), two pixels see different things if their heights differ by more than :data:`DEPTH_JUMP` lens pitches, or if
+  only one of them is finite. From lens to lens this is a surface turned away by more than 63 degrees.
+- Otherwise two pixels see different things if a coded channel differs by more than :data:`EDGE_JUMP`. Such an edge is
+  an outline, a shadow or a texture.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""How the views of two pictures of one display compare: SSIM of each, and what flickers between them.
+"""SSIM and flicker of the views of two pictures of one display.
 
-Some rows of all views are gathered and worked on at a time, whether a picture is whole in memory or read piece by
-piece, and views side by side on several threads. Figures do not depend on how many.
+Some rows of all views are compared at a time, so that pictures need not fit in memory. Several threads compare views
+side by side; the metrics do not depend on their number.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ def view_flicker(reference: Picture, test: Picture) -> Flicker | None:
 def view_figures(
     reference: Picture, test: Picture, progress: ProgressCallback = silent
 ) -> tuple[ViewSimilarity, Flicker | None]:
-    """:func:`view_similarity` and :func:`view_flicker` together, at the price of one."""
+    """:func:`view_similarity` and :func:`view_flicker` together, for the time of one."""
     sums = ViewSums(reference, test)
     for row in sums.work():
         progress(Progress("compare", row, reference.display.panel.height))
@@ -64,7 +64,7 @@ class _Lot:
 
 
 class ViewSums:
-    """Sums over the views of two pictures of one display, which grow as :meth:`work` goes on."""
+    """Sums over the views of two pictures of one display; they grow with :meth:`work`."""
 
     def __init__(self, reference: Picture, test: Picture) -> None:
         self._pictures = reference, test
@@ -88,7 +88,7 @@ class ViewSums:
         return self._flicker.flicker()
 
     def work(self) -> Iterator[int]:
-        """Work through all rows of the views; says now and then up to which row of the panel that was."""
+        """Work through all rows of the views; yields the number of the panel's rows done, now and then."""
         high, height = len(self._windows[0]), self._display.panel.height
         places = self._rows - high + 1
         step = max(2 * WINDOW, _BLOCK // (self._shape[0] * self._shape[1] * self._columns))
@@ -106,25 +106,25 @@ class ViewSums:
         self._flicker.begin()
         for ky in range(self._shape[0]):
             views = [(ky, kx) for kx in range(self._shape[1])]
-            compared = pool.map(lambda view: self._compared(lot, view), views)
-            for view, (total, count, error, found) in zip(views, compared, strict=True):
+            outcomes = pool.map(lambda view: self._compare_view(lot, view), views)
+            for view, (total, count, error, present) in zip(views, outcomes, strict=True):
                 self._totals[view] += total
                 self._counts[view] += count
-                self._flicker.add(error[own], found[own])
+                self._flicker.add(error[own], present[own])
 
-    def _compared(self, lot: _Lot, view: tuple[int, int]) -> tuple[float, int, Real, Flags]:
-        """SSIM of a view's rows, as a sum and a number of values; its errors, and where there are any."""
+    def _compare_view(self, lot: _Lot, view: tuple[int, int]) -> tuple[float, int, Real, Flags]:
+        """SSIM of some rows of a view as a sum and a number of values, their errors ``(rows, W, 3)`` and their mask."""
         from lippmann.metrics import kernels
 
         shape = lot.last - lot.first, self._columns
         places = pixels_of_view_rows(self._display, self._grid, view, lot.first, lot.last)
-        found = np.broadcast_to(places[0], shape)
+        present = np.broadcast_to(places[0], shape)
         row, column = (np.broadcast_to(part, shape) for part in places[1:])
-        coded = []
+        colors = []
         for picture, values in zip(self._pictures, lot.values, strict=True):
             gathered = np.empty((*shape, 3), dtype=values.dtype)
-            kernels.gather(values, row - lot.top, column, found, gathered)
-            coded.append(coded_values(gathered, picture.provenance.transfer))
-        a, b = coded
-        total, count = similarity_sum(a, b, None if found.all() else found, self._windows)
-        return total, count, a - b, found
+            kernels.gather(values, row - lot.top, column, present, gathered)
+            colors.append(coded_values(gathered, picture.provenance.transfer))
+        a, b = colors
+        total, count = similarity_sum(a, b, None if present.all() else present, self._windows)
+        return total, count, a - b, present

@@ -98,13 +98,13 @@ def scatter(marks: Sequence[Mark], x: Axis, y: Axis, *, title: str) -> Markup:
         return drawing.svg(element("title", title), class_="chart", role="img")
 
 
-def lines(drawn: Sequence[Line], x: Axis, y: Axis, *, title: str, level: float | None = None) -> Markup:
+def lines(series: Sequence[Line], x: Axis, y: Axis, *, title: str, level: float | None = None) -> Markup:
     """Lines over a grid, with a dashed one at the height ``level``."""
     with plain_matplotlib(salt=title):
         drawing = _chart(x, y)
         if level is not None and y.ends[0] <= level <= y.ends[1]:
             drawing.add_line(x.ends, [level, level], "diagonal")
-        for line in drawn:
+        for line in series:
             drawing.add_line(*_broken(line.points), f"series {line.class_}", line.title)
         return drawing.svg(element("title", title), class_="chart", role="img")
 
@@ -201,9 +201,9 @@ class _Drawing:
         root = ElementTree.fromstring(written.getvalue())
         for part in root.iter():
             self._adopt(part)
-        drawn = (Markup(ElementTree.tostring(part, "unicode", short_empty_elements=False)) for part in root.iter("g"))
+        groups = (Markup(ElementTree.tostring(part, "unicode", short_empty_elements=False)) for part in root.iter("g"))
         width, height = self._size
-        return element("svg", *inside, next(drawn), viewBox=f"0 0 {width} {height}", **attributes)
+        return element("svg", *inside, next(groups), viewBox=f"0 0 {width} {height}", **attributes)
 
     def _adopt(self, part: ElementTree.Element) -> None:
         """Make an element of Matplotlib's one of the page: its looks come from the style sheet, links stay in it."""

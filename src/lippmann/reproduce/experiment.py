@@ -1,8 +1,8 @@
-"""The experiment: scenes rendered in several ways, timed, and compared with full tracing.
+"""The experiment: scenes are rendered in several ways, timed, and compared with full tracing.
 
-How a picture is rendered is the caller's business (:data:`Renderer`), so that what follows from the pictures can be
-tested without an engine. Times are the seconds of tracing and reusing, with everything loaded, built and compiled: a
-scene's ways take turns, the first turns warm up, and the median of the others counts.
+The caller renders (:data:`Renderer`), so that tests need no engine. Times are the seconds of tracing and reusing;
+loading, building and compiling are left out. The ways of rendering a scene take turns: the first turns warm up, and the
+median of the others counts.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ STAGE = "reproducing the paper"
 
 
 class Manner(Enum):
-    """How the methods that reuse points go about it; the value is for headings."""
+    """Order and treatment of gloss in the methods that reuse points; the value is for headings."""
 
     PAPER = "As the paper does it"
     DEFAULT = "In the default order"
@@ -192,7 +192,7 @@ def run_experiment(experiment: Experiment, render: Renderer, progress: ProgressC
                     seconds[variant.key].append(working_seconds(image))
                 done += 1
         medians = {key: statistics.median(values) for key, values in seconds.items()}
-        runs[scene] = _judged(scene, images, medians)
+        runs[scene] = _compare_runs(scene, images, medians)
     progress(Progress(STAGE, total, total))
     return Results(experiment, runs)
 
@@ -203,12 +203,14 @@ def working_seconds(image: IntegralImage) -> float:
     return seconds.get("trace", 0.0) + seconds.get("reuse", 0.0)
 
 
-def _judged(scene: str, images: Mapping[str, IntegralImage], seconds: Mapping[str, float]) -> dict[str, Run]:
+def _compare_runs(scene: str, images: Mapping[str, IntegralImage], seconds: Mapping[str, float]) -> dict[str, Run]:
     full = images[REFERENCE.key]
     full_rays = sum(full.provenance.rays.values())
     runs = {}
     for variant in VARIANTS:
         image = images[variant.key]
-        judged = None if variant is REFERENCE else compare(full, image)
-        runs[variant.key] = Run(scene, variant, image, seconds[variant.key], seconds[REFERENCE.key], full_rays, judged)
+        comparison = None if variant is REFERENCE else compare(full, image)
+        runs[variant.key] = Run(
+            scene, variant, image, seconds[variant.key], seconds[REFERENCE.key], full_rays, comparison
+        )
     return runs

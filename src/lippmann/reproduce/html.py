@@ -67,5 +67,5 @@ def figure(source: str, size: tuple[int, int], caption: str, alt: str) -> Markup
 
 
 def folded(title: str, *inside: str) -> Markup:
-    """What is shown on demand."""
+    """Content that opens on a click on its title."""
     return element("details", element("summary", title), *inside)

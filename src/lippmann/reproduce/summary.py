@@ -1,4 +1,4 @@
-"""The figures of an experiment as plain values, for ``--json`` and for those who want to plot them otherwise."""
+"""The figures of an experiment as plain values, for JSON."""
 
 from __future__ import annotations
 
@@ -42,18 +42,18 @@ def _run(run: Run) -> JsonObject:
     }
     if run.comparison is None:
         return values
-    found = run.comparison
+    comparison = run.comparison
     return values | {
         "order": variant.order,
         "respect_gloss": variant.respect_gloss,
         "saved_seconds": run.saved_seconds,
         "saved_percent": run.saved_percent,
         "ray_share": run.ray_share,
-        "paper_mean_psnr": _finite(found.paper.mean_psnr),
-        "psnr": _finite(found.psnr),
-        "worst_psnr": _finite(found.worst.psnr),
-        "percentile_1_psnr": _finite(found.percentile_1.psnr),
-        "ssim": _finite(found.views.mean),
+        "paper_mean_psnr": _finite(comparison.paper.mean_psnr),
+        "psnr": _finite(comparison.psnr),
+        "worst_psnr": _finite(comparison.worst.psnr),
+        "percentile_1_psnr": _finite(comparison.percentile_1.psnr),
+        "ssim": _finite(comparison.views.mean),
     }
 
 
