@@ -183,6 +183,16 @@ class TestPictures:
         with pytest.raises(UsageError, match="participating media"):
             lippmann.render(fog_room(homogeneous()), self.display, spp=2, method=method)
 
+    def test_show_media_of_instances(self):
+        from lippmann.device.pbr.media import has_media
+
+        fog = {"type": "shapegroup", "fog": fog_room(homogeneous())["fog"]}
+        clear = {"type": "shapegroup", "medium": {"type": "sphere"}}
+        copy = {"type": "instance", "group": {"type": "ref", "id": "group"}}
+        for group, expected in ((fog, True), (clear, False)):
+            parts = {"type": "scene", "group": group, "copy": copy}
+            assert has_media(lippmann.load_scene(parts).description.scene()) is expected
+
     def test_what_has_no_media_has_the_integrator_for_surfaces(self):
         """So that its pictures stay the same to the last bit."""
         from lippmann.rendering.request.resolve import resolve

@@ -11,8 +11,8 @@ MEDIA_NOTE = (
 
 
 def has_media(scene: MitsubaScene) -> bool:
-    """Whether a shape of ``scene`` bounds a medium, or a sensor stands in one."""
-    return bool(_interior_media(scene) or _other_media(scene))
+    """Whether a shape of ``scene``, instanced ones included, bounds a medium, or a sensor stands in one."""
+    return bool(_interior_media(scene) or _other_media(scene) or _has_instanced_media(scene))
 
 
 def surrounding_medium(scene: MitsubaScene) -> Medium | None:
@@ -34,3 +34,12 @@ def _other_media(scene: MitsubaScene) -> list[Medium]:
     exteriors = (shape.exterior_medium() for shape in scene.shapes())
     sensors = (sensor.get_medium() for sensor in scene.sensors())
     return [medium for medium in (*exteriors, *sensors) if medium is not None]
+
+
+def _has_instanced_media(scene: MitsubaScene) -> bool:
+    """Whether a shape bounds a medium that only instances show: such shapes are known by their parameters alone."""
+    import mitsuba as mi
+
+    if not any(shape.class_name() == "Instance" for shape in scene.shapes()):
+        return False
+    return any({"interior_medium", "exterior_medium"} & set(key.split(".")) for key, _ in mi.traverse(scene))
