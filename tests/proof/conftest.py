@@ -49,9 +49,9 @@ def build_once(monkeypatch, _built_scenes):
 
     build = lippmann.device.pbr.build
 
-    def kept(scene, engine=None):
+    def kept(scene, engine=None, *, memory=None):
         if id(scene) not in _built_scenes:
-            _built_scenes[id(scene)] = (scene, build(scene, engine))
+            _built_scenes[id(scene)] = (scene, build(scene, engine, memory=memory))
         return _built_scenes[id(scene)][1]
 
     monkeypatch.setattr(lippmann.device.pbr, "build", kept)
