@@ -5,8 +5,8 @@ from __future__ import annotations
 from lippmann.device.types import Medium, MitsubaScene
 
 MEDIA_NOTE = (
-    "participating media are rendered by volumetric path tracing: a scattering event counts as a surface of the ray "
-    "depth; layers and the denoiser's features are those of the surfaces in and behind a medium"
+    "light in participating media is found by volumetric path tracing: a scattering event counts as a surface of the "
+    "ray depth; layers and the denoiser's features are those of the surfaces in and behind a medium"
 )
 
 
