@@ -210,6 +210,9 @@ class Session:
         if self.request.integrator not in ("path", "direct", "classic"):
             return ()
         background = even_background(self.built, self.request)
+        scene = getattr(self.built, "mitsuba", None)
+        if background is None and scene is not None and scene.environment() is None:
+            background = (0.0, 0.0, 0.0)
         if not has_pixels and background is not None and max(background) == 0.0:
             return ()  # glowing surfaces before a black background send no rays on
         return nothing_seen(seen_share(frame.pixels if has_pixels else None, background, frame.rays, work))

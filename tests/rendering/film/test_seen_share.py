@@ -30,3 +30,13 @@ def test_the_warning_names_the_way_out():
     assert "0.4% of it shows anything" in line
     assert "camera" in line
     assert "(nothing)" in nothing_seen(0)[0]
+
+
+def test_glowing_surfaces_before_black_are_something(engine):
+    """They send no rays on, which an environment's bound goes by."""
+    from lippmann import api
+
+    glow = {"type": "rectangle", "emitter": {"type": "area", "radiance": {"type": "rgb", "value": 3.0}}}
+    preview = api.preview(api.load_scene({"type": "scene", "glow": glow}, environment="none"), (32, 32), spp=1)
+    assert preview.pixels.max() > 1
+    assert not any("empty" in note for note in preview.provenance.notes)
