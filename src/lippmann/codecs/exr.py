@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lippmann.codecs.types import Pixels
 from lippmann.errors import PictureError
 from lippmann.runtime.quiet_stderr import libraries_silenced
 
@@ -42,7 +42,7 @@ class ExrHeader:
 
 def write_exr(
     path: Path,
-    channels: Mapping[str, NDArray[Any]],
+    channels: Mapping[str, Pixels],
     *,
     text: Mapping[str, str],
     pixel_pitch: float | None = None,
@@ -103,7 +103,7 @@ def exr_header(file: BinaryIO, path: Path) -> ExrHeader:
     return ExrHeader(width, height, channels, text)
 
 
-def read_exr(path: Path) -> dict[str, NDArray[Any]]:
+def read_exr(path: Path) -> dict[str, Pixels]:
     """All channels of an EXR, ``(H, W)`` each, as stored.
 
     Raises

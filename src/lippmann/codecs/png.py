@@ -12,11 +12,11 @@ import zlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import BinaryIO
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lippmann.codecs.types import Pixels
 from lippmann.errors import PictureError
 from lippmann.runtime.quiet_stderr import libraries_silenced
 
@@ -43,7 +43,7 @@ class PngHeader:
 
 
 def encode_png(
-    codes: NDArray[Any],
+    codes: Pixels,
     *,
     text: Mapping[str, str],
     pixel_pitch: float | None = None,
@@ -97,7 +97,7 @@ def png_header(file: BinaryIO, path: Path) -> PngHeader:
     return PngHeader(*header, text=text)
 
 
-def read_png(path: Path) -> NDArray[Any]:
+def read_png(path: Path) -> Pixels:
     """Codes of a PNG as stored: ``(H, W)`` or ``(H, W, 2 to 4)`` uint8 or uint16.
 
     Raises
@@ -108,7 +108,7 @@ def read_png(path: Path) -> NDArray[Any]:
     return decode_png(path.read_bytes(), path)
 
 
-def decode_png(data: bytes, path: Path) -> NDArray[Any]:
+def decode_png(data: bytes, path: Path) -> Pixels:
     """:func:`read_png` of the bytes of a file; ``path`` is its name, for errors."""
     import imagecodecs
 
@@ -117,7 +117,7 @@ def decode_png(data: bytes, path: Path) -> NDArray[Any]:
         pass
     try:
         with libraries_silenced():
-            codes: NDArray[Any] = imagecodecs.png_decode(data)
+            codes: Pixels = imagecodecs.png_decode(data)
     except (RuntimeError, ValueError) as error:
         raise _damaged(path, str(error)) from error
     return codes

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lippmann.codecs.types import Pixels, StoredType
 from lippmann.errors import PictureError
 from lippmann.runtime.cached_property import cached_property
 
@@ -43,7 +43,7 @@ _LIBRARY_ERRORS = (
 )
 
 
-def write_tiff(path: Path, values: NDArray[Any], *, description: str, pixel_pitch: float | None = None) -> None:
+def write_tiff(path: Path, values: Pixels, *, description: str, pixel_pitch: float | None = None) -> None:
     """Write ``(H, W, 3)`` uint8, uint16 or float32 values, losslessly compressed (deflate with predictor).
 
     ``description`` (ASCII) becomes ``ImageDescription``; ``pixel_pitch`` (mm) becomes the resolution in dots per inch.
@@ -66,11 +66,11 @@ def write_tiff(path: Path, values: NDArray[Any], *, description: str, pixel_pitc
 
 def write_tiled_tiff(
     path: Path,
-    tiles: Iterator[NDArray[Any]],
+    tiles: Iterator[Pixels],
     *,
     size: tuple[int, int],
     side: int,
-    dtype: np.dtype[Any],
+    dtype: StoredType,
     description: str,
     pixel_pitch: float | None = None,
 ) -> None:
@@ -87,7 +87,7 @@ def write_tiled_tiff(
     """
     import tifffile
 
-    def padded() -> Iterator[NDArray[Any]]:
+    def padded() -> Iterator[Pixels]:
         for tile in tiles:
             whole = np.zeros((side, side, 3), dtype=dtype)
             whole[: tile.shape[0], : tile.shape[1]] = tile
@@ -167,7 +167,7 @@ class TiffPicture:
         self.dtype: str = np.dtype(dtype).name
         self.description = text if isinstance(text, str) else ""
 
-    def read(self) -> NDArray[Any]:
+    def read(self) -> Pixels:
         """All values as stored, ``(H, W)`` or ``(H, W, channels)``.
 
         Raises
@@ -177,7 +177,7 @@ class TiffPicture:
         """
         with _reported(self._path):
             self._check_segments()
-            values: NDArray[Any] = self._page.asarray()
+            values: Pixels = self._page.asarray()
         return values
 
     @cached_property
@@ -199,7 +199,7 @@ class TiffPicture:
                 raise ValueError(f"its pieces have {chunk[1]} x {chunk[0]} pixels")
         return chunk
 
-    def read_chunk(self, row: int, column: int) -> NDArray[Any]:
+    def read_chunk(self, row: int, column: int) -> Pixels:
         """``(rows, columns, channels)`` values of the tile or strip in that row and column of them.
 
         Raises
@@ -216,7 +216,7 @@ class TiffPicture:
             segment = page.decode(self._file.read(page.databytecounts[number]), number)[0]
             if segment is None:  # a segment without bytes is empty
                 return np.zeros((*shape, self.channels), dtype=self.dtype)
-            values: NDArray[Any] = segment[0, : shape[0], : shape[1]]
+            values: Pixels = segment[0, : shape[0], : shape[1]]
             if values.shape[:2] != shape:
                 raise ValueError(f"segment {number} is cut short")
         return values

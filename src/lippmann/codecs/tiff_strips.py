@@ -8,11 +8,10 @@ from __future__ import annotations
 import zlib
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lippmann.codecs.types import Pixels
 from lippmann.progress import Progress, ProgressCallback, silent
 
 _MM_PER_INCH = 25.4
@@ -30,7 +29,7 @@ _CLASSIC = (1 << 32) - (1 << 25)
 def write_tiff_bands(
     path: Path,
     size: tuple[int, int],
-    band: Callable[[int, int], NDArray[Any]],
+    band: Callable[[int, int], Pixels],
     *,
     pixel_pitch: float,
     description: str = "",
@@ -80,10 +79,10 @@ def write_tiff_bands(
         )
 
 
-def _is_whole(values: NDArray[Any]) -> bool:
+def _is_whole(values: Pixels) -> bool:
     return values.dtype.kind == "u"
 
 
-def _differences(values: NDArray[Any]) -> NDArray[Any]:
+def _differences(values: Pixels) -> Pixels:
     """Each value less the one on its left, modulo the type's range: TIFF's horizontal predictor."""
     return np.diff(values, axis=1, prepend=values.dtype.type(0)) if _is_whole(values) else values

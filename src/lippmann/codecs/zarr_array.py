@@ -9,11 +9,10 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lippmann.codecs.types import Attributes, Pixels, StoredType, ZarrArray, ZarrModule
 from lippmann.codecs.zarr_reader import open_array, read_array
 from lippmann.errors import PictureError
 
@@ -33,11 +32,11 @@ TEXT_KEY = "lippmann"
 
 def write_zarr(
     folder: Path,
-    tiles: Iterable[tuple[tuple[slice, slice], NDArray[Any]]],
+    tiles: Iterable[tuple[tuple[slice, slice], Pixels]],
     *,
     size: tuple[int, int],
     side: int,
-    dtype: np.dtype[Any],
+    dtype: StoredType,
     text: str,
 ) -> None:
     """Write the array into ``folder``, which is empty, tile by tile.
@@ -66,7 +65,7 @@ def write_zarr(
         array[place] = values
 
 
-def _created(zarr: Any, folder: str, shape: dict[str, Any]) -> Any:
+def _created(zarr: ZarrModule, folder: str, shape: Attributes) -> ZarrArray:
     """An empty array packed by Zstandard with check sums, so that a changed byte does not become a colour."""
     if hasattr(zarr, "create_array"):
         packing = zarr.codecs.ZstdCodec(level=_LEVEL, checksum=True)
@@ -119,18 +118,18 @@ class ZarrPicture:
         high, wide = (int(length) for length in self._array.chunks[:2])
         self.chunk = high, wide
 
-    def read(self) -> NDArray[Any]:
+    def read(self) -> Pixels:
         """All ``(height, width, 3)`` values as stored; a :class:`PictureError` if they cannot be decoded."""
         return self._read(slice(None), slice(None))
 
-    def read_chunk(self, row: int, column: int) -> NDArray[Any]:
+    def read_chunk(self, row: int, column: int) -> Pixels:
         """``(rows, columns, 3)`` values of a chunk; a :class:`PictureError` if they cannot be decoded."""
         high, wide = self.chunk
         return self._read(slice(row * high, (row + 1) * high), slice(column * wide, (column + 1) * wide))
 
-    def _read(self, rows: slice, columns: slice) -> NDArray[Any]:
+    def _read(self, rows: slice, columns: slice) -> Pixels:
         try:
-            values: NDArray[Any] = np.asarray(self._array[rows, columns])
+            values: Pixels = np.asarray(self._array[rows, columns])
         except PictureError:
             raise
         except Exception as error:  # whatever the library stumbles with over a damaged chunk
@@ -139,7 +138,7 @@ class ZarrPicture:
         return values
 
 
-def load_zarr(where: Path) -> Any:
+def load_zarr(where: Path) -> ZarrModule:
     """The library, which is an extra.
 
     Raises

@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from lippmann.codecs.types import Attributes, Document, StoredType
 from lippmann.errors import PictureError
 
 #: Names of the metadata of a node (an array or group), in the third and the second version of the format.
@@ -89,11 +90,11 @@ class ArrayMetadata:
     version: int
     shape: tuple[int, ...]
     chunks: tuple[int, ...]
-    dtype: np.dtype[Any]
+    dtype: StoredType
     separator: str
     packing: str
     chunks_of_a_shard: int
-    document: Mapping[str, Any]
+    document: Document
 
     @property
     def chunk_bytes(self) -> int:
@@ -117,7 +118,7 @@ class ArrayMetadata:
             raise PictureError(what, where=where, rule=f"at most {_MOST_CHUNKS} are read")
 
 
-def admitted(values: Mapping[str, Any], version: int, where: str) -> ArrayMetadata:
+def admitted(values: Document, version: int, where: str) -> ArrayMetadata:
     """The metadata of an array, checked.
 
     Parameters
@@ -138,7 +139,7 @@ def admitted(values: Mapping[str, Any], version: int, where: str) -> ArrayMetada
     return _version_2(values, check) if version == 2 else _version_3(values, check)
 
 
-def _version_2(values: Mapping[str, Any], check: _Check) -> ArrayMetadata:
+def _version_2(values: Document, check: _Check) -> ArrayMetadata:
     shape = check.lengths("shape", values.get("shape"), least=0)
     chunks = check.lengths("chunks", values.get("chunks"), least=1, axes=len(shape))
     typed = check.type_2("dtype", values.get("dtype"))
@@ -166,7 +167,7 @@ def _version_2(values: Mapping[str, Any], check: _Check) -> ArrayMetadata:
     return ArrayMetadata(2, shape, chunks, dtype, separator, packing, 1, document)
 
 
-def _version_3(values: Mapping[str, Any], check: _Check) -> ArrayMetadata:
+def _version_3(values: Document, check: _Check) -> ArrayMetadata:
     for name, value in values.items():
         needless = isinstance(value, Mapping) and value.get("must_understand") is False
         if name not in _FIELDS_3 and not needless and value is not None:
@@ -254,13 +255,13 @@ class _Check:
             raise self.damaged("fill_value", value)
         return value
 
-    def plain(self, kind: str, values: Mapping[str, Any]) -> dict[str, Any]:
+    def plain(self, kind: str, values: Document) -> Attributes:
         """The settings of a codec, which are single numbers or words."""
         if not all(value is None or isinstance(value, (bool, int, float, str)) for value in values.values()):
             raise self.damaged(kind, dict(values))
         return dict(values)
 
-    def codec_2(self, kind: str, value: object, known: Sequence[str]) -> dict[str, Any]:
+    def codec_2(self, kind: str, value: object, known: Sequence[str]) -> Attributes:
         """A compressor or filter of the second version."""
         if not isinstance(value, Mapping):
             raise self.damaged(kind, value)
@@ -272,7 +273,7 @@ class _Check:
                 raise self.refused(f"the astype {packed}", f"at most as many bytes as {unpacked} has are read")
         return self.plain(kind, value)
 
-    def named(self, kind: str, value: object, known: Sequence[str]) -> tuple[str, Mapping[str, Any]]:
+    def named(self, kind: str, value: object, known: Sequence[str]) -> tuple[str, Document]:
         """Name and settings of an entry of the third version."""
         values = {"name": value} if isinstance(value, str) else value
         if not isinstance(values, Mapping):
@@ -282,10 +283,10 @@ class _Check:
             raise self.damaged(kind, value)
         return self.choice(kind, values.get("name"), known), settings
 
-    def codecs_3(self, value: object, chunks: tuple[int, ...], depth: int = 0) -> list[dict[str, Any]]:
+    def codecs_3(self, value: object, chunks: tuple[int, ...], depth: int = 0) -> list[Attributes]:
         """A chain of codecs of the third version, which takes chunks of that shape."""
         entries = self.list_of("codecs", value, _MOST_CODECS)
-        admitted_entries: list[dict[str, Any]] = []
+        admitted_entries: list[Attributes] = []
         for entry in entries:
             name, settings = self.named("codec", entry, CODECS)
             if name == "transpose":
@@ -303,7 +304,7 @@ class _Check:
             raise self.refused("several compressors, one inside the other", "one is read")
         return admitted_entries
 
-    def _shard(self, settings: Mapping[str, Any], chunks: tuple[int, ...], depth: int) -> dict[str, Any]:
+    def _shard(self, settings: Document, chunks: tuple[int, ...], depth: int) -> Attributes:
         if depth > _MOST_SHARDS_IN_SHARDS:
             raise self.refused(f"shards in shards, {depth} deep", f"{_MOST_SHARDS_IN_SHARDS} are read")
         inner = self.lengths("chunk_shape", settings.get("chunk_shape"), least=1, axes=len(chunks))
@@ -322,12 +323,12 @@ class _Check:
             "index_location": self.choice("index_location", settings.get("index_location", "end"), ("start", "end")),
         }
 
-    def _index_codecs(self, value: object, shape: tuple[int, ...]) -> list[dict[str, Any]]:
+    def _index_codecs(self, value: object, shape: tuple[int, ...]) -> list[Attributes]:
         for entry in self.list_of("index_codecs", value, _MOST_CODECS):
             self.named("index codec", entry, ("bytes", "transpose", "crc32c"))
         return self.codecs_3(value, shape)
 
-    def chunk_size(self, shape: tuple[int, ...], chunks: tuple[int, ...], dtype: np.dtype[Any]) -> None:
+    def chunk_size(self, shape: tuple[int, ...], chunks: tuple[int, ...], dtype: StoredType) -> None:
         """Refuse chunks that fill the memory, or that are absurd beside their array."""
         size, whole = (math.prod(lengths) * dtype.itemsize for lengths in (chunks, shape))
         most = min(MOST_CHUNK_BYTES, max(whole, _FREE_CHUNK_BYTES))

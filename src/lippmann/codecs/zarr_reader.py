@@ -17,6 +17,7 @@ from collections.abc import Callable, Iterator, MutableMapping
 from pathlib import Path
 from typing import Any, Literal
 
+from lippmann.codecs.types import Attributes, ZarrArray, ZarrModule
 from lippmann.codecs.zarr_metadata import ARRAY_2, ATTRIBUTES_2, GROUP_2, NODE_3, ArrayMetadata, admitted
 from lippmann.errors import PictureError
 
@@ -51,7 +52,7 @@ def node_kind(folder: Path, root: Path | None = None) -> Literal["array", "group
     return None if _json(folder, GROUP_2, root or folder) is None else "group"
 
 
-def read_attributes(folder: Path) -> dict[str, Any]:
+def read_attributes(folder: Path) -> Attributes:
     """The attributes of an array or group; empty if it has none.
 
     Raises
@@ -73,13 +74,13 @@ def read_array_metadata(folder: Path, root: Path | None = None) -> ArrayMetadata
     return _array_metadata(folder, root or folder)[0]
 
 
-def read_array(folder: Path) -> tuple[ArrayMetadata, dict[str, Any]]:
+def read_array(folder: Path) -> tuple[ArrayMetadata, Attributes]:
     """:func:`read_array_metadata` and :func:`read_attributes` together: each file is read once."""
     metadata, values = _array_metadata(folder, folder)
     return metadata, _attributes(folder, values if metadata.version == 3 else None)
 
 
-def _array_metadata(folder: Path, root: Path) -> tuple[ArrayMetadata, dict[str, Any]]:
+def _array_metadata(folder: Path, root: Path) -> tuple[ArrayMetadata, Attributes]:
     """The metadata admitted, and the JSON object that holds it."""
     for name, version in ((NODE_3, 3), (ARRAY_2, 2)):
         values = _json(folder, name, root)
@@ -88,7 +89,7 @@ def _array_metadata(folder: Path, root: Path) -> tuple[ArrayMetadata, dict[str, 
     raise _damaged(folder, "there is no array in it")
 
 
-def _attributes(folder: Path, node: dict[str, Any] | None) -> dict[str, Any]:
+def _attributes(folder: Path, node: Attributes | None) -> Attributes:
     """The attributes in the metadata of a node in format 3; without one, those of format 2, in a file of their own."""
     if node is None:
         return _json(folder, ATTRIBUTES_2, folder) or {}
@@ -98,7 +99,7 @@ def _attributes(folder: Path, node: dict[str, Any] | None) -> dict[str, Any]:
     return attributes
 
 
-def open_array(zarr: Any, folder: Path, metadata: ArrayMetadata, root: Path | None = None) -> Any:
+def open_array(zarr: ZarrModule, folder: Path, metadata: ArrayMetadata, root: Path | None = None) -> ZarrArray:
     """The library's array of a folder; its values are read as they are asked for.
 
     Parameters
@@ -185,7 +186,7 @@ class _Files(MutableMapping[str, Any]):
         raise TypeError("an array opened for reading cannot be changed")
 
 
-def _json(folder: Path, name: str, root: Path) -> dict[str, Any] | None:
+def _json(folder: Path, name: str, root: Path) -> Attributes | None:
     """The object of a JSON file; None if there is no such file."""
     data = _file_inside(folder, name, root, _MOST_METADATA)
     if data is None:

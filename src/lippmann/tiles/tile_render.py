@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from lippmann.codecs.types import Pixels
 from lippmann.display import NUMPY, Display
 from lippmann.display.pixel_window import PixelWindow
 from lippmann.image.encoding import stored_values
@@ -75,7 +75,7 @@ class TracedTile:
     pixels: NDArray[np.float32]
     errors: PixelErrors | None
     rays: RayTotals
-    maps: Mapping[str, NDArray[Any]] = field(default_factory=dict)
+    maps: Mapping[str, Pixels] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
 
 
@@ -176,10 +176,10 @@ def packed(prepared: Prepared, traced: TracedTile) -> TileResult:
     return TileResult(traced.index, values, maps, sums, dict(vars(traced.rays)), traced.notes)
 
 
-def lens_sums(display: Display, window: PixelWindow, errors: PixelErrors) -> dict[str, NDArray[Any]]:
+def lens_sums(display: Display, window: PixelWindow, errors: PixelErrors) -> dict[str, Pixels]:
     """Sums over the part of each micro-image that lies in the tile."""
     lenses, owner, pixels = np.unique(_owners(display, window), return_inverse=True, return_counts=True)
-    found: dict[str, NDArray[Any]] = {LENSES: lenses}
+    found: dict[str, Pixels] = {LENSES: lenses}
     for before, each in (("", errors), (OF_SAMPLES, errors.samples)):
         if each is not None:
             sums = ErrorSums.none(len(lenses), pixels)

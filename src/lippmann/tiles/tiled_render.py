@@ -7,12 +7,12 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lippmann.codecs import tiff, zarr_array
+from lippmann.codecs.types import Pixels
 from lippmann.display import Display
 from lippmann.display.pixel_window import TileGrid
 from lippmann.errors import EngineError
@@ -271,7 +271,7 @@ def _write(
             encode_values(temporary, name, layers, transfer=job.transfer, text=text, pixel_pitch=pitch)
 
 
-def _file_tiles(store: TileStore, progress: ProgressCallback) -> Iterator[NDArray[Any]]:
+def _file_tiles(store: TileStore, progress: ProgressCallback) -> Iterator[Pixels]:
     """The picture in the tiles of its file, from those of the job, whose sides divide theirs."""
     grid, per_side = store.grid, tiff.TILE // store.grid.side
     files = TileGrid(grid.width, grid.height, tiff.TILE)
@@ -287,12 +287,12 @@ def _file_tiles(store: TileStore, progress: ProgressCallback) -> Iterator[NDArra
         progress(Progress("write", number + 1, len(files)))
 
 
-def _whole(job: TileJob, store: TileStore) -> dict[str, NDArray[Any]]:
+def _whole(job: TileJob, store: TileStore) -> dict[str, Pixels]:
     """The layers of the whole picture, as its file holds them."""
     from lippmann.rendering.methods import SAMPLES_LAYER
 
     height, width = job.grid.height, job.grid.width
-    layers: dict[str, NDArray[Any]] = {"": np.empty((height, width, 3), dtype=job.stored)}
+    layers: dict[str, Pixels] = {"": np.empty((height, width, 3), dtype=job.stored)}
     if job.keeps_maps:
         layers[SAMPLES_LAYER] = np.full((height, width), job.request.samples, dtype=np.uint32)
     for tile in store.results():

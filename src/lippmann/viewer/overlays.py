@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from lippmann.codecs.types import Pixels
 from lippmann.color.transfer import quantize
 from lippmann.image import Picture
 from lippmann.metrics.error_image import BRIGHTEST, SCALE, in_false_color
@@ -90,7 +90,7 @@ def _overlay(image: Picture, name: str) -> Overlay | None:
     return Overlay(description, lambda part: _false_color(values[part], low, high))
 
 
-def _color_overlay(head: dict[str, object], values: NDArray[Any]) -> Overlay | None:
+def _color_overlay(head: dict[str, object], values: Pixels) -> Overlay | None:
     """Overlay of a layer of three channels; None if they have no meaning as colours."""
     if head["name"] == _NORMAL:
         return Overlay(
@@ -101,7 +101,7 @@ def _color_overlay(head: dict[str, object], values: NDArray[Any]) -> Overlay | N
     return None
 
 
-def _range(name: str, values: NDArray[Any]) -> tuple[float, float]:
+def _range(name: str, values: Pixels) -> tuple[float, float]:
     """Values at the two ends of the scale, never equal."""
     if name == ERROR_LAYER:
         return 0.0, BRIGHTEST
@@ -113,7 +113,7 @@ def _range(name: str, values: NDArray[Any]) -> tuple[float, float]:
     return (low, high) if high > low else (low, low + max(1.0, float(np.spacing(abs(low)))))
 
 
-def _false_color(values: NDArray[Any], low: float, high: float) -> Codes:
+def _false_color(values: Pixels, low: float, high: float) -> Codes:
     """Codes of ``values`` on the scale from ``low`` to ``high``; values that are not finite get :data:`EMPTY_CODE`."""
     finite = np.isfinite(values)
     places = (np.where(finite, values, low).astype(np.float64) - low) / (high - low)
@@ -122,7 +122,7 @@ def _false_color(values: NDArray[Any], low: float, high: float) -> Codes:
     return codes
 
 
-def _origin_codes(status: NDArray[Any]) -> Codes:
+def _origin_codes(status: Pixels) -> Codes:
     codes: Codes = np.empty((*status.shape, 3), dtype=np.uint8)
     codes[:] = EMPTY_CODE
     for value, _, code in _ORIGINS:

@@ -5,11 +5,10 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lippmann.codecs.types import Pixels
 from lippmann.color.transfer import Transfer, quantize
 from lippmann.errors import OutputError
 from lippmann.image.stored_values import FloatArray
@@ -63,7 +62,7 @@ def write_animation(
             _write_apng(codes, temporary, frames_per_second)
 
 
-def _write_apng(frames: Iterator[NDArray[Any]], path: Path, frames_per_second: float) -> None:
+def _write_apng(frames: Iterator[Pixels], path: Path, frames_per_second: float) -> None:
     from PIL import Image
 
     # A list of all frames: Pillow iterates twice, which exhausts a generator.
@@ -72,7 +71,7 @@ def _write_apng(frames: Iterator[NDArray[Any]], path: Path, frames_per_second: f
     first.save(path, format="PNG", save_all=True, append_images=others, duration=duration, loop=0)
 
 
-def _write_mp4(frames: Iterator[NDArray[Any]], path: Path, frames_per_second: float, place: Path) -> None:
+def _write_mp4(frames: Iterator[Pixels], path: Path, frames_per_second: float, place: Path) -> None:
     from fractions import Fraction
 
     import av

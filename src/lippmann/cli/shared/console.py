@@ -8,7 +8,6 @@ import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any
 
 from lippmann.cli.shared.option_names import translated
 from lippmann.progress import Progress, ProgressCallback, silent
@@ -42,7 +41,7 @@ class Console:
     quiet: bool = False
     as_json: bool = False
 
-    def result(self, values: Mapping[str, Any], lines: str = "") -> None:
+    def result(self, values: Mapping[str, object], lines: str = "") -> None:
         """The outcome: the object with ``--json``, else ``lines`` for people."""
         if self.as_json:
             print(json.dumps(values, ensure_ascii=False, allow_nan=False))
@@ -99,7 +98,7 @@ def _bar() -> Iterator[ProgressCallback]:
         yield report
 
 
-def estimate_in_words(estimate: Mapping[str, Any], part: str = "micro-image") -> str:
+def estimate_in_words(estimate: Mapping[str, object], part: str = "micro-image") -> str:
     """What a picture says of its own error, as :attr:`Provenance.estimate` holds it; a quilt's parts are views."""
     from lippmann.rendering.estimate.psnr import Estimate
 

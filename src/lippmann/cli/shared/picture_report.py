@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, cast
 
 from lippmann.cli.shared.console import Console, estimate_in_words
 
@@ -23,7 +23,7 @@ def remarks(console: Console, made: Provenance) -> None:
         console.remark(f"estimated PSNR {estimate_in_words(made.estimate)}")
 
 
-def report(output: Path, size: tuple[int, int], provenance: Provenance) -> dict[str, Any]:
+def report(output: Path, size: tuple[int, int], provenance: Provenance) -> dict[str, object]:
     """What ``--json`` says of a render."""
     return {
         "output": str(output),
