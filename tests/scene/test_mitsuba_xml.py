@@ -332,5 +332,5 @@ def test_mitsuba_sees_the_same_scene(save, tmp_path, engine):
         }
     )
     pictures = [np.array(mi.render(scene, sensor=sensor, integrator=integrator, spp=4)) for scene in (ours, theirs)]
-    assert np.array_equal(*pictures)
+    np.testing.assert_allclose(*pictures, rtol=1e-5)  # the film adds samples in the order in which threads come
     assert pictures[0].std() > 0.01
