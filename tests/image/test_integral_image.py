@@ -58,7 +58,7 @@ def test_placements(display):
         np.full((4, 4), np.nan),
         "x",
     ):
-        with pytest.raises(PictureError, match="similarity"):
+        with pytest.raises(PictureError, match="rotation times a scale"):
             IntegralImage(np.zeros((9, 12, 3)), display("square"), wrong)
 
 

@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 
 from lippmann.display import Display, LensArray, Panel, list_displays, load_display
 from lippmann.errors import SceneError, UsageError
-from lippmann.scene.placement import FILL, LEAST_FILL, POP_OUT, PlacementOptions, place
+from lippmann.scene.fit_placement import FILL, POP_OUT
+from lippmann.scene.placement import PlacementOptions, place
 from lippmann.scene.values.description import Camera
 
 
@@ -40,8 +41,14 @@ def in_display(placement, points):
 
 
 def scale_of(placement):
-    """World units per millimetre."""
-    return np.cbrt(np.linalg.det(placement.world_from_display[:3, :3]))
+    """World units per millimetre, across the display."""
+    return np.linalg.norm(placement.world_from_display[:3, 0])
+
+
+def silhouette(placement, points, distance):
+    """Where a viewer in front of the display's middle sees points in the lens plane."""
+    points = in_display(placement, points)
+    return points[:, :2] / (1 - points[:, 2:] / distance)
 
 
 def options(**fields):
@@ -87,12 +94,14 @@ class TestFit:
         (warning,) = wished.warnings
         assert "3 mm of the scene lie in front of the lens plane instead of" in warning
 
-    def test_a_deep_scene_is_held_by_the_resolved_depth(self):
+    def test_a_deep_scene_fills_the_panel_with_its_depth_compressed(self):
         placed = place(box(6, 6, 8), display(aperture=0.0))
         back, front = placed.depth_range
         assert (back, front) == (pytest.approx(-50), pytest.approx(0, abs=1e-9))
         assert placed.resolvable_range == (-50, 50)
-        assert placed.warnings == ()
+        assert np.ptp(in_display(placed, corners(box(6, 6, 8))), axis=0)[:2] == pytest.approx([FILL * 75] * 2)
+        assert placed.depth_scale == pytest.approx(50 / (8 / 6 * FILL * 75))
+        assert placed.warnings == ("depth 95 mm shown at 53 %: --depth-scale 1 shows it whole",)
         back, front = place(box(6, 6, 8), display(aperture=60.0)).depth_range
         assert (back, front) == (pytest.approx(-50), pytest.approx(25))
 
@@ -101,11 +110,41 @@ class TestFit:
         placed = place(box(6, 6, 8), display(aperture=aperture), options=options(pop_out=0.6))
         assert placed.depth_range == (pytest.approx(-100 / 3), pytest.approx(50))
 
-    def test_a_scene_far_too_deep_stays_visible(self):
-        placed = place(box(1, 1, 40), display())
-        assert np.ptp(in_display(placed, corners(box(1, 1, 40))), axis=0)[1] == pytest.approx(LEAST_FILL * 75)
-        (warning,) = placed.warnings
+    def test_depth_is_shown_whole_where_that_is_asked_for(self):
+        whole = place(box(1, 1, 40), display(), options=options(depth_scale=1.0))
+        assert np.ptp(in_display(whole, corners(box(1, 1, 40))), axis=0) == pytest.approx(
+            [FILL * 75] * 2 + [FILL * 3000]
+        )
+        (warning,) = whole.warnings
         assert "the display resolves -50 to 50 mm" in warning
+
+    @pytest.mark.parametrize("mode", ["fit", "display"])
+    def test_a_given_depth_scale(self, mode):
+        given = options(mode=mode, depth_scale=0.25, scale=0.5, shift=(1, 2, 3), turn=(20, 30, 40))
+        placed = place(box(10, 10, 2), display(), options=given)
+        plain = place(box(10, 10, 2), display(), options=options(mode=mode, scale=0.5, turn=(20, 30, 40)))
+        points = corners(box(10, 10, 2))
+        if mode == "fit":  # it stands elsewhere in depth
+            assert np.ptp(in_display(placed, points), axis=0)[2] == pytest.approx(
+                0.25 * np.ptp(in_display(plain, points), axis=0)[2]
+            )
+        else:
+            assert in_display(placed, points) == pytest.approx(in_display(plain, points) * (1, 1, 0.25) + (1, 2, 3))
+        assert placed.depth_scale == pytest.approx(0.25)
+
+    @pytest.mark.parametrize("distance", [math.inf, 150.0])
+    def test_extreme_points_fill_where_the_box_would_not(self, distance):
+        rng = np.random.default_rng(3)
+        ball = rng.normal(size=(4000, 3))
+        ball /= np.linalg.norm(ball, axis=1)[:, None]
+        bounds = np.stack([ball.min(axis=0), ball.max(axis=0)])
+
+        def fill(**known):
+            placed = place(bounds, display(distance), options=options(turn=(45, 0, 45)), **known)
+            return np.abs(silhouette(placed, ball, distance)).max(axis=0) / (50, 37.5)
+
+        assert fill(extreme_points=lambda: ball).max() == pytest.approx(FILL, abs=0.01)
+        assert fill().max() < 0.8
 
     def test_a_near_viewer_sees_the_front_face_whole(self):
         near = display(viewing_distance=100.0, aperture=90.0)
@@ -126,7 +165,7 @@ class TestFit:
         ],
     )
     def test_turns(self, turn, of, to):
-        placed = place(box(2, 2, 2), display(), options=options(turn=turn))
+        placed = place(box(2, 2, 2), display(), options=options(turn=turn, depth_scale=1.0))
         origin, point = in_display(placed, [(0, 0, 0), of])
         assert (point - origin) * scale_of(placed) == pytest.approx(to, abs=1e-9)
 
@@ -173,12 +212,13 @@ class TestFit:
         assert place(box(1, 1, 0), display(), options=options(shift=(30, 0, 0))).warnings == ()
 
     @pytest.mark.parametrize("preset", [found.name for found in list_displays()])
-    def test_presets_show_a_ball_at_a_sensible_size(self, preset):
+    def test_presets_are_filled(self, preset):
         found = load_display(preset)
         placed = place(box(2, 2, 2), found)
-        share = 2 / scale_of(placed) / min(found.size_mm)
-        assert 0.9 * LEAST_FILL <= share <= 1
+        seen = np.ptp(silhouette(placed, corners(box(2, 2, 2)), found.viewing_distance), axis=0) / found.size_mm
+        assert seen.max() == pytest.approx(FILL, rel=1e-6)
         assert placed.depth_range[1] <= found.aperture_distance + 1e-9
+        assert not any("blurred" in warning for warning in placed.warnings)
 
     @settings(deadline=None, max_examples=60)
     @given(
@@ -197,17 +237,16 @@ class TestFit:
         bounds = box(*size, center=(3, -2, 1))
         placed = place(bounds, found, options=options(turn=turn, pop_out=pop_out))
         points = in_display(placed, corners(bounds))
-        rotation = placed.world_from_display[:3, :3] / scale_of(placed)
+        rotation = placed.world_from_display[:3, :3] / np.linalg.norm(placed.world_from_display[:3, :3], axis=0)
         assert rotation @ rotation.T == pytest.approx(np.eye(3), abs=1e-9)
         assert np.linalg.det(rotation) == pytest.approx(1)
+        assert 0 < placed.depth_scale <= 1 + 1e-9
         assert points[:, 2].max() <= aperture + 1e-6
         assert placed.depth_range == pytest.approx((points[:, 2].min(), points[:, 2].max()), abs=1e-6)
-        window = np.array(found.size_mm) / 2 * (1 - points[:, 2].max() / distance)
-        extent = np.abs(points[:, :2]).max(axis=0)
-        assert (extent <= FILL * window * (1 + 1e-6) + 1e-6).all()
-        resolved = points[:, 2].min() >= -50 - 1e-6 and points[:, 2].max() <= 50 + 1e-6
-        touches = (extent >= 0.999 * LEAST_FILL * window).any() or extent.max() < 1e-3
-        assert resolved or touches
+        assert points[:, 2].min() >= -50 - 1e-6
+        assert points[:, 2].max() <= 50 + 1e-6
+        fill = np.abs(silhouette(placed, corners(bounds), distance)).max(axis=0) * 2 / found.size_mm
+        assert fill.max() == pytest.approx(FILL, rel=2e-3) or fill.max() < 1e-3
 
 
 class TestCamera:
@@ -352,6 +391,8 @@ class TestDisplayFrame:
         ({"scale": 0.0}, "scale: 0; a factor above 0"),
         ({"scale": -1.0}, "scale: -1"),
         ({"scale": math.nan}, "scale: nan"),
+        ({"depth_scale": 0.0}, r"depth_scale: 0; a factor from 0\.0001 to 10000"),
+        ({"depth_scale": math.nan}, "depth_scale: nan"),
         ({"pop_out": 1.01}, r"pop_out: 1\.01; a share of the depth, 0 to 1"),
         ({"pop_out": -0.1}, r"pop_out: -0\.1"),
         ({"pop_out": math.nan}, "pop_out: nan"),

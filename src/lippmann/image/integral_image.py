@@ -19,7 +19,7 @@ from lippmann.errors import PictureError
 from lippmann.image.micro_images import Permutation, micro_images_as_views
 from lippmann.image.picture import Picture
 from lippmann.image.provenance import Provenance
-from lippmann.image.stored_values import FloatArray, Indices, Layer, Matrix, Stored, checked_similarity
+from lippmann.image.stored_values import FloatArray, Indices, Layer, Matrix, Stored, checked_placement
 from lippmann.image.views import Resampling, exact_view_shape, resampled_views
 
 if TYPE_CHECKING:
@@ -76,7 +76,7 @@ class IntegralImage(Picture):
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "pixels", _checked_pixels(self.pixels, self.display))
-        object.__setattr__(self, "world_from_display", checked_similarity(self.world_from_display))
+        object.__setattr__(self, "world_from_display", checked_placement(self.world_from_display))
         size = self.pixels.shape[:2]
         maps = {name: _checked_map(name, values, size) for name, values in self.maps.items()}
         object.__setattr__(self, "maps", maps)

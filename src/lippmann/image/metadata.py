@@ -10,7 +10,7 @@ from lippmann.display import Display
 from lippmann.errors import LippmannError, PictureError
 from lippmann.image.picture import Picture
 from lippmann.image.provenance import Provenance
-from lippmann.image.stored_values import Matrix, checked_similarity
+from lippmann.image.stored_values import Matrix, checked_placement
 
 #: Version of this text; rises when a known name changes its meaning.
 VERSION = 1
@@ -98,7 +98,7 @@ def from_dict(values: Mapping[str, object], where: str) -> Metadata:
         raise PictureError(what, where=where, rule=rule, fix="get a newer Lippmann")
     try:
         display = Display.from_dict(values.get("display"))  # type: ignore[arg-type]  # it refuses what is no mapping
-        matrix = checked_similarity(values.get("world_from_display"))
+        matrix = checked_placement(values.get("world_from_display"))
         provenance = Provenance.from_dict(values.get("provenance"))
     except LippmannError as error:
         what = f"{error.where}: {error.what}" if error.where else error.what

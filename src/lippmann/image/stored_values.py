@@ -23,13 +23,17 @@ Indices = NDArray[np.integer[Any]]
 #: How values were stored in the file that a picture came from; ``float32`` if it came from none.
 Stored = Literal["uint8", "uint16", "float16", "float32"]
 
-#: Deviation of ``world_from_display`` from a similarity that rounding may leave.
-_SIMILARITY_TOLERANCE = 1e-6
+#: Deviation of ``world_from_display`` from a rotation and scales that rounding may leave.
+_TOLERANCE = 1e-6
 
 
-def checked_similarity(matrix: object) -> Matrix:
-    """``matrix`` as a read-only ``(4, 4)`` float64 array; a :class:`PictureError` if it is no similarity."""
-    rule = "it must be a 4 x 4 similarity: a rotation times a scale, a translation, and (0, 0, 0, 1) below"
+def checked_placement(matrix: object) -> Matrix:
+    """``matrix`` as a read-only ``(4, 4)`` float64 array; a :class:`PictureError` if it places no display.
+
+    Columns 0 to 2 are the display's axes in the world: at right angles, right-handed, x and y equally long. That of z
+    may be longer, where the display shows the scene's depth compressed.
+    """
+    rule = "it must be 4 x 4: a rotation times a scale (that of z may differ), a translation, and (0, 0, 0, 1) below"
     try:
         values: Matrix = np.array(matrix, dtype=np.float64)
     except (TypeError, ValueError, OverflowError):
@@ -37,11 +41,12 @@ def checked_similarity(matrix: object) -> Matrix:
     if values.shape != (4, 4) or not np.isfinite(values).all() or list(values[3]) != [0, 0, 0, 1]:
         raise PictureError(f"world_from_display is {values.tolist()}", rule=rule)
     linear = values[:3, :3]
-    with np.errstate(all="ignore"):  # what overflows is no similarity either: NaN is within no tolerance
-        volume = float(np.linalg.det(linear))
-        scale = np.cbrt(volume)
-        error = np.abs(linear.T @ linear / scale**2 - np.eye(3)).max()
-    if not (volume > 0 and error <= _SIMILARITY_TOLERANCE):
+    with np.errstate(all="ignore"):  # what overflows places nothing either: NaN is within no tolerance
+        lengths = np.linalg.norm(linear, axis=0)
+        axes = linear / lengths
+        is_regular = np.linalg.det(axes) > 0.0 and abs(lengths[0] / lengths[1] - 1.0) <= _TOLERANCE
+        error = np.abs(axes.T @ axes - np.eye(3)).max()
+    if not (is_regular and error <= _TOLERANCE):
         raise PictureError(f"world_from_display is {values.tolist()}", rule=rule)
     values.flags.writeable = False
     return values

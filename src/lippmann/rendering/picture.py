@@ -131,6 +131,7 @@ def placed_options(request: RenderRequest, placement: Placement) -> dict[str, ob
     return {
         "pixel_filter": request.pixel_filter,
         "placement": placement.mode,
+        "depth_scale": placement.depth_scale,
         "depth_range": list(placement.depth_range),
         "resolvable_range": list(placement.resolvable_range),
     }

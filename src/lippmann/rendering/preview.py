@@ -14,6 +14,7 @@ from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.rendering.request.resolve import resolve
 from lippmann.rendering.session import open_session
 from lippmann.runtime.engine_lock import exclusive
+from lippmann.scene.camera_placement import remove_scale
 from lippmann.scene.scene import Scene
 
 
@@ -56,6 +57,7 @@ def render_preview(
         source = WhittedCameraRays(scene.classic.camera, scene.classic.handedness, *size)
     else:
         source = CameraRays(pose, *size)
+    session.face_viewer(remove_scale(pose))
     integrator = session.integrator(source, np.linalg.inv(np.asarray(pose.world_from_camera, dtype=np.float64)))
     plan = make_plan(*size, request.samples, memory=session.memory)
     frame = trace_frame(integrator, source, plan, seed=request.seed, box_filter=request.box_filter, progress=progress)

@@ -25,6 +25,7 @@ from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.runtime import engine as engines
 from lippmann.runtime import machine
 from lippmann.scene.camera_placement import CameraView, VisibleDepth
+from lippmann.scene.matrices import rotation_of
 from lippmann.scene.placement import Placement, place
 from lippmann.scene.scene import Scene
 from lippmann.scene.values.description import Matrix
@@ -95,7 +96,7 @@ class Session:
     choices: dict[str, float] = field(default_factory=dict)
 
     def place(self, display: Display) -> Placement:
-        """Where ``display`` stands in the scene.
+        """Where ``display`` stands in the scene; light that follows the viewer is turned toward it.
 
         Raises
         ------
@@ -103,18 +104,31 @@ class Session:
             As :func:`lippmann.scene.placement.place`.
         """
         scene, placement = self.scene, self.request.placement
-        if isinstance(placement, Placement):
-            return placement
-        return place(
-            scene.bounds,
-            display,
-            cameras=scene.cameras,
-            options=placement,
-            home_camera=scene.display_camera,
-            bounds_in=scene.bounds_in,
-            is_unbounded=scene.is_unbounded,
-            probe=self._probe_depth,
-        )
+        if not isinstance(placement, Placement):
+            placement = place(
+                scene.bounds,
+                display,
+                cameras=scene.cameras,
+                options=placement,
+                home_camera=scene.display_camera,
+                bounds_in=scene.bounds_in,
+                extreme_points=lambda: scene.extreme_points,
+                is_unbounded=scene.is_unbounded,
+                probe=self._probe_depth,
+            )
+        self.face_viewer(rotation_of(placement.world_from_display))
+        return placement
+
+    def face_viewer(self, world_from_viewer: Matrix) -> None:
+        """Turn light that follows the viewer, such as the studio's, by a rotation ``(4, 4)``."""
+        from lippmann.device.pbr import BuiltScene
+        from lippmann.device.pbr.emitters import turn_environment
+
+        if not isinstance(self.built, BuiltScene):
+            return
+        environment, emitter = self.scene.environment, self.built.mitsuba.environment()
+        if environment is not None and environment.follows_viewer and emitter is not None:
+            turn_environment(emitter, world_from_viewer @ environment.world_from_environment)
 
     def _probe_depth(self, view: CameraView) -> VisibleDepth | None:
         from lippmann.rendering.transport.depth_probe import probe_depth

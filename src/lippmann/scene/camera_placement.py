@@ -57,6 +57,7 @@ def place_by_camera(
     is_unbounded: bool = False,
     pop_out: float | None = None,
     scale: float = 1.0,
+    depth_scale: float = 1.0,
     probe: DepthProbe | None = None,
     warnings: list[str],
 ) -> Matrix:
@@ -73,6 +74,8 @@ def place_by_camera(
         Share of the visible depth in front of the lens plane, 0 to 1, in place of the camera's focus.
     scale:
         By which the scene will be enlarged about the lens plane.
+    depth_scale:
+        By which its depth will be scaled besides.
     probe:
         Tells what the camera sees; without it the corners of ``bounds`` stand in for that, and nothing is moved.
     warnings:
@@ -99,14 +102,14 @@ def place_by_camera(
     if not (np.isfinite(focus) and focus > 0.0):
         raise SceneError(f"camera '{camera.name}' focuses at {focus:g}", parameter="camera", rule="a distance above 0")
     seen: VisibleDepth | None = None
-    may_cut = is_unbounded or nearest < _first_recorded(camera, focus, display, scale)
+    may_cut = is_unbounded or nearest < _first_recorded(camera, focus, display, scale * depth_scale)
     if probe is not None and (pop_out is not None or may_cut):
         seen = probe(_view(camera, frame, focus, display, scale))
     if pop_out is not None:
         near, far = (nearest, farthest) if seen is None else (seen.near, seen.far)
         focus = max(near + pop_out * (far - near), np.finfo(float).tiny)
     if seen is not None and seen.near > 0.0:
-        most = _farthest_focus(camera, seen.near, display, scale)
+        most = _farthest_focus(camera, seen.near, display, scale * depth_scale)
         if pop_out is not None and focus > most * (1.0 + 2.0 * _MARGIN):
             _refuse_pop_out(pop_out, max(0.0, (most - seen.near) / (seen.far - seen.near)), display)
         if focus > most:

@@ -32,6 +32,24 @@ def scaling(factor: float) -> Matrix:
     return np.diag([factor, factor, factor, 1.0])
 
 
+def depth_scaling(factor: float) -> Matrix:
+    """Along z alone, about the lens plane."""
+    return np.diag([1.0, 1.0, factor, 1.0])
+
+
+def rotation_of(world_from_display: Matrix) -> Matrix:
+    """The rotation alone, ``(4, 4)``, of a display's place: its axes in the world."""
+    matrix = np.eye(4)
+    linear = np.asarray(world_from_display, np.float64)[:3, :3]
+    matrix[:3, :3] = linear / np.linalg.norm(linear, axis=0)
+    return matrix
+
+
+def normal_matrix(matrix: Matrix) -> Matrix:
+    """``(3, 3)`` that carries normals, up to their length, as ``matrix`` carries points: its inverse, transposed."""
+    return np.asarray(np.linalg.inv(np.asarray(matrix, np.float64)[:3, :3]).T, np.float64)
+
+
 def rotation(turn: Vector) -> Matrix:
     """Yaw about y, then pitch about x, then roll about z (degrees, right-handed)."""
     (cy, cx, cz), (sy, sx, sz) = np.cos(np.radians(turn)), np.sin(np.radians(turn))

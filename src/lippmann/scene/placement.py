@@ -1,4 +1,4 @@
-"""Placement of a display in a scene: the similarity ``world_from_display``.
+"""Placement of a display in a scene: the affine map ``world_from_display``, which may scale depth apart.
 
 The display frame is right-handed, in millimetres: origin at the array's centre in the lens plane, +x right, +y up,
 +z toward the viewer.
@@ -15,29 +15,24 @@ import numpy as np
 from lippmann.display import Display
 from lippmann.errors import SceneError, UsageError
 from lippmann.scene.camera_placement import DepthProbe, place_by_camera
-from lippmann.scene.matrices import Bounds, Vector, inverse, rotation, scaling, transform_points, translation
+from lippmann.scene.fit_placement import fit_scene
+from lippmann.scene.matrices import (
+    Bounds,
+    Vector,
+    depth_scaling,
+    inverse,
+    rotation,
+    scaling,
+    transform_points,
+    translation,
+)
 from lippmann.scene.scene import box, box_corners, find_camera, thin_axis
 from lippmann.scene.values.description import Camera, Matrix
 
 Mode = Literal["fit", "camera", "display"]
 
-#: Share of the panel's width or height that a fitted scene fills if it is shallow.
-FILL = 0.95
-
-#: Share that it fills, seen from the viewing distance, however deep it is. A deep scene is shrunk into the depth that
-#: the display resolves, but that pays only so far: blur grows with the scene, so beyond the resolved depth a larger
-#: scene shows as much detail. On panels with few pixels per lens, which resolve millimetres, it would be a speck.
-LEAST_FILL = 0.4
-
-#: Share of the scene's depth that a fitted scene has in front of the lens plane, where the aperture allows it.
-POP_OUT = 1.0 / 3.0
-
-#: Extents below this share of the largest coordinate are rounding noise: files and renderers hold coordinates in single
-#: precision, whose error of half a unit in the last place a rotation of the scene multiplies by a few.
-_NOISE = 4.0 * float(np.finfo(np.float32).eps)
-
-#: No extent above this share of the largest one is noise, so that a small scene far from the origin has a size.
-_LARGEST_NOISE = 1e-3
+#: Depth that is scaled by less, or by more than its inverse, leaves nothing that rays could tell apart.
+_LEAST_DEPTH_SCALE = 1e-4
 
 
 @dataclass(frozen=True)
@@ -47,7 +42,7 @@ class PlacementOptions:
     Parameters
     ----------
     mode:
-        ``fit``: the bounding box within the panel and the depth that the display resolves. ``camera``: as ``camera``
+        ``fit``: the scene's silhouette fills the panel, its depth what the display resolves. ``camera``: as ``camera``
         looks. ``display``: scene coordinates are millimetres of the display frame. None: ``camera`` if one is named,
         else the scene's home camera if it has one, else ``fit``.
     camera:
@@ -59,6 +54,9 @@ class PlacementOptions:
         Millimetres by which the scene is moved in the display frame, last of all.
     scale:
         Factor on the size at which the scene appears.
+    depth_scale:
+        Factor on its depth, about the lens plane, above 0. None: when fitting, what compresses the depth into what the
+        display resolves, at most 1; otherwise 1.
     pop_out:
         Share of the scene's depth to lie in front of the lens plane, 0 to 1; with a camera, of the depth that it
         sees. None: a third when fitting, as the camera focuses otherwise.
@@ -74,6 +72,7 @@ class PlacementOptions:
     turn: Vector = (0.0, 0.0, 0.0)
     shift: Vector = (0.0, 0.0, 0.0)
     scale: float = 1.0
+    depth_scale: float | None = None
     pop_out: float | None = None
 
     def __post_init__(self) -> None:
@@ -87,6 +86,9 @@ class PlacementOptions:
                 raise UsageError(f"{values!r}", parameter=name, rule="three finite numbers")
         if not (np.isfinite(self.scale) and self.scale > 0.0):
             raise UsageError(f"{self.scale:g}", parameter="scale", rule="a factor above 0")
+        if self.depth_scale is not None and not _LEAST_DEPTH_SCALE <= self.depth_scale <= 1.0 / _LEAST_DEPTH_SCALE:
+            rule = f"a factor from {_LEAST_DEPTH_SCALE:g} to {1.0 / _LEAST_DEPTH_SCALE:g}"
+            raise UsageError(f"{self.depth_scale:g}", parameter="depth_scale", rule=rule)
         if self.pop_out is not None and not 0.0 <= self.pop_out <= 1.0:
             raise UsageError(f"{self.pop_out:g}", parameter="pop_out", rule="a share of the depth, 0 to 1")
         if self.camera is not None and self.mode not in (None, "camera"):
@@ -103,10 +105,11 @@ class PlacementOptions:
 class Placement:
     """Position, orientation and scale of a display in a scene.
 
-    ``world_from_display`` is ``scale * rotation`` with a translation, 4x4; its scale is in world units per
-    millimetre. ``depth_range`` is (back, front): the lowest and highest z of the scene's bounding box in millimetres
-    of the display frame; ``resolvable_range`` the same for what the display resolves. ``warnings`` say, one line each,
-    what will be blurred, cut or outside.
+    ``world_from_display`` is ``scale * rotation * depth`` with a translation, 4x4; its scale is in world units per
+    millimetre, and ``depth`` stretches z alone, where the scene's depth is compressed. ``depth_range`` is (back,
+    front): the lowest and highest z of the scene's bounding box in millimetres of the display frame;
+    ``resolvable_range`` the same for what the display resolves. ``warnings`` say, one line each, what was compressed,
+    and what will be blurred, cut or outside.
     """
 
     world_from_display: Matrix
@@ -120,6 +123,12 @@ class Placement:
         """The inverse, 4x4."""
         return inverse(self.world_from_display)
 
+    @property
+    def depth_scale(self) -> float:
+        """Factor on the scene's depth beside its other extents."""
+        across, _, along = np.linalg.norm(self.world_from_display[:3, :3], axis=0)
+        return float(across / along)
+
 
 def place(
     bounds: Bounds,
@@ -129,6 +138,7 @@ def place(
     options: PlacementOptions | None = None,
     home_camera: str | None = None,
     bounds_in: Callable[[Matrix], Bounds] | None = None,
+    extreme_points: Callable[[], Bounds] | None = None,
     is_unbounded: bool = False,
     probe: DepthProbe | None = None,
 ) -> Placement:
@@ -145,6 +155,9 @@ def place(
     bounds_in:
         The scene's box in another frame (:meth:`lippmann.scene.scene.Scene.bounds_in`), for a depth range that is
         tight; without it the corners of ``bounds`` are carried over, which can only be too large.
+    extreme_points:
+        The scene's extreme points (:attr:`lippmann.scene.scene.Scene.extreme_points`), for a silhouette that is tight;
+        without it the corners of ``bounds``.
     is_unbounded:
         Whether the scene holds more than ``bounds``, such as planes without end.
     probe:
@@ -165,7 +178,8 @@ def place(
     warnings: list[str] = []
     if mode == "fit":
         options = _face_viewer(bounds, options, warnings)
-        display_from_world = _fit(bounds, display, options, warnings)
+        points = box_corners(bounds) if extreme_points is None else extreme_points()
+        display_from_world = _fit(bounds, display, options, warnings, points=points, bounds_in=bounds_in)
     elif mode == "camera":
         camera = _choose_camera(cameras, options.camera or home_camera)
         by_camera = place_by_camera(
@@ -175,6 +189,7 @@ def place(
             is_unbounded=is_unbounded,
             pop_out=options.pop_out,
             scale=options.scale,
+            depth_scale=options.depth_scale or 1.0,
             probe=probe,
             warnings=warnings,
         )
@@ -225,80 +240,42 @@ def _choose_camera(cameras: Sequence[Camera], name: str | None) -> Camera:
     return cameras[0]
 
 
-def _fit(bounds: Bounds, display: Display, options: PlacementOptions, warnings: list[str]) -> Matrix:
-    """``display_from_world`` that puts the turned box into the panel and the display's depth.
-
-    In front of the lens plane lies ``pop_out`` of the depth, but no more than the aperture lets through: the rest of
-    it moves behind.
-    """
-    corners = transform_points(rotation(options.turn), box_corners(bounds))
-    low, high = corners.min(axis=0), corners.max(axis=0)
-    width, height, depth = _extents(corners)
-    pop_out = POP_OUT if options.pop_out is None else options.pop_out
-
-    def largest(fill: float) -> float:
-        return min(
-            _largest_in_window(size, fill * window, depth, pop_out, display)
-            for size, window in zip((width, height), display.size_mm, strict=True)
-        )
-
-    in_depth = _largest_in_depth(depth, pop_out, display)
-    least = largest(LEAST_FILL) if width > 0.0 or height > 0.0 else 0.0  # a line toward the viewer has no width
-    scale = options.scale * min(largest(FILL), max(in_depth, least))
-    full_front = pop_out * depth * scale
-    front = min(full_front, display.aperture_distance)
-    if options.pop_out is not None and front < full_front * (1.0 - 1e-9):
+def _fit(
+    bounds: Bounds,
+    display: Display,
+    options: PlacementOptions,
+    warnings: list[str],
+    *,
+    points: Bounds,
+    bounds_in: Callable[[Matrix], Bounds] | None,
+) -> Matrix:
+    """``display_from_world`` that fits the turned scene to the display, with warnings of what that took."""
+    turned = rotation(options.turn)
+    corners = transform_points(turned, box_corners(bounds)) if bounds_in is None else bounds_in(turned)
+    fit = fit_scene(
+        transform_points(turned, points),
+        np.stack([corners.min(axis=0), corners.max(axis=0)]),
+        display,
+        scale=options.scale,
+        depth_scale=options.depth_scale,
+        pop_out=options.pop_out,
+    )
+    if options.depth_scale is None and fit.depth_scale < 1.0 - 1e-6:
         warnings.append(
-            f"{front:.3g} mm of the scene lie in front of the lens plane instead of {full_front:.3g}: "
+            f"depth {fit.depth:.3g} mm shown at {100 * fit.depth_scale:.2g} %: --depth-scale 1 shows it whole"
+        )
+    if options.pop_out is not None and fit.front < fit.full_front * (1.0 - 1e-9):
+        warnings.append(
+            f"{fit.front:.3g} mm of the scene lie in front of the lens plane instead of {fit.full_front:.3g}: "
             f"recorded rays begin {display.aperture_distance:g} mm in front of it"
         )
-    anchor = np.array([(low[0] + high[0]) / 2.0, (low[1] + high[1]) / 2.0, high[2]])
-    return translation((0.0, 0.0, front)) @ scaling(scale) @ translation(-anchor) @ rotation(options.turn)
-
-
-def _extents(points: Bounds) -> Vector:
-    """Extents along x, y and z of points ``(n, 3)``; those that are rounding noise are 0, but never all of them."""
-    extents = np.ptp(points, axis=0)
-    noise = min(_NOISE * np.abs(points).max(), _LARGEST_NOISE * extents.max())
-    x, y, z = np.where(extents > noise, extents, 0.0).tolist()
-    return x, y, z
-
-
-def _largest_in_window(size: float, window: float, depth: float, pop_out: float, display: Display) -> float:
-    """Largest scale s for which the box's front face, the nearest to the viewer, fits the panel from the eye.
-
-    Seen from (0, 0, D) the panel's window narrows as 1 - z / D. The front face lies at f = min(pop_out depth s,
-    aperture distance), so s size <= window (1 - f / D) holds if it does for either term.
-    """
-    if size <= 0.0:
-        return np.inf
-    distance = display.viewing_distance
-    return max(
-        window / (size + window * pop_out * depth / distance),
-        window / size * (1.0 - display.aperture_distance / distance),
-    )
-
-
-def _largest_in_depth(depth: float, pop_out: float, display: Display) -> float:
-    """Largest scale s for which the box keeps to the depth that the display resolves.
-
-    In front lie f = min(pop_out depth s, aperture distance), which may not exceed the near limit; behind lie
-    depth s - f, which may not exceed the far one.
-    """
-    if depth <= 0.0:
-        return np.inf
-    near, far = display.resolvable_depth
-    aperture = display.aperture_distance
-    by_front = near / (pop_out * depth) if pop_out > 0.0 and aperture > near else np.inf
-    behind = (1.0 - pop_out) * depth
-    if behind > 0.0 and pop_out * depth * -far / behind <= aperture:
-        return min(by_front, -far / behind)
-    return min(by_front, (aperture - far) / depth)
+    return fit.display_from_turned @ turned
 
 
 def _resize(display_from_world: Matrix, options: PlacementOptions) -> Matrix:
-    """Turned and scaled about the middle of the lens plane."""
-    return scaling(options.scale) @ rotation(options.turn) @ display_from_world
+    """Turned and scaled about the middle of the lens plane, the depth once more."""
+    resized = scaling(options.scale) @ rotation(options.turn) @ display_from_world
+    return np.asarray(depth_scaling(options.depth_scale or 1.0) @ resized, np.float64)
 
 
 def _find_warnings(corners: Bounds, display: Display) -> list[str]:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from lippmann.errors import SceneError
 from lippmann.runtime.cached_property import cached_property
+from lippmann.scene.extreme_points import extreme_points_of, used_positions
 from lippmann.scene.mitsuba_source import MitsubaSource
 from lippmann.scene.parsing.name_hints import closest_name_hint
 from lippmann.scene.values.description import Camera, Color, Environment, Material, Matrix, Mesh, SceneDescription
@@ -96,6 +97,16 @@ class Scene:
             return bounds_of(self.description, frame)
         corners = box_corners(self.bounds) @ frame[:3, :3].T + frame[:3, 3]
         return np.stack([corners.min(axis=0), corners.max(axis=0)])
+
+    @cached_property
+    def extreme_points(self) -> Bounds:
+        """Points ``(n, 3)`` between which all geometry lies that has an end, world units.
+
+        Tight around the vertices of a description; the corners of :attr:`bounds` for other scenes.
+        """
+        if isinstance(self.description, SceneDescription):
+            return extreme_points_of(self.description)
+        return box_corners(self.bounds)
 
     @cached_property
     def cameras(self) -> tuple[Camera, ...]:
@@ -266,7 +277,7 @@ def bounds_of(description: SceneDescription, frame: Matrix | None = None) -> Bou
     SceneError
         The description places no triangle.
     """
-    used = {mesh: _used_positions(description.meshes[mesh]) for mesh in description.placements}
+    used = {mesh: used_positions(description.meshes[mesh]) for mesh in description.placements}
     exact = sum(len(used[mesh]) * len(places) for mesh, places in description.placements.items()) <= _EXACT_VERTICES
     boxes = []
     for mesh, places in description.placements.items():
@@ -289,12 +300,6 @@ def _box_of_copies(points: Bounds, world_from_points: Matrix, frame: Matrix | No
         copies = points @ matrices[:, :3, :3].transpose(0, 2, 1) + matrices[:, None, :3, 3]
         low, high = np.minimum(low, copies.min(axis=(0, 1))), np.maximum(high, copies.max(axis=(0, 1)))
     return np.stack([low, high])
-
-
-def _used_positions(mesh: Mesh) -> Bounds:
-    used = np.zeros(len(mesh.positions), bool)
-    used[mesh.faces.ravel()] = True
-    return np.asarray(mesh.positions[used], np.float64)
 
 
 def box_corners(bounds: Bounds) -> Bounds:

@@ -64,7 +64,7 @@ def studio() -> Environment:
     radiance /= (radiance * cosine * solid_angles).sum() / np.pi
     pixels = np.repeat(radiance[..., None], 3, axis=-1).astype(np.float32)
     pixels.setflags(write=False)
-    return Environment(pixels, name=NAME)
+    return Environment(pixels, name=NAME, follows_viewer=True)
 
 
 def directions_of(height: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

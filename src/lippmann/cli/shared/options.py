@@ -103,13 +103,20 @@ Place = Annotated[
     str | None,
     typer.Option(
         "--place",
-        help="fit: the scene into the display's depth; camera: as the scene's camera looks; "
+        help="fit: the scene fills the panel; camera: as the scene's camera looks; "
         "display: scene units are its mm. By default a bundled scene's own camera, else fit.",
     ),
 ]
 Turn = Annotated[str | None, typer.Option("--turn", help="Turn the scene: YAW[,PITCH[,ROLL]] in degrees.")]
 Shift = Annotated[str | None, typer.Option("--shift", help="Move the scene: X,Y,Z in mm.")]
 Scale = Annotated[float, typer.Option("--scale", help="Enlarge the scene about the display's centre.")]
+DepthScale = Annotated[
+    str,
+    typer.Option(
+        "--depth-scale",
+        help="Scale the scene's depth about the lens plane: 1 shows it whole, auto as much as the display resolves.",
+    ),
+]
 PopOut = Annotated[
     float | None, typer.Option("--pop-out", help="Share of the scene's depth in front of the lens plane, 0 to 1.")
 ]

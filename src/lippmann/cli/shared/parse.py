@@ -56,13 +56,15 @@ def memory(text: str | None, option: str = "--memory") -> int | None:
 
 def exposure(text: str) -> float | Literal["auto"]:
     """Stops, or ``auto``."""
-    if text == "auto":
-        return "auto"
+    return "auto" if text == "auto" else number(text, "--exposure", "auto, or a number of stops")
+
+
+def number(text: str, option: str, rule: str) -> float:
+    """One number; ``rule`` says what else could have been typed."""
     try:
-        value = float(text)
+        return float(text)
     except ValueError:
-        raise UsageError(f"'{text}' will not do", where="--exposure", rule="auto, or a number of stops") from None
-    return value
+        raise UsageError(f"'{text}' will not do", where=option, rule=rule) from None
 
 
 def color(text: str | None) -> tuple[float, float, float] | None:
@@ -78,7 +80,13 @@ def display(name: str | None) -> Display | None:
 
 
 def placement(
-    camera: str | None, place: str | None, turn: str | None, shift: str | None, scale: float, pop_out: float | None
+    camera: str | None,
+    place: str | None,
+    turn: str | None,
+    shift: str | None,
+    scale: float,
+    depth_scale: str,
+    pop_out: float | None,
 ) -> PlacementOptions:
     """Where the display is to stand, from the options of those names."""
     from lippmann.scene.placement import PlacementOptions
@@ -89,6 +97,7 @@ def placement(
         turn=angles(turn),
         shift=(0.0, 0.0, 0.0) if shift is None else triple(shift, "--shift"),
         scale=scale,
+        depth_scale=None if depth_scale == "auto" else number(depth_scale, "--depth-scale", "auto, or a factor"),
         pop_out=pop_out,
     )
 

@@ -25,12 +25,15 @@ from lippmann.device.types import (
     Vector3f,
 )
 from lippmann.errors import SceneError
-from lippmann.scene.values.description import Environment, Light
+from lippmann.scene.values.description import Environment, Light, Matrix
 
 #: A spot's inner half-angle stays this much (radians) below its outer one: Mitsuba divides by the difference.
 MIN_PENUMBRA = 1e-3
 #: Environments of more rows are taken as they are: Mitsuba places their rows up to half a row off, 0.2 degrees or less.
 MAX_EXACT_ROWS = 512
+
+#: Mitsuba puts column 0 of an environment, not the middle, at -z: half a turn between.
+_HALF_TURN = np.diag([-1.0, 1.0, -1.0, 1.0])
 
 
 def light_object(light: Light) -> Emitter:
@@ -98,13 +101,21 @@ def environment_object(environment: Environment) -> Emitter:
         raise SceneError("a pixel is negative or not finite", where=where, rule="radiance is finite and not negative")
     if (pixels == pixels[0, 0]).all():
         return mi.load_dict({"type": "constant", "radiance": {"type": "rgb", "value": pixels[0, 0].tolist()}})
-    # Mitsuba puts column 0, not the middle, at -z: half a turn between.
-    half_turn = np.diag([-1.0, 1.0, -1.0, 1.0])
-    to_world = mi.ScalarTransform4f((np.asarray(environment.world_from_environment) @ half_turn).tolist())
+    to_world = mi.ScalarTransform4f((np.asarray(environment.world_from_environment) @ _HALF_TURN).tolist())
     if len(pixels) <= MAX_EXACT_ROWS:
         pixels = _rows_for_mitsuba(pixels)
     bitmap = mi.Bitmap(np.require(pixels, requirements=["C", "W"]))  # it refuses read-only arrays
     return mi.load_dict({"type": "envmap", "bitmap": bitmap, "to_world": to_world})
+
+
+def turn_environment(emitter: Emitter, world_from_environment: Matrix) -> None:
+    """Turn the surroundings of :func:`environment_object`; an even colour looks the same from everywhere."""
+    import mitsuba as mi
+
+    parameters = mi.traverse(emitter)
+    if "to_world" in parameters:
+        parameters["to_world"] = mi.Transform4f((np.asarray(world_from_environment) @ _HALF_TURN).tolist())
+        parameters.update()
 
 
 def _rows_for_mitsuba(pixels: NDArray[np.float32]) -> NDArray[np.float32]:

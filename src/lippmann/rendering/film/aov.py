@@ -20,6 +20,7 @@ from lippmann.rendering.film.wavefront import divide
 from lippmann.rendering.film.wavefront_plan import Plan, Tile, make_plan
 from lippmann.rendering.transport.first_surface import Surfaces, make_surfaces
 from lippmann.rendering.transport.ray_source import RaySource
+from lippmann.scene.matrices import normal_matrix
 
 if TYPE_CHECKING:
     from lippmann.device.pbr import BuiltScene
@@ -104,7 +105,7 @@ def _trace_tile(
     position = dr.select(seen.hit, position, dr.nan)
     values = {
         "depth": dr.select(seen.hit, position.z, -dr.inf),
-        "normal": dr.select(seen.hit, dr.normalize(to_frame(display_from_world, seen.n)), 0),
+        "normal": dr.select(seen.hit, dr.normalize(to_frame(normal_matrix(display_from_world), seen.n)), 0),
         "albedo": seen.albedo,
         "shape": dr.select(seen.hit, mi.Float(seen.shape), -1),
         "position": position,
@@ -114,7 +115,7 @@ def _trace_tile(
 
 
 def to_frame(matrix: NDArray[np.float64], vector: Vector3f) -> Vector3f:
-    """The linear part of ``matrix`` on a vector of the device."""
+    """The linear part ``(3, 3)`` of ``matrix`` on a vector of the device."""
     rows = matrix[:3, :3].tolist()
     return mi.Vector3f(*(row[0] * vector.x + row[1] * vector.y + row[2] * vector.z for row in rows))
 

@@ -18,6 +18,7 @@ from lippmann.rendering.film.wavefront import rays_of_tile
 from lippmann.rendering.film.wavefront_plan import Pass, Plan, Tile, make_plan
 from lippmann.rendering.transport.first_surface import Surfaces, make_surfaces
 from lippmann.rendering.transport.ray_source import RaySource
+from lippmann.scene.matrices import inverse, rotation_of
 
 if TYPE_CHECKING:
     from lippmann.device.pbr import BuiltScene
@@ -86,8 +87,8 @@ def trace_guides(
     """
     surfaces = make_surfaces(built)
     matrix = np.asarray(display_from_world, dtype=np.float64)
-    linear = matrix[:3, :3]
-    rotation = (linear / np.cbrt(np.linalg.det(linear))).astype(np.float32)
+    # Normals of the scene's own shape: where depth is compressed, those of the display would hardly differ.
+    rotation = rotation_of(inverse(matrix))[:3, :3].T.astype(np.float32)
     albedo = np.zeros((plan.height, plan.width, 3), dtype=np.float32)
     normal = np.zeros_like(albedo)
     height = np.zeros((plan.height, plan.width), dtype=np.float32)

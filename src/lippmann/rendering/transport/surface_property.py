@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from lippmann.device.sobol import SampleStream
 from lippmann.device.types import Bool, Color3f, MitsubaScene, Ray3f, Vector3f
 from lippmann.rendering.transport.integrator import RayCounts
+from lippmann.scene.matrices import normal_matrix
 
 SurfaceProperty = Literal["normal", "depth", "position", "albedo"]
 
@@ -45,13 +46,14 @@ class SurfaceIntegrator:
         if self.name == "albedo":
             value = mi.Color3f(si.bsdf(ray).eval_diffuse_reflectance(si, hit))
         elif self.name == "normal":
-            value = mi.Color3f(dr.normalize(self._linear(si.sh_frame.n)))
+            value = mi.Color3f(dr.normalize(_linear(normal_matrix(self._matrix), si.sh_frame.n)))
         else:
-            point = self._linear(si.p) + mi.Vector3f(self._matrix[:3, 3].tolist())
+            point = _linear(self._matrix, si.p) + mi.Vector3f(self._matrix[:3, 3].tolist())
             value = mi.Color3f(point) if self.name == "position" else mi.Color3f(point.z)
         none = dr.zeros(mi.UInt32, dr.width(si.t))
         return dr.select(hit, value, mi.Color3f(0)), RayCounts(none, none)
 
-    def _linear(self, vector: Vector3f) -> Vector3f:
-        rows = self._matrix[:3, :3].tolist()
-        return mi.Vector3f(*(row[0] * vector.x + row[1] * vector.y + row[2] * vector.z for row in rows))
+
+def _linear(matrix: NDArray[np.float64], vector: Vector3f) -> Vector3f:
+    rows = matrix[:3, :3].tolist()
+    return mi.Vector3f(*(row[0] * vector.x + row[1] * vector.y + row[2] * vector.z for row in rows))

@@ -180,11 +180,14 @@ class Environment:
     """Light from far away: an equirectangular image ``(h, w, 3)`` of float32 linear radiance.
 
     Row 0 lies at +y (up), the middle column at -z, ahead of a viewer who looks that way; columns run to the right (+x).
+    ``follows_viewer`` says that this holds for whoever looks at the scene, wherever the display or camera stands;
+    ``world_from_environment`` is then set for each picture.
     """
 
     pixels: FloatArray
     world_from_environment: Matrix = field(default_factory=lambda: np.eye(4))
     name: str = ""
+    follows_viewer: bool = False
 
 
 @dataclass(frozen=True, eq=False)

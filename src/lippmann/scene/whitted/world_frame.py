@@ -29,14 +29,18 @@ def world_from_scene(scene: ClassicScene) -> Matrix:
 def world_bounds(scene: ClassicScene, frame: Matrix | None = None) -> Numbers:
     """The box ``(2, 3)`` around all shapes that have an end, in the world or along the axes of another frame.
 
-    ``frame`` is the similarity ``(4, 4)`` that leads there from the world.
+    ``frame`` ``(4, 4)`` leads there from the world: a similarity, but that its depth (z) may be scaled besides.
 
     Raises
     ------
     SceneError
         No shape has an end.
     """
-    matrix = world_from_scene(scene) if frame is None else frame @ world_from_scene(scene)
+    similarity = np.eye(4) if frame is None else np.array(frame, np.float64)
+    # The depth's own scale is taken out, for spheres to stay spheres, and given to the box.
+    depth_scale = np.linalg.norm(similarity[2, :3]) / np.linalg.norm(similarity[0, :3])
+    similarity[2] /= depth_scale
+    matrix = similarity @ world_from_scene(scene)
     finite: tuple[Batch, ...] = (scene.spheres, scene.tubes, scene.rings, scene.triangles)
     corners = [np.stack(_transform(batch, matrix).extents()) for batch in (*finite, scene.boxes) if len(batch)]
     if not corners:
@@ -45,12 +49,13 @@ def world_bounds(scene: ClassicScene, frame: Matrix | None = None) -> Numbers:
             where=scene.name,
             rule="it needs a shape that has an end; planes and infinite cylinders have none",
         )
-    return np.stack(
+    bounds = np.stack(
         [
             np.min([low.min(axis=0) for low, _ in corners], axis=0),
             np.max([high.max(axis=0) for _, high in corners], axis=0),
         ]
     )
+    return np.asarray(bounds * (1.0, 1.0, depth_scale), np.float64)
 
 
 def world_camera(scene: ClassicScene, name: str = "camera") -> Camera:

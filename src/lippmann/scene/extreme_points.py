@@ -1,0 +1,81 @@
+"""The points of a scene that lie farthest out, which stand for its convex hull."""
+
+from __future__ import annotations
+
+import itertools
+from functools import lru_cache
+
+import numpy as np
+
+from lippmann.scene.matrices import Bounds
+from lippmann.scene.values.description import Matrix, Mesh, SceneDescription
+
+#: Directions in which the farthest points are looked for, on a Fibonacci lattice: the hull of those points is at most
+#: 0.6 % of the scene's radius short of the scene's. Of large meshes fewer are, for time: 3 % short.
+_DIRECTIONS = 256
+_DIRECTIONS_OF_LARGE = 48
+_LARGE = 1_000_000
+#: Vertices that are looked at together.
+_VERTICES_AT_A_TIME = 1 << 14
+#: Of more points of copies than this a box stands for them.
+_COPIED_POINTS = 5_000_000
+
+
+def extreme_points_of(description: SceneDescription) -> Bounds:
+    """Points ``(n, 3)`` in world units, between which all triangles lie up to a hundredth of the scene's radius.
+
+    Empty for a description that places no triangle.
+    """
+    found = []
+    for mesh, places in description.placements.items():
+        points = farthest_points(used_positions(description.meshes[mesh]))
+        if not len(points) or not len(places):
+            continue
+        if len(points) * len(places) > _COPIED_POINTS:
+            points = np.array(list(itertools.product(*zip(points.min(axis=0), points.max(axis=0), strict=True))))
+        found.append(farthest_points(_copies(points, places)))
+    return farthest_points(np.concatenate(found)) if found else np.zeros((0, 3))
+
+
+def farthest_points(points: Bounds) -> Bounds:
+    """Those of points ``(n, 3)`` that lie farthest in one of many directions."""
+    directions = _directions(_DIRECTIONS if len(points) <= _LARGE else _DIRECTIONS_OF_LARGE)
+    if len(points) <= len(directions):
+        return points
+    # About their middle, so that single precision tells those apart that lie far from the origin.
+    centered = points - (points.min(axis=0) + points.max(axis=0)) / 2.0
+    size = float(np.abs(centered).max()) or 1.0
+    centered = (centered / size).astype(np.float32)
+    best = np.full(len(directions), -np.inf, np.float32)
+    index = np.zeros(len(directions), np.intp)
+    for start in range(0, len(points), _VERTICES_AT_A_TIME):
+        reach = centered[start : start + _VERTICES_AT_A_TIME] @ directions.T
+        first = reach.argmax(axis=0)
+        farthest = reach[first, np.arange(len(directions))]
+        index = np.where(farthest > best, start + first, index)
+        best = np.maximum(farthest, best)
+    return points[np.unique(index)]
+
+
+def used_positions(mesh: Mesh) -> Bounds:
+    """Positions ``(n, 3)`` of the vertices that some triangle uses."""
+    used = np.zeros(len(mesh.positions), bool)
+    used[mesh.faces.ravel()] = True
+    return np.asarray(mesh.positions[used], np.float64)
+
+
+def _copies(points: Bounds, places: Matrix) -> Bounds:
+    """Points ``(n, 3)`` at all of ``(k, 4, 4)`` places."""
+    linear, offset = places[:, :3, :3], places[:, None, :3, 3]
+    return np.asarray((points @ linear.transpose(0, 2, 1) + offset).reshape(-1, 3), np.float64)
+
+
+@lru_cache(maxsize=2)
+def _directions(count: int) -> Bounds:
+    """Unit vectors ``(6 + count, 3)``, float32: both ways along each axis, and evenly over the sphere."""
+    number = np.arange(count)
+    z = 1.0 - (2.0 * number + 1.0) / count
+    azimuth = number * np.pi * (3.0 - np.sqrt(5.0))
+    radius = np.sqrt(1.0 - z * z)
+    even = np.stack([radius * np.cos(azimuth), radius * np.sin(azimuth), z], axis=1)
+    return np.concatenate([np.eye(3), -np.eye(3), even]).astype(np.float32)

@@ -1,0 +1,171 @@
+"""How a scene is fitted to a display: its silhouette fills the panel, its depth keeps to what the display resolves.
+
+Size and depth are chosen apart. Seen from the viewing point the silhouette fills the panel's width or height; depth
+that the display would only blur is compressed about the lens plane. That is an affine map of the display's frame:
+straight rays stay straight, and are shaded in the scene's own space.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from lippmann.display import Display
+from lippmann.scene.matrices import Bounds, Vector, depth_scaling, scaling, translation
+from lippmann.scene.values.description import Matrix
+
+#: Share of the panel's width or height that the silhouette fills.
+FILL = 0.95
+
+#: Share of the scene's depth that lies in front of the lens plane, where the aperture allows it.
+POP_OUT = 1.0 / 3.0
+
+#: Extents below this share of the largest coordinate are rounding noise: files and renderers hold coordinates in single
+#: precision, whose error of half a unit in the last place a rotation of the scene multiplies by a few.
+_NOISE = 4.0 * float(np.finfo(np.float32).eps)
+
+#: No extent above this share of the largest one is noise, so that a small scene far from the origin has a size.
+_LARGEST_NOISE = 1e-3
+
+#: The scale is searched between these multiples of the one that fills the panel where all views are parallel.
+_SEARCHED = (1.0 / 16.0, 2.0)
+_HALVINGS = 40
+_CENTERINGS = 8
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A fitted scene.
+
+    Attributes
+    ----------
+    display_from_turned:
+        ``(4, 4)``, from the turned scene (world units) to the display's frame.
+    depth:
+        The scene's depth in mm at the size at which it appears, uncompressed.
+    depth_scale:
+        Share of it that is shown.
+    front, full_front:
+        Millimetres of the shown depth in front of the lens plane, and how many ``pop_out`` asks for.
+    """
+
+    display_from_turned: Matrix
+    depth: float
+    depth_scale: float
+    front: float
+    full_front: float
+
+
+def fit_scene(
+    points: Bounds,
+    bounds: Bounds,
+    display: Display,
+    *,
+    scale: float = 1.0,
+    depth_scale: float | None = None,
+    pop_out: float | None = None,
+) -> Fit:
+    """Fit a scene to a display.
+
+    In front of the lens plane lies ``pop_out`` of the depth, but no more than the aperture lets through: the rest of it
+    moves behind.
+
+    Parameters
+    ----------
+    points:
+        ``(n, 3)``: the turned scene's extreme points, between which all of it lies.
+    bounds:
+        ``(2, 3)``: its bounding box.
+    scale:
+        Factor on the size that fills the panel.
+    depth_scale:
+        Share of the depth that is shown; None: all that the display resolves.
+    pop_out:
+        Share of the depth in front of the lens plane, 0 to 1; None: a third.
+    """
+    low, high = bounds
+    width, height, depth = _extents(bounds)
+    share = POP_OUT if pop_out is None else pop_out
+    resolved = _largest_in_depth(depth, share, display)
+    middle = np.array([(low[0] + high[0]) / 2.0, (low[1] + high[1]) / 2.0, high[2]])
+    # Where there is no extent, rounding noise must not count as one.
+    seen = (points - middle) * (np.array([width, height, depth]) > 0.0)
+
+    def at(size: float) -> Fit:
+        """The fit of a given size, in mm per world unit."""
+        shown = min(1.0, resolved / size) if depth_scale is None else depth_scale
+        full_front = share * depth * size * shown
+        front = min(full_front, display.aperture_distance)
+        x, y = _center(seen, size, shown, front, display)
+        anchor = translation(-middle - (x, y, 0.0))
+        matrix = translation((0.0, 0.0, front)) @ depth_scaling(shown) @ scaling(size) @ anchor
+        return Fit(matrix, depth * size, shown, front, full_front)
+
+    def fills(size: float) -> float:
+        """Share of the panel that the silhouette fills, on the axis where it fills more."""
+        extents = np.ptp(_project(seen, at(size).display_from_turned, middle, display), axis=0)
+        return float((extents / display.size_mm).max())
+
+    if width > 0.0 or height > 0.0:
+        size = FILL * min(
+            side / extent if extent > 0.0 else np.inf
+            for side, extent in zip(display.size_mm, np.ptp(seen[:, :2], axis=0), strict=True)
+        )
+        if np.isfinite(display.viewing_distance):
+            size = _largest(fills, size)
+    else:  # a line toward the viewer
+        size = resolved
+    return at(size * scale)
+
+
+def _largest(fills: Callable[[float], float], size: float) -> float:
+    """The size, near the given one, whose silhouette fills the panel as it should."""
+    least, most = (np.log(size * factor) for factor in _SEARCHED)
+    for _ in range(_HALVINGS):
+        middle = (least + most) / 2.0
+        least, most = (middle, most) if fills(float(np.exp(middle))) <= FILL else (least, middle)
+    return float(np.exp(least))
+
+
+def _center(seen: Bounds, size: float, shown: float, front: float, display: Display) -> tuple[float, float]:
+    """Where, in world units from the box's middle, a scene has its centre as seen from the viewing point."""
+    nearness = 1.0 - (front + seen[:, 2] * size * shown) / display.viewing_distance
+    center = np.zeros(2)
+    if np.isfinite(display.viewing_distance):
+        for _ in range(_CENTERINGS):
+            silhouette = (seen[:, :2] - center) / nearness[:, None]
+            center += (silhouette.max(axis=0) + silhouette.min(axis=0)) / 2.0 * nearness.mean()
+    return float(center[0]), float(center[1])
+
+
+def _project(seen: Bounds, display_from_turned: Matrix, middle: Bounds, display: Display) -> Bounds:
+    """Points ``(n, 2)`` of the lens plane at which the viewing point sees points, mm."""
+    placed = (seen + middle) @ display_from_turned[:3, :3].T + display_from_turned[:3, 3]
+    return np.asarray(placed[:, :2] / (1.0 - placed[:, 2:] / display.viewing_distance), np.float64)
+
+
+def _extents(bounds: Bounds) -> Vector:
+    """Extents along x, y and z of a box; those that are rounding noise are 0, but never all of them."""
+    extents = np.ptp(bounds, axis=0)
+    noise = min(_NOISE * np.abs(bounds).max(), _LARGEST_NOISE * extents.max())
+    x, y, z = np.where(extents > noise, extents, 0.0).tolist()
+    return x, y, z
+
+
+def _largest_in_depth(depth: float, pop_out: float, display: Display) -> float:
+    """Largest scale s of the depth for which a scene keeps to the depth that the display resolves.
+
+    In front lie f = min(pop_out depth s, aperture distance), which may not exceed the near limit; behind lie
+    depth s - f, which may not exceed the far one.
+    """
+    if depth <= 0.0:
+        return np.inf
+    near, far = display.resolvable_depth
+    aperture = display.aperture_distance
+    by_front = near / (pop_out * depth) if pop_out > 0.0 and aperture > near else np.inf
+    behind = (1.0 - pop_out) * depth
+    if behind > 0.0 and pop_out * depth * -far / behind <= aperture:
+        return min(by_front, -far / behind)
+    return min(by_front, (aperture - far) / depth)
