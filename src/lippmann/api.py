@@ -95,7 +95,7 @@ def render(
     quality_mean: float | None = None,
     max_time: float | None = None,
     seed: int = 0,
-    subpixels: bool = False,
+    subpixels: bool | None = None,
     pixel_filter: PixelFilter = "auto",
     denoise: Denoiser = "auto",
     exposure: float | Literal["auto"] = "auto",
@@ -119,11 +119,11 @@ def render(
         A :class:`~lippmann.display.Display`, a preset's name, or a TOML file. Default ``seed-lenticular``.
     placement:
         Where the display stands in the scene: a :class:`~lippmann.scene.placement.PlacementOptions` (by a camera,
-        fitted to the display's depth, or in the display's own millimetres; then turned, moved, scaled), or a placement
+        fitted to the panel, or in the display's own millimetres; then turned, moved, scaled), or a placement
         found before. By default a bundled scene's own camera, else fitted.
     method:
-        ``auto`` (default): ``full`` for a number of samples; for a quality or a time the faster of ``full`` and
-        ``pooled``. ``full`` traces every ray. ``pooled`` denoises, and all micro-images that show a point share its
+        ``auto`` (default): ``pooled`` where light has noise, else ``full``; for a quality or a time the faster of
+        both. ``full`` traces every ray. ``pooled`` denoises, and all micro-images that show a point share its
         light. ``lens-view`` reprojects points from micro-image to micro-image and traces the missed pixels;
         ``interpolated`` averages those of every other micro-image from its neighbours.
     order:
@@ -140,8 +140,8 @@ def render(
         Surfaces along a path, the primary ray's counting 1; 1 to 4096. Default 8 for ``path``, 1 for ``direct``, the
         file's own for ``classic``.
     spp:
-        Samples per pixel, or per sub-pixel; 1 to 2**24. Default 16, 1 for ``classic``, and with a quality or a time as
-        many as that takes.
+        Samples per pixel, or per sub-pixel; 1 to 2**24. By default 16, for pooled light 2 to 16 as the picture's size
+        suggests, 1 for ``classic``, and with a quality or a time as many as that takes.
     quality, quality_mean:
         PSNR in dB that the worst micro-image, or the whole picture, is to reach by its own estimate; above 0, at most
         80. Default: none.
@@ -150,7 +150,7 @@ def render(
     seed:
         Of all random choices, 0 to 2**32 - 1. Default 0.
     subpixels:
-        Trace a ray for each sub-pixel, at its own place. Default False.
+        Trace a ray for each sub-pixel, at its own place. By default where a slanted sheet gives each its own direction.
     pixel_filter:
         ``box`` spreads the samples over the pixel, ``point`` takes its centre. ``auto`` (default): ``box``, but for
         ``classic`` with one sample.

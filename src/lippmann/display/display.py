@@ -36,8 +36,9 @@ INFINITE = "infinite"
 
 Vector = tuple[Array, Array, Array]
 
-#: A scene point is resolved while it spreads over at most this many lens pitches.
-RESOLVED_PITCHES = 1.0
+#: A scene point is resolved while it spreads over at most one lens pitch, or over so small a share of the panel's
+#: shorter side: a large panel of fine lenses is sharp to its viewer long after single lenses are not.
+RESOLVED_SHARE = 1.0 / 150.0
 
 
 @dataclass(frozen=True)
@@ -168,14 +169,21 @@ class Display:
 
     @property
     def resolvable_depth(self) -> tuple[float, float]:
-        """Nearest and farthest z in millimetres that the display resolves: ``(+N g, -N g)``, at most up to the viewer.
+        """Nearest and farthest z in millimetres that the display resolves, at most up to the viewer.
 
-        A point is held to be resolved while its spread is at most one lens pitch, the display's own sampling in the
-        lens plane; beyond, the picture is blurred below the resolution of the lenses. Sub-pixels that are addressed
-        one by one resolve more; that is not counted.
+        A point is held to be resolved while the light of one pixel, at its height, spreads over at most one lens pitch,
+        the display's own sampling in the lens plane, or a 150th of the panel's shorter side: ``z = s g / d`` for a
+        spread s. Where sub-pixels lie under a slanted sheet, each shows a direction of its own: d is theirs.
         """
-        depth = RESOLVED_PITCHES * self.lens_array.pitch * self.gap / self.panel.pixel_pitch
+        resolved = max(self.lens_array.pitch, RESOLVED_SHARE * min(self.size_mm))
+        depth = resolved * self.gap / self.panel.pixel_pitch * (3.0 if self.has_slanted_stripes else 1.0)
         return min(depth, self.viewing_distance), -depth
+
+    @property
+    def has_slanted_stripes(self) -> bool:
+        """Whether a slanted sheet lies before sub-pixels side by side: every sub-pixel shows a direction of its own."""
+        columns = {column for column, _ in self.panel.subpixel_offsets}
+        return self.lens_array.slant != 0.0 and len(columns) > 1
 
     @property
     def depth_budget(self) -> tuple[float, float]:

@@ -108,7 +108,7 @@ def forecast(scene: Scene, display: Display, request: RenderRequest, progress: P
 
     from lippmann.rendering.transport.ray_source import DisplayRays, WindowRays
 
-    whole = DisplayRays(display, placement.world_from_display, request.subpixels)
+    whole = DisplayRays(display, placement.world_from_display, bool(request.subpixels))
     window = traced_window(session, display, placement)
     source = whole if window is None else WindowRays(whole, window)
     probe = _Probe(source, request.seed)
@@ -128,7 +128,7 @@ def forecast(scene: Scene, display: Display, request: RenderRequest, progress: P
     return Forecast(
         display=display.name,
         size=(width, height),
-        subpixels=request.subpixels,
+        subpixels=bool(request.subpixels),
         spp=request.samples,
         placement=placement.mode,
         depth_range=placement.depth_range,

@@ -45,7 +45,7 @@ def render_picture(
     from lippmann.rendering.transport.ray_source import DisplayRays, WindowRays
 
     display_from_world = placement.display_from_world
-    source = DisplayRays(display, placement.world_from_display, request.subpixels)
+    source = DisplayRays(display, placement.world_from_display, bool(request.subpixels))
     integrator = session.integrator(source, display_from_world)
     window = traced_window(session, display, placement)
     part = source if window is None else WindowRays(source, window)
@@ -92,7 +92,7 @@ def choose_exposure(scene: Scene, display: Display, request: RenderRequest) -> f
     placement = session.place(display)
     from lippmann.rendering.transport.ray_source import DisplayRays
 
-    source = DisplayRays(display, placement.world_from_display, session.request.subpixels)
+    source = DisplayRays(display, placement.world_from_display, bool(session.request.subpixels))
     session.integrator(source, placement.display_from_world)
     return session.choices.get("exposure", 0.0)
 

@@ -61,7 +61,7 @@ def render_quilt(
     UsageError, PictureError, SceneError, MemoryLimitError, EngineError
         As the stages find them.
     """
-    request = resolve(request, scene, display, "quilt")
+    request = resolve(request, scene, display, "quilt", size=size)
     session = open_session(scene, request, size, progress=progress)
     placement = session.place(display)
 

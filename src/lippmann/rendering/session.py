@@ -193,7 +193,7 @@ class Session:
             depth=request.surfaces,
             spp=samples,
             seed=request.seed,
-            subpixels=request.subpixels,
+            subpixels=bool(request.subpixels),
             scene=self.scene.name,
             transfer=request.transfer,
             version=VERSION,
@@ -284,6 +284,8 @@ def _without_pooling(request: RenderRequest, built: BuiltScene | BuiltClassic) -
 
     if not (isinstance(built, BuiltScene) and built.has_media) or request.integrator not in POOLED_LIGHT:
         return request
+    if request.method == "pooled" and request.reason:
+        return replace(request, method="full", reason="full: participating media, whose light lies on no surface")
     if request.method == "pooled" or request.method in REUSING:
         raise UsageError(
             f"{request.method} shares the light of surfaces",

@@ -32,7 +32,7 @@ _LARGEST_NOISE = 1e-3
 #: The scale is searched between these multiples of the one that fills the panel where all views are parallel.
 _SEARCHED = (1.0 / 16.0, 2.0)
 _HALVINGS = 40
-_CENTERINGS = 8
+_CENTERINGS = 24
 
 
 @dataclass(frozen=True)

@@ -91,7 +91,7 @@ def prepare(job: TileJob, progress: ProgressCallback = silent) -> Prepared:
     request = job.request
     session = open_session(job.scene, request, memory=job.tile_memory, progress=progress)
     placement = session.place(job.display)
-    source = DisplayRays(job.display, placement.world_from_display, request.subpixels)
+    source = DisplayRays(job.display, placement.world_from_display, bool(request.subpixels))
     integrator = session.integrator(source, placement.display_from_world)
     treatment = survey(integrator, source, request) if request.denoises else None
     # Tiles are traced in silence, whoever counts them.

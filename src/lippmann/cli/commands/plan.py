@@ -24,7 +24,7 @@ def plan(
     spp: options.Spp = None,
     seed: options.Seed = 0,
     exposure: options.Exposure = "auto",
-    subpixels: options.Subpixels = False,
+    subpixels: options.Subpixels = None,
     pixel_filter: options.PixelFilter = "auto",
     denoise: options.Denoise = "auto",
     camera: options.Camera = None,

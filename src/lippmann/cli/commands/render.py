@@ -61,7 +61,7 @@ def render(
     max_time: options.MaxTime = None,
     seed: options.Seed = 0,
     exposure: options.Exposure = "auto",
-    subpixels: options.Subpixels = False,
+    subpixels: options.Subpixels = None,
     pixel_filter: options.PixelFilter = "auto",
     denoise: options.Denoise = "auto",
     layers: options.Layers = False,

@@ -41,7 +41,11 @@ Integrator = Annotated[
 ]
 Depth = Annotated[int | None, typer.Option("--depth", help="Surfaces a path may meet; the primary ray's counts 1.")]
 Spp = Annotated[
-    int | None, typer.Option("--spp", help="Samples per pixel; 16 by default, for classic as the scene has it.")
+    int | None,
+    typer.Option(
+        "--spp",
+        help="Samples per pixel. By default 2 to 16 as the picture's size suggests, for classic as the scene has it.",
+    ),
 ]
 Seed = Annotated[int, typer.Option("--seed", help="Of all random choices.")]
 PixelFilter = Annotated[
@@ -79,7 +83,7 @@ Method = Annotated[
     choices.Method,
     typer.Option(
         "--method",
-        help="auto: what is fastest for the quality asked for; full: every ray is traced; "
+        help="auto: pooled, or what is fastest for a quality asked for; full: every ray is traced, for references; "
         "lens-view: points are carried from lens to lens and missed pixels traced; "
         "interpolated: those of every other lens are averaged; "
         "pooled: noise is taken out, and all lenses that see a point share its light.",
@@ -144,7 +148,14 @@ Layers = Annotated[
         "--layers", help="Add depth, position, normal, albedo and shape of what each pixel sees (OpenEXR only)."
     ),
 ]
-Subpixels = Annotated[bool, typer.Option("--subpixels", help="A ray for every sub-pixel, at its own place.")]
+Subpixels = Annotated[
+    bool | None,
+    typer.Option(
+        "--subpixels/--no-subpixels",
+        help="A ray for every sub-pixel, at its own place. By default behind slanted sheets.",
+        show_default=False,
+    ),
+]
 Bits = Annotated[
     int | None, typer.Option("--bits", help="Bits per value: PNG 8, 16; EXR 16, 32; TIFF and Zarr 8, 16, 32.")
 ]

@@ -14,7 +14,7 @@ from lippmann.scene.placement import Placement, PlacementOptions
 if TYPE_CHECKING:
     from lippmann.display import Display
 
-#: Samples per pixel where nothing is said.
+#: Samples per pixel where nothing is said and light is not pooled.
 DEFAULT_SPP = 16
 #: Surfaces per path where nothing is said.
 DEFAULT_DEPTH: dict[Integrator, int] = {"classic": 2, "path": 8, "direct": 1}
@@ -50,6 +50,7 @@ class RenderRequest:
     Parameters
     ----------
     method:
+        ``auto``: ``pooled`` where light has noise, else ``full``; for a quality or a time the better of the two.
         ``full`` traces every ray. ``pooled`` denoises, and all micro-images that show a point share its light.
         ``lens-view`` reprojects points from micro-image to micro-image and traces the missed pixels. ``interpolated``
         averages the missed pixels of every other micro-image from its neighbours.
@@ -67,7 +68,8 @@ class RenderRequest:
         Surfaces along a path, the primary ray's counting 1; 1 to 4096. None: 8 for ``path``, 1 for ``direct``, the
         file's own for ``classic``.
     spp:
-        Samples per pixel, or per sub-pixel; 1 to 2**24. None: 16, or with a quality or a time as many as that takes.
+        Samples per pixel, or per sub-pixel; 1 to 2**24. None: 16, for pooled light what the picture's size suggests, or
+        with a quality or a time as many as that takes.
     quality, quality_mean:
         PSNR in dB that the worst micro-image, or the whole picture, is to reach by its own estimate; above 0, at most
         80.
@@ -76,7 +78,7 @@ class RenderRequest:
     seed:
         Of all random choices, 0 to 2**32 - 1.
     subpixels:
-        Trace a ray for each sub-pixel, at its own place.
+        Trace a ray for each sub-pixel, at its own place. None: where a slanted sheet gives each its own direction.
     pixel_filter:
         ``box`` spreads the samples over the pixel, ``point`` takes its centre.
     denoise:
@@ -111,7 +113,7 @@ class RenderRequest:
     quality_mean: float | None = None
     max_time: float | None = None
     seed: int = 0
-    subpixels: bool = False
+    subpixels: bool | None = None
     pixel_filter: PixelFilter = "auto"
     denoise: Denoiser = "auto"
     exposure: float | Literal["auto"] = "auto"
@@ -189,7 +191,7 @@ class RenderRequest:
 
         Under cylinders; on arrays, whose micro-images are short in both directions, that was better here, worse there.
         """
-        return self.subpixels and self.denoise != "none" and display.lens_array.layout == "lenticular"
+        return bool(self.subpixels) and self.denoise != "none" and display.lens_array.layout == "lenticular"
 
     @property
     def careful(self) -> bool:

@@ -1,28 +1,41 @@
 """Everything called "auto", decided once: from a request and a scene to a request that says all.
 
 The scene decides the light: scenes made for the classic light models are rendered by ``classic``, with the ray depth of
-their file and one sample in the middle of each pixel; all others by ``path`` with 16 samples over the pixel.
+their file and one sample in the middle of each pixel; all others by ``path``, with samples spread over the pixel. The
+display decides about sub-pixels: behind a slanted sheet each has a direction of its own, and rays of its own.
 
-What is asked for decides the method. A number of samples is an order: so many are traced for every pixel, and nothing
-is taken away from what they show. A quality or a time is a goal: full rendering and pooled light, made of the same
-samples, compete for it, see :mod:`lippmann.rendering.adaptive.method_race`; for a quality they do so where pooled light
-is asked for, too. Methods that reuse points have errors that no estimate covers, and are taken only by name.
+What is asked for decides the method. Light is pooled, so that few samples make a clean picture, with as many samples as
+the size of the picture allows in a short time. A quality or a time is a goal: full rendering and pooled light, made of
+the same samples, compete for it, see :mod:`lippmann.rendering.adaptive.method_race`; for a quality they do so where
+pooled light is asked for, too. Methods that reuse points have errors that no estimate covers, and are taken only by
+name, as is full rendering, for references.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 from lippmann.display import Display
 from lippmann.errors import UsageError
-from lippmann.rendering.request.choices import LIGHT, POOLED_LIGHT, Denoiser
+from lippmann.rendering.request.choices import LIGHT, POOLED_LIGHT, REUSING, Denoiser
 from lippmann.rendering.request.preconditions import Form, check
 from lippmann.rendering.request.render_request import DEFAULT_SPP, RenderRequest
 from lippmann.scene.scene import Scene
 
+#: Samples that a pooled picture is made of where no number is given: a second or two of two cores.
+SAMPLE_BUDGET = 1 << 21
+#: Fewest and most samples that a pixel gets of them; all three sub-pixels together have at least six.
+_FEWEST, _FEWEST_OF_SUBPIXELS, _MOST = 4, 2, 16
+
 
 def resolve(
-    request: RenderRequest, scene: Scene, display: Display | None = None, form: Form = "picture"
+    request: RenderRequest,
+    scene: Scene,
+    display: Display | None = None,
+    form: Form = "picture",
+    *,
+    size: tuple[int, int] | None = None,
 ) -> RenderRequest:
     """Fill in what ``request`` leaves open, and check that it can be honoured.
 
@@ -36,22 +49,47 @@ def resolve(
         What it is rendered for; None for the plain picture of a camera.
     form:
         What is made of it: a picture in one piece, one in tiles, a quilt, a forecast, or a camera's plain picture.
+    size:
+        Width and height of the picture in pixels, where it is not the display's.
 
     Returns
     -------
     RenderRequest
-        With an integrator, a pixel filter, a depth and a method; ``reason`` says why it is that method, if the user
-        left it open. ``spp`` stays None where a quality or a time says when to stop, and ``denoise`` stays "auto" where
-        plain and pooled pictures compete; ``exposure`` stays "auto" where it is to be measured.
+        With an integrator, a pixel filter, a depth, a method and a choice about sub-pixels; ``reason`` says why it is
+        that method, if the user left it open. ``spp`` stays None where a quality or a time says when to stop, and
+        ``denoise`` stays "auto" where plain and pooled pictures compete; ``exposure`` stays "auto" where it is to be
+        measured.
 
     Raises
     ------
     UsageError, PictureError
         What is asked for cannot be done in this form, or for this scene or display.
     """
-    complete = _with_method(_with_light(request, scene, of_own_camera=form == "preview"))
+    lit = _with_light(request, scene, of_own_camera=form == "preview")
+    complete = _with_subpixels(_with_method(lit, form), None if form == "quilt" else display)
+    if complete.spp is None and not complete.is_open_ended:
+        if size is None and display is not None:
+            size = display.panel.width, display.panel.height
+        complete = replace(complete, spp=_choose_samples(complete, size))
     check(complete, form, display)
     return complete
+
+
+def _with_subpixels(request: RenderRequest, display: Display | None) -> RenderRequest:
+    """With rays of their own for sub-pixels, or without; ``display`` is None where nothing has sub-pixels."""
+    if request.subpixels is not None:
+        return request
+    apart = display is not None and display.has_slanted_stripes
+    return replace(request, subpixels=apart and request.integrator in LIGHT and request.method not in REUSING)
+
+
+def _choose_samples(request: RenderRequest, size: tuple[int, int] | None) -> int:
+    """Samples per pixel, or sub-pixel, where no number is given: a power of two for pooled light."""
+    if request.method != "pooled" or size is None:
+        return DEFAULT_SPP
+    fewest = _FEWEST_OF_SUBPIXELS if request.subpixels else _FEWEST
+    allowed = SAMPLE_BUDGET / (size[0] * size[1] * request.channels)
+    return min(max(1 << max(round(math.log2(allowed)), 0), fewest), _MOST)
 
 
 def _with_light(request: RenderRequest, scene: Scene, of_own_camera: bool) -> RenderRequest:
@@ -70,8 +108,8 @@ def _with_light(request: RenderRequest, scene: Scene, of_own_camera: bool) -> Re
     depth, spp, pixel_filter = request.depth, request.spp, request.pixel_filter
     if classic is not None:
         depth = classic.camera.ray_depth if depth is None else depth
-    if spp is None and not request.is_open_ended:
-        spp = DEFAULT_SPP if classic is None else 1 + (classic.camera.antialiasing if of_own_camera else 0)
+    if spp is None and classic is not None and not request.is_open_ended:
+        spp = 1 + (classic.camera.antialiasing if of_own_camera else 0)
     if pixel_filter == "auto":
         pixel_filter = "point" if classic is not None and spp == 1 else "box"
     exposure = request.exposure
@@ -87,7 +125,7 @@ def _with_light(request: RenderRequest, scene: Scene, of_own_camera: bool) -> Re
     return replace(request, integrator=integrator, depth=depth, spp=spp, pixel_filter=pixel_filter, exposure=exposure)
 
 
-def _with_method(request: RenderRequest) -> RenderRequest:
+def _with_method(request: RenderRequest, form: Form) -> RenderRequest:
     """Method and denoiser, as far as they can be told before the first sample."""
     if request.method == "pooled" and request.denoise == "auto":
         # Where the samples themselves come to the quality first, no light needs to be pooled.
@@ -99,11 +137,13 @@ def _with_method(request: RenderRequest) -> RenderRequest:
         return _full(request, request.denoise, f"full {asked}, as asked for")
     if request.integrator not in LIGHT:
         return _full(request, "none", f"full: {request.integrator} has no noise")
-    if not request.is_open_ended:
-        return _full(request, "none", "full: no quality is asked for, so samples stay as they are")
     if request.integrator not in POOLED_LIGHT:
         return _full(request, "none", f"full: the light of {request.integrator} is not pooled")
-    return _full(request, "auto", "full")
+    if form == "preview":
+        return _full(request, "none", "full: a plain picture has no micro-images to share light")
+    if request.is_open_ended:
+        return _full(request, "auto", "full")
+    return replace(request, method="pooled", denoise="oidn", reason="pooled: light shared between micro-images")
 
 
 def _full(request: RenderRequest, denoise: Denoiser, reason: str) -> RenderRequest:
