@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Literal
 
 from lippmann.display import Display, load_display
 from lippmann.progress import ProgressCallback, silent
-from lippmann.rendering.request.choices import Denoiser, Device, Integrator, Method, Order, PixelFilter
+from lippmann.rendering.request.choices import Denoiser, Device, Integrator, Method, Order, PixelFilter, ToneMap
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.scene.placement import Placement, PlacementOptions
 from lippmann.scene.readers.load import load_scene as _load_scene
@@ -99,6 +99,7 @@ def render(
     pixel_filter: PixelFilter = "auto",
     denoise: Denoiser = "auto",
     exposure: float | Literal["auto"] = "auto",
+    tone_map: ToneMap = "none",
     layers: bool = False,
     device: Device = "auto",
     threads: int | None = None,
@@ -160,6 +161,9 @@ def render(
     exposure:
         Stops (EV) by which light is raised or lowered, -40 to 40. ``auto`` (default): 0, and for scenes with physical
         light sources what brings the median of what is lit to mid-grey.
+    tone_map:
+        ``none`` (default): values are light. ``pbr-neutral``: highlights are compressed instead of clipped (Khronos PBR
+        Neutral). ``auto``: the latter where light is physically based.
     layers:
         Add depth, position, normal, albedo and shape of what each pixel sees to the picture's maps. Default False.
     device:
@@ -202,6 +206,7 @@ def render(
         pixel_filter=pixel_filter,
         denoise=denoise,
         exposure=exposure,
+        tone_map=tone_map,
         layers=layers,
         device=device,
         threads=threads,

@@ -243,6 +243,9 @@ def _notes(reference: Picture, test: Picture) -> Iterator[str]:
     first, second = reference.provenance, test.provenance
     if first.transfer != second.transfer:
         yield f"the codes of the pictures are compared, though one is {first.transfer} and the other {second.transfer}"
+    maps = [each.options.get("tone_map", "none") for each in (first, second)]
+    if maps[0] != maps[1]:
+        yield f"the pictures are tone-mapped differently: {maps[0]} and {maps[1]}"
     if first.scene and second.scene and first.scene != second.scene:
         yield f"the pictures show different scenes: {first.scene} and {second.scene}"
     elif first.method and second.method and not np.allclose(reference.world_from_display, test.world_from_display):

@@ -37,6 +37,7 @@ def render_picture(
     """
     request = resolve(request, scene, display)
     session = open_session(scene, request, (display.panel.width, display.panel.height), progress=progress)
+    request = session.request
     placement = session.place(display)
 
     # Mitsuba may be loaded now that the engine has chosen its libraries.
@@ -77,7 +78,7 @@ def render_picture(
     )
     # Files hold whole numbers of 32 bits.
     maps = {name: v.astype(np.uint32) if v.dtype.kind in "iu" else v for name, v in frame.maps.items()}
-    return IntegralImage(frame.pixels, display, placement.world_from_display, provenance, maps)
+    return IntegralImage(request.shown(frame.pixels), display, placement.world_from_display, provenance, maps)
 
 
 def choose_exposure(scene: Scene, display: Display, request: RenderRequest) -> float:
@@ -132,6 +133,7 @@ def placed_options(request: RenderRequest, placement: Placement) -> dict[str, ob
         "pixel_filter": request.pixel_filter,
         "placement": placement.mode,
         "depth_scale": placement.depth_scale,
+        **({"tone_map": request.tone_map} if request.tone_map != "none" else {}),
         "depth_range": list(placement.depth_range),
         "resolvable_range": list(placement.resolvable_range),
     }

@@ -63,6 +63,7 @@ def render_quilt(
     """
     request = resolve(request, scene, display, "quilt", size=size)
     session = open_session(scene, request, size, progress=progress)
+    request = session.request
     placement = session.place(display)
 
     from lippmann.device.pbr import BuiltScene
@@ -93,7 +94,7 @@ def render_quilt(
         estimate=traced.estimate,
         notes=(*placement.warnings, *traced.notes),
     )
-    return QuiltFrame(traced.frame.pixels, provenance)
+    return QuiltFrame(session.request.shown(traced.frame.pixels), provenance)
 
 
 def _assembled(

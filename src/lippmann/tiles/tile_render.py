@@ -88,8 +88,9 @@ def prepare(job: TileJob, progress: ProgressCallback = silent) -> Prepared:
     SceneError, EngineError, UsageError
         As the stages find them.
     """
-    request = job.request
-    session = open_session(job.scene, request, memory=job.tile_memory, progress=progress)
+    session = open_session(job.scene, job.request, memory=job.tile_memory, progress=progress)
+    request = session.request
+    job = replace(job, request=request)
     placement = session.place(job.display)
     source = DisplayRays(job.display, placement.world_from_display, bool(request.subpixels))
     integrator = session.integrator(source, placement.display_from_world)
@@ -172,7 +173,7 @@ def packed(prepared: Prepared, traced: TracedTile) -> TileResult:
         sums = lens_sums(job.display, job.grid[traced.index], traced.errors)
     if job.keeps_maps:
         maps = dict(traced.maps)
-    values = stored_values(traced.pixels, job.stored, job.transfer)
+    values = stored_values(job.request.shown(traced.pixels), job.stored, job.transfer)
     return TileResult(traced.index, values, maps, sums, dict(vars(traced.rays)), traced.notes)
 
 

@@ -72,6 +72,14 @@ Exposure = Annotated[
         "brings the median of what is lit to mid-grey.",
     ),
 ]
+ToneMap = Annotated[
+    choices.ToneMap,
+    typer.Option(
+        "--tone-map",
+        help="pbr-neutral: highlights are compressed, not clipped; none: light as it is. auto: pbr-neutral in PNG "
+        "pictures without --background, none in formats for data.",
+    ),
+]
 SingleScattering = Annotated[
     bool,
     typer.Option(

@@ -9,9 +9,14 @@ from typing import TYPE_CHECKING, Literal
 from lippmann.errors import UsageError
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from lippmann.display import Display
+    from lippmann.rendering.request.choices import ToneMap
     from lippmann.scene.placement import PlacementOptions
 
+#: Endings of formats for data, whose values are not for the eye alone.
+_DATA = (".exr", ".tif", ".tiff", ".zarr")
 _MEMORY_UNITS = {"": 1, "k": 2**10, "m": 2**20, "g": 2**30, "t": 2**40}
 
 
@@ -57,6 +62,12 @@ def memory(text: str | None, option: str = "--memory") -> int | None:
 def exposure(text: str) -> float | Literal["auto"]:
     """Stops, or ``auto``."""
     return "auto" if text == "auto" else number(text, "--exposure", "auto, or a number of stops")
+
+
+def tone_map(kind: ToneMap, output: Path | None, background: str | None) -> ToneMap:
+    """Left open, data stay as they are, and so does a background whose colour was asked for."""
+    is_data = output is not None and output.suffix.lower() in _DATA
+    return "none" if kind == "auto" and (is_data or background is not None) else kind
 
 
 def number(text: str, option: str, rule: str) -> float:

@@ -31,6 +31,7 @@ import os
 import re
 import sys
 from collections.abc import Mapping
+from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
 
@@ -39,6 +40,7 @@ from lippmann.display.formats.inline_spec import display_of_short_form, is_short
 from lippmann.display.formats.looking_glass import display_of_calibration, is_calibration
 from lippmann.display.formats.monitor_toml import TABLE as MONITOR
 from lippmann.display.formats.monitor_toml import monitor_of_tables
+from lippmann.display.formats.recorded_depth import default_aperture
 from lippmann.display.units import MILLIMETRES, length, stripe
 from lippmann.display.validation import Arguments, positive, suggestion
 from lippmann.errors import DisplayError
@@ -117,10 +119,21 @@ def _from_toml(text: str, *, where: str, stem: str) -> Display:
         if MONITOR in values:
             return monitor_of_tables(values).display()
         check_tables(values)
-        return Display.from_dict(_convert_tables(values))
+        display = Display.from_dict(_convert_tables(values))
+        return display if "aperture_distance" in values else _with_aperture(display)
     except DisplayError as error:
         place = _locate(text, error.where, where)
         raise DisplayError(error.what, where=place, rule=error.rule, fix=error.fix) from None
+
+
+def _with_aperture(display: Display) -> Display:
+    aperture = default_aperture(
+        display.viewing_distance,
+        lens_pitch=display.lens_array.pitch,
+        gap=display.gap,
+        pixel_pitch=display.panel.pixel_pitch,
+    )
+    return replace(display, aperture_distance=aperture)
 
 
 def _locate(text: str, key: str, where: str) -> str:

@@ -27,6 +27,7 @@ from numpy.typing import NDArray
 
 from lippmann.display.array_ops import NUMPY
 from lippmann.display.display import Display
+from lippmann.display.formats.recorded_depth import default_aperture
 from lippmann.display.lens_array import LensArray
 from lippmann.display.panel import Panel
 from lippmann.display.validation import check_text, finite, number, positive
@@ -48,8 +49,6 @@ DEFAULT_DISTANCE = 600.0
 
 DEFAULT_CONE = 35.0
 
-#: Aperture distance, as a fraction of the viewing distance.
-_APERTURE_FRACTION = 0.1
 
 #: Digits of a centre that is computed from a display; further ones are rounding noise.
 _DIGITS = 12
@@ -138,9 +137,9 @@ class Monitor:
         panel = self.panel
         middle = panel.width / 2 * self.lenses_right + panel.height / 2 * self.lenses_up - self.center
         axis = (0.5 - middle % 1.0) * apparent_pitch / (math.cos(slant) * magnification)
-        # With the viewer at infinity, rays begin where the display hardly resolves anything.
-        near = 2 * apparent_pitch * gap / panel.pixel_pitch
-        aperture = _APERTURE_FRACTION * self.viewing_distance if math.isfinite(self.viewing_distance) else near
+        aperture = default_aperture(
+            self.viewing_distance, lens_pitch=apparent_pitch, gap=gap, pixel_pitch=panel.pixel_pitch
+        )
         return Display(
             name=self.name,
             title=self.title,

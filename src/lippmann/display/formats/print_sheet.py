@@ -19,6 +19,7 @@ from typing import cast
 
 from lippmann.display import units
 from lippmann.display.display import INFINITE, Display
+from lippmann.display.formats.recorded_depth import default_aperture
 from lippmann.display.lens_array import LensArray
 from lippmann.display.panel import Panel
 from lippmann.display.validation import MAXIMUM_COUNT, finite, number, refuse_unknown
@@ -47,9 +48,6 @@ DEFAULT_DISTANCE = 500.0
 
 #: Shortest viewing distance, mm.
 _NEAREST = 10.0
-
-#: Aperture distance, as a fraction of the viewing distance.
-_APERTURE_FRACTION = 0.1
 
 
 @dataclass(frozen=True)
@@ -189,7 +187,6 @@ class Print:
         width, height = self.pixels
         distance = self.viewing_distance
         lens_pitch = units.INCH / lpi
-        hardly_resolved = 2 * lens_pitch * gap / pixel
         place = "afar" if math.isinf(distance) else f"{distance:g} mm"
         size = f"{self.size[0]:g}x{self.size[1]:g} mm"
         return Display(
@@ -199,7 +196,7 @@ class Print:
             lens_array=LensArray("lenticular", lens_pitch),
             gap=gap,
             viewing_distance=distance,
-            aperture_distance=hardly_resolved if math.isinf(distance) else _APERTURE_FRACTION * distance,
+            aperture_distance=default_aperture(distance, lens_pitch=lens_pitch, gap=gap, pixel_pitch=pixel),
         )
 
 

@@ -9,6 +9,8 @@ Order = Literal["default", "paper"]
 Integrator = Literal["auto", "classic", "path", "direct", "normal", "depth", "position", "albedo"]
 PixelFilter = Literal["auto", "box", "point"]
 Device = Literal["auto", "cpu", "gpu"]
+#: ``auto``: ``pbr-neutral`` for physically based light.
+ToneMap = Literal["auto", "none", "pbr-neutral"]
 Denoiser = Literal["auto", "none", "oidn", "oidn-fast", "oidn-high"]
 
 #: The methods that reuse points of one micro-image in others.

@@ -6,9 +6,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING, Literal, get_args
 
+import numpy as np
+from numpy.typing import NDArray
+
+from lippmann.color.tone_map import pbr_neutral
 from lippmann.color.transfer import Transfer
 from lippmann.errors import UsageError
-from lippmann.rendering.request.choices import Denoiser, Device, Integrator, Method, Order, PixelFilter
+from lippmann.rendering.request.choices import Denoiser, Device, Integrator, Method, Order, PixelFilter, ToneMap
 from lippmann.scene.placement import Placement, PlacementOptions
 
 if TYPE_CHECKING:
@@ -29,6 +33,7 @@ _WORDS = {
     "pixel_filter": PixelFilter,
     "device": Device,
     "denoise": Denoiser,
+    "tone_map": ToneMap,
 }
 #: Lowest and highest values of the whole numbers.
 _RANGES = {
@@ -88,6 +93,9 @@ class RenderRequest:
     exposure:
         Stops (EV) by which light is raised or lowered, -40 to 40; "auto": 0, and for scenes with physical light sources
         what brings the median of what is lit to mid-grey. The background's colour stays as it is.
+    tone_map:
+        How light becomes what the display shows: ``none`` as it is, ``pbr-neutral`` by
+        :func:`lippmann.color.tone_map.pbr_neutral`, "auto" by that where light is physically based.
     layers:
         Add depth, position, normal, albedo and shape of what each pixel sees to the picture's maps.
     placement:
@@ -117,6 +125,7 @@ class RenderRequest:
     pixel_filter: PixelFilter = "auto"
     denoise: Denoiser = "auto"
     exposure: float | Literal["auto"] = "auto"
+    tone_map: ToneMap = "none"
     layers: bool = False
     placement: PlacementOptions | Placement = field(default_factory=PlacementOptions)
     device: Device = "auto"
@@ -212,6 +221,10 @@ class RenderRequest:
     def channels(self) -> int:
         """Rays with places of their own in a pixel: 3 for sub-pixels, else 1."""
         return 3 if self.subpixels else 1
+
+    def shown(self, linear: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Linear RGB ``(..., 3)`` as the display is to show it, after tone mapping."""
+        return pbr_neutral(linear) if self.tone_map == "pbr-neutral" else linear
 
     @property
     def transfer(self) -> Transfer:

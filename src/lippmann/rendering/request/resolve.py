@@ -18,7 +18,7 @@ from dataclasses import replace
 
 from lippmann.display import Display
 from lippmann.errors import UsageError
-from lippmann.rendering.request.choices import LIGHT, POOLED_LIGHT, REUSING, Denoiser
+from lippmann.rendering.request.choices import LIGHT, POOLED_LIGHT, REUSING, Denoiser, Integrator
 from lippmann.rendering.request.preconditions import Form, check
 from lippmann.rendering.request.render_request import DEFAULT_SPP, RenderRequest
 from lippmann.scene.scene import Scene
@@ -116,13 +116,30 @@ def _with_light(request: RenderRequest, scene: Scene, of_own_camera: bool) -> Re
     if exposure == "auto" and not (integrator in POOLED_LIGHT and scene.has_physical_lights):
         exposure = 0.0
     if exposure and integrator not in POOLED_LIGHT:
-        raise UsageError(
-            f"the values of {integrator} are no amounts of light",
-            parameter="exposure",
-            rule=f"it is for {' and '.join(POOLED_LIGHT)}",
-            fix="leave it out",
-        )
-    return replace(request, integrator=integrator, depth=depth, spp=spp, pixel_filter=pixel_filter, exposure=exposure)
+        raise _no_light(integrator, "exposure")
+    tone_map = request.tone_map
+    if tone_map == "auto":
+        tone_map = "pbr-neutral" if integrator in POOLED_LIGHT else "none"
+    if tone_map != "none" and integrator not in POOLED_LIGHT:
+        raise _no_light(integrator, "tone_map")
+    return replace(
+        request,
+        integrator=integrator,
+        depth=depth,
+        spp=spp,
+        pixel_filter=pixel_filter,
+        exposure=exposure,
+        tone_map=tone_map,
+    )
+
+
+def _no_light(integrator: Integrator, parameter: str) -> UsageError:
+    return UsageError(
+        f"the values of {integrator} are no amounts of light",
+        parameter=parameter,
+        rule=f"it is for {' and '.join(POOLED_LIGHT)}",
+        fix="leave it out",
+    )
 
 
 def _with_method(request: RenderRequest, form: Form) -> RenderRequest:
