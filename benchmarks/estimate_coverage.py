@@ -156,7 +156,7 @@ def promised(case: Case, way: str, qualities: tuple[int, ...]) -> Iterator[dict[
 
     for quality in qualities:
         for seed in SEEDS:
-            found = case.beside_the_truth(case.trace(way, 100 + seed, quality=quality, spp=MOST))
+            found = case.beside_the_truth(case.trace(way, 100 + seed, quality_worst=quality, spp=MOST))
             end = "samples" if found["samples"] >= MOST else "quality"
             kept = end == "quality" and found["worst"] >= quality - TOLERANCE
             yield {"quality": quality, "seed": seed, "end": end} | found | {"kept": kept}

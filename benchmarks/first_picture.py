@@ -2,8 +2,8 @@
 
 python benchmarks/first_picture.py [--scenes FOLDER] [--only DISPLAY...]
 
-For every picture: the share of the panel that the model fills as the central eye sees it, the model's mean brightness and
-clipped share there, and the PSNR of pixels all over the panel against a long plain rendering of these pixels. Writes
+For every picture: the share of the panel that the model fills as the central eye sees it, the model's mean brightness
+and clipped share there, and the PSNR of pixels all over the panel against a long plain rendering of these. Writes
 ``benchmarks/results/first_picture.json`` and the contact sheet in ``docs/images/first-pictures.png``. ``FOLDER`` holds
 ``fancy_teapot/scene.gltf`` and ``clearcoat_test/ClearCoatTest.gltf``; without it those two are left out.
 """

@@ -1,6 +1,6 @@
 """What a quality takes that is asked for: by full, by full with Open Image Denoise, by pooled.
 
-The scenes, displays and rows of equal_error.py. Each way is asked for a PSNR of the whole picture (``--quality-mean``)
+The scenes, displays and rows of equal_error.py. Each way is asked for a PSNR of the whole picture (``--quality``)
 and works until its own estimate says that it is there, judging included, with at most 256 samples a pixel. Where full
 does not come to the PSNR with these, its time is drawn out by the law of its noise. Time is that of the processors over
 their number; each way has run before, for a low quality.
@@ -53,7 +53,7 @@ def _reached(stage: Stage, quality: float, options: dict[str, Any]) -> dict[str,
     from lippmann.rendering.methods import Job, trace
     from lippmann.rendering.request.resolve import resolve
 
-    asked = replace(stage.session.request, quality_mean=quality, spp=MOST_SAMPLES, **options)
+    asked = replace(stage.session.request, quality=quality, spp=MOST_SAMPLES, **options)
     session = replace(stage.session, request=resolve(asked, stage.session.scene))
     job = Job(session, stage.integrator, stage.source, stage.display_from_world)
     seconds, traced = once(lambda: trace(job))

@@ -14,7 +14,7 @@ def describe(result: dict[str, Any]) -> str:
     parts = [
         f"""## A quality that is asked for (`goals.py`)
 
-Seconds, judging included, until a picture says of itself that it has the PSNR (`--quality-mean`), and the samples per
+Seconds, judging included, until a picture says of itself that it has the PSNR (`--quality`), and the samples per
 pixel that it took: by `full`, by `full --denoise oidn`, and by `pooled`, which stops at plain samples where these are
 there sooner (then in italics), as `auto` does. Plain samples are believed from 16 on, or from 4 where they are 8 dB
 better than what is asked for, or 8 and 4 dB; denoised ones from 4, or from 8 where samples cost less than a look at

@@ -17,7 +17,7 @@ import warnings
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, cast
 
 from lippmann.display import Display, load_display
 from lippmann.progress import ProgressCallback, silent
@@ -92,7 +92,7 @@ def render(
     depth: int | None = None,
     spp: int | None = None,
     quality: float | None = None,
-    quality_mean: float | None = None,
+    quality_worst: float | None = None,
     max_time: float | None = None,
     seed: int = 0,
     subpixels: bool | None = None,
@@ -143,9 +143,9 @@ def render(
     spp:
         Samples per pixel, or per sub-pixel; 1 to 2**24. By default 16, for pooled light 2 to 16 as the picture's size
         suggests, 1 for ``classic``, and with a quality or a time as many as that takes.
-    quality, quality_mean:
-        PSNR in dB that the worst micro-image, or the whole picture, is to reach by its own estimate; above 0, at most
-        80. Default: none.
+    quality, quality_worst:
+        PSNR in dB that the whole picture, or every micro-image, is to reach by its own estimate; above 0, at most 80.
+        Where the former is asked for, no micro-image has over 12 dB less.
     max_time:
         Seconds of tracing after which the best picture so far is taken. Default: none.
     seed:
@@ -176,7 +176,7 @@ def render(
         Called with :class:`~lippmann.progress.Progress` as the work goes on.
     **former:
         Deprecated: ``camera``, ``place``, ``turn``, ``shift``, ``scale``, ``pop_out`` and ``placed``, which are
-        parts of ``placement`` now.
+        parts of ``placement`` now, and ``quality_mean``, which is called ``quality``.
 
     Returns
     -------
@@ -190,6 +190,9 @@ def render(
     """
     from lippmann.rendering.picture import render_picture
 
+    if "quality_mean" in former:
+        warnings.warn("quality_mean is called quality now", DeprecationWarning, stacklevel=2)
+        quality = cast("float | None", former.pop("quality_mean"))
     request = RenderRequest(
         placement=_placement(placement, former, "render"),
         method=method,
@@ -199,7 +202,7 @@ def render(
         depth=depth,
         spp=spp,
         quality=quality,
-        quality_mean=quality_mean,
+        quality_worst=quality_worst,
         max_time=max_time,
         seed=seed,
         subpixels=subpixels,
@@ -334,7 +337,7 @@ def render_quilt(
         Columns and rows of views, width and height in pixels; by default those that the device is given, see
         :data:`lippmann.quilts.quilt.DEVICE_QUILTS`.
     **options:
-        ``integrator``, ``depth``, ``spp``, ``quality``, ``quality_mean``, ``max_time``, ``seed``, ``pixel_filter``,
+        ``integrator``, ``depth``, ``spp``, ``quality``, ``quality_worst``, ``max_time``, ``seed``, ``pixel_filter``,
         ``denoise``, ``device``, ``threads`` and ``memory`` as for :func:`render`; every view counts as a micro-image
         does there. ``method``: ``auto``, ``full``, or ``pooled``, with which neighbouring views share their light
         before it is denoised.

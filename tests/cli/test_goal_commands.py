@@ -21,7 +21,7 @@ def small(cut_display):
 
 def test_a_quality_is_worked_for_and_stated(lippmann, engine, tmp_path, small):
     out = tmp_path / "a.png"
-    done = lippmann("render", "teapot", "--display", small, "--quality", 30, "--json", "-o", out)
+    done = lippmann("render", "teapot", "--display", small, "--quality-worst", 30, "--json", "-o", out)
     assert done.code == 0, done.err
     stated = done.json["estimate"]
     assert stated["worst"] >= 30
@@ -31,13 +31,13 @@ def test_a_quality_is_worked_for_and_stated(lippmann, engine, tmp_path, small):
     assert open_file(out).metadata.provenance.estimate == stated
     assert f"estimated   {stated['psnr']:.1f} dB" in lippmann("info", out).out
     assert "estimated PSNR" in done.err
-    more = lippmann("render", "teapot", "--display", small, "--quality-mean", 36, "--json", "-o", out)
+    more = lippmann("render", "teapot", "--display", small, "--quality", 36, "--json", "-o", out)
     assert more.json["estimate"]["psnr"] >= 36
 
 
 @pytest.mark.parametrize("scene", ["gears", "primitives", "room", "small-balls", "teapot", "tree"])
 @pytest.mark.parametrize(
-    "goal", [("--quality", 20), ("--quality-mean", 20), ("--max-time", 1)], ids=lambda goal: goal[0]
+    "goal", [("--quality-worst", 20), ("--quality", 20), ("--max-time", 1)], ids=lambda goal: goal[0]
 )
 def test_every_bundled_scene_has_a_goal_with_the_light_it_was_made_for(lippmann, engine, tmp_path, small, scene, goal):
     """Some were made for classic light, which is not pooled."""
@@ -62,7 +62,7 @@ def test_samples_alone_are_judged_too_and_the_error_is_a_layer(lippmann, engine,
 
 
 def test_time_ends_it_and_the_quality_reached_is_said(lippmann, engine, tmp_path, small):
-    words = ("--quality", 60, "--max-time", 4, "--denoise", "none")
+    words = ("--quality-worst", 60, "--max-time", 4, "--denoise", "none")
     started = time.process_time()
     done = lippmann("render", "teapot", "--display", small, *words, "--json", "-o", tmp_path / "a.png")
     assert done.code == 0
@@ -73,7 +73,7 @@ def test_time_ends_it_and_the_quality_reached_is_said(lippmann, engine, tmp_path
 
 
 def test_samples_bound_a_quality(lippmann, engine, tmp_path, small):
-    words = ("--quality", 60, "--spp", 24)
+    words = ("--quality-worst", 60, "--spp", 24)
     done = lippmann("render", "teapot", "--display", small, *words, "--json", "-o", tmp_path / "a.png")
     assert done.json["spp"] == 24
     assert "the samples are spent" in done.err
@@ -88,14 +88,14 @@ def test_one_sample_says_why_it_says_nothing(lippmann, engine, tmp_path, small):
 @pytest.mark.parametrize(
     ("words", "complaint"),
     [
-        (("--quality", "0"), "--quality"),
-        (("--quality", "200"), "--quality"),
-        (("--quality-mean", "nan"), "--quality-mean"),
+        (("--quality-worst", "0"), "--quality-worst"),
+        (("--quality-worst", "200"), "--quality-worst"),
+        (("--quality", "nan"), "--quality"),
         (("--max-time", "0"), "--max-time"),
         (("--max-time", "inf"), "--max-time"),
-        (("--quality", "40", "--spp", "1"), "--spp"),
-        (("--quality", "40", "--method", "lens-view"), "--quality"),
-        (("--quality", "40", "--integrator", "classic", "--pixel-filter", "point"), "--quality"),
+        (("--quality-worst", "40", "--spp", "1"), "--spp"),
+        (("--quality-worst", "40", "--method", "lens-view"), "--quality-worst"),
+        (("--quality-worst", "40", "--integrator", "classic", "--pixel-filter", "point"), "--quality-worst"),
         (("--max-time", "9", "--integrator", "normal", "--pixel-filter", "point"), "--max-time"),
     ],
 )
@@ -135,7 +135,7 @@ def test_auto_is_the_default_and_says_what_it_took(lippmann, engine, tmp_path, s
 
 
 def test_auto_takes_the_noise_out_where_that_reaches_the_quality_sooner(lippmann, engine, tmp_path, small):
-    words = ("render", "teapot", "--display", small, "--quality", 28, "--json", "-o")
+    words = ("render", "teapot", "--display", small, "--quality-worst", 28, "--json", "-o")
     done = lippmann(*words, tmp_path / "a.png")
     assert done.code == 0, done.err
     options, plain = done.json["options"], lippmann(*words, tmp_path / "b.png", "--denoise", "none").json

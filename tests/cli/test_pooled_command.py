@@ -48,7 +48,7 @@ def test_a_denoiser_is_its_default(lippmann, engine, tmp_path):
 
 
 def test_it_can_be_asked_for_a_quality(lippmann, engine, tmp_path):
-    done = rendered(lippmann, tmp_path / "a.exr", *POOLED, "--quality-mean", 33)
+    done = rendered(lippmann, tmp_path / "a.exr", *POOLED, "--quality", 33)
     assert done.json["estimate"]["psnr"] >= 33
     assert done.json["spp"] < 64
 
@@ -62,8 +62,8 @@ def test_it_can_be_asked_for_a_quality(lippmann, engine, tmp_path):
             ("--denoise", "none"),
             "--denoise: pooled needs the denoiser; pooled shares denoised light; use --method full",
         ),
-        (("--denoise", "none", "--quality", "30"), "--denoise"),
-        (("--spp", "1", "--quality", "30"), "--spp"),
+        (("--denoise", "none", "--quality-worst", "30"), "--denoise"),
+        (("--spp", "1", "--quality-worst", "30"), "--spp"),
         (("--order", "paper"), "--order"),
     ],
 )

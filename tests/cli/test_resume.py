@@ -206,7 +206,7 @@ def test_what_is_made_from_neighbours_goes_to_tiles_sooner():
         (("--method", "lens-view"), "--method: lens-view needs the whole picture"),
         (("--maps", "m"), "--maps: needs the whole picture at once"),
         (("--layers",), "--layers"),
-        (("--quality", 40), "--quality: 40.0 needs the whole picture"),
+        (("--quality-worst", 40), "--quality-worst: 40.0 needs the whole picture"),
         (("--order", "paper"), "--order: paper needs the whole picture"),
         (("--bits", 12), "12 bits per channel are not possible"),
     ],

@@ -78,7 +78,7 @@ def test_what_a_picture_says_of_itself_holds(case, samples):
 
 def test_a_promised_quality_is_kept(case):
     quality = CASES[case.name][1]
-    image = case.render(quality=quality, denoise="none")
+    image = case.render(quality_worst=quality, denoise="none")
     assert image.provenance.estimate["worst"] >= quality
     assert case.psnr(image)[1] >= quality - 1
 
@@ -96,7 +96,7 @@ def test_denoised_pictures_get_better_and_do_not_flatter_themselves(case):
 def test_a_quality_that_auto_goes_for_is_kept(case):
     """Whichever of the two pictures it takes, its own word for it is true."""
     quality = CASES[case.name][1]
-    image = case.render(quality=quality)
+    image = case.render(quality_worst=quality)
     assert image.provenance.estimate["worst"] >= quality
     assert case.psnr(image)[1] >= quality - 1
 

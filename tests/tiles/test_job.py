@@ -210,8 +210,8 @@ def test_an_object_of_mitsubas_has_no_content_to_compare(engine):
     ("changes", "parameter"),
     [
         ({"method": "lens-view", "integrator": "path"}, "method"),
+        ({"quality_worst": 40.0, "spp": None}, "quality"),
         ({"quality": 40.0, "spp": None}, "quality"),
-        ({"quality_mean": 40.0, "spp": None}, "quality_mean"),
         ({"max_time": 1.0, "spp": None}, "max_time"),
         ({"layers": True}, "layers"),
     ],

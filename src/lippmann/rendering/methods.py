@@ -354,4 +354,4 @@ def _end_notes(goal: Goal, outcome: Outcome) -> tuple[str, ...]:
     if outcome.end == "quality" or not goal.has_quality:
         return ()
     what = "the time is up" if outcome.end == "time" else "the samples are spent"
-    return (f"{what} before the quality asked for was reached: {goal.describe(outcome.estimate)}",)
+    return (f"{what} before the quality asked for was reached: {goal.describe_shortfall(outcome.estimate)}",)

@@ -79,36 +79,36 @@ def run(
 
 
 def test_denoising_wins_where_noise_is_strong():
-    race, outcome, _ = run(Goal(quality=25))
+    race, outcome, _ = run(Goal(quality_worst=25))
     assert (race.leader, outcome.end) == ("pooled", "quality")
     assert outcome.samples < 100  # plain samples would have taken 300
     assert "pooled and" in race.reason
 
 
 def test_pooled_light_is_believed_sooner():
-    race, outcome, _ = run(Goal(quality_mean=25), plain=0.5, denoised=1e-3)
+    race, outcome, _ = run(Goal(quality=25), plain=0.5, denoised=1e-3)
     assert (race.leader, outcome.end, outcome.samples) == ("pooled", "quality", Sooner.fewest)
 
 
 def test_plain_samples_are_not_believed_as_soon_as_pooled_light():
     """They are there with 8; what 16 cost is set against pooling."""
-    race, outcome, clean = run(Goal(quality_mean=25), plain=0.02, denoised=1e-3, rays=0.5)
+    race, outcome, clean = run(Goal(quality=25), plain=0.02, denoised=1e-3, rays=0.5)
     assert (race.leader, outcome.end, outcome.samples) == ("plain", "quality", PictureEstimator.fewest)
     assert clean.looks == 0
-    is_expensive, outcome, _ = run(Goal(quality_mean=25), plain=0.02, denoised=1e-3, rays=30.0)
+    is_expensive, outcome, _ = run(Goal(quality=25), plain=0.02, denoised=1e-3, rays=30.0)
     assert (is_expensive.leader, outcome.samples) == ("pooled", Sooner.fewest)
 
 
 def test_a_few_plain_samples_end_it_where_they_are_far_better():
     """Nobody looks at pooled light, whatever samples take."""
     for rays in (0.5, 300.0):
-        race, outcome, clean = run(Goal(quality_mean=25), plain=1e-3, denoised=1e-3, rays=rays)
+        race, outcome, clean = run(Goal(quality=25), plain=1e-3, denoised=1e-3, rays=rays)
         assert (race.leader, outcome.end, outcome.samples) == ("plain", "quality", PictureEstimator.first)
         assert clean.looks == 0
 
 
 def test_plain_samples_win_where_the_quality_is_near():
-    race, outcome, clean = run(Goal(quality_mean=24.8), plain=0.05, rays=1.0)
+    race, outcome, clean = run(Goal(quality=24.8), plain=0.05, rays=1.0)
     assert (race.leader, outcome.end) == ("plain", "quality")
     assert clean.looks == 0
     assert "less than pooling takes" in race.reason
@@ -116,30 +116,30 @@ def test_plain_samples_win_where_the_quality_is_near():
 
 def test_a_denoised_picture_that_stays_wrong_is_left():
     """It is better at first, but its bias keeps it from the goal."""
-    race, outcome, clean = run(Goal(quality=33), plain=0.2, denoised=0.005, floor=1e-3)
+    race, outcome, clean = run(Goal(quality_worst=33), plain=0.2, denoised=0.005, floor=1e-3)
     assert (race.leader, outcome.end) == ("plain", "quality")
     assert clean.looks < len(outcome.rounds)
     assert "which reaches the goal sooner" in race.reason
 
 
 def test_a_denoised_picture_that_is_worse_is_seldom_looked_at():
-    race, outcome, clean = run(Goal(quality=40), plain=0.2, denoised=0.5)
+    race, outcome, clean = run(Goal(quality_worst=40), plain=0.2, denoised=0.5)
     assert race.leader == "plain"
     assert 1 < clean.looks <= 1 + math.log(outcome.samples / 8, ASKED_AGAIN)
     assert clean.looks < len(outcome.rounds)
-    timed, _, clean = run(Goal(quality=40, max_time=1000.0), plain=0.2, denoised=0.5)
+    timed, _, clean = run(Goal(quality_worst=40, max_time=1000.0), plain=0.2, denoised=0.5)
     assert (timed.leader, clean.looks) == ("plain", 1)
 
 
 def test_when_no_more_samples_may_be_taken_the_denoised_picture_is_looked_at_again():
     """It lost at first; plain samples did not get there."""
-    race, outcome, clean = run(Goal(quality=30, spp=24), plain=0.05, floor_of_plain=4e-3, shaken_to=12)
+    race, outcome, clean = run(Goal(quality_worst=30, spp=24), plain=0.05, floor_of_plain=4e-3, shaken_to=12)
     assert (race.leader, outcome.end, outcome.samples, clean.looks) == ("pooled", "quality", 24, 2)
 
 
 def test_a_denoised_picture_gets_another_chance_where_plain_samples_do_not_keep_their_promise():
     """So it is where the first single hits of strong light shake both, and plain noise then never falls."""
-    race, outcome, clean = run(Goal(quality=30, spp=4096), plain=0.05, floor_of_plain=2e-3, shaken_to=24)
+    race, outcome, clean = run(Goal(quality_worst=30, spp=4096), plain=0.05, floor_of_plain=2e-3, shaken_to=24)
     assert (race.leader, outcome.end) == ("pooled", "quality")
     assert clean.looks > 1
 
@@ -152,10 +152,10 @@ def test_with_a_time_the_better_picture_at_its_end_wins(seconds, leader):
 
 
 def test_samples_bound_both():
-    race, outcome, _ = run(Goal(quality=60, spp=32))
+    race, outcome, _ = run(Goal(quality_worst=60, spp=32))
     assert (outcome.end, outcome.samples, race.leader) == ("samples", 32, "pooled")
 
 
 def test_the_same_samples_give_the_same_winner_whatever_they_take():
-    slow, fast = (run(Goal(quality=30), seconds=seconds)[1].samples for seconds in (1.0, 1e-6))
+    slow, fast = (run(Goal(quality_worst=30), seconds=seconds)[1].samples for seconds in (1.0, 1e-6))
     assert slow == fast

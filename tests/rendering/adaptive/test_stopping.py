@@ -46,7 +46,7 @@ def run(goal, renderer, reports=None):
 @pytest.mark.parametrize("slope", [0.8, 1.0, 1.5])
 def test_the_quality_is_reached_without_wasting_samples(slope):
     renderer = Noise(slope=slope)
-    outcome = run(Goal(quality=40), renderer)
+    outcome = run(Goal(quality_worst=40), renderer)
     assert outcome.end == "quality"
     assert outcome.estimate.worst >= 40
     assert outcome.estimate.worst_low >= 40 - TOLERANCE
@@ -65,7 +65,7 @@ def test_the_first_look_waits_while_it_takes_more_than_samples(dear_until, first
     """Not longer than for twice the fewest samples; whatever comes then is a multiple of the batches again."""
     renderer = Noise(error=0.2)
     track = ErrorTrack(renderer, Sooner(SHOWN), is_expensive=lambda: 0 < renderer.samples < dear_until)
-    outcome = reach(Goal(quality_mean=40), renderer.add, track, clock=renderer.clock)
+    outcome = reach(Goal(quality=40), renderer.add, track, clock=renderer.clock)
     found = [each.samples for each in outcome.rounds]
     assert found[0] == first
     assert all(samples % STEP == 0 for samples in found[1:])
@@ -74,7 +74,7 @@ def test_the_first_look_waits_while_it_takes_more_than_samples(dear_until, first
 def test_where_time_is_short_no_look_waits():
     renderer = Noise(error=0.2, seconds=1.0)
     track = ErrorTrack(renderer, Sooner(SHOWN), is_expensive=lambda: True)
-    goal = Goal(quality_mean=40, max_time=5.5)
+    goal = Goal(quality=40, max_time=5.5)
     outcome = reach(goal, renderer.add, track, clock=renderer.clock, probe=lambda: 1.0)
     assert renderer.now <= 5.5
     assert outcome.rounds[0].samples == 4
@@ -82,15 +82,15 @@ def test_where_time_is_short_no_look_waits():
 
 def test_the_mean_asks_for_less_than_the_worst():
     worst, mean = Noise(), Noise()
-    run(Goal(quality=40), worst)
-    outcome = run(Goal(quality_mean=40), mean)
+    run(Goal(quality_worst=40), worst)
+    outcome = run(Goal(quality=40), mean)
     assert outcome.estimate.psnr >= 40
     assert mean.samples < 0.8 * worst.samples
 
 
 def test_time_ends_it_with_the_best_so_far():
     renderer = Noise(seconds=0.05)
-    outcome = run(Goal(quality=60, max_time=10.0), renderer)
+    outcome = run(Goal(quality_worst=60, max_time=10.0), renderer)
     assert outcome.end == "time"
     assert 8.0 <= renderer.now <= 10.0
 
@@ -140,7 +140,7 @@ def test_without_a_limit_of_time_nothing_is_probed():
 
 def test_samples_end_it():
     renderer = Noise()
-    outcome = run(Goal(quality=60, spp=100), renderer)
+    outcome = run(Goal(quality_worst=60, spp=100), renderer)
     assert (outcome.end, outcome.samples) == ("samples", 100)
 
 
@@ -150,7 +150,7 @@ def test_samples_alone_are_spent_in_one_go():
 
 
 def test_a_renderer_that_stops_getting_better_is_not_followed_for_ever():
-    outcome = run(Goal(quality=50, spp=5000), Noise(floor=1e-3))
+    outcome = run(Goal(quality_worst=50, spp=5000), Noise(floor=1e-3))
     assert outcome.end == "samples"
 
 
@@ -162,19 +162,19 @@ def test_a_few_samples_are_believed_where_they_are_far_better_than_what_is_asked
         def squared_error(self):
             return PixelErrors(np.full((64, 64), 10 ** (-seems / 10), np.float32), None, OWN_NOISE)
 
-    outcome = run(Goal(quality_mean=30), Still())
+    outcome = run(Goal(quality=30), Still())
     assert (outcome.end, outcome.samples) == ("quality", samples)
     assert len(outcome.rounds) <= 3
 
 
 def test_no_look_is_lost_on_a_picture_that_will_not_be_believed():
-    outcome = run(Goal(quality_mean=30, spp=1000), Noise(error=0.5))
+    outcome = run(Goal(quality=30, spp=1000), Noise(error=0.5))
     assert [each.samples for each in outcome.rounds][:2] == [4, PictureEstimator.fewest]
 
 
 def test_reports_climb_to_the_end_and_say_where_the_picture_stands():
     reports = []
-    run(Goal(quality=40), Noise(), reports)
+    run(Goal(quality_worst=40), Noise(), reports)
     done = [report.done for report in reports]
     assert done == sorted(done)
     assert all(report.done <= report.total for report in reports)
@@ -184,7 +184,7 @@ def test_reports_climb_to_the_end_and_say_where_the_picture_stands():
 
 def test_missing_is_by_the_likely_value_and_by_the_low_end():
     wide = Estimate(45, 44, 46, 41.0, 38.0, 43.0, (0, 0))
-    assert Goal(quality=40).missing(wide) == pytest.approx(1.0)
+    assert Goal(quality_worst=40).missing(wide) == pytest.approx(1.0)
     narrow = Estimate(45, 44.9, 45.1, 41.0, 40.8, 41.2, (0, 0))
-    assert Goal(quality=42).missing(narrow) == pytest.approx(1.0)
-    assert Goal(quality_mean=44).missing(wide) <= 0
+    assert Goal(quality_worst=42).missing(narrow) == pytest.approx(1.0)
+    assert Goal(quality=44).missing(wide) <= 0

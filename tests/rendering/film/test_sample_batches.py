@@ -149,7 +149,7 @@ def test_a_quality_that_is_asked_for_is_kept(integrator):
     from lippmann.rendering.estimate.psnr import PictureEstimator
 
     renderer = batches(integrator, seed=5)
-    outcome = reach(Goal(quality=30), renderer.add, ErrorTrack(renderer, PictureEstimator(SHOWN)))
+    outcome = reach(Goal(quality_worst=30), renderer.add, ErrorTrack(renderer, PictureEstimator(SHOWN)))
     long = batches(integrator, seed=6)
     long.add(768)
     errors = np.square(encode_srgb(renderer.picture()) - encode_srgb(long.picture())).mean(axis=2)

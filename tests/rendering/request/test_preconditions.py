@@ -26,10 +26,10 @@ PLAIN = {"method": "full", "integrator": "path", "pixel_filter": "box", "denoise
         ({"method": "pooled"}, "denoise"),
         ({"method": "pooled", "denoise": "oidn", "integrator": "classic"}, "integrator"),
         ({"denoise": "oidn", "integrator": "depth"}, "denoise"),
-        ({"method": "lens-view", "quality": 30.0}, "quality"),
+        ({"method": "lens-view", "quality_worst": 30.0}, "quality"),
         ({"method": "interpolated", "max_time": 3.0}, "max_time"),
-        ({"quality_mean": 30.0, "spp": 1}, "spp"),
-        ({"quality_mean": 30.0, "integrator": "normal", "pixel_filter": "point"}, "quality_mean"),
+        ({"quality": 30.0, "spp": 1}, "spp"),
+        ({"quality": 30.0, "integrator": "normal", "pixel_filter": "point"}, "quality"),
     ],
 )
 def test_what_does_not_go_together_is_refused(options, parameter):
@@ -48,8 +48,8 @@ def test_every_form_honours_a_plain_request(form):
     [
         ({"method": "lens-view"}, "method"),
         ({"order": "paper"}, "order"),
+        ({"quality_worst": 40.0}, "quality"),
         ({"quality": 40.0}, "quality"),
-        ({"quality_mean": 40.0}, "quality_mean"),
         ({"max_time": 4.0}, "max_time"),
         ({"layers": True}, "layers"),
     ],

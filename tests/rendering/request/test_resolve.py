@@ -23,13 +23,13 @@ def test_samples_stay_as_they_are(values):
     assert "no quality is asked for" in found.reason
 
 
-@pytest.mark.parametrize("goal", [{"quality": 30.0}, {"quality_mean": 30.0}, {"max_time": 5.0}])
+@pytest.mark.parametrize("goal", [{"quality_worst": 30.0}, {"quality": 30.0}, {"max_time": 5.0}])
 def test_a_goal_opens_the_contest(goal):
     found = decided(**goal)
     assert (found.method, found.denoise) == ("full", "auto")
 
 
-@pytest.mark.parametrize("goal", [{"quality": 30.0}, {"quality_mean": 30.0}, {"max_time": 5.0}])
+@pytest.mark.parametrize("goal", [{"quality_worst": 30.0}, {"quality": 30.0}, {"max_time": 5.0}])
 def test_light_that_cannot_be_pooled_has_no_contest(goal):
     found = decided(integrator="classic", **goal)
     assert (found.method, found.denoise) == ("full", "none")
@@ -38,7 +38,7 @@ def test_light_that_cannot_be_pooled_has_no_contest(goal):
 
 @pytest.mark.parametrize("denoise", ["none", "oidn", "oidn-fast", "oidn-high"])
 def test_what_is_asked_for_wins(denoise):
-    found = decided(quality=30.0, denoise=denoise)
+    found = decided(quality_worst=30.0, denoise=denoise)
     assert (found.method, found.denoise) == ("full", denoise)
     assert "as asked for" in found.reason
 
@@ -47,7 +47,7 @@ def test_pooled_light_is_denoised():
     assert decided(method="pooled").denoise == "oidn"
 
 
-@pytest.mark.parametrize("goal", [{"quality": 30.0}, {"quality_mean": 30.0}])
+@pytest.mark.parametrize("goal", [{"quality_worst": 30.0}, {"quality": 30.0}])
 def test_a_quality_opens_the_contest_for_pooled_light_too(goal):
     found = decided(method="pooled", **goal)
     assert (found.method, found.denoise) == ("pooled", "auto")

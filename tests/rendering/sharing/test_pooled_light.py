@@ -243,7 +243,7 @@ def command(*words):
 
 def test_a_promised_quality_is_reached_by_the_whole_command(tmp_path, small, capfd):
     words = ("render", "teapot", "--display", small, "--json")
-    assert command(*words, "--method", "pooled", "--quality", 34, "-o", tmp_path / "pooled.exr") == 0
+    assert command(*words, "--method", "pooled", "--quality-worst", 34, "-o", tmp_path / "pooled.exr") == 0
     told = json.loads(capfd.readouterr().out)
     assert told["method"] == "pooled"
     assert told["estimate"]["worst"] >= 34
@@ -259,7 +259,7 @@ def test_a_quality_that_samples_reach_by_themselves_takes_no_pooling(tmp_path, s
     for name, more in (("pooled", ()), ("full", ()), ("obeyed", ("--denoise", "oidn-fast"))):
         method = "full" if name == "full" else "pooled"
         path = tmp_path / f"{name}.exr"
-        assert command(*words, "--method", method, "--quality-mean", 30, *more, "-o", path) == 0
+        assert command(*words, "--method", method, "--quality", 30, *more, "-o", path) == 0
         pictures[name] = json.loads(capfd.readouterr().out), read_picture(path)
     told = pictures["pooled"][0]
     assert told["method"] == "pooled"

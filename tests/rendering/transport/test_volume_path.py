@@ -174,7 +174,7 @@ class TestPictures:
         assert image.pixels.mean() > 0.05
 
     def test_seek_a_quality_without_the_denoiser(self):
-        image = lippmann.render(fog_room(homogeneous()), self.display, quality=15.0)
+        image = lippmann.render(fog_room(homogeneous()), self.display, quality_worst=15.0)
         assert image.provenance.method == "full"
         assert "denoise" not in image.provenance.options
 

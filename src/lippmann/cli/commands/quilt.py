@@ -65,9 +65,8 @@ def render(
     integrator: options.Integrator = "auto",
     depth: options.Depth = None,
     spp: options.Spp = None,
-    quality: Annotated[
-        float | None, typer.Option("--quality", help="Work until every view is estimated to reach this PSNR in dB.")
-    ] = None,
+    quality: options.Quality = None,
+    quality_worst: options.QualityWorst = None,
     quality_mean: options.QualityMean = None,
     max_time: options.MaxTime = None,
     seed: options.Seed = 0,
@@ -112,8 +111,8 @@ def render(
         integrator=integrator,
         depth=depth,
         spp=spp,
-        quality=quality,
-        quality_mean=quality_mean,
+        quality=parse.quality(quality, quality_mean, console),
+        quality_worst=quality_worst,
         max_time=max_time,
         seed=seed,
         exposure=parse.exposure(exposure),

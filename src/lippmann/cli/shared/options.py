@@ -134,11 +134,17 @@ PopOut = Annotated[
 ]
 Quality = Annotated[
     float | None,
-    typer.Option("--quality", help="Work until every micro-image is estimated to reach this PSNR in dB, such as 40."),
+    typer.Option(
+        "--quality",
+        help="Work until the picture is estimated to reach this PSNR in dB, such as 40, and no micro-image is worse by "
+        "over 12 dB.",
+    ),
 ]
-QualityMean = Annotated[
-    float | None, typer.Option("--quality-mean", help="Work until the whole picture is estimated to reach this PSNR.")
+QualityWorst = Annotated[
+    float | None,
+    typer.Option("--quality-worst", help="Work until every micro-image is estimated to reach this PSNR; takes longer."),
 ]
+QualityMean = Annotated[float | None, typer.Option("--quality-mean", hidden=True, help="What --quality is now.")]
 MaxTime = Annotated[
     float | None, typer.Option("--max-time", help="Stop tracing after so many seconds, with the best so far.")
 ]

@@ -11,6 +11,7 @@ from lippmann.errors import UsageError
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from lippmann.cli.shared.console import Console
     from lippmann.display import Display
     from lippmann.rendering.request.choices import ToneMap
     from lippmann.scene.placement import PlacementOptions
@@ -62,6 +63,16 @@ def memory(text: str | None, option: str = "--memory") -> int | None:
 def exposure(text: str) -> float | Literal["auto"]:
     """Stops, or ``auto``."""
     return "auto" if text == "auto" else number(text, "--exposure", "auto, or a number of stops")
+
+
+def quality(asked: float | None, former: float | None, console: Console) -> float | None:
+    """The quality of the whole picture, also by the former name of its option."""
+    if former is None:
+        return asked
+    console.remark("--quality-mean is called --quality now")
+    if asked is not None:
+        raise UsageError("is what --quality asks for", where="--quality-mean", rule="only one", fix="leave it out")
+    return former
 
 
 def tone_map(kind: ToneMap, output: Path | None, background: str | None) -> ToneMap:

@@ -138,6 +138,6 @@ class MethodRace:
         return _Outlook(True, likely - 10 * assessment.slope * math.log10(room))
 
     def _value(self, assessment: Assessment) -> str:
-        if self._goal.quality is not None:
+        if self._goal.quality is None and self._goal.quality_worst is not None:
             return f"{assessment.estimate.worst:.1f} dB"
         return f"{assessment.estimate.psnr:.1f} dB"

@@ -30,8 +30,10 @@ STEP = 8
 MOST_GROWTH, LEAST_GROWTH = 4.0, 1.2
 #: The most where the quality is likely there, but not surely.
 SURER_GROWTH = 2.0
-#: The promise: the worst micro-image may miss the quality asked for by this much, in dB.
+#: The promise: a quality asked for may be missed by this much, in dB, but with a probability of 2.5 %.
 TOLERANCE = 1.0
+#: Where a quality of the whole picture is asked for, every micro-image has at most so many dB less.
+MOST_BELOW = 12.0
 #: Samples per pixel at which it is given up: the noise of single precision sums comes near.
 MOST_SAMPLES = 1 << 20
 #: Of the time that is left, the share that a round is planned to take: rates vary.
@@ -45,9 +47,10 @@ class Goal:
     Parameters
     ----------
     quality:
+        PSNR in dB that the picture's mean squared error is to reach; every micro-image then has at most ``MOST_BELOW``
+        dB less.
+    quality_worst:
         PSNR in dB that every micro-image is to reach.
-    quality_mean:
-        PSNR in dB that the mean squared error of all micro-images is to reach.
     max_time:
         Seconds.
     spp:
@@ -57,7 +60,7 @@ class Goal:
     """
 
     quality: float | None = None
-    quality_mean: float | None = None
+    quality_worst: float | None = None
     max_time: float | None = None
     spp: int | None = None
     part: str = "micro-image"
@@ -65,7 +68,7 @@ class Goal:
     @property
     def has_quality(self) -> bool:
         """Whether some quality is asked for."""
-        return self.quality is not None or self.quality_mean is not None
+        return self.quality is not None or self.quality_worst is not None
 
     def missing(self, estimate: Estimate) -> float:
         """How many dB the picture is short of the quality; at most 0 if it has it.
@@ -73,38 +76,63 @@ class Goal:
         It has it where the quality is the likely one, and is missed by more than ``TOLERANCE`` only with a probability
         of 2.5 %.
         """
-        short = [-math.inf]
+        short = [self.likely_missing(estimate)]
         if self.quality is not None:
-            short += [self.quality - estimate.worst, self.quality - TOLERANCE - estimate.worst_low]
-        if self.quality_mean is not None:
-            short += [self.quality_mean - estimate.psnr, self.quality_mean - TOLERANCE - estimate.psnr_low]
+            short.append(self.quality - TOLERANCE - estimate.psnr_low)
+        if self.least_worst is not None:
+            short.append(self.least_worst - TOLERANCE - estimate.worst_low)
         return max(short)
 
     def likely_missing(self, estimate: Estimate) -> float:
         """How many dB the likely PSNR is short, whatever its interval: that gets narrower as samples grow."""
         short = [-math.inf]
         if self.quality is not None:
-            short.append(self.quality - estimate.worst)
-        if self.quality_mean is not None:
-            short.append(self.quality_mean - estimate.psnr)
+            short.append(self.quality - estimate.psnr)
+        if self.least_worst is not None:
+            short.append(self.least_worst - estimate.worst)
         return max(short)
+
+    @property
+    def least_worst(self) -> float | None:
+        """PSNR in dB that every micro-image is to reach, if there is such a bound."""
+        bounds = [] if self.quality_worst is None else [self.quality_worst]
+        if self.quality is not None:
+            bounds.append(self.quality - MOST_BELOW)
+        return max(bounds, default=None)
 
     def describe(self, estimate: Estimate) -> str:
         """Where the picture stands, for a progress report."""
-        parts = []
-        if self.quality is not None or self.quality_mean is None:
-            wanted = f" of {self.quality:g}" if self.quality is not None else ""
-            parts.append(f"worst {self.part} {estimate.worst:.1f}{wanted} dB")
-        if self.quality_mean is not None:
-            parts.append(f"{estimate.psnr:.1f} of {self.quality_mean:g} dB")
+        parts = [] if self.quality is None else [f"{estimate.psnr:.1f} of {self.quality:g} dB"]
+        if self.quality_worst is not None or not parts:
+            bound = "" if self.quality_worst is None else f" of {self.quality_worst:g}"
+            parts.append(f"worst {self.part} {estimate.worst:.1f}{bound} dB")
         return ", ".join(parts)
+
+    def describe_shortfall(self, estimate: Estimate) -> str:
+        """What a picture lacks that ended short of the goal; no figure is rounded up to what was asked for."""
+        found = []
+        for what, value, low, asked in (
+            ("the picture", estimate.psnr, estimate.psnr_low, self.quality),
+            (f"the worst {self.part}", estimate.worst, estimate.worst_low, self.least_worst),
+        ):
+            if asked is None:
+                continue
+            if value < asked:
+                found.append(f"{what} is estimated at {_floor(value):.1f} of {asked:g} dB")
+            elif low < asked - TOLERANCE:
+                found.append(f"{what} is likely there, but may have {_floor(low):.1f} of {asked:g} dB")
+        return ", ".join(found) or "too few samples to be sure"
+
+
+def _floor(value: float) -> float:
+    return math.floor(10.0 * value) / 10.0
 
 
 def goal_of(request: RenderRequest) -> Goal | None:
     """When to stop, where that is not a number of samples alone."""
     if not request.is_open_ended:
         return None
-    return Goal(request.quality, request.quality_mean, request.max_time, request.spp)
+    return Goal(request.quality, request.quality_worst, request.max_time, request.spp)
 
 
 @dataclass(frozen=True)

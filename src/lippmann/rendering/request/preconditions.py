@@ -106,7 +106,7 @@ def _check_goal(request: RenderRequest) -> None:
     """A quality or a time needs samples that tell their error."""
     if not request.is_open_ended:
         return
-    name = "max_time" if request.max_time is not None else "quality" if request.quality is not None else "quality_mean"
+    name = "max_time" if request.max_time is not None else "quality" if request.quality is not None else "quality_worst"
     if request.spp == 1:
         raise UsageError("1 will not do", parameter="spp", rule="two samples or more tell their error")
     if request.method in REUSING:
@@ -127,7 +127,7 @@ def _check_tiles(request: RenderRequest, display: Display | None) -> None:
         "order": request.order,
         "respect_gloss": request.respect_gloss,
         "quality": request.quality,
-        "quality_mean": request.quality_mean,
+        "quality_worst": request.quality_worst,
         "max_time": request.max_time,
         "layers": True if request.layers else None,
     }

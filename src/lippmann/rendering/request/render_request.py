@@ -75,9 +75,9 @@ class RenderRequest:
     spp:
         Samples per pixel, or per sub-pixel; 1 to 2**24. None: 16, for pooled light what the picture's size suggests, or
         with a quality or a time as many as that takes.
-    quality, quality_mean:
-        PSNR in dB that the worst micro-image, or the whole picture, is to reach by its own estimate; above 0, at most
-        80.
+    quality, quality_worst:
+        PSNR in dB that the whole picture (no micro-image being worse by more than 12 dB), or every micro-image, is to
+        reach by its own estimate; above 0, at most 80.
     max_time:
         Seconds of tracing after which the best picture so far is taken.
     seed:
@@ -118,7 +118,7 @@ class RenderRequest:
     depth: int | None = None
     spp: int | None = None
     quality: float | None = None
-    quality_mean: float | None = None
+    quality_worst: float | None = None
     max_time: float | None = None
     seed: int = 0
     subpixels: bool | None = None
@@ -145,7 +145,7 @@ class RenderRequest:
             if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
                 rule = f"a whole number from {low} to {high}"
                 raise UsageError(f"{value!r} will not do", parameter=name, rule=rule)
-        for name in ("quality", "quality_mean"):
+        for name in ("quality", "quality_worst"):
             value = getattr(self, name)
             if value is not None and not 0 < value <= 80:
                 raise UsageError(f"{value:g} dB will not do", parameter=name, rule="above 0 and at most 80 dB")
@@ -188,7 +188,7 @@ class RenderRequest:
     @property
     def has_quality(self) -> bool:
         """Whether a PSNR is to be reached."""
-        return self.quality is not None or self.quality_mean is not None
+        return self.quality is not None or self.quality_worst is not None
 
     @property
     def is_open_ended(self) -> bool:
