@@ -18,7 +18,7 @@ def picture_size(path):
 
 def test_render_says_what_it_did(lippmann, tmp_path, engine):
     out = tmp_path / "a.png"
-    done = lippmann("render", "teapot", "--spp", 2, "--depth", 2, "--seed", 7, "--json", "-o", out)
+    done = lippmann("render", "teapot", "--method", "full", "--spp", 2, "--depth", 2, "--seed", 7, "--json", "-o", out)
     assert done.code == 0
     values = done.json
     assert values["output"] == str(out)

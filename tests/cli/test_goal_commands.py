@@ -123,13 +123,13 @@ def test_pixels_that_were_carried_over_have_had_no_samples(lippmann, engine, tmp
 def test_auto_is_the_default_and_says_what_it_took(lippmann, engine, tmp_path, small):
     out = tmp_path / "a.png"
     done = lippmann("render", "teapot", "--display", small, "--spp", 2, "--json", "-o", out)
-    assert done.json["method"] == "full"
-    assert "auto: full: no quality is asked for" in done.err
-    assert done.json["options"]["auto"].startswith("full: no quality")
-    assert "denoise" not in done.json["options"]
-    assert "auto        full: no quality" in lippmann("info", out).out
+    assert done.json["method"] == "pooled"
+    assert "auto: pooled: " in done.err
+    assert done.json["options"]["auto"].startswith("pooled: ")
+    assert done.json["options"]["denoise"] == "oidn"
+    assert "auto        pooled: " in lippmann("info", out).out
     plain = tmp_path / "b.png"
-    named = lippmann("render", "teapot", "--display", small, "--spp", 2, "--method", "full", "--json", "-o", plain)
+    named = lippmann("render", "teapot", "--display", small, "--spp", 2, "--method", "pooled", "--json", "-o", plain)
     assert "auto" not in named.json["options"]
     assert np.array_equal(read_picture(out).pixels, read_picture(plain).pixels)
 

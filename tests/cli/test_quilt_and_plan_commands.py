@@ -61,7 +61,19 @@ def test_a_calibration_names_its_quilt_and_takes_it_back(lippmann, calibration, 
 @pytest.mark.usefixtures("engine")
 def test_plan_says_what_to_expect(lippmann, calibration, monkeypatch):
     monkeypatch.setattr(forecast, "PROBE_SECONDS", 0.1)
-    words = ("plan", "teapot", "-d", calibration, "--subpixels", "--spp", "4", "--integrator", "direct")
+    words = (
+        "plan",
+        "teapot",
+        "-d",
+        calibration,
+        "--subpixels",
+        "--spp",
+        "4",
+        "--integrator",
+        "direct",
+        "--shift",
+        "0,0,-8",
+    )
     outcome = lippmann(*words)
     assert outcome.code == 0, outcome.err
     starts = [line.split()[0] for line in outcome.out.splitlines()]

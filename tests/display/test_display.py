@@ -416,7 +416,7 @@ def test_summary_is_plain():
     assert json.loads(json.dumps(summary)) == summary
     assert summary["pixels"] == [3840, 2160]
     assert summary["viewing_distance"] == 600
-    assert summary["depth_budget"] == pytest.approx([5.5, -5.5], abs=0.01)
+    assert summary["depth_budget"] == pytest.approx([38.3, -38.3], abs=0.1)
     assert summary["pixels_per_lens"] == [pytest.approx(6.3, abs=0.01), None]
     assert load_display("mla-square").summary()["pixels_per_lens"] == pytest.approx([15, 15])
 

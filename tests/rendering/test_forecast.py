@@ -65,14 +65,14 @@ def test_nothing_beyond_what_is_resolved_is_blurred():
 def test_work_grows_with_samples_and_pixels(monkeypatch):
     measured, trace = [], forecast._Probe.trace
     monkeypatch.setattr(forecast._Probe, "trace", lambda *given: measured.append(trace(*given)) or measured[-1])
-    one, many = (lippmann.plan("teapot", SHEET, spp=spp, integrator="direct") for spp in (2, 2000))
+    one, many = (lippmann.plan("teapot", SHEET, spp=spp, integrator="direct", method="full") for spp in (2, 2000))
     assert many.rays["primary"] == 1000 * one.rays["primary"]
     # Each measures anew, so their times cannot be compared with one another.
     for foreseen, found in zip((one, many), measured, strict=True):
         assert found.seconds_per_sample > 0
         traced = foreseen.rays["primary"] * found.seconds_per_sample
         assert foreseen.seconds["trace"] == pytest.approx(found.compile + traced)
-    large = lippmann.plan("teapot", SHEET.resized(2400, 1600), spp=2, integrator="direct")
+    large = lippmann.plan("teapot", SHEET.resized(2400, 1600), spp=2, integrator="direct", method="full")
     assert large.memory["expected"] - one.memory["expected"] > 100 * 240 * 160 * 36 * 0.5
     assert set(one.seconds) == {"load", "build", "trace", "total"}
     assert one.seconds["total"] == pytest.approx(sum(v for k, v in one.seconds.items() if k != "total"))
@@ -81,7 +81,7 @@ def test_work_grows_with_samples_and_pixels(monkeypatch):
 def test_denoising_counts():
     found = lippmann.plan("teapot", SHEET, spp=2, denoise="oidn-fast")
     assert found.seconds["denoise"] > 0
-    assert found.memory["expected"] > lippmann.plan("teapot", SHEET, spp=2).memory["expected"]
+    assert found.memory["expected"] > lippmann.plan("teapot", SHEET, spp=2, method="full").memory["expected"]
 
 
 def test_small_and_classic_pictures():

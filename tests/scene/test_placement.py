@@ -101,7 +101,7 @@ class TestFit:
         assert placed.resolvable_range == (-50, 50)
         assert np.ptp(in_display(placed, corners(box(6, 6, 8))), axis=0)[:2] == pytest.approx([FILL * 75] * 2)
         assert placed.depth_scale == pytest.approx(50 / (8 / 6 * FILL * 75))
-        assert placed.warnings == ("depth 95 mm shown at 53 %: --depth-scale 1 shows it whole",)
+        assert placed.warnings == ("depth 95 mm shown at 53 %: depth_scale=1 shows it whole",)
         back, front = place(box(6, 6, 8), display(aperture=60.0)).depth_range
         assert (back, front) == (pytest.approx(-50), pytest.approx(25))
 

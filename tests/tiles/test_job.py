@@ -210,7 +210,7 @@ def test_an_object_of_mitsubas_has_no_content_to_compare(engine):
     ("changes", "parameter"),
     [
         ({"method": "lens-view", "integrator": "path"}, "method"),
-        ({"quality_worst": 40.0, "spp": None}, "quality"),
+        ({"quality_worst": 40.0, "spp": None}, "quality_worst"),
         ({"quality": 40.0, "spp": None}, "quality"),
         ({"max_time": 1.0, "spp": None}, "max_time"),
         ({"layers": True}, "layers"),

@@ -262,7 +262,7 @@ def _fit(
     )
     if options.depth_scale is None and fit.depth_scale < 1.0 - 1e-6:
         warnings.append(
-            f"depth {fit.depth:.3g} mm shown at {100 * fit.depth_scale:.2g} %: --depth-scale 1 shows it whole"
+            f"depth {fit.depth:.3g} mm shown at {100 * fit.depth_scale:.2g} %: depth_scale=1 shows it whole"
         )
     if options.pop_out is not None and fit.front < fit.full_front * (1.0 - 1e-9):
         warnings.append(

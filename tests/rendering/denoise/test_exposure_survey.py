@@ -32,7 +32,7 @@ def test_many_rays_deserve_the_high_effort():
 
 
 def test_plain_settings_need_none():
-    assert treatment(settings=RenderRequest(integrator="direct", spp=1)) is None
+    assert treatment(settings=RenderRequest(method="full", integrator="direct", spp=1)) is None
 
 
 def test_exposure_makes_the_mean_a_middle_grey():

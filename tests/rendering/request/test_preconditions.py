@@ -26,7 +26,7 @@ PLAIN = {"method": "full", "integrator": "path", "pixel_filter": "box", "denoise
         ({"method": "pooled"}, "denoise"),
         ({"method": "pooled", "denoise": "oidn", "integrator": "classic"}, "integrator"),
         ({"denoise": "oidn", "integrator": "depth"}, "denoise"),
-        ({"method": "lens-view", "quality_worst": 30.0}, "quality"),
+        ({"method": "lens-view", "quality_worst": 30.0}, "quality_worst"),
         ({"method": "interpolated", "max_time": 3.0}, "max_time"),
         ({"quality": 30.0, "spp": 1}, "spp"),
         ({"quality": 30.0, "integrator": "normal", "pixel_filter": "point"}, "quality"),
@@ -48,7 +48,7 @@ def test_every_form_honours_a_plain_request(form):
     [
         ({"method": "lens-view"}, "method"),
         ({"order": "paper"}, "order"),
-        ({"quality_worst": 40.0}, "quality"),
+        ({"quality_worst": 40.0}, "quality_worst"),
         ({"quality": 40.0}, "quality"),
         ({"max_time": 4.0}, "max_time"),
         ({"layers": True}, "layers"),

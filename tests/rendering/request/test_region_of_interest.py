@@ -41,14 +41,14 @@ def placed(scene, display, options):
     return at, scene_corners(build(scene), at.display_from_world)
 
 
-@pytest.mark.parametrize("place", [{}, {"turn": (30.0, 20.0, 10.0)}, {"shift": (9.0, -7.0, -30.0), "scale": 0.5}])
+@pytest.mark.parametrize("place", [{}, {"turn": (30.0, 20.0, 10.0)}, {"shift": (9.0, -7.0, -30.0), "scale": 0.25}])
 @pytest.mark.parametrize("display", DISPLAYS, ids=lambda display: display.name)
 def test_nothing_of_the_scene_is_outside_a_panels_window(ball, display, place):
     """Whole pictures are rendered without any window."""
     at, corners = placed(
         ball,
         display,
-        PlacementOptions(scale=place.get("scale", 0.6), **{k: v for k, v in place.items() if k != "scale"}),
+        PlacementOptions(scale=place.get("scale", 0.4), **{k: v for k, v in place.items() if k != "scale"}),
     )
     found = panel_window(corners, display)
     assert found is not None
@@ -69,7 +69,7 @@ def test_nothing_of_the_scene_is_outside_a_quilts_windows(ball, display, monkeyp
     from lippmann.rendering import quilt as module
 
     options = {"views": (4, 3), "size": (400, 300), "integrator": "direct", "spp": 2, "denoise": "none", "seed": 2}
-    place = PlacementOptions(scale=0.5, turn=(20.0, 10.0, 0.0), shift=(5.0, 3.0, -8.0))
+    place = PlacementOptions(scale=0.4, turn=(20.0, 10.0, 0.0), shift=(5.0, 3.0, -8.0))
     windowed = lippmann.render_quilt(ball, display, placement=place, **options)
     left, top, width, height = windowed.provenance.options["window"]
     assert width * height < 0.6 * 100 * 100

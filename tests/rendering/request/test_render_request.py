@@ -27,7 +27,7 @@ from lippmann.rendering.request.render_request import RenderRequest
         ({"seed": 2**32}, "seed"),
         ({"threads": 1.5}, "threads"),
         ({"memory": 0}, "memory"),
-        ({"quality_worst": 81.0}, "quality"),
+        ({"quality_worst": 81.0}, "quality_worst"),
         ({"quality": 0.0}, "quality"),
         ({"max_time": float("inf")}, "max_time"),
         ({"max_time": float("nan")}, "max_time"),

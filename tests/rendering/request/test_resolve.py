@@ -16,11 +16,11 @@ def decided(**values):
     return resolve(RenderRequest(**values), SCENE)
 
 
-@pytest.mark.parametrize("values", [{}, {"spp": 4}, {"integrator": "classic"}, {"layers": True}])
-def test_samples_stay_as_they_are(values):
+@pytest.mark.parametrize("values", [{}, {"spp": 4}, {"integrator": "direct"}, {"layers": True}])
+def test_light_is_pooled_unless_something_else_is_said(values):
     found = decided(**values)
-    assert (found.method, found.denoise) == ("full", "none")
-    assert "no quality is asked for" in found.reason
+    assert (found.method, found.denoise) == ("pooled", "oidn")
+    assert found.reason.startswith("pooled")
 
 
 @pytest.mark.parametrize("goal", [{"quality_worst": 30.0}, {"quality": 30.0}, {"max_time": 5.0}])
