@@ -201,6 +201,25 @@ def test_unfinished_quilts_are_gone_on_with(engine, display, tmp_path):
     assert whole == {name: data for name, data in broken.items() if name in whole}
 
 
+def test_a_camera_that_places_the_display_cuts_nothing_off(display):
+    teapot = lippmann.load_scene("teapot")
+    options = PlacementOptions(mode="camera")
+    motion = open_turntable(teapot, 8, placement=options)
+    where = find_stand(motion, display, options)
+    fronts = [where(frame).depth_range[1] for frame in range(8)]
+    assert max(fronts) <= display.aperture_distance
+    assert "the lens plane moved" in where(0).warnings[0]
+
+
+def test_progress_never_runs_backwards(engine, display):
+    reports = []
+    motion = open_turntable(scene_of(block(), lights=[SIDE_LIGHT]), 3)
+    list(render_sequence(motion, display, range(3), progress=reports.append, layers=True, **QUICK))
+    done = [report.done for report in reports]
+    assert done == sorted(done)
+    assert done[-1] == 3
+
+
 def test_the_call_renders_a_whole_turn(engine, display):
     images = list(lippmann.render_turntable(scene_of(block(), lights=[SIDE_LIGHT]), display, 3, spp=1, device="cpu"))
     assert len(images) == 3

@@ -333,10 +333,13 @@ def hold_exposure(request: RenderRequest, motion: Motion, display: Display, wher
 
 
 def _of_frame(progress: ProgressCallback, position: int, frames: int) -> ProgressCallback:
-    """Reports of one frame's tracing as reports of the whole sequence."""
+    """Reports of one frame's tracing as reports of the whole sequence, which never run backwards."""
+    done = float(position)
 
     def report(inner: Progress) -> None:
-        done = position + (inner.done / inner.total if inner.stage in ("trace", "tiles") else 0.0)
+        nonlocal done
+        if inner.stage in ("trace", "tiles"):
+            done = max(done, position + inner.done / inner.total)
         progress(Progress("sequence", done, frames, f"frame {position + 1} of {frames}"))
 
     return report

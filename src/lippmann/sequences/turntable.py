@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
 from lippmann.display import Display
 from lippmann.errors import UsageError
+from lippmann.scene.camera_placement import CameraView, VisibleDepth
 from lippmann.scene.matrices import Bounds, Vector, inverse, transform_points
 from lippmann.scene.mitsuba_source import MitsubaSource
 from lippmann.scene.placement import Placement, PlacementOptions, face_viewer, place
@@ -119,6 +121,7 @@ class Turntable(Motion):
                 options=options,
                 home_camera=scene.display_camera,
                 is_unbounded=scene.is_unbounded,
+                probe=partial(_depth_of, swept),
             )
             return replace(found, warnings=(*notes, *found.warnings))
         options = face_viewer(scene.bounds, replace(options, mode="fit"), notes)
@@ -176,6 +179,13 @@ def open_turntable(
         scene = replace(scene, description=None, views=scene.cameras)
     axis = turning_axis(scene, placement or PlacementOptions())
     return Turntable(scene, TURNTABLE_FRAMES if frames is None else frames, swing=swing, axis=axis)
+
+
+def _depth_of(points: Bounds, view: CameraView) -> VisibleDepth | None:
+    """The depth that points before a camera fill; None if there are none."""
+    depths = -transform_points(inverse(view.world_from_camera), points)[:, 2]
+    ahead = depths[depths > 0.0]
+    return VisibleDepth(float(ahead.min()), float(ahead.max())) if len(ahead) else None
 
 
 def _box_of(points: Bounds) -> Bounds:
