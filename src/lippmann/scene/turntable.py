@@ -42,7 +42,7 @@ def turn_about(axis: Vector, center: Vector | Bounds, degrees: float) -> Matrix:
 def turning_axis(scene: Scene, options: PlacementOptions) -> Vector:
     """The axis of the scene's own frame that stands most upright before the viewer, pointing up: a unit vector.
 
-    A model that ``--turn`` or a camera shows from above thus turns as on a table that is seen from above.
+    A model that ``options.turn`` or a camera shows from above thus turns as on a table that is seen from above.
 
     Raises
     ------

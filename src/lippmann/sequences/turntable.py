@@ -99,7 +99,7 @@ class Turntable(Motion):
         return np.eye(4) if moves_meshes(self._scene) else inverse(self._turn(self.angle(frame)))
 
     def bounds(self) -> Bounds:
-        return _box_of(self._swept())
+        return _box_of(self.swept())
 
     def placement(self, display: Display, options: PlacementOptions) -> Placement:
         """Where the display stands: fitted to all that the scene sweeps, or as a camera or the scene's mm have it.
@@ -112,7 +112,7 @@ class Turntable(Motion):
         scene, notes = self._scene, list[str]()
         if isinstance(scene.description, MitsubaSource) and scene.has_lights and scene.description.environment is None:
             notes.append("the light sources of a Mitsuba scene turn with it")
-        swept = self._swept()
+        swept = self.swept()
         if options.mode not in (None, "fit") or options.camera is not None:
             found = place(
                 _box_of(swept),
@@ -140,8 +140,8 @@ class Turntable(Motion):
     def _turn(self, degrees: float) -> Matrix:
         return turn_about(self._axis, self._center, degrees)
 
-    def _swept(self) -> Bounds:
-        """Points about all that the scene ever fills, whichever frames there are."""
+    def swept(self) -> Bounds:
+        """Points ``(n, 3)`` whose convex hull is about all that the scene ever fills, whichever frames there are."""
         reach = 360.0 if self._swing is None else self._swing
         angles = np.linspace(-reach / 2.0, reach / 2.0, 2 * math.ceil(reach / 2.0 / STEP) + 1)
         return swept_points(self._scene, self._axis, self._center, angles)
