@@ -246,3 +246,14 @@ def test_the_middle_stays_where_it_is():
     assert transform_points(Turntable(scene, 6)._turn(60.0), np.array([[2.0, 0.0, 1.0]])) == pytest.approx(
         np.array([[2.0, 0.0, 1.0]])
     )
+
+
+def test_a_scene_of_mitsubas_turns_with_its_light_and_says_so(engine, display):
+    cube = {"type": "cube", "bsdf": {"type": "diffuse"}}
+    light = {"type": "point", "position": [4.0, 5.0, 6.0], "intensity": 60.0}
+    motion = open_turntable(lippmann.load_scene({"type": "scene", "cube": cube, "light": light}), 4)
+    first, second = (image for _, image in render_sequence(motion, display, [0, 1], **QUICK))
+    assert "the light sources of a Mitsuba scene turn with it" in first.provenance.notes
+    # Its right side comes to the front, with the light on it.
+    assert min(first.pixels.max(), second.pixels.max()) > 0.05
+    assert not np.array_equal(first.pixels, second.pixels)
