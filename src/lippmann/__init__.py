@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from lippmann import _version
 
 if TYPE_CHECKING:
-    from lippmann.api import load_scene, plan, preview, render, render_quilt, render_to_file
+    from lippmann.api import load_scene, plan, preview, render, render_quilt, render_to_file, render_turntable
     from lippmann.display import Display, LensArray, Panel, list_displays, load_display
     from lippmann.errors import LippmannError
     from lippmann.image import IntegralImage, read_picture
@@ -29,6 +29,7 @@ _HOME = {
     "render": "lippmann.api",
     "render_quilt": "lippmann.api",
     "render_to_file": "lippmann.api",
+    "render_turntable": "lippmann.api",
     "Display": "lippmann.display",
     "LensArray": "lippmann.display",
     "Panel": "lippmann.display",
@@ -63,6 +64,7 @@ __all__ = [
     "render",
     "render_quilt",
     "render_to_file",
+    "render_turntable",
 ]
 
 

@@ -1,4 +1,5 @@
-"""The library by its few calls: load a scene, render it, whole or into a file, as a quilt or a preview, or plan that.
+"""The library by its few calls: load a scene, render it, whole or into a file, as a quilt, a turntable or a preview, or
+plan that.
 
 Everything else hangs on what they return.
 
@@ -14,7 +15,7 @@ Everything else hangs on what they return.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, cast
@@ -366,6 +367,55 @@ def render_quilt(
         progress,
     )
     return Quilt(frame.pixels, layout.layout, provenance=frame.provenance)
+
+
+def render_turntable(
+    scene: Scene | object,
+    display: Display | str | Path = "seed-lenticular",
+    frames: int | None = None,
+    *,
+    swing: float | None = None,
+    placement: PlacementOptions | None = None,
+    progress: ProgressCallback = silent,
+    **options: object,
+) -> Iterator[IntegralImage]:
+    """Render a scene on a turntable, frame by frame; display and light stand still.
+
+    The scene turns about its upright axis, through the middle of its box, with one placement that is fitted to all
+    angles: it never leaves the panel nor changes its size. Frame k of N is turned by 360 k / N degrees. For quilts see
+    :func:`lippmann.sequences.frames.render_quilt_sequence`.
+
+    Parameters
+    ----------
+    scene, display, progress:
+        As for :func:`render`.
+    frames:
+        Frames of a whole turn, or of a swing to and fro; 48 by default.
+    swing:
+        Degrees from one end of a swing to the other, above 0 and at most 360; None for a whole turn. Frame k of N is
+        turned by ``swing / 2 sin(2 pi k / N)``.
+    placement:
+        Where the display stands during the whole turn. Without a mode or a camera the scene is fitted.
+    **options:
+        Further options of :func:`render`. All frames have the same seed.
+
+    Yields
+    ------
+    IntegralImage
+        The frames in their order; each is rendered when it is asked for.
+
+    Raises
+    ------
+    LippmannError
+        Of the kind that says what was wrong; before the first frame for what can be told then.
+    """
+    from lippmann.sequences.frames import render_sequence
+    from lippmann.sequences.turntable import open_turntable
+
+    classic = options.get("integrator") == "classic"
+    motion = open_turntable(_scene(scene), frames, swing=swing, placement=placement, classic=classic)
+    pictures = render_sequence(motion, display, range(motion.count), placement=placement, progress=progress, **options)
+    return (image for _, image in pictures)
 
 
 def plan(

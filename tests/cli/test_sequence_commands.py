@@ -112,3 +112,89 @@ def test_frames_on_a_cluster_are_the_same(engine, lippmann, moving_ball, tmp_pat
         here, there = (read_picture(tmp_path / place / name) for place in ("here", "there"))
         assert np.array_equal(here.pixels, there.pixels)
     assert len(frames_of(tmp_path / "film.mp4")[1]) == 2
+
+
+SMALL_QUILT = ("--views", "3x2", "--size", "384x288", *QUICK)
+
+
+def test_a_turntable_with_a_film(engine, lippmann, moving_ball, tmp_path):
+    film = tmp_path / "turn.mp4"
+    call = (moving_ball, "--turntable", "5", "-o", tmp_path / "out", "--video", film, "--fps", "10", "--json")
+    done = lippmann("render", *call, *QUICK)
+    assert done.code == 0, done.err
+    assert [frame["frame"] for frame in done.json["frames"]] == [0, 1, 2, 3, 4]
+    rate, shown = frames_of(film)
+    assert (rate, len(shown)) == (10, 5)
+
+
+def test_a_part_of_a_swing(engine, lippmann, tmp_path):
+    call = ("--turntable", "8", "--swing", "40", "--frames", "2:4", "-o", tmp_path / "out_%d.png")
+    done = lippmann("render", "teapot", *call, *QUICK)
+    assert done.code == 0, done.err
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["out_2.png", "out_3.png"]
+
+
+@pytest.mark.parametrize(
+    ("film", "eye", "shape"), [("seen.mp4", ("--eye", "sweep"), (144, 108)), ("all_qs3x2a0.75.png", (), None)]
+)
+def test_quilts_of_a_turn_and_their_film(engine, lippmann, tmp_path, film, eye, shape):
+    from lippmann.color.transfer import quantize
+    from lippmann.quilts.files import read_quilt
+    from lippmann.viewing.video_frames import view_of_quilt
+
+    call = ("quilt", "render", "teapot", "--turntable", "3", *SMALL_QUILT, *eye, "--video", tmp_path / film)
+    done = lippmann(*call, "-o", tmp_path / "out", "--json")
+    assert done.code == 0, done.err
+    paths = [Path(frame["output"]) for frame in done.json["frames"]]
+    assert [path.name for path in paths] == [f"frame_{number:04}_qs3x2a0.75.png" for number in range(3)]
+    _, shown = frames_of(tmp_path / film)
+    assert len(shown) == 3
+    first = read_quilt(paths[0])
+    # What the cameras rendered: to the right, to the left and in the middle.
+    for frame, number, path in zip(shown, (3, 5, 0), paths, strict=True):
+        quilt = read_quilt(path)
+        expected = quantize(view_of_quilt(quilt, number), 8, "srgb") if eye else quantize(quilt.pixels, 8, "srgb")
+        even = frame[: expected.shape[0], : expected.shape[1]]
+        assert 10 * np.log10(255**2 / max(np.mean((expected.astype(float) - even) ** 2), 1e-9)) > 30
+    assert not np.array_equal(first.view(0), first.view(5))
+    assert shape is None or shown[0].shape[:2] == shape
+
+
+def test_a_film_of_quilts_beside_integral_images_is_rendered_by_their_cameras(engine, lippmann, tmp_path):
+    from lippmann.color.transfer import quantize
+
+    film, still = tmp_path / "film_qs2x1a1.png", tmp_path / "still_qs2x1a1.png"
+    options = ("--turntable", "2", "--frames", "0:1", *QUICK)
+    assert lippmann("render", "teapot", *options, "-o", tmp_path / "out.png", "--video", film).code == 0
+    quilt = ("--display", "seed-lenticular", "--views", "2x1", "--size", "1024x512", "-o", still)
+    assert lippmann("quilt", "render", "teapot", *options, *quilt).code == 0
+    from lippmann.quilts.files import read_quilt
+
+    _, shown = frames_of(film)
+    assert np.array_equal(shown[0], quantize(read_quilt(still).pixels, 8, "srgb"))
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("render", "--turntable", "1", "-o", "out"), "--turntable: 1 frames; 2 to 100000 frames of a turn"),
+        (("render", "--swing", "400", "-o", "out"), "--swing: 400 degrees; above 0 and at most 360 degrees"),
+        (("render", "--turntable", "8", "--animation", "hop", "-o", "out"), "--animation: a scene on a turntable"),
+        (("render", "--turntable", "8", "--frames", "0:9", "-o", "out"), "there is no frame 8"),
+        (("render", "--turntable", "8", "--fps", "9", "-o", "out"), "--fps: a turn has one pose a frame"),
+        (("render", "--turntable", "8", "-o", "out", "--video", "x_qs8x6a1.mp4", "--eye", "0,0,9"), "--eye: a quilt's"),
+        (("quilt", "render", "--turntable", "8", "-o", "out_%d.png"), "does not say how many views"),
+        (("quilt", "render", "--turntable", "8", "-o", "x_qs8x6a0.75.png"), "x_%04d_qs8x6a0.75.png, or a folder"),
+        (("quilt", "render", "--turntable", "8", "--video", "x_qs5x9a0.75.mp4"), "the name says another quilt"),
+        (("quilt", "render", "--turntable", "8", "--video", "x.mp4", "--eye", "0,0,0"), "--eye: an eye at z = 0"),
+        (("quilt", "render", "--resume"), "--resume: a quilt is rendered in one piece"),
+    ],
+)
+def test_turns_that_cannot_be_are_said_in_one_line(lippmann, moving_ball, tmp_path, monkeypatch, words, message):
+    monkeypatch.chdir(tmp_path)
+    command = 2 if words[0] == "quilt" else 1
+    done = lippmann(*words[:command], moving_ball, *words[command:])
+    assert done.code == 2
+    assert message in done.err
+    assert done.err.count("\n") == 1
+    assert not list(tmp_path.iterdir())

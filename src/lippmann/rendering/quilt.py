@@ -90,7 +90,7 @@ def render_quilt(
             "window": list(astuple(source.window)),
             **placed_options(request, placement),
         },
-        # A quilt's method is the one asked for; which one won stands among the options.
+        method=traced.method,
         estimate=traced.estimate,
         notes=(*placement.warnings, *traced.notes),
     )

@@ -177,7 +177,7 @@ def place(
     mode = options.mode or ("camera" if options.camera or home_camera else "fit")
     warnings: list[str] = []
     if mode == "fit":
-        options = _face_viewer(bounds, options, warnings)
+        options = face_viewer(bounds, options, warnings)
         points = box_corners(bounds) if extreme_points is None else extreme_points()
         display_from_world = _fit(bounds, display, options, warnings, points=points, bounds_in=bounds_in)
     elif mode == "camera":
@@ -223,7 +223,7 @@ def stand(
     return Placement(world_from_display, (back, front), (far, near), mode, warnings)
 
 
-def _face_viewer(bounds: Bounds, options: PlacementOptions, warnings: list[str]) -> PlacementOptions:
+def face_viewer(bounds: Bounds, options: PlacementOptions, warnings: list[str]) -> PlacementOptions:
     """The options, with a turn for a flat scene that would be seen edge-on, unless a turn was asked for."""
     thin = thin_axis(bounds)
     if thin is None or any(options.turn):

@@ -6,11 +6,10 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from lippmann.display import Display
 from lippmann.image.provenance import Provenance
-from lippmann.image.read import read_metadata
 from lippmann.image.write import format_for
 from lippmann.journal.fingerprint import content_hash, in_words
 from lippmann.journal.frame_journal import ENDING, FrameJournal
@@ -19,6 +18,7 @@ from lippmann.progress import ProgressCallback, silent
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.runtime import engine
 from lippmann.scene.placement import PlacementOptions
+from lippmann.sequences.forms import INTEGRAL, Form
 from lippmann.sequences.frames import Stand, find_stand, hold_choice, render_frames, render_tiled_frames
 from lippmann.sequences.motion import Motion
 
@@ -66,6 +66,7 @@ def saved_sequence(
     frames: Sequence[int],
     request: RenderRequest,
     *,
+    form: Form[Any] = INTEGRAL,
     resume: bool = False,
     bits: int | None = None,
     runner: Runner | None = None,
@@ -84,6 +85,8 @@ def saved_sequence(
         The file of each frame.
     request:
         How each is made; its placement is for the whole sequence.
+    form:
+        What each frame is: an integral image, or a quilt.
     resume:
         Keep the frames that an interrupted run finished, if there are any: those whose files are as they were then. All
         frames together are the same, byte for byte, as those of an unbroken run.
@@ -121,6 +124,7 @@ def saved_sequence(
         **in_words(display.to_dict(), "the display's "),
         **in_words(options),
         **in_words(vars(placement), "placement "),
+        **form.settings,
         "the format": name,
         "values": stored,
         "frames are rendered": "whole" if runner is None else "in tiles",
@@ -137,11 +141,11 @@ def saved_sequence(
             chosen = {"method": request.method, "denoise": request.denoise, **journal.chosen}
             request = hold_choice(request, chosen["method"], chosen["denoise"])
         if runner is None:
-            made = _whole(motion, display, missing, where, path_of, bits, progress, request)
+            made = _whole(motion, display, missing, where, path_of, bits, progress, request, form)
         else:
             files = render_tiled_frames(motion, display, missing, where, path_of, request, runner, bits, progress)
             made = ((number, written.provenance, {}) for number, written in files)
-        yield _in_order(frames, missing, path_of, made, journal)
+        yield _in_order(frames, missing, path_of, made, journal, form)
         if all(number in journal for number in frames):
             journal.finish()
 
@@ -152,13 +156,14 @@ def _in_order(
     path_of: Callable[[int], Path],
     made: Iterator[_Made],
     journal: FrameJournal,
+    form: Form[Any],
 ) -> Iterator[SavedFrame]:
     """The frames that lie there and those that are ``made``; the latter are written down."""
     absent = set(missing)
     for number in frames:
         path = path_of(number)
         if number not in absent:
-            yield SavedFrame(number, path, read_metadata(path).provenance, found=True)
+            yield SavedFrame(number, path, form.provenance(path), found=True)
             continue
         _, provenance, chosen = next(made)
         journal.add(number, path, chosen)
@@ -174,9 +179,10 @@ def _whole(
     bits: int | None,
     progress: ProgressCallback,
     request: RenderRequest,
+    form: Form[Any],
 ) -> Iterator[_Made]:
     """Frames rendered in one piece, and saved."""
-    for number, image in render_frames(motion, display, frames, where, request, progress):
-        image.save(path_of(number), bits=bits)
+    for number, image in render_frames(motion, display, frames, where, request, form, progress):
+        form.write(image, path_of(number), bits)
         made = image.provenance
         yield number, made, {"method": made.method, "denoise": str(made.options.get("denoise", "none"))}

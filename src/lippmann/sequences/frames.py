@@ -20,10 +20,12 @@ from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.scene.placement import Mode, Placement, PlacementOptions, place, stand
 from lippmann.scene.values.description import Camera, Matrix
+from lippmann.sequences.forms import INTEGRAL, Form, QuiltForm, Shown
 from lippmann.sequences.motion import Motion, open_motion
 
 if TYPE_CHECKING:
     from lippmann.image import IntegralImage
+    from lippmann.quilts.quilt import Quilt
     from lippmann.rendering.request.choices import Denoiser, Method
     from lippmann.tiles.tiled_render import Rendered, Runner
 
@@ -75,6 +77,7 @@ class Stand:
     """Where the display stands in every frame; call it with a frame's number.
 
     ``camera`` is the name of the scene's camera that the display follows, if it follows one of the scene's own.
+    ``warnings`` hold for all frames, in place of those of each.
     """
 
     motion: Motion
@@ -83,14 +86,16 @@ class Stand:
     first: Matrix
     camera: str | None = None
     first_pose: Matrix | None = None
+    warnings: tuple[str, ...] | None = None
 
     def __call__(self, frame: int) -> Placement:
         scene = self.motion.scene(frame)
-        where = self.first
+        where = self.motion.display_turn(frame) @ self.first
         if self.first_pose is not None:
             camera = cast(Camera, self.motion.camera(frame, self.camera))
             where = _pose(camera) @ np.linalg.inv(self.first_pose) @ self.first
-        return stand(where, scene.bounds, self.display, mode=self.mode, bounds_in=scene.bounds_in)
+        found = stand(where, scene.bounds, self.display, mode=self.mode, bounds_in=scene.bounds_in)
+        return found if self.warnings is None else replace(found, warnings=self.warnings)
 
 
 def find_stand(motion: Motion, display: Display, options: PlacementOptions) -> Stand:
@@ -101,6 +106,9 @@ def find_stand(motion: Motion, display: Display, options: PlacementOptions) -> S
     UsageError, SceneError
         As :func:`lippmann.scene.placement.place`; or a flight is to be fitted.
     """
+    own = motion.placement(display, options)
+    if own is not None:
+        return Stand(motion, display, own.mode, own.world_from_display, warnings=own.warnings)
     camera = motion.camera(0, options.camera)
     if camera is None and options.mode == "camera":
         cameras = motion.scene(0).cameras
@@ -157,7 +165,47 @@ def render_sequence(
         Of the kind that says what was wrong; before the first frame for what can be told then.
     """
     target, numbers, where = _begin(motion, display, frames, placement)
-    return render_frames(motion, target, numbers, where, RenderRequest.of(options), progress)
+    return render_frames(motion, target, numbers, where, RenderRequest.of(options), INTEGRAL, progress)
+
+
+def render_quilt_sequence(
+    motion: Motion,
+    display: Display | str | Path = "portrait",
+    frames: FrameRange | Sequence[int] = FrameRange(),
+    *,
+    placement: PlacementOptions | None = None,
+    views: tuple[int, int] | None = None,
+    size: tuple[int, int] | None = None,
+    progress: ProgressCallback = silent,
+    **options: object,
+) -> Iterator[tuple[int, Quilt]]:
+    """Render one quilt a frame, each when it is asked for.
+
+    Parameters
+    ----------
+    motion, frames, placement, progress:
+        As of :func:`render_sequence`.
+    display, views, size:
+        As of :func:`lippmann.render_quilt`.
+    **options:
+        Further options of :func:`lippmann.render_quilt`.
+
+    Yields
+    ------
+    int, Quilt
+        A frame's number and quilt, whose provenance has ``frame`` among its options.
+
+    Raises
+    ------
+    LippmannError
+        Of the kind that says what was wrong; before the first frame for what can be told then.
+    """
+    from lippmann.quilts.quilt import load_device, quilt_of_display
+
+    device = display if isinstance(display, Display) else load_device(str(display))
+    form = QuiltForm(quilt_of_display(device, views, size))
+    target, numbers, where = _begin(motion, device, frames, placement)
+    return render_frames(motion, target, numbers, where, RenderRequest.of(options), form, progress)
 
 
 def sequence_to_files(
@@ -217,21 +265,19 @@ def render_frames(
     frames: Sequence[int],
     where: Stand,
     request: RenderRequest,
+    form: Form[Shown],
     progress: ProgressCallback,
-) -> Iterator[tuple[int, IntegralImage]]:
-    """The frames of :func:`render_sequence`, once it is known where the display stands."""
-    from lippmann.rendering.picture import render_picture
-
+) -> Iterator[tuple[int, Shown]]:
+    """The frames of :func:`render_sequence`, in any form, once it is known where the display stands."""
     request = hold_exposure(request, motion, display, where)
     for position, frame in enumerate(frames):
         report = _of_frame(progress, position, len(frames))
-        image = render_picture(motion.scene(frame), display, replace(request, placement=where(frame)), report)
+        image = form.render(motion.scene(frame), display, replace(request, placement=where(frame)), report)
+        made = image.provenance
         if position == 0:
             # What was chosen for the first frame holds for all: a change of method would be seen.
-            made = image.provenance
             request = hold_choice(request, made.method, str(made.options.get("denoise", "none")))
-        provenance = replace(image.provenance, options={**image.provenance.options, "frame": frame})
-        yield frame, replace(image, provenance=provenance)
+        yield frame, replace(image, provenance=replace(made, options={**made.options, "frame": frame}))
 
 
 def render_tiled_frames(
@@ -287,10 +333,13 @@ def hold_exposure(request: RenderRequest, motion: Motion, display: Display, wher
 
 
 def _of_frame(progress: ProgressCallback, position: int, frames: int) -> ProgressCallback:
-    """Reports of one frame's tracing as reports of the whole sequence."""
+    """Reports of one frame's tracing as reports of the whole sequence, which never run backwards."""
+    done = float(position)
 
     def report(inner: Progress) -> None:
-        done = position + (inner.done / inner.total if inner.stage in ("trace", "tiles") else 0.0)
+        nonlocal done
+        if inner.stage in ("trace", "tiles"):
+            done = max(done, position + inner.done / inner.total)
         progress(Progress("sequence", done, frames, f"frame {position + 1} of {frames}"))
 
     return report
@@ -300,4 +349,12 @@ def _pose(camera: Camera) -> Matrix:
     return np.asarray(camera.world_from_camera, np.float64)
 
 
-__all__ = ["FrameRange", "Motion", "find_stand", "open_motion", "render_sequence", "sequence_to_files"]
+__all__ = [
+    "FrameRange",
+    "Motion",
+    "find_stand",
+    "open_motion",
+    "render_quilt_sequence",
+    "render_sequence",
+    "sequence_to_files",
+]

@@ -10,11 +10,13 @@ from pathlib import Path
 
 import numpy as np
 
+from lippmann.display import Display
 from lippmann.errors import UsageError
 from lippmann.scene.matrices import Bounds
+from lippmann.scene.placement import Placement, PlacementOptions
 from lippmann.scene.readers.load import kind_of_file, load_scene
 from lippmann.scene.scene import Scene, check_description, find_camera, override_light
-from lippmann.scene.values.description import Camera, Environment, SceneDescription
+from lippmann.scene.values.description import Camera, Environment, Matrix, SceneDescription
 from lippmann.scene.values.whitted_camera import CameraPose
 from lippmann.scene.values.whitted_scene import ClassicScene
 from lippmann.scene.whitted.world_frame import world_camera
@@ -53,6 +55,14 @@ class Motion(ABC):
     @abstractmethod
     def bounds(self) -> Bounds:
         """The box ``(2, 3)`` around all that is ever filled, world units; the same whichever frames are rendered."""
+
+    def placement(self, display: Display, options: PlacementOptions) -> Placement | None:
+        """Where a display stands that does not follow a camera, by the motion's own rule; None: it has none."""
+        return None
+
+    def display_turn(self, frame: int) -> Matrix:
+        """The rigid 4x4 matrix by which the display goes round the scene in a frame, from its first place."""
+        return np.eye(4)
 
 
 class GltfMotion(Motion):
@@ -217,7 +227,7 @@ def open_motion(
             f"nothing moves in '{source}'",
             parameter="frames",
             rule="glTF files have animations; Tachyon and NFF scenes are flown through",
-            fix="add camera_path=FILE.cam for a flight",
+            fix="add camera_path=FILE.cam for a flight, or turntable=48 for a turn",
         )
     return GltfMotion(
         Path(source),

@@ -1,4 +1,4 @@
-"""Frames of a video from integral images: the picture that an eye sees, or a quilt of such pictures."""
+"""Frames of a video: what an eye sees of an integral image, a view of a quilt, or a whole quilt."""
 
 from __future__ import annotations
 
@@ -8,11 +8,13 @@ from pathlib import Path
 
 import numpy as np
 
+from lippmann.display import Display
+from lippmann.display.view_cone import cone_tangent
 from lippmann.errors import OutputError
 from lippmann.image import IntegralImage
 from lippmann.image.stored_values import FloatArray
 from lippmann.quilts.quilt import Quilt, QuiltLayout, layout_of_name
-from lippmann.viewing.replay import Eye, default_eye, default_size, replay
+from lippmann.viewing.replay import DEFAULT_WIDTH, Eye, default_eye, default_size, replay
 from lippmann.viewing.video_file import check_animation_path
 
 #: Limit on the width of a quilt in a video, in pixels: that of players and of common H.264 levels.
@@ -39,14 +41,80 @@ def projection_of(path: Path, eye: Eye | None = None) -> Projection:
     PictureError
         If the name's layout is out of range.
     """
+    layout = layout_of_video(path)
+    if layout is None:
+        return lambda image: replay(image, eye)
+    return lambda image: quilt_of(image, layout, eye).pixels
+
+
+def layout_of_video(path: Path) -> QuiltLayout | None:
+    """The layout of the quilts that a video's name asks for; None for single views.
+
+    Raises
+    ------
+    OutputError
+        If the name has no ending of an animation, or the quilt has too many columns.
+    PictureError
+        If the name's layout is out of range.
+    """
     check_animation_path(path)
     if "_qs" not in path.stem:
-        return lambda image: replay(image, eye)
+        return None
     layout = layout_of_name(path)
     if layout.columns > WIDEST_QUILT // 16:
         rule = f"a view of a quilt in a video has at least 16 of {WIDEST_QUILT} pixels"
         raise OutputError(f"{layout.columns} columns are too many", where=str(path), rule=rule)
-    return lambda image: quilt_of(image, layout, eye).pixels
+    return layout
+
+
+def view_toward(display: Display, views: int, eye: Eye | None = None) -> int:
+    """The number of the view, of so many across a lenticular display's cone, whose camera is nearest to an eye.
+
+    Parameters
+    ----------
+    eye:
+        Position ``(x, y, z)`` in the display frame in mm; only its direction sideways counts. None: the middle.
+    """
+    slope = 0.0 if eye is None else eye[0] / eye[2]
+    share = (slope / cone_tangent(display) + 1.0) / 2.0
+    return min(max(math.floor(share * views), 0), views - 1)
+
+
+def view_of_quilt(quilt: Quilt, number: int) -> FloatArray:
+    """A view ``(height, width, 3)`` of a quilt in linear light, in the proportions in which it is displayed.
+
+    Views of other proportions lose pixels along one side. The width is at most
+    :data:`~lippmann.viewing.replay.DEFAULT_WIDTH`.
+    """
+    width, height = quilt.view_size
+    aspect = quilt.layout.aspect or width / height
+    shown = min(width, height * aspect, DEFAULT_WIDTH)
+    return _resized(quilt.view(number), max(1, round(shown)), max(1, round(shown / aspect)))
+
+
+def quilt_of_video(quilt: Quilt) -> FloatArray:
+    """The views of a quilt side by side, in linear light, at most :data:`WIDEST_QUILT` pixels wide and high."""
+    width, height = quilt.view_size
+    columns, rows = quilt.layout[:2]
+    shrink = min(1.0, WIDEST_QUILT / (columns * width), WIDEST_QUILT / (rows * height))
+    size = max(1, int(width * shrink)), max(1, int(height * shrink))
+    small = Quilt(np.empty((size[1] * rows, size[0] * columns, 3), dtype=np.float32), quilt.layout)
+    for number in range(quilt.layout.views):
+        small.view_values(number)[...] = _resized(quilt.view(number), *size)
+    return small.pixels
+
+
+def _resized(pixels: FloatArray, width: int, height: int) -> FloatArray:
+    """Linear RGB in another size: each pixel the mean of what it covers."""
+    from PIL import Image
+
+    if pixels.shape[:2] == (height, width):
+        return pixels
+    planes = [
+        np.asarray(Image.fromarray(pixels[..., channel]).resize((width, height), Image.Resampling.BOX), np.float32)
+        for channel in range(3)
+    ]
+    return np.stack(planes, axis=-1)
 
 
 def quilt_of(image: IntegralImage, layout: QuiltLayout, eye: Eye | None = None) -> Quilt:

@@ -8,10 +8,12 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
+from lippmann.cli.commands import sequence
 from lippmann.cli.shared import options, parse
 from lippmann.cli.shared.console import Console, estimate_in_words
 from lippmann.cli.shared.picture_report import add_seconds, depth_line, report
 from lippmann.cli.shared.scene_source import SceneSource
+from lippmann.errors import UsageError
 from lippmann.progress import Progress, ProgressCallback
 
 if TYPE_CHECKING:
@@ -32,7 +34,8 @@ Output = Annotated[
     typer.Option(
         "--output",
         "-o",
-        help="The quilt to write: NAME_qsCOLUMNSxROWSaASPECT.png, .exr or .tif. By default the scene's name, here.",
+        help="The quilt to write: NAME_qsCOLUMNSxROWSaASPECT.png, .exr or .tif. By default the scene's name, here. "
+        "Of a sequence a folder, or a name with %04d.",
         show_default=False,
     ),
 ]
@@ -86,6 +89,17 @@ def render(
     allow_outside: options.AllowOutside = False,
     single_scattering: options.SingleScattering = False,
     bits: options.Bits = None,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Of a sequence: keep the frames that an interrupted run finished.")
+    ] = False,
+    frames: sequence.Frames = None,
+    fps: sequence.Fps = None,
+    animation: sequence.Animation = None,
+    camera_path: sequence.CameraPath = None,
+    turntable: sequence.TurntableFrames = None,
+    swing: sequence.Swing = None,
+    video: sequence.Video = None,
+    eye: sequence.Eye = None,
     device: options.Device = "auto",
     threads: options.Threads = None,
     memory: options.Memory = None,
@@ -103,9 +117,14 @@ def render(
     target = load_device(display)
     grid = None if views is None else parse.size(views, "--views", rule="columns x rows, such as 8x6")
     wanted = quilt_of_display(target, grid, None if size is None else parse.size(size, "--size"))
-    path = output or Path(f"{Path(scene).stem}{wanted.layout.ending}.png")
-    _check_name(path, wanted.layout.ending)
-    check_output(path, format_for(path, bits)[0])
+    moving = sequence.Wanted(frames, fps, animation, camera_path, turntable, swing, video, eye)
+    path = output or Path(f"{Path(scene).stem}{'' if moving else f'{wanted.layout.ending}.png'}")
+    if not moving or (path.suffix and not path.is_dir()):
+        _check_name(path, wanted.layout.ending)
+    if not moving:
+        if resume:
+            raise UsageError("a quilt is rendered in one piece", where="--resume", fix="leave it out")
+        check_output(path, format_for(path, bits)[0])
     request = RenderRequest(
         method=method,
         integrator=integrator,
@@ -125,6 +144,12 @@ def render(
         memory=parse.memory(memory),
     )
     source = SceneSource(scene, environment, parse.color(background), allow_outside, single_scattering)
+    if moving:
+        from lippmann.sequences.forms import QuiltForm
+
+        files = sequence.Files(path, bits, None, resume)
+        sequence.render_frames(source, target, request, moving, files, console, form=QuiltForm(wanted))
+        return
     with console.progress() as progress:
         started = time.perf_counter()
         loaded = source.load()

@@ -97,6 +97,8 @@ def render(
     fps: sequence.Fps = None,
     animation: sequence.Animation = None,
     camera_path: sequence.CameraPath = None,
+    turntable: sequence.TurntableFrames = None,
+    swing: sequence.Swing = None,
     video: sequence.Video = None,
     eye: sequence.Eye = None,
     device: options.Device = "auto",
@@ -123,7 +125,8 @@ def render(
         index=index,
         field=field,
     )
-    margin = printing.margin_of(marks, target, in_frames=frames is not None)
+    wanted = sequence.Wanted(frames, fps, animation, camera_path, turntable, swing, video, eye)
+    margin = printing.margin_of(marks, target, in_frames=bool(wanted))
     request = RenderRequest(
         method=method,
         order=order,
@@ -147,12 +150,11 @@ def render(
         memory=parse.memory(memory),
     )
     source = SceneSource(scene, environment, parse.color(background), allow_outside, single_scattering)
-    wanted = sequence.Wanted(frames, fps, animation, camera_path, video, eye)
     on_cluster = clusters.ClusterOptions(cluster, tls_ca, tls_cert, tls_key)
     if wanted:
         files = sequence.Files(output, bits, maps, resume)
         with on_cluster.runner(console, threads) as runner:
-            sequence.render_frames(source, target, request, wanted, files, console, runner)
+            sequence.render_frames(source, target, request, wanted, files, console, runner=runner)
         return
     name, _ = format_for(output, bits)
     _check_layers(layers, name, output)

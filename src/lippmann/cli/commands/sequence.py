@@ -1,4 +1,4 @@
-"""``lippmann render --frames``: a scene that moves becomes numbered pictures, and a film of them."""
+"""Sequences: a scene that moves, or turns on a turntable, becomes numbered pictures or quilts, and a film of them."""
 
 from __future__ import annotations
 
@@ -23,7 +23,10 @@ if TYPE_CHECKING:
     from lippmann.progress import ProgressCallback
     from lippmann.rendering.request.render_request import RenderRequest
     from lippmann.sequences.files import SavedFrame
+    from lippmann.sequences.films import FilmEye, Filming
+    from lippmann.sequences.forms import Form
     from lippmann.sequences.frames import FrameRange
+    from lippmann.sequences.motion import Motion
     from lippmann.tiles.tiled_render import Runner
 
 Frames = Annotated[
@@ -34,12 +37,29 @@ Frames = Annotated[
         "The output is then a folder or a name with %04d.",
     ),
 ]
-Fps = Annotated[float | None, typer.Option("--fps", help="Frames per second of an animation and of its film; 24.")]
+Fps = Annotated[float | None, typer.Option("--fps", help="Frames per second of an animation and of the film; 24.")]
 Animation = Annotated[
     str | None, typer.Option("--animation", help="A glTF file's animation by name; its first by default.")
 ]
 CameraPath = Annotated[
     Path | None, typer.Option("--camera-path", help="Fly through a Tachyon or NFF scene along this .cam file.")
+]
+TurntableFrames = Annotated[
+    int | None,
+    typer.Option(
+        "--turntable",
+        help="Render so many frames of a whole turn of the scene about its upright axis, before a display and light "
+        "at rest. The output is a folder or a name with %04d.",
+        show_default=False,
+    ),
+]
+Swing = Annotated[
+    float | None,
+    typer.Option(
+        "--swing",
+        help="Swing the scene to and fro by so many degrees in all, instead of a whole turn.",
+        show_default=False,
+    ),
 ]
 Video = Annotated[
     Path | None,
@@ -50,24 +70,36 @@ Video = Annotated[
     ),
 ]
 Eye = Annotated[
-    str | None, typer.Option("--eye", help="Where the film's eye is: X,Y,Z in mm, z toward the viewer; central.")
+    str | None,
+    typer.Option(
+        "--eye",
+        help="Where the film's eye is: X,Y,Z in mm, z toward the viewer; central. Of quilts also 'sweep': the eye goes "
+        "to and fro across their views.",
+    ),
 ]
 
 _NUMBER = re.compile(r"%(?:0(\d{1,2}))?d")
 _NUMERAL = re.compile(r"[\d.]+")
-_FOLDER_PATTERN = "frame_%04d.png"
+_FOLDER_PATTERN = "frame_%04d"
 
 
 @dataclass(frozen=True)
 class Wanted:
-    """What ``--frames`` and the options beside it ask for; ``frames`` None is a single picture at rest."""
+    """What ``--frames``, ``--turntable``, ``--swing`` and the options beside them ask for; else a picture at rest."""
 
     frames: str | None
     fps: float | None
     animation: str | None
     camera_path: Path | None
+    turntable: int | None
+    swing: float | None
     video: Path | None
     eye: str | None
+
+    @property
+    def turns(self) -> bool:
+        """Whether the scene stands on a turntable."""
+        return self.turntable is not None or self.swing is not None
 
     def __bool__(self) -> bool:
         """Whether a sequence is wanted.
@@ -77,12 +109,23 @@ class Wanted:
         UsageError
             An option is given that means nothing without one.
         """
+        if self.turns:
+            for option in ("animation", "camera_path"):
+                if getattr(self, option) is not None:
+                    raise UsageError(
+                        "a scene on a turntable moves in no other way",
+                        where=f"--{option.replace('_', '-')}",
+                        fix="leave it out",
+                    )
+            return True
         if self.frames is not None:
             return True
         for option in ("fps", "animation", "camera_path", "video", "eye"):
             if getattr(self, option) is not None:
                 name = f"--{option.replace('_', '-')}"
-                raise UsageError("has no meaning for a single picture", where=name, fix="add --frames 0:48")
+                raise UsageError(
+                    "has no meaning for a single picture", where=name, fix="add --frames 0:48, or --turntable 48"
+                )
         return False
 
 
@@ -103,42 +146,33 @@ def render_frames(
     wanted: Wanted,
     files: Files,
     console: Console,
-    runner: Runner | None,
+    *,
+    form: Form[Any] | None = None,
+    runner: Runner | None = None,
 ) -> None:
-    """Render and write all frames."""
-    from lippmann.image import read_picture
+    """Render and write all frames: quilts of a given ``form``, or without one integral images."""
     from lippmann.image.write import format_for
     from lippmann.journal.tile_journal import sweep_beside
     from lippmann.sequences.files import saved_sequence
-    from lippmann.sequences.frames import open_motion
+    from lippmann.sequences.forms import INTEGRAL, QuiltForm
     from lippmann.sequences.motion import FRAMES_PER_SECOND
     from lippmann.viewing.video_file import write_animation
-    from lippmann.viewing.video_frames import projection_of
 
-    flying = wanted.camera_path is not None
-    if flying and wanted.fps is not None and wanted.video is None:
-        raise UsageError("a camera path has one pose a frame", where="--fps", fix="leave it out, or add --video")
+    if (wanted.camera_path is not None or wanted.turns) and wanted.fps is not None and wanted.video is None:
+        what = "a turn" if wanted.turns else "a camera path"
+        raise UsageError(f"{what} has one pose a frame", where="--fps", fix="leave it out, or add --video")
     if wanted.fps is not None and not 0.001 <= wanted.fps <= 1000:
         raise UsageError(f"{wanted.fps:g} frames per second", where="--fps", rule="0.001 to 1000")
     if wanted.eye is not None and wanted.video is None:
         raise UsageError("nobody looks", where="--eye", fix="add --video FILE.mp4, or leave it out")
-    chosen = frame_range(wanted.frames or "")
-    eye = None if wanted.eye is None else parse.triple(wanted.eye, "--eye")
-    projection = None if wanted.video is None else projection_of(wanted.video, eye)
+    chosen = frame_range(wanted.frames or ":")
     output = files.output
-    motion = open_motion(
-        source.name,
-        fps=None if flying else wanted.fps,
-        animation=wanted.animation,
-        camera_path=wanted.camera_path,
-        environment=source.environment,
-        background=source.background,
-        allow_outside=source.allow_outside,
-        multiple_scattering=not source.single_scattering,
-    )
+    motion = _open(source, wanted, request)
     frames = chosen.of(motion)
-    path_of = numbered(output, len(frames))
+    ending = form.quilt.layout.ending if isinstance(form, QuiltForm) else ""
+    path_of = numbered(output, len(frames), ending)
     name, _ = format_for(path_of(frames[0]), files.bits)
+    filming = _filming(wanted, motion, display, request, form, len(frames))
     if files.maps is not None:
         raise UsageError("a sequence writes no pictures of its maps", where="--maps", fix="leave it out")
     if request.layers and name != "exr":
@@ -175,6 +209,7 @@ def render_frames(
             display,
             frames,
             request,
+            form=form or INTEGRAL,
             resume=files.resume,
             bits=files.bits,
             runner=runner,
@@ -182,18 +217,17 @@ def render_frames(
         ) as saved,
     ):
         noted_frames = map(noted, saved)
-        if projection is None or wanted.video is None:
+        if filming is None or wanted.video is None:
             deque(noted_frames, maxlen=0)
         else:
             sweep_beside(wanted.video)
-            # The film shows what the files hold, whether they were rendered now or before an interruption.
-            images = (read_picture(frame.path) for frame in noted_frames)
-            first = next(images)
+            shots = map(filming, noted_frames)
+            first = next(shots)
             write_animation(
-                map(projection, chain([first], images)),
+                (shot.pixels for shot in chain([first], shots)),
                 wanted.video,
                 frames_per_second=wanted.fps or FRAMES_PER_SECOND,
-                transfer=first.provenance.transfer,
+                transfer=first.transfer,
             )
     for alike in notes.values():
         only = f" ({len(alike)} of {len(done)} frames)" if len(alike) < len(done) else ""
@@ -205,6 +239,62 @@ def render_frames(
         {"output": str(output), "frames": done, "video": None if wanted.video is None else str(wanted.video)},
         f"{done[0]['output']} to {Path(done[-1]['output']).name}{film}: {len(done)} frames{before}, {seconds:.1f} s",
     )
+
+
+def _open(source: SceneSource, wanted: Wanted, request: RenderRequest) -> Motion:
+    """What moves."""
+    if wanted.turns:
+        from lippmann.runtime import engine
+        from lippmann.scene.placement import PlacementOptions
+        from lippmann.sequences.turntable import open_turntable
+
+        # A scene of Mitsuba's tells its box only once the engine runs, and that on the device that was asked for.
+        engine.start(request.device, request.threads)
+        placement = request.placement if isinstance(request.placement, PlacementOptions) else None
+        return open_turntable(
+            source.load(),
+            wanted.turntable,
+            swing=wanted.swing,
+            placement=placement,
+            classic=request.integrator == "classic",
+        )
+    from lippmann.sequences.motion import open_motion
+
+    return open_motion(
+        source.name,
+        fps=None if wanted.camera_path is not None else wanted.fps,
+        animation=wanted.animation,
+        camera_path=wanted.camera_path,
+        environment=source.environment,
+        background=source.background,
+        allow_outside=source.allow_outside,
+        multiple_scattering=not source.single_scattering,
+    )
+
+
+def _filming(
+    wanted: Wanted, motion: Motion, display: Display, request: RenderRequest, form: Form[Any] | None, count: int
+) -> Filming | None:
+    """What the film shows of each frame."""
+    if wanted.video is None:
+        return None
+    from lippmann.sequences.films import film_of_pictures, film_of_quilts
+    from lippmann.sequences.forms import QuiltForm
+
+    if isinstance(form, QuiltForm):
+        return film_of_quilts(wanted.video, display, form, _eye(wanted.eye), count)
+    eye = None if wanted.eye is None else parse.triple(wanted.eye, "--eye")
+    return film_of_pictures(wanted.video, motion, display, request, eye)
+
+
+def _eye(text: str | None) -> FilmEye:
+    """The eye of a film of quilts."""
+    if text is None or text == "sweep":
+        return text  # type: ignore[return-value]
+    x, y, z = parse.triple(text, "--eye")
+    if z <= 0.0:
+        raise UsageError(f"an eye at z = {z:g}", where="--eye", rule="z is toward the viewer, above 0 mm")
+    return x, y, z
 
 
 @contextmanager
@@ -243,8 +333,10 @@ def frame_range(text: str) -> FrameRange:
     return FrameRange(int(match[2] or 0), int(match[3]) if match[3] else None, int(match[4] or 1))
 
 
-def numbered(output: Path, frames: int) -> Callable[[int], Path]:
+def numbered(output: Path, frames: int, ending: str = "") -> Callable[[int], Path]:
     """Where each frame goes: ``output`` has one ``%d`` or ``%04d`` in its name, or is a folder.
+
+    The stems of the files in a folder end in ``ending``.
 
     Raises
     ------
@@ -257,10 +349,11 @@ def numbered(output: Path, frames: int) -> Callable[[int], Path]:
             raise OutputError("the frames' numbers have no clear place", where=str(output), rule="one %d or %04d")
         return lambda number: output.with_name(_NUMBER.sub(lambda m: f"{number:0{m[1] or 1}}", name))
     if output.is_dir() or not output.suffix:
-        return lambda number: output / (_FOLDER_PATTERN % number)
+        return lambda number: output / f"{_FOLDER_PATTERN % number}{ending}.png"
     if frames == 1:
         return lambda number: output
-    fix = f"{output.stem}_%04d{output.suffix}, or a folder"
+    stem = output.stem.removesuffix(ending)
+    fix = f"{stem}_%04d{ending}{output.suffix}, or a folder"
     raise OutputError(f"this is one name for {frames} frames", where=str(output), fix=fix)
 
 

@@ -1,0 +1,172 @@
+"""A scene on a turntable: the axis that it turns about, the scene at an angle, and the space that it sweeps.
+
+The display and all light stand still. A scene of meshes turns by the places of its meshes. The shapes of a scene for
+the classic light models keep their places, since some of them (boxes along the axes) cannot turn. There the display and
+the light sources go round the other way, which gives the same picture.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lippmann.scene.camera_placement import remove_scale
+from lippmann.scene.matrices import Bounds, Vector, inverse, rotation, transform_points, translation
+from lippmann.scene.placement import PlacementOptions, face_viewer
+from lippmann.scene.scene import Scene
+from lippmann.scene.values.description import Matrix, SceneDescription
+from lippmann.scene.values.whitted_lighting import Background, ClassicLight
+from lippmann.scene.values.whitted_scene import ClassicScene
+from lippmann.scene.whitted.world_frame import world_from_scene
+
+#: Steps (degrees) in which the outline of a scene and the space that it sweeps are measured. A circle's radius is exact
+#: to 0.1 %.
+STEP = 5.0
+
+#: How much more upright than y another axis has to be to be preferred: ties go to y.
+_TIE = 1e-6
+
+
+def turn_about(axis: Vector, center: Vector | Bounds, degrees: float) -> Matrix:
+    """The rotation ``(4, 4)`` by ``degrees`` (right-handed) about the line along the unit vector ``axis``."""
+    angle, along = np.radians(degrees), np.asarray(axis, np.float64)
+    cross = np.cross(np.eye(3), along)
+    matrix = np.eye(4)
+    matrix[:3, :3] = np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * (cross @ cross)
+    return np.asarray(translation(center) @ matrix @ translation(-np.asarray(center)), np.float64)
+
+
+def turning_axis(scene: Scene, options: PlacementOptions) -> Vector:
+    """The axis of the scene's own frame that stands most upright before the viewer, pointing up: a unit vector.
+
+    A model that ``options.turn`` or a camera shows from above thus turns as on a table that is seen from above.
+
+    Raises
+    ------
+    SceneError
+        The camera that the options name is not there.
+    """
+    if options.mode == "camera" or options.camera is not None:
+        frame = remove_scale(scene.camera(options.camera))[:3, :3]
+        display_from_world = rotation(options.turn)[:3, :3] @ frame.T
+    elif options.mode == "display":
+        display_from_world = rotation(options.turn)[:3, :3]
+    else:
+        display_from_world = rotation(face_viewer(scene.bounds, options, []).turn)[:3, :3]
+    up = display_from_world[1]
+    upright = int(np.argmax(np.abs(up) + np.array([0.0, _TIE, 0.0])))
+    axis = [0.0, 0.0, 0.0]
+    axis[upright] = float(np.copysign(1.0, up[upright]))
+    return axis[0], axis[1], axis[2]
+
+
+def moves_meshes(scene: Scene) -> bool:
+    """Whether a scene turns by itself; otherwise the display goes round it, by :func:`with_lights_moved`."""
+    return isinstance(scene.description, SceneDescription)
+
+
+def with_meshes_moved(scene: Scene, matrix: Matrix) -> Scene:
+    """The scene with its meshes moved by a rigid ``matrix`` (4x4, world from world); light and cameras stay."""
+    description = scene.description
+    assert isinstance(description, SceneDescription)
+    instances = [
+        replace(instance, world_from_mesh=matrix @ np.asarray(instance.world_from_mesh, np.float64))
+        for instance in description.instances
+    ]
+    # A form for the classic light models would not have turned.
+    return replace(scene, description=replace(description, instances=instances), classic=None)
+
+
+def with_lights_moved(scene: Scene, matrix: Matrix) -> Scene:
+    """The scene with its light sources, environment and background moved by a rigid ``matrix``; its shapes stay.
+
+    Light sources in a scene of Mitsuba's are parts of it and stay, too; an environment that was given instead moves.
+    """
+    if scene.description is None:
+        assert scene.classic is not None
+        return replace(scene, classic=_classic_lights_moved(scene.classic, matrix))
+    environment = scene.description.environment
+    if environment is None:
+        return scene
+    turned = replace(environment, world_from_environment=_turn_of(matrix) @ environment.world_from_environment)
+    return replace(scene, description=replace(scene.description, environment=turned))
+
+
+def outline(scene: Scene, axis: Vector, center: Vector | Bounds) -> Bounds:
+    """Points ``(n, 3)`` whose convex hull, a prism along ``axis``, is the least one of so many sides about the scene.
+
+    Its sides, in steps of :data:`STEP` about the axis, touch the scene.
+    """
+    upright = _frame_along(axis) @ translation(-np.asarray(center))
+    quarter = np.arange(0.0, 90.0, STEP)
+    # The box in a frame that is turned by an angle touches the scene on four sides, a quarter turn apart.
+    boxes = np.stack([scene.bounds_in(turn_about((0.0, 1.0, 0.0), (0.0, 0.0, 0.0), -a) @ upright) for a in quarter])
+    low, high = boxes[:, 0], boxes[:, 1]
+    # Distances of the sides, whose normals are (sin b, 0, cos b) at b = 0, STEP, ... degrees.
+    distances = np.concatenate([high[:, 2], high[:, 0], -low[:, 2], -low[:, 0]])
+    normal = np.radians(np.arange(0.0, 360.0, STEP))
+    half = np.radians(STEP / 2.0)
+    ahead = np.roll(distances, -1)
+    along = (distances + ahead) / 2.0 / np.cos(half)
+    aside = (ahead - distances) / 2.0 / np.sin(half)
+    x = along * np.sin(normal + half) + aside * np.cos(normal + half)
+    z = along * np.cos(normal + half) - aside * np.sin(normal + half)
+    points = np.concatenate([np.stack([x, np.full_like(x, y), z], axis=1) for y in (low[0, 1], high[0, 1])])
+    return transform_points(inverse(upright), points)
+
+
+def swept_points(scene: Scene, axis: Vector, center: Vector | Bounds, angles: Iterable[float]) -> Bounds:
+    """Points ``(n, 3)`` whose convex hull is about the scene at all of ``angles`` (degrees)."""
+    points = outline(scene, axis, center)
+    return np.concatenate([transform_points(turn_about(axis, center, angle), points) for angle in angles])
+
+
+def _frame_along(axis: Vector) -> Matrix:
+    """A rotation ``(4, 4)`` that brings ``axis`` to +y."""
+    up = np.asarray(axis, np.float64)
+    least = np.eye(3)[int(np.argmin(np.abs(up)))]
+    right = np.cross(up, least)
+    right /= np.linalg.norm(right)
+    matrix = np.eye(4)
+    matrix[:3, :3] = np.stack([right, up, np.cross(right, up)])
+    return matrix
+
+
+def _turn_of(matrix: Matrix) -> Matrix:
+    turn = np.eye(4)
+    turn[:3, :3] = matrix[:3, :3]
+    return turn
+
+
+def _classic_lights_moved(scene: ClassicScene, matrix: Matrix) -> ClassicScene:
+    """``matrix`` moves in the world, whose z the scene's own numbers may have negated."""
+    mirror = world_from_scene(scene)
+    own = mirror @ matrix @ mirror
+    lights = tuple(_light_moved(light, own) for light in scene.lights)
+    return replace(scene, lights=lights, background=_background_moved(scene.background, own))
+
+
+def _light_moved(light: ClassicLight, matrix: Matrix) -> ClassicLight:
+    center = transform_points(matrix, np.asarray([light.center], np.float64))[0]
+    direction = matrix[:3, :3] @ np.asarray(light.direction, np.float64)
+    return replace(light, center=_vector(center), direction=_vector(direction))
+
+
+def _background_moved(background: Background, matrix: Matrix) -> Background:
+    up = matrix[:3, :3] @ np.asarray(background.up, np.float64)
+    # A gradient over a plane is told by places, which move along.
+    offset = float(up @ matrix[:3, 3]) if background.kind == "sky-plane" else 0.0
+    return replace(
+        background,
+        up=_vector(up),
+        top_value=background.top_value + offset,
+        bottom_value=background.bottom_value + offset,
+    )
+
+
+def _vector(values: NDArray[np.float64]) -> Vector:
+    x, y, z = values.tolist()
+    return x, y, z

@@ -1,0 +1,110 @@
+"""What the frames of a sequence are: integral images, or quilts."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Generic, TypeVar
+
+from lippmann.display import Display
+from lippmann.image import IntegralImage
+from lippmann.image.provenance import Provenance
+from lippmann.image.read import read_metadata, read_picture
+from lippmann.progress import ProgressCallback
+from lippmann.quilts.files import read_quilt, write_quilt
+from lippmann.quilts.quilt import DeviceQuilt, Quilt
+from lippmann.rendering.request.render_request import RenderRequest
+from lippmann.scene.scene import Scene
+
+#: An integral image, or a quilt.
+Shown = TypeVar("Shown", IntegralImage, Quilt)
+
+
+class Form(ABC, Generic[Shown]):
+    """How a frame is rendered, written and read."""
+
+    @property
+    @abstractmethod
+    def settings(self) -> Mapping[str, str]:
+        """What an unfinished sequence has to agree in with one that goes on with it, besides the render's request."""
+
+    @abstractmethod
+    def render(self, scene: Scene, display: Display, request: RenderRequest, progress: ProgressCallback) -> Shown:
+        """Render a frame; errors as of the renderer."""
+
+    @abstractmethod
+    def write(self, frame: Shown, path: Path, bits: int | None) -> None:
+        """Write a frame to a file, with so many bits per value."""
+
+    @abstractmethod
+    def read(self, path: Path) -> Shown:
+        """Read a frame that was written."""
+
+    @abstractmethod
+    def provenance(self, path: Path) -> Provenance:
+        """How the frame in a file was made, as far as the file tells."""
+
+
+class IntegralForm(Form[IntegralImage]):
+    """Native pictures of a display."""
+
+    @property
+    def settings(self) -> Mapping[str, str]:
+        return {}
+
+    def render(
+        self, scene: Scene, display: Display, request: RenderRequest, progress: ProgressCallback
+    ) -> IntegralImage:
+        from lippmann.rendering.picture import render_picture
+
+        return render_picture(scene, display, request, progress)
+
+    def write(self, frame: IntegralImage, path: Path, bits: int | None) -> None:
+        frame.save(path, bits=bits)
+
+    def read(self, path: Path) -> IntegralImage:
+        return read_picture(path)
+
+    def provenance(self, path: Path) -> Provenance:
+        return read_metadata(path).provenance
+
+
+@dataclass(frozen=True)
+class QuiltForm(Form[Quilt]):
+    """Quilts of one size and layout.
+
+    Parameters
+    ----------
+    quilt:
+        As :func:`lippmann.quilts.quilt.quilt_of_display` gives it.
+    """
+
+    quilt: DeviceQuilt
+
+    @property
+    def settings(self) -> Mapping[str, str]:
+        layout, size = self.quilt.layout, (self.quilt.width, self.quilt.height)
+        return {"the quilt": f"{layout.columns}x{layout.rows} views, {size[0]}x{size[1]} pixels"}
+
+    def render(self, scene: Scene, display: Display, request: RenderRequest, progress: ProgressCallback) -> Quilt:
+        from lippmann.rendering.quilt import render_quilt
+
+        layout = self.quilt.layout
+        grid, size = (layout.columns, layout.rows), (self.quilt.width, self.quilt.height)
+        frame = render_quilt(scene, display, grid, size, request, progress)
+        return Quilt(frame.pixels, layout, provenance=frame.provenance)
+
+    def write(self, frame: Quilt, path: Path, bits: int | None) -> None:
+        write_quilt(frame, path, bits=bits)
+
+    def read(self, path: Path) -> Quilt:
+        return read_quilt(path)
+
+    def provenance(self, path: Path) -> Provenance:
+        # A quilt's file holds nothing but its pixels.
+        return Provenance()
+
+
+INTEGRAL = IntegralForm()
