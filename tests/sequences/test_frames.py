@@ -90,7 +90,7 @@ def test_a_frame_alone_is_the_same_as_among_others(engine, moving_ball):
 
 def test_frames_are_rendered_in_tiles_too(engine, moving_ball, tmp_path):
     motion = open_motion(moving_ball)
-    options = {"integrator": "direct", "spp": 1, "device": "cpu"}
+    options = {"integrator": "direct", "method": "full", "spp": 1, "device": "cpu"}
     (whole,) = (image for _, image in render_sequence(motion, frames=[3], **options))
     made = dict(sequence_to_files(motion, lambda frame: tmp_path / f"{frame}.exr", frames=[3], bits=32, **options))
     assert made[3].tiles > 1
@@ -108,7 +108,7 @@ def test_nothing_is_compiled_for_later_frames(engine, moving_ball, room, kind, m
     from lippmann.rendering.film import sample_batches
 
     motion = open_motion(moving_ball) if kind == "animation" else open_motion(room[0], camera_path=room[1])
-    options = {"integrator": "direct"} if kind == "animation" else {}
+    options = {"integrator": "direct", "method": "full"} if kind == "animation" else {}
     kernels: list[set[object]] = []
 
     def look() -> float:
@@ -126,7 +126,7 @@ def test_nothing_is_compiled_for_later_frames(engine, moving_ball, room, kind, m
 
 def test_what_was_chosen_for_the_first_frame_holds(engine, moving_ball):
     images = render_sequence(open_motion(moving_ball), frames=[0, 1], integrator="direct", spp=1, device="cpu")
-    assert [image.provenance.method for _, image in images] == ["full", "full"]
+    assert [image.provenance.method for _, image in images] == ["pooled", "pooled"]
 
 
 @pytest.mark.parametrize(
