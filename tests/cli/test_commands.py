@@ -126,7 +126,7 @@ def test_a_sweep_is_an_animation(lippmann, picture, tmp_path, ending):
 
 
 def test_preview_renders_the_plain_picture(lippmann, tmp_path, engine):
-    done = lippmann("preview", "teapot", "--spp", 1, "--size", "40x30", "-o", tmp_path / "p.png", "--json")
+    done = lippmann("preview", "teapot", "--plain", "--spp", 1, "--pixels", "40x30", "-o", tmp_path / "p.png", "--json")
     assert done.json["rays"]["primary"] == 1200
     assert picture_size(tmp_path / "p.png") == (40, 30)
 

@@ -39,8 +39,8 @@ def lippmann(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
     "words",
     [
         ("doctor",),
-        ("preview", "teapot", "--size", "16x16", "--spp", "1", "-o", "x.png"),
-        ("preview", "scene.xml", "--size", "16x16", "--spp", "1", "-o", "x.png"),
+        ("preview", "teapot", "--pixels", "16x16", "--spp", "1", "-o", "x.png"),
+        ("preview", "scene.xml", "--plain", "--pixels", "16x16", "--spp", "1", "-o", "x.png"),
     ],
     ids=("doctor", "bundled scene", "scene file"),
 )

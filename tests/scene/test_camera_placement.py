@@ -8,8 +8,10 @@ import pytest
 from lippmann import api
 from lippmann.display import load_display
 from lippmann.errors import UsageError
-from lippmann.scene.camera_placement import VisibleDepth, place_by_camera
+from lippmann.scene.camera_placement import FILL, VisibleDepth, place_by_camera
 from lippmann.scene.matrices import inverse
+from lippmann.scene.placement import PlacementOptions, place
+from lippmann.scene.scene import box_corners
 from lippmann.scene.values.description import Camera, Instance, Light, Material, Mesh, SceneDescription
 
 BOUNDS = np.array([[-5.0, -5.0, -30.0], [5.0, 5.0, -1.0]])
@@ -108,3 +110,43 @@ def test_what_a_camera_sees_near_the_eye_is_not_cut_off(engine):
     image = api.render(steps_scene(), DISPLAY, placement=options, spp=1, integrator="depth", method="full")
     assert any("the lens plane moved" in note for note in image.provenance.notes)
     assert (image.world_from_display[2, 3], 6.0) == pytest.approx((-6.2, 6.0), abs=0.05)
+
+
+class TestFraming:
+    """A home camera that may move: all of its picture is seen, and a scene within it is large."""
+
+    CAMERA = Camera("home", np.eye(4), fov_y=0.6, focus_distance=20.0)
+    DISPLAYS = ("looking-glass-portrait", "panel-4k", "print-60lpi", "mla-hexagonal")
+
+    @staticmethod
+    def seen(bounds, display, **options):
+        """Extent of a scene on the panel, as the viewing point sees it, in shares of the panel: lowest and highest."""
+        placed = place(bounds, display, cameras=[TestFraming.CAMERA], home_camera="home", **options)
+        points = box_corners(bounds) @ placed.display_from_world[:3, :3].T + placed.display_from_world[:3, 3]
+        places = points[:, :2] / (1 - points[:, 2:] / display.viewing_distance) / display.size_mm
+        return places.min(axis=0), places.max(axis=0)
+
+    @pytest.mark.parametrize("name", DISPLAYS)
+    def test_a_part_of_the_picture_fills_the_panel(self, name):
+        bounds = np.array([[1.0, 0.5, -20.5], [3.0, 1.5, -19.5]])
+        low, high = self.seen(bounds, load_display(name), contains_home=True)
+        assert (high - low).max() == pytest.approx(FILL, abs=0.005)
+        assert low + high == pytest.approx([0, 0], abs=0.01)
+
+    @pytest.mark.parametrize("name", DISPLAYS)
+    def test_more_than_the_picture_shows_all_of_the_picture(self, name):
+        reach = 20.0 * np.tan(0.3)
+        picture = np.array([[-reach, -reach, -20.0], [reach, reach, -20.0]])
+        beyond = np.array([[-30.0, -30.0, -20.0], [30.0, 30.0, -20.0]])
+        display = load_display(name)
+        low, high = self.seen(beyond, display, contains_home=True)
+        shown = (high - low) * np.ptp(picture, axis=0)[:2] / np.ptp(beyond, axis=0)[:2]
+        assert shown.max() <= 1 + 1e-9
+        exact = self.seen(beyond, display)
+        assert (high - low).max() <= (exact[1] - exact[0]).max() + 1e-9
+
+    def test_a_placement_that_was_asked_for_is_kept(self):
+        bounds, display = np.array([[1.0, 0.5, -20.5], [3.0, 1.5, -19.5]]), load_display("panel-4k")
+        asked = PlacementOptions(camera="home")
+        kept = self.seen(bounds, display, contains_home=True, options=asked)
+        assert np.allclose(kept, self.seen(bounds, display, options=asked))

@@ -62,4 +62,4 @@ def render_preview(
     plan = make_plan(*size, request.samples, memory=session.memory)
     frame = trace_frame(integrator, source, plan, seed=request.seed, box_filter=request.box_filter, progress=progress)
     options = {"pixel_filter": request.pixel_filter, "camera": pose.name}
-    return Preview(frame.pixels, session.provenance(frame, samples=request.samples, options=options))
+    return Preview(request.shown(frame.pixels), session.provenance(frame, samples=request.samples, options=options))

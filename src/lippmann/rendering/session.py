@@ -111,6 +111,7 @@ class Session:
                 cameras=scene.cameras,
                 options=placement,
                 home_camera=scene.display_camera,
+                contains_home=scene.home_may_move,
                 bounds_in=scene.bounds_in,
                 extreme_points=lambda: scene.extreme_points,
                 is_unbounded=scene.is_unbounded,

@@ -22,6 +22,9 @@ from lippmann.scene.values.description import Camera, Matrix
 _UNITS_PER_MM = (1e-30, 1e30)
 #: Share by which the nearest surface stays behind the beginning of the recorded rays.
 _MARGIN = 1e-3
+#: Share of the panel that a scene is enlarged to, the least that is left as it is, and how often that is repeated:
+#: nearer parts grow faster than farther ones.
+FILL, _LEAST_FILL, _FRAMINGS = 0.95, 0.85, 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,6 +178,47 @@ def _units_per_mm(camera: Camera, focus: float, display: Display) -> float:
     if not (np.isfinite(height) and height > 0.0 and camera.aspect > 0.0):
         raise SceneError(f"camera '{camera.name}' has a field {height:g} high", parameter="camera", rule="above 0")
     return min(height * camera.aspect / display.size_mm[0], height / display.size_mm[1])
+
+
+def frame_whole(camera: Camera, points: Bounds, display: Display) -> Matrix:
+    """The change ``(4, 4)`` in a display's frame after which the panel shows all that a camera shows.
+
+    Seen from the viewing point, all of the camera's picture then lies on the panel. A scene of which that is only a
+    part, such as a teapot on its table, is enlarged until it fills the panel, and centred.
+
+    Parameters
+    ----------
+    points:
+        ``(n, 3)``: the scene's extreme points in the frame of the display as :func:`place_by_camera` places it.
+    """
+    panel = np.array(display.size_mm)
+    change = scaling(_share_contained(camera, display))
+    for step in range(_FRAMINGS):
+        placed = transform_points(change, points)
+        if (placed[:, 2] >= display.viewing_distance).any():
+            return change
+        seen = placed[:, :2] / (1.0 - placed[:, 2:] / display.viewing_distance)
+        low, high = seen.min(axis=0), seen.max(axis=0)
+        is_whole = (np.maximum(-low, high) <= panel / 2.0).all()
+        fill = float(((high - low) / panel).max())
+        if step == 0 and (not is_whole or fill >= _LEAST_FILL):
+            return change
+        middle = (low + high) / 2.0
+        change = scaling(FILL / fill) @ translation((-middle[0], -middle[1], 0.0)) @ change
+    return change
+
+
+def _share_contained(camera: Camera, display: Display) -> float:
+    """The scale, at most 1, at which all of a camera's picture is seen on the panel, from the viewing point."""
+    if camera.fov_y is None:
+        return 1.0
+    slope = float(np.tan(camera.fov_y / 2.0))
+    width, height = display.size_mm
+    if np.isfinite(display.viewing_distance):
+        reach = 2.0 * display.viewing_distance * slope
+        return min(1.0, width / (reach * camera.aspect), height / reach)
+    shares = width / camera.aspect, height
+    return min(shares) / max(shares)
 
 
 def remove_scale(camera: Camera) -> Matrix:

@@ -13,11 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from lippmann.display import Display
+from lippmann.scene.camera_placement import FILL
 from lippmann.scene.matrices import Bounds, Vector, depth_scaling, scaling, translation
 from lippmann.scene.values.description import Matrix
-
-#: Share of the panel's width or height that the silhouette fills.
-FILL = 0.95
 
 #: Share of the scene's depth that lies in front of the lens plane, where the aperture allows it.
 POP_OUT = 1.0 / 3.0

@@ -14,7 +14,7 @@ import numpy as np
 
 from lippmann.display import Display
 from lippmann.errors import SceneError, UsageError
-from lippmann.scene.camera_placement import DepthProbe, place_by_camera
+from lippmann.scene.camera_placement import DepthProbe, frame_whole, place_by_camera
 from lippmann.scene.fit_placement import fit_scene
 from lippmann.scene.matrices import (
     Bounds,
@@ -137,6 +137,7 @@ def place(
     cameras: Sequence[Camera] = (),
     options: PlacementOptions | None = None,
     home_camera: str | None = None,
+    contains_home: bool = False,
     bounds_in: Callable[[Matrix], Bounds] | None = None,
     extreme_points: Callable[[], Bounds] | None = None,
     is_unbounded: bool = False,
@@ -152,6 +153,9 @@ def place(
         The scene's cameras; ``options.camera`` names one of them.
     home_camera:
         The camera that the scene was made to be shown by, if there is one.
+    contains_home:
+        Whether the panel is to show all of that camera's picture, and a scene within it large, where nobody asked for a
+        placement.
     bounds_in:
         The scene's box in another frame (:meth:`lippmann.scene.scene.Scene.bounds_in`), for a depth range that is
         tight; without it the corners of ``bounds`` are carried over, which can only be too large.
@@ -193,6 +197,9 @@ def place(
             probe=probe,
             warnings=warnings,
         )
+        if contains_home and options.mode is None and options.camera is None:
+            points = box_corners(bounds) if extreme_points is None else extreme_points()
+            by_camera = frame_whole(camera, transform_points(by_camera, points), display) @ by_camera
         display_from_world = _resize(by_camera, options)
     else:
         display_from_world = _resize(np.eye(4), options)

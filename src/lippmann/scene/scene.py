@@ -42,7 +42,8 @@ class Scene:
     ``description`` is what was read, with the environment and background that the caller asked for in it. A scene made
     for the classic light models has ``classic`` instead, with ``views`` for its cameras; its ``physical`` form is then
     derived when it is first needed. A scene with both has a form of its own for either kind of light.
-    ``home_camera`` names the camera that the scene was made to be shown by (bundled scenes), None for all others.
+    ``home_camera`` names the camera that the scene was made to be shown by (bundled scenes, files of Whitted tracers),
+    None for all others; ``home_may_move`` says that it need not be kept to exactly where a display shows more or less.
     ``studio`` says whether the built-in studio may light a scene that has no lights.
 
     A scene from Mitsuba knows its ``bounds``, ``cameras``, ``lights`` and hence ``environment``, ``background`` and
@@ -52,6 +53,7 @@ class Scene:
     name: str
     description: SceneDescription | MitsubaSource | None = field(default=None, repr=False)
     home_camera: str | None = None
+    home_may_move: bool = False
     studio: bool = True
     classic: ClassicScene | None = field(default=None, repr=False)
     views: tuple[Camera, ...] = field(default=(), repr=False)

@@ -100,7 +100,7 @@ def test_a_scene_without_a_classic_form_is_refused(tmp_path):
 
 def test_commands(corners, tmp_path, capsys):
     out = tmp_path / "out.png"
-    assert run(["preview", str(corners), "-o", str(out), "--size", "32x32", "--json"]) == 0
+    assert run(["preview", str(corners), "-o", str(out), "--plain", "--pixels", "32x32", "--json"]) == 0
     said = json.loads(capsys.readouterr().out)
     assert (said["integrator"], said["depth"], said["spp"]) == ("classic", 3, 1)
     assert said["rays"]["primary"] == 32 * 32

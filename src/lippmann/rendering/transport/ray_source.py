@@ -50,7 +50,7 @@ def pixel_number(source: RaySource, column: UInt32, row: UInt32) -> UInt32:
 
     A pixel thus has the same samples whichever part of the picture it is rendered with.
     """
-    if isinstance(source, WindowRays | SubpixelRays):
+    if isinstance(source, WindowRays | SubpixelRays | SinglePixelRays):
         return source.number(column, row)
     return row * source.width + column
 
@@ -119,6 +119,47 @@ class WindowRays(_OnePicture):
     def number(self, column: UInt32, row: UInt32) -> UInt32:
         """Index of pixels in the whole picture, row by row."""
         return (row + self._top) * self._source.width + (column + self._left)
+
+
+class SinglePixelRays(_OnePicture):
+    """Rays of single (sub-)pixels of a display, one beside the other, with the random numbers of the whole picture.
+
+    Parameters
+    ----------
+    source:
+        The whole picture.
+    columns, rows, channels:
+        ``(n,)``: which pixels; ``channels`` are 0 where sub-pixels have no rays of their own.
+    """
+
+    height, channels = 1, 1
+
+    def __init__(
+        self,
+        source: DisplayRays,
+        columns: NDArray[np.integer],
+        rows: NDArray[np.integer],
+        channels: NDArray[np.integer],
+    ) -> None:
+        self.width = len(columns)
+        self._source = source
+        self._columns, self._rows, self._own = (
+            mi.UInt32(np.asarray(values, np.uint32)) for values in (columns, rows, channels)
+        )
+
+    def rays(self, column: UInt32, row: UInt32, channel: UInt32, jitter: Point2f) -> Ray3f:
+        del row, channel
+        return self._source.rays(*self._pixel(column), jitter)
+
+    def number(self, column: UInt32, row: UInt32) -> UInt32:
+        """Index of the (sub-)pixels in the whole picture."""
+        del row
+        x, y, channel = self._pixel(column)
+        return (y * self._source.width + x) * self._source.channels + channel
+
+    def _pixel(self, place: UInt32) -> tuple[UInt32, UInt32, UInt32]:
+        x, y, channel = (dr.gather(mi.UInt32, table, place) for table in (self._columns, self._rows, self._own))
+        return x, y, channel
 
 
 class SubpixelRays(_OnePicture):

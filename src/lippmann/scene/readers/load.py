@@ -192,10 +192,10 @@ def _from_library(name: str) -> Scene:
     # The paper renders its scenes with this ray depth.
     classic = replace(classic, camera=replace(classic.camera, ray_depth=_PAPER_DEPTH))
     if isinstance(content, ClassicScene):
-        return _classic(classic, bundled.stage_of(name).camera())
+        return replace(_classic(classic, bundled.stage_of(name).camera()), home_may_move=True)
     description = check_description(content, name)
     home = description.cameras[0].name if description.cameras else None
-    return Scene(name, description, home_camera=home, classic=classic)
+    return Scene(name, description, home_camera=home, home_may_move=True, classic=classic)
 
 
 def _classic(scene: ClassicScene, camera: Camera) -> Scene:

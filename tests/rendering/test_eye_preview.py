@@ -1,0 +1,70 @@
+"""A preview is what replay shows of the whole picture, without the whole picture."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import lippmann
+from lippmann.display import Display, LensArray, Panel
+from lippmann.rendering.eye_preview import render_eye_preview, seen_pixels
+from lippmann.rendering.request.render_request import RenderRequest
+from lippmann.scene.placement import PlacementOptions
+
+pytestmark = pytest.mark.usefixtures("engine")
+
+DISPLAYS = {
+    "lenticular": Display("lenticular", Panel(96, 64, 0.5), LensArray("lenticular", 4.0), 3.0, "", 300.0, 20.0),
+    "slanted": Display("slanted", Panel(90, 60, 0.5), LensArray("lenticular", 2.3, 12.0), 3.0, "", 400.0, 20.0),
+    "hexagonal": Display("hexagonal", Panel(96, 64, 0.5), LensArray("hexagonal", 4.0), 3.0, "", float("inf"), 20.0),
+}
+EYES = [(0.0, 0.0, 300.0), (25.0, -10.0, 220.0)]
+
+
+@pytest.fixture(scope="module")
+def teapot():
+    return lippmann.load_scene("teapot")
+
+
+@pytest.mark.parametrize("eye", EYES)
+@pytest.mark.parametrize("name", DISPLAYS)
+def test_it_is_the_replay_of_the_whole_picture(teapot, name, eye):
+    display = DISPLAYS[name]
+    placed = PlacementOptions(turn=(20.0, 0.0, 0.0))
+    exact = {"integrator": "albedo", "pixel_filter": "point", "spp": 1, "placement": placed}
+    whole = lippmann.render(teapot, display, method="full", **exact)
+    found = render_eye_preview(teapot, display, eye, RenderRequest(**exact), (60, 60))
+    height, width = found.pixels.shape[:2]
+    assert (width, height) == (60, 40)
+    replayed = whole.replay(eye, size=(width, height), filter="nearest")
+    assert replayed.std() > 0.05
+    # A point on a boundary between pixels may fall to either side.
+    assert (np.abs(found.pixels - replayed).max(axis=2) > 1e-4).mean() < 0.01
+
+    light = {"spp": 64, "denoise": "none", "placement": placed}
+    whole = lippmann.render(teapot, display, method="full", **light)
+    assert whole.provenance.subpixels == (name == "slanted")
+    found = render_eye_preview(teapot, display, eye, RenderRequest(**light), (60, 60))
+    replayed = whole.replay(eye, size=(width, height), filter="nearest")
+    assert np.abs(found.pixels - replayed).mean() < 0.015
+    assert found.pixels.mean() == pytest.approx(replayed.mean(), rel=0.02)
+
+
+def test_few_samples_are_denoised_and_near_many(teapot):
+    display = Display("fine", Panel(360, 240, 0.125), LensArray("lenticular", 0.6, 12.0), 0.8, "", 400.0, 20.0)
+
+    def shown(**options):
+        return render_eye_preview(teapot, display, EYES[0], RenderRequest(**options), (120, 120))
+
+    fine = shown(spp=256, denoise="none").pixels
+    noisy, clean = shown(spp=2, denoise="none", seed=3).pixels, shown(spp=2, seed=3)
+    assert clean.provenance.options["denoise"] == "oidn"
+    assert np.mean((clean.pixels - fine) ** 2) < 0.5 * np.mean((noisy - fine) ** 2)
+
+
+def test_every_pixel_is_traced_once_and_what_lies_past_the_panel_not_at_all():
+    seen = seen_pixels(DISPLAYS["hexagonal"], (900.0, 0.0, 300.0), (200, 125), subpixels=False)
+    assert len(np.unique(np.stack([seen.column, seen.row]), axis=1).T) == len(seen.column)
+    assert seen.number.max() == len(seen.column) - 1
+    assert (seen.number == -1).any()
+    assert (seen.number[..., 0] == seen.number[..., 2]).all()
