@@ -53,7 +53,7 @@ class Scene:
     name: str
     description: SceneDescription | MitsubaSource | None = field(default=None, repr=False)
     home_camera: str | None = None
-    home_may_move: bool = False
+    home_may_move: bool = field(default=False, repr=False)
     studio: bool = True
     classic: ClassicScene | None = field(default=None, repr=False)
     views: tuple[Camera, ...] = field(default=(), repr=False)
