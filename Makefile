@@ -31,8 +31,9 @@ setup-dev:
 demo: setup
 	@mkdir -p $(dir $(PICTURE))
 	.venv/bin/lippmann render teapot --display seed-lenticular -o $(PICTURE)
-	@echo 'The picture lies in $(CURDIR)/$(PICTURE). Look at it with:'
-	@echo '  $(OPEN) $(PICTURE)'
+	.venv/bin/lippmann view $(PICTURE) --export $(PICTURE:.png=.html)
+	@echo 'The native pixels lie in $(PICTURE). Move before the display on the page:'
+	@echo '  $(OPEN) $(CURDIR)/$(PICTURE:.png=.html)'
 
 docs: setup-dev
 	NO_MKDOCS_2_WARNING=1 .venv/bin/python -m mkdocs build --strict --site-dir $(SITE)

@@ -12,6 +12,7 @@ import typer
 from lippmann.cli.commands import view as viewing
 from lippmann.cli.shared import options
 from lippmann.cli.shared.console import Console
+from lippmann.cli.shared.grouped_help import HelpfulCommand
 from lippmann.errors import OutputError, UsageError
 
 if TYPE_CHECKING:
@@ -24,7 +25,7 @@ calibrate = typer.Typer(
 )
 
 
-@calibrate.command("pattern")
+@calibrate.command("pattern", cls=HelpfulCommand)
 def pattern(
     name: Annotated[
         str,
@@ -83,7 +84,7 @@ def pattern(
     console.result(result, "\n".join(lines))
 
 
-@calibrate.command("page")
+@calibrate.command("page", cls=HelpfulCommand)
 def page(
     display: Annotated[str, typer.Argument(help="Display to start from: a name, a TOML file, or as for --display.")],
     output: Annotated[Path, typer.Option("--output", "-o", help="Display file to save (.toml).")],

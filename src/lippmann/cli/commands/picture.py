@@ -10,6 +10,7 @@ import typer
 
 from lippmann.cli.shared import options, parse
 from lippmann.cli.shared.console import Console, estimate_in_words
+from lippmann.cli.shared.default_output import output_of
 from lippmann.errors import UsageError
 
 if TYPE_CHECKING:
@@ -109,7 +110,7 @@ def compose(
 
 def replay(
     picture: options.Picture,
-    output: options.Output,
+    output: options.OptionalOutput = None,
     eye: Annotated[
         str | None,
         typer.Option(
@@ -141,6 +142,7 @@ def replay(
     from lippmann.viewing.video_file import check_animation_path, write_animation
 
     console = Console(quiet, as_json)
+    output = output_of(output, picture, "-sweep.png" if sweep else "-seen.png")
     if sweep:
         check_animation_path(output)
         check_writable(output)

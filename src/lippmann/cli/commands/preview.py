@@ -10,6 +10,7 @@ import typer
 from lippmann.cli.commands import print as printing
 from lippmann.cli.shared import options, parse
 from lippmann.cli.shared.console import Console
+from lippmann.cli.shared.default_output import output_of
 from lippmann.cli.shared.picture_report import add_seconds, depth_line, report
 from lippmann.cli.shared.scene_source import SceneSource
 from lippmann.errors import UsageError
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
 
 def preview(
     scene: options.Scene,
-    output: options.Output,
+    output: options.OptionalOutput = None,
     display: options.DisplayName = "seed-lenticular",
     plain: Annotated[
         bool, typer.Option("--plain", help="Without a display: what the scene's own camera sees, or --camera.")
@@ -74,6 +75,7 @@ def preview(
     from lippmann.rendering.request.render_request import RenderRequest
 
     console = Console(quiet, as_json)
+    output = output_of(output, scene, "-preview.png")
     check_output(output, format_for(output, bits)[0])
     target = printing.display_of(
         display,

@@ -11,6 +11,7 @@ import typer
 from lippmann.cli.commands import sequence
 from lippmann.cli.shared import options, parse
 from lippmann.cli.shared.console import Console, estimate_in_words
+from lippmann.cli.shared.grouped_help import HelpfulCommand
 from lippmann.cli.shared.picture_report import add_seconds, depth_line, report
 from lippmann.cli.shared.scene_source import SceneSource
 from lippmann.errors import UsageError
@@ -57,7 +58,7 @@ Method = Annotated[
 Format = Annotated[str | None, typer.Option("--format", help="png, exr or tiff; by default as the quilt is stored.")]
 
 
-@quilt.command("render")
+@quilt.command("render", cls=HelpfulCommand)
 def render(
     scene: options.Scene,
     output: Output = None,
@@ -173,7 +174,7 @@ def render(
     console.result(values | {"display": target.name, "views": wanted.layout.views}, _sentence(path, made, seconds))
 
 
-@quilt.command("pack")
+@quilt.command("pack", cls=HelpfulCommand)
 def pack(
     folder: Annotated[Path, typer.Argument(help="A folder with one picture per view, numbered from the left.")],
     output: Annotated[
@@ -199,7 +200,7 @@ def pack(
     console.result(result, f"{output}: {layout.columns}x{layout.rows} views, {width}x{height} pixels")
 
 
-@quilt.command("unpack")
+@quilt.command("unpack", cls=HelpfulCommand)
 def unpack(
     picture: Annotated[Path, typer.Argument(help="A quilt (PNG, EXR, TIFF or JPEG) with its layout in the name.")],
     output: options.Folder,
@@ -222,7 +223,7 @@ def unpack(
     console.result(result, f"{output}: {found.layout.views} views of {width}x{height} pixels")
 
 
-@quilt.command("sizes")
+@quilt.command("sizes", cls=HelpfulCommand)
 def sizes(as_json: options.Json = False) -> None:
     """List the quilts that devices are given."""
     from lippmann.quilts.quilt import DEVICE_QUILTS

@@ -13,9 +13,10 @@ import typer
 
 from lippmann.cli.commands import cluster as clusters
 from lippmann.cli.commands import print as printing
-from lippmann.cli.commands import sequence
+from lippmann.cli.commands import sequence, view
 from lippmann.cli.shared import options, parse
 from lippmann.cli.shared.console import Console
+from lippmann.cli.shared.default_output import output_of
 from lippmann.cli.shared.picture_report import add_seconds, remarks, report
 from lippmann.cli.shared.scene_source import SceneSource
 from lippmann.errors import UsageError
@@ -47,7 +48,7 @@ Resume = Annotated[
 
 def render(
     scene: options.Scene,
-    output: options.Output,
+    output: options.OptionalOutput = None,
     display: options.DisplayName = "seed-lenticular",
     method: options.Method = "auto",
     order: options.Order = None,
@@ -89,6 +90,7 @@ def render(
     marks: printing.MarksMargin = None,
     bits: options.Bits = None,
     resume: Resume = False,
+    opens: options.Open = False,
     cluster: clusters.ClusterName = None,
     tls_ca: clusters.TlsCa = None,
     tls_cert: clusters.TlsCert = None,
@@ -127,6 +129,9 @@ def render(
     )
     wanted = sequence.Wanted(frames, fps, animation, camera_path, turntable, swing, video, eye)
     margin = printing.margin_of(marks, target, in_frames=bool(wanted))
+    output = output_of(output, scene, "-frames" if wanted else ".png")
+    if opens and wanted and video is None:
+        raise UsageError("shows a picture or a film", where="--open", fix="add --video film.mp4")
     request = RenderRequest(
         method=method,
         order=order,
@@ -155,6 +160,8 @@ def render(
         files = sequence.Files(output, bits, maps, resume)
         with on_cluster.runner(console, threads) as runner:
             sequence.render_frames(source, target, request, wanted, files, console, runner=runner)
+        if opens and video is not None:
+            view.open_file(video)
         return
     name, _ = format_for(output, bits)
     _check_layers(layers, name, output)
@@ -162,6 +169,8 @@ def render(
         _check_whole({"--maps": maps, "--marks": margin})
         with on_cluster.runner(console, threads) as runner:
             _render_tiled(source, target, request, output, console, bits=bits, resume=resume, runner=runner)
+        if opens:
+            view.view(output, quiet=quiet, as_json=as_json)
         return
     check_output(output, name)
     if maps is not None:
@@ -184,6 +193,8 @@ def render(
     remarks(console, image.provenance)
     height, width = image.pixels.shape[:2]
     console.result(report(output, (width, height), written.provenance), _sentence(output, written))
+    if opens:
+        view.view(output, quiet=quiet, as_json=as_json)
 
 
 def _check_layers(layers: bool, name: str, output: Path) -> None:

@@ -154,6 +154,14 @@ def serve(
             raise SystemExit(INTERRUPTED) from None  # the regular end of a page: no message
 
 
+def open_file(path: Path) -> None:
+    """Show a film in whatever the desktop shows such files with."""
+    import webbrowser
+
+    if has_screen():
+        webbrowser.open(path.resolve().as_uri())
+
+
 def is_remote() -> bool:
     """Whether the command runs in an SSH session."""
     return "SSH_CONNECTION" in os.environ

@@ -7,11 +7,22 @@ from typing import Annotated
 
 import typer
 
+from lippmann.cli.shared.completion import complete_displays, complete_scenes
 from lippmann.rendering.request import choices
 
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on standard output.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Say nothing but errors.")]
 Output = Annotated[Path, typer.Option("--output", "-o", help="The file to write; its ending names the format.")]
+OptionalOutput = Annotated[
+    Path | None,
+    typer.Option(
+        "--output",
+        "-o",
+        help="The file to write; its ending names the format. By default named after the input, in this folder.",
+        show_default=False,
+    ),
+]
+Open = Annotated[bool, typer.Option("--open", help="View the result in a browser once it is written.")]
 Folder = Annotated[Path, typer.Option("--output", "-o", help="The folder to write; it appears whole or not at all.")]
 Picture = Annotated[Path, typer.Argument(help="A picture that Lippmann wrote (PNG, EXR, TIFF or Zarr).")]
 DisplayName = Annotated[
@@ -20,6 +31,7 @@ DisplayName = Annotated[
         "--display",
         "-d",
         help="A name (see 'lippmann displays'), a TOML file, a device's visual.json, or print:... or monitor:...",
+        autocompletion=complete_displays,
     ),
 ]
 PictureDisplay = Annotated[
@@ -28,7 +40,8 @@ PictureDisplay = Annotated[
 Scene = Annotated[
     str,
     typer.Argument(
-        help="A .glb, .gltf, .obj, .ply, .stl, Mitsuba .xml, Tachyon .dat or .nff file, or a bundled scene's name."
+        help="A .glb, .gltf, .obj, .ply, .stl, Mitsuba .xml, Tachyon .dat or .nff file, or a bundled scene's name.",
+        autocompletion=complete_scenes,
     ),
 ]
 Integrator = Annotated[

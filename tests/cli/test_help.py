@@ -1,0 +1,120 @@
+"""Help: in groups, at 80 columns, with examples that are commands."""
+
+from __future__ import annotations
+
+import shlex
+import subprocess
+import sys
+
+import pytest
+import typer
+
+from lippmann.cli.app import app
+from lippmann.cli.shared.grouped_help import COMMAND_GROUPS, EXAMPLES, OPTION_GROUPS
+
+
+def commands(command=None, words=()):
+    """All commands by their words."""
+    command = command or typer.main.get_command(app)
+    found = {}
+    for name, each in getattr(command, "commands", {}).items():
+        if hasattr(each, "commands"):
+            found |= commands(each, (*words, name))
+        else:
+            found[" ".join((*words, name))] = each
+    return found
+
+
+@pytest.mark.parametrize("name", commands())
+def test_each_command_has_two_examples_that_parse(name):
+    assert len(EXAMPLES[name]) == 2
+    for line in EXAMPLES[name]:
+        program, *words = shlex.split(line)
+        own = name.split()
+        assert [program, *words[: len(own)]] == ["lippmann", *own]
+        context = commands()[name].make_context(name, list(words[len(own) :]))
+        assert context.params
+
+
+def test_no_example_is_of_something_else():
+    assert set(EXAMPLES) == {*commands(), "lippmann"}
+
+
+def test_every_option_of_the_large_commands_has_a_group():
+    grouped = {name for names in OPTION_GROUPS.values() for name in names}
+    for name in ("render", "quilt render", "plan", "preview"):
+        command = commands()[name]
+        options = {part for each in command.params for part in each.opts if part.startswith("--") and not each.hidden}
+        assert options - grouped <= {"--help"}, name
+
+
+def test_every_command_has_a_group():
+    top = typer.main.get_command(app)
+    assert {name for names in COMMAND_GROUPS.values() for name in names} >= set(top.commands)
+
+
+@pytest.mark.parametrize("words", [(), ("--help",), ("render", "--help"), ("quilt", "--help"), ("plan", "--help")])
+def test_help_is_well_formed(lippmann, words):
+    done = lippmann(*words)
+    assert (done.code, done.err) == (0, "")
+    lines = done.out.splitlines()
+    assert lines[0].startswith("Usage: lippmann")
+    is_example = False
+    for line in lines:
+        is_example = is_example or line == "Examples:"
+        assert is_example or len(line) <= 80, line
+    titles = [line[:-1] for line in lines if line.endswith(":") and not line.startswith(" ")]
+    if words == ("render", "--help"):
+        assert titles == ["Arguments", *OPTION_GROUPS, "Options", "Examples"]
+    if not words:
+        assert titles == ["Options", *COMMAND_GROUPS, "Examples"]
+
+
+def test_names_are_completed(monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "tea.glb").write_bytes(b"")
+    (tmp_path / "tea.txt").write_bytes(b"")
+    from lippmann.cli.shared.completion import complete_displays, complete_scenes
+
+    assert complete_scenes("tea") == ["teapot", "tea.glb"]
+    assert "panel-4k" in complete_displays("panel")
+    code = "from lippmann.cli import main; main()"
+    words = {"_LIPPMANN_COMPLETE": "complete_bash", "COMP_WORDS": "lippmann render tea", "COMP_CWORD": "2"}
+    import os
+
+    done = subprocess.run([sys.executable, "-c", code], env=os.environ | words, capture_output=True, text=True)
+    assert "teapot" in done.stdout.split()
+
+
+class TestOutputsThatNobodyNamed:
+    def test_they_are_named_after_the_scene(self, lippmann, engine, tmp_path, monkeypatch):
+        monkeypatch.chdir(tmp_path)
+        words = ("render", "teapot", "--spp", 1, "--integrator", "albedo")
+        first = lippmann(*words)
+        assert (first.code, (tmp_path / "teapot.png").exists()) == (0, True)
+        assert first.out.startswith("teapot.png: ")
+        assert lippmann(*words).code == 0  # over its own picture
+        assert lippmann("replay", "teapot.png").code == 0
+        assert (tmp_path / "teapot-seen.png").exists()
+        assert lippmann("preview", "teapot", "--spp", 1, "--pixels", "32x32", "--integrator", "albedo").code == 0
+        assert (tmp_path / "teapot-preview.png").exists()
+
+    def test_nothing_of_anybody_elses_is_overwritten(self, lippmann, tmp_path, monkeypatch):
+        monkeypatch.chdir(tmp_path)
+        (tmp_path / "teapot.png").write_bytes(b"a texture")
+        done = lippmann("render", "teapot", "--spp", 1)
+        assert done.code == 2
+        assert done.err == "lippmann: teapot.png: is there, and no picture of Lippmann's; say -o FILE\n"
+        assert (tmp_path / "teapot.png").read_bytes() == b"a texture"
+
+
+def test_a_picture_is_opened_once_it_is_written(lippmann, engine, tmp_path, monkeypatch):
+    from lippmann.cli.commands import view
+
+    opened = []
+    monkeypatch.setattr(view, "view", lambda path, **_: opened.append((path, path.exists())))
+    out = tmp_path / "a.png"
+    assert lippmann("render", "teapot", "--spp", 1, "--integrator", "albedo", "--open", "-o", out).code == 0
+    assert opened == [(out, True)]
+    refused = lippmann("render", "teapot", "--turntable", 4, "--open", "-o", tmp_path / "f")
+    assert (refused.code, refused.err.startswith("lippmann: --open: shows a picture or a film; ")) == (2, True)
