@@ -47,6 +47,7 @@ def load_scene(
     background: tuple[float, float, float] | None = None,
     allow_outside: bool = False,
     multiple_scattering: bool = True,
+    up: Literal["y", "z"] | None = None,
 ) -> Scene:
     """Load a scene from a file, a bundled scene's name, or an object of another library.
 
@@ -66,6 +67,9 @@ def load_scene(
     multiple_scattering:
         Give back the light that rough surfaces reflect more than once between microfacets. False: as dark as glTF's
         formulas make them.
+    up:
+        ``y`` or ``z``: the axis that points up in a file that does not say so. By default ``y`` in OBJ and PLY files,
+        ``z`` in STL files.
 
     Raises
     ------
@@ -78,6 +82,7 @@ def load_scene(
         background=background,
         allow_outside=allow_outside,
         multiple_scattering=multiple_scattering,
+        up=up,
     )
 
 
@@ -353,10 +358,10 @@ def render_quilt(
     LippmannError
         Of the kind that says what was wrong.
     """
-    from lippmann.quilts.quilt import Quilt, load_device, quilt_of_display
+    from lippmann.quilts.quilt import Quilt, quilt_of_display
     from lippmann.rendering.quilt import render_quilt as rendered
 
-    device = display if isinstance(display, Display) else load_device(str(display))
+    device = display if isinstance(display, Display) else load_display(str(display))
     layout = quilt_of_display(device, views, size)
     frame = rendered(
         _scene(scene),

@@ -71,6 +71,8 @@ def test_plan_says_what_to_expect(lippmann, calibration, monkeypatch):
         "4",
         "--integrator",
         "direct",
+        "--method",
+        "full",
         "--shift",
         "0,0,-8",
     )

@@ -14,18 +14,23 @@ from lippmann.errors import DisplayError
     ("text", "expected"),
     [
         ("200x300mm", (200, 300)),
-        ("200x300", (200, 300)),
         ("8x10in", (203.2, 254)),
         (" 8 in x 25 cm ", (203.2, 250)),
         ("0.2mx300mm", (200, 300)),
         ("8inx10in", (203.2, 254)),
         ("1.5x2.5cm", (15, 25)),
         ("20X30cm", (200, 300)),
+        ("200 x 300 mm", (200, 300)),
         ("8in x 10", (203.2, 254)),
     ],
 )
 def test_sizes(text, expected):
     assert units.size(text, "size") == pytest.approx(expected)
+
+
+def test_a_size_without_a_unit_is_refused_with_both_readings():
+    with pytest.raises(DisplayError, match="size: '8x10' has no unit; inches or millimetres\\?; say 8x10in or 8x10mm"):
+        units.size("8x10", "size")
 
 
 @pytest.mark.parametrize("text", ["", "200", "200x", "x300mm", "200x300x10mm", "200 by 300", "200x300 furlongs", "axb"])

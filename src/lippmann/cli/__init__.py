@@ -14,6 +14,7 @@ from typing import NoReturn
 
 from typer import BadParameter
 
+from lippmann.cli.shared import command_clock
 from lippmann.cli.shared.exit_codes import INTERRUPTED
 from lippmann.errors import LippmannError
 
@@ -33,6 +34,7 @@ def main(arguments: list[str] | None = None) -> None:
 
 def run(words: list[str], *, debug: bool = False) -> int:
     """Run one command; errors become one line on standard error unless ``debug`` asks for the traceback."""
+    command_clock.start()
     from lippmann.cli.app import app
     from lippmann.cli.shared.option_names import in_options
 
@@ -96,8 +98,20 @@ def _is_interrupt(error: BaseException | None) -> bool:
 _NOT_LISTED = re.compile(r"Invalid value for '(--[\w-]+)'.*: (?:Value error, )?('.*?') is not one of (.*)\.")
 
 
+_NO_SUCH = re.compile(r"No such option: (--[\w-]+)")
+#: What people ask for by names that other programs have for it.
+_OTHER_NAMES = {
+    "--dpi": "it is called --ppi here, pixels per inch",
+    "--samples": "it is called --spp here, samples per pixel",
+    "--out": "it is called --output or -o here",
+}
+
+
 def _usage(error: BaseException) -> str:
     message = " ".join(getattr(error, "format_message", error.__str__)().split())
+    former = _NO_SUCH.search(message)
+    if former is not None and former[1] in _OTHER_NAMES:
+        return f"{former[1]}: {_OTHER_NAMES[former[1]]}"
     listed = _NOT_LISTED.fullmatch(message)
     if listed is not None:
         return f"{listed[1]}: {listed[2]} is not known; known are {listed[3].replace(chr(39), '')}"

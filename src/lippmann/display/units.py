@@ -70,18 +70,22 @@ def length(
 def size(text: str, key: str) -> tuple[float, float]:
     """Width and height in millimetres of a text such as ``200x300mm``, ``8x10in`` or ``8 in x 25 cm``.
 
-    A unit at the end counts for both; without any they are millimetres.
+    A unit at the end counts for both.
 
     Raises
     ------
     DisplayError
-        If the text is no size, or a unit is unknown.
+        If the text is no size, or a unit is missing or unknown.
     """
     match = _SIZE.fullmatch(text.strip())
     if match is None:
         rule = "a size is width x height with a unit, such as 200x300mm or 8x10in"
         raise DisplayError(f"{text!r} is not a size", where=key, rule=rule)
-    unit_of_height = match[4] or match[2] or "mm"
+    unit_of_height = match[4] or match[2]
+    if not unit_of_height:
+        bare = f"{match[1]}x{match[3]}"
+        fix = f"say {bare}in or {bare}mm"
+        raise DisplayError(f"{text!r} has no unit", where=key, rule="inches or millimetres?", fix=fix)
     sides = []
     for amount, unit in ((match[1], match[2] or unit_of_height), (match[3], unit_of_height)):
         if unit not in MILLIMETRES:

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lippmann.display import Display, load_display
+from lippmann.display import Display
 from lippmann.errors import PictureError, UsageError
 from lippmann.image.encoding import linear_values
 from lippmann.image.provenance import Provenance
@@ -166,18 +166,6 @@ class Quilt:
         for number in range(self.layout.views):
             rows[number] = linear_values(self.view_values(number)[first:last], self.provenance.transfer)
         return rows
-
-
-def load_device(name: str) -> Display:
-    """Load a Looking Glass device by the end of its preset's name, such as ``portrait``, or any other display.
-
-    Raises
-    ------
-    DisplayError
-        If the display is unknown, or its description is missing or invalid.
-    """
-    known = {device.display for device in DEVICE_QUILTS}
-    return load_display(_FAMILY + name if _FAMILY + name in known else name)
 
 
 def quilt_of_display(

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from lippmann.progress import ProgressCallback
 from lippmann.rendering.adaptive.convergence import Assessor, ErrorTrack
+from lippmann.rendering.adaptive.extra_samples import extra_samples
 from lippmann.rendering.adaptive.method_race import DENOISED_SLOPE, MethodRace
 from lippmann.rendering.adaptive.stopping import Goal, Outcome, goal_of, reach
 from lippmann.rendering.denoise.cost_model import effort_of, look_cost, traced_work
@@ -39,6 +40,10 @@ Floats = NDArray[np.float32]
 
 #: The layer of a picture with the number of samples that each pixel had.
 SAMPLES_LAYER = "samples"
+
+
+#: What putting a picture together and writing it takes, as a rule.
+_SECONDS_PER_PIXEL_WRITTEN = 1e-7
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,6 +186,8 @@ def _fixed_samples(job: Job) -> Traced:
 
 def _until(job: Job, goal: Goal) -> Traced:
     """As many samples as the goal takes, the noise taken out of them where that is asked for or proves better."""
+    writing = _SECONDS_PER_PIXEL_WRITTEN * job.source.width * job.source.height
+    goal = replace(goal, began=job.request.began, reserve=writing)
     batches = _batches(job)
     estimator = _estimator(job)
 
@@ -196,6 +203,9 @@ def _until(job: Job, goal: Goal) -> Traced:
     else:
         assessor = denoised.track
     outcome = reach(goal, batches.add, assessor, job.progress, probe=batches.probe)
+    more = extra_samples(outcome, job.request.spp_reserve)
+    if more:
+        outcome = _with_more(outcome, more, batches, assessor, job.progress)
     options: dict[str, object] = {}
     notes = _end_notes(goal, outcome)
     method = job.request.method
@@ -214,6 +224,15 @@ def _until(job: Job, goal: Goal) -> Traced:
     seconds = {} if denoised is None or denoised.denoiser is None else {"denoise": denoised.denoiser.seconds}
     options |= _denoiser_options(job, won.denoiser)
     return Traced(frame, outcome.samples, outcome.estimate, notes, options, seconds, method=method)
+
+
+def _with_more(
+    outcome: Outcome, more: int, batches: FullInBatches, assessor: Assessor, progress: ProgressCallback
+) -> Outcome:
+    batches.add(more, progress)
+    samples = outcome.samples + more
+    assessment = assessor.assess(samples, 1.0)
+    return replace(outcome, estimate=assessment.estimate, errors=assessment.errors, samples=samples)
 
 
 def _batches(job: Job) -> FullInBatches:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -35,6 +37,8 @@ def render_picture(
     UsageError, SceneError, MemoryLimitError, EngineError
         As the stages find them; nothing has been written then.
     """
+    if request.began is None:
+        request = replace(request, began=time.perf_counter())
     request = resolve(request, scene, display)
     session = open_session(scene, request, (display.panel.width, display.panel.height), progress=progress)
     request = session.request

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import astuple, dataclass
+import time
+from dataclasses import astuple, dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -61,6 +62,8 @@ def render_quilt(
     UsageError, PictureError, SceneError, MemoryLimitError, EngineError
         As the stages find them.
     """
+    if request.began is None:
+        request = replace(request, began=time.perf_counter())
     request = resolve(request, scene, display, "quilt", size=size)
     session = open_session(scene, request, size, progress=progress)
     request = session.request

@@ -200,9 +200,9 @@ def render_quilt_sequence(
     LippmannError
         Of the kind that says what was wrong; before the first frame for what can be told then.
     """
-    from lippmann.quilts.quilt import load_device, quilt_of_display
+    from lippmann.quilts.quilt import quilt_of_display
 
-    device = display if isinstance(display, Display) else load_device(str(display))
+    device = display if isinstance(display, Display) else load_display(str(display))
     form = QuiltForm(quilt_of_display(device, views, size))
     target, numbers, where = _begin(motion, device, frames, placement)
     return render_frames(motion, target, numbers, where, RenderRequest.of(options), form, progress)

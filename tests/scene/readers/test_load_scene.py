@@ -44,8 +44,32 @@ def triangle(**fields):
 def test_files_by_ending(save, name, kind):
     scene = load_scene(kind(save(name, FILES[name])))
     assert scene.name == "a"
-    assert scene.bounds.tolist() == [[0, 0, 0], [1, 1, 0]]
+    assert scene.bounds.tolist() == ([[0, 0, -1], [1, 0, 0]] if name.endswith("stl") else [[0, 0, 0], [1, 1, 0]])
     assert STUDIO_NOTE in scene.notes
+
+
+@pytest.mark.parametrize(("name", "usual"), [("a.obj", "y"), ("a.ply", "y"), ("a.stl", "z")])
+def test_up_is_taken_as_it_mostly_is_or_as_it_is_said(save, name, usual):
+    path = save(name, FILES["a.PLY" if name == "a.ply" else name])
+    bounds = {up: load_scene(path, up=up).bounds.tolist() for up in ("y", "z")}
+    assert bounds == {"y": [[0, 0, 0], [1, 1, 0]], "z": [[0, 0, -1], [1, 0, 0]]}
+    assert load_scene(path).bounds.tolist() == bounds[usual]
+    said = [note for note in load_scene(path).notes if note.startswith("up is taken as")]
+    assert len(said) == (name != "a.obj")
+    assert not any(note.startswith("up is taken as") for note in load_scene(path, up="z").notes)
+
+
+def test_up_of_what_says_it_itself_is_refused():
+    with pytest.raises(UsageError, match="up: teapot says itself which way is up; y or z, for .obj, .ply, .stl"):
+        load_scene("teapot", up="z")
+
+
+@pytest.mark.parametrize(
+    ("name", "said"), [("car.blend", "in Blender: File > Export > glTF"), ("part.STEP", "FreeCAD")]
+)
+def test_files_of_other_programs_are_told_how_to_become_gltf(save, name, said):
+    with pytest.raises(SceneError, match="is no known kind of scene file; .*" + said):
+        load_scene(save(name, b"BLENDER-v402"))
 
 
 def test_mitsuba_files_are_not_loaded_yet(save):

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated, Literal
 
+import typer
+
+from lippmann.cli.commands import print as printing
 from lippmann.cli.shared import options, parse
 from lippmann.cli.shared.console import Console
 from lippmann.cli.shared.picture_report import depths
@@ -19,11 +22,17 @@ _MINUTE, _HOUR = 60.0, 3600.0
 def plan(
     scene: options.Scene,
     display: options.DisplayName = "seed-lenticular",
+    method: Annotated[
+        Literal["auto", "full", "pooled"],
+        typer.Option("--method", help="auto and pooled: light is pooled; full: every ray is traced, for references."),
+    ] = "auto",
+    up: options.Up = None,
     integrator: options.Integrator = "auto",
     depth: options.Depth = None,
     spp: options.Spp = None,
     seed: options.Seed = 0,
     exposure: options.Exposure = "auto",
+    tone_map: options.ToneMap = "auto",
     subpixels: options.Subpixels = None,
     pixel_filter: options.PixelFilter = "auto",
     denoise: options.Denoise = "auto",
@@ -38,6 +47,14 @@ def plan(
     background: options.Background = None,
     allow_outside: options.AllowOutside = False,
     single_scattering: options.SingleScattering = False,
+    lpi: printing.Lpi = None,
+    print_lpi: printing.PrintLpi = None,
+    ppi: printing.Ppi = None,
+    size: printing.Size = None,
+    viewing_distance: printing.Distance = None,
+    thickness: printing.Thickness = None,
+    index: printing.Index = None,
+    field: printing.Field = None,
     device: options.Device = "auto",
     threads: options.Threads = None,
     memory: options.Memory = None,
@@ -45,17 +62,29 @@ def plan(
     quiet: options.Quiet = False,
 ) -> None:
     """Say what 'render' will show and take, without rendering: depth, blur, rays, memory and time."""
-    from lippmann.display import load_display
     from lippmann.rendering.forecast import forecast
     from lippmann.rendering.request.render_request import RenderRequest
 
     console = Console(quiet, as_json)
+    target = printing.display_of(
+        display,
+        lpi=lpi,
+        print_lpi=print_lpi,
+        ppi=ppi,
+        size=size,
+        viewing_distance=viewing_distance,
+        thickness=thickness,
+        index=index,
+        field=field,
+    )
     request = RenderRequest(
+        method=method,
         integrator=integrator,
         depth=depth,
         spp=spp,
         seed=seed,
         exposure=parse.exposure(exposure),
+        tone_map=tone_map,
         subpixels=subpixels,
         pixel_filter=pixel_filter,
         denoise=denoise,
@@ -64,10 +93,10 @@ def plan(
         threads=threads,
         memory=parse.memory(memory),
     )
-    source = SceneSource(scene, environment, parse.color(background), allow_outside, single_scattering)
+    source = SceneSource(scene, environment, parse.color(background), allow_outside, single_scattering, up)
     with console.progress() as progress:
         loaded = source.load()
-        found = forecast(loaded, load_display(display), request, progress)
+        found = forecast(loaded, target, request, progress)
     for note in found.notes:
         console.remark(note)
     console.result({"scene": loaded.name, **found.to_dict()}, "\n".join(_lines(loaded.name, found)))

@@ -35,6 +35,7 @@ def preview(
     eye: Annotated[
         str | None, typer.Option("--eye", help="The eye's place: X,Y,Z in mm; by default before the middle.")
     ] = None,
+    up: options.Up = None,
     integrator: options.Integrator = "auto",
     depth: options.Depth = None,
     spp: options.Spp = None,
@@ -103,7 +104,7 @@ def preview(
         threads=threads,
         memory=parse.memory(memory),
     )
-    source = SceneSource(scene, environment, parse.color(background), allow_outside, single_scattering)
+    source = SceneSource(scene, environment, parse.color(background), allow_outside, single_scattering, up)
     with console.progress() as progress:
         started = time.perf_counter()
         loaded = source.load()

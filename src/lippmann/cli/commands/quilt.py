@@ -66,6 +66,7 @@ def render(
     views: Views = None,
     size: Size = None,
     method: Method = "auto",
+    up: options.Up = None,
     integrator: options.Integrator = "auto",
     depth: options.Depth = None,
     spp: options.Spp = None,
@@ -108,14 +109,15 @@ def render(
     quiet: options.Quiet = False,
 ) -> None:
     """Render a scene as a quilt: the views of cameras side by side before the display."""
+    from lippmann.display import load_display
     from lippmann.image.write import check_output, format_for
     from lippmann.quilts.files import write_quilt
-    from lippmann.quilts.quilt import Quilt, load_device, quilt_of_display
+    from lippmann.quilts.quilt import Quilt, quilt_of_display
     from lippmann.rendering.quilt import render_quilt
     from lippmann.rendering.request.render_request import RenderRequest
 
     console = Console(quiet, as_json)
-    target = load_device(display)
+    target = load_display(display)
     grid = None if views is None else parse.size(views, "--views", rule="columns x rows, such as 8x6")
     wanted = quilt_of_display(target, grid, None if size is None else parse.size(size, "--size"))
     moving = sequence.Wanted(frames, fps, animation, camera_path, turntable, swing, video, eye)
@@ -144,7 +146,7 @@ def render(
         threads=threads,
         memory=parse.memory(memory),
     )
-    source = SceneSource(scene, environment, parse.color(background), allow_outside, single_scattering)
+    source = SceneSource(scene, environment, parse.color(background), allow_outside, single_scattering, up)
     if moving:
         from lippmann.sequences.forms import QuiltForm
 

@@ -14,7 +14,7 @@ import typer
 from lippmann.cli.commands import cluster as clusters
 from lippmann.cli.commands import print as printing
 from lippmann.cli.commands import sequence, view
-from lippmann.cli.shared import options, parse
+from lippmann.cli.shared import command_clock, options, parse
 from lippmann.cli.shared.console import Console
 from lippmann.cli.shared.default_output import output_of
 from lippmann.cli.shared.picture_report import add_seconds, remarks, report
@@ -54,6 +54,7 @@ def render(
     order: options.Order = None,
     respect_gloss: options.RespectGloss = None,
     maps: Maps = None,
+    up: options.Up = None,
     integrator: options.Integrator = "auto",
     depth: options.Depth = None,
     spp: options.Spp = None,
@@ -142,6 +143,7 @@ def render(
         quality=parse.quality(quality, quality_mean, console),
         quality_worst=quality_worst,
         max_time=max_time,
+        began=None if wanted else command_clock.began(),
         seed=seed,
         exposure=parse.exposure(exposure),
         tone_map=parse.tone_map(tone_map, output, background),
@@ -154,7 +156,7 @@ def render(
         threads=threads,
         memory=parse.memory(memory),
     )
-    source = SceneSource(scene, environment, parse.color(background), allow_outside, single_scattering)
+    source = SceneSource(scene, environment, parse.color(background), allow_outside, single_scattering, up)
     on_cluster = clusters.ClusterOptions(cluster, tls_ca, tls_cert, tls_key)
     if wanted:
         files = sequence.Files(output, bits, maps, resume)

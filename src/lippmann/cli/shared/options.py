@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -43,6 +43,10 @@ Scene = Annotated[
         help="A .glb, .gltf, .obj, .ply, .stl, Mitsuba .xml, Tachyon .dat or .nff file, or a bundled scene's name.",
         autocompletion=complete_scenes,
     ),
+]
+Up = Annotated[
+    Literal["y", "z"] | None,
+    typer.Option("--up", help="Which axis points up in OBJ, PLY (y by default) and STL files (z).", show_default=False),
 ]
 Integrator = Annotated[
     choices.Integrator,
@@ -159,7 +163,10 @@ QualityWorst = Annotated[
 ]
 QualityMean = Annotated[float | None, typer.Option("--quality-mean", hidden=True, help="What --quality is now.")]
 MaxTime = Annotated[
-    float | None, typer.Option("--max-time", help="Stop tracing after so many seconds, with the best so far.")
+    float | None,
+    typer.Option(
+        "--max-time", help="Be done after so many seconds, loading and writing included."
+    ),
 ]
 Denoise = Annotated[
     choices.Denoiser,

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from lippmann.scene.readers.load import Up
     from lippmann.scene.scene import Scene
 
 
@@ -19,6 +20,7 @@ class SceneSource:
     background: tuple[float, float, float] | None = None
     allow_outside: bool = False
     single_scattering: bool = False
+    up: Up | None = None
 
     def load(self) -> Scene:
         """The scene.
@@ -36,4 +38,5 @@ class SceneSource:
             background=self.background,
             allow_outside=self.allow_outside,
             multiple_scattering=not self.single_scattering,
+            up=self.up,
         )

@@ -50,6 +50,9 @@ if sys.version_info >= (3, 11):
 else:
     import tomli as tomllib
 
+#: How the names of all Looking Glass devices begin.
+_FAMILY = "looking-glass-"
+
 _MAXIMUM_BYTES = 1_000_000  # a picture given by mistake is not read to its end
 
 #: Lengths of a file by table; beside plain lengths, the units per inch and whether the panel's pixel may be the unit.
@@ -63,6 +66,8 @@ _LENGTHS: dict[str, dict[str, tuple[tuple[str, ...], bool]]] = {
 def load_display(name_or_path: str | os.PathLike[str]) -> Display:
     """The preset of that name, the display of a TOML file or a Looking Glass's ``visual.json``, or of a short form.
 
+    A Looking Glass preset goes by the end of its name, too, such as ``portrait``.
+
     Raises
     ------
     DisplayError
@@ -70,6 +75,8 @@ def load_display(name_or_path: str | os.PathLike[str]) -> Display:
     """
     presets = _preset_texts()
     name = os.fspath(name_or_path)
+    # Owners of a Looking Glass know their device as "portrait".
+    name = _FAMILY + name if _FAMILY + name in presets else name
     if name in presets:
         return _from_toml(presets[name], where=f"{name}.toml", stem=name)
     if is_short_form(name):

@@ -100,20 +100,19 @@ class MethodRace:
         if with_noise_out < outlook:
             self._lead(self._pooled, stand)
             return pooled
-        # Plain noise falls more reliably than the error left by denoising, unless few paths find the light. Where time
-        # is limited, none is spent on further assessments.
-        self._closed_to = math.inf if self._goal.max_time is not None else ASKED_AGAIN * samples
+        # Plain noise falls more reliably than the error left by denoising, unless few paths find the light.
+        self._closed_to = ASKED_AGAIN * samples
         self._lead(self._plain, f"{stand}, which reaches the goal sooner" if self._goal.has_quality else stand)
         return plain
 
     def seconds(self) -> float:
-        """Expected seconds of the next assessment."""
-        return self._plain.seconds() + (self._pooled.seconds() if self._closed_to < math.inf else 0.0)
+        """Expected seconds of the next assessment: the last one is of both pictures."""
+        return self._plain.seconds() + self._pooled.seconds()
 
     def _is_last_chance(self, plain: Assessment, samples: int, room: float) -> bool:
         """Whether plain samples miss the goal and no more may be taken: the better of both pictures is wanted then."""
         short = missing_with_margin(self._goal, plain.estimate, samples, self._plain)
-        return self._goal.max_time is None and room <= 1 and short > 0
+        return room < LEAST_GROWTH and short > 0
 
     def _lead(self, track: ErrorTrack, reason: str) -> None:
         self._leading, self.reason = track, reason

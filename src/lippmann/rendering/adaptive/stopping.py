@@ -56,7 +56,11 @@ class Goal:
     spp:
         Samples per pixel; at least two, fewer tell no error.
     part:
-        What a part of the picture that is assessment by itself is called.
+        What a part of the picture that is assessed by itself is called.
+    began:
+        Reading of the clock from which ``max_time`` counts; None: when the first sample is taken.
+    reserve:
+        Seconds of ``max_time`` to be left for what follows.
     """
 
     quality: float | None = None
@@ -64,6 +68,8 @@ class Goal:
     max_time: float | None = None
     spp: int | None = None
     part: str = "micro-image"
+    began: float | None = None
+    reserve: float = 0.0
 
     @property
     def has_quality(self) -> bool:
@@ -209,7 +215,7 @@ class _AdaptiveLoop:
     rate: float = 0.0
 
     def __post_init__(self) -> None:
-        self._began = self.clock()
+        self._began = self.clock() if self.goal.began is None else self.goal.began
         self._most = min(self.goal.spp or MOST_SAMPLES, MOST_SAMPLES)
         self._slope = 1.0
 
@@ -254,7 +260,7 @@ class _AdaptiveLoop:
         short = missing_with_margin(self.goal, estimate, self.spent, self.assessor)
         if self.goal.has_quality and short <= 0 and self.spent >= self.assessor.first:
             return "quality"
-        if self.goal.max_time is not None and self._seconds() >= self.goal.max_time:
+        if self.goal.max_time is not None and self._seconds() >= self.goal.max_time - self.goal.reserve:
             return "time"
         return "samples" if self.spent >= self._most else None
 
@@ -281,7 +287,7 @@ class _AdaptiveLoop:
     def _affordable(self) -> int:
         """Samples that fit the time left, assessment included."""
         assert self.goal.max_time is not None
-        left = self.goal.max_time - self._seconds() - self.assessor.seconds()
+        left = self.goal.max_time - self.goal.reserve - self._seconds() - self.assessor.seconds()
         return math.floor(_TIME_SHARE * max(0.0, left) * self.rate)
 
     def _time_for(self, samples: int) -> bool:

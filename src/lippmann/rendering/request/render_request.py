@@ -104,6 +104,11 @@ class RenderRequest:
         Where it runs, on how many CPU threads (None: all cores), and in how many bytes (None: 60 % of what is free).
     reason:
         Why the method is this one, where it was left open; set by the resolver.
+    spp_reserve:
+        Where the number of samples was left open: how many a picture may have that is not clean with ``spp``. Set by
+        the resolver.
+    began:
+        When the work began that ``max_time`` limits, in seconds of :func:`time.perf_counter`; None: with the rendering.
 
     Raises
     ------
@@ -132,6 +137,8 @@ class RenderRequest:
     threads: int | None = None
     memory: int | None = None
     reason: str = field(default="", compare=False)
+    spp_reserve: int | None = field(default=None, compare=False)
+    began: float | None = field(default=None, compare=False)
 
     def __post_init__(self) -> None:
         for name, words in _WORDS.items():
@@ -164,7 +171,7 @@ class RenderRequest:
         UsageError
             A name or a value is not known.
         """
-        known = [each.name for each in fields(cls) if each.name != "reason"]
+        known = [each.name for each in fields(cls) if each.name not in ("reason", "spp_reserve", "began")]
         for name in options:
             if name not in known:
                 raise UsageError(f"'{name}' is no option of a render", rule=f"known are {', '.join(known)}")

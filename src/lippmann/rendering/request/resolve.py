@@ -27,6 +27,8 @@ from lippmann.scene.scene import Scene
 SAMPLE_BUDGET = 1 << 21
 #: Fewest and most samples that a pixel gets of them; all three sub-pixels together have at least six.
 _FEWEST, _FEWEST_OF_SUBPIXELS, _MOST = 4, 2, 16
+#: By how much the samples of a small picture may be multiplied that is not clean with them.
+_MOST_IN_RESERVE = 4
 
 
 def resolve(
@@ -70,7 +72,9 @@ def resolve(
     if complete.spp is None and not complete.is_open_ended:
         if size is None and display is not None:
             size = display.panel.width, display.panel.height
-        complete = replace(complete, spp=_choose_samples(complete, size))
+        samples = _choose_samples(complete, size)
+        reserve = _MOST_IN_RESERVE * samples if _has_reserve(complete, form, size) else None
+        complete = replace(complete, spp=samples, spp_reserve=reserve)
     check(complete, form, display)
     return complete
 
@@ -90,6 +94,16 @@ def _choose_samples(request: RenderRequest, size: tuple[int, int] | None) -> int
     fewest = _FEWEST_OF_SUBPIXELS if request.subpixels else _FEWEST
     allowed = SAMPLE_BUDGET / (size[0] * size[1] * request.channels)
     return min(max(1 << max(round(math.log2(allowed)), 0), fewest), _MOST)
+
+
+def _has_reserve(request: RenderRequest, form: Form, size: tuple[int, int] | None) -> bool:
+    """Whether a picture may have more samples if it is not clean: one piece of few pixels."""
+    return (
+        form == "picture"
+        and request.method == "pooled"
+        and size is not None
+        and size[0] * size[1] * request.channels <= SAMPLE_BUDGET
+    )
 
 
 def _with_light(request: RenderRequest, scene: Scene, of_own_camera: bool) -> RenderRequest:

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
+from typing import Literal, get_args
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from lippmann.errors import SceneError, UsageError
 from lippmann.scene.mitsuba_source import MitsubaSource
 from lippmann.scene.parsing.files import read_bytes
 from lippmann.scene.parsing.name_hints import closest_name_hint
+from lippmann.scene.readers.ply import UP_NOTE
 from lippmann.scene.scene import Scene, check_description, override_light
 from lippmann.scene.values.description import Camera, Color, Environment, Material, SceneDescription
 from lippmann.scene.values.whitted_lighting import Background
@@ -41,6 +43,34 @@ _BEGINNINGS = {b"glTF": ".glb", b"ply\n": ".ply", b"ply\r": ".ply", b"<": ".xml"
 
 _PAPER_DEPTH = 2
 
+#: Files of other programs, and how a glTF file is made of them.
+_ELSEWHERE = {
+    ".blend": "in Blender: File > Export > glTF 2.0 (.glb)",
+    ".fbx": "open it in Blender, then File > Export > glTF 2.0 (.glb)",
+    ".dae": "open it in Blender, then File > Export > glTF 2.0 (.glb)",
+    ".3ds": "open it in Blender, then File > Export > glTF 2.0 (.glb)",
+    ".usd": "open it in Blender, then File > Export > glTF 2.0 (.glb)",
+    ".usda": "open it in Blender, then File > Export > glTF 2.0 (.glb)",
+    ".usdc": "open it in Blender, then File > Export > glTF 2.0 (.glb)",
+    ".usdz": "open it in Blender, then File > Export > glTF 2.0 (.glb)",
+    ".abc": "open it in Blender, then File > Export > glTF 2.0 (.glb)",
+    ".max": "in 3ds Max: File > Export > glTF",
+    ".c4d": "in Cinema 4D: File > Export > glTF",
+    ".skp": "in SketchUp: File > Export > 3D Model > glTF (.glb)",
+    ".ma": "export it from Maya as FBX, and that from Blender as glTF 2.0 (.glb)",
+    ".mb": "export it from Maya as FBX, and that from Blender as glTF 2.0 (.glb)",
+    ".step": "open it in FreeCAD, then File > Export > glTF (.glb)",
+    ".stp": "open it in FreeCAD, then File > Export > glTF (.glb)",
+    ".iges": "open it in FreeCAD, then File > Export > glTF (.glb)",
+    ".igs": "open it in FreeCAD, then File > Export > glTF (.glb)",
+    ".3mf": "save it from the slicer as .stl or .obj",
+}
+
+#: Kinds of files that do not say which way is up, and which way it mostly is: for 3D printing, z.
+Up = Literal["y", "z"]
+_USUAL_UP: dict[str, Up] = {".obj": "y", ".ply": "y", ".stl": "z"}
+_Y_FROM_Z = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, -1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
+
 
 def load_scene(
     source: object,
@@ -49,6 +79,7 @@ def load_scene(
     background: Color | None = None,
     allow_outside: bool = False,
     multiple_scattering: bool = True,
+    up: Up | None = None,
 ) -> Scene:
     """Load a scene.
 
@@ -68,6 +99,9 @@ def load_scene(
     multiple_scattering:
         Give back the light that rough surfaces reflect more than once between microfacets. False: as dark as glTF's
         formulas make them.
+    up:
+        The axis that points up in a file that does not say so: OBJ, PLY (None: "y") and STL (None: "z", as 3D printing
+        has it).
 
     Raises
     ------
@@ -79,7 +113,12 @@ def load_scene(
     """
     sky = _environment(environment)
     color = _background(background)
-    scene = _from_name(source, allow_outside) if isinstance(source, str | Path) else _from_object(source)
+    if isinstance(source, str | Path):
+        scene = _from_name(source, allow_outside, up)
+    elif up is None:
+        scene = _from_object(source)
+    else:
+        raise UsageError("is for files", parameter="up", fix="leave it out")
     studio = scene.studio and str(environment) != NO_ENVIRONMENT
     if scene.classic is not None and color is not None:
         scene = replace(scene, classic=replace(scene.classic, background=Background(color=color)))
@@ -124,9 +163,12 @@ def kind_of_file(source: str | Path) -> str | None:
     return _suffix_by_content(path) or path.suffix.lower()
 
 
-def _from_name(source: str | Path, allow_outside: bool) -> Scene:
+def _from_name(source: str | Path, allow_outside: bool, up: Up | None = None) -> Scene:
     path = Path(source)
     suffix = path.suffix.lower()
+    if up is not None and (up not in get_args(Up) or suffix not in _USUAL_UP):
+        what = f"'{up}'" if up not in get_args(Up) else f"{path.name} says itself which way is up"
+        raise UsageError(what, parameter="up", rule=f"y or z, for {', '.join(_USUAL_UP)}", fix="leave it out")
     if isinstance(source, str) and not suffix and path.name == source:
         from lippmann.scene import bundled
 
@@ -149,14 +191,34 @@ def _from_name(source: str | Path, allow_outside: bool) -> Scene:
             f"'{suffix}' is no known kind of scene file" if suffix else "is no known kind of scene file",
             where=path.name,
             rule=f"known are {', '.join(_READERS)}",
+            fix=_ELSEWHERE.get(suffix, ""),
         )
     module, function = reader.split(":")
     description = getattr(import_module(module), function)(path, allow_outside=allow_outside)
     if isinstance(description, ClassicScene):
         return _classic(description, world_camera(description))
     if isinstance(description, SceneDescription):
-        description = _with_remarks(check_description(description, path.name))
+        description = _upright(_with_remarks(check_description(description, path.name)), suffix, up)
     return Scene(description.name, description)
+
+
+def _upright(description: SceneDescription, suffix: str, up: Up | None) -> SceneDescription:
+    """A description of a file that does not say which way is up, with y up, and a note where that was guessed."""
+    if suffix not in _USUAL_UP:
+        return description
+    axis = up or _USUAL_UP[suffix]
+    notes = [note for note in description.notes if note != UP_NOTE or up is None]
+    if up is None and axis == "z":
+        notes.append(
+            f"{suffix} files do not say which way is up: +z is taken for it, as 3D printing has it (else up=y)"
+        )
+    if axis == "y":
+        return replace(description, notes=notes)
+    instances = [
+        replace(each, world_from_mesh=_Y_FROM_Z @ np.asarray(each.world_from_mesh, np.float64))
+        for each in description.instances
+    ]
+    return replace(description, instances=instances, notes=notes)
 
 
 def _with_remarks(description: SceneDescription) -> SceneDescription:

@@ -22,7 +22,7 @@ from lippmann.scene.parsing.triangulation import triangulate
 from lippmann.scene.readers.ply_header import Element, Header, read_header
 from lippmann.scene.values.description import Instance, Material, Mesh, SceneDescription, Texture
 
-UP_NOTE = "up is taken as +y, for nothing in the data says it (turn 0,-90 sets a model upright whose up is +z)"
+UP_NOTE = "up is taken as +y, for nothing in the data says it (else up=z)"
 
 # Numbers may be followed by remarks, as in the header.
 _REMARK = re.compile(rb"(?m)^[ \t]*comment\b.*$|#.*$")

@@ -13,7 +13,6 @@ import numpy as np
 
 from lippmann.errors import SceneError
 from lippmann.scene.parsing.files import decode_text, read_bytes
-from lippmann.scene.readers.ply import UP_NOTE
 from lippmann.scene.values.description import FloatArray, Instance, Material, Mesh, SceneDescription
 
 _HEADER = 84  # bytes
@@ -39,7 +38,7 @@ def read_stl(path: Path, *, allow_outside: bool = False) -> SceneDescription:
     del allow_outside
     where = path.name
     data = read_bytes(path)
-    notes = [UP_NOTE]
+    notes: list[str] = []
     binary = _is_binary(data)
     positions = _binary_positions(data, where) if binary else _text_positions(decode_text(data, where), where)
     if len(positions) == 0:

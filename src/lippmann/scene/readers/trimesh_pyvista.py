@@ -15,7 +15,6 @@ from numpy.typing import ArrayLike, NDArray
 from lippmann.color.transfer import decode_srgb
 from lippmann.errors import SceneError
 from lippmann.scene.parsing.files import texels_of
-from lippmann.scene.readers.ply import UP_NOTE
 from lippmann.scene.values.description import (
     AlphaMode,
     Camera,
@@ -33,6 +32,8 @@ if TYPE_CHECKING:
     import pyvista
     import trimesh
     from PIL import Image as Pillow
+
+_UP_NOTE = "up is taken as +y, for nothing in the data says it (turn 0,-90 sets a model upright whose up is +z)"
 
 _GREY = Material("grey", base_color=(0.7, 0.7, 0.7), roughness=0.6, double_sided=True)
 _COLORED = Material("vertex colours", roughness=0.6, double_sided=True)
@@ -214,7 +215,7 @@ def from_pyvista(source: pyvista.DataSet | pyvista.MultiBlock) -> SceneDescripti
     positions = np.asarray(surface.points, np.float64)
     if len(faces) == 0:
         raise SceneError("the PyVista data set has no surface", rule="there must be at least one face")
-    notes = [UP_NOTE]
+    notes = [_UP_NOTE]
     normals, uvs, colors = surface.point_data.active_normals, surface.active_texture_coordinates, None
     scalars = surface.active_scalars
     if scalars is not None and scalars.dtype == np.uint8 and scalars.ndim == 2 and scalars.shape[1] in (3, 4):
