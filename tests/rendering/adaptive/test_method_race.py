@@ -128,7 +128,8 @@ def test_a_denoised_picture_that_is_worse_is_seldom_looked_at():
     assert 1 < clean.looks <= 1 + math.log(outcome.samples / 8, ASKED_AGAIN)
     assert clean.looks < len(outcome.rounds)
     timed, _, clean = run(Goal(quality_worst=40, max_time=1000.0), plain=0.2, denoised=0.5)
-    assert (timed.leader, clean.looks) == ("plain", 1)
+    assert timed.leader == "plain"
+    assert clean.looks <= 1 + math.log(1000, ASKED_AGAIN)
 
 
 def test_when_no_more_samples_may_be_taken_the_denoised_picture_is_looked_at_again():

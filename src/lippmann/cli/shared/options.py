@@ -164,9 +164,7 @@ QualityWorst = Annotated[
 QualityMean = Annotated[float | None, typer.Option("--quality-mean", hidden=True, help="What --quality is now.")]
 MaxTime = Annotated[
     float | None,
-    typer.Option(
-        "--max-time", help="Be done after so many seconds, loading and writing included."
-    ),
+    typer.Option("--max-time", help="Be done after so many seconds, loading and writing included."),
 ]
 Denoise = Annotated[
     choices.Denoiser,

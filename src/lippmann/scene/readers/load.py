@@ -209,9 +209,7 @@ def _upright(description: SceneDescription, suffix: str, up: Up | None) -> Scene
     axis = up or _USUAL_UP[suffix]
     notes = [note for note in description.notes if note != UP_NOTE or up is None]
     if up is None and axis == "z":
-        notes.append(
-            f"{suffix} files do not say which way is up: +z is taken for it, as 3D printing has it (else up=y)"
-        )
+        notes.append(f"up is taken as +z, as 3D printing has it, for nothing in {suffix} files says it (else up=y)")
     if axis == "y":
         return replace(description, notes=notes)
     instances = [

@@ -1,0 +1,23 @@
+"""Pictures that are not clean with a default number of samples get more, within bounds."""
+
+import pytest
+
+from lippmann.rendering.adaptive.extra_samples import CLEAN, extra_samples
+from lippmann.rendering.adaptive.stopping import Outcome
+from lippmann.rendering.estimate.psnr import Estimate
+
+
+def after(psnr, samples=8):
+    estimate = Estimate(psnr, psnr - 1, psnr + 1, psnr - 5, psnr - 6, psnr - 4, (0, 0))
+    return Outcome("samples", estimate, samples, (), None)
+
+
+def test_clean_pictures_and_asked_numbers_stay():
+    assert extra_samples(after(CLEAN), 64) == 0
+    assert extra_samples(after(20.0), None) == 0
+    assert extra_samples(Outcome("samples", None, 1, (), None), 64) == 0
+
+
+@pytest.mark.parametrize(("psnr", "total"), [(CLEAN - 0.1, 16), (CLEAN - 2.0, 24), (CLEAN - 20.0, 32)])
+def test_as_many_as_the_estimate_suggests_but_no_more_than_there_may_be(psnr, total):
+    assert extra_samples(after(psnr), 32) == total - 8
