@@ -24,7 +24,7 @@ from PIL import Image, ImageDraw
 
 import lippmann
 from first_picture_models import models
-from harness import save
+from harness import save, saved
 from lippmann.color.tone_map import pbr_neutral
 from lippmann.color.transfer import encode_srgb, quantize
 from lippmann.display import Display
@@ -46,7 +46,7 @@ DISPLAYS = (
     "print-60lpi",
 )
 #: Pixels all over the panel that are judged, and samples of their reference.
-JUDGED, REFERENCE_SAMPLES = 6000, 1024
+JUDGED, REFERENCE_SAMPLES = 3000, 512
 #: Points of the panel, along its longer side, at which the central eye looks.
 SEEN = 150
 CELL, LABEL = 150, 14
@@ -145,9 +145,12 @@ def main() -> None:
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         found = models(Path(folder), options.scenes)
-        sheet = Image.new("RGB", (CELL * len(found), (CELL + LABEL) * len(options.only)), (30, 30, 30))
-        rows = []
-        for row, display in enumerate(options.only):
+        sheet = Image.new("RGB", (CELL * len(found), (CELL + LABEL) * len(DISPLAYS)), (30, 30, 30))
+        if PICTURE.exists() and set(options.only) != set(DISPLAYS):
+            sheet.paste(Image.open(PICTURE))
+        rows = [old for old in saved("first_picture").get("pictures", []) if old["display"] not in options.only]
+        for display in options.only:
+            row = DISPLAYS.index(display)
             for column, (name, model) in enumerate(found.items()):
                 figures, picture = judge(model, display, Path(folder) / "picture.png")
                 rows.append({"model": name, **figures})
@@ -160,9 +163,8 @@ def main() -> None:
                 sheet.paste(picture, corner)
                 words = f"{name}, {display}" if column == 0 else name
                 ImageDraw.Draw(sheet).text((column * CELL + 3, row * (CELL + LABEL) + CELL), words, fill="white")
-    if tuple(options.only) == DISPLAYS:
         sheet.save(PICTURE, optimize=True)
-        save("first_picture", {"pictures": rows})
+    save("first_picture", {"pictures": sorted(rows, key=lambda each: DISPLAYS.index(each["display"]))})
 
 
 if __name__ == "__main__":
