@@ -41,6 +41,9 @@ class Comparison:
     micro_image_errors, micro_image_pixels:
         ``(lens_rows, lens_cols)``: mean squared error of each micro-image (NaN where a lens has no pixel), and its
         pixels.
+    micro_image_similarity:
+        ``(lens_rows, lens_cols)``: SSIM of each micro-image (NaN where a lens has no pixel), see
+        :mod:`~lippmann.metrics.micro_image_similarity`.
     silhouettes:
         Share of the reference's pixels that lie on outlines.
     views:
@@ -57,6 +60,7 @@ class Comparison:
     off_silhouettes_error: float | None
     micro_image_errors: Real
     micro_image_pixels: NDArray[np.intp]
+    micro_image_similarity: Real
     silhouettes: SilhouetteShare
     views: ViewSimilarity
     flicker: Flicker | None
@@ -91,6 +95,17 @@ class Comparison:
         return low_percentile(self.micro_image_errors, self.micro_image_pixels, LOW_PERCENTILE)
 
     @property
+    def mean_similarity(self) -> float:
+        """Mean SSIM of the micro-images."""
+        return float(np.nanmean(self.micro_image_similarity))
+
+    @property
+    def least_similar(self) -> tuple[int, int, float]:
+        """Column and row of the micro-image with the least SSIM, and that SSIM."""
+        row, column = divmod(int(np.nanargmin(self.micro_image_similarity)), self.micro_image_similarity.shape[1])
+        return column, row, float(self.micro_image_similarity[row, column])
+
+    @property
     def psnr_off_silhouettes(self) -> float | None:
         """PSNR in dB over the pixels that lie on no silhouette; None if there are none."""
         return None if self.off_silhouettes_error is None else psnr(self.off_silhouettes_error)
@@ -114,6 +129,11 @@ class Comparison:
                 "count": lenses,
                 "worst": _lens(self.worst),
                 "percentile_1": _lens(self.percentile_1),
+                "ssim": {
+                    "mean": self.mean_similarity,
+                    "worst": self.least_similar[2],
+                    "worst_lens": list(self.least_similar[:2]),
+                },
             },
             "ssim": {
                 "mean": _finite(self.views.mean),
@@ -144,6 +164,7 @@ class Comparison:
                 "pixels": int(self.micro_image_pixels[row, column]),
                 "mean_squared_error": error,
                 "psnr": psnr(error),
+                "ssim": float(self.micro_image_similarity[row, column]),
                 "paper_rmse": float(self.paper.rmse[row, column]),
                 "paper_psnr": float(paper_psnr[row, column]),
             }
@@ -179,6 +200,7 @@ def compare(reference: Picture, test: Picture, progress: ProgressCallback = sile
         off_silhouettes_error=sums.off_error / sums.off_pixels if sums.off_pixels else None,
         micro_image_errors=sums.means(sums.errors),
         micro_image_pixels=sums.pixels,
+        micro_image_similarity=sums.similarity.values(),
         silhouettes=SilhouetteShare(1 - sums.off_pixels / pixels, source_of(depth_of(reference))),
         views=views.similarity,
         flicker=views.flicker,

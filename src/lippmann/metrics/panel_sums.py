@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from lippmann.image import Picture
 from lippmann.metrics.bands import Band, bands
+from lippmann.metrics.micro_image_similarity import MicroImageSimilarity
 from lippmann.metrics.mse_psnr import coded_values, squared_differences
 from lippmann.metrics.paper import paper_codes
 from lippmann.metrics.silhouettes import depth_of, mark_silhouettes
@@ -27,6 +28,8 @@ class PanelSums:
         ``(lens_rows, lens_cols)``: sums of their squared errors, of coded values and of the paper's 8-bit codes.
     off_error, off_pixels:
         Sum of the squared errors of the pixels that lie on no silhouette, and their number.
+    similarity:
+        SSIM of every micro-image.
     """
 
     def __init__(self, reference: Picture, test: Picture) -> None:
@@ -37,6 +40,7 @@ class PanelSums:
         self.pixels = np.zeros(shape, dtype=np.intp)
         self.errors, self.paper_errors = np.zeros(shape), np.zeros(shape)
         self.off_error, self.off_pixels = 0.0, 0
+        self.similarity = MicroImageSimilarity(reference.display)
 
     def work(self) -> Iterator[int]:
         """Work through all rows of the panel; yields the number of rows done, now and then."""
@@ -55,7 +59,9 @@ class PanelSums:
         around = self._reference.held_rows(band.top, band.bottom)
         own = around[band.inner], self._test.held_rows(band.first, band.last)
         colors = coded_values(around, transfers[0])
-        errors = squared_differences(colors[band.inner], coded_values(own[1], transfers[1]))
+        tested = coded_values(own[1], transfers[1])
+        errors = squared_differences(colors[band.inner], tested)
+        self.similarity.add(band.first, band.owner[band.inner], colors[band.inner], tested)
         codes = (paper_codes(values, transfer) for values, transfer in zip(own, transfers, strict=True))
         self._add_to_lenses(band.owner[band.inner].ravel(), errors.ravel(), squared_differences(*codes).ravel())
         off = ~mark_silhouettes(band, colors, self._depth)

@@ -107,6 +107,7 @@ def _write_table(comparison: Comparison, path: Path) -> None:
 def _lines(comparison: Comparison) -> list[str]:
     views, paper, silhouettes = comparison.views, comparison.paper, comparison.silhouettes
     ky, kx = views.worst
+    column, row, least = comparison.least_similar
     off = comparison.psnr_off_silhouettes
     source = "depths" if silhouettes.source == "depth" else "strong edges"
     lenses = int((comparison.micro_image_pixels > 0).sum())
@@ -117,6 +118,7 @@ def _lines(comparison: Comparison) -> list[str]:
         f"({100 * (1 - silhouettes.share):.1f} % of the pixels; silhouettes by {source})",
         f"worst micro-image   {_decibels(comparison.worst.psnr)} ({_lens(comparison.worst)} of {lenses})",
         f"1st percentile      {_decibels(comparison.percentile_1.psnr)} ({_lens(comparison.percentile_1)})",
+        f"SSIM of lenses      {comparison.mean_similarity:.4f}, worst {least:.4f} (lens {column}, {row})",
         f"SSIM of views       {views.mean:.4f}, worst {views.values[ky, kx]:.4f} (view {kx}, {ky})",
         _flicker_line(comparison),
         f"the paper's PSNR    {_decibels(paper.mean_psnr)}, mean of micro-images"
