@@ -21,6 +21,7 @@ ORDER = (
     "_version",
     "errors",
     "progress",
+    "progress_bar",
     "json_values",
     "color",
     "runtime",

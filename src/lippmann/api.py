@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING, Literal, cast
 
 from lippmann.display import Display, load_display
 from lippmann.progress import ProgressCallback, silent
+from lippmann.progress_bar import shown
 from lippmann.rendering.request.choices import Denoiser, Device, Integrator, Method, Order, PixelFilter, ToneMap
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.scene.placement import Placement, PlacementOptions
@@ -110,7 +111,7 @@ def render(
     device: Device = "auto",
     threads: int | None = None,
     memory: int | None = None,
-    progress: ProgressCallback = silent,
+    progress: ProgressCallback | None = None,
     **former: object,
 ) -> IntegralImage:
     """Render a scene into the native pixels of a display.
@@ -179,7 +180,8 @@ def render(
     memory:
         Bytes to use. Default: 60 % of what is free.
     progress:
-        Called with :class:`~lippmann.progress.Progress` as the work goes on.
+        Called with :class:`~lippmann.progress.Progress` as the work goes on. By default a bar in terminals and
+        notebooks, and nothing elsewhere.
     **former:
         Deprecated: ``camera``, ``place``, ``turn``, ``shift``, ``scale``, ``pop_out`` and ``placed``, which are
         parts of ``placement`` now, and ``quality_mean``, which is called ``quality``.
@@ -221,7 +223,8 @@ def render(
         threads=threads,
         memory=memory,
     )
-    return render_picture(_scene(scene), _display(display), request, progress)
+    with shown(progress) as told:
+        return render_picture(_scene(scene), _display(display), request, told)
 
 
 def render_to_file(
@@ -233,7 +236,7 @@ def render_to_file(
     bits: int | None = None,
     resume: bool = False,
     runner: Runner | None = None,
-    progress: ProgressCallback = silent,
+    progress: ProgressCallback | None = None,
     **options: object,
 ) -> Rendered:
     """Render a scene into a file tile by tile: for pictures larger than memory, and runs that may be interrupted.
@@ -270,16 +273,17 @@ def render_to_file(
     from lippmann.tiles.tiled_render import render_to_file as rendered
 
     request = _request(placement, options)
-    return rendered(
-        _scene(scene),
-        _display(display),
-        request,
-        Path(output),
-        bits=bits,
-        resume=resume,
-        runner=runner,
-        progress=progress,
-    )
+    with shown(progress) as told:
+        return rendered(
+            _scene(scene),
+            _display(display),
+            request,
+            Path(output),
+            bits=bits,
+            resume=resume,
+            runner=runner,
+            progress=told,
+        )
 
 
 def preview(
@@ -287,7 +291,7 @@ def preview(
     size: tuple[int, int] = (512, 512),
     *,
     camera: str | None = None,
-    progress: ProgressCallback = silent,
+    progress: ProgressCallback | None = None,
     **options: object,
 ) -> Preview:
     """Render the plain picture that a camera of the scene sees. Calls of other threads wait, as of :func:`render`.
@@ -316,7 +320,8 @@ def preview(
     """
     from lippmann.rendering.preview import render_preview
 
-    return render_preview(_scene(scene), camera, size, RenderRequest.of(options), progress)
+    with shown(progress) as told:
+        return render_preview(_scene(scene), camera, size, RenderRequest.of(options), told)
 
 
 def render_quilt(
@@ -326,7 +331,7 @@ def render_quilt(
     placement: PlacementOptions | Placement | None = None,
     views: tuple[int, int] | None = None,
     size: tuple[int, int] | None = None,
-    progress: ProgressCallback = silent,
+    progress: ProgressCallback | None = None,
     **options: object,
 ) -> Quilt:
     """Render the views that cameras before a display see, side by side in one picture.
@@ -363,14 +368,15 @@ def render_quilt(
 
     device = display if isinstance(display, Display) else load_display(str(display))
     layout = quilt_of_display(device, views, size)
-    frame = rendered(
-        _scene(scene),
-        device,
-        (layout.layout.columns, layout.layout.rows),
-        (layout.width, layout.height),
-        _request(placement, options),
-        progress,
-    )
+    with shown(progress) as told:
+        frame = rendered(
+            _scene(scene),
+            device,
+            (layout.layout.columns, layout.layout.rows),
+            (layout.width, layout.height),
+            _request(placement, options),
+            told,
+        )
     return Quilt(frame.pixels, layout.layout, provenance=frame.provenance)
 
 
@@ -381,7 +387,7 @@ def render_turntable(
     *,
     swing: float | None = None,
     placement: PlacementOptions | None = None,
-    progress: ProgressCallback = silent,
+    progress: ProgressCallback | None = None,
     **options: object,
 ) -> Iterator[IntegralImage]:
     """Render a scene on a turntable, frame by frame; display and light stand still.
@@ -419,7 +425,8 @@ def render_turntable(
 
     classic = options.get("integrator") == "classic"
     motion = open_turntable(_scene(scene), frames, swing=swing, placement=placement, classic=classic)
-    pictures = render_sequence(motion, display, range(motion.count), placement=placement, progress=progress, **options)
+    told = progress or silent
+    pictures = render_sequence(motion, display, range(motion.count), placement=placement, progress=told, **options)
     return (image for _, image in pictures)
 
 
@@ -428,7 +435,7 @@ def plan(
     display: Display | str | Path = "seed-lenticular",
     *,
     placement: PlacementOptions | Placement | None = None,
-    progress: ProgressCallback = silent,
+    progress: ProgressCallback | None = None,
     **options: object,
 ) -> Forecast:
     """Say what rendering a scene for a display will show and take, without rendering more than a few pixels.
@@ -455,7 +462,8 @@ def plan(
     """
     from lippmann.rendering.forecast import forecast
 
-    return forecast(_scene(scene), _display(display), _request(placement, options), progress)
+    with shown(progress) as told:
+        return forecast(_scene(scene), _display(display), _request(placement, options), told)
 
 
 def _scene(source: Scene | object) -> Scene:

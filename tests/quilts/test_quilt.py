@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import io
+
 import numpy as np
 import pytest
+from PIL import Image
 
 from lippmann.color.transfer import dequantize
 from lippmann.display import load_display
@@ -87,3 +90,15 @@ def test_devices(device, tmp_path):
 def test_sizes_that_disagree_with_the_name_are_refused(width, height, said):
     with pytest.raises(PictureError, match=said):
         check_size(width, height, LAYOUT, "x")
+
+
+def test_a_quilt_shows_itself_in_notebooks_and_gives_its_codes():
+    layout = QuiltLayout(4, 3, 0.75)
+    quilt = Quilt(np.full((900, 1600, 3), 0.5, np.float32), layout)
+    assert repr(quilt) == "<Quilt 1600 x 900 pixels, 4 x 3 views, aspect 0.75>"
+    with Image.open(io.BytesIO(quilt._repr_png_())) as shown:
+        assert shown.size == (534, 300)
+        assert shown.getpixel((9, 9)) == (188, 188, 188)
+    assert (quilt.srgb(16) == 48192).all()
+    with pytest.raises(PictureError, match="codes of 12 bits; display codes have 8 or 16 bits"):
+        quilt.srgb(12)

@@ -46,6 +46,13 @@ _SCALAR, _VECTOR = "V", "XYZW"
 _FLOAT16_MAX = 65504.0
 
 
+def display_codes(linear: FloatArray, bits: int, transfer: Transfer) -> NDArray[np.uint8] | NDArray[np.uint16]:
+    """Codes of linear RGB as integer formats hold them, of 8 or 16 bits; another number is a :class:`PictureError`."""
+    if bits not in (8, 16):
+        raise PictureError(f"codes of {bits} bits", rule="display codes have 8 or 16 bits")
+    return quantize(linear, bits, transfer)
+
+
 def stored_values(linear: FloatArray, stored: Stored, transfer: Transfer) -> Values:
     """Codes or floats of the type ``stored`` for linear float32 values; same shape."""
     if stored in ("uint8", "uint16"):

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from lippmann.display import Display
 from lippmann.display.pixel_window import PixelWindow
 from lippmann.errors import PictureError
+from lippmann.image.encoding import display_codes
 from lippmann.image.micro_images import Permutation, micro_images_as_views
 from lippmann.image.picture import Picture
 from lippmann.image.provenance import Provenance
@@ -206,6 +207,16 @@ class IntegralImage(Picture):
         from lippmann.image.write import write_picture
 
         write_picture(self, Path(path), bits=bits)
+
+    def srgb(self, bits: int = 8) -> NDArray[np.uint8] | NDArray[np.uint16]:
+        """Display codes ``(H, W, 3)``, as integer formats hold them: uint8, or uint16 for 16 ``bits``.
+
+        Raises
+        ------
+        PictureError
+            If ``bits`` is neither 8 nor 16.
+        """
+        return display_codes(self.pixels, bits, self.provenance.transfer)
 
     def with_pixels(self, pixels: ArrayLike, **parts: Unpack[Parts]) -> IntegralImage:
         """A copy with other ``pixels``, ``(H, W, 3)`` linear RGB, and other ``parts``; errors as of the class."""

@@ -14,15 +14,19 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lippmann.display import Display
 from lippmann.errors import PictureError, UsageError
-from lippmann.image.encoding import linear_values
+from lippmann.image.encoding import display_codes, linear_values
 from lippmann.image.provenance import Provenance
 from lippmann.image.stored_values import FloatArray, Stored, Values
 
 #: Least and largest side of a quilt in pixels, and the largest number of columns or rows.
 LEAST_SIDE, MOST_SIDE, MOST_TILES = 256, 16384, 32
+
+#: Width in pixels of a quilt in a notebook, at most.
+_NOTEBOOK_WIDTH = 768
 
 _NAME = re.compile(r"_qs(\d{1,4})x(\d{1,4})(?:a(\d{1,4}(?:\.\d{1,12})?))?$")
 _CONVENTION = "a quilt's name ends in columns x rows and aspect ratio, such as _qs8x6a0.75.png"
@@ -137,6 +141,22 @@ class Quilt:
     def pixels(self) -> FloatArray:
         """``(height, width, 3)`` float32 linear RGB, row 0 on top."""
         return linear_values(self.values, self.provenance.transfer)
+
+    def srgb(self, bits: int = 8) -> NDArray[np.uint8] | NDArray[np.uint16]:
+        """Display codes ``(height, width, 3)``: uint8, or uint16 for 16 ``bits``; errors as of an integral image."""
+        return display_codes(self.pixels, bits, self.provenance.transfer)
+
+    def __repr__(self) -> str:
+        (width, height), layout = self.size, self.layout
+        return f"<Quilt {width} x {height} pixels, {layout.columns} x {layout.rows} views, aspect {layout.aspect:g}>"
+
+    def _repr_png_(self) -> bytes:
+        """A PNG of all views for notebooks, at most 768 pixels wide."""
+        from lippmann.codecs.png import encode_png
+
+        step = -(-self.size[0] // _NOTEBOOK_WIDTH)
+        codes = np.ascontiguousarray(self.srgb()[::step, ::step])
+        return encode_png(codes, text={}, srgb=self.provenance.transfer == "srgb")
 
     @property
     def view_size(self) -> tuple[int, int]:

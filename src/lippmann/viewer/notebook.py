@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-import sys
 from importlib.util import find_spec
 from typing import TYPE_CHECKING
+
+from lippmann.progress_bar import in_notebook
 
 if TYPE_CHECKING:
     from lippmann.image import IntegralImage
@@ -17,10 +18,3 @@ def mimebundle(image: IntegralImage) -> object:
     from lippmann.viewer.widget import PictureWidget
 
     return PictureWidget(image)._repr_mimebundle_()
-
-
-def in_notebook() -> bool:
-    """Whether a notebook's kernel runs this program, rather than a script or a terminal."""
-    ipython = sys.modules.get("IPython")
-    shell = None if ipython is None else ipython.get_ipython()
-    return getattr(shell, "kernel", None) is not None
