@@ -12,6 +12,7 @@ from lippmann.cli.commands import (
     cluster,
     compare,
     exchange,
+    interlace,
     picture,
     plan,
     preview,
@@ -47,6 +48,7 @@ app.command("import")(exchange.import_)
 app.command("view")(view.view)
 app.add_typer(quilt.quilt, name="quilt")
 app.command("weave")(quilt.weave)
+app.command("interlace")(interlace.interlace)
 app.add_typer(calibrate.calibrate, name="calibrate")
 app.command("pitch-test")(printing.pitch_test)
 app.command("marks")(printing.marks)

@@ -159,17 +159,19 @@ class Quilt:
         column, row = self.corner(number)
         return self.values[row : row + height, column : column + width]
 
-    def view_rows(self, first: int, last: int) -> FloatArray:
-        """``(views, last - first, width, 3)`` linear RGB of rows of all views."""
-        width, _ = self.view_size
-        rows = np.empty((self.layout.views, last - first, width, 3), dtype=np.float32)
+    def view_rows(self, first: int, last: int, left: int = 0, right: int | None = None) -> FloatArray:
+        """``(views, last - first, right - left, 3)`` linear RGB of rows of all views, by default in full width."""
+        right = self.view_size[0] if right is None else right
+        rows = np.empty((self.layout.views, last - first, right - left, 3), dtype=np.float32)
         for number in range(self.layout.views):
-            rows[number] = linear_values(self.view_values(number)[first:last], self.provenance.transfer)
+            values = self.view_values(number)[first:last, left:right]
+            rows[number] = linear_values(values, self.provenance.transfer)
         return rows
 
 
 def load_device(name: str) -> Display:
-    """Load a Looking Glass device by the end of its preset's name, such as ``portrait``, or any other display.
+    """Load a Looking Glass device by the end of its preset's name, such as ``portrait`` or ``lkg-portrait``, or any
+    other display.
 
     Raises
     ------
@@ -177,7 +179,8 @@ def load_device(name: str) -> Display:
         If the display is unknown, or its description is missing or invalid.
     """
     known = {device.display for device in DEVICE_QUILTS}
-    return load_display(_FAMILY + name if _FAMILY + name in known else name)
+    device = _FAMILY + name.removeprefix("lkg-")
+    return load_display(device if device in known else name)
 
 
 def quilt_of_display(
