@@ -170,26 +170,49 @@ def refocus(
     picture: options.Picture,
     output: options.Output,
     plane: Annotated[
-        float,
+        float | None,
         typer.Option("--plane", help="Height of the focus plane in mm, positive toward the viewer."),
-    ],
+    ] = None,
+    planes: Annotated[
+        str | None,
+        typer.Option(
+            "--planes",
+            help="Focal stack: FIRST:LAST:COUNT, such as -40:40:9. The output is a folder, a .tif of pages, or an "
+            "animation (.png, .mp4).",
+        ),
+    ] = None,
     size: Size = None,
     bits: options.Bits = None,
     display: options.PictureDisplay = None,
     as_json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
-    """Refocus on a plane, as a camera whose aperture is as wide as the field of view."""
+    """Refocus on a plane, or on several, as a camera whose aperture is as wide as the field of view."""
     from lippmann.image.streamed import open_picture
     from lippmann.image.write import check_output, format_for, write_plain_picture
+    from lippmann.viewing.focal_stack import check_stack_path, write_focal_stack
     from lippmann.viewing.refocus import refocus as refocus_picture
 
     console = Console(quiet, as_json)
-    check_output(output, format_for(output, bits)[0])
+    if (plane is None) == (planes is None):
+        raise UsageError("say --plane or --planes", rule="one plane, or FIRST:LAST:COUNT")
+    heights = [] if planes is None else parse.steps(planes, "--planes")
+    if plane is None:
+        check_stack_path(output, bits)
+    else:
+        check_output(output, format_for(output, bits)[0])
     image = open_picture(picture, display=parse.display(display))
-    pixels = refocus_picture(image, plane, size=None if size is None else parse.size(size, "--size"))
-    write_plain_picture(pixels, output, bits=bits, transfer=image.provenance.transfer)
-    console.result({"output": str(output), "plane": plane}, f"{output}: focused at {plane:g} mm")
+    pixels = None if size is None else parse.size(size, "--size")
+    if plane is not None:
+        write_plain_picture(
+            refocus_picture(image, plane, size=pixels), output, bits=bits, transfer=image.provenance.transfer
+        )
+        console.result({"output": str(output), "plane": plane}, f"{output}: focused at {plane:g} mm")
+        return
+    with console.progress() as progress:
+        write_focal_stack(image, heights, output, size=pixels, bits=bits, progress=progress)
+    line = f"{output}: {len(heights)} planes, focused at {heights[0]:g} to {heights[-1]:g} mm"
+    console.result({"output": str(output), "planes": heights}, line)
 
 
 def _position(eye: tuple[float, float, float]) -> str:
