@@ -357,7 +357,7 @@ def render_quilt(
         _request(placement, options),
         progress,
     )
-    return Quilt(frame.pixels, layout.layout, provenance=frame.provenance)
+    return Quilt(frame.pixels, layout.layout, provenance=frame.provenance, display=device)
 
 
 def plan(

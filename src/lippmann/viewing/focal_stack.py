@@ -107,17 +107,38 @@ def write_focal_stack(
     OutputError
         If the ending is unknown, there are no such bits, or the file cannot be written.
     """
+    pictures = focal_planes(image, planes, size=size)
+    write_planes(pictures, planes, path, bits=bits, transfer=image.provenance.transfer, progress=progress)
+
+
+def write_planes(
+    pictures: Iterator[FloatArray],
+    planes: Sequence[float],
+    path: Path,
+    *,
+    bits: int | None = None,
+    transfer: Transfer = "srgb",
+    progress: ProgressCallback = silent,
+) -> None:
+    """Write the pictures of a focal stack, as :func:`write_focal_stack` does.
+
+    Parameters
+    ----------
+    pictures:
+        ``(height, width, 3)`` linear RGB, one for each of the ``planes``.
+    transfer:
+        Coding of the values.
+    """
     check_stack_path(path, bits)
-    transfer = image.provenance.transfer
-    pictures = _reported(_finite(focal_planes(image, planes, size=size), path), len(planes), progress)
+    checked = _reported(_finite(pictures, path), len(planes), progress)
     if not path.suffix:
-        _write_folder(pictures, planes, path, bits, transfer)
+        _write_folder(checked, planes, path, bits, transfer)
     elif path.suffix.lower() in ANIMATIONS:
-        write_animation(pictures, path, frames_per_second=_FRAMES_PER_SECOND, transfer=transfer)
+        write_animation(checked, path, frames_per_second=_FRAMES_PER_SECOND, transfer=transfer)
     else:
         stored = format_for(path, bits)[1]
         with replacing(path) as temporary:
-            write_tiff_pages(temporary, (converted_values(picture, stored, transfer) for picture in pictures))
+            write_tiff_pages(temporary, (converted_values(picture, stored, transfer) for picture in checked))
 
 
 def _write_folder(
