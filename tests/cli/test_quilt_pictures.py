@@ -62,6 +62,22 @@ def test_a_lost_layout_is_given_back(lippmann, tmp_path):
     assert "--aspect: applies to --layout only" in lippmann("info", path, "--aspect", "1").err
 
 
+def test_the_page_shows_a_quilt_as_its_display_does(lippmann, tmp_path):
+    display = tmp_path / "print.toml"
+    display.write_text(
+        "gap = 2.0\nviewing_distance = 300\naperture_distance = 0\n[panel]\nwidth = 96\nheight = 128\n"
+        'pixel_pitch = "200 dpi"\n[lens_array]\nlayout = "lenticular"\npitch = "20 lpi"\n'
+    )
+    Image.new("RGB", (384, 384), (90, 90, 90)).save(tmp_path / "plain.png")
+    page = tmp_path / "page.html"
+    words = ("view", tmp_path / "plain.png", "--layout", "8x6", "--export", page)
+    assert "say --display" in lippmann(*words).err
+    outcome = lippmann(*words, "--display", display)
+    assert outcome.code == 0, outcome.err
+    assert str(tmp_path / "plain.png") in outcome.out
+    assert page.stat().st_size > 10_000
+
+
 def test_a_quilt_is_no_picture_of_a_panel(lippmann, quilt, tmp_path):
     lost = shutil.copy(quilt, tmp_path / f"copy{quilt.suffix}")
     outcome = lippmann("views", lost, "-o", tmp_path / "views")
