@@ -118,14 +118,14 @@ def _compiled(image: IntegralImage, planes: Sequence[float], width: int, height:
     x, _ = display.panel_point((np.arange(width) + 0.5) * (display.panel.width / width), np.zeros(width))
     _, y = display.panel_point(np.zeros(height), (np.arange(height) + 0.5) * (display.panel.height / height))
     for plane in planes:
-        total = np.zeros((height, 3, width), dtype=np.float32)
+        total = np.zeros((height, width, 3), dtype=np.float32)
         steps = np.zeros((height, width + 1), dtype=np.int32)
         place = x, y, float(plane), lattice.layout == "hexagonal", np.array(numbers)
         with Bands(usable_cores()) as bands:
             bands.lines(add_views, height, views, masks, eyes, *place, total, steps)
         count = np.cumsum(steps[:, :-1], axis=1, dtype=np.int32).astype(np.float32)
-        total /= np.maximum(count, 1)[:, None]
-        yield np.ascontiguousarray(total.transpose(0, 2, 1))
+        total /= np.maximum(count, 1)[..., None]
+        yield total
 
 
 def _eyes(display: Display) -> dict[View, Eye]:

@@ -99,7 +99,7 @@ def add_views(
 
     ``views`` is ``(views, lens_rows, lens_cols, 3)`` and ``masks`` ``(views, lens_rows, lens_cols)``; ``eyes`` is
     ``(views, 3)``, mm. ``x`` ``(width,)`` and ``y`` ``(height,)`` are the points of the plane, mm. ``total``
-    ``(height, 3, width)`` is added to, and so is ``steps`` ``(height, width + 1)``: the number of views that show a
+    ``(height, width, 3)`` is added to, and so is ``steps`` ``(height, width + 1)``: the number of views that show a
     point, less that of the point on its left.
     """
     width, scale = x.shape[0], lattice[MAGNIFICATION]
@@ -136,10 +136,13 @@ def add_views(
                         stop += 1  # the lens is looked up again there
                 # Lenses far beyond the array exceed all integers.
                 if 0 <= j < views.shape[1] and 0 <= i < views.shape[2] and masks[view, int(j), int(i)]:
-                    for channel in range(3):
-                        color = views[view, int(j), int(i), channel]
-                        for at in range(start, stop):
-                            total[line, channel, at] += color
+                    row, column = int(j), int(i)
+                    red, green = views[view, row, column, 0], views[view, row, column, 1]
+                    blue = views[view, row, column, 2]
+                    for at in range(start, stop):
+                        total[line, at, 0] += red
+                        total[line, at, 1] += green
+                        total[line, at, 2] += blue
                     steps[line, start] += 1
                     steps[line, stop] -= 1
                 start, i, j = stop, next_i, next_j
