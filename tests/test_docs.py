@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
@@ -83,6 +84,9 @@ def workplace(tmp_path, monkeypatch, moving_ball):
     for number in range(48):
         view = np.full((64, 48, 3), number / 48, dtype=np.float32)
         write_plain_picture(view, tmp_path / "pinholes" / f"view_{number:02}.png")
+    (tmp_path / "photos").mkdir()
+    for number in range(3):
+        Image.new("RGB", (80, 60), (50 + 50 * number,) * 3).save(tmp_path / "photos" / f"IMG_{number}.jpg")
     shutil.copytree(moving_ball.parent, tmp_path, dirs_exist_ok=True)
     monkeypatch.chdir(tmp_path)
     return tmp_path

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from lippmann.rendering.request.render_request import RenderRequest
     from lippmann.scene.placement import PlacementOptions
     from lippmann.scene.scene import Scene
+    from lippmann.viewing.focal_stack import focal_stack
 
 __version__ = _version.VERSION
 
@@ -42,6 +43,7 @@ _HOME = {
     "Progress": "lippmann.progress",
     "RenderRequest": "lippmann.rendering.request.render_request",
     "Scene": "lippmann.scene.scene",
+    "focal_stack": "lippmann.viewing.focal_stack",
 }
 
 __all__ = [
@@ -55,6 +57,7 @@ __all__ = [
     "RenderRequest",
     "Scene",
     "__version__",
+    "focal_stack",
     "list_displays",
     "load_display",
     "load_scene",

@@ -377,7 +377,7 @@ def render_quilt(
             _request(placement, options),
             told,
         )
-    return Quilt(frame.pixels, layout.layout, provenance=frame.provenance)
+    return Quilt(frame.pixels, layout.layout, provenance=frame.provenance, display=device)
 
 
 def render_turntable(

@@ -30,6 +30,7 @@ STAGE_NAMES = {
     "read": "reading",
     "weave": "weaving",
     "draw": "drawing",
+    "refocus": "refocusing",
     "sequence": "rendering frames",
     "write": "writing",
 }

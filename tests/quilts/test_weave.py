@@ -143,7 +143,7 @@ def test_what_holds_for_all_rows_or_channels_is_found_once(offsets, slant, dista
     display = Display("d", panel, lenses, gap=6.8, viewing_distance=distance, aperture_distance=5.0)
     quilt = solid(np.linspace(0, 1, 6), 3, 2)
     u, v = np.meshgrid(np.arange(61) + 0.5, np.arange(9, 20) + 0.5)
-    for channel, found in enumerate(weave_module._samples_of_rows(quilt, display, "linear", 9, 20)):
+    for channel, found in enumerate(weave_module._samples_of_window(quilt, display, "linear", (9, 20), (0, 61))):
         expected = weave_module._samples_at(quilt, display, "linear", channel, u, v)
         for one, other in zip(found, expected, strict=True):
             np.testing.assert_array_equal(np.broadcast_to(one, u.shape), other)

@@ -8,6 +8,7 @@ import pytest
 from lippmann.display import NUMPY, Display, LensArray, Panel
 from lippmann.errors import UsageError
 from lippmann.image import IntegralImage
+from lippmann.image.streamed import ChunkedPixels, LargePicture
 from lippmann.viewing.refocus import refocus
 
 PIXELS, PITCH, GAP = 5, 1.25, 6.0
@@ -123,6 +124,26 @@ def test_a_drawn_plane_is_sharp_at_its_own_depth_only(display, z):
     assert min(errors, key=errors.get) == z
     assert errors[z] < 0.2
     assert errors[-z] > 2 * errors[z]
+
+
+@pytest.mark.parametrize(("plane", "size"), [(0.0, (9, 7)), (-8.0, (97, 61)), (5.0, (230, 90)), (11.0, (1, 1))])
+@pytest.mark.parametrize(
+    "display",
+    [
+        square(11, 9),
+        square(11, 9, 40.0),
+        square(11, 9, layout="hexagonal"),
+        Display("broken", Panel(57, 43, PIXEL), LensArray("hexagonal", 1.31), gap=GAP, viewing_distance=90.0),
+        Display("flat", Panel(57, 43, PIXEL), LensArray("hexagonal", 1.31, row_pitch=0.655), gap=GAP),
+    ],
+    ids=["square", "near square", "hexagonal", "broken hexagonal", "flat hexagonal"],
+)
+def test_compiled_runs_are_the_look_ups_of_single_points(display, plane, size):
+    image = random_picture(display)
+    shape = image.pixels.shape[:2]
+    source = ChunkedPixels(shape[::-1], shape, image.pixels.dtype, lambda row, column: image.pixels)
+    single = LargePicture(source, display, np.eye(4), image.provenance, "float32")
+    np.testing.assert_array_equal(refocus(image, plane, size=size), refocus(single, plane, size=size))
 
 
 def test_one_colour_stays_that_colour_where_anything_is_seen():

@@ -12,6 +12,7 @@ from lippmann.cli.commands import (
     cluster,
     compare,
     exchange,
+    interlace,
     picture,
     plan,
     preview,
@@ -48,6 +49,7 @@ app.command("import", cls=HelpfulCommand)(exchange.import_)
 app.command("view", cls=HelpfulCommand)(view.view)
 app.add_typer(quilt.quilt, name="quilt")
 app.command("weave", cls=HelpfulCommand)(quilt.weave)
+app.command("interlace", cls=HelpfulCommand)(interlace.interlace)
 app.add_typer(calibrate.calibrate, name="calibrate")
 app.command("pitch-test", cls=HelpfulCommand)(printing.pitch_test)
 app.command("marks", cls=HelpfulCommand)(printing.marks)

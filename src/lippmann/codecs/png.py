@@ -48,17 +48,20 @@ def encode_png(
     text: Mapping[str, str],
     pixel_pitch: float | None = None,
     srgb: bool = True,
+    icc: bytes = b"",
 ) -> bytes:
     """A PNG file of ``(H, W, 3)`` uint8 or uint16 codes.
 
     ``text`` becomes one ``iTXt`` chunk per keyword (Latin-1, at most 79 letters); ``pixel_pitch`` (mm) becomes
-    ``pHYs``; ``srgb`` marks the codes as sRGB.
+    ``pHYs``; ``srgb`` marks the codes as sRGB, unless ``icc``, a profile, describes them.
     """
     import imagecodecs
 
     encoded = bytes(imagecodecs.png_encode(np.ascontiguousarray(codes), level=_LEVEL))
     extra = b""
-    if srgb:
+    if icc:
+        extra += _chunk(b"iCCP", b"profile\0\0" + zlib.compress(icc))  # name, method deflate
+    elif srgb:
         extra += _chunk(b"sRGB", b"\0")  # perceptual intent
     if pixel_pitch is not None:
         per_metre = max(1, round(1000 / pixel_pitch))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import logging
 import struct
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -62,6 +62,22 @@ def write_tiff(path: Path, values: Pixels, *, description: str, pixel_pitch: flo
         software="Lippmann",
         **_resolution(pixel_pitch),
     )
+
+
+def write_tiff_pages(path: Path, pages: Iterable[Pixels]) -> None:
+    """Write ``(H, W, 3)`` uint8, uint16 or float32 pictures as the pages of one BigTIFF, losslessly compressed."""
+    import tifffile
+
+    with tifffile.TiffWriter(path, bigtiff=True) as file:
+        for values in pages:
+            file.write(
+                np.ascontiguousarray(values),
+                photometric="rgb",
+                compression="zlib",
+                predictor=True,
+                metadata=None,
+                software="Lippmann",
+            )
 
 
 def write_tiled_tiff(

@@ -33,6 +33,7 @@ def write_tiff_bands(
     *,
     pixel_pitch: float,
     description: str = "",
+    icc: bytes = b"",
     progress: ProgressCallback = silent,
 ) -> None:
     """Write a grey or RGB picture of ``size`` (width, height), losslessly compressed (deflate, whole numbers with
@@ -48,6 +49,8 @@ def write_tiff_bands(
         Millimetres; becomes the resolution in dots per inch.
     description:
         ASCII; becomes ``ImageDescription``.
+    icc:
+        ICC profile of the values; empty without.
     """
     import tifffile
 
@@ -76,6 +79,7 @@ def write_tiff_bands(
             description=description,
             metadata=None,
             software="Lippmann",
+            iccprofile=icc or None,
         )
 
 

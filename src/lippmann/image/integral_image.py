@@ -130,8 +130,9 @@ class IntegralImage(Picture):
             raise PictureError(f"resampling is {resampling!r}", rule=rule)
         if not self.views_are_exact:
             return resampled_views(self.pixels, self.display, resampling)
-        views = micro_images_as_views(self.micro_images(), self.display)
-        return views, micro_images_as_views(self.micro_image_mask(), self.display)
+        permutation = Permutation(self.display)
+        views = micro_images_as_views(permutation.split(self.pixels), self.display)
+        return views, micro_images_as_views(permutation.mask, self.display)
 
     @classmethod
     def from_micro_images(cls, micro_images: ArrayLike, display: Display, **parts: Unpack[Parts]) -> IntegralImage:

@@ -18,6 +18,9 @@ VERSION = 1
 #: The key that holds the version and marks the JSON as ours.
 KEY = "lippmann"
 
+#: The key that marks the metadata of a quilt, which is no picture of a panel.
+QUILT_KEY = "quilt"
+
 
 @dataclass(frozen=True, eq=False)
 class Metadata:
@@ -60,7 +63,7 @@ def to_text(metadata: Metadata) -> str:
 
 
 def from_text(text: str, where: str) -> Metadata | None:
-    """Metadata of a text by :func:`to_text`; None for any other text.
+    """Metadata of a text by :func:`to_text`; None for any other text, such as a quilt's.
 
     Raises
     ------
@@ -68,9 +71,15 @@ def from_text(text: str, where: str) -> Metadata | None:
         If a value makes no sense, or the text is of a later version; names ``where``.
     """
     values = parse_json(text)
-    if not isinstance(values, dict) or KEY not in values:
+    if not isinstance(values, dict) or KEY not in values or QUILT_KEY in values:
         return None
     return from_dict(values, where)
+
+
+def is_quilt_text(text: str) -> bool:
+    """Whether a text is the metadata of a quilt."""
+    values = parse_json(text) if text else None
+    return isinstance(values, dict) and KEY in values and QUILT_KEY in values
 
 
 def parse_json(text: str) -> object:

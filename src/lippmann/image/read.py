@@ -17,7 +17,7 @@ from lippmann.display import Display
 from lippmann.errors import PictureError
 from lippmann.image.encoding import STORED, TEXT_KEY, FormatName, layers_of_channels, linear_values
 from lippmann.image.integral_image import IntegralImage
-from lippmann.image.metadata import Metadata, from_text
+from lippmann.image.metadata import Metadata, from_text, is_quilt_text
 from lippmann.image.provenance import Provenance
 from lippmann.image.stored_values import Layer, Stored, Values
 from lippmann.runtime.cached_property import cached_property
@@ -84,6 +84,8 @@ class PictureFile:
         """
         metadata = self.metadata
         if metadata is None:
+            if is_quilt_text(self.text):
+                raise PictureError("is a quilt", where=str(self.path), fix="weave it for a display")
             if display is None:
                 raise PictureError("has no display in it", where=str(self.path), fix="say display=...")
             metadata = Metadata(display, np.eye(4), Provenance())

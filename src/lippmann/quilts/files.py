@@ -22,7 +22,8 @@ from lippmann.image.read import MOST_PIXELS, open_file
 from lippmann.image.stored_values import Stored, Values
 from lippmann.image.write import format_for, replacing_output
 from lippmann.progress import Progress, ProgressCallback, silent
-from lippmann.quilts.quilt import MOST_SIDE, Quilt, QuiltLayout, check_size, layout_of_name
+from lippmann.quilts.quilt import MOST_SIDE, Quilt, QuiltLayout, check_size, layout_of_name, names_layout
+from lippmann.quilts.quilt_metadata import metadata_of_text, quilt_text
 from lippmann.runtime.atomic_write import replacing_folder
 
 if TYPE_CHECKING:
@@ -33,20 +34,51 @@ _JPEG = (".jpg", ".jpeg")
 _READ = (*FORMATS, *_JPEG)
 
 
-def read_quilt(path: Path) -> Quilt:
-    """Read a quilt: PNG, OpenEXR, TIFF or JPEG. Its name states the layout, such as ``_qs8x6a0.75``.
+def is_quilt(path: Path) -> bool:
+    """Whether a file is a quilt: by its metadata, or by its name if there is none.
 
     Raises
     ------
     PictureError
-        If the file is missing or damaged, or its name has no layout or one that does not fit its size.
+        If the file is missing or damaged.
     """
-    layout = layout_of_name(path)
+    if path.suffix.lower() in _JPEG:
+        return names_layout(path)
+    text = open_file(path).text
+    if not text:
+        return names_layout(path)
+    return metadata_of_text(text, str(path)) is not None
+
+
+def read_quilt(path: Path, layout: QuiltLayout | None = None) -> Quilt:
+    """Read a quilt: PNG, OpenEXR, TIFF or JPEG.
+
+    Parameters
+    ----------
+    path:
+        The file.
+    layout:
+        Columns, rows and aspect ratio. None: as the file's name says, such as ``_qs8x6a0.75``, or else its metadata.
+
+    Raises
+    ------
+    PictureError
+        If the file is missing or damaged, nothing says its layout, or the layout does not fit its size.
+    """
     _check_ending(path)
     with _open(path) as file:
+        metadata = metadata_of_text(file.text, str(path))
+        if layout is None:
+            # A name that says nothing is refused only where the metadata says nothing either.
+            layout = metadata.layout if metadata and not names_layout(path) else layout_of_name(path)
+        if layout.aspect is None and metadata is not None:
+            layout = layout._replace(aspect=metadata.layout.aspect)
         check_size(*file.size, layout, str(path))
         values = file.read()
-    return Quilt(values, layout, cast(Stored, values.dtype.name))
+    stored = cast(Stored, values.dtype.name)
+    if metadata is None:
+        return Quilt(values, layout, stored)
+    return Quilt(values, layout, stored, metadata.provenance, metadata.display)
 
 
 def read_views(folder: Path, layout: QuiltLayout | None = None, *, progress: ProgressCallback = silent) -> Quilt:
@@ -142,8 +174,9 @@ def write_quilt(quilt: Quilt, path: Path, *, bits: int | None = None) -> None:
     if quilt.values.dtype.kind == "f" and not np.isfinite(quilt.values).all():
         raise PictureError("the quilt holds values that are not finite", where=str(path))
     transfer = quilt.provenance.transfer
+    layers = {"": converted_values(quilt.values, stored, transfer)}
     with replacing_output(path, name) as temporary:
-        encode_values(temporary, name, {"": converted_values(quilt.values, stored, transfer)}, transfer=transfer)
+        encode_values(temporary, name, layers, transfer=transfer, text=quilt_text(quilt))
 
 
 def write_views(
@@ -229,11 +262,12 @@ def _check_ending(path: Path) -> None:
 
 
 class _OpenFile(NamedTuple):
-    """A picture file whose header is read: its width and height, the type of its values, and their decoder."""
+    """A picture file whose header is read: its width and height, the type of its values, their decoder, its text."""
 
     size: tuple[int, int]
     stored: Callable[[], Stored]
     read: Callable[[], Values]
+    text: str = ""
 
 
 @contextmanager
@@ -242,7 +276,7 @@ def _open(path: Path) -> Iterator[_OpenFile]:
     if path.suffix.lower() not in _JPEG:
         file = open_file(path)
         size = file.width, file.height
-        yield _OpenFile(size, lambda: file.check_stored(file.stored), lambda: file.decode()[0])
+        yield _OpenFile(size, lambda: file.check_stored(file.stored), lambda: file.decode()[0], file.text)
         return
     with _opened_jpeg(path) as picture:
         size = picture.width, picture.height

@@ -124,13 +124,16 @@ class Quilt:
     stored:
         Type of the values in the file.
     provenance:
-        How the quilt was made; files do not hold it.
+        How the quilt was made.
+    display:
+        The display that the views are for; None if unknown.
     """
 
     values: Values
     layout: QuiltLayout
     stored: Stored = "float32"
     provenance: Provenance = field(default_factory=Provenance)
+    display: Display | None = None
 
     @property
     def size(self) -> tuple[int, int]:
@@ -179,12 +182,13 @@ class Quilt:
         column, row = self.corner(number)
         return self.values[row : row + height, column : column + width]
 
-    def view_rows(self, first: int, last: int) -> FloatArray:
-        """``(views, last - first, width, 3)`` linear RGB of rows of all views."""
-        width, _ = self.view_size
-        rows = np.empty((self.layout.views, last - first, width, 3), dtype=np.float32)
+    def view_rows(self, first: int, last: int, left: int = 0, right: int | None = None) -> FloatArray:
+        """``(views, last - first, right - left, 3)`` linear RGB of rows of all views, by default in full width."""
+        right = self.view_size[0] if right is None else right
+        rows = np.empty((self.layout.views, last - first, right - left, 3), dtype=np.float32)
         for number in range(self.layout.views):
-            rows[number] = linear_values(self.view_values(number)[first:last], self.provenance.transfer)
+            values = self.view_values(number)[first:last, left:right]
+            rows[number] = linear_values(values, self.provenance.transfer)
         return rows
 
 
@@ -239,6 +243,11 @@ def quilt_of_display(
     return quilt
 
 
+def names_layout(path: Path) -> bool:
+    """Whether a file's name says a quilt's layout."""
+    return _NAME.search(path.stem) is not None
+
+
 def layout_of_name(path: Path) -> QuiltLayout:
     """Columns, rows and aspect ratio from a quilt's file name.
 
@@ -250,13 +259,23 @@ def layout_of_name(path: Path) -> QuiltLayout:
     match = _NAME.search(path.stem)
     if match is None:
         raise PictureError("the name does not say how many views there are", where=str(path), rule=_CONVENTION)
-    columns, rows = int(match[1]), int(match[2])
+    aspect = None if match[3] is None else float(match[3])
+    return checked_layout(int(match[1]), int(match[2]), aspect, where=str(path))
+
+
+def checked_layout(columns: int, rows: int, aspect: float | None, *, where: str) -> QuiltLayout:
+    """A layout as people write it in a file's name or on the command line, which ``where`` names.
+
+    Raises
+    ------
+    PictureError
+        If a number is out of range.
+    """
     if not (1 <= columns <= MOST_TILES and 1 <= rows <= MOST_TILES):
         rule = f"there are 1 to {MOST_TILES} of both"
-        raise PictureError(f"the name says {columns} columns and {rows} rows", where=str(path), rule=rule)
-    aspect = None if match[3] is None else float(match[3])
+        raise PictureError(f"it says {columns} columns and {rows} rows", where=where, rule=rule)
     if aspect is not None and not 0.05 <= aspect <= 20:
-        raise PictureError(f"the name says the aspect {match[3]}", where=str(path), rule=_CONVENTION)
+        raise PictureError(f"it says the aspect {aspect:g}", where=where, rule="it is width over height, 0.05 to 20")
     return QuiltLayout(columns, rows, aspect)
 
 
@@ -271,5 +290,5 @@ def check_size(width: int, height: int, layout: QuiltLayout, where: str) -> None
             rule = f"a quilt's sides are {LEAST_SIDE} to {MOST_SIDE} pixels"
             raise PictureError(f"it is {side} pixels {what}", where=where, rule=rule)
         if side % count and side & (side - 1):
-            rule = f"its name says {layout.columns}x{layout.rows} views, and {side} is no multiple of {count}"
+            rule = f"it has {layout.columns}x{layout.rows} views, and {side} is no multiple of {count}"
             raise PictureError(f"it is {side} pixels {what}", where=where, rule=rule)

@@ -65,15 +65,15 @@ def weave(
     PictureError
         If the display is not lenticular, or the quilt has another aspect ratio than its panel.
     """
-    _check(quilt, display, choice)
+    check_weave(quilt, display, choice)
     width, height = display.panel.width, display.panel.height
     pixels = np.empty((height, width, 3), dtype=np.float32)
     step = _rows_at_a_time(quilt, display)
     for first in range(0, height, step):
         last = min(first + step, height)
-        pixels[first:last] = _weave_rows(quilt, display, choice, first, last)
+        pixels[first:last] = weave_window(quilt, display, choice, (first, last))
         progress(Progress("weave", last, height))
-    return IntegralImage(pixels, display, provenance=_provenance(quilt, choice, scene))
+    return IntegralImage(pixels, display, provenance=weave_provenance(quilt, choice, scene))
 
 
 def weave_to_file(
@@ -115,21 +115,22 @@ def weave_to_file(
     OutputError
         If the format is not TIFF or Zarr or has no such bits, or the file cannot be written.
     """
-    _check(quilt, display, choice)
+    check_weave(quilt, display, choice)
     step = _rows_at_a_time(quilt, display)
 
     def rows(first: int, last: int) -> FloatArray:
         band = np.empty((last - first, display.panel.width, 3), dtype=np.float32)
         for start in range(first, last, step):
             stop = min(start + step, last)
-            band[start - first : stop - first] = _weave_rows(quilt, display, choice, start, stop)
+            band[start - first : stop - first] = weave_window(quilt, display, choice, (start, stop))
             progress(Progress("weave", stop, display.panel.height))
         return band
 
-    write_rows(rows, Metadata(display, np.eye(4), _provenance(quilt, choice, scene)), path, bits=bits)
+    write_rows(rows, Metadata(display, np.eye(4), weave_provenance(quilt, choice, scene)), path, bits=bits)
 
 
-def _provenance(quilt: Quilt, choice: ViewChoice, scene: str) -> Provenance:
+def weave_provenance(quilt: Quilt, choice: ViewChoice, scene: str) -> Provenance:
+    """Provenance of a woven picture."""
     options = {"views": quilt.layout.views, "view_choice": choice, "direction": "even in the tangent"}
     return Provenance(method="weave", subpixels=True, scene=scene, version=VERSION, options=options)
 
@@ -139,24 +140,40 @@ def _rows_at_a_time(quilt: Quilt, display: Display) -> int:
     return max(1, min(_BLOCK // display.panel.width, _VIEW_BLOCK * display.panel.height // (width * height)))
 
 
-def _weave_rows(quilt: Quilt, display: Display, choice: ViewChoice, first: int, last: int) -> FloatArray:
-    """Rows ``first`` to ``last`` of the picture, ``(last - first, W, 3)``."""
+def weave_window(
+    quilt: Quilt, display: Display, choice: ViewChoice, rows: tuple[int, int], columns: tuple[int, int] | None = None
+) -> FloatArray:
+    """A window of the woven picture.
+
+    Parameters
+    ----------
+    quilt, display, choice:
+        As for :func:`weave`, by which they are checked.
+    rows, columns:
+        First and past-the-last row and column of the window, within the panel. None: all columns.
+
+    Returns
+    -------
+    ``(rows, columns, 3)`` float32 linear RGB.
+    """
     from lippmann.quilts.weave_kernel import weave_channel
 
-    shape = last - first, display.panel.width
+    columns = columns or (0, display.panel.width)
+    shape = rows[1] - rows[0], columns[1] - columns[0]
     result = np.empty((*shape, 3), dtype=np.float32)
-    channels = _samples_of_rows(quilt, display, choice, first, last)
-    # Only these rows of the views are sampled.
-    top = min(int(samples.down.min()) for samples in channels)
-    bottom = max(int(samples.down.max()) for samples in channels) + 2
-    views = quilt.view_rows(top, min(bottom, quilt.view_size[1]))
+    channels = _samples_of_window(quilt, display, choice, rows, columns)
+    # Only this part of the views is sampled.
+    top, left = (min(int(samples[axis].min()) for samples in channels) for axis in (3, 2))
+    bottom, right = (max(int(samples[axis].max()) for samples in channels) + 2 for axis in (3, 2))
+    width, height = quilt.view_size
+    views = quilt.view_rows(top, min(bottom, height), left, min(right, width))
     for channel, (number, share, across, down) in enumerate(channels):
         weave_channel(
             views,
             channel,
             np.broadcast_to(number, shape),
             np.broadcast_to(share, shape),
-            np.broadcast_to(across, shape),
+            np.broadcast_to(across - left, shape),
             np.broadcast_to(down - top, shape),
             result,
         )
@@ -176,11 +193,13 @@ class _Samples(NamedTuple):
     down: Real
 
 
-def _samples_of_rows(quilt: Quilt, display: Display, choice: ViewChoice, first: int, last: int) -> list[_Samples]:
-    """Samples of the sub-pixels of rows ``first`` to ``last``, by channel."""
+def _samples_of_window(
+    quilt: Quilt, display: Display, choice: ViewChoice, rows: tuple[int, int], columns: tuple[int, int]
+) -> list[_Samples]:
+    """Samples of the sub-pixels of a window, by channel."""
     panel = display.panel
-    u: Real = np.arange(panel.width, dtype=np.float64)[None] + 0.5
-    v: Real = np.arange(first, last, dtype=np.float64)[:, None] + 0.5
+    u: Real = np.arange(*columns, dtype=np.float64)[None] + 0.5
+    v: Real = np.arange(*rows, dtype=np.float64)[:, None] + 0.5
     channels: list[_Samples] = []
     for channel in range(3):
         offset, before = panel.subpixel_offsets[channel], panel.subpixel_offsets[:channel]
@@ -212,7 +231,8 @@ def view_fraction(display: Display, x: Real, y: Real) -> Real:
     return fraction
 
 
-def _check(quilt: Quilt, display: Display, choice: str) -> None:
+def check_weave(quilt: Quilt, display: Display, choice: str) -> None:
+    """Raise the errors of :func:`weave`."""
     if choice not in get_args(ViewChoice):
         raise UsageError(f"the choice {choice!r} is unknown", rule=f"known are {', '.join(get_args(ViewChoice))}")
     _check_fit(quilt, display)

@@ -11,7 +11,7 @@ lens plane, z = 0, it is the mean of each micro-image.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +22,9 @@ from lippmann.image.integral_image import IntegralImage
 from lippmann.image.stored_values import FloatArray
 from lippmann.image.streamed import LargePicture
 from lippmann.image.views import pixels_of_view, view_grid
-from lippmann.viewing.replay import Eye, Real, checked_size, default_size, eye_of_view, lens_plane_points, pixel_at
+from lippmann.runtime.machine import usable_cores
+from lippmann.runtime.row_threads import Bands
+from lippmann.viewing.replay import Eye, Real, checked_size, default_size, eye_of_offset, lens_plane_points, pixel_at
 
 Index = NDArray[np.intp]
 Flags = NDArray[np.bool_]
@@ -54,25 +56,86 @@ def refocus(image: IntegralImage | LargePicture, plane: float, *, size: tuple[in
     UsageError
         If the plane is not finite or not below the viewing distance, or the size is out of range.
     """
+    return next(focal_planes(image, [plane], size=size))
+
+
+def focal_planes(
+    image: IntegralImage | LargePicture, planes: Sequence[float], *, size: tuple[int, int] | None = None
+) -> Iterator[FloatArray]:
+    """Pictures focused on several planes, one after the other; the views are found once for all.
+
+    Parameters
+    ----------
+    image, size:
+        As for :func:`refocus`.
+    planes:
+        Heights of the planes over the lens plane in mm.
+
+    Returns
+    -------
+    Iterator of ``(height, width, 3)`` float32 linear RGB; errors are those of :func:`refocus`, raised at once.
+    """
     display = image.display
-    if not math.isfinite(plane) or plane >= display.viewing_distance:
-        rule = f"it must be finite and below the viewing distance of {display.viewing_distance:g} mm"
-        raise UsageError(f"{plane:g} mm is out of range", parameter="plane", rule=rule)
+    for plane in planes:
+        if not math.isfinite(plane) or plane >= display.viewing_distance:
+            rule = f"it must be finite and below the viewing distance of {display.viewing_distance:g} mm"
+            raise UsageError(f"{plane:g} mm is out of range", parameter="plane", rule=rule)
     width, height = checked_size(default_size(display, DEFAULT_WIDTH) if size is None else size)
-    look_up = _view_lookup(image)
+    if isinstance(image, IntegralImage) and display.lens_array.layout != "lenticular":
+        return _compiled(image, planes, width, height)
+    return _interpreted(image, planes, width, height)
+
+
+def _interpreted(
+    image: IntegralImage | LargePicture, planes: Sequence[float], width: int, height: int
+) -> Iterator[FloatArray]:
+    """:func:`focal_planes` for all pictures and lenses."""
+    look_up, display = _view_lookup(image), image.display
+    eyes = _eyes(display)
+    for plane in planes:
+        picture = np.zeros((height, width, 3), dtype=np.float32)
+        for rows, x, y in lens_plane_points(display, width, height):
+            total, count = np.zeros((*x.shape, 3), dtype=np.float32), np.zeros(x.shape, dtype=np.float32)
+            for view, eye in eyes.items():
+                row, column, inside = _line_of_sight(display, eye, (x, y, plane))
+                colors, exists = look_up(view, row, column)
+                inside &= exists
+                total += colors * inside[..., None]
+                count += inside
+            picture[rows] = total / np.maximum(count, 1)[..., None]
+        yield picture
+
+
+def _compiled(image: IntegralImage, planes: Sequence[float], width: int, height: int) -> Iterator[FloatArray]:
+    """:func:`focal_planes` of a picture in memory behind square or hexagonal lenses, compiled and on all cores."""
+    from lippmann.viewing.refocus_kernel import add_views
+
+    display, lattice = image.display, image.display.lattice
+    views, masks = (values.reshape(-1, *values.shape[2:]) for values in image.views_and_mask())
+    eyes = np.array(list(_eyes(display).values()))
+    numbers = [lattice.pitch, lattice.row_pitch, lattice.origin_x, lattice.origin_y, lattice.tolerance]
+    numbers.append(display.magnification)
+    x, _ = display.panel_point((np.arange(width) + 0.5) * (display.panel.width / width), np.zeros(width))
+    _, y = display.panel_point(np.zeros(height), (np.arange(height) + 0.5) * (display.panel.height / height))
+    for plane in planes:
+        total = np.zeros((height, width, 3), dtype=np.float32)
+        steps = np.zeros((height, width + 1), dtype=np.int32)
+        place = x, y, float(plane), lattice.layout == "hexagonal", np.array(numbers)
+        with Bands(usable_cores()) as bands:
+            bands.lines(add_views, height, views, masks, eyes, *place, total, steps)
+        count = np.cumsum(steps[:, :-1], axis=1, dtype=np.int32).astype(np.float32)
+        total /= np.maximum(count, 1)[..., None]
+        yield total
+
+
+def _eyes(display: Display) -> dict[View, Eye]:
+    """Eyes of all views, by ``(ky, kx)``."""
     grid = view_grid(display)
-    eyes = {(ky, kx): eye_of_view(display, ky, kx) for ky, kx in np.ndindex(len(grid.down), len(grid.right))}
-    picture = np.zeros((height, width, 3), dtype=np.float32)
-    for rows, x, y in lens_plane_points(display, width, height):
-        total, count = np.zeros((*x.shape, 3), dtype=np.float32), np.zeros(x.shape, dtype=np.float32)
-        for view, eye in eyes.items():
-            row, column, inside = _line_of_sight(display, eye, (x, y, plane))
-            colors, exists = look_up(view, row, column)
-            inside &= exists
-            total += colors * inside[..., None]
-            count += inside
-        picture[rows] = total / np.maximum(count, 1)[..., None]
-    return picture
+    return {
+        (ky, kx): eye_of_offset(display, right, down)
+        for ky, down in enumerate(grid.down)
+        for kx, right in enumerate(grid.right)
+    }
 
 
 def _view_lookup(image: IntegralImage | LargePicture) -> Callable[[View, Index, Index], tuple[FloatArray, Flags]]:

@@ -104,7 +104,7 @@ def replay(
     UsageError
         If the eye is not in front of the lens plane, the size is out of range, or the filter is unknown.
     """
-    eye = _checked_eye(default_eye(image.display) if eye is None else eye)
+    eye = checked_eye(default_eye(image.display) if eye is None else eye)
     width, height = checked_size(default_size(image.display) if size is None else size)
     if filter not in get_args(Filter):
         raise UsageError(f"the filter {filter!r} is unknown", rule=f"known are {', '.join(get_args(Filter))}")
@@ -124,7 +124,7 @@ def replay_at_lens_centers(image: Picture, eye: Eye) -> LensSamples:
     UsageError
         If the eye is not in front of the lens plane.
     """
-    eye = _checked_eye(eye)
+    eye = checked_eye(eye)
     display = image.display
     x, y, i, j = _lens_points(display, eye)
     panel_x, panel_y = display.panel_point_seen_by(*eye, x, y, NUMPY)
@@ -181,11 +181,16 @@ def sweep(
         If ``frames`` is below 1, an eye is not in front of the lens plane, the size is out of range, or the filter is
         unknown.
     """
+    eyes = path_of_eye(start, stop, frames)
+    return (replay(image, eye, size=size, filter=filter, subpixels=subpixels) for eye in eyes)
+
+
+def path_of_eye(start: Eye, stop: Eye, frames: int) -> list[Eye]:
+    """Positions of an eye that moves from ``start`` to ``stop`` in equal steps; errors are those of :func:`sweep`."""
     if frames < 1:
         raise UsageError(f"{frames} is out of range", parameter="frames", rule="it must be at least 1")
-    places = np.linspace(_checked_eye(start), _checked_eye(stop), frames)
-    eyes: list[Eye] = [(float(x), float(y), float(z)) for x, y, z in places]
-    return (replay(image, eye, size=size, filter=filter, subpixels=subpixels) for eye in eyes)
+    places = np.linspace(checked_eye(start), checked_eye(stop), frames)
+    return [(float(x), float(y), float(z)) for x, y, z in places]
 
 
 def default_eye(display: Display) -> Eye:
@@ -372,7 +377,8 @@ def _lens_points(display: Display, eye: Eye) -> tuple[Real, Real, Real, Real]:
     return across / math.cos(slant) + y * math.tan(slant), y, i, 0.0 * i
 
 
-def _checked_eye(eye: Eye) -> Eye:
+def checked_eye(eye: Eye) -> Eye:
+    """``eye`` as floats; :class:`UsageError` unless it is finite and in front of the lens plane."""
     try:
         x, y, z = (float(value) for value in eye)
     except (TypeError, ValueError):

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
+from lippmann.cli.commands.quilt import Aspect, Layout, layout_of
 from lippmann.cli.shared import options, parse
 from lippmann.cli.shared.console import Console, estimate_in_words
 from lippmann.cli.shared.default_output import output_of
@@ -16,6 +17,8 @@ from lippmann.errors import UsageError
 if TYPE_CHECKING:
     from lippmann.display import Display
     from lippmann.image import PictureFile, Provenance
+    from lippmann.image.stored_values import FloatArray
+    from lippmann.quilts.quilt import Quilt
 
 Format = Annotated[
     Literal["png", "exr", "tiff"] | None,
@@ -32,11 +35,17 @@ Size = Annotated[
 
 def info(
     picture: options.Picture,
+    layout: Layout = None,
+    aspect: Aspect = None,
     as_json: options.Json = False,
 ) -> None:
     """Show a picture's display, size and provenance."""
     from lippmann.image import open_file
 
+    quilt = quilt_of(picture, layout, aspect)
+    if quilt is not None:
+        Console(as_json=as_json).result(_quilt_values(picture, quilt), "\n".join(_quilt_lines(picture, quilt)))
+        return
     file = open_file(picture)
     Console(as_json=as_json).result(_info_values(picture, file), "\n".join(_info_lines(picture, file)))
 
@@ -127,6 +136,8 @@ def replay(
     ] = None,
     size: Size = None,
     filter: Filter = "nearest",
+    layout: Layout = None,
+    aspect: Aspect = None,
     bits: options.Bits = None,
     display: options.PictureDisplay = None,
     as_json: options.Json = False,
@@ -136,9 +147,9 @@ def replay(
     from lippmann.image.streamed import open_picture
     from lippmann.image.write import check_output, format_for, write_plain_picture
     from lippmann.runtime.atomic_write import check_writable
-    from lippmann.viewing.replay import default_eye
+    from lippmann.viewing.quilt_views import quilt_display, replay_quilt
+    from lippmann.viewing.replay import default_eye, path_of_eye
     from lippmann.viewing.replay import replay as replay_picture
-    from lippmann.viewing.replay import sweep as sweep_picture
     from lippmann.viewing.video_file import check_animation_path, write_animation
 
     console = Console(quiet, as_json)
@@ -150,20 +161,28 @@ def replay(
         if width is not None:
             raise UsageError("applies to a sweep only", where="--sweep-width", fix="add --sweep")
         check_output(output, format_for(output, bits)[0])
-    image = open_picture(picture, display=parse.display(display))
-    position = default_eye(image.display) if eye is None else parse.triple(eye, "--eye")
+    quilt = quilt_of(picture, layout, aspect)
+    if quilt is None:
+        image = open_picture(picture, display=parse.display(display))
+        target, transfer = image.display, image.provenance.transfer
+    else:
+        target, transfer = quilt_display(quilt, parse.display(display), str(picture)), quilt.provenance.transfer
+    position = default_eye(target) if eye is None else parse.triple(eye, "--eye")
     pixels = None if size is None else parse.size(size, "--size")
-    transfer = image.provenance.transfer
+
+    def seen_from(place: tuple[float, float, float]) -> FloatArray:
+        if quilt is not None:
+            return replay_quilt(quilt, target, place, size=pixels, linear=filter == "linear")
+        return replay_picture(image, place, size=pixels, filter=filter)
+
     result: dict[str, Any] = {"output": str(output), "eye": list(position), "filter": filter}
     if not sweep:
-        pixels_seen = replay_picture(image, position, size=pixels, filter=filter)
-        write_plain_picture(pixels_seen, output, bits=bits, transfer=transfer)
+        write_plain_picture(seen_from(position), output, bits=bits, transfer=transfer)
         console.result(result, f"{output}: seen from {_position(position)}")
         return
-    reach = _field_width(image.display, position[2]) if width is None else width
+    reach = _field_width(target, position[2]) if width is None else width
     start, stop = ((position[0] + side * reach / 2, *position[1:]) for side in (-1, 1))
-    moving = sweep_picture(image, start, stop, frames, size=pixels, filter=filter)
-    write_animation(moving, output, transfer=transfer)
+    write_animation((seen_from(place) for place in path_of_eye(start, stop, frames)), output, transfer=transfer)
     result |= {"frames": frames, "start": list(start), "stop": list(stop)}
     console.result(result, f"{output}: {frames} frames, seen from {_position(start)} to {_position(stop)}")
 
@@ -172,26 +191,84 @@ def refocus(
     picture: options.Picture,
     output: options.Output,
     plane: Annotated[
-        float,
+        float | None,
         typer.Option("--plane", help="Height of the focus plane in mm, positive toward the viewer."),
-    ],
+    ] = None,
+    planes: Annotated[
+        str | None,
+        typer.Option(
+            "--planes",
+            help="Focal stack: FIRST:LAST:COUNT, such as -40:40:9. The output is a folder, a .tif of pages, or an "
+            "animation (.png, .mp4).",
+        ),
+    ] = None,
     size: Size = None,
+    layout: Layout = None,
+    aspect: Aspect = None,
     bits: options.Bits = None,
     display: options.PictureDisplay = None,
     as_json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
-    """Refocus on a plane, as a camera whose aperture is as wide as the field of view."""
+    """Refocus on a plane, or on several, as a camera whose aperture is as wide as the field of view."""
     from lippmann.image.streamed import open_picture
     from lippmann.image.write import check_output, format_for, write_plain_picture
-    from lippmann.viewing.refocus import refocus as refocus_picture
+    from lippmann.viewing.focal_stack import check_stack_path, write_planes
+    from lippmann.viewing.quilt_views import quilt_display, refocus_quilt
+    from lippmann.viewing.refocus import focal_planes
 
     console = Console(quiet, as_json)
-    check_output(output, format_for(output, bits)[0])
-    image = open_picture(picture, display=parse.display(display))
-    pixels = refocus_picture(image, plane, size=None if size is None else parse.size(size, "--size"))
-    write_plain_picture(pixels, output, bits=bits, transfer=image.provenance.transfer)
-    console.result({"output": str(output), "plane": plane}, f"{output}: focused at {plane:g} mm")
+    if (plane is None) == (planes is None):
+        raise UsageError("say --plane or --planes", rule="one plane, or FIRST:LAST:COUNT")
+    heights = [] if planes is None else parse.steps(planes, "--planes")
+    if plane is None:
+        check_stack_path(output, bits)
+    else:
+        check_output(output, format_for(output, bits)[0])
+    pixels = None if size is None else parse.size(size, "--size")
+    planes_asked = heights if plane is None else [plane]
+    quilt = quilt_of(picture, layout, aspect)
+    if quilt is None:
+        image = open_picture(picture, display=parse.display(display))
+        focused, transfer = focal_planes(image, planes_asked, size=pixels), image.provenance.transfer
+    else:
+        target, transfer = quilt_display(quilt, parse.display(display), str(picture)), quilt.provenance.transfer
+        focused = refocus_quilt(quilt, target, planes_asked, size=pixels)
+    if plane is not None:
+        write_plain_picture(next(focused), output, bits=bits, transfer=transfer)
+        console.result({"output": str(output), "plane": plane}, f"{output}: focused at {plane:g} mm")
+        return
+    with console.progress() as progress:
+        write_planes(focused, heights, output, bits=bits, transfer=transfer, progress=progress)
+    line = f"{output}: {len(heights)} planes, focused at {heights[0]:g} to {heights[-1]:g} mm"
+    console.result({"output": str(output), "planes": heights}, line)
+
+
+def quilt_of(picture: Path, layout: str | None, aspect: float | None) -> Quilt | None:
+    """The quilt of a file: by ``--layout``, its metadata or its name; None for a picture of a panel."""
+    from lippmann.quilts.files import is_quilt, read_quilt
+
+    asked = layout_of(layout, aspect)
+    if asked is None and not is_quilt(picture):
+        return None
+    return read_quilt(picture, asked)
+
+
+def _quilt_values(path: Path, quilt: Quilt) -> dict[str, Any]:
+    values: dict[str, Any] = {"file": str(path), "size": list(quilt.size), "stored": quilt.stored}
+    values["quilt"] = quilt.layout._asdict()
+    values["display"] = None if quilt.display is None else quilt.display.to_dict()
+    return values | {"provenance": quilt.provenance.to_dict()}
+
+
+def _quilt_lines(path: Path, quilt: Quilt) -> list[str]:
+    (width, height), (view_width, view_height) = quilt.size, quilt.view_size
+    aspect = "" if quilt.layout.aspect is None else f", aspect {quilt.layout.aspect:g}"
+    lines = [f"{path}: quilt, {width}x{height}, {quilt.stored}"]
+    lines.append(f"views       {quilt.layout.columns}x{quilt.layout.rows} of {view_width}x{view_height} pixels{aspect}")
+    if quilt.display is not None:
+        lines.append(f"display     {quilt.display.name}")
+    return lines + _provenance_lines(quilt.provenance)
 
 
 def _position(eye: tuple[float, float, float]) -> str:
@@ -235,6 +312,12 @@ def _info_lines(path: Path, file: PictureFile) -> list[str]:
     lines += [
         f"display     {display.name} ({display.lens_array.layout}, {grid.columns}x{grid.rows} lenses, "
         f"field {display.field_of_view:.1f} degrees)",
+    ]
+    return lines + _provenance_lines(provenance)
+
+
+def _provenance_lines(provenance: Provenance) -> list[str]:
+    lines = [
         f"scene       {provenance.scene or 'unknown'}",
         f"method      {_method(provenance)}",
         f"made by     Lippmann {provenance.version or '(unknown version)'} "

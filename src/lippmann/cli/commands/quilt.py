@@ -18,7 +18,7 @@ from lippmann.errors import UsageError
 from lippmann.progress import Progress, ProgressCallback
 
 if TYPE_CHECKING:
-    from lippmann.quilts.quilt import Quilt
+    from lippmann.quilts.quilt import Quilt, QuiltLayout
 
 quilt = typer.Typer(help="Quilts: all views side by side in one picture.", no_args_is_help=True, rich_markup_mode=None)
 
@@ -54,6 +54,13 @@ Method = Annotated[
         help="auto: what is fastest for the quality asked for; full: every ray is traced; "
         "pooled: neighbouring views share their light before it is denoised.",
     ),
+]
+Layout = Annotated[
+    str | None,
+    typer.Option("--layout", help="Columns x rows of a quilt whose name and metadata do not say them, such as 8x6."),
+]
+Aspect = Annotated[
+    float | None, typer.Option("--aspect", help="With --layout: width over height of the displayed picture.")
 ]
 Format = Annotated[str | None, typer.Option("--format", help="png, exr or tiff; by default as the quilt is stored.")]
 
@@ -161,7 +168,7 @@ def render(
         frame = render_quilt(
             loaded, target, (layout.columns, layout.rows), (wanted.width, wanted.height), request, progress
         )
-        made = Quilt(frame.pixels, layout, provenance=frame.provenance)
+        made = Quilt(frame.pixels, layout, provenance=frame.provenance, display=target)
         progress(Progress("write", 0, 1))
         writing = time.perf_counter()
         write_quilt(made, path, bits=bits)
@@ -204,8 +211,10 @@ def pack(
 
 @quilt.command("unpack", cls=HelpfulCommand)
 def unpack(
-    picture: Annotated[Path, typer.Argument(help="A quilt (PNG, EXR, TIFF or JPEG) with its layout in the name.")],
+    picture: Annotated[Path, typer.Argument(help="A quilt: PNG, EXR, TIFF or JPEG.")],
     output: options.Folder,
+    layout: Layout = None,
+    aspect: Aspect = None,
     format: Format = None,
     bits: options.Bits = None,
     as_json: options.Json = False,
@@ -217,7 +226,7 @@ def unpack(
 
     console = Console(quiet, as_json)
     check_folder_writable(output)
-    found = read_quilt(picture)
+    found = read_quilt(picture, layout_of(layout, aspect))
     with console.progress() as progress:
         write_views(found, output, format=format, bits=bits, progress=progress)  # type: ignore[arg-type]
     width, height = found.view_size
@@ -255,6 +264,8 @@ def weave(
     choice: Annotated[
         str, typer.Option("--views", help="nearest: one view per sub-pixel; linear: a mixture of two.")
     ] = "linear",
+    layout: Layout = None,
+    aspect: Aspect = None,
     bits: options.Bits = None,
     as_json: options.Json = False,
     quiet: options.Quiet = False,
@@ -272,7 +283,7 @@ def weave(
     target = load_display(display)
     width, height = target.panel.width, target.panel.height
     with console.progress() as progress:
-        views = _views(source, progress)
+        views = _views(source, layout_of(layout, aspect), progress)
         asked: dict[str, Any] = {"choice": choice, "scene": source.stem, "progress": progress}
         if width * height > LARGE and can_be_banded(name):
             weave_to_file(views, target, output, bits=bits, **asked)
@@ -306,7 +317,25 @@ def _sentence(path: Path, made: Quilt, seconds: float) -> str:
     )
 
 
-def _views(source: Path, progress: ProgressCallback) -> Quilt:
+def layout_of(layout: str | None, aspect: float | None) -> QuiltLayout | None:
+    """The layout of ``--layout`` and ``--aspect``; None without them.
+
+    Raises
+    ------
+    UsageError, PictureError
+        If a value is out of range, or an aspect is given alone.
+    """
+    from lippmann.quilts.quilt import checked_layout
+
+    if layout is None:
+        if aspect is not None:
+            raise UsageError("applies to --layout only", where="--aspect", fix="add --layout")
+        return None
+    columns, rows = parse.size(layout, "--layout", rule="columns x rows, such as 8x6")
+    return checked_layout(columns, rows, aspect, where="--layout")
+
+
+def _views(source: Path, layout: QuiltLayout | None, progress: ProgressCallback) -> Quilt:
     from lippmann.quilts.files import read_quilt, read_views
 
-    return read_views(source, progress=progress) if source.is_dir() else read_quilt(source)
+    return read_views(source, layout, progress=progress) if source.is_dir() else read_quilt(source, layout)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+import tempfile
 import threading
 from collections.abc import Callable
 from pathlib import Path
@@ -11,7 +12,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from lippmann.cli.shared import options, parse
+from lippmann.cli.commands.quilt import Aspect, Layout, layout_of
+from lippmann.cli.shared import options
 from lippmann.cli.shared.console import Console
 from lippmann.cli.shared.exit_codes import INTERRUPTED
 from lippmann.cli.shared.option_names import in_options
@@ -19,6 +21,7 @@ from lippmann.errors import LippmannError, UsageError
 
 if TYPE_CHECKING:
     from lippmann.display import Display
+    from lippmann.quilts.quilt import QuiltLayout
     from lippmann.viewer.http_server import Site
     from lippmann.viewer.manifest import TileFormat
     from lippmann.viewer.served_picture import PictureFile
@@ -37,6 +40,8 @@ def view(
     picture: options.Picture,
     other: Other = None,
     export: Export = None,
+    layout: Layout = None,
+    aspect: Aspect = None,
     display: options.PictureDisplay = None,
     host: Host = "127.0.0.1",
     port: Port = 0,
@@ -45,28 +50,61 @@ def view(
     quiet: options.Quiet = False,
 ) -> None:
     """View a picture in a browser as its display shows it."""
+
     console = Console(quiet, as_json)
     paths = [picture] if other is None else [picture, other]
-    target = parse.display(display)
     if export is not None:
         for name, is_given in (("--host", host != "127.0.0.1"), ("--port", port != 0), ("--no-browser", no_browser)):
             if is_given:
                 raise UsageError("does not apply to --export", where=name, fix="leave it out")
-        _export(paths, target, export, console)
-        return
+    with tempfile.TemporaryDirectory() as folder:
+        asked, target = layout_of(layout, aspect), parse.display(display)
+        shown = [_panel_picture(path, target, asked, Path(folder) / str(k)) for k, path in enumerate(paths)]
+        if export is not None:
+            _export(shown, target, export, paths, console)
+            return
+        _serve_pictures(shown, target, paths, console, host=host, port=port, browser=not no_browser)
+
+
+def _panel_picture(path: Path, display: Display | None, layout: QuiltLayout | None, folder: Path) -> Path:
+    """The picture itself; a quilt is woven for its display, into ``folder``."""
+    from lippmann.quilts.files import is_quilt, read_quilt
+
+    if layout is None and not is_quilt(path):
+        return path
+    from lippmann.quilts.weave import weave
+    from lippmann.viewing.quilt_views import quilt_display
+
+    folder.mkdir()
+    woven = folder / f"{path.stem}.png"
+    quilt = read_quilt(path, layout)
+    weave(quilt, quilt_display(quilt, display, str(path))).save(woven)
+    return woven
+
+
+def _serve_pictures(
+    shown: list[Path],
+    target: Display | None,
+    paths: list[Path],
+    console: Console,
+    *,
+    host: str,
+    port: int,
+    browser: bool,
+) -> None:
     from lippmann.viewer.served_picture import PictureFile
     from lippmann.viewer.server import ViewerSite
 
     # Uncompressed tiles are fastest on one machine, PNG through a tunnel.
     tile_format: TileFormat = "png" if is_remote() else "rgb"
-    files = [PictureFile(path, target, tile_format) for path in paths]
+    files = [PictureFile(path, target, tile_format) for path in shown]
     serve(
         ViewerSite(files),
         " and ".join(str(path) for path in paths),
         console,
         host=host,
         port=port,
-        browser=not no_browser,
+        browser=browser,
         started=lambda: _read_ahead(files, console),
     )
 
@@ -84,7 +122,7 @@ def _read_ahead(files: list[PictureFile], console: Console) -> None:
     threading.Thread(target=read, daemon=True).start()
 
 
-def _export(paths: list[Path], display: Display | None, output: Path, console: Console) -> None:
+def _export(paths: list[Path], display: Display | None, output: Path, sources: list[Path], console: Console) -> None:
     from lippmann.image import open_file
     from lippmann.image.streamed import picture_of_file
     from lippmann.runtime.atomic_write import check_writable
@@ -96,7 +134,7 @@ def _export(paths: list[Path], display: Display | None, output: Path, console: C
     check_writable(output)
     export_page([(file.path.name, picture_of_file(file, display, keeps_codes=True)) for file in files], output)
     size = output.stat().st_size
-    names = " and ".join(str(path) for path in paths)
+    names = " and ".join(str(path) for path in sources)
     console.result({"output": str(output), "bytes": size}, f"{output}: {names}, {size / 1e6:.1f} MB")
 
 

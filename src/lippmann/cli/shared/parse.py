@@ -41,6 +41,18 @@ def triple(text: str, option: str) -> tuple[float, float, float]:
     return x, y, z
 
 
+def steps(text: str, option: str) -> list[float]:
+    """Equal steps of ``FIRST:LAST:COUNT``, such as ``-40:40:9``; COUNT is 1 to 9999."""
+    parts = text.split(":")
+    rule = "FIRST:LAST:COUNT, such as -40:40:9"
+    if len(parts) != 3 or not re.fullmatch(r"\d{1,4}", parts[2].strip()) or int(parts[2]) < 1:
+        raise UsageError(f"'{text}' will not do", where=option, rule=rule)
+    first, last = numbers(f"{parts[0]},{parts[1]}", option, (2,))
+    count = int(parts[2])
+    # Rounded, so that a step of 0.1 is said as such.
+    return [round(first + (last - first) * k / max(count - 1, 1), 9) for k in range(count)]
+
+
 def size(text: str, option: str, rule: str = "width x height in pixels, such as 512x512") -> tuple[int, int]:
     """Width and height in pixels, such as ``512x512``; or columns and rows, as ``rule`` says."""
     match = re.fullmatch(r"(\d{1,6})[xX](\d{1,6})", text.strip())

@@ -66,7 +66,8 @@ _LENGTHS: dict[str, dict[str, tuple[tuple[str, ...], bool]]] = {
 def load_display(name_or_path: str | os.PathLike[str]) -> Display:
     """The preset of that name, the display of a TOML file or a Looking Glass's ``visual.json``, or of a short form.
 
-    A Looking Glass preset goes by the end of its name, too, such as ``portrait``.
+    A Looking Glass preset goes by the end of its name, too, such as ``portrait`` or
+    ``lkg-portrait``.
 
     Raises
     ------
@@ -76,7 +77,8 @@ def load_display(name_or_path: str | os.PathLike[str]) -> Display:
     presets = _preset_texts()
     name = os.fspath(name_or_path)
     # Owners of a Looking Glass know their device as "portrait".
-    name = _FAMILY + name if _FAMILY + name in presets else name
+    short = _FAMILY + name.removeprefix("lkg-")
+    name = short if short in presets else name
     if name in presets:
         return _from_toml(presets[name], where=f"{name}.toml", stem=name)
     if is_short_form(name):

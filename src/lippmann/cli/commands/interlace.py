@@ -1,0 +1,180 @@
+"""``lippmann interlace``: photographs or frames woven for a lens sheet."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import typer
+
+from lippmann.cli.commands.print import Distance, Field, Index, Lpi, Ppi, PrintLpi, Size, Thickness, print_of
+from lippmann.cli.shared import options
+from lippmann.cli.shared.console import Console
+from lippmann.errors import UsageError
+
+if TYPE_CHECKING:
+    from lippmann.display import Display
+    from lippmann.quilts.photos import Photos, Shift
+
+
+def interlace(
+    photos: Annotated[list[Path], typer.Argument(help="Photographs or frames, in natural order; or their folder.")],
+    output: Annotated[Path, typer.Option("--output", "-o", help="The .tif or .png file to write.")],
+    lpi: Lpi = None,
+    print_lpi: PrintLpi = None,
+    ppi: Ppi = None,
+    size: Size = None,
+    viewing_distance: Distance = None,
+    thickness: Thickness = None,
+    index: Index = None,
+    field: Field = None,
+    display: Annotated[
+        str | None,
+        typer.Option("--display", "-d", help="A lenticular display in place of a print, such as lkg-portrait."),
+    ] = None,
+    bleed: Annotated[
+        str | None, typer.Option("--bleed", help="Enlarge the print by this width on every side, such as 3mm.")
+    ] = None,
+    lenses: Annotated[
+        Literal["along", "across"],
+        typer.Option("--lenses", help="along: upright lenses; across: lying lenses, for flips."),
+    ] = "along",
+    views: Annotated[
+        Literal["nearest", "linear"] | None,
+        typer.Option(
+            "--views",
+            help="nearest: one photograph per pixel; linear: a mixture of two. "
+            "Default: linear for lenses along, nearest for lenses across.",
+        ),
+    ] = None,
+    reverse: Annotated[bool, typer.Option("--reverse", help="Take the photographs in reverse order.")] = False,
+    fit: Annotated[
+        Literal["cover", "contain", "stretch"] | None,
+        typer.Option(
+            "--fit",
+            help="cover: crop; contain: leave white paper; stretch: change proportions. "
+            "Default: cover; photographs must then have one size.",
+        ),
+    ] = None,
+    shift: Annotated[
+        str | None,
+        typer.Option(
+            "--shift",
+            help="Move each photograph against the one before, to choose the plane without "
+            "parallax: 12px of the photographs, or 0.4mm on the print; to the right, or down for lenses "
+            "across.",
+        ),
+    ] = None,
+    icc: Annotated[
+        Path | None,
+        typer.Option("--icc", help="Convert to this ICC profile (RGB). Default: the photographs' own is kept."),
+    ] = None,
+    as_json: options.Json = False,
+    quiet: options.Quiet = False,
+) -> None:
+    """Interlace photographs or frames for a lenticular print or display."""
+    from lippmann.quilts.interlace import check_interlaced_path, view_size, write_interlaced
+    from lippmann.quilts.photos import natural_order, read_photos
+
+    console = Console(quiet, as_json)
+    check_interlaced_path(output)
+    texts = {"lpi": lpi, "print_lpi": print_lpi, "ppi": ppi, "size": size, "viewing_distance": viewing_distance}
+    texts |= {"thickness": thickness, "index": index, "field": field}
+    across = lenses == "across"
+    target = _display(display, texts, bleed, turned=across)
+    paths = natural_order(_pictures(photos))
+    if reverse:
+        paths.reverse()
+    with console.progress() as progress:
+        read = read_photos(
+            paths,
+            view_size(target),
+            target.size_mm,
+            fit=fit,
+            shift=_shift(shift),
+            turned=across,
+            icc=icc,
+            progress=progress,
+        )
+        for note in (*read.notes, *_fit_note(read, fit, across=across)):
+            console.remark(note)
+        choice = views or ("nearest" if across else "linear")
+        pixels = write_interlaced(
+            read, target, output, lenses=lenses, choice=choice, scene=paths[0].stem, progress=progress
+        )
+    result: dict[str, Any] = {
+        "output": str(output),
+        "size": list(pixels),
+        "ppi": 25.4 / target.panel.pixel_pitch,
+        "photos": [str(path) for path in paths],
+        "fit": fit or "cover",
+        "lenses": lenses,
+        "view_choice": choice,
+        "pixels_per_lens": target.pixels_per_lens[0],
+    }
+    line = f"{output}: {len(paths)} photographs, {paths[0].name} to {paths[-1].name}, on {pixels[0]}x{pixels[1]} pixels"
+    console.result(result, f"{line}, {target.pixels_per_lens[0]:.4g} a lens")
+
+
+def _display(name: str | None, texts: dict[str, str | None], bleed: str | None, *, turned: bool) -> Display:
+    """The display, or the print with its bleed; lying on its side if ``turned``."""
+    from dataclasses import replace
+
+    from lippmann.display.units import length
+
+    if name is None:
+        sheet = print_of(**texts)
+        edge = 0.0 if bleed is None else length(bleed, "--bleed")
+        if edge < 0:
+            raise UsageError(f"{edge:g} mm is out of range", where="--bleed", rule="it is 0 or more")
+        width, height = (side + 2 * edge for side in sheet.size)
+        return replace(sheet, size=(height, width) if turned else (width, height)).display()
+    for option, value in {**texts, "bleed": bleed, "lenses": "across" if turned else None}.items():
+        if value is not None:
+            rule = f"it applies to prints, and --display {name} is given"
+            raise UsageError("does not apply", where=f"--{option.replace('_', '-')}", rule=rule)
+    from lippmann.display import load_display
+
+    return load_display(name)
+
+
+def _pictures(photos: list[Path]) -> list[Path]:
+    """The photographs; a folder stands for its pictures, and a pattern that no shell resolved for its files."""
+    from glob import glob  # as below: not for --help
+
+    from lippmann.quilts.photos import ENDINGS
+
+    paths: list[Path] = []
+    for path in photos:
+        if path.is_dir():
+            paths += [file for file in path.iterdir() if file.suffix.lower() in ENDINGS and file.name[0] != "."]
+        elif "*" in path.name and not path.exists():
+            paths += [Path(name) for name in glob(str(path))]
+        else:
+            paths.append(path)
+    return paths
+
+
+def _shift(text: str | None) -> Shift:
+    from lippmann.quilts.photos import Shift
+
+    if text is None:
+        return Shift()
+    match = re.fullmatch(r"([+-]?\d{1,6}(?:\.\d{1,9})?)\s*(px|mm)", text.strip())
+    if match is None:
+        rule = "a number with its unit: 12px of the photographs, or 0.4mm on the print"
+        raise UsageError(f"'{text}' will not do", where="--shift", rule=rule)
+    return Shift(float(match[1]), "mm" if match[2] == "mm" else "px")
+
+
+def _fit_note(read: Photos, fit: str | None, *, across: bool) -> list[str]:
+    """What becomes of the photographs' edges, in one line."""
+    if fit == "stretch":
+        return ["the photographs are stretched to the print's proportions"]
+    first, second = read.cropped
+    width, height = (second, first) if across else (first, second)
+    parts = [f"{part:.0%} of the {side}" for part, side in ((width, "width"), (height, "height")) if part >= 0.005]
+    if not parts:
+        return []
+    return [f"{fit or 'cover'}: {' and '.join(parts)} of the photographs is cut off"]

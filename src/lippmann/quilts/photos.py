@@ -1,0 +1,285 @@
+"""Photographs as views: any names, upright by their EXIF orientation, cut to the shape of a print, of one colour space.
+
+A photograph moves against the one before by ``shift``: the plane whose things move by as much the other way then has
+no parallax. The part that all photographs have in common is what is fitted.
+"""
+
+from __future__ import annotations
+
+import io
+import re
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal, NamedTuple, get_args
+
+import numpy as np
+
+from lippmann.codecs.pillow_formats import RULE, open_picture
+from lippmann.errors import PictureError, UsageError
+from lippmann.image.read import MOST_PIXELS
+from lippmann.progress import Progress, ProgressCallback, silent
+from lippmann.quilts.quilt import Quilt, QuiltLayout
+
+if TYPE_CHECKING:
+    from PIL import Image
+
+Fit = Literal["cover", "contain", "stretch"]
+
+#: Endings of the pictures in a folder of photographs.
+ENDINGS = (".jpg", ".jpeg", ".png", ".tif", ".tiff", ".webp", ".avif", ".bmp")
+
+#: EXIF tag of the orientation, and its values that exchange width and height.
+_ORIENTATION, _LYING = 0x112, (5, 6, 7, 8)
+
+_PAPER = (255, 255, 255)
+
+
+class Shift(NamedTuple):
+    """Displacement of each photograph against the one before, to the right (down for lenses across).
+
+    Attributes
+    ----------
+    amount:
+        The displacement; negative to the left.
+    unit:
+        ``px``, pixels of the photographs, or ``mm`` on the print.
+    """
+
+    amount: float = 0.0
+    unit: Literal["px", "mm"] = "px"
+
+
+NO_SHIFT = Shift()
+
+
+@dataclass(frozen=True)
+class Photos:
+    """Photographs as views.
+
+    Parameters
+    ----------
+    quilt:
+        The views in one row, 8-bit codes.
+    icc:
+        ICC profile of the codes; empty: sRGB.
+    cropped:
+        Fraction of a photograph's width and of its height that is cut off, 0 to 1; the largest of all photographs.
+    notes:
+        What was decided, each in one line.
+    """
+
+    quilt: Quilt
+    icc: bytes
+    cropped: tuple[float, float]
+    notes: tuple[str, ...]
+
+
+def natural_order(paths: Iterable[Path]) -> list[Path]:
+    """Paths in natural order: numbers in names count as numbers, ``frame2`` before ``frame10``; case does not count."""
+
+    def key(path: Path) -> tuple[list[tuple[int, int, str]], str]:
+        parts = re.findall(r"\d+|\D+", str(path))
+        return [(0, int(part), "") if part.isdecimal() else (1, 0, part.casefold()) for part in parts], str(path)
+
+    return sorted(paths, key=key)
+
+
+def read_photos(
+    paths: Sequence[Path],
+    size: tuple[int, int],
+    paper: tuple[float, float],
+    *,
+    fit: Fit | None = None,
+    shift: Shift = NO_SHIFT,
+    turned: bool = False,
+    icc: Path | None = None,
+    progress: ProgressCallback = silent,
+) -> Photos:
+    """Read photographs as views of a print.
+
+    Parameters
+    ----------
+    paths:
+        The photographs, at least 2, in the order of the views.
+    size:
+        Largest width and height of a view in pixels.
+    paper:
+        Width and height of the print in mm.
+    fit:
+        ``cover`` crops what is too long, ``contain`` leaves white paper, ``stretch`` changes the proportions. None:
+        ``cover``, and all photographs must have one size.
+    shift:
+        Displacement of each photograph against the one before.
+    turned:
+        Whether photographs are turned by 90 degrees to the left first, for lenses across; ``size``, ``paper`` and
+        ``shift`` are those of turned photographs.
+    icc:
+        File of an RGB profile to which all photographs are converted. None: the photographs' own profile is kept;
+        photographs of several profiles become sRGB.
+    progress:
+        Called after every photograph.
+
+    Raises
+    ------
+    UsageError
+        If there are fewer than 2 photographs, the fit is unknown, or the shift leaves nothing in common.
+    PictureError
+        If a file is missing, damaged or no picture, a profile cannot be used, or photographs differ in size and no fit
+        is given.
+    """
+    if len(paths) < 2:
+        raise UsageError(f"{len(paths)} photographs are given", rule="at least 2 are interlaced")
+    if fit is not None and fit not in get_args(Fit):
+        raise UsageError(f"{fit!r} is unknown", parameter="fit", rule=f"known are {', '.join(get_args(Fit))}")
+    headers = [_header(path) for path in paths]
+    sizes = [header.size[::-1] if turned else header.size for header in headers]
+    for path, header in zip(paths, headers, strict=True):
+        if fit is None and header.size != headers[0].size:
+            rule = f"{paths[0].name} has {headers[0].size[0]} x {headers[0].size[1]}"
+            what = f"has {header.size[0]} x {header.size[1]} pixels"
+            raise PictureError(what, where=str(path), rule=rule, fix='say fit="cover" to fit each by itself')
+    windows = [_window(size, paper, number, len(paths), fit or "cover", shift) for number, size in enumerate(sizes)]
+    width, height = size[0], min(size[1], max(1, max(round(window.box[3] - window.box[1]) for window in windows)))
+    if width * height * len(paths) > MOST_PIXELS:
+        rule = f"together they have at most {MOST_PIXELS} pixels"
+        raise PictureError(f"{len(paths)} views of {width} x {height} pixels", rule=rule, fix="take fewer photographs")
+    target, notes = _common_profile(headers, icc)
+    values = np.empty((height, width * len(paths), 3), dtype=np.uint8)
+    quilt = Quilt(values, QuiltLayout(len(paths), 1, None), "uint8")
+    for number, path in enumerate(paths):
+        with _opened(path) as picture:
+            colors = _in_profile(_upright(picture, turned=turned), headers[number].icc, target, path)
+            quilt.view_values(number)[...] = np.asarray(_fitted(colors, windows[number], (width, height)))
+        progress(Progress("read", number + 1, len(paths)))
+    cropped = tuple(max(window.cropped[axis] for window in windows) for axis in (0, 1))
+    return Photos(quilt, target, (cropped[0], cropped[1]), notes)
+
+
+class _Header(NamedTuple):
+    """Width and height of an upright photograph, and its ICC profile (empty: sRGB)."""
+
+    size: tuple[int, int]
+    icc: bytes
+
+
+class _Window(NamedTuple):
+    """The rectangle of a photograph that becomes a view, and the part of it that is shown; left, top, right, bottom.
+
+    ``cropped`` is the fraction of the photograph's width and height outside it.
+    """
+
+    box: tuple[float, float, float, float]
+    shown: tuple[float, float, float, float]
+    cropped: tuple[float, float]
+
+
+def _window(
+    size: tuple[int, int], paper: tuple[float, float], number: int, count: int, fit: Fit, shift: Shift
+) -> _Window:
+    width, height = size
+    steps, in_mm = count - 1, shift.unit == "mm"
+    pixels = 0.0 if in_mm else abs(shift.amount) * steps
+    # Pixels of the photograph per mm of paper at which the common part is as wide as the paper, and as high.
+    across = (width - pixels) / (paper[0] + (abs(shift.amount) * steps if in_mm else 0.0))
+    down = height / paper[1]
+    scales = {"cover": (min(across, down),) * 2, "contain": (max(across, down),) * 2, "stretch": (across, down)}[fit]
+    step = shift.amount * (scales[0] if in_mm else 1.0)
+    common = width - abs(step) * steps
+    if common < 1:
+        rule = f"{count} photographs of {width} pixels have nothing in common then"
+        raise UsageError(f"{shift.amount:g}{shift.unit} is too far", parameter="shift", rule=rule)
+    x, y = width / 2 + step * (steps / 2 - number), height / 2
+    half = paper[0] * scales[0] / 2, paper[1] * scales[1] / 2
+    box = x - half[0], y - half[1], x + half[0], y + half[1]
+    shown = (
+        max(box[0], x - common / 2, 0.0),
+        max(box[1], 0.0),
+        min(box[2], x + common / 2, float(width)),
+        min(box[3], float(height)),
+    )
+    return _Window(box, shown, (1 - (shown[2] - shown[0]) / width, 1 - (shown[3] - shown[1]) / height))
+
+
+def _fitted(picture: Image.Image, window: _Window, size: tuple[int, int]) -> Image.Image:
+    """The window of a picture as a view of ``size``, on white paper."""
+    from PIL import Image
+
+    left, top, right, bottom = window.box
+    scale = size[0] / (right - left), size[1] / (bottom - top)
+    edges = [round((edge - (left, top)[k % 2]) * scale[k % 2]) for k, edge in enumerate(window.shown)]
+    part = max(1, edges[2] - edges[0]), max(1, edges[3] - edges[1])
+    resized = picture.resize(part, Image.Resampling.LANCZOS, box=window.shown)
+    if part == size:
+        return resized
+    view = Image.new("RGB", size, _PAPER)
+    view.paste(resized, (edges[0], edges[1]))
+    return view
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[Image.Image]:
+    """An opened photograph; errors of Pillow become :class:`PictureError`."""
+    from PIL import Image, UnidentifiedImageError
+
+    try:
+        with open_picture(path) as picture:
+            yield picture
+    except FileNotFoundError:
+        raise PictureError("is not there", where=str(path)) from None
+    except UnidentifiedImageError:
+        raise PictureError("is no picture that is read here", where=str(path), rule=RULE) from None
+    except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
+        raise PictureError(f"cannot be read: {error}", where=str(path)) from None
+
+
+def _header(path: Path) -> _Header:
+    with _opened(path) as picture:
+        lying = picture.getexif().get(_ORIENTATION) in _LYING
+        # The profile of a grey or CMYK picture does not describe the RGB that it becomes.
+        icc = picture.info.get("icc_profile") or b"" if picture.mode in ("RGB", "RGBA", "P", "PA") else b""
+        return _Header(picture.size[::-1] if lying else picture.size, icc)
+
+
+def _upright(picture: Image.Image, *, turned: bool) -> Image.Image:
+    """RGB without alpha, upright by its EXIF orientation, then turned to the left if ``turned``."""
+    from PIL import Image, ImageOps
+
+    upright = ImageOps.exif_transpose(picture)
+    if "A" in upright.getbands() or "transparency" in upright.info:
+        over = upright.convert("RGBA")
+        upright = Image.new("RGB", over.size, _PAPER)
+        upright.paste(over, mask=over.getchannel("A"))
+    upright = upright.convert("RGB")
+    return upright.transpose(Image.Transpose.ROTATE_90) if turned else upright
+
+
+def _common_profile(headers: Sequence[_Header], icc: Path | None) -> tuple[bytes, tuple[str, ...]]:
+    """Profile of the print (empty: sRGB), and notes."""
+    if icc is not None:
+        try:
+            return icc.read_bytes(), (f"colours are converted to the profile {icc.name}",)
+        except OSError as error:
+            raise PictureError(f"cannot be read: {error.strerror}", where=str(icc)) from None
+    profiles = {header.icc for header in headers}
+    if len(profiles) == 1:
+        return headers[0].icc, ()
+    return b"", ("the photographs have several colour profiles: they are converted to sRGB",)
+
+
+def _in_profile(picture: Image.Image, source: bytes, target: bytes, path: Path) -> Image.Image:
+    if source == target:
+        return picture
+    from PIL import ImageCms
+
+    def profile(data: bytes) -> ImageCms.ImageCmsProfile:
+        return ImageCms.ImageCmsProfile(io.BytesIO(data) if data else ImageCms.createProfile("sRGB"))
+
+    try:
+        converted = ImageCms.profileToProfile(picture, profile(source), profile(target), outputMode="RGB")
+    except (ImageCms.PyCMSError, OSError) as error:
+        rule = "profiles are those of RGB devices"
+        raise PictureError(f"its colours cannot be converted: {error}", where=str(path), rule=rule) from None
+    assert converted is not None  # it is not done in place
+    return converted

@@ -1,0 +1,158 @@
+"""What an eye or a camera before a display sees of a quilt's views, without the display's lenses.
+
+View k of N is that of the camera in the middle of the k-th of N equal parts of the field of view, counted from the
+left, even in the tangent. A view shows the panel's rectangle in the lens plane. The direction in which an eye looks
+through a point of the lens plane lies between two cameras; beyond the outermost camera that camera's view is taken.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lippmann.display import Display
+from lippmann.errors import PictureError, UsageError
+from lippmann.image.stored_values import FloatArray
+from lippmann.quilts.quilt import Quilt
+from lippmann.viewing.replay import Eye, Real, checked_eye, checked_size, default_eye, eye_of_offset, lens_plane_points
+
+#: Default limit on the width of a picture, in pixels.
+_WIDEST = 2048
+
+
+def quilt_display(quilt: Quilt, display: Display | None, where: str) -> Display:
+    """The display of a quilt: ``display``, or else the quilt's own.
+
+    Raises
+    ------
+    PictureError
+        If there is none, or it is not lenticular; names ``where``.
+    """
+    display = quilt.display if display is None else display
+    if display is None:
+        raise PictureError("the quilt does not say its display", where=where, fix="say display=...")
+    if display.lens_array.layout != "lenticular":
+        rule = "a quilt needs cylindrical lenses"
+        raise PictureError(f"{display.name} has {display.lens_array.layout} lenses", where=where, rule=rule)
+    return display
+
+
+def replay_quilt(
+    quilt: Quilt, display: Display, eye: Eye | None = None, *, size: tuple[int, int] | None = None, linear: bool = True
+) -> FloatArray:
+    """Picture that an eye sees of a quilt's views.
+
+    Parameters
+    ----------
+    quilt:
+        The views.
+    display:
+        The lenticular display that they are for.
+    eye:
+        Position ``(x, y, z)`` in mm, z > 0. None: central, at the viewing distance.
+    size:
+        Width and height of the result in pixels. None: the views' height, and the panel's proportions.
+    linear:
+        Whether to interpolate between the two next views; otherwise the nearest is taken.
+
+    Returns
+    -------
+    ``(height, width, 3)`` float32 linear RGB.
+
+    Raises
+    ------
+    UsageError
+        If the eye is not in front of the lens plane, or the size is out of range.
+    """
+    eye = checked_eye(default_eye(display) if eye is None else eye)
+    width, height = checked_size(_default_size(quilt, display) if size is None else size)
+    lattice, count = display.lattice, quilt.layout.views
+    convergence = 1 / display.viewing_distance if math.isfinite(display.viewing_distance) else 0.0
+    views = quilt.view_rows(0, quilt.view_size[1])
+    picture = np.empty((height, width, 3), dtype=np.float32)
+    for rows, x, y in lens_plane_points(display, width, height):
+        across = lattice.across(x, y)
+        # Where under its lens the eye sees the panel, in micro-images from the middle: right of it from the left.
+        place = (across - lattice.across(eye[0], eye[1])) / eye[2] - across * convergence
+        place *= display.gap / display.micro_image_pitch
+        position = np.clip((0.5 - place) * count - 0.5, 0.0, count - 1.0)
+        first = np.floor(position if linear else position + 0.5).astype(np.intp)
+        share = (position - first if linear else np.zeros_like(position))[..., None]
+        seen = _sample(views, first, x, y, display)
+        following = _sample(views, np.minimum(first + 1, count - 1), x, y, display)
+        picture[rows] = seen + (following - seen) * share.astype(np.float32)
+    return picture
+
+
+def refocus_quilt(
+    quilt: Quilt, display: Display, planes: Sequence[float], *, size: tuple[int, int] | None = None
+) -> Iterator[FloatArray]:
+    """Pictures focused on planes: at each point of a plane the mean of the views that show it, by shift and sum.
+
+    Parameters
+    ----------
+    quilt, display, size:
+        As for :func:`replay_quilt`.
+    planes:
+        Heights of the planes over the lens plane in mm, positive toward the viewer, below the viewing distance.
+
+    Returns
+    -------
+    Iterator of ``(height, width, 3)`` float32 linear RGB, black where no view shows the plane.
+
+    Raises
+    ------
+    UsageError
+        If a plane or the size is out of range; raised at once.
+    """
+    for plane in planes:
+        if not math.isfinite(plane) or plane >= display.viewing_distance:
+            rule = f"it must be finite and below the viewing distance of {display.viewing_distance:g} mm"
+            raise UsageError(f"{plane:g} mm is out of range", parameter="plane", rule=rule)
+    width, height = checked_size(_default_size(quilt, display) if size is None else size)
+    return (_refocused(quilt, display, plane, width, height) for plane in planes)
+
+
+def _refocused(quilt: Quilt, display: Display, plane: float, width: int, height: int) -> FloatArray:
+    picture = np.zeros((height, width, 3), dtype=np.float32)
+    count = np.zeros((height, width), dtype=np.float32)
+    across, _ = display.pixels_per_lens
+    half = display.size_mm[0] / 2, display.size_mm[1] / 2
+    for number in range(quilt.layout.views):
+        fraction = (number + 0.5) / quilt.layout.views
+        eye = eye_of_offset(display, (0.5 - fraction) * across, 0.0)
+        view = quilt.view(number)[None]
+        stretch = plane / (eye[2] - plane)
+        for rows, x, y in lens_plane_points(display, width, height):
+            lens_x, lens_y = x + (x - eye[0]) * stretch, y + (y - eye[1]) * stretch
+            inside = (np.abs(lens_x) <= half[0]) & (np.abs(lens_y) <= half[1])
+            colors = _sample(view, np.zeros(x.shape, dtype=np.intp), lens_x, lens_y, display)
+            picture[rows] += colors * inside[..., None]
+            count[rows] += inside
+    picture /= np.maximum(count, 1)[..., None]
+    return picture
+
+
+def _sample(views: FloatArray, number: NDArray[np.intp], x: Real, y: Real, display: Display) -> FloatArray:
+    """Bilinear samples ``(..., 3)`` of ``views`` ``(views, rows, columns, 3)`` at points of the lens plane, mm."""
+    rows, columns = views.shape[1:3]
+    width, height = display.size_mm
+    across = np.clip((x / width + 0.5) * columns - 0.5, 0.0, columns - 1.0)
+    down = np.clip((0.5 - y / height) * rows - 0.5, 0.0, rows - 1.0)
+    left, top = across.astype(np.intp), down.astype(np.intp)
+    right, bottom = np.minimum(left + 1, columns - 1), np.minimum(top + 1, rows - 1)
+    part_x, part_y = (part.astype(np.float32)[..., None] for part in (across - left, down - top))
+    upper = views[number, top, left] * (1 - part_x) + views[number, top, right] * part_x
+    lower = views[number, bottom, left] * (1 - part_x) + views[number, bottom, right] * part_x
+    sampled: FloatArray = upper * (1 - part_y) + lower * part_y
+    return sampled
+
+
+def _default_size(quilt: Quilt, display: Display) -> tuple[int, int]:
+    height = quilt.view_size[1]
+    width = max(1, round(height * display.panel.width / display.panel.height))
+    shrink = min(1.0, _WIDEST / width)
+    return max(1, round(width * shrink)), max(1, round(height * shrink))
