@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from lippmann.cli.commands.quilt import Aspect, Layout, layout_of
-from lippmann.cli.shared import options
+from lippmann.cli.shared import options, parse
 from lippmann.cli.shared.console import Console
 from lippmann.cli.shared.exit_codes import INTERRUPTED
 from lippmann.cli.shared.option_names import in_options

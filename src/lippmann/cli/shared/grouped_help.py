@@ -98,11 +98,15 @@ EXAMPLES: Mapping[str, tuple[str, ...]] = {
     "replay": ("lippmann replay model.png --sweep", "lippmann replay model.png --eye 20,0,600 -o left.png"),
     "refocus": (
         "lippmann refocus model.png --plane -20 -o back.png",
-        "lippmann refocus model.exr --plane 5 -o front.exr",
+        "lippmann refocus model.exr --planes -40:40:9 -o stack",
     ),
     "export": ("lippmann export model.exr --as hci -o scene", "lippmann export model.exr --as eslf -o scene.png"),
     "import": ("lippmann import scene -o model.exr", "lippmann import scene.png --as eslf -o model.exr"),
     "view": ("lippmann view model.png", "lippmann view model.png --export model.html"),
+    "interlace": (
+        "lippmann interlace photos/*.jpg --lpi 60 --ppi 720 --size 8x10in -o print.tif",
+        "lippmann interlace day.jpg night.jpg --lenses across --lpi 40 --ppi 600 --size 20x15cm -o flip.tif",
+    ),
     "weave": (
         "lippmann weave city_qs8x6a0.75.png --display looking-glass-portrait -o city.png",
         "lippmann weave photos --display panel-4k --views nearest -o photos.tif",
