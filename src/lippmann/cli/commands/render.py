@@ -165,7 +165,7 @@ def render(
         if opens and video is not None:
             view.open_file(video)
         return
-    name, _ = format_for(output, bits)
+    name, stored = format_for(output, bits)
     _check_layers(layers, name, output)
     if on_cluster or is_tiled(output, bits, target, request, resume=resume):
         _check_whole({"--maps": maps, "--marks": margin})
@@ -189,14 +189,30 @@ def render(
             from lippmann.viewing.diagnostic_maps import write_maps
 
             write_maps(image, maps)
+        image, remark = _readable(image, stored, output)
         image = printing.marked(image, margin)
         image.save(output, bits=bits)
     written = _with_seconds(image, write=time.perf_counter() - writing)
     remarks(console, image.provenance)
+    if remark:
+        console.remark(remark)
     height, width = image.pixels.shape[:2]
     console.result(report(output, (width, height), written.provenance), _sentence(output, written))
     if opens:
         view.view(output, quiet=quiet, as_json=as_json)
+
+
+def _readable(image: IntegralImage, stored: str, output: Path) -> tuple[IntegralImage, str]:
+    """Depth in a format of integers as shades, with a legend beside it and a line that says so; all else as it is."""
+    if image.provenance.integrator != "depth" or stored.startswith("float"):
+        return image, ""
+    from lippmann.image.write import write_plain_picture
+    from lippmann.viewing.depth_picture import legend, shades_of_depth
+
+    shades, (low, high) = shades_of_depth(image)
+    beside = output.with_name(f"{output.stem}-legend.png")
+    write_plain_picture(legend(shades, (low, high)), beside, bits=8, transfer="linear")
+    return shades, f"depth from {low:.1f} mm (dark) to {high:.1f} mm (white), see {beside.name}; .exr keeps millimetres"
 
 
 def _check_layers(layers: bool, name: str, output: Path) -> None:
