@@ -52,7 +52,7 @@ def test_placements(display):
     np.testing.assert_array_equal(IntegralImage(np.zeros((9, 12, 3)), display("square")).world_from_display, np.eye(4))
     for wrong in (
         np.eye(3),
-        np.diag([1, 1, 2, 1]),
+        np.diag([1, 2, 1, 1]),
         np.diag([1, 1, -1, 1]),
         np.eye(4) * 2,
         np.full((4, 4), np.nan),

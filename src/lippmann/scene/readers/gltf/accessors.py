@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
+from lippmann.runtime.cached_property import cached_property
 from lippmann.scene.readers.gltf.buffers import Buffers
 from lippmann.scene.readers.gltf.document import Document
+from lippmann.scene.readers.gltf.draco import DracoMeshes
 from lippmann.scene.readers.gltf.json_fields import Fields
 from lippmann.scene.values.description import FloatArray
 
@@ -79,7 +82,17 @@ class Accessors:
 
     document: Document
     buffers: Buffers
+    decoded: Mapping[int, NDArray[np.generic]] = field(default_factory=dict)
     _floats: dict[tuple[int, Storage], FloatArray] = field(default_factory=dict)
+
+    @cached_property
+    def draco(self) -> DracoMeshes:
+        """The document's compressed meshes."""
+        return DracoMeshes(self.document, self.buffers)
+
+    def with_decoded(self, decoded: Mapping[int, NDArray[np.generic]]) -> Accessors:
+        """The same, but for accessors whose elements ``(count, width)`` were decoded elsewhere."""
+        return Accessors(self.document, self.buffers, decoded)
 
     def count(self, index: int) -> int:
         """The number of elements."""
@@ -97,7 +110,7 @@ class Accessors:
         if key not in self._floats:
             fields = self.document.all("accessors")[index]
             normalized = self._check(fields, storage)
-            raw = self._elements(fields)
+            raw = self._elements_of(index, fields)
             self._floats[key] = _normalize(raw) if normalized else _canonicalize_nan(raw.astype(np.float32))
         return self._floats[key]
 
@@ -105,7 +118,16 @@ class Accessors:
         """Elements as uint32 ``(count, width)``; errors as for :meth:`floats`."""
         fields = self.document.all("accessors")[index]
         self._check(fields, storage)
-        return self._elements(fields).astype(np.uint32)
+        return self._elements_of(index, fields).astype(np.uint32)
+
+    def _elements_of(self, index: int, fields: Fields) -> NDArray[np.generic]:
+        elements = self.decoded.get(index)
+        if elements is None:
+            return self._elements(fields)
+        width, dtype = _WIDTHS[str(fields.text("type"))], _DTYPES[fields.integer("componentType")]
+        if elements.shape[1] != width or (elements.dtype.kind == "f") != (dtype.kind == "f"):
+            raise fields.error("type", f"what was decoded for it is {elements.shape[1]} x {elements.dtype}")
+        return elements.astype(dtype)
 
     def _check(self, fields: Fields, storage: Storage) -> bool:
         """Whether the (allowed) storage of an accessor is normalised."""

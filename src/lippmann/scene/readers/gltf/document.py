@@ -33,6 +33,8 @@ _CHUNK_BIN = 0x004E4942
 _HEADER = struct.Struct("<4sII")
 _CHUNK_HEADER = struct.Struct("<II")
 
+DRACO = "KHR_draco_mesh_compression"
+
 # Extensions whose members are read.
 _UNDERSTOOD = frozenset(
     {
@@ -40,6 +42,7 @@ _UNDERSTOOD = frozenset(
         "EXT_meshopt_compression",
         "EXT_texture_avif",
         "EXT_texture_webp",
+        DRACO,
         "KHR_lights_punctual",
         "KHR_materials_anisotropy",
         "KHR_materials_clearcoat",
@@ -66,8 +69,6 @@ _SILENT = frozenset({"KHR_xmp", "KHR_xmp_json_ld", "KHR_node_selectability", "KH
 # It moves what stands still in a scene at rest.
 _POINTER = "KHR_animation_pointer"
 
-DRACO = "KHR_draco_mesh_compression"
-
 # Surfaces as programs of shaders, and others that glTF 2.0 has no terms for: the meshes are read without them.
 _FORMER_MATERIALS = frozenset({"KHR_blend", "KHR_materials_common", "KHR_technique_webgl", "KHR_techniques_webgl"})
 
@@ -75,7 +76,6 @@ _FORMER_MATERIALS = frozenset({"KHR_blend", "KHR_materials_common", "KHR_techniq
 _UPGRADE = "convert it with 'gltf-pipeline -i in.gltf -o out.glb'"
 DECOMPRESS = "decompress it with 'gltf-transform cp in.glb out.glb'"
 _REMEDIES = {
-    DRACO: DECOMPRESS,
     "KHR_texture_basisu": "convert its textures with 'gltf-transform ktxdecompress in.glb out.glb'",
 }
 #: Extensions of compressed buffer views; the file may hold the same bytes uncompressed, too.
@@ -288,8 +288,6 @@ def check_extensions(document: Document) -> None:
 
 def _remark(extension: str) -> str:
     """What becomes of an extension that the file uses, does not require, and that is not understood."""
-    if extension == DRACO:
-        return f"the glTF extension {extension} is not understood; the uncompressed data beside it is read"
     if extension in _FORMER_MATERIALS:
         return f"materials of the glTF extension {extension} are shown as plain ones; {_UPGRADE}"
     if extension == _POINTER:

@@ -41,6 +41,10 @@ class Fields:
         """Whether the member is there."""
         return self.values.get(key) is not None
 
+    def names(self) -> list[str]:
+        """The names of all members."""
+        return list(self.values)
+
     def integer(self, key: str) -> int:
         """A required whole number, 0 or more."""
         value = self.optional_integer(key)

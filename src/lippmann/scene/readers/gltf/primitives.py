@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from lippmann.scene.readers.gltf import accessors as storage
 from lippmann.scene.readers.gltf.accessors import Accessors, Storage
-from lippmann.scene.readers.gltf.document import DECOMPRESS, DRACO, Document
+from lippmann.scene.readers.gltf.document import DRACO, Document
 from lippmann.scene.readers.gltf.json_fields import Fields
 from lippmann.scene.readers.gltf.skinning import Skin, deform, unit_normals
 from lippmann.scene.values.description import FloatArray, IndexArray
@@ -61,7 +61,16 @@ class Primitives:
         if attributes is None or position is None:
             self.document.notes.add("a primitive without vertex positions is left out", primitive.place)
             return None
-        self._check_compression(primitive, position)
+        if self._is_compressed(primitive, position):
+            decoded = self.accessors.with_decoded(self.accessors.draco.decode(primitive))
+            return replace(self, accessors=decoded)._read(primitive, _TRIANGLES, position, weights, skin)
+        return self._read(primitive, mode, position, weights, skin)
+
+    def _read(
+        self, primitive: Fields, mode: int, position: int, weights: tuple[float, ...], skin: Skin | None
+    ) -> Geometry | None:
+        attributes = primitive.child("attributes")
+        assert attributes is not None
         positions = self.accessors.floats(position, storage.POSITION)
         faces = self._faces(primitive, mode, len(positions))
         if not len(faces):
@@ -111,16 +120,10 @@ class Primitives:
         proper = (faces != np.roll(faces, -1, axis=1)).all(axis=1)
         return faces if proper.all() else faces[proper]
 
-    def _check_compression(self, primitive: Fields, position: int) -> None:
-        """Refuse a primitive whose vertices are compressed and given in no other way."""
-        compressed = primitive.extension(DRACO) is not None
+    def _is_compressed(self, primitive: Fields, position: int) -> bool:
+        """Whether the vertices of a primitive are compressed, and given in no other way."""
         accessor = self.document.all("accessors")[position]
-        if compressed and not accessor.has("bufferView") and not accessor.has("sparse"):
-            raise self.document.error(
-                f"{primitive.place} is compressed by Draco with the glTF extension {DRACO}",
-                rule="it is not understood, and the file holds no uncompressed copy",
-                fix=DECOMPRESS,
-            )
+        return primitive.extension(DRACO) is not None and not accessor.has("bufferView") and not accessor.has("sparse")
 
     def _uvs(self, attributes: Fields, count: int) -> tuple[FloatArray, ...]:
         sets: list[FloatArray] = []
