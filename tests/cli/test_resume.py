@@ -18,7 +18,7 @@ from lippmann.image import read_picture
 from lippmann.journal import TileGrid, TileResult, TileStore, journal_of
 
 #: 32 tiles of 128 x 128 pixels; a run takes a few seconds, most of them for starting.
-WORDS = ("--integrator", "direct", "--spp", "1", "--resume", "--quiet", "--threads", "1")
+WORDS = ("--integrator", "direct", "--method", "full", "--spp", "1", "--resume", "--quiet", "--threads", "1")
 
 
 @pytest.fixture(scope="module")
@@ -166,7 +166,7 @@ def test_an_interrupted_run_says_what_is_kept(display, tmp_path):
 
 
 def test_the_command_says_how_much_was_found(lippmann, engine, tmp_path):
-    words = ("render", "small-balls", "--integrator", "direct", "--spp", 1, "--resume", "--json")
+    words = ("render", "small-balls", "--integrator", "direct", "--method", "full", "--spp", 1, "--resume", "--json")
     done = lippmann(*words, "-o", tmp_path / "a.png")
     assert done.code == 0
     assert done.json["tiles"] == {"made": 16, "found": 0}

@@ -220,7 +220,7 @@ class Render(Thread):
         return self
 
 
-OPTIONS: dict[str, Any] = {"integrator": "direct", "spp": 2, "device": "cpu"}
+OPTIONS: dict[str, Any] = {"integrator": "direct", "method": "full", "spp": 2, "device": "cpu"}
 #: Tiles that the picture has.
 TILES = 16
 

@@ -44,7 +44,7 @@ FEWEST_WINDOWS = 4
 #: The most memory that tiles with surroundings are planned for where no limit is given.
 MOST_MEMORY = 4 << 30
 #: What of a request changes nothing in the picture.
-_IMMATERIAL = ("device", "threads", "memory", "reason")
+_IMMATERIAL = ("device", "threads", "memory", "reason", "began", "spp_reserve")
 
 
 @dataclass(frozen=True, eq=False)
