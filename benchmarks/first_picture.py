@@ -146,11 +146,9 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         found = models(Path(folder), options.scenes)
         sheet = Image.new("RGB", (CELL * len(found), (CELL + LABEL) * len(DISPLAYS)), (30, 30, 30))
-        if PICTURE.exists() and set(options.only) != set(DISPLAYS):
-            sheet.paste(Image.open(PICTURE))
         rows = [old for old in saved("first_picture").get("pictures", []) if old["display"] not in options.only]
         for display in options.only:
-            row = DISPLAYS.index(display)
+            row = options.only.index(display)
             for column, (name, model) in enumerate(found.items()):
                 figures, picture = judge(model, display, Path(folder) / "picture.png")
                 rows.append({"model": name, **figures})
@@ -163,7 +161,7 @@ def main() -> None:
                 sheet.paste(picture, corner)
                 words = f"{name}, {display}" if column == 0 else name
                 ImageDraw.Draw(sheet).text((column * CELL + 3, row * (CELL + LABEL) + CELL), words, fill="white")
-        sheet.save(PICTURE, optimize=True)
+        sheet.crop((0, 0, sheet.width, (CELL + LABEL) * len(options.only))).save(PICTURE, optimize=True)
     save("first_picture", {"pictures": sorted(rows, key=lambda each: DISPLAYS.index(each["display"]))})
 
 

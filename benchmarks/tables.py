@@ -13,6 +13,7 @@ from typing import Any
 import conformance_tables
 import equal_error_tables
 import estimate_coverage_tables
+import first_picture_tables
 import goals_tables
 from harness import RESULTS, saved
 
@@ -380,6 +381,7 @@ medians of {result["runs"]} runs.
 
 SECTIONS = {
     "methods": _methods,
+    "first_picture": first_picture_tables.describe,
     "equal_error": equal_error_tables.describe,
     "goals": goals_tables.describe,
     "estimate_coverage": estimate_coverage_tables.describe,
