@@ -24,10 +24,10 @@ def describe(result: dict[str, Any]) -> str:
     table = "\n".join(rows)
     return f"""## First pictures (`first_picture.py`)
 
-`lippmann render MODEL --display NAME` with nothing else said. The least share of the panel's width or height that a model
-fills as the central eye sees it; the mean display code of the model's pixels, of the darkest and the brightest model; the
-share of them that is clipped; PSNR of 3000 pixels all over the panel against 512 plain samples of each. The darkest model
-is a chart of black and dark blue samples.
+`lippmann render MODEL --display NAME` with nothing else said. The least share of the panel's width or height that a
+model fills as the central eye sees it; the mean display code of the model's pixels, of the darkest and the brightest
+model; the share of them that is clipped; PSNR of 3000 pixels all over the panel against 512 plain samples of each. The
+darkest model is a chart of black and dark blue samples.
 
 | display | models | samples | fills at least | brightness | clipped | median PSNR | least PSNR |
 |---|---|---|---|---|---|---|---|
