@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 
 import numpy as np
@@ -30,7 +31,8 @@ def lippmann(capfd):
 def without_engine(monkeypatch, fake_renderer):
     """Pictures come from the fake renderer."""
     monkeypatch.setattr(
-        "lippmann.reproduce.run.engine_renderer", lambda display, device, threads: fake_renderer(display)
+        "lippmann.reproduce.run.engine_renderer",
+        lambda display, device, threads, physical=False: fake_renderer(display),
     )
 
 
@@ -53,6 +55,24 @@ def test_the_command_writes_the_page_and_its_figures(lippmann, without_engine, t
     assert figures["display"]["pixels"] == [256, 256]
     assert set(figures["scenes"]) == {"teapot", "small-balls"}
     assert set(figures["scenes"]["teapot"]) == {variant.key for variant in VARIANTS}
+    assert set(figures["physical"]) == {"teapot"}
+
+
+def test_tables_for_other_programs(lippmann, without_engine, tmp_path):
+    assert lippmann("reproduce", "-o", tmp_path / "report", "--quick")[0] == 0
+    with (tmp_path / "report" / "results.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == 3 * len(VARIANTS)
+    first = next(row for row in rows if row["method"] == "interpolated, as in the paper")
+    assert (first["light"], first["time saved, %"], first["pixels traced, %"]) == ("cheap", "60.0", "20.0")
+    assert {row["light"] for row in rows} == {"cheap", "physically based"}
+    latex = (tmp_path / "report" / "results.tex").read_text()
+    lines = latex.splitlines()
+    assert lines[:2] == [r"\begin{tabular}{lllrrrrr}", r"\toprule"]
+    assert lines[-2:] == [r"\bottomrule", r"\end{tabular}"]
+    assert all(line.count(" & ") == 7 for line in lines if line.endswith(r"\\"))
+    assert r"time saved, \%" in latex
+    assert "%" not in latex.replace(r"\%", "")
 
 
 def test_it_says_what_was_saved(lippmann, without_engine, tmp_path):
@@ -85,7 +105,7 @@ def test_nothing_is_left_of_a_run_that_fails(monkeypatch, fake_renderer, tmp_pat
     def interrupt(results):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("lippmann.reproduce.run.engine_renderer", lambda display, *_: fake_renderer(display))
+    monkeypatch.setattr("lippmann.reproduce.run.engine_renderer", lambda display, *_, **__: fake_renderer(display))
     monkeypatch.setattr("lippmann.reproduce.run.report_page", interrupt)
     with pytest.raises(KeyboardInterrupt):
         reproduce(tmp_path / "report", quick=True)

@@ -157,10 +157,11 @@ class Run:
 
 @dataclass(frozen=True, eq=False)
 class Results:
-    """All runs of an experiment, by scene and variant."""
+    """All runs of an experiment, by scene and variant; ``physical`` are those with physically based light, if any."""
 
     experiment: Experiment
     runs: Mapping[str, Mapping[str, Run]] = field(default_factory=dict)
+    physical: Results | None = None
 
     def of(self, scene: str, key: str) -> Run:
         """The run of one scene by a variant's key."""

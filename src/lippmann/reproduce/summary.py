@@ -20,7 +20,8 @@ def summary(results: Results) -> JsonObject:
         "integrator": reference.integrator,
         "depth": reference.depth,
         "runs": experiment.runs,
-        "scenes": {scene: {key: _run(run) for key, run in runs.items()} for scene, runs in results.runs.items()},
+        "scenes": _of_scenes(results),
+        "physical": {} if results.physical is None else _of_scenes(results.physical),
         "printed": {
             "full_seconds": list(paper_values.FULL_SECONDS),
             "saved_percent": list(paper_values.SAVED_PERCENT),
@@ -30,6 +31,10 @@ def summary(results: Results) -> JsonObject:
             "teapot_lenses": paper_values.TEAPOT_LENSES,
         },
     }
+
+
+def _of_scenes(results: Results) -> JsonObject:
+    return {scene: {key: _run(run) for key, run in runs.items()} for scene, runs in results.runs.items()}
 
 
 def _run(run: Run) -> JsonObject:
