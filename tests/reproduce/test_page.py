@@ -168,3 +168,10 @@ def test_the_summary_is_json_with_the_same_figures(results):
     assert "psnr" not in values["scenes"]["teapot"]["full"]
     assert values["printed"]["saved_percent"] == [57, 66]
     assert values["device"] == "a <test> device"
+
+
+def test_slowdowns_are_said_as_such():
+    from lippmann.reproduce.page import in_words
+
+    assert in_words(0.29) == "71 % saved"
+    assert in_words(10.91) == "10.9 times as long"
