@@ -58,7 +58,7 @@ class Cameras:
     center:
         Position ``(x, y)`` of the centre of the grid in the display frame.
     world_from_display:
-        ``(4, 4)`` similarity from the display frame, whose lens plane is the focus plane, to the world.
+        ``(4, 4)`` affine map from the display frame, whose lens plane is the focus plane, to the world.
     """
 
     baseline: float

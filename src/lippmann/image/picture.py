@@ -22,7 +22,7 @@ class Picture(ABC):
     display:
         Display of the picture; its panel has ``W x H`` pixels.
     world_from_display:
-        ``(4, 4)`` similarity from the display frame (mm) to the scene.
+        ``(4, 4)`` affine map from the display frame (mm) to the scene.
     provenance:
         How the picture was made.
     maps:

@@ -57,7 +57,7 @@ class Job:
     integrator, source:
         What is gathered along which rays.
     display_from_world:
-        ``(4, 4)`` similarity to the display's frame (mm).
+        ``(4, 4)`` affine map to the display's frame (mm).
     treatment:
         Of a part of a picture that is denoised: how all its parts are.
     """

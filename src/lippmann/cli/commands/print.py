@@ -16,29 +16,27 @@ if TYPE_CHECKING:
     from lippmann.display.formats.print_sheet import Print
     from lippmann.image import IntegralImage
 
-Lpi = Annotated[str | None, typer.Option("--lpi", help="Print: pitch of the lens sheet in lenses per inch.")]
+Lpi = Annotated[str | None, typer.Option("--lpi", help="Pitch of the lens sheet in lenses per inch.")]
 PrintLpi = Annotated[
     str | None,
-    typer.Option("--print-lpi", help="Print: print pitch in lenses per inch from a pitch test, in place of --lpi."),
+    typer.Option("--print-lpi", help="Print pitch in lenses per inch from a pitch test, in place of --lpi."),
 ]
-Ppi = Annotated[str | None, typer.Option("--ppi", help="Print: resolution in pixels per inch.")]
+Ppi = Annotated[str | None, typer.Option("--ppi", help="Resolution in pixels per inch.")]
 Size = Annotated[
-    str | None, typer.Option("--size", help="Print: WIDTHxHEIGHT with a unit, such as 200x300mm or 8x10in.")
+    str | None, typer.Option("--size", help="Of a print: WIDTHxHEIGHT with a unit, such as 200x300mm or 8x10in.")
 ]
 Distance = Annotated[
     str | None,
-    typer.Option("--viewing-distance", help="Print: viewing distance, such as 600mm, or infinite. Default: 500mm."),
+    typer.Option("--viewing-distance", help="Viewing distance, such as 600mm, or infinite. Default: 500mm."),
 ]
-Thickness = Annotated[
-    str | None, typer.Option("--thickness", help="Print: thickness of the sheet, such as 0.66mm or 26mil.")
-]
-Index = Annotated[str | None, typer.Option("--index", help="Print: refractive index of the sheet. Default: 1.57.")]
+Thickness = Annotated[str | None, typer.Option("--thickness", help="Thickness of the sheet, such as 0.66mm or 26mil.")]
+Index = Annotated[str | None, typer.Option("--index", help="Refractive index of the sheet. Default: 1.57.")]
 Field = Annotated[
     str | None,
-    typer.Option("--field", help="Print: field of view in degrees, instead of --thickness. Default: 54."),
+    typer.Option("--field", help="Field of view in degrees, instead of --thickness. Default: 54."),
 ]
 MarksMargin = Annotated[
-    str | None, typer.Option("--marks", help="Print: add a margin of this width, such as 10mm, with alignment marks.")
+    str | None, typer.Option("--marks", help="Add a margin of this width, such as 10mm, with alignment marks.")
 ]
 
 _PRINT = "print"

@@ -65,7 +65,7 @@ def trace_layers(
     plan:
         Tiles from :func:`plan_layers`; the result is the same whatever they are.
     display_from_world:
-        ``(4, 4)`` similarity to the frame that the layers speak of.
+        ``(4, 4)`` affine map to the frame that the layers speak of.
 
     Returns
     -------
