@@ -52,6 +52,8 @@ def cheaper(words: list[str]) -> list[str]:
     kept = list(words)
     if "--spp" in kept:
         kept[kept.index("--spp") + 1] = "1"
+    if words[1] == "render" and not {"--method", "--denoise", "--integrator", "--turntable", "--frames"} & set(words):
+        kept += ["--method", "full"]
     return kept if "--spp" in kept else [*kept, "--spp", "1"]
 
 

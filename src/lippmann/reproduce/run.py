@@ -95,7 +95,7 @@ def make_physical_experiment(*, quick: bool) -> Experiment:
     """Physically based light on a larger frame, where a ray costs more than looking after a point; or, quick, less."""
     display = load_display(paper_values.DISPLAY)
     if quick:
-        return Experiment(PHYSICAL_SCENES, display.resized(*PHYSICAL_QUICK_SIZE), runs=1)
+        return Experiment(PHYSICAL_SCENES, display.resized(*PHYSICAL_QUICK_SIZE), runs=1, warm_up=0)
     return Experiment(PHYSICAL_SCENES, display.resized(*PHYSICAL_SIZE))
 
 

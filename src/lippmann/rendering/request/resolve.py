@@ -23,12 +23,12 @@ from lippmann.rendering.request.preconditions import Form, check
 from lippmann.rendering.request.render_request import DEFAULT_SPP, RenderRequest
 from lippmann.scene.scene import Scene
 
-#: Samples that a pooled picture is made of where no number is given: a second or two of two cores.
-SAMPLE_BUDGET = 1 << 21
+#: Samples that a pooled picture is made of where no number is given: half a second of two cores.
+SAMPLE_BUDGET = 1 << 20
 #: Fewest and most samples that a pixel gets of them; all three sub-pixels together have at least six.
 _FEWEST, _FEWEST_OF_SUBPIXELS, _MOST = 4, 2, 16
 #: By how much the samples of a small picture may be multiplied that is not clean with them.
-_MOST_IN_RESERVE = 4
+_MOST_IN_RESERVE = 8
 
 
 def resolve(
