@@ -15,7 +15,8 @@ def describe(result: dict[str, Any]) -> str:
         fill = min(picture["fill"] for picture in pictures)
         dark, *_, bright = sorted(picture["brightness"] for picture in pictures)
         clipped = max(picture["clipped"] for picture in pictures)
-        spp = " to ".join(str(each) for each in sorted({picture["spp"] for picture in pictures}))
+        samples = [picture["spp"] for picture in pictures]
+        spp = " to ".join(str(each) for each in dict.fromkeys((min(samples), max(samples))))
         median = statistics.median(picture["psnr"] for picture in pictures)
         rows.append(
             f"| {display} | {len(pictures)} | {spp} | {100 * fill:.0f} % | {dark:.2f} to {bright:.2f} | "
