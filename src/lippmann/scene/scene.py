@@ -160,9 +160,9 @@ class Scene:
         """Light from far away: the scene's or the caller's; the studio where the scene has no light at all."""
         if not self.in_studio:
             return self.physical.environment
-        from lippmann.scene.studio_light import studio
+        from lippmann.scene.studio_light import studio, studio_for
 
-        return studio()
+        return studio_for(self.physical) if isinstance(self.physical, SceneDescription) else studio()
 
     @property
     def background(self) -> Color | None:

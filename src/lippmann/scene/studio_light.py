@@ -8,13 +8,19 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.scene.values.description import Color, Environment
+from lippmann.scene.reflectance import mean_reflectance
+from lippmann.scene.values.description import Color, Environment, SceneDescription
 
 NAME = "studio"
 
 #: Backdrop of a scene that the studio lights. Even, because a panel shows nothing at infinite depth sharply:
 #: the soft boxes themselves would only smear. A middle grey stands apart from black and white objects alike.
 BACKDROP: Color = (0.18, 0.18, 0.18)
+
+#: The most by which the studio is brightened for dark models.
+BRIGHTEST = 2.5
+
+_DARK = 0.25
 
 _HEIGHT = 256
 
@@ -45,13 +51,25 @@ _BOXES = (
 )
 
 
-@lru_cache(maxsize=1)
-def studio() -> Environment:
+def studio_for(scene: SceneDescription) -> Environment:
+    """The studio as it lights a scene: brighter before dark models, up to :data:`BRIGHTEST` times.
+
+    A scene whose surfaces are darker than a quarter of white in the mean (:func:`mean_reflectance`) gets as much more light,
+    as a photographer would give it; all others get 1.
+    """
+    reflectance = mean_reflectance(scene)
+    if reflectance is None or reflectance >= _DARK:
+        return studio()
+    return studio(min(BRIGHTEST, round(_DARK / max(reflectance, 1e-3), 2)))
+
+
+@lru_cache(maxsize=4)
+def studio(strength: float = 1.0) -> Environment:
     """Soft boxes on a grey gradient, as an environment of 512 x 256 texels.
 
     The viewer is taken to look along -z with +y up: the key light hangs over the viewer's left shoulder, the fill on
     the right, one box overhead, a narrow one behind the scene on the right. All light is white. It is scaled so that
-    a white diffuse surface facing the viewer and 30 degrees upwards has radiance 1.
+    a white diffuse surface facing the viewer and 30 degrees upwards has radiance 1, times ``strength``.
     """
     directions, solid_angles = directions_of(_HEIGHT)
     up = directions[..., 1]
@@ -61,7 +79,7 @@ def studio() -> Environment:
         radiance += box.radiance * _coverage(box, directions)
     tilt = np.radians(_CALIBRATION_TILT)
     cosine = np.maximum(directions @ np.array([0.0, np.sin(tilt), np.cos(tilt)]), 0.0)
-    radiance /= (radiance * cosine * solid_angles).sum() / np.pi
+    radiance *= strength * np.pi / (radiance * cosine * solid_angles).sum()
     pixels = np.repeat(radiance[..., None], 3, axis=-1).astype(np.float32)
     pixels.setflags(write=False)
     return Environment(pixels, name=NAME, follows_viewer=True)

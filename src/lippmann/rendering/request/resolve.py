@@ -27,8 +27,9 @@ from lippmann.scene.scene import Scene
 SAMPLE_BUDGET = 1 << 20
 #: Fewest and most samples that a pixel gets of them; all three sub-pixels together have at least six.
 _FEWEST, _FEWEST_OF_SUBPIXELS, _MOST = 4, 2, 16
-#: By how much the samples of a small picture may be multiplied that is not clean with them.
-_MOST_IN_RESERVE = 8
+#: By how much the samples of a picture may be multiplied that is not clean with them, by the values that it has at
+#: most. Beyond that a pass takes minutes: who asks for so large a picture may say how clean it shall be.
+_RESERVE = {SAMPLE_BUDGET: 8, 1 << 24: 4}
 
 
 def resolve(
@@ -73,8 +74,7 @@ def resolve(
         if size is None and display is not None:
             size = display.panel.width, display.panel.height
         samples = _choose_samples(complete, size)
-        reserve = _MOST_IN_RESERVE * samples if _has_reserve(complete, form, size) else None
-        complete = replace(complete, spp=samples, spp_reserve=reserve)
+        complete = replace(complete, spp=samples, spp_reserve=_choose_reserve(complete, form, size, samples))
     check(complete, form, display)
     return complete
 
@@ -96,14 +96,12 @@ def _choose_samples(request: RenderRequest, size: tuple[int, int] | None) -> int
     return min(max(1 << max(round(math.log2(allowed)), 0), fewest), _MOST)
 
 
-def _has_reserve(request: RenderRequest, form: Form, size: tuple[int, int] | None) -> bool:
-    """Whether a picture may have more samples if it is not clean: one piece of few pixels."""
-    return (
-        form == "picture"
-        and request.method == "pooled"
-        and size is not None
-        and size[0] * size[1] * request.channels <= SAMPLE_BUDGET
-    )
+def _choose_reserve(request: RenderRequest, form: Form, size: tuple[int, int] | None, samples: int) -> int | None:
+    """Samples that a picture may have in all if it is not clean with ``samples``; None for no more than those."""
+    if form != "picture" or request.method != "pooled" or size is None:
+        return None
+    values = size[0] * size[1] * request.channels
+    return next((factor * samples for most, factor in _RESERVE.items() if values <= most), None)
 
 
 def _with_light(request: RenderRequest, scene: Scene, of_own_camera: bool) -> RenderRequest:
