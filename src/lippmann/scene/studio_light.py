@@ -54,8 +54,8 @@ _BOXES = (
 def studio_for(scene: SceneDescription) -> Environment:
     """The studio as it lights a scene: brighter before dark models, up to :data:`BRIGHTEST` times.
 
-    A scene whose surfaces are darker than a quarter of white in the mean (:func:`mean_reflectance`) gets as much more light,
-    as a photographer would give it; all others get 1.
+    A scene whose surfaces are darker than a quarter of white in the mean (:func:`mean_reflectance`) gets as much more
+    light, as a photographer would give it; all others get 1.
     """
     reflectance = mean_reflectance(scene)
     if reflectance is None or reflectance >= _DARK:
