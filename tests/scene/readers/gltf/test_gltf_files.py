@@ -225,17 +225,10 @@ def test_only_the_first_buffer_lives_in_the_binary_chunk(writer, read):
     assert "buffers[0].uri is missing" in _refusal(read, json.dumps(text).encode(), "scene.gltf")
 
 
-@pytest.mark.parametrize(
-    ("name", "tool"),
-    [
-        ("KHR_texture_basisu", "convert its textures with 'gltf-transform ktxdecompress in.glb out.glb'"),
-        ("ACME_gizmo", "export the scene without it"),
-    ],
-)
-def test_required_extension_that_is_not_understood_is_named_with_its_remedy(writer, read, name, tool):
-    writer.triangle().json["extensionsRequired"] = [name]
-    rule = "it is not understood"
-    assert _refusal(read, writer) == f"scene.glb: the file requires the glTF extension {name}; {rule}; {tool}"
+def test_required_extension_that_is_not_understood_is_named_with_its_remedy(writer, read):
+    writer.triangle().json["extensionsRequired"] = ["ACME_gizmo"]
+    line = "scene.glb: the file requires the glTF extension ACME_gizmo; it is not understood"
+    assert _refusal(read, writer) == f"{line}; export the scene without it"
 
 
 @pytest.mark.parametrize("name", ["KHR_techniques_webgl", "KHR_technique_webgl", "KHR_materials_common", "KHR_blend"])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,6 +11,8 @@ from PIL import Image as Pillow
 from PIL import features
 
 from lippmann.errors import SceneError
+
+KTX2 = Path(__file__).parents[3] / "codecs" / "ktx2" / "data" / "uastc_rgba.ktx2"
 
 
 @pytest.fixture
@@ -109,12 +112,36 @@ def test_entries_of_one_file_share_an_image(writer, read, tmp_path):
 
 
 def test_a_texture_of_an_unknown_kind_alone_is_noted(writer, read):
-    writer.json["extensionsUsed"] = ["KHR_texture_basisu"]
-    writer.add("textures", extensions={"KHR_texture_basisu": {"source": 0}})
+    writer.json["extensionsUsed"] = ["ACME_texture"]
+    writer.add("textures", extensions={"ACME_texture": {"source": 0}})
     writer.add("materials", normalTexture={"index": 0}, name="kept")
     scene = read(writer.triangle(material=0))
     assert scene.materials[0].normal_texture is None
     assert scene.notes[1] == "a texture has no image that is understood and is left out (textures[0])"
+
+
+def test_basis_universal_textures_are_read(writer, read, tmp_path):
+    """They come before an image that the texture has for readers without the extension."""
+    (tmp_path / "wood.png").write_bytes(writer.png([[[1, 2, 3]]]))
+    (tmp_path / "wood.ktx2").write_bytes(KTX2.read_bytes())
+    writer.json |= {"extensionsUsed": ["KHR_texture_basisu"], "extensionsRequired": ["KHR_texture_basisu"]}
+    plain, basis = (writer.add("images", uri=name) for name in ("wood.png", "wood.ktx2"))
+    writer.add("textures", source=plain, extensions={"KHR_texture_basisu": {"source": basis}})
+    writer.add("materials", pbrMetallicRoughness={"baseColorTexture": {"index": 0}})
+    scene = read(writer.triangle(material=0))
+    texture = scene.materials[0].base_color_texture
+    assert texture.srgb
+    assert np.array_equal(texture.image.pixels, np.asarray(Pillow.open(KTX2.with_suffix(".png"))))
+    assert not [note for note in scene.notes if "basisu" in note]
+
+
+def test_a_damaged_basis_universal_texture_is_one_line(writer, read, tmp_path):
+    (tmp_path / "wood.ktx2").write_bytes(KTX2.read_bytes()[:300])
+    writer.add("textures", extensions={"KHR_texture_basisu": {"source": writer.add("images", uri="wood.ktx2")}})
+    writer.add("materials", normalTexture={"index": 0})
+    with pytest.raises(SceneError) as caught:
+        read(writer.triangle(material=0))
+    assert str(caught.value) == "scene.glb: texture 'wood.ktx2' cannot be decoded (it is cut short)"
 
 
 @pytest.mark.parametrize(

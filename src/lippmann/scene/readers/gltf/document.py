@@ -34,6 +34,7 @@ _HEADER = struct.Struct("<4sII")
 _CHUNK_HEADER = struct.Struct("<II")
 
 DRACO = "KHR_draco_mesh_compression"
+BASISU = "KHR_texture_basisu"
 
 # Extensions whose members are read.
 _UNDERSTOOD = frozenset(
@@ -59,6 +60,7 @@ _UNDERSTOOD = frozenset(
         "KHR_mesh_quantization",
         "KHR_meshopt_compression",
         "KHR_node_visibility",
+        BASISU,
         "KHR_texture_transform",
     }
 )
@@ -75,9 +77,6 @@ _FORMER_MATERIALS = frozenset({"KHR_blend", "KHR_materials_common", "KHR_techniq
 # Tools that write the same scene without an extension.
 _UPGRADE = "convert it with 'gltf-pipeline -i in.gltf -o out.glb'"
 DECOMPRESS = "decompress it with 'gltf-transform cp in.glb out.glb'"
-_REMEDIES = {
-    "KHR_texture_basisu": "convert its textures with 'gltf-transform ktxdecompress in.glb out.glb'",
-}
 #: Extensions of compressed buffer views; the file may hold the same bytes uncompressed, too.
 MESHOPT = ("EXT_meshopt_compression", "KHR_meshopt_compression")
 
@@ -277,7 +276,7 @@ def check_extensions(document: Document) -> None:
             raise document.error(
                 f"the file requires the glTF extension {name}",
                 rule="it is not understood",
-                fix=_REMEDIES.get(name, "export the scene without it"),
+                fix="export the scene without it",
             )
     for name in document.root.texts("extensionsUsed"):
         if name == "KHR_materials_variants":

@@ -7,9 +7,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from lippmann.codecs.ktx2 import IDENTIFIER, Ktx2Error, decode_ktx2
+from lippmann.errors import SceneError
 from lippmann.scene.parsing.files import decode_image
 from lippmann.scene.readers.gltf.buffers import Buffers, read_uri
-from lippmann.scene.readers.gltf.document import Document, texture_extension_is_readable
+from lippmann.scene.readers.gltf.document import BASISU, Document, texture_extension_is_readable
 from lippmann.scene.readers.gltf.json_fields import Fields
 from lippmann.scene.values.description import Filter, Image, Matrix, Texture, Wrap
 
@@ -69,9 +71,9 @@ class Textures:
         )
 
     def _source(self, texture: Fields) -> int | None:
-        for name in ("EXT_texture_webp", "EXT_texture_avif"):
+        for name in (BASISU, "EXT_texture_webp", "EXT_texture_avif"):
             better = texture.extension(name)
-            if better is not None and texture_extension_is_readable(name):
+            if better is not None and (name == BASISU or texture_extension_is_readable(name)):
                 return self.document.required_reference(better, "source", "images")
         return self.document.reference(texture, "source", "images")
 
@@ -102,12 +104,21 @@ class Textures:
         if uri is None:
             view = self.document.required_reference(fields, "bufferView", "bufferViews")
             name = fields.text("name") or fields.place
-            return decode_image(bytes(self.buffers.view(view)[0]), name, where=self.document.file)
+            return _decode(bytes(self.buffers.view(view)[0]), name, self.document.file)
         # Several entries of the list may name one file.
         if uri not in self._files:
             data, name = read_uri(self.document, uri, fields.place, "texture")
-            self._files[uri] = decode_image(data, name, where=self.document.file)
+            self._files[uri] = _decode(data, name, self.document.file)
         return self._files[uri]
+
+
+def _decode(data: bytes, name: str, file: str) -> Image:
+    if not data.startswith(IDENTIFIER):
+        return decode_image(data, name, where=file)
+    try:
+        return Image(name, decode_ktx2(data))
+    except Ktx2Error as error:
+        raise SceneError(f"texture '{name}' cannot be decoded ({error})", where=file) from None
 
 
 def _uv_transform(fields: Fields) -> Matrix:
