@@ -87,7 +87,7 @@ def start(device: DeviceChoice = "auto", threads: int | None = None) -> Engine:
     with exclusive():
         library = None if "drjit" in sys.modules else _point_to_llvm(device)
         dr, mi = _load()
-        _search_package_alone(mi)
+        search_package_alone(mi)
         kind = _resolve(device, dr, mi)
         engine = _on_gpu() if kind == "gpu" else _on_cpu(dr, library)
         if mi.variant() != engine.variant:
@@ -129,7 +129,7 @@ def _load() -> tuple[Any, Any]:
     return drjit, mitsuba
 
 
-def _search_package_alone(mi: Any) -> None:
+def search_package_alone(mi: Any) -> None:
     """Restrict Mitsuba's search for plugins and tables to its own package.
 
     By default it searches the working directory first and runs the code of any ``plugins/NAME.so`` there.

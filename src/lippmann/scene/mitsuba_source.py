@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from lippmann.errors import SceneError
 from lippmann.runtime.engine_lock import exclusive
 from lippmann.scene.mitsuba_plugins import check_plugins_of
+from lippmann.scene.mitsuba_trial import try_scene
 from lippmann.scene.mitsuba_xml import MitsubaXml, read_mitsuba_xml
 from lippmann.scene.values.description import Camera, Color, Environment
 
@@ -104,11 +105,17 @@ class MitsubaSource:
                     fix="load it after mitsuba.set_variant of that name",
                 )
             return content
-        if isinstance(content, Mapping):
-            check_plugins_of(content, self.name)
         try:
-            loaded = mi.load_string(content.text()) if isinstance(content, MitsubaXml) else mi.load_dict(dict(content))
-        except (RuntimeError, TypeError, ValueError) as error:
+            if isinstance(content, Mapping):
+                check_plugins_of(content, self.name)
+                loaded = mi.load_dict(dict(content))
+            else:
+                text = content.text()
+                try_scene(text, variant, self.name)
+                loaded = mi.load_string(text)
+        except SceneError:
+            raise
+        except Exception as error:  # noqa: BLE001  # of all kinds, for a misspelt word
             message = " ".join(self._with_origins(str(error)).split())[:_LONGEST_MESSAGE]
             raise SceneError(f"Mitsuba refuses the scene: {message}", where=self.name) from None
         if not isinstance(loaded, mi.Scene):
@@ -139,6 +146,10 @@ def with_sky(scene: mi.Scene, sky: mi.Emitter) -> mi.Scene:
     import mitsuba as mi
 
     parts: dict[str, object] = {"type": "scene", "environment": sky}
+    # Shape groups are no shapes of a scene, but their instances need them beside them.
+    nodes = mi.traverse(scene).hierarchy
+    groups = [node for node in nodes if node.class_name().startswith("ShapeGroup")]
+    parts |= {f"group_{number}": group for number, group in enumerate(groups)}
     parts |= {f"shape_{number}": shape for number, shape in enumerate(scene.shapes())}
     emitters = [
         emitter

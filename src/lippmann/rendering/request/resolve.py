@@ -29,7 +29,7 @@ SAMPLE_BUDGET = 1 << 20
 _FEWEST, _FEWEST_OF_SUBPIXELS, _MOST = 4, 2, 16
 #: By how much the samples of a picture may be multiplied that is not clean with them, by the values that it has at
 #: most. Beyond that a pass takes minutes: who asks for so large a picture may say how clean it shall be.
-_RESERVE = {SAMPLE_BUDGET: 8, 1 << 24: 4}
+_RESERVE = {SAMPLE_BUDGET: 8, 1 << 24: 4, 1 << 25: 2}
 
 
 def resolve(

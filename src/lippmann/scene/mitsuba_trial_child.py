@@ -1,0 +1,86 @@
+"""The process in which Mitsuba loads a scene for the first time: what brings it down ends nothing else.
+
+Reads requests from standard input, each a length and JSON, and answers each by a line of JSON. It ends when the input
+does, or when nothing is asked of it for a while.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import select
+import struct
+import sys
+from typing import Any
+
+LENGTH = struct.Struct("<Q")
+#: Seconds without a request after which the process ends, and its memory is free.
+_IDLE_SECONDS = 5.0
+
+
+def main() -> None:
+    """Answer requests: ``variant``, ``text`` of a scene, and ``memory`` in bytes that may be taken."""
+    answers = os.fdopen(os.dup(1), "w")
+    silence = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(silence, 1)  # what libraries print is no answer
+    os.dup2(silence, 2)
+    requests = sys.stdin.buffer
+    while _is_asked():
+        head = requests.read(LENGTH.size)
+        if len(head) < LENGTH.size:
+            return
+        request = json.loads(requests.read(*LENGTH.unpack(head)))
+        answers.write(json.dumps(_try(request["variant"], request["text"], request["memory"])) + "\n")
+        answers.flush()
+
+
+def _is_asked() -> bool:
+    if os.name == "nt":  # which waits for sockets alone
+        return True
+    return bool(select.select([0], [], [], _IDLE_SECONDS)[0])
+
+
+def _try(variant: str, text: str, memory: int) -> str | None:
+    """Load a scene. Gives what is wrong with its meshes; None if they are sound, or Mitsuba refuses it by itself."""
+    import gc
+
+    import mitsuba as mi
+
+    from lippmann.runtime.engine import search_package_alone
+
+    _limit_memory(memory)
+    mi.set_variant(variant)
+    mi.set_log_level(mi.LogLevel.Error)
+    search_package_alone(mi)
+    try:
+        return fault_of_meshes(mi, mi.load_string(text))
+    except MemoryError:
+        return "more memory than there is would be needed"
+    except Exception:  # noqa: BLE001  # whoever loads it next gets the same, with a place to tell it
+        return None
+    finally:
+        gc.collect()
+
+
+def fault_of_meshes(mi: Any, scene: Any) -> str | None:
+    """What is wrong with the triangles of a loaded scene, those of shape groups included; None if nothing is."""
+    import numpy as np
+
+    values = mi.traverse(scene)
+    for name in values.properties:
+        if not name.endswith("faces"):
+            continue
+        vertices = len(values[name.removesuffix("faces") + "vertex_positions"]) // 3
+        faces = np.asarray(values[name])
+        if len(faces) and faces.max() >= vertices:
+            return f"a mesh names vertex {int(faces.max())}; it has {vertices}"
+    return None
+
+
+def _limit_memory(memory: int) -> None:
+    try:
+        import resource
+    except ImportError:  # there is none on Windows
+        return
+    _, most = resource.getrlimit(resource.RLIMIT_DATA)
+    resource.setrlimit(resource.RLIMIT_DATA, (memory if most < 0 else min(memory, most), most))
