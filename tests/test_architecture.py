@@ -85,7 +85,7 @@ REACHES_BACK = {("image.integral_image", "image.write")}
 FACADES = {"display": "display.formats"}
 
 #: The only modules that may use Mitsuba or Dr.Jit; of the scene those that build it on the device, never its readers.
-USES_ENGINE = ("runtime.engine", "scene.mitsuba_source", "device", "rendering")
+USES_ENGINE = ("runtime.engine", "scene.mitsuba_source", "scene.mitsuba_trial_child", "device", "rendering")
 #: Of those, the ones that may load it by being imported.
 LOADS_ENGINE = ("device", "rendering")
 

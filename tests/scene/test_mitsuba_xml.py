@@ -175,6 +175,15 @@ class TestIncludes:
             read_mitsuba_xml(save('<include filename="old.xml"/>'))
 
 
+def test_elements_are_counted_as_often_as_they_are_included(save, monkeypatch):
+    """Some short files that include each other would stand for more than fits in memory."""
+    monkeypatch.setattr("lippmann.scene.mitsuba_xml.MOST_ELEMENTS", 40)
+    save('<shape type="sphere"/>' * 12, "many.xml")
+    assert read_mitsuba_xml(save('<include filename="many.xml"/>' * 2)).root.children
+    with pytest.raises(SceneError, match=r"many.xml:2: the scene has too many elements; at most 40 are read"):
+        read_mitsuba_xml(save('<include filename="many.xml"/>' * 4))
+
+
 class TestSearchPaths:
     def test_the_last_path_is_searched_first(self, save, tmp_path):
         first, last = put(tmp_path / "scene" / "one" / "a.ply"), put(tmp_path / "scene" / "two" / "a.ply")

@@ -26,6 +26,8 @@ from lippmann.scene.parsing.files import find_file, find_folder, read_bytes
 MOST_INCLUDE_LEVELS = 15
 #: Included files in all: a few short ones that include each other in turn could stand for any number of elements.
 MOST_INCLUDES = 1000
+#: Elements of all files, counted as often as they are included. A kilobyte each, here and in Mitsuba.
+MOST_ELEMENTS = 1_000_000
 #: Elements inside elements; Mitsuba's own parser recurses without a limit.
 MOST_LEVELS = 100
 
@@ -118,7 +120,7 @@ class _Reader:
         self.allow_outside = allow_outside
         self.files: dict[str, Path] = {}
         self._scene_folders = [folder]  # where files of all kinds but spectra are looked up
-        self._includes = 0
+        self._includes = self._elements = 0
         self._version: tuple[str, bool] | None = None
 
     def file(self, path: Path, parameters: dict[str, str], folders: list[Path], name: str, *, level: int) -> XmlElement:
@@ -163,6 +165,12 @@ class _Reader:
         *,
         is_root: bool = False,
     ) -> XmlElement:
+        self._elements += 1
+        if self._elements > MOST_ELEMENTS:
+            rule = f"at most {MOST_ELEMENTS} are read"
+            raise SceneError(
+                "the scene has too many elements", where=raw._origin, rule=rule, fix="put them into meshes"
+            )
         element = self._substitute(raw, parameters)
         where = element._origin
         if kind := element.get("type"):
