@@ -12,6 +12,8 @@ from lippmann.image import read_picture
 from lippmann.viewing.replay import replay
 
 QUICK = ("--integrator", "direct", "--spp", "1", "--device", "cpu")
+#: The same byte by byte, in one piece and in tiles.
+EXACT = (*QUICK, "--method", "full", "--denoise", "none")
 
 
 def frames_of(path):
@@ -106,7 +108,20 @@ def test_a_single_frame_may_have_a_plain_name(engine, lippmann, moving_ball, tmp
 def test_frames_on_a_cluster_are_the_same(engine, lippmann, moving_ball, tmp_path):
     pytest.importorskip("distributed")
     for place, more in (("here", ()), ("there", ("--cluster", "local:2", "--video", tmp_path / "film.mp4"))):
-        done = lippmann("render", moving_ball, "--frames", "0:2", "-o", tmp_path / place, *QUICK, *more)
+        done = lippmann(
+            "render",
+            moving_ball,
+            "--frames",
+            "0:2",
+            "-o",
+            tmp_path / place,
+            *QUICK,
+            "--method",
+            "full",
+            "--denoise",
+            "none",
+            *more,
+        )
         assert done.code == 0, done.err
     for name in ("frame_0000.png", "frame_0001.png"):
         here, there = (read_picture(tmp_path / place / name) for place in ("here", "there"))

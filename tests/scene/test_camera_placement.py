@@ -150,3 +150,15 @@ class TestFraming:
         asked = PlacementOptions(camera="home")
         kept = self.seen(bounds, display, contains_home=True, options=asked)
         assert np.allclose(kept, self.seen(bounds, display, options=asked))
+
+    @pytest.mark.parametrize("name", DISPLAYS)
+    def test_what_is_enlarged_is_not_cut_open(self, name):
+        """Recorded rays begin before all of it: a teapot had a hole on a print."""
+        display = load_display(name)
+        bounds = np.array([[-1.5, -1.5, -21.0], [1.5, 1.5, -19.7]])
+        placed = place(bounds, display, cameras=[self.CAMERA], home_camera="home", contains_home=True)
+        nearest = (box_corners(bounds) @ placed.display_from_world[:3, :3].T + placed.display_from_world[:3, 3])[
+            :, 2
+        ].max()
+        assert nearest <= display.aperture_distance
+        assert not [line for line in placed.warnings if "cut off" in line]

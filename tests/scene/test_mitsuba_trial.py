@@ -74,7 +74,7 @@ def test_what_kills_mitsuba_is_one_line(scene, kind, data):
 
 def test_more_memory_than_there_is_is_refused(scene, monkeypatch):
     """A header of some bytes asks for a grid of gigabytes."""
-    monkeypatch.setattr(mitsuba_trial.machine, "available_memory", lambda: 1 << 30)
+    monkeypatch.setattr(mitsuba_trial, "input_memory_left", lambda: 1 << 30)
     grid = b"VOL\x03" + struct.pack("<5i6f", 1, 1500, 1500, 1500, 1, 0, 0, 0, 1, 1, 1)
     body = (
         '<shape type="cube"><medium type="heterogeneous" name="interior"><volume type="gridvolume" name="sigma_t">'

@@ -17,6 +17,7 @@ from typer import BadParameter
 from lippmann.cli.shared import command_clock
 from lippmann.cli.shared.exit_codes import INTERRUPTED
 from lippmann.errors import LippmannError
+from lippmann.runtime.input_memory import limit_inputs
 
 #: The base of all complaints about the command line itself; its home moved between releases of typer.
 _ComplaintError = BadParameter.__mro__[2]
@@ -35,6 +36,7 @@ def main(arguments: list[str] | None = None) -> None:
 def run(words: list[str], *, debug: bool = False) -> int:
     """Run one command; errors become one line on standard error unless ``debug`` asks for the traceback."""
     command_clock.start()
+    limit_inputs(None)  # of the command before, in one process
     from lippmann.cli.app import app
     from lippmann.cli.shared.option_names import in_options
 

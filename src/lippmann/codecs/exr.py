@@ -19,6 +19,7 @@ import numpy as np
 
 from lippmann.codecs.types import Pixels
 from lippmann.errors import PictureError
+from lippmann.runtime.input_memory import check_input
 from lippmann.runtime.quiet_stderr import libraries_silenced
 
 SIGNATURE = b"\x76\x2f\x31\x01"
@@ -28,6 +29,8 @@ _DTYPES = {0: "uint32", 1: "float16", 2: "float32"}
 #: Rows per chunk by compression: none, RLE, ZIPS, ZIP, PIZ, PXR24, B44, B44A, DWAA, DWAB.
 _ROWS_PER_CHUNK = (1, 1, 1, 16, 32, 16, 32, 32, 32, 256)
 _LONGEST_ATTRIBUTE = 1 << 24
+#: Pixels of a tile that may be larger than its picture.
+_LARGEST_FREE_TILE = 1 << 20
 
 
 @dataclass(frozen=True)
@@ -95,7 +98,9 @@ def exr_header(file: BinaryIO, path: Path) -> ExrHeader:
         width, height = x1 - x0 + 1, y1 - y0 + 1
         if width < 1 or height < 1:
             raise _damaged(path, f"its size is {width} x {height}")
-        if not version & _TILED:
+        if version & _TILED:
+            _check_tiles(attributes["tiles"][1], width * height, path)
+        else:
             _check_chunks(file, height, attributes["compression"][1][0])
         text = {name: value.decode("utf-8") for name, (kind, value) in attributes.items() if kind == "string"}
     except (struct.error, KeyError, IndexError, EOFError, UnicodeDecodeError) as error:
@@ -103,16 +108,21 @@ def exr_header(file: BinaryIO, path: Path) -> ExrHeader:
     return ExrHeader(width, height, channels, text)
 
 
-def read_exr(path: Path) -> dict[str, Pixels]:
-    """All channels of an EXR, ``(H, W)`` each, as stored.
+def read_exr(path: Path, header: ExrHeader) -> dict[str, Pixels]:
+    """All channels of an EXR, ``(H, W)`` each, as stored; ``header`` is what :func:`read_exr_header` said of it.
 
     Raises
     ------
     PictureError
         If the pixels cannot be decoded.
+    MemoryLimitError
+        If they take more than the memory that is left.
     """
     import OpenEXR
 
+    pixel = sum(np.dtype(kind).itemsize for kind in header.channels.values())
+    # The library's own planes, and those that it is asked for.
+    check_input(2 * pixel * header.width * header.height, "its picture", where=str(path))
     # The binding prints a warning where it should raise; what it read then has no parts.
     with contextlib.redirect_stdout(io.StringIO()), libraries_silenced():
         try:
@@ -122,6 +132,13 @@ def read_exr(path: Path) -> dict[str, Pixels]:
     if not file.parts:
         raise _damaged(path, "its pixels cannot be decoded")
     return {name: np.asarray(channel.pixels) for name, channel in file.channels().items()}
+
+
+def _check_tiles(attribute: bytes, pixels: int, path: Path) -> None:
+    """Refuse tiles that are absurd beside their picture: the library gives memory to whole ones."""
+    wide, high = struct.unpack_from("<2I", attribute)
+    if not wide or not high or wide * high > max(pixels, _LARGEST_FREE_TILE):
+        raise _damaged(path, f"its tiles have {wide} x {high} pixels")
 
 
 def _exactly(file: BinaryIO, count: int) -> bytes:

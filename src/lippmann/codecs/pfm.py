@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.errors import PictureError
+from lippmann.runtime.regular_file import check_kind
 
 _HEADER = re.compile(rb"(P[Ff])\s+(\d{1,9})\s+(\d{1,9})\s+(-?\d{1,9}(?:\.\d{1,9})?(?:[eE][-+]?\d{1,2})?)[ \t\r]*\n")
 
@@ -32,6 +33,7 @@ def read_pfm(path: Path) -> NDArray[np.float32]:
         If the file is missing, no PFM of one channel, or has more or fewer values than its header says.
     """
     try:
+        check_kind(path, PictureError)
         content = path.read_bytes()
     except FileNotFoundError:
         raise PictureError("is not there", where=str(path)) from None

@@ -11,6 +11,10 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO
 
+from lippmann.errors import PictureError
+from lippmann.runtime.input_memory import check_input
+from lippmann.runtime.regular_file import check_kind
+
 if TYPE_CHECKING:
     from PIL import Image
 
@@ -29,6 +33,9 @@ FORMATS = {
 
 #: What Pillow calls a JPEG file with several pictures, of which the first is taken.
 _SEVERAL = "MPO"
+
+#: What Pillow holds of a pixel in four channels, and as much again in the array that is made of it.
+_BYTES_PER_PIXEL = 8
 
 #: The rule that a refusal quotes.
 RULE = f"{', '.join([*FORMATS.values()][:-1])} and {[*FORMATS.values()][-1]} are read"
@@ -53,15 +60,27 @@ def open_picture(source: Path | BinaryIO, formats: tuple[str, ...] = (*FORMATS,)
         If it is of none of the formats.
     OSError, SyntaxError, PIL.Image.DecompressionBombError
         If it is missing, damaged or too large; libraries below Pillow raise other errors too.
+    PictureError
+        If it is a pipe or a device.
+    MemoryLimitError
+        If its pixels take more than the memory that is left.
     """
     from PIL import Image
 
+    if isinstance(source, Path):
+        check_kind(source, PictureError)
     Image.init()  # loads all decoders, without which those of the list may be unknown
     known = tuple(name for name in formats if name in Image.OPEN)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", Image.DecompressionBombWarning)
         with Image.open(source, formats=known) as picture:
+            name = str(source) if isinstance(source, Path) else ""
+            check_input(_BYTES_PER_PIXEL * picture.width * picture.height, f"a picture of {_size(picture)}", where=name)
             yield picture
+
+
+def _size(picture: Image.Image) -> str:
+    return f"{picture.width} x {picture.height} pixels"
 
 
 def is_allowed(picture: Image.Image) -> bool:

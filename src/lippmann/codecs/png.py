@@ -18,6 +18,7 @@ import numpy as np
 
 from lippmann.codecs.types import Pixels
 from lippmann.errors import PictureError
+from lippmann.runtime.input_memory import check_input
 from lippmann.runtime.quiet_stderr import libraries_silenced
 
 SIGNATURE = b"\x89PNG\r\n\x1a\n"
@@ -115,6 +116,9 @@ def decode_png(data: bytes, path: Path) -> Pixels:
     """:func:`read_png` of the bytes of a file; ``path`` is its name, for errors."""
     import imagecodecs
 
+    header = png_header(io.BytesIO(data), path)
+    size = header.width * header.height * header.channels * max(1, header.bits // 8)
+    check_input(size, "its picture", where=str(path))
     # libpng reports a wrong check sum of most chunks on standard error and goes on; so all are looked at first.
     for _ in _chunks(io.BytesIO(data), path, all_bodies=True):
         pass

@@ -14,7 +14,8 @@ import numpy as np
 
 from lippmann.codecs.types import Attributes, Pixels, StoredType, ZarrArray, ZarrModule
 from lippmann.codecs.zarr_reader import open_array, read_array
-from lippmann.errors import PictureError
+from lippmann.errors import MemoryLimitError, PictureError
+from lippmann.runtime.input_memory import check_input
 
 ENDING = ".zarr"
 
@@ -120,6 +121,8 @@ class ZarrPicture:
 
     def read(self) -> Pixels:
         """All ``(height, width, 3)`` values as stored; a :class:`PictureError` if they cannot be decoded."""
+        size = 3 * self.width * self.height * np.dtype(self.dtype).itemsize
+        check_input(size, "its picture", where=str(self._folder))
         return self._read(slice(None), slice(None))
 
     def read_chunk(self, row: int, column: int) -> Pixels:
@@ -130,7 +133,7 @@ class ZarrPicture:
     def _read(self, rows: slice, columns: slice) -> Pixels:
         try:
             values: Pixels = np.asarray(self._array[rows, columns])
-        except PictureError:
+        except (PictureError, MemoryLimitError):
             raise
         except Exception as error:  # whatever the library stumbles with over a damaged chunk
             what = f"this Zarr array is damaged: {error}"

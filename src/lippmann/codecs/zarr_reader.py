@@ -20,6 +20,7 @@ from typing import Any, Literal
 from lippmann.codecs.types import Attributes, ZarrArray, ZarrModule
 from lippmann.codecs.zarr_metadata import ARRAY_2, ATTRIBUTES_2, GROUP_2, NODE_3, ArrayMetadata, admitted
 from lippmann.errors import PictureError
+from lippmann.runtime.input_memory import check_input
 
 #: Bytes of a file of metadata; a light field of ours has some thousand.
 _MOST_METADATA = 1 << 22
@@ -163,6 +164,8 @@ class _Files(MutableMapping[str, Any]):
         data = _file_inside(self._folder, key, self._root, self._most + self._slack)
         if data is None:
             raise KeyError(key)
+        # Unpacked, and again while the library brings it into its own order.
+        check_input(2 * self._most, f"its chunk {key}", where=str(self._folder))
         _check_expansion(self._packing, data, self._most, self._folder, key)
         found = self._wrapped(data)
         self._last = key, found

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from lippmann.errors import PictureError
 from lippmann.exchange.cameras import Cameras
+from lippmann.runtime.regular_file import check_kind
 
 NAME = "parameters.cfg"
 
@@ -99,6 +100,7 @@ def read_parameters(path: Path) -> Parameters:
     """
     parser = configparser.ConfigParser(delimiters="=", interpolation=None)
     try:
+        check_kind(path, PictureError)
         text = path.read_text(encoding="utf-8")
         if max(map(len, text.splitlines()), default=0) > _LONGEST_LINE:
             raise PictureError("is no list of parameters", where=str(path), rule="its lines are short")

@@ -7,7 +7,6 @@ where the axes are reversed, since MATLAB is column-major. Versions 5 to 7 are r
 
 from __future__ import annotations
 
-import mmap
 from pathlib import Path
 from typing import Any
 
@@ -24,9 +23,12 @@ from lippmann.exchange.light_field import (
     decode_weights,
     encode_weights,
 )
+from lippmann.exchange.matlab5 import Matlab5Error, read_variables
 from lippmann.exchange.metadata_text import TEXT_KEY, from_note, to_note
 from lippmann.exchange.optional_import import optional
 from lippmann.runtime.atomic_write import replacing
+from lippmann.runtime.input_memory import check_input
+from lippmann.runtime.regular_file import check_kind
 
 LAYOUT = "lftoolbox"
 
@@ -42,9 +44,6 @@ _FILTERS = {1: "deflate", 2: "shuffle", 3: "fletcher32", 32000: "lzf"}
 
 #: Limit on characters of the metadata text, which has some thousand.
 _MOST_TEXT = 1 << 22
-
-#: Classes of a MATLAB variable of version 5 that are arrays of numbers.
-_NUMBERS = ("int8", "uint8", "int16", "uint16", "int32", "uint32", "int64", "uint64", "single", "double")
 
 
 def write_matlab(light_field: LightField, display: Display, path: Path) -> None:
@@ -77,21 +76,22 @@ def write_matlab(light_field: LightField, display: Display, path: Path) -> None:
         values = values.astype(np.float32)
     if light_field.weight is not None:
         values = np.concatenate([values, encode_weights(light_field.weight, values.dtype)[..., None]], axis=-1)
-    with replacing(path) as temporary:
-        with h5py.File(temporary, "w", userblock_size=_USER_BLOCK) as file:
-            reversed_ = values.transpose()
-            # One colour of one view per chunk, the part that tools display.
-            chunks = (1, *reversed_.shape[1:3], 1, 1)
-            stored = file.create_dataset(_VARIABLE, data=reversed_, chunks=chunks, compression="gzip", shuffle=True)
-            stored.attrs["MATLAB_class"] = np.bytes_(_CLASSES[values.dtype.name])
-            if note := to_note(light_field.metadata, LAYOUT):
-                text = file.create_dataset(
-                    TEXT_KEY, data=np.frombuffer(note.encode("ascii"), "u1").astype("u2")[:, None]
-                )
-                text.attrs["MATLAB_class"] = np.bytes_(b"char")
-                text.attrs["MATLAB_int_decode"] = np.int32(2)
-        with temporary.open("r+b") as raw:
-            raw.write(_HEADER)
+    # In memory, and written by Python: where a disk is full the library would end the process.
+    with h5py.File(path.name, "w", driver="core", backing_store=False) as file:
+        reversed_ = values.transpose()
+        # One colour of one view per chunk, the part that tools display.
+        chunks = (1, *reversed_.shape[1:3], 1, 1)
+        stored = file.create_dataset(_VARIABLE, data=reversed_, chunks=chunks, compression="gzip", shuffle=True)
+        stored.attrs["MATLAB_class"] = np.bytes_(_CLASSES[values.dtype.name])
+        if note := to_note(light_field.metadata, LAYOUT):
+            text = file.create_dataset(TEXT_KEY, data=np.frombuffer(note.encode("ascii"), "u1").astype("u2")[:, None])
+            text.attrs["MATLAB_class"] = np.bytes_(b"char")
+            text.attrs["MATLAB_int_decode"] = np.int32(2)
+        file.flush()
+        image = file.id.get_file_image()
+    with replacing(path) as temporary, temporary.open("wb") as raw:
+        raw.write(_HEADER.ljust(_USER_BLOCK, b"\0"))
+        raw.write(image)
 
 
 def read_matlab(path: Path) -> LightField:
@@ -102,10 +102,11 @@ def read_matlab(path: Path) -> LightField:
     Raises
     ------
     UsageError
-        If h5py (version 7.3) or scipy (version 5 to 7) is not installed.
+        If h5py is not installed, for version 7.3.
     PictureError
         If the file is missing, damaged or no ``.mat`` file, or holds no light field.
     """
+    check_kind(path, PictureError)
     try:
         with path.open("rb") as file:
             head = file.read(128)
@@ -197,24 +198,17 @@ def _text(note: Any, path: Path) -> str:
 
 
 def _read_version_5(path: Path) -> tuple[NDArray[Any], str]:
-    optional("scipy")
-    from scipy import io
-
     try:
-        # Memory-mapped: with a plain file scipy allocates as many bytes as a damaged header states.
-        with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as content:
-            variables = {name: (shape, kind) for name, shape, kind in io.whosmat(content)}
-            shape, kind = variables.get(_VARIABLE, ((), ""))
-            _check_variable(shape, sorted(variables), path)
-            if kind not in _NUMBERS:  # cells, structures, objects or functions
-                raise _not_numeric(_VARIABLE, f"the class {kind}", path)
-            values: NDArray[Any] = io.loadmat(content, variable_names=[_VARIABLE])[_VARIABLE]
-    except PictureError:
-        raise
-    except Exception as error:  # scipy raises many kinds of errors for damaged files
+        check_input(path.stat().st_size, "the file", where=str(path))
+        variables = {variable.name: variable for variable in read_variables(path.read_bytes())}
+        found = variables.get(_VARIABLE)
+        _check_variable(() if found is None else found.shape, sorted(variables), path)
+        assert found is not None
+        if not found.is_numeric:  # cells, structures, objects or functions
+            raise _not_numeric(_VARIABLE, f"the class {found.kind}", path)
+        values: NDArray[Any] = found.values(str(path))
+    except (Matlab5Error, OSError) as error:
         raise _damaged(path, error) from error
-    if values.dtype.kind not in "uif":
-        raise _not_numeric(_VARIABLE, str(values.dtype), path)
     return values, ""
 
 

@@ -27,12 +27,15 @@ from lippmann.image.metadata import metadata_of
 from lippmann.image.micro_images import Permutation, micro_images_as_views
 from lippmann.image.stored_values import Stored, Values
 from lippmann.image.views import view_grid
+from lippmann.runtime.input_memory import check_input
 
 #: Cameras down and across, rows and columns of a view.
 Shape = tuple[int, int, int, int]
 
 #: Limit on pixels of all views together: a light field is held in memory as a whole.
 MOST_PIXELS = 1 << 29
+#: What a light field takes at least, while it is read: colours of one byte.
+_BYTES_PER_PIXEL = 3
 
 #: Name of the map with the confidence weight of each value, 0 to 1: the fourth channel of LFToolbox and ESLF.
 WEIGHT = "weight"
@@ -197,6 +200,7 @@ def check_shape(shape: tuple[int, ...], where: str) -> None:
     pixels = shape[0] * shape[1] * shape[2] * shape[3]
     if pixels > MOST_PIXELS:
         raise PictureError(f"claims {pixels} pixels", where=where, rule=f"at most {MOST_PIXELS} are read")
+    check_input(_BYTES_PER_PIXEL * pixels, f"a light field of {pixels} pixels", where=where)
 
 
 def check_rectangular(display: Display, layout: str) -> None:

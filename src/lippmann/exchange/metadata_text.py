@@ -12,6 +12,7 @@ from typing import Any
 
 from lippmann.errors import PictureError
 from lippmann.image.metadata import KEY, Metadata, from_dict, parse_json
+from lippmann.runtime.regular_file import check_kind
 
 #: Keyword of the PNG text and name of the MATLAB variable that hold the JSON.
 TEXT_KEY = "lippmann_light_field"
@@ -62,6 +63,7 @@ def read_note_file(folder: Path, layout: str) -> Metadata | None:
     """
     path = folder / FILE
     try:
+        check_kind(path, PictureError)
         text = path.read_text(encoding="utf-8")
     except FileNotFoundError:
         return None

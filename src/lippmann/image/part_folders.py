@@ -38,6 +38,7 @@ from lippmann.image.views import (
 from lippmann.image.write import stored_as
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.runtime.atomic_write import replacing_folder
+from lippmann.runtime.regular_file import check_kind
 
 MANIFEST = "lippmann.json"
 
@@ -331,6 +332,7 @@ def _part_name(kind: Kind, name: FormatName, shape: tuple[int, int], place: tupl
 def _read_manifest(folder: Path) -> _Manifest:
     path = folder / MANIFEST
     try:
+        check_kind(path, PictureError)
         values = parse_json(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
         fix = "give a folder written by 'lippmann views' or 'lippmann micro-images'"

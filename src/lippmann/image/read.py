@@ -21,6 +21,7 @@ from lippmann.image.metadata import Metadata, from_text, is_quilt_text
 from lippmann.image.provenance import Provenance
 from lippmann.image.stored_values import Layer, Stored, Values
 from lippmann.runtime.cached_property import cached_property
+from lippmann.runtime.regular_file import check_kind
 
 #: Largest number of pixels decoded at once; a file that claims more is damaged, or meant to fill the memory.
 MOST_PIXELS = 1 << 29
@@ -194,6 +195,7 @@ def open_file(path: str | Path) -> PictureFile:
         size, text = (array.width, array.height), array.text
         opened = PictureFile(path, "zarr", *size, array.dtype, (), text, array, lambda: {"": array.read()})
         return _plausible(opened, None)  # the size of a folder shows nothing: chunks without values need no files
+    check_kind(path, PictureError)
     try:
         file = path.open("rb")
         start = file.peek(8)[:8]
@@ -223,7 +225,7 @@ def _opened(path: Path, file: BufferedReader, start: bytes) -> PictureFile:
         stored, text = parts.channels.get("R", "none"), parts.text.get(TEXT_KEY, "")
         size = parts.width, parts.height
         return PictureFile(
-            path, "exr", *size, stored, layers, text, None, lambda: layers_of_channels(exr.read_exr(path), path)
+            path, "exr", *size, stored, layers, text, None, lambda: layers_of_channels(exr.read_exr(path, parts), path)
         )
     if start.startswith(tiff.SIGNATURES):
         page = tiff.TiffPicture(file, path)

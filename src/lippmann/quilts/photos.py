@@ -21,6 +21,7 @@ from lippmann.errors import PictureError, UsageError
 from lippmann.image.read import MOST_PIXELS
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.quilts.quilt import Quilt, QuiltLayout
+from lippmann.runtime.regular_file import check_kind
 
 if TYPE_CHECKING:
     from PIL import Image
@@ -259,6 +260,7 @@ def _common_profile(headers: Sequence[_Header], icc: Path | None) -> tuple[bytes
     """Profile of the print (empty: sRGB), and notes."""
     if icc is not None:
         try:
+            check_kind(icc, PictureError)
             return icc.read_bytes(), (f"colours are converted to the profile {icc.name}",)
         except OSError as error:
             raise PictureError(f"cannot be read: {error.strerror}", where=str(icc)) from None

@@ -22,6 +22,8 @@ from lippmann.scene.values.description import Camera, Matrix
 _UNITS_PER_MM = (1e-30, 1e30)
 #: Share by which the nearest surface stays behind the beginning of the recorded rays.
 _MARGIN = 1e-3
+#: Share of a scene's depth by which it may reach beyond its extreme points, which are those of some directions.
+_BETWEEN = 0.005
 #: Share of the panel that a scene is enlarged to, the least that is left as it is, and how often that is repeated:
 #: nearer parts grow faster than farther ones.
 FILL, _LEAST_FILL, _FRAMINGS = 0.95, 0.85, 4
@@ -184,7 +186,8 @@ def frame_whole(camera: Camera, points: Bounds, display: Display) -> Matrix:
     """The change ``(4, 4)`` in a display's frame after which the panel shows all that a camera shows.
 
     Seen from the viewing point, all of the camera's picture then lies on the panel. A scene of which that is only a
-    part, such as a teapot on its table, is enlarged until it fills the panel, and centred.
+    part, such as a teapot on its table, is enlarged until it fills the panel, centred, and set behind the beginning of
+    recorded rays.
 
     Parameters
     ----------
@@ -205,6 +208,10 @@ def frame_whole(camera: Camera, points: Bounds, display: Display) -> Matrix:
             return change
         middle = (low + high) / 2.0
         change = scaling(FILL / fill) @ translation((-middle[0], -middle[1], 0.0)) @ change
+        # Enlarged, it may stand out of the panel farther than rays are recorded: it moves back.
+        depths = transform_points(change, points)[:, 2]
+        nearest = float(depths.max() + _BETWEEN * np.ptp(depths))
+        change = translation((0.0, 0.0, min(0.0, display.aperture_distance * (1.0 - _MARGIN) - nearest))) @ change
     return change
 
 

@@ -13,8 +13,8 @@ from contextlib import suppress
 from dataclasses import dataclass
 
 from lippmann.errors import SceneError
-from lippmann.runtime import machine
 from lippmann.runtime.child_python import python_command
+from lippmann.runtime.input_memory import input_memory_left
 from lippmann.scene.mitsuba_trial_child import LENGTH
 
 _CODE = "from lippmann.scene.mitsuba_trial_child import main; main()"
@@ -52,7 +52,7 @@ def try_scene(text: str, variant: str, where: str) -> None:
         The scene ends the process that loads it, takes more than the free memory or :data:`MOST_SECONDS`, or holds a
         mesh whose triangles name vertices that it does not have.
     """
-    request = json.dumps({"variant": variant, "text": text, "memory": machine.available_memory()}).encode()
+    request = json.dumps({"variant": variant, "text": text, "memory": input_memory_left()}).encode()
     answer = _ask(LENGTH.pack(len(request)) + request)
     if answer is None:
         raise SceneError(f"Mitsuba takes more than {MOST_SECONDS:g} s to load the scene", where=where, fix=_FIX)

@@ -339,11 +339,18 @@ def check_description(description: SceneDescription, where: str) -> SceneDescrip
     for number, instance in enumerate(description.instances):
         if not 0 <= instance.mesh < len(description.meshes):
             raise SceneError(f"instance {number} uses mesh {instance.mesh} of {len(description.meshes)}", where=where)
-        if np.shape(instance.world_from_mesh)[-2:] != (4, 4) or not np.isfinite(instance.world_from_mesh).all():
-            raise SceneError(f"instance {number} has a matrix that is not 4x4 finite numbers", where=where)
+        if np.shape(instance.world_from_mesh)[-2:] != (4, 4):
+            raise _no_matrix(number, where)
+    matrices = [np.reshape(instance.world_from_mesh, (-1, 16)) for instance in description.instances]
+    if matrices and not np.isfinite(np.concatenate(matrices)).all():  # all at once: there may be a million
+        raise _no_matrix(next(number for number, own in enumerate(matrices) if not np.isfinite(own).all()), where)
     if not any(len(places) and len(description.meshes[mesh].faces) for mesh, places in description.placements.items()):
         raise SceneError("the scene has no geometry", where=where, rule="there must be at least one triangle")
     return description
+
+
+def _no_matrix(number: int, where: str) -> SceneError:
+    return SceneError(f"instance {number} has a matrix that is not 4x4 finite numbers", where=where)
 
 
 def _check_mesh(mesh: Mesh, materials: int, where: str) -> None:

@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 
 import typer
 
+from lippmann.cli.shared import parse
 from lippmann.cli.shared.completion import complete_displays, complete_scenes
 from lippmann.rendering.request import choices
 
@@ -71,7 +72,24 @@ PixelFilter = Annotated[
 ]
 Device = Annotated[choices.Device, typer.Option("--device", help="Where to render; auto: the GPU if there is one.")]
 Threads = Annotated[int | None, typer.Option("--threads", help="CPU threads; all cores by default.")]
-Memory = Annotated[str | None, typer.Option("--memory", help="Memory to use, such as 2G; 60 % of the free by default.")]
+
+
+def _limit_inputs(text: str | None) -> str | None:
+    """Hold what is read from files to the limit, too, from the moment that it is known."""
+    from lippmann.runtime.input_memory import limit_inputs
+
+    limit_inputs(parse.memory(text))
+    return text
+
+
+Memory = Annotated[
+    str | None,
+    typer.Option(
+        "--memory",
+        help="Memory to use, such as 2G; 60 % of the free by default. What is read from files counts, too.",
+        callback=_limit_inputs,
+    ),
+]
 Environment = Annotated[
     Path | None, typer.Option("--environment", help="Light the scene by this picture of the surroundings (EXR, HDR).")
 ]

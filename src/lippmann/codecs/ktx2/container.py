@@ -9,6 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from lippmann.runtime.input_memory import check_input
+
 Bytes = NDArray[np.uint8]
 
 IDENTIFIER = b"\xabKTX 20\xbb\r\n\x1a\n"
@@ -56,6 +58,7 @@ def decode_ktx2(data: bytes) -> Bytes:
     """
     header = _read_header(data)
     across, down = header.blocks
+    check_input(8 * header.width * header.height, f"a picture of {header.width} x {header.height} pixels", where="")
     if header.model == _ETC1S:
         if header.scheme != "BasisLZ":
             raise Ktx2Error("its ETC1S texels are not compressed by BasisLZ")

@@ -44,6 +44,7 @@ from lippmann.display.formats.recorded_depth import default_aperture
 from lippmann.display.units import MILLIMETRES, length, stripe
 from lippmann.display.validation import Arguments, positive, suggestion
 from lippmann.errors import DisplayError
+from lippmann.runtime.regular_file import check_kind
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -106,6 +107,7 @@ def _preset_texts() -> dict[str, str]:
 
 def _read(path: Path) -> str:
     rule = "a display is a preset's name, a TOML file or a Looking Glass's visual.json"
+    check_kind(path, DisplayError)
     try:
         with path.open("rb") as file:
             content = file.read(_MAXIMUM_BYTES + 1)

@@ -11,10 +11,9 @@ import math
 from lippmann.rendering.adaptive.method_race import DENOISED_SLOPE
 from lippmann.rendering.adaptive.stopping import STEP, Outcome
 
-#: PSNR in dB at which a picture counts as clean, and what is asked of it beyond that, as estimates are uncertain.
-CLEAN, _SPARE = 34.5, 0.5
-#: The estimate of two samples is of halves with one each, which the denoiser helps least: the picture is mostly better.
-_UNDERSTATED_OF_TWO = 0.9
+#: Estimated PSNR in dB at which a picture counts as clean, and what others get samples for. The estimate is of light
+#: before tone mapping, which brings out the noise of highlights: up to 1.5 dB more than the 34 dB that are wanted.
+CLEAN, _AIM = 35.5, 35.0
 
 
 def extra_samples(outcome: Outcome, most: int | None) -> int:
@@ -27,11 +26,9 @@ def extra_samples(outcome: Outcome, most: int | None) -> int:
     most:
         Samples that the picture may have in all; None where a number was asked for.
     """
-    if most is None or outcome.estimate is None:
+    if most is None or outcome.estimate is None or outcome.estimate.psnr >= CLEAN:
         return 0
-    psnr = outcome.estimate.psnr + (_UNDERSTATED_OF_TWO if outcome.samples <= 2 else 0.0)
-    if psnr >= CLEAN:
-        return 0
-    needed = outcome.samples * 10 ** ((CLEAN + _SPARE - psnr) / (10 * DENOISED_SLOPE))
     step = min(STEP, outcome.samples)
+    needed = outcome.samples * 10 ** ((_AIM - outcome.estimate.psnr) / (10 * DENOISED_SLOPE))
+    needed = max(needed, outcome.samples + step)
     return max(0, min(most, step * math.ceil(needed / step)) - outcome.samples)

@@ -14,7 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.codecs.pillow_formats import RULE, is_allowed, open_picture
-from lippmann.errors import SceneError
+from lippmann.errors import MemoryLimitError, SceneError
+from lippmann.runtime.input_memory import check_input
+from lippmann.runtime.regular_file import check_kind
 from lippmann.scene.values.description import Image
 
 if TYPE_CHECKING:
@@ -35,12 +37,16 @@ def read_bytes(path: Path, most: int = -1) -> bytes:
     Raises
     ------
     SceneError
-        The file is missing, a folder, unreadable or empty.
+        The file is missing, a folder, a pipe or device, unreadable or empty.
+    MemoryLimitError
+        It is larger than the memory that is left.
     """
     where = path.name
     try:
         if path.is_dir():
             raise SceneError("is a folder, not a scene file", where=str(path), fix="name the file inside it")
+        check_kind(path, SceneError)
+        check_input(path.stat().st_size if most < 0 else most, "the file", where=where)
         with path.open("rb") as file:
             data = file.read(most)
     except FileNotFoundError:
@@ -227,12 +233,16 @@ def decode_image(data: bytes, name: str, *, where: str) -> Image:
     SceneError
         The bytes are no picture of a format of :data:`lippmann.codecs.pillow_formats.FORMATS`, are cut short, or decode
         to more pixels than Pillow's safety limit.
+    MemoryLimitError
+        They take more than the memory that is left.
     """
     from PIL import UnidentifiedImageError
 
     try:
         with open_picture(io.BytesIO(data)) as picture:
             pixels = texels_of(picture)
+    except MemoryLimitError as error:
+        raise MemoryLimitError(f"texture '{name}': {error.what}", where=where, rule=error.rule, fix=error.fix) from None
     except UnidentifiedImageError:
         raise SceneError(f"texture '{name}' is not a picture that can be read", where=where, rule=RULE) from None
     except Exception as error:  # Pillow's decoders pass on whatever their libraries throw at damaged data

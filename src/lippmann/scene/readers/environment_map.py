@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from lippmann.codecs.exr import SIGNATURE, read_exr, read_exr_header
 from lippmann.errors import PictureError, SceneError
+from lippmann.runtime.input_memory import check_input
 from lippmann.scene.parsing.files import read_bytes
 from lippmann.scene.values.description import Environment
 
@@ -53,7 +54,7 @@ def _read_exr(path: Path, where: str) -> NDArray[np.float32]:
             held = ", ".join(sorted(header.channels))
             raise SceneError(f"has the channels {held}", where=where, rule="R, G and B are needed")
         _check_size(header.height, header.width, where)
-        channels = read_exr(path)
+        channels = read_exr(path, header)
     except PictureError as error:
         raise _undecodable(error.what, where) from None
     return np.stack([np.asarray(channels[name], np.float32) for name in names], axis=-1)
@@ -67,6 +68,7 @@ def _read_hdr(data: bytes, where: str) -> NDArray[np.float32]:
         raise _undecodable("it does not say its size", where)
     height, width = int(size[1]), int(size[2])
     _check_size(height, width, where)
+    check_input(16 * height * width, "its picture", where=where)
     if height * width > _HDR_PIXELS_PER_BYTE * len(data):
         raise _undecodable(f"{len(data)} bytes hold no {width}x{height} pixels", where)
     try:

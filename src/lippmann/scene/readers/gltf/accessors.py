@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.runtime.cached_property import cached_property
+from lippmann.runtime.input_memory import check_input
 from lippmann.scene.readers.gltf.buffers import Buffers
 from lippmann.scene.readers.gltf.document import Document
 from lippmann.scene.readers.gltf.draco import DracoMeshes
@@ -111,6 +112,7 @@ class Accessors:
             fields = self.document.all("accessors")[index]
             normalized = self._check(fields, storage)
             raw = self._elements_of(index, fields)
+            check_input(4 * raw.size, fields.place, where=self.document.file)
             self._floats[key] = _normalize(raw) if normalized else _canonicalize_nan(raw.astype(np.float32))
         return self._floats[key]
 
@@ -118,7 +120,9 @@ class Accessors:
         """Elements as uint32 ``(count, width)``; errors as for :meth:`floats`."""
         fields = self.document.all("accessors")[index]
         self._check(fields, storage)
-        return self._elements_of(index, fields).astype(np.uint32)
+        raw = self._elements_of(index, fields)
+        check_input(4 * raw.size, fields.place, where=self.document.file)
+        return raw.astype(np.uint32)
 
     def _elements_of(self, index: int, fields: Fields) -> NDArray[np.generic]:
         elements = self.decoded.get(index)

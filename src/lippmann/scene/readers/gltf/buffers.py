@@ -8,6 +8,7 @@ import re
 from urllib.parse import unquote
 
 from lippmann.errors import SceneError
+from lippmann.runtime.input_memory import check_input
 from lippmann.scene.parsing.files import read_bytes, resolve
 from lippmann.scene.readers.gltf.document import DECOMPRESS, MESHOPT, Document
 from lippmann.scene.readers.gltf.json_fields import Fields
@@ -96,6 +97,7 @@ class Buffers:
             raise compressed.error("mode", "it is required")
         if fields.integer("byteLength") != count * stride:
             raise fields.error("byteLength", f"{count} elements of {stride} bytes belong here")
+        check_input(2 * count * stride, f"{fields.place}, decompressed,", where=self._document.file)
         data = bytes(self._slice(compressed))
         try:
             return memoryview(decompress(data, mode, compressed.text("filter") or "NONE", count, stride))

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from lippmann.errors import SceneError
 from lippmann.runtime.child_python import python_command
+from lippmann.runtime.input_memory import input_memory_left
 from lippmann.scene.readers.gltf.buffers import Buffers
 from lippmann.scene.readers.gltf.document import DECOMPRESS, DRACO, Document
 from lippmann.scene.readers.gltf.draco_child import HEADER
@@ -81,7 +82,7 @@ class DracoMeshes:
         }
         blocks = {view: bytes(self.buffers.view(view)[0]) for view in sorted(views)}
         given = b"".join(HEADER.pack(view, len(data)) + data for view, data in blocks.items())
-        command, environment = python_command(_CODE)
+        command, environment = python_command(_CODE, str(input_memory_left()))
         try:
             done = subprocess.run(command, input=given, capture_output=True, env=environment, timeout=_MOST_SECONDS)
         except subprocess.TimeoutExpired:

@@ -1,6 +1,7 @@
 """The process that decodes Draco: a native decoder that damaged data may bring down, with nothing else in it.
 
-Reads from standard input, and writes to standard output one ``.npz`` of all results.
+Its argument is the number of bytes that it may take. Reads from standard input, and writes to standard output one
+``.npz`` of all results.
 """
 
 from __future__ import annotations
@@ -12,15 +13,13 @@ import sys
 import numpy as np
 from numpy.typing import NDArray
 
-#: Bytes that decoding may take.
-MEMORY = 8 << 30
 #: Before each block of compressed data: its number and its length.
 HEADER = struct.Struct("<QQ")
 
 
 def main() -> None:
     """Decode all blocks: ``N/faces`` and ``N/ID`` hold triangles and attributes of block N, or ``N/error`` a reason."""
-    _limit_memory()
+    _limit_memory(int(sys.argv[1]))
     import DracoPy  # type: ignore[import-not-found, unused-ignore]  # it has no types
 
     found: dict[str, NDArray[np.generic]] = {}
@@ -39,12 +38,12 @@ def main() -> None:
     sys.stdout.buffer.write(written.getvalue())
 
 
-def _limit_memory() -> None:
+def _limit_memory(most: int) -> None:
     try:
         import resource
     except ImportError:  # there is none on Windows
         return
-    resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+    resource.setrlimit(resource.RLIMIT_DATA, (most, most))
 
 
 if __name__ == "__main__":

@@ -18,6 +18,12 @@ _FARTHEST = 1e30  # matrices of larger entries lead out of single precision
 # Singular values this much smaller than the largest count as none: a scale of zero after some rounding.
 _FLAT = 1e-12
 
+# Members of a node that say where it lies.
+_TRANSFORMS = frozenset({"matrix", "translation", "rotation", "scale"})
+
+_ONE = np.eye(4)[None]
+_ONE.setflags(write=False)
+
 
 class Nodes:
     """The nodes of a document.
@@ -32,6 +38,7 @@ class Nodes:
         self._document = document
         self._parents: dict[int, int] = {}
         self._locals = _local_matrices(document.all("nodes"))
+        self._is_near = np.abs(self._locals).max(axis=(1, 2), initial=0.0) < _FARTHEST
         self._worlds: dict[int, Matrix] = {}
         for index, fields in enumerate(document.all("nodes")):
             for child in document.references(fields, "children", "nodes"):
@@ -80,6 +87,9 @@ class Nodes:
         SceneError
             The node is its own ancestor, or numbers overflow.
         """
+        if index not in self._parents and self._is_near[index]:
+            root: Matrix = self._locals[index]
+            return root
         chain: list[int] = []
         on_chain: set[int] = set()
         at: int | None = index
@@ -106,6 +116,8 @@ def _local_matrices(nodes: list[Fields]) -> Matrix:
     rotations[:, 3] = 1.0
     explicit: dict[int, Matrix] = {}
     for index, fields in enumerate(nodes):
+        if not fields.values.keys() & _TRANSFORMS:
+            continue
         columns = fields.numbers("matrix", 16)
         if columns is not None:
             explicit[index] = np.array(columns).reshape(4, 4).T
@@ -117,8 +129,8 @@ def _local_matrices(nodes: list[Fields]) -> Matrix:
             numbers = fields.numbers(key, values.shape[1])
             if numbers is not None:
                 values[index] = numbers
-        if not rotations[index].any():
-            raise _no_rotation(fields, "rotation")
+    for turned in np.flatnonzero(~rotations.any(axis=1)):
+        raise _no_rotation(nodes[turned], "rotation")
     matrices = compose(translations, rotations, scales)
     for index, matrix in explicit.items():
         matrices[index] = matrix
@@ -140,7 +152,7 @@ def instance_matrices(node: Fields, document: Document, accessors: Accessors) ->
     instancing = node.extension("EXT_mesh_gpu_instancing")
     attributes = None if instancing is None else instancing.child("attributes")
     if attributes is None:
-        return np.eye(4)[None]
+        return _ONE
     values_of: dict[str, Matrix] = {}
     for key, kind in (
         ("TRANSLATION", storage.TRANSLATION),

@@ -130,7 +130,8 @@ class Contents:
     def _add_mesh(self, mesh: int, node: Fields, world: Matrix) -> None:
         skin_index = self.document.reference(node, "skin", "skins")
         if skin_index is None:
-            worlds = world @ instance_matrices(node, self.document, self.accessors)
+            copies = instance_matrices(node, self.document, self.accessors)
+            worlds = world[None] if len(copies) == 1 and (copies[0] == _IDENTITY).all() else world @ copies
             places = self.meshes.places(mesh, node, None)
         else:
             # A skin places its mesh in the world by itself, whatever the node's own transformation (section 3.7.3.3).
@@ -138,6 +139,9 @@ class Contents:
             skin = read_skin(skin_index, self.document, self.accessors, self.nodes)
             places = self.meshes.places(mesh, node, skin)
         self.placements.extend(_Placements(place, worlds, node) for place in places)
+
+
+_IDENTITY = np.eye(4)
 
 
 def _instantiate(
@@ -154,6 +158,9 @@ def _instantiate(
     instances: list[Instance] = []
     triangles = [placement for placement in placements if meshes[placement.mesh].faces.shape[1] == 3]
     for placement, copy_ranks in zip(triangles, _ranks(triangles), strict=True):
+        if len(copy_ranks) == 1 and copy_ranks[0] == 3:  # as nearly all are
+            instances.append(Instance(placement.mesh, placement.worlds[0]))
+            continue
         solid = copy_ranks == 3
         if solid.any():
             worlds = placement.worlds if solid.all() else placement.worlds[solid]
@@ -171,13 +178,17 @@ def _instantiate(
 
 
 def _check_reach(meshes: list[Mesh], placements: list[_Placements], document: Document) -> None:
-    reaches = [np.abs(mesh.positions).max(axis=0).astype(np.float64) for mesh in meshes]
-    for placement in placements:
-        farthest = np.abs(placement.worlds[:, :3, :3]) @ reaches[placement.mesh] + np.abs(placement.worlds[:, :3, 3])
-        if (farthest > np.finfo(np.float32).max).any():
-            raise document.error(
-                f"{placement.node.place} puts its mesh beyond all bounds", rule="positions must be finite"
-            )
+    if not placements:
+        return
+    reaches = np.array([np.abs(mesh.positions).max(axis=0).astype(np.float64) for mesh in meshes])
+    worlds = np.abs(np.concatenate([placement.worlds for placement in placements]))
+    counts = [len(placement.worlds) for placement in placements]
+    reach = np.repeat(reaches[[placement.mesh for placement in placements]], counts, axis=0)
+    farthest = np.einsum("kij,kj->ki", worlds[:, :3, :3], reach) + worlds[:, :3, 3]
+    beyond = (farthest > np.finfo(np.float32).max).any(axis=1)
+    if beyond.any():
+        first = placements[int(np.searchsorted(np.cumsum(counts), np.argmax(beyond), side="right"))]
+        raise document.error(f"{first.node.place} puts its mesh beyond all bounds", rule="positions must be finite")
 
 
 def _check_count(placements: list[_Placements], document: Document) -> None:

@@ -1,0 +1,31 @@
+"""Pipes and devices are told from files without being opened."""
+
+import os
+import socket
+
+import pytest
+
+from lippmann.errors import SceneError
+from lippmann.runtime.regular_file import check_kind, other_kind
+
+
+def test_files_and_nothing_are_no_other_kind(tmp_path):
+    (tmp_path / "f").write_bytes(b"x")
+    assert other_kind(tmp_path / "f") is None
+    assert other_kind(tmp_path / "none") is None
+    assert other_kind("a\0b") is None
+    assert other_kind(tmp_path) == "a folder"
+    check_kind(tmp_path, SceneError)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no such files")
+def test_pipes_devices_and_sockets_are_refused(tmp_path, monkeypatch):
+    os.mkfifo(tmp_path / "p")
+    (tmp_path / "link").symlink_to(tmp_path / "p")
+    assert other_kind(tmp_path / "link") == "a pipe"
+    assert other_kind("/dev/null") == "a device"
+    monkeypatch.chdir(tmp_path)  # the names of sockets are short
+    with socket.socket(socket.AF_UNIX) as server:
+        server.bind("s")
+        with pytest.raises(SceneError, match="is a socket, no file"):
+            check_kind(tmp_path / "s", SceneError)
