@@ -7,6 +7,8 @@ from typing import Any
 
 from typer.core import TyperCommand, TyperGroup
 
+from lippmann.cli.shared.kept_inputs import check_outputs
+
 #: Options of the commands that render and look, by group; the rest stand under "Options". The last are rarely used.
 OPTION_GROUPS: Mapping[str, tuple[str, ...]] = {
     "Scene": ("--up", "--integrator", "--depth", "--allow-outside", "--single-scattering"),
@@ -164,6 +166,11 @@ class HelpfulCommand(TyperCommand):
     def format_epilog(self, ctx: Any, formatter: Any) -> None:
         _write_examples(ctx, formatter)
 
+    def invoke(self, ctx: Any) -> Any:
+        if ctx.info_name not in _MAY_CHANGE:
+            check_outputs((parameter.opts, ctx.params.get(parameter.name)) for parameter in self.params)
+        return super().invoke(ctx)
+
 
 class HelpfulGroup(TyperGroup):
     """A group whose commands stand in groups themselves, with examples below."""
@@ -185,6 +192,9 @@ class HelpfulGroup(TyperGroup):
     def format_epilog(self, ctx: Any, formatter: Any) -> None:
         _write_examples(ctx, formatter)
 
+
+#: Commands that may write over what they read: the page of a calibration refines a display's file.
+_MAY_CHANGE = frozenset({"page"})
 
 #: Commands with fewer options have them in one list.
 _LARGE = 20
