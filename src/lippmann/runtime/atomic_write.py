@@ -19,10 +19,8 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from lippmann.errors import OutputError
-from lippmann.runtime.private_files import FILE_MODE, ForeignFileError, open_to_read, without_following
-
-#: File that lists the files of a folder written by :func:`replacing_folder`, which a later write may replace.
-CONTENTS_FILE = ".lippmann-files"
+from lippmann.runtime.folder_list import CONTENTS_FILE, listed, write_list
+from lippmann.runtime.private_files import FILE_MODE, without_following
 
 _REASONS = {
     errno.ENOSPC: ("no space is left on the disk", "free some space or choose another place"),
@@ -76,8 +74,9 @@ def replacing(path: Path, *, private: bool = False) -> Iterator[Path]:
 def replacing_folder(path: Path) -> Iterator[Path]:
     """Write a folder atomically: yield a temporary folder, which is renamed to ``path`` when the block succeeds.
 
-    An existing folder is replaced if it is empty, or if this function wrote it and it holds no other files, as listed
-    in its file :data:`CONTENTS_FILE`. No stale file of an earlier write remains, and no file of the user is lost.
+    An existing folder is replaced if it is empty, or if this function wrote it and it holds no other files, as
+    :mod:`~lippmann.runtime.folder_list` says. No stale file of an earlier write remains, and no file of the user is
+    lost.
 
     Raises
     ------
@@ -92,7 +91,7 @@ def replacing_folder(path: Path) -> Iterator[Path]:
             mode = _make_folder(temporary)
             yield temporary
             names = sorted(_files(temporary))
-            (temporary / CONTENTS_FILE).write_text("".join(f"{name}\n" for name in names), encoding="utf-8")
+            write_list(temporary, names)
             for name in (*names, CONTENTS_FILE):
                 _flush(temporary / name)
             _set_mode(temporary, mode)
@@ -217,23 +216,14 @@ def _files(folder: Path) -> Iterator[str]:
 def _refuse_foreign_files(place: Path, path: Path) -> None:
     if not place.exists():
         return
-    foreign = sorted(set(_files(place)) - {CONTENTS_FILE, *_listed(place)})
+    foreign = sorted(set(_files(place)) - {CONTENTS_FILE} - listed(place))
     if foreign:
         raise OutputError(
-            f"the folder holds {foreign[0]!r}, which Lippmann did not write",
+            f"the folder holds {foreign[0]!r}, which Lippmann did not write, or which was changed since",
             where=str(path),
             rule="a folder is replaced as a whole",
             fix="choose a new folder, or move your files out of this one",
         )
-
-
-def _listed(folder: Path) -> list[str]:
-    """Files that Lippmann wrote into ``folder``; none if the list is a link or not the folder owner's."""
-    try:
-        with open_to_read(folder / CONTENTS_FILE, owner=folder.stat().st_uid) as file:
-            return file.read().decode().split("\n")
-    except (OSError, UnicodeDecodeError, ForeignFileError):
-        return []
 
 
 def _exchange(temporary: Path, place: Path) -> None:
