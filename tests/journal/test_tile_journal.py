@@ -218,3 +218,12 @@ def test_the_job_can_be_read_by_people(output):
     job = json.loads((journal_of(output) / "job.json").read_text())
     assert job["fingerprint"] == JOB
     assert job["grid"] == [100, 70, 32]
+
+
+def test_a_name_too_long_for_the_journal_is_refused_at_once(tmp_path):
+    """Such a picture was rendered whole before its journal could not be put away."""
+    longest = 255 - len("..parts-01234567.old")
+    with TileStore.open(tmp_path / ("a" * (longest - 4) + ".tif"), JOB, TileGrid(100, 70, 32), resume=False):
+        pass
+    with pytest.raises(OutputError, match=r"the name is too long for the journal beside it; 1 bytes less fit"):
+        TileStore.open(tmp_path / ("a" * (longest - 3) + ".tif"), JOB, TileGrid(100, 70, 32), resume=False)

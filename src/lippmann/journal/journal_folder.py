@@ -18,7 +18,9 @@ TILE = ".tile"
 _TILE_NAME = re.compile(r"r\d{4,}_c\d{4,}\.tile")
 #: Names that :func:`lippmann.runtime.atomic_write.replacing` gives to files on their way to a tile's or the job's
 #: place, and those of empty files by which a file system is tried.
-_HALF_FILE = re.compile(r"\.(r\d{4,}_c\d{4,}-[0-9a-f]{8}\.part\.tile|job-[0-9a-f]{8}\.part\.json|[0-9a-f]{16}\.part)")
+_HALF_FILE = re.compile(
+    r"\.(r\d{4,}_c\d{4,}-(?:[0-9a-f]{20}|[0-9a-f]{8})\.part\.tile|job-(?:[0-9a-f]{20}|[0-9a-f]{8})\.part\.json|[0-9a-f]{16}\.part)"
+)
 
 #: Whether a name is that of a tile.
 IsTile = Callable[[str], bool]

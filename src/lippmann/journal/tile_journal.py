@@ -30,9 +30,12 @@ from lippmann.journal.tile_file import MARK, DamagedTile, TileResult, decode, en
 from lippmann.runtime import private_files
 from lippmann.runtime.atomic_write import replacing
 from lippmann.runtime.private_files import ForeignFileError
+from lippmann.runtime.temporary_names import pattern_of
 
 #: Added to the picture's name.
 ENDING = ".parts"
+#: Bytes of a name on all usual file systems.
+_LONGEST_NAME = 255
 
 _KEY, _VERSION = "lippmann-journal", 1
 #: Largest job in bytes; a job has some kilobytes.
@@ -95,6 +98,7 @@ class TileStore:
             If the journal is of another picture (names the differences), or the folder is no journal of the user's.
         """
         folder = journal_of(output)
+        _check_name(output, folder)
         job = Job(dict(fingerprint), [grid.width, grid.height, grid.side])
         _is_begun(output, folder, job, resume)  # refuses before anything is created
         with _reported(folder):
@@ -260,6 +264,18 @@ def read_job(output: Path) -> Job | None:
     return Job(fingerprint, job.get("grid"))
 
 
+def _check_name(output: Path, folder: Path) -> None:
+    """Refuse a name with which the journal beside it could not be named, or put away in the end."""
+    too_long = len(os.fsencode(folder.name)) + len(".-01234567.old") - _LONGEST_NAME
+    if too_long > 0:
+        raise OutputError(
+            "the name is too long for the journal beside it",
+            where=str(output),
+            rule=f"{too_long} bytes less fit",
+            fix="choose a shorter name",
+        )
+
+
 def sweep_beside(output: Path) -> None:
     """Remove temporary files of killed writers of ``output``; to be called only while its journal is locked.
 
@@ -267,10 +283,7 @@ def sweep_beside(output: Path) -> None:
     """
     place = output.resolve()
     # The names that lippmann.runtime.atomic_write and TileStore.finish give to what is on its way.
-    file, folder = f"{place.stem[:64]}-NUMBER.part{place.suffix}", f"{place.name[:64]}-NUMBER."
-    journal = f"{place.name}{ENDING}-NUMBER.old"
-    names = [re.escape(name).replace("NUMBER", "[0-9a-f]{8}") for name in (file, folder, journal)]
-    half, old = re.compile(rf"\.({names[0]}|{names[1]}(part|old))"), re.compile(rf"\.{names[2]}")
+    half, old = pattern_of(place), re.compile(rf"\.{re.escape(place.name + ENDING)}-[0-9a-f]{{8}}\.old")
     with suppress(OSError):  # a folder that cannot be listed keeps them
         for name in os.listdir(place.parent):
             path = place.with_name(name)

@@ -3,7 +3,8 @@
 A file or folder is written under a temporary name beside its path, flushed to disk, and renamed. A failure (full disk,
 error in the writer, Ctrl-C) leaves the path as it was.
 
-Temporary names hold random digits and are created exclusively, so that no link can be planted under them. In a folder
+Temporary names hold random digits and are created exclusively, so that no link can be planted under them. What a killed
+writer left under such a name is removed by the next one (:mod:`~lippmann.runtime.temporary_names`). In a folder
 without a sticky bit that other users may write to, these can still replace temporary files, as they can the output.
 """
 
@@ -21,6 +22,7 @@ from pathlib import Path
 from lippmann.errors import OutputError
 from lippmann.runtime.folder_list import CONTENTS_FILE, listed, write_list
 from lippmann.runtime.private_files import FILE_MODE, without_following
+from lippmann.runtime.temporary_names import sweep, temporary_file, temporary_folder
 
 _REASONS = {
     errno.ENOSPC: ("no space is left on the disk", "free some space or choose another place"),
@@ -56,8 +58,10 @@ def replacing(path: Path, *, private: bool = False) -> Iterator[Path]:
         exceptions pass through.
     """
     place = path.absolute() if private else _place(path)
-    temporary = place.with_name(f".{place.stem[:64]}-{secrets.token_hex(4)}.part{place.suffix}")
+    temporary = temporary_file(place)
     with _reported(path, temporary):
+        if not private:
+            sweep(place)
         try:
             _create(temporary, like=None if private else place)
             yield temporary
@@ -85,8 +89,9 @@ def replacing_folder(path: Path) -> Iterator[Path]:
         folder. Other exceptions pass through.
     """
     place = _place(path, folder=True)
-    temporary = place.with_name(f".{place.name[:64]}-{secrets.token_hex(4)}.part")
+    temporary = temporary_folder(place)
     with _reported(path, temporary):
+        sweep(place)
         try:
             mode = _make_folder(temporary)
             yield temporary
