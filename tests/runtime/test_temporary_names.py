@@ -7,7 +7,7 @@ import sys
 import pytest
 
 from lippmann.runtime.atomic_write import replacing, replacing_folder
-from lippmann.runtime.temporary_names import pattern_of, temporary_file, temporary_folder
+from lippmann.runtime.temporary_names import pattern_of, scratch_folder, temporary_file, temporary_folder
 
 KILLED = """
 import os, sys
@@ -66,3 +66,16 @@ def test_names_as_long_as_names_may_be_can_be_written(tmp_path, stem):
         assert pattern_of(place).fullmatch(temporary.name)
     assert os.listdir(tmp_path) == [place.name]
     assert pattern_of(place).fullmatch(temporary_folder(place).name)
+
+
+def test_folders_of_killed_processes_go_with_the_next(tmp_path):
+    code = "import os, sys\nfrom lippmann.runtime.temporary_names import scratch_folder\n"
+    code += "with scratch_folder('lippmann-x-', sys.argv[1]) as folder:\n    open(folder + '/f', 'w').close()\n"
+    code += "    os.kill(os.getpid(), 9)"
+    subprocess.run([sys.executable, "-c", code, str(tmp_path)], check=False)
+    (left,) = os.listdir(tmp_path)
+    (tmp_path / "lippmann-x-mine").mkdir()
+    with scratch_folder("lippmann-x-", str(tmp_path)) as folder, scratch_folder("lippmann-x-", str(tmp_path)) as other:
+        assert len({left, "lippmann-x-mine", os.path.basename(folder), os.path.basename(other)}) == 4
+        assert sorted(os.listdir(tmp_path)) == sorted({"lippmann-x-mine", *map(os.path.basename, (folder, other))})
+    assert os.listdir(tmp_path) == ["lippmann-x-mine"]

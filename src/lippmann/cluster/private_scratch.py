@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import os
 import sys
-import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 
 from lippmann.errors import ClusterError
+from lippmann.runtime.temporary_names import scratch_folder
 
 
 @contextmanager
@@ -27,15 +27,16 @@ def private_scratch() -> Iterator[str]:
     import dask
 
     above = dask.config.get("temporary-directory", None)
+    stack = ExitStack()
     try:
         if above is not None:
             os.makedirs(above, exist_ok=True)
-        scratch = tempfile.TemporaryDirectory(prefix="lippmann-dask-", dir=above, ignore_cleanup_errors=True)
+        folder = stack.enter_context(scratch_folder("lippmann-dask-", above))
     except OSError as error:
         raise ClusterError(
             f"no folder for Dask's files can be made ({error})", fix="set DASK_TEMPORARY_DIRECTORY to a folder of yours"
         ) from None
-    with scratch as folder:
+    with stack:
         try:
             yield folder
         finally:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import tempfile
 import threading
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -16,6 +15,7 @@ from numpy.typing import NDArray
 from lippmann.cluster.job_pickle import unpack
 from lippmann.errors import ClusterError
 from lippmann.journal.tile_file import encode
+from lippmann.runtime.temporary_names import scratch_folder
 
 if TYPE_CHECKING:
     from lippmann.tiles.tile_render import Prepared
@@ -127,7 +127,7 @@ def _prepared(
         from lippmann.tiles.tile_render import prepare
 
         _current.clear()  # one scene at a time
-        with tempfile.TemporaryDirectory(prefix="lippmann-scene-") as folder:
+        with scratch_folder("lippmann-scene-") as folder:
             job = unpack(outline, names, parts, Path(folder))
             job = replace(job, request=replace(job.request, threads=engine_threads()))
             _current[key] = prepare(job)

@@ -12,7 +12,9 @@ import os
 import platform
 import re
 import secrets
-from contextlib import suppress
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
 
@@ -52,8 +54,33 @@ def sweep(place: Path) -> None:
                 private_files.remove(place.with_name(name))
 
 
+@contextmanager
+def scratch_folder(prefix: str, above: str | None = None) -> Iterator[str]:
+    """A new folder of this account alone, removed at the end; those that killed processes left there go before.
+
+    Parameters
+    ----------
+    prefix:
+        Beginning of its name, such as ``lippmann-dask-``.
+    above:
+        Where it lies; None for the system's temporary folder.
+
+    Raises
+    ------
+    OSError
+        If it cannot be created.
+    """
+    above = above or tempfile.gettempdir()
+    with suppress(OSError):
+        for name in os.listdir(above):
+            if name.startswith(prefix) and _is_dead(name.removeprefix(prefix)[:20]):
+                private_files.remove(Path(above, name))
+    with tempfile.TemporaryDirectory(prefix=f"{prefix}{_number()}-", dir=above, ignore_cleanup_errors=True) as folder:
+        yield folder
+
+
 def _is_dead(number: str) -> bool:
-    if len(number) != 20 or not number.startswith(_machine()):
+    if not re.fullmatch("[0-9a-f]{20}", number) or not number.startswith(_machine()):
         return False
     import psutil
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import sys
-import tempfile
 import threading
 from collections.abc import Callable
 from pathlib import Path
@@ -18,6 +17,7 @@ from lippmann.cli.shared.console import Console
 from lippmann.cli.shared.exit_codes import INTERRUPTED
 from lippmann.cli.shared.option_names import in_options
 from lippmann.errors import LippmannError, UsageError
+from lippmann.runtime.temporary_names import scratch_folder
 
 if TYPE_CHECKING:
     from lippmann.display import Display
@@ -57,7 +57,7 @@ def view(
         for name, is_given in (("--host", host != "127.0.0.1"), ("--port", port != 0), ("--no-browser", no_browser)):
             if is_given:
                 raise UsageError("does not apply to --export", where=name, fix="leave it out")
-    with tempfile.TemporaryDirectory() as folder:
+    with scratch_folder("lippmann-view-") as folder:
         asked, target = layout_of(layout, aspect), parse.display(display)
         shown = [_panel_picture(path, target, asked, Path(folder) / str(k)) for k, path in enumerate(paths)]
         if export is not None:
