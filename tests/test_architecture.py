@@ -19,6 +19,7 @@ SOURCE = ROOT / "src" / "lippmann"
 #: package itself offers the API, so it comes after.
 ORDER = (
     "_version",
+    "printable",
     "errors",
     "progress",
     "progress_bar",

@@ -6,6 +6,8 @@ prints that line alone and leaves with the error's exit code; a library caller c
 
 from __future__ import annotations
 
+from lippmann.printable import one_line
+
 
 class LippmannError(Exception):
     """Base of all errors that Lippmann raises on purpose.
@@ -38,7 +40,8 @@ class LippmannError(Exception):
     def __str__(self) -> str:
         head = ": ".join(part for part in (self.where, self.parameter, self.what) if part)
         line = "; ".join(part for part in (head, self.rule, self.fix) if part)
-        return " ".join(line.split())  # a value quoted from a file may hold line breaks
+        # A value quoted from a file may hold line breaks, and what commands a terminal.
+        return one_line(" ".join(line.split()))
 
     def __reduce__(self) -> tuple[object, ...]:
         # Keyword-only fields are lost by the default pickling, which worker processes rely on.

@@ -17,6 +17,7 @@ from typer import BadParameter
 from lippmann.cli.shared import command_clock
 from lippmann.cli.shared.exit_codes import INTERRUPTED
 from lippmann.errors import LippmannError
+from lippmann.printable import one_line
 from lippmann.runtime.input_memory import limit_inputs
 
 #: The base of all complaints about the command line itself; its home moved between releases of typer.
@@ -123,5 +124,5 @@ def _usage(error: BaseException) -> str:
 
 
 def _leave(line: str, code: int) -> int:
-    print(f"lippmann: {line}", file=sys.stderr)
+    print(f"lippmann: {one_line(line)}", file=sys.stderr)
     return code

@@ -23,6 +23,7 @@ from typing import Any, Protocol
 from urllib.parse import urlsplit
 
 from lippmann.errors import LippmannError, UsageError
+from lippmann.printable import one_line
 
 LOOPBACK = "127.0.0.1"
 
@@ -205,7 +206,7 @@ class _Server(socketserver.ThreadingMixIn, socketserver.TCPServer):
         # A page that is closed or reloaded aborts its requests.
         if not isinstance(error, (ConnectionError, TimeoutError)):
             what = " ".join(f"{type(error).__name__}: {error}".split())
-            print(f"lippmann: internal error while answering a request: {what}; report it", file=sys.stderr)
+            print(one_line(f"lippmann: internal error while answering a request: {what}; report it"), file=sys.stderr)
 
 
 class _Handler(BaseHTTPRequestHandler):

@@ -44,10 +44,10 @@ def info(
 
     quilt = quilt_of(picture, layout, aspect)
     if quilt is not None:
-        Console(as_json=as_json).result(_quilt_values(picture, quilt), "\n".join(_quilt_lines(picture, quilt)))
+        Console(as_json=as_json).result(_quilt_values(picture, quilt), _quilt_lines(picture, quilt))
         return
     file = open_file(picture)
-    Console(as_json=as_json).result(_info_values(picture, file), "\n".join(_info_lines(picture, file)))
+    Console(as_json=as_json).result(_info_values(picture, file), _info_lines(picture, file))
 
 
 def views(

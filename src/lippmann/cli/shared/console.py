@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 
+from lippmann import printable
 from lippmann.cli.shared.option_names import translated
 from lippmann.progress import ProgressCallback, silent
 from lippmann.progress_bar import PlainProgress, bar
@@ -20,17 +21,17 @@ class Console:
     quiet: bool = False
     as_json: bool = False
 
-    def result(self, values: Mapping[str, object], lines: str = "") -> None:
-        """The outcome: the object with ``--json``, else ``lines`` for people."""
+    def result(self, values: Mapping[str, object], lines: str | Sequence[str] = "") -> None:
+        """The outcome: the object with ``--json``, else ``lines`` for people, as one text or one by one."""
         if self.as_json:
-            print(json.dumps(values, ensure_ascii=False, allow_nan=False))
+            print(printable.json_text(json.dumps(values, ensure_ascii=False, allow_nan=False)))
         elif lines and not self.quiet:
-            print(lines)
+            print(printable.lines(lines) if isinstance(lines, str) else "\n".join(map(printable.one_line, lines)))
 
     def remark(self, line: str) -> None:
         """One line that is no result: a note or a warning, its parameters as options."""
         if not self.quiet:
-            print(translated(line), file=sys.stderr)
+            print(printable.one_line(translated(line)), file=sys.stderr)
 
     @contextmanager
     def progress(self) -> Iterator[ProgressCallback]:

@@ -1,0 +1,28 @@
+"""Text of files as a terminal may show it: what would command the terminal, or turn lines around, is spelt out."""
+
+from __future__ import annotations
+
+import re
+
+# C0 and C1 controls, line and paragraph separators, and characters that change the direction of what follows.
+_UNSAFE = re.compile("[\x00-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff\ufeff]")
+_UNSAFE_BUT_BREAKS = re.compile(_UNSAFE.pattern.replace("\x00-\x1f", "\x00-\x09\x0b-\x1f"))
+
+
+def one_line(text: str) -> str:
+    """``text`` as a single line; characters that are not to be shown as in Python's strings (``\\x1b``)."""
+    return _UNSAFE.sub(_spelt, text)
+
+
+def lines(text: str) -> str:
+    """``text`` with its line breaks, otherwise as :func:`one_line`."""
+    return _UNSAFE_BUT_BREAKS.sub(_spelt, text)
+
+
+def json_text(text: str) -> str:
+    """JSON whose strings hold none of these characters raw."""
+    return _UNSAFE.sub(lambda match: f"\\u{ord(match[0]):04x}", text)
+
+
+def _spelt(match: re.Match[str]) -> str:
+    return ascii(match[0])[1:-1]
