@@ -16,6 +16,8 @@ import pytest
 from lippmann.errors import ClusterError
 
 TILES = 16
+#: Of a picture that is the same byte by byte wherever its tiles are rendered.
+OPTIONS = {"integrator": "direct", "method": "full", "spp": 2, "device": "cpu"}
 
 
 def test_a_killed_worker_and_a_poisoned_tile(lab, render, here, until):
@@ -204,9 +206,7 @@ def test_interrupting_leaves_no_tiles_behind(lab, render, until):
             run_on(cluster, prepared.job, missing, put)
 
         with pytest.raises(KeyboardInterrupt):
-            api.render_to_file(
-                "primitives", lab.faults.parent / "x.png", runner=runner, integrator="direct", spp=2, device="cpu"
-            )
+            api.render_to_file("primitives", lab.faults.parent / "x.png", runner=runner, **OPTIONS)
         until(lambda: not cluster.client.processing() or not any(cluster.client.processing().values()))
         assert len(lab.begun()) < TILES
 
@@ -232,7 +232,7 @@ def test_encrypted_connections(lab, here, tmp_path, until):
     lab.start_worker(*map(str, ours), address=address)
     output = tmp_path / "x.png"
     with connect(parse_target(address), TlsFiles(certificate, certificate, key)) as cluster:
-        api.render_to_file("primitives", output, runner=runner_on(cluster), integrator="direct", spp=2, device="cpu")
+        api.render_to_file("primitives", output, runner=runner_on(cluster), **OPTIONS)
     assert output.read_bytes() == here
     with pytest.raises(ClusterError), connect(parse_target(address)):
         pass
@@ -268,7 +268,7 @@ def test_no_more_is_rendered_than_is_taken_in(lab, tmp_path, until):
         run_on(cluster, prepared.job, missing, slow)
 
     with connect(parse_target(lab.address)) as cluster:
-        api.render_to_file("primitives", tmp_path / "x.png", runner=runner, integrator="direct", spp=2, device="cpu")
+        api.render_to_file("primitives", tmp_path / "x.png", runner=runner, **OPTIONS)
     assert len(seen) == TILES
     assert max(seen) <= TILES_PER_THREAD
 
@@ -295,7 +295,7 @@ def test_a_scene_goes_to_each_worker_once(lab, tmp_path):
     with connect(parse_target(lab.address)) as cluster:
         for seed in (1, 2):
             output = tmp_path / f"{seed}.png"
-            api.render_to_file("primitives", output, runner=runner, integrator="direct", spp=2, device="cpu", seed=seed)
+            api.render_to_file("primitives", output, runner=runner, **OPTIONS, seed=seed)
         logs = cluster.client.run(received)
     assert names
     assert len(logs) == 2

@@ -5,12 +5,13 @@ from __future__ import annotations
 import http.client
 import json
 import socket
-from contextlib import closing, suppress
+from contextlib import ExitStack, closing, suppress
 from http import HTTPStatus
 
 import pytest
 
 from lippmann.errors import PictureError, UsageError
+from lippmann.viewer import http_server
 from lippmann.viewer.http_server import RefusedError, Response, WebServer, is_loopback, json_response
 
 
@@ -274,3 +275,40 @@ def test_a_closed_server_answers_nobody_who_is_still_connected():
 
     with closing(connection), pytest.raises((http.client.HTTPException, ConnectionError)):
         ask_again()
+
+
+@pytest.mark.parametrize(
+    "head",
+    [b"GET / HTTP/1.1\r\n", b"POST / HTTP/1.1\r\nHost: localhost\r\nContent-Length: 90\r\n\r\n"],
+    ids=["head", "body"],
+)
+def test_a_request_that_never_ends_is_given_up(server, monkeypatch, head):
+    """One byte now and then, in the head or in the body, would hold a thread for ever."""
+    monkeypatch.setattr(http_server, "_REQUEST_TIMEOUT", 0.4)
+    with socket.create_connection((server.host, server.port), timeout=10) as connection:
+        connection.sendall(head)
+        ended, sent = False, 0
+        while not ended and sent < 100:
+            sent += 1
+            try:
+                connection.sendall(b"x")
+                connection.settimeout(0.05)
+                ended = connection.recv(1000) == b""
+            except TimeoutError:
+                continue
+            except ConnectionError:
+                ended = True
+        assert ended
+
+
+def test_connections_are_counted(server, monkeypatch):
+    monkeypatch.setattr(http_server, "_MOST_CONNECTIONS", 2)
+    with ExitStack() as stack:
+        kept = [stack.enter_context(socket.create_connection((server.host, server.port), timeout=10)) for _ in range(2)]
+        for connection in kept:
+            connection.sendall(b"GET / HTTP/1.1\r\nHost: localhost\r\n\r\n")
+            assert connection.recv(12).startswith(b"HTTP/1.1")
+        third = stack.enter_context(socket.create_connection((server.host, server.port), timeout=10))
+        third.sendall(b"GET / HTTP/1.1\r\nHost: localhost\r\n\r\n")
+        with suppress(ConnectionError):
+            assert third.recv(12) == b""

@@ -7,6 +7,7 @@ DNS rebinding: a foreign page whose name resolves to this address. No other site
 from __future__ import annotations
 
 import errno
+import io
 import ipaddress
 import json
 import socket
@@ -24,6 +25,7 @@ from urllib.parse import urlsplit
 
 from lippmann.errors import LippmannError, UsageError
 from lippmann.printable import one_line
+from lippmann.viewer.timed_reader import TimedReader
 
 LOOPBACK = "127.0.0.1"
 
@@ -32,8 +34,10 @@ _MAX_BODY = 1 << 16
 #: Limit on the digits of a Content-Length, so that absurd numbers are never parsed.
 _MAX_LENGTH_DIGITS = 9
 
-#: Seconds after which an idle connection is closed.
-_IDLE_TIMEOUT = 60.0
+#: Seconds after which an idle connection is closed, and one whose request is not whole.
+_IDLE_TIMEOUT, _REQUEST_TIMEOUT = 60.0, 20.0
+#: Connections at a time; a browser opens six, and each has a thread.
+_MOST_CONNECTIONS = 256
 
 _MEDIA_TYPES = {"html": "text/html", "css": "text/css", "js": "text/javascript", "svg": "image/svg+xml"}
 
@@ -188,6 +192,9 @@ class _Server(socketserver.ThreadingMixIn, socketserver.TCPServer):
         super().__init__((str(place[0]), port), _Handler)
 
     def process_request(self, request: Any, client_address: Any) -> None:
+        if len(self._open) >= _MOST_CONNECTIONS:
+            self.shutdown_request(request)
+            return
         self._open.add(request)
         super().process_request(request, client_address)
 
@@ -213,6 +220,15 @@ class _Handler(BaseHTTPRequestHandler):
     server: _Server
     protocol_version = "HTTP/1.1"
     timeout = _IDLE_TIMEOUT
+
+    def setup(self) -> None:
+        super().setup()
+        self._timed = TimedReader(self.connection, _IDLE_TIMEOUT, _REQUEST_TIMEOUT)
+        self.rfile = io.BufferedReader(self._timed)
+
+    def handle_one_request(self) -> None:
+        self._timed.expect_request()
+        super().handle_one_request()
 
     def do_GET(self) -> None:
         self._respond(lambda: self.server.site.get(self._request()))
