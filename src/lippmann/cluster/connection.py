@@ -20,6 +20,7 @@ from lippmann.cluster.address import (
     warn_of_exposure,
 )
 from lippmann.cluster.private_scratch import private_scratch
+from lippmann.cluster.reachable import check_reachable
 from lippmann.cluster.tasks import THREADS_VARIABLE
 from lippmann.cluster.worker_roster import Roster
 from lippmann.errors import ClusterError, UsageError
@@ -106,6 +107,7 @@ def connect(
     security = tls.security()
     # Before connecting: whoever listens there can send code as soon as the connection is open.
     warn_of_exposure(target.address, security, remark)
+    check_reachable(target.address, tls.ca, tls.certificate, tls.key)
     try:
         client = distributed.Client(
             target.address, security=security, timeout=CONNECT_SECONDS, set_as_default=False, name="lippmann"
