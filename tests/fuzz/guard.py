@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import resource
 import signal
 import sys
@@ -80,6 +81,8 @@ def _faults_of(error: LippmannError) -> list[str]:
     line = str(error)
     if not line or len(line.splitlines()) != 1:
         faults.append(f"{type(error).__name__} is not one line: {line[:200]!r}")
+    if re.search("bad_alloc|std::|MemoryError|length_error", line):
+        faults.append(f"tells of memory as a library does: {line[:200]}")
     cause: BaseException | None = error
     for _ in range(20):
         if isinstance(cause, MemoryError):

@@ -1,11 +1,17 @@
-"""Folders as one input: each file behind a line with its name."""
+"""Folders as one input: each file behind a line with its name.
+
+A file that begins with :data:`LINK` becomes a link to what follows, one that is :data:`PIPE` a pipe that nobody writes
+into.
+"""
 
 from __future__ import annotations
 
+import os
 import re
 from itertools import zip_longest
 from pathlib import Path
 
+LINK, PIPE = b"<link>", b"<pipe>"
 _HEAD = re.compile(rb"^=== ([A-Za-z0-9_.-]{1,60}(?:/[A-Za-z0-9_.-]{1,60}){0,5})\n", re.M)
 
 
@@ -28,6 +34,16 @@ def unpack(data: bytes, folder: Path) -> None:
             if path.parent not in made:
                 path.parent.mkdir(parents=True, exist_ok=True)
                 made.add(path.parent)
-            path.write_bytes(data[head.end() : end].removesuffix(b"\n"))
-        except OSError:  # a file where a folder should be, or the other way round
+            _make(path, data[head.end() : end].removesuffix(b"\n"))
+        except (OSError, ValueError):  # a file where a folder should be, or the other way round
             continue
+
+
+def _make(path: Path, content: bytes) -> None:
+    if content.startswith(LINK):
+        # Inside the folder, or to nothing at all: what an input leads to must not depend on the machine.
+        os.symlink(content.removeprefix(LINK).lstrip(b"/").replace(b"..", b"")[:80] or b"nothing", path)
+    elif content == PIPE:
+        os.mkfifo(path)
+    else:
+        path.write_bytes(content)

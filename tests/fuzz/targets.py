@@ -7,24 +7,28 @@ from __future__ import annotations
 
 import io
 import json
+import os
 import re
 import shutil
 from collections.abc import Callable
+from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
 from unittest import mock
 
+from lippmann.cli import run
 from lippmann.cli.commands.sequence import frame_range, numbered
 from lippmann.cli.shared import parse
 from lippmann.cluster.address import parse_target
+from lippmann.codecs.ktx2 import Ktx2Error, decode_ktx2
 from lippmann.codecs.pfm import read_pfm
 from lippmann.display import load_display
 from lippmann.display.formats.inline_spec import display_of_short_form
 from lippmann.display.formats.looking_glass import display_of_calibration
 from lippmann.display.formats.monitor_toml import monitor_of_tables
-from lippmann.errors import LippmannError, PictureError
+from lippmann.errors import LippmannError, PictureError, SceneError
 from lippmann.exchange.hci_parameters import read_parameters
 from lippmann.exchange.layouts import import_image
 from lippmann.image import compose, read_picture, streamed
@@ -53,7 +57,7 @@ from forms import (  # isort: skip
 )
 from guard import Read  # isort: skip
 from mutation import json_tree  # isort: skip
-from parcels import unpack  # isort: skip
+from parcels import LINK, PIPE, unpack  # isort: skip
 from vocabulary import VOCABULARY  # isort: skip
 
 CORPUS = Path(__file__).parent / "corpus"
@@ -134,6 +138,36 @@ def _environment(data: bytes, folder: Path) -> object:
 
 def _texture(data: bytes, folder: Path) -> object:
     return decode_image(data, "t.png", where="s.obj")
+
+
+def _ktx2(data: bytes, folder: Path) -> object:
+    try:
+        return decode_ktx2(data).sum()
+    except Ktx2Error as error:  # whoever reads textures tells it further, with a place
+        raise SceneError(str(error)).with_traceback(error.__traceback__) from None
+
+
+#: Commands whose words are tried: those that neither render nor serve.
+_TRIED = ("compare", "displays", "info", "quilt sizes", "quilt unpack", "views", "weave")
+
+
+def _command(data: bytes, folder: Path) -> object:
+    """Words of a command, one a line, in a folder with a picture."""
+    words = [line.decode("utf-8", "surrogateescape").replace("\0", "") for line in data.split(b"\n")][:12]
+    if words[0] not in _TRIED or any("/" in word or ".." in word for word in words):
+        return None
+    shutil.copy(CORPUS / "picture-png" / "seed-8.png", folder / "p.png")
+    before = os.getcwd()
+    os.chdir(folder)
+    try:
+        with redirect_stdout(io.StringIO()), redirect_stderr(io.StringIO()) as said:
+            code = run([*words[0].split(), *words[1:]])
+    finally:
+        os.chdir(before)
+    line = said.getvalue()
+    if "internal error" in line or "Traceback" in line:
+        raise RuntimeError(line)
+    return code
 
 
 def _cam(data: bytes, folder: Path) -> object:
@@ -356,6 +390,8 @@ _READERS: dict[str, Target] = {
     "mitsuba-xml": Target(_mitsuba),
     "environment": Target(_environment),
     "texture": Target(_texture, repair=png_repaired),
+    "ktx2": Target(_ktx2),
+    "command": Target(_command),
     "display-toml": Target(_toml),
     "short-form": Target(_short),
     "visual-json": Target(_visual, tree=json_tree),
@@ -383,8 +419,21 @@ _READERS: dict[str, Target] = {
     "viewer-request": Target(_viewer),
     "calibration-request": Target(_calibration, tree=body_tree),
 }
+#: Inputs that are whole folders, whose files may be links and pipes, too.
+_FOLDERS = (
+    "obj",
+    "mitsuba-xml",
+    "picture-zarr",
+    "pieces-zarr",
+    "journal",
+    "views-folder",
+    "layout-hci",
+    "layout-views",
+)
+_KINDS = (LINK, LINK + b"nothing", LINK + b".", PIPE, b"\n=== s.xml\n" + PIPE)
 TARGETS: dict[str, Target] = {
-    name: replace(target, words=VOCABULARY.get(name, ())) for name, target in _READERS.items()
+    name: replace(target, words=(*VOCABULARY.get(name, ()), *(_KINDS if name in _FOLDERS else ())))
+    for name, target in _READERS.items()
 }
 
 

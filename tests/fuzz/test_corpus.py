@@ -17,7 +17,10 @@ from targets import CORPUS, TARGETS, emptied, found, seeds
 from lippmann.errors import LippmannError
 
 #: Sound inputs that are refused for what they lack.
-REFUSED = {("layout-lftoolbox", "seed-5"): "has no display in it"}
+REFUSED = {
+    ("layout-lftoolbox", "seed-5"): "has no display in it",
+    ("layout-lftoolbox", "seed-5-packed"): "has no display in it",
+}
 
 
 @cache
