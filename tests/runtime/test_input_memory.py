@@ -42,6 +42,22 @@ def test_a_limit_counts_what_was_taken_since(machine):
         check_input((1 << 30) + 1, "a texture", where="m.glb")
 
 
+def test_libraries_do_not_count(machine):
+    """The engine alone takes some hundred megabytes."""
+    limit_inputs(64 << 20)
+    machine["has"] += 1 << 30
+    check_input(32 << 20, "a texture", where="m.glb")
+    with pytest.raises(MemoryLimitError, match="32 MiB are left"):
+        check_input(33 << 20, "a texture", where="m.glb")
+
+
+def test_what_is_free_again_does_not_count(machine):
+    limit_inputs(1 << 30)
+    for _ in range(100):
+        check_input(512 << 20, "a frame's texture", where="m.glb")
+    assert input_memory_left() == 1 << 30
+
+
 def test_many_small_things_are_as_much_as_a_large_one(machine):
     machine["free"] = 8 << 20
     for _ in range(15):

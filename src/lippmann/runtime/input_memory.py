@@ -18,11 +18,21 @@ _UNSEEN = 16 << 20
 
 @dataclass
 class _Limit:
-    """``most`` bytes beyond those that the process had at ``start``; ``unseen`` were granted without a look."""
+    """``most`` bytes, of which ``granted`` were asked for in all, since the process had ``start``.
+
+    What was granted may be free again, and what the process took besides may be libraries: the lesser of the two
+    counts. ``unseen`` bytes were granted without a look.
+    """
 
     most: int | None = None
     start: int = 0
+    granted: int = 0
     unseen: int = 0
+
+    @property
+    def taken(self) -> int:
+        """Bytes that are certainly taken for what files hold."""
+        return min(self.granted, max(0, _resident() - self.start))
 
 
 _limit: ContextVar[_Limit] = ContextVar("input memory")
@@ -51,9 +61,11 @@ def check_input(size: int, what: str, *, where: str) -> None:
     limit = _current()
     limit.unseen += size
     if limit.unseen < _UNSEEN:
+        limit.granted += size
         return
     limit.unseen = 0
     free, fix = _left(limit)
+    limit.granted += size
     if size > free:
         took = f"{what} takes {_amount(size)} of memory"
         raise MemoryLimitError(took, where=where, rule=f"{_amount(free)} are left", fix=fix)
@@ -76,7 +88,7 @@ def _left(limit: _Limit) -> tuple[int, str]:
     """Bytes, and what gives more."""
     free = machine.available_memory()
     if limit.most is not None:
-        left = max(0, limit.most - max(0, _resident() - limit.start))
+        left = max(0, limit.most - limit.taken)
         if left < free:
             return left, "allow more with memory=..."
     return free, "close other programs, or use a machine with more memory"
