@@ -25,8 +25,8 @@ from lippmann.scene.scene import Scene
 
 #: Samples that a pooled picture is made of where no number is given: half a second of two cores.
 SAMPLE_BUDGET = 1 << 20
-#: Fewest and most samples that a pixel gets of them; all three sub-pixels together have at least six.
-_FEWEST, _FEWEST_OF_SUBPIXELS, _MOST = 4, 2, 16
+#: Fewest and most samples that a pixel gets of them; sub-pixels of very large pictures have two each.
+_FEWEST, _FEWEST_OF_MANY, _MANY, _MOST = 4, 2, 1 << 24, 16
 #: By how much the samples of a picture may be multiplied that is not clean with them, by the values that it has at
 #: most. Beyond that a pass takes minutes: who asks for so large a picture may say how clean it shall be.
 _RESERVE = {SAMPLE_BUDGET: 8, 1 << 24: 4, 1 << 25: 2}
@@ -91,8 +91,9 @@ def _choose_samples(request: RenderRequest, size: tuple[int, int] | None) -> int
     """Samples per pixel, or sub-pixel, where no number is given: a power of two for pooled light."""
     if request.method != "pooled" or size is None:
         return DEFAULT_SPP
-    fewest = _FEWEST_OF_SUBPIXELS if request.subpixels else _FEWEST
-    allowed = SAMPLE_BUDGET / (size[0] * size[1] * request.channels)
+    values = size[0] * size[1] * request.channels
+    fewest = _FEWEST_OF_MANY if request.subpixels and values > _MANY else _FEWEST
+    allowed = SAMPLE_BUDGET / values
     return min(max(1 << max(round(math.log2(allowed)), 0), fewest), _MOST)
 
 
