@@ -50,6 +50,7 @@ JUDGED, REFERENCE_SAMPLES = 3000, 512
 #: Points of the panel, along its longer side, at which the central eye looks.
 SEEN = 150
 CELL, LABEL = 150, 14
+BACKGROUND = (30, 30, 30)
 PICTURE = Path(__file__).parent.parent / "docs" / "images" / "first-pictures.png"
 
 
@@ -138,6 +139,16 @@ def judge(model: object, name: str, image_path: Path) -> tuple[dict[str, object]
     return figures, Image.fromarray(quantize(shown, 8, "srgb"))
 
 
+def contact_sheet(columns: int) -> Image.Image:
+    """The sheet of the last run, so that displays not named keep their rows; empty where its size was another."""
+    size = CELL * columns, (CELL + LABEL) * len(DISPLAYS)
+    if PICTURE.exists():
+        with Image.open(PICTURE) as last:
+            if last.size == size:
+                return last.convert("RGB")
+    return Image.new("RGB", size, BACKGROUND)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--scenes", type=Path)
@@ -145,10 +156,11 @@ def main() -> None:
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         found = models(Path(folder), options.scenes)
-        sheet = Image.new("RGB", (CELL * len(found), (CELL + LABEL) * len(DISPLAYS)), (30, 30, 30))
+        sheet = contact_sheet(len(found))
         rows = [old for old in saved("first_picture").get("pictures", []) if old["display"] not in options.only]
         for display in options.only:
-            row = options.only.index(display)
+            row = DISPLAYS.index(display)
+            sheet.paste(BACKGROUND, (0, row * (CELL + LABEL), sheet.width, (row + 1) * (CELL + LABEL)))
             for column, (name, model) in enumerate(found.items()):
                 figures, picture = judge(model, display, Path(folder) / "picture.png")
                 rows.append({"model": name, **figures})
@@ -161,7 +173,7 @@ def main() -> None:
                 sheet.paste(picture, corner)
                 words = f"{name}, {display}" if column == 0 else name
                 ImageDraw.Draw(sheet).text((column * CELL + 3, row * (CELL + LABEL) + CELL), words, fill="white")
-        sheet.crop((0, 0, sheet.width, (CELL + LABEL) * len(options.only))).save(PICTURE, optimize=True)
+        sheet.save(PICTURE, optimize=True)
     save("first_picture", {"pictures": sorted(rows, key=lambda each: DISPLAYS.index(each["display"]))})
 
 

@@ -76,6 +76,23 @@ def test_the_middle_s_ground_truth_is_that_of_its_view(display, picture, tmp_pat
             np.testing.assert_array_equal(read_pfm(tmp_path / "hci" / f"gt_{kind}_{size}.pfm"), own)
 
 
+def test_the_middle_s_heights_are_shades_for_eyes(display, picture, tmp_path):
+    made = display("square", lenses=(12, 9), pixels=3, distance=500)
+    image = picture(made, stored="uint8", depth=True)
+    there_and_back(image, tmp_path / "hci", "uint8")
+    shown = np.asarray(Image.open(tmp_path / "hci" / "depth_in_mm.png"))
+    heights = light_field_of(image, "uint8").maps["depth"][1, 1]
+    times = -(-128 // 9)
+    assert shown.shape == (9 * times, 12 * times + 96, 3)
+    shades = shown[times // 2 :: times, times // 2 : 12 * times : times, 0]
+    seen = np.isfinite(heights)
+    found = heights[seen]
+    share = (found - found.min()) / np.ptp(found)
+    np.testing.assert_allclose(shades[seen] / 255, 0.15 + 0.85 * share, atol=1 / 255)
+    assert (shades[~seen] == 0).all()
+    assert (shown[:, 12 * times :] == 255).any()
+
+
 @pytest.mark.parametrize("distance", [np.inf, 400.0])
 def test_depth_and_disparity_agree_by_the_file_s_own_parameters(display, picture, tmp_path, distance):
     image = picture(display("square", distance=distance), stored="uint8", depth=True)

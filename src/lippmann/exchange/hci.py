@@ -7,6 +7,8 @@
 - ``..._lowres`` and ``..._highres``: the middle view (with an even number of views the one after the middle). The
   second has ``depth_map_scale`` times the resolution of the first, here 1.
 - ``..._lowres_Cam000`` and so on: every view, as in the benchmark's set "all views".
+
+``depth_in_mm.png`` shows the middle view's heights to eyes, with a legend; it is not part of the layout and never read.
 """
 
 from __future__ import annotations
@@ -20,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.codecs.pfm import read_pfm, write_pfm
+from lippmann.color.transfer import quantize
 from lippmann.display import Display
 from lippmann.errors import PictureError
 from lippmann.exchange.cameras import Cameras
@@ -28,11 +31,15 @@ from lippmann.exchange.light_field import DEPTH, LightField, check_rectangular, 
 from lippmann.exchange.metadata_text import read_note_file, write_note_file
 from lippmann.exchange.view_folder import read_view_files, write_view
 from lippmann.image import Provenance
+from lippmann.image.height_shades import height_legend, height_shades
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.runtime.atomic_write import replacing_folder
 
 LAYOUT = "hci"
+HEIGHTS = "depth_in_mm.png"
 
+#: A legend can be read from so many rows on.
+_LEGEND_ROWS = 128
 _VIEW = re.compile(r"input_Cam(\d{3,6})\.png")
 _METRE = 1000.0
 
@@ -88,6 +95,7 @@ def write_hci(
         disparities = None
         if truth is not None:
             middle = down // 2, across // 2
+            _show_heights(temporary / HEIGHTS, _heights(light_field.maps[DEPTH], light_field.mask)[middle])
             for end in ("lowres", "highres"):
                 truth.write(temporary, middle, end)
             disparities = truth.disparity[middle][np.isfinite(truth.depth[middle])]
@@ -143,6 +151,15 @@ def _view_names(folder: Path, parameters: Parameters) -> list[list[str]]:
 
 
 # ---- Ground truth --------------------------------------------------------------------------------------------------
+
+
+def _show_heights(path: Path, heights: NDArray[np.float64]) -> None:
+    """Heights ``(v, u)`` as shades beside a legend; views of few pixels are enlarged to the legend's height."""
+    shades, ends = height_shades(heights, np.isfinite(heights))
+    times = -(-_LEGEND_ROWS // len(shades))
+    enlarged = np.repeat(np.repeat(shades, times, axis=0), times, axis=1)[..., None].repeat(3, axis=2)
+    codes = np.concatenate([enlarged, height_legend(len(enlarged), ends)], axis=1)
+    write_view(path, "png", quantize(codes, 8, "linear"), "srgb")
 
 
 def _heights(depth: NDArray[Any], mask: NDArray[np.bool_] | None) -> NDArray[np.float64]:
