@@ -124,7 +124,7 @@ def _child(name: str, inputs: int, seed: int, seconds: float) -> Iterator[dict[s
         if number != before:
             before, since = number, cpu
         ended, status = os.waitpid(child, os.WNOHANG)
-        hangs = not ended and cpu - since > _PATIENCE
+        hangs = not ended and cpu - since > max(_PATIENCE, 2 * TARGETS[name].seconds)
         if hangs:
             os.kill(child, signal.SIGKILL)
             ended, status = os.waitpid(child, 0)
@@ -154,7 +154,7 @@ def _run(name: str, inputs: int, seed: int, seconds: float, shared: mmap.mmap, r
     try:
         with quiet() as said:
             for data in sound:  # libraries are loaded, and say what they say of themselves
-                judge(target.read, data, emptied(folder))
+                judge(target.read, data, emptied(folder), target.seconds)
             said()
             bound = _memory_in_use() + MEMORY
             _bound_memory(bound)
@@ -162,12 +162,7 @@ def _run(name: str, inputs: int, seed: int, seconds: float, shared: mmap.mmap, r
                 data = mutator.next()
                 shared[_HEAD.size : _HEAD.size + len(data)] = data
                 _HEAD.pack_into(shared, 0, done + 1, len(data))
-                outcome = judge(target.read, data, emptied(folder))
-                if "emory" in outcome.broken:
-                    # Room that is asked for and never used takes none: what counts is what is used.
-                    _bound_memory(bound + 2 * MEMORY)
-                    outcome = judge(target.read, data, emptied(folder))
-                    _bound_memory(bound)
+                outcome = judge(target.read, data, emptied(folder), target.seconds)
                 done += 1
                 broken = outcome.broken
                 if printed := said():

@@ -7,6 +7,7 @@ import re
 import shutil
 import signal
 import subprocess
+import sys
 import time
 from urllib.request import urlopen
 
@@ -302,3 +303,24 @@ def test_a_scene_goes_to_each_worker_once(lab, tmp_path):
     for keys in logs.values():
         parts = [key for key in keys if key.removeprefix("scene-") in names]
         assert len(parts) == len(set(parts)) <= len(names)
+
+
+def test_workers_that_end_while_they_start_are_one_line(tmp_path):
+    """As the kernel does when memory is short: the process is gone before it has said anything."""
+    preload = tmp_path / "ends.py"
+    preload.write_text("import os\n\n\ndef dask_setup(worker):\n    os._exit(9)\n")
+    code = "from lippmann.cli import main; main()"
+    words = ["render", "teapot", "--display", "seed-lenticular", "--spp", "1", "--cluster", "local:2", "-o", "p.png"]
+    ended = subprocess.run(
+        [sys.executable, "-c", code, *words],
+        env={**os.environ, "DASK_DISTRIBUTED__WORKER__PRELOAD": str(preload)},
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+    assert ended.returncode == 1
+    assert ended.stderr.splitlines()[-1].startswith(
+        "lippmann: --cluster: the workers of this machine did not start (RuntimeError"
+    )
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["ends.py"]

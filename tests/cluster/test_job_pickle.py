@@ -24,7 +24,7 @@ def job_of(scene, **settings):
 
 
 def unpacked(parcel, folder):
-    return unpack(parcel.outline, parcel.names, [parcel.parts[name] for name in parcel.names], folder)
+    return unpack(parcel.key, parcel.outline, parcel.names, [parcel.parts[name] for name in parcel.names], folder)
 
 
 @pytest.fixture
@@ -118,7 +118,19 @@ def test_a_part_that_was_changed_on_the_way_is_found(tmp_path):
     parts[0] = np.array(parts[0])
     parts[0].ravel()[3] += 1
     with pytest.raises(ClusterError, match="damaged in transit"):
-        unpack(parcel.outline, parcel.names, parts, tmp_path)
+        unpack(parcel.key, parcel.outline, parcel.names, parts, tmp_path)
+
+
+@pytest.mark.parametrize("place", [0, 0.3, 0.9])
+def test_an_outline_that_was_changed_on_the_way_is_never_restored(tmp_path, place):
+    parcel = pack(job_of("teapot"))
+    outline = parcel.outline.copy()
+    outline[int(place * len(outline))] ^= 1
+    parts = [parcel.parts[name] for name in parcel.names]
+    with pytest.raises(ClusterError, match="damaged in transit"):
+        unpack(parcel.key, outline, parcel.names, parts, tmp_path)
+    with pytest.raises(ClusterError, match="damaged in transit"):
+        unpack(parcel.key, parcel.outline, parcel.names, parts[:-1], tmp_path)
 
 
 def test_content_is_more_than_bytes():

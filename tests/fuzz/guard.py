@@ -48,13 +48,14 @@ class Outcome:
     site: tuple[str, ...]
 
 
-def judge(read: Read, data: bytes, folder: Path) -> Outcome:
-    """Give an input to a reader, which may write into ``folder``."""
+def judge(read: Read, data: bytes, folder: Path, seconds: float | None = None) -> Outcome:
+    """Give an input to a reader, which may write into ``folder`` and take so many CPU seconds (:data:`SECONDS`)."""
+    seconds = SECONDS if seconds is None else seconds
     _forget_peak()
     peak = _peak()
     site: tuple[str, ...] = ("result",)
     faults: list[str] = []
-    with warnings.catch_warnings(record=True) as warned, _limit():
+    with warnings.catch_warnings(record=True) as warned, _limit(seconds):
         warnings.simplefilter("always")
         try:
             result = read(data, folder)
@@ -65,7 +66,7 @@ def judge(read: Read, data: bytes, folder: Path) -> Outcome:
             faults += _faults_of(error)
         except TooSlow as error:
             site = _site(error)
-            faults.append(f"takes more than {SECONDS:g} s of CPU time at {site[-1] if site else '?'}")
+            faults.append(f"takes more than {seconds:g} s of CPU time at {site[-1] if site else '?'}")
         except Exception as error:  # noqa: BLE001  # which is what is looked for
             site = _site(error)
             faults.append(f"{type(error).__name__}: {str(error)[:200]} at {site[-1] if site else '?'}")
@@ -119,12 +120,12 @@ def _forget_peak() -> None:
 
 
 @contextmanager
-def _limit() -> Iterator[None]:
+def _limit(seconds: float) -> Iterator[None]:
     def stop(*_: Any) -> None:
         raise TooSlow
 
     before = signal.signal(signal.SIGPROF, stop)
-    signal.setitimer(signal.ITIMER_PROF, SECONDS)
+    signal.setitimer(signal.ITIMER_PROF, seconds)
     try:
         yield
     finally:

@@ -9,8 +9,14 @@ import struct
 from collections.abc import Callable, Sequence
 from typing import Any
 
-#: Inputs are cut at this length: what is long is slow to read without being odder.
-LONGEST = 1 << 16
+#: Inputs are cut at this length.
+LONGEST = 1 << 19
+
+#: Damage makes inputs longer than this only where it is meant to: what is long is slow to read, seldom odder.
+_USUAL = 1 << 16
+
+#: Share of inputs that are made long, so that what readers do in pieces and tables meets damage, too.
+_LONG = 1 / 500
 
 #: Words are looked for in so many bytes, somewhere: in all of a long input that would take longer than reading it.
 _PART = 2048
@@ -77,6 +83,7 @@ class Mutator:
         pick = self._random
         # Half of all inputs come straight from a sound one: many kinds of damage at once end early.
         data = pick.choice(self._pool[: self._sound] if pick.random() < 0.5 else self._pool)
+        longest = len(data)
         for _ in range(pick.choice((1, 1, 1, 2, 2, 3, 5, 8))):
             if self._tree is not None and pick.random() < 0.4:
                 data = self._in_tree(data)
@@ -84,7 +91,9 @@ class Mutator:
                 data = pick.choice((self._in_bytes, self._in_bytes, self._in_words, self._in_words, self._in_lines))(
                     data
                 )
-            data = data[:LONGEST]
+            data = data[: max(_USUAL, longest)]
+        if pick.random() < _LONG:
+            data = self._long(data)
         if self._repair is not None and pick.random() < 0.5:
             data = self._repair(data)
         return data
@@ -93,6 +102,13 @@ class Mutator:
         start = self._random.randint(0, length)
         size = self._random.choice((1, 1, 2, 4, 8, 16, 64, 256, length))
         return start, min(length, start + size)
+
+    def _long(self, data: bytes) -> bytes:
+        """A part repeated until the whole is longer than 64 KiB, some of it damaged."""
+        pick, (start, stop) = self._random, self._span(len(data))
+        part = data[start:stop] or b"\0"
+        times = (pick.randrange(_USUAL, LONGEST) - len(data)) // len(part)
+        return (data[:start] + self._in_bytes(part * max(2, times)) + data[stop:])[:LONGEST]
 
     def _in_bytes(self, data: bytes) -> bytes:
         pick, changed = self._random, bytearray(data)

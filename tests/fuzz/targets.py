@@ -15,16 +15,21 @@ from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 from unittest import mock
 
+import numpy as np
+
+from lippmann.api import render
 from lippmann.cli import run
 from lippmann.cli.commands.sequence import frame_range, numbered
 from lippmann.cli.shared import parse
+from lippmann.cluster import job_pickle
 from lippmann.cluster.address import parse_target
 from lippmann.codecs.ktx2 import Ktx2Error, decode_ktx2
 from lippmann.codecs.pfm import read_pfm
-from lippmann.display import load_display
+from lippmann.display import Display, LensArray, Panel, load_display
 from lippmann.display.formats.inline_spec import display_of_short_form
 from lippmann.display.formats.looking_glass import display_of_calibration
 from lippmann.display.formats.monitor_toml import monitor_of_tables
@@ -36,11 +41,13 @@ from lippmann.image.metadata import from_text
 from lippmann.journal import DamagedTile, FrameJournal, TileGrid, TileStore, decode
 from lippmann.quilts import files as quilt_files
 from lippmann.quilts import quilt
+from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.scene.parsing.files import decode_image
 from lippmann.scene.readers.environment_map import read_environment
 from lippmann.scene.readers.gltf_animation.animated_file import MovingGltf
 from lippmann.scene.readers.load import load_scene
 from lippmann.scene.readers.tachyon.reader import read_cam
+from lippmann.tiles.job import make_job
 from lippmann.viewer.calibrate.site import CalibrationSite
 from lippmann.viewer.http_server import _Handler
 from lippmann.viewer.served_picture import PictureFile
@@ -55,7 +62,7 @@ from forms import (  # isort: skip
     tile_repaired,
     tile_tree,
 )
-from guard import Read  # isort: skip
+from guard import SECONDS, Read  # isort: skip
 from mutation import json_tree  # isort: skip
 from parcels import LINK, PIPE, unpack  # isort: skip
 from vocabulary import VOCABULARY  # isort: skip
@@ -73,17 +80,32 @@ class Target:
         Gives it an input, in a folder of its own that is empty; returns, or raises what the reader raises.
     words, tree, repair:
         As of :class:`mutation.Mutator`.
+    seconds:
+        CPU seconds that an input may take.
     """
 
     read: Read
     words: tuple[bytes, ...] = ()
     tree: Callable[[bytes], Any] | None = None
     repair: Callable[[bytes], bytes] | None = None
+    seconds: float = SECONDS
+
+
+def _format(name: str) -> str:
+    """The target whose inputs a target shares: what is rendered is what is read."""
+    return name.removeprefix("rendered-")
 
 
 def seeds(name: str) -> list[bytes]:
     """The sound inputs of a target."""
-    return [path.read_bytes() for path in sorted((CORPUS / name).glob("seed-*"))]
+    return list(named_seeds(name).values())
+
+
+def named_seeds(name: str) -> dict[str, bytes]:
+    """The sound inputs of a target by name."""
+    if name == "parcel":
+        return {"seed-now": _sound_parcel()}
+    return {path.name: path.read_bytes() for path in sorted((CORPUS / _format(name)).glob("seed-*"))}
 
 
 def found(name: str) -> list[Path]:
@@ -168,6 +190,53 @@ def _command(data: bytes, folder: Path) -> object:
     if "internal error" in line or "Traceback" in line:
         raise RuntimeError(line)
     return code
+
+
+#: CPU seconds for those that are rendered: a new kind of scene is compiled first.
+COMPILED = 10.0
+
+#: A display with few pixels: what is under fire is that the scene is built and traced.
+_FEW = Display("few", Panel(6, 4, 0.5), LensArray("square", 1.0), gap=2.0)
+
+
+def _rendered(name: str) -> Read:
+    """A scene built and traced, with all that its meshes, materials and textures may be."""
+
+    def render_scene(data: bytes, folder: Path) -> object:
+        if name in ("s.obj", "s.xml"):
+            unpack(data, folder)
+        else:
+            (folder / name).write_bytes(data)
+        return render(folder / name, _FEW, method="full", integrator="direct", spp=1).pixels.sum()
+
+    return render_scene
+
+
+#: Stands between the key, the outline, and the names and contents of the parts of a job on its way to a worker.
+_SEAM = b"<part>"
+
+
+@cache
+def _sound_parcel() -> bytes:
+    """A job as it is sent now: the corpus could only hold that of one version."""
+    with TemporaryDirectory() as folder:
+        path = Path(folder, "s.xml")
+        path.write_text(
+            '<scene version="3.0.0"><shape type="obj"><string name="filename" value="m.obj"/></shape></scene>'
+        )
+        Path(folder, "m.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+        job = make_job(load_scene(path), _FEW, RenderRequest(integrator="direct", spp=2), stored="uint8")
+        parcel = job_pickle.pack(job)
+    parts = [field for name in parcel.names for field in (name.encode(), parcel.parts[name].tobytes())]
+    return _SEAM.join([parcel.key.encode(), parcel.outline.tobytes(), *parts])
+
+
+def _parcel(data: bytes, folder: Path) -> object:
+    """A job on its way to a worker; whatever is not what was sent is refused before it is restored."""
+    key, outline, *parts = [*data.split(_SEAM), b""][: data.count(_SEAM) + 1 + (_SEAM not in data)]
+    names = [name.decode("latin-1") for name in parts[::2]]
+    contents = [np.frombuffer(part, np.uint8) for part in parts[1::2]]
+    return job_pickle.unpack(key.decode("latin-1"), np.frombuffer(outline, np.uint8), names, contents, folder)
 
 
 def _cam(data: bytes, folder: Path) -> object:
@@ -391,6 +460,10 @@ _READERS: dict[str, Target] = {
     "environment": Target(_environment),
     "texture": Target(_texture, repair=png_repaired),
     "ktx2": Target(_ktx2),
+    "rendered-gltf": Target(_rendered("s.gltf"), tree=json_tree, seconds=COMPILED),
+    "rendered-obj": Target(_rendered("s.obj"), seconds=COMPILED),
+    "rendered-mitsuba-xml": Target(_rendered("s.xml"), seconds=COMPILED),
+    "parcel": Target(_parcel),
     "command": Target(_command),
     "display-toml": Target(_toml),
     "short-form": Target(_short),
@@ -423,6 +496,8 @@ _READERS: dict[str, Target] = {
 _FOLDERS = (
     "obj",
     "mitsuba-xml",
+    "rendered-obj",
+    "rendered-mitsuba-xml",
     "picture-zarr",
     "pieces-zarr",
     "journal",
@@ -432,7 +507,7 @@ _FOLDERS = (
 )
 _KINDS = (LINK, LINK + b"nothing", LINK + b".", PIPE, b"\n=== s.xml\n" + PIPE)
 TARGETS: dict[str, Target] = {
-    name: replace(target, words=(*VOCABULARY.get(name, ()), *(_KINDS if name in _FOLDERS else ())))
+    name: replace(target, words=(*VOCABULARY.get(_format(name), ()), *(_KINDS if name in _FOLDERS else ())))
     for name, target in _READERS.items()
 }
 

@@ -41,7 +41,13 @@ PLANE RING TRI STRI BOX SCAPE VERTEXARRAY POLYCYLINDER EXTBOX SCALARVOL
 scene version include filename default path integrator sensor film sampler texture bsdf shape emitter medium phase
 volume spectrum rgb float integer boolean string point vector transform matrix lookat rotate scale translate ref id
 alias name value type $spp m.ply s.xml lamps.xml ../s.xml /etc/passwd obj cube bitmap envmap instance shapegroup
-homogeneous hdrfilm specfilm width height batch plugin <!-- --> <!DOCTYPE <!ENTITY CDATA &amp; &x; <?xml encoding
+homogeneous heterogeneous hdrfilm specfilm width height batch plugin diffuse dielectric thindielectric roughdielectric
+conductor roughconductor hair measured plastic roughplastic bumpmap normalmap blendbsdf mask twosided principled
+principledthin null area point constant spot projector directional directionalarea sunsky isotropic hg rayleigh sggx
+checkerboard mesh_attribute volume_adapter gridvolume constvolume uniform srgb blackbody irregular ply serialized sphere
+cylinder disk rectangle bsplinecurve linearcurve sdfgrid ellipsoids ellipsoidsmesh merge independent stratified aov path
+volpath ptracer direct moment depth stokes perspective thinlens orthographic distant radiancemeter irradiancemeter
+fileresolver <!-- --> <!DOCTYPE <!ENTITY CDATA &amp; &x; <?xml encoding
 """,
     "environment": "#?RADIANCE #?RGBE FORMAT= 32-bit_rle_rgbe EXPOSURE= -Y +X +Y 2 4 channels dataWindow tiles box2i",
     "texture": "IHDR PLTE tRNS IDAT IEND iCCP JFIF Exif RIFF WEBP VP8 VP8L VP8X BM GIF89a P3 P6 P7",

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,7 +15,7 @@ from lippmann.color.transfer import quantize
 from lippmann.display import Display, LensArray, Panel
 from lippmann.errors import PictureError
 from lippmann.image import IntegralImage, read_picture, streamed
-from lippmann.image.write import write_plain_picture
+from lippmann.image.write import write_picture, write_plain_picture
 from lippmann.viewer import served_picture
 from lippmann.viewer.served_picture import PictureFile
 from lippmann.viewer.tiles import Tiles
@@ -69,3 +72,49 @@ def test_a_large_picture_is_read_piece_by_piece(tmp_path, monkeypatch, bits):
     assert isinstance(opened, streamed.LargePicture)
     expected = quantize(read_picture(path).pixels, 8, "srgb")
     np.testing.assert_array_equal(Tiles(opened, 7).codes("picture", 1, 1), expected[7:14, 7:14])
+
+
+WATCHED = """
+import sys
+from pathlib import Path
+from lippmann.viewer.served_picture import PictureFile
+
+
+def used(word):
+    return int(next(line for line in open("/proc/self/status") if line.startswith(word)).split()[1]) * 1024
+
+
+PictureFile(Path(sys.argv[2])).current()  # loads the decoders
+open("/proc/self/clear_refs", "w").write("5")
+before = used("VmRSS")
+served = PictureFile(Path(sys.argv[1])).current()
+print(used("VmRSS") - before, used("VmHWM") - before)
+"""
+
+
+@pytest.mark.skipif(not Path("/proc/self/clear_refs").exists(), reason="the system does not tell a process's memory")
+@pytest.mark.parametrize(
+    ("name", "stored", "held", "read"),
+    [
+        ("p.png", "uint8", 3, 6),
+        ("p.png", "uint16", 6, 12),
+        ("p.exr", "float16", 12, 24),
+        ("p.exr", "float32", 12, 24),
+    ],
+)
+def test_the_server_takes_the_memory_that_is_documented(tmp_path, name, stored, held, read):
+    side = 2000
+    made = Display("big", Panel(side, side, 0.05), LensArray("square", 0.5), gap=1.0)
+    noise = np.random.default_rng(2).random((side, side, 3), dtype=np.float32)
+    write_picture(IntegralImage(noise, made, stored=stored), tmp_path / name)
+    write_picture(IntegralImage(PIXELS, DISPLAY, stored=stored), tmp_path / f"small-{name}")
+    said = subprocess.run(
+        [sys.executable, "-c", WATCHED, str(tmp_path / name), str(tmp_path / f"small-{name}")],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    shown, peak = (int(word) / side**2 for word in said.stdout.split())
+    slack = 4.0  # buffers of a file's own size, which the system takes back late
+    assert 0.8 * held < shown < held + slack
+    assert shown < peak < read + slack

@@ -138,23 +138,31 @@ def _started_here(distributed: Any, count: int, threads: int | None) -> Iterator
         # Dask's HTTP servers answer everyone and cannot be disabled, so they get no pages.
         pages: dict[str, Any] = {"distributed.scheduler.http.routes": [], "distributed.worker.http.routes": []}
         with dask.config.set({"temporary-directory": folder, **pages}):
-            cluster = distributed.LocalCluster(
-                n_workers=count,
-                threads_per_worker=1,
-                processes=True,
-                host=LOOPBACK,
-                security=security,
-                # Without an address the scheduler's HTTP server would be open to the network.
-                dashboard_address=f"{LOOPBACK}:0",
-                scheduler_kwargs={"dashboard": False},
-                worker_dashboard_address=None,
-                local_directory=folder,
-                memory_limit=machine.total_memory() // count,
-                silence_logs=logging.CRITICAL,
-                env={THREADS_VARIABLE: str(each)},
-                # Workers that are started later as replacements have the same configuration.
-                config=copy.deepcopy(dask.config.config),
-            )
+            try:
+                cluster = distributed.LocalCluster(
+                    n_workers=count,
+                    threads_per_worker=1,
+                    processes=True,
+                    host=LOOPBACK,
+                    security=security,
+                    # Without an address the scheduler's HTTP server would be open to the network.
+                    dashboard_address=f"{LOOPBACK}:0",
+                    scheduler_kwargs={"dashboard": False},
+                    worker_dashboard_address=None,
+                    local_directory=folder,
+                    memory_limit=machine.total_memory() // count,
+                    silence_logs=logging.CRITICAL,
+                    env={THREADS_VARIABLE: str(each)},
+                    # Workers that are started later as replacements have the same configuration.
+                    config=copy.deepcopy(dask.config.config),
+                )
+            except (OSError, TimeoutError, RuntimeError) as error:
+                why = " ".join(str(error).split())[:200]
+                raise ClusterError(
+                    f"the workers of this machine did not start ({type(error).__name__}: {why})",
+                    parameter="cluster",
+                    fix="run it again, with fewer workers if memory is short",
+                ) from None
         with cluster, distributed.Client(cluster, set_as_default=False, name="lippmann") as client:
             # The active memory manager would remove copies of the scene from workers between tiles.
             client.amm.stop()

@@ -68,12 +68,14 @@ def pack(job: TileJob) -> Parcel:
 
 
 def unpack(
-    outline: NDArray[np.uint8], names: Sequence[str], parts: Sequence[NDArray[np.generic]], folder: Path
+    key: str, outline: NDArray[np.uint8], names: Sequence[str], parts: Sequence[NDArray[np.generic]], folder: Path
 ) -> TileJob:
     """Restore a job that :func:`pack` serialized.
 
     Parameters
     ----------
+    key:
+        SHA-256 of the whole job.
     outline:
         ``(n,)`` uint8: the pickled job without its parts.
     names:
@@ -86,8 +88,11 @@ def unpack(
     Raises
     ------
     ClusterError
-        If a part does not have the content of its hash.
+        If the outline or a part does not have the content of its hash.
     """
+    # Before anything is restored: a damaged outline could stand for any object.
+    if _HASH(outline.tobytes()).hexdigest() != key or len(names) != len(parts):
+        raise ClusterError("the outline of the scene was damaged in transit")
     by_name = dict(zip(names, parts, strict=True))
     for name, part in by_name.items():
         if content_name(part) != name:

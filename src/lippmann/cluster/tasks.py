@@ -128,7 +128,7 @@ def _prepared(
 
         _current.clear()  # one scene at a time
         with scratch_folder("lippmann-scene-") as folder:
-            job = unpack(outline, names, parts, Path(folder))
+            job = unpack(key, outline, names, parts, Path(folder))
             job = replace(job, request=replace(job.request, threads=engine_threads()))
             _current[key] = prepare(job)
     return _current[key]

@@ -116,6 +116,8 @@ class MitsubaSource:
         except SceneError:
             raise
         except Exception as error:  # noqa: BLE001  # of all kinds, for a misspelt word
+            if isinstance(error, MemoryError) or "bad_alloc" in str(error):
+                raise SceneError("the scene needs more memory than there is", where=self.name) from None
             message = " ".join(self._with_origins(str(error)).split())[:_LONGEST_MESSAGE]
             raise SceneError(f"Mitsuba refuses the scene: {message}", where=self.name) from None
         if not isinstance(loaded, mi.Scene):

@@ -16,6 +16,7 @@ from typing import Any
 LENGTH = struct.Struct("<Q")
 #: Seconds without a request after which the process ends, and its memory is free.
 _IDLE_SECONDS = 5.0
+NO_MEMORY = "more memory than there is would be needed"
 
 
 def main() -> None:
@@ -55,9 +56,9 @@ def _try(variant: str, text: str, memory: int) -> str | None:
     try:
         return fault_of_meshes(mi, mi.load_string(text))
     except MemoryError:
-        return "more memory than there is would be needed"
-    except Exception:  # noqa: BLE001  # whoever loads it next gets the same, with a place to tell it
-        return None
+        return NO_MEMORY
+    except Exception as error:  # noqa: BLE001  # whoever loads it next gets the same, with a place to tell it
+        return NO_MEMORY if "bad_alloc" in str(error) else None
     finally:
         gc.collect()
 
@@ -72,7 +73,9 @@ def fault_of_meshes(mi: Any, scene: Any) -> str | None:
             continue
         vertices = len(values[name.removesuffix("faces") + "vertex_positions"]) // 3
         faces = np.asarray(values[name])
-        if len(faces) and faces.max() >= vertices:
+        if not len(faces):
+            return "a mesh has no triangles"
+        if faces.max() >= vertices:
             return f"a mesh names vertex {int(faces.max())}; it has {vertices}"
     return None
 

@@ -241,6 +241,7 @@ def _placed_faces(piece: Piece) -> IndexArray:
 
 def _has_area(piece: Piece) -> bool:
     corners = _placed_positions(piece)[_placed_faces(piece)]
+    corners = corners.astype(np.float64)  # products of large coordinates go beyond single precision
     return bool(np.any(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])))
 
 
