@@ -133,6 +133,14 @@ def test_an_outline_that_was_changed_on_the_way_is_never_restored(tmp_path, plac
         unpack(parcel.key, parcel.outline, parcel.names, parts[:-1], tmp_path)
 
 
+@pytest.mark.parametrize("of_file", [False, True])
+def test_a_part_that_did_not_arrive_is_missed(xml, tmp_path, of_file):
+    parcel = pack(job_of(xml if of_file else "teapot"))
+    names = parcel.names[1:]
+    with pytest.raises(ClusterError, match="lost in transit"):
+        unpack(parcel.key, parcel.outline, names, [parcel.parts[name] for name in names], tmp_path)
+
+
 def test_content_is_more_than_bytes():
     flat = np.zeros(8, np.float32)
     assert content_name(flat) != content_name(flat.reshape(2, 4))

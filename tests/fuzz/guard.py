@@ -17,8 +17,10 @@ from pathlib import Path
 from typing import Any
 
 from lippmann.errors import LippmannError
+from lippmann.runtime.input_memory import limit_inputs
 
 #: CPU seconds and bytes of memory that one input may take. Seconds of the clock would measure the machine's load.
+#: Readers are granted a quarter of the bytes for what files hold, and have to ask first.
 SECONDS = 2.0
 MEMORY = 1 << 30
 
@@ -57,6 +59,7 @@ def judge(read: Read, data: bytes, folder: Path, seconds: float | None = None) -
     faults: list[str] = []
     with warnings.catch_warnings(record=True) as warned, _limit(seconds):
         warnings.simplefilter("always")
+        limit_inputs(MEMORY // 4)
         try:
             result = read(data, folder)
             if isinstance(result, bytes):
@@ -70,6 +73,8 @@ def judge(read: Read, data: bytes, folder: Path, seconds: float | None = None) -
         except Exception as error:  # noqa: BLE001  # which is what is looked for
             site = _site(error)
             faults.append(f"{type(error).__name__}: {str(error)[:200]} at {site[-1] if site else '?'}")
+        finally:
+            limit_inputs(None)
     faults += [f"warning: {entry.category.__name__}: {str(entry.message)[:200]}" for entry in warned]
     if _peak() - peak > MEMORY:
         faults.append(f"takes {(_peak() - peak) >> 20} MiB")

@@ -489,7 +489,8 @@ _READERS: dict[str, Target] = {
     "layout-eslf": Target(_layout_file("l.png", "eslf"), repair=png_repaired),
     "parameters-cfg": Target(_parameters),
     "pfm": Target(_pfm),
-    "viewer-request": Target(_viewer),
+    # A long input is thousands of requests of one connection.
+    "viewer-request": Target(_viewer, seconds=5 * SECONDS),
     "calibration-request": Target(_calibration, tree=body_tree),
 }
 #: Inputs that are whole folders, whose files may be links and pipes, too.

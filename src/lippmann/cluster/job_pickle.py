@@ -22,6 +22,7 @@ from lippmann.tiles.job import TileJob
 SMALLEST_PART = 4096
 
 _HASH = hashlib.sha256
+_INCOMPLETE = "a part of the scene was lost in transit"
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,7 +89,7 @@ def unpack(
     Raises
     ------
     ClusterError
-        If the outline or a part does not have the content of its hash.
+        If the outline or a part does not have the content of its hash, or a part is missing.
     """
     # Before anything is restored: a damaged outline could stand for any object.
     if _HASH(outline.tobytes()).hexdigest() != key or len(names) != len(parts):
@@ -101,6 +102,8 @@ def unpack(
     assert isinstance(job, TileJob)
     if files is None:
         return job
+    if not by_name.keys() >= set(files.values()):
+        raise ClusterError(_INCOMPLETE)
     paths = {}
     for key, name in files.items():
         paths[key] = path = folder.joinpath(*PurePosixPath(key).parts)
@@ -166,4 +169,6 @@ class _Unpacker(pickle.Unpickler):
         self._parts = parts
 
     def persistent_load(self, name: Any) -> NDArray[np.generic]:
+        if name not in self._parts:
+            raise ClusterError(_INCOMPLETE)
         return self._parts[name]

@@ -40,6 +40,8 @@ _MOST_COUNT = 1 << 20
 
 #: Limit on characters of a line: the parser's time is quadratic in them.
 _LONGEST_LINE = 1000
+#: Limit on characters of the whole, which has a dozen lines.
+_LONGEST = 1 << 16
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,8 +104,8 @@ def read_parameters(path: Path) -> Parameters:
     try:
         check_kind(path, PictureError)
         text = path.read_text(encoding="utf-8")
-        if max(map(len, text.splitlines()), default=0) > _LONGEST_LINE:
-            raise PictureError("is no list of parameters", where=str(path), rule="its lines are short")
+        if len(text) > _LONGEST or max(map(len, text.splitlines()), default=0) > _LONGEST_LINE:
+            raise PictureError("is no list of parameters", where=str(path), rule="it and its lines are short")
         parser.read_string(text)
     except FileNotFoundError:
         raise PictureError("is not there", where=str(path)) from None

@@ -19,6 +19,7 @@ from lippmann.errors import SceneError
 from lippmann.runtime.engine_lock import exclusive
 from lippmann.scene.mitsuba_plugins import check_plugins_of
 from lippmann.scene.mitsuba_trial import try_scene
+from lippmann.scene.mitsuba_trial_child import NO_ROOM
 from lippmann.scene.mitsuba_xml import MitsubaXml, read_mitsuba_xml
 from lippmann.scene.values.description import Camera, Color, Environment
 
@@ -116,7 +117,7 @@ class MitsubaSource:
         except SceneError:
             raise
         except Exception as error:  # noqa: BLE001  # of all kinds, for a misspelt word
-            if isinstance(error, MemoryError) or "bad_alloc" in str(error):
+            if isinstance(error, MemoryError) or NO_ROOM.search(str(error)):
                 raise SceneError("the scene needs more memory than there is", where=self.name) from None
             message = " ".join(self._with_origins(str(error)).split())[:_LONGEST_MESSAGE]
             raise SceneError(f"Mitsuba refuses the scene: {message}", where=self.name) from None

@@ -31,6 +31,10 @@ class _Child:
     parent: int
 
 
+class RefusedSceneError(Exception):
+    """Mitsuba's own words for what is wrong with a scene."""
+
+
 _child: _Child | None = None
 
 
@@ -48,6 +52,8 @@ def try_scene(text: str, variant: str, where: str) -> None:
 
     Raises
     ------
+    RefusedSceneError
+        Mitsuba refuses the scene, in its own words.
     SceneError
         The scene ends the process that loads it, takes more than the free memory or :data:`MOST_SECONDS`, or holds a
         mesh whose triangles name vertices that it does not have.
@@ -59,9 +65,11 @@ def try_scene(text: str, variant: str, where: str) -> None:
     if isinstance(answer, int):
         end = f"signal {-answer}" if answer < 0 else f"exit status {answer}"
         raise SceneError(f"Mitsuba breaks down at the scene ({end})", where=where, fix=_FIX)
-    fault = json.loads(answer)
-    if fault is not None:
-        raise SceneError(f"Mitsuba would be misled: {fault}", where=where, fix=_FIX)
+    found = json.loads(answer)
+    if "refusal" in found:
+        raise RefusedSceneError(found["refusal"])
+    if "fault" in found:
+        raise SceneError(f"Mitsuba would be misled: {found['fault']}", where=where, fix=_FIX)
 
 
 def _ask(request: bytes) -> bytes | int | None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import select
 import struct
 import sys
@@ -16,6 +17,8 @@ from typing import Any
 LENGTH = struct.Struct("<Q")
 #: Seconds without a request after which the process ends, and its memory is free.
 _IDLE_SECONDS = 5.0
+#: What C++ calls it when memory is short, in messages of Mitsuba's.
+NO_ROOM = re.compile("bad_alloc|bad_array_new_length|length_error")
 NO_MEMORY = "more memory than there is would be needed"
 
 
@@ -41,8 +44,8 @@ def _is_asked() -> bool:
     return bool(select.select([0], [], [], _IDLE_SECONDS)[0])
 
 
-def _try(variant: str, text: str, memory: int) -> str | None:
-    """Load a scene. Gives what is wrong with its meshes; None if they are sound, or Mitsuba refuses it by itself."""
+def _try(variant: str, text: str, memory: int) -> dict[str, str]:
+    """Load a scene. Gives the ``fault`` of what Mitsuba takes, or its ``refusal`` in its own words; else nothing."""
     import gc
 
     import mitsuba as mi
@@ -54,11 +57,13 @@ def _try(variant: str, text: str, memory: int) -> str | None:
     mi.set_log_level(mi.LogLevel.Error)
     search_package_alone(mi)
     try:
-        return fault_of_meshes(mi, mi.load_string(text))
+        fault = fault_of_meshes(mi, mi.load_string(text))
+        return {} if fault is None else {"fault": fault}
     except MemoryError:
-        return NO_MEMORY
-    except Exception as error:  # noqa: BLE001  # whoever loads it next gets the same, with a place to tell it
-        return NO_MEMORY if "bad_alloc" in str(error) else None
+        return {"fault": NO_MEMORY}
+    except Exception as error:  # noqa: BLE001  # of all kinds, for a misspelt word
+        # It may be refused here and bring the next process down: whoever asks does not load it.
+        return {"fault": NO_MEMORY} if NO_ROOM.search(str(error)) else {"refusal": str(error) or type(error).__name__}
     finally:
         gc.collect()
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import codecs
 import difflib
 import io
+import os
 import re
 from collections.abc import Sequence
 from pathlib import Path, PurePosixPath, PureWindowsPath
@@ -179,8 +180,14 @@ def _is_absolute(name: str) -> bool:
     return PurePosixPath(name.replace("\\", "/")).is_absolute() or PureWindowsPath(name).is_absolute()
 
 
+#: Limit on characters of a path: what systems allow.
+_LONGEST_PATH = 4096
+
+
 def _lies_in(path: Path, folder: Path) -> bool | None:
     """Whether a file lies in ``folder`` or deeper, wherever links lead; None of a name that no file can have."""
+    if len(os.fspath(path)) > _LONGEST_PATH:  # each part of it would be looked up
+        return None
     try:
         return path.resolve().is_relative_to(folder.resolve())
     except (OSError, ValueError, RuntimeError):  # a NUL, a name too long, links that run in a circle

@@ -72,6 +72,10 @@ class _Geometry:
     material_of: Integers
 
 
+#: Material libraries that a file may name: each is looked for in its folder.
+_MOST_LIBRARIES = 1000
+
+
 def read_obj(path: Path, *, allow_outside: bool = False) -> SceneDescription:
     """Read an OBJ file; faces of one material become one mesh.
 
@@ -339,10 +343,15 @@ def _read_libraries(libraries: Lines, path: Path, allow_outside: bool) -> tuple[
     """All materials of all libraries, the first of each name, and notes on the libraries that are not there."""
     records: dict[str, MtlRecord] = {}
     notes: list[str] = []
+    named: set[str] = set()
     for body, number in zip(libraries.bodies, libraries.numbers, strict=True):
-        if not body:
+        if not body or body in named:
             continue
         where = f"{path.name}:{number}"
+        if len(named) == _MOST_LIBRARIES:
+            rule = f"at most {_MOST_LIBRARIES} are looked for"
+            raise SceneError("names too many material libraries", where=where, rule=rule, fix="join them")
+        named.add(body)
         # One name with spaces, or several names: only the folder can tell.
         plain = uncommented(body)
         whole = next((name for name in (body, plain) if is_file(path.parent / name)), None)

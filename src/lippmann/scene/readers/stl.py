@@ -73,7 +73,7 @@ def _binary_positions(data: bytes, where: str) -> FloatArray:
 def _text_positions(text: str, where: str) -> FloatArray:
     """Vertices ``(3 facets, 3)``; words other than vertices, such as normals, are not looked at."""
     text = text.lower()
-    opened, closed = len(re.findall(r"(?m)^\s*solid\b", text)), len(re.findall(r"(?m)^\s*endsolid\b", text))
+    opened, closed = (len(re.findall(rf"(?m)^[ \t]*{word}\b", text)) for word in ("solid", "endsolid"))
     if opened != closed:
         raise SceneError(f"has {opened} 'solid' and {closed} 'endsolid'", where=where, fix="is it cut short?")
     # A space for each remark keeps the lines, and with them their numbers.
