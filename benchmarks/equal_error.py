@@ -127,7 +127,7 @@ def _measure(stage: Stage, references: Path | None) -> dict[str, Any]:
     judge = Judge(stage, references)
     curves: dict[str, list[Point]] = {"full": [], "full + oidn": [], "pooled": []}
     for samples in SAMPLES:
-        traced, picture = timed(lambda samples=samples: _trace(stage, samples, 3))
+        traced, picture = timed(lambda samples=samples: trace_paths(stage, samples, 3))
         curves["full"].append({"spp": samples, "seconds": traced, **judge(picture)})
         for effort in ("fast", "high"):
             _denoised(stage, judge, curves, (samples, effort), traced, picture)
@@ -183,14 +183,16 @@ def once(call: Callable[[], T]) -> tuple[float, T]:
 
 
 class Judge:
-    """Squared errors by two references that know nothing of each other."""
+    """Squared errors by two references that know nothing of each other: ``pictures``, or long ones of paths."""
 
-    def __init__(self, stage: Stage, file: Path | None) -> None:
+    def __init__(self, stage: Stage, file: Path | None, pictures: NDArray[np.float32] | None = None) -> None:
         from lippmann.metrics.mse_psnr import micro_image_means
 
         self._display, self._means = stage.display, micro_image_means
-        found = kept(file, lambda: {"pictures": [_trace(stage, REFERENCE, seed) for seed in (1001, 2002)]})
-        self._references = [coded(picture) for picture in found["pictures"]]
+        if pictures is None:
+            found = kept(file, lambda: {"pictures": [trace_paths(stage, REFERENCE, seed) for seed in (1001, 2002)]})
+            pictures = found["pictures"]
+        self._references = [coded(picture) for picture in pictures]
         own = ((self._references[0] - self._references[1]) ** 2).mean() / 2
         #: PSNR of a single reference.
         self.own_psnr = _psnr(own)
@@ -212,7 +214,7 @@ def _psnr(error: float) -> float:
     return -10 * math.log10(max(error, 1e-9))
 
 
-def _trace(stage: Stage, samples: int, seed: int) -> Picture:
+def trace_paths(stage: Stage, samples: int, seed: int) -> Picture:
     from lippmann.rendering.film.wavefront import trace_frame
     from lippmann.rendering.film.wavefront_plan import make_plan
 

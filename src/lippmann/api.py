@@ -23,7 +23,16 @@ from typing import TYPE_CHECKING, Literal, cast
 from lippmann.display import Display, load_display
 from lippmann.progress import ProgressCallback, silent
 from lippmann.progress_bar import shown
-from lippmann.rendering.request.choices import Denoiser, Device, Integrator, Method, Order, PixelFilter, ToneMap
+from lippmann.rendering.request.choices import (
+    Caustics,
+    Denoiser,
+    Device,
+    Integrator,
+    Method,
+    Order,
+    PixelFilter,
+    ToneMap,
+)
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.scene.placement import Placement, PlacementOptions
 from lippmann.scene.readers.load import load_scene as _load_scene
@@ -105,6 +114,7 @@ def render(
     subpixels: bool | None = None,
     pixel_filter: PixelFilter = "auto",
     denoise: Denoiser = "auto",
+    caustics: Caustics = "paths",
     exposure: float | Literal["auto"] = "auto",
     tone_map: ToneMap = "none",
     layers: bool = False,
@@ -165,6 +175,9 @@ def render(
     denoise:
         ``oidn`` denoises by Open Image Denoise with the effort that the traced rays deserve, ``oidn-fast`` and
         ``oidn-high`` with a given one, ``none`` not at all. ``auto`` (default): as the method needs it.
+    caustics:
+        Light that mirrors, glass and smooth gloss throw onto rough surfaces: ``paths`` (default) as paths find it,
+        ``photons`` traced from the emitters, ``none`` left out.
     exposure:
         Stops (EV) by which light is raised or lowered, -40 to 40. ``auto`` (default): 0, and for scenes with physical
         light sources what brings the median of what is lit to mid-grey.
@@ -216,6 +229,7 @@ def render(
         subpixels=subpixels,
         pixel_filter=pixel_filter,
         denoise=denoise,
+        caustics=caustics,
         exposure=exposure,
         tone_map=tone_map,
         layers=layers,

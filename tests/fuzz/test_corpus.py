@@ -72,11 +72,12 @@ def test_what_broke_a_reader_once_does_so_no_more(name, looked_at):
     [
         ("obj", b"=== s.obj\n" + b"".join(b"mtllib %d.mtl\n" % number for number in range(40_000)) + b"f 1 2 3\n"),
         ("obj", b"=== s.obj\n" + b"mtllib none.mtl\n" * 100_000 + b"f 1 2 3\n"),
+        ("obj", b"=== s.obj\nmtllib " + b"none.mtl " * 50_000 + b"\nf 1 2 3\n"),
         ("obj", b"=== s.obj\nmtllib " + b"a/" * 200_000 + b"\nf 1 2 3\n"),
         ("stl", b"solid" + b"\n" * 200_000 + b"facet"),
         ("parameters-cfg", b"[intrinsics]\nfocal_length_mm = 1\n" + b" f\n" * 150_000),
     ],
-    ids=["libraries", "one library", "folders", "blank lines", "lines"],
+    ids=["libraries", "one library", "one line of libraries", "folders", "blank lines", "lines"],
 )
 def test_long_inputs_end_in_time(name, data, looked_at):
     assert looked_at(name, data) == ""

@@ -51,10 +51,15 @@ def _unit_float(bits: UInt32) -> Float:
 
 @dataclass
 class SampleStream:
-    """The samples of one wavefront: lane-wise pixel ``key`` (hashed with the seed) and sample ``index``."""
+    """The samples of one wavefront: lane-wise pixel ``key`` (hashed with the seed) and sample ``index``.
+
+    ``half``, 0 or 1, says for which half of a picture they are, where its samples are kept in two that know nothing of
+    each other.
+    """
 
     key: UInt32
     index: UInt32
+    half: UInt32 | int = 0
 
     @staticmethod
     def of_pixels(pixel: UInt32, index: UInt32, seed: UInt32) -> SampleStream:
@@ -63,7 +68,7 @@ class SampleStream:
 
     def at(self, index: UInt32) -> SampleStream:
         """The same pixels' points of the samples with the numbers ``index`` (UInt32)."""
-        return SampleStream(self.key, index)
+        return SampleStream(self.key, index, self.half)
 
     def _shuffle(self, dimension: UInt32) -> tuple[UInt32, UInt32]:
         seed = hash32(self.key + mi.UInt32(dimension) * 0x9E3779B9)

@@ -149,7 +149,9 @@ class Session:
         """
         return self.watch.stage(
             "build",
-            lambda: self._expose(_make_integrator(self.built, self.request, frame_from_world, source), source),
+            lambda: self._expose(
+                _make_integrator(self.built, self.request, frame_from_world, source, self.memory), source
+            ),
         )
 
     def _expose(self, integrator: Integrator, source: RaySource) -> Integrator:
@@ -209,6 +211,7 @@ class Session:
                 *self.notes,
                 *notes,
                 *self._exposure_notes(),
+                *self._caustics_notes(),
                 *_frame_notes(frame),
                 *self._warn_of_emptiness(frame, work, has_pixels),
             ),
@@ -218,6 +221,20 @@ class Session:
         if self.request.exposure != "auto" or "exposure" not in self.choices:
             return ()
         return (f"exposure {self.choices['exposure']:+.2f} EV: physical light, its median at mid-grey",)
+
+    def _caustics_notes(self) -> tuple[str, ...]:
+        from lippmann.device.pbr import BuiltScene
+        from lippmann.rendering.transport.caustic_photons import hides_caustics
+
+        request, built = self.request, self.built
+        if request.integrator != "path" or request.caustics != "paths" or request.surfaces < 2:
+            return ()
+        if not isinstance(built, BuiltScene) or not hides_caustics(built.mitsuba):
+            return ()
+        return (
+            "paths hardly find what mirrors, glass or gloss throw onto other surfaces from lamps as small as here, and "
+            "no estimate of the error knows of it: --caustics photons",
+        )
 
     def _warn_of_emptiness(self, frame: Frame, work: int, has_pixels: bool) -> tuple[str, ...]:
         from lippmann.rendering.film.seen_share import nothing_seen, seen_share
@@ -315,9 +332,10 @@ def _build(scene: Scene, request: RenderRequest, memory: int) -> BuiltScene | Bu
 
 
 def _make_integrator(
-    built: BuiltScene | BuiltClassic, request: RenderRequest, frame_from_world: Matrix, source: RaySource
+    built: BuiltScene | BuiltClassic, request: RenderRequest, frame_from_world: Matrix, source: RaySource, memory: int
 ) -> Integrator:
     from lippmann.device.whitted.scene import BuiltClassic
+    from lippmann.rendering.transport.caustic_photons import make_photon_map
     from lippmann.rendering.transport.emitter_weights import make_light_sampler
     from lippmann.rendering.transport.path import PathIntegrator
     from lippmann.rendering.transport.scene_features import make_scene_features
@@ -329,6 +347,11 @@ def _make_integrator(
         return WhittedIntegrator(built, request.surfaces)
     if request.integrator in ("path", "direct"):
         if built.has_media:
+            if request.caustics != "paths":
+                rule = "this scene has participating media, through which photons are not traced"
+                raise UsageError(
+                    f"'{request.caustics}' will not do", parameter="caustics", rule=rule, fix="leave it out"
+                )
             return VolumePathIntegrator(built.mitsuba, request.surfaces, request.integrator, built.background)
         features = make_scene_features(
             built.mitsuba, background=built.background, has_null=built.has_null, absorption=built.absorption
@@ -336,6 +359,8 @@ def _make_integrator(
         integrator = PathIntegrator(built.mitsuba, features, request.surfaces, name=request.integrator)
         if not built.borrowed:
             integrator.light_sampler = make_light_sampler(integrator, source)
+        if request.caustics != "paths":
+            integrator.photons = make_photon_map(integrator, request, memory)
         return integrator
     return SurfaceIntegrator(built.mitsuba, cast("SurfaceProperty", request.integrator), frame_from_world)
 

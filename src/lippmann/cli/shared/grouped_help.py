@@ -35,6 +35,7 @@ OPTION_GROUPS: Mapping[str, tuple[str, ...]] = {
         "--order",
         "--respect-gloss",
         "--pixel-filter",
+        "--caustics",
         "--seed",
     ),
     "Output": ("--output", "--open", "--bits", "--layers", "--maps", "--resume", "--json", "--quiet"),

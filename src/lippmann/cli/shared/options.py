@@ -70,6 +70,14 @@ PixelFilter = Annotated[
     choices.PixelFilter,
     typer.Option("--pixel-filter", help="box: over the pixel; point: at its centre. By default box, but for classic."),
 ]
+Caustics = Annotated[
+    choices.Caustics,
+    typer.Option(
+        "--caustics",
+        help="Light that mirrors and glass throw onto matt surfaces. paths: as paths find it; photons: sent by the"
+        " emitters, for small ones; none: without.",
+    ),
+]
 Device = Annotated[choices.Device, typer.Option("--device", help="Where to render; auto: the GPU if there is one.")]
 Threads = Annotated[int | None, typer.Option("--threads", help="CPU threads; all cores by default.")]
 

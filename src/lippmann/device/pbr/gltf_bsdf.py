@@ -14,6 +14,7 @@ light below the surface: such light is folded back up, as if the next slope refl
 from __future__ import annotations
 
 import functools
+import math
 from collections.abc import Callable
 
 from lippmann.device.pbr import microfacet
@@ -33,6 +34,15 @@ from lippmann.device.types import (
     UInt32,
     Vector3f,
 )
+
+#: The attribute that tells the normal of a surface's narrow lobe, in the frame of the interaction and on the viewer's
+#: side: that of the clear coat, else of the body; 0 where neither is narrow.
+SHARP_LOBE = "sharp_lobe"
+#: The attribute that tells the albedo of the light which a surface scatters alike in all directions, its opacity
+#: included; 0 for surfaces whose other layers dim it by direction (cloth), or whose normal is not the surface's own.
+LAMBERTIAN = "lambertian"
+#: A lobe is narrow whose GGX widths are below this.
+NARROW_ALPHA = 0.02
 
 
 def surface_bsdf(model: SurfaceModel) -> BSDF:
@@ -72,6 +82,14 @@ def _bsdf_class(variant: str) -> type[BSDF]:
             self.kinds = [kind for kind, there in present.items() if there]
             self.m_components = [int(mi.BSDFFlags(kind) | sides) for kind in self.kinds]
             self.m_flags = functools.reduce(lambda a, b: a | b, self.m_components)
+            self._is_directional = (
+                model.metal or model.sheen_color is not None or model.normal is not None or model.film is not None
+            )
+            glossy = model.metal or not model.dull
+            signals = [model.roughness] if glossy else []
+            if model.clearcoat_roughness is not None:
+                signals.append(model.clearcoat_roughness)
+            self._may_be_sharp = any(signal.may_be_below(math.sqrt(NARROW_ALPHA)) for signal in signals)
 
         # ---- what integrators call ----
 
@@ -128,6 +146,10 @@ def _bsdf_class(variant: str) -> type[BSDF]:
 
         def has_attribute(self, name: str, active: Bool = True) -> Bool:
             del active
+            if name == SHARP_LOBE:
+                return mi.Bool(self._may_be_sharp)
+            if name == LAMBERTIAN:
+                return mi.Bool(True)
             return mi.Bool(name in ("base_color", "normal", "roughness", "metallic", "transmission"))
 
         def eval_attribute_1(self, name: str, si: SurfaceInteraction3f, active: Bool = True) -> Float:
@@ -145,6 +167,10 @@ def _bsdf_class(variant: str) -> type[BSDF]:
                 flip = dr.select(si.wi.z < 0, mi.Float(-1), 1)
                 n = mapped_normal(self.model.normal, Place(si, active), flip)
                 return mi.Color3f(si.to_world(mi.Vector3f(n.x, n.y, n.z * flip))) & active
+            if name == LAMBERTIAN and not self._is_directional:
+                return self._lambertian(Place(si, active)) & active
+            if name == SHARP_LOBE and self._may_be_sharp:
+                return mi.Color3f(self._sharp_normal(surface_point(self.model, Place(si, active)))) & active
             return mi.Color3f(0)
 
         def eval_attribute(self, name: str, si: SurfaceInteraction3f, active: Bool = True) -> Color3f:
@@ -152,6 +178,35 @@ def _bsdf_class(variant: str) -> type[BSDF]:
 
         def to_string(self) -> str:
             return f"SurfaceBSDF[flags = {self.m_flags:#x}]"
+
+        # ---- narrow lobes ----
+
+        def _narrow(self, lobe: Lobe) -> Bool:
+            return dr.maximum(lobe.alpha.x, lobe.alpha.y) < NARROW_ALPHA
+
+        def _narrow_body(self, point: Point) -> Bool:
+            return self._narrow(point.lobe) if self.model.metal or not self.model.dull else mi.Bool(False)
+
+        def _narrow_coat(self, point: Point) -> Bool:
+            coat = point.coat
+            return mi.Bool(False) if coat is None else self._narrow(coat.lobe) & (coat.weight > 0)
+
+        def _sharp_normal(self, point: Point) -> Vector3f:
+            """See :data:`SHARP_LOBE`."""
+            up = mi.Vector3f(0, 0, 1)
+            n = dr.select(self._narrow_body(point), up if point.lobe.frame is None else point.lobe.frame.n, 0)
+            if point.coat is not None:
+                frame = point.coat.lobe.frame
+                n = dr.select(self._narrow_coat(point), up if frame is None else frame.n, n)
+            return mi.Vector3f(n.x, n.y, n.z * point.flip)
+
+        def _lambertian(self, place: Place) -> Color3f:
+            """See :data:`LAMBERTIAN`: what the factors of the diffuse term of :meth:`_scatter` make of it."""
+            point = surface_point(self.model, place)
+            albedo = point.base * (point.below * (1 - point.metallic) * (1 - point.transmission))
+            if point.coat is not None:
+                albedo = albedo * (1 - point.coat.weight)
+            return albedo if self.model.opacity is None else albedo * self.model.coverage(place)
 
         # ---- scattering ----
 

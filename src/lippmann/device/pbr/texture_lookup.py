@@ -242,6 +242,13 @@ class Signal:
         value = self.lookup.eval(place)
         return value if factor is None else value * factor
 
+    def may_be_below(self, least: float) -> bool:
+        """Whether a number may be less than ``least`` somewhere."""
+        if self.lookup is not None:
+            return True
+        values = self.factor.values if isinstance(self.factor, Table) else self.factor
+        return bool((np.array(values) < least).any())
+
     @property
     def follows_uv_only(self) -> bool:
         """Whether texture coordinates are all that the value depends on, the mesh's attributes nothing."""

@@ -242,6 +242,7 @@ class FullInBatches:
         seed = dr.opaque(mi.UInt32, self._seed) + stream_of * SEED_STEP
 
         stream = SampleStream.of_pixels(pixel * channels + channel, sample, seed)
+        stream.half = stream_of
         jitter = stream.next_2d(PIXEL_DIMENSION) if self._box_filter else mi.Point2f(0.5)
         ray = self._source.rays(column, row, channel, jitter)
         radiance, counts = self._integrator.sample(ray, stream, mi.Bool(True))

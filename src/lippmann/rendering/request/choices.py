@@ -12,6 +12,7 @@ Device = Literal["auto", "cpu", "gpu"]
 #: ``auto``: ``pbr-neutral`` for physically based light.
 ToneMap = Literal["auto", "none", "pbr-neutral"]
 Denoiser = Literal["auto", "none", "oidn", "oidn-fast", "oidn-high"]
+Caustics = Literal["paths", "photons", "none"]
 
 #: The methods that reuse points of one micro-image in others.
 REUSING: tuple[Method, ...] = ("lens-view", "interpolated")

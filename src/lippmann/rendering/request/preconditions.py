@@ -31,6 +31,7 @@ def check(request: RenderRequest, form: Form, display: Display | None) -> None:
     if form == "quilt":
         _check_quilt(request, display)
     _check_denoiser(request)
+    _check_caustics(request)
     _check_reuse(request)
     _check_goal(request)
 
@@ -65,6 +66,16 @@ def _check_denoiser(request: RenderRequest) -> None:
             parameter="denoise",
             rule="pooled shares denoised light",
             fix='use method="full", or leave denoise out',
+        )
+
+
+def _check_caustics(request: RenderRequest) -> None:
+    if request.caustics != "paths" and request.integrator != "path":
+        raise UsageError(
+            f"{request.integrator} has no caustics",
+            parameter="caustics",
+            rule="'photons' and 'none' are for integrator=\"path\"",
+            fix="leave it out",
         )
 
 

@@ -12,7 +12,16 @@ from numpy.typing import NDArray
 from lippmann.color.tone_map import pbr_neutral
 from lippmann.color.transfer import Transfer
 from lippmann.errors import UsageError
-from lippmann.rendering.request.choices import Denoiser, Device, Integrator, Method, Order, PixelFilter, ToneMap
+from lippmann.rendering.request.choices import (
+    Caustics,
+    Denoiser,
+    Device,
+    Integrator,
+    Method,
+    Order,
+    PixelFilter,
+    ToneMap,
+)
 from lippmann.scene.placement import Placement, PlacementOptions
 
 if TYPE_CHECKING:
@@ -33,6 +42,7 @@ _WORDS = {
     "pixel_filter": PixelFilter,
     "device": Device,
     "denoise": Denoiser,
+    "caustics": Caustics,
     "tone_map": ToneMap,
 }
 #: Lowest and highest values of the whole numbers.
@@ -90,6 +100,10 @@ class RenderRequest:
         ``oidn`` denoises by Open Image Denoise with the effort that the traced rays deserve
         (:mod:`~lippmann.rendering.denoise.cost_model`), ``oidn-fast`` and ``oidn-high`` with a given one, ``none`` not
         at all.
+    caustics:
+        For ``path``: light that mirrors, glass and smooth gloss throw from emitters onto rough surfaces. ``paths``
+        leaves it to paths, which find small emitters seldom and points and directions never; ``photons`` traces it from
+        the emitters, with a small blur; ``none`` leaves it out.
     exposure:
         Stops (EV) by which light is raised or lowered, -40 to 40; "auto": 0, and for scenes with physical light sources
         what brings the median of what is lit to mid-grey. The background's colour stays as it is.
@@ -129,6 +143,7 @@ class RenderRequest:
     subpixels: bool | None = None
     pixel_filter: PixelFilter = "auto"
     denoise: Denoiser = "auto"
+    caustics: Caustics = "paths"
     exposure: float | Literal["auto"] = "auto"
     tone_map: ToneMap = "none"
     layers: bool = False

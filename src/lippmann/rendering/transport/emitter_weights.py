@@ -116,7 +116,7 @@ def _squared_contributions(
         point = stream.next_2d(dimension)
         point.x = (mi.Float(emitter) + point.x) / emitters
         sampling = active & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
-        light, _ = integrator.direct_light(si, bsdf, point, sampling)
+        light, _, _ = integrator.direct_light(si, bsdf, point, sampling)
         squares += dr.square(dr.minimum(dr.mean(throughput * light / emitters), 1))
 
         bs, weight = bsdf.sample(context, si, stream.next_1d(dimension + 1), stream.next_2d(dimension + 2), active)

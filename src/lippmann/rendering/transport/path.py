@@ -11,6 +11,8 @@ Ray depth counts surfaces, the primary ray's hit being 1: at depth 1 a surface s
 
 from __future__ import annotations
 
+from typing import cast
+
 import drjit as dr
 import mitsuba as mi
 
@@ -29,7 +31,9 @@ from lippmann.device.types import (
 )
 from lippmann.rendering.transport.integrator import FirstHit, RayCounts
 from lippmann.rendering.transport.light_sampling import LightSampler, SceneLightSampler
+from lippmann.rendering.transport.photon_map import PhotonMap
 from lippmann.rendering.transport.scene_features import SceneFeatures
+from lippmann.rendering.transport.sharp_events import MOST_EVENTS, has_no_width, is_sharp, lambertian, sharp_lobe
 
 #: Straight-through surfaces that one ray may cross before it counts as blocked. Bounds the loop between many panes.
 MAX_CROSSINGS = 64
@@ -96,6 +100,9 @@ class PathIntegrator:
         self.light_sampler: LightSampler = SceneLightSampler(scene)
         self.gain: Float | None = None
         emitters = scene.emitters()
+        #: Photons of caustics in place of paths that would have to find them; None for paths.
+        self.photons: PhotonMap | None = None
+        self._environment = scene.environment()
         # A single delta emitter: more than one sample of it tells nothing more.
         self._single_delta = len(emitters) == 1 and bool(mi.has_flag(emitters[0].flags(), mi.EmitterFlags.Delta))
 
@@ -126,6 +133,9 @@ class PathIntegrator:
         vertex_delta = mi.Bool(True)
         vertex_samples = mi.UInt32(1)  # emitter samples taken there
         all_specular = mi.Bool(True)  # no emitter has been sampled yet
+        rough = mi.UInt32(0)  # events that were not sharp
+        sharp = mi.UInt32(0)  # sharp events since the last of them, straight-through surfaces excluded
+        by_photons = mi.Spectrum(0)  # share of the light met by sharp events from here on that photons bring
         samples_at_start, start = first_emitter_samples(stream.index)
         shown_background = mi.Spectrum(0 if background is None else background)
         if dr.hint(self.gain is not None, mode="scalar"):
@@ -154,6 +164,9 @@ class PathIntegrator:
             emission = ds.emitter.eval(si) * weight
             if dr.hint(background is not None, mode="scalar"):
                 emission = dr.select((depth == 0) & ~si.is_valid(), shown_background, emission)
+            if dr.hint(self.photons is not None, mode="scalar"):
+                is_caustic = (rough == 1) & (sharp > 0) & (sharp <= MOST_EVENTS) & si.is_valid()
+                emission = dr.select(is_caustic, emission * (1 - by_photons), emission)
             radiance += throughput * emission
 
             # ---- next-event estimation ----
@@ -166,10 +179,25 @@ class PathIntegrator:
                     dr.select(all_specular, samples_at_start, samples),
                     dr.select(all_specular, start, number),
                 )
+            lobe, lambert = mi.Vector3f(0), mi.Color3f(0)
+            if dr.hint(self.photons is not None, mode="scalar"):
+                lobe = sharp_lobe(si, bsdf, continues)
+                lambert = lambertian(si, bsdf, continues & (rough == 0))
+                lands = continues & (rough == 0) & (dr.max(lambert) > 0)
+                side = dr.select(si.wi.z * dr.dot(si.n, si.sh_frame.n) < 0, -si.n, si.n)
+                photons = cast("PhotonMap", self.photons)
+                caustics = photons.irradiance(
+                    si, mi.Vector3f(side), lobe, mi.UInt32(stream.half), self.depth - depth - 1, lands
+                )
+                radiance += dr.select(lands, throughput * lambert * caustics * dr.inv_pi, 0)
             last = number + samples
             while dr.hint(sampling, label="emitters"):
                 point = stream.at(number).next_2d(dimension)
-                light, tests = self.direct_light(si, bsdf, point, sampling, samples=mi.Float(samples))
+                light, ds, tests = self.direct_light(si, bsdf, point, sampling, samples=mi.Float(samples))
+                if dr.hint(self.photons is not None, mode="scalar"):
+                    is_caustic = (rough == 1) & (sharp < MOST_EVENTS) & is_sharp(si, lobe, si.to_local(ds.d))
+                    is_caustic &= self._is_near(ds)
+                    light = dr.select(is_caustic, light * (1 - by_photons), light)
                 radiance += throughput * light / mi.Float(samples)
                 shadow += tests
                 number += 1
@@ -180,6 +208,15 @@ class PathIntegrator:
                 context, si, stream.next_1d(dimension + 1), stream.next_2d(dimension + 2), continues
             )
             passes = mi.has_flag(bs.sampled_type, mi.BSDFFlags.Null)
+            if dr.hint(self.photons is not None, mode="scalar"):
+                is_event = continues & ~passes
+                keeps_sharp = has_no_width(bs.sampled_type) | is_sharp(si, lobe, bs.wo)
+                scattered = mi.Color3f(bsdf_weight) * bs.pdf
+                share = dr.select(scattered > 0, lambert * (dr.abs(bs.wo.z) * dr.inv_pi) / scattered, 0)
+                becomes_rough = is_event & ~keeps_sharp
+                by_photons = dr.select(becomes_rough & (rough == 0), dr.clip(share, 0, 1), by_photons)
+                rough += dr.select(becomes_rough, mi.UInt32(1), mi.UInt32(0))
+                sharp = dr.select(becomes_rough, mi.UInt32(0), sharp + dr.select(is_event, mi.UInt32(1), mi.UInt32(0)))
             throughput *= bsdf_weight
             eta *= bs.eta
             if dr.hint(self.features.has_absorption, mode="scalar"):
@@ -214,8 +251,8 @@ class PathIntegrator:
 
     def direct_light(
         self, si: SurfaceInteraction3f, bsdf: BSDFPtr, point: Point2f, active: Bool, samples: Float = 1
-    ) -> tuple[Spectrum, UInt32]:
-        """Radiance toward ``si.wi`` from the emitter that ``point`` samples, and the shadow rays traced.
+    ) -> tuple[Spectrum, DirectionSample3f, UInt32]:
+        """Radiance toward ``si.wi`` from the emitter that ``point`` samples, that sample, and the shadow rays traced.
 
         The radiance is divided by the pdf of the sample, and weighted by MIS against BSDF sampling, as one of
         ``samples`` emitter samples at this surface.
@@ -227,7 +264,13 @@ class PathIntegrator:
         reflected = value * light * weight
         lit &= dr.max(reflected) > 0
         visible, tests = self.visibility(si, ds, lit)
-        return dr.select(lit, reflected * visible, 0), tests
+        return dr.select(lit, reflected * visible, 0), ds, tests
+
+    def _is_near(self, ds: DirectionSample3f) -> Bool:
+        """Whether a sampled emitter is another than the environment."""
+        if self._environment is None:
+            return mi.Bool(True)
+        return ds.emitter != mi.EmitterPtr(self._environment)
 
     @dr.syntax
     def visibility(self, si: SurfaceInteraction3f, ds: DirectionSample3f, active: Bool) -> tuple[Spectrum, UInt32]:

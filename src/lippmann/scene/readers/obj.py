@@ -343,19 +343,21 @@ def _read_libraries(libraries: Lines, path: Path, allow_outside: bool) -> tuple[
     """All materials of all libraries, the first of each name, and notes on the libraries that are not there."""
     records: dict[str, MtlRecord] = {}
     notes: list[str] = []
-    named: set[str] = set()
+    looked_for = 0
+    seen: set[str] = set()
     for body, number in zip(libraries.bodies, libraries.numbers, strict=True):
-        if not body or body in named:
+        if not body or body in seen:
             continue
+        seen.add(body)
         where = f"{path.name}:{number}"
-        if len(named) == _MOST_LIBRARIES:
-            rule = f"at most {_MOST_LIBRARIES} are looked for"
-            raise SceneError("names too many material libraries", where=where, rule=rule, fix="join them")
-        named.add(body)
         # One name with spaces, or several names: only the folder can tell.
         plain = uncommented(body)
         whole = next((name for name in (body, plain) if is_file(path.parent / name)), None)
         for name in [whole] if whole else plain.split():
+            looked_for += 1
+            if looked_for > _MOST_LIBRARIES:
+                rule = f"at most {_MOST_LIBRARIES} are looked for"
+                raise SceneError("names too many material libraries", where=where, rule=rule, fix="join them")
             try:
                 library = resolve(path.parent, name, where=where, what="material library", allow_outside=allow_outside)
             except MissingFileError as error:

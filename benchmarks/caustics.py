@@ -1,0 +1,100 @@
+"""Caustics by photons and by paths: light found, error of pictures of few samples, and time.
+
+Three bundled scenes on the paper's display (160 rows of pixels), path light. References a and b are two long renderings
+with photons, 256 samples and two million emissions each, that know nothing of each other; the error of a picture p is
+the mean of (p - a)(p - b) in codes. Time is that of the processors over their number, photons included. How far the
+references agree is told beside.
+
+python benchmarks/caustics.py [--references FOLDER]
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from equal_error import CORES, REFERENCE, Judge, Picture, Stage, once, prepare, trace_paths
+from harness import kept, save
+
+SCENES = ("primitives", "small-balls", "gears")
+DISPLAY = "lenticular-8"
+SAMPLES = (4, 16, 64)
+
+
+def main() -> None:
+    words = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    words.add_argument("--references", type=Path)
+    given = words.parse_args()
+    results = {}
+    for name in SCENES:
+        file = given.references and given.references / f"caustics-{name}.npz"
+        results[name] = measure(name, file)
+        save("caustics", {"reference_spp": 2 * REFERENCE, "scenes": results})
+
+
+def measure(name: str, file: Path | None) -> dict[str, Any]:
+    stage = prepare(name, DISPLAY)
+    found = kept(file, lambda: {"pictures": np.stack([with_photons(stage, REFERENCE, seed) for seed in (1001, 2002)])})
+    stage.integrator.photons = None
+    judge = Judge(stage, None, found["pictures"])
+    rows: list[dict[str, Any]] = []
+    for samples in SAMPLES:
+        for way in ("paths", "photons"):
+            for method in ("full", "pooled"):
+                picture(stage, way, method, samples)  # compiles
+                seconds, pixels = once(lambda s=samples, w=way, m=method: picture(stage, w, m, s))
+                rows.append({"spp": samples, "way": way, "method": method, "seconds": seconds, **judge(pixels)})
+                print(name, rows[-1], flush=True)
+    stage.integrator.photons = None
+    light = {"paths": float(trace_paths(stage, REFERENCE, 5).mean()), "photons": float(found["pictures"].mean())}
+    return {"judge_psnr": judge.own_psnr, "mean_light": light, "rows": rows}
+
+
+def with_photons(stage: Stage, samples: int, seed: int) -> Picture:
+    shoot(stage, samples, seed)
+    return trace_paths(stage, samples, seed)
+
+
+def shoot(stage: Stage, samples: int, seed: int) -> None:
+    from lippmann.rendering.transport.caustic_photons import find_casters, shoot_photons
+
+    paths = stage.integrator
+    casters = find_casters(paths.scene)
+    paths.photons = shoot_photons(paths.scene, paths.features, casters, samples=samples, seed=seed)
+
+
+def picture(stage: Stage, way: str, method: str, samples: int) -> Picture:
+    """As the program makes it: halves with photons of their own; pooled by the effort that the rays deserve."""
+    from lippmann.rendering.denoise.cost_model import effort_of, traced_work
+    from lippmann.rendering.denoise.dual_buffer import Denoised
+    from lippmann.rendering.denoise.guided_denoiser import GuidedDenoiser
+    from lippmann.rendering.film.sample_batches import FullInBatches
+
+    stage.integrator.photons = None
+    if way == "photons":
+        shoot(stage, samples, 3)
+    batches = FullInBatches(stage.integrator, stage.source, seed=3, memory=4 << 30)
+    batches.add(samples)
+    if method == "full":
+        return batches.picture()
+    rays = batches.rays
+    work = traced_work(rays.primary, rays.shadow, rays.secondary) / (stage.source.width * stage.source.height)
+    denoiser = GuidedDenoiser(
+        stage.built,
+        stage.source,
+        stage.display_from_world,
+        seed=3,
+        box_filter=True,
+        memory=4 << 30,
+        threads=CORES,
+        effort=lambda: effort_of("oidn", work),
+        shares=True,
+    )
+    return Denoised(batches, denoiser.denoise, "srgb", CORES, denoiser.share).picture()
+
+
+if __name__ == "__main__":
+    main()

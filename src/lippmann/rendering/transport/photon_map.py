@@ -1,0 +1,188 @@
+"""Photons of caustics in cells, and the irradiance that they bring to a point.
+
+Photons are sorted by cell, so that a look-up goes through short runs of them, and sums never depend on the order of
+threads. Cells are hashed into buckets; a bucket may hold photons of other cells, which are told apart one by one.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from lippmann.device.types import Bool, Color3f, Point3f, SurfaceInteraction3f, UInt32, Vector3f
+from lippmann.rendering.transport.sharp_events import is_sharp
+
+Floats = NDArray[np.float32]
+
+#: The least cosine between the normals of a photon and of the point, and how far photons may lie from the tangent plane
+#: there, in radii.
+LEAST_AGREEMENT, FARTHEST_FROM_PLANE = 0.7, 0.4
+#: Limit on what interpolated normals may add to light that grazes the true surface.
+STEEPEST = 4.0
+_PRIMES = (73856093, 19349663, 83492791)
+
+
+@dataclass(frozen=True, eq=False)
+class Photons:
+    """Photons where they land; all arrays have ``n`` rows.
+
+    Attributes
+    ----------
+    position, normal, toward:
+        ``(n, 3)``: the point, the unit geometric normal on the side that the light comes from, and the unit direction
+        that it comes from; world space.
+    power:
+        ``(n, 3)``: flux that each stands for.
+    surfaces:
+        ``(n,)``: sharp events between the emitter and the point.
+    """
+
+    position: Floats
+    normal: Floats
+    toward: Floats
+    power: Floats
+    surfaces: NDArray[np.uint32]
+
+    def __len__(self) -> int:
+        return len(self.surfaces)
+
+    @staticmethod
+    def dark(count: int) -> Photons:
+        """So many photons without power, at the origin."""
+        point = np.zeros((count, 3), np.float32)
+        return Photons(point, point, point, point, np.zeros(count, np.uint32))
+
+    @staticmethod
+    def joined(parts: list[Photons]) -> Photons:
+        """All photons of several sets."""
+        names = ("position", "normal", "toward", "power", "surfaces")
+        return Photons(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
+
+
+class PhotonMap:
+    """Two sets of photons that know nothing of each other, one for either half of a picture's samples.
+
+    Parameters
+    ----------
+    halves:
+        The photons.
+    radius:
+        Of a look-up, in world units.
+    """
+
+    # Not a dataclass: Dr.Jit would take it for loop state and write its fields.
+    def __init__(self, halves: tuple[Photons, Photons], radius: float) -> None:
+        self.radius = radius
+        most = max(1, *(len(half) for half in halves))
+        self._bits = max(1, math.ceil(math.log2(most)))
+        starts, ordered, before = [], [], 0
+        for half in halves:
+            bucket = self._bucket_numbers(half.position)
+            order = np.argsort(bucket, kind="stable")
+            edges = np.searchsorted(bucket[order], np.arange((1 << self._bits) + 1))
+            starts.append(edges + before)
+            before += len(half)
+            ordered.append(Photons(*(getattr(half, name)[order] for name in vars(half))))
+        photons = Photons.joined(ordered)
+        if not len(photons):  # gathers need something to point at
+            photons = Photons.dark(1)
+        self._start = mi.UInt32(np.concatenate(starts).astype(np.uint32))
+        self._position, self._normal, self._toward, self._power = (
+            mi.Float(getattr(photons, name).astype(np.float32).ravel())
+            for name in ("position", "normal", "toward", "power")
+        )
+        self._surfaces = mi.UInt32(photons.surfaces)
+        self._r = dr.opaque(mi.Float, radius)
+
+    def _bucket_numbers(self, position: Floats) -> NDArray[np.uint32]:
+        # In single precision as on the device, so that both find the same cells.
+        cell = np.floor(position / np.float32(2 * self.radius)).astype(np.int32).astype(np.uint32)
+        mixed = cell[:, 0] * np.uint32(_PRIMES[0]) ^ cell[:, 1] * np.uint32(_PRIMES[1])
+        mixed ^= cell[:, 2] * np.uint32(_PRIMES[2])
+        return np.asarray(mixed & np.uint32((1 << self._bits) - 1), dtype=np.uint32)
+
+    @dr.syntax
+    def irradiance(
+        self,
+        si: SurfaceInteraction3f,
+        normal: Vector3f,
+        lobe: Vector3f,
+        half: UInt32,
+        surfaces: UInt32,
+        active: Bool,
+    ) -> Color3f:
+        """Irradiance by the photons around a point, of an Epanechnikov kernel.
+
+        Parameters
+        ----------
+        si:
+            The point.
+        normal:
+            Its geometric normal on the side that is seen.
+        lobe:
+            Of its narrow lobe (:func:`~lippmann.rendering.transport.sharp_events.sharp_lobe`): light that it reflects
+            sharply is no caustic here.
+        half:
+            0 or 1: which photons.
+        surfaces:
+            The most sharp events that a photon may have had.
+        """
+        r = self._r
+        p = mi.Point3f(si.p)
+        base = dr.floor((p - r) / (2 * r))
+        total = mi.Color3f(0)
+        corner = mi.UInt32(0)
+        first_bucket = half * ((1 << self._bits) + 1)
+        looking = mi.Bool(active)
+        while dr.hint(looking, label="cells"):
+            cell = base + mi.Vector3f(mi.Float(corner & 1), mi.Float((corner >> 1) & 1), mi.Float(corner >> 2))
+            bucket = first_bucket + self._bucket(cell)
+            number = dr.gather(mi.UInt32, self._start, bucket, looking)
+            end = dr.gather(mi.UInt32, self._start, bucket + 1, looking)
+            inside = looking & (number < end)
+            while dr.hint(inside, label="photons"):
+                q = dr.gather(mi.Point3f, self._position, number, inside)
+                apart = q - p
+                distance2 = dr.squared_norm(apart)
+                near = inside & (distance2 < r * r) & dr.all(dr.floor(q / (2 * r)) == cell)
+                if near:
+                    n = dr.gather(mi.Vector3f, self._normal, number, near)
+                    d = dr.gather(mi.Vector3f, self._toward, number, near)
+                    fits = near & (dr.dot(n, normal) > LEAST_AGREEMENT) & (dr.dot(d, normal) > 0)
+                    fits &= dr.abs(dr.dot(apart, normal)) < FARTHEST_FROM_PLANE * r
+                    fits &= dr.gather(mi.UInt32, self._surfaces, number, near) <= surfaces
+                    wo = si.to_local(d)
+                    fits &= ~is_sharp(si, lobe, wo)
+                    power = dr.gather(mi.Color3f, self._power, number, fits)
+                    # Photons know the true surface; it is shaded by its interpolated normal.
+                    power *= dr.minimum(dr.abs(wo.z) / dr.dot(d, normal), STEEPEST)
+                    total += dr.select(fits, power * (1 - distance2 / (r * r)), 0)
+                number += 1
+                inside &= number < end
+            corner += 1
+            looking &= corner < 8
+        return total * (2 / (dr.pi * r * r))
+
+    def _bucket(self, cell: Point3f) -> UInt32:
+        x, y, z = (mi.UInt32(mi.Int32(part)) * prime for part, prime in zip(cell, _PRIMES, strict=True))
+        return (x ^ y ^ z) & ((1 << self._bits) - 1)
+
+
+def irradiance_by_all(
+    photons: Photons, position: Floats, normal: Floats, radius: float, surfaces: int = 1 << 30
+) -> Floats:
+    """What :meth:`PhotonMap.irradiance` computes, photon by photon: ``(m, 3)`` at ``(m, 3)`` points without a lobe."""
+    apart = photons.position[None] - position[:, None]
+    distance2 = (apart**2).sum(axis=2)
+    fits = distance2 < radius**2
+    fits &= np.einsum("nk,mk->mn", photons.normal, normal) > LEAST_AGREEMENT
+    fits &= np.einsum("nk,mk->mn", photons.toward, normal) > 0
+    fits &= np.abs(np.einsum("mnk,mk->mn", apart, normal)) < FARTHEST_FROM_PLANE * radius
+    fits &= photons.surfaces[None] <= surfaces
+    weight = np.where(fits, 1 - distance2 / radius**2, 0)
+    return np.asarray(weight @ photons.power * 2 / (math.pi * radius**2), dtype=np.float32)

@@ -1,0 +1,57 @@
+"""Sharp events: scattering that keeps an image sharp, by mirrors, clear glass, smooth gloss and holes.
+
+Light that comes from an emitter by sharp events alone and then meets a rough surface is a *caustic* there; paths from
+the eye hardly ever find small emitters so. All other light is left to them.
+
+Whether an event is sharp follows from the surface and the two directions alone, not from the lobe that a direction was
+drawn from: so the division is exact however light is sampled. Lobes without width (delta) are sharp by themselves. A
+surface with a narrow lobe tells that lobe's normal, as the attribute :data:`~lippmann.device.pbr.gltf_bsdf.SHARP_LOBE`:
+reflection is sharp where the half vector lies near it, and all that goes through such a surface is.
+"""
+
+from __future__ import annotations
+
+import math
+
+import drjit as dr
+import mitsuba as mi
+
+from lippmann.device.pbr.gltf_bsdf import LAMBERTIAN, SHARP_LOBE
+from lippmann.device.types import Bool, BSDFPtr, Color3f, SurfaceInteraction3f, UInt32, Vector3f
+
+#: Sharp events between an emitter and a caustic, at most; light of more is left to paths.
+MOST_EVENTS = 6
+#: Cosine between half vector and normal from which on a reflection is sharp: that of 0.05 rad, 2.5 times the width of
+#: the widest lobe that counts as narrow.
+LEAST_COSINE = math.cos(0.05)
+
+
+def sharp_lobe(si: SurfaceInteraction3f, bsdf: BSDFPtr, active: Bool) -> Vector3f:
+    """Unit normal of a surface's narrow lobe in the frame of ``si``, on the side of ``si.wi``; 0 where it has none."""
+    told = active & bsdf.has_attribute(SHARP_LOBE, active)
+    return dr.select(told, mi.Vector3f(bsdf.eval_attribute_3(SHARP_LOBE, si, told)), 0)
+
+
+def is_sharp(si: SurfaceInteraction3f, lobe: Vector3f, wo: Vector3f) -> Bool:
+    """Whether scattering from ``wo`` to ``si.wi`` is sharp, by a lobe from :func:`sharp_lobe`."""
+    half = dr.normalize(si.wi + wo)
+    reflected = si.wi.z * wo.z > 0
+    return (dr.squared_norm(lobe) > 0) & (~reflected | (dr.dot(half, lobe) > LEAST_COSINE))
+
+
+def has_no_width(kind: UInt32) -> Bool:
+    """Whether a sampled lobe, by its ``mi.BSDFFlags``, is sharp whatever the directions."""
+    return (kind & int(mi.BSDFFlags.Delta | mi.BSDFFlags.Null)) != 0
+
+
+def lambertian(si: SurfaceInteraction3f, bsdf: BSDFPtr, active: Bool) -> Color3f:
+    """Albedo of the part of a surface's scattering that is the same in all directions; 0 where there is none.
+
+    It is the surface's own word (:data:`~lippmann.device.pbr.gltf_bsdf.LAMBERTIAN`), or the reflectance of a surface
+    that scatters in no other way.
+    """
+    told = active & bsdf.has_attribute(LAMBERTIAN, active)
+    value = dr.select(told, mi.Color3f(bsdf.eval_attribute_3(LAMBERTIAN, si, told)), 0)
+    kinds = bsdf.flags() & int(mi.BSDFFlags.All)
+    plain = active & ~told & (kinds == int(mi.BSDFFlags.DiffuseReflection))
+    return dr.select(plain, mi.Color3f(bsdf.eval_diffuse_reflectance(si, plain)), value)

@@ -1,0 +1,103 @@
+"""Look-ups of photons against the sum over all of them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+pytestmark = pytest.mark.usefixtures("engine")
+
+
+def scattered(count, seed, *, flat=True):
+    """Photons about the plane z = 0 in a square of side 1, some of them elsewhere and from below."""
+    from lippmann.rendering.transport.photon_map import Photons
+
+    random = np.random.default_rng(seed)
+    position = random.uniform(-0.5, 0.5, (count, 3))
+    position[:, 2] *= 0.02 if flat else 1
+    toward = random.normal(size=(count, 3))
+    toward[:, 2] = np.abs(toward[:, 2])
+    toward[: count // 10, 2] *= -1
+    toward /= np.linalg.norm(toward, axis=1, keepdims=True)
+    normal = np.tile([0.0, 0.0, 1.0], (count, 1))
+    normal[::7] = [0.0, 1.0, 0.0]
+    power = random.uniform(0, 2, (count, 3))
+    arrays = (np.asarray(each, dtype=np.float32) for each in (position, normal, toward, power))
+    return Photons(*arrays, random.integers(1, 5, count).astype(np.uint32))
+
+
+def looked_up(photon_map, points, half, surfaces, active=True):
+    import drjit as dr
+    import mitsuba as mi
+
+    si = dr.zeros(mi.SurfaceInteraction3f, len(points))
+    si.p = mi.Point3f(np.ascontiguousarray(points.T))
+    si.n = mi.Normal3f(0, 0, 1)
+    si.sh_frame = mi.Frame3f(mi.Vector3f(0, 0, 1))
+    si.wi = mi.Vector3f(0, 0, 1)
+    found = photon_map.irradiance(
+        si, mi.Vector3f(0, 0, 1), mi.Vector3f(0), mi.UInt32(half), mi.UInt32(surfaces), mi.Bool(active)
+    )
+    return np.array(found + dr.zeros(mi.Color3f, len(points))).T
+
+
+@pytest.mark.parametrize("radius", [0.004, 0.05, 0.3, 2.0])
+@pytest.mark.parametrize("flat", [True, False])
+def test_a_look_up_is_the_sum_over_all_photons(radius, flat):
+    from lippmann.rendering.transport.photon_map import PhotonMap, irradiance_by_all
+
+    halves = scattered(3000, 1, flat=flat), scattered(500, 2, flat=flat)
+    photon_map = PhotonMap(halves, radius)
+    random = np.random.default_rng(3)
+    points = random.uniform(-0.6, 0.6, (400, 3)).astype(np.float32) * [1, 1, 0.01]
+    points = points.astype(np.float32)
+    normal = np.tile(np.float32([0, 0, 1]), (400, 1))
+    for half, surfaces in ((0, 9), (1, 9), (0, 2), (1, 0)):
+        found = looked_up(photon_map, points, half, surfaces)
+        expected = irradiance_by_all(halves[half], points, normal, radius, surfaces)
+        np.testing.assert_allclose(found, expected, rtol=2e-4, atol=1e-4 * max(1e-9, expected.max()))
+    assert (looked_up(photon_map, points, 0, 0) == 0).all()  # each has had one event at least
+
+
+def test_nothing_is_brought_by_no_photons_and_to_lanes_that_do_not_ask():
+    from lippmann.rendering.transport.photon_map import PhotonMap, Photons
+
+    points = np.zeros((3, 3), np.float32)
+    assert (looked_up(PhotonMap((Photons.dark(0), Photons.dark(0)), 1.0), points, 0, 9) == 0).all()
+    some = PhotonMap((scattered(99, 1), scattered(99, 2)), 1.0)
+    assert (looked_up(some, points, 0, 9) > 0).all()
+    assert (looked_up(some, points, 0, 9, active=False) == 0).all()
+
+
+def test_a_narrow_lobe_keeps_what_it_reflects_sharply():
+    """That light is seen in the surface, not gathered on it."""
+    import drjit as dr
+    import mitsuba as mi
+
+    from lippmann.rendering.transport.photon_map import PhotonMap, Photons
+
+    up = np.float32([[0, 0, 1]])
+    straight = Photons(np.zeros((1, 3), np.float32), up, up, np.ones((1, 3), np.float32), np.ones(1, np.uint32))
+    si = dr.zeros(mi.SurfaceInteraction3f, 1)
+    si.sh_frame = mi.Frame3f(mi.Vector3f(0, 0, 1))
+    for wi, kept in (((0.0, 0.0, 1.0), 0.0), ((0.6, 0.0, 0.8), 2 / np.pi)):
+        si.wi = mi.Vector3f(*wi)
+        found = PhotonMap((straight, straight), 1.0).irradiance(
+            si, mi.Vector3f(0, 0, 1), mi.Vector3f(0, 0, 1), mi.UInt32(0), mi.UInt32(9), mi.Bool(True)
+        )
+        np.testing.assert_allclose(np.array(found).ravel(), kept, rtol=1e-6)
+
+
+def test_the_kernel_keeps_the_flux():
+    """Of photons spread evenly over a plane the irradiance is their flux over its area."""
+    from lippmann.rendering.transport.photon_map import PhotonMap, Photons
+
+    random = np.random.default_rng(5)
+    count = 200_000
+    position = np.float32(np.stack([*random.uniform(-1, 1, (2, count)), np.zeros(count)], axis=1))
+    up = np.tile(np.float32([0, 0, 1]), (count, 1))
+    power = np.full((count, 3), 4 * 2.5 / count, np.float32)
+    photons = Photons(position, up, up, power, np.ones(count, np.uint32))
+    points = np.float32(np.stack([*random.uniform(-0.8, 0.8, (2, 2000)), np.zeros(2000)], axis=1))
+    found = looked_up(PhotonMap((photons, photons), 0.05), points, 1, 1)
+    assert found.mean() == pytest.approx(2.5, rel=0.01)
