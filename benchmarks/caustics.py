@@ -63,7 +63,8 @@ def shoot(stage: Stage, samples: int, seed: int) -> None:
 
     paths = stage.integrator
     casters = find_casters(paths.scene)
-    paths.photons = shoot_photons(paths.scene, paths.features, casters, samples=samples, seed=seed)
+    whole = samples * stage.source.width * stage.source.height
+    paths.photons = shoot_photons(paths.scene, paths.features, casters, samples=whole, seed=seed)
 
 
 def picture(stage: Stage, way: str, method: str, samples: int) -> Picture:

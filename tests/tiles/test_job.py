@@ -41,13 +41,15 @@ def rendered(made, order=None):
         # Tiles that are cut off at the edges; all others fit, to spare the compiler.
         ("small-balls", 48, {}),
         ("gears", 64, {"integrator": "path", "depth": 3, "spp": 3}),
+        ("small-balls", 64, {"integrator": "path", "depth": 4, "caustics": "photons"}),
         ("teapot", 64, {"spp": 1, "subpixels": True}),
         ("tree", 64, {"integrator": "classic", "spp": 1, "pixel_filter": "point"}),
     ],
 )
 def test_tiles_make_the_picture_that_is_rendered_whole(engine, scene, side, changes):
     settings = replace(SETTINGS, **changes)
-    asked = {name: getattr(settings, name) for name in ("integrator", "depth", "spp", "subpixels", "pixel_filter")}
+    names = ("integrator", "depth", "spp", "subpixels", "pixel_filter", "caustics")
+    asked = {name: getattr(settings, name) for name in names}
     whole = api.render(scene, DISPLAY, method="full", memory=1 << 30, **asked).pixels
     made = job(scene, settings=settings, side=side)
     pixels = np.full_like(whole, np.nan)
@@ -125,6 +127,7 @@ def test_the_sums_of_tiles_give_the_estimate_of_the_whole(engine, layout):
         ({"settings": replace(SETTINGS, spp=3)}, "spp"),
         ({"settings": replace(SETTINGS, seed=1)}, "seed"),
         ({"settings": replace(SETTINGS, depth=2)}, "depth"),
+        ({"settings": replace(SETTINGS, integrator="path", caustics="none")}, "caustics"),
         ({"settings": replace(SETTINGS, placement=PlacementOptions(shift=(0.0, 1.0, 0.0)))}, "placement shift"),
         ({"stored": "uint8"}, "values"),
     ],

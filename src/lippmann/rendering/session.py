@@ -149,9 +149,7 @@ class Session:
         """
         return self.watch.stage(
             "build",
-            lambda: self._expose(
-                _make_integrator(self.built, self.request, frame_from_world, source, self.memory), source
-            ),
+            lambda: self._expose(_make_integrator(self.built, self.request, frame_from_world, source), source),
         )
 
     def _expose(self, integrator: Integrator, source: RaySource) -> Integrator:
@@ -332,10 +330,10 @@ def _build(scene: Scene, request: RenderRequest, memory: int) -> BuiltScene | Bu
 
 
 def _make_integrator(
-    built: BuiltScene | BuiltClassic, request: RenderRequest, frame_from_world: Matrix, source: RaySource, memory: int
+    built: BuiltScene | BuiltClassic, request: RenderRequest, frame_from_world: Matrix, source: RaySource
 ) -> Integrator:
     from lippmann.device.whitted.scene import BuiltClassic
-    from lippmann.rendering.transport.caustic_photons import make_photon_map
+    from lippmann.rendering.film.caustics import photons_of_picture
     from lippmann.rendering.transport.emitter_weights import make_light_sampler
     from lippmann.rendering.transport.path import PathIntegrator
     from lippmann.rendering.transport.scene_features import make_scene_features
@@ -359,8 +357,7 @@ def _make_integrator(
         integrator = PathIntegrator(built.mitsuba, features, request.surfaces, name=request.integrator)
         if not built.borrowed:
             integrator.light_sampler = make_light_sampler(integrator, source)
-        if request.caustics != "paths":
-            integrator.photons = make_photon_map(integrator, request, memory)
+        integrator.photons = photons_of_picture(integrator, request, source, memory_limit(request))
         return integrator
     return SurfaceIntegrator(built.mitsuba, cast("SurfaceProperty", request.integrator), frame_from_world)
 

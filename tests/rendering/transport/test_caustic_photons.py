@@ -146,7 +146,7 @@ def test_photons_pass_holes_on_their_way():
     np.testing.assert_allclose(crossed.power.sum(axis=0), free * 0.75**2, rtol=0.02)
 
 
-def traced(scene_dict, view, *, photons, size=24, spp=64, seed=0, depth=6, samples=64):
+def traced(scene_dict, view, *, photons, size=24, spp=64, seed=0, depth=6, samples=1 << 26):
     import mitsuba as mi
 
     from lippmann.rendering.film.wavefront import trace_frame

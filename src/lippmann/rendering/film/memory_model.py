@@ -22,6 +22,8 @@ ERROR_MAPS = 8
 BATCH = 12
 #: The errors that are made from batches.
 BATCH_ERRORS = 12
+#: One emission of photons, which lands about once, with what sorting takes, in bytes.
+PHOTON = 128
 #: What reuse of points takes: points without colours, plain rows, maps and lists of pixels. The paper's order takes
 #: the most: 6 for points, 4 for lenses, 8 for places beside centres, 12 for the sorted list.
 POINT_IMAGE = 32

@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import drjit as dr
 import mitsuba as mi
@@ -24,14 +23,9 @@ from numpy.typing import NDArray
 from lippmann.device.pbr.gltf_bsdf import SHARP_LOBE
 from lippmann.device.sobol import SampleStream
 from lippmann.device.types import Bool, Color3f, MitsubaScene, Spectrum, SurfaceInteraction3f, UInt32
-from lippmann.errors import UsageError
 from lippmann.rendering.transport.photon_map import PhotonMap, Photons
 from lippmann.rendering.transport.scene_features import SceneFeatures
 from lippmann.rendering.transport.sharp_events import MOST_EVENTS, has_no_width, is_sharp, lambertian, sharp_lobe
-
-if TYPE_CHECKING:
-    from lippmann.rendering.request.render_request import RenderRequest
-    from lippmann.rendering.transport.path import PathIntegrator
 
 #: Straight-through surfaces on its way, at most.
 _MOST_CROSSINGS = 4
@@ -39,14 +33,10 @@ _MOST_CROSSINGS = 4
 PILOT_OF_PAIR, PILOT = 4096, 1 << 20
 #: Share of the emissions that goes to all pairs alike, whatever the pilot met.
 _UNIFORM_SHARE = 0.1
-#: Emissions of each half: so many for each sample, within limits.
-OF_SAMPLE, FEWEST, MOST = 1 << 16, 1 << 18, 1 << 21
-#: For a picture whose samples a quality or a time decides.
-GOAL_SAMPLES = 32
-#: Bytes of one photon, with what sorting takes; an emission lands about once.
-_BYTES = 128
+#: Emissions of each half: one for so many samples of the picture, within limits.
+SAMPLES_OF_EMISSION, FEWEST, MOST = 16, 1 << 18, 1 << 21
 #: Photons within the radius of a look-up, as a rule, where there are :data:`FEWEST` emissions.
-NEIGHBOURS = 30
+NEIGHBOURS = 50
 #: Photons by which the radius is found.
 _PROBED = 2000
 _SEED_STEPS = (0xB5297A4D, 0x68E31DA4)
@@ -132,57 +122,36 @@ def _gives_points(shape: mi.Shape) -> bool:
         return False
 
 
-def make_photon_map(integrator: PathIntegrator, request: RenderRequest, memory: int) -> PhotonMap:
-    """Photons for a picture of ``request``, whose caustics are not left to paths; none at all where it wants none.
+def no_photons() -> PhotonMap:
+    """A map in place of paths to which nothing comes."""
+    return PhotonMap((_NONE, _NONE), 1.0)
 
-    A quarter of ``memory`` bytes may go to them.
 
-    The more samples, the more photons and the smaller the look-ups: errors of both kinds vanish together, as the square
-    of the radius falls with a root of their number while ever more lie within it (C. Knaus, M. Zwicker, *Progressive
-    Photon Mapping: A Probabilistic Approach*, ACM Transactions on Graphics 30(3), 2011).
-
-    Raises
-    ------
-    UsageError
-        Photons cannot start from some shape of the scene.
-    """
-    if request.caustics == "none":
-        return PhotonMap((_NONE, _NONE), 1.0)
-    casters = find_casters(integrator.scene)
-    if casters.missing:
-        raise UsageError(
-            f"photons cannot start from {casters.missing}",
-            parameter="caustics",
-            rule="mirrors, glass and gloss are meshes, spheres, cylinders, disks or rectangles then",
-            fix="leave it out",
-        )
-    # Where a goal says when to stop, as many as its picture may come to have.
-    samples = GOAL_SAMPLES if request.is_open_ended else request.samples
-    scene, features = integrator.scene, integrator.features
-    return shoot_photons(scene, features, casters, samples=samples, seed=request.seed, memory=memory)
+def emissions(samples: int) -> int:
+    """Emissions of each half for a picture of so many samples in all."""
+    return int(np.clip(samples // SAMPLES_OF_EMISSION, FEWEST, MOST))
 
 
 def shoot_photons(
-    scene: MitsubaScene, features: SceneFeatures, casters: Casters, *, samples: int, seed: int, memory: int = 1 << 32
+    scene: MitsubaScene, features: SceneFeatures, casters: Casters, *, samples: int, seed: int
 ) -> PhotonMap:
-    """Photons for a picture of so many samples per pixel, in two sets; empty where there are no caustics.
+    """Photons for a picture of so many samples in all, in two sets; empty where there are no caustics.
 
     The numbers of emissions of each emitter and caster follow from a pilot: in proportion to the roots of the second
     moments of what they bring, but for a share that all have alike.
     """
     if casters.pairs == 0:
-        return PhotonMap((_NONE, _NONE), 1.0)
+        return no_photons()
     shooter = PhotonShooter(scene, features, casters)
     pilot = min(PILOT_OF_PAIR, max(64, PILOT // casters.pairs)) * casters.pairs
     even = np.full(casters.pairs, 1 / casters.pairs)
     photons, pair = shooter.shoot(pilot, even, (seed + _PILOT_STEP) % 2**32)
     if not len(photons):
-        return PhotonMap((_NONE, _NONE), 1.0)
+        return no_photons()
     moments = np.bincount(pair, np.square(photons.power.astype(np.float64)).sum(axis=1), minlength=casters.pairs)
     roots = np.sqrt(moments)
     chances = _UNIFORM_SHARE * even + (1 - _UNIFORM_SHARE) * roots / roots.sum()
-    most = min(MOST, memory // 4 // (2 * _BYTES))
-    count = int(np.clip(OF_SAMPLE * samples, min(FEWEST, most), most))
+    count = emissions(samples)
     first, second = (shooter.shoot(count, chances, (seed + step) % 2**32)[0] for step in _SEED_STEPS)
     return PhotonMap((first, second), _radius(first, NEIGHBOURS * math.sqrt(count / FEWEST)))
 

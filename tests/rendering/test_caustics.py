@@ -1,0 +1,107 @@
+"""Pictures with caustics by photons, as they are asked for."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import trimesh
+
+import lippmann
+from lippmann.display import Display, LensArray, Panel
+from lippmann.errors import MemoryLimitError, UsageError
+from lippmann.scene.placement import PlacementOptions
+from lippmann.scene.values.description import Instance, Light, Material, Mesh, SceneDescription
+
+pytestmark = pytest.mark.usefixtures("engine")
+
+DISPLAYS = {
+    layout: Display("test", Panel(96, 64, 1.0), LensArray(layout, 8.0), 30.0, "", 500.0, 80.0)
+    for layout in ("lenticular", "square", "hexagonal")
+}
+
+
+def place(x, y, z):
+    matrix = np.eye(4)
+    matrix[:3, 3] = x, y, z
+    return matrix
+
+
+def lamp_over_glass(*, instances=1):
+    """A matt wall behind a glass ball and a glossy block, lit by a lamp that has no size."""
+    shapes = [trimesh.creation.box((300, 200, 2)), trimesh.creation.icosphere(4, 18), trimesh.creation.box((20, 20, 4))]
+    meshes = [Mesh("", m.vertices.astype(np.float32), m.faces.astype(np.uint32), n) for n, m in enumerate(shapes)]
+    materials = [
+        Material("wall", base_color=(0.6, 0.6, 0.6), roughness=1.0, specular=0.0),
+        Material("glass", transmission=1.0, roughness=0.0, ior=1.5, thickness=1.0),
+        Material("gloss", base_color=(0.1, 0.1, 0.4), roughness=0.1),
+    ]
+    found = [Instance(0, place(0, 0, -20)), Instance(1, place(-15, 0, 4)), Instance(2, place(30, 0, -10))]
+    found += [Instance(1, place(20 * number, 25, 4)) for number in range(instances - 1)]
+    lamp = Light("point", (4e4, 4e4, 4e4), place(60.0, 40.0, 90.0))
+    description = SceneDescription("lamp", meshes=meshes, materials=materials, instances=found, lights=[lamp])
+    return lippmann.load_scene(description)
+
+
+def rendered(scene, layout="lenticular", **options):
+    chosen = {"integrator": "path", "method": "full", "spp": 8, "placement": PlacementOptions(mode="display")}
+    return lippmann.render(scene, DISPLAYS[layout], exposure=0, tone_map="none", **(chosen | options))
+
+
+@pytest.mark.parametrize("layout", DISPLAYS)
+def test_photons_bring_what_paths_do_not_find(layout):
+    """Every lens that sees the focus sees it by photons alone; nothing else differs."""
+    scene = lamp_over_glass()
+    pictures = {way: rendered(scene, layout, caustics=way) for way in ("paths", "photons", "none")}
+    pixels = {way: picture.pixels for way, picture in pictures.items()}
+    # The block's gloss has a little width, by which a path may meet a lamp without size.
+    assert (np.abs(pixels["paths"] - pixels["none"]).max(axis=2) > 1e-5).mean() < 2e-3
+    gained = pixels["photons"] - pixels["none"]
+    assert gained.min() > -1e-5
+    assert gained.max() > 0.1
+    assert (gained.max(axis=2) > 0.02).mean() > 0.01
+    assert (gained.max(axis=2) < 1e-4).mean() > 0.3
+    assert pictures["photons"].provenance.options["caustics"] == "photons"
+    assert "caustics" not in pictures["paths"].provenance.options
+    assert any("--caustics photons" in note for note in pictures["paths"].provenance.notes)
+    assert not any("--caustics" in note for note in pictures["photons"].provenance.notes)
+
+
+def test_halves_have_photons_of_their_own():
+    """The photons' noise is in the estimate: pictures of other seeds differ by what it says."""
+    scene = lamp_over_glass()
+    found = [rendered(scene, caustics="photons", spp=16, seed=seed) for seed in range(3)]
+    told = np.mean([picture.provenance.estimate["psnr"] for picture in found])
+    from lippmann.color.transfer import encode_srgb
+
+    codes = np.stack([encode_srgb(picture.pixels) for picture in found]).astype(np.float64)
+    scatter = -10 * np.log10(codes.var(axis=0, ddof=1).mean())
+    assert told == pytest.approx(scatter, abs=1.5)
+
+
+def test_pooled_light_has_them_too():
+    scene = lamp_over_glass()
+    plain, pooled = (rendered(scene, caustics="photons", method=method, spp=8).pixels for method in ("full", "pooled"))
+    assert pooled.mean() == pytest.approx(plain.mean(), rel=0.02)
+
+
+def test_a_scene_without_lamps_is_the_same_with_photons():
+    shape = trimesh.creation.icosphere(3, 20)
+    mesh = Mesh("", shape.vertices.astype(np.float32), shape.faces.astype(np.uint32), 0)
+    mirror = Material("mirror", metallic=1.0, roughness=0.0)
+    ball = [Instance(0, np.eye(4))]
+    scene = lippmann.load_scene(SceneDescription("ball", meshes=[mesh], materials=[mirror], instances=ball))
+    plain, photons = (rendered(scene, caustics=way, spp=2) for way in ("paths", "photons"))
+    assert np.array_equal(plain.pixels, photons.pixels)
+    assert not any("--caustics" in note for note in plain.provenance.notes)
+
+
+@pytest.mark.parametrize("integrator", ["direct", "classic", "depth"])
+def test_other_light_has_no_caustics(integrator):
+    scene = "primitives" if integrator == "classic" else lamp_over_glass()
+    with pytest.raises(UsageError, match="has no caustics"):
+        rendered(scene, integrator=integrator, caustics="photons")
+
+
+def test_too_little_memory_is_refused():
+    with pytest.raises(MemoryLimitError, match="photons of caustics"):
+        rendered(lamp_over_glass(), caustics="photons", memory=40 << 20)
