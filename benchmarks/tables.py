@@ -10,6 +10,7 @@ import statistics
 from pathlib import Path
 from typing import Any
 
+import caustics_tables
 import conformance_tables
 import equal_error_tables
 import estimate_coverage_tables
@@ -19,6 +20,7 @@ from harness import RESULTS, saved
 
 README = Path(__file__).parent.parent / "README.md"
 BEGIN, END = "<!-- methods -->", "<!-- /methods -->"
+CAUSTICS_PAGE = Path(__file__).parent.parent / "docs" / "background" / "caustics.md"
 PAGE = Path(__file__).parent.parent / "docs" / "background" / "measurements.md"
 
 HEAD = """# Measurements
@@ -38,6 +40,8 @@ def main() -> None:
             sections.append(describe(result) + "\n" + _machine(result["machine"]))
             if name == "methods":
                 _into_readme(result)
+            if name == "caustics":
+                _into_page(CAUSTICS_PAGE, name, caustics_tables.rows(result))
             if name in QUILTS_PAGE_TABLES:
                 _into_page(QUILTS_PAGE, name, QUILTS_PAGE_TABLES[name](result))
     PAGE.write_text("\n".join(sections))
@@ -382,6 +386,7 @@ medians of {result["runs"]} runs.
 SECTIONS = {
     "methods": _methods,
     "first_picture": first_picture_tables.describe,
+    "caustics": caustics_tables.describe,
     "equal_error": equal_error_tables.describe,
     "goals": goals_tables.describe,
     "estimate_coverage": estimate_coverage_tables.describe,

@@ -37,9 +37,10 @@ if [ "$(cat "$stamp" 2>/dev/null)" != "$(oldest_versions)" ]; then
   "$python" -m venv --clear "$environment"
   mapfile -t versions < <(oldest_versions)
   "$environment/bin/python" -m pip install --disable-pip-version-check --quiet \
-    "${versions[@]}" pytest hypothesis psutil rich tomli
+    "${versions[@]}" pytest hypothesis psutil rich tomli typer numba
   oldest_versions >"$stamp"
 fi
 PYTHONPATH=src exec "$environment/bin/python" -m pytest -p no:cacheprovider "$@" \
-  tests/codecs/test_zarr_reader.py tests/image/test_streamed_write.py tests/image/test_streamed.py tests/image/test_files.py \
+  tests/codecs/test_zarr_reader.py tests/image/test_read.py tests/image/test_write.py tests/image/test_write_rows.py \
+  tests/image/test_streamed.py \
   tests/exchange/test_zarr_store.py tests/exchange/test_lftoolbox_mat.py tests/codecs/test_pillow_formats.py

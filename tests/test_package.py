@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
+
 import lippmann
 
 
@@ -15,3 +18,10 @@ def test_all_names_are_there():
     for name in lippmann.__all__:
         assert getattr(lippmann, name) is not None
     assert set(lippmann.__all__) <= set(dir(lippmann))
+
+
+def test_scripts_name_tests_that_are_there():
+    root = Path(__file__).resolve().parent.parent
+    named = re.findall(r"tests/\S+\.py", (root / "scripts" / "test-oldest.sh").read_text())
+    assert len(named) > 5
+    assert [name for name in named if not (root / name).exists()] == []
