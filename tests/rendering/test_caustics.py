@@ -62,8 +62,8 @@ def test_photons_bring_what_paths_do_not_find(layout):
     assert (gained.max(axis=2) < 1e-4).mean() > 0.3
     assert pictures["photons"].provenance.options["caustics"] == "photons"
     assert "caustics" not in pictures["paths"].provenance.options
-    assert any("--caustics photons" in note for note in pictures["paths"].provenance.notes)
-    assert not any("--caustics" in note for note in pictures["photons"].provenance.notes)
+    assert any("photons bring it" in note for note in pictures["paths"].provenance.notes)
+    assert not any("photons bring it" in note for note in pictures["photons"].provenance.notes)
 
 
 def test_halves_have_photons_of_their_own():
@@ -92,7 +92,7 @@ def test_a_scene_without_lamps_is_the_same_with_photons():
     scene = lippmann.load_scene(SceneDescription("ball", meshes=[mesh], materials=[mirror], instances=ball))
     plain, photons = (rendered(scene, caustics=way, spp=2) for way in ("paths", "photons"))
     assert np.array_equal(plain.pixels, photons.pixels)
-    assert not any("--caustics" in note for note in plain.provenance.notes)
+    assert not any("photons bring it" in note for note in plain.provenance.notes)
 
 
 @pytest.mark.parametrize("integrator", ["direct", "classic", "depth"])

@@ -231,7 +231,7 @@ class Session:
             return ()
         return (
             "paths hardly find what mirrors, glass or gloss throw onto other surfaces from lamps as small as here, and "
-            "no estimate of the error knows of it: --caustics photons",
+            "no estimate of the error knows of it; photons bring it (caustics)",
         )
 
     def _warn_of_emptiness(self, frame: Frame, work: int, has_pixels: bool) -> tuple[str, ...]:
