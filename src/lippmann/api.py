@@ -115,6 +115,7 @@ def render(
     pixel_filter: PixelFilter = "auto",
     denoise: Denoiser = "auto",
     caustics: Caustics = "paths",
+    clamp_indirect: float | None = None,
     exposure: float | Literal["auto"] = "auto",
     tone_map: ToneMap = "none",
     layers: bool = False,
@@ -178,6 +179,8 @@ def render(
     caustics:
         Light that mirrors, glass and smooth gloss throw onto rough surfaces: ``paths`` (default) as paths find it,
         ``photons`` traced from the emitters, ``none`` left out.
+    clamp_indirect:
+        What indirect light may bring to a sample at most each time that it is met, 1 being white. Default: no limit.
     exposure:
         Stops (EV) by which light is raised or lowered, -40 to 40. ``auto`` (default): 0, and for scenes with physical
         light sources what brings the median of what is lit to mid-grey.
@@ -230,6 +233,7 @@ def render(
         pixel_filter=pixel_filter,
         denoise=denoise,
         caustics=caustics,
+        clamp_indirect=clamp_indirect,
         exposure=exposure,
         tone_map=tone_map,
         layers=layers,

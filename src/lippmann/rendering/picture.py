@@ -138,6 +138,7 @@ def placed_options(request: RenderRequest, placement: Placement) -> dict[str, ob
         "placement": placement.mode,
         "depth_scale": placement.depth_scale,
         **({"tone_map": request.tone_map} if request.tone_map != "none" else {}),
+        **({} if request.clamp_indirect is None else {"clamp_indirect": request.clamp_indirect}),
         **({"caustics": request.caustics} if request.caustics != "paths" else {}),
         "depth_range": list(placement.depth_range),
         "resolvable_range": list(placement.resolvable_range),

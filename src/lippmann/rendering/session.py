@@ -163,11 +163,14 @@ class Session:
             exposure = measure_exposure(
                 integrator, source, even_background(self.built, self.request), self.request.seed
             )
-        if exposure:
-            import mitsuba as mi
+        import mitsuba as mi
 
+        if exposure:
             integrator.gain = mi.Float(gain_of(exposure))
             self.choices["exposure"] = exposure
+        if self.request.clamp_indirect is not None:
+            most = self.request.clamp_indirect / (gain_of(exposure) if exposure else 1.0)
+            integrator.most_indirect = mi.Float(most)
         return integrator
 
     def provenance(
@@ -210,6 +213,7 @@ class Session:
                 *notes,
                 *self._exposure_notes(),
                 *self._caustics_notes(),
+                *self._clamping_notes(),
                 *_frame_notes(frame),
                 *self._warn_of_emptiness(frame, work, has_pixels),
             ),
@@ -232,6 +236,12 @@ class Session:
         return (
             "paths hardly find what mirrors, glass or gloss throw onto other surfaces from lamps as small as here, and "
             "no estimate of the error knows of it; photons bring it (caustics)",
+        )
+
+    def _clamping_notes(self) -> tuple[str, ...]:
+        most = self.request.clamp_indirect
+        return (
+            () if most is None else (f"indirect light above {most:g} is cut off: bright light is lost, not only noise",)
         )
 
     def _warn_of_emptiness(self, frame: Frame, work: int, has_pixels: bool) -> tuple[str, ...]:
@@ -345,6 +355,9 @@ def _make_integrator(
         return WhittedIntegrator(built, request.surfaces)
     if request.integrator in ("path", "direct"):
         if built.has_media:
+            if request.clamp_indirect is not None:
+                rule = "this scene has participating media, whose light is not clamped"
+                raise UsageError("will not do", parameter="clamp_indirect", rule=rule, fix="leave it out")
             if request.caustics != "paths":
                 rule = "this scene has participating media, through which photons are not traced"
                 raise UsageError(

@@ -36,6 +36,7 @@ OPTION_GROUPS: Mapping[str, tuple[str, ...]] = {
         "--respect-gloss",
         "--pixel-filter",
         "--caustics",
+        "--clamp-indirect",
         "--seed",
     ),
     "Output": ("--output", "--open", "--bits", "--layers", "--maps", "--resume", "--json", "--quiet"),

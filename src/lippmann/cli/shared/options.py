@@ -78,6 +78,14 @@ Caustics = Annotated[
         " emitters, for small ones; none: without.",
     ),
 ]
+ClampIndirect = Annotated[
+    float | None,
+    typer.Option(
+        "--clamp-indirect",
+        metavar="RADIANCE",
+        help="Cut indirect light off above this, 1 being white: against fireflies, at the cost of true light.",
+    ),
+]
 Device = Annotated[choices.Device, typer.Option("--device", help="Where to render; auto: the GPU if there is one.")]
 Threads = Annotated[int | None, typer.Option("--threads", help="CPU threads; all cores by default.")]
 

@@ -70,6 +70,13 @@ def _check_denoiser(request: RenderRequest) -> None:
 
 
 def _check_caustics(request: RenderRequest) -> None:
+    if request.clamp_indirect is not None and request.integrator != "path":
+        raise UsageError(
+            f"{request.integrator} has no indirect light that is sampled",
+            parameter="clamp_indirect",
+            rule='it is for integrator="path"',
+            fix="leave it out",
+        )
     if request.caustics != "paths" and request.integrator != "path":
         raise UsageError(
             f"{request.integrator} has no caustics",

@@ -104,6 +104,10 @@ class RenderRequest:
         For ``path``: light that mirrors, glass and smooth gloss throw from emitters onto rough surfaces. ``paths``
         leaves it to paths, which find small emitters seldom and points and directions never; ``photons`` traces it from
         the emitters, with a small blur; ``none`` leaves it out.
+    clamp_indirect:
+        For ``path``: what light may bring to a sample at most that comes by way of another surface than the one seen,
+        each time that it is met, in units of the picture's white; above 0. Fireflies go, and so does true light. None:
+        no limit.
     exposure:
         Stops (EV) by which light is raised or lowered, -40 to 40; "auto": 0, and for scenes with physical light sources
         what brings the median of what is lit to mid-grey. The background's colour stays as it is.
@@ -144,6 +148,7 @@ class RenderRequest:
     pixel_filter: PixelFilter = "auto"
     denoise: Denoiser = "auto"
     caustics: Caustics = "paths"
+    clamp_indirect: float | None = None
     exposure: float | Literal["auto"] = "auto"
     tone_map: ToneMap = "none"
     layers: bool = False
@@ -174,6 +179,9 @@ class RenderRequest:
         if self.exposure != "auto" and not -MOST_EXPOSURE <= self.exposure <= MOST_EXPOSURE:
             rule = f"'auto', or stops from {-MOST_EXPOSURE} to {MOST_EXPOSURE}"
             raise UsageError(f"{self.exposure!r} will not do", parameter="exposure", rule=rule)
+        if self.clamp_indirect is not None and not 0 < self.clamp_indirect < float("inf"):
+            rule = "radiance above 0, 1 being white"
+            raise UsageError(f"{self.clamp_indirect:g} will not do", parameter="clamp_indirect", rule=rule)
         if self.max_time is not None and not 0 < self.max_time < float("inf"):
             raise UsageError(f"{self.max_time:g} s will not do", parameter="max_time", rule="seconds above 0")
 

@@ -89,6 +89,8 @@ class PathIntegrator:
         Samples the scene's emitters; at first by the scene's own weights.
     gain:
         Factor on the radiance, the background's apart; None for 1.
+    most_indirect:
+        What one indirect contribution may bring at most, before ``gain``; None for no limit.
     """
 
     # Not a dataclass: Dr.Jit would take it for loop state and write its fields.
@@ -100,6 +102,7 @@ class PathIntegrator:
         self.light_sampler: LightSampler = SceneLightSampler(scene)
         self.gain: Float | None = None
         emitters = scene.emitters()
+        self.most_indirect: Float | None = None
         #: Photons of caustics in place of paths that would have to find them; None for paths.
         self.photons: PhotonMap | None = None
         self._environment = scene.environment()
@@ -167,7 +170,10 @@ class PathIntegrator:
             if dr.hint(self.photons is not None, mode="scalar"):
                 is_caustic = (rough == 1) & (sharp > 0) & (sharp <= MOST_EVENTS) & si.is_valid()
                 emission = dr.select(is_caustic, emission * (1 - by_photons), emission)
-            radiance += throughput * emission
+            met = throughput * emission
+            if dr.hint(self.most_indirect is not None, mode="scalar"):
+                met = dr.select(depth > 1, self._clamped(met), met)
+            radiance += met
 
             # ---- next-event estimation ----
             continues = si.is_valid() & (depth < self.depth)
@@ -198,7 +204,10 @@ class PathIntegrator:
                     is_caustic = (rough == 1) & (sharp < MOST_EVENTS) & is_sharp(si, lobe, si.to_local(ds.d))
                     is_caustic &= self._is_near(ds)
                     light = dr.select(is_caustic, light * (1 - by_photons), light)
-                radiance += throughput * light / mi.Float(samples)
+                drawn = throughput * light
+                if dr.hint(self.most_indirect is not None, mode="scalar"):
+                    drawn = dr.select(depth > 0, self._clamped(drawn), drawn)
+                radiance += drawn / mi.Float(samples)
                 shadow += tests
                 number += 1
                 sampling &= number != last
@@ -248,6 +257,10 @@ class PathIntegrator:
         if dr.hint(self.gain is not None, mode="scalar"):
             radiance *= self.gain
         return radiance, RayCounts(secondary, shadow), FirstHit(first_distance, view_dependent)
+
+    def _clamped(self, light: Spectrum) -> Spectrum:
+        """``light`` with no component above :attr:`most_indirect`, its hue unchanged."""
+        return light * dr.minimum(1, self.most_indirect / dr.maximum(dr.max(light), 1e-20))
 
     def direct_light(
         self, si: SurfaceInteraction3f, bsdf: BSDFPtr, point: Point2f, active: Bool, samples: Float = 1
