@@ -264,3 +264,24 @@ def test_without_casters_or_lamps_there_are_no_photons():
     matt = {"type": "sphere", "bsdf": {"type": "roughconductor"}}
     assert find_casters(mi.load_dict({"type": "scene", "ball": matt, "lamp": lamp([0, 0, 9])})).pairs == 0
     assert find_casters(mi.load_dict({"type": "scene", "ball": mirror, "lamp": lamp([0, 0, 9])})).pairs == 1
+
+
+def test_shapes_that_give_no_points_are_told(tmp_path):
+    """Glass threads and instances: their light cannot be replaced, and so is left to paths."""
+    import mitsuba as mi
+
+    from lippmann.rendering.transport.caustic_photons import find_casters, hides_caustics
+
+    (tmp_path / "thread.txt").write_text("0 0 0 .1\n1 0 0 .1\n1 1 0 .1\n0 1 0 .1\n")
+    glass = {"type": "dielectric"}
+    thread = {"type": "bsplinecurve", "filename": str(tmp_path / "thread.txt"), "bsdf": glass}
+    glow = {"type": "bsplinecurve", "filename": str(tmp_path / "thread.txt"), "bsdf": {"type": "diffuse"}}
+    curves = mi.load_dict({"type": "scene", "thread": thread, "glow": glow, "lamp": lamp([0, 0, 9])})
+    assert "curves" in find_casters(curves).missing
+    assert hides_caustics(curves)
+    group = {"type": "shapegroup", "ball": {"type": "sphere", "bsdf": glass}}
+    copies = mi.load_dict(
+        {"type": "scene", "group": group, "copy": {"type": "instance", "of": {"type": "ref", "id": "group"}}}
+    )
+    assert "instances" in find_casters(copies).missing
+    assert not hides_caustics(copies)

@@ -76,17 +76,12 @@ def find_casters(scene: MitsubaScene) -> Casters:
     emitters = [number for number, each in enumerate(scene.emitters()) if each is not environment]
     shapes, missing = [], ""
     for number, shape in enumerate(scene.shapes()):
-        bsdf = shape.bsdf()
-        if bsdf is None:  # an instance: what it shows lies in its group
+        if shape.class_name() == "Instance":  # what it shows lies in its group, and may be sharp
             missing = "instances"
             continue
-        if not _may_be_sharp(bsdf):
+        if not _may_be_sharp(shape.bsdf()):
             continue
-        try:
-            area = _area(shape)
-        except (RuntimeError, NotImplementedError):
-            area = 0.0
-        if not (np.isfinite(area) and area > 0) or not _gives_points(shape):
+        if not 0 < _area(shape) < math.inf or not _gives_points(shape):
             missing = "curves and other shapes without points of their own"
             continue
         shapes.append(number)
@@ -95,7 +90,7 @@ def find_casters(scene: MitsubaScene) -> Casters:
 
 def hides_caustics(scene: MitsubaScene) -> bool:
     """Whether a scene has mirrors, glass or smooth gloss, and an emitter so small that paths hardly find it by them."""
-    if not any(shape.bsdf() is not None and _may_be_sharp(shape.bsdf()) for shape in scene.shapes()):
+    if not any(_may_be_sharp(shape.bsdf()) for shape in scene.shapes()):
         return False
     if any(mi.has_flag(emitter.flags(), mi.EmitterFlags.Delta) for emitter in scene.emitters()):
         return True
@@ -105,7 +100,11 @@ def hides_caustics(scene: MitsubaScene) -> bool:
 
 
 def _area(shape: mi.Shape) -> float:
-    return float(np.array(shape.surface_area()).ravel()[0])
+    """Area of a shape; not a number for shapes that do not tell it."""
+    try:
+        return float(np.array(shape.surface_area()).ravel()[0])
+    except (RuntimeError, NotImplementedError):
+        return math.nan
 
 
 def _may_be_sharp(bsdf: mi.BSDF) -> bool:
