@@ -240,7 +240,9 @@ class TiffPicture:
     def _check_segments(self) -> None:
         """A ValueError if a strip or tile lies (partly) beyond the end: memory would be given to what is claimed."""
         size, page = self._path.stat().st_size, self._page
-        if any(place + count > size for place, count in zip(page.dataoffsets, page.databytecounts, strict=True)):
+        spans = zip(page.dataoffsets, page.databytecounts, strict=True)
+        # Older versions of the library read some numbers as negative ones.
+        if any(not 0 <= place <= place + count <= size for place, count in spans):
             raise ValueError("it is cut short")
 
 
