@@ -113,9 +113,8 @@ def connect(
             target.address, security=security, timeout=CONNECT_SECONDS, set_as_default=False, name="lippmann"
         )
     except (OSError, TimeoutError, TypeError, ValueError, RuntimeError) as error:
-        why = " ".join(str(error).split())[:200]
         raise ClusterError(
-            f"no scheduler answers at {target.address} ({type(error).__name__}: {why})",
+            f"no scheduler answers at {target.address} ({_in_brief(error)})",
             parameter="cluster",
             fix="start one: dask scheduler",
         ) from None
@@ -157,9 +156,8 @@ def _started_here(distributed: Any, count: int, threads: int | None) -> Iterator
                     config=copy.deepcopy(dask.config.config),
                 )
             except (OSError, TimeoutError, RuntimeError) as error:
-                why = " ".join(str(error).split())[:200]
                 raise ClusterError(
-                    f"the workers of this machine did not start ({type(error).__name__}: {why})",
+                    f"the workers of this machine did not start ({_in_brief(error)})",
                     parameter="cluster",
                     fix="run it again, with fewer workers if memory is short",
                 ) from None
@@ -188,3 +186,8 @@ def _silence_dask() -> None:
     if not sys.flags.dev_mode:
         for name in _LOGGERS:
             logging.getLogger(name).setLevel(logging.CRITICAL)
+
+
+def _in_brief(error: Exception) -> str:
+    """The error's kind and text on one line of limited length."""
+    return f"{type(error).__name__}: {' '.join(str(error).split())[:200]}"

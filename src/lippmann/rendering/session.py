@@ -234,8 +234,8 @@ class Session:
         if not isinstance(built, BuiltScene) or not hides_caustics(built.mitsuba):
             return ()
         return (
-            "paths hardly find what mirrors, glass or gloss throw onto other surfaces from lamps as small as here, and "
-            "no estimate of the error knows of it; photons bring it (caustics)",
+            "paths hardly find what mirrors, glass or gloss throw onto other surfaces from emitters as small as here, "
+            "and no estimate of the error knows of it; photons bring it (caustics)",
         )
 
     def _clamping_notes(self) -> tuple[str, ...]:

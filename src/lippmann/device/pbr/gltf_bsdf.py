@@ -73,9 +73,10 @@ def _bsdf_class(variant: str) -> type[BSDF]:
         def __init__(self, props: Properties, model: SurfaceModel) -> None:
             super().__init__(props)
             self.model = model
+            self._is_glossy = model.metal or not model.dull
             present = {
                 scattering: not model.metal,
-                reflecting: model.metal or not model.dull or model.clearcoat is not None,
+                reflecting: self._is_glossy or model.clearcoat is not None,
                 transmitting: model.transmission is not None,
                 passing: model.opacity is not None,
             }
@@ -85,8 +86,7 @@ def _bsdf_class(variant: str) -> type[BSDF]:
             self._is_directional = (
                 model.metal or model.sheen_color is not None or model.normal is not None or model.film is not None
             )
-            glossy = model.metal or not model.dull
-            signals = [model.roughness] if glossy else []
+            signals = [model.roughness] if self._is_glossy else []
             if model.clearcoat_roughness is not None:
                 signals.append(model.clearcoat_roughness)
             self._may_be_sharp = any(signal.may_be_below(math.sqrt(NARROW_ALPHA)) for signal in signals)
@@ -185,7 +185,7 @@ def _bsdf_class(variant: str) -> type[BSDF]:
             return dr.maximum(lobe.alpha.x, lobe.alpha.y) < NARROW_ALPHA
 
         def _narrow_body(self, point: Point) -> Bool:
-            return self._narrow(point.lobe) if self.model.metal or not self.model.dull else mi.Bool(False)
+            return self._narrow(point.lobe) if self._is_glossy else mi.Bool(False)
 
         def _narrow_coat(self, point: Point) -> Bool:
             coat = point.coat

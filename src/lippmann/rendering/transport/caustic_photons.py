@@ -25,7 +25,13 @@ from lippmann.device.sobol import SampleStream
 from lippmann.device.types import Bool, Color3f, MitsubaScene, Spectrum, SurfaceInteraction3f, UInt32
 from lippmann.rendering.transport.photon_map import PhotonMap, Photons
 from lippmann.rendering.transport.scene_features import SceneFeatures
-from lippmann.rendering.transport.sharp_events import MOST_EVENTS, has_no_width, is_sharp, lambertian, sharp_lobe
+from lippmann.rendering.transport.sharp_events import (
+    MOST_EVENTS,
+    facing_normal,
+    follows_sharply,
+    lambertian,
+    sharp_lobe,
+)
 
 #: Straight-through surfaces on its way, at most.
 _MOST_CROSSINGS = 4
@@ -90,8 +96,10 @@ def find_casters(scene: MitsubaScene) -> Casters:
 
 def hides_caustics(scene: MitsubaScene) -> bool:
     """Whether a scene has mirrors, glass or smooth gloss, and an emitter so small that paths hardly find it by them."""
-    if not any(_may_be_sharp(shape.bsdf()) for shape in scene.shapes()):
-        return False
+    return _has_small_emitter(scene) and any(_may_be_sharp(shape.bsdf()) for shape in scene.shapes())
+
+
+def _has_small_emitter(scene: MitsubaScene) -> bool:
     if any(mi.has_flag(emitter.flags(), mi.EmitterFlags.Delta) for emitter in scene.emitters()):
         return True
     box = scene.bbox()
@@ -204,9 +212,9 @@ class PhotonShooter:
         index = dr.arange(mi.UInt32, lanes) + dr.opaque(mi.UInt32, first)
         stream = SampleStream.of_pixels(mi.UInt32(0), index, dr.opaque(mi.UInt32, seed))
         caster = numbers // len(self._casters.emitters)
-        lamp = numbers - caster * len(self._casters.emitters)
+        source = numbers - caster * len(self._casters.emitters)
         shape = dr.gather(mi.ShapePtr, scene.shapes_dr(), dr.gather(mi.UInt32, self._shape_numbers, caster))
-        emitter = dr.gather(mi.EmitterPtr, scene.emitters_dr(), dr.gather(mi.UInt32, self._emitter_numbers, lamp))
+        emitter = dr.gather(mi.EmitterPtr, scene.emitters_dr(), dr.gather(mi.UInt32, self._emitter_numbers, source))
 
         point = shape.sample_position(mi.Float(0), stream.next_2d(0), mi.Bool(True))
         reference = dr.zeros(mi.SurfaceInteraction3f, lanes)
@@ -239,10 +247,10 @@ class PhotonShooter:
             )
             lambert = lambertian(si, si.bsdf(), active)
             lands = active & (dr.max(lambert) > 0) & (dr.max(power) > 0)
-            normal = dr.select(si.wi.z * dr.dot(si.n, si.sh_frame.n) < 0, -si.n, si.n)
+            normal = facing_normal(si)
             toward = si.to_world(si.wi)
             dr.eval(si, power, events, absorption, active, lands, normal, toward)
-            kept = np.flatnonzero(np.array(lands) & np.ones(lanes, bool))
+            kept = np.flatnonzero(np.array(lands))
             if len(kept):
                 found.append((_photons(kept, si, normal, toward, power, events), kept))
             if not dr.any(active):
@@ -268,7 +276,7 @@ class PhotonShooter:
         wo = si.to_world(bs.wo)
         # Light that passes the first surface starts at the next.
         active &= ~passes | (events > 0)
-        active &= has_no_width(bs.sampled_type) | is_sharp(si, lobe, bs.wo)
+        active &= follows_sharply(si, lobe, bs)
         # Adjoint of shading normals: Veach 1997, eq. 5.19.
         into, out = dr.dot(si.n, si.to_world(si.wi)), dr.dot(si.n, wo)
         active &= passes | ((into * si.wi.z > 0) & (out * bs.wo.z > 0))
@@ -304,5 +312,4 @@ def _photons(
     def rows(values: mi.Vector3f) -> NDArray[np.float32]:
         return np.ascontiguousarray(np.array(values, dtype=np.float32).T[kept])
 
-    count = np.broadcast_to(np.array(events), (int(kept.max()) + 1,)) if dr.width(events) == 1 else np.array(events)
-    return Photons(rows(si.p), rows(normal), rows(toward), rows(power), count[kept].astype(np.uint32))
+    return Photons(rows(si.p), rows(normal), rows(toward), rows(power), np.array(events)[kept].astype(np.uint32))

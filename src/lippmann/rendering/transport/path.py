@@ -33,7 +33,14 @@ from lippmann.rendering.transport.integrator import FirstHit, RayCounts
 from lippmann.rendering.transport.light_sampling import LightSampler, SceneLightSampler
 from lippmann.rendering.transport.photon_map import PhotonMap
 from lippmann.rendering.transport.scene_features import SceneFeatures
-from lippmann.rendering.transport.sharp_events import MOST_EVENTS, has_no_width, is_sharp, lambertian, sharp_lobe
+from lippmann.rendering.transport.sharp_events import (
+    MOST_EVENTS,
+    facing_normal,
+    follows_sharply,
+    is_sharp,
+    lambertian,
+    sharp_lobe,
+)
 
 #: Straight-through surfaces that one ray may cross before it counts as blocked. Bounds the loop between many panes.
 MAX_CROSSINGS = 64
@@ -190,10 +197,9 @@ class PathIntegrator:
                 lobe = sharp_lobe(si, bsdf, continues)
                 lambert = lambertian(si, bsdf, continues & (rough == 0))
                 lands = continues & (rough == 0) & (dr.max(lambert) > 0)
-                side = dr.select(si.wi.z * dr.dot(si.n, si.sh_frame.n) < 0, -si.n, si.n)
                 photons = cast("PhotonMap", self.photons)
                 caustics = photons.irradiance(
-                    si, mi.Vector3f(side), lobe, mi.UInt32(stream.half), self.depth - depth - 1, lands
+                    si, facing_normal(si), lobe, mi.UInt32(stream.half), self.depth - depth - 1, lands
                 )
                 radiance += dr.select(lands, throughput * lambert * caustics * dr.inv_pi, 0)
             last = number + samples
@@ -219,7 +225,7 @@ class PathIntegrator:
             passes = mi.has_flag(bs.sampled_type, mi.BSDFFlags.Null)
             if dr.hint(self.photons is not None, mode="scalar"):
                 is_event = continues & ~passes
-                keeps_sharp = has_no_width(bs.sampled_type) | is_sharp(si, lobe, bs.wo)
+                keeps_sharp = follows_sharply(si, lobe, bs)
                 scattered = mi.Color3f(bsdf_weight) * bs.pdf
                 share = dr.select(scattered > 0, lambert * (dr.abs(bs.wo.z) * dr.inv_pi) / scattered, 0)
                 becomes_rough = is_event & ~keeps_sharp

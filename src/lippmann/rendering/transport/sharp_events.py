@@ -17,7 +17,7 @@ import drjit as dr
 import mitsuba as mi
 
 from lippmann.device.pbr.gltf_bsdf import LAMBERTIAN, SHARP_LOBE
-from lippmann.device.types import Bool, BSDFPtr, Color3f, SurfaceInteraction3f, UInt32, Vector3f
+from lippmann.device.types import Bool, BSDFPtr, BSDFSample3f, Color3f, SurfaceInteraction3f, Vector3f
 
 #: Sharp events between an emitter and a caustic, at most; light of more is left to paths.
 MOST_EVENTS = 6
@@ -39,9 +39,15 @@ def is_sharp(si: SurfaceInteraction3f, lobe: Vector3f, wo: Vector3f) -> Bool:
     return (dr.squared_norm(lobe) > 0) & (~reflected | (dr.dot(half, lobe) > LEAST_COSINE))
 
 
-def has_no_width(kind: UInt32) -> Bool:
-    """Whether a sampled lobe, by its ``mi.BSDFFlags``, is sharp whatever the directions."""
-    return (kind & int(mi.BSDFFlags.Delta | mi.BSDFFlags.Null)) != 0
+def follows_sharply(si: SurfaceInteraction3f, lobe: Vector3f, bs: BSDFSample3f) -> Bool:
+    """Whether a sampled direction goes on sharply: by a lobe without width, or by ``lobe`` (:func:`sharp_lobe`)."""
+    has_no_width = (bs.sampled_type & int(mi.BSDFFlags.Delta | mi.BSDFFlags.Null)) != 0
+    return has_no_width | is_sharp(si, lobe, bs.wo)
+
+
+def facing_normal(si: SurfaceInteraction3f) -> Vector3f:
+    """The geometric normal, in world space, on the side of ``si.wi``."""
+    return mi.Vector3f(dr.select(si.wi.z * dr.dot(si.n, si.sh_frame.n) < 0, -si.n, si.n))
 
 
 def lambertian(si: SurfaceInteraction3f, bsdf: BSDFPtr, active: Bool) -> Color3f:
