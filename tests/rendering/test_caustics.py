@@ -10,7 +10,7 @@ import lippmann
 from lippmann.display import Display, LensArray, Panel
 from lippmann.errors import MemoryLimitError, UsageError
 from lippmann.scene.placement import PlacementOptions
-from lippmann.scene.values.description import Instance, Light, Material, Mesh, SceneDescription
+from lippmann.scene.values.description import Image, Instance, Light, Material, Mesh, SceneDescription, Texture
 
 pytestmark = pytest.mark.usefixtures("engine")
 
@@ -105,3 +105,60 @@ def test_other_light_has_no_caustics(integrator):
 def test_too_little_memory_is_refused():
     with pytest.raises(MemoryLimitError, match="photons of caustics"):
         rendered(lamp_over_glass(), caustics="photons", memory=40 << 20)
+
+
+def bumps():
+    texels = np.random.default_rng(1).normal(128, 40, (16, 16, 3)).clip(38, 218)
+    texels[..., 2] = 230
+    return Texture(Image("bumps", texels.astype(np.uint8)), srgb=False)
+
+
+RECEIVERS = {
+    "rough metal": Material("floor", base_color=(0.8, 0.6, 0.3), metallic=1.0, roughness=0.5),
+    "gloss": Material("floor", base_color=(0.5, 0.5, 0.5), roughness=0.3),
+    "clear coat": Material("floor", base_color=(0.5, 0.3, 0.3), roughness=0.6, clearcoat=1.0, clearcoat_roughness=0.02),
+    "cloth": Material("floor", base_color=(0.4, 0.2, 0.5), roughness=1.0, sheen_color=(0.6, 0.6, 0.6)),
+    "normal map": Material("floor", base_color=(0.6, 0.6, 0.6), roughness=1.0, normal_texture=bumps()),
+}
+
+
+def glass_under_a_wide_emitter(floor):
+    """Caustics that paths find, too."""
+    wall = trimesh.creation.box((300, 200, 2))
+    ball, panel = trimesh.creation.icosphere(4, 18), trimesh.creation.box((80, 60, 1))
+    meshes = [
+        Mesh(
+            "",
+            m.vertices.astype(np.float32),
+            m.faces.astype(np.uint32),
+            n,
+            uvs=((m.vertices[:, :2] / 40).astype(np.float32),),
+        )
+        for n, m in enumerate((wall, ball, panel))
+    ]
+    glass = Material("glass", transmission=1.0, roughness=0.0, ior=1.5, thickness=1.0)
+    glow = Material("glow", base_color=(0.0, 0.0, 0.0), emission=(12.0, 11.0, 9.0))
+    return lippmann.load_scene(
+        SceneDescription(
+            "receiver",
+            meshes=meshes,
+            materials=[floor, glass, glow],
+            instances=[Instance(0, place(0, 0, -20)), Instance(1, place(-10, 0, 4)), Instance(2, place(10, 5, 120))],
+        )
+    )
+
+
+@pytest.mark.parametrize("floor", RECEIVERS)
+def test_every_receiver_has_the_light_of_paths(floor):
+    """Blocks of pixels, by the scatter of independent pictures."""
+    scene = glass_under_a_wide_emitter(RECEIVERS[floor])
+    found = {
+        way: np.stack([rendered(scene, "square", caustics=way, spp=64, seed=seed).pixels for seed in range(4)])
+        for way in ("paths", "photons", "none")
+    }
+    parts = {way: p.reshape(4, 8, 8, 12, 8, 3).mean(axis=(2, 4)).reshape(4, -1) for way, p in found.items()}
+    mean = {way: values.mean(axis=0) for way, values in parts.items()}
+    error = np.sqrt(sum(parts[way].var(axis=0, ddof=1) / 4 for way in ("paths", "photons")))
+    np.testing.assert_array_less(np.abs(mean["photons"] - mean["paths"]), 5 * error + 0.02 * mean["paths"] + 1e-4)
+    assert mean["photons"].mean() == pytest.approx(mean["paths"].mean(), rel=0.005)
+    assert mean["photons"].mean() > mean["none"].mean() * 1.01  # and there are some

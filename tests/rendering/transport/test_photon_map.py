@@ -26,7 +26,7 @@ def scattered(count, seed, *, flat=True):
     return Photons(*arrays, random.integers(1, 5, count).astype(np.uint32))
 
 
-def looked_up(photon_map, points, half, surfaces, active=True):
+def gathered(photon_map, points, half, surfaces, *, choice=0.5, active=True):
     import drjit as dr
     import mitsuba as mi
 
@@ -35,10 +35,36 @@ def looked_up(photon_map, points, half, surfaces, active=True):
     si.n = mi.Normal3f(0, 0, 1)
     si.sh_frame = mi.Frame3f(mi.Vector3f(0, 0, 1))
     si.wi = mi.Vector3f(0, 0, 1)
-    found = photon_map.irradiance(
-        si, mi.Vector3f(0, 0, 1), mi.Vector3f(0), mi.UInt32(half), mi.UInt32(surfaces), mi.Bool(active)
-    )
+    up, none, choice = mi.Vector3f(0, 0, 1), mi.Vector3f(0), mi.Float(np.float32(choice))
+    return photon_map.gather(si, up, none, mi.UInt32(half), mi.UInt32(surfaces), choice, mi.Bool(active))
+
+
+def looked_up(photon_map, points, half, surfaces, active=True):
+    import drjit as dr
+    import mitsuba as mi
+
+    found = gathered(photon_map, points, half, surfaces, active=active).irradiance
     return np.array(found + dr.zeros(mi.Color3f, len(points))).T
+
+
+def test_one_photon_stands_for_all_in_proportion_to_its_power():
+    """The mean over all choices of any function of the direction is its sum over the photons."""
+    from lippmann.rendering.transport.photon_map import PhotonMap
+
+    some = scattered(300, 4)
+    photon_map = PhotonMap((some, some), 0.4)
+    choices = (np.arange(40_000) + 0.5) / 40_000
+    points = np.zeros((len(choices), 3), np.float32)
+    found = gathered(photon_map, points, 0, 9, choice=choices)
+    flux, toward = np.array(found.flux), np.array(found.toward)
+    near = np.linalg.norm(some.position, axis=1) < 0.4
+    near &= (some.normal[:, 2] > 0.7) & (some.toward[:, 2] > 0) & (np.abs(some.position[:, 2]) < 0.16)
+    assert near.sum() > 5
+    kernel = 2 / (np.pi * 0.4**2) * (1 - (some.position[near] ** 2).sum(axis=1) / 0.4**2)
+    expected = ((some.power[near].T * kernel) * some.toward[near].T[0] ** 2).sum(axis=1)
+    np.testing.assert_allclose((flux * toward[0] ** 2).mean(axis=1), expected, rtol=0.02)
+    chosen = {tuple(way) for way in np.round(toward.T, 4).tolist()}
+    assert chosen == {tuple(way) for way in np.round(some.toward[near], 4).tolist()}
 
 
 @pytest.mark.parametrize("radius", [0.004, 0.05, 0.3, 2.0])
@@ -82,10 +108,10 @@ def test_a_narrow_lobe_keeps_what_it_reflects_sharply():
     si.sh_frame = mi.Frame3f(mi.Vector3f(0, 0, 1))
     for wi, kept in (((0.0, 0.0, 1.0), 0.0), ((0.6, 0.0, 0.8), 2 / np.pi)):
         si.wi = mi.Vector3f(*wi)
-        found = PhotonMap((straight, straight), 1.0).irradiance(
-            si, mi.Vector3f(0, 0, 1), mi.Vector3f(0, 0, 1), mi.UInt32(0), mi.UInt32(9), mi.Bool(True)
+        found = PhotonMap((straight, straight), 1.0).gather(
+            si, mi.Vector3f(0, 0, 1), mi.Vector3f(0, 0, 1), mi.UInt32(0), mi.UInt32(9), mi.Float(0.5), mi.Bool(True)
         )
-        np.testing.assert_allclose(np.array(found).ravel(), kept, rtol=1e-6)
+        np.testing.assert_allclose(np.array(found.irradiance).ravel(), kept, rtol=1e-6)
 
 
 def test_the_kernel_keeps_the_flux():

@@ -41,8 +41,10 @@ SHARP_LOBE = "sharp_lobe"
 #: The attribute that tells the albedo of the light which a surface scatters alike in all directions, its opacity
 #: included; 0 for surfaces whose other layers dim it by direction (cloth), or whose normal is not the surface's own.
 LAMBERTIAN = "lambertian"
-#: A lobe is narrow whose GGX widths are below this.
-NARROW_ALPHA = 0.02
+#: The attribute that is 1 where no lobe of a surface is too narrow for photons to show it, its sharp one apart.
+WIDE_LOBES = "wide_lobes"
+#: A lobe is narrow whose GGX widths are below the first, and wide if they are above the second.
+NARROW_ALPHA, WIDE_ALPHA = 0.02, 0.04
 
 
 def surface_bsdf(model: SurfaceModel) -> BSDF:
@@ -148,11 +150,13 @@ def _bsdf_class(variant: str) -> type[BSDF]:
             del active
             if name == SHARP_LOBE:
                 return mi.Bool(self._may_be_sharp)
-            if name == LAMBERTIAN:
+            if name in (LAMBERTIAN, WIDE_LOBES):
                 return mi.Bool(True)
             return mi.Bool(name in ("base_color", "normal", "roughness", "metallic", "transmission"))
 
         def eval_attribute_1(self, name: str, si: SurfaceInteraction3f, active: Bool = True) -> Float:
+            if name == WIDE_LOBES:
+                return self._has_wide_lobes(surface_point(self.model, Place(si, active))) & active
             values = {
                 "roughness": self.model.roughness.eval,
                 "metallic": self.model.metalness,
@@ -190,6 +194,16 @@ def _bsdf_class(variant: str) -> type[BSDF]:
         def _narrow_coat(self, point: Point) -> Bool:
             coat = point.coat
             return mi.Bool(False) if coat is None else self._narrow(coat.lobe) & (coat.weight > 0)
+
+        def _has_wide_lobes(self, point: Point) -> Float:
+            """See :data:`WIDE_LOBES`."""
+            lobes = [point.lobe] if self._is_glossy else []
+            if point.coat is not None:
+                lobes.append(point.coat.lobe)
+            wide = mi.Bool(True)
+            for lobe in lobes:
+                wide &= self._narrow(lobe) | (dr.minimum(lobe.alpha.x, lobe.alpha.y) > WIDE_ALPHA)
+            return dr.select(wide, mi.Float(1), 0)
 
         def _sharp_normal(self, point: Point) -> Vector3f:
             """See :data:`SHARP_LOBE`."""

@@ -29,6 +29,7 @@ from lippmann.rendering.transport.sharp_events import (
     MOST_EVENTS,
     facing_normal,
     follows_sharply,
+    has_wide_lobes,
     lambertian,
     sharp_lobe,
 )
@@ -246,7 +247,8 @@ class PhotonShooter:
                 si, power, events, absorption, active, stream, dr.opaque(mi.UInt32, 2 + _DIMENSIONS * step)
             )
             lambert = lambertian(si, si.bsdf(), active)
-            lands = active & (dr.max(lambert) > 0) & (dr.max(power) > 0)
+            lands = active & (dr.max(power) > 0)
+            lands &= (dr.max(lambert) > 0) | has_wide_lobes(si, si.bsdf(), lands)
             normal = facing_normal(si)
             toward = si.to_world(si.wi)
             dr.eval(si, power, events, absorption, active, lands, normal, toward)

@@ -20,6 +20,7 @@ from lippmann.device.sobol import SampleStream
 from lippmann.device.types import (
     Bool,
     BSDFPtr,
+    Color3f,
     DirectionSample3f,
     Float,
     MitsubaScene,
@@ -28,15 +29,17 @@ from lippmann.device.types import (
     Spectrum,
     SurfaceInteraction3f,
     UInt32,
+    Vector3f,
 )
 from lippmann.rendering.transport.integrator import FirstHit, RayCounts
 from lippmann.rendering.transport.light_sampling import LightSampler, SceneLightSampler
-from lippmann.rendering.transport.photon_map import PhotonMap
+from lippmann.rendering.transport.photon_map import STEEPEST, PhotonMap
 from lippmann.rendering.transport.scene_features import SceneFeatures
 from lippmann.rendering.transport.sharp_events import (
     MOST_EVENTS,
     facing_normal,
     follows_sharply,
+    has_wide_lobes,
     is_sharp,
     lambertian,
     sharp_lobe,
@@ -46,6 +49,8 @@ from lippmann.rendering.transport.sharp_events import (
 MAX_CROSSINGS = 64
 #: Sample dimensions used at one vertex.
 DIMENSIONS_PER_VERTEX = 4
+#: Sample dimension, from a vertex's first, of the photon chosen there.
+GATHER_DIMENSION = 1 << 24
 #: Surfaces after which Russian roulette may end a path.
 ROULETTE_DEPTH = 5
 #: Emitter samples at the first surface of a path that is not purely specular: ``FIRST_EMITTER_SAMPLES`` in each of a
@@ -192,16 +197,14 @@ class PathIntegrator:
                     dr.select(all_specular, samples_at_start, samples),
                     dr.select(all_specular, start, number),
                 )
-            lobe, lambert = mi.Vector3f(0), mi.Color3f(0)
+            lobe, lambert, wide = mi.Vector3f(0), mi.Color3f(0), mi.Bool(False)
             if dr.hint(self.photons is not None, mode="scalar"):
                 lobe = sharp_lobe(si, bsdf, continues)
                 lambert = lambertian(si, bsdf, continues & (rough == 0))
-                lands = continues & (rough == 0) & (dr.max(lambert) > 0)
-                photons = cast("PhotonMap", self.photons)
-                caustics = photons.irradiance(
-                    si, facing_normal(si), lobe, mi.UInt32(stream.half), self.depth - depth - 1, lands
-                )
-                radiance += dr.select(lands, throughput * lambert * caustics * dr.inv_pi, 0)
+                wide = has_wide_lobes(si, bsdf, continues & (rough == 0))
+                lands = continues & (rough == 0) & (wide | (dr.max(lambert) > 0))
+                choice = stream.next_1d(dimension + GATHER_DIMENSION)
+                radiance += throughput * self._caustics(si, bsdf, lobe, lambert, wide, stream, depth, choice, lands)
             last = number + samples
             while dr.hint(sampling, label="emitters"):
                 point = stream.at(number).next_2d(dimension)
@@ -229,7 +232,8 @@ class PathIntegrator:
                 scattered = mi.Color3f(bsdf_weight) * bs.pdf
                 share = dr.select(scattered > 0, lambert * (dr.abs(bs.wo.z) * dr.inv_pi) / scattered, 0)
                 becomes_rough = is_event & ~keeps_sharp
-                by_photons = dr.select(becomes_rough & (rough == 0), dr.clip(share, 0, 1), by_photons)
+                share = dr.select(wide & (si.wi.z * bs.wo.z > 0), 1, dr.clip(share, 0, 1))
+                by_photons = dr.select(becomes_rough & (rough == 0), share, by_photons)
                 rough += dr.select(becomes_rough, mi.UInt32(1), mi.UInt32(0))
                 sharp = dr.select(becomes_rough, mi.UInt32(0), sharp + dr.select(is_event, mi.UInt32(1), mi.UInt32(0)))
             throughput *= bsdf_weight
@@ -263,6 +267,35 @@ class PathIntegrator:
         if dr.hint(self.gain is not None, mode="scalar"):
             radiance *= self.gain
         return radiance, RayCounts(secondary, shadow), FirstHit(first_distance, view_dependent)
+
+    def _caustics(
+        self,
+        si: SurfaceInteraction3f,
+        bsdf: BSDFPtr,
+        lobe: Vector3f,
+        lambert: Color3f,
+        wide: Bool,
+        stream: SampleStream,
+        depth: UInt32,
+        choice: Float,
+        active: Bool,
+    ) -> Spectrum:
+        """Radiance toward ``si.wi`` of the photons about a point.
+
+        The sum over all of them by the Lambertian part of the surface, and by the rest of its scattering that of one
+        for all, where its lobes are wide enough for that.
+        """
+        photons = cast("PhotonMap", self.photons)
+        found = photons.gather(
+            si, facing_normal(si), lobe, mi.UInt32(stream.half), self.depth - depth - 1, choice, active
+        )
+        light = lambert * found.irradiance * dr.inv_pi
+        wo = si.to_local(found.toward)
+        wide = active & wide & (dr.max(found.flux) > 0) & (wo.z * si.wi.z > 0)
+        rest = bsdf.eval(mi.BSDFContext(), si, wo, wide) - lambert * (dr.abs(wo.z) * dr.inv_pi)
+        grazing = dr.abs(dr.dot(found.toward, si.n))
+        rest *= dr.minimum(dr.rcp(grazing), STEEPEST / dr.abs(wo.z))
+        return dr.select(active, light, 0) + dr.select(wide, rest * found.flux, 0)
 
     def _clamped(self, light: Spectrum) -> Spectrum:
         """``light`` with no component above :attr:`most_indirect`, its hue unchanged."""

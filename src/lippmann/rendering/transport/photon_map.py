@@ -14,7 +14,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.device.types import Bool, Color3f, Point3f, SurfaceInteraction3f, UInt32, Vector3f
+from lippmann.device.types import Bool, Color3f, Float, Point3f, SurfaceInteraction3f, UInt32, Vector3f
 from lippmann.rendering.transport.sharp_events import is_sharp
 
 Floats = NDArray[np.float32]
@@ -64,6 +64,27 @@ class Photons:
         return Photons(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
 
 
+class Gathered:
+    """Light that photons bring to a point.
+
+    Attributes
+    ----------
+    irradiance:
+        On a Lambertian surface of the point's shading normal.
+    toward:
+        World-space unit direction to where one of the photons came from, chosen by its share.
+    flux:
+        Irradiance, geometric normal, if all came from ``toward``: its product with a BSDF is an unbiased estimate of
+        the sum over all photons.
+    """
+
+    # Not a dataclass: Dr.Jit would take it for loop state and write its fields.
+    def __init__(self, irradiance: Color3f, toward: Vector3f, flux: Color3f) -> None:
+        self.irradiance = irradiance
+        self.toward = toward
+        self.flux = flux
+
+
 class PhotonMap:
     """Two sets of photons that know nothing of each other, one for either half of a picture's samples.
 
@@ -107,16 +128,17 @@ class PhotonMap:
         return np.asarray(mixed & np.uint32((1 << self._bits) - 1), dtype=np.uint32)
 
     @dr.syntax
-    def irradiance(
+    def gather(
         self,
         si: SurfaceInteraction3f,
         normal: Vector3f,
         lobe: Vector3f,
         half: UInt32,
         surfaces: UInt32,
+        choice: Float,
         active: Bool,
-    ) -> Color3f:
-        """Irradiance by the photons around a point, of an Epanechnikov kernel.
+    ) -> Gathered:
+        """Light of the photons around a point, by an Epanechnikov kernel.
 
         Parameters
         ----------
@@ -131,11 +153,16 @@ class PhotonMap:
             0 or 1: which photons.
         surfaces:
             The most sharp events that a photon may have had.
+        choice:
+            Uniform in [0, 1): by which one photon is chosen.
         """
         r = self._r
         p = mi.Point3f(si.p)
         base = dr.floor((p - r) / (2 * r))
         total = mi.Color3f(0)
+        weights = mi.Float(0)  # of the photons met so far; one of them is chosen by reservoir sampling
+        chosen = mi.Vector3f(0, 0, 1)
+        color = mi.Color3f(0)
         corner = mi.UInt32(0)
         first_bucket = half * ((1 << self._bits) + 1)
         looking = mi.Bool(active)
@@ -159,14 +186,22 @@ class PhotonMap:
                     wo = si.to_local(d)
                     fits &= ~is_sharp(si, lobe, wo)
                     power = dr.gather(mi.Color3f, self._power, number, fits)
+                    power = dr.select(fits, power * (1 - distance2 / (r * r)), 0)
+                    weight = dr.mean(power)
+                    weights += weight
+                    share = dr.select(weight > 0, weight / weights, 0)
+                    taken = choice < share
+                    choice = dr.select(taken, choice / share, (choice - share) / (1 - share))
+                    chosen = dr.select(taken, d, chosen)
+                    color = dr.select(taken, power / weight, color)
                     # Photons know the true surface; it is shaded by its interpolated normal.
-                    power *= dr.minimum(dr.abs(wo.z) / dr.dot(d, normal), STEEPEST)
-                    total += dr.select(fits, power * (1 - distance2 / (r * r)), 0)
+                    total += power * dr.minimum(dr.abs(wo.z) / dr.dot(d, normal), STEEPEST)
                 number += 1
                 inside &= number < end
             corner += 1
             looking &= corner < 8
-        return total * (2 / (dr.pi * r * r))
+        density = 2 / (dr.pi * r * r)
+        return Gathered(total * density, chosen, color * weights * density)
 
     def _bucket(self, cell: Point3f) -> UInt32:
         x, y, z = (mi.UInt32(mi.Int32(part)) * prime for part, prime in zip(cell, _PRIMES, strict=True))
@@ -176,7 +211,7 @@ class PhotonMap:
 def irradiance_by_all(
     photons: Photons, position: Floats, normal: Floats, radius: float, surfaces: int = 1 << 30
 ) -> Floats:
-    """What :meth:`PhotonMap.irradiance` computes, photon by photon: ``(m, 3)`` at ``(m, 3)`` points without a lobe."""
+    """The irradiance that :meth:`PhotonMap.gather` computes, photon by photon: ``(m, 3)`` at ``(m, 3)`` points without a lobe."""
     apart = photons.position[None] - position[:, None]
     distance2 = (apart**2).sum(axis=2)
     fits = distance2 < radius**2

@@ -16,7 +16,7 @@ import math
 import drjit as dr
 import mitsuba as mi
 
-from lippmann.device.pbr.gltf_bsdf import LAMBERTIAN, SHARP_LOBE
+from lippmann.device.pbr.gltf_bsdf import LAMBERTIAN, SHARP_LOBE, WIDE_LOBES
 from lippmann.device.types import Bool, BSDFPtr, BSDFSample3f, Color3f, SurfaceInteraction3f, Vector3f
 
 #: Sharp events between an emitter and a caustic, at most; light of more is left to paths.
@@ -43,6 +43,12 @@ def follows_sharply(si: SurfaceInteraction3f, lobe: Vector3f, bs: BSDFSample3f) 
     """Whether a sampled direction goes on sharply: by a lobe without width, or by ``lobe`` (:func:`sharp_lobe`)."""
     has_no_width = (bs.sampled_type & int(mi.BSDFFlags.Delta | mi.BSDFFlags.Null)) != 0
     return has_no_width | is_sharp(si, lobe, bs.wo)
+
+
+def has_wide_lobes(si: SurfaceInteraction3f, bsdf: BSDFPtr, active: Bool) -> Bool:
+    """Whether all that a surface reflects but sharply can be told from photons, by its own word."""
+    told = active & bsdf.has_attribute(WIDE_LOBES, active)
+    return told & (bsdf.eval_attribute_1(WIDE_LOBES, si, told) > 0)
 
 
 def facing_normal(si: SurfaceInteraction3f) -> Vector3f:
