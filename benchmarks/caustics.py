@@ -59,7 +59,8 @@ def with_photons(stage: Stage, samples: int, seed: int) -> Picture:
 
 
 def shoot(stage: Stage, samples: int, seed: int) -> None:
-    from lippmann.rendering.transport.caustic_photons import find_casters, shoot_photons
+    from lippmann.rendering.transport.casters import find_casters
+    from lippmann.rendering.transport.caustic_photons import shoot_photons
 
     paths = stage.integrator
     casters = find_casters(paths.scene)

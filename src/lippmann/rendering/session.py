@@ -226,7 +226,7 @@ class Session:
 
     def _caustics_notes(self) -> tuple[str, ...]:
         from lippmann.device.pbr import BuiltScene
-        from lippmann.rendering.transport.caustic_photons import hides_caustics
+        from lippmann.rendering.transport.casters import hides_caustics
 
         request, built = self.request, self.built
         if request.integrator != "path" or request.caustics != "paths" or request.surfaces < 2:

@@ -31,12 +31,12 @@ def landed(scene_dict, count=1 << 17, seed=3):
     """Photons of a scene, and how many emissions each emitter and caster had."""
     import mitsuba as mi
 
-    from lippmann.rendering.transport.caustic_photons import PhotonShooter, find_casters
+    from lippmann.rendering.transport.casters import find_casters
+    from lippmann.rendering.transport.caustic_photons import PhotonShooter
     from lippmann.rendering.transport.scene_features import make_scene_features
 
     scene = mi.load_dict({"type": "scene"} | scene_dict)
     casters = find_casters(scene)
-    assert not casters.missing
     assert casters.pairs > 0
     shooter = PhotonShooter(scene, make_scene_features(scene, has_null="mask" in str(scene_dict)), casters)
     return shooter.shoot(count, np.full(casters.pairs, 1 / casters.pairs), seed)[0]
@@ -151,7 +151,8 @@ def traced(scene_dict, view, *, photons, size=24, spp=64, seed=0, depth=6, sampl
 
     from lippmann.rendering.film.wavefront import trace_frame
     from lippmann.rendering.film.wavefront_plan import make_plan
-    from lippmann.rendering.transport.caustic_photons import find_casters, shoot_photons
+    from lippmann.rendering.transport.casters import find_casters
+    from lippmann.rendering.transport.caustic_photons import shoot_photons
     from lippmann.rendering.transport.path import PathIntegrator
     from lippmann.rendering.transport.ray_source import CameraRays
     from lippmann.rendering.transport.scene_features import make_scene_features
@@ -256,7 +257,7 @@ def test_a_picture_is_the_same_however_it_is_cut(monkeypatch):
 def test_without_casters_or_lamps_there_are_no_photons():
     import mitsuba as mi
 
-    from lippmann.rendering.transport.caustic_photons import find_casters
+    from lippmann.rendering.transport.casters import find_casters
 
     mirror = {"type": "sphere", "bsdf": {"type": "conductor"}}
     sky = {"type": "constant"}
@@ -266,22 +267,33 @@ def test_without_casters_or_lamps_there_are_no_photons():
     assert find_casters(mi.load_dict({"type": "scene", "ball": mirror, "lamp": lamp([0, 0, 9])})).pairs == 1
 
 
-def test_shapes_that_give_no_points_are_told(tmp_path):
-    """Glass threads and instances: their light cannot be replaced, and so is left to paths."""
+def test_instances_and_curves_throw_what_the_shapes_throw(tmp_path):
+    """Shapes that give no points get photons through the boxes about them: the same flux."""
     import mitsuba as mi
 
-    from lippmann.rendering.transport.caustic_photons import find_casters, hides_caustics
+    from lippmann.rendering.transport.casters import find_casters, hides_caustics
 
-    (tmp_path / "thread.txt").write_text("0 0 0 .1\n1 0 0 .1\n1 1 0 .1\n0 1 0 .1\n")
+    place = mi.ScalarTransform4f
     glass = {"type": "dielectric"}
+    rest = {"room": room(), "lamp": lamp([0, 0, 4.0]), "second": lamp([0.7, 0.8, -0.9])}
+    ball = {"type": "sphere", "radius": 0.5, "bsdf": glass}
+    plain = landed({"ball": ball | {"to_world": place().translate([0, 0, 1]).scale(2)}, **rest}, count=1 << 19)
+    group = {"type": "shapegroup", "ball": ball, "matt": {"type": "sphere", "center": [9, 9, 9], "radius": 0.01}}
+    of = {"type": "ref", "id": "group"}
+    copy = {"type": "instance", "of": of, "to_world": place().translate([0, 0, 1]).scale(2)}
+    (tmp_path / "thread.txt").write_text("-1 0 -2 .2\n0 0 -2 .2\n1 0 -2 .2\n2 0 -2 .2\n")
     thread = {"type": "bsplinecurve", "filename": str(tmp_path / "thread.txt"), "bsdf": glass}
-    glow = {"type": "bsplinecurve", "filename": str(tmp_path / "thread.txt"), "bsdf": {"type": "diffuse"}}
-    curves = mi.load_dict({"type": "scene", "thread": thread, "glow": glow, "lamp": lamp([0, 0, 9])})
-    assert "curves" in find_casters(curves).missing
-    assert hides_caustics(curves)
-    group = {"type": "shapegroup", "ball": {"type": "sphere", "bsdf": glass}}
-    copies = mi.load_dict(
-        {"type": "scene", "group": group, "copy": {"type": "instance", "of": {"type": "ref", "id": "group"}}}
-    )
-    assert "instances" in find_casters(copies).missing
-    assert not hides_caustics(copies)
+    copies = {"group": group, "copy": copy, **rest}
+    copied = landed(copies, count=1 << 21)
+    for events in (1, 2):
+        expected, found = (photons.power[photons.surfaces == events].sum(axis=0) for photons in (plain, copied))
+        np.testing.assert_allclose(found, expected, rtol=0.02)
+    # A thread beside the ball, of the same size as a cylinder that gives points.
+    alone = {"room": room(), "lamp": lamp([0.3, 3.0, -1.5])}
+    rod = {"type": "cylinder", "p0": [0, 0, -2], "p1": [1, 0, -2], "radius": 0.2, "bsdf": glass}
+    through = landed({"thread": thread, "ball": ball, **alone}, count=1 << 21)
+    rods = landed({"rod": rod, "ball": ball, **alone}, count=1 << 19)
+    np.testing.assert_allclose(through.power.sum(axis=0), rods.power.sum(axis=0), rtol=0.03)
+    assert hides_caustics(mi.load_dict({"type": "scene", "thread": thread, **alone}))
+    found = find_casters(mi.load_dict({"type": "scene", **copies}))
+    assert np.isfinite(found.boxes).all(axis=1).tolist() == [True]

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from lippmann.errors import UsageError
 from lippmann.rendering.film.memory_model import PHOTON, too_small
 from lippmann.rendering.request.render_request import RenderRequest
-from lippmann.rendering.transport.caustic_photons import emissions, find_casters, no_photons, shoot_photons
+from lippmann.rendering.transport.casters import find_casters
+from lippmann.rendering.transport.caustic_photons import emissions, no_photons, shoot_photons
 from lippmann.rendering.transport.path import PathIntegrator
 from lippmann.rendering.transport.photon_map import PhotonMap
 from lippmann.rendering.transport.ray_source import RaySource
@@ -21,8 +21,6 @@ def photons_of_picture(
 
     Raises
     ------
-    UsageError
-        Photons cannot start from some shape of the scene.
     MemoryLimitError
         ``memory`` bytes do not hold them.
     """
@@ -31,13 +29,6 @@ def photons_of_picture(
     if request.caustics == "none":
         return no_photons()
     casters = find_casters(integrator.scene)
-    if casters.missing:
-        raise UsageError(
-            f"photons cannot start from {casters.missing}",
-            parameter="caustics",
-            rule="mirrors, glass and gloss are meshes, spheres, cylinders, disks or rectangles then",
-            fix="leave it out",
-        )
     samples = GOAL_SAMPLES if request.is_open_ended else request.samples
     samples *= source.width * source.height * source.channels
     # No fewer where memory is short: it does not change a picture.

@@ -13,16 +13,15 @@ Lambertian lobe.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.device.pbr.gltf_bsdf import SHARP_LOBE
 from lippmann.device.sobol import SampleStream
 from lippmann.device.types import Bool, Color3f, MitsubaScene, Spectrum, SurfaceInteraction3f, UInt32
+from lippmann.rendering.transport.casters import CasterPoints, Casters
 from lippmann.rendering.transport.photon_map import PhotonMap, Photons
 from lippmann.rendering.transport.scene_features import SceneFeatures
 from lippmann.rendering.transport.sharp_events import (
@@ -38,6 +37,7 @@ from lippmann.rendering.transport.sharp_events import (
 _MOST_CROSSINGS = 4
 #: Emissions of the pilot for each emitter and caster, and in all.
 PILOT_OF_PAIR, PILOT = 4096, 1 << 20
+_FEWEST_OF_PAIR = 64
 #: Share of the emissions that goes to all pairs alike, whatever the pilot met.
 _UNIFORM_SHARE = 0.1
 #: Emissions of each half: one for so many samples of the picture, within limits.
@@ -48,86 +48,11 @@ NEIGHBOURS = 50
 _PROBED = 2000
 _SEED_STEPS = (0xB5297A4D, 0x68E31DA4)
 _PILOT_STEP = 0x1B56C4E9
-#: The point met on the way from an emitter is the one that was drawn if it is nearer than this part of the way, and
-#: their normals agree to this cosine: the back of a thin body is another point.
-_SAME_POINT, _SAME_SIDE = 1e-5, 0.5
 #: How far a ray goes on behind a straight-through surface, relative to its coordinates.
 _CLEARANCE = 1e-4
-#: Emitters are small whose area is less than this part of the square of the scene's diagonal.
-SMALL = 1e-3
 #: Dimensions of the sample stream at one surface.
 _DIMENSIONS = 2
 _NONE = Photons.dark(0)
-
-
-@dataclass(frozen=True, eq=False)
-class Casters:
-    """What can make caustics in a scene: indices of emitters and of shapes, and every pair of them.
-
-    ``missing`` says why some could not be used; empty if all can.
-    """
-
-    emitters: NDArray[np.uint32]
-    shapes: NDArray[np.uint32]
-    missing: str = ""
-
-    @property
-    def pairs(self) -> int:
-        """Number of pairs of an emitter and a caster."""
-        return len(self.emitters) * len(self.shapes)
-
-
-def find_casters(scene: MitsubaScene) -> Casters:
-    """Emitters other than the environment, and shapes with lobes that may be sharp."""
-    environment = scene.environment()
-    emitters = [number for number, each in enumerate(scene.emitters()) if each is not environment]
-    shapes, missing = [], ""
-    for number, shape in enumerate(scene.shapes()):
-        if shape.class_name() == "Instance":  # what it shows lies in its group, and may be sharp
-            missing = "instances"
-            continue
-        if not _may_be_sharp(shape.bsdf()):
-            continue
-        if not 0 < _area(shape) < math.inf or not _gives_points(shape):
-            missing = "curves and other shapes without points of their own"
-            continue
-        shapes.append(number)
-    return Casters(np.array(emitters, np.uint32), np.array(shapes, np.uint32), missing)
-
-
-def hides_caustics(scene: MitsubaScene) -> bool:
-    """Whether a scene has mirrors, glass or smooth gloss, and an emitter so small that paths hardly find it by them."""
-    return _has_small_emitter(scene) and any(_may_be_sharp(shape.bsdf()) for shape in scene.shapes())
-
-
-def _has_small_emitter(scene: MitsubaScene) -> bool:
-    if any(mi.has_flag(emitter.flags(), mi.EmitterFlags.Delta) for emitter in scene.emitters()):
-        return True
-    box = scene.bbox()
-    small = SMALL * float(dr.squared_norm(box.max - box.min))
-    return any(_area(shape) < small for shape in scene.shapes() if shape.is_emitter())
-
-
-def _area(shape: mi.Shape) -> float:
-    """Area of a shape; not a number for shapes that do not tell it."""
-    try:
-        return float(np.array(shape.surface_area()).ravel()[0])
-    except (RuntimeError, NotImplementedError):
-        return math.nan
-
-
-def _may_be_sharp(bsdf: mi.BSDF) -> bool:
-    if int(bsdf.flags()) & int(mi.BSDFFlags.DeltaReflection | mi.BSDFFlags.DeltaTransmission):
-        return True
-    return bool(np.any(np.array(bsdf.has_attribute(SHARP_LOBE, True))))
-
-
-def _gives_points(shape: mi.Shape) -> bool:
-    try:
-        point = shape.sample_position(0.0, mi.Point2f(0.5), True)
-        return bool(np.isfinite(np.array(point.p)).all() and np.array(point.pdf).ravel()[0] > 0)
-    except (RuntimeError, NotImplementedError):
-        return False
 
 
 def no_photons() -> PhotonMap:
@@ -151,7 +76,7 @@ def shoot_photons(
     if casters.pairs == 0:
         return no_photons()
     shooter = PhotonShooter(scene, features, casters)
-    pilot = min(PILOT_OF_PAIR, max(64, PILOT // casters.pairs)) * casters.pairs
+    pilot = min(PILOT_OF_PAIR, max(_FEWEST_OF_PAIR, PILOT // casters.pairs)) * casters.pairs
     even = np.full(casters.pairs, 1 / casters.pairs)
     photons, pair = shooter.shoot(pilot, even, (seed + _PILOT_STEP) % 2**32)
     if not len(photons):
@@ -183,10 +108,7 @@ class PhotonShooter:
         self._scene = scene
         self._features = features
         self._casters = casters
-        shapes = scene.shapes()
-        areas = [_area(shapes[int(number)]) for number in casters.shapes]
-        self._areas = mi.Float(np.array(areas, np.float32))
-        self._emitter_numbers, self._shape_numbers = mi.UInt32(casters.emitters), mi.UInt32(casters.shapes)
+        self._emitter_numbers = mi.UInt32(casters.emitters)
 
     def shoot(self, count: int, chances: NDArray[np.float64], seed: int) -> tuple[Photons, NDArray[np.int64]]:
         """``count`` emissions of pairs drawn by ``chances``: photons that landed, and their pairs."""
@@ -214,20 +136,17 @@ class PhotonShooter:
         stream = SampleStream.of_pixels(mi.UInt32(0), index, dr.opaque(mi.UInt32, seed))
         caster = numbers // len(self._casters.emitters)
         source = numbers - caster * len(self._casters.emitters)
-        shape = dr.gather(mi.ShapePtr, scene.shapes_dr(), dr.gather(mi.UInt32, self._shape_numbers, caster))
         emitter = dr.gather(mi.EmitterPtr, scene.emitters_dr(), dr.gather(mi.UInt32, self._emitter_numbers, source))
 
-        point = shape.sample_position(mi.Float(0), stream.next_2d(0), mi.Bool(True))
-        reference = dr.zeros(mi.SurfaceInteraction3f, lanes)
-        reference.p, reference.n = point.p, point.n
-        ds, light = emitter.sample_direction(reference, stream.next_2d(1), mi.Bool(True))
+        point = CasterPoints(scene, self._casters, caster, stream.next_2d(0), stream.next_1d(2))
+        ds, light = emitter.sample_direction(point.reference(), stream.next_2d(1), mi.Bool(True))
         active = (ds.pdf > 0) & (dr.max(light) > 0)
         power = mi.Color3f(light) * share
         # From the emitter to the point: tells whether one sees the other, and what surface is met there.
         ray = mi.Ray3f(point.p + ds.d * (ds.dist * (1 - 1e-3)), -ds.d)
         si = scene.ray_intersect(ray, mi.RayFlags.All, False, active)
         for _ in range(_MOST_CROSSINGS if self._features.has_null else 0):
-            other = active & si.is_valid() & ~_is_at(si, point, ds.dist)
+            other = active & si.is_valid() & ~point.is_met(si, ds.dist)
             through = si.bsdf(ray).eval_null_transmission(si, other)
             power = dr.select(other, power * through, power)
             active &= ~other | (dr.max(through) > 0)
@@ -236,15 +155,15 @@ class PhotonShooter:
             beyond = mi.Ray3f(si.p + ray.d * step, ray.d)
             again = scene.ray_intersect(beyond, mi.RayFlags.All, False, other & active)
             si = dr.select(other, again, si)
-        active &= si.is_valid() & _is_at(si, point, ds.dist)
-        power *= dr.abs(dr.dot(si.n, ds.d)) * dr.gather(mi.Float, self._areas, caster)
+        active &= si.is_valid() & point.is_met(si, ds.dist)
+        power *= point.cosine(si, ds.d) * point.area
 
         found = []
         events, absorption = dr.zeros(mi.UInt32, lanes), dr.zeros(mi.Color3f, lanes)
         dr.eval(si, power, events, absorption, active)
         for step in range(MOST_EVENTS + (_MOST_CROSSINGS if self._features.has_null else 0)):
             si, power, events, absorption, active = self._next_surface(
-                si, power, events, absorption, active, stream, dr.opaque(mi.UInt32, 2 + _DIMENSIONS * step)
+                si, power, events, absorption, active, stream, dr.opaque(mi.UInt32, 3 + _DIMENSIONS * step)
             )
             lambert = lambertian(si, si.bsdf(), active)
             lands = active & (dr.max(power) > 0)
@@ -296,11 +215,6 @@ class PhotonShooter:
         if self._features.has_absorption:
             power *= dr.exp(-absorption * dr.select(si.is_valid(), si.t, 0))
         return si, power, events, absorption, active
-
-
-def _is_at(si: SurfaceInteraction3f, point: mi.PositionSample3f, distance: mi.Float) -> Bool:
-    near = dr.squared_norm(si.p - point.p) < dr.square(_SAME_POINT * distance)
-    return near & (dr.dot(si.n, point.n) > _SAME_SIDE)
 
 
 def _photons(

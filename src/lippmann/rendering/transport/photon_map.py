@@ -211,7 +211,7 @@ class PhotonMap:
 def irradiance_by_all(
     photons: Photons, position: Floats, normal: Floats, radius: float, surfaces: int = 1 << 30
 ) -> Floats:
-    """The irradiance that :meth:`PhotonMap.gather` computes, photon by photon: ``(m, 3)`` at ``(m, 3)`` points without a lobe."""
+    """The irradiance of :meth:`PhotonMap.gather`, photon by photon: ``(m, 3)`` at ``(m, 3)`` points without a lobe."""
     apart = photons.position[None] - position[:, None]
     distance2 = (apart**2).sum(axis=2)
     fits = distance2 < radius**2

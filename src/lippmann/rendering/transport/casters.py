@@ -1,0 +1,223 @@
+"""Casters: shapes whose mirrors, glass or smooth gloss may make caustics, and where emitters' light meets them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from lippmann.device.pbr.gltf_bsdf import SHARP_LOBE
+from lippmann.device.types import (
+    Bool,
+    Float,
+    MitsubaScene,
+    Point2f,
+    Point3f,
+    ShapePtr,
+    SurfaceInteraction3f,
+    UInt32,
+    Vector3f,
+)
+
+#: Emitters are small whose area is less than this part of the square of the scene's diagonal.
+SMALL = 1e-3
+#: The point met on the way from an emitter is the one that was drawn if it is nearer than this part of the way, and
+#: their normals agree to this cosine: the back of a thin body is another point.
+_SAME_POINT, _SAME_SIDE = 1e-5, 0.5
+#: Boxes about shapes that give no points are wider than these by this part of their diagonal.
+_MARGIN = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class Casters:
+    """What can make caustics in a scene.
+
+    Attributes
+    ----------
+    emitters, shapes:
+        Indices into the scene's; every pair of them may make caustics.
+    boxes:
+        ``(len(shapes), 6)``: least and greatest corners of the boxes of shapes that give no points (instances, curves);
+        not numbers for others.
+    areas:
+        ``(len(shapes),)``: of the shapes, or of their boxes.
+    """
+
+    emitters: NDArray[np.uint32]
+    shapes: NDArray[np.uint32]
+    boxes: NDArray[np.float32]
+    areas: NDArray[np.float32]
+
+    @property
+    def pairs(self) -> int:
+        """Number of pairs of an emitter and a caster."""
+        return len(self.emitters) * len(self.shapes)
+
+
+def find_casters(scene: MitsubaScene) -> Casters:
+    """Emitters other than the environment, and shapes with lobes that may be sharp; all instances may show such."""
+    environment = scene.environment()
+    emitters = [number for number, each in enumerate(scene.emitters()) if each is not environment]
+    shapes, boxes, areas = [], [], []
+    for number, shape in enumerate(scene.shapes() if emitters else ()):
+        if not (_is_instance(shape) or _may_be_sharp(shape.bsdf())):
+            continue
+        box, area = np.full(6, np.nan), area_of(shape)
+        if not (0 < area < math.inf and _gives_points(shape)):
+            box = _box_about(shape)
+            sides = box[3:] - box[:3]
+            area = 2 * float(sides @ np.roll(sides, 1))
+        shapes.append(number)
+        boxes.append(box)
+        areas.append(area)
+    return Casters(
+        np.array(emitters, np.uint32),
+        np.array(shapes, np.uint32),
+        np.array(boxes, np.float32).reshape(-1, 6),
+        np.array(areas, np.float32),
+    )
+
+
+def hides_caustics(scene: MitsubaScene) -> bool:
+    """Whether a scene has mirrors, glass or smooth gloss, and an emitter so small that paths hardly find it by them."""
+    return _has_small_emitter(scene) and any(_may_be_sharp(shape.bsdf()) for shape in scene.shapes())
+
+
+def _has_small_emitter(scene: MitsubaScene) -> bool:
+    if any(mi.has_flag(emitter.flags(), mi.EmitterFlags.Delta) for emitter in scene.emitters()):
+        return True
+    box = scene.bbox()
+    small = SMALL * float(dr.squared_norm(box.max - box.min))
+    return any(area_of(shape) < small for shape in scene.shapes() if shape.is_emitter())
+
+
+def area_of(shape: mi.Shape) -> float:
+    """Area of a shape; not a number for shapes that do not tell it."""
+    try:
+        return float(np.array(shape.surface_area()).ravel()[0])
+    except (RuntimeError, NotImplementedError):
+        return math.nan
+
+
+def _is_instance(shape: mi.Shape) -> bool:
+    return bool(shape.class_name() == "Instance")
+
+
+def _may_be_sharp(bsdf: mi.BSDF) -> bool:
+    if int(bsdf.flags()) & int(mi.BSDFFlags.DeltaReflection | mi.BSDFFlags.DeltaTransmission):
+        return True
+    return bool(np.any(np.array(bsdf.has_attribute(SHARP_LOBE, True))))
+
+
+def _gives_points(shape: mi.Shape) -> bool:
+    if _is_instance(shape):
+        return False
+    try:
+        point = shape.sample_position(0.0, mi.Point2f(0.5), True)
+        return bool(np.isfinite(np.array(point.p)).all() and np.array(point.pdf).ravel()[0] > 0)
+    except (RuntimeError, NotImplementedError):
+        return False
+
+
+def _box_about(shape: mi.Shape) -> NDArray[np.float64]:
+    found = shape.bbox()
+    low, high = np.array(found.min, dtype=float).ravel(), np.array(found.max, dtype=float).ravel()
+    margin = _MARGIN * float(np.linalg.norm(high - low))
+    return np.concatenate([low - margin, high + margin])
+
+
+class CasterPoints:
+    """Points on the casters of a wavefront, toward which emitters are sampled.
+
+    A shape's own point is where light meets it. For a shape that gives none it lies on the box about it, where light
+    leaves the box if nothing is in its way: whatever comes from an emitter to the shape, does so on a ray that leaves
+    the box once.
+
+    Parameters
+    ----------
+    scene, casters:
+        The scene, and its casters.
+    caster:
+        Indices of the casters of the lanes.
+    sample, face:
+        Uniform in [0, 1): the place, and for boxes the side on which it lies.
+    """
+
+    # Not a dataclass: Dr.Jit would take it for loop state and write its fields.
+    def __init__(self, scene: MitsubaScene, casters: Casters, caster: UInt32, sample: Point2f, face: Float) -> None:
+        number = dr.gather(mi.UInt32, mi.UInt32(casters.shapes), caster)
+        self._shape: ShapePtr = dr.gather(mi.ShapePtr, scene.shapes_dr(), number)
+        self.area: Float = dr.gather(mi.Float, mi.Float(casters.areas), caster)
+        self._boxed = mi.Bool(False)
+        boxed: NDArray[np.bool_] = np.isfinite(casters.boxes).all(axis=1)
+        shapes = scene.shapes()
+        # Not a virtual call: that would ask all shapes there are, and some refuse.
+        self.p, self._n = dr.switch(
+            caster,
+            [
+                _no_point if is_boxed else _point_of(shapes[int(number)])
+                for number, is_boxed in zip(casters.shapes, boxed.tolist(), strict=True)
+            ],
+            sample,
+        )
+        if boxed.any():
+            self._boxed = dr.gather(mi.Bool, mi.Bool(boxed), caster)
+            corners = [
+                dr.gather(mi.Vector3f, mi.Float(np.nan_to_num(part).astype(np.float32).ravel()), caster)
+                for part in (casters.boxes[:, :3], casters.boxes[:, 3:])
+            ]
+            p, n = _point_on_box(corners[0], corners[1], sample, face)
+            self.p, self._n = dr.select(self._boxed, p, self.p), dr.select(self._boxed, n, self._n)
+
+    def reference(self) -> SurfaceInteraction3f:
+        """The points, as emitters want them for sampling a direction."""
+        found = dr.zeros(mi.SurfaceInteraction3f, dr.width(self.p))
+        found.p, found.n = self.p, mi.Normal3f(self._n)
+        return found
+
+    def cosine(self, si: SurfaceInteraction3f, toward: Vector3f) -> Float:
+        """Area of a thin beam over that of its trace on the sampled surface; 0 for beams that enter a box.
+
+        ``si`` is where light from ``toward`` meets the caster.
+        """
+        leaves = dr.maximum(-dr.dot(self._n, toward), 0)
+        return dr.select(self._boxed, leaves, dr.abs(dr.dot(si.n, toward)))
+
+    def is_met(self, si: SurfaceInteraction3f, distance: Float) -> Bool:
+        """Whether light met the caster for which its emitter was sampled, from an emitter at ``distance``."""
+        near = dr.squared_norm(si.p - self.p) < dr.square(_SAME_POINT * distance)
+        near &= dr.dot(si.n, self._n) > _SAME_SIDE
+        return dr.select(self._boxed, (si.instance == self._shape) | (si.shape == self._shape), near)
+
+
+def _point_of(shape: mi.Shape) -> Callable[[Point2f], tuple[Point3f, Vector3f]]:
+    def sampled(sample: Point2f) -> tuple[Point3f, Vector3f]:
+        point = shape.sample_position(mi.Float(0), sample, mi.Bool(True))
+        return mi.Point3f(point.p), mi.Vector3f(point.n)
+
+    return sampled
+
+
+def _no_point(sample: Point2f) -> tuple[Point3f, Vector3f]:
+    return mi.Point3f(sample.x * 0), mi.Vector3f(sample.x * 0)
+
+
+def _point_on_box(low: Vector3f, high: Vector3f, sample: Point2f, face: Float) -> tuple[Vector3f, Vector3f]:
+    """A point spread evenly over a box, and the outward unit normal there."""
+    sides = high - low
+    areas = mi.Vector3f(sides.y * sides.z, sides.z * sides.x, sides.x * sides.y)
+    place = face * (2 * dr.sum(areas))
+    upper = place >= dr.sum(areas)
+    place = dr.select(upper, place - dr.sum(areas), place)
+    is_x, is_y = place < areas.x, place < areas.x + areas.y
+    sign = dr.select(upper, mi.Float(1), -1)
+    n = dr.select(is_x, mi.Vector3f(sign, 0, 0), dr.select(is_y, mi.Vector3f(0, sign, 0), mi.Vector3f(0, 0, sign)))
+    end = dr.select(upper, mi.Float(1), 0)
+    u, v = sample.x, sample.y
+    at = dr.select(is_x, mi.Vector3f(end, u, v), dr.select(is_y, mi.Vector3f(u, end, v), mi.Vector3f(u, v, end)))
+    return low + at * sides, n
