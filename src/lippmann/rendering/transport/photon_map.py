@@ -113,16 +113,16 @@ class PhotonMap:
         if not len(photons):  # gathers need something to point at
             photons = Photons.dark(1)
         self._start = mi.UInt32(np.concatenate(starts).astype(np.uint32))
-        self._position, self._normal, self._toward, self._power = (
-            mi.Float(getattr(photons, name).astype(np.float32).ravel())
-            for name in ("position", "normal", "toward", "power")
+        # Four numbers a row: such are fetched at once.
+        self._position, self._normal, self._toward = (
+            mi.Float(_rows_of_four(getattr(photons, name))) for name in ("position", "normal", "toward")
         )
-        self._surfaces = mi.UInt32(photons.surfaces)
+        self._power_and_surfaces = mi.Float(_rows_of_four(photons.power, photons.surfaces))
         self._r = dr.opaque(mi.Float, radius)
 
     def _bucket_numbers(self, position: Floats) -> NDArray[np.uint32]:
         # In single precision as on the device, so that both find the same cells.
-        cell = np.floor(position / np.float32(2 * self.radius)).astype(np.int32).astype(np.uint32)
+        cell = np.floor(position / np.float32(self.radius)).astype(np.int32).astype(np.uint32)
         mixed = cell[:, 0] * np.uint32(_PRIMES[0]) ^ cell[:, 1] * np.uint32(_PRIMES[1])
         mixed ^= cell[:, 2] * np.uint32(_PRIMES[2])
         return np.asarray(mixed & np.uint32((1 << self._bits) - 1), dtype=np.uint32)
@@ -158,7 +158,9 @@ class PhotonMap:
         """
         r = self._r
         p = mi.Point3f(si.p)
-        base = dr.floor((p - r) / (2 * r))
+        base = dr.floor(p / r) - 1
+        # How far the tangent plane's slab reaches from the centre of a cell that it touches.
+        reach = r * (FARTHEST_FROM_PLANE + 0.5 * dr.sum(dr.abs(normal)))
         total = mi.Color3f(0)
         weights = mi.Float(0)  # of the photons met so far; one of them is chosen by reservoir sampling
         chosen = mi.Vector3f(0, 0, 1)
@@ -167,26 +169,31 @@ class PhotonMap:
         first_bucket = half * ((1 << self._bits) + 1)
         looking = mi.Bool(active)
         while dr.hint(looking, label="cells"):
-            cell = base + mi.Vector3f(mi.Float(corner & 1), mi.Float((corner >> 1) & 1), mi.Float(corner >> 2))
+            cell = base + mi.Vector3f(mi.Float(corner % 3), mi.Float(corner // 3 % 3), mi.Float(corner // 9))
+            from_center = (cell + 0.5) * r - p
+            touches = dr.abs(dr.dot(from_center, normal)) < reach
+            touches &= dr.squared_norm(dr.maximum(dr.abs(from_center) - 0.5 * r, 0)) < r * r
             bucket = first_bucket + self._bucket(cell)
             number = dr.gather(mi.UInt32, self._start, bucket, looking)
             end = dr.gather(mi.UInt32, self._start, bucket + 1, looking)
-            inside = looking & (number < end)
+            inside = looking & touches & (number < end)
             while dr.hint(inside, label="photons"):
-                q = dr.gather(mi.Point3f, self._position, number, inside)
+                q = dr.gather(mi.Vector4f, self._position, number, inside).xyz
                 apart = q - p
                 distance2 = dr.squared_norm(apart)
-                near = inside & (distance2 < r * r) & dr.all(dr.floor(q / (2 * r)) == cell)
+                near = inside & (distance2 < r * r)
                 if near:
-                    n = dr.gather(mi.Vector3f, self._normal, number, near)
-                    d = dr.gather(mi.Vector3f, self._toward, number, near)
-                    fits = near & (dr.dot(n, normal) > LEAST_AGREEMENT) & (dr.dot(d, normal) > 0)
+                    # Two of the cells may share a bucket.
+                    fits = near & dr.all(dr.floor(q / r) == cell)
+                    n = dr.gather(mi.Vector4f, self._normal, number, near).xyz
+                    d = dr.gather(mi.Vector4f, self._toward, number, near).xyz
+                    fits &= (dr.dot(n, normal) > LEAST_AGREEMENT) & (dr.dot(d, normal) > 0)
                     fits &= dr.abs(dr.dot(apart, normal)) < FARTHEST_FROM_PLANE * r
-                    fits &= dr.gather(mi.UInt32, self._surfaces, number, near) <= surfaces
+                    brought = dr.gather(mi.Vector4f, self._power_and_surfaces, number, fits)
+                    fits &= brought.w <= mi.Float(surfaces)
                     wo = si.to_local(d)
                     fits &= ~is_sharp(si, lobe, wo)
-                    power = dr.gather(mi.Color3f, self._power, number, fits)
-                    power = dr.select(fits, power * (1 - distance2 / (r * r)), 0)
+                    power = dr.select(fits, mi.Color3f(brought.xyz) * (1 - distance2 / (r * r)), 0)
                     weight = dr.mean(power)
                     weights += weight
                     share = dr.select(weight > 0, weight / weights, 0)
@@ -199,13 +206,22 @@ class PhotonMap:
                 number += 1
                 inside &= number < end
             corner += 1
-            looking &= corner < 8
+            looking &= corner < 27
         density = 2 / (dr.pi * r * r)
         return Gathered(total * density, chosen, color * weights * density)
 
     def _bucket(self, cell: Point3f) -> UInt32:
         x, y, z = (mi.UInt32(mi.Int32(part)) * prime for part, prime in zip(cell, _PRIMES, strict=True))
         return (x ^ y ^ z) & ((1 << self._bits) - 1)
+
+
+def _rows_of_four(values: Floats, last: NDArray[np.uint32] | None = None) -> Floats:
+    """``(4 n,)``: rows of three numbers, each followed by one of ``last`` or by 0."""
+    rows = np.zeros((len(values), 4), np.float32)
+    rows[:, :3] = values
+    if last is not None:
+        rows[:, 3] = last
+    return rows.ravel()
 
 
 def irradiance_by_all(
