@@ -60,12 +60,12 @@ def with_photons(stage: Stage, samples: int, seed: int) -> Picture:
 
 def shoot(stage: Stage, samples: int, seed: int) -> None:
     from lippmann.rendering.transport.casters import find_casters
-    from lippmann.rendering.transport.caustic_photons import shoot_photons
+    from lippmann.rendering.transport.caustic_photons import CausticPhotons
 
     paths = stage.integrator
     casters = find_casters(paths.scene)
     whole = samples * stage.source.width * stage.source.height
-    paths.photons = shoot_photons(paths.scene, paths.features, casters, samples=whole, seed=seed)
+    paths.photons = CausticPhotons(paths.scene, paths.features, casters, samples=whole, seed=seed).of_pass(0)
 
 
 def picture(stage: Stage, way: str, method: str, samples: int) -> Picture:

@@ -114,7 +114,7 @@ def render(
     subpixels: bool | None = None,
     pixel_filter: PixelFilter = "auto",
     denoise: Denoiser = "auto",
-    caustics: Caustics = "paths",
+    caustics: Caustics = "auto",
     clamp_indirect: float | None = None,
     exposure: float | Literal["auto"] = "auto",
     tone_map: ToneMap = "none",
@@ -177,8 +177,8 @@ def render(
         ``oidn`` denoises by Open Image Denoise with the effort that the traced rays deserve, ``oidn-fast`` and
         ``oidn-high`` with a given one, ``none`` not at all. ``auto`` (default): as the method needs it.
     caustics:
-        Light that mirrors, glass and smooth gloss throw onto rough surfaces: ``paths`` (default) as paths find it,
-        ``photons`` traced from the emitters, ``none`` left out.
+        Light that mirrors, glass and smooth gloss throw onto rough surfaces: ``photons`` traced from the emitters,
+        ``paths`` as paths find it, ``none`` left out. ``auto`` (default): photons where there is such light.
     clamp_indirect:
         What indirect light may bring to a sample at most each time that it is met, 1 being white. Default: no limit.
     exposure:

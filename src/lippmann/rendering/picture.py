@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
@@ -99,7 +99,7 @@ def choose_exposure(scene: Scene, display: Display, request: RenderRequest) -> f
 
     source = DisplayRays(display, placement.world_from_display, bool(session.request.subpixels))
     session.integrator(source, placement.display_from_world)
-    return session.choices.get("exposure", 0.0)
+    return cast("float", session.choices.get("exposure", 0.0))
 
 
 def traced_window(session: Session, display: Display, placement: Placement) -> PixelWindow | None:
@@ -139,7 +139,6 @@ def placed_options(request: RenderRequest, placement: Placement) -> dict[str, ob
         "depth_scale": placement.depth_scale,
         **({"tone_map": request.tone_map} if request.tone_map != "none" else {}),
         **({} if request.clamp_indirect is None else {"clamp_indirect": request.clamp_indirect}),
-        **({"caustics": request.caustics} if request.caustics != "paths" else {}),
         "depth_range": list(placement.depth_range),
         "resolvable_range": list(placement.resolvable_range),
     }

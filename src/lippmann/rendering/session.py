@@ -93,7 +93,7 @@ class Session:
     built: BuiltScene | BuiltClassic
     memory: int
     watch: Stopwatch
-    choices: dict[str, float] = field(default_factory=dict)
+    choices: dict[str, object] = field(default_factory=dict)
 
     def place(self, display: Display) -> Placement:
         """Where ``display`` stands in the scene; light that follows the viewer is turned toward it.
@@ -158,6 +158,11 @@ class Session:
 
         if not isinstance(integrator, PathIntegrator):
             return integrator
+        from lippmann.rendering.film.caustics import give_photons
+
+        caustics = give_photons(integrator, self.request, source, memory_limit(self.request))
+        if caustics != "paths":
+            self.choices["caustics"] = caustics
         exposure = self.request.exposure
         if exposure == "auto":
             exposure = measure_exposure(
@@ -229,7 +234,7 @@ class Session:
         from lippmann.rendering.transport.casters import hides_caustics
 
         request, built = self.request, self.built
-        if request.integrator != "path" or request.caustics != "paths" or request.surfaces < 2:
+        if request.integrator != "path" or "caustics" in self.choices or request.surfaces < 2:
             return ()
         if not isinstance(built, BuiltScene) or not hides_caustics(built.mitsuba):
             return ()
@@ -343,7 +348,6 @@ def _make_integrator(
     built: BuiltScene | BuiltClassic, request: RenderRequest, frame_from_world: Matrix, source: RaySource
 ) -> Integrator:
     from lippmann.device.whitted.scene import BuiltClassic
-    from lippmann.rendering.film.caustics import photons_of_picture
     from lippmann.rendering.transport.emitter_weights import make_light_sampler
     from lippmann.rendering.transport.path import PathIntegrator
     from lippmann.rendering.transport.scene_features import make_scene_features
@@ -358,7 +362,7 @@ def _make_integrator(
             if request.clamp_indirect is not None:
                 rule = "this scene has participating media, whose light is not clamped"
                 raise UsageError("will not do", parameter="clamp_indirect", rule=rule, fix="leave it out")
-            if request.caustics != "paths":
+            if request.caustics not in ("auto", "paths"):
                 rule = "this scene has participating media, through which photons are not traced"
                 raise UsageError(
                     f"'{request.caustics}' will not do", parameter="caustics", rule=rule, fix="leave it out"
@@ -370,7 +374,6 @@ def _make_integrator(
         integrator = PathIntegrator(built.mitsuba, features, request.surfaces, name=request.integrator)
         if not built.borrowed:
             integrator.light_sampler = make_light_sampler(integrator, source)
-        integrator.photons = photons_of_picture(integrator, request, source, memory_limit(request))
         return integrator
     return SurfaceIntegrator(built.mitsuba, cast("SurfaceProperty", request.integrator), frame_from_world)
 

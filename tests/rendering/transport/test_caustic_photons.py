@@ -152,7 +152,7 @@ def traced(scene_dict, view, *, photons, size=24, spp=64, seed=0, depth=6, sampl
     from lippmann.rendering.film.wavefront import trace_frame
     from lippmann.rendering.film.wavefront_plan import make_plan
     from lippmann.rendering.transport.casters import find_casters
-    from lippmann.rendering.transport.caustic_photons import shoot_photons
+    from lippmann.rendering.transport.caustic_photons import CausticPhotons
     from lippmann.rendering.transport.path import PathIntegrator
     from lippmann.rendering.transport.ray_source import CameraRays
     from lippmann.rendering.transport.scene_features import make_scene_features
@@ -161,7 +161,8 @@ def traced(scene_dict, view, *, photons, size=24, spp=64, seed=0, depth=6, sampl
     features = make_scene_features(scene, has_null="mask" in str(scene_dict))
     integrator = PathIntegrator(scene, features, depth)
     if photons:
-        integrator.photons = shoot_photons(scene, features, find_casters(scene), samples=samples, seed=seed)
+        photons = CausticPhotons(scene, features, find_casters(scene), samples=samples, seed=seed)
+        integrator.photons = photons.of_pass(0)
     plan = make_plan(size, size, spp, memory=2**31)
     return trace_frame(integrator, CameraRays(view, size, size), plan, seed=seed).pixels
 

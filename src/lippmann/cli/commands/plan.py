@@ -36,7 +36,7 @@ def plan(
     subpixels: options.Subpixels = None,
     pixel_filter: options.PixelFilter = "auto",
     denoise: options.Denoise = "auto",
-    caustics: options.Caustics = "paths",
+    caustics: options.Caustics = "auto",
     clamp_indirect: options.ClampIndirect = None,
     camera: options.Camera = None,
     place: options.Place = None,

@@ -86,7 +86,7 @@ def render(
     tone_map: options.ToneMap = "auto",
     pixel_filter: options.PixelFilter = "auto",
     denoise: options.Denoise = "auto",
-    caustics: options.Caustics = "paths",
+    caustics: options.Caustics = "auto",
     clamp_indirect: options.ClampIndirect = None,
     camera: options.Camera = None,
     place: options.Place = None,

@@ -68,7 +68,7 @@ def render(
     subpixels: options.Subpixels = None,
     pixel_filter: options.PixelFilter = "auto",
     denoise: options.Denoise = "auto",
-    caustics: options.Caustics = "paths",
+    caustics: options.Caustics = "auto",
     clamp_indirect: options.ClampIndirect = None,
     layers: options.Layers = False,
     camera: options.Camera = None,

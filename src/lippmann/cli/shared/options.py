@@ -74,8 +74,8 @@ Caustics = Annotated[
     choices.Caustics,
     typer.Option(
         "--caustics",
-        help="Light that mirrors and glass throw onto matt surfaces. paths: as paths find it; photons: sent by the"
-        " emitters, for small ones; none: without.",
+        help="Light that mirrors and glass throw onto other surfaces. photons: sent by the emitters; paths: as paths"
+        " find it; none: without. auto: photons where there is such light.",
     ),
 ]
 ClampIndirect = Annotated[

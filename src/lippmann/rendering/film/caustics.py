@@ -2,37 +2,108 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
 from lippmann.rendering.film.memory_model import PHOTON, too_small
+from lippmann.rendering.film.scattered_rays import ScatteredRays
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.rendering.transport.casters import find_casters
-from lippmann.rendering.transport.caustic_photons import emissions, no_photons, shoot_photons
+from lippmann.rendering.transport.caustic_photons import (
+    MOST,
+    SAMPLES_OF_EMISSION,
+    CausticPhotons,
+    emissions,
+    no_photons,
+)
+from lippmann.rendering.transport.integrator import Integrator
 from lippmann.rendering.transport.path import PathIntegrator
-from lippmann.rendering.transport.photon_map import PhotonMap
 from lippmann.rendering.transport.ray_source import RaySource
 
-#: Samples of a pixel for which photons are shot where a quality or a time decides: as many as it may come to have.
-GOAL_SAMPLES = 32
+#: Samples of a pixel that one pass of photons serves, at least; where a quality or a time decides, just as many.
+PASS_SAMPLES = 32
+#: Share of the memory for photons of passes that tiles and bands ask for in turn.
+KEPT_SHARE = 0.25
+#: Rays that tell what is seen, to the side of a square; the share of their ends that may lie apart from the others, to
+#: either side; and by how much of its size the box about the others is widened.
+SEEN_SIDE, APART, WIDER = 64, 0.002, 0.25
 
 
-def photons_of_picture(
-    integrator: PathIntegrator, request: RenderRequest, source: RaySource, memory: int
-) -> PhotonMap | None:
-    """Photons for the picture of ``source``; None where its caustics are left to paths.
+def stretches(integrator: Integrator, first: int, samples: int) -> Iterator[int]:
+    """Numbers of samples that make ``samples``, from ``first`` on; the integrator is ready for each in turn."""
+    passes = integrator.photon_passes if isinstance(integrator, PathIntegrator) else None
+    if passes is None:
+        yield samples
+        return
+    assert isinstance(integrator, PathIntegrator)
+    while samples > 0:
+        number, within = divmod(first, passes.samples_of_pixel)
+        integrator.photons = passes.of_pass(number)
+        count = min(samples, passes.samples_of_pixel - within)
+        yield count
+        first, samples = first + count, samples - count
+
+
+def give_photons(integrator: PathIntegrator, request: RenderRequest, source: RaySource, memory: int) -> str:
+    """Give the integrator what it needs for the picture of ``source``; says how caustics come: as in a request.
 
     Raises
     ------
     MemoryLimitError
-        ``memory`` bytes do not hold them.
+        ``memory`` bytes do not hold the photons that were asked for; where nothing was, they are left to paths.
     """
-    if request.caustics == "paths":
-        return None
+    if request.caustics == "paths" or request.integrator != "path" or request.surfaces < 2:
+        return "paths"
     if request.caustics == "none":
-        return no_photons()
+        integrator.photons = no_photons()
+        return "none"
     casters = find_casters(integrator.scene)
-    samples = GOAL_SAMPLES if request.is_open_ended else request.samples
-    samples *= source.width * source.height * source.channels
+    if casters.pairs == 0:
+        return "paths"
+    pixels = source.width * source.height * source.channels
+    each = max(PASS_SAMPLES, MOST * SAMPLES_OF_EMISSION // pixels)
+    passes = -(-request.samples // each)
+    if request.is_open_ended:
+        each, passes = PASS_SAMPLES, 1
+    whole = pixels * min(each, request.samples if passes == 1 and not request.is_open_ended else each)
     # No fewer where memory is short: it does not change a picture.
-    required = 2 * emissions(samples) * PHOTON
+    required = 2 * emissions(whole) * PHOTON
     if required > memory:
+        if request.caustics == "auto":
+            return "paths"
         raise too_small(memory, "photons of caustics", required)
-    return shoot_photons(integrator.scene, integrator.features, casters, samples=samples, seed=request.seed)
+    photons = CausticPhotons(
+        integrator.scene,
+        integrator.features,
+        casters,
+        samples=whole,
+        samples_of_pixel=each,
+        seed=request.seed,
+        region=_seen_region(integrator, source),
+        kept=max(1, min(passes, int(KEPT_SHARE * memory) // required)),
+    )
+    if photons.are_none and request.caustics == "auto":
+        return "paths"
+    integrator.photons = photons.of_pass(0)
+    integrator.photon_passes = photons
+    return "photons"
+
+
+def _seen_region(integrator: PathIntegrator, source: RaySource) -> NDArray[np.float64] | None:
+    """Corners ``(2, 3)`` of a box about what the picture's rays meet first; None where they meet nothing."""
+    few = ScatteredRays(source, SEEN_SIDE)
+    place = dr.arange(mi.UInt32, few.width * few.height)
+    row = place // few.width
+    ray = few.rays(place - row * few.width, row, mi.UInt32(0), mi.Point2f(0.5))
+    si = integrator.scene.ray_intersect(ray)
+    points = np.array(si.p, dtype=np.float64).T[np.array(si.is_valid())]
+    if not len(points):
+        return None
+    corners: NDArray[np.float64] = np.quantile(points, [APART, 1 - APART], axis=0)
+    middle, size = corners.mean(axis=0), np.ptp(corners, axis=0)
+    reach = (0.5 + WIDER) * size + WIDER * size.max()
+    return np.stack([middle - reach, middle + reach])

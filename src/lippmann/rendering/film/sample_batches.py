@@ -25,6 +25,7 @@ from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.rendering.estimate.jackknife import error_of_batches
 from lippmann.rendering.estimate.pixel_errors import OWN_NOISE, PixelErrors
 from lippmann.rendering.film import memory_model
+from lippmann.rendering.film.caustics import stretches
 from lippmann.rendering.film.wavefront import Frame, RayTotals, compile_seconds, divide, evaluated
 from lippmann.rendering.film.wavefront_plan import Run, cut_batches
 from lippmann.rendering.transport.integrator import Integrator
@@ -117,19 +118,20 @@ class FullInBatches:
         channels, pixels = self._source.channels, self._sums.shape[1]
         started, done, compiled = time.perf_counter(), 0, 0.0
         self._errors = None
-        taken = list(self._taken)
-        for run in self._runs(samples):
-            with dr.scoped_set_flag(dr.JitFlag.KernelHistory, done == 0):
-                sums = self._trace(run)
-                if done == 0:
-                    compiled = compile_seconds()
-            for place, batch in enumerate(run.batches):
-                self._sums[batch, run.first : run.last] += sums[:, place]
-                if run.last == pixels:
-                    taken[batch] += run.count
-            done += (run.last - run.first) * channels * run.count * len(run.batches)
-            progress(Progress("trace", done, pixels * channels * samples))
-        self._taken = taken
+        for stretch in stretches(self._integrator, self.samples, samples):
+            taken = list(self._taken)
+            for run in self._runs(stretch):
+                with dr.scoped_set_flag(dr.JitFlag.KernelHistory, done == 0):
+                    sums = self._trace(run)
+                    if done == 0:
+                        compiled = compile_seconds()
+                for place, batch in enumerate(run.batches):
+                    self._sums[batch, run.first : run.last] += sums[:, place]
+                    if run.last == pixels:
+                        taken[batch] += run.count
+                done += (run.last - run.first) * channels * run.count * len(run.batches)
+                progress(Progress("trace", done, pixels * channels * samples))
+            self._taken = taken
         self.seconds_compile += compiled
         self.seconds_trace += time.perf_counter() - started - compiled
 

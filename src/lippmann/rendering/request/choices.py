@@ -12,7 +12,8 @@ Device = Literal["auto", "cpu", "gpu"]
 #: ``auto``: ``pbr-neutral`` for physically based light.
 ToneMap = Literal["auto", "none", "pbr-neutral"]
 Denoiser = Literal["auto", "none", "oidn", "oidn-fast", "oidn-high"]
-Caustics = Literal["paths", "photons", "none"]
+#: ``auto``: photons where a few find that there are caustics.
+Caustics = Literal["auto", "photons", "paths", "none"]
 
 #: The methods that reuse points of one micro-image in others.
 REUSING: tuple[Method, ...] = ("lens-view", "interpolated")

@@ -77,7 +77,7 @@ def _check_caustics(request: RenderRequest) -> None:
             rule='it is for integrator="path"',
             fix="leave it out",
         )
-    if request.caustics != "paths" and request.integrator != "path":
+    if request.caustics not in ("auto", "paths") and request.integrator != "path":
         raise UsageError(
             f"{request.integrator} has no caustics",
             parameter="caustics",

@@ -101,9 +101,10 @@ class RenderRequest:
         (:mod:`~lippmann.rendering.denoise.cost_model`), ``oidn-fast`` and ``oidn-high`` with a given one, ``none`` not
         at all.
     caustics:
-        For ``path``: light that mirrors, glass and smooth gloss throw from emitters onto rough surfaces. ``paths``
-        leaves it to paths, which find small emitters seldom and points and directions never; ``photons`` traces it from
-        the emitters, with a small blur; ``none`` leaves it out.
+        For ``path``: light that mirrors, glass and smooth gloss throw from emitters onto rough surfaces. ``photons``
+        traces it from the emitters, with a blur that shrinks with the samples; ``paths`` leaves it to paths, which find
+        small emitters seldom and points and directions never; ``none`` leaves it out. ``auto``: photons where a few of
+        them find that there is such light, else paths.
     clamp_indirect:
         For ``path``: what light may bring to a sample at most that comes by way of another surface than the one seen,
         each time that it is met, in units of the picture's white; above 0. Fireflies go, and so does true light. None:
@@ -147,7 +148,7 @@ class RenderRequest:
     subpixels: bool | None = None
     pixel_filter: PixelFilter = "auto"
     denoise: Denoiser = "auto"
-    caustics: Caustics = "paths"
+    caustics: Caustics = "auto"
     clamp_indirect: float | None = None
     exposure: float | Literal["auto"] = "auto"
     tone_map: ToneMap = "none"

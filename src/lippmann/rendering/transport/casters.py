@@ -154,7 +154,7 @@ class CasterPoints:
         self._shape: ShapePtr = dr.gather(mi.ShapePtr, scene.shapes_dr(), number)
         self.area: Float = dr.gather(mi.Float, mi.Float(casters.areas), caster)
         self._boxed = mi.Bool(False)
-        boxed: NDArray[np.bool_] = np.isfinite(casters.boxes).all(axis=1)
+        boxed = np.asarray(np.isfinite(casters.boxes).all(axis=1))
         shapes = scene.shapes()
         # Not a virtual call: that would ask all shapes there are, and some refuse.
         self.p, self._n = dr.switch(

@@ -6,8 +6,8 @@ emitter, and back along it. So none misses, and every emitter works that can be 
 
 What is gathered is exactly what :class:`~lippmann.rendering.transport.path.PathIntegrator` leaves out: light that comes
 by sharp events alone (:mod:`lippmann.rendering.transport.sharp_events`), one at least and :data:`MOST_EVENTS` at most,
-from an emitter other than the environment to the first rough surface of a camera path, and is scattered there by a
-Lambertian lobe.
+from an emitter other than the environment to the first rough surface of a camera path, and is scattered there by lobes
+that are wide enough to be told from photons.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ NEIGHBOURS = 50
 #: Photons by which the radius is found.
 _PROBED = 2000
 _SEED_STEPS = (0xB5297A4D, 0x68E31DA4)
-_PILOT_STEP = 0x1B56C4E9
+_PILOT_STEP, _PASS_STEP = 0x1B56C4E9, 0x632BE5AB
 #: How far a ray goes on behind a straight-through surface, relative to its coordinates.
 _CLEARANCE = 1e-4
 #: Dimensions of the sample stream at one surface.
@@ -65,28 +65,90 @@ def emissions(samples: int) -> int:
     return int(np.clip(samples // SAMPLES_OF_EMISSION, FEWEST, MOST))
 
 
-def shoot_photons(
-    scene: MitsubaScene, features: SceneFeatures, casters: Casters, *, samples: int, seed: int
-) -> PhotonMap:
-    """Photons for a picture of so many samples in all, in two sets; empty where there are no caustics.
+class CausticPhotons:
+    """Photons of a picture's caustics in passes, each for the next samples of every pixel.
 
-    The numbers of emissions of each emitter and caster follow from a pilot: in proportion to the roots of the second
-    moments of what they bring, but for a share that all have alike.
+    Passes know nothing of each other, and their radii shrink (Knaus and Zwicker 2011, with alpha = 2/3), so that the
+    mean over them comes to have neither noise nor blur.
+
+    Parameters
+    ----------
+    scene, features, casters:
+        What they are shot in.
+    samples:
+        Of all pixels together for which the photons of one pass are.
+    samples_of_pixel:
+        Those of one pixel; None where one pass is for all.
+    seed:
+        0 to 2**32 - 1: the same gives the same photons.
+    region:
+        Corners ``(2, 3)`` of the box that is seen: emitters and casters are given photons by what they bring there.
+    kept:
+        Passes whose photons are kept for others that ask, at least 1.
     """
-    if casters.pairs == 0:
-        return no_photons()
-    shooter = PhotonShooter(scene, features, casters)
-    pilot = min(PILOT_OF_PAIR, max(_FEWEST_OF_PAIR, PILOT // casters.pairs)) * casters.pairs
-    even = np.full(casters.pairs, 1 / casters.pairs)
-    photons, pair = shooter.shoot(pilot, even, (seed + _PILOT_STEP) % 2**32)
-    if not len(photons):
-        return no_photons()
-    moments = np.bincount(pair, np.square(photons.power.astype(np.float64)).sum(axis=1), minlength=casters.pairs)
-    roots = np.sqrt(moments)
-    chances = _UNIFORM_SHARE * even + (1 - _UNIFORM_SHARE) * roots / roots.sum()
-    count = emissions(samples)
-    first, second = (shooter.shoot(count, chances, (seed + step) % 2**32)[0] for step in _SEED_STEPS)
-    return PhotonMap((first, second), _radius(first, NEIGHBOURS * math.sqrt(count / FEWEST)))
+
+    def __init__(
+        self,
+        scene: MitsubaScene,
+        features: SceneFeatures,
+        casters: Casters,
+        *,
+        samples: int,
+        seed: int,
+        samples_of_pixel: int | None = None,
+        region: NDArray[np.float64] | None = None,
+        kept: int = 1,
+    ) -> None:
+        self._shooter = PhotonShooter(scene, features, casters)
+        self.samples_of_pixel = samples_of_pixel or 1 << 32
+        self._count = emissions(samples)
+        self._seed = seed
+        self._region = region
+        self._kept = kept
+        self._maps: dict[int, PhotonMap] = {}
+        self._radius = 0.0
+        self._chances = self._pilot(casters)
+
+    @property
+    def are_none(self) -> bool:
+        """Whether a few emissions of each emitter and caster brought nothing that is seen."""
+        return self._chances is None
+
+    def of_pass(self, number: int) -> PhotonMap:
+        """The photons of pass ``number``, from 0 on; a map without any where there are none."""
+        if self._chances is None:
+            return no_photons()
+        if number not in self._maps:
+            while len(self._maps) >= self._kept:
+                del self._maps[next(iter(self._maps))]
+            seeds = [(self._seed + step + number * _PASS_STEP) % 2**32 for step in _SEED_STEPS]
+            first, second = (self._shooter.shoot(self._count, self._chances, seed)[0] for seed in seeds)
+            if not self._radius:
+                shown = first if number == 0 else self._shooter.shoot(self._count, self._chances, self._seed)[0]
+                shown = shown.inside(self._region)
+                self._radius = _radius(shown, NEIGHBOURS * math.sqrt(self._count / FEWEST))
+            self._maps[number] = PhotonMap((first, second), self._radius * radius_of_pass(number))
+        return self._maps[number]
+
+    def _pilot(self, casters: Casters) -> NDArray[np.float64] | None:
+        """Shares of the emissions of each emitter and caster: as the roots of the second moments of what they bring."""
+        if casters.pairs == 0:
+            return None
+        count = min(PILOT_OF_PAIR, max(_FEWEST_OF_PAIR, PILOT // casters.pairs)) * casters.pairs
+        even = np.full(casters.pairs, 1 / casters.pairs)
+        photons, pair = self._shooter.shoot(count, even, (self._seed + _PILOT_STEP) % 2**32)
+        seen = photons.are_inside(self._region)
+        if not seen.any():
+            return None
+        power = photons.power[seen].astype(np.float64)
+        roots = np.sqrt(np.bincount(pair[seen], np.square(power).sum(axis=1), minlength=casters.pairs))
+        return np.asarray(_UNIFORM_SHARE * even + (1 - _UNIFORM_SHARE) * roots / roots.sum())
+
+
+def radius_of_pass(number: int) -> float:
+    """Radius of a look-up in pass ``number`` over that in the first: Knaus and Zwicker 2011, eq. 20."""
+    squares = [(k + 2 / 3) / (k + 1) for k in range(1, number + 1)]
+    return math.sqrt(math.prod(squares))
 
 
 def _radius(photons: Photons, neighbours: float) -> float:

@@ -11,7 +11,7 @@ Ray depth counts surfaces, the primary ray's hit being 1: at depth 1 a surface s
 
 from __future__ import annotations
 
-from typing import cast
+from typing import TYPE_CHECKING, cast
 
 import drjit as dr
 import mitsuba as mi
@@ -44,6 +44,9 @@ from lippmann.rendering.transport.sharp_events import (
     lambertian,
     sharp_lobe,
 )
+
+if TYPE_CHECKING:
+    from lippmann.rendering.transport.caustic_photons import CausticPhotons
 
 #: Straight-through surfaces that one ray may cross before it counts as blocked. Bounds the loop between many panes.
 MAX_CROSSINGS = 64
@@ -117,6 +120,8 @@ class PathIntegrator:
         self.most_indirect: Float | None = None
         #: Photons of caustics in place of paths that would have to find them; None for paths.
         self.photons: PhotonMap | None = None
+        #: Gives :attr:`photons` for each part of a picture's samples; None where they are the same for all.
+        self.photon_passes: CausticPhotons | None = None
         self._environment = scene.environment()
         # A single delta emitter: more than one sample of it tells nothing more.
         self._single_delta = len(emitters) == 1 and bool(mi.has_flag(emitters[0].flags(), mi.EmitterFlags.Delta))

@@ -7,7 +7,7 @@ threads. Cells are hashed into buckets; a bucket may hold photons of other cells
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import drjit as dr
 import mitsuba as mi
@@ -51,6 +51,21 @@ class Photons:
     def __len__(self) -> int:
         return len(self.surfaces)
 
+    def are_inside(self, region: NDArray[np.float64] | None) -> NDArray[np.bool_]:
+        """``(n,)``: which lie in the box with these corners ``(2, 3)``; all where it is None."""
+        if region is None:
+            return np.ones(len(self), bool)
+        inside: NDArray[np.bool_] = ((self.position >= region[0]) & (self.position <= region[1])).all(axis=1)
+        return inside
+
+    def inside(self, region: NDArray[np.float64] | None) -> Photons:
+        """Those that lie in a box."""
+        return self.chosen(self.are_inside(region))
+
+    def chosen(self, which: NDArray[np.generic]) -> Photons:
+        """Some of them, by a mask or by numbers."""
+        return Photons(*(getattr(self, each.name)[which] for each in fields(self)))
+
     @staticmethod
     def dark(count: int) -> Photons:
         """So many photons without power, at the origin."""
@@ -60,8 +75,7 @@ class Photons:
     @staticmethod
     def joined(parts: list[Photons]) -> Photons:
         """All photons of several sets."""
-        names = ("position", "normal", "toward", "power", "surfaces")
-        return Photons(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
+        return Photons(*(np.concatenate([getattr(part, each.name) for part in parts]) for each in fields(Photons)))
 
 
 class Gathered:
@@ -99,16 +113,19 @@ class PhotonMap:
     # Not a dataclass: Dr.Jit would take it for loop state and write its fields.
     def __init__(self, halves: tuple[Photons, Photons], radius: float) -> None:
         self.radius = radius
+        self.halves = halves
         most = max(1, *(len(half) for half in halves))
-        self._bits = max(1, math.ceil(math.log2(most)))
+        self._mask = (1 << max(1, math.ceil(math.log2(most)))) - 1
+        # Opaque to the compiler, so that all sets of photons share a kernel.
+        self._last_bucket = dr.opaque(mi.UInt32, self._mask)
         starts, ordered, before = [], [], 0
         for half in halves:
             bucket = self._bucket_numbers(half.position)
             order = np.argsort(bucket, kind="stable")
-            edges = np.searchsorted(bucket[order], np.arange((1 << self._bits) + 1))
+            edges = np.searchsorted(bucket[order], np.arange(self._mask + 2))
             starts.append(edges + before)
             before += len(half)
-            ordered.append(Photons(*(getattr(half, name)[order] for name in vars(half))))
+            ordered.append(half.chosen(order))
         photons = Photons.joined(ordered)
         if not len(photons):  # gathers need something to point at
             photons = Photons.dark(1)
@@ -125,7 +142,7 @@ class PhotonMap:
         cell = np.floor(position / np.float32(self.radius)).astype(np.int32).astype(np.uint32)
         mixed = cell[:, 0] * np.uint32(_PRIMES[0]) ^ cell[:, 1] * np.uint32(_PRIMES[1])
         mixed ^= cell[:, 2] * np.uint32(_PRIMES[2])
-        return np.asarray(mixed & np.uint32((1 << self._bits) - 1), dtype=np.uint32)
+        return np.asarray(mixed & np.uint32(self._mask), dtype=np.uint32)
 
     @dr.syntax
     def gather(
@@ -166,7 +183,7 @@ class PhotonMap:
         chosen = mi.Vector3f(0, 0, 1)
         color = mi.Color3f(0)
         corner = mi.UInt32(0)
-        first_bucket = half * ((1 << self._bits) + 1)
+        first_bucket = half * (self._last_bucket + 2)
         looking = mi.Bool(active)
         while dr.hint(looking, label="cells"):
             cell = base + mi.Vector3f(mi.Float(corner % 3), mi.Float(corner // 3 % 3), mi.Float(corner // 9))
@@ -212,7 +229,7 @@ class PhotonMap:
 
     def _bucket(self, cell: Point3f) -> UInt32:
         x, y, z = (mi.UInt32(mi.Int32(part)) * prime for part, prime in zip(cell, _PRIMES, strict=True))
-        return (x ^ y ^ z) & ((1 << self._bits) - 1)
+        return (x ^ y ^ z) & self._last_bucket
 
 
 def _rows_of_four(values: Floats, last: NDArray[np.uint32] | None = None) -> Floats:
