@@ -27,6 +27,7 @@ class Noise:
         self.samples += samples
 
     samples = 2
+    blurred = None
 
     def picture(self):
         return self._halves[0]
@@ -37,6 +38,9 @@ class Noise:
     def squared_error(self):
         difference = np.square(self._halves[0] - self._halves[1]).mean(axis=2) / 4
         return PixelErrors(difference, None, OWN_NOISE)
+
+    def squared_blur(self):
+        return self.blurred
 
 
 def blur(picture, turned=False):
@@ -180,3 +184,12 @@ def test_where_codes_are_steep_the_whole_step_counts(as_denoised):
     step = float(encode_srgb(np.float64(0.02)) - encode_srgb(np.float64(0.001)))
     assert step**2 < 1.5 * float(told.values.mean())
     assert float(told.values.mean()) < step**2
+
+
+def test_blur_of_caustics_counts_in_full():
+    """It is the same in both halves, so that they do not tell of it."""
+    renderer = Noise(seed=1)
+    plain = Denoised(renderer, blur, "srgb").squared_error()
+    renderer.blurred = np.full(plain.values.shape, 0.01, np.float32)
+    counted = Denoised(renderer, blur, "srgb").squared_error()
+    np.testing.assert_allclose(counted.values - plain.values, 0.01, rtol=1e-4)

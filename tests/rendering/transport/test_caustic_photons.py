@@ -298,3 +298,47 @@ def test_instances_and_curves_throw_what_the_shapes_throw(tmp_path):
     assert hides_caustics(mi.load_dict({"type": "scene", "thread": thread, **alone}))
     found = find_casters(mi.load_dict({"type": "scene", **copies}))
     assert np.isfinite(found.boxes).all(axis=1).tolist() == [True]
+
+
+def photons_of(scene_dict, **options):
+    import mitsuba as mi
+
+    from lippmann.rendering.transport.casters import find_casters
+    from lippmann.rendering.transport.caustic_photons import CausticPhotons
+    from lippmann.rendering.transport.scene_features import make_scene_features
+
+    scene = mi.load_dict({"type": "scene"} | scene_dict)
+    features = make_scene_features(scene, has_null=False)
+    return CausticPhotons(scene, features, find_casters(scene), samples=1, seed=2, **options)
+
+
+def test_passes_have_photons_of_their_own_and_shrinking_radii():
+    from lippmann.rendering.transport.caustic_photons import radius_of_pass
+
+    ball = {"ball": {"type": "sphere", "bsdf": {"type": "dielectric"}}, "room": room(), "lamp": lamp([0, 0, 4.0])}
+    photons = photons_of(ball, kept=2)
+    first, second = photons.of_pass(0), photons.of_pass(1)
+    assert second.radius == pytest.approx(first.radius * np.sqrt(5 / 6))
+    assert len({half.position.tobytes() for each in (first, second) for half in each.halves}) == 4
+    assert photons.of_pass(0) is first  # kept
+    assert photons.of_pass(2).radius == pytest.approx(first.radius * np.sqrt(5 / 6 * 8 / 9))
+    again = photons.of_pass(0)  # made anew
+    assert again is not first
+    assert again.halves[0].position.tobytes() == first.halves[0].position.tobytes()
+    # So slowly that noise and blur both go: radius squared as n to the power of -1/3.
+    assert radius_of_pass(999) ** 2 == pytest.approx(1000 ** (-1 / 3), rel=0.15)
+
+
+def test_what_is_not_seen_gets_few_photons():
+    """Two balls, of which one throws its light outside of the region."""
+    ball = {"type": "sphere", "bsdf": {"type": "dielectric"}}
+    far = ball | {"center": [40, 0, 0]}
+    scene = {"ball": ball, "far": far, "room": room(60.0), "lamp": lamp([0, 0, 20.0])}
+    everywhere = photons_of(scene).of_pass(0).halves[0]
+    region = np.array([[-20.0, -20, -61], [20, 20, 61]])
+    chosen = photons_of(scene, region=region).of_pass(0).halves[0]
+    assert chosen.are_inside(region).sum() > 1.1 * everywhere.are_inside(region).sum()
+    np.testing.assert_allclose(
+        chosen.inside(region).power.sum(axis=0), everywhere.inside(region).power.sum(axis=0), rtol=0.02
+    )
+    assert photons_of(scene, region=np.array([[50.0, 50, 50], [51, 51, 51]])).are_none

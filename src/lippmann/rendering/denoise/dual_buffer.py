@@ -68,6 +68,8 @@ class Halved(Protocol):
 
     def squared_error(self) -> PixelErrors: ...
 
+    def squared_blur(self) -> Floats | None: ...
+
 
 class Denoised:
     """The pictures of ``renderer`` after ``denoise``; see the head of this module.
@@ -125,6 +127,9 @@ class Denoised:
         limit = DROWNED * max(1.0, MANY / self._renderer.samples)
         drowned = np.maximum(np.abs(left[0]), np.abs(left[1])).max(axis=2) > limit
         common[drowned] = np.float32(LONE_RATIO) * apart[drowned]
+        blur = self._renderer.squared_blur()
+        if blur is not None:
+            common += blur
         samples = self._renderer.squared_error()
         if self._renderer.samples < LONE_TOLD_FROM:
             # Any hit may be.

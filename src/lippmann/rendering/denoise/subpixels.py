@@ -46,8 +46,8 @@ class SubpixelBatches(FullInBatches):
         """Of all colours, see :meth:`halves_of_all`, those that the sub-pixels show."""
         return self._source.own_colors(values)
 
-    def _shown_sums(self) -> Floats:
-        return self.own_colors(self._sums)
+    def _shown(self, values: Floats) -> Floats:
+        return self.own_colors(values)
 
 
 class DenoisedSubpixels(Denoised):

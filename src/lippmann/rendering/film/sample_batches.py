@@ -16,7 +16,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.color.transfer import Transfer
+from lippmann.color.transfer import Transfer, coding_slope
 from lippmann.device.sobol import PIXEL_DIMENSION, SampleStream
 from lippmann.device.types import Spectrum, UInt32
 from lippmann.display.pixel_window import PixelWindow
@@ -25,6 +25,7 @@ from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.rendering.estimate.jackknife import error_of_batches
 from lippmann.rendering.estimate.pixel_errors import OWN_NOISE, PixelErrors
 from lippmann.rendering.film import memory_model
+from lippmann.rendering.film.caustic_blur import squared_blur
 from lippmann.rendering.film.caustics import stretches
 from lippmann.rendering.film.wavefront import Frame, RayTotals, compile_seconds, divide, evaluated
 from lippmann.rendering.film.wavefront_plan import Run, cut_batches
@@ -102,6 +103,8 @@ class FullInBatches:
         self._taken = [0] * batches
         # Plain and denoised pictures of the same samples both ask for their errors.
         self._errors: PixelErrors | None = None
+        self._blur: Floats | None = None
+        self._blur_samples = 0
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -195,14 +198,32 @@ class FullInBatches:
         if self.samples < STREAMS:
             raise UsageError("one sample per pixel does not tell its own error", rule="two or more do")
         if self._errors is None:
-            error, lone = error_of_batches(self._shown_sums(), self._taken, self._transfer)
+            error, lone = error_of_batches(self._shown(self._sums), self._taken, self._transfer)
             shape = self.shape[0], -1
-            self._errors = PixelErrors(error.reshape(shape), lone.reshape(shape), OWN_NOISE)
+            error = error.reshape(shape)
+            blur = self.squared_blur()
+            if blur is not None:
+                error += blur
+            self._errors = PixelErrors(error, lone.reshape(shape), OWN_NOISE)
         return self._errors
 
-    def _shown_sums(self) -> Floats:
-        """``(batches, pixels, 3)``: the sums of what the picture shows."""
-        return self._sums
+    def squared_blur(self) -> Floats | None:
+        """``(H, W)``: what the blur of caustics adds to the squared errors of the codes; None where there is none.
+
+        See :func:`lippmann.rendering.film.caustic_blur.squared_blur`.
+        """
+        if self._blur_samples != self.samples:
+            self._blur_samples = self.samples
+            linear = squared_blur(self._integrator, self._source, self._window, seed=self._seed, samples=self.samples)
+            self._blur = None
+            if linear is not None:
+                slope = coding_slope(self.picture(), self._transfer)
+                self._blur = (np.square(slope) * self._shown(linear)).mean(axis=-1)
+        return self._blur
+
+    def _shown(self, values: Floats) -> Floats:
+        """Of values ``(..., W, 3)`` of what is traced those that the picture shows."""
+        return values
 
     def _runs(self, samples: int) -> Iterator[Run]:
         """Wavefronts that take ``samples`` more of every pixel."""

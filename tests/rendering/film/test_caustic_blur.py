@@ -1,0 +1,124 @@
+"""What the blur of caustics adds to the error, against blur that is known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from lippmann.display.pixel_window import PixelWindow
+
+pytestmark = pytest.mark.usefixtures("engine")
+
+SIZE = 32
+WHOLE = PixelWindow(0, 0, SIZE, SIZE)
+
+
+class PlaneOfPhotons:
+    """Stands in for photons of passes: spread over a plane, as dense as ``light`` says at their places."""
+
+    samples_of_pixel = 8
+
+    def __init__(self, light, radius, count=400_000):
+        self._light, self._radius, self._count = light, radius, count
+
+    def of_pass(self, number):
+        from lippmann.rendering.transport.photon_map import PhotonMap, Photons
+
+        halves = []
+        for seed in (2 * number, 2 * number + 1):
+            random = np.random.default_rng(seed)
+            position = np.float32(np.stack([*random.uniform(-2, 2, (2, self._count)), np.zeros(self._count)], axis=1))
+            up = np.tile(np.float32([0, 0, 1]), (self._count, 1))
+            power = np.repeat(self._light(position[:, :1]) * 16 / self._count, 3, axis=1).astype(np.float32)
+            halves.append(Photons(position, up, up, power, np.ones(self._count, np.uint32)))
+        return PhotonMap((halves[0], halves[1]), self._radius)
+
+
+def matt_plane(passes):
+    """An integrator before a white plane, seen from z = 5; pixels cover x and y from -0.5 to 0.5."""
+    import mitsuba as mi
+
+    from lippmann.rendering.transport.path import PathIntegrator
+    from lippmann.rendering.transport.ray_source import CameraRays
+    from lippmann.rendering.transport.scene_features import make_scene_features
+    from lippmann.scene.values.description import Camera
+
+    plane = {
+        "type": "rectangle",
+        "to_world": mi.ScalarTransform4f().scale(3),
+        "bsdf": {"type": "diffuse", "reflectance": 1.0},
+    }
+    scene = mi.load_dict({"type": "scene", "plane": plane})
+    integrator = PathIntegrator(scene, make_scene_features(scene, has_null=False), 2)
+    if passes is not None:
+        integrator.photons, integrator.photon_passes = passes.of_pass(0), passes
+    pose = np.eye(4)
+    pose[2, 3] = 5.0
+    return integrator, CameraRays(Camera("test", pose, height=1.0), SIZE, SIZE)
+
+
+def blur_of(light, radius, *, samples=8, window=WHOLE, seed=3):
+    from lippmann.rendering.film.caustic_blur import squared_blur
+
+    integrator, source = matt_plane(PlaneOfPhotons(light, radius))
+    shown = integrator.photons
+    found = squared_blur(integrator, source, window, seed=seed, samples=samples)
+    assert integrator.photons is shown
+    return found
+
+
+def test_pictures_without_photons_have_none():
+    from lippmann.rendering.film.caustic_blur import squared_blur
+
+    integrator, source = matt_plane(None)
+    assert squared_blur(integrator, source, WHOLE, seed=1, samples=8) is None
+
+
+def test_smooth_light_is_held_for_three_times_as_blurred_as_it_is():
+    """A parabola's: the second moment of the kernel is a sixth of the squared radius."""
+    radius, bend = 0.2, 5.0
+    found = blur_of(lambda x: 1 + bend * x**2, radius).mean()
+    bias = bend * radius**2 / 6 / np.pi
+    assert found == pytest.approx((3 * bias) ** 2, rel=0.15)
+
+
+def test_an_edge_is_told_to_a_factor():
+    radius = 0.1
+    found = blur_of(lambda x: np.where(x > 0, 1.0, 0.0), radius).mean()
+    place = np.linspace(-1, 1, 20001) * radius
+    kernel = 8 / (3 * np.pi) * np.maximum(1 - (place / radius) ** 2, 0) ** 1.5 / radius
+    step = place[1] - place[0]
+    true = np.square((np.cumsum(kernel) * step - (place > 0)) / np.pi).sum() * step
+    assert found == pytest.approx(true / 2.315, rel=0.15)
+
+
+def test_pixels_are_the_same_in_parts_and_fewer_stand_for_all():
+    light = lambda x: np.where(x > 0, 1.0, 0.0)  # noqa: E731
+    whole = blur_of(light, 0.1, samples=8)
+    looked = (whole != 0).any(axis=2)
+    assert 0.3 < looked[:, 14:18].mean() < 0.7  # half as many samples as each look is worth
+    part = PixelWindow(8, 4, 16, 12)
+    np.testing.assert_array_equal(blur_of(light, 0.1, samples=8, window=part), whole[part.slices])
+    every = blur_of(light, 0.1, samples=16)
+    # In two passes, of which the second has a smaller radius.
+    shrunk = np.square((1 + 5 / 6) / 2)
+    assert whole.mean() * shrunk == pytest.approx(every.mean(), rel=0.3)
+
+
+def test_the_estimate_of_a_picture_counts_it():
+    from lippmann.color.transfer import coding_slope
+    from lippmann.rendering.film.sample_batches import FullInBatches
+
+    integrator, source = matt_plane(PlaneOfPhotons(lambda x: np.where(x > 0, 1.0, 0.0), 0.1))
+    batches = FullInBatches(integrator, source, seed=3, memory=1 << 28)
+    batches.add(8)
+    blur = batches.squared_blur()
+    counted = batches.squared_error().values.copy()
+    integrator.photon_passes = None
+    plain = FullInBatches(integrator, source, seed=3, memory=1 << 28)
+    plain.add(8)
+    assert plain.squared_blur() is None
+    np.testing.assert_allclose(counted - plain.squared_error().values, blur, atol=1e-7)
+    slope = coding_slope(batches.picture(), "srgb")
+    linear = blur_of(lambda x: np.where(x > 0, 1.0, 0.0), 0.1)
+    np.testing.assert_allclose(blur, (slope**2 * linear).mean(axis=2), rtol=1e-5)
