@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from caustic_scenes import CAUSTIC_SCENES
 from hard_scenes import HARD_SCENES
 from harness import kept, save, saved
 
@@ -46,7 +47,13 @@ QUALITIES = {
     "stripes": (28, 32, 40),
     "canopy": (26, 30, 38),
     "hidden_lamp": (11, 15, 20),
+    "curved_mirrors": (20, 26, 32),
+    "mirror_balls": (18, 24, 28),
+    "jewel": (22, 28, 34),
+    "sunlit_water": (24, 30, 36),
+    "chrome_ring": (24, 30, 36),
 }
+SCENES = HARD_SCENES | CAUSTIC_SCENES
 #: Samples per pixel at which a quality is given up.
 MOST = 1024
 DEPTH = 8
@@ -81,7 +88,7 @@ class Case:
         from lippmann.rendering.session import open_session
 
         request = RenderRequest(integrator="path", depth=DEPTH, threads=THREADS)
-        self.session = open_session(load_scene(HARD_SCENES[scene]()), request, memory=MEMORY)
+        self.session = open_session(load_scene(SCENES[scene]()), request, memory=MEMORY)
 
         from lippmann.rendering.transport.ray_source import DisplayRays
 
@@ -104,17 +111,27 @@ class Case:
         while rounds == 0 or time.process_time() - start < seconds:
             for part in range(REFERENCE_PARTS):
                 seed = 1_000_000 + rounds * REFERENCE_PARTS + part
+                self._shoot(seed, 128)
                 parts[part] += trace_frame(self.integrator, self.source, plan, seed=seed).pixels
             rounds += 1
         return parts / rounds, 128 * rounds * REFERENCE_PARTS
 
+    def _shoot(self, seed: int, samples: int | None) -> None:
+        """Photons of this seed, where there are caustics: references and pictures must not share any."""
+        from lippmann.rendering.film.caustics import give_photons
+
+        request = replace(self.session.request, seed=seed, spp=samples)
+        give_photons(self.integrator, request, self.source, MEMORY)
+
     def trace(self, way: str, seed: int, **asked: Any) -> Any:
         """A picture made that way, as the whole program makes it."""
+        from lippmann.rendering.film.caustics import give_photons
         from lippmann.rendering.methods import Job, trace
 
         method, denoise = WAYS[way]
         request = replace(self.session.request, method=method, denoise=denoise, seed=seed, pixel_filter="box", **asked)
         session = replace(self.session, request=request)
+        give_photons(self.integrator, request, self.source, MEMORY)
         return trace(Job(session, self.integrator, self.source, self.display_from_world))
 
     def truth(self, picture: NDArray[np.float32]) -> tuple[float, float]:
@@ -172,7 +189,7 @@ def few(case: Case) -> Iterator[dict[str, Any]]:
 def main() -> None:
     options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     options.add_argument("--seconds", type=float, default=60.0, help="of the processors, for each reference")
-    options.add_argument("--scenes", nargs="+", default=list(HARD_SCENES), choices=list(HARD_SCENES))
+    options.add_argument("--scenes", nargs="+", default=list(SCENES), choices=list(SCENES))
     options.add_argument("--displays", type=int, default=2, choices=range(1, 5), help="for each scene")
     options.add_argument("--ways", nargs="+", default=list(WAYS), choices=list(WAYS))
     options.add_argument("--references", type=Path, help="a folder that keeps the references")

@@ -161,7 +161,7 @@ class Session:
         from lippmann.rendering.film.caustics import give_photons
 
         caustics = give_photons(integrator, self.request, source, memory_limit(self.request))
-        if caustics != "paths":
+        if caustics is not None:
             self.choices["caustics"] = caustics
         exposure = self.request.exposure
         if exposure == "auto":
@@ -211,7 +211,7 @@ class Session:
             pixel_shares=frame.shares,
             rays={"primary": rays.primary, "shadow": rays.shadow, "secondary": rays.secondary},
             seconds=_stage_seconds(self.watch, frame),
-            estimate=None if estimate is None else estimate.to_dict(),
+            estimate=None if estimate is None or self._misses_caustics else estimate.to_dict(),
             options={**options, **self.choices},
             notes=(
                 *self.notes,
@@ -229,18 +229,17 @@ class Session:
             return ()
         return (f"exposure {self.choices['exposure']:+.2f} EV: physical light, its median at mid-grey",)
 
-    def _caustics_notes(self) -> tuple[str, ...]:
-        from lippmann.device.pbr import BuiltScene
-        from lippmann.rendering.transport.casters import hides_caustics
+    @property
+    def _misses_caustics(self) -> bool:
+        """Whether there is light that paths hardly find, and that no difference between samples tells of."""
+        return self.choices.get("caustics") == "paths"
 
-        request, built = self.request, self.built
-        if request.integrator != "path" or "caustics" in self.choices or request.surfaces < 2:
-            return ()
-        if not isinstance(built, BuiltScene) or not hides_caustics(built.mitsuba):
+    def _caustics_notes(self) -> tuple[str, ...]:
+        if not self._misses_caustics:
             return ()
         return (
-            "paths hardly find what mirrors, glass or gloss throw onto other surfaces from emitters as small as here, "
-            "and no estimate of the error knows of it; photons bring it (caustics)",
+            "no estimate of the error: paths hardly find what mirrors, glass or gloss throw onto other surfaces from "
+            "emitters as small as here; photons bring it (caustics)",
         )
 
     def _clamping_notes(self) -> tuple[str, ...]:

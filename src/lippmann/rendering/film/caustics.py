@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Literal
 
 import drjit as dr
 import mitsuba as mi
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 from lippmann.rendering.film.memory_model import PHOTON, too_small
 from lippmann.rendering.film.scattered_rays import ScatteredRays
 from lippmann.rendering.request.render_request import RenderRequest
-from lippmann.rendering.transport.casters import find_casters
+from lippmann.rendering.transport.casters import find_casters, hides_caustics
 from lippmann.rendering.transport.caustic_photons import (
     MOST,
     SAMPLES_OF_EMISSION,
@@ -48,22 +49,26 @@ def stretches(integrator: Integrator, first: int, samples: int) -> Iterator[int]
         first, samples = first + count, samples - count
 
 
-def give_photons(integrator: PathIntegrator, request: RenderRequest, source: RaySource, memory: int) -> str:
-    """Give the integrator what it needs for the picture of ``source``; says how caustics come: as in a request.
+def give_photons(
+    integrator: PathIntegrator, request: RenderRequest, source: RaySource, memory: int
+) -> Literal["photons", "paths", "none"] | None:
+    """Give the integrator the photons for the picture of ``source``; how caustics come, or None if there are none.
 
     Raises
     ------
     MemoryLimitError
         ``memory`` bytes do not hold the photons that were asked for; where nothing was, they are left to paths.
     """
-    if request.caustics == "paths" or request.integrator != "path" or request.surfaces < 2:
-        return "paths"
+    if request.integrator != "path" or request.surfaces < 2:
+        return None
+    if request.caustics == "paths":
+        return "paths" if hides_caustics(integrator.scene) else None
     if request.caustics == "none":
         integrator.photons = no_photons()
         return "none"
     casters = find_casters(integrator.scene)
     if casters.pairs == 0:
-        return "paths"
+        return None
     pixels = source.width * source.height * source.channels
     each = max(PASS_SAMPLES, MOST * SAMPLES_OF_EMISSION // pixels)
     passes = -(-request.samples // each)
@@ -74,7 +79,7 @@ def give_photons(integrator: PathIntegrator, request: RenderRequest, source: Ray
     required = 2 * emissions(whole) * PHOTON
     if required > memory:
         if request.caustics == "auto":
-            return "paths"
+            return "paths" if hides_caustics(integrator.scene) else None
         raise too_small(memory, "photons of caustics", required)
     photons = CausticPhotons(
         integrator.scene,
@@ -86,8 +91,8 @@ def give_photons(integrator: PathIntegrator, request: RenderRequest, source: Ray
         region=_seen_region(integrator, source),
         kept=max(1, min(passes, int(KEPT_SHARE * memory) // required)),
     )
-    if photons.are_none and request.caustics == "auto":
-        return "paths"
+    if photons.are_none:
+        return None
     integrator.photons = photons.of_pass(0)
     integrator.photon_passes = photons
     return "photons"
