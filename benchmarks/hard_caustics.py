@@ -23,6 +23,9 @@ SEEDS = range(1, 9)
 
 
 def main() -> None:
+    from lippmann.runtime import engine
+
+    engine.start("cpu", 2)
     results = {}
     for name in CAUSTIC_SCENES:
         results[name] = measure(name)

@@ -20,6 +20,10 @@ DISPLAYS = {
 }
 
 
+#: Holds the picture, but no photons.
+SMALL = 9 << 20
+
+
 def place(x, y, z):
     matrix = np.eye(4)
     matrix[:3, 3] = x, y, z
@@ -62,7 +66,8 @@ def test_photons_bring_what_paths_do_not_find(layout):
     assert (gained.max(axis=2) < 1e-4).mean() > 0.3
     assert pictures["photons"].provenance.options["caustics"] == "photons"
     assert pictures["none"].provenance.options["caustics"] == "none"
-    assert "caustics" not in pictures["paths"].provenance.options
+    assert pictures["paths"].provenance.options["caustics"] == "paths"
+    assert pictures["paths"].provenance.estimate is None
     assert any("photons bring it" in note for note in pictures["paths"].provenance.notes)
     assert not any("photons bring it" in note for note in pictures["photons"].provenance.notes)
 
@@ -72,28 +77,9 @@ def test_photons_are_the_default_where_there_are_caustics():
     chosen, photons = rendered(scene), rendered(scene, caustics="photons")
     assert chosen.pixels.tobytes() == photons.pixels.tobytes()
     assert chosen.provenance.options["caustics"] == "photons"
-    # Nothing but direct light is wanted, or there is no memory: paths.
-    for options in ({"depth": 1}, {"memory": 40 << 20}, {"integrator": "direct"}):
+    assert rendered(scene, memory=SMALL).provenance.options["caustics"] == "paths"
+    for options in ({"depth": 1}, {"integrator": "direct"}):  # none, and nothing is missed
         assert "caustics" not in rendered(scene, **options).provenance.options
-
-
-def test_more_samples_come_with_other_photons():
-    """A pass for every 32 samples where a quality decides how many there are."""
-    from unittest.mock import patch
-
-    from lippmann.rendering.transport.caustic_photons import CausticPhotons
-
-    asked = []
-    of_pass = CausticPhotons.of_pass
-
-    def noted(photons, number):
-        asked.append(number)
-        return of_pass(photons, number)
-
-    with patch.object(CausticPhotons, "of_pass", noted):
-        picture = rendered(lamp_over_glass(), spp=None, quality=80.0, max_time=4.0)
-    assert set(asked) == set(range(-(-picture.provenance.spp // 32)))
-    assert max(asked) >= 1
 
 
 def test_halves_have_photons_of_their_own():
@@ -134,7 +120,7 @@ def test_other_light_has_no_caustics(integrator):
 
 def test_too_little_memory_is_refused():
     with pytest.raises(MemoryLimitError, match="photons of caustics"):
-        rendered(lamp_over_glass(), caustics="photons", memory=40 << 20)
+        rendered(lamp_over_glass(), caustics="photons", memory=SMALL)
 
 
 def bumps():

@@ -31,6 +31,7 @@ from lippmann.rendering.request.preconditions import why_no_estimate
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.rendering.session import Session
 from lippmann.rendering.transport.integrator import Integrator, ReusableIntegrator
+from lippmann.rendering.transport.path import PathIntegrator
 from lippmann.rendering.transport.ray_source import DisplayRays, QuiltRays, SubpixelRays, WindowRays
 
 if TYPE_CHECKING:
@@ -41,6 +42,9 @@ Floats = NDArray[np.float32]
 #: The layer of a picture with the number of samples that each pixel had.
 SAMPLES_LAYER = "samples"
 
+#: Samples from which on a denoised picture is believed where sharp surfaces may mirror emitters, as photons show: with
+#: four, both halves may miss a mirror image of an emitter alike, by up to 10 dB of the worst micro-image.
+FIRST_AMONG_MIRRORS = 16
 
 #: What putting a picture together and writing it takes, as a rule.
 _SECONDS_PER_PIXEL_WRITTEN = 1e-7
@@ -288,7 +292,10 @@ def _denoised_candidate(job: Job, goal: Goal, batches: FullInBatches, rays: Call
         spent = rays()
         return 0 < spent < look_cost(spent)
 
-    track = ErrorTrack(renderer, _estimator(job, DenoisedEstimator), DENOISED_SLOPE, seconds, is_expensive)
+    estimator = _estimator(job, DenoisedEstimator)
+    if isinstance(job.integrator, PathIntegrator) and job.integrator.photons is not None:
+        estimator.first = estimator.fewest = FIRST_AMONG_MIRRORS
+    track = ErrorTrack(renderer, estimator, DENOISED_SLOPE, seconds, is_expensive)
     return _Candidate(renderer, track, denoiser)
 
 

@@ -194,3 +194,26 @@ def test_a_probe_tells_the_time_and_leaves_no_trace(integrator):
     assert np.array_equal(renderer.picture(), untouched.picture())
     assert renderer.rays == untouched.rays
     assert renderer.seconds_trace > 0
+
+
+def test_samples_of_one_pass_are_taken_together():
+    """Each stretch begins when the integrator has the photons of its pass."""
+    import mitsuba as mi
+
+    from lippmann.rendering.film.caustics import stretches
+    from lippmann.rendering.transport.path import PathIntegrator
+    from lippmann.rendering.transport.scene_features import make_scene_features
+
+    class Passes:
+        samples_of_pixel = 32
+
+        def of_pass(self, number):
+            return f"photons {number}"
+
+    scene = mi.load_dict({"type": "scene", "sky": {"type": "constant"}})
+    integrator = PathIntegrator(scene, make_scene_features(scene, has_null=False), 3)
+    assert list(stretches(integrator, 7, 100)) == [100]
+    integrator.photon_passes = Passes()
+    found = [(count, integrator.photons) for count in stretches(integrator, 20, 50)]
+    assert found == [(12, "photons 0"), (32, "photons 1"), (6, "photons 2")]
+    assert list(stretches(integrator, 64, 32)) == [32]

@@ -15,6 +15,7 @@ from lippmann.rendering.film.scattered_rays import ScatteredRays
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.rendering.transport.casters import find_casters, hides_caustics
 from lippmann.rendering.transport.caustic_photons import (
+    FEWEST,
     MOST,
     SAMPLES_OF_EMISSION,
     CausticPhotons,
@@ -25,7 +26,7 @@ from lippmann.rendering.transport.integrator import Integrator
 from lippmann.rendering.transport.path import PathIntegrator
 from lippmann.rendering.transport.ray_source import RaySource
 
-#: Samples of a pixel that one pass of photons serves, at least; where a quality or a time decides, just as many.
+#: Samples of a pixel that one pass of photons serves, at least.
 PASS_SAMPLES = 32
 #: Share of the memory for photons of passes that tiles and bands ask for in turn.
 KEPT_SHARE = 0.25
@@ -73,7 +74,7 @@ def give_photons(
     each = max(PASS_SAMPLES, MOST * SAMPLES_OF_EMISSION // pixels)
     passes = -(-request.samples // each)
     if request.is_open_ended:
-        each, passes = PASS_SAMPLES, 1
+        each, passes = max(PASS_SAMPLES, FEWEST * SAMPLES_OF_EMISSION // pixels), 1
     whole = pixels * min(each, request.samples if passes == 1 and not request.is_open_ended else each)
     # No fewer where memory is short: it does not change a picture.
     required = 2 * emissions(whole) * PHOTON

@@ -41,9 +41,9 @@ _FEWEST_OF_PAIR = 64
 #: Share of the emissions that goes to all pairs alike, whatever the pilot met.
 _UNIFORM_SHARE = 0.1
 #: Emissions of each half: one for so many samples of the picture, within limits.
-SAMPLES_OF_EMISSION, FEWEST, MOST = 16, 1 << 18, 1 << 21
-#: Photons within the radius of a look-up, as a rule, where there are :data:`FEWEST` emissions.
-NEIGHBOURS = 50
+SAMPLES_OF_EMISSION, FEWEST, MOST = 4, 1 << 16, 1 << 21
+#: Photons within the radius of a look-up, as a rule, where there are so many emissions.
+NEIGHBOURS, EMISSIONS_OF_NEIGHBOURS = 50, 1 << 18
 #: Photons by which the radius is found.
 _PROBED = 2000
 _SEED_STEPS = (0xB5297A4D, 0x68E31DA4)
@@ -126,7 +126,7 @@ class CausticPhotons:
             if not self._radius:
                 shown = first if number == 0 else self._shooter.shoot(self._count, self._chances, self._seed)[0]
                 shown = shown.inside(self._region)
-                self._radius = _radius(shown, NEIGHBOURS * math.sqrt(self._count / FEWEST))
+                self._radius = _radius(shown, NEIGHBOURS * math.sqrt(self._count / EMISSIONS_OF_NEIGHBOURS))
             self._maps[number] = PhotonMap((first, second), self._radius * radius_of_pass(number))
         return self._maps[number]
 
