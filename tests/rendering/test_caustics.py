@@ -131,7 +131,6 @@ def bumps():
 
 RECEIVERS = {
     "rough metal": Material("floor", base_color=(0.8, 0.6, 0.3), metallic=1.0, roughness=0.5),
-    "gloss": Material("floor", base_color=(0.5, 0.5, 0.5), roughness=0.3),
     "clear coat": Material("floor", base_color=(0.5, 0.3, 0.3), roughness=0.6, clearcoat=1.0, clearcoat_roughness=0.02),
     "cloth": Material("floor", base_color=(0.4, 0.2, 0.5), roughness=1.0, sheen_color=(0.6, 0.6, 0.6)),
     "normal map": Material("floor", base_color=(0.6, 0.6, 0.6), roughness=1.0, normal_texture=bumps()),
