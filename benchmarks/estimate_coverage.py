@@ -111,27 +111,25 @@ class Case:
         while rounds == 0 or time.process_time() - start < seconds:
             for part in range(REFERENCE_PARTS):
                 seed = 1_000_000 + rounds * REFERENCE_PARTS + part
-                self._shoot(seed, 128)
+                self._shoot(replace(self.session.request, seed=seed, spp=128))
                 parts[part] += trace_frame(self.integrator, self.source, plan, seed=seed).pixels
             rounds += 1
         return parts / rounds, 128 * rounds * REFERENCE_PARTS
 
-    def _shoot(self, seed: int, samples: int | None) -> None:
-        """Photons of this seed, where there are caustics: references and pictures must not share any."""
+    def _shoot(self, request: Any) -> None:
+        """Photons for a request, where there are caustics: references and pictures must not share any."""
         from lippmann.rendering.film.caustics import give_photons
 
-        request = replace(self.session.request, seed=seed, spp=samples)
         give_photons(self.integrator, request, self.source, MEMORY)
 
     def trace(self, way: str, seed: int, **asked: Any) -> Any:
         """A picture made that way, as the whole program makes it."""
-        from lippmann.rendering.film.caustics import give_photons
         from lippmann.rendering.methods import Job, trace
 
         method, denoise = WAYS[way]
         request = replace(self.session.request, method=method, denoise=denoise, seed=seed, pixel_filter="box", **asked)
         session = replace(self.session, request=request)
-        give_photons(self.integrator, request, self.source, MEMORY)
+        self._shoot(request)
         return trace(Job(session, self.integrator, self.source, self.display_from_world))
 
     def truth(self, picture: NDArray[np.float32]) -> tuple[float, float]:

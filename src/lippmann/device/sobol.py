@@ -18,6 +18,8 @@ from lippmann.device.types import Float, Point2f, UInt32
 
 #: Sample dimension that places a sample in its pixel; integrators use those above.
 PIXEL_DIMENSION = 0
+#: Seeds of streams that know nothing of each other differ by multiples of this: the golden ratio in 32 bits, odd.
+SEED_STEP = 0x9E3779B9
 
 
 def hash32(x: UInt32) -> UInt32:

@@ -149,10 +149,10 @@ class Session:
         """
         return self.watch.stage(
             "build",
-            lambda: self._expose(_make_integrator(self.built, self.request, frame_from_world, source), source),
+            lambda: self._prepare_light(_make_integrator(self.built, self.request, frame_from_world, source), source),
         )
 
-    def _expose(self, integrator: Integrator, source: RaySource) -> Integrator:
+    def _prepare_light(self, integrator: Integrator, source: RaySource) -> Integrator:
         from lippmann.rendering.film.exposure import gain_of, measure_exposure
         from lippmann.rendering.transport.path import PathIntegrator
 

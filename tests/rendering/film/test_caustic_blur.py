@@ -58,20 +58,17 @@ def matt_plane(passes):
 
 
 def blur_of(light, radius, *, samples=8, window=WHOLE, seed=3):
-    from lippmann.rendering.film.caustic_blur import squared_blur
+    from lippmann.rendering.film.caustic_blur import SquaredBlur
 
     integrator, source = matt_plane(PlaneOfPhotons(light, radius))
-    shown = integrator.photons
-    found = squared_blur(integrator, source, window, seed=seed, samples=samples)
-    assert integrator.photons is shown
-    return found
+    return SquaredBlur(integrator, source, window, seed).after(samples)
 
 
 def test_pictures_without_photons_have_none():
-    from lippmann.rendering.film.caustic_blur import squared_blur
+    from lippmann.rendering.film.caustic_blur import SquaredBlur
 
     integrator, source = matt_plane(None)
-    assert squared_blur(integrator, source, WHOLE, seed=1, samples=8) is None
+    assert SquaredBlur(integrator, source, WHOLE, 1).after(8) is None
 
 
 def test_smooth_light_is_held_for_three_times_as_blurred_as_it_is():

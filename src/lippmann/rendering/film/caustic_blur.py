@@ -11,29 +11,26 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.device.sobol import PIXEL_DIMENSION, SampleStream
+from lippmann.device.sobol import PIXEL_DIMENSION, SEED_STEP, SampleStream
 from lippmann.display.pixel_window import PixelWindow
-from lippmann.rendering.film.wavefront import divide
+from lippmann.rendering.film.wavefront import divide, shown_colors
 from lippmann.rendering.transport.caustic_blur import CausticBlur
 from lippmann.rendering.transport.caustic_photons import radius_of_pass
 from lippmann.rendering.transport.integrator import Integrator
 from lippmann.rendering.transport.path import PathIntegrator
+from lippmann.rendering.transport.photon_map import PhotonMap
 from lippmann.rendering.transport.ray_source import RaySource, pixel_number
 
 Floats = NDArray[np.float32]
 
 #: Of a picture of fewer samples only so many pixels are looked at, one for each in this many samples.
 SAMPLES_OF_LOOK = 16
-_SEED_STEP, _LOOK_SEED = 0x9E3779B9, 0x2545F491
+_LOOK_SEED = 0x2545F491
 _LANES = 1 << 20
 
 
-def squared_blur(
-    integrator: Integrator, source: RaySource, window: PixelWindow, *, seed: int, samples: int
-) -> Floats | None:
-    """``(H, W, 3)``: expected square of what blur adds to the linear pixels of a window; None where there is none.
-
-    Values of single pixels are noisy, and may be negative; their sums are not biased.
+class SquaredBlur:
+    """Expected square of what blur adds to the linear pixels of a window.
 
     Parameters
     ----------
@@ -41,39 +38,53 @@ def squared_blur(
         Of the picture; pixels have the same values in any window.
     seed:
         Of the picture, 0 to 2**32 - 1.
-    samples:
-        That each pixel has had.
     """
-    if not isinstance(integrator, PathIntegrator) or integrator.photons is None or integrator.photon_passes is None:
-        return None
-    passes, shown = integrator.photon_passes, integrator.photons
-    integrator.photons = passes.of_pass(0)
-    try:
-        blur = CausticBlur(integrator)
-        looked, weight = _looked_at(source, window, seed, samples)
-        found = np.zeros((window.pixels, 3), np.float32)
-        step = max(1, _LANES // (2 * source.channels))
+
+    def __init__(self, integrator: Integrator, source: RaySource, window: PixelWindow, seed: int) -> None:
+        self._integrator = integrator
+        self._source = source
+        self._window = window
+        self._seed = seed
+        self._share = 0.0
+        self._of_first_pass = np.zeros((0, 3), np.float32)
+
+    def after(self, samples: int) -> Floats | None:
+        """``(H, W, 3)`` for a picture of so many samples per pixel; None where no photons are in passes.
+
+        Values of single pixels are noisy, and may be negative; their sums are not biased.
+        """
+        passes = self._integrator.photon_passes if isinstance(self._integrator, PathIntegrator) else None
+        if passes is None:
+            return None
+        share = min(1.0, samples / SAMPLES_OF_LOOK)
+        if share != self._share:
+            self._share, self._of_first_pass = share, self._looked(passes.of_pass(0), share)
+        # Later passes blur less: in proportion to the squares of their radii.
+        count = -(-samples // passes.samples_of_pixel)
+        in_pass = np.minimum(samples - np.arange(count) * passes.samples_of_pixel, passes.samples_of_pixel)
+        shrunk = float((in_pass * np.square([radius_of_pass(k) for k in range(count)])).sum() / samples)
+        return (self._of_first_pass * np.float32(shrunk**2)).reshape(*self._window.shape, 3)
+
+    def _looked(self, photons: PhotonMap, share: float) -> Floats:
+        """``(pixels, 3)`` by a look at this share of the pixels, each of which stands for its like."""
+        assert isinstance(self._integrator, PathIntegrator)
+        blur = CausticBlur(self._integrator, photons)
+        looked = _looked_at(self._source, self._window, self._seed, share)
+        found = np.zeros((self._window.pixels, 3), np.float32)
+        step = max(1, _LANES // (2 * self._source.channels))
         for first in range(0, len(looked), step):
             part = looked[first : first + step]
-            found[part] = weight * _products(blur, source, window, part, seed)
-    finally:
-        integrator.photons = shown
-    # Later passes blur less: in proportion to the squares of their radii.
-    count = -(-samples // passes.samples_of_pixel)
-    in_pass = np.minimum(samples - np.arange(count) * passes.samples_of_pixel, passes.samples_of_pixel)
-    shrunk = float((in_pass * np.square([radius_of_pass(k) for k in range(count)])).sum() / samples)
-    return (found * np.float32(shrunk**2)).reshape(*window.shape, 3)
+            found[part] = _products(blur, self._source, self._window, part, self._seed) / np.float32(share)
+        return found
 
 
-def _looked_at(source: RaySource, window: PixelWindow, seed: int, samples: int) -> tuple[NDArray[np.intp], float]:
-    """Pixels of the window that are looked at, and by how much each of them counts more."""
-    share = min(1.0, samples / SAMPLES_OF_LOOK)
+def _looked_at(source: RaySource, window: PixelWindow, seed: int, share: float) -> NDArray[np.intp]:
+    """Numbers of a share of the pixels of a window, spread evenly."""
     row, column = np.divmod(np.arange(window.pixels, dtype=np.uint64), np.uint64(window.width))
     number = (row + np.uint64(window.top)) * np.uint64(source.width) + column + np.uint64(window.left)
-    # Fibonacci hashing, which spreads them evenly.
-    mixed = (number * np.uint64(_SEED_STEP) + np.uint64(seed)) & np.uint64(0xFFFFFFFF)
-    looked = np.flatnonzero(mixed < share * 2**32)
-    return looked, 1 / share
+    # Fibonacci hashing.
+    mixed = (number * np.uint64(SEED_STEP) + np.uint64(seed)) & np.uint64(0xFFFFFFFF)
+    return np.flatnonzero(mixed < share * 2**32)
 
 
 def _products(blur: CausticBlur, source: RaySource, window: PixelWindow, pixels: NDArray[np.intp], seed: int) -> Floats:
@@ -86,12 +97,11 @@ def _products(blur: CausticBlur, source: RaySource, window: PixelWindow, pixels:
     row, column = divide(pixel, dr.opaque(mi.UInt32, window.width))
     row += dr.opaque(mi.UInt32, window.top)
     column += dr.opaque(mi.UInt32, window.left)
-    stream_seed = dr.opaque(mi.UInt32, seed ^ _LOOK_SEED) + half * _SEED_STEP
+    stream_seed = dr.opaque(mi.UInt32, seed ^ _LOOK_SEED) + half * SEED_STEP
     number = pixel_number(source, column, row) * channels + channel
     stream = SampleStream.of_pixels(number, dr.zeros(mi.UInt32, lanes), stream_seed)
     stream.half = half
     ray = source.rays(column, row, channel, stream.next_2d(PIXEL_DIMENSION))
     added = np.array(dr.ravel(blur.sample(ray, stream, mi.Bool(True)))).reshape(-1, channels, 2, 3)
     product = np.nan_to_num(added[:, :, 0] * added[:, :, 1], posinf=0.0, neginf=0.0)
-    # A sub-pixel's rays carry all three colours; it shows its own.
-    return product[:, 0] if channels == 1 else np.stack([product[:, c, c] for c in range(3)], axis=-1)
+    return shown_colors(product)

@@ -63,7 +63,7 @@ def give_photons(
     if request.integrator != "path" or request.surfaces < 2:
         return None
     if request.caustics == "paths":
-        return "paths" if hides_caustics(integrator.scene) else None
+        return _left_to_paths(integrator)
     if request.caustics == "none":
         integrator.photons = no_photons()
         return "none"
@@ -71,16 +71,14 @@ def give_photons(
     if casters.pairs == 0:
         return None
     pixels = source.width * source.height * source.channels
-    each = max(PASS_SAMPLES, MOST * SAMPLES_OF_EMISSION // pixels)
-    passes = -(-request.samples // each)
-    if request.is_open_ended:
-        each, passes = max(PASS_SAMPLES, FEWEST * SAMPLES_OF_EMISSION // pixels), 1
-    whole = pixels * min(each, request.samples if passes == 1 and not request.is_open_ended else each)
+    each = max(PASS_SAMPLES, (FEWEST if request.is_open_ended else MOST) * SAMPLES_OF_EMISSION // pixels)
+    passes = 1 if request.is_open_ended else -(-request.samples // each)
+    whole = pixels * (each if request.is_open_ended else min(each, request.samples))
     # No fewer where memory is short: it does not change a picture.
     required = 2 * emissions(whole) * PHOTON
     if required > memory:
         if request.caustics == "auto":
-            return "paths" if hides_caustics(integrator.scene) else None
+            return _left_to_paths(integrator)
         raise too_small(memory, "photons of caustics", required)
     photons = CausticPhotons(
         integrator.scene,
@@ -97,6 +95,10 @@ def give_photons(
     integrator.photons = photons.of_pass(0)
     integrator.photon_passes = photons
     return "photons"
+
+
+def _left_to_paths(integrator: PathIntegrator) -> Literal["paths"] | None:
+    return "paths" if hides_caustics(integrator.scene) else None
 
 
 def _seen_region(integrator: PathIntegrator, source: RaySource) -> NDArray[np.float64] | None:

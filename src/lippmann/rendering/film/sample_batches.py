@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.color.transfer import Transfer, coding_slope
-from lippmann.device.sobol import PIXEL_DIMENSION, SampleStream
+from lippmann.device.sobol import PIXEL_DIMENSION, SEED_STEP, SampleStream
 from lippmann.device.types import Spectrum, UInt32
 from lippmann.display.pixel_window import PixelWindow
 from lippmann.errors import UsageError
@@ -25,9 +25,9 @@ from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.rendering.estimate.jackknife import error_of_batches
 from lippmann.rendering.estimate.pixel_errors import OWN_NOISE, PixelErrors
 from lippmann.rendering.film import memory_model
-from lippmann.rendering.film.caustic_blur import squared_blur
+from lippmann.rendering.film.caustic_blur import SquaredBlur
 from lippmann.rendering.film.caustics import stretches
-from lippmann.rendering.film.wavefront import Frame, RayTotals, compile_seconds, divide, evaluated
+from lippmann.rendering.film.wavefront import Frame, RayTotals, compile_seconds, divide, evaluated, shown_colors
 from lippmann.rendering.film.wavefront_plan import Run, cut_batches
 from lippmann.rendering.transport.integrator import Integrator
 from lippmann.rendering.transport.ray_source import RaySource, pixel_number
@@ -43,8 +43,6 @@ MOST_BATCHES = 8
 _PROBE_SIZES, _PROBE_SECONDS = (1 << 14, 1 << 16, 1 << 18), 0.05
 #: Samples of a launch that takes hardly more than launches do; a single one would have a kernel of its own.
 _LAUNCH_SIZE = 64
-#: Seeds of the streams: the user's, each changed by another odd multiple of the golden ratio's 32 bits.
-SEED_STEP = 0x9E3779B9
 
 
 class FullInBatches:
@@ -103,8 +101,7 @@ class FullInBatches:
         self._taken = [0] * batches
         # Plain and denoised pictures of the same samples both ask for their errors.
         self._errors: PixelErrors | None = None
-        self._blur: Floats | None = None
-        self._blur_samples = 0
+        self._blur = SquaredBlur(integrator, source, self._window, seed)
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -210,16 +207,14 @@ class FullInBatches:
     def squared_blur(self) -> Floats | None:
         """``(H, W)``: what the blur of caustics adds to the squared errors of the codes; None where there is none.
 
-        See :func:`lippmann.rendering.film.caustic_blur.squared_blur`.
+        See :class:`lippmann.rendering.film.caustic_blur.SquaredBlur`.
         """
-        if self._blur_samples != self.samples:
-            self._blur_samples = self.samples
-            linear = squared_blur(self._integrator, self._source, self._window, seed=self._seed, samples=self.samples)
-            self._blur = None
-            if linear is not None:
-                slope = coding_slope(self.picture(), self._transfer)
-                self._blur = (np.square(slope) * self._shown(linear)).mean(axis=-1)
-        return self._blur
+        linear = self._blur.after(self.samples)
+        if linear is None:
+            return None
+        slope = coding_slope(self.picture(), self._transfer)
+        blur: Floats = (np.square(slope) * self._shown(linear)).mean(axis=-1)
+        return blur
 
     def _shown(self, values: Floats) -> Floats:
         """Of values ``(..., W, 3)`` of what is traced those that the picture shows."""
@@ -357,8 +352,4 @@ def _table(numbers: Sequence[int]) -> UInt32:
 def _sums(radiance: Spectrum, channels: int, batches: int, count: int) -> Floats:
     """``(pixels, batches, 3)`` from lanes ordered pixel, channel, batch, sample."""
     parts = [dr.block_sum(component, count) if count > 1 else component for component in radiance]
-    sums: Floats = np.array(dr.ravel(mi.Color3f(*parts))).reshape(-1, channels, batches, 3)
-    if channels == 1:
-        return sums[:, 0]
-    # A sub-pixel's rays carry all three colours; it shows its own.
-    return np.stack([sums[:, c, :, c] for c in range(3)], axis=-1)
+    return shown_colors(np.array(dr.ravel(mi.Color3f(*parts))).reshape(-1, channels, batches, 3))

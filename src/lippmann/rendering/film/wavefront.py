@@ -173,11 +173,17 @@ def divide(number: UInt32, by: UInt32 | int) -> tuple[UInt32, UInt32]:
 
 def _channel_sums(radiance: Spectrum, channels: int, count: int) -> NDArray[np.float32]:
     parts = [dr.block_sum(component, count) if count > 1 else component for component in radiance]
-    if channels == 1:
-        return np.array(dr.ravel(mi.Color3f(*parts))).reshape(-1, 3)
-    sums = np.stack([np.array(component) for component in parts], axis=-1)
-    # A sub-pixel's rays carry all three colours; it shows its own.
-    return np.ascontiguousarray(np.diagonal(sums.reshape(-1, 3, 3), axis1=1, axis2=2))
+    return shown_colors(np.array(dr.ravel(mi.Color3f(*parts))).reshape(-1, channels, 3))
+
+
+def shown_colors(values: NDArray[np.float32]) -> NDArray[np.float32]:
+    """``(pixels, ..., 3)``: of ``(pixels, channels, ..., 3)`` what the pixels show.
+
+    The rays of a sub-pixel carry all three colours; it shows its own.
+    """
+    if values.shape[1] == 1:
+        return values[:, 0]
+    return np.stack([values[:, c, ..., c] for c in range(3)], axis=-1)
 
 
 def lane_total(counts: UInt32) -> int:

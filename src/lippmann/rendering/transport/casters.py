@@ -54,6 +54,11 @@ class Casters:
     areas: NDArray[np.float32]
 
     @property
+    def boxed(self) -> NDArray[np.bool_]:
+        """``(len(shapes),)``: which have boxes."""
+        return np.asarray(np.isfinite(self.boxes).all(axis=1))
+
+    @property
     def pairs(self) -> int:
         """Number of pairs of an emitter and a caster."""
         return len(self.emitters) * len(self.shapes)
@@ -67,7 +72,7 @@ def find_casters(scene: MitsubaScene) -> Casters:
     for number, shape in enumerate(scene.shapes() if emitters else ()):
         if not (_is_instance(shape) or _may_be_sharp(shape.bsdf())):
             continue
-        box, area = np.full(6, np.nan), area_of(shape)
+        box, area = np.full(6, np.nan), _area(shape)
         if not (0 < area < math.inf and _gives_points(shape)):
             box = _box_about(shape)
             sides = box[3:] - box[:3]
@@ -93,10 +98,10 @@ def _has_small_emitter(scene: MitsubaScene) -> bool:
         return True
     box = scene.bbox()
     small = SMALL * float(dr.squared_norm(box.max - box.min))
-    return any(area_of(shape) < small for shape in scene.shapes() if shape.is_emitter())
+    return any(_area(shape) < small for shape in scene.shapes() if shape.is_emitter())
 
 
-def area_of(shape: mi.Shape) -> float:
+def _area(shape: mi.Shape) -> float:
     """Area of a shape; not a number for shapes that do not tell it."""
     try:
         return float(np.array(shape.surface_area()).ravel()[0])
@@ -135,8 +140,7 @@ class CasterPoints:
     """Points on the casters of a wavefront, toward which emitters are sampled.
 
     A shape's own point is where light meets it. For a shape that gives none it lies on the box about it, where light
-    leaves the box if nothing is in its way: whatever comes from an emitter to the shape, does so on a ray that leaves
-    the box once.
+    leaves the box if nothing is in its way: light from an emitter to the shape comes on a ray that leaves the box once.
 
     Parameters
     ----------
@@ -154,7 +158,7 @@ class CasterPoints:
         self._shape: ShapePtr = dr.gather(mi.ShapePtr, scene.shapes_dr(), number)
         self.area: Float = dr.gather(mi.Float, mi.Float(casters.areas), caster)
         self._boxed = mi.Bool(False)
-        boxed = np.asarray(np.isfinite(casters.boxes).all(axis=1))
+        boxed = casters.boxed
         shapes = scene.shapes()
         # Not a virtual call: that would ask all shapes there are, and some refuse.
         self.p, self._n = dr.switch(

@@ -22,17 +22,16 @@ WIDER = 2.0
 
 
 class CausticBlur:
-    """Estimates the radiance that the blur of ``integrator``'s photons adds along rays, of either sign.
+    """Estimates the radiance that the blur of ``photons`` adds along rays of ``integrator``, of either sign.
 
     It sees what Lambertian lobes show; the gloss of the same surfaces is taken to be blurred no more.
     """
 
     # Not a dataclass: Dr.Jit would take it for loop state and write its fields.
-    def __init__(self, integrator: PathIntegrator) -> None:
-        assert integrator.photons is not None
+    def __init__(self, integrator: PathIntegrator, photons: PhotonMap) -> None:
         self._paths = integrator
-        self._narrow = integrator.photons
-        self._wide = PhotonMap(self._narrow.halves, WIDER * self._narrow.radius)
+        self._narrow = photons
+        self._wide = PhotonMap(photons.halves, WIDER * photons.radius)
 
     @dr.syntax
     def sample(self, ray: Ray3f, stream: SampleStream, active: Bool) -> Spectrum:

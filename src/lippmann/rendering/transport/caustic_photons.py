@@ -118,15 +118,16 @@ class CausticPhotons:
         """The photons of pass ``number``, from 0 on; a map without any where there are none."""
         if self._chances is None:
             return no_photons()
+        if not self._radius and number > 0:
+            self.of_pass(0)  # which tells the radius
         if number not in self._maps:
             while len(self._maps) >= self._kept:
                 del self._maps[next(iter(self._maps))]
             seeds = [(self._seed + step + number * _PASS_STEP) % 2**32 for step in _SEED_STEPS]
             first, second = (self._shooter.shoot(self._count, self._chances, seed)[0] for seed in seeds)
-            if not self._radius:
-                shown = first if number == 0 else self._shooter.shoot(self._count, self._chances, self._seed)[0]
-                shown = shown.inside(self._region)
-                self._radius = _radius(shown, NEIGHBOURS * math.sqrt(self._count / EMISSIONS_OF_NEIGHBOURS))
+            if number == 0 and not self._radius:
+                neighbours = NEIGHBOURS * math.sqrt(self._count / EMISSIONS_OF_NEIGHBOURS)
+                self._radius = _radius(first.inside(self._region), neighbours)
             self._maps[number] = PhotonMap((first, second), self._radius * radius_of_pass(number))
         return self._maps[number]
 

@@ -33,7 +33,7 @@ from lippmann.device.types import (
 )
 from lippmann.rendering.transport.integrator import FirstHit, RayCounts
 from lippmann.rendering.transport.light_sampling import LightSampler, SceneLightSampler
-from lippmann.rendering.transport.photon_map import STEEPEST, PhotonMap
+from lippmann.rendering.transport.photon_map import PhotonMap
 from lippmann.rendering.transport.scene_features import SceneFeatures
 from lippmann.rendering.transport.sharp_events import (
     MOST_EVENTS,
@@ -297,9 +297,7 @@ class PathIntegrator:
         light = lambert * found.irradiance * dr.inv_pi
         wo = si.to_local(found.toward)
         wide = active & wide & (dr.max(found.flux) > 0) & (wo.z * si.wi.z > 0)
-        rest = bsdf.eval(mi.BSDFContext(), si, wo, wide) - lambert * (dr.abs(wo.z) * dr.inv_pi)
-        grazing = dr.abs(dr.dot(found.toward, si.n))
-        rest *= dr.minimum(dr.rcp(grazing), STEEPEST / dr.abs(wo.z))
+        rest = bsdf.eval(mi.BSDFContext(), si, wo, wide) / dr.abs(wo.z) - lambert * dr.inv_pi
         return dr.select(active, light, 0) + dr.select(wide, rest * found.flux, 0)
 
     def _clamped(self, light: Spectrum) -> Spectrum:

@@ -88,8 +88,8 @@ class Gathered:
     toward:
         World-space unit direction to where one of the photons came from, chosen by its share.
     flux:
-        Irradiance, geometric normal, if all came from ``toward``: its product with a BSDF is an unbiased estimate of
-        the sum over all photons.
+        Irradiance on a surface of the shading normal, if all came from ``toward``: its product with the BSDF there is
+        an unbiased estimate of the sum over all photons.
     """
 
     # Not a dataclass: Dr.Jit would take it for loop state and write its fields.
@@ -217,9 +217,10 @@ class PhotonMap:
                     taken = choice < share
                     choice = dr.select(taken, choice / share, (choice - share) / (1 - share))
                     chosen = dr.select(taken, d, chosen)
-                    color = dr.select(taken, power / weight, color)
                     # Photons know the true surface; it is shaded by its interpolated normal.
-                    total += power * dr.minimum(dr.abs(wo.z) / dr.dot(d, normal), STEEPEST)
+                    power *= dr.minimum(dr.abs(wo.z) / dr.dot(d, normal), STEEPEST)
+                    total += power
+                    color = dr.select(taken, power / weight, color)
                 number += 1
                 inside &= number < end
             corner += 1
