@@ -159,8 +159,14 @@ class Session:
         if not isinstance(integrator, PathIntegrator):
             return integrator
         from lippmann.rendering.film.caustics import give_photons
+        from lippmann.rendering.transport.beam import beam_of
+        from lippmann.rendering.transport.casters import has_sharp_surfaces
 
-        caustics = give_photons(integrator, self.request, source, memory_limit(self.request))
+        request = self.request
+        # A goal may be reached by samples alone, which are to have no blur.
+        if request.shares_light and not request.is_open_ended and has_sharp_surfaces(integrator.scene):
+            integrator.beam = beam_of(source, request.samples)
+        caustics = give_photons(integrator, request, source, memory_limit(request))
         if caustics is not None:
             self.choices["caustics"] = caustics
         exposure = self.request.exposure

@@ -20,10 +20,16 @@ from lippmann.device.pbr.gltf_bsdf_parameters import (
 )
 from lippmann.device.pbr.texture_lookup import Place, Signal
 from lippmann.device.pbr.thin_film import thin_film_reflectance
-from lippmann.device.types import Bool, Color3f, Float, Vector3f
+from lippmann.device.types import Bool, Color3f, Float, SurfaceInteraction3f, Vector3f
 
 #: Reflectance of the clear coat seen head-on (refractive index 1.5).
 COAT_F0 = 0.04
+
+
+def widen_lobes(si: SurfaceInteraction3f, by: Float) -> None:
+    """Have the squares of all GGX widths at an interaction grow by ``by``; no lobe gets wider than 1."""
+    # Derivatives of texture coordinates by pixels, which rays without differentials leave at 0 and no texture reads.
+    si.duv_dx = mi.Vector2f(by, 0)
 
 
 def surface_point(model: SurfaceModel, place: Place) -> Point:
@@ -61,7 +67,8 @@ def _lobe(
     anisotropy: Anisotropy | None = None,
 ) -> Lobe:
     wi = mi.Vector3f(place.si.wi.x, place.si.wi.y, dr.abs(place.si.wi.z))
-    alpha = mi.Point2f(dr.clip(dr.square(roughness.eval(place)), microfacet.MIN_ALPHA, 1))
+    alpha = dr.clip(dr.square(roughness.eval(place)), microfacet.MIN_ALPHA, 1)
+    alpha = mi.Point2f(dr.minimum(dr.sqrt(dr.square(alpha) + place.si.duv_dx.x), 1))
     if normal_map is None and anisotropy is None:
         return Lobe(None, wi, alpha)
     normal = mapped_normal(normal_map, place, flip)

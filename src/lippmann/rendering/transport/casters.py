@@ -90,7 +90,12 @@ def find_casters(scene: MitsubaScene) -> Casters:
 
 def hides_caustics(scene: MitsubaScene) -> bool:
     """Whether a scene has mirrors, glass or smooth gloss, and an emitter so small that paths hardly find it by them."""
-    return _has_small_emitter(scene) and any(_may_be_sharp(shape.bsdf()) for shape in scene.shapes())
+    return _has_small_emitter(scene) and has_sharp_surfaces(scene)
+
+
+def has_sharp_surfaces(scene: MitsubaScene) -> bool:
+    """Whether a scene has mirrors, clear glass or smooth gloss; those of instances are not told."""
+    return any(_may_be_sharp(shape.bsdf()) for shape in scene.shapes())
 
 
 def _has_small_emitter(scene: MitsubaScene) -> bool:

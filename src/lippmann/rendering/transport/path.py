@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, cast
 import drjit as dr
 import mitsuba as mi
 
+from lippmann.device.pbr.surface_point import widen_lobes
 from lippmann.device.sobol import SampleStream
 from lippmann.device.types import (
     Bool,
@@ -31,6 +32,7 @@ from lippmann.device.types import (
     UInt32,
     Vector3f,
 )
+from lippmann.rendering.transport.beam import Beam, turn_of_normals, widening
 from lippmann.rendering.transport.integrator import FirstHit, RayCounts
 from lippmann.rendering.transport.light_sampling import LightSampler, SceneLightSampler
 from lippmann.rendering.transport.photon_map import PhotonMap
@@ -122,6 +124,8 @@ class PathIntegrator:
         self.photons: PhotonMap | None = None
         #: Gives :attr:`photons` for each part of a picture's samples; None where they are the same for all.
         self.photon_passes: CausticPhotons | None = None
+        #: Beam of a sample, by which lobes of curved surfaces are widened; None for lobes as they are.
+        self.beam: Beam | None = None
         self._environment = scene.environment()
         # A single delta emitter: more than one sample of it tells nothing more.
         self._single_delta = len(emitters) == 1 and bool(mi.has_flag(emitters[0].flags(), mi.EmitterFlags.Delta))
@@ -157,6 +161,13 @@ class PathIntegrator:
         sharp = mi.UInt32(0)  # sharp events since the last of them, straight-through surfaces excluded
         by_photons = mi.Spectrum(0)  # share of the light met by sharp events from here on that photons bring
         samples_at_start, start = first_emitter_samples(stream.index)
+        width, spread = mi.Vector2f(0), mi.Vector2f(0)  # of the beam
+        is_beam = mi.Bool(True)  # no rough event has widened it beyond use
+        needed = mi.RayFlags.All
+        if dr.hint(self.beam is not None, mode="scalar"):
+            beam = cast("Beam", self.beam)
+            width, spread = mi.Vector2f(beam.width), mi.Vector2f(beam.spread)
+            needed = mi.RayFlags.All | mi.RayFlags.dNSdUV
         shown_background = mi.Spectrum(0 if background is None else background)
         if dr.hint(self.gain is not None, mode="scalar"):
             shown_background /= self.gain  # a colour that is to be seen as it was said
@@ -166,7 +177,7 @@ class PathIntegrator:
         view_dependent = mi.Bool(False)
 
         while dr.hint(active, label="paths"):
-            si = pi.compute_surface_interaction(ray, ray_flags=mi.RayFlags.All)
+            si = pi.compute_surface_interaction(ray, ray_flags=needed)
             bsdf = si.bsdf(ray)
 
             shiny = (bsdf.flags() & int(mi.BSDFFlags.Glossy | mi.BSDFFlags.Delta | mi.BSDFFlags.Null)) != 0
@@ -202,12 +213,19 @@ class PathIntegrator:
                     dr.select(all_specular, samples_at_start, samples),
                     dr.select(all_specular, start, number),
                 )
-            lobe, lambert, wide = mi.Vector3f(0), mi.Color3f(0), mi.Bool(False)
+            lobe, lambert, wide, lands = mi.Vector3f(0), mi.Color3f(0), mi.Bool(False), mi.Bool(False)
             if dr.hint(self.photons is not None, mode="scalar"):
                 lobe = sharp_lobe(si, bsdf, continues)
                 lambert = lambertian(si, bsdf, continues & (rough == 0))
                 wide = has_wide_lobes(si, bsdf, continues & (rough == 0))
                 lands = continues & (rough == 0) & (wide | (dr.max(lambert) > 0))
+            turn = mi.Float(0)
+            if dr.hint(self.beam is not None, mode="scalar"):
+                # After what surfaces say of their lobes: light is divided by lobes as they are.
+                width += spread * dr.select(si.is_valid(), si.t, 0)
+                turn = dr.select(is_beam & si.is_valid(), turn_of_normals(si, width), 0)
+                widen_lobes(si, widening(turn))
+            if dr.hint(self.photons is not None, mode="scalar"):
                 choice = stream.next_1d(dimension + GATHER_DIMENSION)
                 radiance += throughput * self._caustics(si, bsdf, lobe, lambert, wide, stream, depth, choice, lands)
             last = number + samples
@@ -239,10 +257,14 @@ class PathIntegrator:
                 becomes_rough = is_event & ~keeps_sharp
                 share = dr.select(wide & (si.wi.z * bs.wo.z > 0), 1, dr.clip(share, 0, 1))
                 by_photons = dr.select(becomes_rough & (rough == 0), share, by_photons)
+                is_beam &= ~becomes_rough
                 rough += dr.select(becomes_rough, mi.UInt32(1), mi.UInt32(0))
                 sharp = dr.select(becomes_rough, mi.UInt32(0), sharp + dr.select(is_event, mi.UInt32(1), mi.UInt32(0)))
             throughput *= bsdf_weight
             eta *= bs.eta
+            if dr.hint(self.beam is not None, mode="scalar"):
+                is_beam &= ~mi.has_flag(bs.sampled_type, mi.BSDFFlags.DiffuseReflection)
+                spread += dr.select(mi.has_flag(bs.sampled_type, mi.BSDFFlags.GlossyReflection), 2 * turn, 0)
             if dr.hint(self.features.has_absorption, mode="scalar"):
                 crosses = mi.has_flag(bs.sampled_type, mi.BSDFFlags.Transmission) & ~passes
                 inside = dr.dot(bs.wo, mi.Vector3f(0, 0, 1)) < 0
