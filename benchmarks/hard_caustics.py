@@ -79,7 +79,7 @@ def rendered(scene: Any, way: Any, method: Any, spp: int, seed: int) -> Any:
         seed=seed,
         exposure=0,
         tone_map="none",
-        placement=PlacementOptions(mode="fit"),
+        placement=PlacementOptions(mode="fit", turn=(0.0, 30.0, 0.0)),
     )
 
 

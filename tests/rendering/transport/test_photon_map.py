@@ -26,17 +26,18 @@ def scattered(count, seed, *, flat=True):
     return Photons(*arrays, random.integers(1, 5, count).astype(np.uint32))
 
 
-def gathered(photon_map, points, half, surfaces, *, choice=0.5, active=True):
+def gathered(photon_map, points, half, surfaces, *, choice=0.5, active=True, normal=(0, 0, 1), seen=True):
     import drjit as dr
     import mitsuba as mi
 
     si = dr.zeros(mi.SurfaceInteraction3f, len(points))
     si.p = mi.Point3f(np.ascontiguousarray(points.T))
-    si.n = mi.Normal3f(0, 0, 1)
-    si.sh_frame = mi.Frame3f(mi.Vector3f(0, 0, 1))
+    up, none, choice = mi.Vector3f(*normal), mi.Vector3f(0), mi.Float(np.float32(choice))
+    si.n = mi.Normal3f(up)
+    si.sh_frame = mi.Frame3f(up)
     si.wi = mi.Vector3f(0, 0, 1)
-    up, none, choice = mi.Vector3f(0, 0, 1), mi.Vector3f(0), mi.Float(np.float32(choice))
-    return photon_map.gather(si, up, none, mi.UInt32(half), mi.UInt32(surfaces), choice, mi.Bool(active))
+    half, surfaces = mi.UInt32(half), mi.UInt32(surfaces)
+    return photon_map.gather(si, up, none, half, surfaces, choice, mi.Bool(seen), mi.Bool(active))
 
 
 def looked_up(photon_map, points, half, surfaces, active=True):
@@ -85,6 +86,53 @@ def test_a_look_up_is_the_sum_over_all_photons(radius, flat):
     assert (looked_up(photon_map, points, 0, 0) == 0).all()  # each has had one event at least
 
 
+def tilted(normal, count, seed):
+    """Photons spread over a square of side 2 of a plane through 0, with a flux of 2.5 to a unit of area."""
+    from lippmann.rendering.transport.photon_map import Photons
+
+    random = np.random.default_rng(seed)
+    along = np.linalg.svd(np.array([normal]))[2][1:]
+    position = np.float32(random.uniform(-1, 1, (count, 2)) @ along)
+    up = np.tile(np.float32(normal), (count, 1))
+    power = np.full((count, 3), 4 * 2.5 / count, np.float32)
+    return Photons(position, up, up, power, np.ones(count, np.uint32)), along
+
+
+NORMALS = [(0.0, 0.0, 1.0), (0.6, 0.0, -0.8), (-0.48, 0.6, 0.64), (0.01, -0.02, 0.99975)]
+
+
+@pytest.mark.parametrize("normal", NORMALS)
+def test_surfaces_that_are_not_seen_have_the_light_of_their_cell(normal):
+    from lippmann.rendering.transport.photon_map import PhotonMap, irradiance_of_cell
+
+    photons, along = tilted(normal, 20_000, 3)
+    random = np.random.default_rng(4)
+    # Not quite on the photons' plane, which for upright ones is the border of cells.
+    points = np.float32(random.uniform(-0.7, 0.7, (60, 2)) @ along + 0.03 * np.array(normal))
+    moved = at_place(photons, np.float32(photons.position + 0.03 * np.float32(normal)))
+    found = gathered(PhotonMap((moved, moved), 0.1), points, 0, 9, normal=normal, seen=False).irradiance
+    expected = irradiance_of_cell(moved, points, np.tile(np.float32(normal), (60, 1)), 0.1)
+    np.testing.assert_allclose(np.array(found).T, expected, rtol=0.03, atol=0.03)
+
+
+def at_place(photons, position):
+    from dataclasses import replace
+
+    return replace(photons, position=position)
+
+
+@pytest.mark.parametrize("normal", NORMALS)
+def test_cells_keep_the_flux(normal):
+    from lippmann.rendering.transport.photon_map import PhotonMap
+
+    photons, along = tilted(normal, 200_000, 5)
+    photons = at_place(photons, np.float32(photons.position + 0.03 * np.float32(normal)))
+    random = np.random.default_rng(6)
+    points = np.float32(random.uniform(-0.8, 0.8, (4000, 2)) @ along + 0.03 * np.array(normal))
+    found = gathered(PhotonMap((photons, photons), 0.1), points, 1, 1, normal=normal, seen=False).irradiance
+    assert np.array(found).mean() == pytest.approx(2.5, rel=0.015)
+
+
 def test_nothing_is_brought_by_no_photons_and_to_lanes_that_do_not_ask():
     from lippmann.rendering.transport.photon_map import PhotonMap, Photons
 
@@ -109,7 +157,14 @@ def test_a_narrow_lobe_keeps_what_it_reflects_sharply():
     for wi, kept in (((0.0, 0.0, 1.0), 0.0), ((0.6, 0.0, 0.8), 2 / np.pi)):
         si.wi = mi.Vector3f(*wi)
         found = PhotonMap((straight, straight), 1.0).gather(
-            si, mi.Vector3f(0, 0, 1), mi.Vector3f(0, 0, 1), mi.UInt32(0), mi.UInt32(9), mi.Float(0.5), mi.Bool(True)
+            si,
+            mi.Vector3f(0, 0, 1),
+            mi.Vector3f(0, 0, 1),
+            mi.UInt32(0),
+            mi.UInt32(9),
+            mi.Float(0.5),
+            mi.Bool(True),
+            mi.Bool(True),
         )
         np.testing.assert_allclose(np.array(found.irradiance).ravel(), kept, rtol=1e-6)
 

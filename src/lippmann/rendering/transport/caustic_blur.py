@@ -51,8 +51,8 @@ class CausticBlur:
             lands = active & (dr.max(lambert) > 0)
             surfaces, half = paths.depth - depth - 1, mi.UInt32(stream.half)
             normal, choice = facing_normal(si), mi.Float(0)
-            wide = self._wide.gather(si, normal, lobe, half, surfaces, choice, lands).irradiance
-            narrow = self._narrow.gather(si, normal, lobe, half, surfaces, choice, lands).irradiance
+            wide = self._wide.gather(si, normal, lobe, half, surfaces, choice, mi.Bool(True), lands).irradiance
+            narrow = self._narrow.gather(si, normal, lobe, half, surfaces, choice, mi.Bool(True), lands).irradiance
             added += dr.select(lands, throughput * lambert * (wide - narrow) * dr.inv_pi, 0)
 
             dimension = (depth * 2 + crossings) * DIMENSIONS_PER_VERTEX + 1

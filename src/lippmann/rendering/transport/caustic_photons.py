@@ -6,8 +6,8 @@ emitter, and back along it. So none misses, and every emitter works that can be 
 
 What is gathered is exactly what :class:`~lippmann.rendering.transport.path.PathIntegrator` leaves out: light that comes
 by sharp events alone (:mod:`lippmann.rendering.transport.sharp_events`), one at least and :data:`MOST_EVENTS` at most,
-from an emitter other than the environment to the first rough surface of a camera path, and is scattered there by lobes
-that are wide enough to be told from photons.
+from an emitter other than the environment to a rough surface of a camera path, and is scattered there by lobes that are
+wide enough to be told from photons.
 """
 
 from __future__ import annotations

@@ -157,9 +157,9 @@ class PathIntegrator:
         vertex_delta = mi.Bool(True)
         vertex_samples = mi.UInt32(1)  # emitter samples taken there
         all_specular = mi.Bool(True)  # no emitter has been sampled yet
-        rough = mi.UInt32(0)  # events that were not sharp
-        sharp = mi.UInt32(0)  # sharp events since the last of them, straight-through surfaces excluded
-        by_photons = mi.Spectrum(0)  # share of the light met by sharp events from here on that photons bring
+        seen = mi.Bool(True)  # all events were sharp
+        sharp = mi.UInt32(0)  # sharp events since the last rough one, straight-through surfaces excluded
+        by_photons = mi.Spectrum(0)  # share of the light met by sharp events from that one on that photons bring
         samples_at_start, start = first_emitter_samples(stream.index)
         width, spread = mi.Vector2f(0), mi.Vector2f(0)  # of the beam
         is_beam = mi.Bool(True)  # no rough event has widened it beyond use
@@ -196,7 +196,7 @@ class PathIntegrator:
             if dr.hint(background is not None, mode="scalar"):
                 emission = dr.select((depth == 0) & ~si.is_valid(), shown_background, emission)
             if dr.hint(self.photons is not None, mode="scalar"):
-                is_caustic = (rough == 1) & (sharp > 0) & (sharp <= MOST_EVENTS) & si.is_valid()
+                is_caustic = ~seen & (sharp > 0) & (sharp <= MOST_EVENTS) & si.is_valid()
                 emission = dr.select(is_caustic, emission * (1 - by_photons), emission)
             met = throughput * emission
             if dr.hint(self.most_indirect is not None, mode="scalar"):
@@ -216,9 +216,9 @@ class PathIntegrator:
             lobe, lambert, wide, lands = mi.Vector3f(0), mi.Color3f(0), mi.Bool(False), mi.Bool(False)
             if dr.hint(self.photons is not None, mode="scalar"):
                 lobe = sharp_lobe(si, bsdf, continues)
-                lambert = lambertian(si, bsdf, continues & (rough == 0))
-                wide = has_wide_lobes(si, bsdf, continues & (rough == 0))
-                lands = continues & (rough == 0) & (wide | (dr.max(lambert) > 0))
+                lambert = lambertian(si, bsdf, continues)
+                wide = has_wide_lobes(si, bsdf, continues)
+                lands = continues & (wide | (dr.max(lambert) > 0))
             turn = mi.Float(0)
             if dr.hint(self.beam is not None, mode="scalar"):
                 # After what surfaces say of their lobes: light is divided by lobes as they are.
@@ -227,13 +227,15 @@ class PathIntegrator:
                 widen_lobes(si, widening(turn))
             if dr.hint(self.photons is not None, mode="scalar"):
                 choice = stream.next_1d(dimension + GATHER_DIMENSION)
-                radiance += throughput * self._caustics(si, bsdf, lobe, lambert, wide, stream, depth, choice, lands)
+                radiance += throughput * self._caustics(
+                    si, bsdf, lobe, lambert, wide, stream, depth, choice, seen, lands
+                )
             last = number + samples
             while dr.hint(sampling, label="emitters"):
                 point = stream.at(number).next_2d(dimension)
                 light, ds, tests = self.direct_light(si, bsdf, point, sampling, samples=mi.Float(samples))
                 if dr.hint(self.photons is not None, mode="scalar"):
-                    is_caustic = (rough == 1) & (sharp < MOST_EVENTS) & is_sharp(si, lobe, si.to_local(ds.d))
+                    is_caustic = ~seen & (sharp < MOST_EVENTS) & is_sharp(si, lobe, si.to_local(ds.d))
                     is_caustic &= self._is_near(ds)
                     light = dr.select(is_caustic, light * (1 - by_photons), light)
                 drawn = throughput * light
@@ -256,9 +258,9 @@ class PathIntegrator:
                 share = dr.select(scattered > 0, lambert * (dr.abs(bs.wo.z) * dr.inv_pi) / scattered, 0)
                 becomes_rough = is_event & ~keeps_sharp
                 share = dr.select(wide & (si.wi.z * bs.wo.z > 0), 1, dr.clip(share, 0, 1))
-                by_photons = dr.select(becomes_rough & (rough == 0), share, by_photons)
+                by_photons = dr.select(becomes_rough, share, by_photons)
                 is_beam &= ~becomes_rough
-                rough += dr.select(becomes_rough, mi.UInt32(1), mi.UInt32(0))
+                seen &= ~becomes_rough
                 sharp = dr.select(becomes_rough, mi.UInt32(0), sharp + dr.select(is_event, mi.UInt32(1), mi.UInt32(0)))
             throughput *= bsdf_weight
             eta *= bs.eta
@@ -305,6 +307,7 @@ class PathIntegrator:
         stream: SampleStream,
         depth: UInt32,
         choice: Float,
+        seen: Bool,
         active: Bool,
     ) -> Spectrum:
         """Radiance toward ``si.wi`` of the photons about a point.
@@ -314,7 +317,7 @@ class PathIntegrator:
         """
         photons = cast("PhotonMap", self.photons)
         found = photons.gather(
-            si, facing_normal(si), lobe, mi.UInt32(stream.half), self.depth - depth - 1, choice, active
+            si, facing_normal(si), lobe, mi.UInt32(stream.half), self.depth - depth - 1, choice, seen, active
         )
         light = lambert * found.irradiance * dr.inv_pi
         wo = si.to_local(found.toward)

@@ -6,6 +6,7 @@ threads. Cells are hashed into buckets; a bucket may hold photons of other cells
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import dataclass, fields
 
@@ -24,6 +25,8 @@ Floats = NDArray[np.float32]
 LEAST_AGREEMENT, FARTHEST_FROM_PLANE = 0.7, 0.4
 #: Limit on what interpolated normals may add to light that grazes the true surface.
 STEEPEST = 4.0
+#: Least slope of a plane, and least area in faces of a cell, by which light in a cell is divided.
+_LEAST_SLOPE, _LEAST_AREA = 0.01, 0.05
 _PRIMES = (73856093, 19349663, 83492791)
 
 
@@ -153,9 +156,10 @@ class PhotonMap:
         half: UInt32,
         surfaces: UInt32,
         choice: Float,
+        seen: Bool,
         active: Bool,
     ) -> Gathered:
-        """Light of the photons around a point, by an Epanechnikov kernel.
+        """Light of the photons around a point: by an Epanechnikov kernel, or in its cell.
 
         Parameters
         ----------
@@ -172,6 +176,9 @@ class PhotonMap:
             The most sharp events that a photon may have had.
         choice:
             Uniform in [0, 1): by which one photon is chosen.
+        seen:
+            Whether the point is seen; else the mean over the part of its tangent plane that lies in its cell will do,
+            which costs a tenth.
         """
         r = self._r
         p = mi.Point3f(si.p)
@@ -182,7 +189,10 @@ class PhotonMap:
         weights = mi.Float(0)  # of the photons met so far; one of them is chosen by reservoir sampling
         chosen = mi.Vector3f(0, 0, 1)
         color = mi.Color3f(0)
-        corner = mi.UInt32(0)
+        # The own cell is the fourteenth of those around it.
+        corner = dr.select(seen, mi.UInt32(0), 13)
+        end_corner = dr.select(seen, mi.UInt32(27), 14)
+        density = dr.select(seen, 2 / (dr.pi * r * r), 1 / _area_in_cell(p - (base + 1) * r, normal, r))
         first_bucket = half * (self._last_bucket + 2)
         looking = mi.Bool(active)
         while dr.hint(looking, label="cells"):
@@ -198,7 +208,7 @@ class PhotonMap:
                 q = dr.gather(mi.Vector4f, self._position, number, inside).xyz
                 apart = q - p
                 distance2 = dr.squared_norm(apart)
-                near = inside & (distance2 < r * r)
+                near = inside & (~seen | (distance2 < r * r))
                 if near:
                     # Two of the cells may share a bucket.
                     fits = near & dr.all(dr.floor(q / r) == cell)
@@ -210,7 +220,8 @@ class PhotonMap:
                     fits &= brought.w <= mi.Float(surfaces)
                     wo = si.to_local(d)
                     fits &= ~is_sharp(si, lobe, wo)
-                    power = dr.select(fits, mi.Color3f(brought.xyz) * (1 - distance2 / (r * r)), 0)
+                    share_of_power = dr.select(seen, 1 - distance2 / (r * r), 1)
+                    power = dr.select(fits, mi.Color3f(brought.xyz) * share_of_power, 0)
                     weight = dr.mean(power)
                     weights += weight
                     share = dr.select(weight > 0, weight / weights, 0)
@@ -224,13 +235,29 @@ class PhotonMap:
                 number += 1
                 inside &= number < end
             corner += 1
-            looking &= corner < 27
-        density = 2 / (dr.pi * r * r)
+            looking &= corner < end_corner
         return Gathered(total * density, chosen, color * weights * density)
 
     def _bucket(self, cell: Point3f) -> UInt32:
         x, y, z = (mi.UInt32(mi.Int32(part)) * prime for part, prime in zip(cell, _PRIMES, strict=True))
         return (x ^ y ^ z) & self._last_bucket
+
+
+def _area_in_cell(place: Vector3f, normal: Vector3f, side: Float) -> Float:
+    """Area of the plane through ``place`` in a cell with corners 0 and ``side``, no less than a share of its face.
+
+    It is the derivative, by the plane's distance, of the cell's volume below the plane: a sum over its corners.
+    """
+    # Steeper planes have hardly another area, and would be lost in rounding.
+    n = dr.maximum(dr.abs(normal), _LEAST_SLOPE)
+    at = dr.select(normal < 0, side - place, place)
+    height = dr.dot(n, at)
+    area = mi.Float(0)
+    for corner in itertools.product((0, 1), repeat=3):
+        below = dr.maximum(height - side * dr.dot(n, mi.Vector3f(*corner)), 0)
+        area += (-1) ** sum(corner) * dr.square(below)
+    area *= dr.norm(n) / (2 * n.x * n.y * n.z)
+    return dr.maximum(area, _LEAST_AREA * side * side)
 
 
 def _rows_of_four(values: Floats, last: NDArray[np.uint32] | None = None) -> Floats:
@@ -240,6 +267,35 @@ def _rows_of_four(values: Floats, last: NDArray[np.uint32] | None = None) -> Flo
     if last is not None:
         rows[:, 3] = last
     return rows.ravel()
+
+
+def irradiance_of_cell(photons: Photons, position: Floats, normal: Floats, side: float) -> Floats:
+    """The irradiance of :meth:`PhotonMap.gather` at a surface that is not seen, point by point: ``(m, 3)``.
+
+    The plane's area in a cell is that of the polygon of its meetings with the cell's edges.
+    """
+    from scipy.spatial import ConvexHull
+
+    found = np.zeros((len(position), 3), np.float32)
+    corners = np.array(list(itertools.product((0, 1), repeat=3)), np.float64)
+    edges = [(a, b) for a in range(8) for b in range(a) if np.abs(corners[a] - corners[b]).sum() == 1]
+    for number, (point, n) in enumerate(zip(position.astype(np.float64), normal.astype(np.float64), strict=True)):
+        cell = np.floor(point / side)
+        height = ((cell + corners) * side - point) @ n
+        meetings = np.array(
+            [
+                corners[a] + height[a] / (height[a] - height[b]) * (corners[b] - corners[a])
+                for a, b in edges
+                if height[a] * height[b] < 0
+            ]
+        )
+        flat = np.linalg.svd(n[None])[2][1:]  # two directions in the plane
+        area = max(ConvexHull(meetings * side @ flat.T).volume, _LEAST_AREA * side**2)
+        fits = (np.floor(photons.position / side) == cell).all(axis=1)
+        fits &= (photons.normal @ n > LEAST_AGREEMENT) & (photons.toward @ n > 0)
+        fits &= np.abs((photons.position - point) @ n) < FARTHEST_FROM_PLANE * side
+        found[number] = photons.power[fits].sum(axis=0) / area
+    return found
 
 
 def irradiance_by_all(
