@@ -168,12 +168,13 @@ def test_every_receiver_has_the_light_of_paths(floor):
     """Blocks of pixels, by the scatter of independent pictures."""
     scene = glass_under_a_wide_emitter(RECEIVERS[floor])
     found = {
-        way: np.stack([rendered(scene, "square", caustics=way, spp=64, seed=seed).pixels for seed in range(4)])
-        for way in ("paths", "photons", "none")
+        way: np.stack([rendered(scene, "square", caustics=way, spp=32, seed=seed).pixels for seed in range(4)])
+        for way in ("paths", "photons")
     }
     parts = {way: p.reshape(4, 8, 8, 12, 8, 3).mean(axis=(2, 4)).reshape(4, -1) for way, p in found.items()}
     mean = {way: values.mean(axis=0) for way, values in parts.items()}
     error = np.sqrt(sum(parts[way].var(axis=0, ddof=1) / 4 for way in ("paths", "photons")))
     np.testing.assert_array_less(np.abs(mean["photons"] - mean["paths"]), 5 * error + 0.02 * mean["paths"] + 1e-4)
     assert mean["photons"].mean() == pytest.approx(mean["paths"].mean(), rel=0.005)
-    assert mean["photons"].mean() > mean["none"].mean() * 1.01  # and there are some
+    without = rendered(scene, "square", caustics="none", spp=16).pixels.mean()
+    assert mean["photons"].mean() > without * 1.01  # and there are some

@@ -15,7 +15,7 @@ DISPLAY = load_display("seed-lenticular").resized(128, 32)
 
 
 def rendered(**options):
-    chosen = {"integrator": "path", "method": "full", "spp": 8, "seed": 2}
+    chosen = {"integrator": "path", "method": "full", "spp": 8, "seed": 2, "caustics": "paths"}
     return lippmann.render("room", DISPLAY, **(chosen | options))
 
 

@@ -116,10 +116,10 @@ def test_calls_of_eight_threads_give_the_bytes_of_single_ones(tmp_path):
 
     quilt = dict(views=(2, 2), size=(256, 256), **plain)
     kinds = {{
-        "mitsuba": (90, lambda: render(mitsubas)),
-        "mitsuba anew": (40, lambda: render(native(), threads=1)),
-        "full": (25, render),
-        "replay": (24, lambda: picture.replay((5.0, 0.0, 300.0)).tobytes()),
+        "mitsuba": (50, lambda: render(mitsubas)),
+        "mitsuba anew": (20, lambda: render(native(), threads=1)),
+        "full": (16, render),
+        "replay": (16, lambda: picture.replay((5.0, 0.0, 300.0)).tobytes()),
         "classic": (4, lambda: render("primitives", integrator="classic")),
         "lens-view": (2, lambda: render(method="lens-view")),
         "pooled": (4, lambda: render(method="pooled", denoise="oidn-fast", spp=2)),

@@ -42,8 +42,8 @@ Floats = NDArray[np.float32]
 #: The layer of a picture with the number of samples that each pixel had.
 SAMPLES_LAYER = "samples"
 
-#: Samples from which on a denoised picture states its error where sharp surfaces may mirror emitters, as photons show:
-#: with four, both halves may miss a mirrored emitter alike, by up to 10 dB of the worst micro-image.
+#: Samples from which on a picture is held to have reached a quality where sharp surfaces may mirror emitters, as photons
+#: show: with fewer, both halves may miss a mirrored emitter alike, by up to 10 dB of the worst micro-image.
 FIRST_AMONG_MIRRORS = 16
 
 #: What putting a picture together and writing it takes, as a rule.
@@ -292,10 +292,7 @@ def _denoised_candidate(job: Job, goal: Goal, batches: FullInBatches, rays: Call
         spent = rays()
         return 0 < spent < look_cost(spent)
 
-    estimator = _estimator(job, DenoisedEstimator)
-    if isinstance(job.integrator, PathIntegrator) and job.integrator.photons is not None:
-        estimator.first = estimator.fewest = FIRST_AMONG_MIRRORS
-    track = ErrorTrack(renderer, estimator, DENOISED_SLOPE, seconds, is_expensive)
+    track = ErrorTrack(renderer, _estimator(job, DenoisedEstimator), DENOISED_SLOPE, seconds, is_expensive)
     return _Candidate(renderer, track, denoiser)
 
 
@@ -305,6 +302,13 @@ def _rays_per_pixel(job: Job, rays: RayTotals) -> float:
 
 def _estimator(job: Job, kind: type[PictureEstimator] = PictureEstimator) -> PictureEstimator:
     """Judges a display's picture by its micro-images, a quilt by its views."""
+    estimator = _estimator_of_parts(job, kind)
+    if isinstance(job.integrator, PathIntegrator) and job.integrator.photons is not None:
+        estimator.first = estimator.fewest = FIRST_AMONG_MIRRORS
+    return estimator
+
+
+def _estimator_of_parts(job: Job, kind: type[PictureEstimator]) -> PictureEstimator:
     source = job.source
     if isinstance(source, QuiltRays):
         window, (width, height) = source.window, source.view_size

@@ -233,7 +233,7 @@ def test_pictures_with_photons_are_those_of_paths(floor):
     """Means of parts of the picture, by the scatter of independent pictures; the blur moves little light."""
     scene, view = caustics_of_a_large_lamp(floor), camera(5.0)
     found = {
-        photons: np.stack([traced(scene, view, photons=photons, seed=seed, spp=128) for seed in range(4)])
+        photons: np.stack([traced(scene, view, photons=photons, seed=seed, spp=64) for seed in range(4)])
         for photons in (False, True)
     }
     parts = {
