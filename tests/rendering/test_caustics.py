@@ -168,7 +168,7 @@ def test_every_receiver_has_the_light_of_paths(floor):
     """Blocks of pixels, by the scatter of independent pictures."""
     scene = glass_under_a_wide_emitter(RECEIVERS[floor])
     found = {
-        way: np.stack([rendered(scene, "square", caustics=way, spp=32, seed=seed).pixels for seed in range(4)])
+        way: np.stack([rendered(scene, "square", caustics=way, spp=64, seed=seed).pixels for seed in range(4)])
         for way in ("paths", "photons")
     }
     parts = {way: p.reshape(4, 8, 8, 12, 8, 3).mean(axis=(2, 4)).reshape(4, -1) for way, p in found.items()}
