@@ -42,8 +42,8 @@ Floats = NDArray[np.float32]
 #: The layer of a picture with the number of samples that each pixel had.
 SAMPLES_LAYER = "samples"
 
-#: Samples from which on a picture is held to have reached a quality where sharp surfaces may mirror emitters, as photons
-#: show: with fewer, both halves may miss a mirrored emitter alike, by up to 10 dB of the worst micro-image.
+#: Fewest samples at which a picture may be held to have reached a quality where sharp surfaces may mirror emitters, as
+#: photons show: with fewer, both halves may miss a mirrored emitter alike, by up to 10 dB of the worst micro-image.
 FIRST_AMONG_MIRRORS = 16
 
 #: What putting a picture together and writing it takes, as a rule.
