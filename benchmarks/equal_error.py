@@ -96,7 +96,7 @@ def asked(words: argparse.ArgumentParser) -> tuple[argparse.Namespace, list[tupl
     return given, [(name, given.displays) for name in (given.scenes.split(",") if given.scenes else known)]
 
 
-def prepare(name: str, display_name: str) -> Stage:
+def prepare(name: str, display_name: str, caustics: str = "paths") -> Stage:
     """The scene on the device, before the display."""
     from dataclasses import replace
 
@@ -114,7 +114,7 @@ def prepare(name: str, display_name: str) -> Stage:
     scene = lippmann.load_scene(GLTF.get(name, name))
     at = place(scene.bounds, whole, cameras=scene.cameras, home_camera=scene.home_camera, bounds_in=scene.bounds_in)
     display = whole if rows is None else whole.resized(whole.panel.width, rows)
-    session = open_session(scene, RenderRequest(integrator="path", caustics="paths"), memory=4 << 30)
+    session = open_session(scene, RenderRequest(integrator="path", caustics=caustics), memory=4 << 30)
 
     from lippmann.rendering.transport.ray_source import DisplayRays
 

@@ -1,11 +1,16 @@
-"""What a quality takes that is asked for: by full, by full with Open Image Denoise, by pooled.
+"""What a quality takes that is asked for: by full, by full with Open Image Denoise, by pooled, and by stock views.
 
 The scenes, displays and rows of equal_error.py. Each way is asked for a PSNR of the whole picture (``--quality``)
 and works until its own estimate says that it is there, judging included, with at most 256 samples a pixel. Where full
 does not come to the PSNR with these, its time is drawn out by the law of its noise. Time is that of the processors over
-their number; each way has run before, for a low quality.
+their number; each way has run before, for a low quality. Caustics come as by default.
 
-python benchmarks/goals.py [DISPLAY ...] [--scenes NAME,...]
+*Stock views* are what there is without Lippmann: Mitsuba's own ``path`` along the very rays of the display, so that
+nothing is lost by weaving, each view denoised by Open Image Denoise with albedo and normals, all views interlaced. They
+know nothing of their error, so they are told: of 1, 2, 4 ... 256 samples the fewest count with which they are there by
+two references with photons, denoised with the cheaper effort that gets there, and only that picture's time.
+
+python benchmarks/goals.py [DISPLAY ...] [--scenes NAME,...] [--references FOLDER]
 """
 
 from __future__ import annotations
@@ -13,13 +18,20 @@ from __future__ import annotations
 import argparse
 import statistics
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
-from equal_error import Stage, asked, once, prepare
-from harness import save, saved
+import numpy as np
+
+from equal_error import Judge, Picture, Stage, asked, once, prepare
+from harness import kept, save, saved
 
 QUALITIES = (35.0, 40.0)
 MOST_SAMPLES = 256
+#: Samples of either reference by which stock views are told their error. The mean of the products of the differences
+#: from both is free of the references' own noise, so few samples do.
+REFERENCE = 64
+STOCK = "stock views"
 #: A quality that every way has after its first round.
 LOW = 10.0
 WAYS: dict[str, dict[str, Any]] = {
@@ -31,31 +43,106 @@ WAYS: dict[str, dict[str, Any]] = {
 
 def main() -> None:
     results = saved("goals").get("results", {})
-    _, scenes = asked(argparse.ArgumentParser(description=__doc__))
+    words = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    words.add_argument("--references", type=Path)
+    given, scenes = asked(words)
     for name, displays in scenes:
         for display in displays:
-            results.setdefault(display, {})[name] = _measured(prepare(name, display))
+            file = given.references and given.references / f"{display}-{name}-{REFERENCE}.npz"
+            results.setdefault(display, {})[name] = _measured(prepare(name, display, caustics="auto"), file)
             summary = {kind: _summary(measured) for kind, measured in results.items()}
             save("goals", {"most_samples": MOST_SAMPLES, "results": results, "summary": summary})
 
 
-def _measured(stage: Stage) -> dict[str, Any]:
+def _measured(stage: Stage, references: Path | None) -> dict[str, Any]:
     found: dict[str, Any] = {f"{quality:g}": {} for quality in QUALITIES}
     for way, options in WAYS.items():
         _reached(stage, LOW, options)
         for quality in QUALITIES:
             found[f"{quality:g}"][way] = _reached(stage, quality, options)
+    pictures = kept(references, lambda: {"pictures": np.stack([_reference(stage, seed) for seed in (1001, 2002)])})
+    judge = Judge(stage, None, pictures["pictures"])
+    for quality in QUALITIES:
+        found[f"{quality:g}"][STOCK] = _stock(stage, judge, quality)
     return found
+
+
+def _reference(stage: Stage, seed: int) -> Picture:
+    return np.asarray(_picture(stage, {"method": "full", "denoise": "none", "spp": REFERENCE, "seed": seed}))
+
+
+def _picture(stage: Stage, options: dict[str, Any]) -> Picture:
+    from lippmann.rendering.methods import trace
+
+    picture: Picture = trace(_job(stage, options)).frame.pixels
+    return picture
+
+
+def _job(stage: Stage, options: dict[str, Any]) -> Any:
+    from lippmann.rendering.methods import Job
+    from lippmann.rendering.request.resolve import resolve
+
+    session = replace(stage.session, request=resolve(replace(stage.session.request, **options), stage.session.scene))
+    return Job(session, stage.integrator, stage.source, stage.display_from_world)
+
+
+def _stock(stage: Stage, judge: Judge, quality: float) -> dict[str, Any]:
+    """The fewest samples with which stock views have the quality, and their time."""
+    samples, best = 1, -1.0
+    while samples <= MOST_SAMPLES:
+        for effort in ("fast", "high"):
+            seconds, picture = once(lambda n=samples, e=effort: _stock_views(stage, n, e))
+            psnr = judge(picture)["psnr"]
+            if psnr >= quality:
+                # Now that its kernels are warm.
+                seconds = min(seconds, once(lambda n=samples, e=effort: _stock_views(stage, n, e))[0])
+                return {"seconds": seconds, "spp": samples, "psnr": psnr, "short": 0.0, "denoised": True}
+            best = max(best, psnr)
+        samples *= 2
+    return {"seconds": seconds, "spp": MOST_SAMPLES, "psnr": best, "short": quality - best, "denoised": True}
+
+
+def _stock_views(stage: Stage, samples: int, effort: Any) -> Picture:
+    """Mitsuba's own integrator and sampler along the rays of all pixels, in bands; each view denoised by itself."""
+    import drjit as dr
+    import mitsuba as mi
+
+    from lippmann.rendering.denoise.cost_model import GUIDE_SAMPLES
+    from lippmann.rendering.denoise.pixel_order import denoise_views
+    from lippmann.rendering.film.feature_buffers import plan_guides, trace_guides
+
+    source, scene = stage.source, stage.built.mitsuba
+    stock = mi.load_dict({"type": "path", "max_depth": stage.session.request.surfaces + 1, "rr_depth": 5})
+    rows = max(1, (1 << 20) // (source.width * samples))
+    picture = np.empty((source.height, source.width, 3), np.float32)
+    for first in range(0, source.height, rows):
+        count = min(rows, source.height - first)
+        lanes = count * source.width * samples
+        sampler = mi.load_dict({"type": "independent"})
+        sampler.seed(first, lanes)
+        pixel = dr.arange(mi.UInt32, lanes) // samples
+        row = pixel // source.width
+        ray = source.rays(
+            pixel - row * source.width, row + dr.opaque(mi.UInt32, first), mi.UInt32(0), sampler.next_2d()
+        )
+        radiance = stock.sample(scene, sampler, mi.RayDifferential3f(ray))[0]
+        dr.eval(radiance)
+        means = [dr.block_sum(part, samples) / samples if samples > 1 else part for part in radiance]
+        band = np.array(dr.ravel(mi.Color3f(*means))).reshape(count, source.width, 3)
+        picture[first : first + count] = np.nan_to_num(band)
+    if stage.integrator.gain is not None:
+        picture *= float(np.array(stage.integrator.gain).ravel()[0])
+    plan = plan_guides(source, GUIDE_SAMPLES[effort], 4 << 30)
+    guides = trace_guides(stage.built, source, plan, stage.display_from_world, seed=77)
+    clean: Picture = denoise_views(picture, stage.display, guides, form="views", effort=effort)
+    return clean
 
 
 def _reached(stage: Stage, quality: float, options: dict[str, Any]) -> dict[str, Any]:
     """Seconds and samples, and where it ended."""
-    from lippmann.rendering.methods import Job, trace
-    from lippmann.rendering.request.resolve import resolve
+    from lippmann.rendering.methods import trace
 
-    asked = replace(stage.session.request, quality=quality, spp=MOST_SAMPLES, **options)
-    session = replace(stage.session, request=resolve(asked, stage.session.scene))
-    job = Job(session, stage.integrator, stage.source, stage.display_from_world)
+    job = _job(stage, {"quality": quality, "spp": MOST_SAMPLES, **options})
     seconds, traced = once(lambda: trace(job))
     assert traced.estimate is not None
     short = max(0.0, quality - traced.estimate.psnr)
@@ -75,11 +162,13 @@ def _summary(scenes: dict[str, Any]) -> dict[str, Any]:
     """By quality and rival: how many times as fast pooled is, over the scenes in which it gets there."""
     summary: dict[str, Any] = {}
     for quality in next(iter(scenes.values())):
-        for rival in ("full", "full + oidn"):
+        for rival in ("full", "full + oidn", STOCK):
             times = {
                 name: goals[quality][rival]["seconds"] / goals[quality]["pooled"]["seconds"]
                 for name, goals in scenes.items()
-                if not goals[quality]["pooled"]["short"] and (rival == "full" or not goals[quality][rival]["short"])
+                if rival in goals[quality]
+                and not goals[quality]["pooled"]["short"]
+                and (rival == "full" or not goals[quality][rival]["short"])
             }
             if times:
                 mean = statistics.geometric_mean(times.values())

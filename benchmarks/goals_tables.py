@@ -6,7 +6,7 @@ from typing import Any
 
 from equal_error_tables import DISPLAYS, name_of
 
-_WAYS = ("full", "full + oidn", "pooled")
+_WAYS = ("full", "full + oidn", "stock views", "pooled")
 
 
 def describe(result: dict[str, Any]) -> str:
@@ -20,8 +20,10 @@ there sooner (then in italics), as `auto` does. Plain samples are believed from 
 better than what is asked for, or 8 and 4 dB; denoised ones from 4, or from 8 where samples cost less than a look at
 them. No picture has more than {result["most_samples"]}. Where full does not get there with these, its time is drawn
 out by the law of its noise (*): that is long where single bright hits of caustics come late, and outweighs other scenes
-in the mean. Where another does not, its cell is empty. Rows and clock are those above, and so are the scenes, but for
-those that are missing from a table: they were not run."""
+in the mean. Where another does not, its cell is empty. *Stock views* are Mitsuba's own `path` along the same rays, each
+view denoised with albedo and normals: they know nothing of their error, so they are told it, and stop with the fewest
+samples (a power of two) that are enough. Caustics come by photons where there are any, in all ways but stock views.
+Rows and clock are those above, and so are the scenes, but for those missing from a table, which were not run."""
     ]
     for name, (title, *_) in DISPLAYS.items():
         if scenes := result["results"].get(name):
@@ -39,12 +41,14 @@ def _gains(summary: dict[str, Any]) -> str:
 
 
 def _rows(scenes: dict[str, Any]) -> list[str]:
-    qualities = list(next(iter(scenes.values())))
-    ways = " | ".join(name_of(way) for way in _WAYS)
+    first = next(iter(scenes.values()))
+    qualities = list(first)
+    measured = [way for way in _WAYS if way in first[qualities[0]]]
+    ways = " | ".join(name_of(way) for way in measured)
     rows = [f"| scene | {' | '.join(f'{quality} dB: {ways}' for quality in qualities)} |"]
-    rows.append("|" + "---|" * (1 + len(qualities) * len(_WAYS)))
+    rows.append("|" + "---|" * (1 + len(qualities) * len(measured)))
     for name, goals in scenes.items():
-        cells = [_cell(goals[quality][way], way) for quality in qualities for way in _WAYS]
+        cells = [_cell(goals[quality][way], way) for quality in qualities for way in measured]
         rows.append(f"| {name} | {' | '.join(cells)} |")
     return rows
 

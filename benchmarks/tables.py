@@ -16,6 +16,7 @@ import equal_error_tables
 import estimate_coverage_tables
 import first_picture_tables
 import goals_tables
+import kernel_profile_tables
 from harness import RESULTS, saved
 
 README = Path(__file__).parent.parent / "README.md"
@@ -395,6 +396,7 @@ SECTIONS = {
     "cycles": _cycles,
     "tachyon": _tachyon,
     "full_rate": _full_rate,
+    "kernel_profile": kernel_profile_tables.describe,
     "large_frame": _large_frame,
     "huge": _huge,
     "huge_pooled_oidn-fast": _huge,

@@ -26,7 +26,7 @@ def scattered(count, seed, *, flat=True):
     return Photons(*arrays, random.integers(1, 5, count).astype(np.uint32))
 
 
-def gathered(photon_map, points, half, surfaces, *, choice=0.5, active=True, normal=(0, 0, 1), seen=True):
+def gathered(photon_map, points, half, surfaces, *, choice=0.5, active=True, normal=(0, 0, 1), seen=True, **parts):
     import drjit as dr
     import mitsuba as mi
 
@@ -37,7 +37,7 @@ def gathered(photon_map, points, half, surfaces, *, choice=0.5, active=True, nor
     si.sh_frame = mi.Frame3f(up)
     si.wi = mi.Vector3f(0, 0, 1)
     half, surfaces = mi.UInt32(half), mi.UInt32(surfaces)
-    return photon_map.gather(si, up, none, half, surfaces, choice, mi.Bool(seen), mi.Bool(active))
+    return photon_map.gather(si, up, none, half, surfaces, choice, mi.Bool(seen), mi.Bool(active), **parts)
 
 
 def looked_up(photon_map, points, half, surfaces, active=True):
@@ -84,6 +84,22 @@ def test_a_look_up_is_the_sum_over_all_photons(radius, flat):
         expected = irradiance_by_all(halves[half], points, normal, radius, surfaces)
         np.testing.assert_allclose(found, expected, rtol=2e-4, atol=1e-4 * max(1e-9, expected.max()))
     assert (looked_up(photon_map, points, 0, 0) == 0).all()  # each has had one event at least
+
+
+@pytest.mark.parametrize("seen", [True, False])
+def test_parts_of_the_photons_have_the_mean_of_all(seen):
+    from lippmann.rendering.transport.photon_map import PhotonMap
+
+    halves = scattered(3000, 5), scattered(1000, 6)
+    photon_map = PhotonMap(halves, 0.2)
+    points = np.float32(np.random.default_rng(7).uniform(-0.5, 0.5, (200, 3)) * [1, 1, 0.01])
+    for half in (0, 1):
+        whole = np.array(gathered(photon_map, points, half, 9, seen=seen).irradiance)
+        parts = np.stack(
+            [np.array(gathered(photon_map, points, half, 9, seen=seen, part=k, parts=4).irradiance) for k in range(4)]
+        )
+        np.testing.assert_allclose(parts.mean(axis=0), whole, rtol=1e-4, atol=1e-5 * whole.max())
+        assert (parts.std(axis=0).mean(axis=1) > 0.05 * whole.mean(axis=1)).all()  # each looks at photons of its own
 
 
 def tilted(normal, count, seed):

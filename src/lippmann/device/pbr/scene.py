@@ -15,8 +15,9 @@ from lippmann.device.pbr.material_groups import Variant
 from lippmann.device.pbr.materials import Finish, make_finishes
 from lippmann.device.pbr.media import MEDIA_NOTE, has_media
 from lippmann.device.pbr.shapes import Dress, has_volume, make_shapes
+from lippmann.device.pbr.straight_through import has_null, may_pass
 from lippmann.device.pbr.textures import TextureStore
-from lippmann.device.types import BSDF, Emitter, MitsubaScene, Shape
+from lippmann.device.types import Emitter, MitsubaScene, Shape
 from lippmann.errors import SceneError
 from lippmann.runtime import engine as engines
 from lippmann.runtime import machine
@@ -119,7 +120,7 @@ def build_description(description: SceneDescription, *, memory: int | None = Non
         mitsuba=scene,
         background=description.background,
         absorption=_absorption(scene, shapes, shape_finishes),
-        has_null=any(_is_null(finish.bsdf) for finish in finishes.values()),
+        has_null=any(has_null(finish.bsdf) for finish in finishes.values()),
         notes=tuple(notes),
         seconds=seconds,
     )
@@ -131,12 +132,10 @@ def _build_source(source: MitsubaSource, scene: Scene) -> BuiltScene:
         loaded = source.scene()
         if scene.environment is not None:
             loaded = with_sky(loaded, environment_object(scene.environment))
-    surfaces = [shape.bsdf() for shape in loaded.shapes()]
-    # Shapes inside instanced groups are out of sight: they count as letting rays through, which only costs time.
-    has_null = any(surface is None or _is_null(surface) for surface in surfaces)
+    passing = any(may_pass(shape) for shape in loaded.shapes())
     with_media = has_media(loaded)
     notes = (MEDIA_NOTE,) if with_media else ()
-    return BuiltScene(loaded, scene.background, {}, has_null, notes, seconds, source.is_borrowed, with_media)
+    return BuiltScene(loaded, scene.background, {}, passing, notes, seconds, source.is_borrowed, with_media)
 
 
 @contextmanager
@@ -217,9 +216,3 @@ def _absorption(scene: MitsubaScene, shapes: Sequence[Shape], finishes: Sequence
         for shape, finish in zip(shapes, finishes, strict=True)
         if finish is not None and finish.absorption is not None
     }
-
-
-def _is_null(bsdf: BSDF) -> bool:
-    import mitsuba as mi
-
-    return bool(mi.has_flag(bsdf.flags(), mi.BSDFFlags.Null))

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.device.pbr.gltf_bsdf import SHARP_LOBE
+from lippmann.device.pbr.straight_through import is_instance
 from lippmann.device.types import (
     Bool,
     Float,
@@ -70,7 +71,7 @@ def find_casters(scene: MitsubaScene) -> Casters:
     emitters = [number for number, each in enumerate(scene.emitters()) if each is not environment]
     shapes, boxes, areas = [], [], []
     for number, shape in enumerate(scene.shapes() if emitters else ()):
-        if not (_is_instance(shape) or _may_be_sharp(shape.bsdf())):
+        if not (is_instance(shape) or _may_be_sharp(shape.bsdf())):
             continue
         box, area = np.full(6, np.nan), _area(shape)
         if not (0 < area < math.inf and _gives_points(shape)):
@@ -114,10 +115,6 @@ def _area(shape: mi.Shape) -> float:
         return math.nan
 
 
-def _is_instance(shape: mi.Shape) -> bool:
-    return bool(shape.class_name() == "Instance")
-
-
 def _may_be_sharp(bsdf: mi.BSDF) -> bool:
     if int(bsdf.flags()) & int(mi.BSDFFlags.DeltaReflection | mi.BSDFFlags.DeltaTransmission):
         return True
@@ -125,7 +122,7 @@ def _may_be_sharp(bsdf: mi.BSDF) -> bool:
 
 
 def _gives_points(shape: mi.Shape) -> bool:
-    if _is_instance(shape):
+    if is_instance(shape):
         return False
     try:
         point = shape.sample_position(0.0, mi.Point2f(0.5), True)

@@ -13,8 +13,9 @@ import mitsuba as mi
 
 from lippmann.device.sobol import SampleStream
 from lippmann.device.types import Bool, Ray3f, Spectrum
-from lippmann.rendering.transport.path import DIMENSIONS_PER_VERTEX, MAX_CROSSINGS, PathIntegrator
+from lippmann.rendering.transport.path import DIMENSIONS_PER_VERTEX, PathIntegrator
 from lippmann.rendering.transport.photon_map import PhotonMap
+from lippmann.rendering.transport.shadow_rays import MAX_CROSSINGS
 from lippmann.rendering.transport.sharp_events import facing_normal, follows_sharply, lambertian, sharp_lobe
 
 #: Radius of the wider look-up over that of the picture's.

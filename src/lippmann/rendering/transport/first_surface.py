@@ -31,7 +31,7 @@ from lippmann.device.types import (
 from lippmann.device.whitted.background_fog import background_color
 from lippmann.device.whitted.geometry import NONE
 from lippmann.device.whitted.scene import BuiltClassic
-from lippmann.rendering.transport.path import MAX_CROSSINGS
+from lippmann.rendering.transport.shadow_rays import MAX_CROSSINGS
 
 if TYPE_CHECKING:
     from lippmann.device.pbr import BuiltScene

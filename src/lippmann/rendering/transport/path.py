@@ -37,6 +37,7 @@ from lippmann.rendering.transport.integrator import FirstHit, RayCounts
 from lippmann.rendering.transport.light_sampling import LightSampler, SceneLightSampler
 from lippmann.rendering.transport.photon_map import PhotonMap
 from lippmann.rendering.transport.scene_features import SceneFeatures
+from lippmann.rendering.transport.shadow_rays import MAX_CROSSINGS, ShadowRays
 from lippmann.rendering.transport.sharp_events import (
     MOST_EVENTS,
     facing_normal,
@@ -50,12 +51,12 @@ from lippmann.rendering.transport.sharp_events import (
 if TYPE_CHECKING:
     from lippmann.rendering.transport.caustic_photons import CausticPhotons
 
-#: Straight-through surfaces that one ray may cross before it counts as blocked. Bounds the loop between many panes.
-MAX_CROSSINGS = 64
 #: Sample dimensions used at one vertex.
 DIMENSIONS_PER_VERTEX = 4
 #: Sample dimension, from a vertex's first, of the photon chosen there.
 GATHER_DIMENSION = 1 << 24
+#: Parts of the photons about a point that is seen: a power of two. Successive samples of a pixel look at one part each.
+PHOTON_PARTS = 4
 #: Surfaces after which Russian roulette may end a path.
 ROULETTE_DEPTH = 5
 #: Emitter samples at the first surface of a path that is not purely specular: ``FIRST_EMITTER_SAMPLES`` in each of a
@@ -126,6 +127,7 @@ class PathIntegrator:
         self.photon_passes: CausticPhotons | None = None
         #: Beam of a sample, by which lobes of curved surfaces are widened; None for lobes as they are.
         self.beam: Beam | None = None
+        self.shadow_rays = ShadowRays(scene, features.has_null)
         self._environment = scene.environment()
         # A single delta emitter: more than one sample of it tells nothing more.
         self._single_delta = len(emitters) == 1 and bool(mi.has_flag(emitters[0].flags(), mi.EmitterFlags.Delta))
@@ -316,8 +318,19 @@ class PathIntegrator:
         for all, where its lobes are wide enough for that.
         """
         photons = cast("PhotonMap", self.photons)
+        parts = dr.select(seen, mi.UInt32(PHOTON_PARTS), 1)
+        part = (stream.key + stream.index) & (parts - 1)
         found = photons.gather(
-            si, facing_normal(si), lobe, mi.UInt32(stream.half), self.depth - depth - 1, choice, seen, active
+            si,
+            facing_normal(si),
+            lobe,
+            mi.UInt32(stream.half),
+            self.depth - depth - 1,
+            choice,
+            seen,
+            active,
+            part,
+            parts,
         )
         light = lambert * found.irradiance * dr.inv_pi
         wo = si.to_local(found.toward)
@@ -352,26 +365,7 @@ class PathIntegrator:
             return mi.Bool(True)
         return ds.emitter != mi.EmitterPtr(self._environment)
 
-    @dr.syntax
     def visibility(self, si: SurfaceInteraction3f, ds: DirectionSample3f, active: Bool) -> tuple[Spectrum, UInt32]:
         """Transmittance in [0, 1] from the emitter sample ``ds`` to the surface, and the shadow rays traced."""
-        scene = self.scene
-        ray = si.spawn_ray_to(ds.p)
-        tests = dr.select(active, mi.UInt32(1), mi.UInt32(0))
-        transmittance = mi.Spectrum(1)
-        if dr.hint(not self.features.has_null, mode="scalar"):
-            transmittance = dr.select(scene.ray_test(ray, active), mi.Spectrum(0), transmittance)
-        else:
-            active = mi.Bool(active)
-            crossings = mi.UInt32(0)
-            while dr.hint(active, label="visibility"):
-                hit = scene.ray_intersect(ray, mi.RayFlags.All, False, active)
-                blocked = hit.is_valid()
-                through = hit.bsdf(ray).eval_null_transmission(hit, blocked)
-                transmittance = dr.select(blocked, transmittance * through, transmittance)
-                crossings += 1
-                transmittance = dr.select(blocked & (crossings >= MAX_CROSSINGS), mi.Spectrum(0), transmittance)
-                active = blocked & (dr.max(transmittance) > 0) & (crossings < MAX_CROSSINGS)
-                tests += dr.select(active, mi.UInt32(1), mi.UInt32(0))
-                ray = hit.spawn_ray_to(ds.p)
-        return transmittance, tests
+        found: tuple[Spectrum, UInt32] = self.shadow_rays.transmittance(si.spawn_ray_to(ds.p), ds.p, active)
+        return found

@@ -158,6 +158,8 @@ class PhotonMap:
         choice: Float,
         seen: Bool,
         active: Bool,
+        part: UInt32 | int = 0,
+        parts: UInt32 | int = 1,
     ) -> Gathered:
         """Light of the photons around a point: by an Epanechnikov kernel, or in its cell.
 
@@ -179,6 +181,9 @@ class PhotonMap:
         seen:
             Whether the point is seen; else the mean over the part of its tangent plane that lies in its cell will do,
             which costs a tenth.
+        part, parts:
+            Only every ``parts``-th photon is looked at, from number ``part`` (below ``parts``, a power of two) on, and
+            counts ``parts`` times. Over all parts the mean is that of all photons.
         """
         r = self._r
         p = mi.Point3f(si.p)
@@ -193,6 +198,8 @@ class PhotonMap:
         corner = dr.select(seen, mi.UInt32(0), 13)
         end_corner = dr.select(seen, mi.UInt32(27), 14)
         density = dr.select(seen, 2 / (dr.pi * r * r), 1 / _area_in_cell(p - (base + 1) * r, normal, r))
+        step, first = mi.UInt32(parts), mi.UInt32(part)
+        density *= mi.Float(step)
         first_bucket = half * (self._last_bucket + 2)
         looking = mi.Bool(active)
         while dr.hint(looking, label="cells"):
@@ -202,6 +209,7 @@ class PhotonMap:
             touches &= dr.squared_norm(dr.maximum(dr.abs(from_center) - 0.5 * r, 0)) < r * r
             bucket = first_bucket + self._bucket(cell)
             number = dr.gather(mi.UInt32, self._start, bucket, looking)
+            number += (first - number) & (step - 1)
             end = dr.gather(mi.UInt32, self._start, bucket + 1, looking)
             inside = looking & touches & (number < end)
             while dr.hint(inside, label="photons"):
@@ -232,7 +240,7 @@ class PhotonMap:
                     power *= dr.minimum(dr.abs(wo.z) / dr.dot(d, normal), STEEPEST)
                     total += power
                     color = dr.select(taken, power / weight, color)
-                number += 1
+                number += step
                 inside &= number < end
             corner += 1
             looking &= corner < end_corner

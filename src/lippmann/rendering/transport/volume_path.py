@@ -30,8 +30,9 @@ from lippmann.device.types import (
 )
 from lippmann.rendering.transport.integrator import FirstHit, RayCounts
 from lippmann.rendering.transport.light_sampling import LightSampler, SceneLightSampler
-from lippmann.rendering.transport.path import MAX_CROSSINGS, ROULETTE_DEPTH, mis_weight
+from lippmann.rendering.transport.path import ROULETTE_DEPTH, mis_weight
 from lippmann.rendering.transport.scene_features import Color
+from lippmann.rendering.transport.shadow_rays import MAX_CROSSINGS
 
 #: Collisions, null collisions included, along one path or shadow ray: bounds the loop in media that are all but opaque.
 MAX_COLLISIONS = 1 << 16

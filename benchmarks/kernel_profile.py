@@ -1,0 +1,164 @@
+"""Where the time of a path goes, per scene: rays, emitters, surfaces, photons; and how full the processor's lanes are.
+
+Paths of the default depth, four samples of each pixel of 160 rows of the paper's display, as the program traces them.
+Each part is left out in turn from the kernel, and what that saves is its share: shadow rays (every sampled emitter is
+taken to be visible), evaluating surfaces for sampled emitters, sampling emitters at all, look-ups of photons. Rays to
+the next surface are timed by themselves, along random walks of as many surfaces. What remains is sampling of surfaces,
+random numbers and bookkeeping. Parts overlap in a processor, so that shares are good to some hundredths.
+
+*Lanes at work*: a vector unit goes on until the longest of its 16 paths has ended; the share of its lanes that have
+still something to do.
+
+*Before*: opaque surfaces without an acceleration structure of their own where others let rays straight through, and
+look-ups of all photons about a point by every sample (:mod:`lippmann.rendering.transport.shadow_rays`,
+``PHOTON_PARTS`` of :mod:`lippmann.rendering.transport.path`).
+
+python benchmarks/kernel_profile.py [--scenes NAME,...]
+
+Nanoseconds of a processor per path, medians of interleaved runs.
+"""
+
+from __future__ import annotations
+
+import argparse
+import statistics
+from typing import Any
+
+import numpy as np
+
+from equal_error import CORES, Stage, asked, once, prepare
+from harness import save, saved
+
+SAMPLES, RUNS, LANES = 4, 7, 16
+DISPLAY = "lenticular-8"
+
+
+def main() -> None:
+    _, scenes = asked(
+        argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    )
+    results = saved("kernel_profile").get("scenes", {})
+    for name, _ in scenes:
+        results[name] = profile(prepare(name, DISPLAY, caustics="auto"))
+        ratios = [found["before"] / found["nanoseconds"] for found in results.values()]
+        mean = statistics.geometric_mean(ratios)
+        save("kernel_profile", {"samples": SAMPLES, "scenes": results, "times_faster": mean})
+
+
+def profile(stage: Stage) -> dict[str, Any]:
+    kernels = _kernels(stage)
+    seconds: dict[str, list[float]] = {name: [] for name in kernels}
+    for run in range(RUNS + 1):
+        for name, call in kernels.items():
+            spent, lanes = once(lambda c=call, r=run: c(r))
+            if run:  # the first compiles
+                seconds[name].append(spent * CORES * 1e9 / len(lanes))
+    median = {name: statistics.median(found) for name, found in seconds.items()}
+    whole = median["whole"]
+    surfaces = np.asarray(kernels["whole"](0)) + 1
+    packets = surfaces[: len(surfaces) // LANES * LANES].reshape(-1, LANES)
+    saved_by = {part: whole - median[part] for part in median if part not in ("whole", "before", "walks")}
+    rays_of_walk = 1 + float(np.asarray(kernels["walks"](0)).mean())
+    parts = {
+        "shadow rays": saved_by["shadow rays"],
+        "surfaces evaluated": saved_by["evaluation"] - saved_by["shadow rays"],
+        "emitters sampled": saved_by["emitters"] - saved_by["evaluation"],
+        "rays to surfaces": median["walks"] / rays_of_walk * float(surfaces.mean()),
+    }
+    if "photons" in saved_by:
+        parts["photons looked up"] = saved_by["photons"]
+    parts["rest"] = whole - sum(parts.values())
+    return {
+        "nanoseconds": whole,
+        "before": statistics.median(b / w for b, w in zip(seconds["before"], seconds["whole"], strict=True)) * whole,
+        "parts": {part: max(0.0, value) for part, value in parts.items()},
+        "surfaces_per_path": float(surfaces.mean()),
+        "lanes_at_work": float(surfaces.mean() / packets.max(axis=1).mean()),
+    }
+
+
+def _kernels(stage: Stage) -> dict[str, Any]:
+    """By name, what traces all paths with a seed, and gives the surfaces behind the first of each."""
+    import drjit as dr
+    import mitsuba as mi
+
+    from lippmann.rendering.film.wavefront import rays_of_tile
+    from lippmann.rendering.film.wavefront_plan import make_plan
+    from lippmann.rendering.transport import path
+
+    source, paths = stage.source, stage.integrator
+    plan = make_plan(source.width, source.height, SAMPLES, memory=4 << 30)
+    tile, run = next(iter(plan))
+
+    class Unshadowed(path.PathIntegrator):
+        def visibility(self, si: Any, ds: Any, active: Any) -> Any:
+            return dr.select(active, mi.Spectrum(1), 0), dr.select(active, mi.UInt32(1), 0)
+
+    class Unevaluated(Unshadowed):
+        def direct_light(self, si: Any, bsdf: Any, point: Any, active: Any, samples: Any = 1) -> Any:
+            ds, light = self.light_sampler.sample_direction(si, point, active)
+            return dr.select(active, light * 1e-3, 0), ds, mi.UInt32(0)
+
+    class Unlit(path.PathIntegrator):
+        def direct_light(self, si: Any, bsdf: Any, point: Any, active: Any, samples: Any = 1) -> Any:
+            return mi.Spectrum(0), dr.zeros(mi.DirectionSample3f), mi.UInt32(0)
+
+    class Unfocused(path.PathIntegrator):
+        def _caustics(self, *args: Any) -> Any:
+            return mi.Spectrum(0)
+
+    def alike(kind: type[path.PathIntegrator]) -> path.PathIntegrator:
+        other = kind(paths.scene, paths.features, paths.depth)
+        for name in ("light_sampler", "gain", "photons", "beam"):
+            setattr(other, name, getattr(paths, name))
+        return other
+
+    def traced(integrator: path.PathIntegrator, parts: int = path.PHOTON_PARTS) -> Any:
+        def call(seed: int) -> Any:
+            path.PHOTON_PARTS = parts
+            ray, stream = rays_of_tile(source, plan, tile, run, seed, True)
+            radiance, counts = integrator.sample(ray, stream, mi.Bool(True))
+            dr.eval(radiance, counts.secondary, counts.shadow)
+            return np.array(counts.secondary)
+
+        return call
+
+    def step(ray: Any, stream: Any, active: Any, steps: Any, way: Any, pi: Any) -> Any:
+        si = pi.compute_surface_interaction(ray)
+        wo = mi.warp.square_to_cosine_hemisphere(stream.next_2d(steps))
+        ray = si.spawn_ray(si.to_world(mi.Vector3f(wo.x, wo.y, wo.z * dr.sign(si.wi.z))))
+        steps += 1
+        active &= si.is_valid() & (steps <= dr.opaque(mi.UInt32, paths.depth))
+        pi = paths.scene.ray_intersect_preliminary(ray, coherent=False, active=active)
+        return ray, stream, active, steps, way + si.t, pi
+
+    def walk(ray: Any, stream: Any) -> Any:
+        pi = paths.scene.ray_intersect_preliminary(ray, coherent=True, active=mi.Bool(True))
+        state = (ray, stream, mi.Bool(True), mi.UInt32(0), mi.Float(0), pi)
+        *_, steps, way, _ = dr.while_loop(state, lambda *now: now[2], step, label="walk")
+        return way, steps
+
+    def walks(seed: int) -> Any:
+        ray, stream = rays_of_tile(source, plan, tile, run, seed, True)
+        way, steps = walk(ray, stream)
+        dr.eval(way, steps)
+        return np.array(steps) - 1
+
+    before = alike(path.PathIntegrator)
+    if before.features.has_null:
+        before.shadow_rays.opaque, before.shadow_rays.asked = None, paths.scene
+    kernels = {
+        "whole": traced(paths),
+        "before": traced(before, parts=1),
+        "shadow rays": traced(alike(Unshadowed)),
+        "evaluation": traced(alike(Unevaluated)),
+        "emitters": traced(alike(Unlit)),
+        "walks": walks,
+    }
+    if paths.photons is not None:
+        kernels["photons"] = traced(alike(Unfocused))
+    return kernels
+
+
+if __name__ == "__main__":
+    main()
