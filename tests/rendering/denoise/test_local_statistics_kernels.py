@@ -9,7 +9,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lippmann.rendering.denoise.local_statistics_kernels import column_mean_rows, judged_rows, row_mean_rows
+from lippmann.rendering.denoise.local_statistics_kernels import (
+    column_mean_rows,
+    compared_rows,
+    judged_rows,
+    row_mean_rows,
+)
 
 
 def means(values, radius, cuts=()):
@@ -55,3 +60,20 @@ def test_halves_measure_their_noise_and_the_clean_ones_error():
     judged_rows(0, 64, a, b, truth + np.float32(0.2), truth + np.float32(0.1), slope, noise, error)
     assert float(noise.mean()) == pytest.approx(4 * 0.1**2, rel=0.05)
     assert float(error.mean()) == pytest.approx(4 * (0.2**2 + 0.1**2) / 2, rel=0.05)
+
+
+def test_measures_are_those_of_their_formulas():
+    random = np.random.default_rng(4)
+    a, b, clean_a, clean_b, shared_a, shared_b, slope = random.uniform(0, 2, (7, 9, 11, 3)).astype(np.float32)
+    found = np.full((4, 9, 11), np.nan, np.float32)
+    for first, last in ((0, 4), (4, 9)):
+        judged_rows(first, last, a, b, clean_a, clean_b, slope, *found[:2])
+        compared_rows(first, last, a, b, clean_a, clean_b, shared_a, shared_b, slope, *found[2:])
+    weight = np.square(slope, dtype=np.float64)
+    scatter = np.square(a - b)
+    noise = (weight * scatter / 2).mean(axis=2)
+    error = (weight * (np.square(clean_a - b) + np.square(clean_b - a) - scatter) / 2).mean(axis=2)
+    steps = shared_a - clean_a, shared_b - clean_b
+    gain = (weight * ((shared_a - b) * steps[0] + (shared_b - a) * steps[1])).sum(axis=2)
+    apart = (weight * (np.square(steps[0]) + np.square(steps[1]))).sum(axis=2)
+    np.testing.assert_allclose(found, [noise, error, gain, apart], rtol=1e-4, atol=1e-4)

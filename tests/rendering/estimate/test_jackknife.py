@@ -19,6 +19,57 @@ def errors(batches, taken=None, transfer="srgb"):
     return error_of_batches(sums.astype(np.float32), taken, transfer)
 
 
+def slow_errors(sums, taken):
+    """Errors and lone parts of ``(K, pixels, 3)`` sums, by the definition, batch by batch.
+
+    The jackknife of the sRGB codes; and (n - 2) / (n - 1) times what the streams differ by less what three halves
+    differ by that hold as much of either stream, n being the batches that hold samples.
+    """
+    sums, taken = sums.astype(np.float64), np.asarray(taken, np.float64)
+    number, count, total = len(taken), taken.sum(), sums.sum(axis=0)
+    held = np.flatnonzero(taken)
+    without = {k: encode_srgb((total - sums[k]) / max(count - taken[k], 1)) for k in held}
+    middle = np.mean(list(without.values()), axis=0)
+    moves = {k: np.square(without[k] - middle).mean(axis=1) for k in held}
+    jackknife = sum(moves[k] * (count - taken[k]) / count for k in held)
+    largest, spread = np.max(list(moves.values()), axis=0), sum(moves.values())
+    lone = np.where((largest > 0.8 * spread) & (largest > 0.15**2 / 3), jackknife, 0)
+
+    def apart(half):
+        """Squared error of the mean by what a half and the rest differ by; None if one of them has no samples."""
+        some, own = sums[half].sum(axis=0), taken[half].sum()
+        rest = count - own
+        if own == 0 or rest == 0:
+            return None
+        difference = encode_srgb(some / own) - encode_srgb((total - some) / rest)
+        return np.square(difference).mean(axis=1) * own * rest / count**2
+
+    signs = (np.array([(-1) ** bin(pattern & k).count("1") for k in range(number)]) for pattern in range(1, number))
+    halves = [np.flatnonzero(sign > 0) for sign in signs if 0 < (sign[: number // 2] > 0).sum() < number // 2]
+    mixed = [difference for half in halves[:3] if (difference := apart(half)) is not None]
+    evenness = 0.0
+    if mixed:
+        streams = apart(np.arange(number // 2))
+        evenness = (len(held) - 2) / max(len(held) - 1, 1) * (streams - np.mean(mixed, axis=0))
+    return jackknife + evenness, lone
+
+
+@pytest.mark.parametrize(
+    "taken", [[1, 1], [2, 2, 1, 1], [3, 3, 2, 2, 3, 2, 2, 2], [1, 1, 0, 0, 1, 0, 0, 0], [8] * 8], ids=str
+)
+def test_errors_are_those_of_the_definition(taken):
+    from lippmann.rendering.estimate.jackknife import error_of_batches
+
+    random = np.random.default_rng(3)
+    values = random.lognormal(-1, 0.7, (len(taken), 500, 3)) + 30 * (random.random((len(taken), 500, 1)) < 0.02)
+    sums = (values * np.array(taken)[:, None, None]).astype(np.float32)
+    found, lone = error_of_batches(sums, taken, "srgb")
+    expected, expected_lone = slow_errors(sums, taken)
+    np.testing.assert_allclose(found, expected, rtol=1e-3, atol=2e-6)
+    np.testing.assert_allclose(lone, expected_lone, rtol=1e-3, atol=2e-6)
+    assert (expected_lone > 0).any() == (np.count_nonzero(taken) >= 6)
+
+
 def picture(batches, taken=None):
     return np.average(batches, axis=0, weights=taken)
 

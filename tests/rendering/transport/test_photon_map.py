@@ -102,6 +102,58 @@ def test_parts_of_the_photons_have_the_mean_of_all(seen):
         assert (parts.std(axis=0).mean(axis=1) > 0.05 * whole.mean(axis=1)).all()  # each looks at photons of its own
 
 
+def gathered_slowly(photons, points, normal, shading, wi, lobe, radius):
+    """``(m, 3)`` irradiance, photon by photon, on surfaces shaded by another normal, with a narrow lobe about it.
+
+    The Epanechnikov kernel ``2 / (pi r^2) (1 - d^2 / r^2)`` of the photons nearby on the same side of the same surface;
+    times the cosine to the shading normal over that to the true one, 4 at most; without those that the lobe reflects
+    sharply (half vector within 0.05 rad of it) or that come through the surface. All vectors are in world space.
+    """
+    result = np.zeros((len(points), 3))
+    for place, point in enumerate(points.astype(np.float64)):
+        for position, n, toward, power in zip(
+            photons.position, photons.normal, photons.toward, photons.power, strict=True
+        ):
+            apart = position - point
+            if apart @ apart >= radius**2 or abs(apart @ normal) >= 0.4 * radius:
+                continue
+            if n @ normal <= 0.7 or toward @ normal <= 0:
+                continue
+            half = wi + toward
+            is_reflected = (wi @ shading) * (toward @ shading) > 0
+            if lobe is not None and (not is_reflected or half @ lobe > np.cos(0.05) * np.linalg.norm(half)):
+                continue
+            turned = min(abs(toward @ shading) / (toward @ normal), 4.0)
+            result[place] += power * turned * (1 - apart @ apart / radius**2)
+    return result * 2 / (np.pi * radius**2)
+
+
+@pytest.mark.parametrize("with_lobe", [False, True])
+def test_a_look_up_on_shaded_surfaces_is_the_slow_one(with_lobe):
+    import drjit as dr
+    import mitsuba as mi
+
+    from lippmann.rendering.transport.photon_map import PhotonMap
+
+    some, radius = scattered(4000, 11), 0.3
+    normal, shading, wi = np.array([0, 0, 1.0]), np.array([0.48, 0.36, 0.8]), np.array([-0.6, 0.0, 0.8])
+    points = np.random.default_rng(12).uniform(-0.4, 0.4, (25, 3)).astype(np.float32) * np.float32([1, 1, 0.01])
+    si = dr.zeros(mi.SurfaceInteraction3f, len(points))
+    si.p = mi.Point3f(np.ascontiguousarray(points.T))
+    up, turned, seen_from = (mi.Vector3f(*each.tolist()) for each in (normal, shading, wi))
+    si.n, si.sh_frame = mi.Normal3f(up), mi.Frame3f(turned)
+    si.wi = si.to_local(seen_from)
+    lobe = mi.Vector3f(0, 0, 1 if with_lobe else 0)
+    known = mi.UInt32(0), mi.UInt32(9), mi.Float(0.5), mi.Bool(True), mi.Bool(True)
+    found = PhotonMap((some, some), radius).gather(si, up, lobe, *known)
+    expected = gathered_slowly(some, points, normal, shading, wi, shading if with_lobe else None, radius)
+    np.testing.assert_allclose(np.array(found.irradiance).T, expected, rtol=2e-4)
+    # The lobe takes some photons, not all: what is above can fail.
+    plain = gathered_slowly(some, points, normal, shading, wi, None, radius)
+    assert (0.1 * plain < expected).all()
+    assert (expected < plain).any() == with_lobe
+
+
 def tilted(normal, count, seed):
     """Photons spread over a square of side 2 of a plane through 0, with a flux of 2.5 to a unit of area."""
     from lippmann.rendering.transport.photon_map import Photons
