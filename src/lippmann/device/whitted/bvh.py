@@ -45,8 +45,9 @@ class _Tree:
 class Bvh:
     """Layouts ``(8, 2 n - 1, 4)`` uint32 over a grid of 2^16 steps along each axis.
 
-    A node is x, y and z, each low | high << 16 in steps of ``step (3,)`` from ``origin (3,)``, and a last word: below
-    ``LEAF`` how many entries to skip where the box is missed, else ``LEAF`` + the index of the one box inside.
+    A node is x, y and z, each near | far << 16 in steps of ``step (3,)`` from ``origin (3,)``, and a last word: below
+    ``LEAF`` how many entries to skip where the box is missed, else ``LEAF`` + the index of the one box inside. Near is
+    the side at which rays of the layout's octant enter: the lower one where they go up the axis, else the higher one.
     """
 
     nodes: NDArray[np.uint32]
@@ -67,12 +68,13 @@ def make_bvh(boxes: Numbers) -> Bvh:
     step = size / (GRID - 5)
     origin = low[0] - 2 * step
     corners = np.floor((low - origin) / step) - 1, np.ceil((high - origin) / step) + 1
-    packed = corners[0].astype(np.uint32) | corners[1].astype(np.uint32) << 16
+    sides = np.stack([corner.astype(np.uint32) for corner in corners])
     last = np.where(tree.left < 0, LEAF + tree.order[tree.start], sizes).astype(np.uint32)
-    nodes = np.column_stack([packed, last])
-    layouts = np.empty((OCTANTS, *nodes.shape), np.uint32)
+    layouts = np.empty((OCTANTS, len(last), 4), np.uint32)
     for octant in range(OCTANTS):
-        layouts[octant, _places(tree, sizes, octant)] = nodes
+        down = octant >> np.arange(3) & 1 == 1
+        near, far = np.where(down, sides[::-1], sides)
+        layouts[octant, _places(tree, sizes, octant)] = np.column_stack([near | far << 16, last])
     return Bvh(layouts, origin, step)
 
 

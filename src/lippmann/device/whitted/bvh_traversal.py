@@ -6,10 +6,11 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from lippmann.device.kernel_ops import larger, smaller, upload
 from lippmann.device.types import Bool, Float, Point3f, UInt32, Vector3f
 from lippmann.device.whitted.bvh import GRID, LEAF, make_bvh
 from lippmann.device.whitted.clip_planes import Clipping
-from lippmann.device.whitted.intersections import Row, crossings, fetch, literal, reciprocal, slab
+from lippmann.device.whitted.intersections import Row, crossings, fetch, literal, reciprocal
 from lippmann.device.whitted.shape_table import Column, Kind, ShapeTable
 
 #: Up to this many listed shapes are written into the kernel; more are looped over.
@@ -26,11 +27,11 @@ class ShapeTracer:
         self._table = table
         self._clipping = clipping if (table.rows[:, Column.CLIP] >= 0).any() else None
         self._inside_only = bool(table.rows[:, Column.INSIDE].any())
-        self.rows = mi.Float(table.rows.ravel())
+        self.rows = upload(table.rows)
         self.filters = bool((table.rows[:, Column.PASSES] > 0).any())
         if table.walked:
             self._bvh = make_bvh(table.boxes)
-            self._nodes = mi.UInt32(self._bvh.nodes.ravel())
+            self._nodes = upload(self._bvh.nodes)
 
     def closest(self, o: Point3f, d: Vector3f, t: Float, index: UInt32, active: Bool) -> tuple[Float, UInt32]:
         """Distance and row of the nearest crossing before ``t``; where there is none, ``t`` and ``index``."""
@@ -61,10 +62,10 @@ class ShapeTracer:
     @dr.syntax
     def _nearest_walked(self, o: Point3f, d: Vector3f, t: Float, index: UInt32, active: Bool) -> tuple[Float, UInt32]:
         kinds = self._kinds(self._table.walked_rows)
-        foot, og, inverse, node, end = self._start(o, d)
+        foot, scale, shift, node, end = self._start(o, d)
         node = dr.select(active, node, end)
         while dr.hint(node < end, label="shapes"):
-            meets, last = self._meets(node, og, inverse, -foot, t - foot)
+            meets, last = self._meets(node, scale, shift, -foot, t - foot)
             if meets & (last >= LEAF):
                 number = last - LEAF + self._table.traced
                 t, index = self._nearer(kinds, fetch(self.rows, number, True), number, o, d, t, index)
@@ -96,9 +97,9 @@ class ShapeTracer:
     @dr.syntax
     def _past_walked(self, o: Point3f, d: Vector3f, t: Float, light: Float) -> Float:
         kinds = self._kinds(self._table.walked_rows)
-        foot, og, inverse, node, end = self._start(o, d)
+        foot, scale, shift, node, end = self._start(o, d)
         while dr.hint((node < end) & (light > 0), label="shadows of shapes"):
-            meets, last = self._meets(node, og, inverse, -foot, t - foot)
+            meets, last = self._meets(node, scale, shift, -foot, t - foot)
             if meets & (last >= LEAF):
                 row = fetch(self.rows, last - LEAF + self._table.traced, True)
                 light = self._past(kinds, row, o, d, t, light)
@@ -119,8 +120,9 @@ class ShapeTracer:
             good = crossing.good & (crossing.t > 0) & (crossing.t < t)
             if self._clipping is not None:
                 # Tachyon clips the shadows of opaque shapes alone.
-                good &= (row.passes > 0) | self._clipping.keeps(row.clip, o + d * crossing.t, good)
-            light = dr.select(good, light * row.passes, light)
+                kept = self._clipping.keeps(row.clip, o + d * crossing.t, good)
+                good &= (row.passes > 0) | kept if self.filters else kept
+            light = dr.select(good, light * row.passes if self.filters else 0, light)
         return light
 
     def _kinds(self, rows: range) -> set[Kind]:
@@ -128,7 +130,8 @@ class ShapeTracer:
 
     def _start(self, o: Point3f, d: Vector3f) -> tuple[Float, Vector3f, Vector3f, UInt32, UInt32]:
         """A ray on the grid of the hierarchy, counted from its point nearest to the middle: distance of that point,
-        its place, the reciprocal direction, and the first entry and the end of the layout to walk."""
+        what makes distances of steps along an axis (times ``scale``, plus ``shift``), and the first entry and the end
+        of the layout to walk."""
         bvh = self._bvh
         middle = mi.Vector3f(*(bvh.origin + bvh.step * (GRID / 2)).tolist())
         per_step = mi.Vector3f(*(1 / bvh.step).tolist())
@@ -136,14 +139,18 @@ class ShapeTracer:
         place = (o - middle + d * foot) * per_step + GRID / 2
         octant = dr.select(d.x < 0, mi.UInt32(1), mi.UInt32(0))
         octant += dr.select(d.y < 0, mi.UInt32(2), mi.UInt32(0)) + dr.select(d.z < 0, mi.UInt32(4), mi.UInt32(0))
-        return foot, place, reciprocal(d * per_step), octant * bvh.count, (octant + 1) * bvh.count
+        scale = reciprocal(d * per_step)
+        return foot, scale, -place * scale, octant * bvh.count, (octant + 1) * bvh.count
 
     def _meets(
-        self, node: UInt32, place: Vector3f, inverse: Vector3f, nearest: Float, farthest: Float
+        self, node: UInt32, scale: Vector3f, shift: Vector3f, nearest: Float, farthest: Float
     ) -> tuple[Bool, UInt32]:
         """Whether a ray meets a node's box between two distances, and the node's last word."""
         words = dr.gather(mi.Vector4u, self._nodes, node)
-        low = mi.Vector3f(*(mi.Float(words[axis] & 0xFFFF) for axis in range(3)))
-        high = mi.Vector3f(*(mi.Float(words[axis] >> 16) for axis in range(3)))
-        enter, leave = slab(low, high, place, inverse)
-        return (enter <= dr.minimum(leave, farthest)) & (leave >= nearest), words[3]
+        near, far = (
+            [dr.fma(mi.Float(side(words[axis])), scale[axis], shift[axis]) for axis in range(3)]
+            for side in (lambda word: word & 0xFFFF, lambda word: word >> 16)
+        )
+        enter = larger(larger(near[0], near[1]), larger(near[2], nearest))
+        leave = smaller(smaller(far[0], far[1]), smaller(far[2], farthest))
+        return enter <= leave, words[3]

@@ -16,6 +16,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from lippmann.device.kernel_ops import larger, smaller
 from lippmann.device.types import Bool, Float, Point3f, UInt32, Vector3f, Vector4f
 from lippmann.device.whitted.shape_table import Column, Kind
 
@@ -32,11 +33,11 @@ class Row:
     k0: Float
     k1: Float
     k2: Float
+    low: Float
+    high: Float
     kind: Float
     material: Float
     clip: Float
-    low: Float
-    high: Float
     inside: Float
     passes: Float
 
@@ -75,13 +76,6 @@ def xyz(v: Vector4f) -> Vector3f:
 def reciprocal(d: Vector3f) -> Vector3f:
     """One over each component of a direction, never infinite."""
     return dr.rcp(dr.select(dr.abs(d) < _SMALLEST, dr.copysign(mi.Vector3f(_SMALLEST), d), d))
-
-
-def slab(low: Vector3f, high: Vector3f, o: Point3f, inverse: Vector3f) -> tuple[Float, Float]:
-    """Distances at which a ray enters and leaves a box along the axes; it misses where the second is smaller."""
-    a, b = (low - o) * inverse, (high - o) * inverse
-    near, far = dr.minimum(a, b), dr.maximum(a, b)
-    return dr.maximum(dr.maximum(near.x, near.y), near.z), dr.minimum(dr.minimum(far.x, far.y), far.z)
 
 
 def crossings(kinds: Collection[Kind], inside_only: bool, row: Row, o: Point3f, d: Vector3f) -> list[Crossing]:
@@ -152,7 +146,7 @@ def _quadric(inside_only: bool, row: Row, o: Point3f, d: Vector3f) -> list[Cross
     q = -(b + dr.copysign(dr.sqrt(discriminant), b))
     s1, s2 = q / a, c / q
     found = []
-    for s in (dr.minimum(s1, s2), dr.maximum(s1, s2)):
+    for s in (smaller(s1, s2), larger(s1, s2)):
         along = h + s * dh
         good = (discriminant > 0) & (along > row.low) & (along < row.high)
         if inside_only:
@@ -167,10 +161,10 @@ def _box(inside_only: bool, row: Row, o: Point3f, d: Vector3f) -> list[Crossing]
     between = (o >= row.center) & (o <= row.axis)
     inverse = reciprocal(d)
     a, b = (row.center - o) * inverse, (row.axis - o) * inverse
-    near = dr.select(along, dr.select(between, -dr.inf, dr.inf), dr.minimum(a, b))
-    far = dr.select(along, dr.inf, dr.maximum(a, b))
-    enter = dr.maximum(dr.maximum(near.x, near.y), near.z)
-    leave = dr.minimum(dr.minimum(far.x, far.y), far.z)
+    near = dr.select(along, dr.select(between, -dr.inf, dr.inf), smaller(a, b))
+    far = dr.select(along, dr.inf, larger(a, b))
+    enter = larger(larger(near.x, near.y), near.z)
+    leave = smaller(smaller(far.x, far.y), far.z)
     return [Crossing(enter, enter <= leave), Crossing(leave, enter <= leave)]
 
 
