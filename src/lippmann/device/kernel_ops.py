@@ -20,8 +20,10 @@ def upload(values: NDArray[Any]) -> Array:
     """
     kinds = {"f": (mi.Float, np.float32), "i": (mi.Int32, np.int32), "u": (mi.UInt32, np.uint32)}
     device_type, dtype = kinds[values.dtype.kind]
-    table = device_type(np.ascontiguousarray(values, dtype).ravel()) + dr.opaque(device_type, 0)
-    dr.eval(table)
+    table = device_type(np.ascontiguousarray(values, dtype).ravel())
+    if len(table):
+        table = table + dr.opaque(device_type, 0)
+        dr.eval(table)
     return table
 
 

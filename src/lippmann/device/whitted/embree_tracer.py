@@ -82,7 +82,7 @@ class EngineTracer:
         shares = np.concatenate([passing(scene)[scene.triangles.material[triangles.order]], np.zeros(table.traced)])
         groups = np.concatenate([scene.triangles.clip_group[triangles.order], np.full(table.traced, -1)])
         self._passes = upload(shares) if self._airy else None
-        self._groups = upload(groups) if self._clips else None
+        self._groups = upload(groups.astype(np.float32)) if self._clips else None
 
     def closest(self, o: Point3f, d: Vector3f, t: Float, active: Bool, coherent: Bool) -> tuple[Float, UInt32, Point2f]:
         """Distance, index and barycentric coordinates of the nearest hit before ``t``; ``t`` and ``NONE`` without."""

@@ -78,34 +78,29 @@ def reciprocal(d: Vector3f) -> Vector3f:
     return dr.rcp(dr.select(dr.abs(d) < _SMALLEST, dr.copysign(mi.Vector3f(_SMALLEST), d), d))
 
 
-def crossings(kinds: Collection[Kind], inside_only: bool, row: Row, o: Point3f, d: Vector3f) -> list[Crossing]:
-    """All crossings of a ray with a shape of one of ``kinds``, at any distance, the nearer first.
+def formulas(kinds: Collection[Kind]) -> list[Kind]:
+    """The kinds whose formulas serve shapes of all of ``kinds``: a sphere is a quadric too, where both occur."""
+    return sorted(set(kinds) - ({Kind.SPHERE} if Kind.QUADRIC in kinds else set()))
+
+
+def serves(formula: Kind, row: Row) -> Bool:
+    """Whether a shape is one for this formula, of several."""
+    return row.kind <= float(formula) if formula is Kind.QUADRIC else row.kind == float(formula)
+
+
+def crossings(formula: Kind, inside_only: bool, row: Row, o: Point3f, d: Vector3f) -> list[Crossing]:
+    """All crossings of a ray with a shape by one of the :func:`formulas`, at any distance, the nearer first.
 
     ``inside_only`` says that some shapes may be seen from within alone.
     """
-    # A sphere is a quadric too: where both occur, one formula serves.
-    ways = set(kinds)
-    if Kind.QUADRIC in ways:
-        ways.discard(Kind.SPHERE)
-    formulas = {
+    cross = {
         Kind.SPHERE: _sphere,
         Kind.QUADRIC: _quadric,
         Kind.BOX: _box,
         Kind.FLAT: _flat,
         Kind.HUGE_SPHERE: _huge_sphere,
     }
-    found = {kind: formulas[kind](inside_only, row, o, d) for kind in sorted(ways)}
-    merged = found.pop(max(found))
-    merged += [Crossing(mi.Float(dr.inf), mi.Bool(False))] * (max(map(len, [merged, *found.values()])) - len(merged))
-    for kind, way in found.items():
-        this = row.kind <= float(kind) if kind is Kind.QUADRIC else row.kind == float(kind)
-        for place, crossing in enumerate(way):
-            merged[place] = Crossing(
-                dr.select(this, crossing.t, merged[place].t), dr.select(this, crossing.good, merged[place].good)
-            )
-        for place in range(len(way), len(merged)):
-            merged[place] = Crossing(merged[place].t, merged[place].good & ~this)
-    return merged
+    return cross[formula](inside_only, row, o, d)
 
 
 def _sphere(inside_only: bool, row: Row, o: Point3f, d: Vector3f) -> list[Crossing]:
