@@ -24,6 +24,7 @@ def upload(values: NDArray[Any]) -> Array:
     if len(table):
         table = table + dr.opaque(device_type, 0)
         dr.eval(table)
+        dr.sync_thread()  # the caller may write into its array again
     return table
 
 
