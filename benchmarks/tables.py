@@ -211,18 +211,19 @@ def _seconds(value: float | None) -> str:
 
 def _tachyon(result: dict[str, Any]) -> str:
     rows = "\n".join(
-        f"| {one['scene']} | {one['size']} | {1000 * one['seconds']['tachyon']['median']:.0f} ms "
-        f"| {1000 * one['seconds']['lippmann']['median']:.0f} ms | {one['times_faster']:.1f} | {one['target']:g} "
-        f"| {one['megarays_per_second']:.0f} M/s |"
+        f"| {one['scene']} | {one['size']} | {one['ray_depth']} | {one['seconds']['tachyon_cpu']['median']:.2f} s "
+        f"| {one['seconds']['lippmann_cpu']['median']:.2f} s | {one['times_faster']:.1f} "
+        f"| {one['times_faster_wall']:.1f} | {one['target']:g} | {one['megarays_per_processor_second']:.0f} M/s |"
         for one in result["results"]
     )
     return f"""## The classic light model against Tachyon (`tachyon.py`)
 
-The same files from their own cameras, ray depth {result["ray_depth"]}, {result["threads"]} threads each, run in turn:
-Tachyon's own "Ray Tracing Time", and ours with warm kernels. "Times faster" is the median over pairs of runs.
+The same files from their own cameras, {result["threads"]} threads each, run in turn, pairs of runs: {result["runs"]}.
+Processor time of tracing alone, ours with warm kernels; other work ran beside. "Times faster" is the median over pairs.
+Wall times compare Tachyon's own "Ray Tracing Time" with ours. Rays are ours, per processor second.
 
-| scene | pixels a side | Tachyon | Lippmann | times faster | target | our rays |
-|---|---|---|---|---|---|---|
+| scene | pixels a side | ray depth | Tachyon | Lippmann | times faster | by wall time | target | rays |
+|---|---|---|---|---|---|---|---|---|
 {rows}
 """
 

@@ -295,27 +295,74 @@ def test_a_planet_alone_is_huge_for_who_stands_on_it():
         assert (row[Column.KIND] == Kind.HUGE_SPHERE) == is_huge
 
 
-@pytest.mark.parametrize("count", [1, 2, 3, 17, 500])
-def test_every_layout_of_a_hierarchy_holds_each_box_once(count):
+def boxes_in_cube(count):
     rng = np.random.default_rng(count)
     low = rng.uniform(-5, 5, (count, 3))
-    boxes = np.stack([low, low + rng.uniform(0, 1, (count, 3)) ** 4], axis=1)
+    return np.stack([low, low + rng.uniform(0, 1, (count, 3)) ** 4], axis=1)
+
+
+@pytest.mark.parametrize("count", [2, 3, 17, 500])
+def test_every_layout_of_a_hierarchy_holds_each_box_once(count):
+    boxes = boxes_in_cube(count)
     bvh = make_bvh(boxes)
-    assert bvh.nodes.shape == (8, 2 * count - 1, 4)
-    for layout in bvh.nodes:
-        last = layout[:, 3].astype(np.int64)
-        leaves = np.flatnonzero(last >= LEAF)
-        assert sorted(last[leaves] - LEAF) == list(range(count))
-        corners = np.stack([layout[:, :3] & (GRID - 1), layout[:, :3] >> 16], axis=1) * bvh.step + bvh.origin
-        for place, box in zip(leaves, last[leaves] - LEAF, strict=True):
-            # Within its own node, and within all nodes whose run of entries it lies in.
-            above = [i for i in range(place + 1) if i == place or (last[i] < LEAF and i + last[i] > place)]
-            assert (corners[above, 0] <= boxes[box, 0]).all()
-            assert (corners[above, 1] >= boxes[box, 1]).all()
-        assert all(i + last[i] <= len(layout) for i in range(len(layout)) if last[i] < LEAF)
+    assert bvh.nodes.shape == (8, count - 1, 8)
+    for octant, layout in enumerate(bvh.nodes):
+        down = octant >> np.arange(3) & 1 == 1
+        found = []
+
+        def leaves_below(place, layout=layout, down=down, found=found):
+            """Visit all entries below one; return the end of its run and the members below it."""
+            below, following = [], place + 1
+            for node in layout[place].reshape(2, 4):
+                if node[3] >= LEAF:
+                    members = [int(node[3]) - LEAF]
+                    found.extend(members)
+                else:
+                    end, members = leaves_below(following)
+                    assert end - following == node[3]
+                    following = end
+                near, far = ((node[:3] >> shift & GRID - 1) * bvh.step + bvh.origin for shift in (0, 16))
+                low, high = np.where(down, far, near), np.where(down, near, far)
+                assert (low <= boxes[members, 0].min(axis=0)).all()
+                assert (high >= boxes[members, 1].max(axis=0)).all()
+                below += members
+            return following, below
+
+        assert leaves_below(0)[0] == count - 1
+        assert sorted(found) == list(range(count))
+
+
+def test_rays_of_an_octant_come_to_the_nearer_node_first():
+    """Boxes in a row along an axis: both directions meet them in their own order."""
+    boxes = np.array([[(2.0 * n, 0, 0), (2.0 * n + 1, 1, 1)] for n in range(40)])
+    for octant, expected in ((0, range(40)), (1, reversed(range(40)))):
+        last = make_bvh(boxes).nodes[octant].reshape(-1, 2, 4)[:, :, 3].astype(np.int64)
+        order = []
+
+        def visit(place, last=last, order=order):
+            following = place + 1
+            for word in last[place]:
+                if word >= LEAF:
+                    order.append(word - LEAF)
+                else:
+                    visit(following)
+                    following += word
+
+        visit(0)
+        assert order == list(expected)
+
+
+def test_nodes_are_split_along_the_axis_that_pays():
+    """Two long rows side by side: the longest axis would mix them."""
+    x = np.arange(32) * 1.0
+    low = np.concatenate([np.stack([x, 0 * x + y, 0 * x], axis=1) for y in (0.0, 25.0)])
+    bvh = make_bvh(np.stack([low, low + np.array([40.0, 1.0, 1.0])], axis=1))
+    root = bvh.nodes[0, 0].reshape(2, 4)
+    height = ((root[:, 1] >> 16).astype(float) - (root[:, 1] & GRID - 1)) * bvh.step[1]
+    assert (height < 2).all()
 
 
 def test_equal_boxes_do_not_make_the_tree_deep():
     boxes = np.zeros((300, 2, 3))
     boxes[:, 1] = 1
-    assert make_bvh(boxes).count == 599
+    assert make_bvh(boxes).count == 299

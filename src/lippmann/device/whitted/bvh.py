@@ -1,9 +1,10 @@
 """A bounding volume hierarchy without a stack, in the order in which a ray walks it.
 
-Nodes are split where the surface area heuristic says, along the longest side of the box around their members' centres
-(MacDonald and Booth 1990). The tree is laid out depth first, each node saying how many entries to skip where its box is
-missed ("skip pointers", Smits 1998), so that a ray keeps one index and nothing more. Eight layouts, one for each octant
-of ray directions, visit the nearer child first. All nodes of a level are split at once.
+Nodes are split where the surface area heuristic says, along the axis for which it promises most (MacDonald and Booth
+1990). An entry is an inner node with the boxes of both its children, which are tested at once. Entries are laid out
+depth first, each saying how many to skip where a child is missed ("skip pointers", Smits 1998), so that a ray keeps one
+index and nothing more. Eight layouts, one for each octant of ray directions, visit the nearer child first. All nodes of
+a level are split at once.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from lippmann.scene.values.whitted_shapes import Numbers
 
 #: Layouts, by the signs of a direction: 1 for x < 0, 2 for y < 0, 4 for z < 0.
 OCTANTS = 8
-#: Steps of the grid on which the corners of boxes lie: a node then is four words, one fetch.
+#: Steps of the grid on which the corners of boxes lie: an entry then is eight words, one fetch.
 GRID = 1 << 16
 #: Last words from here on are leaves.
 LEAF = 1 << 31
@@ -43,10 +44,13 @@ class _Tree:
 
 @dataclass(frozen=True, eq=False)
 class Bvh:
-    """Layouts ``(8, 2 n - 1, 4)`` uint32 over a grid of 2^16 steps along each axis.
+    """Layouts ``(8, n - 1, 8)`` uint32 over a grid of 2^16 steps along each axis.
 
-    A node is x, y and z, each low | high << 16 in steps of ``step (3,)`` from ``origin (3,)``, and a last word: below
-    ``LEAF`` how many entries to skip where the box is missed, else ``LEAF`` + the index of the one box inside.
+    An entry is two nodes, the one that rays of the layout's octant come to first, then its sibling. A node is x, y and
+    z, each near | far << 16 in steps of ``step (3,)`` from ``origin (3,)``, and a last word: below ``LEAF`` the number
+    of entries below the node, else ``LEAF`` + the index of the one box inside. Near is the side at which rays enter:
+    the lower one where they go up the axis, else the higher one. The entries of the first node follow on its own, those
+    of the second on these.
     """
 
     nodes: NDArray[np.uint32]
@@ -59,20 +63,25 @@ class Bvh:
 
 
 def make_bvh(boxes: Numbers) -> Bvh:
-    """The tree over boxes ``(n, 2, 3)``, n at least 1."""
+    """The tree over boxes ``(n, 2, 3)``, n at least 2."""
     tree = _grow(boxes)
-    low, high, sizes = _gather_up(tree, boxes)
+    low, high = _gather_up(tree, boxes)
+    inner = tree.left >= 0
+    entries = tree.stop - tree.start - 1
     size = np.maximum(high[0] - low[0], 1e-6 * max(np.abs(boxes).max(), 1e-30))
     # One step of margin on each side for rounding on the device, and boxes grow to whole steps.
     step = size / (GRID - 5)
     origin = low[0] - 2 * step
     corners = np.floor((low - origin) / step) - 1, np.ceil((high - origin) / step) + 1
-    packed = corners[0].astype(np.uint32) | corners[1].astype(np.uint32) << 16
-    last = np.where(tree.left < 0, LEAF + tree.order[tree.start], sizes).astype(np.uint32)
-    nodes = np.column_stack([packed, last])
-    layouts = np.empty((OCTANTS, *nodes.shape), np.uint32)
+    sides = np.stack([corner.astype(np.uint32) for corner in corners])
+    last = np.where(inner, entries, LEAF + tree.order[tree.start]).astype(np.uint32)
+    layouts = np.empty((OCTANTS, len(boxes) - 1, 8), np.uint32)
     for octant in range(OCTANTS):
-        layouts[octant, _places(tree, sizes, octant)] = nodes
+        down = octant >> np.arange(3) & 1 == 1
+        near, far = np.where(down, sides[::-1], sides)
+        nodes = np.column_stack([near | far << 16, last])
+        first, second = _visited(tree, octant)
+        layouts[octant, _places(tree, entries, octant)[inner]] = np.hstack([nodes[first], nodes[second]])[inner]
     return Bvh(layouts, origin, step)
 
 
@@ -89,13 +98,8 @@ def _grow(boxes: Numbers) -> _Tree:
     total = 0
     while len(start):
         run, member = _members(start, stop)
-        placed = centers[order[member]]
-        extent = _per_run(np.maximum, placed, start, stop) - _per_run(np.minimum, placed, start, stop)
-        axis = np.argmax(extent, axis=1)
-        by_run = np.lexsort((placed[np.arange(len(run)), axis[run]], run))
-        order[member] = order[member][by_run]
+        order[member], middle, axis = _split(boxes, centers, order[member], run, start, stop, len(levels))
         inner = stop - start > 1
-        middle = _cuts(boxes[order[member]], start, stop, len(levels) >= _LAST_WEIGHED_LEVEL)
         levels.append(total)
         starts.append(start)
         stops.append(stop)
@@ -109,6 +113,27 @@ def _grow(boxes: Numbers) -> _Tree:
     return _Tree(
         levels, np.concatenate(starts), np.concatenate(stops), np.concatenate(lefts), np.concatenate(axes), order
     )
+
+
+def _split(
+    boxes: Numbers, centers: Numbers, order: Whole, run: Whole, start: Whole, stop: Whole, level: int
+) -> tuple[Whole, Whole, Whole]:
+    """Members sorted along the best axis of their run, where to cut each run, and that axis."""
+    placed = centers[order]
+    extent = _per_run(np.maximum, placed, start, stop) - _per_run(np.minimum, placed, start, stop)
+    halve = level >= _LAST_WEIGHED_LEVEL or (stop - start).max() > _MOST_WEIGHED
+    if halve:
+        axis = np.argmax(extent, axis=1)
+        order = order[np.lexsort((placed[np.arange(len(run)), axis[run]], run))]
+        return order, start + (stop - start) // 2, axis
+    ways = []
+    for direction in range(3):
+        sorted_members = order[np.lexsort((placed[:, direction], run))]
+        ways.append((sorted_members, *_cuts(boxes[sorted_members], start, stop)))
+    orders, middles, costs = (np.stack(part) for part in zip(*ways, strict=True))
+    # Among equals the longest axis: its order tells best which child a ray comes to first.
+    axis = np.lexsort((-extent.T, costs), axis=0)[0]
+    return np.choose(axis[run], orders), np.choose(axis, middles), axis
 
 
 def _members(start: Whole, stop: Whole) -> tuple[Whole, Whole]:
@@ -125,12 +150,12 @@ def _per_run(reduce: np.ufunc, values: Numbers, start: Whole, stop: Whole) -> Nu
     return result
 
 
-def _cuts(boxes: Numbers, start: Whole, stop: Whole, halve: bool) -> Whole:
-    """Where to cut each run of sorted members ``boxes (m, 2, 3)``: the place of the second part's first member."""
+def _cuts(boxes: Numbers, start: Whole, stop: Whole) -> tuple[Whole, Numbers]:
+    """Where to cut each run of sorted members ``boxes (m, 2, 3)``, and the cost of that: area times members, summed.
+
+    The place is that of the second part's first member.
+    """
     sizes = stop - start
-    middle = start + sizes // 2
-    if halve or sizes.max() > _MOST_WEIGHED or sizes.max() == 1:
-        return middle
     first = np.cumsum(sizes) - sizes
     run = np.repeat(np.arange(len(sizes)), sizes)
     inside = np.arange(len(run)) - first[run]
@@ -142,7 +167,7 @@ def _cuts(boxes: Numbers, start: Whole, stop: Whole, halve: bool) -> Whole:
     cost[inside == 0] = np.inf
     best = np.minimum.reduceat(cost, first)
     cut = np.maximum.reduceat(np.where(cost == best[run], inside, 0), first)
-    return np.where((cut > 0) & np.isfinite(best), start + cut, middle)
+    return start + np.where((cut > 0) & np.isfinite(best), cut, sizes // 2), best
 
 
 def _running(boxes: Numbers, inside: Whole) -> Numbers:
@@ -164,8 +189,8 @@ def _area(boxes: Numbers) -> Numbers:
     return area
 
 
-def _gather_up(tree: _Tree, boxes: Numbers) -> tuple[Numbers, Numbers, Whole]:
-    """Lowest and highest corner and number of entries of each node's subtree."""
+def _gather_up(tree: _Tree, boxes: Numbers) -> tuple[Numbers, Numbers]:
+    """Lowest and highest corner of each node."""
     count = len(tree.start)
     low, high = np.empty((count, 3)), np.empty((count, 3))
     leaf = tree.left < 0
@@ -176,18 +201,22 @@ def _gather_up(tree: _Tree, boxes: Numbers) -> tuple[Numbers, Numbers, Whole]:
         left = tree.left[nodes]
         low[nodes] = np.minimum(low[left], low[left + 1])
         high[nodes] = np.maximum(high[left], high[left + 1])
-    return low, high, 2 * (tree.stop - tree.start) - 1
+    return low, high
 
 
-def _places(tree: _Tree, sizes: Whole, octant: int) -> Whole:
-    """Place of each node in the layout that rays of this octant walk."""
+def _visited(tree: _Tree, octant: int) -> tuple[Whole, Whole]:
+    """Children of each node in the order in which rays of an octant come to them; any numbers for leaves."""
+    swap = octant >> tree.axis & 1
+    return tree.left + swap, tree.left + 1 - swap
+
+
+def _places(tree: _Tree, entries: Whole, octant: int) -> Whole:
+    """Place of each inner node in the layout that rays of this octant walk."""
     places = np.zeros(len(tree.start), np.int64)
-    for first, end in zip(tree.levels, [*tree.levels[1:], len(tree.start)], strict=True):
-        nodes = np.arange(first, end)
+    firsts, seconds = _visited(tree, octant)
+    for start, end in zip(tree.levels, [*tree.levels[1:], len(tree.start)], strict=True):
+        nodes = np.arange(start, end)
         nodes = nodes[tree.left[nodes] >= 0]
-        left = tree.left[nodes]
-        swap = (octant >> tree.axis[nodes]) & 1
-        near, far = left + swap, left + 1 - swap
-        places[near] = places[nodes] + 1
-        places[far] = places[near] + sizes[near]
+        places[firsts[nodes]] = places[nodes] + 1
+        places[seconds[nodes]] = places[nodes] + 1 + entries[firsts[nodes]]
     return places

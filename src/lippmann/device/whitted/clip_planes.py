@@ -8,6 +8,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from lippmann.device.kernel_ops import upload
 from lippmann.device.types import Bool, Float, Point3f
 from lippmann.scene.values.whitted_shapes import Numbers
 
@@ -19,7 +20,7 @@ class Clipping:
         self._groups = [group.tolist() for group in groups]
         sizes = [len(group) for group in groups]
         # Group -1, no clipping, comes first: it has no planes.
-        self._planes = mi.Float(np.concatenate([np.zeros((1, 4)), *groups]).astype(np.float32).ravel())
+        self._planes = upload(np.concatenate([np.zeros((1, 4)), *groups]))
         self._starts = mi.UInt32((1 + np.cumsum([0, 0, *sizes])[:-1]).astype(np.uint32))
         self._sizes = mi.UInt32(np.array([0, *sizes], np.uint32))
 

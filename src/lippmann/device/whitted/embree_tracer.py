@@ -15,6 +15,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from lippmann.device.kernel_ops import upload
 from lippmann.device.types import (
     Bool,
     Float,
@@ -80,8 +81,8 @@ class EngineTracer:
         self._starts = _starts([part for part in parts if part is not None])
         shares = np.concatenate([passing(scene)[scene.triangles.material[triangles.order]], np.zeros(table.traced)])
         groups = np.concatenate([scene.triangles.clip_group[triangles.order], np.full(table.traced, -1)])
-        self._passes = mi.Float(shares.astype(np.float32)) if self._airy else None
-        self._groups = mi.Float(groups.astype(np.float32)) if self._clips else None
+        self._passes = upload(shares) if self._airy else None
+        self._groups = upload(groups.astype(np.float32)) if self._clips else None
 
     def closest(self, o: Point3f, d: Vector3f, t: Float, active: Bool, coherent: Bool) -> tuple[Float, UInt32, Point2f]:
         """Distance, index and barycentric coordinates of the nearest hit before ``t``; ``t`` and ``NONE`` without."""

@@ -12,6 +12,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from lippmann.device.kernel_ops import upload
 from lippmann.device.types import Bool, Color3f, Float, Point2f, Point3f, UInt32, Vector3f
 from lippmann.device.whitted.bvh_traversal import ShapeTracer
 from lippmann.device.whitted.clip_planes import Clipping
@@ -74,7 +75,7 @@ class Geometry:
         self._colored = bool(scene.triangles.colored.any())
         if self._table.lights:
             numbers = self._table.rows[self._table.light_rows.start :, Column.MATERIAL]
-            self._lights = mi.UInt32(numbers.astype(np.uint32))
+            self._lights = upload(numbers.astype(np.uint32))
         self._load_triangles(scene)
 
     def _load_triangles(self, scene: ClassicScene) -> None:
@@ -90,7 +91,7 @@ class Geometry:
         rows[:, :3], rows[:, 3] = normal, offset
         rows[:, 4], rows[:, 5] = batch.material[order], batch.colored[order]
         rows[:, 6] = np.abs(corners).max(axis=(1, 2))
-        self._faces = mi.Float(rows.astype(np.float32).ravel())
+        self._faces = upload(rows)
         if self._smooth:
             self._normals = _corner_table(batch.normals[order])
         if self._colored:
@@ -225,7 +226,7 @@ def _corner_table(values: Numbers) -> Float:
     """Vectors at three corners ``(n, 3, 3)`` as rows of four."""
     rows = np.zeros((len(values), 3, 4), np.float32)
     rows[:, :, :3] = values
-    return mi.Float(rows.ravel())
+    return upload(rows)
 
 
 def _interpolate(table: Float, index: UInt32, u: Float, v: Float, active: Bool) -> Vector3f:

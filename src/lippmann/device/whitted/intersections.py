@@ -16,6 +16,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from lippmann.device.kernel_ops import larger, smaller
 from lippmann.device.types import Bool, Float, Point3f, UInt32, Vector3f, Vector4f
 from lippmann.device.whitted.shape_table import Column, Kind
 
@@ -32,11 +33,11 @@ class Row:
     k0: Float
     k1: Float
     k2: Float
+    low: Float
+    high: Float
     kind: Float
     material: Float
     clip: Float
-    low: Float
-    high: Float
     inside: Float
     passes: Float
 
@@ -77,41 +78,29 @@ def reciprocal(d: Vector3f) -> Vector3f:
     return dr.rcp(dr.select(dr.abs(d) < _SMALLEST, dr.copysign(mi.Vector3f(_SMALLEST), d), d))
 
 
-def slab(low: Vector3f, high: Vector3f, o: Point3f, inverse: Vector3f) -> tuple[Float, Float]:
-    """Distances at which a ray enters and leaves a box along the axes; it misses where the second is smaller."""
-    a, b = (low - o) * inverse, (high - o) * inverse
-    near, far = dr.minimum(a, b), dr.maximum(a, b)
-    return dr.maximum(dr.maximum(near.x, near.y), near.z), dr.minimum(dr.minimum(far.x, far.y), far.z)
+def formulas(kinds: Collection[Kind]) -> list[Kind]:
+    """The kinds whose formulas serve shapes of all of ``kinds``: a sphere is a quadric too, where both occur."""
+    return sorted(set(kinds) - ({Kind.SPHERE} if Kind.QUADRIC in kinds else set()))
 
 
-def crossings(kinds: Collection[Kind], inside_only: bool, row: Row, o: Point3f, d: Vector3f) -> list[Crossing]:
-    """All crossings of a ray with a shape of one of ``kinds``, at any distance, the nearer first.
+def serves(formula: Kind, row: Row) -> Bool:
+    """Whether a shape is one for this formula, of several."""
+    return row.kind <= float(formula) if formula is Kind.QUADRIC else row.kind == float(formula)
+
+
+def crossings(formula: Kind, inside_only: bool, row: Row, o: Point3f, d: Vector3f) -> list[Crossing]:
+    """All crossings of a ray with a shape by one of the :func:`formulas`, at any distance, the nearer first.
 
     ``inside_only`` says that some shapes may be seen from within alone.
     """
-    # A sphere is a quadric too: where both occur, one formula serves.
-    ways = set(kinds)
-    if Kind.QUADRIC in ways:
-        ways.discard(Kind.SPHERE)
-    formulas = {
+    cross = {
         Kind.SPHERE: _sphere,
         Kind.QUADRIC: _quadric,
         Kind.BOX: _box,
         Kind.FLAT: _flat,
         Kind.HUGE_SPHERE: _huge_sphere,
     }
-    found = {kind: formulas[kind](inside_only, row, o, d) for kind in sorted(ways)}
-    merged = found.pop(max(found))
-    merged += [Crossing(mi.Float(dr.inf), mi.Bool(False))] * (max(map(len, [merged, *found.values()])) - len(merged))
-    for kind, way in found.items():
-        this = row.kind <= float(kind) if kind is Kind.QUADRIC else row.kind == float(kind)
-        for place, crossing in enumerate(way):
-            merged[place] = Crossing(
-                dr.select(this, crossing.t, merged[place].t), dr.select(this, crossing.good, merged[place].good)
-            )
-        for place in range(len(way), len(merged)):
-            merged[place] = Crossing(merged[place].t, merged[place].good & ~this)
-    return merged
+    return cross[formula](inside_only, row, o, d)
 
 
 def _sphere(inside_only: bool, row: Row, o: Point3f, d: Vector3f) -> list[Crossing]:
@@ -152,7 +141,7 @@ def _quadric(inside_only: bool, row: Row, o: Point3f, d: Vector3f) -> list[Cross
     q = -(b + dr.copysign(dr.sqrt(discriminant), b))
     s1, s2 = q / a, c / q
     found = []
-    for s in (dr.minimum(s1, s2), dr.maximum(s1, s2)):
+    for s in (smaller(s1, s2), larger(s1, s2)):
         along = h + s * dh
         good = (discriminant > 0) & (along > row.low) & (along < row.high)
         if inside_only:
@@ -167,10 +156,10 @@ def _box(inside_only: bool, row: Row, o: Point3f, d: Vector3f) -> list[Crossing]
     between = (o >= row.center) & (o <= row.axis)
     inverse = reciprocal(d)
     a, b = (row.center - o) * inverse, (row.axis - o) * inverse
-    near = dr.select(along, dr.select(between, -dr.inf, dr.inf), dr.minimum(a, b))
-    far = dr.select(along, dr.inf, dr.maximum(a, b))
-    enter = dr.maximum(dr.maximum(near.x, near.y), near.z)
-    leave = dr.minimum(dr.minimum(far.x, far.y), far.z)
+    near = dr.select(along, dr.select(between, -dr.inf, dr.inf), smaller(a, b))
+    far = dr.select(along, dr.inf, larger(a, b))
+    enter = larger(larger(near.x, near.y), near.z)
+    leave = smaller(smaller(far.x, far.y), far.z)
     return [Crossing(enter, enter <= leave), Crossing(leave, enter <= leave)]
 
 

@@ -9,6 +9,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from lippmann.device.kernel_ops import upload
 from lippmann.device.types import Bool, Color3f, Float, UInt32
 from lippmann.device.whitted.intersections import xyz
 from lippmann.scene.values.whitted_surfaces import ClassicMaterial
@@ -50,7 +51,7 @@ class MaterialTable:
             ]
             for m, texture in zip(materials, textures, strict=True)
         ]
-        self._rows = mi.Float(np.array(rows, np.float32).ravel())
+        self._rows = upload(np.array(rows, np.float32))
 
         def some(holds: Callable[[ClassicMaterial], bool]) -> bool:
             return any(holds(material) for material in materials)

@@ -10,6 +10,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from lippmann.device.kernel_ops import upload
 from lippmann.device.sobol import SampleStream
 from lippmann.device.types import Bool, Color3f, Float, Point3f, UInt32, Vector3f
 from lippmann.device.whitted.geometry import FAR, Geometry, Surface
@@ -38,7 +39,7 @@ class LightTable:
     def __init__(self, lights: Sequence[ClassicLight]) -> None:
         self.count = len(lights)
         rows = [_light_row(light) for light in lights] or [[0.0] * 16]
-        self._rows = mi.Float(np.array(rows, np.float32).ravel())
+        self._rows = upload(np.array(rows, np.float32))
         self._directional = any(light.kind == "directional" for light in lights)
         self._attenuated = any(light.attenuation is not None for light in lights)
         self._spots = any(light.kind == "spot" for light in lights)

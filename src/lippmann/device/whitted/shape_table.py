@@ -48,18 +48,21 @@ class Kind(IntEnum):
 
 
 class Column(IntEnum):
-    """Columns of the table; CENTER and AXIS are the first of three."""
+    """Columns of the table; CENTER and AXIS are the first of three.
+
+    A row is fetched in packets of four columns: those that most intersections do not need share the last.
+    """
 
     CENTER = 0
     K0 = 3  # flat: inner^2
     AXIS = 4
     K1 = 7  # flat: outer^2
     K2 = 8
-    KIND = 9
-    MATERIAL = 10  # of a light's sphere: the light's index
-    CLIP = 11  # clip group, -1 for none
-    LOW = 12
-    HIGH = 13
+    LOW = 9
+    HIGH = 10
+    KIND = 11
+    MATERIAL = 12  # of a light's sphere: the light's index
+    CLIP = 13  # clip group, -1 for none
     INSIDE = 14  # 1: seen from inside alone
     PASSES = 15  # share of light that passes
 

@@ -10,6 +10,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from lippmann.device.kernel_ops import upload
 from lippmann.device.sobol import hash32
 from lippmann.device.types import Bool, Color3f, Float, Point3f, UInt32, Vector3f
 from lippmann.device.whitted.intersections import xyz
@@ -45,7 +46,7 @@ class TextureTable:
         self.kinds: list[TextureKind] = sorted({texture.kind for texture in textures}, key=TEXTURE_KINDS.index)
         self.has_images = any(kind.endswith("image") for kind in self.kinds)
         if textures:
-            self._rows = mi.Float(np.array([_row(texture) for texture in textures], np.float32).ravel())
+            self._rows = upload(np.array([_row(texture) for texture in textures], np.float32))
         if self.has_images:
             self._images = ImageTable(images)
         if {"marble", "noise"} & set(self.kinds):
@@ -210,10 +211,10 @@ class ImageTable:
                 depth, height, width = copy.shape[:3]
                 levels.append((start, width, height, depth))
                 start += len(parts[-1])
-        self._texels = mi.UInt32(np.concatenate(parts))
-        self._levels = mi.UInt32(np.array(levels, np.uint32).ravel())
-        self._first = mi.UInt32(np.array(firsts, np.uint32))
-        self._count = mi.UInt32(np.array(counts, np.uint32))
+        self._texels = upload(np.concatenate(parts))
+        self._levels = upload(np.array(levels, np.uint32))
+        self._first = upload(np.array(firsts, np.uint32))
+        self._count = upload(np.array(counts, np.uint32))
         self._volumes = any(image.texels.shape[0] > 1 for image in images)
 
     def lookup(self, image: UInt32, u: Float, v: Float, w: Float, reduction: Float, active: Bool) -> Color3f:
@@ -287,7 +288,7 @@ class Noise:
     """Tachyon's lattice noise on the device."""
 
     def __init__(self) -> None:
-        self._values = mi.Int32(lattice())
+        self._values = upload(lattice())
 
     def at(self, p: Point3f, active: Bool) -> Float:
         """Noise at points: whole numbers from 0 to 12000, mirrored about the planes through the origin.

@@ -1,0 +1,41 @@
+"""Operations whose plain form compiles to slow code on the CPU."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from lippmann.device.types import Array
+
+
+def upload(values: NDArray[Any]) -> Array:
+    """A flat table on the device in memory of its own: Float, Int32 or UInt32 by the type of ``values``.
+
+    On the CPU Dr.Jit reads a NumPy array where it lies. It is not aligned there as packets of loads need it, so every
+    look-up of a row would become one slow gather a column.
+    """
+    kinds = {"f": (mi.Float, np.float32), "i": (mi.Int32, np.int32), "u": (mi.UInt32, np.uint32)}
+    device_type, dtype = kinds[values.dtype.kind]
+    table = device_type(np.ascontiguousarray(values, dtype).ravel())
+    if len(table):
+        table = table + dr.opaque(device_type, 0)
+        dr.eval(table)
+        dr.sync_thread()  # the caller may write into its array again
+    return table
+
+
+def smaller(a: Array, b: Array) -> Array:
+    """The smaller of two numbers; ``b`` where one is NaN.
+
+    One instruction. ``dr.minimum`` is several on x86, because its result is NaN where either is.
+    """
+    return dr.select(a < b, a, b)
+
+
+def larger(a: Array, b: Array) -> Array:
+    """The larger of two numbers; ``b`` where one is NaN. See :func:`smaller`."""
+    return dr.select(a > b, a, b)

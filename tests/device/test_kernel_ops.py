@@ -1,0 +1,59 @@
+"""Operations in their fast form: the same numbers, and the fast code."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+pytestmark = pytest.mark.usefixtures("engine")
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64, np.int64, np.uint32])
+def test_upload_keeps_the_values(dtype):
+    from lippmann.device.kernel_ops import upload
+
+    values = np.array([[0, 1], [2**24 - 1, 3]], dtype)
+    np.testing.assert_array_equal(np.array(upload(values)), values.ravel())
+
+
+def test_upload_of_nothing():
+    from lippmann.device.kernel_ops import upload
+
+    assert len(upload(np.zeros((0, 4)))) == 0
+
+
+def test_uploaded_tables_do_not_follow_the_array():
+    from lippmann.device.kernel_ops import upload
+
+    values = np.arange(64, dtype=np.float32)
+    table = upload(values)
+    values[:] = -1
+    np.testing.assert_array_equal(np.array(table), np.arange(64))
+
+
+def test_rows_of_uploaded_tables_are_fetched_in_packets():
+    """One packet of loads, no masked gather of single columns."""
+    import drjit as dr
+    import mitsuba as mi
+
+    from lippmann.device.kernel_ops import upload
+
+    if not mi.variant().startswith("llvm"):
+        pytest.skip("packets of loads are for the CPU")
+    table = upload(np.arange(4096, dtype=np.float32))
+    index = dr.arange(mi.UInt32, 512) * 3 % 1024
+    dr.eval(index)
+    with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
+        dr.eval(dr.gather(mi.Vector4f, table, index))
+        (kernel,) = [k for k in dr.kernel_history() if "ir" in k]
+    assert "masked.gather" not in str(kernel["ir"].getvalue() if hasattr(kernel["ir"], "getvalue") else kernel["ir"])
+
+
+def test_smaller_and_larger():
+    import mitsuba as mi
+
+    from lippmann.device.kernel_ops import larger, smaller
+
+    a, b = mi.Float([1, 5, np.nan]), mi.Float([2, -3, 7])
+    assert np.array(smaller(a, b)).tolist() == [1, -3, 7]
+    assert np.array(larger(a, b)).tolist() == [2, 5, 7]
