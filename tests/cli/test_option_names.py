@@ -23,6 +23,7 @@ OTHER_PROGRAMS = {
     "scene/mitsuba_plugins.py",
     "reproduce/style.py",
     "cluster/worker_preload.py",
+    "runtime/llvm_install.py",
 }
 #: Whole commands, named as such.
 COMMANDS = re.compile(r"lippmann (?:export|compare)[\w `-]*--\w+|``--json``")
