@@ -55,6 +55,17 @@ def test_pairs_along_a_sweep_and_a_head_path(lippmann, picture, tmp_path):
         assert animation.n_frames == 2
 
 
+@pytest.mark.parametrize(("codec", "name"), [("hevc", "hevc"), ("av1", "av1")])
+def test_a_sweep_in_another_codec(lippmann, picture, tmp_path, codec, name):
+    import av
+
+    out = tmp_path / "pairs.mp4"
+    words = ("--sweep", "--frames", 2, "--sbs", "half", "--size", "64x48", "-o", out)
+    assert lippmann("replay", picture, "--codec", codec, *words).code == 0
+    with av.open(str(out)) as video:
+        assert video.streams.video[0].codec_context.codec.canonical_name == name
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [
@@ -62,6 +73,8 @@ def test_pairs_along_a_sweep_and_a_head_path(lippmann, picture, tmp_path):
         (("--eyes", "60"), "--eyes: there is one eye"),
         (("--anaglyph", "--eyes", "-1"), "--eyes: -1 mm is out of range"),
         (("--sbs", "wide"), "'wide'"),
+        (("--codec", "av1"), "--codec: applies to an animation only"),
+        (("--codec", "av1", "--sweep"), "--codec: only MP4 has a choice of codecs"),
         (("--path", "none.csv"), "none.csv: cannot be read"),
         (("--path", "none.csv", "--sweep"), "--path: the path says where the eye is"),
         (("--path", "none.csv", "--sweep-width", "9"), "--sweep-width: applies to a sweep only"),

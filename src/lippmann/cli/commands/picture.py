@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from lippmann.cli.commands.quilt import Aspect, Layout, layout_of
+from lippmann.cli.commands.sequence import Codec
 from lippmann.cli.shared import options, parse
 from lippmann.cli.shared.console import Console, estimate_in_words
 from lippmann.cli.shared.default_output import output_of
@@ -147,6 +148,7 @@ def replay(
     ] = None,
     anaglyph: Annotated[bool, typer.Option("--anaglyph", help="Two eyes in one picture for red-cyan glasses.")] = False,
     eyes: Annotated[float | None, typer.Option("--eyes", help="Distance between the two eyes in mm; 63.")] = None,
+    codec: Codec = None,
     size: Size = None,
     filter: Filter = "nearest",
     layout: Layout = None,
@@ -173,9 +175,11 @@ def replay(
     moves = sweep or path is not None
     output = output_of(output, picture, "-sweep.png" if moves else "-seen.png")
     if moves:
-        check_animation_path(output)
+        check_animation_path(output, codec)
         check_writable(output)
     else:
+        if codec is not None:
+            raise UsageError("applies to an animation only", where="--codec", fix="add --sweep, or leave it out")
         check_output(output, format_for(output, bits)[0])
     if width is not None and not sweep:
         raise UsageError("applies to a sweep only", where="--sweep-width", fix="add --sweep")
@@ -209,7 +213,7 @@ def replay(
         reach = _field_width(target, position[2]) if width is None else width
         start, stop = ((position[0] + side * reach / 2, *position[1:]) for side in (-1, 1))
         places = path_of_eye(start, stop, frames)
-    write_animation((seen_from(place) for place in places), output, transfer=transfer)
+    write_animation((seen_from(place) for place in places), output, transfer=transfer, codec=codec)
     start, stop = places[0], places[-1]
     result |= {"frames": len(places), "start": list(start), "stop": list(stop)}
     console.result(result, f"{output}: {len(places)} frames, seen{by} from {_position(start)} to {_position(stop)}")

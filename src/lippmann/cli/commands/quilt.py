@@ -111,6 +111,7 @@ def render(
     swing: sequence.Swing = None,
     video: sequence.Video = None,
     eye: sequence.Eye = None,
+    codec: sequence.Codec = None,
     device: options.Device = "auto",
     threads: options.Threads = None,
     memory: options.Memory = None,
@@ -129,7 +130,7 @@ def render(
     target = load_display(display)
     grid = None if views is None else parse.size(views, "--views", rule="columns x rows, such as 8x6")
     wanted = quilt_of_display(target, grid, None if size is None else parse.size(size, "--size"))
-    moving = sequence.Wanted(frames, fps, animation, camera_path, turntable, swing, video, eye)
+    moving = sequence.Wanted(frames, fps, animation, camera_path, turntable, swing, video, eye, codec)
     path = output or Path(f"{Path(scene).stem}{'' if moving else f'{wanted.layout.ending}.png'}")
     if not moving or (path.suffix and not path.is_dir()):
         _check_name(path, wanted.layout.ending)

@@ -106,6 +106,7 @@ def render(
     swing: sequence.Swing = None,
     video: sequence.Video = None,
     eye: sequence.Eye = None,
+    codec: sequence.Codec = None,
     device: options.Device = "auto",
     threads: options.Threads = None,
     memory: options.Memory = None,
@@ -130,7 +131,7 @@ def render(
         index=index,
         field=field,
     )
-    wanted = sequence.Wanted(frames, fps, animation, camera_path, turntable, swing, video, eye)
+    wanted = sequence.Wanted(frames, fps, animation, camera_path, turntable, swing, video, eye, codec)
     margin = printing.margin_of(marks, target, in_frames=bool(wanted))
     output = output_of(output, scene, "-frames" if wanted else ".png")
     if opens and wanted and video is None:
