@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from lippmann.display import NUMPY, Display, LensArray, Panel
 from lippmann.errors import UsageError
 from lippmann.image import IntegralImage
+from lippmann.viewing import stereo
 from lippmann.viewing.replay import replay
 from lippmann.viewing.stereo import (
     DUBOIS_LEFT,
@@ -74,8 +77,8 @@ def test_each_eye_has_its_own_place_and_no_other_light():
     def see(eye):
         return np.full((2, 4, 3), 1.0 if eye[0] < 0 else 0.0, dtype=np.float32)
 
-    for stereo, width in (("full", 8), ("half", 4)):
-        pair = stereo_pair(see, (0, 0, 600), stereo)
+    for kind, width in (("full", 8), ("half", 4)):
+        pair = stereo_pair(see, (0, 0, 600), kind)
         assert pair.shape == (2, width, 3)
         assert np.all(pair[:, : width // 2] == 1)
         assert np.all(pair[:, width // 2 :] == 0)
@@ -139,6 +142,19 @@ def test_bad_head_paths_are_refused_in_one_line(tmp_path, text, said):
     with pytest.raises(UsageError, match=said) as caught:
         head_path(path)
     assert "\n" not in str(caught.value)
+
+
+def test_a_head_path_that_is_too_long(tmp_path, monkeypatch):
+    path = tmp_path / "path.csv"
+    path.write_text("0,0,600\n" * 5)
+    monkeypatch.setattr(stereo, "MOST_POSITIONS", 4)
+    with pytest.raises(UsageError, match="too many positions; at most 4"):
+        head_path(path)
+    monkeypatch.setattr(stereo, "MOST_BYTES", 39)
+    with pytest.raises(UsageError, match="is too large; at most 39 bytes"):
+        head_path(path)
+    with pytest.raises(UsageError, match="is a device, no file"):
+        head_path(Path("/dev/zero"))
 
 
 def test_a_head_path_that_cannot_be_read(tmp_path):

@@ -141,7 +141,7 @@ def _of_system(
 
 def _conda(host: Host, tools: Tools) -> Remedy | None:
     """conda-forge's package, where the running Python lies in a conda environment."""
-    if not (host.root / Path(host.prefix).relative_to(Path(host.prefix).anchor) / "conda-meta").is_dir():
+    if not (host.at(host.prefix) / "conda-meta").is_dir():
         return None
     package = f"libllvm-c{VERSION}" if host.system == "win32" else f"libllvm{VERSION}"
     words = ("install", "--yes", "--prefix", host.prefix, "--channel", "conda-forge", package)

@@ -53,21 +53,21 @@ class Host:
 
     def folders(self) -> list[Path]:
         """Folders in which LLVM libraries are usually installed, each once, the nearest to the user first."""
-        found = [self._at(entry) for entry in self._loader_path()]
+        found = [self.at(entry) for entry in self._loader_path()]
         inside = "Library/bin" if self.system == "win32" else "lib"
         homes = [self.prefix, self.environment.get("CONDA_PREFIX", "")]
-        found += [self._at(home) / inside for home in homes if home]
+        found += [self.at(home) / inside for home in homes if home]
         found += {"darwin": self._mac, "win32": self._windows}.get(self.system, self._linux)()
         return list(dict.fromkeys(found))
 
-    def _at(self, path: str) -> Path:
+    def at(self, path: str) -> Path:
         """``path`` below :attr:`root`."""
         return (
             Path(path) if self.root == Path("/") else self.root / path.replace("\\", "/").lstrip("/").replace(":", "")
         )
 
     def _glob(self, folder: str, pattern: str) -> list[Path]:
-        return sorted(self._at(folder).glob(pattern))
+        return sorted(self.at(folder).glob(pattern))
 
     def _loader_path(self) -> list[str]:
         variable = {"darwin": "DYLD_LIBRARY_PATH", "win32": "PATH"}.get(self.system, "LD_LIBRARY_PATH")
@@ -78,7 +78,7 @@ class Host:
 
     def _linux(self) -> list[Path]:
         fixed = [f"/usr/lib/{self.processor}-linux-gnu", "/usr/lib64", "/usr/lib", "/usr/local/lib", "/usr/local/lib64"]
-        found = [self._at(name) for name in fixed]
+        found = [self.at(name) for name in fixed]
         for folder, pattern in (
             ("/usr/lib", "llvm*/lib"),
             ("/usr/lib", "llvm/*/lib*"),
@@ -97,7 +97,7 @@ class Host:
         for prefix in dict.fromkeys([own, *usual] if own else usual):
             found += self._glob(f"{prefix}/opt", "llvm*/lib")
         found += self._glob("/opt/local/libexec", "llvm-*/lib")
-        return [*found, self._at("/opt/local/lib"), self._at("/usr/local/lib")]
+        return [*found, self.at("/opt/local/lib"), self.at("/usr/local/lib")]
 
     def _windows(self) -> list[Path]:
         found = []
@@ -109,5 +109,5 @@ class Host:
             ("ProgramData", "scoop/apps/llvm/current/bin"),
         ):
             if self.environment.get(variable):
-                found.append(self._at(self.environment[variable]) / inside)
+                found.append(self.at(self.environment[variable]) / inside)
         return found

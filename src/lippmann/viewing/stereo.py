@@ -17,6 +17,7 @@ import numpy as np
 from lippmann.errors import UsageError
 from lippmann.image.picture import Picture
 from lippmann.image.stored_values import FloatArray
+from lippmann.runtime.regular_file import check_kind
 from lippmann.viewing.replay import Eye, Filter, checked_eye, default_eye, replay
 
 #: How a pair becomes one picture: side by side at full or half width, or for red-cyan glasses.
@@ -29,8 +30,9 @@ EYE_DISTANCE = 63.0
 #: Largest distance between two eyes, mm: wide bases are used for distant scenes.
 WIDEST_EYES = 1000.0
 
-#: Most positions of a head path.
+#: Most positions of a head path, and most bytes of its file.
 MOST_POSITIONS = 100_000
+MOST_BYTES = 1 << 24
 
 #: Least-squares projection for red-cyan glasses, for the left and the right picture in linear RGB: E. Dubois, "A
 #: projection method to generate anaglyph stereo images", Proc. ICASSP (2001); the numbers for a display with sRGB's
@@ -138,7 +140,10 @@ def head_path(file: Path) -> list[Eye]:
         If the file cannot be read, a line is no position before the lens plane, or there are none or too many.
     """
     places: list[Eye] = []
+    check_kind(file, UsageError)
     try:
+        if file.stat().st_size > MOST_BYTES:
+            raise UsageError("is too large", where=str(file), rule=f"at most {MOST_BYTES} bytes")
         with file.open(encoding="utf-8") as lines:
             for number, line in enumerate(lines, 1):
                 text = line.strip()
