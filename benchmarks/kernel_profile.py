@@ -9,9 +9,9 @@ random numbers and bookkeeping. Parts overlap in a processor, so that shares are
 *Lanes at work*: a vector unit goes on until the longest of its 16 paths has ended; the share of its lanes that have
 still something to do.
 
-*Before*: opaque surfaces without an acceleration structure of their own where others let rays straight through, look-ups
-of all photons about a point by every sample, and photons in NumPy's memory, whose rows cannot be fetched at once
-(:mod:`lippmann.rendering.transport.shadow_rays`, ``PHOTON_PARTS`` of :mod:`lippmann.rendering.transport.path`,
+*Before*: opaque surfaces without an acceleration structure of their own where others let rays straight through,
+look-ups of all photons about a point by every sample, and photons in NumPy's memory, whose rows cannot be fetched at
+once (:mod:`lippmann.rendering.transport.shadow_rays`, ``PHOTON_PARTS`` of :mod:`lippmann.rendering.transport.path`,
 :mod:`lippmann.device.kernel_ops`).
 
 python benchmarks/kernel_profile.py [--scenes NAME,...]
