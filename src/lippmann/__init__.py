@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from lippmann.scene.placement import PlacementOptions
     from lippmann.scene.scene import Scene
     from lippmann.viewing.focal_stack import focal_stack
+    from lippmann.viewing.stereo import replay_stereo
 
 __version__ = _version.VERSION
 
@@ -44,6 +45,7 @@ _HOME = {
     "RenderRequest": "lippmann.rendering.request.render_request",
     "Scene": "lippmann.scene.scene",
     "focal_stack": "lippmann.viewing.focal_stack",
+    "replay_stereo": "lippmann.viewing.stereo",
 }
 
 __all__ = [
@@ -68,6 +70,7 @@ __all__ = [
     "render_quilt",
     "render_to_file",
     "render_turntable",
+    "replay_stereo",
 ]
 
 

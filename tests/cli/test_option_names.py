@@ -16,13 +16,14 @@ from lippmann.errors import UsageError
 assert app  # whose making says which commands there are
 SOURCE = Path(package.__file__).parent
 #: Parameters of the library that no command has.
-OF_THE_LIBRARY = {"form", "effort"}
+OF_THE_LIBRARY = {"form", "effort", "stereo"}
 #: Files whose texts are for other programs: pip, a style sheet's variables, Dask's own command.
 OTHER_PROGRAMS = {
     "runtime/engine.py",
     "scene/mitsuba_plugins.py",
     "reproduce/style.py",
     "cluster/worker_preload.py",
+    "runtime/llvm_install.py",
 }
 #: Whole commands, named as such.
 COMMANDS = re.compile(r"lippmann (?:export|compare)[\w `-]*--\w+|``--json``")

@@ -99,7 +99,10 @@ EXAMPLES: Mapping[str, tuple[str, ...]] = {
         "lippmann micro-images model.exr -o lenses",
     ),
     "compose": ("lippmann compose views -o again.png", "lippmann compose lenses -o again.exr --bits 32"),
-    "replay": ("lippmann replay model.png --sweep", "lippmann replay model.png --eye 20,0,600 -o left.png"),
+    "replay": (
+        "lippmann replay model.png --sweep",
+        "lippmann replay model.png --sbs half --eye 20,0,600 -o pair.png",
+    ),
     "refocus": (
         "lippmann refocus model.png --plane -20 -o back.png",
         "lippmann refocus model.exr --planes -40:40:9 -o stack",
