@@ -57,16 +57,19 @@ def load_scene(
     background: tuple[float, float, float] | None = None,
     allow_outside: bool = False,
     multiple_scattering: bool = True,
-    up: Literal["y", "z"] | None = None,
+    up: Literal["y", "z", "-y"] | None = None,
+    crop: tuple[float, float, float, float, float, float] | None = None,
+    unit_scale: float | None = None,
+    min_opacity: float | None = None,
 ) -> Scene:
     """Load a scene from a file, a bundled scene's name, or an object of another library.
 
     Parameters
     ----------
     source:
-        Path of a ``.glb``, ``.gltf``, ``.obj``, ``.ply``, ``.stl``, Mitsuba ``.xml``, Tachyon ``.dat`` or ``.nff``
-        file; name of a bundled scene; a
-        ``mi.Scene`` or Mitsuba dict; a trimesh scene or mesh; a PyVista mesh; a
+        Path of a ``.glb``, ``.gltf``, ``.obj``, ``.ply``, ``.spz``, ``.sog``, ``.stl``, Mitsuba ``.xml``, Tachyon
+        ``.dat`` or ``.nff`` file; name of a bundled scene; a ``mi.Scene`` or Mitsuba dict; a
+        trimesh scene or mesh; a PyVista mesh; a
         :class:`~lippmann.scene.values.description.SceneDescription`.
     environment:
         An equirectangular EXR or HDR file (or an ``Environment``) that lights the scene in place of its own.
@@ -78,8 +81,16 @@ def load_scene(
         Give back the light that rough surfaces reflect more than once between microfacets. False: as dark as glTF's
         formulas make them.
     up:
-        ``y`` or ``z``: the axis that points up in a file that does not say so. By default ``y`` in OBJ and PLY files,
-        ``z`` in STL files.
+        ``y``, ``z`` or ``-y``: the axis that points up in a file that does not say so. By default ``y`` in OBJ, PLY and
+        SPZ files, ``z`` in STL files, ``-y`` in PLY files of Gaussian splats and in SOG files.
+    crop:
+        Of Gaussian splats those are kept whose centres lie in the box from ``(x0, y0, z0)`` to ``(x1, y1, z1)``, all in
+        one tuple: coordinates with +y up, after ``unit_scale``.
+    unit_scale:
+        Factor on the coordinates of Gaussian splats, whose files have no unit: what one of their units is in the unit
+        that ``crop`` and placements shall count in.
+    min_opacity:
+        Leave out Gaussian splats of less opacity, 0 to 1: most floaters are faint.
 
     Raises
     ------
@@ -93,6 +104,9 @@ def load_scene(
         allow_outside=allow_outside,
         multiple_scattering=multiple_scattering,
         up=up,
+        crop=crop,
+        unit_scale=unit_scale,
+        min_opacity=min_opacity,
     )
 
 

@@ -149,8 +149,19 @@ class Session:
         """
         return self.watch.stage(
             "build",
-            lambda: self._prepare_light(_make_integrator(self.built, self.request, frame_from_world, source), source),
+            lambda: self._before_splats(
+                self._prepare_light(_make_integrator(self.built, self.request, frame_from_world, source), source)
+            ),
         )
+
+    def _before_splats(self, integrator: Integrator) -> Integrator:
+        from lippmann.device.pbr import BuiltScene
+        from lippmann.rendering.transport.splats import SplatIntegrator
+
+        built = self.built
+        if not isinstance(built, BuiltScene) or built.splats is None:
+            return integrator
+        return SplatIntegrator(integrator, built, built.splats, self.engine.threads)
 
     def _prepare_light(self, integrator: Integrator, source: RaySource) -> Integrator:
         from lippmann.rendering.film.exposure import gain_of, measure_exposure

@@ -13,6 +13,7 @@ from lippmann.runtime.cached_property import cached_property
 from lippmann.scene.extreme_points import extreme_points_of, used_positions
 from lippmann.scene.mitsuba_source import MitsubaSource
 from lippmann.scene.parsing.name_hints import closest_name_hint
+from lippmann.scene.splat_clouds import check_splats, typical_points
 from lippmann.scene.values.description import Camera, Color, Environment, Material, Matrix, Mesh, SceneDescription
 from lippmann.scene.values.whitted_scene import ClassicScene
 from lippmann.scene.whitted.world_frame import world_bounds
@@ -151,6 +152,11 @@ class Scene:
         return isinstance(description, SceneDescription) and description.physical_lights
 
     @property
+    def has_splats(self) -> bool:
+        """Whether there are Gaussian splats."""
+        return isinstance(self.description, SceneDescription) and self.description.splats is not None
+
+    @property
     def in_studio(self) -> bool:
         """Whether the built-in studio lights the scene, for want of other light."""
         return self.studio and not self.has_lights
@@ -270,7 +276,7 @@ def box(bounds: Bounds) -> tuple[Bounds, Bounds]:
 
 
 def bounds_of(description: SceneDescription, frame: Matrix | None = None) -> Bounds:
-    """The box ``(2, 3)`` around all vertices that some triangle of some instance uses.
+    """The box ``(2, 3)`` around all vertices that some triangle of some instance uses, and most splats.
 
     Its sides run along the axes of the world, or of the frame that the 4x4 matrix ``frame`` (from world) leads to.
 
@@ -287,6 +293,8 @@ def bounds_of(description: SceneDescription, frame: Matrix | None = None) -> Bou
         if len(points) and len(places):
             points = points if exact else box_corners(np.stack([points.min(axis=0), points.max(axis=0)]))
             boxes.append(_box_of_copies(points, places, frame))
+    if description.splats is not None:
+        boxes.append(_box_of_copies(typical_points(description.splats), np.eye(4)[None], frame))
     if not boxes:
         raise SceneError("the scene holds no triangles", where=description.name, rule="there must be something to see")
     return np.stack([np.min(boxes, axis=0)[0], np.max(boxes, axis=0)[1]])
@@ -319,9 +327,9 @@ def has_lights(description: SceneDescription) -> bool:
         return True
     indices = {description.meshes[mesh].material for mesh in description.placements}
     materials = [description.materials[index] for index in indices]
-    return any(max(material.emission) > 1.0 for material in materials) or (
-        bool(materials) and all(material.unlit for material in materials)
-    )
+    if not materials:
+        return description.splats is not None  # which nothing lights
+    return any(max(material.emission) > 1.0 for material in materials) or all(material.unlit for material in materials)
 
 
 def check_description(description: SceneDescription, where: str) -> SceneDescription:
@@ -344,7 +352,11 @@ def check_description(description: SceneDescription, where: str) -> SceneDescrip
     matrices = [np.reshape(instance.world_from_mesh, (-1, 16)) for instance in description.instances]
     if matrices and not np.isfinite(np.concatenate(matrices)).all():  # all at once: there may be a million
         raise _no_matrix(next(number for number, own in enumerate(matrices) if not np.isfinite(own).all()), where)
-    if not any(len(places) and len(description.meshes[mesh].faces) for mesh, places in description.placements.items()):
+    if description.splats is not None:
+        check_splats(description.splats, where)
+    elif not any(
+        len(places) and len(description.meshes[mesh].faces) for mesh, places in description.placements.items()
+    ):
         raise SceneError("the scene has no geometry", where=where, rule="there must be at least one triangle")
     return description
 

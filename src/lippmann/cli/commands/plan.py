@@ -27,6 +27,9 @@ def plan(
         typer.Option("--method", help="auto and pooled: light is pooled; full: every ray is traced, for references."),
     ] = "auto",
     up: options.Up = None,
+    crop: options.Crop = None,
+    unit_scale: options.UnitScale = None,
+    min_opacity: options.MinOpacity = None,
     integrator: options.Integrator = "auto",
     depth: options.Depth = None,
     spp: options.Spp = None,
@@ -97,7 +100,10 @@ def plan(
         threads=threads,
         memory=parse.memory(memory),
     )
-    source = SceneSource(scene, environment, parse.color(background), allow_outside, single_scattering, up)
+    source = SceneSource(
+        *(scene, environment, parse.color(background), allow_outside, single_scattering, up),
+        *(parse.crop(crop), unit_scale, min_opacity),
+    )
     with console.progress() as progress:
         loaded = source.load()
         found = forecast(loaded, target, request, progress)

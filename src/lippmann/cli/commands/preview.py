@@ -36,6 +36,9 @@ def preview(
         str | None, typer.Option("--eye", help="The eye's place: X,Y,Z in mm; by default before the middle.")
     ] = None,
     up: options.Up = None,
+    crop: options.Crop = None,
+    unit_scale: options.UnitScale = None,
+    min_opacity: options.MinOpacity = None,
     integrator: options.Integrator = "auto",
     depth: options.Depth = None,
     spp: options.Spp = None,
@@ -104,7 +107,10 @@ def preview(
         threads=threads,
         memory=parse.memory(memory),
     )
-    source = SceneSource(scene, environment, parse.color(background), allow_outside, single_scattering, up)
+    source = SceneSource(
+        *(scene, environment, parse.color(background), allow_outside, single_scattering, up),
+        *(parse.crop(crop), unit_scale, min_opacity),
+    )
     with console.progress() as progress:
         started = time.perf_counter()
         loaded = source.load()

@@ -74,6 +74,9 @@ def render(
     size: Size = None,
     method: Method = "auto",
     up: options.Up = None,
+    crop: options.Crop = None,
+    unit_scale: options.UnitScale = None,
+    min_opacity: options.MinOpacity = None,
     integrator: options.Integrator = "auto",
     depth: options.Depth = None,
     spp: options.Spp = None,
@@ -158,7 +161,10 @@ def render(
         threads=threads,
         memory=parse.memory(memory),
     )
-    source = SceneSource(scene, environment, parse.color(background), allow_outside, single_scattering, up)
+    source = SceneSource(
+        *(scene, environment, parse.color(background), allow_outside, single_scattering, up),
+        *(parse.crop(crop), unit_scale, min_opacity),
+    )
     if moving:
         from lippmann.sequences.forms import QuiltForm
 

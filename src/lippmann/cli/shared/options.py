@@ -41,13 +41,42 @@ PictureDisplay = Annotated[
 Scene = Annotated[
     str,
     typer.Argument(
-        help="A .glb, .gltf, .obj, .ply, .stl, Mitsuba .xml, Tachyon .dat or .nff file, or a bundled scene's name.",
+        help="A .glb, .gltf, .obj, .ply, .spz, .sog, .stl, Mitsuba .xml, Tachyon .dat or .nff file, or the name of a "
+        "bundled scene.",
         autocompletion=complete_scenes,
     ),
 ]
 Up = Annotated[
-    Literal["y", "z"] | None,
-    typer.Option("--up", help="Which axis points up in OBJ, PLY (y by default) and STL files (z).", show_default=False),
+    Literal["y", "z", "-y"] | None,
+    typer.Option(
+        "--up",
+        help="Which axis points up in OBJ, PLY (y by default), STL (z) and splat files (-y; of .spz y).",
+        show_default=False,
+    ),
+]
+Crop = Annotated[
+    str | None,
+    typer.Option(
+        "--crop",
+        help="Of Gaussian splats, keep those in the box X0,Y0,Z0,X1,Y1,Z1 (y up, after --unit-scale).",
+        show_default=False,
+    ),
+]
+UnitScale = Annotated[
+    float | None,
+    typer.Option(
+        "--unit-scale",
+        help="Factor on the coordinates of Gaussian splats, whose files have no unit: for --crop and --place display.",
+        show_default=False,
+    ),
+]
+MinOpacity = Annotated[
+    float | None,
+    typer.Option(
+        "--min-opacity",
+        help="Leave out Gaussian splats of less opacity (0 to 1): most floaters are faint.",
+        show_default=False,
+    ),
 ]
 Integrator = Annotated[
     choices.Integrator,

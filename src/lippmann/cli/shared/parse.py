@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from lippmann.display import Display
     from lippmann.rendering.request.choices import ToneMap
     from lippmann.scene.placement import PlacementOptions
+    from lippmann.scene.splat_selection import Crop
 
 #: Endings of formats for data, whose values are not for the eye alone.
 _DATA = (".exr", ".tif", ".tiff", ".zarr")
@@ -104,6 +105,14 @@ def number(text: str, option: str, rule: str) -> float:
 def color(text: str | None) -> tuple[float, float, float] | None:
     """A background colour from what was typed."""
     return None if text is None else triple(text, "--background")
+
+
+def crop(text: str | None) -> Crop | None:
+    """A box from what was typed."""
+    if text is None:
+        return None
+    x0, y0, z0, x1, y1, z1 = numbers(text, "--crop", (6,))
+    return x0, y0, z0, x1, y1, z1
 
 
 def display(name: str | None) -> Display | None:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from lippmann.scene.readers.load import Up
     from lippmann.scene.scene import Scene
+    from lippmann.scene.splat_selection import Crop
 
 
 @dataclass(frozen=True)
@@ -21,6 +22,9 @@ class SceneSource:
     allow_outside: bool = False
     single_scattering: bool = False
     up: Up | None = None
+    crop: Crop | None = None
+    unit_scale: float | None = None
+    min_opacity: float | None = None
 
     def load(self) -> Scene:
         """The scene.
@@ -39,4 +43,7 @@ class SceneSource:
             allow_outside=self.allow_outside,
             multiple_scattering=not self.single_scattering,
             up=self.up,
+            crop=self.crop,
+            unit_scale=self.unit_scale,
+            min_opacity=self.min_opacity,
         )

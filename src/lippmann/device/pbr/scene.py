@@ -17,6 +17,7 @@ from lippmann.device.pbr.media import MEDIA_NOTE, has_media
 from lippmann.device.pbr.shapes import Dress, has_volume, make_shapes
 from lippmann.device.pbr.straight_through import has_null, may_pass
 from lippmann.device.pbr.textures import TextureStore
+from lippmann.device.splats.table import SplatTable, make_table
 from lippmann.device.types import Emitter, MitsubaScene, Shape
 from lippmann.errors import SceneError
 from lippmann.runtime import engine as engines
@@ -45,6 +46,8 @@ class BuiltScene:
         Whether the ``mi.Scene`` is the caller's own, which nothing may change.
     has_media:
         Whether there are participating media.
+    splats:
+        Gaussian splats that can be seen, which are no part of the ``mi.Scene``.
     notes:
         What could not be honoured, one line each.
     seconds:
@@ -60,6 +63,7 @@ class BuiltScene:
     seconds: Mapping[str, float]
     borrowed: bool = False
     has_media: bool = False
+    splats: SplatTable | None = None
 
 
 def build(scene: Scene, engine: engines.Engine | None = None, *, memory: int | None = None) -> BuiltScene:
@@ -99,7 +103,7 @@ def build_description(description: SceneDescription, *, memory: int | None = Non
     seconds: dict[str, float] = {}
     notes: list[str] = []
     placed = _placements(description, notes)
-    if not placed:
+    if not placed and description.splats is None:
         raise SceneError(
             "the scene has no geometry", where=description.name, rule="there must be at least one triangle"
         )
@@ -110,6 +114,10 @@ def build_description(description: SceneDescription, *, memory: int | None = Non
         dressed = [(_dress(description, mesh, finishes), matrices) for mesh, matrices in placed.items()]
         available = machine.available_memory() if memory is None else memory
         shapes, shape_finishes = make_shapes(dressed, available, name=description.name)
+    splats = None
+    if description.splats is not None:
+        with _time_stage(seconds, "splats"):
+            splats = make_table(description.splats, available, name=description.name)
     with _time_stage(seconds, "lights"):
         lights = [light_object(light) for light in description.lights if max(light.color) > 0]
         if description.environment is not None:
@@ -123,6 +131,7 @@ def build_description(description: SceneDescription, *, memory: int | None = Non
         has_null=any(has_null(finish.bsdf) for finish in finishes.values()),
         notes=tuple(notes),
         seconds=seconds,
+        splats=splats,
     )
 
 
