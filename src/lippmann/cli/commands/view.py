@@ -22,8 +22,8 @@ from lippmann.runtime.temporary_names import scratch_folder
 if TYPE_CHECKING:
     from lippmann.display import Display
     from lippmann.quilts.quilt import QuiltLayout
-    from lippmann.viewer.http_server import Site
     from lippmann.viewer.manifest import TileFormat
+    from lippmann.viewer.responses import Site
     from lippmann.viewer.served_picture import PictureFile
 
 Other = Annotated[Path | None, typer.Argument(help="Second picture to compare, behind a divider.")]
@@ -172,7 +172,8 @@ def serve(
     """
     import webbrowser  # as socket below: not for --help
 
-    from lippmann.viewer.http_server import WebServer, is_loopback
+    from lippmann.viewer.http_server import WebServer
+    from lippmann.viewer.request_guard import is_loopback
 
     with WebServer(site, host, port) as server:
         # The address is printed last: its reader may send Ctrl-C at once.
