@@ -60,6 +60,7 @@ ORDER = (
     "rendering.reprojection.lenticular",
     "rendering.reprojection",
     "rendering",
+    "rendering.live",
     "viewing",
     "tiles",
     "cluster",

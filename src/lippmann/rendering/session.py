@@ -103,22 +103,27 @@ class Session:
         UsageError, SceneError
             As :func:`lippmann.scene.placement.place`.
         """
-        scene, placement = self.scene, self.request.placement
-        if not isinstance(placement, Placement):
-            placement = place(
-                scene.bounds,
-                display,
-                cameras=scene.cameras,
-                options=placement,
-                home_camera=scene.display_camera,
-                contains_home=scene.home_may_move,
-                bounds_in=scene.bounds_in,
-                extreme_points=lambda: scene.extreme_points,
-                is_unbounded=scene.is_unbounded,
-                probe=self._probe_depth,
-            )
+        placement = self.find_place(display)
         self.face_viewer(rotation_of(placement.world_from_display))
         return placement
+
+    def find_place(self, display: Display) -> Placement:
+        """As :meth:`place`, leaving the light as it is."""
+        scene, placement = self.scene, self.request.placement
+        if isinstance(placement, Placement):
+            return placement
+        return place(
+            scene.bounds,
+            display,
+            cameras=scene.cameras,
+            options=placement,
+            home_camera=scene.display_camera,
+            contains_home=scene.home_may_move,
+            bounds_in=scene.bounds_in,
+            extreme_points=lambda: scene.extreme_points,
+            is_unbounded=scene.is_unbounded,
+            probe=self._probe_depth,
+        )
 
     def face_viewer(self, world_from_viewer: Matrix) -> None:
         """Turn light that follows the viewer, such as the studio's, by a rotation ``(4, 4)``."""
@@ -149,7 +154,7 @@ class Session:
         """
         return self.watch.stage(
             "build",
-            lambda: self._prepare_light(_make_integrator(self.built, self.request, frame_from_world, source), source),
+            lambda: self._prepare_light(make_integrator(self.built, self.request, frame_from_world, source), source),
         )
 
     def _prepare_light(self, integrator: Integrator, source: RaySource) -> Integrator:
@@ -349,9 +354,14 @@ def _build(scene: Scene, request: RenderRequest, memory: int) -> BuiltScene | Bu
     return build(scene, memory=memory)
 
 
-def _make_integrator(
-    built: BuiltScene | BuiltClassic, request: RenderRequest, frame_from_world: Matrix, source: RaySource
+def make_integrator(
+    built: BuiltScene | BuiltClassic, request: RenderRequest, frame_from_world: Matrix, source: RaySource | None
 ) -> Integrator:
+    """The integrator that a resolved request names.
+
+    ``source`` and ``frame_from_world`` are those of :meth:`Session.integrator`; without a source emitters are sampled
+    by the scene's own weights.
+    """
     from lippmann.device.whitted.scene import BuiltClassic
     from lippmann.rendering.transport.emitter_weights import make_light_sampler
     from lippmann.rendering.transport.path import PathIntegrator
@@ -377,7 +387,7 @@ def _make_integrator(
             built.mitsuba, background=built.background, has_null=built.has_null, absorption=built.absorption
         )
         integrator = PathIntegrator(built.mitsuba, features, request.surfaces, name=request.integrator)
-        if not built.borrowed:
+        if source is not None and not built.borrowed:
             integrator.light_sampler = make_light_sampler(integrator, source)
         return integrator
     return SurfaceIntegrator(built.mitsuba, cast("SurfaceProperty", request.integrator), frame_from_world)

@@ -22,6 +22,7 @@ from lippmann.device.types import (
     Point2f,
     Properties,
     SurfaceInteraction3f,
+    Transform4f,
     Vector3f,
 )
 from lippmann.errors import SceneError
@@ -114,8 +115,15 @@ def turn_environment(emitter: Emitter, world_from_environment: Matrix) -> None:
 
     parameters = mi.traverse(emitter)
     if "to_world" in parameters:
-        parameters["to_world"] = mi.Transform4f((np.asarray(world_from_environment) @ _HALF_TURN).tolist())
+        parameters["to_world"] = environment_transform(world_from_environment)
         parameters.update()
+
+
+def environment_transform(world_from_environment: Matrix) -> Transform4f:
+    """The ``to_world`` of an emitter of :func:`environment_object` whose surroundings stand so."""
+    import mitsuba as mi
+
+    return mi.Transform4f((np.asarray(world_from_environment) @ _HALF_TURN).tolist())
 
 
 def _rows_for_mitsuba(pixels: NDArray[np.float32]) -> NDArray[np.float32]:
