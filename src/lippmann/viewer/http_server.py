@@ -14,6 +14,7 @@ from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIO
 from lippmann.errors import UsageError
 from lippmann.viewer.request_guard import Application, RequestGuard
 from lippmann.viewer.responses import Site
+from lippmann.viewer.secret_folder import SecretFolder
 from lippmann.viewer.site_application import site_application
 from lippmann.viewer.timed_protocol import IDLE_TIMEOUT, TimedProtocol
 
@@ -55,6 +56,8 @@ class WebServer:
         self.host, self.port = host, int(listener.getsockname()[1])
         self._folder = folder
         application = content if callable(content) else site_application(content)
+        if folder:
+            application = SecretFolder(application, folder)
         self._server = uvicorn.Server(
             uvicorn.Config(
                 RequestGuard(application, host),

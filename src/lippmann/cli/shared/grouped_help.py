@@ -71,7 +71,7 @@ _REST, _HELP = "Options", "--help"
 #: Commands by what one does with them.
 COMMAND_GROUPS: Mapping[str, tuple[str, ...]] = {
     "Render": ("render", "preview", "plan", "quilt"),
-    "Look": ("view", "replay", "refocus", "info", "compare"),
+    "Look": ("studio", "view", "show", "replay", "refocus", "info", "compare"),
     "From and to other pictures": ("interlace", "weave", "views", "micro-images", "compose", "export", "import"),
     "Displays and prints": ("displays", "calibrate", "pitch-test", "marks"),
     "Program": ("doctor", "worker", "reproduce"),
@@ -106,6 +106,8 @@ EXAMPLES: Mapping[str, tuple[str, ...]] = {
     ),
     "export": ("lippmann export model.exr --as hci -o scene", "lippmann export model.exr --as eslf -o scene.png"),
     "import": ("lippmann import scene -o model.exr", "lippmann import scene.png --as eslf -o model.exr"),
+    "studio": ("lippmann studio", "lippmann studio model.glb --display looking-glass-portrait"),
+    "show": ("lippmann show model.png", "lippmann show model.exr --display my-display.toml"),
     "view": ("lippmann view model.png", "lippmann view model.png --export model.html"),
     "interlace": (
         "lippmann interlace photos/*.jpg --lpi 60 --ppi 720 --size 8x10in -o print.tif",
