@@ -44,7 +44,7 @@ _PROGRESS = re.compile(r"(\d{1,3}) %: (.{1,200})")
 #: Options of ``lippmann render`` that quilts, whose views have no sub-pixels, lack.
 _NOT_FOR_QUILTS = ("--subpixels", "--no-subpixels")
 
-_CODE = "from lippmann.cli.shared.render_process import main; main()"
+_CODE = "from lippmann.cli.render_process import main; main()"
 
 
 @dataclass(frozen=True)
