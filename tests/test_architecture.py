@@ -67,6 +67,7 @@ ORDER = (
     "reproduce",
     "viewer",
     "viewer.calibrate",
+    "studio",
     "sequences",
     "api",
     "",
