@@ -43,6 +43,7 @@ if TYPE_CHECKING:
     from lippmann.quilts.quilt import Quilt
     from lippmann.rendering.forecast import Forecast
     from lippmann.rendering.preview import Preview
+    from lippmann.scene.light_options import LightOptions
     from lippmann.scene.values.description import Environment
     from lippmann.tiles.tiled_render import Rendered, Runner
 
@@ -58,6 +59,7 @@ def load_scene(
     allow_outside: bool = False,
     multiple_scattering: bool = True,
     up: Literal["y", "z"] | None = None,
+    light: LightOptions | None = None,
 ) -> Scene:
     """Load a scene from a file, a bundled scene's name, or an object of another library.
 
@@ -80,6 +82,8 @@ def load_scene(
     up:
         ``y`` or ``z``: the axis that points up in a file that does not say so. By default ``y`` in OBJ and PLY files,
         ``z`` in STL files.
+    light:
+        A :class:`~lippmann.scene.light_options.LightOptions`: turns and scales the scene's light.
 
     Raises
     ------
@@ -93,6 +97,7 @@ def load_scene(
         allow_outside=allow_outside,
         multiple_scattering=multiple_scattering,
         up=up,
+        light=light,
     )
 
 

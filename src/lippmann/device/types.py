@@ -44,8 +44,6 @@ Spectrum: TypeAlias = Any
 #: Any array of Dr.Jit's; functions that take one return the same kind.
 Array: TypeAlias = Any
 
-#: ``mi.Transform4f``: an affine map of space.
-Transform4f: TypeAlias = Any
 #: ``mi.Ray3f``: a ray with origin ``o``, unit direction ``d`` and extent ``maxt``.
 Ray3f: TypeAlias = Any
 #: ``mi.Interaction3f``: a point where light scatters.

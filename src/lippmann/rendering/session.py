@@ -11,6 +11,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, TypeVar, cast
 
+import numpy as np
+
 from lippmann._version import VERSION
 from lippmann.display import Display
 from lippmann.errors import UsageError
@@ -40,6 +42,9 @@ if TYPE_CHECKING:
 
 #: Share of the free memory that is used where no limit is given.
 DEFAULT_MEMORY_SHARE = 0.6
+
+#: Views whose depth is kept.
+_MOST_DEPTHS = 64
 
 T = TypeVar("T")
 
@@ -94,6 +99,8 @@ class Session:
     memory: int
     watch: Stopwatch
     choices: dict[str, object] = field(default_factory=dict)
+    #: What cameras see, by their views: those of a scene at rest are asked again and again for displays that move.
+    depths: dict[bytes, VisibleDepth | None] = field(default_factory=dict)
 
     def place(self, display: Display) -> Placement:
         """Where ``display`` stands in the scene; light that follows the viewer is turned toward it.
@@ -107,8 +114,8 @@ class Session:
         self.face_viewer(rotation_of(placement.world_from_display))
         return placement
 
-    def find_place(self, display: Display) -> Placement:
-        """As :meth:`place`, leaving the light as it is."""
+    def find_place(self, display: Display, bounds_in: Callable[[Matrix], Matrix] | None = None) -> Placement:
+        """As :meth:`place`, leaving the light as it is; ``bounds_in`` stands for the scene's, if given."""
         scene, placement = self.scene, self.request.placement
         if isinstance(placement, Placement):
             return placement
@@ -119,7 +126,7 @@ class Session:
             options=placement,
             home_camera=scene.display_camera,
             contains_home=scene.home_may_move,
-            bounds_in=scene.bounds_in,
+            bounds_in=bounds_in or scene.bounds_in,
             extreme_points=lambda: scene.extreme_points,
             is_unbounded=scene.is_unbounded,
             probe=self._probe_depth,
@@ -139,7 +146,14 @@ class Session:
     def _probe_depth(self, view: CameraView) -> VisibleDepth | None:
         from lippmann.rendering.transport.depth_probe import probe_depth
 
-        return self.watch.stage("build", lambda: probe_depth(self.built, view))
+        key = np.array(
+            [*np.ravel(view.world_from_camera), view.half_width, view.half_height, view.is_parallel]
+        ).tobytes()
+        if key not in self.depths:
+            if len(self.depths) >= _MOST_DEPTHS:
+                self.depths.clear()
+            self.depths[key] = self.watch.stage("build", lambda: probe_depth(self.built, view))
+        return self.depths[key]
 
     def integrator(self, source: RaySource, frame_from_world: Matrix) -> Integrator:
         """The integrator that the request names, for the built scene.

@@ -47,6 +47,9 @@ def plan(
     pop_out: options.PopOut = None,
     environment: options.Environment = None,
     background: options.Background = None,
+    light_turn: options.LightTurn = None,
+    light_strength: options.LightStrength = 1.0,
+    environment_strength: options.EnvironmentStrength = 1.0,
     allow_outside: options.AllowOutside = False,
     single_scattering: options.SingleScattering = False,
     lpi: printing.Lpi = None,
@@ -57,6 +60,7 @@ def plan(
     thickness: printing.Thickness = None,
     index: printing.Index = None,
     field: printing.Field = None,
+    state: options.State = None,
     device: options.Device = "auto",
     threads: options.Threads = None,
     memory: options.Memory = None,
@@ -97,7 +101,15 @@ def plan(
         threads=threads,
         memory=parse.memory(memory),
     )
-    source = SceneSource(scene, environment, parse.color(background), allow_outside, single_scattering, up)
+    source = SceneSource(
+        scene,
+        environment,
+        parse.color(background),
+        allow_outside,
+        single_scattering,
+        up,
+        parse.light(light_turn, light_strength, environment_strength),
+    )
     with console.progress() as progress:
         loaded = source.load()
         found = forecast(loaded, target, request, progress)

@@ -97,6 +97,9 @@ def render(
     pop_out: options.PopOut = None,
     environment: options.Environment = None,
     background: options.Background = None,
+    light_turn: options.LightTurn = None,
+    light_strength: options.LightStrength = 1.0,
+    environment_strength: options.EnvironmentStrength = 1.0,
     allow_outside: options.AllowOutside = False,
     single_scattering: options.SingleScattering = False,
     bits: options.Bits = None,
@@ -111,6 +114,7 @@ def render(
     swing: sequence.Swing = None,
     video: sequence.Video = None,
     eye: sequence.Eye = None,
+    state: options.State = None,
     device: options.Device = "auto",
     threads: options.Threads = None,
     memory: options.Memory = None,
@@ -157,7 +161,15 @@ def render(
         threads=threads,
         memory=parse.memory(memory),
     )
-    source = SceneSource(scene, environment, parse.color(background), allow_outside, single_scattering, up)
+    source = SceneSource(
+        scene,
+        environment,
+        parse.color(background),
+        allow_outside,
+        single_scattering,
+        up,
+        parse.light(light_turn, light_strength, environment_strength),
+    )
     if moving:
         from lippmann.sequences.forms import QuiltForm
 

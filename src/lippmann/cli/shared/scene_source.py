@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from lippmann.scene.light_options import LightOptions
     from lippmann.scene.readers.load import Up
     from lippmann.scene.scene import Scene
 
@@ -21,6 +22,7 @@ class SceneSource:
     allow_outside: bool = False
     single_scattering: bool = False
     up: Up | None = None
+    light: LightOptions | None = None
 
     def load(self) -> Scene:
         """The scene.
@@ -39,4 +41,5 @@ class SceneSource:
             allow_outside=self.allow_outside,
             multiple_scattering=not self.single_scattering,
             up=self.up,
+            light=self.light,
         )

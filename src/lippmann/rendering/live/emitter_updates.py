@@ -8,14 +8,14 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from lippmann.device.pbr.emitters import environment_transform
+from lippmann.device.pbr.emitters import environment_to_world
 from lippmann.scene.light_options import LightOptions
 from lippmann.scene.scene import Scene
 from lippmann.scene.values.description import Light, Matrix
 
 if TYPE_CHECKING:
     from lippmann.device.pbr import BuiltScene
-    from lippmann.device.types import Emitter, Transform4f
+    from lippmann.device.types import Emitter
 
 #: Parameters of Mitsuba's emitters that hold how much light they give.
 _STRENGTHS = ("intensity.value", "irradiance.value", "radiance.value")
@@ -50,7 +50,7 @@ class EmitterUpdates:
             viewer = world_from_viewer if environment.follows_viewer else np.eye(4)
             placed = viewer @ light.rotation @ environment.world_from_environment
             self._surroundings.scale(light.environment_strength)
-            self._surroundings.place(environment_transform(placed))
+            self._surroundings.place(environment_to_world(placed))
         if (light.turn, light.strength) != (self._last.turn, self._last.strength):
             for original, emitter in self._sources:
                 emitter.scale(light.strength)
@@ -75,20 +75,23 @@ class _Emitter:
     def scale(self, factor: float) -> None:
         """Give ``factor`` times the light that the emitter was built with."""
         if self._key is not None:
-            self._set(self._key, self._color * factor)
+            self._set(self._key, self._color * dr.opaque(mi.Float, factor))
         elif "scale" in self._parameters:
-            self._set("scale", mi.Float(factor))
+            self._set("scale", dr.opaque(mi.Float, factor))
 
-    def place(self, to_world: Transform4f) -> None:
+    def place(self, to_world: Matrix) -> None:
         """Turn the emitter, if it has a direction."""
-        if "to_world" in self._parameters:
-            self._set("to_world", to_world)
+        if "to_world" not in self._parameters:
+            return
+        # Each number by itself: of equal ones the compiler would make one, and another kernel where they differ.
+        rows = [[dr.opaque(mi.Float, value) for value in row] for row in np.asarray(to_world).tolist()]
+        self._set("to_world", mi.Transform4f(mi.Matrix4f(rows)))
 
     def _set(self, key: str, value: object) -> None:
+        # Constants of a kernel would need another one for each value.
+        dr.make_opaque(value)
         self._parameters[key] = value
         self._parameters.update()
-        # Constants of a kernel would need another one for each value.
-        dr.make_opaque(self._parameters[key])
 
 
 def _name(emitter: Emitter) -> str:
@@ -97,9 +100,12 @@ def _name(emitter: Emitter) -> str:
     return str(emitter.id() if shape is None else shape.id())
 
 
-def _directional_frame(light: Light) -> Transform4f:
+def _directional_frame(light: Light) -> Matrix:
+    """A ``to_world`` whose z axis lies along the light."""
     axis = -np.asarray(light.world_from_light, np.float64)[:3, 2]
     axis /= np.linalg.norm(axis)
-    up = np.eye(3)[np.argmin(np.abs(axis))]
-    frame = mi.ScalarTransform4f().look_at([0.0, 0.0, 0.0], axis.tolist(), up.tolist())
-    return mi.Transform4f(frame)
+    x = np.cross(np.eye(3)[np.argmin(np.abs(axis))], axis)
+    x /= np.linalg.norm(x)
+    frame = np.eye(4)
+    frame[:3, :3] = np.stack([x, np.cross(axis, x), axis], axis=1)
+    return frame

@@ -32,6 +32,9 @@ Rows = list[list[Float64]]
 #: Integrators of physically based light.
 LiveIntegrator = PathIntegrator | VolumePathIntegrator
 
+#: Launches after which no more recordings were seen to be needed.
+WARMING_LAUNCHES = 4
+
 
 @dataclass(frozen=True, eq=False)
 class Samples:
@@ -68,6 +71,11 @@ class Lanes:
         return [dr.opaque(mi.UInt32, first), dr.opaque(mi.UInt32, seed)]
 
 
+def _two_lanes() -> Lanes:
+    pair = np.zeros(2, np.uint32)
+    return Lanes(PixelSet(pair, pair, pair, np.zeros((1, 1, 1), np.int32)), slice(0, 2), 1, 1)
+
+
 class PlacedDisplay:
     """A display's place in the world, as inputs of kernels."""
 
@@ -100,11 +108,17 @@ class LiveTracer:
         self._rays = _Rays(display, subpixels, box_filter)
         self._integrator = integrator
         self._kernel = Frozen(self._sample, integrator, changes=True)
+        self._warm_up()
 
     @property
     def recordings(self) -> int:
         """How often the kernel was recorded."""
         return self._kernel.recordings
+
+    def _warm_up(self) -> None:
+        """Record the kernel: the first launches change how scenes of several emitters lie on the device."""
+        for _ in range(WARMING_LAUNCHES):
+            self.trace(_two_lanes(), PlacedDisplay(np.eye(4)), first=0, seed=0)
 
     def trace(self, lanes: Lanes, placed: PlacedDisplay, *, first: int, seed: int) -> Samples:
         """Samples ``first`` to ``first + lanes.count`` of each stream of the pixels of ``lanes``."""
@@ -165,6 +179,13 @@ class FeatureTracer:
         self._rays = _Rays(display, subpixels, box_filter)
         self._surfaces = surfaces
         self._kernel = Frozen(self._features, surfaces, changes=True)
+        for _ in range(WARMING_LAUNCHES):
+            self.trace(_two_lanes(), PlacedDisplay(np.eye(4)), seed=0)
+
+    @property
+    def recordings(self) -> int:
+        """How often the kernel was recorded."""
+        return self._kernel.recordings
 
     def trace(self, lanes: Lanes, placed: PlacedDisplay, *, seed: int) -> tuple[Floats, Floats]:
         """Means of albedo and normal ``(n, 3)`` over the samples of ``lanes``; normals in the display's frame."""

@@ -98,6 +98,11 @@ class LiveRenderer:
         """The scene."""
         return self._scene
 
+    @property
+    def recordings(self) -> int:
+        """How often kernels were recorded for the scene and its displays: not for a view that changes."""
+        return self._kernels.recordings
+
     @exclusive()
     def set_scene(self, scene: Scene) -> None:
         """Show another scene, or the same one with another environment or background.
@@ -119,10 +124,12 @@ class LiveRenderer:
         self._forget()
 
     @exclusive()
-    def frame(self, view: LiveView, is_stale: IsStale = lambda: False) -> LiveFrame | None:
+    def frame(self, view: LiveView, is_stale: IsStale = lambda: False, *, settled: bool = False) -> LiveFrame | None:
         """A picture of one sample a pixel in direct light, for a view that changes.
 
-        A render with the integrator ``direct`` and one sample a pixel shows the same to the same eye.
+        A render with the integrator ``direct`` and one sample a pixel shows the same to the same eye. Where a scene has
+        several emitters, the weights by which they are sampled, and an automatic exposure, stay while a view changes:
+        those of a render are found with ``settled``.
 
         Parameters
         ----------
@@ -130,6 +137,8 @@ class LiveRenderer:
             What is looked at.
         is_stale:
             Asked between wavefronts whether the frame is still wanted.
+        settled:
+            Find the weights of emitters and the exposure anew, which takes some frames' time.
 
         Returns
         -------
@@ -143,7 +152,7 @@ class LiveRenderer:
         """
         seconds: dict[str, float] = {}
         stand = self._stand(view, _moving(view.request), seconds)
-        exposure = self._kernels.expose(self._display, stand.request, stand.placement, measure=False)
+        exposure = self._kernels.expose(self._display, stand.request, stand.placement, measure=settled)
         with _timed(seconds, "trace"):
             found = self._trace_once(stand, is_stale)
         if found is None:
@@ -245,7 +254,7 @@ class LiveRenderer:
             )
         with _timed(seconds, "place"):
             resolved = resolve(request, self._scene, self._display)
-            placement = replace(self._kernels.session, request=resolved).find_place(self._display)
+            placement = self._kernels.place(self._display, resolved)
             self._kernels.light(view.light, rotation_of(placement.world_from_display))
             placed = PlacedDisplay(placement.world_from_display)
         with _timed(seconds, "map"):

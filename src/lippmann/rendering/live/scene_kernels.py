@@ -13,6 +13,7 @@ from lippmann.display import Display
 from lippmann.rendering.film.exposure import gain_of, measure_exposure
 from lippmann.rendering.film.memory_model import BYTES_PER_LANE
 from lippmann.rendering.live.emitter_updates import EmitterUpdates
+from lippmann.rendering.live.hull_bounds import bounds_by_hull
 from lippmann.rendering.live.live_tracer import FeatureTracer, LiveIntegrator, LiveTracer
 from lippmann.rendering.request.region_of_interest import even_background
 from lippmann.rendering.request.render_request import RenderRequest
@@ -59,16 +60,27 @@ class SceneKernels:
         self._tracers: dict[_Kind, LiveTracer] = {}
         self._features: dict[_Kind, FeatureTracer] = {}
         self._exposure: float | None = None
+        self._bounds_in = bounds_by_hull(session.scene)
 
     @property
     def most_lanes(self) -> int:
         """Lanes of the largest wavefront that fits the memory."""
         return max(1 << 14, min(_MOST_LANES, self.session.memory // BYTES_PER_LANE))
 
+    @property
+    def recordings(self) -> int:
+        """How often kernels were recorded."""
+        tracers: tuple[LiveTracer | FeatureTracer, ...] = (*self._tracers.values(), *self._features.values())
+        return sum(each.recordings for each in tracers)
+
     def forget_display(self) -> None:
         """Drop the kernels of displays."""
         self._tracers.clear()
         self._features.clear()
+
+    def place(self, display: Display, request: RenderRequest) -> Placement:
+        """Where a display stands by a resolved request."""
+        return replace(self.session, request=request).find_place(display, self._bounds_in)
 
     def can_light(self, light: LightOptions) -> bool:
         """Whether a change of light needs no other scene on the device."""

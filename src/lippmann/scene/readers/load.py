@@ -11,6 +11,7 @@ from typing import Literal, get_args
 import numpy as np
 
 from lippmann.errors import SceneError, UsageError
+from lippmann.scene.light_options import LightOptions
 from lippmann.scene.mitsuba_source import MitsubaSource
 from lippmann.scene.parsing.files import read_bytes
 from lippmann.scene.parsing.name_hints import closest_name_hint
@@ -80,6 +81,7 @@ def load_scene(
     allow_outside: bool = False,
     multiple_scattering: bool = True,
     up: Up | None = None,
+    light: LightOptions | None = None,
 ) -> Scene:
     """Load a scene.
 
@@ -102,6 +104,8 @@ def load_scene(
     up:
         The axis that points up in a file that does not say so: OBJ, PLY (None: "y") and STL (None: "z", as 3D printing
         has it).
+    light:
+        Direction and strength of the scene's light; None: as the file has them.
 
     Raises
     ------
@@ -119,6 +123,7 @@ def load_scene(
         scene = _from_object(source)
     else:
         raise UsageError("is for files", parameter="up", fix="leave it out")
+    scene = scene if light is None else replace(scene, light=light)
     studio = scene.studio and str(environment) != NO_ENVIRONMENT
     if scene.classic is not None and color is not None:
         scene = replace(scene, classic=replace(scene.classic, background=Background(color=color)))
