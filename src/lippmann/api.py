@@ -43,6 +43,7 @@ if TYPE_CHECKING:
     from lippmann.quilts.quilt import Quilt
     from lippmann.rendering.forecast import Forecast
     from lippmann.rendering.preview import Preview
+    from lippmann.scene.light_options import LightOptions
     from lippmann.scene.values.description import Environment
     from lippmann.tiles.tiled_render import Rendered, Runner
 
@@ -61,6 +62,7 @@ def load_scene(
     crop: tuple[float, float, float, float, float, float] | None = None,
     unit_scale: float | None = None,
     min_opacity: float | None = None,
+    light: LightOptions | None = None,
 ) -> Scene:
     """Load a scene from a file, a bundled scene's name, or an object of another library.
 
@@ -91,6 +93,8 @@ def load_scene(
         that ``crop`` and placements shall count in.
     min_opacity:
         Leave out Gaussian splats of less opacity, 0 to 1: most floaters are faint.
+    light:
+        A :class:`~lippmann.scene.light_options.LightOptions`: turns and scales the scene's light.
 
     Raises
     ------
@@ -107,6 +111,7 @@ def load_scene(
         crop=crop,
         unit_scale=unit_scale,
         min_opacity=min_opacity,
+        light=light,
     )
 
 

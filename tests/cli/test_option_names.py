@@ -17,11 +17,13 @@ assert app  # whose making says which commands there are
 SOURCE = Path(package.__file__).parent
 #: Parameters of the library that no command has.
 OF_THE_LIBRARY = {"form", "effort", "stereo"}
-#: Files whose texts are for other programs: pip, a style sheet's variables, Dask's own command.
+#: Files whose texts are for other programs: pip, a style sheet's variables, Dask's own command, commands that are run.
 OTHER_PROGRAMS = {
     "runtime/engine.py",
     "scene/mitsuba_plugins.py",
     "reproduce/style.py",
+    "studio/command_line.py",
+    "studio/render_jobs.py",
     "cluster/worker_preload.py",
     "runtime/llvm_install.py",
 }

@@ -11,10 +11,20 @@ from numpy.typing import NDArray
 from lippmann.errors import SceneError
 from lippmann.runtime.cached_property import cached_property
 from lippmann.scene.extreme_points import extreme_points_of, used_positions
+from lippmann.scene.light_options import LightOptions
 from lippmann.scene.mitsuba_source import MitsubaSource
 from lippmann.scene.parsing.name_hints import closest_name_hint
 from lippmann.scene.splat_clouds import check_splats, typical_points
-from lippmann.scene.values.description import Camera, Color, Environment, Material, Matrix, Mesh, SceneDescription
+from lippmann.scene.values.description import (
+    Camera,
+    Color,
+    Environment,
+    Light,
+    Material,
+    Matrix,
+    Mesh,
+    SceneDescription,
+)
 from lippmann.scene.values.whitted_scene import ClassicScene
 from lippmann.scene.whitted.world_frame import world_bounds
 
@@ -45,7 +55,8 @@ class Scene:
     derived when it is first needed. A scene with both has a form of its own for either kind of light.
     ``home_camera`` names the camera that the scene was made to be shown by (bundled scenes, files of Whitted tracers),
     None for all others; ``home_may_move`` says that it need not be kept to exactly where a display shows more or less.
-    ``studio`` says whether the built-in studio may light a scene that has no lights.
+    ``studio`` says whether the built-in studio may light a scene that has no lights. ``light`` changes the direction
+    and the strength of its light: :attr:`environment` and :attr:`lights` are those after that change.
 
     A scene from Mitsuba knows its ``bounds``, ``cameras``, ``lights`` and hence ``environment``, ``background`` and
     ``notes`` only once the engine has started: asked before, they start it.
@@ -58,6 +69,7 @@ class Scene:
     studio: bool = True
     classic: ClassicScene | None = field(default=None, repr=False)
     views: tuple[Camera, ...] = field(default=(), repr=False)
+    light: LightOptions = field(default_factory=LightOptions, repr=False)
 
     def __post_init__(self) -> None:
         if self.description is None and self.classic is None:
@@ -164,11 +176,23 @@ class Scene:
     @property
     def environment(self) -> Environment | None:
         """Light from far away: the scene's or the caller's; the studio where the scene has no light at all."""
+        original = self._original_environment
+        return None if original is None else self.light.environment(original)
+
+    @property
+    def _original_environment(self) -> Environment | None:
         if not self.in_studio:
             return self.physical.environment
         from lippmann.scene.studio_light import studio, studio_for
 
         return studio_for(self.physical) if isinstance(self.physical, SceneDescription) else studio()
+
+    @property
+    def lights(self) -> tuple[Light, ...]:
+        """The light sources of a description; none of a scene of Mitsuba's, which keeps its own."""
+        if isinstance(self.physical, MitsubaSource):
+            return ()
+        return tuple(self.light.source(light) for light in self.physical.lights)
 
     @property
     def background(self) -> Color | None:

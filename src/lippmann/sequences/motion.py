@@ -12,6 +12,7 @@ import numpy as np
 
 from lippmann.display import Display
 from lippmann.errors import UsageError
+from lippmann.scene.light_options import LightOptions
 from lippmann.scene.matrices import Bounds
 from lippmann.scene.placement import Placement, PlacementOptions
 from lippmann.scene.readers.load import kind_of_file, load_scene
@@ -74,7 +75,7 @@ class GltfMotion(Motion):
         Frames per second of the animation's own time, which begins at 0.
     animation:
         Its name; ``None`` for the file's first.
-    environment, background, allow_outside, multiple_scattering:
+    environment, background, allow_outside, multiple_scattering, light:
         As of :func:`lippmann.scene.readers.load.load_scene`.
 
     Raises
@@ -93,6 +94,7 @@ class GltfMotion(Motion):
         background: tuple[float, float, float] | None = None,
         allow_outside: bool = False,
         multiple_scattering: bool = True,
+        light: LightOptions | None = None,
     ) -> None:
         from lippmann.scene.readers.gltf_animation.animated_file import MovingGltf
 
@@ -107,6 +109,7 @@ class GltfMotion(Motion):
             environment=environment,
             background=background,
             multiple_scattering=multiple_scattering,
+            light=light,
         )
 
     @property
@@ -189,6 +192,7 @@ def open_motion(
     background: tuple[float, float, float] | None = None,
     allow_outside: bool = False,
     multiple_scattering: bool = True,
+    light: LightOptions | None = None,
 ) -> Motion:
     """What moves in a scene file.
 
@@ -198,7 +202,7 @@ def open_motion(
         Of a glTF file, see :class:`GltfMotion`.
     camera_path:
         A Tachyon ``.cam`` file: the display flies along it.
-    environment, background, allow_outside, multiple_scattering:
+    environment, background, allow_outside, multiple_scattering, light:
         As of :func:`lippmann.scene.readers.load.load_scene`.
 
     Raises
@@ -220,6 +224,7 @@ def open_motion(
             background=background,
             allow_outside=allow_outside,
             multiple_scattering=multiple_scattering,
+            light=light,
         )
         return Flight(scene, read_cam(camera_path))
     if kind_of_file(source) not in (".glb", ".gltf"):
@@ -237,4 +242,5 @@ def open_motion(
         background=background,
         allow_outside=allow_outside,
         multiple_scattering=multiple_scattering,
+        light=light,
     )

@@ -50,6 +50,9 @@ def plan(
     pop_out: options.PopOut = None,
     environment: options.Environment = None,
     background: options.Background = None,
+    light_turn: options.LightTurn = None,
+    light_strength: options.LightStrength = 1.0,
+    environment_strength: options.EnvironmentStrength = 1.0,
     allow_outside: options.AllowOutside = False,
     single_scattering: options.SingleScattering = False,
     lpi: printing.Lpi = None,
@@ -60,6 +63,7 @@ def plan(
     thickness: printing.Thickness = None,
     index: printing.Index = None,
     field: printing.Field = None,
+    state: options.State = None,
     device: options.Device = "auto",
     threads: options.Threads = None,
     memory: options.Memory = None,
@@ -103,6 +107,7 @@ def plan(
     source = SceneSource(
         *(scene, environment, parse.color(background), allow_outside, single_scattering, up),
         *(parse.crop(crop), unit_scale, min_opacity),
+        light=parse.light(light_turn, light_strength, environment_strength),
     )
     with console.progress() as progress:
         loaded = source.load()

@@ -57,6 +57,9 @@ def preview(
     pop_out: options.PopOut = None,
     environment: options.Environment = None,
     background: options.Background = None,
+    light_turn: options.LightTurn = None,
+    light_strength: options.LightStrength = 1.0,
+    environment_strength: options.EnvironmentStrength = 1.0,
     allow_outside: options.AllowOutside = False,
     single_scattering: options.SingleScattering = False,
     lpi: printing.Lpi = None,
@@ -68,6 +71,7 @@ def preview(
     index: printing.Index = None,
     field: printing.Field = None,
     bits: options.Bits = None,
+    state: options.State = None,
     device: options.Device = "auto",
     threads: options.Threads = None,
     memory: options.Memory = None,
@@ -110,6 +114,7 @@ def preview(
     source = SceneSource(
         *(scene, environment, parse.color(background), allow_outside, single_scattering, up),
         *(parse.crop(crop), unit_scale, min_opacity),
+        light=parse.light(light_turn, light_strength, environment_strength),
     )
     with console.progress() as progress:
         started = time.perf_counter()

@@ -83,6 +83,9 @@ def render(
     pop_out: options.PopOut = None,
     environment: options.Environment = None,
     background: options.Background = None,
+    light_turn: options.LightTurn = None,
+    light_strength: options.LightStrength = 1.0,
+    environment_strength: options.EnvironmentStrength = 1.0,
     allow_outside: options.AllowOutside = False,
     single_scattering: options.SingleScattering = False,
     lpi: printing.Lpi = None,
@@ -110,6 +113,7 @@ def render(
     video: sequence.Video = None,
     eye: sequence.Eye = None,
     codec: sequence.Codec = None,
+    state: options.State = None,
     device: options.Device = "auto",
     threads: options.Threads = None,
     memory: options.Memory = None,
@@ -167,6 +171,7 @@ def render(
     source = SceneSource(
         *(scene, environment, parse.color(background), allow_outside, single_scattering, up),
         *(parse.crop(crop), unit_scale, min_opacity),
+        light=parse.light(light_turn, light_strength, environment_strength),
     )
     on_cluster = clusters.ClusterOptions(cluster, tls_ca, tls_cert, tls_key)
     if wanted:

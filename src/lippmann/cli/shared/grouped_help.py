@@ -12,6 +12,7 @@ from lippmann.cli.shared.kept_inputs import check_outputs
 #: Options of the commands that render and look, by group; the rest stand under "Options". The last are rarely used.
 OPTION_GROUPS: Mapping[str, tuple[str, ...]] = {
     "Scene": (
+        "--state",
         "--up",
         "--crop",
         "--unit-scale",
@@ -36,7 +37,15 @@ OPTION_GROUPS: Mapping[str, tuple[str, ...]] = {
         "--pixels",
         "--plain",
     ),
-    "Light": ("--environment", "--background", "--exposure", "--tone-map"),
+    "Light": (
+        "--environment",
+        "--environment-strength",
+        "--light-turn",
+        "--light-strength",
+        "--background",
+        "--exposure",
+        "--tone-map",
+    ),
     "Quality": (
         "--quality",
         "--quality-worst",
@@ -85,7 +94,7 @@ _REST, _HELP = "Options", "--help"
 #: Commands by what one does with them.
 COMMAND_GROUPS: Mapping[str, tuple[str, ...]] = {
     "Render": ("render", "preview", "plan", "quilt"),
-    "Look": ("view", "replay", "refocus", "info", "compare"),
+    "Look": ("studio", "view", "show", "replay", "refocus", "info", "compare"),
     "From and to other pictures": ("interlace", "weave", "views", "micro-images", "compose", "export", "import"),
     "Displays and prints": ("displays", "calibrate", "pitch-test", "marks"),
     "Program": ("doctor", "worker", "reproduce"),
@@ -123,6 +132,8 @@ EXAMPLES: Mapping[str, tuple[str, ...]] = {
     ),
     "export": ("lippmann export model.exr --as hci -o scene", "lippmann export model.exr --as eslf -o scene.png"),
     "import": ("lippmann import scene -o model.exr", "lippmann import scene.png --as eslf -o model.exr"),
+    "studio": ("lippmann studio", "lippmann studio model.glb --display looking-glass-portrait"),
+    "show": ("lippmann show model.png", "lippmann show model.exr --display my-display.toml"),
     "view": ("lippmann view model.png", "lippmann view model.png --export model.html"),
     "interlace": (
         "lippmann interlace photos/*.jpg --lpi 60 --ppi 720 --size 8x10in -o print.tif",

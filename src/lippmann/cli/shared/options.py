@@ -9,6 +9,7 @@ import typer
 
 from lippmann.cli.shared import parse
 from lippmann.cli.shared.completion import complete_displays, complete_scenes
+from lippmann.cli.shared.state_defaults import read_defaults
 from lippmann.rendering.request import choices
 
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on standard output.")]
@@ -165,6 +166,32 @@ SingleScattering = Annotated[
     typer.Option(
         "--single-scattering",
         help="Shade rough metal and glass exactly by glTF's formulas, which lose light between microfacets.",
+    ),
+]
+LightTurn = Annotated[
+    str | None,
+    typer.Option(
+        "--light-turn",
+        metavar="AZIMUTH[,ELEVATION]",
+        help="Turn light from far away, degrees to the right and up: the environment, the studio, directional lights.",
+        show_default=False,
+    ),
+]
+LightStrength = Annotated[
+    float, typer.Option("--light-strength", metavar="FACTOR", help="Factor on the scene's own light sources.")
+]
+EnvironmentStrength = Annotated[
+    float,
+    typer.Option("--environment-strength", metavar="FACTOR", help="Factor on light of the environment or the studio."),
+]
+State = Annotated[
+    Path | None,
+    typer.Option(
+        "--state",
+        help="Take scene, display and settings from this file of the studio; options given beside it win.",
+        callback=read_defaults,
+        is_eager=True,
+        show_default=False,
     ),
 ]
 Method = Annotated[

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from lippmann.cli.shared.console import Console
     from lippmann.display import Display
     from lippmann.rendering.request.choices import ToneMap
+    from lippmann.scene.light_options import LightOptions
     from lippmann.scene.placement import PlacementOptions
     from lippmann.scene.splat_selection import Crop
 
@@ -143,6 +144,14 @@ def placement(
         depth_scale=None if depth_scale == "auto" else number(depth_scale, "--depth-scale", "auto, or a factor"),
         pop_out=pop_out,
     )
+
+
+def light(turn: str | None, strength: float, environment_strength: float) -> LightOptions:
+    """Direction and strength of light, from the options of those names."""
+    from lippmann.scene.light_options import LightOptions
+
+    azimuth, *elevation = (0.0,) if turn is None else numbers(turn, "--light-turn", (1, 2))
+    return LightOptions((azimuth, elevation[0] if elevation else 0.0), strength, environment_strength)
 
 
 def angles(text: str | None) -> tuple[float, float, float]:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from lippmann.scene.light_options import LightOptions
     from lippmann.scene.readers.load import Up
     from lippmann.scene.scene import Scene
     from lippmann.scene.splat_selection import Crop
@@ -25,6 +26,7 @@ class SceneSource:
     crop: Crop | None = None
     unit_scale: float | None = None
     min_opacity: float | None = None
+    light: LightOptions | None = None
 
     def load(self) -> Scene:
         """The scene.
@@ -46,4 +48,5 @@ class SceneSource:
             crop=self.crop,
             unit_scale=self.unit_scale,
             min_opacity=self.min_opacity,
+            light=self.light,
         )

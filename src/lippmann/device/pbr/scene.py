@@ -19,9 +19,10 @@ from lippmann.device.pbr.straight_through import has_null, may_pass
 from lippmann.device.pbr.textures import TextureStore
 from lippmann.device.splats.table import SplatTable, make_table
 from lippmann.device.types import Emitter, MitsubaScene, Shape
-from lippmann.errors import SceneError
+from lippmann.errors import SceneError, UsageError
 from lippmann.runtime import engine as engines
 from lippmann.runtime import machine
+from lippmann.scene.light_options import LightOptions
 from lippmann.scene.mitsuba_source import MitsubaSource, with_sky
 from lippmann.scene.scene import Scene
 from lippmann.scene.values.description import Color, Matrix, SceneDescription
@@ -86,7 +87,9 @@ def build(scene: Scene, engine: engines.Engine | None = None, *, memory: int | N
         engines.start()
     if isinstance(scene.physical, MitsubaSource):
         return _build_source(scene.physical, scene)
-    description = replace(scene.physical, environment=scene.environment, background=scene.background)
+    description = replace(
+        scene.physical, environment=scene.environment, background=scene.background, lights=scene.lights
+    )
     return build_description(description, memory=memory)
 
 
@@ -137,14 +140,31 @@ def build_description(description: SceneDescription, *, memory: int | None = Non
 
 def _build_source(source: MitsubaSource, scene: Scene) -> BuiltScene:
     seconds: dict[str, float] = {}
+    environment = scene.environment
+    _check_light(scene.light, has_environment=environment is not None)
     with _time_stage(seconds, "load"):
         loaded = source.scene()
-        if scene.environment is not None:
-            loaded = with_sky(loaded, environment_object(scene.environment))
+        if environment is not None:
+            loaded = with_sky(loaded, environment_object(environment))
     passing = any(may_pass(shape) for shape in loaded.shapes())
     with_media = has_media(loaded)
     notes = (MEDIA_NOTE,) if with_media else ()
     return BuiltScene(loaded, scene.background, {}, passing, notes, seconds, source.is_borrowed, with_media)
+
+
+def _check_light(light: LightOptions, *, has_environment: bool) -> None:
+    """Refuse changes to the light sources that a scene of Mitsuba's brings."""
+    rule = "a Mitsuba scene keeps its own light sources"
+    if light.strength != 1.0:
+        raise UsageError(f"{light.strength:g}", parameter="light_strength", rule=rule, fix="use exposure")
+    if has_environment:
+        return
+    for parameter, changes in (
+        ("light_turn", any(light.turn)),
+        ("environment_strength", light.environment_strength != 1.0),
+    ):
+        if changes:
+            raise UsageError("has nothing to change", parameter=parameter, rule=rule, fix="leave it out")
 
 
 @contextmanager

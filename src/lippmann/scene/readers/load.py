@@ -11,6 +11,7 @@ from typing import Literal, get_args
 import numpy as np
 
 from lippmann.errors import SceneError, UsageError
+from lippmann.scene.light_options import LightOptions
 from lippmann.scene.mitsuba_source import MitsubaSource
 from lippmann.scene.parsing.files import read_bytes
 from lippmann.scene.parsing.name_hints import closest_name_hint
@@ -92,6 +93,7 @@ def load_scene(
     crop: Crop | None = None,
     unit_scale: float | None = None,
     min_opacity: float | None = None,
+    light: LightOptions | None = None,
 ) -> Scene:
     """Load a scene.
 
@@ -116,6 +118,8 @@ def load_scene(
         trainers have it), SOG (None: "-y"), SPZ (None: "y") and STL (None: "z", as 3D printing has it).
     crop, unit_scale, min_opacity:
         Of Gaussian splats; see :class:`~lippmann.scene.splat_selection.SplatSelection`.
+    light:
+        Direction and strength of the scene's light; None: as the file has them.
 
     Raises
     ------
@@ -134,6 +138,7 @@ def load_scene(
     else:
         raise UsageError("is for files", parameter="up", fix="leave it out")
     scene = SplatSelection(crop, unit_scale, min_opacity).of(scene)
+    scene = scene if light is None else replace(scene, light=light)
     studio = scene.studio and str(environment) != NO_ENVIRONMENT
     if scene.classic is not None and color is not None:
         scene = replace(scene, classic=replace(scene.classic, background=Background(color=color)))
