@@ -58,14 +58,15 @@ def load_scene(
     allow_outside: bool = False,
     multiple_scattering: bool = True,
     up: Literal["y", "z"] | None = None,
+    variants: Mapping[str, str] | None = None,
 ) -> Scene:
     """Load a scene from a file, a bundled scene's name, or an object of another library.
 
     Parameters
     ----------
     source:
-        Path of a ``.glb``, ``.gltf``, ``.obj``, ``.ply``, ``.stl``, Mitsuba ``.xml``, Tachyon ``.dat`` or ``.nff``
-        file; name of a bundled scene; a
+        Path of a ``.glb``, ``.gltf``, ``.obj``, ``.ply``, ``.stl``, ``.usd`` (``.usda``, ``.usdc``, ``.usdz``), Mitsuba
+        ``.xml``, Tachyon ``.dat`` or ``.nff`` file; name of a bundled scene; a
         ``mi.Scene`` or Mitsuba dict; a trimesh scene or mesh; a PyVista mesh; a
         :class:`~lippmann.scene.values.description.SceneDescription`.
     environment:
@@ -80,6 +81,8 @@ def load_scene(
     up:
         ``y`` or ``z``: the axis that points up in a file that does not say so. By default ``y`` in OBJ and PLY files,
         ``z`` in STL files.
+    variants:
+        Of a USD stage: ``{"set": "choice"}`` for every prim that has them, ``{"/prim:set": "choice"}`` for one.
 
     Raises
     ------
@@ -93,6 +96,7 @@ def load_scene(
         allow_outside=allow_outside,
         multiple_scattering=multiple_scattering,
         up=up,
+        variants=variants,
     )
 
 

@@ -27,6 +27,7 @@ def plan(
         typer.Option("--method", help="auto and pooled: light is pooled; full: every ray is traced, for references."),
     ] = "auto",
     up: options.Up = None,
+    variants: options.Variants = None,
     integrator: options.Integrator = "auto",
     depth: options.Depth = None,
     spp: options.Spp = None,
@@ -97,7 +98,9 @@ def plan(
         threads=threads,
         memory=parse.memory(memory),
     )
-    source = SceneSource(scene, environment, parse.color(background), allow_outside, single_scattering, up)
+    source = SceneSource(
+        scene, environment, parse.color(background), allow_outside, single_scattering, up, parse.variants(variants)
+    )
     with console.progress() as progress:
         loaded = source.load()
         found = forecast(loaded, target, request, progress)

@@ -36,6 +36,7 @@ def preview(
         str | None, typer.Option("--eye", help="The eye's place: X,Y,Z in mm; by default before the middle.")
     ] = None,
     up: options.Up = None,
+    variants: options.Variants = None,
     integrator: options.Integrator = "auto",
     depth: options.Depth = None,
     spp: options.Spp = None,
@@ -104,7 +105,9 @@ def preview(
         threads=threads,
         memory=parse.memory(memory),
     )
-    source = SceneSource(scene, environment, parse.color(background), allow_outside, single_scattering, up)
+    source = SceneSource(
+        scene, environment, parse.color(background), allow_outside, single_scattering, up, parse.variants(variants)
+    )
     with console.progress() as progress:
         started = time.perf_counter()
         loaded = source.load()

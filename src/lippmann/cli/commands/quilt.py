@@ -74,6 +74,7 @@ def render(
     size: Size = None,
     method: Method = "auto",
     up: options.Up = None,
+    variants: options.Variants = None,
     integrator: options.Integrator = "auto",
     depth: options.Depth = None,
     spp: options.Spp = None,
@@ -157,7 +158,9 @@ def render(
         threads=threads,
         memory=parse.memory(memory),
     )
-    source = SceneSource(scene, environment, parse.color(background), allow_outside, single_scattering, up)
+    source = SceneSource(
+        scene, environment, parse.color(background), allow_outside, single_scattering, up, parse.variants(variants)
+    )
     if moving:
         from lippmann.sequences.forms import QuiltForm
 

@@ -55,6 +55,7 @@ def render(
     respect_gloss: options.RespectGloss = None,
     maps: Maps = None,
     up: options.Up = None,
+    variants: options.Variants = None,
     integrator: options.Integrator = "auto",
     depth: options.Depth = None,
     spp: options.Spp = None,
@@ -160,7 +161,9 @@ def render(
         threads=threads,
         memory=parse.memory(memory),
     )
-    source = SceneSource(scene, environment, parse.color(background), allow_outside, single_scattering, up)
+    source = SceneSource(
+        scene, environment, parse.color(background), allow_outside, single_scattering, up, parse.variants(variants)
+    )
     on_cluster = clusters.ClusterOptions(cluster, tls_ca, tls_cert, tls_key)
     if wanted:
         files = sequence.Files(output, bits, maps, resume)

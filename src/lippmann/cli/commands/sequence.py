@@ -269,6 +269,7 @@ def _open(source: SceneSource, wanted: Wanted, request: RenderRequest) -> Motion
         background=source.background,
         allow_outside=source.allow_outside,
         multiple_scattering=not source.single_scattering,
+        variants=source.variants,
     )
 
 

@@ -41,13 +41,23 @@ PictureDisplay = Annotated[
 Scene = Annotated[
     str,
     typer.Argument(
-        help="A .glb, .gltf, .obj, .ply, .stl, Mitsuba .xml, Tachyon .dat or .nff file, or a bundled scene's name.",
+        help="A .glb, .gltf, .obj, .ply, .stl, .usd, Mitsuba .xml, Tachyon .dat or .nff file, or a bundled "
+        "scene's name.",
         autocompletion=complete_scenes,
     ),
 ]
 Up = Annotated[
     Literal["y", "z"] | None,
     typer.Option("--up", help="Which axis points up in OBJ, PLY (y by default) and STL files (z).", show_default=False),
+]
+Variants = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--variant",
+        metavar="SET=CHOICE",
+        help="Choose a variant of a USD stage, for all prims that have it, or /PRIM:SET=CHOICE for one. Repeatable.",
+        show_default=False,
+    ),
 ]
 Integrator = Annotated[
     choices.Integrator,

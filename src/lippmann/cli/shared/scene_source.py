@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -21,6 +22,7 @@ class SceneSource:
     allow_outside: bool = False
     single_scattering: bool = False
     up: Up | None = None
+    variants: Mapping[str, str] | None = None
 
     def load(self) -> Scene:
         """The scene.
@@ -39,4 +41,5 @@ class SceneSource:
             allow_outside=self.allow_outside,
             multiple_scattering=not self.single_scattering,
             up=self.up,
+            variants=self.variants,
         )
