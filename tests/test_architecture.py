@@ -39,6 +39,7 @@ ORDER = (
     "scene.readers.gltf_animation",
     "scene.readers.tachyon",
     "scene.readers",
+    "scene.readers.usd",
     "journal",
     "image",
     "device",

@@ -63,15 +63,16 @@ def load_scene(
     unit_scale: float | None = None,
     min_opacity: float | None = None,
     light: LightOptions | None = None,
+    variants: Mapping[str, str] | None = None,
 ) -> Scene:
     """Load a scene from a file, a bundled scene's name, or an object of another library.
 
     Parameters
     ----------
     source:
-        Path of a ``.glb``, ``.gltf``, ``.obj``, ``.ply``, ``.spz``, ``.sog``, ``.stl``, Mitsuba ``.xml``, Tachyon
-        ``.dat`` or ``.nff`` file; name of a bundled scene; a ``mi.Scene`` or Mitsuba dict; a
-        trimesh scene or mesh; a PyVista mesh; a
+        Path of a ``.glb``, ``.gltf``, ``.obj``, ``.ply``, ``.spz``, ``.sog``, ``.stl``, ``.usd`` (``.usda``, ``.usdc``,
+        ``.usdz``), Mitsuba ``.xml``, Tachyon ``.dat`` or ``.nff`` file; name of a bundled scene; a ``mi.Scene`` or
+        Mitsuba dict; a trimesh scene or mesh; a PyVista mesh; a
         :class:`~lippmann.scene.values.description.SceneDescription`.
     environment:
         An equirectangular EXR or HDR file (or an ``Environment``) that lights the scene in place of its own.
@@ -95,6 +96,8 @@ def load_scene(
         Leave out Gaussian splats of less opacity, 0 to 1: most floaters are faint.
     light:
         A :class:`~lippmann.scene.light_options.LightOptions`: turns and scales the scene's light.
+    variants:
+        Of a USD stage: ``{"set": "choice"}`` for every prim that has them, ``{"/prim:set": "choice"}`` for one.
 
     Raises
     ------
@@ -112,6 +115,7 @@ def load_scene(
         unit_scale=unit_scale,
         min_opacity=min_opacity,
         light=light,
+        variants=variants,
     )
 
 

@@ -15,6 +15,7 @@ from collections.abc import Callable
 from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass, replace
 from functools import cache
+from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -122,6 +123,16 @@ def _scene(name: str) -> Read:
     def read(data: bytes, folder: Path) -> object:
         (folder / name).write_bytes(data)
         return load_scene(folder / name).bounds
+
+    return read
+
+
+def _usd(name: str) -> Read:
+    """A stage, which a process of its own opens: a library that is not installed is not under fire."""
+    still = _scene(name)
+
+    def read(data: bytes, folder: Path) -> object:
+        return still(data, folder) if find_spec("pxr") else None
 
     return read
 
@@ -487,6 +498,8 @@ _READERS: dict[str, Target] = {
     "cam": Target(_cam),
     "nff": Target(_scene("s.nff")),
     "mitsuba-xml": Target(_mitsuba),
+    "usd": Target(_usd("s.usda")),
+    "usd-package": Target(_usd("s.usdz")),
     "environment": Target(_environment),
     "texture": Target(_texture, repair=png_repaired),
     "ktx2": Target(_ktx2),

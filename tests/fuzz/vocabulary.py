@@ -37,6 +37,12 @@ int uint float double end_header comment obj_info tristrips TextureFile t.png # 
 BEGIN_SCENE END_SCENE CAMERA END_CAMERA TEXTURE TEXDEF TEXALIAS INCLUDE IMAGEDEF s.dat red # SPHERE CYLINDER FCYLINDER
 PLANE RING TRI STRI BOX SCAPE VERTEXARRAY POLYCYLINDER EXTBOX SCALARVOL
 """,
+    "usd": """
+def over class Mesh Xform PointInstancer Material Shader SkelRoot Skeleton SkelAnimation Sphere Cube Capsule DomeLight
+RectLight SphereLight Camera GeomSubset references payload subLayers variantSet variants point3f[] int[] token float
+faceVertexCounts faceVertexIndices holeIndices protoIndices prototypes positions instanceable timeSamples inputs:file
+"catmullClark" "none" "leftHanded" "faceVarying" "uniform" interpolation = ( ) [ ] { } @s.usda@ </m> None inf nan -1
+""",
     "mitsuba-xml": """
 scene version include filename default path integrator sensor film sampler texture bsdf shape emitter medium phase
 volume spectrum rgb float integer boolean string point vector transform matrix lookat rotate scale translate ref id

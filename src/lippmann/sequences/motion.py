@@ -1,12 +1,13 @@
-"""Scenes that move: the frames of a glTF animation, and flights of a camera through a Tachyon scene."""
+"""Scenes that move: the frames of a glTF animation or a USD stage, and flights of a camera through a Tachyon scene."""
 
 from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,12 +16,16 @@ from lippmann.errors import UsageError
 from lippmann.scene.light_options import LightOptions
 from lippmann.scene.matrices import Bounds
 from lippmann.scene.placement import Placement, PlacementOptions
-from lippmann.scene.readers.load import kind_of_file, load_scene
+from lippmann.scene.readers.load import STAGES, kind_of_file, load_scene
 from lippmann.scene.scene import Scene, check_description, find_camera, override_light
 from lippmann.scene.values.description import Camera, Environment, Matrix, SceneDescription
 from lippmann.scene.values.whitted_camera import CameraPose
 from lippmann.scene.values.whitted_scene import ClassicScene
 from lippmann.scene.whitted.world_frame import world_camera
+
+if TYPE_CHECKING:
+    from lippmann.scene.readers.gltf_animation.animated_file import MovingGltf
+    from lippmann.scene.readers.usd.moving_stage import MovingStage
 
 #: Frames of an animation per second where nothing is said.
 FRAMES_PER_SECOND = 24.0
@@ -66,8 +71,8 @@ class Motion(ABC):
         return np.eye(4)
 
 
-class GltfMotion(Motion):
-    """The frames of a glTF animation; beyond its end the scene stands still.
+class AnimatedFile(Motion):
+    """The frames of a glTF animation or a USD stage; beyond its end the scene stands still.
 
     Parameters
     ----------
@@ -75,13 +80,14 @@ class GltfMotion(Motion):
         Frames per second of the animation's own time, which begins at 0.
     animation:
         Its name; ``None`` for the file's first.
-    environment, background, allow_outside, multiple_scattering, light:
+    environment, background, allow_outside, multiple_scattering, light, variants:
         As of :func:`lippmann.scene.readers.load.load_scene`.
 
     Raises
     ------
     SceneError
-        As :class:`lippmann.scene.readers.gltf_animation.animated_file.MovingGltf`.
+        As :class:`lippmann.scene.readers.gltf_animation.animated_file.MovingGltf` and
+        :class:`lippmann.scene.readers.usd.moving_stage.MovingStage`.
     """
 
     def __init__(
@@ -95,14 +101,13 @@ class GltfMotion(Motion):
         allow_outside: bool = False,
         multiple_scattering: bool = True,
         light: LightOptions | None = None,
+        variants: Mapping[str, str] | None = None,
     ) -> None:
-        from lippmann.scene.readers.gltf_animation.animated_file import MovingGltf
-
         if not (math.isfinite(fps) and fps > 0.0):
             raise UsageError(f"{fps:g} frames per second", parameter="fps", rule="a number above 0")
         self._file = path.name
         self._fps = fps
-        self._moving = MovingGltf(path, animation=animation, allow_outside=allow_outside)
+        self._moving = _open_moving(path, animation, allow_outside, variants)
         # Surroundings and background are read once, with the first frame.
         self._first = load_scene(
             self._moving.at(0.0),
@@ -138,6 +143,18 @@ class GltfMotion(Motion):
             multiple_scattering=physical.multiple_scattering,
         )
         return replace(self._first, description=override_light(description, physical.environment, physical.background))
+
+
+def _open_moving(
+    path: Path, animation: str | None, allow_outside: bool, variants: Mapping[str, str] | None
+) -> MovingGltf | MovingStage:
+    if kind_of_file(path) in STAGES:
+        from lippmann.scene.readers.usd.moving_stage import MovingStage
+
+        return MovingStage(path, animation=animation, allow_outside=allow_outside, variants=variants)
+    from lippmann.scene.readers.gltf_animation.animated_file import MovingGltf
+
+    return MovingGltf(path, animation=animation, allow_outside=allow_outside)
 
 
 class Flight(Motion):
@@ -193,16 +210,17 @@ def open_motion(
     allow_outside: bool = False,
     multiple_scattering: bool = True,
     light: LightOptions | None = None,
+    variants: Mapping[str, str] | None = None,
 ) -> Motion:
     """What moves in a scene file.
 
     Parameters
     ----------
     fps, animation:
-        Of a glTF file, see :class:`GltfMotion`.
+        Of a glTF file or USD stage, see :class:`AnimatedFile`.
     camera_path:
         A Tachyon ``.cam`` file: the display flies along it.
-    environment, background, allow_outside, multiple_scattering, light:
+    environment, background, allow_outside, multiple_scattering, light, variants:
         As of :func:`lippmann.scene.readers.load.load_scene`.
 
     Raises
@@ -227,14 +245,14 @@ def open_motion(
             light=light,
         )
         return Flight(scene, read_cam(camera_path))
-    if kind_of_file(source) not in (".glb", ".gltf"):
+    if kind_of_file(source) not in (".glb", ".gltf", *STAGES):
         raise UsageError(
             f"nothing moves in '{source}'",
             parameter="frames",
-            rule="glTF files have animations; Tachyon and NFF scenes are flown through",
+            rule="glTF files and USD stages have animations; Tachyon and NFF scenes are flown through",
             fix="add camera_path=FILE.cam for a flight, or turntable=48 for a turn",
         )
-    return GltfMotion(
+    return AnimatedFile(
         Path(source),
         fps=FRAMES_PER_SECOND if fps is None else fps,
         animation=animation,
@@ -243,4 +261,5 @@ def open_motion(
         allow_outside=allow_outside,
         multiple_scattering=multiple_scattering,
         light=light,
+        variants=variants,
     )

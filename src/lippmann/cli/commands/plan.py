@@ -30,6 +30,7 @@ def plan(
     crop: options.Crop = None,
     unit_scale: options.UnitScale = None,
     min_opacity: options.MinOpacity = None,
+    variants: options.Variants = None,
     integrator: options.Integrator = "auto",
     depth: options.Depth = None,
     spp: options.Spp = None,
@@ -108,6 +109,7 @@ def plan(
         *(scene, environment, parse.color(background), allow_outside, single_scattering, up),
         *(parse.crop(crop), unit_scale, min_opacity),
         light=parse.light(light_turn, light_strength, environment_strength),
+        variants=parse.variants(variants),
     )
     with console.progress() as progress:
         loaded = source.load()

@@ -39,6 +39,7 @@ def preview(
     crop: options.Crop = None,
     unit_scale: options.UnitScale = None,
     min_opacity: options.MinOpacity = None,
+    variants: options.Variants = None,
     integrator: options.Integrator = "auto",
     depth: options.Depth = None,
     spp: options.Spp = None,
@@ -115,6 +116,7 @@ def preview(
         *(scene, environment, parse.color(background), allow_outside, single_scattering, up),
         *(parse.crop(crop), unit_scale, min_opacity),
         light=parse.light(light_turn, light_strength, environment_strength),
+        variants=parse.variants(variants),
     )
     with console.progress() as progress:
         started = time.perf_counter()

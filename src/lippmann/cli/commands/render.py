@@ -58,6 +58,7 @@ def render(
     crop: options.Crop = None,
     unit_scale: options.UnitScale = None,
     min_opacity: options.MinOpacity = None,
+    variants: options.Variants = None,
     integrator: options.Integrator = "auto",
     depth: options.Depth = None,
     spp: options.Spp = None,
@@ -172,6 +173,7 @@ def render(
         *(scene, environment, parse.color(background), allow_outside, single_scattering, up),
         *(parse.crop(crop), unit_scale, min_opacity),
         light=parse.light(light_turn, light_strength, environment_strength),
+        variants=parse.variants(variants),
     )
     on_cluster = clusters.ClusterOptions(cluster, tls_ca, tls_cert, tls_key)
     if wanted:

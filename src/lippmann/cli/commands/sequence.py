@@ -285,6 +285,7 @@ def _open(source: SceneSource, wanted: Wanted, request: RenderRequest) -> Motion
         allow_outside=source.allow_outside,
         multiple_scattering=not source.single_scattering,
         light=source.light,
+        variants=source.variants,
     )
 
 

@@ -14,6 +14,7 @@ OPTION_GROUPS: Mapping[str, tuple[str, ...]] = {
     "Scene": (
         "--state",
         "--up",
+        "--variant",
         "--crop",
         "--unit-scale",
         "--min-opacity",

@@ -42,8 +42,8 @@ PictureDisplay = Annotated[
 Scene = Annotated[
     str,
     typer.Argument(
-        help="A .glb, .gltf, .obj, .ply, .spz, .sog, .stl, Mitsuba .xml, Tachyon .dat or .nff file, or the name of a "
-        "bundled scene.",
+        help="A .glb, .gltf, .obj, .ply, .spz, .sog, .stl, .usd, Mitsuba .xml, Tachyon .dat or .nff file, or the name "
+        "of a bundled scene.",
         autocompletion=complete_scenes,
     ),
 ]
@@ -76,6 +76,15 @@ MinOpacity = Annotated[
     typer.Option(
         "--min-opacity",
         help="Leave out Gaussian splats of less opacity (0 to 1): most floaters are faint.",
+        show_default=False,
+    ),
+]
+Variants = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--variant",
+        metavar="SET=CHOICE",
+        help="Choose a variant of a USD stage, for all prims that have it, or /PRIM:SET=CHOICE for one. Repeatable.",
         show_default=False,
     ),
 ]

@@ -161,3 +161,14 @@ def angles(text: str | None) -> tuple[float, float, float]:
     values = numbers(text, "--turn", (1, 2, 3))
     yaw, pitch, roll = (*values, *([0.0] * (3 - len(values))))
     return math.fmod(yaw, 360.0), pitch, roll
+
+
+def variants(texts: list[str] | None) -> dict[str, str]:
+    """``SET=CHOICE``, as often as it was given."""
+    chosen = {}
+    for text in texts or ():
+        name, equals, choice = text.rpartition("=")
+        if not (name and equals and choice):
+            raise UsageError(f"'{text}'", where="--variant", rule="SET=CHOICE, such as shading=red")
+        chosen[name] = choice
+    return chosen

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -27,6 +28,7 @@ class SceneSource:
     unit_scale: float | None = None
     min_opacity: float | None = None
     light: LightOptions | None = None
+    variants: Mapping[str, str] | None = None
 
     def load(self) -> Scene:
         """The scene.
@@ -49,4 +51,5 @@ class SceneSource:
             unit_scale=self.unit_scale,
             min_opacity=self.min_opacity,
             light=self.light,
+            variants=self.variants,
         )

@@ -25,7 +25,9 @@ if TYPE_CHECKING:
 
 
 #: Endings of files that name other files.
-_NAMING_FILES = frozenset({".dat", ".glb", ".gltf", ".mtl", ".nff", ".obj", ".ply", ".stl", ".xml"})
+_NAMING_FILES = frozenset(
+    {".dat", ".glb", ".gltf", ".mtl", ".nff", ".obj", ".ply", ".stl", ".usd", ".usda", ".usdc", ".usdz", ".xml"}
+)
 
 
 class MissingFileError(SceneError):

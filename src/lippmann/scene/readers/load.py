@@ -39,11 +39,26 @@ _READERS = {
     ".sog": "lippmann.scene.readers.splats.sog:read_sog",
     ".spz": "lippmann.scene.readers.splats.spz:read_spz",
     ".stl": "lippmann.scene.readers.stl:read_stl",
+    ".usd": "lippmann.scene.readers.usd:read_usd",
+    ".usda": "lippmann.scene.readers.usd:read_usd",
+    ".usdc": "lippmann.scene.readers.usd:read_usd",
+    ".usdz": "lippmann.scene.readers.usd:read_usd",
     ".xml": "lippmann.scene.mitsuba_source:read_mitsuba",
 }
 
 # First bytes of a file -> its suffix, for unmistakable formats.
-_BEGINNINGS = {b"glTF": ".glb", b"ply\n": ".ply", b"ply\r": ".ply", b"<": ".xml", b"{": ".gltf"}
+_BEGINNINGS = {
+    b"glTF": ".glb",
+    b"ply\n": ".ply",
+    b"ply\r": ".ply",
+    b"#usda": ".usda",
+    b"PXR-USDC": ".usdc",
+    b"<": ".xml",
+    b"{": ".gltf",
+}
+
+#: Kinds of files whose variants can be chosen.
+STAGES = (".usd", ".usda", ".usdc", ".usdz")
 
 
 _PAPER_DEPTH = 2
@@ -54,10 +69,6 @@ _ELSEWHERE = {
     ".fbx": "open it in Blender, then File > Export > glTF 2.0 (.glb)",
     ".dae": "open it in Blender, then File > Export > glTF 2.0 (.glb)",
     ".3ds": "open it in Blender, then File > Export > glTF 2.0 (.glb)",
-    ".usd": "open it in Blender, then File > Export > glTF 2.0 (.glb)",
-    ".usda": "open it in Blender, then File > Export > glTF 2.0 (.glb)",
-    ".usdc": "open it in Blender, then File > Export > glTF 2.0 (.glb)",
-    ".usdz": "open it in Blender, then File > Export > glTF 2.0 (.glb)",
     ".abc": "open it in Blender, then File > Export > glTF 2.0 (.glb)",
     ".max": "in 3ds Max: File > Export > glTF",
     ".c4d": "in Cinema 4D: File > Export > glTF",
@@ -94,6 +105,7 @@ def load_scene(
     unit_scale: float | None = None,
     min_opacity: float | None = None,
     light: LightOptions | None = None,
+    variants: Mapping[str, str] | None = None,
 ) -> Scene:
     """Load a scene.
 
@@ -120,6 +132,8 @@ def load_scene(
         Of Gaussian splats; see :class:`~lippmann.scene.splat_selection.SplatSelection`.
     light:
         Direction and strength of the scene's light; None: as the file has them.
+    variants:
+        Of a USD stage: ``{"set": "choice"}`` for every prim that has them, ``{"/prim:set": "choice"}`` for one.
 
     Raises
     ------
@@ -132,11 +146,11 @@ def load_scene(
     sky = _environment(environment)
     color = _background(background)
     if isinstance(source, str | Path):
-        scene = _from_name(source, allow_outside, up)
-    elif up is None:
+        scene = _from_name(source, allow_outside, up, variants)
+    elif up is None and not variants:
         scene = _from_object(source)
     else:
-        raise UsageError("is for files", parameter="up", fix="leave it out")
+        raise UsageError("is for files", parameter="variants" if up is None else "up", fix="leave it out")
     scene = SplatSelection(crop, unit_scale, min_opacity).of(scene)
     scene = scene if light is None else replace(scene, light=light)
     studio = scene.studio and str(environment) != NO_ENVIRONMENT
@@ -183,12 +197,18 @@ def kind_of_file(source: str | Path) -> str | None:
     return _suffix_by_content(path) or path.suffix.lower()
 
 
-def _from_name(source: str | Path, allow_outside: bool, up: Up | None = None) -> Scene:
+def _from_name(
+    source: str | Path, allow_outside: bool, up: Up | None = None, variants: Mapping[str, str] | None = None
+) -> Scene:
     path = Path(source)
     suffix = path.suffix.lower()
     if up is not None and (up not in get_args(Up) or suffix not in _USUAL_UP):
         what = f"'{up}'" if up not in get_args(Up) else f"{path.name} says itself which way is up"
         raise UsageError(what, parameter="up", rule=f"y, z or -y, for {', '.join(_USUAL_UP)}", fix="leave it out")
+    if variants and kind_of_file(source) not in STAGES:
+        raise UsageError(
+            f"{path.name} has no variants", parameter="variants", rule=f"{', '.join(STAGES)} files may have some"
+        )
     if isinstance(source, str) and not suffix and path.name == source:
         from lippmann.scene import bundled
 
@@ -213,8 +233,9 @@ def _from_name(source: str | Path, allow_outside: bool, up: Up | None = None) ->
             rule=f"known are {', '.join(_READERS)}",
             fix=_ELSEWHERE.get(suffix, ""),
         )
+    chosen = {"variants": variants} if variants else {}
     module, function = reader.split(":")
-    description = getattr(import_module(module), function)(path, allow_outside=allow_outside)
+    description = getattr(import_module(module), function)(path, allow_outside=allow_outside, **chosen)
     if isinstance(description, ClassicScene):
         return _classic(description, world_camera(description))
     if isinstance(description, SceneDescription):

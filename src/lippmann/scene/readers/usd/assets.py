@@ -1,0 +1,150 @@
+"""Files that a stage names: beside it, or in a USDZ package, which is a ZIP archive without compression."""
+
+from __future__ import annotations
+
+import io
+import tempfile
+import zipfile
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lippmann.color.transfer import decode_srgb
+from lippmann.errors import SceneError
+from lippmann.runtime.input_memory import check_input
+from lippmann.scene.parsing.files import MissingFileError, decode_image, find_file, read_bytes
+from lippmann.scene.parsing.texture_maps import unit
+from lippmann.scene.readers.environment_map import read_environment
+from lippmann.scene.readers.usd.records import Record
+from lippmann.scene.values.description import Image
+
+#: Files that a package may hold.
+_MOST_ENTRIES = 65_536
+#: Packages within packages.
+_DEEPEST = 4
+
+#: Pictures of light, whose values are not bounded.
+_LIGHT_SUFFIXES = (".exr", ".hdr")
+
+
+def check_package(path: Path) -> None:
+    """Look at a USDZ package before it is opened.
+
+    Raises
+    ------
+    SceneError
+        It is no ZIP archive, is compressed or encrypted, or holds more than it is long.
+    """
+    try:
+        with zipfile.ZipFile(path) as archive:
+            entries = archive.infolist()
+    except (zipfile.BadZipFile, OSError, ValueError, NotImplementedError) as error:
+        raise SceneError(f"is no USDZ package ({error})", where=path.name, fix="is it whole?") from None
+    if len(entries) > _MOST_ENTRIES:
+        raise SceneError(f"holds {len(entries)} files", where=path.name, rule=f"up to {_MOST_ENTRIES} are read")
+    for entry in entries:
+        if entry.compress_type != zipfile.ZIP_STORED or entry.flag_bits & 1:
+            raise SceneError(
+                f"'{entry.filename}' is compressed or encrypted",
+                where=path.name,
+                rule="files in a USDZ package are stored as they are",
+                fix="pack it with usdzip",
+            )
+    if sum(entry.file_size for entry in entries) > path.stat().st_size:
+        raise SceneError("its files are said to be longer than the package", where=path.name, fix="is it whole?")
+
+
+@dataclass(frozen=True, eq=False)
+class Assets:
+    """The pictures of a stage, each decoded once."""
+
+    stage: Path
+    allow_outside: bool
+    notes: dict[str, None] = field(default_factory=dict)
+    _images: dict[str, Image | None] = field(default_factory=dict)
+
+    def image(self, asset: Record) -> Image | None:
+        """A texture; None, with a note, of one in tiles (``<UDIM>``).
+
+        Raises
+        ------
+        SceneError
+            It is not there, lies outside the stage's folder, or cannot be decoded.
+        """
+        key = asset["found"] or f"{asset['folder']}\0{asset['name']}"
+        if key not in self._images:
+            self._images[key] = self._load(asset)
+        return self._images[key]
+
+    def _load(self, asset: Record) -> Image | None:
+        name = asset["name"]
+        if "<UDIM>" in name:
+            self.notes[f"texture '{name}' is in tiles, which are not read"] = None
+            return None
+        if name.lower().endswith(_LIGHT_SUFFIXES):
+            self.notes[f"texture '{name}' is a picture of light, which surfaces do not take, and is left out"] = None
+            return None
+        return decode_image(self._bytes(asset), Path(name).name, where=self.stage.name)
+
+    def environment(self, asset: Record) -> NDArray[np.float32]:
+        """The pixels ``(h, w, 3)`` of a picture of the surroundings, linear; an ordinary one is sRGB-coded.
+
+        Raises
+        ------
+        SceneError
+            As :meth:`image`, and as :func:`lippmann.scene.readers.environment_map.read_environment`.
+        """
+        if asset["name"].lower().endswith(_LIGHT_SUFFIXES):
+            path = self._path(asset)
+            if path is not None:
+                return read_environment(path).pixels
+            with tempfile.TemporaryDirectory() as folder:
+                path = Path(folder) / Path(asset["name"]).name
+                path.write_bytes(self._bytes(asset))
+                return read_environment(path).pixels
+        image = self.image(asset)
+        if image is None:
+            return np.ones((2, 4, 3), np.float32)
+        values = unit(image)[..., :3]
+        return np.asarray(decode_srgb(np.broadcast_to(values, (*values.shape[:2], 3))), np.float32)
+
+    def _path(self, asset: Record) -> Path | None:
+        """The file; None of one within a package."""
+        if "[" in asset["found"]:
+            return None
+        folders = [Path(asset["folder"] or self.stage.parent), self.stage.parent]
+        return find_file(
+            asset["name"],
+            folders,
+            self.stage.resolve().parent,
+            where=self.stage.name,
+            what="texture",
+            allow_outside=self.allow_outside,
+        )
+
+    def _bytes(self, asset: Record) -> bytes:
+        path = self._path(asset)
+        if path is not None:
+            return read_bytes(path)
+        outer, *inner = asset["found"].rstrip("]").split("[")
+        if not self.allow_outside and not Path(outer).resolve().is_relative_to(self.stage.resolve().parent):
+            raise SceneError(f"texture '{asset['name']}' lies outside the scene's folder", where=self.stage.name)
+        return self._packed(Path(outer), inner[:_DEEPEST])
+
+    def _packed(self, package: Path, names: list[str]) -> bytes:
+        source: Path | io.BytesIO = package
+        data = b""
+        for name in names:
+            try:
+                with zipfile.ZipFile(source) as archive:
+                    entry = archive.getinfo(name)
+                    if entry.compress_type != zipfile.ZIP_STORED:
+                        raise SceneError(f"'{name}' is compressed in its package", where=self.stage.name)
+                    check_input(entry.file_size, f"texture '{name}'", where=self.stage.name)
+                    data = archive.read(entry)
+            except (KeyError, zipfile.BadZipFile, OSError, ValueError, RuntimeError, NotImplementedError, EOFError):
+                raise MissingFileError(f"texture '{name}' is not in the package", where=self.stage.name) from None
+            source = io.BytesIO(data)
+        return data

@@ -1,0 +1,306 @@
+"""Triangles of a stage's polygons: subdivision, holes, values of every interpolation, one mesh for each material."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lippmann.errors import SceneError
+from lippmann.runtime.input_memory import check_input
+from lippmann.scene.parsing.triangulation import triangulate
+from lippmann.scene.readers.gltf.skinning import unit_normals
+from lippmann.scene.readers.usd.primitives import primitive_polygons
+from lippmann.scene.readers.usd.records import Record
+from lippmann.scene.readers.usd.subdivision import Cage, Refined, refine, smooth_groups
+from lippmann.scene.values.description import FloatArray, Mesh
+
+Stored = Sequence[NDArray[np.generic]]
+Integers = NDArray[np.int64]
+
+#: How often a cage of Catmull-Clark is refined; less often where that makes more quadrilaterals than so many.
+LEVELS, _MOST_QUADS = 2, 1 << 19
+#: Bytes of the sparse matrices and arrays of a refined quadrilateral.
+_BYTES_PER_QUAD = 1000
+#: The same for a corner of a face that is not refined.
+_BYTES_PER_CORNER = 200
+
+
+@dataclass(frozen=True)
+class Part:
+    """Faces of one mesh that share a material: its number, -1 for none, and the triangles."""
+
+    material: int
+    mesh: Mesh
+
+
+@dataclass(frozen=True, eq=False)
+class _Polygons:
+    """Polygons as they are shown: float64 points, corners of each face and their points, and its face in the stage.
+
+    ``values`` take what stands at points, and at corners, of the stage's own polygons to those.
+    """
+
+    points: NDArray[np.float64]
+    counts: Integers
+    indices: Integers
+    faces: Integers
+    refined: Refined | None
+    corner_groups: Integers | None
+
+
+class MeshReader:
+    """Makes triangles of a stage's mesh records.
+
+    Attributes
+    ----------
+    notes:
+        What is not honoured.
+    """
+
+    def __init__(self, arrays: Stored, uv_names: Mapping[int, Sequence[str]], where: str) -> None:
+        """``uv_names`` has the texture coordinates that each material asks for, in the order of its uv sets."""
+        self._arrays, self._uv_names, self._where = arrays, uv_names, where
+        self.notes: dict[str, None] = {}
+
+    def parts(self, record: Record) -> list[Part]:
+        """The triangles of a record, by material.
+
+        Raises
+        ------
+        SceneError
+            Corners name points that there are not, or values do not fit the mesh.
+        """
+        if "primitive" in record:
+            return self._primitive(record)
+        counts, indices = self._integers(record, "counts"), self._integers(record, "indices")
+        points = self._array(record, "points").astype(np.float64)
+        self._check(record, points, counts, indices)
+        owner = np.repeat(np.arange(len(counts)), counts)
+        wide = counts >= 3
+        kept = wide[owner]
+        corner_of = np.flatnonzero(kept)
+        polygons = self._polygons(record, points, counts[wide], indices[kept])
+        corners = np.arange(len(polygons.indices))
+        hole = np.isin(np.flatnonzero(wide), self._integers(record, "holes"))
+        triangles, owners = triangulate(polygons.points, polygons.indices, polygons.counts)
+        shown = ~hole[polygons.faces[owners]]
+        triangles, owners = triangles[shown], owners[shown]
+        if record["left_handed"]:
+            triangles = triangles[:, ::-1]
+        stage_faces = np.flatnonzero(wide)[polygons.faces]
+        face_of_corner = np.repeat(stage_faces, polygons.counts)
+        sampler = _Sampler(polygons, corners, face_of_corner, corner_of, len(points), len(counts), len(owner))
+        return self._split(record, polygons, triangles, stage_faces[owners], sampler, len(counts))
+
+    def _primitive(self, record: Record) -> list[Part]:
+        shape = primitive_polygons(record["primitive"], record["numbers"])
+        triangles, _ = triangulate(shape.points, shape.indices, shape.counts)
+        if record["left_handed"]:
+            triangles = triangles[:, ::-1]
+        positions = shape.points[shape.indices].astype(np.float32)
+        mesh = Mesh(record["name"], positions, triangles.astype(np.uint32), 0, shape.normals.astype(np.float32))
+        color = self._constant_color(record)
+        if color is not None:
+            mesh = replace(mesh, colors=np.repeat(color, len(positions), axis=0))
+        return [Part(record["material"], mesh)]
+
+    def _constant_color(self, record: Record) -> FloatArray | None:
+        if record["color"] is None or record["material"] >= 0:
+            return None
+        return np.asarray(self._arrays[record["color"]["values"]][:1], np.float32)
+
+    def _array(self, record: Record, name: str) -> NDArray[np.generic]:
+        return self._arrays[record[name]]
+
+    def _integers(self, record: Record, name: str) -> Integers:
+        return np.asarray(self._array(record, name), np.int64)
+
+    def _check(self, record: Record, points: NDArray[np.float64], counts: Integers, indices: Integers) -> None:
+        name = record["name"]
+        if counts.min(initial=0) < 0 or counts.sum() != len(indices):
+            raise self._error(name, f"has {len(indices)} corners where its faces say {int(counts.sum())}")
+        if len(indices) and not 0 <= indices.min() <= indices.max() < len(points):
+            raise self._error(name, f"uses point {int(indices.max())} of {len(points)}")
+        if not np.isfinite(points).all():
+            raise self._error(name, "has points that are not finite")
+
+    def _error(self, name: str, what: str) -> SceneError:
+        return SceneError(f"mesh {name} {what}", where=self._where)
+
+    def _polygons(self, record: Record, points: NDArray[np.float64], counts: Integers, indices: Integers) -> _Polygons:
+        faces = np.arange(len(counts))
+        scheme = record["scheme"]
+        if scheme == "loop":
+            self.notes["meshes of Loop subdivision are shown as their cages, shaded smoothly"] = None
+        check_input(_BYTES_PER_CORNER * len(indices), f"mesh {record['name']}", where=self._where)
+        plain = _Polygons(points, counts, indices, faces, None, None)
+        if not len(counts) or (scheme == "none" and not record["is_skinned"]):
+            return plain
+        cage = self._cage(record, len(points), counts, indices)
+        if scheme != "catmullClark":
+            return replace(plain, corner_groups=smooth_groups(cage))
+        levels = LEVELS
+        while levels and len(indices) << (2 * levels - 2) > _MOST_QUADS:
+            levels -= 1
+        if levels < LEVELS:
+            self.notes[f"mesh {record['name']} is refined {levels} time(s) instead of {LEVELS}: it is large"] = None
+        if not levels:
+            return replace(plain, corner_groups=smooth_groups(cage))
+        quads = len(indices) << (2 * levels - 2)
+        check_input(_BYTES_PER_QUAD * quads, f"mesh {record['name']}, refined,", where=self._where)
+        refined = refine(cage, levels, sharp_corners=record["boundary"] != "edgeOnly")
+        return _Polygons(
+            refined.from_points @ points,
+            refined.cage.counts,
+            refined.cage.indices,
+            refined.faces,
+            refined,
+            smooth_groups(refined.cage),
+        )
+
+    def _cage(self, record: Record, points: int, counts: Integers, indices: Integers) -> Cage:
+        lengths, along = self._integers(record, "crease_lengths"), self._integers(record, "crease_indices")
+        sharpness = self._array(record, "crease_sharpnesses").astype(np.float64)
+        corners = np.zeros(points)
+        own, keen = self._integers(record, "corner_indices"), self._array(record, "corner_sharpnesses")
+        edges = np.zeros((0, 2), np.int64)
+        keenness = np.zeros(0)
+        fits = lengths.sum() == len(along) and (lengths >= 2).all() and len(own) == len(keen)
+        pairs = int(lengths.sum()) - len(lengths)
+        fits = fits and len(sharpness) in (len(lengths), pairs)
+        fits = fits and all(not len(each) or 0 <= each.min() <= each.max() < points for each in (along, own))
+        if not fits:
+            self.notes[f"mesh {record['name']}: creases that do not fit it are left out"] = None
+        else:
+            corners[own] = np.nan_to_num(keen)
+            if len(lengths):
+                last = np.zeros(len(along), bool)
+                last[np.cumsum(lengths) - 1] = True
+                first = np.flatnonzero(~last)
+                edges = np.stack([along[first], along[first + 1]], axis=1)
+                per_edge = len(sharpness) == pairs and pairs != len(lengths)
+                keenness = np.nan_to_num(sharpness if per_edge else np.repeat(sharpness, lengths - 1))
+        return Cage(points, counts, indices, edges, np.maximum(keenness, 0.0), np.maximum(corners, 0.0))
+
+    def _split(
+        self,
+        record: Record,
+        polygons: _Polygons,
+        triangles: Integers,
+        faces: Integers,
+        sampler: _Sampler,
+        face_count: int,
+    ) -> list[Part]:
+        """Triangles by material; ``faces`` is each one's face in the stage."""
+        materials = np.full(face_count, record["material"])
+        for subset in record["subsets"]:
+            own = self._integers(subset, "faces")
+            materials[own[(own >= 0) & (own < face_count)]] = subset["material"]
+        of_triangle = materials[faces]
+        parts = []
+        for material in np.unique(of_triangle):
+            chosen = triangles if len(record["subsets"]) == 0 else triangles[of_triangle == material]
+            mesh = self._mesh(record, polygons, chosen, sampler, int(material))
+            parts.append(Part(int(material), mesh))
+        return parts
+
+    def _mesh(self, record: Record, polygons: _Polygons, triangles: Integers, sampler: _Sampler, material: int) -> Mesh:
+        name = record["name"]
+        normals = None
+        if polygons.corner_groups is not None:
+            normals = _smooth_normals(polygons, record["left_handed"])
+        elif record["normals"] is not None:
+            normals = self._values(sampler, record["normals"], name, "normals")
+        uvs = []
+        for uv_name in self._uv_names.get(material, ()):
+            found = record["uvs"].get(uv_name)
+            if found is None:
+                self.notes[f"mesh {name} has no texture coordinates '{uv_name}': its textures show one texel"] = None
+                uvs.append(np.zeros((len(polygons.indices), 2), np.float32))
+                continue
+            values = self._values(sampler, found, name, f"texture coordinates '{uv_name}'")
+            # A stage's v points up the picture.
+            uvs.append((values * (1.0, -1.0) + (0.0, 1.0)).astype(np.float32))
+        colors = None
+        if record["color"] is not None and material < 0:
+            colors = np.clip(self._values(sampler, record["color"], name, "display colours"), 0.0, None)
+            if record["opacity"] is not None:
+                opacity = np.clip(self._values(sampler, record["opacity"], name, "display opacities"), 0.0, 1.0)
+                colors = np.concatenate([colors, opacity], axis=1)
+        corners = np.unique(triangles)
+        places = np.zeros(len(polygons.indices), np.uint32)
+        places[corners] = np.arange(len(corners), dtype=np.uint32)
+        positions = polygons.points[polygons.indices[corners]].astype(np.float32)
+        faces = places[triangles]
+        mesh = Mesh(
+            name,
+            positions,
+            faces,
+            0,
+            uvs=tuple(values[corners] for values in uvs),
+            colors=None if colors is None else colors[corners].astype(np.float32),
+        )
+        if normals is None or not len(faces):
+            return mesh
+        return replace(mesh, normals=unit_normals(normals[corners].astype(np.float32), positions, faces)[0])
+
+    def _values(self, sampler: _Sampler, primvar: Record, name: str, what: str) -> FloatArray:
+        values = np.asarray(self._arrays[primvar["values"]], np.float32)
+        taken = sampler.at_corners(values, primvar["interpolation"])
+        if taken is None:
+            raise self._error(name, f"has {len(values)} {what}, {primvar['interpolation']}, which do not fit it")
+        return taken
+
+
+@dataclass(frozen=True, eq=False)
+class _Sampler:
+    """Values of a mesh at the corners of the polygons that are shown.
+
+    ``corner_of`` are the stage's corners that polygons of three and more have; the counts are those of the stage.
+    """
+
+    polygons: _Polygons
+    corners: Integers
+    face_of_corner: Integers
+    corner_of: Integers
+    points: int
+    faces: int
+    stage_corners: int
+
+    def at_corners(self, values: FloatArray, interpolation: str) -> FloatArray | None:
+        """Values ``(c, k)``; None where there are not as many as the mesh needs."""
+        refined = self.polygons.refined
+        if interpolation == "constant":
+            return np.broadcast_to(values[:1], (len(self.corners), values.shape[1])) if len(values) else None
+        if interpolation == "uniform":
+            return values[self.face_of_corner] if len(values) == self.faces else None
+        if interpolation in ("vertex", "varying"):
+            if len(values) != self.points:
+                return None
+            if refined is not None:
+                matrix = refined.from_points if interpolation == "vertex" else refined.from_points_linear
+                values = np.asarray(matrix @ values, np.float32)
+            return values[self.polygons.indices]
+        if interpolation != "faceVarying" or len(values) != self.stage_corners:
+            return None
+        own = values[self.corner_of]
+        return own if refined is None else np.asarray(refined.from_corners @ own, np.float32)
+
+
+def _smooth_normals(polygons: _Polygons, left_handed: bool) -> FloatArray:
+    """Normals ``(c, 3)`` at corners, not of unit length: sums of faces by area, where no sharp edge parts them."""
+    assert polygons.corner_groups is not None
+    corners = polygons.points[polygons.indices]
+    ends = np.cumsum(polygons.counts)
+    starts = ends - polygons.counts
+    following = np.arange(len(corners)) + 1
+    following[ends - 1] = starts
+    first = np.repeat(starts, polygons.counts)
+    areas = np.add.reduceat(np.cross(corners - corners[first], corners[following] - corners[first]), starts, axis=0)
+    owner = np.repeat(np.arange(len(polygons.counts)), polygons.counts)
+    groups = polygons.corner_groups
+    sums = np.stack([np.bincount(groups, areas[owner, axis]) for axis in range(3)], axis=1)
+    return (sums[groups] * (-1.0 if left_handed else 1.0)).astype(np.float32)

@@ -1,0 +1,92 @@
+"""The process that opens stages: native code that damaged files may bring down, with nothing else in it."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+
+from pxr import Sdf, Usd, UsdGeom
+
+from lippmann.runtime.helper_process import limit_memory, serve
+from lippmann.scene.readers.usd.records import Arrays, Record, pack
+from lippmann.scene.readers.usd.stage_layers import StageError, check_layers, choose_variants, used_files
+from lippmann.scene.readers.usd.stage_traversal import Traversal
+
+#: What C++ calls it when memory is short.
+_NO_ROOM = re.compile("bad_alloc|bad_array_new_length|length_error")
+
+#: The stage that was asked for last, with what it was opened by: frames of a sequence share it.
+_opened: dict[str, Usd.Stage] = {}
+
+
+def main() -> None:
+    """Answer requests, each a JSON object; see :func:`lippmann.scene.readers.usd.process.ask_stage`."""
+    serve(_answer)
+
+
+def _answer(data: bytes) -> bytes:
+    request = json.loads(data)
+    limit_memory(request["memory"])
+    arrays = Arrays()
+    try:
+        return pack(_read(request, arrays), arrays)
+    except StageError as error:
+        tree: Record = {"error": {"what": error.what, "rule": error.rule, "fix": error.fix}}
+    except Exception as error:  # noqa: BLE001  # USD raises errors of many kinds, for values of a wrong type too
+        words = _words(error, request["path"])
+        if isinstance(error, MemoryError) or _NO_ROOM.search(words):
+            tree = {"error": {"what": "takes more memory than is left", "rule": "", "fix": "allow more: memory=..."}}
+        else:
+            tree = {"error": {"what": f"USD refuses it: {words}", "rule": "", "fix": ""}}
+    _opened.clear()
+    return pack(tree, Arrays())
+
+
+def _words(error: Exception, path: str) -> str:
+    """USD's own words without what names source files and lines of C++, and without the folder of the file."""
+    try:
+        said = " ".join(str(error).split())
+    except UnicodeDecodeError:  # it quotes the file
+        return "it holds text that is not UTF-8"
+    message = said.rpartition(" : ")[2].strip("'\" ")
+    return message.replace(os.path.join(os.path.dirname(path), ""), "")[:300]
+
+
+def _read(request: Record, arrays: Arrays) -> Record:
+    stage, notes = _open(request)
+    rate = stage.GetTimeCodesPerSecond() or 24.0
+    start, end = stage.GetStartTimeCode(), stage.GetEndTimeCode()
+    is_timed = stage.HasAuthoredTimeCodeRange() and end > start
+    seconds = request["seconds"]
+    if seconds is None:
+        time = Usd.TimeCode(start) if is_timed else Usd.TimeCode.EarliestTime()
+    else:
+        time = Usd.TimeCode(start + seconds * rate)
+    traversal = Traversal(stage, time, arrays, notes)
+    traversal.run()
+    return {
+        **traversal.tree(),
+        "meters_per_unit": UsdGeom.GetStageMetersPerUnit(stage),
+        "up": str(UsdGeom.GetStageUpAxis(stage)),
+        "duration": (end - start) / rate if is_timed else 0.0,
+        "files": used_files(stage),
+        "notes": list(traversal.notes),
+    }
+
+
+def _open(request: Record) -> tuple[Usd.Stage, dict[str, None]]:
+    key = json.dumps([request[name] for name in ("path", "stamp", "folder", "variants")])
+    if key not in _opened:
+        _opened.clear()
+        missing = check_layers(request["path"], request["folder"])
+        layer = Sdf.Layer.FindOrOpen(request["path"])
+        if layer is None:
+            raise StageError("is no USD file", rule="its beginning is not that of one")
+        layer.Reload()  # another file may have had this name
+        stage = Usd.Stage.Open(layer, Usd.Stage.LoadAll)
+        stage.missing_layers = missing
+        choose_variants(stage, request["variants"])
+        _opened[key] = stage
+    stage = _opened[key]
+    return stage, dict.fromkeys(stage.missing_layers)

@@ -1,0 +1,120 @@
+"""Layers of a stage: which files it is made of, where they may lie, and which variants are chosen."""
+
+from __future__ import annotations
+
+import os
+
+from pxr import Sdf, Usd
+
+#: Layers that a stage may be made of.
+_MOST_LAYERS = 10_000
+#: Rounds in which a chosen variant may bring prims that have variants themselves.
+_MOST_ROUNDS = 8
+
+
+class StageError(Exception):
+    """A stage that is not read: what is wrong, the rule and the fix."""
+
+    def __init__(self, what: str, *, rule: str = "", fix: str = "") -> None:
+        super().__init__(what)
+        self.what, self.rule, self.fix = what, rule, fix
+
+
+def check_layers(path: str, folder: str | None) -> list[str]:
+    """Look at all layers that a file leads to, before a stage is made of them.
+
+    Parameters
+    ----------
+    folder:
+        The folder that all must lie in; None allows any.
+
+    Returns
+    -------
+    Notes on layers that are not there.
+
+    Raises
+    ------
+    StageError
+        A layer lies outside, or there are too many.
+    """
+    home = None if folder is None else os.path.realpath(folder)
+    waiting, known, notes = [path], {path}, []
+    while waiting:
+        layer = Sdf.Layer.FindOrOpen(waiting.pop())
+        if layer is None:
+            continue
+        for name in sorted(filter(None, layer.GetCompositionAssetDependencies())):
+            found = layer.ComputeAbsolutePath(name)
+            if found in known:
+                continue
+            known.add(found)
+            if len(known) > _MOST_LAYERS:
+                raise StageError(f"is made of more than {_MOST_LAYERS} layers")
+            if home is not None and not _lies_in(found, home):
+                raise StageError(
+                    f"layer '{name}' lies outside the scene's folder",
+                    rule="a scene file may name only files in its own folder and below",
+                    fix="move it there, or trust the scene file with allow_outside=True",
+                )
+            if os.path.isfile(_outer(found)):
+                waiting.append(found)
+            else:
+                notes.append(f"layer '{name}' is not there: the scene lacks what it holds")
+    return notes
+
+
+def _outer(name: str) -> str:
+    """The file of a layer's name, which may lie in a package and have arguments."""
+    return name.split(":SDF_FORMAT_ARGS:")[0].split("[")[0]
+
+
+def _lies_in(name: str, home: str) -> bool:
+    place = os.path.realpath(os.path.join(home, _outer(name)))
+    return place == home or place.startswith(home.rstrip(os.sep) + os.sep)
+
+
+def used_files(stage: Usd.Stage) -> list[str]:
+    """The files of all layers that a stage is made of."""
+    return sorted({_outer(layer.realPath) for layer in stage.GetUsedLayers() if layer.realPath})
+
+
+def choose_variants(stage: Usd.Stage, choices: dict[str, str]) -> None:
+    """Choose variants: ``{"set": "choice"}`` for every prim that has them, ``{"/prim:set": "choice"}`` for one.
+
+    Raises
+    ------
+    StageError
+        No prim has such a set with such a choice.
+    """
+    left = dict(choices)
+    with Usd.EditContext(stage, stage.GetSessionLayer()):
+        for _ in range(_MOST_ROUNDS):
+            changed = False
+            for path in [prim.GetPath() for prim in stage.TraverseAll()]:
+                prim = stage.GetPrimAtPath(path)
+                if not prim:  # a choice took it away
+                    continue
+                for name in prim.GetVariantSets().GetNames():
+                    variants = prim.GetVariantSet(name)
+                    for key in (name, f"{prim.GetPath()}:{name}"):
+                        choice = choices.get(key)
+                        if choice is None or choice not in variants.GetVariantNames():
+                            continue
+                        left.pop(key, None)
+                        if variants.GetVariantSelection() != choice:
+                            variants.SetVariantSelection(choice)
+                            changed = True
+            if not changed:
+                break
+    if left:
+        key, choice = next(iter(left.items()))
+        raise StageError(f"no prim has a variant '{choice}' of '{key}'", rule=_known_variants(stage))
+
+
+def _known_variants(stage: Usd.Stage) -> str:
+    known: dict[str, set[str]] = {}
+    for prim in stage.TraverseAll():
+        for name in prim.GetVariantSets().GetNames():
+            known.setdefault(name, set()).update(prim.GetVariantSet(name).GetVariantNames())
+    told = [f"{name}={'|'.join(sorted(choices))}" for name, choices in sorted(known.items())]
+    return "known are " + ", ".join(told[:20]) if told else "the stage has no variants"

@@ -1,0 +1,125 @@
+"""Records of meshes: points, polygons, primvars, creases and subsets as they stand in a stage."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from pxr import Usd, UsdGeom, UsdShade
+
+from lippmann.scene.readers.usd.records import Arrays, Record
+from lippmann.scene.readers.usd.stage_layers import StageError
+from lippmann.scene.readers.usd.stage_shading import MaterialTable
+from lippmann.scene.readers.usd.stage_skinning import Skin, skinned_points
+
+#: Types that are given by numbers, and which.
+PRIMITIVES = {
+    "Sphere": ("radius",),
+    "Cube": ("size",),
+    "Cylinder": ("height", "radius", "axis"),
+    "Cylinder_1": ("height", "radiusTop", "radiusBottom", "axis"),
+    "Cone": ("height", "radius", "axis"),
+    "Capsule": ("height", "radius", "axis"),
+    "Capsule_1": ("height", "radiusTop", "radiusBottom", "axis"),
+    "Plane": ("width", "length", "axis"),
+}
+
+_UV_TYPES = ("texCoord2f[]", "texCoord2d[]", "texCoord2h[]", "float2[]", "double2[]", "half2[]")
+_MOST_UV_SETS = 8
+
+
+def mesh_record(
+    mesh: UsdGeom.Mesh, time: Usd.TimeCode, arrays: Arrays, materials: MaterialTable, skin: Skin | None
+) -> Record:
+    """A mesh as it is at a time; a skinned one in the space of its skeleton."""
+
+    def integers(attribute: Any) -> int:
+        return arrays.add(np.asarray(attribute.Get(time) or [], np.int64).ravel())
+
+    prim = mesh.GetPrim()
+    points = mesh.GetPointsAttr().Get(time)
+    if skin is not None and points:
+        points = skinned_points(skin, prim, points, time)
+    crease_lengths = np.asarray(mesh.GetCreaseLengthsAttr().Get(time) or [], np.int64)
+    return {
+        **_shown(prim, time, arrays),
+        "points": arrays.add(_floats(points, 3)),
+        "counts": integers(mesh.GetFaceVertexCountsAttr()),
+        "indices": integers(mesh.GetFaceVertexIndicesAttr()),
+        "holes": integers(mesh.GetHoleIndicesAttr()),
+        "crease_indices": integers(mesh.GetCreaseIndicesAttr()),
+        "crease_lengths": arrays.add(crease_lengths),
+        "crease_sharpnesses": arrays.add(_floats(mesh.GetCreaseSharpnessesAttr().Get(time), 1).ravel()),
+        "corner_indices": integers(mesh.GetCornerIndicesAttr()),
+        "corner_sharpnesses": arrays.add(_floats(mesh.GetCornerSharpnessesAttr().Get(time), 1).ravel()),
+        "scheme": str(mesh.GetSubdivisionSchemeAttr().Get(time) or "catmullClark"),
+        "boundary": str(mesh.GetInterpolateBoundaryAttr().Get(time) or "edgeAndCorner"),
+        "normals": None if skin is not None else _normals(mesh, time, arrays),
+        "is_skinned": skin is not None,
+        "uvs": _uv_sets(prim, time, arrays),
+        "subsets": _subsets(prim, time, arrays, materials),
+    }
+
+
+def primitive_record(prim: Usd.Prim, time: Usd.TimeCode, arrays: Arrays) -> Record:
+    """A shape that is given by numbers."""
+    kind = str(prim.GetTypeName())
+    values = {name: prim.GetAttribute(name).Get(time) for name in PRIMITIVES[kind]}
+    numbers = {name: str(value) if name == "axis" else float(value) for name, value in values.items()}
+    return {**_shown(prim, time, arrays), "primitive": kind, "numbers": numbers}
+
+
+def _shown(prim: Usd.Prim, time: Usd.TimeCode, arrays: Arrays) -> Record:
+    gprim = UsdGeom.Gprim(prim)
+    primvars = UsdGeom.PrimvarsAPI(prim)
+    return {
+        "left_handed": str(gprim.GetOrientationAttr().Get(time)) == "leftHanded",
+        "color": _primvar(primvars.FindPrimvarWithInheritance("displayColor"), 3, time, arrays),
+        "opacity": _primvar(primvars.FindPrimvarWithInheritance("displayOpacity"), 1, time, arrays),
+    }
+
+
+def _normals(mesh: UsdGeom.Mesh, time: Usd.TimeCode, arrays: Arrays) -> Record | None:
+    """The primvar ``normals``, which wins over the attribute of that name."""
+    record = _primvar(UsdGeom.PrimvarsAPI(mesh).GetPrimvar("normals"), 3, time, arrays)
+    values = mesh.GetNormalsAttr().Get(time)
+    if record is not None or not values:
+        return record
+    return {"values": arrays.add(_floats(values, 3)), "interpolation": str(mesh.GetNormalsInterpolation())}
+
+
+def _uv_sets(prim: Usd.Prim, time: Usd.TimeCode, arrays: Arrays) -> Record:
+    found: Record = {}
+    for primvar in UsdGeom.PrimvarsAPI(prim).FindPrimvarsWithInheritance():
+        if str(primvar.GetTypeName()) in _UV_TYPES and len(found) < _MOST_UV_SETS:
+            record = _primvar(primvar, 2, time, arrays)
+            if record is not None:
+                found[str(primvar.GetPrimvarName())] = record
+    return found
+
+
+def _primvar(primvar: UsdGeom.Primvar, width: int, time: Usd.TimeCode, arrays: Arrays) -> Record | None:
+    """Values of a primvar without its indices, and how they lie on the mesh; None where it has none."""
+    if not primvar or not primvar.HasValue():
+        return None
+    values = primvar.ComputeFlattened(time)
+    if not values:
+        return None
+    return {"values": arrays.add(_floats(values, width)), "interpolation": str(primvar.GetInterpolation())}
+
+
+def _subsets(prim: Usd.Prim, time: Usd.TimeCode, arrays: Arrays, materials: MaterialTable) -> list[Record]:
+    """Faces that have a material of their own."""
+    found = []
+    for subset in UsdShade.MaterialBindingAPI(prim).GetMaterialBindSubsets():
+        faces = np.asarray(subset.GetIndicesAttr().Get(time) or [], np.int64).ravel()
+        found.append({"faces": arrays.add(faces), "material": materials.bound(subset.GetPrim())})
+    return found
+
+
+def _floats(values: Any, width: int) -> np.ndarray:
+    """Values ``(n, width)`` float32."""
+    array = np.asarray(values if values else [], np.float32)
+    if array.size % width:
+        raise StageError(f"{array.size} numbers where {width} each belong")
+    return array.reshape(-1, width)

@@ -1,0 +1,96 @@
+"""Records of materials: the inputs of ``UsdPreviewSurface``, with the values and textures that feed them."""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+
+from pxr import Gf, Sdf, Usd, UsdShade
+
+from lippmann.scene.readers.usd.records import Record
+
+_SURFACE = "UsdPreviewSurface"
+#: Nodes between a surface and what it reads.
+_DEEPEST = 8
+
+
+class MaterialTable:
+    """The materials of a stage, read when they are first met.
+
+    Attributes
+    ----------
+    records:
+        One for each material; meshes refer to them by their place.
+    """
+
+    def __init__(self, time: Usd.TimeCode, notes: dict[str, None]) -> None:
+        self.records: list[Record] = []
+        self._time, self._notes = time, notes
+        self._known: dict[str, int] = {}
+
+    def bound(self, prim: Usd.Prim) -> int:
+        """The number of the material that is bound to a prim, by itself or by what lies above it; -1 for none."""
+        material = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial()[0]
+        if not material:
+            return -1
+        own = material.GetPrim()
+        path = str((own.GetPrimInPrototype() if own.IsInstanceProxy() else own).GetPath())
+        if path not in self._known:
+            record = self._read(material)
+            self._known[path] = -1 if record is None else len(self.records)
+            if record is not None:
+                self.records.append(record)
+        return self._known[path]
+
+    def _read(self, material: UsdShade.Material) -> Record | None:
+        name = str(material.GetPath())
+        surface = material.ComputeSurfaceSource()[0]
+        kind = str(surface.GetShaderId()) if surface else ""
+        if kind != _SURFACE:
+            what = f"its surface is '{kind}'" if kind else "it has no surface"
+            self._notes[f"material {name}: {what}, not {_SURFACE}: display colours are taken"] = None
+            return None
+        inputs = {each.GetBaseName(): self._source(each, _DEEPEST) for each in surface.GetInputs()}
+        return {"name": name, "inputs": {key: value for key, value in inputs.items() if value is not None}}
+
+    def _source(self, shader_input: UsdShade.Input, depth: int) -> Record | None:
+        """What feeds an input: a ``value``, a ``texture`` or a ``primvar``; None where nothing does."""
+        attributes = UsdShade.Utils.GetValueProducingAttributes(shader_input)
+        if not attributes or depth == 0:
+            return None
+        attribute = attributes[0]
+        name, kind = UsdShade.Utils.GetBaseNameAndType(attribute.GetName())
+        if kind != UsdShade.AttributeType.Output:
+            value = attribute.Get(self._time)
+            if isinstance(value, Sdf.AssetPath):
+                return {"asset": asset_record(attribute, value, self._time)}
+            return None if value is None else {"value": _plain(value)}
+        node = UsdShade.Shader(attribute.GetPrim())
+        node_kind = str(node.GetShaderId()) if node else ""
+        inputs = {each.GetBaseName(): self._source(each, depth - 1) for each in node.GetInputs()} if node else {}
+        given = {key: value for key, value in inputs.items() if value is not None}
+        if node_kind == "UsdUVTexture":
+            return {"texture": given, "channel": name}
+        if node_kind == "UsdTransform2d":
+            return {"transform": given}
+        if node_kind.startswith("UsdPrimvarReader_"):
+            return {"primvar": given.get("varname", {}).get("value", ""), "fallback": given.get("fallback")}
+        self._notes[f"shader nodes of type '{node_kind}' are not read"] = None
+        return None
+
+
+def asset_record(attribute: Usd.Attribute, value: Sdf.AssetPath, time: Usd.TimeCode) -> Record:
+    """A file that an attribute names: as it stands there, as USD finds it, and the folder of the layer that says so."""
+    stack = attribute.GetPropertyStack(time)
+    layer = stack[0].layer.realPath if stack else ""
+    folder = os.path.dirname(layer.split("[")[0]) if layer else ""
+    return {"name": value.path, "found": value.resolvedPath, "folder": folder}
+
+
+def _plain(value: Any) -> Any:
+    """A value in terms of JSON."""
+    if isinstance(value, (bool, int, float, str)):
+        return value
+    if isinstance(value, (Gf.Vec2f, Gf.Vec3f, Gf.Vec4f, Gf.Vec2d, Gf.Vec3d, Gf.Vec4d, Gf.Vec2h, Gf.Vec3h, Gf.Vec4h)):
+        return [float(number) for number in value]
+    return str(value)

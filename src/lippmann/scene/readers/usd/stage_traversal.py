@@ -1,0 +1,176 @@
+"""What a stage shows at a time: its prims in order, with the places of all copies."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pxr import Usd, UsdGeom, UsdLux, UsdSkel
+
+from lippmann.scene.readers.usd.records import Arrays, Record
+from lippmann.scene.readers.usd.stage_layers import StageError
+from lippmann.scene.readers.usd.stage_lights import camera_record, light_record
+from lippmann.scene.readers.usd.stage_meshes import PRIMITIVES, mesh_record, primitive_record
+from lippmann.scene.readers.usd.stage_shading import MaterialTable
+from lippmann.scene.readers.usd.stage_skinning import Skinning
+
+Matrices = NDArray[np.float64]
+
+#: Copies of all meshes together.
+_MOST_COPIES = 1 << 21
+#: Point instancers within the prototypes of others.
+_DEEPEST = 16
+
+_PREDICATE = Usd.TraverseInstanceProxies(Usd.PrimIsActive & Usd.PrimIsDefined & ~Usd.PrimIsAbstract & Usd.PrimIsLoaded)
+
+
+class Traversal:
+    """One walk over a stage.
+
+    Attributes
+    ----------
+    notes:
+        What is not read, in the order of its first appearance.
+    """
+
+    def __init__(self, stage: Usd.Stage, time: Usd.TimeCode, arrays: Arrays, notes: dict[str, None]) -> None:
+        self.notes = notes
+        self._stage, self._time, self._arrays = stage, time, arrays
+        self._transforms = UsdGeom.XformCache(time)
+        self._materials = MaterialTable(time, notes)
+        self._skinning = Skinning(stage, time, _PREDICATE)
+        self._meshes: dict[tuple[object, ...], Record] = {}
+        self._worlds: dict[tuple[object, ...], list[Matrices]] = {}
+        self._lights: list[Record] = []
+        self._cameras: list[Record] = []
+        self._copies = 0
+        self._unread: dict[str, int] = {}
+
+    def run(self) -> None:
+        """Visit all prims.
+
+        Raises
+        ------
+        StageError
+            Too many copies, or instancers that hold themselves.
+        """
+        self._visit(self._stage.GetPseudoRoot(), np.eye(4)[None], np.eye(4), 0)
+        for kind, count in self._unread.items():
+            self.notes[f"{count} prim(s) of type {kind} are not drawn"] = None
+
+    def tree(self) -> Record:
+        """All records."""
+        meshes = []
+        for key, record in self._meshes.items():
+            worlds = np.concatenate(self._worlds[key])
+            meshes.append({**record, "worlds": self._arrays.add(worlds)})
+        return {
+            "meshes": meshes,
+            "materials": self._materials.records,
+            "lights": self._lights,
+            "cameras": self._cameras,
+        }
+
+    def _visit(self, root: Usd.Prim, base: Matrices, base_from_world: Matrices, depth: int) -> None:
+        """Take over what ``root`` and all below it show, at ``base`` ``(k, 4, 4)``, in a frame of their own."""
+        prims = iter(Usd.PrimRange(root, _PREDICATE))
+        for prim in prims:
+            if prim.IsPseudoRoot():
+                continue
+            if not prim.IsA(UsdGeom.Imageable):
+                continue
+            if self._is_hidden(prim):
+                prims.PruneChildren()
+                continue
+            place = base_from_world @ self._world(prim)
+            if prim.IsA(UsdGeom.PointInstancer):
+                self._add_instancer(UsdGeom.PointInstancer(prim), base @ place, depth)
+                prims.PruneChildren()
+            elif prim.IsA(UsdGeom.Mesh) or str(prim.GetTypeName()) in PRIMITIVES:
+                self._add_mesh(prim, base, place)
+            elif prim.IsA(UsdGeom.Camera):
+                self._cameras.append(camera_record(UsdGeom.Camera(prim), (base @ place)[0], self._time))
+            elif prim.HasAPI(UsdLux.LightAPI):
+                self._lights += [light_record(prim, world, self._time, self.notes) for world in base @ place]
+            elif prim.IsA(UsdGeom.Boundable) and not prim.IsA(UsdSkel.Root) and not prim.IsA(UsdSkel.Skeleton):
+                kind = str(prim.GetTypeName())
+                self._unread[kind] = self._unread.get(kind, 0) + 1
+
+    def _is_hidden(self, prim: Usd.Prim) -> bool:
+        imageable = UsdGeom.Imageable(prim)
+        if imageable.GetVisibilityAttr().Get(self._time) == UsdGeom.Tokens.invisible:
+            return True
+        return imageable.GetPurposeAttr().Get() in (UsdGeom.Tokens.guide, UsdGeom.Tokens.proxy)
+
+    def _world(self, prim: Usd.Prim) -> Matrices:
+        """``world_from_prim``; USD's matrices act on row vectors."""
+        return np.array(self._transforms.GetLocalToWorldTransform(prim), np.float64).T
+
+    def _add_mesh(self, prim: Usd.Prim, base: Matrices, place: Matrices) -> None:
+        skin = self._skinning.of(prim)
+        if skin is not None:
+            place = self._world(skin.skeleton)
+        material = self._materials.bound(prim)
+        own = prim.GetPrimInPrototype() if prim.IsInstanceProxy() and skin is None else prim
+        color = inherited_color(prim)
+        key = (own.GetPath(), material, str(color))
+        worlds = base @ place
+        self._count(len(worlds))
+        if key not in self._meshes:
+            if prim.IsA(UsdGeom.Mesh):
+                record = mesh_record(UsdGeom.Mesh(prim), self._time, self._arrays, self._materials, skin)
+            else:
+                record = primitive_record(prim, self._time, self._arrays)
+            self._meshes[key] = {**record, "name": str(prim.GetPath()), "material": material}
+        self._worlds.setdefault(key, []).append(worlds)
+
+    def _add_instancer(self, instancer: UsdGeom.PointInstancer, worlds: Matrices, depth: int) -> None:
+        name = str(instancer.GetPath())
+        if depth >= _DEEPEST:
+            raise StageError(f"instancers within instancers at {name}", rule=f"up to {_DEEPEST} deep are read")
+        targets = instancer.GetPrototypesRel().GetForwardedTargets()
+        kinds = np.asarray(instancer.GetProtoIndicesAttr().Get(self._time) or [], np.int64)
+        places = _instance_matrices(instancer, self._time)
+        shown = np.asarray(instancer.ComputeMaskAtTime(self._time) or [True] * len(kinds), bool)
+        if len(places) != len(kinds) or len(shown) != len(kinds):
+            raise StageError(f"{name} has {len(places)} places for {len(kinds)} copies", rule="one each")
+        if len(kinds) and not 0 <= kinds.min() <= kinds.max() < len(targets):
+            raise StageError(f"{name} has {len(targets)} prototypes, counted from 0, and names {kinds.max()}")
+        if UsdGeom.PrimvarsAPI(instancer.GetPrim()).HasPrimvar("displayColor"):
+            self.notes["colours of a point instancer's copies are not read: they have those of its prototypes"] = None
+        for number, target in enumerate(targets):
+            own = places[(kinds == number) & shown]
+            prim = self._stage.GetPrimAtPath(target)
+            if not len(own) or not prim:
+                continue
+            if len(own) * len(worlds) > _MOST_COPIES:
+                self._count(len(own) * len(worlds))
+            # The prototype's own transformation belongs to it; that of what lies above does not.
+            parent = self._world(prim.GetParent())
+            if not np.linalg.det(parent):
+                self.notes[f"{target}: lies under a transformation that is flat, and is left out"] = None
+                continue
+            copies = (worlds[:, None] @ own[None]).reshape(-1, 4, 4)
+            self._visit(prim, copies, np.asarray(np.linalg.inv(parent), np.float64), depth + 1)
+
+    def _count(self, copies: int) -> None:
+        self._copies += copies
+        if self._copies > _MOST_COPIES:
+            raise StageError(f"places more than {_MOST_COPIES} copies of meshes", rule="so many may be placed")
+
+
+def inherited_color(prim: Usd.Prim) -> Any:
+    """The ``displayColor`` that a prim inherits, which copies of a prototype may have their own of; or None."""
+    primvars = UsdGeom.PrimvarsAPI(prim)
+    if primvars.HasPrimvar("displayColor"):
+        return None
+    inherited = primvars.FindPrimvarWithInheritance("displayColor")
+    return inherited.Get() if inherited else None
+
+
+def _instance_matrices(instancer: UsdGeom.PointInstancer, time: Usd.TimeCode) -> Matrices:
+    """``instancer_from_copy`` ``(k, 4, 4)`` of all copies, hidden ones too."""
+    exclude, ignore = UsdGeom.PointInstancer.ExcludeProtoXform, UsdGeom.PointInstancer.IgnoreMask
+    matrices = instancer.ComputeInstanceTransformsAtTime(time, time, exclude, ignore)
+    return np.array(matrices, np.float64).reshape(-1, 4, 4).transpose(0, 2, 1)

@@ -1,0 +1,127 @@
+"""Light sources and cameras of stages: radiances, areas, directions."""
+
+import math
+
+import numpy as np
+import pytest
+
+from .conftest import triangle
+from .test_stage_materials import png
+
+
+def test_a_distant_light(read):
+    (light,) = read(
+        triangle() + 'def DistantLight "sun" {\nfloat inputs:intensity = 1000\nfloat inputs:angle = 2\n}'
+    ).lights
+    assert light.kind == "directional"
+    # Radiance times the projected solid angle of a disk of half-angle 1 degree.
+    assert light.color == pytest.approx((1000 * math.pi * math.sin(math.radians(1)) ** 2,) * 3)
+
+
+def test_a_normalized_distant_light_gives_its_irradiance(read):
+    body = 'def DistantLight "sun" {\nfloat inputs:intensity = 3\nbool inputs:normalize = true\n'
+    body += "float inputs:exposure = 1\n}"
+    assert read(triangle() + body).lights[0].color == pytest.approx((6, 6, 6))
+
+
+def test_a_sphere_light(read):
+    body = (
+        'def SphereLight "bulb" {\nfloat inputs:intensity = 10\nfloat inputs:radius = 0.5\n'
+        "color3f inputs:color = (1, 0.5, 0)\ndouble3 xformOp:translate = (1, 2, 3)\n"
+        'uniform token[] xformOpOrder = ["xformOp:translate"]\n}'
+    )
+    (light,) = read(triangle() + body).lights
+    assert light.kind == "point"
+    assert light.radius == 0.5
+    assert light.color == pytest.approx((10 * math.pi * 0.25, 5 * math.pi * 0.25, 0))
+    assert light.world_from_light[:3, 3].tolist() == [1, 2, 3]
+
+
+def test_a_shaped_light_is_a_spot(read):
+    body = (
+        'def SphereLight "spot" (prepend apiSchemas = ["ShapingAPI"]) {\nfloat inputs:shaping:cone:angle = 30\n'
+        "float inputs:shaping:cone:softness = 0.5\nbool treatAsPoint = true\n}"
+    )
+    (light,) = read(triangle() + body).lights
+    assert (light.kind, light.radius) == ("spot", 0)
+    assert (math.degrees(light.outer_angle), math.degrees(light.inner_angle)) == pytest.approx((30, 15))
+
+
+SURFACES = {
+    "RectLight": ("float inputs:width = 2\nfloat inputs:height = 3", 6),
+    "DiskLight": ("float inputs:radius = 2", math.pi * 4),
+    "CylinderLight": ("float inputs:radius = 1\nfloat inputs:length = 3", 2 * math.pi * 3),
+}
+
+
+@pytest.mark.parametrize("kind", SURFACES)
+def test_area_lights_glow(read, kind):
+    numbers, area = SURFACES[kind]
+    scene = read(
+        triangle() + f'def {kind} "l" {{\n{numbers}\nfloat inputs:intensity = 5\nbool inputs:normalize = true\n}}'
+    )
+    mesh = scene.meshes[1]
+    corners = mesh.positions[mesh.faces].astype(float)
+    vectors = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) / 2
+    assert np.linalg.norm(vectors, axis=1).sum() == pytest.approx(area, rel=2e-3)
+    material = scene.materials[mesh.material]
+    assert material.emission == pytest.approx((5 / area,) * 3, rel=2e-3)
+    assert (material.base_color, material.double_sided) == ((0, 0, 0), False)
+    if kind == "CylinderLight":
+        outward = corners.mean(axis=1) * (0, 1, 1)
+        assert (np.einsum("ij,ij->i", vectors, outward) > 0).all()
+    else:
+        assert (vectors[:, 2] < 0).all()
+
+
+def test_a_dome_of_one_colour(read):
+    environment = read(
+        triangle() + 'def DomeLight "sky" {\nfloat inputs:intensity = 2\ncolor3f inputs:color = (1, 2, 3)\n}'
+    ).environment
+    assert np.unique(environment.pixels.reshape(-1, 3), axis=0).tolist() == [[2, 4, 6]]
+
+
+@pytest.mark.parametrize(("up", "kind"), [("Y", "DomeLight"), ("Y", "DomeLight_1"), ("Z", "DomeLight_1")])
+def test_a_domes_picture_is_upright_and_its_middle_lies_at_z(read, up, kind):
+    """The frame of OpenEXR: the middle at +z, the left of the middle at +x."""
+    pixels = np.zeros((4, 8, 3), np.uint8)
+    body = triangle() + f'def {kind} "sky" {{\nasset inputs:texture:file = @sky.png@\n}}'
+    head = f'#usda 1.0\n(\n    upAxis = "{up}"\n    metersPerUnit = 1\n)\n'
+    environment = read(body, head=head, files={"sky.png": png(pixels)}).environment
+    turn = environment.world_from_environment[:3, :3]
+    # Of an environment: the middle is -z, the right of it +x, up +y.
+    assert turn @ [0, 1, 0] == pytest.approx([0, 1, 0])
+    if up == "Y":
+        assert turn @ [0, 0, -1] == pytest.approx([0, 0, 1])
+        assert turn @ [-1, 0, 0] == pytest.approx([1, 0, 0])
+
+
+def test_cameras(read):
+    body = """
+def Camera "view" {
+    float focalLength = 50
+    float horizontalAperture = 36
+    float verticalAperture = 24
+    float focusDistance = 7
+    double3 xformOp:translate = (0, 0, 5)
+    uniform token[] xformOpOrder = ["xformOp:translate"]
+}
+def Camera "flat" {
+    token projection = "orthographic"
+    float horizontalAperture = 40
+    float verticalAperture = 20
+}
+"""
+    head = '#usda 1.0\n(\n    upAxis = "Y"\n    metersPerUnit = 0.1\n)\n'
+    view, flat = read(triangle() + body, head=head).cameras
+    assert view.fov_y == pytest.approx(2 * math.atan(12 / 50))
+    assert view.aspect == pytest.approx(1.5)
+    assert view.focus_distance == pytest.approx(0.7)
+    assert view.world_from_camera[:3, 3] == pytest.approx([0, 0, 0.5])
+    # An aperture is in tenths of a unit, a unit is 0.1 m.
+    assert (flat.height, flat.aspect) == pytest.approx((0.2, 2))
+
+
+def test_lights_that_are_not_read_are_named(read):
+    scene = read(triangle() + 'def PortalLight "p" {}')
+    assert scene.notes == ["light sources of type PortalLight are not read"]

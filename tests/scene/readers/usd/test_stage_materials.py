@@ -1,0 +1,266 @@
+"""``UsdPreviewSurface``: values, textures, channels, scale and bias, coordinates, opacity."""
+
+import io
+import zipfile
+
+import numpy as np
+import pytest
+from PIL import Image as Pillow
+
+from lippmann.errors import SceneError
+
+from .conftest import HEAD
+
+SURFACE = """
+def Material "mat" {{
+    token outputs:surface.connect = </mat/s.outputs:surface>
+    def Shader "s" {{
+        uniform token info:id = "UsdPreviewSurface"
+        {inputs}
+        token outputs:surface
+    }}
+    {nodes}
+}}
+def Mesh "m" (prepend apiSchemas = ["MaterialBindingAPI"]) {{
+    rel material:binding = </mat>
+    point3f[] points = [(0, 0, 0), (1, 0, 0), (0, 1, 0)]
+    int[] faceVertexCounts = [3]
+    int[] faceVertexIndices = [0, 1, 2]
+    texCoord2f[] primvars:st = [(0, 0), (1, 0), (0, 1)] (interpolation = "vertex")
+    texCoord2f[] primvars:other = [(0.5, 0.25), (1, 0), (0, 1)] (interpolation = "vertex")
+    uniform token subdivisionScheme = "none"
+}}
+"""
+
+TEXTURE = """
+    def Shader "{name}" {{
+        uniform token info:id = "UsdUVTexture"
+        asset inputs:file = @{file}@
+        float2 inputs:st.connect = </mat/{st}.outputs:result>
+        {more}
+        float3 outputs:rgb
+        float outputs:r
+        float outputs:g
+        float outputs:b
+        float outputs:a
+    }}
+"""
+
+READER = """
+    def Shader "uv" {
+        uniform token info:id = "UsdPrimvarReader_float2"
+        string inputs:varname = "st"
+        float2 outputs:result
+    }
+"""
+
+
+def surface(inputs, nodes=""):
+    return SURFACE.format(inputs=inputs, nodes=nodes)
+
+
+def texture(name="t", file="t.png", st="uv", more=""):
+    return TEXTURE.format(name=name, file=file, st=st, more=more) + READER * (st == "uv")
+
+
+def png(pixels):
+    held = io.BytesIO()
+    Pillow.fromarray(np.array(pixels, np.uint8)).save(held, "PNG")
+    return held.getvalue()
+
+
+PICTURE = [[[10, 60, 110, 160], [20, 70, 120, 170]], [[30, 80, 130, 180], [40, 90, 140, 190]]]
+
+
+def test_plain_values(read):
+    body = surface(
+        "color3f inputs:diffuseColor = (0.1, 0.2, 0.3)\nfloat inputs:roughness = 0.25\nfloat inputs:metallic = 0.75\n"
+        "color3f inputs:emissiveColor = (2, 3, 4)\nfloat inputs:ior = 1.4\nfloat inputs:clearcoat = 0.5\n"
+        "float inputs:clearcoatRoughness = 0.125"
+    )
+    (material,) = read(body).materials
+    assert material.base_color == pytest.approx((0.1, 0.2, 0.3))
+    assert (material.roughness, material.metallic, material.clearcoat) == (0.25, 0.75, 0.5)
+    assert material.clearcoat_roughness == 0.125
+    assert material.emission == (2, 3, 4)
+    assert material.ior == pytest.approx(1.4)
+    assert material.alpha_mode == "opaque"
+
+
+def test_defaults_are_those_of_the_specification(read):
+    (material,) = read(surface("")).materials
+    assert material.base_color == (0.18, 0.18, 0.18)
+    assert (material.roughness, material.metallic, material.ior, material.clearcoat) == (0.5, 0, 1.5, 0)
+
+
+def test_values_come_through_the_materials_interface(read):
+    body = surface("color3f inputs:diffuseColor.connect = </mat.inputs:paint>").replace(
+        'def Material "mat" {', 'def Material "mat" {\ncolor3f inputs:paint = (0.5, 0.25, 0.125)', 1
+    )
+    assert read(body).materials[0].base_color == (0.5, 0.25, 0.125)
+
+
+def test_a_colour_texture(read):
+    body = surface(
+        "color3f inputs:diffuseColor.connect = </mat/t.outputs:rgb>", texture(more='token inputs:wrapS = "mirror"')
+    )
+    scene = read(body, files={"t.png": png(PICTURE)})
+    found = scene.materials[0].base_color_texture
+    assert found.srgb
+    assert found.image.pixels.tolist() == np.array(PICTURE)[..., :3].tolist()
+    assert (found.wrap_u, found.wrap_v) == ("mirror", "repeat")
+    # v runs upwards in a stage, and downwards here.
+    (mesh,) = scene.meshes
+    place = {tuple(position): uv.tolist() for position, uv in zip(mesh.positions, mesh.uvs[0], strict=True)}
+    assert place == {(0, 0, 0): [0, 1], (1, 0, 0): [1, 1], (0, 1, 0): [0, 0]}
+
+
+def test_scale_is_a_factor_and_bias_is_added_to_linear_values(read):
+    scaled = surface(
+        "color3f inputs:diffuseColor.connect = </mat/t.outputs:rgb>",
+        texture(more="float4 inputs:scale = (0.5, 0.25, 1, 1)"),
+    )
+    material = read(scaled, files={"t.png": png(PICTURE)}).materials[0]
+    assert material.base_color == (0.5, 0.25, 1)
+    biased = surface(
+        "color3f inputs:diffuseColor.connect = </mat/t.outputs:rgb>",
+        texture(
+            more="float4 inputs:scale = (2, 2, 2, 1)\nfloat4 inputs:bias = (0.1, 0, 0, 0)\n"
+            'token inputs:sourceColorSpace = "raw"'
+        ),
+    )
+    found = read(biased).materials[0].base_color_texture
+    assert not found.srgb
+    assert found.image.pixels[0, 0] == pytest.approx([2 * 10 / 255 + 0.1, 2 * 60 / 255, 2 * 110 / 255], abs=1e-6)
+
+
+def test_channels_of_one_picture_feed_roughness_and_metal(read):
+    body = surface(
+        "float inputs:roughness.connect = </mat/t.outputs:g>\nfloat inputs:metallic.connect = </mat/t.outputs:b>",
+        texture(more='token inputs:sourceColorSpace = "raw"'),
+    )
+    material = read(body, files={"t.png": png(PICTURE)}).materials[0]
+    pixels = material.metallic_roughness_texture.image.pixels
+    assert pixels[1, 1, 1:] == pytest.approx([90 / 255, 140 / 255])
+    assert (material.roughness, material.metallic) == (1, 1)
+
+
+def test_opacity_by_the_alpha_of_the_colours_picture(read):
+    body = surface(
+        "color3f inputs:diffuseColor.connect = </mat/t.outputs:rgb>\n"
+        "float inputs:opacity.connect = </mat/t.outputs:a>\n"
+        "float inputs:opacityThreshold = 0.25",
+        texture(),
+    )
+    material = read(body, files={"t.png": png(PICTURE)}).materials[0]
+    assert material.base_color_texture.image.pixels.tolist() == PICTURE
+    assert material.base_color_texture.srgb
+    assert (material.alpha_mode, material.alpha_cutoff) == ("mask", 0.25)
+
+
+def test_plain_opacity_blends(read):
+    material = read(surface("float inputs:opacity = 0.5")).materials[0]
+    assert (material.alpha_mode, material.alpha) == ("blend", 0.5)
+
+
+def test_normal_maps_as_exporters_write_them(read):
+    body = surface(
+        "normal3f inputs:normal.connect = </mat/t.outputs:rgb>",
+        texture(more="float4 inputs:scale = (2, 2, 2, 1)\nfloat4 inputs:bias = (-1, -1, -1, 0)"),
+    )
+    found = read(body, files={"t.png": png(PICTURE)}).materials[0].normal_texture
+    assert found.image.pixels.tolist() == np.array(PICTURE)[..., :3].tolist()
+    assert not found.srgb
+
+
+def test_a_specular_workflow(read):
+    material = read(
+        surface(
+            "int inputs:useSpecularWorkflow = 1\nfloat inputs:metallic = 1\n"
+            "color3f inputs:specularColor = (0.5, 0.25, 0.125)"
+        )
+    ).materials[0]
+    assert material.metallic == 0
+    assert material.specular_color == (0.5, 0.25, 0.125)
+    assert ((material.ior - 1) / (material.ior + 1)) ** 2 > 0.99
+
+
+def test_transformed_coordinates_of_another_set(read):
+    nodes = (
+        texture(st="move")
+        + """
+    def Shader "move" {
+        uniform token info:id = "UsdTransform2d"
+        float2 inputs:in.connect = </mat/other.outputs:result>
+        float inputs:rotation = 90
+        float2 inputs:scale = (2, 3)
+        float2 inputs:translation = (0.125, 0.25)
+        float2 outputs:result
+    }
+    def Shader "other" {
+        uniform token info:id = "UsdPrimvarReader_float2"
+        string inputs:varname = "other"
+        float2 outputs:result
+    }
+"""
+    )
+    scene = read(
+        surface("color3f inputs:diffuseColor.connect = </mat/t.outputs:rgb>", nodes), files={"t.png": png(PICTURE)}
+    )
+    found = scene.materials[0].base_color_texture
+    (mesh,) = scene.meshes
+    first = mesh.uvs[found.uv_set][np.flatnonzero((mesh.positions == 0).all(axis=1))[0]]
+    u, v, _ = found.uv_transform @ [*first, 1]
+    # (0.5, 0.25): scaled to (1, 0.75), turned counter-clockwise to (-0.75, 1), moved; v then runs downwards.
+    assert (u, 1 - v) == pytest.approx((-0.75 + 0.125, 1 + 0.25))
+
+
+def test_other_surfaces_are_named(read):
+    scene = read(surface("").replace("UsdPreviewSurface", "ND_standard_surface_surfaceshader"))
+    assert scene.notes == [
+        "material /mat: its surface is 'ND_standard_surface_surfaceshader', not UsdPreviewSurface: display colours are "
+        "taken"
+    ]
+    assert scene.materials[0].name == "display colour"
+
+
+@pytest.mark.parametrize(
+    ("file", "line"),
+    [
+        ("none.png", "stage.usda: texture 'none.png' is not there"),
+        (
+            "../../secret.png",
+            "stage.usda: texture '../../secret.png' lies outside the scene's folder; a scene file may",
+        ),
+        ("bad.png", "stage.usda: texture 'bad.png' is not a picture that can be read"),
+    ],
+)
+def test_textures_that_are_not_read_are_errors(read, tmp_path, file, line):
+    body = surface("color3f inputs:diffuseColor.connect = </mat/t.outputs:rgb>", texture(file=file))
+    (tmp_path.parent.parent / "secret.png").write_bytes(png(PICTURE))
+    with pytest.raises(SceneError) as caught:
+        read(body, files={"bad.png": b"no picture"})
+    assert str(caught.value).startswith(line)
+
+
+def test_a_package_with_its_picture(tmp_path):
+    from lippmann.scene.readers.load import load_scene
+
+    body = HEAD + surface("color3f inputs:diffuseColor.connect = </mat/t.outputs:rgb>", texture(file="maps/t.png"))
+    path = tmp_path / "model.usdz"
+    packed(path, {"stage.usda": body.encode(), "maps/t.png": png(PICTURE)})
+    found = load_scene(path).description.materials[0].base_color_texture
+    assert found.image.pixels.tolist() == np.array(PICTURE)[..., :3].tolist()
+
+
+def packed(path, files, compression=zipfile.ZIP_STORED):
+    """A package whose contents begin at multiples of 64 bytes, as the format has it."""
+    with zipfile.ZipFile(path, "w", compression) as archive:
+        for name, data in files.items():
+            entry = zipfile.ZipInfo(name)
+            entry.compress_type = compression
+            place = archive.fp.tell() + 30 + len(name)
+            entry.extra = b"\0" * (-place % 64) if -place % 64 >= 4 or not -place % 64 else b"\0" * (-place % 64 + 64)
+            if entry.extra:
+                entry.extra = b"\x86\x19" + (len(entry.extra) - 4).to_bytes(2, "little") + entry.extra[4:]
+            archive.writestr(entry, data)

@@ -1,0 +1,272 @@
+"""Meshes of stages: polygons, values of every interpolation, subsets, places of copies."""
+
+import numpy as np
+import pytest
+
+from lippmann.errors import SceneError
+
+from .conftest import triangle
+
+
+def corners(mesh):
+    return mesh.positions[mesh.faces]
+
+
+def world_corners(scene):
+    """Corners ``(n, 3, 3)`` of all triangles where they are placed."""
+    found = []
+    for instance in scene.instances:
+        mesh = scene.meshes[instance.mesh]
+        for world in np.reshape(instance.world_from_mesh, (-1, 4, 4)):
+            found.append(corners(mesh) @ world[:3, :3].T + world[:3, 3])
+    return np.concatenate(found)
+
+
+def facing(triangles):
+    return np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+
+
+def test_a_triangle(read):
+    scene = read(triangle())
+    (mesh,) = scene.meshes
+    assert corners(mesh).tolist() == [[[0, 0, 0], [1, 0, 0], [0, 1, 0]]]
+    assert mesh.normals is None
+    assert scene.notes == []
+
+
+def test_left_handed_meshes_are_turned_round(read):
+    scene = read(triangle("r") + triangle("l", 'uniform token orientation = "leftHanded"'))
+    right, left = (facing(corners(mesh))[0, 2] for mesh in scene.meshes)
+    assert (right, left) == (1, -1)
+
+
+def test_polygons_and_holes(read):
+    body = """
+def Mesh "m" {
+    point3f[] points = [(0, 0, 0), (2, 0, 0), (2, 2, 0), (1, 0.5, 0), (0, 2, 0), (5, 0, 0), (6, 0, 0), (5, 1, 0)]
+    int[] faceVertexCounts = [5, 3, 2]
+    int[] faceVertexIndices = [0, 1, 2, 3, 4, 5, 6, 7, 0, 1]
+    int[] holeIndices = [1]
+    uniform token subdivisionScheme = "none"
+}
+"""
+    (mesh,) = read(body).meshes
+    triangles = corners(mesh)
+    areas = facing(triangles)[:, 2] / 2
+    assert (areas > 0).all()
+    # The square of side 2 without the notch of 2 x 1.5 / 2.
+    assert areas.sum() == pytest.approx(4 - 1.5)
+    assert triangles[..., 0].max() == 2
+
+
+QUADS = """
+def Mesh "m" {{
+    point3f[] points = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (2, 0, 0), (2, 1, 0)]
+    int[] faceVertexCounts = [4, 4]
+    int[] faceVertexIndices = [0, 1, 2, 3, 1, 4, 5, 2]
+    uniform token subdivisionScheme = "none"
+    {}
+}}
+"""
+
+
+@pytest.mark.parametrize(
+    ("interpolation", "values", "expected"),
+    [
+        ("constant", [(1, 0, 0)], lambda x, y, right: (1, 0, 0)),
+        ("uniform", [(1, 0, 0), (0, 1, 0)], lambda x, y, right: (0, 1, 0) if right else (1, 0, 0)),
+        ("vertex", [(x, y, 0) for x, y in ((0, 0), (1, 0), (1, 1), (0, 1), (2, 0), (2, 1))], lambda x, y, r: (x, y, 0)),
+        (
+            "varying",
+            [(x, y, 0) for x, y in ((0, 0), (1, 0), (1, 1), (0, 1), (2, 0), (2, 1))],
+            lambda x, y, r: (x, y, 0),
+        ),
+        (
+            "faceVarying",
+            [(0, x, y) for x, y in ((0, 0), (1, 0), (1, 1), (0, 1), (1, 0), (2, 0), (2, 1), (1, 1))],
+            lambda x, y, r: (0, x, y),
+        ),
+    ],
+)
+def test_display_colours_of_every_interpolation(read, interpolation, values, expected):
+    text = f'color3f[] primvars:displayColor = {values} (interpolation = "{interpolation}")'
+    (mesh,) = read(QUADS.format(text)).meshes
+    for face in mesh.faces:
+        right = mesh.positions[face, 0].max() > 1.5
+        for vertex in face:
+            x, y, _ = mesh.positions[vertex]
+            assert mesh.colors[vertex] == pytest.approx(expected(x, y, right))
+
+
+def test_indexed_normals_of_faces(read):
+    text = (
+        'normal3f[] primvars:normals = [(0, 0, 1), (1, 0, 0)] (interpolation = "faceVarying")\n'
+        "int[] primvars:normals:indices = [0, 0, 0, 0, 1, 1, 1, 1]"
+    )
+    (mesh,) = read(QUADS.format(text)).meshes
+    for face in mesh.faces:
+        right = mesh.positions[face, 0].max() > 1.5
+        assert mesh.normals[face] == pytest.approx(np.tile([1, 0, 0] if right else [0, 0, 1], (3, 1)))
+
+
+def test_values_that_do_not_fit_are_refused(read):
+    text = 'normal3f[] normals = [(0, 0, 1), (1, 0, 0)] (interpolation = "vertex")'
+    with pytest.raises(SceneError, match=r"^stage\.usda: mesh /m has 2 normals, vertex, which do not fit it$"):
+        read(QUADS.format(text))
+
+
+def test_corners_beyond_the_points_are_refused(read):
+    body = QUADS.format("").replace("4, 5, 2]", "4, 50, 2]")
+    with pytest.raises(SceneError, match=r"mesh /m uses point 50 of 6"):
+        read(body)
+
+
+def test_subsets_have_their_own_materials(read):
+    material = """
+def Material "{0}" {{
+    token outputs:surface.connect = </{0}/s.outputs:surface>
+    def Shader "s" {{
+        uniform token info:id = "UsdPreviewSurface"
+        color3f inputs:diffuseColor = ({1})
+        token outputs:surface
+    }}
+}}
+"""
+    subset = """
+    rel material:binding = </one>
+    def GeomSubset "right" (prepend apiSchemas = ["MaterialBindingAPI"]) {
+        uniform token elementType = "face"
+        uniform token familyName = "materialBind"
+        int[] indices = [1]
+        rel material:binding = </two>
+    }
+"""
+    body = QUADS.format(subset).replace('"m" {', '"m" (prepend apiSchemas = ["MaterialBindingAPI"]) {', 1)
+    scene = read(body + material.format("one", "1, 0, 0") + material.format("two", "0, 0, 1"))
+    found = {scene.materials[mesh.material].base_color: mesh.positions[:, 0].max() for mesh in scene.meshes}
+    assert found == {(1, 0, 0): 1, (0, 0, 1): 2}
+
+
+def test_cages_are_refined_by_default(read):
+    body = QUADS.format("").replace('uniform token subdivisionScheme = "none"', "")
+    (mesh,) = read(body).meshes
+    assert len(mesh.faces) == 2 * 16 * 2
+    assert mesh.normals == pytest.approx(np.tile([0, 0, 1], (len(mesh.positions), 1)))
+    # Points that one face alone uses stay where they are.
+    assert mesh.positions.max(axis=0).tolist() == [2, 1, 0]
+
+
+def test_units_and_the_up_axis(read):
+    head = '#usda 1.0\n(\n    upAxis = "Z"\n    metersPerUnit = 0.01\n)\n'
+    scene = read(triangle(), head=head)
+    # x stays, z is up, y leads away from the viewer.
+    assert world_corners(scene)[0] == pytest.approx(np.array([[0, 0, 0], [0.01, 0, 0], [0, 0, -0.01]]))
+
+
+def test_hidden_prims_and_guides_are_not_shown(read):
+    scene = read(
+        triangle("seen")
+        + triangle("hidden", 'token visibility = "invisible"')
+        + triangle("guide", 'uniform token purpose = "guide"')
+    )
+    assert [mesh.name for mesh in scene.meshes] == ["/seen"]
+
+
+PRIMITIVES = {
+    "Sphere": ("double radius = 2", (4, 4, 4), 4 / 3 * np.pi * 8),
+    "Cube": ("double size = 2", (2, 2, 2), 8),
+    "Cylinder": ('double height = 3\ndouble radius = 1\nuniform token axis = "X"', (3, 2, 2), 3 * np.pi),
+    "Cone": ('double height = 3\ndouble radius = 1\nuniform token axis = "Y"', (2, 3, 2), np.pi),
+    "Capsule": ('double height = 1\ndouble radius = 1\nuniform token axis = "Z"', (2, 2, 3), np.pi + 4 / 3 * np.pi),
+}
+
+
+@pytest.mark.parametrize("kind", PRIMITIVES)
+def test_primitives_are_closed_and_as_large_as_their_numbers_say(read, kind):
+    numbers, size, volume = PRIMITIVES[kind]
+    (mesh,) = read(f'def {kind} "p" {{\n{numbers}\n}}').meshes
+    assert np.ptp(mesh.positions, axis=0) == pytest.approx(size, rel=2e-3)
+    triangles = corners(mesh).astype(float)
+    # The divergence theorem: outward faces only.
+    assert np.linalg.det(triangles).sum() / 6 == pytest.approx(volume, rel=5e-3)
+    normals = mesh.normals[mesh.faces].mean(axis=1)
+    area = facing(triangles)
+    assert (np.einsum("ij,ij->i", area, normals)[np.linalg.norm(area, axis=1) > 1e-9] > 0).all()
+
+
+def test_a_plane_lies_across_its_axis(read):
+    (mesh,) = read('def Plane "p" {\ndouble width = 4\ndouble length = 2\nuniform token axis = "Y"\n}').meshes
+    assert np.ptp(mesh.positions, axis=0).tolist() == [4, 0, 2]
+    assert (facing(corners(mesh))[:, 1] > 0).all()
+
+
+def test_scenegraph_instances_share_their_mesh(read):
+    body = 'def Xform "proto" {\n' + triangle("m") + "}\n"
+    for number in range(3):
+        body += (
+            f'def Xform "copy{number}" (instanceable = true\nprepend references = </proto>) {{\n'
+            f"double3 xformOp:translate = ({number + 1}, 0, 0)\n"
+            'uniform token[] xformOpOrder = ["xformOp:translate"]\n}\n'
+        )
+    scene = read(body)
+    shared = [instance for instance in scene.instances if np.shape(instance.world_from_mesh) == (3, 4, 4)]
+    assert len(shared) == 1
+    assert shared[0].world_from_mesh[:, 0, 3].tolist() == [1, 2, 3]
+    assert len(scene.meshes) == 2  # the prototype itself, and what its copies share
+
+
+def test_point_instancers_place_copies(read):
+    body = (
+        """
+def PointInstancer "many" {
+    point3f[] positions = [(1, 0, 0), (2, 0, 0), (3, 0, 0), (4, 0, 0)]
+    int[] protoIndices = [0, 1, 0, 0]
+    float3[] scales = [(1, 1, 1), (2, 2, 2), (1, 1, 1), (3, 3, 3)]
+    int64[] invisibleIds = [2]
+    rel prototypes = [</many/a>, </many/b>]
+    double3 xformOp:translate = (0, 10, 0)
+    uniform token[] xformOpOrder = ["xformOp:translate"]
+"""
+        + triangle("a")
+        + triangle("b", 'double3 xformOp:translate = (0, 0, 5)\nuniform token[] xformOpOrder = ["xformOp:translate"]')
+        + "}"
+    )
+    scene = read(body)
+    assert [mesh.name for mesh in scene.meshes] == ["/many/a", "/many/b"]
+    first, second = (np.reshape(instance.world_from_mesh, (-1, 4, 4)) for instance in scene.instances)
+    assert first[:, :3, 3].tolist() == [[1, 10, 0], [4, 10, 0]]
+    assert [matrix[0, 0] for matrix in first] == [1, 3]
+    # The prototype's own translation is scaled with its copy.
+    assert second[:, :3, 3].tolist() == [[2, 10, 10]]
+
+
+def test_instancers_that_hold_themselves_end(read):
+    body = (
+        'def PointInstancer "a" {\npoint3f[] positions = [(1, 0, 0)]\nint[] protoIndices = [0]\n'
+        "rel prototypes = [</holder>]\n}\n"
+        'def Xform "holder" {\ndef PointInstancer "b" {\npoint3f[] positions = [(1, 0, 0)]\nint[] protoIndices = [0]\n'
+        "rel prototypes = [</holder>]\n}\n}\n"
+    )
+    with pytest.raises(SceneError, match="instancers within instancers"):
+        read(triangle() + body)
+
+
+def test_copies_beyond_all_bounds_are_refused(read):
+    """Instancers within instancers multiply: sixteen thousand, then as many of each."""
+    many = f"point3f[] positions = {[(0, 0, 0)] * 16384}\nint[] protoIndices = {[0] * 16384}\n"
+    body = (
+        f'def PointInstancer "a" {{\n{many}rel prototypes = [</holder>]\n}}\n'
+        f'def Xform "holder" {{\ndef PointInstancer "b" {{\n{many}rel prototypes = [</m>]\n}}\n}}\n'
+    )
+    with pytest.raises(SceneError, match="places more than 2097152 copies of meshes"):
+        read(triangle() + body)
+
+
+def test_what_is_not_drawn_is_named(read):
+    curve = 'def BasisCurves "c" {\nint[] curveVertexCounts = [2]\npoint3f[] points = [(0, 0, 0), (1, 0, 0)]\n}\n'
+    assert read(triangle() + curve).notes == ["1 prim(s) of type BasisCurves are not drawn"]
+
+
+def test_a_stage_without_meshes_is_refused(read):
+    with pytest.raises(SceneError, match=r"^stage\.usda: the stage shows no meshes; a scene needs some$"):
+        read('def Xform "x" {}')
