@@ -59,6 +59,7 @@ def load_scene(
     multiple_scattering: bool = True,
     up: Literal["y", "z"] | None = None,
     variants: Mapping[str, str] | None = None,
+    depth_map: str | Path | None = None,
 ) -> Scene:
     """Load a scene from a file, a bundled scene's name, or an object of another library.
 
@@ -83,6 +84,8 @@ def load_scene(
         ``z`` in STL files.
     variants:
         Of a USD stage: ``{"set": "choice"}`` for every prim that has them, ``{"/prim:set": "choice"}`` for one.
+    depth_map:
+        The depth of a photograph (``.jpg``, ``.png``, ``.webp``), as a file; None for one that a JPEG file holds.
 
     Raises
     ------
@@ -97,6 +100,7 @@ def load_scene(
         multiple_scattering=multiple_scattering,
         up=up,
         variants=variants,
+        depth_map=None if depth_map is None else Path(depth_map),
     )
 
 

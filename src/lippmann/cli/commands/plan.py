@@ -28,6 +28,7 @@ def plan(
     ] = "auto",
     up: options.Up = None,
     variants: options.Variants = None,
+    depth_map: options.DepthMap = None,
     integrator: options.Integrator = "auto",
     depth: options.Depth = None,
     spp: options.Spp = None,
@@ -99,7 +100,14 @@ def plan(
         memory=parse.memory(memory),
     )
     source = SceneSource(
-        scene, environment, parse.color(background), allow_outside, single_scattering, up, parse.variants(variants)
+        scene,
+        environment,
+        parse.color(background),
+        allow_outside,
+        single_scattering,
+        up,
+        parse.variants(variants),
+        depth_map,
     )
     with console.progress() as progress:
         loaded = source.load()

@@ -37,6 +37,7 @@ def preview(
     ] = None,
     up: options.Up = None,
     variants: options.Variants = None,
+    depth_map: options.DepthMap = None,
     integrator: options.Integrator = "auto",
     depth: options.Depth = None,
     spp: options.Spp = None,
@@ -106,7 +107,14 @@ def preview(
         memory=parse.memory(memory),
     )
     source = SceneSource(
-        scene, environment, parse.color(background), allow_outside, single_scattering, up, parse.variants(variants)
+        scene,
+        environment,
+        parse.color(background),
+        allow_outside,
+        single_scattering,
+        up,
+        parse.variants(variants),
+        depth_map,
     )
     with console.progress() as progress:
         started = time.perf_counter()

@@ -75,6 +75,7 @@ def render(
     method: Method = "auto",
     up: options.Up = None,
     variants: options.Variants = None,
+    depth_map: options.DepthMap = None,
     integrator: options.Integrator = "auto",
     depth: options.Depth = None,
     spp: options.Spp = None,
@@ -159,7 +160,14 @@ def render(
         memory=parse.memory(memory),
     )
     source = SceneSource(
-        scene, environment, parse.color(background), allow_outside, single_scattering, up, parse.variants(variants)
+        scene,
+        environment,
+        parse.color(background),
+        allow_outside,
+        single_scattering,
+        up,
+        parse.variants(variants),
+        depth_map,
     )
     if moving:
         from lippmann.sequences.forms import QuiltForm

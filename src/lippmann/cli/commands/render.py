@@ -56,6 +56,7 @@ def render(
     maps: Maps = None,
     up: options.Up = None,
     variants: options.Variants = None,
+    depth_map: options.DepthMap = None,
     integrator: options.Integrator = "auto",
     depth: options.Depth = None,
     spp: options.Spp = None,
@@ -162,7 +163,14 @@ def render(
         memory=parse.memory(memory),
     )
     source = SceneSource(
-        scene, environment, parse.color(background), allow_outside, single_scattering, up, parse.variants(variants)
+        scene,
+        environment,
+        parse.color(background),
+        allow_outside,
+        single_scattering,
+        up,
+        parse.variants(variants),
+        depth_map,
     )
     on_cluster = clusters.ClusterOptions(cluster, tls_ca, tls_cert, tls_key)
     if wanted:

@@ -11,7 +11,7 @@ from lippmann.cli.shared.kept_inputs import check_outputs
 
 #: Options of the commands that render and look, by group; the rest stand under "Options". The last are rarely used.
 OPTION_GROUPS: Mapping[str, tuple[str, ...]] = {
-    "Scene": ("--up", "--variant", "--integrator", "--depth", "--allow-outside", "--single-scattering"),
+    "Scene": ("--up", "--variant", "--depth-map", "--integrator", "--depth", "--allow-outside", "--single-scattering"),
     "Placement": ("--camera", "--place", "--turn", "--shift", "--scale", "--depth-scale", "--pop-out"),
     "Display": (
         "--display",

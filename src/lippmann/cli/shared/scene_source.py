@@ -23,6 +23,7 @@ class SceneSource:
     single_scattering: bool = False
     up: Up | None = None
     variants: Mapping[str, str] | None = None
+    depth_map: Path | None = None
 
     def load(self) -> Scene:
         """The scene.
@@ -42,4 +43,5 @@ class SceneSource:
             multiple_scattering=not self.single_scattering,
             up=self.up,
             variants=self.variants,
+            depth_map=self.depth_map,
         )
