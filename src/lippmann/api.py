@@ -64,6 +64,7 @@ def load_scene(
     min_opacity: float | None = None,
     light: LightOptions | None = None,
     variants: Mapping[str, str] | None = None,
+    depth_map: str | Path | None = None,
 ) -> Scene:
     """Load a scene from a file, a bundled scene's name, or an object of another library.
 
@@ -98,6 +99,8 @@ def load_scene(
         A :class:`~lippmann.scene.light_options.LightOptions`: turns and scales the scene's light.
     variants:
         Of a USD stage: ``{"set": "choice"}`` for every prim that has them, ``{"/prim:set": "choice"}`` for one.
+    depth_map:
+        The depth of a photograph (``.jpg``, ``.png``, ``.webp``), as a file; None for one that a JPEG file holds.
 
     Raises
     ------
@@ -116,6 +119,7 @@ def load_scene(
         min_opacity=min_opacity,
         light=light,
         variants=variants,
+        depth_map=None if depth_map is None else Path(depth_map),
     )
 
 

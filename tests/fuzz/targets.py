@@ -47,6 +47,7 @@ from lippmann.quilts import files as quilt_files
 from lippmann.quilts import quilt
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.scene.parsing.files import decode_image
+from lippmann.scene.readers.depth_map import read_depth_map
 from lippmann.scene.readers.environment_map import read_environment
 from lippmann.scene.readers.gltf_animation.animated_file import MovingGltf
 from lippmann.scene.readers.load import load_scene
@@ -125,6 +126,15 @@ def _scene(name: str) -> Read:
         return load_scene(folder / name).bounds
 
     return read
+
+
+def _depth_map(data: bytes, folder: Path) -> object:
+    """A depth map in whichever form its first bytes are of."""
+    endings = {b"\x93NUMPY": ".npy", b"Pf": ".pfm", b"v/1\x01": ".exr"}
+    ending = next((ending for head, ending in endings.items() if data.startswith(head)), ".png")
+    (folder / f"d{ending}").write_bytes(data)
+    with np.errstate(all="ignore"):
+        return read_depth_map(folder / f"d{ending}").inverse.shape
 
 
 def _usd(name: str) -> Read:
@@ -498,6 +508,8 @@ _READERS: dict[str, Target] = {
     "cam": Target(_cam),
     "nff": Target(_scene("s.nff")),
     "mitsuba-xml": Target(_mitsuba),
+    "photograph": Target(_scene("s.jpg")),
+    "depth-map": Target(_depth_map),
     "usd": Target(_usd("s.usda")),
     "usd-package": Target(_usd("s.usdz")),
     "environment": Target(_environment),

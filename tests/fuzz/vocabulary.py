@@ -37,6 +37,8 @@ int uint float double end_header comment obj_info tristrips TextureFile t.png # 
 BEGIN_SCENE END_SCENE CAMERA END_CAMERA TEXTURE TEXDEF TEXALIAS INCLUDE IMAGEDEF s.dat red # SPHERE CYLINDER FCYLINDER
 PLANE RING TRI STRI BOX SCAPE VERTEXARRAY POLYCYLINDER EXTBOX SCALARVOL
 """,
+    "photograph": 'GDepth:Format="RangeLinear" GDepth:Near="0" GDepth:Far="inf" GDepth:Data=" http://ns.adobe.com/xap/1.0/',
+    "depth-map": "NUMPY descr fortran_order shape True False <f8 |O8 |u1 Pf PF -1.0 channels Z IHDR IDAT",
     "usd": """
 def over class Mesh Xform PointInstancer Material Shader SkelRoot Skeleton SkelAnimation Sphere Cube Capsule DomeLight
 RectLight SphereLight Camera GeomSubset references payload subLayers variantSet variants point3f[] int[] token float

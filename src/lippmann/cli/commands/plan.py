@@ -31,6 +31,7 @@ def plan(
     unit_scale: options.UnitScale = None,
     min_opacity: options.MinOpacity = None,
     variants: options.Variants = None,
+    depth_map: options.DepthMap = None,
     integrator: options.Integrator = "auto",
     depth: options.Depth = None,
     spp: options.Spp = None,
@@ -110,6 +111,7 @@ def plan(
         *(parse.crop(crop), unit_scale, min_opacity),
         light=parse.light(light_turn, light_strength, environment_strength),
         variants=parse.variants(variants),
+        depth_map=depth_map,
     )
     with console.progress() as progress:
         loaded = source.load()

@@ -40,6 +40,7 @@ def preview(
     unit_scale: options.UnitScale = None,
     min_opacity: options.MinOpacity = None,
     variants: options.Variants = None,
+    depth_map: options.DepthMap = None,
     integrator: options.Integrator = "auto",
     depth: options.Depth = None,
     spp: options.Spp = None,
@@ -117,6 +118,7 @@ def preview(
         *(parse.crop(crop), unit_scale, min_opacity),
         light=parse.light(light_turn, light_strength, environment_strength),
         variants=parse.variants(variants),
+        depth_map=depth_map,
     )
     with console.progress() as progress:
         started = time.perf_counter()

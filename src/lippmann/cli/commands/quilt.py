@@ -78,6 +78,7 @@ def render(
     unit_scale: options.UnitScale = None,
     min_opacity: options.MinOpacity = None,
     variants: options.Variants = None,
+    depth_map: options.DepthMap = None,
     integrator: options.Integrator = "auto",
     depth: options.Depth = None,
     spp: options.Spp = None,
@@ -171,6 +172,7 @@ def render(
         *(parse.crop(crop), unit_scale, min_opacity),
         light=parse.light(light_turn, light_strength, environment_strength),
         variants=parse.variants(variants),
+        depth_map=depth_map,
     )
     if moving:
         from lippmann.sequences.forms import QuiltForm

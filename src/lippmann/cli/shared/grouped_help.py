@@ -15,6 +15,7 @@ OPTION_GROUPS: Mapping[str, tuple[str, ...]] = {
         "--state",
         "--up",
         "--variant",
+        "--depth-map",
         "--crop",
         "--unit-scale",
         "--min-opacity",

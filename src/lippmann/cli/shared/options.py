@@ -42,8 +42,8 @@ PictureDisplay = Annotated[
 Scene = Annotated[
     str,
     typer.Argument(
-        help="A .glb, .gltf, .obj, .ply, .spz, .sog, .stl, .usd, Mitsuba .xml, Tachyon .dat or .nff file, or the name "
-        "of a bundled scene.",
+        help="A .glb, .gltf, .obj, .ply, .spz, .sog, .stl, .usd, Mitsuba .xml, Tachyon .dat or .nff file, a photograph "
+        "with depth, or a bundled scene's name.",
         autocompletion=complete_scenes,
     ),
 ]
@@ -85,6 +85,15 @@ Variants = Annotated[
         "--variant",
         metavar="SET=CHOICE",
         help="Choose a variant of a USD stage, for all prims that have it, or /PRIM:SET=CHOICE for one. Repeatable.",
+        show_default=False,
+    ),
+]
+DepthMap = Annotated[
+    Path | None,
+    typer.Option(
+        "--depth-map",
+        help="The depth of a photograph: .pfm, .npy, .exr (metres), a picture of 16 bits (millimetres) or of 8 bits "
+        "(brighter is nearer).",
         show_default=False,
     ),
 ]

@@ -29,6 +29,7 @@ class SceneSource:
     min_opacity: float | None = None
     light: LightOptions | None = None
     variants: Mapping[str, str] | None = None
+    depth_map: Path | None = None
 
     def load(self) -> Scene:
         """The scene.
@@ -52,4 +53,5 @@ class SceneSource:
             min_opacity=self.min_opacity,
             light=self.light,
             variants=self.variants,
+            depth_map=self.depth_map,
         )

@@ -27,6 +27,9 @@ from lippmann.scene.whitted.world_frame import world_camera
 #: Words in place of an environment file: the built-in studio, and no light but the scene's own.
 STUDIO, NO_ENVIRONMENT = "studio", "none"
 
+#: Pictures, which are scenes if they have depth.
+PHOTOS = (".jpg", ".jpeg", ".png", ".webp")
+
 # Suffix -> "module:function" of its reader: read(path, *, allow_outside) gives a SceneDescription, a MitsubaSource or a
 # ClassicScene.
 _READERS = {
@@ -44,6 +47,7 @@ _READERS = {
     ".usdc": "lippmann.scene.readers.usd:read_usd",
     ".usdz": "lippmann.scene.readers.usd:read_usd",
     ".xml": "lippmann.scene.mitsuba_source:read_mitsuba",
+    **dict.fromkeys(PHOTOS, "lippmann.scene.readers.depth_photo:read_depth_photo"),
 }
 
 # First bytes of a file -> its suffix, for unmistakable formats.
@@ -60,12 +64,12 @@ _BEGINNINGS = {
 #: Kinds of files whose variants can be chosen.
 STAGES = (".usd", ".usda", ".usdc", ".usdz")
 
-
 _PAPER_DEPTH = 2
 
 #: Files of other programs, and how a glTF file is made of them.
 _ELSEWHERE = {
     ".blend": "in Blender: File > Export > glTF 2.0 (.glb)",
+    ".heic": "save it as .jpg, and its depth as a picture of its own for depth_map=...",
     ".fbx": "open it in Blender, then File > Export > glTF 2.0 (.glb)",
     ".dae": "open it in Blender, then File > Export > glTF 2.0 (.glb)",
     ".3ds": "open it in Blender, then File > Export > glTF 2.0 (.glb)",
@@ -106,6 +110,7 @@ def load_scene(
     min_opacity: float | None = None,
     light: LightOptions | None = None,
     variants: Mapping[str, str] | None = None,
+    depth_map: Path | None = None,
 ) -> Scene:
     """Load a scene.
 
@@ -134,6 +139,8 @@ def load_scene(
         Direction and strength of the scene's light; None: as the file has them.
     variants:
         Of a USD stage: ``{"set": "choice"}`` for every prim that has them, ``{"/prim:set": "choice"}`` for one.
+    depth_map:
+        The depth of a photograph, as a file; None for one that a JPEG file holds.
 
     Raises
     ------
@@ -146,11 +153,13 @@ def load_scene(
     sky = _environment(environment)
     color = _background(background)
     if isinstance(source, str | Path):
-        scene = _from_name(source, allow_outside, up, variants)
-    elif up is None and not variants:
+        scene = _from_name(source, allow_outside, up, variants, depth_map)
+    elif up is None and not variants and depth_map is None:
         scene = _from_object(source)
     else:
-        raise UsageError("is for files", parameter="variants" if up is None else "up", fix="leave it out")
+        asked = {"up": up, "variants": variants, "depth_map": depth_map}
+        parameter = next(name for name, value in asked.items() if value)
+        raise UsageError("is for files", parameter=parameter, fix="leave it out")
     scene = SplatSelection(crop, unit_scale, min_opacity).of(scene)
     scene = scene if light is None else replace(scene, light=light)
     studio = scene.studio and str(environment) != NO_ENVIRONMENT
@@ -198,7 +207,11 @@ def kind_of_file(source: str | Path) -> str | None:
 
 
 def _from_name(
-    source: str | Path, allow_outside: bool, up: Up | None = None, variants: Mapping[str, str] | None = None
+    source: str | Path,
+    allow_outside: bool,
+    up: Up | None = None,
+    variants: Mapping[str, str] | None = None,
+    depth_map: Path | None = None,
 ) -> Scene:
     path = Path(source)
     suffix = path.suffix.lower()
@@ -209,6 +222,8 @@ def _from_name(
         raise UsageError(
             f"{path.name} has no variants", parameter="variants", rule=f"{', '.join(STAGES)} files may have some"
         )
+    if depth_map is not None and suffix not in PHOTOS:
+        raise UsageError(f"{path.name} is no photograph", parameter="depth_map", rule=f"for {', '.join(PHOTOS)} files")
     if isinstance(source, str) and not suffix and path.name == source:
         from lippmann.scene import bundled
 
@@ -233,7 +248,7 @@ def _from_name(
             rule=f"known are {', '.join(_READERS)}",
             fix=_ELSEWHERE.get(suffix, ""),
         )
-    chosen = {"variants": variants} if variants else {}
+    chosen = {key: value for key, value in (("variants", variants), ("depth_map", depth_map)) if value}
     module, function = reader.split(":")
     description = getattr(import_module(module), function)(path, allow_outside=allow_outside, **chosen)
     if isinstance(description, ClassicScene):

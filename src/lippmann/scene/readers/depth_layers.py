@@ -1,0 +1,127 @@
+"""A height field in two layers: what the camera saw, and what goes on behind its near edges.
+
+All is reckoned in inverse depth, to which parallax on a display is proportional. A layered depth image has the same
+purpose (Shade et al. 1998); what lies behind is filled by normalised convolution (Knutsson and Westin 1993).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from lippmann.errors import SceneError
+
+Plane = NDArray[np.float32]
+Mask = NDArray[np.bool_]
+Faces = NDArray[np.uint32]
+
+#: A step of so much of the range of inverse depth from a pixel to the next is an edge, where the surface ends.
+EDGE = 0.05
+#: Share of pixels that may lie nearer or farther than the rest: as far as those they are brought.
+_OUTLIERS = 0.1
+# Pixels at an edge whose colours may be those of both sides.
+_MIXED = 2
+
+
+@dataclass(frozen=True, eq=False)
+class Layers:
+    """Two height fields over one grid ``(h, w)``.
+
+    Attributes
+    ----------
+    nearness, faces:
+        What the camera saw: inverse depth brought to [0, 1], 1 the nearest, and triangles ``(m, 3)`` of points counted
+        by rows, without those across edges.
+    behind, behind_colors, behind_faces:
+        The same of what goes on behind, with its colours ``(h, w, 3)``.
+    filled:
+        Share of pixels whose depth was unknown.
+    """
+
+    nearness: Plane
+    faces: Faces
+    behind: Plane
+    behind_colors: Plane
+    behind_faces: Faces
+    filled: float
+
+
+def split_layers(inverse: Plane, colors: Plane, where: str) -> Layers:
+    """The two layers of inverse depth ``(h, w)`` and its colours ``(h, w, 3)``.
+
+    Depth that is unknown (NaN) is filled from beside.
+
+    Raises
+    ------
+    SceneError
+        No depth is known.
+    """
+    known = np.isfinite(inverse)
+    if not known.any():
+        raise SceneError("the depth map tells no depth", where=where, rule="it is above 0 somewhere")
+    low, high = np.percentile(inverse[known], (_OUTLIERS, 100.0 - _OUTLIERS))
+    scale = float(high - low) or 1.0
+    nearness = np.where(known, np.clip((inverse - low) / scale, 0.0, 1.0), 0.0).astype(np.float32)
+    if not known.all():
+        nearness = _fill(nearness[..., None], known)[..., 0]
+    near_edge = nearness - ndimage.minimum_filter(nearness, 3) > EDGE
+    far_edge = ndimage.maximum_filter(nearness, 3) - nearness > EDGE
+    behind, behind_colors, hidden = _behind(nearness, colors, near_edge, far_edge)
+    faces = _triangles(nearness.shape)
+    continued = hidden.ravel()[faces].any(axis=1)
+    return Layers(
+        nearness=nearness,
+        faces=faces[np.ptp(nearness.ravel()[faces], axis=1) <= EDGE],
+        behind=behind,
+        behind_colors=behind_colors,
+        behind_faces=faces[continued & (np.ptp(behind.ravel()[faces], axis=1) <= EDGE)],
+        filled=float(1.0 - known.mean()),
+    )
+
+
+def _behind(nearness: Plane, colors: Plane, near_edge: Mask, far_edge: Mask) -> tuple[Plane, Plane, Mask]:
+    """Nearness and colours with the far side going on behind what is near, and where they do."""
+    sources = far_edge & ~near_edge
+    if not sources.any():
+        return nearness, colors, np.zeros_like(near_edge)
+    # The far side some pixels away from the edge, whose own pixels show both sides mixed.
+    distance, nearest = ndimage.distance_transform_edt(~sources, return_indices=True)
+    level = nearness[tuple(nearest)]
+    clear = (distance > _MIXED) & (distance <= 3 * _MIXED) & (np.abs(nearness - level) <= EDGE) & ~near_edge
+    filled = _fill(np.concatenate([nearness[..., None], colors], axis=2), clear if clear.any() else sources)
+    hidden = nearness - filled[..., 0] > EDGE / 2
+    result = np.where(hidden, filled[..., 0], nearness).astype(np.float32)
+    return result, np.where(hidden[..., None], filled[..., 1:], colors).astype(np.float32), hidden
+
+
+def _fill(values: NDArray[np.float32], known: Mask) -> NDArray[np.float32]:
+    """Values ``(h, w, c)`` where they are known, elsewhere means of known ones about, as near as there are any."""
+    result = np.where(known[..., None], values, 0.0).astype(np.float32)
+    missing = ~known
+    weight = known.astype(np.float32)
+    sigma = 1.0
+    while missing.any() and sigma < 4 * max(known.shape):
+        shares = ndimage.gaussian_filter(weight, sigma, truncate=2.0)
+        reached = missing & (shares > 1e-3)
+        if reached.any():
+            for channel in range(values.shape[2]):
+                sums = ndimage.gaussian_filter(np.where(known, values[..., channel], 0.0), sigma, truncate=2.0)
+                result[..., channel][reached] = sums[reached] / shares[reached]
+            missing &= ~reached
+        sigma *= 2.0
+    if missing.any():
+        result[missing] = values[known].mean(axis=0)
+    return result
+
+
+def _triangles(shape: tuple[int, ...]) -> Faces:
+    """Triangles ``(m, 3)`` of a grid, counter-clockwise for who looks at the picture."""
+    rows, columns = shape
+    first = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).ravel()
+    right, below = first + 1, first + columns
+    lower = np.stack([first, below, below + 1], axis=1)
+    upper = np.stack([first, below + 1, right], axis=1)
+    return np.concatenate([lower, upper]).astype(np.uint32)

@@ -1,0 +1,174 @@
+"""Depth maps: files of distances, pictures of nearness, and XMP GDepth within JPEG files."""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import io
+import re
+import warnings
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import UnidentifiedImageError
+
+from lippmann.codecs.exr import read_exr, read_exr_header
+from lippmann.codecs.pfm import read_pfm
+from lippmann.codecs.pillow_formats import RULE, open_picture
+from lippmann.errors import MemoryLimitError, PictureError, SceneError
+from lippmann.runtime.input_memory import check_input
+from lippmann.scene.parsing.files import read_bytes
+
+#: Channels of OpenEXR that hold depth, the first that there is.
+_CHANNELS = ("Z", "depth.Z", "depth", "Depth", "V", "Y", "R")
+
+_XMP = b"http://ns.adobe.com/xap/1.0/\0"
+_XMP_EXTENSION = b"http://ns.adobe.com/xmp/extension/\0"
+#: Of an extension: its name, its whole length, and where this part of it belongs.
+_EXTENSION_HEAD = 40
+_GDEPTH = re.compile(rb'GDepth:(Format|Near|Far|Data)="([^"]*)"')
+
+
+@dataclass(frozen=True, eq=False)
+class DepthMap:
+    """Inverse depth along the camera's axis ``(h, w)`` float32, up to scale and shift; NaN where it is unknown."""
+
+    inverse: NDArray[np.float32]
+
+
+def of_depth(depth: NDArray[np.float32]) -> DepthMap:
+    """Depth map of distances: infinity is the sky; 0, negative numbers and NaN are unknown."""
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        inverse = np.where(depth > 0.0, 1.0 / depth, np.nan)
+    return DepthMap(np.where(np.isfinite(inverse), inverse, np.nan).astype(np.float32))
+
+
+def read_depth_map(path: Path) -> DepthMap:
+    """Read a depth map.
+
+    Floats (``.pfm``, ``.npy``, OpenEXR, TIFF) are metres, pictures of 16 bits millimetres. A picture of 8 bits is
+    brighter where something is nearer, as programs that estimate depth write it.
+
+    Raises
+    ------
+    SceneError
+        The file is missing, damaged, or of another kind.
+    MemoryLimitError
+        It takes more memory than is left.
+    """
+    data = read_bytes(path)
+    suffix = path.suffix.lower()
+    check_input(2 * len(data), "the depth map", where=path.name)
+    try:
+        if suffix == ".npy":
+            return of_depth(_one_channel(_numpy_array(path), path.name))
+        if suffix == ".pfm":
+            return of_depth(read_pfm(path))
+        if suffix == ".exr":
+            return of_depth(_exr(path))
+    except PictureError as error:
+        raise SceneError(error.what, where=path.name, rule=error.rule) from None
+    except (ValueError, EOFError, OSError) as error:
+        raise SceneError(f"is no depth map ({error})", where=path.name) from None
+    return _picture(data, path.name)
+
+
+def _numpy_array(path: Path) -> NDArray[np.generic]:
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of a header's odd Python
+            return np.asarray(np.load(path, mmap_mode="r", allow_pickle=False))
+    except Exception as error:  # a header is read as Python, whose own errors come through
+        raise SceneError(f"is no depth map ({error})", where=path.name, rule="an array of numbers") from error
+
+
+def _exr(path: Path) -> NDArray[np.float32]:
+    header = read_exr_header(path)
+    check_input(4 * header.height * header.width * len(header.channels), "the depth map", where=path.name)
+    channels = read_exr(path, header)
+    name = next((name for name in _CHANNELS if name in channels), None)
+    if name is None:
+        held = ", ".join(sorted(channels))
+        raise SceneError(f"has the channels {held}", where=path.name, rule=f"depth is one of {', '.join(_CHANNELS)}")
+    return np.asarray(channels[name], np.float32)
+
+
+def _one_channel(values: NDArray[np.generic], where: str) -> NDArray[np.float32]:
+    if values.ndim == 3 and values.shape[2] == 1:
+        values = values[..., 0]
+    if values.ndim != 2 or values.dtype.kind not in "fiu":
+        raise SceneError(f"is an array {values.shape} of {values.dtype}", where=where, rule="depth is (h, w) numbers")
+    check_input(4 * values.size, "the depth map", where=where)
+    with np.errstate(over="ignore"):
+        return np.asarray(values, np.float32)
+
+
+def _picture(data: bytes, where: str) -> DepthMap:
+    values, is_wide = _gray(data, where)
+    if values.dtype.kind == "f" or is_wide:  # a scale is no matter
+        return of_depth(values.astype(np.float32))
+    return DepthMap(values.astype(np.float32))
+
+
+def _gray(data: bytes, where: str) -> tuple[NDArray[np.generic], bool]:
+    """Values ``(h, w)`` of a grey picture, and whether they have 16 bits."""
+    try:
+        with open_picture(io.BytesIO(data)) as picture:
+            if picture.mode == "F":
+                return np.asarray(picture, np.float32), False
+            if picture.mode.startswith("I"):
+                return np.asarray(picture).astype(np.int64), True
+            return np.asarray(picture.convert("L")), False
+    except MemoryLimitError as error:
+        raise MemoryLimitError(error.what, where=where, rule=error.rule, fix=error.fix) from None
+    except UnidentifiedImageError:
+        raise SceneError("is no depth map", where=where, rule=f".pfm, .npy, .exr, {RULE}") from None
+    except Exception as error:  # Pillow's decoders pass on whatever their libraries throw at damaged data
+        raise SceneError(f"cannot be decoded ({error})", where=where) from error
+
+
+def embedded_depth(data: bytes, where: str) -> DepthMap | None:
+    """The depth that a JPEG file carries as XMP (GDepth, as Android's portrait pictures have it); None without it.
+
+    Depth is near + d (far - near) for ``RangeLinear``, and its inverse is linear in d for ``RangeInverse``
+    (Depthmap Metadata, developers.google.com/depthmap-metadata).
+
+    Raises
+    ------
+    SceneError
+        Its values mean nothing, or its picture is damaged.
+    """
+    found = dict(reversed(_GDEPTH.findall(_xmp(data))))
+    if b"Data" not in found:
+        return None
+    try:
+        near, far = float(found.get(b"Near", b"nan")), float(found.get(b"Far", b"nan"))
+        encoded = base64.b64decode(found[b"Data"])
+    except (ValueError, binascii.Error) as error:
+        raise SceneError(f"has depth that is not readable ({error})", where=where, rule="GDepth in XMP") from None
+    if not 0.0 < near < far < np.inf:
+        raise SceneError(f"has depth from {near:g} to {far:g}", where=where, rule="near is above 0, far beyond it")
+    values, is_wide = _gray(encoded, where)
+    share = values.astype(np.float32) / np.float32(65535.0 if is_wide else 255.0)
+    if found.get(b"Format") == b"RangeLinear":
+        return of_depth((near + share * (far - near)).astype(np.float32))
+    return DepthMap((1.0 / near + share * (1.0 / far - 1.0 / near)).astype(np.float32))
+
+
+def _xmp(data: bytes) -> bytes:
+    """The XMP of a JPEG file, the parts of its extension in their order; empty without any."""
+    if not data.startswith(b"\xff\xd8"):
+        return b""
+    plain, parts, place = [], [], 2
+    while place + 4 <= len(data) and data[place] == 0xFF and data[place + 1] not in (0xDA, 0xD9):
+        length = int.from_bytes(data[place + 2 : place + 4], "big")
+        segment = data[place + 4 : place + 2 + length]
+        if data[place + 1] == 0xE1 and segment.startswith(_XMP):
+            plain.append(segment[len(_XMP) :])
+        elif data[place + 1] == 0xE1 and segment.startswith(_XMP_EXTENSION):
+            body = segment[len(_XMP_EXTENSION) :]
+            parts.append((int.from_bytes(body[36:_EXTENSION_HEAD], "big"), body[_EXTENSION_HEAD:]))
+        place += 2 + max(length, 2)
+    return b"".join([*plain, *(part for _, part in sorted(parts, key=lambda each: each[0]))])

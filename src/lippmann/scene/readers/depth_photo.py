@@ -1,0 +1,116 @@
+"""Photographs with depth: a picture and its depth map become a height field whose hidden parts are filled."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image as Pillow
+
+from lippmann.errors import SceneError
+from lippmann.runtime.input_memory import check_input
+from lippmann.scene.parsing.files import decode_image, read_bytes
+from lippmann.scene.readers.depth_layers import Layers, split_layers
+from lippmann.scene.readers.depth_map import embedded_depth, read_depth_map
+from lippmann.scene.values.description import Image, Instance, Material, Mesh, SceneDescription, Texture
+
+#: How deep the height field is, over the shorter side of the picture; displays scale it to what they resolve.
+DEPTH = 0.5
+#: Points of the height field; of larger depth maps one pixel in so many is taken.
+_MOST_POINTS = 1 << 20
+#: Bytes of intermediate values for a point.
+_BYTES_PER_POINT = 400
+#: How much the sides of picture and depth map may differ in proportion.
+_ASPECT = 0.02
+
+
+def read_depth_photo(path: Path, *, allow_outside: bool = False, depth_map: Path | None = None) -> SceneDescription:
+    """Read a photograph with its depth.
+
+    The picture shows its own colours, unlit, and is 1 high or wide, whichever is less. What the camera saw as a pyramid
+    becomes a block: seen along its axis it is the photograph, and parallax is proportional to inverse depth. Where a
+    display looks past something near, the far side goes on behind it.
+
+    Parameters
+    ----------
+    allow_outside:
+        Without effect: the files are named by the caller.
+    depth_map:
+        A depth map; None for one within the picture (XMP GDepth in JPEG files).
+
+    Raises
+    ------
+    SceneError
+        A file is missing or damaged; the picture holds no depth and none is given; their sides differ in proportion.
+    """
+    data = read_bytes(path)
+    image = decode_image(data, path.name, where=path.name)
+    found = read_depth_map(depth_map) if depth_map is not None else embedded_depth(data, path.name)
+    if found is None:
+        raise SceneError(
+            "is a picture without depth", where=path.name, rule="a scene has depth", fix="name its map: depth_map=..."
+        )
+    height, width = image.pixels.shape[:2]
+    rows, columns = found.inverse.shape
+    if abs(math.log((width / height) / (columns / rows))) > _ASPECT:
+        raise SceneError(
+            f"the depth map has {columns}x{rows} pixels, the picture {width}x{height}",
+            where=path.name,
+            rule="their sides have the same proportion",
+        )
+    step = math.ceil(math.sqrt(rows * columns / _MOST_POINTS))
+    check_input(_BYTES_PER_POINT * (rows // step) * (columns // step), "its height field", where=path.name)
+    places = np.arange(step // 2, rows, step), np.arange(step // 2, columns, step)
+    inverse = found.inverse[np.ix_(*places)]
+    if min(inverse.shape) < 2:
+        raise SceneError(f"the depth map has {columns}x{rows} pixels", where=path.name, rule="2 x 2 and more are read")
+    v, u = ((place + 0.5) / count for place, count in zip(places, (rows, columns), strict=True))
+    layers = split_layers(inverse, _colors_at(image, u, v), path.name)
+    return _description(path.stem, image, layers, u, v)
+
+
+def _colors_at(image: Image, u: NDArray[np.float64], v: NDArray[np.float64]) -> NDArray[np.float32]:
+    """Colours ``(h, w, 3)`` of the picture, as coded, in [0, 1], in the size of the height field."""
+    pixels = image.pixels[..., :3]
+    if pixels.dtype != np.uint8:
+        pixels = np.rint(np.clip(pixels, 0.0, 1.0) * 255.0).astype(np.uint8)
+    picture = Pillow.fromarray(np.ascontiguousarray(np.broadcast_to(pixels, (*pixels.shape[:2], 3))))
+    small = picture.resize((len(u), len(v)), Pillow.Resampling.BOX)
+    return np.asarray(small, np.float32) / np.float32(255.0)
+
+
+def _description(
+    name: str, image: Image, layers: Layers, u: NDArray[np.float64], v: NDArray[np.float64]
+) -> SceneDescription:
+    height, width = image.pixels.shape[:2]
+    sides = np.array([width, height]) / min(width, height)
+    across = np.stack(np.broadcast_arrays((u - 0.5) * sides[0], (0.5 - v[:, None]) * sides[1]), axis=-1)
+    uvs = np.stack(np.broadcast_arrays(u, v[:, None]), axis=-1).reshape(-1, 2).astype(np.float32)
+
+    def mesh(label: str, nearness: NDArray[np.float32], faces: NDArray[np.uint32], material: int) -> Mesh:
+        points = np.concatenate([across, DEPTH * nearness[..., None]], axis=-1).reshape(-1, 3)
+        used = np.unique(faces)
+        places = np.zeros(len(points), np.uint32)
+        places[used] = np.arange(len(used), dtype=np.uint32)
+        return Mesh(label, points[used].astype(np.float32), places[faces], material, uvs=(uvs[used],))
+
+    behind = Image(f"{name}, behind", np.rint(layers.behind_colors * 255.0).astype(np.uint8))
+    materials = [
+        Material(label, base_color_texture=Texture(each, srgb=True, wrap_u="clamp", wrap_v="clamp"), unlit=True)
+        for label, each in (("photograph", _rgb(image)), ("behind", behind))
+    ]
+    meshes = [mesh("photograph", layers.nearness, layers.faces, 0)]
+    if len(layers.behind_faces):
+        meshes.append(mesh("behind", layers.behind, layers.behind_faces, 1))
+    notes = []
+    if layers.filled:
+        notes.append(f"{layers.filled:.1%} of the depth map have no depth and are filled from beside")
+    instances = [Instance(number, np.eye(4)) for number in range(len(meshes))]
+    return SceneDescription(name, meshes, materials[: len(meshes)], instances, notes=notes)
+
+
+def _rgb(image: Image) -> Image:
+    """Without alpha: a photograph hides what lies behind it."""
+    return Image(image.name, np.ascontiguousarray(image.pixels[..., :3])) if image.pixels.shape[2] == 4 else image

@@ -1,0 +1,222 @@
+"""Photographs with depth: maps of every kind, edges, what is filled behind them, and damaged files."""
+
+import base64
+import io
+
+import numpy as np
+import pytest
+from PIL import Image as Pillow
+
+from lippmann.codecs.exr import write_exr
+from lippmann.codecs.pfm import write_pfm
+from lippmann.errors import SceneError, UsageError
+from lippmann.scene.readers.depth_layers import split_layers
+from lippmann.scene.readers.depth_map import embedded_depth, read_depth_map
+from lippmann.scene.readers.load import load_scene
+
+DEPTH = np.array([[1.0, 2.0, 4.0], [2.0, 0.0, np.nan]], np.float32)
+INVERSE = np.array([[1.0, 0.5, 0.25], [0.5, np.nan, np.nan]])
+
+
+def encoded(pixels, kind="PNG", **options):
+    held = io.BytesIO()
+    Pillow.fromarray(pixels).save(held, kind, **options)
+    return held.getvalue()
+
+
+def saved(path, depth):
+    """A depth map in the form that the name's ending says."""
+    if path.suffix == ".npy":
+        np.save(path, depth.astype(np.float64))
+    elif path.suffix == ".pfm":
+        write_pfm(path, depth)
+    elif path.suffix == ".exr":
+        write_exr(path, {"Z": depth}, text={})
+    elif path.suffix == ".tif":
+        Pillow.fromarray(depth).save(path)
+    else:
+        Pillow.fromarray(np.nan_to_num(1000 * depth).astype(np.uint16)).save(path)
+    return path
+
+
+@pytest.mark.parametrize("ending", [".npy", ".pfm", ".exr", ".tif", ".png"])
+def test_depth_of_every_kind_of_file(tmp_path, ending):
+    found = read_depth_map(saved(tmp_path / f"d{ending}", DEPTH)).inverse
+    scale = 1000 if ending == ".png" else 1
+    assert found * scale == pytest.approx(INVERSE, nan_ok=True)
+
+
+def test_the_sky_is_infinitely_far(tmp_path):
+    found = read_depth_map(saved(tmp_path / "d.npy", np.array([[np.inf, 1.0]], np.float32)))
+    assert found.inverse.tolist() == [[0, 1]]
+
+
+def test_grey_pictures_tell_what_is_nearer(tmp_path):
+    path = tmp_path / "d.png"
+    path.write_bytes(encoded(np.array([[0, 128, 255]], np.uint8)))
+    assert read_depth_map(path).inverse.tolist() == [[0, 128, 255]]
+
+
+@pytest.mark.parametrize(
+    ("name", "data", "line"),
+    [
+        (
+            "d.npy",
+            b"\x93NUMPY\x01\x00v\x00{'descr': '<f8', 'fortran_order': False, 'shape': (90000, 90000), }\n",
+            "d.npy: is no",
+        ),
+        ("d.npy", b"nothing", "d.npy: is no depth map"),
+        ("d.pfm", b"Pf\n3 2\n-1.0\n", "d.pfm: is cut short"),
+        ("d.exr", b"v/1\x01", "d.exr: "),
+        ("d.png", b"nothing", "d.png: is no depth map"),
+    ],
+)
+def test_damaged_maps_are_refused(tmp_path, name, data, line):
+    (tmp_path / name).write_bytes(data)
+    with pytest.raises(SceneError) as caught:
+        read_depth_map(tmp_path / name)
+    assert str(caught.value).startswith(line)
+
+
+def portrait(shares, *, near=1.0, far=4.0, form="RangeInverse", parts=2):
+    """A JPEG file with depth as Android writes it: its picture in an extension of XMP, in parts."""
+    picture = encoded(np.full((4, 6, 3), 90, np.uint8), "JPEG")
+    depth = base64.b64encode(encoded(np.asarray(shares, np.uint8)))
+    plain = f'<x GDepth:Format="{form}" GDepth:Near="{near}" GDepth:Far="{far}"/>'.encode()
+    extension = b'<x GDepth:Data="' + depth + b'"/>'
+    cut = len(extension) // parts
+    pieces = [(start, extension[start : start + cut]) for start in range(0, len(extension), cut)]
+    segments = [b"http://ns.adobe.com/xap/1.0/\0" + plain]
+    for start, piece in reversed(pieces):  # in any order
+        head = bytes(32) + len(extension).to_bytes(4, "big") + start.to_bytes(4, "big")
+        segments.append(b"http://ns.adobe.com/xmp/extension/\0" + head + piece)
+    blocks = b"".join(b"\xff\xe1" + (len(each) + 2).to_bytes(2, "big") + each for each in segments)
+    return picture[:2] + blocks + picture[2:]
+
+
+@pytest.mark.parametrize("form", ["RangeInverse", "RangeLinear"])
+def test_depth_within_a_portrait(form):
+    """The formulas of the depth map metadata: share 0.2 of the way from 1 to 4, in depth or its inverse."""
+    found = embedded_depth(portrait([[0, 51, 255]], form=form), "p.jpg").inverse
+    depth = 1 + 0.2 * 3 if form == "RangeLinear" else 4 * 1 / (4 - 0.2 * 3)
+    assert found == pytest.approx(np.array([[1, 1 / depth, 0.25]]))
+
+
+def test_portraits_that_mean_nothing_are_refused():
+    with pytest.raises(SceneError, match=r"^p\.jpg: has depth from 5 to 4; near is above 0"):
+        embedded_depth(portrait([[0, 255]], near=5), "p.jpg")
+    assert embedded_depth(encoded(np.zeros((2, 2, 3), np.uint8), "JPEG"), "p.jpg") is None
+
+
+@pytest.mark.parametrize("cut", range(0, 500, 50))
+def test_portraits_that_are_cut_short_are_refused_or_without_depth(cut):
+    data = portrait([[0, 51, 255]])[:cut]
+    try:
+        found = embedded_depth(data, "p.jpg")
+    except SceneError as error:
+        found = str(error)
+    assert found is None or str(found).startswith("p.jpg: ")
+
+
+def scene_of(tmp_path, depth, picture=None):
+    rows, columns = depth.shape
+    picture = np.full((rows, columns, 3), 128, np.uint8) if picture is None else picture
+    (tmp_path / "photo.png").write_bytes(encoded(picture))
+    saved(tmp_path / "depth.npy", depth)
+    return load_scene(tmp_path / "photo.png", depth_map=tmp_path / "depth.npy").description
+
+
+def step_scene(tmp_path):
+    """A near red half before a far green one."""
+    depth = np.full((20, 40), 4.0, np.float32)
+    depth[:, :20] = 1.0
+    picture = np.zeros((20, 40, 3), np.uint8)
+    picture[:, :20, 0] = 200
+    picture[:, 20:, 1] = 200
+    return scene_of(tmp_path, depth, picture)
+
+
+def test_a_step_is_cut_and_the_far_side_goes_on_behind_it(tmp_path):
+    photograph, behind = step_scene(tmp_path).meshes
+    corners = photograph.positions[photograph.faces]
+    assert (np.ptp(corners[..., 2], axis=1) == 0).all()
+    assert set(np.unique(corners[..., 2])) == {0, 0.5}
+    # It lies in the plane of the far half, reaches to it, and goes on to the other border.
+    assert behind.positions[..., 2] == pytest.approx(0)
+    assert behind.positions[:, 0].min() == photograph.positions[:, 0].min()
+    # The first pixel of the far half: its middle lies half a pixel of 1/20 right of the picture's own.
+    assert behind.positions[:, 0].max() == pytest.approx(0.5 / 20)
+
+
+def test_what_lies_behind_has_the_far_sides_colour(tmp_path):
+    scene = step_scene(tmp_path)
+    texels = scene.materials[1].base_color_texture.image.pixels
+    assert (texels[..., 0] == 0).all()
+    assert (texels[..., 1] == 200).all()
+    assert all(material.unlit for material in scene.materials)
+
+
+def test_the_front_is_the_photograph(tmp_path):
+    """Seen along its axis each point lies where its pixel is; faces look at the viewer."""
+    scene = scene_of(tmp_path, np.tile(1 / np.linspace(1, 1.7, 32, dtype=np.float32), (24, 1)))
+    (mesh,) = scene.meshes
+    u, v = mesh.uvs[0].T
+    assert mesh.positions[:, 0] == pytest.approx((u - 0.5) * 32 / 24, abs=1e-6)
+    assert mesh.positions[:, 1] == pytest.approx(0.5 - v, abs=1e-6)
+    corners = mesh.positions[mesh.faces].astype(float)
+    assert (np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])[:, 2] > 0).all()
+
+
+def test_nearness_is_linear_in_inverse_depth(tmp_path):
+    depth = 1 / np.linspace(0.25, 1.0, 50, dtype=np.float32)
+    scene = scene_of(tmp_path, np.tile(depth, (50, 1)))
+    order = np.argsort(scene.meshes[0].positions[:, 0], kind="stable")
+    heights = scene.meshes[0].positions[order][::50, 2]
+    assert heights == pytest.approx(np.linspace(0, 0.5, 50), abs=1e-3)
+
+
+def test_unknown_depth_is_filled_from_beside(tmp_path):
+    depth = np.full((20, 20), 2.0, np.float32)
+    depth[:, 10:] = 4.0
+    depth[5:8, 2:5] = np.nan
+    scene = scene_of(tmp_path, depth)
+    assert scene.notes == ["2.2% of the depth map have no depth and are filled from beside"]
+    left = scene.meshes[0].positions[scene.meshes[0].positions[:, 0] < -0.1]
+    assert left[:, 2] == pytest.approx(0.5)
+
+
+def test_without_any_depth_there_is_no_scene(tmp_path):
+    with pytest.raises(SceneError, match="the depth map tells no depth"):
+        scene_of(tmp_path, np.zeros((4, 4), np.float32))
+    (tmp_path / "photo.png").write_bytes(encoded(np.zeros((4, 4, 3), np.uint8)))
+    with pytest.raises(SceneError, match=r"^photo\.png: is a picture without depth; a scene has depth; name its map"):
+        load_scene(tmp_path / "photo.png")
+
+
+def test_maps_of_other_proportions_are_refused(tmp_path):
+    (tmp_path / "photo.png").write_bytes(encoded(np.zeros((40, 40, 3), np.uint8)))
+    saved(tmp_path / "depth.npy", np.ones((10, 20), np.float32))
+    with pytest.raises(
+        SceneError, match="the depth map has 20x10 pixels, the picture 40x40; their sides have the same"
+    ):
+        load_scene(tmp_path / "photo.png", depth_map=tmp_path / "depth.npy")
+
+
+def test_a_depth_map_is_for_photographs(tmp_path):
+    with pytest.raises(UsageError, match=r"depth_map: teapot is no photograph; for \.jpg, \.jpeg, \.png, \.webp files"):
+        load_scene("teapot", depth_map=tmp_path / "depth.npy")
+
+
+def test_a_flat_map_has_one_layer():
+    layers = split_layers(np.full((8, 8), 0.5, np.float32), np.zeros((8, 8, 3), np.float32), "x")
+    assert len(layers.behind_faces) == 0
+    assert len(layers.faces) == 2 * 49
+
+
+def test_a_portrait_is_a_scene(tmp_path):
+    shares = np.zeros((4, 6), np.uint8)
+    shares[:, 3:] = 255
+    (tmp_path / "p.jpg").write_bytes(portrait(shares))
+    scene = load_scene(tmp_path / "p.jpg")
+    assert scene.bounds[:, 2].tolist() == [0, 0.5]
+    assert not scene.in_studio
