@@ -132,7 +132,7 @@ def _toml(value: object) -> str:
         return "true" if value else "false"
     if isinstance(value, str):
         # JSON's strings are TOML's, but for this one control character.
-        return json.dumps(value).replace("\x7f", "\\u007F")
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007F")
     if isinstance(value, tuple):
         return f"[{', '.join(_toml(float(part)) for part in value)}]"
     return repr(value)
@@ -160,7 +160,7 @@ def _syntax_error(message: str, where: str) -> UsageError:
 
 
 def _line_of(text: str, name: str) -> int:
-    for number, line in enumerate(text.splitlines(), start=1):
+    for number, line in enumerate(text.split("\n"), start=1):
         if re.match(rf"\s*[\[\"']*{re.escape(name)}[\]\"']*\s*([=.]|$)", line):
             return number
     return 1

@@ -20,6 +20,7 @@ from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.rendering.session import Session, make_integrator
 from lippmann.rendering.transport.emitter_weights import make_light_sampler
 from lippmann.rendering.transport.first_surface import make_surfaces
+from lippmann.rendering.transport.light_sampling import SceneLightSampler
 from lippmann.rendering.transport.path import PathIntegrator
 from lippmann.rendering.transport.ray_source import DisplayRays
 from lippmann.scene.light_options import LightOptions
@@ -122,6 +123,7 @@ class SceneKernels:
         is_new = integrator.gain is None
         integrator.gain = dr.opaque(mi.Float, 1.0)
         if (measure or is_new) and not self.built.borrowed:
+            integrator.light_sampler = SceneLightSampler(integrator.scene)
             integrator.light_sampler = make_light_sampler(integrator, source)
         if exposure == "auto":
             if measure or self._exposure is None:
