@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from lippmann.image import IntegralImage, read_picture
     from lippmann.progress import Progress
     from lippmann.rendering.request.render_request import RenderRequest
+    from lippmann.scene.light_options import LightOptions
     from lippmann.scene.placement import PlacementOptions
     from lippmann.scene.scene import Scene
     from lippmann.viewing.focal_stack import focal_stack
@@ -39,6 +40,7 @@ _HOME = {
     "LippmannError": "lippmann.errors",
     "IntegralImage": "lippmann.image",
     "read_picture": "lippmann.image",
+    "LightOptions": "lippmann.scene.light_options",
     "PlacementOptions": "lippmann.scene.placement",
     "Progress": "lippmann.progress",
     "RenderRequest": "lippmann.rendering.request.render_request",
@@ -50,6 +52,7 @@ __all__ = [
     "Display",
     "IntegralImage",
     "LensArray",
+    "LightOptions",
     "LippmannError",
     "Panel",
     "PlacementOptions",

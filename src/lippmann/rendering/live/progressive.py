@@ -8,6 +8,7 @@ the denoiser made of the other: where that is wrong, the samples themselves are 
 from __future__ import annotations
 
 import time
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -64,6 +65,7 @@ class Progressive:
         self._taken = 0
         self._features: tuple[Floats, Floats] | None = None
         self._denoised_at = 0
+        self._task: Iterator[Floats | None] | None = None
         self._parts = [
             slice(start, min(start + kernels.most_lanes // STREAMS, count))
             for start in range(0, count, kernels.most_lanes // STREAMS)
@@ -80,9 +82,11 @@ class Progressive:
 
     def step(self, seconds: dict[str, float]) -> LiveFrame | None:
         """One step of work; the picture if it changed."""
+        if self._task is not None:
+            return self._denoise(seconds)
         if self._denoises and self._taken and self._features is None:
             self._trace_features(seconds)
-            return self._denoised(seconds)
+            return self._denoise(seconds)
         if self.samples >= MOST_SAMPLES:
             return None
         if not self._sample(seconds):
@@ -90,7 +94,7 @@ class Progressive:
         if not self._denoises:
             return self._frame(develop(self._mean(), self._pixels, self._request), seconds, is_denoised=False)
         if self._features is not None and self._taken >= _MORE * self._denoised_at:
-            return self._denoised(seconds)
+            return self._denoise(seconds)
         return None
 
     def _sample(self, seconds: dict[str, float]) -> bool:
@@ -131,23 +135,36 @@ class Progressive:
     def _mean(self) -> Floats:
         return np.asarray(self._sums.sum(axis=0) / np.float32(self.samples), np.float32)
 
-    def _denoised(self, seconds: dict[str, float]) -> LiveFrame:
-        load_denoiser()
+    def _denoise(self, seconds: dict[str, float]) -> LiveFrame | None:
+        """One of the steps that take the noise out; the picture after the last."""
         started = time.perf_counter()
-        self._denoised_at = self._taken
+        if self._task is None:
+            load_denoiser()
+            self._denoised_at = self._taken
+            self._task = self._denoising()
+        picture = next(self._task)
+        seconds["denoise"] = time.perf_counter() - started
+        if picture is None:
+            return None
+        self._task = None
+        return self._frame(self._developed(picture), seconds, is_denoised=True)
+
+    def _denoising(self) -> Iterator[Floats | None]:
+        """Steps of taking the noise out, the last of which brings the picture: no step takes long."""
         assert self._features is not None
         albedo, normal = (self._picture(values) for values in self._features)
         noisy = [self._picture(sums / np.float32(self._taken)) for sums in self._sums]
         threads = self._kernels.session.engine.threads
         mean = np.asarray((noisy[0] + noisy[1]) / 2, np.float32)
         if self.samples < _JUDGED_FROM:
-            picture = denoise(mean, albedo, normal, effort="fast", threads=threads)
-        else:
-            clean = [denoise(half, albedo, normal, effort="fast", threads=threads) for half in noisy]
-            share = own_share((noisy[0], noisy[1]), (clean[0], clean[1]), "srgb", threads=threads)
-            picture = np.asarray((clean[0] + clean[1]) / 2 * (1 - share) + mean * share, np.float32)
-        seconds["denoise"] = time.perf_counter() - started
-        return self._frame(self._developed(picture), seconds, is_denoised=True)
+            yield denoise(mean, albedo, normal, effort="fast", threads=threads)
+            return
+        clean = []
+        for half in noisy:
+            clean.append(denoise(half, albedo, normal, effort="fast", threads=threads))
+            yield None
+        share = own_share((noisy[0], noisy[1]), (clean[0], clean[1]), "srgb", threads=threads)
+        yield np.asarray((clean[0] + clean[1]) / 2 * (1 - share) + mean * share, np.float32)
 
     def _picture(self, values: Floats) -> Floats:
         """Values ``(n, 3)`` of the pixels as the picture that the denoiser sees: of lenses, where they are blocks."""
