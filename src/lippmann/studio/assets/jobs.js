@@ -90,7 +90,9 @@ export class Jobs {
     this.result.hidden = false;
     title.focus();
     if (isPicture) {
-      this.#viewer = createViewer(frame, serverSource(job.number), { theme: "dark", compact: true });
+      const view = h("div");
+      frame.append(view);
+      this.#viewer = createViewer(view, serverSource(job.number), { theme: "dark" });
       this.#viewer.ready.catch(() => {}); // the viewer displays its errors itself
     } else if (job.shows === "film") {
       frame.append(h("video", { src: `results/${job.number}/${job.name}`, controls: true, loop: true, autoplay: true }));
