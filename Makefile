@@ -9,12 +9,13 @@ ROUNDS ?= 20
 OPEN := $(if $(filter Darwin,$(shell uname -s)),open,xdg-open)
 
 .DEFAULT_GOAL := help
-.PHONY: audit docs help setup setup-dev demo test test-oldest search lint clean
+.PHONY: audit check docs help setup setup-dev demo test test-oldest measure-tests search lint clean
 
 help:
 	@echo 'make demo    set up and render a teapot for a lenticular display into $(PICTURE)'
 	@echo 'make setup   set up only: virtual environment, package, LLVM runtime'
 	@echo 'make test    set up, lint and run the tests (JOBS=2 PYTEST="-k replay")'
+	@echo 'make check   the same in three minutes: lint, types and the quick tests'
 	@echo 'make search  look for random examples that break a property test (ROUNDS=20)'
 	@echo 'make test-oldest  run the tests of picture files with the oldest libraries that are allowed'
 	@echo 'make lint    set up, check style and types'
@@ -50,6 +51,13 @@ lint: setup-dev
 
 test: lint
 	.venv/bin/python -m pytest -n $(JOBS) -m 'not long' $(PYTEST)
+
+# The tests that are not in tests/slow.txt.
+check: lint
+	.venv/bin/python -m pytest -n $(JOBS) --quick $(PYTEST)
+
+measure-tests: setup-dev
+	.venv/bin/python scripts/measure_tests.py -q
 
 search: setup-dev
 	.venv/bin/python -m pytest -n auto -m hypothesis --hypothesis-profile search --rounds $(ROUNDS) $(PYTEST)

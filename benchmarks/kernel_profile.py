@@ -9,9 +9,10 @@ random numbers and bookkeeping. Parts overlap in a processor, so that shares are
 *Lanes at work*: a vector unit goes on until the longest of its 16 paths has ended; the share of its lanes that have
 still something to do.
 
-*Before*: opaque surfaces without an acceleration structure of their own where others let rays straight through, and
-look-ups of all photons about a point by every sample (:mod:`lippmann.rendering.transport.shadow_rays`,
-``PHOTON_PARTS`` of :mod:`lippmann.rendering.transport.path`).
+*Before*: opaque surfaces without an acceleration structure of their own where others let rays straight through,
+look-ups of all photons about a point by every sample, and photons in NumPy's memory, whose rows cannot be fetched at
+once (:mod:`lippmann.rendering.transport.shadow_rays`, ``PHOTON_PARTS`` of :mod:`lippmann.rendering.transport.path`,
+:mod:`lippmann.device.kernel_ops`).
 
 python benchmarks/kernel_profile.py [--scenes NAME,...]
 
@@ -21,6 +22,7 @@ Nanoseconds of a processor per path, medians of interleaved runs.
 from __future__ import annotations
 
 import argparse
+import copy
 import statistics
 from typing import Any
 
@@ -147,6 +149,8 @@ def _kernels(stage: Stage) -> dict[str, Any]:
     before = alike(path.PathIntegrator)
     if before.features.has_null:
         before.shadow_rays.opaque, before.shadow_rays.asked = None, paths.scene
+    if paths.photons is not None:
+        before.photons = _unaligned(paths.photons)
     kernels = {
         "whole": traced(paths),
         "before": traced(before, parts=1),
@@ -158,6 +162,18 @@ def _kernels(stage: Stage) -> dict[str, Any]:
     if paths.photons is not None:
         kernels["photons"] = traced(alike(Unfocused))
     return kernels
+
+
+def _unaligned(photons: Any) -> Any:
+    """The same photons in tables that lie in NumPy's memory, one number off."""
+    other = copy.copy(photons)
+    for name in ("_start", "_position", "_normal", "_toward", "_power_and_surfaces"):
+        table = getattr(photons, name)
+        values = np.array(table)
+        moved = np.empty(len(values) + 1, values.dtype)[1:]
+        moved[:] = values
+        setattr(other, name, type(table)(moved))
+    return other
 
 
 if __name__ == "__main__":

@@ -28,6 +28,23 @@ settings.load_profile("ci")
 def pytest_addoption(parser):
     # Tests state how many examples they take; a search takes more of them by further rounds.
     parser.addoption("--rounds", type=int, default=1, help="run each property test so many times")
+    parser.addoption("--quick", action="store_true", help="leave out the tests of tests/slow.txt and the long ones")
+
+
+def slow_tests() -> dict[str, float]:
+    """Tests that `make check` leaves out, and their processor seconds."""
+    lines = (ROOT / "tests" / "slow.txt").read_text(encoding="utf-8").splitlines()
+    pairs = (line.split(" ", 1) for line in lines if line and not line.startswith("#"))
+    return {name: float(seconds) for seconds, name in pairs}
+
+
+def pytest_collection_modifyitems(config, items):
+    if not config.getoption("--quick"):
+        return
+    slow = slow_tests()
+    is_out = [item.nodeid.partition("[")[0] in slow or "long" in item.keywords for item in items]
+    config.hook.pytest_deselected(items=[item for item, out in zip(items, is_out, strict=True) if out])
+    items[:] = [item for item, out in zip(items, is_out, strict=True) if not out]
 
 
 def pytest_generate_tests(metafunc):

@@ -8,6 +8,7 @@ import shlex
 import shutil
 import subprocess
 import sys
+import urllib.request
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -106,10 +107,21 @@ def run_python(page: Path) -> None:
         exec(compile(code, str(page), "exec"), {"__name__": "example"})
 
 
+def serve_once(content, what, console, *, host, port, browser, folder="", started=lambda: None):
+    """In place of a server that runs until Ctrl-C: the page is fetched, once."""
+    from lippmann.viewer.http_server import WebServer
+
+    with WebServer(content, host, port, folder=folder) as server:
+        with urllib.request.urlopen(server.address, timeout=20) as answer:
+            assert b"<main" in answer.read()
+    console.result({"address": server.address}, server.address)
+
+
 @pytest.mark.parametrize("page", [p for p in PAGES if commands(p)], ids=name)
-def test_commands_and_python_run_in_the_order_of_the_page(page, workplace, engine, capfd):
+def test_commands_and_python_run_in_the_order_of_the_page(page, workplace, engine, capfd, monkeypatch):
     from lippmann.cli import run
 
+    monkeypatch.setattr("lippmann.cli.commands.view.serve", serve_once)
     save_named_files(page, workplace)
     for words in commands(page):
         assert words[0] == "lippmann", f"{name(page)}: only lippmann's own commands are shown as sh"

@@ -17,9 +17,11 @@ if TYPE_CHECKING:
     from lippmann.image import IntegralImage, read_picture
     from lippmann.progress import Progress
     from lippmann.rendering.request.render_request import RenderRequest
+    from lippmann.scene.light_options import LightOptions
     from lippmann.scene.placement import PlacementOptions
     from lippmann.scene.scene import Scene
     from lippmann.viewing.focal_stack import focal_stack
+    from lippmann.viewing.stereo import replay_stereo
 
 __version__ = _version.VERSION
 
@@ -39,17 +41,20 @@ _HOME = {
     "LippmannError": "lippmann.errors",
     "IntegralImage": "lippmann.image",
     "read_picture": "lippmann.image",
+    "LightOptions": "lippmann.scene.light_options",
     "PlacementOptions": "lippmann.scene.placement",
     "Progress": "lippmann.progress",
     "RenderRequest": "lippmann.rendering.request.render_request",
     "Scene": "lippmann.scene.scene",
     "focal_stack": "lippmann.viewing.focal_stack",
+    "replay_stereo": "lippmann.viewing.stereo",
 }
 
 __all__ = [
     "Display",
     "IntegralImage",
     "LensArray",
+    "LightOptions",
     "LippmannError",
     "Panel",
     "PlacementOptions",
@@ -68,6 +73,7 @@ __all__ = [
     "render_quilt",
     "render_to_file",
     "render_turntable",
+    "replay_stereo",
 ]
 
 

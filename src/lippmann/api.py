@@ -43,6 +43,7 @@ if TYPE_CHECKING:
     from lippmann.quilts.quilt import Quilt
     from lippmann.rendering.forecast import Forecast
     from lippmann.rendering.preview import Preview
+    from lippmann.scene.light_options import LightOptions
     from lippmann.scene.values.description import Environment
     from lippmann.tiles.tiled_render import Rendered, Runner
 
@@ -57,7 +58,11 @@ def load_scene(
     background: tuple[float, float, float] | None = None,
     allow_outside: bool = False,
     multiple_scattering: bool = True,
-    up: Literal["y", "z"] | None = None,
+    up: Literal["y", "z", "-y"] | None = None,
+    crop: tuple[float, float, float, float, float, float] | None = None,
+    unit_scale: float | None = None,
+    min_opacity: float | None = None,
+    light: LightOptions | None = None,
     variants: Mapping[str, str] | None = None,
     depth_map: str | Path | None = None,
 ) -> Scene:
@@ -66,9 +71,9 @@ def load_scene(
     Parameters
     ----------
     source:
-        Path of a ``.glb``, ``.gltf``, ``.obj``, ``.ply``, ``.stl``, ``.usd`` (``.usda``, ``.usdc``, ``.usdz``), Mitsuba
-        ``.xml``, Tachyon ``.dat`` or ``.nff`` file; name of a bundled scene; a
-        ``mi.Scene`` or Mitsuba dict; a trimesh scene or mesh; a PyVista mesh; a
+        Path of a ``.glb``, ``.gltf``, ``.obj``, ``.ply``, ``.spz``, ``.sog``, ``.stl``, ``.usd`` (``.usda``, ``.usdc``,
+        ``.usdz``), Mitsuba ``.xml``, Tachyon ``.dat`` or ``.nff`` file; name of a bundled scene; a ``mi.Scene`` or
+        Mitsuba dict; a trimesh scene or mesh; a PyVista mesh; a
         :class:`~lippmann.scene.values.description.SceneDescription`.
     environment:
         An equirectangular EXR or HDR file (or an ``Environment``) that lights the scene in place of its own.
@@ -80,8 +85,18 @@ def load_scene(
         Give back the light that rough surfaces reflect more than once between microfacets. False: as dark as glTF's
         formulas make them.
     up:
-        ``y`` or ``z``: the axis that points up in a file that does not say so. By default ``y`` in OBJ and PLY files,
-        ``z`` in STL files.
+        ``y``, ``z`` or ``-y``: the axis that points up in a file that does not say so. By default ``y`` in OBJ, PLY and
+        SPZ files, ``z`` in STL files, ``-y`` in PLY files of Gaussian splats and in SOG files.
+    crop:
+        Of Gaussian splats those are kept whose centres lie in the box from ``(x0, y0, z0)`` to ``(x1, y1, z1)``, all in
+        one tuple: coordinates with +y up, after ``unit_scale``.
+    unit_scale:
+        Factor on the coordinates of Gaussian splats, whose files have no unit: what one of their units is in the unit
+        that ``crop`` and placements shall count in.
+    min_opacity:
+        Leave out Gaussian splats of less opacity, 0 to 1: most floaters are faint.
+    light:
+        A :class:`~lippmann.scene.light_options.LightOptions`: turns and scales the scene's light.
     variants:
         Of a USD stage: ``{"set": "choice"}`` for every prim that has them, ``{"/prim:set": "choice"}`` for one.
     depth_map:
@@ -99,6 +114,10 @@ def load_scene(
         allow_outside=allow_outside,
         multiple_scattering=multiple_scattering,
         up=up,
+        crop=crop,
+        unit_scale=unit_scale,
+        min_opacity=min_opacity,
+        light=light,
         variants=variants,
         depth_map=None if depth_map is None else Path(depth_map),
     )

@@ -16,13 +16,16 @@ from lippmann.errors import UsageError
 assert app  # whose making says which commands there are
 SOURCE = Path(package.__file__).parent
 #: Parameters of the library that no command has.
-OF_THE_LIBRARY = {"form", "effort"}
-#: Files whose texts are for other programs: pip, a style sheet's variables, Dask's own command.
+OF_THE_LIBRARY = {"form", "effort", "stereo", "pick"}
+#: Files whose texts are for other programs: pip, a style sheet's variables, Dask's own command, commands that are run.
 OTHER_PROGRAMS = {
     "runtime/engine.py",
     "scene/mitsuba_plugins.py",
     "reproduce/style.py",
+    "studio/command_line.py",
+    "studio/render_jobs.py",
     "cluster/worker_preload.py",
+    "runtime/llvm_install.py",
 }
 #: Whole commands, named as such.
 COMMANDS = re.compile(r"lippmann (?:export|compare)[\w `-]*--\w+|``--json``")

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from lippmann.image import read_picture
+from lippmann.quilts.quilt_metadata import metadata_of_text
 from lippmann.viewing.replay import replay
 
 QUICK = ("--integrator", "direct", "--spp", "1", "--device", "cpu")
@@ -52,6 +53,8 @@ def test_frames_by_a_pattern_and_a_film_of_quilts(engine, lippmann, moving_ball,
     _, shown = frames_of(film)
     assert len(shown) == 2
     assert shown[0].shape == (512, 1536, 3)
+    with av.open(str(film)) as video:
+        assert metadata_of_text(video.metadata["comment"], "film").layout == (3, 1, 1.0)
 
 
 def test_a_flight(engine, lippmann, tmp_path):
@@ -80,6 +83,9 @@ def test_a_flight(engine, lippmann, tmp_path):
         (("--frames", "0:2", "-o", "out", "--video", "film.avi"), "animations are"),
         (("--frames", "0:2", "-o", "out", "--fps", "0"), "0.001 to 1000"),
         (("--frames", "0:2", "-o", "out", "--eye", "0,0,500"), "nobody looks"),
+        (("--frames", "0:2", "-o", "out", "--codec", "av1"), "--codec: there is no film"),
+        (("--frames", "0:2", "-o", "out", "--video", "film.png", "--codec", "av1"), "--codec: only MP4 has a choice"),
+        (("--codec", "av1", "-o", "out.png"), "--codec: has no meaning for a single picture"),
         (("--frames", "0:2", "-o", "out", "--animation", "walk"), "no animation is named 'walk'"),
         (("--frames", "0:2", "-o", "out", "--maps", "maps"), "--maps"),
         (("--frames", "0:2", "-o", "out", "--layers"), "OpenEXR can"),

@@ -5,6 +5,7 @@ Formats whose reader follows references (materials, chunks, views) take whole fo
 
 from __future__ import annotations
 
+import asyncio
 import io
 import json
 import os
@@ -21,6 +22,8 @@ from typing import Any
 from unittest import mock
 
 import numpy as np
+import uvicorn
+from uvicorn.server import ServerState
 
 from lippmann.api import render
 from lippmann.cli import run
@@ -51,9 +54,11 @@ from lippmann.scene.readers.load import load_scene
 from lippmann.scene.readers.tachyon.reader import read_cam
 from lippmann.tiles.job import make_job
 from lippmann.viewer.calibrate.site import CalibrationSite
-from lippmann.viewer.http_server import _Handler
+from lippmann.viewer.request_guard import RequestGuard
 from lippmann.viewer.served_picture import PictureFile
 from lippmann.viewer.server import ViewerSite
+from lippmann.viewer.site_application import site_application
+from lippmann.viewer.timed_protocol import TimedProtocol
 
 from forms import (  # isort: skip
     body_tree,
@@ -418,36 +423,61 @@ def _pfm(data: bytes, folder: Path) -> object:
     return read_pfm(folder / "a.pfm")
 
 
-class _Connection:
-    """A socket whose other side has said all that it will."""
+class _Connection(asyncio.Transport):
+    """A connection whose other side has said all that it will."""
 
-    def __init__(self, said: bytes) -> None:
-        self._said = said
+    def __init__(self) -> None:
+        super().__init__()
         self.answered = b""
+        self._protocol: Any = None
+        self._is_closing = False
 
-    def makefile(self, *_: Any) -> io.BytesIO:
-        return io.BytesIO(self._said)
+    def set_protocol(self, protocol: Any) -> None:
+        self._protocol = protocol
 
-    def sendall(self, data: bytes) -> None:
+    def get_protocol(self) -> Any:
+        return self._protocol
+
+    def write(self, data: Any) -> None:
         self.answered += bytes(data)
 
-    def settimeout(self, seconds: float) -> None:
+    def is_closing(self) -> bool:
+        return self._is_closing
+
+    def close(self) -> None:
+        self._is_closing = True
+
+    abort = close
+
+    def pause_reading(self) -> None:
         pass
 
+    resume_reading = pause_reading
 
-class _Server:
-    host = "127.0.0.1"
 
-    def __init__(self, site: object) -> None:
-        self.site = site
+async def _talk(site: object, said: bytes) -> bytes:
+    application = RequestGuard(site_application(site), "127.0.0.1")  # type: ignore[arg-type]
+    config = uvicorn.Config(application, http=TimedProtocol, lifespan="off", log_config=None, log_level="critical")
+    connection, state = _Connection(), ServerState()
+    protocol = TimedProtocol(config, state, {}, asyncio.get_running_loop())
+    connection.set_protocol(protocol)
+    protocol.connection_made(connection)
+    if said:  # asyncio calls for no empty bytes
+        protocol.data_received(said)
+    protocol.eof_received()
+    while pending := list(state.tasks):
+        if protocol.cycle is not None and protocol.cycle.more_body:
+            break  # the body never comes
+        await asyncio.wait(pending)
+    connection.get_protocol().connection_lost(None)
+    await asyncio.gather(*state.tasks)
+    return connection.answered
 
 
 def _asked(site: object, data: bytes) -> bytes:
     """What is answered to a connection; a ValueError if that is no answer of a sound server."""
-    connection = _Connection(data)
-    _Handler(connection, ("127.0.0.1", 1), _Server(site))  # type: ignore[arg-type]
-    answer = connection.answered
-    if answer and not re.match(rb"HTTP/1\.[01] [1-4]\d\d |HTTP/1\.[01] 50[57] |\{", answer):
+    answer = asyncio.run(_talk(site, data))
+    if answer and not re.match(rb"HTTP/1\.1 ([1-4]\d\d|50[57]) ", answer):
         raise ValueError(f"the answer begins with {answer[:60]!r}")
     return answer
 

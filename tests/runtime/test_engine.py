@@ -22,6 +22,10 @@ NOTHING_FOUND = (
     "llvm.listed_files = lambda: iter(()); llvm.search_folders = lambda: []\n"
 )
 
+BY_FILE_NAME = (
+    "from lippmann.runtime.library_file import LibraryName\nllvm.name_of = lambda path: LibraryName(path.name)\n"
+)
+
 
 def python(code: str, **environment: str) -> subprocess.CompletedProcess[str]:
     """Run ``code`` in a process that lacks the caller's choice of a library."""
@@ -85,7 +89,7 @@ def old_libraries(folder: Path) -> list[tuple[int, Path, str]]:
     for version in {14, 15, 16} - {version for version, _, _ in found}:
         path = folder / f"libLLVM-{version}.so.1"
         path.write_text("its name is all that is looked at")
-        found.append((version, path, "llvm._own_name = lambda path: path.name\n"))
+        found.append((version, path, BY_FILE_NAME))
     return found
 
 

@@ -9,6 +9,7 @@ import pytest
 
 from lippmann.errors import EngineError
 from lippmann.runtime import llvm
+from lippmann.runtime.library_file import elf_machine
 
 pytestmark = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="the libraries made here are Linux's")
 
@@ -20,7 +21,7 @@ def library_bytes(own_name: str | None, *, machine: bytes | None = None) -> byte
     entries = [(5, base + dynamic_at + 48)] + ([(14, 1)] if own_name else []) + [(0, 0)]
     dynamic = b"".join(struct.pack("<QQ", *entry) for entry in entries).ljust(48, b"\0")
     size = dynamic_at + 48 + len(strings)
-    head = b"\x7fELF\x02\x01\x01" + bytes(9) + struct.pack("<H", 3) + (machine or llvm._machine_code())
+    head = b"\x7fELF\x02\x01\x01" + bytes(9) + struct.pack("<H", 3) + (machine or elf_machine(Path(sys.executable)))
     head += struct.pack("<IQQQIHHHHHH", 1, 0, 64, 0, 0, 64, 56, 2, 0, 0, 0)
     load = struct.pack("<IIQQQQQQ", 1, 4, 0, base, base, size, size, 4096)
     section = struct.pack("<IIQQQQQQ", 2, 4, dynamic_at, base + dynamic_at, base + dynamic_at, 48, 48, 8)

@@ -18,7 +18,7 @@ from lippmann.color.transfer import quantize
 from lippmann.display import Display, LensArray, Panel
 from lippmann.errors import PictureError
 from lippmann.image import IntegralImage, read_picture
-from lippmann.viewer.http_server import RefusedError, Request
+from lippmann.viewer.responses import RefusedError, Request
 from lippmann.viewer.served_picture import PictureFile
 from lippmann.viewer.server import ViewerSite
 

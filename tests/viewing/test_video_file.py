@@ -6,7 +6,10 @@ import pytest
 from PIL import Image, ImageSequence
 
 from lippmann.color.transfer import quantize
-from lippmann.errors import OutputError
+from lippmann.errors import OutputError, UsageError
+from lippmann.quilts.quilt import QuiltLayout
+from lippmann.quilts.quilt_metadata import metadata_of_text
+from lippmann.viewing import video_file
 from lippmann.viewing.video_file import check_animation_path, write_animation
 
 
@@ -30,10 +33,16 @@ def test_apng_is_exact(tmp_path, name):
             np.testing.assert_array_equal(np.asarray(shown.convert("RGB")), quantize(frame, 8, "srgb"))
 
 
-def test_mp4_is_close(tmp_path):
-    write_animation(frames(7, 63, 49), tmp_path / "a.mp4", frames_per_second=25)
+@pytest.mark.parametrize(
+    ("codec", "name", "tag"),
+    [(None, "h264", "avc1"), ("h264", "h264", "avc1"), ("hevc", "hevc", "hvc1"), ("av1", "av1", "av01")],
+)
+def test_mp4_is_close(tmp_path, capfd, codec, name, tag):
+    write_animation(frames(7, 63, 49), tmp_path / "a.mp4", frames_per_second=25, codec=codec)
+    assert capfd.readouterr() == ("", "")
     with av.open(str(tmp_path / "a.mp4")) as video:
         stream = video.streams.video[0]
+        assert (stream.codec_context.codec.canonical_name, stream.codec_context.codec_tag) == (name, tag)
         assert stream.average_rate == 25
         shown = [frame.to_ndarray(format="rgb24", src_colorspace="ITU709") for frame in video.decode(stream)]
     assert len(shown) == 7
@@ -43,6 +52,29 @@ def test_mp4_is_close(tmp_path):
         # Halved colour resolution blurs the edges of the column; the rest is near.
         assert np.median(np.abs(difference)) <= 3
         assert np.abs(difference.mean(axis=(0, 1))).max() < 4
+
+
+@pytest.mark.parametrize("codec", ["h264", "hevc", "av1"])
+def test_a_film_of_quilts_says_its_layout(tmp_path, codec):
+    layout = QuiltLayout(8, 6, 0.75)
+    path = tmp_path / "film_qs8x6a0.75.mp4"
+    write_animation(frames(), path, codec=codec, quilt=layout)
+    with av.open(str(path)) as video:
+        assert video.metadata["title"] == "film_qs8x6a0.75"
+        assert metadata_of_text(video.metadata["comment"], "film").layout == layout
+    write_animation(frames(), tmp_path / "plain.mp4", codec=codec)
+    with av.open(str(tmp_path / "plain.mp4")) as video:
+        assert "comment" not in video.metadata
+
+
+def test_a_codec_that_cannot_be(tmp_path, monkeypatch):
+    with pytest.raises(UsageError, match="codec: only MP4 has a choice of codecs"):
+        write_animation(frames(), tmp_path / "a.png", codec="av1")
+    encoder = video_file._Encoder("libnone", {}, "none")
+    monkeypatch.setitem(video_file._ENCODERS, "av1", encoder)
+    with pytest.raises(OutputError, match=r"a\.mp4: the codec is not there; PyAV as it is installed has no libnone"):
+        write_animation(frames(), tmp_path / "a.mp4", codec="av1")
+    assert os.listdir(tmp_path) == []
 
 
 def test_one_frame_is_enough(tmp_path):

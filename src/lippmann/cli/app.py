@@ -18,6 +18,7 @@ from lippmann.cli.commands import (
     preview,
     quilt,
     render,
+    studio,
     system,
     view,
 )
@@ -46,6 +47,8 @@ app.command("replay", cls=HelpfulCommand)(picture.replay)
 app.command("refocus", cls=HelpfulCommand)(picture.refocus)
 app.command("export", cls=HelpfulCommand)(exchange.export)
 app.command("import", cls=HelpfulCommand)(exchange.import_)
+app.command("studio", cls=HelpfulCommand)(studio.studio)
+app.command("show", cls=HelpfulCommand)(studio.show)
 app.command("view", cls=HelpfulCommand)(view.view)
 app.add_typer(quilt.quilt, name="quilt")
 app.command("weave", cls=HelpfulCommand)(quilt.weave)

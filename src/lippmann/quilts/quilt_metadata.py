@@ -43,6 +43,12 @@ def quilt_text(quilt: Quilt) -> str:
     return json.dumps(values, allow_nan=False, separators=(",", ":"))
 
 
+def layout_text(layout: QuiltLayout) -> str:
+    """ASCII JSON of a layout alone, for :func:`metadata_of_text`: of files whose quilts have many displays or none."""
+    values = {KEY: VERSION, QUILT_KEY: layout._asdict(), "display": None, "provenance": {}}
+    return json.dumps(values, allow_nan=False, separators=(",", ":"))
+
+
 def metadata_of_text(text: str, where: str) -> QuiltMetadata | None:
     """Metadata of a text by :func:`quilt_text`; None for any other text.
 

@@ -11,6 +11,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, TypeVar, cast
 
+import numpy as np
+
 from lippmann._version import VERSION
 from lippmann.display import Display
 from lippmann.errors import UsageError
@@ -40,6 +42,9 @@ if TYPE_CHECKING:
 
 #: Share of the free memory that is used where no limit is given.
 DEFAULT_MEMORY_SHARE = 0.6
+
+#: Views whose depth is kept.
+_MOST_DEPTHS = 64
 
 T = TypeVar("T")
 
@@ -94,6 +99,8 @@ class Session:
     memory: int
     watch: Stopwatch
     choices: dict[str, object] = field(default_factory=dict)
+    #: What cameras see, by their views: those of a scene at rest are asked again and again for displays that move.
+    depths: dict[bytes, VisibleDepth | None] = field(default_factory=dict)
 
     def place(self, display: Display) -> Placement:
         """Where ``display`` stands in the scene; light that follows the viewer is turned toward it.
@@ -103,22 +110,27 @@ class Session:
         UsageError, SceneError
             As :func:`lippmann.scene.placement.place`.
         """
-        scene, placement = self.scene, self.request.placement
-        if not isinstance(placement, Placement):
-            placement = place(
-                scene.bounds,
-                display,
-                cameras=scene.cameras,
-                options=placement,
-                home_camera=scene.display_camera,
-                contains_home=scene.home_may_move,
-                bounds_in=scene.bounds_in,
-                extreme_points=lambda: scene.extreme_points,
-                is_unbounded=scene.is_unbounded,
-                probe=self._probe_depth,
-            )
+        placement = self.find_place(display)
         self.face_viewer(rotation_of(placement.world_from_display))
         return placement
+
+    def find_place(self, display: Display, bounds_in: Callable[[Matrix], Matrix] | None = None) -> Placement:
+        """As :meth:`place`, leaving the light as it is; ``bounds_in`` stands for the scene's, if given."""
+        scene, placement = self.scene, self.request.placement
+        if isinstance(placement, Placement):
+            return placement
+        return place(
+            scene.bounds,
+            display,
+            cameras=scene.cameras,
+            options=placement,
+            home_camera=scene.display_camera,
+            contains_home=scene.home_may_move,
+            bounds_in=bounds_in or scene.bounds_in,
+            extreme_points=lambda: scene.extreme_points,
+            is_unbounded=scene.is_unbounded,
+            probe=self._probe_depth,
+        )
 
     def face_viewer(self, world_from_viewer: Matrix) -> None:
         """Turn light that follows the viewer, such as the studio's, by a rotation ``(4, 4)``."""
@@ -134,7 +146,14 @@ class Session:
     def _probe_depth(self, view: CameraView) -> VisibleDepth | None:
         from lippmann.rendering.transport.depth_probe import probe_depth
 
-        return self.watch.stage("build", lambda: probe_depth(self.built, view))
+        key = np.array(
+            [*np.ravel(view.world_from_camera), view.half_width, view.half_height, view.is_parallel]
+        ).tobytes()
+        if key not in self.depths:
+            if len(self.depths) >= _MOST_DEPTHS:
+                self.depths.clear()
+            self.depths[key] = self.watch.stage("build", lambda: probe_depth(self.built, view))
+        return self.depths[key]
 
     def integrator(self, source: RaySource, frame_from_world: Matrix) -> Integrator:
         """The integrator that the request names, for the built scene.
@@ -149,8 +168,19 @@ class Session:
         """
         return self.watch.stage(
             "build",
-            lambda: self._prepare_light(_make_integrator(self.built, self.request, frame_from_world, source), source),
+            lambda: self._before_splats(
+                self._prepare_light(make_integrator(self.built, self.request, frame_from_world, source), source)
+            ),
         )
+
+    def _before_splats(self, integrator: Integrator) -> Integrator:
+        from lippmann.device.pbr import BuiltScene
+        from lippmann.rendering.transport.splats import SplatIntegrator
+
+        built = self.built
+        if not isinstance(built, BuiltScene) or built.splats is None:
+            return integrator
+        return SplatIntegrator(integrator, built, built.splats, self.engine.threads)
 
     def _prepare_light(self, integrator: Integrator, source: RaySource) -> Integrator:
         from lippmann.rendering.film.exposure import gain_of, measure_exposure
@@ -349,9 +379,14 @@ def _build(scene: Scene, request: RenderRequest, memory: int) -> BuiltScene | Bu
     return build(scene, memory=memory)
 
 
-def _make_integrator(
-    built: BuiltScene | BuiltClassic, request: RenderRequest, frame_from_world: Matrix, source: RaySource
+def make_integrator(
+    built: BuiltScene | BuiltClassic, request: RenderRequest, frame_from_world: Matrix, source: RaySource | None
 ) -> Integrator:
+    """The integrator that a resolved request names.
+
+    ``source`` and ``frame_from_world`` are those of :meth:`Session.integrator`; without a source emitters are sampled
+    by the scene's own weights.
+    """
     from lippmann.device.whitted.scene import BuiltClassic
     from lippmann.rendering.transport.emitter_weights import make_light_sampler
     from lippmann.rendering.transport.path import PathIntegrator
@@ -377,7 +412,7 @@ def _make_integrator(
             built.mitsuba, background=built.background, has_null=built.has_null, absorption=built.absorption
         )
         integrator = PathIntegrator(built.mitsuba, features, request.surfaces, name=request.integrator)
-        if not built.borrowed:
+        if source is not None and not built.borrowed:
             integrator.light_sampler = make_light_sampler(integrator, source)
         return integrator
     return SurfaceIntegrator(built.mitsuba, cast("SurfaceProperty", request.integrator), frame_from_world)

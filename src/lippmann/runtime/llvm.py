@@ -9,8 +9,6 @@ from __future__ import annotations
 
 import functools
 import os
-import platform
-import re
 import struct
 import subprocess
 import sys
@@ -20,6 +18,9 @@ from pathlib import Path
 
 from lippmann.errors import EngineError
 from lippmann.runtime.child_python import python_command
+from lippmann.runtime.library_file import name_of
+from lippmann.runtime.llvm_install import remedy
+from lippmann.runtime.llvm_places import VERSION_IN_NAME, Host
 
 #: Environment variable with the path of Dr.Jit's library; users may set it to force one.
 PATH_VARIABLE = "DRJIT_LIBLLVM_PATH"
@@ -27,14 +28,6 @@ PATH_VARIABLE = "DRJIT_LIBLLVM_PATH"
 OLDEST = 17
 #: The newest major version that was tested; a newer one is used only if there is no other.
 NEWEST_TRIED = 22
-
-_MAC = sys.platform == "darwin"
-_FILE_NAME = re.compile(r"libLLVM(-\d[\w.]*)?(\.so(\.\d[\w.]*)?|\.dylib)")
-_VERSION_IN_NAME = re.compile(r"libLLVM(?:-|\.so\.)(\d+(?:\.\d+)*)")
-
-# ELF: kinds of segments (PT_LOAD, PT_DYNAMIC) and of entries of the dynamic section (DT_STRTAB, DT_SONAME).
-_LOADED_SEGMENT, _DYNAMIC_SEGMENT = 1, 2
-_STRINGS_ENTRY, _NAME_ENTRY = 5, 14
 
 
 @dataclass(frozen=True)
@@ -61,18 +54,8 @@ class Library:
 
 
 def install_command() -> str:
-    """Command that installs a suitable LLVM library on this system."""
-    if _MAC:
-        return "brew install llvm"
-    for tool, command in (
-        ("apt-get", "sudo apt-get install libllvm19"),
-        ("dnf", "sudo dnf install llvm-libs"),
-        ("pacman", "sudo pacman -S llvm-libs"),
-        ("zypper", "sudo zypper install libLLVM19"),
-    ):
-        if any((Path(folder) / tool).exists() for folder in ("/usr/bin", "/bin")):
-            return command
-    return f"install the LLVM runtime library, version {OLDEST} or newer"
+    """Command that installs a suitable LLVM library on this system, or a sentence where none is known."""
+    return remedy(OLDEST, NEWEST_TRIED).text
 
 
 def choose() -> Library:
@@ -115,15 +98,15 @@ def inspect(path: Path) -> Library:
     if path.is_dir():
         return Library(path, problem="is a folder, not a library")
     try:
-        name = _own_name(path)
+        name, stated = name_of(path)
     except FileNotFoundError:
         return Library(path, problem="is not there")
     except OSError as error:
         return Library(path, problem=f"cannot be read ({error.strerror})")
     except (ValueError, struct.error):
         return Library(path, problem="is not a shared library, or a damaged one")
-    match = _VERSION_IN_NAME.match(name)
-    version = tuple(int(part) for part in match[1].split(".")) if match else _ask(path)
+    match = VERSION_IN_NAME.match(name)
+    version = tuple(int(part) for part in match[1].split(".")) if match else stated or _ask(path)
     if not version:
         return Library(path, problem="is not an LLVM library, or cannot be loaded")
     if version[0] < OLDEST:
@@ -133,31 +116,15 @@ def inspect(path: Path) -> Library:
 
 def search_folders() -> list[Path]:
     """Folders in which LLVM libraries are usually installed, each once."""
-    machine = platform.machine()
-    homes = [sys.prefix, os.environ.get("CONDA_PREFIX", "")]
-    folders = [Path(entry) for entry in os.environ.get("LD_LIBRARY_PATH", "").split(os.pathsep) if entry]
-    folders += [Path(home) / "lib" for home in homes if home]
-    fixed = [f"/usr/lib/{machine}-linux-gnu", "/usr/lib64", "/usr/lib", "/usr/local/lib", "/usr/local/lib64"]
-    folders += [Path(name) for name in fixed]
-    for root, pattern in (
-        ("/usr/lib", "llvm*/lib"),
-        ("/usr/lib", "llvm/*/lib*"),
-        ("/usr/lib64", "llvm*/lib*"),
-        ("/usr/local", "llvm*/lib"),
-        ("/opt", "llvm*/lib"),
-        ("/opt/homebrew/opt", "llvm*/lib"),
-        ("/usr/local/opt", "llvm*/lib"),
-    ):
-        folders += sorted(Path(root).glob(pattern))
-    return list(dict.fromkeys(folders))
+    return Host().folders()
 
 
 def files_in(folders: Iterable[Path]) -> Iterator[Path]:
     """Files in ``folders`` with the name of an LLVM library, each once after resolving links."""
-    resolved = set()
+    resolved, host = set(), Host()
     for folder in folders:
         try:
-            names = sorted(name for name in os.listdir(folder) if _FILE_NAME.fullmatch(name))
+            names = sorted(name for name in os.listdir(folder) if host.is_library(name))
         except OSError:
             continue
         for name in names:
@@ -177,13 +144,15 @@ def listed_files() -> Iterator[Path]:
         except (OSError, subprocess.SubprocessError):
             continue
         places = (line.partition("=>")[2].strip() for line in run.stdout.splitlines())
-        yield from {Path(p).resolve(): None for p in places if _FILE_NAME.fullmatch(os.path.basename(p))}
+        host = Host()
+        yield from {Path(p).resolve(): None for p in places if host.is_library(os.path.basename(p))}
         return
 
 
 def _named(name: str) -> Library:
     path: Path | None = Path(name).absolute()
-    if os.sep not in name:  # the dynamic loader looks such a name up in its folders, never in the current one
+    if not {os.sep, os.altsep} & set(name):
+        # The dynamic loader looks such a name up in its folders, never in the current one.
         path = next((folder / name for folder in search_folders() if (folder / name).is_file()), None)
     library = inspect(path) if path else Library(Path(name), problem="is not there")
     if library.problem:
@@ -208,51 +177,6 @@ def _unusable(libraries: list[Library]) -> str:
         return ""
     versions = sorted({library.version_text for library in libraries if library.version})
     return f" (found only {', '.join(versions)})" if versions else f" ('{libraries[0].path}' {libraries[0].problem})"
-
-
-def _own_name(path: Path) -> str:
-    """The ELF ``SONAME`` of a library, which holds its version; else the name of its file.
-
-    The format is that of the System V ABI, "Object Files" and "Dynamic Linking".
-    """
-    with path.open("rb") as file:
-        length = os.fstat(file.fileno()).st_size
-
-        def read(offset: int, size: int) -> bytes:
-            if offset + size > length:
-                raise ValueError("the file is cut off")
-            file.seek(offset)
-            return file.read(size)
-
-        head = read(0, 64)
-        if _MAC and head[:4] in (b"\xcf\xfa\xed\xfe", b"\xca\xfe\xba\xbe"):
-            return path.resolve().name
-        if head[:6] != b"\x7fELF\x02\x01" or head[18:20] != _machine_code():
-            raise ValueError("not a 64-bit little-endian library for this processor")
-        table, size, count = *struct.unpack_from("<Q", head, 32), *struct.unpack_from("<HH", head, 54)
-        segments = [struct.unpack("<IIQQQQQQ", read(table + size * i, 56)) for i in range(count)]
-        dynamic = next((s for s in segments if s[0] == _DYNAMIC_SEGMENT), None)
-        if dynamic is None:
-            raise ValueError("not a shared library")
-        entries = dict(reversed(list(struct.iter_unpack("<QQ", read(dynamic[2], dynamic[5])))))  # the first one counts
-        if _NAME_ENTRY not in entries:
-            return path.name
-        address = entries.get(_STRINGS_ENTRY, 0) + entries[_NAME_ENTRY]
-        load = next((s for s in segments if s[0] == _LOADED_SEGMENT and s[3] <= address < s[3] + s[5]), None)
-        if load is None:
-            raise ValueError("the name lies outside the file")
-        start = address - load[3] + load[2]
-        name, end, _ = read(start, min(256, length - start)).partition(b"\0")
-        if not end:
-            raise ValueError("the name is cut off")
-        return name.decode("ascii")
-
-
-@functools.cache
-def _machine_code() -> bytes:
-    """Machine code of the processor in ELF files, from that of the running Python."""
-    with Path(sys.executable).open("rb") as file:
-        return file.read(20)[18:]
 
 
 def _ask(path: Path) -> tuple[int, ...]:

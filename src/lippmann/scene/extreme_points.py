@@ -8,6 +8,7 @@ from functools import lru_cache
 import numpy as np
 
 from lippmann.scene.matrices import Bounds
+from lippmann.scene.splat_clouds import typical_points
 from lippmann.scene.values.description import Matrix, Mesh, SceneDescription
 
 #: Directions in which the farthest points are looked for, on a Fibonacci lattice: the hull of those points is at most
@@ -24,7 +25,9 @@ _COPIED_POINTS = 5_000_000
 def extreme_points_of(description: SceneDescription) -> Bounds:
     """Points ``(n, 3)`` in world units, between which all triangles lie up to a hundredth of the scene's radius.
 
-    Empty for a description that places no triangle.
+    Of splats those between which all lie but floaters.
+
+    Empty for a description that places neither.
     """
     found = []
     for mesh, places in description.placements.items():
@@ -34,6 +37,8 @@ def extreme_points_of(description: SceneDescription) -> Bounds:
         if len(points) * len(places) > _COPIED_POINTS:
             points = np.array(list(itertools.product(*zip(points.min(axis=0), points.max(axis=0), strict=True))))
         found.append(farthest_points(_copies(points, places)))
+    if description.splats is not None:
+        found.append(typical_points(description.splats))
     return farthest_points(np.concatenate(found)) if found else np.zeros((0, 3))
 
 

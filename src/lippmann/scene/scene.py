@@ -11,9 +11,20 @@ from numpy.typing import NDArray
 from lippmann.errors import SceneError
 from lippmann.runtime.cached_property import cached_property
 from lippmann.scene.extreme_points import extreme_points_of, used_positions
+from lippmann.scene.light_options import LightOptions
 from lippmann.scene.mitsuba_source import MitsubaSource
 from lippmann.scene.parsing.name_hints import closest_name_hint
-from lippmann.scene.values.description import Camera, Color, Environment, Material, Matrix, Mesh, SceneDescription
+from lippmann.scene.splat_clouds import check_splats, typical_points
+from lippmann.scene.values.description import (
+    Camera,
+    Color,
+    Environment,
+    Light,
+    Material,
+    Matrix,
+    Mesh,
+    SceneDescription,
+)
 from lippmann.scene.values.whitted_scene import ClassicScene
 from lippmann.scene.whitted.world_frame import world_bounds
 
@@ -44,7 +55,8 @@ class Scene:
     derived when it is first needed. A scene with both has a form of its own for either kind of light.
     ``home_camera`` names the camera that the scene was made to be shown by (bundled scenes, files of Whitted tracers),
     None for all others; ``home_may_move`` says that it need not be kept to exactly where a display shows more or less.
-    ``studio`` says whether the built-in studio may light a scene that has no lights.
+    ``studio`` says whether the built-in studio may light a scene that has no lights. ``light`` changes the direction
+    and the strength of its light: :attr:`environment` and :attr:`lights` are those after that change.
 
     A scene from Mitsuba knows its ``bounds``, ``cameras``, ``lights`` and hence ``environment``, ``background`` and
     ``notes`` only once the engine has started: asked before, they start it.
@@ -57,6 +69,7 @@ class Scene:
     studio: bool = True
     classic: ClassicScene | None = field(default=None, repr=False)
     views: tuple[Camera, ...] = field(default=(), repr=False)
+    light: LightOptions = field(default_factory=LightOptions, repr=False)
 
     def __post_init__(self) -> None:
         if self.description is None and self.classic is None:
@@ -151,6 +164,11 @@ class Scene:
         return isinstance(description, SceneDescription) and description.physical_lights
 
     @property
+    def has_splats(self) -> bool:
+        """Whether there are Gaussian splats."""
+        return isinstance(self.description, SceneDescription) and self.description.splats is not None
+
+    @property
     def in_studio(self) -> bool:
         """Whether the built-in studio lights the scene, for want of other light."""
         return self.studio and not self.has_lights
@@ -158,11 +176,23 @@ class Scene:
     @property
     def environment(self) -> Environment | None:
         """Light from far away: the scene's or the caller's; the studio where the scene has no light at all."""
+        original = self._original_environment
+        return None if original is None else self.light.environment(original)
+
+    @property
+    def _original_environment(self) -> Environment | None:
         if not self.in_studio:
             return self.physical.environment
         from lippmann.scene.studio_light import studio, studio_for
 
         return studio_for(self.physical) if isinstance(self.physical, SceneDescription) else studio()
+
+    @property
+    def lights(self) -> tuple[Light, ...]:
+        """The light sources of a description; none of a scene of Mitsuba's, which keeps its own."""
+        if isinstance(self.physical, MitsubaSource):
+            return ()
+        return tuple(self.light.source(light) for light in self.physical.lights)
 
     @property
     def background(self) -> Color | None:
@@ -270,7 +300,7 @@ def box(bounds: Bounds) -> tuple[Bounds, Bounds]:
 
 
 def bounds_of(description: SceneDescription, frame: Matrix | None = None) -> Bounds:
-    """The box ``(2, 3)`` around all vertices that some triangle of some instance uses.
+    """The box ``(2, 3)`` around all vertices that some triangle of some instance uses, and most splats.
 
     Its sides run along the axes of the world, or of the frame that the 4x4 matrix ``frame`` (from world) leads to.
 
@@ -287,6 +317,8 @@ def bounds_of(description: SceneDescription, frame: Matrix | None = None) -> Bou
         if len(points) and len(places):
             points = points if exact else box_corners(np.stack([points.min(axis=0), points.max(axis=0)]))
             boxes.append(_box_of_copies(points, places, frame))
+    if description.splats is not None:
+        boxes.append(_box_of_copies(typical_points(description.splats), np.eye(4)[None], frame))
     if not boxes:
         raise SceneError("the scene holds no triangles", where=description.name, rule="there must be something to see")
     return np.stack([np.min(boxes, axis=0)[0], np.max(boxes, axis=0)[1]])
@@ -319,9 +351,9 @@ def has_lights(description: SceneDescription) -> bool:
         return True
     indices = {description.meshes[mesh].material for mesh in description.placements}
     materials = [description.materials[index] for index in indices]
-    return any(max(material.emission) > 1.0 for material in materials) or (
-        bool(materials) and all(material.unlit for material in materials)
-    )
+    if not materials:
+        return description.splats is not None  # which nothing lights
+    return any(max(material.emission) > 1.0 for material in materials) or all(material.unlit for material in materials)
 
 
 def check_description(description: SceneDescription, where: str) -> SceneDescription:
@@ -344,7 +376,11 @@ def check_description(description: SceneDescription, where: str) -> SceneDescrip
     matrices = [np.reshape(instance.world_from_mesh, (-1, 16)) for instance in description.instances]
     if matrices and not np.isfinite(np.concatenate(matrices)).all():  # all at once: there may be a million
         raise _no_matrix(next(number for number, own in enumerate(matrices) if not np.isfinite(own).all()), where)
-    if not any(len(places) and len(description.meshes[mesh].faces) for mesh, places in description.placements.items()):
+    if description.splats is not None:
+        check_splats(description.splats, where)
+    elif not any(
+        len(places) and len(description.meshes[mesh].faces) for mesh, places in description.placements.items()
+    ):
         raise SceneError("the scene has no geometry", where=where, rule="there must be at least one triangle")
     return description
 

@@ -17,6 +17,7 @@ from lippmann.scene.camera_placement import remove_scale
 from lippmann.scene.matrices import Bounds, Vector, inverse, rotation, transform_points, translation
 from lippmann.scene.placement import PlacementOptions, face_viewer
 from lippmann.scene.scene import Scene
+from lippmann.scene.splat_clouds import moved
 from lippmann.scene.values.description import Matrix, SceneDescription
 from lippmann.scene.values.whitted_lighting import Background, ClassicLight
 from lippmann.scene.values.whitted_scene import ClassicScene
@@ -76,8 +77,9 @@ def with_meshes_moved(scene: Scene, matrix: Matrix) -> Scene:
         replace(instance, world_from_mesh=matrix @ np.asarray(instance.world_from_mesh, np.float64))
         for instance in description.instances
     ]
+    splats = None if description.splats is None else moved(description.splats, matrix)
     # A form for the classic light models would not have turned.
-    return replace(scene, description=replace(description, instances=instances), classic=None)
+    return replace(scene, description=replace(description, instances=instances, splats=splats), classic=None)
 
 
 def with_lights_moved(scene: Scene, matrix: Matrix) -> Scene:

@@ -13,6 +13,7 @@ import numpy as np
 
 from lippmann.display import Display
 from lippmann.errors import UsageError
+from lippmann.scene.light_options import LightOptions
 from lippmann.scene.matrices import Bounds
 from lippmann.scene.placement import Placement, PlacementOptions
 from lippmann.scene.readers.load import STAGES, kind_of_file, load_scene
@@ -79,7 +80,7 @@ class AnimatedFile(Motion):
         Frames per second of the animation's own time, which begins at 0.
     animation:
         Its name; ``None`` for the file's first.
-    environment, background, allow_outside, multiple_scattering, variants:
+    environment, background, allow_outside, multiple_scattering, light, variants:
         As of :func:`lippmann.scene.readers.load.load_scene`.
 
     Raises
@@ -99,6 +100,7 @@ class AnimatedFile(Motion):
         background: tuple[float, float, float] | None = None,
         allow_outside: bool = False,
         multiple_scattering: bool = True,
+        light: LightOptions | None = None,
         variants: Mapping[str, str] | None = None,
     ) -> None:
         if not (math.isfinite(fps) and fps > 0.0):
@@ -112,6 +114,7 @@ class AnimatedFile(Motion):
             environment=environment,
             background=background,
             multiple_scattering=multiple_scattering,
+            light=light,
         )
 
     @property
@@ -206,6 +209,7 @@ def open_motion(
     background: tuple[float, float, float] | None = None,
     allow_outside: bool = False,
     multiple_scattering: bool = True,
+    light: LightOptions | None = None,
     variants: Mapping[str, str] | None = None,
 ) -> Motion:
     """What moves in a scene file.
@@ -216,7 +220,7 @@ def open_motion(
         Of a glTF file or USD stage, see :class:`AnimatedFile`.
     camera_path:
         A Tachyon ``.cam`` file: the display flies along it.
-    environment, background, allow_outside, multiple_scattering, variants:
+    environment, background, allow_outside, multiple_scattering, light, variants:
         As of :func:`lippmann.scene.readers.load.load_scene`.
 
     Raises
@@ -238,6 +242,7 @@ def open_motion(
             background=background,
             allow_outside=allow_outside,
             multiple_scattering=multiple_scattering,
+            light=light,
         )
         return Flight(scene, read_cam(camera_path))
     if kind_of_file(source) not in (".glb", ".gltf", *STAGES):
@@ -255,5 +260,6 @@ def open_motion(
         background=background,
         allow_outside=allow_outside,
         multiple_scattering=multiple_scattering,
+        light=light,
         variants=variants,
     )

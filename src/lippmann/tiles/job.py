@@ -115,7 +115,8 @@ class TileJob:
                 fix="save it as an XML file",
             )
         xml = described.content
-        return content_hash([xml.outline(), xml.files, described.environment, described.background, self.scene.studio])
+        known = xml.outline(), xml.files, described.environment, described.background
+        return content_hash([*known, self.scene.studio, self.scene.light])
 
     def fingerprint(self, device: str, llvm: str | None = None, denoiser: str | None = None) -> dict[str, str]:
         """All that the picture's bytes depend on, by names for people; parameters as of :func:`made_by`."""

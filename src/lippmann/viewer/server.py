@@ -17,13 +17,14 @@ from http import HTTPStatus
 
 from lippmann.errors import UsageError
 from lippmann.viewer import page
-from lippmann.viewer.http_server import (
+from lippmann.viewer.responses import (
     RefusedError,
     Request,
     Response,
     content_security_policy,
     file_response,
     json_response,
+    not_found,
     text_response,
 )
 from lippmann.viewer.served_picture import PictureFile
@@ -33,7 +34,7 @@ _TILE = re.compile(r"/pictures/([0-9]{1,3})/tiles/([A-Za-z_][A-Za-z0-9_-]{0,99})
 
 
 class ViewerSite:
-    """The viewer's page for one or more pictures; a :class:`~lippmann.viewer.http_server.Site`."""
+    """The viewer's page for one or more pictures; a :class:`~lippmann.viewer.responses.Site`."""
 
     def __init__(self, pictures: Sequence[PictureFile]) -> None:
         self._pictures = tuple(pictures)
@@ -51,14 +52,14 @@ class ViewerSite:
         if match := _TILE.fullmatch(path):
             number, layer, column, row = match.groups()
             return self._tile(int(number), layer, int(column), int(row), request.headers.get("If-Match"))
-        raise _not_found()
+        raise not_found()
 
     def post(self, request: Request, body: bytes) -> Response:
         raise RefusedError(HTTPStatus.METHOD_NOT_ALLOWED, "nothing is taken here")
 
     def _picture(self, number: int) -> PictureFile:
         if number >= len(self._pictures):
-            raise _not_found()
+            raise not_found()
         return self._pictures[number]
 
     def _manifest(self, number: int) -> Response:
@@ -75,7 +76,3 @@ class ViewerSite:
             return Response(picture.tiles.rgb(layer, column, row), "application/octet-stream")
         except UsageError as error:
             raise RefusedError(HTTPStatus.NOT_FOUND, str(error)) from None
-
-
-def _not_found() -> RefusedError:
-    return RefusedError(HTTPStatus.NOT_FOUND, "there is nothing here")

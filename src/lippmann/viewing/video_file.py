@@ -1,38 +1,83 @@
-"""Animation files: APNG, lossless with 8 bits, and MP4 (H.264)."""
+"""Animation files: APNG, lossless with 8 bits, and MP4 (H.264, HEVC or AV1).
+
+Players of quilts know the layout by the file's name, which ends in ``_qs8x6a0.75``: the vendor's convention. The same
+layout lies in the file's own metadata, as the comment, so that it outlives another name.
+"""
 
 from __future__ import annotations
 
 import itertools
+import os
 from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
 from lippmann.codecs.types import Pixels
 from lippmann.color.transfer import Transfer, quantize
-from lippmann.errors import OutputError
+from lippmann.errors import OutputError, UsageError
 from lippmann.image.stored_values import FloatArray
+from lippmann.quilts.quilt import QuiltLayout
+from lippmann.quilts.quilt_metadata import layout_text
 from lippmann.runtime.atomic_write import replacing
 
 #: Endings of the file names.
 ANIMATIONS = (".png", ".apng", ".mp4")
 
-#: Constant rate factor of H.264; 18 is considered visually lossless, lower is better.
-_RATE_FACTOR = "16"
+#: How the frames of an MP4 file are coded. H.264 plays everywhere; HEVC and AV1 make smaller files.
+Codec = Literal["h264", "hevc", "av1"]
+
+
+@dataclass(frozen=True)
+class _Encoder:
+    """An encoder of FFmpeg, its options, and the sample entry that names the codec in the file."""
+
+    name: str
+    options: dict[str, str]
+    tag: str
+
+
+#: Constant rate factors near the one that is considered visually lossless (18 in H.264); lower is better. Apple's
+#: players take HEVC as ``hvc1`` alone.
+_ENCODERS: dict[Codec, _Encoder] = {
+    "h264": _Encoder("libx264", {"crf": "16"}, "avc1"),
+    "hevc": _Encoder("libx265", {"crf": "18", "x265-params": "log-level=error"}, "hvc1"),
+    "av1": _Encoder("libsvtav1", {"crf": "20", "preset": "8"}, "av01"),
+}
 
 #: sRGB and BT.709 in the numbering of ITU-T H.273.
 _BT709, _SRGB_TRANSFER, _LIMITED_RANGE = 1, 13, 1
 
 
-def check_animation_path(path: Path) -> None:
-    """Raise :class:`OutputError` unless the name ends in ``.png``, ``.apng`` or ``.mp4``."""
+def check_animation_path(path: Path, codec: Codec | None = None) -> None:
+    """Check the name of an animation before its frames are made.
+
+    Raises
+    ------
+    OutputError
+        If the name does not end in ``.png``, ``.apng`` or ``.mp4``.
+    UsageError
+        If a codec is asked for, and the file is no MP4.
+    """
     if path.suffix.lower() not in ANIMATIONS:
         ending = f"the ending '{path.suffix}' is unknown" if path.suffix else "the name has no ending"
         raise OutputError(ending, where=str(path), rule=f"animations are {', '.join(ANIMATIONS)}")
+    if codec is not None and path.suffix.lower() != ".mp4":
+        raise UsageError(
+            "only MP4 has a choice of codecs", parameter="codec", fix="name the file .mp4, or leave it out"
+        )
 
 
 def write_animation(
-    frames: Iterable[FloatArray], path: Path, *, frames_per_second: float = 24.0, transfer: Transfer = "srgb"
+    frames: Iterable[FloatArray],
+    path: Path,
+    *,
+    frames_per_second: float = 24.0,
+    transfer: Transfer = "srgb",
+    codec: Codec | None = None,
+    quilt: QuiltLayout | None = None,
 ) -> None:
     """Write frames as an animation.
 
@@ -41,23 +86,29 @@ def write_animation(
     frames:
         At least one frame ``(H, W, 3)`` of linear RGB; all have one size.
     path:
-        The file: ``.png`` or ``.apng`` for APNG, which repeats forever, or ``.mp4``. H.264 needs even sizes: an odd
+        The file: ``.png`` or ``.apng`` for APNG, which repeats forever, or ``.mp4``, which needs even sizes: an odd
         last column or row is doubled.
     frames_per_second:
         Frame rate.
     transfer:
         Transfer function of the codes.
+    codec:
+        ``h264``, ``hevc`` or ``av1``, of an MP4 file; ``h264`` if None.
+    quilt:
+        Layout of the frames if they are quilts; an MP4 file says it in its metadata.
 
     Raises
     ------
     OutputError
-        If the ending is unknown, or the file cannot be written.
+        If the ending is unknown, the codec is not installed, or the file cannot be written.
+    UsageError
+        If a codec is given, and the file is no MP4.
     """
-    check_animation_path(path)
+    check_animation_path(path, codec)
     codes = (quantize(frame, 8, transfer) for frame in frames)
     with replacing(path) as temporary:
         if path.suffix.lower() == ".mp4":
-            _write_mp4(codes, temporary, frames_per_second, path)
+            _write_mp4(codes, temporary, frames_per_second, path, _ENCODERS[codec or "h264"], quilt)
         else:
             _write_apng(codes, temporary, frames_per_second)
 
@@ -71,17 +122,31 @@ def _write_apng(frames: Iterator[Pixels], path: Path, frames_per_second: float) 
     first.save(path, format="PNG", save_all=True, append_images=others, duration=duration, loop=0)
 
 
-def _write_mp4(frames: Iterator[Pixels], path: Path, frames_per_second: float, place: Path) -> None:
+def _write_mp4(
+    frames: Iterator[Pixels],
+    path: Path,
+    frames_per_second: float,
+    place: Path,
+    encoder: _Encoder,
+    quilt: QuiltLayout | None,
+) -> None:
     from fractions import Fraction
 
     import av
+
+    # SVT-AV1 prints its settings on standard error, unless told to print errors alone before it is first used.
+    os.environ.setdefault("SVT_LOG", "1")
 
     first = next(frames)
     height, width = first.shape[:2]
     try:
         with av.open(str(path), "w", format="mp4") as container:
             rate = Fraction(frames_per_second).limit_denominator(1001)
-            stream = container.add_stream("libx264", rate=rate, options={"crf": _RATE_FACTOR})
+            container.metadata["title"] = place.stem
+            if quilt is not None:
+                container.metadata["comment"] = layout_text(quilt)
+            stream = container.add_stream(encoder.name, rate=rate, options=encoder.options)
+            stream.codec_context.codec_tag = encoder.tag
             stream.width, stream.height, stream.pix_fmt = width + width % 2, height + height % 2, "yuv420p"
             context = stream.codec_context
             context.color_primaries, context.colorspace = _BT709, _BT709
@@ -92,5 +157,8 @@ def _write_mp4(frames: Iterator[Pixels], path: Path, frames_per_second: float, p
                 frame = frame.reformat(format="yuv420p", dst_colorspace="ITU709", dst_color_range="MPEG")
                 container.mux(stream.encode(frame))
             container.mux(stream.encode())
+    except av.codec.codec.UnknownCodecError:
+        rule = f"PyAV as it is installed has no {encoder.name}"
+        raise OutputError("the codec is not there", where=str(place), rule=rule, fix="write H.264") from None
     except (av.error.FFmpegError, ValueError) as error:
         raise OutputError(f"cannot be written as MP4 ({error})", where=str(place)) from error

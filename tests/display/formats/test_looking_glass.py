@@ -11,6 +11,8 @@ import pytest
 from lippmann.display import NUMPY, Display, load_display
 from lippmann.errors import DisplayError
 
+from .published_calibrations import PUBLISHED, VENDOR_PITCH_AND_TILT
+
 #: A portrait panel of the second generation.
 PORTRAIT = {
     "configVersion": "1.0",
@@ -75,7 +77,7 @@ def prescribed_view(values, column, row, c):
     tilt = height / (width * slope) * (-1 if flip else 1)
     sub = 1 / (3 * width) * (-1 if flip else 1)
     x, y = (column + 0.5) / width, (height - row - 0.5) / height
-    index = 2 - c if values["flipSubp"]["value"] else c
+    index = 2 - c if values.get("flipSubp", {"value": 0})["value"] else c
     if values.get("subpixelCells"):
         py = int(height) - 1 - row
         mode = int(values["CellPatternMode"]["value"])
@@ -111,7 +113,12 @@ VARIANTS = {
 }
 
 
-@pytest.mark.parametrize("values", VARIANTS.values(), ids=VARIANTS.keys())
+PUBLISHED_BY_NAME = {f"{number} {values['serial']}": values for number, values in enumerate(PUBLISHED)}
+
+
+@pytest.mark.parametrize(
+    "values", [*VARIANTS.values(), *PUBLISHED], ids=[*VARIANTS.keys(), *(name for name in PUBLISHED_BY_NAME)]
+)
 def test_every_subpixel_shows_the_view_that_the_calibration_prescribes(values, load):
     display = load(values)
     rng = np.random.default_rng(7)
@@ -125,6 +132,40 @@ def test_every_subpixel_shows_the_view_that_the_calibration_prescribes(values, l
         difference = shown_view(display, column, row, c) - prescribed_view(values, column, row, c)
         # Views 0 and 1 are neighbours. A ten-thousandth of one of 48 views.
         assert abs(difference - round(difference)) < 2e-6, (column, row, c)
+
+
+@pytest.mark.parametrize("serial", VENDOR_PITCH_AND_TILT)
+def test_lenses_across_the_panel_are_those_of_the_vendor_s_own_software(serial, load):
+    display = load(next(values for values in PUBLISHED if values["serial"] == serial))
+    pitch, tilt = VENDOR_PITCH_AND_TILT[serial]
+    width, height = display.size_mm
+    slant = math.radians(display.lens_array.slant)
+    assert width * math.cos(slant) / display.micro_image_pitch == pytest.approx(pitch, rel=1e-5)
+    # The lenses move by so much of the width over the height; positive slants lean to the right.
+    assert -height * math.tan(slant) / width == pytest.approx(tilt, rel=1e-5)
+
+
+def test_panels_of_one_kind_with_and_without_invview_are_read_alike(load):
+    values = next(dict(one) for one in PUBLISHED if one["serial"] == "LKG-J00133")
+    assert values["invView"]["value"] == 0
+    display = load(values)
+    values["invView"] = {"value": 1.0}
+    assert load(values) == display
+    del values["invView"]
+    assert load(values) == display
+    values["configVersion"] = "1.0"
+    with pytest.raises(DisplayError, match="invView is missing"):
+        load(values)
+
+
+def test_either_spelling_of_the_cells_pattern_is_read(load):
+    values = calibration(subpixelCells=CELLS, CellPatternMode=3)
+    display = load(values)
+    values["cellPatternMode"] = values.pop("CellPatternMode")
+    assert load(values) == display
+    values["cellPatternMode"] = {"value": 7}
+    with pytest.raises(DisplayError, match="cellPatternMode is 7"):
+        load(values)
 
 
 def test_what_the_file_does_not_say_is_the_documented_camera_s(load):

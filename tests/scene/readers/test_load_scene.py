@@ -60,7 +60,9 @@ def test_up_is_taken_as_it_mostly_is_or_as_it_is_said(save, name, usual):
 
 
 def test_up_of_what_says_it_itself_is_refused():
-    with pytest.raises(UsageError, match=r"up: teapot says itself which way is up; y or z, for \.obj, \.ply, \.stl"):
+    with pytest.raises(
+        UsageError, match=r"up: teapot says itself which way is up; y, z or -y, for \.obj, \.ply, \.sog"
+    ):
         load_scene("teapot", up="z")
 
 

@@ -16,7 +16,7 @@ from lippmann.display import load_display
 from lippmann.display.formats.monitor import Monitor
 from lippmann.errors import LippmannError, OutputError
 from lippmann.viewer.calibrate.site import CalibrationSite
-from lippmann.viewer.http_server import RefusedError, Request
+from lippmann.viewer.responses import RefusedError, Request
 
 TURNED = {"pitch": 45.7, "slope": -5.5, "center": 0.25, "order": None}
 

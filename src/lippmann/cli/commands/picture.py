@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from lippmann.cli.commands.quilt import Aspect, Layout, layout_of
+from lippmann.cli.commands.sequence import Codec
 from lippmann.cli.shared import options, parse
 from lippmann.cli.shared.console import Console, estimate_in_words
 from lippmann.cli.shared.default_output import output_of
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from lippmann.image import PictureFile, Provenance
     from lippmann.image.stored_values import FloatArray
     from lippmann.quilts.quilt import Quilt
+    from lippmann.viewing.stereo import Stereo
 
 Format = Annotated[
     Literal["png", "exr", "tiff"] | None,
@@ -134,6 +136,19 @@ def replay(
     width: Annotated[
         float | None, typer.Option("--sweep-width", help="Width of the sweep in mm. Default: the field of view.")
     ] = None,
+    path: Annotated[
+        Path | None,
+        typer.Option(
+            "--path", help="Write an animation along this head path: a text file with X,Y,Z in mm on each line."
+        ),
+    ] = None,
+    sbs: Annotated[
+        Literal["full", "half"] | None,
+        typer.Option("--sbs", help="Two eyes side by side, the left one's picture on the left: full or half width."),
+    ] = None,
+    anaglyph: Annotated[bool, typer.Option("--anaglyph", help="Two eyes in one picture for red-cyan glasses.")] = False,
+    eyes: Annotated[float | None, typer.Option("--eyes", help="Distance between the two eyes in mm; 63.")] = None,
+    codec: Codec = None,
     size: Size = None,
     filter: Filter = "nearest",
     layout: Layout = None,
@@ -150,17 +165,25 @@ def replay(
     from lippmann.viewing.quilt_views import quilt_display, replay_quilt
     from lippmann.viewing.replay import default_eye, path_of_eye
     from lippmann.viewing.replay import replay as replay_picture
+    from lippmann.viewing.stereo import head_path, stereo_pair
     from lippmann.viewing.video_file import check_animation_path, write_animation
 
     console = Console(quiet, as_json)
-    output = output_of(output, picture, "-sweep.png" if sweep else "-seen.png")
-    if sweep:
-        check_animation_path(output)
+    stereo = _stereo(sbs, anaglyph, eyes)
+    if path is not None and (sweep or eye is not None):
+        raise UsageError("the path says where the eye is", where="--path", fix="leave out --sweep and --eye")
+    moves = sweep or path is not None
+    output = output_of(output, picture, "-sweep.png" if moves else "-seen.png")
+    if moves:
+        check_animation_path(output, codec)
         check_writable(output)
     else:
-        if width is not None:
-            raise UsageError("applies to a sweep only", where="--sweep-width", fix="add --sweep")
+        if codec is not None:
+            raise UsageError("applies to an animation only", where="--codec", fix="add --sweep, or leave it out")
         check_output(output, format_for(output, bits)[0])
+    if width is not None and not sweep:
+        raise UsageError("applies to a sweep only", where="--sweep-width", fix="add --sweep")
+    places = None if path is None else head_path(path)
     quilt = quilt_of(picture, layout, aspect)
     if quilt is None:
         image = open_picture(picture, display=parse.display(display))
@@ -170,21 +193,30 @@ def replay(
     position = default_eye(target) if eye is None else parse.triple(eye, "--eye")
     pixels = None if size is None else parse.size(size, "--size")
 
-    def seen_from(place: tuple[float, float, float]) -> FloatArray:
+    def seen_by(place: tuple[float, float, float]) -> FloatArray:
         if quilt is not None:
             return replay_quilt(quilt, target, place, size=pixels, linear=filter == "linear")
         return replay_picture(image, place, size=pixels, filter=filter)
 
+    def seen_from(place: tuple[float, float, float]) -> FloatArray:
+        return seen_by(place) if stereo is None else stereo_pair(seen_by, place, *stereo)
+
     result: dict[str, Any] = {"output": str(output), "eye": list(position), "filter": filter}
-    if not sweep:
+    if stereo is not None:
+        result |= {"stereo": stereo[0], "eyes": stereo[1]}
+    by = "" if stereo is None else f" by two eyes {stereo[1]:g} mm apart"
+    if not moves:
         write_plain_picture(seen_from(position), output, bits=bits, transfer=transfer)
-        console.result(result, f"{output}: seen from {_position(position)}")
+        console.result(result, f"{output}: seen{by} from {_position(position)}")
         return
-    reach = _field_width(target, position[2]) if width is None else width
-    start, stop = ((position[0] + side * reach / 2, *position[1:]) for side in (-1, 1))
-    write_animation((seen_from(place) for place in path_of_eye(start, stop, frames)), output, transfer=transfer)
-    result |= {"frames": frames, "start": list(start), "stop": list(stop)}
-    console.result(result, f"{output}: {frames} frames, seen from {_position(start)} to {_position(stop)}")
+    if places is None:
+        reach = _field_width(target, position[2]) if width is None else width
+        start, stop = ((position[0] + side * reach / 2, *position[1:]) for side in (-1, 1))
+        places = path_of_eye(start, stop, frames)
+    write_animation((seen_from(place) for place in places), output, transfer=transfer, codec=codec)
+    start, stop = places[0], places[-1]
+    result |= {"frames": len(places), "start": list(start), "stop": list(stop)}
+    console.result(result, f"{output}: {len(places)} frames, seen{by} from {_position(start)} to {_position(stop)}")
 
 
 def refocus(
@@ -252,6 +284,22 @@ def quilt_of(picture: Path, layout: str | None, aspect: float | None) -> Quilt |
     if asked is None and not is_quilt(picture):
         return None
     return read_quilt(picture, asked)
+
+
+def _stereo(sbs: Literal["full", "half"] | None, anaglyph: bool, eyes: float | None) -> tuple[Stereo, float] | None:
+    """How two eyes become one picture, and their distance in mm; None for one eye."""
+    from lippmann.viewing.stereo import EYE_DISTANCE, eyes_of
+
+    if sbs is not None and anaglyph:
+        raise UsageError("a picture is one or the other", where="--anaglyph", fix="leave out --sbs or --anaglyph")
+    stereo: Stereo | None = "anaglyph" if anaglyph else sbs
+    if stereo is None:
+        if eyes is not None:
+            raise UsageError("there is one eye", where="--eyes", fix="add --sbs full, --sbs half or --anaglyph")
+        return None
+    distance = EYE_DISTANCE if eyes is None else eyes
+    eyes_of((0.0, 0.0, 1.0), distance)
+    return stereo, distance
 
 
 def _quilt_values(path: Path, quilt: Quilt) -> dict[str, Any]:

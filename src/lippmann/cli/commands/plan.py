@@ -27,6 +27,9 @@ def plan(
         typer.Option("--method", help="auto and pooled: light is pooled; full: every ray is traced, for references."),
     ] = "auto",
     up: options.Up = None,
+    crop: options.Crop = None,
+    unit_scale: options.UnitScale = None,
+    min_opacity: options.MinOpacity = None,
     variants: options.Variants = None,
     depth_map: options.DepthMap = None,
     integrator: options.Integrator = "auto",
@@ -49,6 +52,9 @@ def plan(
     pop_out: options.PopOut = None,
     environment: options.Environment = None,
     background: options.Background = None,
+    light_turn: options.LightTurn = None,
+    light_strength: options.LightStrength = 1.0,
+    environment_strength: options.EnvironmentStrength = 1.0,
     allow_outside: options.AllowOutside = False,
     single_scattering: options.SingleScattering = False,
     lpi: printing.Lpi = None,
@@ -59,6 +65,7 @@ def plan(
     thickness: printing.Thickness = None,
     index: printing.Index = None,
     field: printing.Field = None,
+    state: options.State = None,
     device: options.Device = "auto",
     threads: options.Threads = None,
     memory: options.Memory = None,
@@ -100,14 +107,11 @@ def plan(
         memory=parse.memory(memory),
     )
     source = SceneSource(
-        scene,
-        environment,
-        parse.color(background),
-        allow_outside,
-        single_scattering,
-        up,
-        parse.variants(variants),
-        depth_map,
+        *(scene, environment, parse.color(background), allow_outside, single_scattering, up),
+        *(parse.crop(crop), unit_scale, min_opacity),
+        light=parse.light(light_turn, light_strength, environment_strength),
+        variants=parse.variants(variants),
+        depth_map=depth_map,
     )
     with console.progress() as progress:
         loaded = source.load()

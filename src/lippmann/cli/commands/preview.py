@@ -36,6 +36,9 @@ def preview(
         str | None, typer.Option("--eye", help="The eye's place: X,Y,Z in mm; by default before the middle.")
     ] = None,
     up: options.Up = None,
+    crop: options.Crop = None,
+    unit_scale: options.UnitScale = None,
+    min_opacity: options.MinOpacity = None,
     variants: options.Variants = None,
     depth_map: options.DepthMap = None,
     integrator: options.Integrator = "auto",
@@ -56,6 +59,9 @@ def preview(
     pop_out: options.PopOut = None,
     environment: options.Environment = None,
     background: options.Background = None,
+    light_turn: options.LightTurn = None,
+    light_strength: options.LightStrength = 1.0,
+    environment_strength: options.EnvironmentStrength = 1.0,
     allow_outside: options.AllowOutside = False,
     single_scattering: options.SingleScattering = False,
     lpi: printing.Lpi = None,
@@ -67,6 +73,7 @@ def preview(
     index: printing.Index = None,
     field: printing.Field = None,
     bits: options.Bits = None,
+    state: options.State = None,
     device: options.Device = "auto",
     threads: options.Threads = None,
     memory: options.Memory = None,
@@ -107,14 +114,11 @@ def preview(
         memory=parse.memory(memory),
     )
     source = SceneSource(
-        scene,
-        environment,
-        parse.color(background),
-        allow_outside,
-        single_scattering,
-        up,
-        parse.variants(variants),
-        depth_map,
+        *(scene, environment, parse.color(background), allow_outside, single_scattering, up),
+        *(parse.crop(crop), unit_scale, min_opacity),
+        light=parse.light(light_turn, light_strength, environment_strength),
+        variants=parse.variants(variants),
+        depth_map=depth_map,
     )
     with console.progress() as progress:
         started = time.perf_counter()

@@ -74,6 +74,9 @@ def render(
     size: Size = None,
     method: Method = "auto",
     up: options.Up = None,
+    crop: options.Crop = None,
+    unit_scale: options.UnitScale = None,
+    min_opacity: options.MinOpacity = None,
     variants: options.Variants = None,
     depth_map: options.DepthMap = None,
     integrator: options.Integrator = "auto",
@@ -99,6 +102,9 @@ def render(
     pop_out: options.PopOut = None,
     environment: options.Environment = None,
     background: options.Background = None,
+    light_turn: options.LightTurn = None,
+    light_strength: options.LightStrength = 1.0,
+    environment_strength: options.EnvironmentStrength = 1.0,
     allow_outside: options.AllowOutside = False,
     single_scattering: options.SingleScattering = False,
     bits: options.Bits = None,
@@ -113,6 +119,8 @@ def render(
     swing: sequence.Swing = None,
     video: sequence.Video = None,
     eye: sequence.Eye = None,
+    codec: sequence.Codec = None,
+    state: options.State = None,
     device: options.Device = "auto",
     threads: options.Threads = None,
     memory: options.Memory = None,
@@ -131,7 +139,7 @@ def render(
     target = load_display(display)
     grid = None if views is None else parse.size(views, "--views", rule="columns x rows, such as 8x6")
     wanted = quilt_of_display(target, grid, None if size is None else parse.size(size, "--size"))
-    moving = sequence.Wanted(frames, fps, animation, camera_path, turntable, swing, video, eye)
+    moving = sequence.Wanted(frames, fps, animation, camera_path, turntable, swing, video, eye, codec)
     path = output or Path(f"{Path(scene).stem}{'' if moving else f'{wanted.layout.ending}.png'}")
     if not moving or (path.suffix and not path.is_dir()):
         _check_name(path, wanted.layout.ending)
@@ -160,14 +168,11 @@ def render(
         memory=parse.memory(memory),
     )
     source = SceneSource(
-        scene,
-        environment,
-        parse.color(background),
-        allow_outside,
-        single_scattering,
-        up,
-        parse.variants(variants),
-        depth_map,
+        *(scene, environment, parse.color(background), allow_outside, single_scattering, up),
+        *(parse.crop(crop), unit_scale, min_opacity),
+        light=parse.light(light_turn, light_strength, environment_strength),
+        variants=parse.variants(variants),
+        depth_map=depth_map,
     )
     if moving:
         from lippmann.sequences.forms import QuiltForm

@@ -55,6 +55,9 @@ def render(
     respect_gloss: options.RespectGloss = None,
     maps: Maps = None,
     up: options.Up = None,
+    crop: options.Crop = None,
+    unit_scale: options.UnitScale = None,
+    min_opacity: options.MinOpacity = None,
     variants: options.Variants = None,
     depth_map: options.DepthMap = None,
     integrator: options.Integrator = "auto",
@@ -82,6 +85,9 @@ def render(
     pop_out: options.PopOut = None,
     environment: options.Environment = None,
     background: options.Background = None,
+    light_turn: options.LightTurn = None,
+    light_strength: options.LightStrength = 1.0,
+    environment_strength: options.EnvironmentStrength = 1.0,
     allow_outside: options.AllowOutside = False,
     single_scattering: options.SingleScattering = False,
     lpi: printing.Lpi = None,
@@ -108,6 +114,8 @@ def render(
     swing: sequence.Swing = None,
     video: sequence.Video = None,
     eye: sequence.Eye = None,
+    codec: sequence.Codec = None,
+    state: options.State = None,
     device: options.Device = "auto",
     threads: options.Threads = None,
     memory: options.Memory = None,
@@ -132,7 +140,7 @@ def render(
         index=index,
         field=field,
     )
-    wanted = sequence.Wanted(frames, fps, animation, camera_path, turntable, swing, video, eye)
+    wanted = sequence.Wanted(frames, fps, animation, camera_path, turntable, swing, video, eye, codec)
     margin = printing.margin_of(marks, target, in_frames=bool(wanted))
     output = output_of(output, scene, "-frames" if wanted else ".png")
     if opens and wanted and video is None:
@@ -163,14 +171,11 @@ def render(
         memory=parse.memory(memory),
     )
     source = SceneSource(
-        scene,
-        environment,
-        parse.color(background),
-        allow_outside,
-        single_scattering,
-        up,
-        parse.variants(variants),
-        depth_map,
+        *(scene, environment, parse.color(background), allow_outside, single_scattering, up),
+        *(parse.crop(crop), unit_scale, min_opacity),
+        light=parse.light(light_turn, light_strength, environment_strength),
+        variants=parse.variants(variants),
+        depth_map=depth_map,
     )
     on_cluster = clusters.ClusterOptions(cluster, tls_ca, tls_cert, tls_key)
     if wanted:

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -78,6 +78,13 @@ Eye = Annotated[
     ),
 ]
 
+Codec = Annotated[
+    Literal["h264", "hevc", "av1"] | None,
+    typer.Option(
+        "--codec", help="How an .mp4 is coded: h264 plays everywhere, hevc and av1 make smaller files. Default: h264."
+    ),
+]
+
 _NUMBER = re.compile(r"%(?:0(\d{1,2}))?d")
 _NUMERAL = re.compile(r"[\d.]+")
 _FOLDER_PATTERN = "frame_%04d"
@@ -95,6 +102,7 @@ class Wanted:
     swing: float | None
     video: Path | None
     eye: str | None
+    codec: Literal["h264", "hevc", "av1"] | None = None
 
     @property
     def turns(self) -> bool:
@@ -120,7 +128,7 @@ class Wanted:
             return True
         if self.frames is not None:
             return True
-        for option in ("fps", "animation", "camera_path", "video", "eye"):
+        for option in ("fps", "animation", "camera_path", "video", "eye", "codec"):
             if getattr(self, option) is not None:
                 name = f"--{option.replace('_', '-')}"
                 raise UsageError(
@@ -156,7 +164,8 @@ def render_frames(
     from lippmann.sequences.files import saved_sequence
     from lippmann.sequences.forms import INTEGRAL, QuiltForm
     from lippmann.sequences.motion import FRAMES_PER_SECOND
-    from lippmann.viewing.video_file import write_animation
+    from lippmann.viewing.video_file import check_animation_path, write_animation
+    from lippmann.viewing.video_frames import layout_of_video
 
     if (wanted.camera_path is not None or wanted.turns) and wanted.fps is not None and wanted.video is None:
         what = "a turn" if wanted.turns else "a camera path"
@@ -165,6 +174,10 @@ def render_frames(
         raise UsageError(f"{wanted.fps:g} frames per second", where="--fps", rule="0.001 to 1000")
     if wanted.eye is not None and wanted.video is None:
         raise UsageError("nobody looks", where="--eye", fix="add --video FILE.mp4, or leave it out")
+    if wanted.video is not None:
+        check_animation_path(wanted.video, wanted.codec)
+    elif wanted.codec is not None:
+        raise UsageError("there is no film", where="--codec", fix="add --video FILE.mp4, or leave it out")
     chosen = frame_range(wanted.frames or ":")
     output = files.output
     motion = _open(source, wanted, request)
@@ -228,6 +241,8 @@ def render_frames(
                 wanted.video,
                 frames_per_second=wanted.fps or FRAMES_PER_SECOND,
                 transfer=first.transfer,
+                codec=wanted.codec,
+                quilt=layout_of_video(wanted.video),
             )
     for alike in notes.values():
         only = f" ({len(alike)} of {len(done)} frames)" if len(alike) < len(done) else ""
@@ -269,6 +284,7 @@ def _open(source: SceneSource, wanted: Wanted, request: RenderRequest) -> Motion
         background=source.background,
         allow_outside=source.allow_outside,
         multiple_scattering=not source.single_scattering,
+        light=source.light,
         variants=source.variants,
     )
 

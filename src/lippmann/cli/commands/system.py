@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -11,14 +11,26 @@ from lippmann.cli.shared import options
 from lippmann.cli.shared.console import Console
 
 if TYPE_CHECKING:
-    from lippmann.runtime.engine import Check
+    from lippmann.runtime.engine import Check, Diagnosis
 
 
-def doctor(as_json: options.Json = False) -> None:
+def doctor(
+    fix: Annotated[
+        bool,
+        typer.Option(
+            "--fix",
+            help="Install the LLVM runtime if it is missing, where that needs no rights beyond this process's own; "
+            "else print the command.",
+        ),
+    ] = False,
+    as_json: options.Json = False,
+) -> None:
     """Check the rendering engine of this machine and say how to fix what is missing."""
     from lippmann.runtime import engine
 
     diagnosis = engine.diagnose()
+    if fix and not diagnosis.ok:
+        diagnosis = _fixed(diagnosis, Console(as_json=as_json))
     width = max(len(check.name) for check in diagnosis.checks)
     lines = []
     for check in diagnosis.checks:
@@ -29,6 +41,29 @@ def doctor(as_json: options.Json = False) -> None:
     checks = [asdict(check) for check in diagnosis.checks]
     Console(as_json=as_json).result({"ok": diagnosis.ok, "checks": checks}, "\n".join([*lines, verdict]))
     raise typer.Exit(0 if diagnosis.ok else 1)
+
+
+def _fixed(diagnosis: Diagnosis, console: Console) -> Diagnosis:
+    """Install what is missing, or say how; the diagnosis afterwards."""
+    import os
+
+    from lippmann.runtime import engine, llvm, llvm_install
+
+    if all(check.ok for check in diagnosis.checks if check.name == "LLVM"):
+        console.remark("no package to install would mend this; the check below says what does")
+        return diagnosis
+    if os.environ.get(llvm.PATH_VARIABLE):
+        console.remark(f"unset {llvm.PATH_VARIABLE}, or correct it: no other library is considered")
+        return diagnosis
+    remedy = llvm_install.remedy(llvm.OLDEST, llvm.NEWEST_TRIED)
+    if remedy.obstacle:
+        console.remark(f"{remedy.obstacle}. Do this: {remedy.text}")
+        return diagnosis
+    console.remark(f"running: {' '.join(remedy.command)}")
+    problem = llvm_install.run(remedy)
+    if problem:
+        console.remark(f"{problem}. Do this: {remedy.text}")
+    return engine.diagnose()
 
 
 def _mark(check: Check) -> str:

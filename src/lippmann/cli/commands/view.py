@@ -22,8 +22,9 @@ from lippmann.runtime.temporary_names import scratch_folder
 if TYPE_CHECKING:
     from lippmann.display import Display
     from lippmann.quilts.quilt import QuiltLayout
-    from lippmann.viewer.http_server import Site
     from lippmann.viewer.manifest import TileFormat
+    from lippmann.viewer.request_guard import Application
+    from lippmann.viewer.responses import Site
     from lippmann.viewer.served_picture import PictureFile
 
 Other = Annotated[Path | None, typer.Argument(help="Second picture to compare, behind a divider.")]
@@ -139,21 +140,22 @@ def _export(paths: list[Path], display: Display | None, output: Path, sources: l
 
 
 def serve(
-    site: Site,
+    content: Site | Application,
     what: str,
     console: Console,
     *,
     host: str,
     port: int,
     browser: bool,
+    folder: str = "",
     started: Callable[[], None] = lambda: None,
 ) -> None:
     """Serve a page until Ctrl-C, then exit with the code 130.
 
     Parameters
     ----------
-    site:
-        The pages to serve.
+    content:
+        The pages to serve: a site, or an ASGI application.
     what:
         Title of the page in the printed line.
     console:
@@ -162,6 +164,8 @@ def serve(
         Address and port to listen on; port 0 takes a free one.
     browser:
         Whether to open the page in a browser, if there is a screen.
+    folder:
+        Secret folder that the pages lie in; the printed address tells it.
     started:
         Called once the page can be opened.
 
@@ -172,9 +176,10 @@ def serve(
     """
     import webbrowser  # as socket below: not for --help
 
-    from lippmann.viewer.http_server import WebServer, is_loopback
+    from lippmann.viewer.http_server import WebServer
+    from lippmann.viewer.request_guard import is_loopback
 
-    with WebServer(site, host, port) as server:
+    with WebServer(content, host, port, folder=folder) as server:
         # The address is printed last: its reader may send Ctrl-C at once.
         if not is_loopback(host):
             console.remark("everyone who can reach this machine can open the page")

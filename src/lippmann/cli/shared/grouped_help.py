@@ -11,7 +11,19 @@ from lippmann.cli.shared.kept_inputs import check_outputs
 
 #: Options of the commands that render and look, by group; the rest stand under "Options". The last are rarely used.
 OPTION_GROUPS: Mapping[str, tuple[str, ...]] = {
-    "Scene": ("--up", "--variant", "--depth-map", "--integrator", "--depth", "--allow-outside", "--single-scattering"),
+    "Scene": (
+        "--state",
+        "--up",
+        "--variant",
+        "--depth-map",
+        "--crop",
+        "--unit-scale",
+        "--min-opacity",
+        "--integrator",
+        "--depth",
+        "--allow-outside",
+        "--single-scattering",
+    ),
     "Placement": ("--camera", "--place", "--turn", "--shift", "--scale", "--depth-scale", "--pop-out"),
     "Display": (
         "--display",
@@ -21,10 +33,21 @@ OPTION_GROUPS: Mapping[str, tuple[str, ...]] = {
         "--layout",
         "--aspect",
         "--eye",
+        "--eyes",
+        "--sbs",
+        "--anaglyph",
         "--pixels",
         "--plain",
     ),
-    "Light": ("--environment", "--background", "--exposure", "--tone-map"),
+    "Light": (
+        "--environment",
+        "--environment-strength",
+        "--light-turn",
+        "--light-strength",
+        "--background",
+        "--exposure",
+        "--tone-map",
+    ),
     "Quality": (
         "--quality",
         "--quality-worst",
@@ -60,8 +83,10 @@ OPTION_GROUPS: Mapping[str, tuple[str, ...]] = {
         "--animation",
         "--camera-path",
         "--video",
+        "--codec",
         "--sweep",
         "--sweep-width",
+        "--path",
     ),
     "Cluster": ("--cluster", "--tls-ca", "--tls-cert", "--tls-key"),
     "Machine": ("--device", "--threads", "--memory"),
@@ -71,7 +96,7 @@ _REST, _HELP = "Options", "--help"
 #: Commands by what one does with them.
 COMMAND_GROUPS: Mapping[str, tuple[str, ...]] = {
     "Render": ("render", "preview", "plan", "quilt"),
-    "Look": ("view", "replay", "refocus", "info", "compare"),
+    "Look": ("studio", "view", "show", "replay", "refocus", "info", "compare"),
     "From and to other pictures": ("interlace", "weave", "views", "micro-images", "compose", "export", "import"),
     "Displays and prints": ("displays", "calibrate", "pitch-test", "marks"),
     "Program": ("doctor", "worker", "reproduce"),
@@ -99,13 +124,18 @@ EXAMPLES: Mapping[str, tuple[str, ...]] = {
         "lippmann micro-images model.exr -o lenses",
     ),
     "compose": ("lippmann compose views -o again.png", "lippmann compose lenses -o again.exr --bits 32"),
-    "replay": ("lippmann replay model.png --sweep", "lippmann replay model.png --eye 20,0,600 -o left.png"),
+    "replay": (
+        "lippmann replay model.png --sweep",
+        "lippmann replay model.png --sbs half --eye 20,0,600 -o pair.png",
+    ),
     "refocus": (
         "lippmann refocus model.png --plane -20 -o back.png",
         "lippmann refocus model.exr --planes -40:40:9 -o stack",
     ),
     "export": ("lippmann export model.exr --as hci -o scene", "lippmann export model.exr --as eslf -o scene.png"),
     "import": ("lippmann import scene -o model.exr", "lippmann import scene.png --as eslf -o model.exr"),
+    "studio": ("lippmann studio", "lippmann studio model.glb --display looking-glass-portrait"),
+    "show": ("lippmann show model.png", "lippmann show model.exr --display my-display.toml"),
     "view": ("lippmann view model.png", "lippmann view model.png --export model.html"),
     "interlace": (
         "lippmann interlace photos/*.jpg --lpi 60 --ppi 720 --size 8x10in -o print.tif",

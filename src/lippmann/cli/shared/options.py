@@ -9,6 +9,7 @@ import typer
 
 from lippmann.cli.shared import parse
 from lippmann.cli.shared.completion import complete_displays, complete_scenes
+from lippmann.cli.shared.state_defaults import read_defaults
 from lippmann.rendering.request import choices
 
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on standard output.")]
@@ -41,14 +42,42 @@ PictureDisplay = Annotated[
 Scene = Annotated[
     str,
     typer.Argument(
-        help="A .glb, .gltf, .obj, .ply, .stl, .usd, Mitsuba .xml, Tachyon .dat or .nff file, a photograph "
+        help="A .glb, .gltf, .obj, .ply, .spz, .sog, .stl, .usd, Mitsuba .xml, Tachyon .dat or .nff file, a photograph "
         "with depth, or a bundled scene's name.",
         autocompletion=complete_scenes,
     ),
 ]
 Up = Annotated[
-    Literal["y", "z"] | None,
-    typer.Option("--up", help="Which axis points up in OBJ, PLY (y by default) and STL files (z).", show_default=False),
+    Literal["y", "z", "-y"] | None,
+    typer.Option(
+        "--up",
+        help="Which axis points up in OBJ, PLY (y by default), STL (z) and splat files (-y; of .spz y).",
+        show_default=False,
+    ),
+]
+Crop = Annotated[
+    str | None,
+    typer.Option(
+        "--crop",
+        help="Of Gaussian splats, keep those in the box X0,Y0,Z0,X1,Y1,Z1 (y up, after --unit-scale).",
+        show_default=False,
+    ),
+]
+UnitScale = Annotated[
+    float | None,
+    typer.Option(
+        "--unit-scale",
+        help="Factor on the coordinates of Gaussian splats, whose files have no unit: for --crop and --place display.",
+        show_default=False,
+    ),
+]
+MinOpacity = Annotated[
+    float | None,
+    typer.Option(
+        "--min-opacity",
+        help="Leave out Gaussian splats of less opacity (0 to 1): most floaters are faint.",
+        show_default=False,
+    ),
 ]
 Variants = Annotated[
     list[str] | None,
@@ -155,6 +184,32 @@ SingleScattering = Annotated[
     typer.Option(
         "--single-scattering",
         help="Shade rough metal and glass exactly by glTF's formulas, which lose light between microfacets.",
+    ),
+]
+LightTurn = Annotated[
+    str | None,
+    typer.Option(
+        "--light-turn",
+        metavar="AZIMUTH[,ELEVATION]",
+        help="Turn light from far away, degrees to the right and up: the environment, the studio, directional lights.",
+        show_default=False,
+    ),
+]
+LightStrength = Annotated[
+    float, typer.Option("--light-strength", metavar="FACTOR", help="Factor on the scene's own light sources.")
+]
+EnvironmentStrength = Annotated[
+    float,
+    typer.Option("--environment-strength", metavar="FACTOR", help="Factor on light of the environment or the studio."),
+]
+State = Annotated[
+    Path | None,
+    typer.Option(
+        "--state",
+        help="Take scene, display and settings from this file of the studio; options given beside it win.",
+        callback=read_defaults,
+        is_eager=True,
+        show_default=False,
     ),
 ]
 Method = Annotated[

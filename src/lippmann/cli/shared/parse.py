@@ -14,7 +14,9 @@ if TYPE_CHECKING:
     from lippmann.cli.shared.console import Console
     from lippmann.display import Display
     from lippmann.rendering.request.choices import ToneMap
+    from lippmann.scene.light_options import LightOptions
     from lippmann.scene.placement import PlacementOptions
+    from lippmann.scene.splat_selection import Crop
 
 #: Endings of formats for data, whose values are not for the eye alone.
 _DATA = (".exr", ".tif", ".tiff", ".zarr")
@@ -106,6 +108,14 @@ def color(text: str | None) -> tuple[float, float, float] | None:
     return None if text is None else triple(text, "--background")
 
 
+def crop(text: str | None) -> Crop | None:
+    """A box from what was typed."""
+    if text is None:
+        return None
+    x0, y0, z0, x1, y1, z1 = numbers(text, "--crop", (6,))
+    return x0, y0, z0, x1, y1, z1
+
+
 def display(name: str | None) -> Display | None:
     """The display of that name or file; None if no name is given."""
     from lippmann.display import load_display
@@ -134,6 +144,14 @@ def placement(
         depth_scale=None if depth_scale == "auto" else number(depth_scale, "--depth-scale", "auto, or a factor"),
         pop_out=pop_out,
     )
+
+
+def light(turn: str | None, strength: float, environment_strength: float) -> LightOptions:
+    """Direction and strength of light, from the options of those names."""
+    from lippmann.scene.light_options import LightOptions
+
+    azimuth, *elevation = (0.0,) if turn is None else numbers(turn, "--light-turn", (1, 2))
+    return LightOptions((azimuth, elevation[0] if elevation else 0.0), strength, environment_strength)
 
 
 def angles(text: str | None) -> tuple[float, float, float]:

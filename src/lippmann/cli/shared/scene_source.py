@@ -8,8 +8,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from lippmann.scene.light_options import LightOptions
     from lippmann.scene.readers.load import Up
     from lippmann.scene.scene import Scene
+    from lippmann.scene.splat_selection import Crop
 
 
 @dataclass(frozen=True)
@@ -22,6 +24,10 @@ class SceneSource:
     allow_outside: bool = False
     single_scattering: bool = False
     up: Up | None = None
+    crop: Crop | None = None
+    unit_scale: float | None = None
+    min_opacity: float | None = None
+    light: LightOptions | None = None
     variants: Mapping[str, str] | None = None
     depth_map: Path | None = None
 
@@ -42,6 +48,10 @@ class SceneSource:
             allow_outside=self.allow_outside,
             multiple_scattering=not self.single_scattering,
             up=self.up,
+            crop=self.crop,
+            unit_scale=self.unit_scale,
+            min_opacity=self.min_opacity,
+            light=self.light,
             variants=self.variants,
             depth_map=self.depth_map,
         )

@@ -114,8 +114,13 @@ def turn_environment(emitter: Emitter, world_from_environment: Matrix) -> None:
 
     parameters = mi.traverse(emitter)
     if "to_world" in parameters:
-        parameters["to_world"] = mi.Transform4f((np.asarray(world_from_environment) @ _HALF_TURN).tolist())
+        parameters["to_world"] = mi.Transform4f(environment_to_world(world_from_environment).tolist())
         parameters.update()
+
+
+def environment_to_world(world_from_environment: Matrix) -> Matrix:
+    """The ``to_world`` ``(4, 4)`` of an emitter of :func:`environment_object` whose surroundings stand so."""
+    return np.asarray(world_from_environment, np.float64) @ _HALF_TURN
 
 
 def _rows_for_mitsuba(pixels: NDArray[np.float32]) -> NDArray[np.float32]:

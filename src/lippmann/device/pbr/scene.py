@@ -17,10 +17,12 @@ from lippmann.device.pbr.media import MEDIA_NOTE, has_media
 from lippmann.device.pbr.shapes import Dress, has_volume, make_shapes
 from lippmann.device.pbr.straight_through import has_null, may_pass
 from lippmann.device.pbr.textures import TextureStore
+from lippmann.device.splats.table import SplatTable, make_table
 from lippmann.device.types import Emitter, MitsubaScene, Shape
-from lippmann.errors import SceneError
+from lippmann.errors import SceneError, UsageError
 from lippmann.runtime import engine as engines
 from lippmann.runtime import machine
+from lippmann.scene.light_options import LightOptions
 from lippmann.scene.mitsuba_source import MitsubaSource, with_sky
 from lippmann.scene.scene import Scene
 from lippmann.scene.values.description import Color, Matrix, SceneDescription
@@ -45,6 +47,8 @@ class BuiltScene:
         Whether the ``mi.Scene`` is the caller's own, which nothing may change.
     has_media:
         Whether there are participating media.
+    splats:
+        Gaussian splats that can be seen, which are no part of the ``mi.Scene``.
     notes:
         What could not be honoured, one line each.
     seconds:
@@ -60,6 +64,7 @@ class BuiltScene:
     seconds: Mapping[str, float]
     borrowed: bool = False
     has_media: bool = False
+    splats: SplatTable | None = None
 
 
 def build(scene: Scene, engine: engines.Engine | None = None, *, memory: int | None = None) -> BuiltScene:
@@ -82,7 +87,9 @@ def build(scene: Scene, engine: engines.Engine | None = None, *, memory: int | N
         engines.start()
     if isinstance(scene.physical, MitsubaSource):
         return _build_source(scene.physical, scene)
-    description = replace(scene.physical, environment=scene.environment, background=scene.background)
+    description = replace(
+        scene.physical, environment=scene.environment, background=scene.background, lights=scene.lights
+    )
     return build_description(description, memory=memory)
 
 
@@ -99,7 +106,7 @@ def build_description(description: SceneDescription, *, memory: int | None = Non
     seconds: dict[str, float] = {}
     notes: list[str] = []
     placed = _placements(description, notes)
-    if not placed:
+    if not placed and description.splats is None:
         raise SceneError(
             "the scene has no geometry", where=description.name, rule="there must be at least one triangle"
         )
@@ -110,6 +117,10 @@ def build_description(description: SceneDescription, *, memory: int | None = Non
         dressed = [(_dress(description, mesh, finishes), matrices) for mesh, matrices in placed.items()]
         available = machine.available_memory() if memory is None else memory
         shapes, shape_finishes = make_shapes(dressed, available, name=description.name)
+    splats = None
+    if description.splats is not None:
+        with _time_stage(seconds, "splats"):
+            splats = make_table(description.splats, available, name=description.name)
     with _time_stage(seconds, "lights"):
         lights = [light_object(light) for light in description.lights if max(light.color) > 0]
         if description.environment is not None:
@@ -123,19 +134,37 @@ def build_description(description: SceneDescription, *, memory: int | None = Non
         has_null=any(has_null(finish.bsdf) for finish in finishes.values()),
         notes=tuple(notes),
         seconds=seconds,
+        splats=splats,
     )
 
 
 def _build_source(source: MitsubaSource, scene: Scene) -> BuiltScene:
     seconds: dict[str, float] = {}
+    environment = scene.environment
+    _check_light(scene.light, has_environment=environment is not None)
     with _time_stage(seconds, "load"):
         loaded = source.scene()
-        if scene.environment is not None:
-            loaded = with_sky(loaded, environment_object(scene.environment))
+        if environment is not None:
+            loaded = with_sky(loaded, environment_object(environment))
     passing = any(may_pass(shape) for shape in loaded.shapes())
     with_media = has_media(loaded)
     notes = (MEDIA_NOTE,) if with_media else ()
     return BuiltScene(loaded, scene.background, {}, passing, notes, seconds, source.is_borrowed, with_media)
+
+
+def _check_light(light: LightOptions, *, has_environment: bool) -> None:
+    """Refuse changes to the light sources that a scene of Mitsuba's brings."""
+    rule = "a Mitsuba scene keeps its own light sources"
+    if light.strength != 1.0:
+        raise UsageError(f"{light.strength:g}", parameter="light_strength", rule=rule, fix="use exposure")
+    if has_environment:
+        return
+    for parameter, changes in (
+        ("light_turn", any(light.turn)),
+        ("environment_strength", light.environment_strength != 1.0),
+    ):
+        if changes:
+            raise UsageError("has nothing to change", parameter=parameter, rule=rule, fix="leave it out")
 
 
 @contextmanager

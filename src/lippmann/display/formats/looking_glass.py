@@ -10,7 +10,8 @@ The formula of such a file, with x and y in [0, 1] from the lower left corner of
 
 The phase mod 1 is the place of a sub-pixel under its lens, from the left edge (0) to the right (1): in millimetres the
 micro-images are 25.4 / pitch wide and lean by -atan(1 / slope). A sub-pixel on the right under a lens is seen from
-the left, so the lens itself reverses the order; ``invView`` = 1 means that.
+the left, so the lens itself reverses the order; ``invView`` = 1 means that. Files of version 3 hold 0, 1 or nothing
+there, for devices of one kind, and the vendor's shaders of that time do not read it.
 
 The file holds neither gap nor viewing distance. The gap is that of lenses whose field is ``viewCone`` for an eye that
 moves sideways, as the cameras of the views do; the directions in it are even in the tangent, as an ideal lens's are.
@@ -21,6 +22,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from collections.abc import Mapping
 from dataclasses import replace
 
@@ -37,6 +39,9 @@ CAMERA_FIELD = 14.0
 
 #: Beginnings of serials whose sub-pixels lie in no plain stripe: without their cells up to 6 of 48 views are wrong.
 _NEEDS_CELLS = ("LKG-H", "LKG-J", "LKG-K")
+
+#: The first version of the file in which ``invView`` means nothing.
+_VERSION_WITHOUT_ORDER = 3
 
 _CELL_KEYS = ("ROffsetX", "ROffsetY", "GOffsetX", "GOffsetY", "BOffsetX", "BOffsetY")
 
@@ -114,11 +119,17 @@ def _display(values: Table) -> Display:
 
 
 def _check_orientation(values: Table) -> None:
-    if not _read_flag(values, "invView"):
+    if _version(values) < _VERSION_WITHOUT_ORDER and not _read_flag(values, "invView"):
         rule = "a lens shows on the left what lies on its right, which is invView 1"
         raise DisplayError("invView is 0", where="invView", rule=rule, fix="calibrations of devices have 1")
     if _read_flag(values, "flipImageY", optional=True):
         raise DisplayError("flipImageY is 1", where="flipImageY", rule="only 0 is understood", fix="turn the picture")
+
+
+def _version(values: Table) -> int:
+    """The file's major version; 1 if it says none."""
+    match = re.match(r"\d{1,3}", str(values.get("configVersion", "")))
+    return int(match[0]) if match else 1
 
 
 def _stripe(is_mirrored: bool, is_swapped: bool) -> tuple[SubpixelOffsets, float]:
@@ -140,9 +151,11 @@ def _read_cells(values: Table, height: int, serial: str) -> SubpixelCells | None
         raise DisplayError(f"subpixelCells is {listed!r}", where=key, rule="it must be a list of cells")
     if not listed:
         return None
-    mode = _read_number(values, "CellPatternMode")
+    # The vendor's own reader takes either spelling.
+    mode_key = "cellPatternMode" if "cellPatternMode" in values else "CellPatternMode"
+    mode = _read_number(values, mode_key)
     if mode not in _PATTERNS:
-        raise DisplayError(f"CellPatternMode is {mode:g}", where="CellPatternMode", rule="it must be 0, 1, 2, 3 or 4")
+        raise DisplayError(f"{mode_key} is {mode:g}", where=mode_key, rule="it must be 0, 1, 2, 3 or 4")
     is_swapped = _read_flag(values, "flipSubp", optional=True)
     cells = [_read_cell(cell, f"{key}[{number}]", is_swapped) for number, cell in enumerate(listed)]
     pattern = _PATTERNS[int(mode)]

@@ -38,6 +38,8 @@ def scene_corners(built: BuiltScene, display_from_world: NDArray[np.float64]) ->
     """``(8, 3)`` corners in mm of a box that holds everything which a ray can meet, light sources included."""
     box = built.mitsuba.bbox()
     low, high = np.array(box.min, dtype=np.float64), np.array(box.max, dtype=np.float64)
+    if built.splats is not None:
+        low, high = np.minimum(low, built.splats.bounds[0]), np.maximum(high, built.splats.bounds[1])
     corners = np.array(list(itertools.product(*zip(low, high, strict=True))))
     moved: NDArray[np.float64] = corners @ display_from_world[:3, :3].T + display_from_world[:3, 3]
     return moved

@@ -21,6 +21,8 @@ from lippmann.errors import UsageError
 from lippmann.rendering.request.choices import LIGHT, POOLED_LIGHT, REUSING, Denoiser, Integrator
 from lippmann.rendering.request.preconditions import Form, check
 from lippmann.rendering.request.render_request import DEFAULT_SPP, RenderRequest
+from lippmann.rendering.request.splat_request import with_splats
+from lippmann.scene.light_options import LightOptions
 from lippmann.scene.scene import Scene
 
 #: Samples that a pooled picture is made of where no number is given: half a second of two cores.
@@ -68,6 +70,8 @@ def resolve(
     UsageError, PictureError
         What is asked for cannot be done in this form, or for this scene or display.
     """
+    if scene.has_splats:
+        request = with_splats(request, scene)
     lit = _with_light(request, scene, of_own_camera=form == "preview")
     complete = _with_subpixels(_with_method(lit, form), None if form == "quilt" else display)
     if complete.spp is None and not complete.is_open_ended:
@@ -116,6 +120,13 @@ def _with_light(request: RenderRequest, scene: Scene, of_own_camera: bool) -> Re
             f"'{scene.name}' has no form for the classic light models",
             parameter="integrator",
             rule="classic is for Tachyon (.dat) and NFF files and the bundled scenes",
+            fix='use integrator="path"',
+        )
+    if classic is not None and scene.light != LightOptions():
+        raise UsageError(
+            "the light is to be another than the file's",
+            parameter="integrator",
+            rule="classic light models know no other direction and strength",
             fix='use integrator="path"',
         )
     depth, spp, pixel_filter = request.depth, request.spp, request.pixel_filter

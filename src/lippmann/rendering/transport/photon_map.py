@@ -15,6 +15,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from lippmann.device.kernel_ops import upload
 from lippmann.device.types import Bool, Color3f, Float, Point3f, SurfaceInteraction3f, UInt32, Vector3f
 from lippmann.rendering.transport.sharp_events import is_sharp
 
@@ -132,12 +133,12 @@ class PhotonMap:
         photons = Photons.joined(ordered)
         if not len(photons):  # gathers need something to point at
             photons = Photons.dark(1)
-        self._start = mi.UInt32(np.concatenate(starts).astype(np.uint32))
+        self._start = upload(np.concatenate(starts).astype(np.uint32))
         # Four numbers a row: such are fetched at once.
         self._position, self._normal, self._toward = (
-            mi.Float(_rows_of_four(getattr(photons, name))) for name in ("position", "normal", "toward")
+            upload(_rows_of_four(getattr(photons, name))) for name in ("position", "normal", "toward")
         )
-        self._power_and_surfaces = mi.Float(_rows_of_four(photons.power, photons.surfaces))
+        self._power_and_surfaces = upload(_rows_of_four(photons.power, photons.surfaces))
         self._r = dr.opaque(mi.Float, radius)
 
     def _bucket_numbers(self, position: Floats) -> NDArray[np.uint32]:

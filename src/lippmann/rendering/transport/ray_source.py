@@ -18,6 +18,7 @@ from lippmann.display.view_cone import cone_tangent
 from lippmann.scene.values.description import Camera
 
 Matrix = NDArray[np.float64]
+Triple = tuple[Float64, Float64, Float64]
 
 
 class RaySource(Protocol):
@@ -90,6 +91,10 @@ class DisplayRays(_OnePicture):
         self.world_from_display = np.asarray(world_from_display, dtype=np.float64)
 
     def rays(self, column: UInt32, row: UInt32, channel: UInt32, jitter: Point2f) -> Ray3f:
+        return world_ray(self.world_from_display, *self.light_rays(column, row, channel, jitter))
+
+    def light_rays(self, column: UInt32, row: UInt32, channel: UInt32, jitter: Point2f) -> tuple[Triple, Triple]:
+        """Origins and unit directions of :meth:`rays` in the display's frame, mm."""
         u = mi.Float64(column) + mi.Float64(jitter.x)
         v = mi.Float64(row) + mi.Float64(jitter.y)
         if self.channels == 3:
@@ -97,8 +102,7 @@ class DisplayRays(_OnePicture):
             x, y = self.display.subpixel_point(u, v, mi.Float64(channel), DEVICE)
         else:
             x, y = self.display.panel_point(u, v)
-        origin, direction = self.display.light_ray(x, y, DEVICE)
-        return world_ray(self.world_from_display, origin, direction)
+        return self.display.light_ray(x, y, DEVICE)
 
 
 class WindowRays(_OnePicture):
@@ -307,15 +311,24 @@ def _without_scale(world_from_camera: Matrix) -> Matrix:
     return matrix
 
 
-def world_ray(
-    matrix: Matrix, origin: tuple[Float64, Float64, Float64], direction: tuple[Float64, Float64, Float64]
-) -> Ray3f:
+def world_ray(matrix: Matrix, origin: Triple, direction: Triple) -> Ray3f:
     """World-space ray with unit direction, from an origin and a direction of any length in another frame.
 
     ``matrix`` is ``(4, 4)``, an affine map from that frame to the world.
     """
-    # Opaque to the compiler, so that a display that moves from frame to frame keeps its kernel.
-    rows = [[dr.opaque(mi.Float64, value) for value in row] for row in matrix[:3].tolist()]
+    return world_ray_by(opaque_rows(matrix), origin, direction)
+
+
+def opaque_rows(matrix: Matrix) -> list[list[Float64]]:
+    """The first three rows of a matrix ``(4, 4)`` on the device.
+
+    Opaque to the compiler, so that a display that moves from frame to frame keeps its kernel.
+    """
+    return [[dr.opaque(mi.Float64, value) for value in row] for row in np.asarray(matrix)[:3].tolist()]
+
+
+def world_ray_by(rows: list[list[Float64]], origin: Triple, direction: Triple) -> Ray3f:
+    """:func:`world_ray` by the rows of its matrix on the device."""
     o = [sum((m * a for m, a in zip(row[:3], origin, strict=True)), row[3]) for row in rows]
     d = [sum((m * a for m, a in zip(row[:3], direction, strict=True)), mi.Float64(0)) for row in rows]
     length = dr.rsqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2])

@@ -11,12 +11,15 @@ from typing import Literal, get_args
 import numpy as np
 
 from lippmann.errors import SceneError, UsageError
+from lippmann.scene.light_options import LightOptions
 from lippmann.scene.mitsuba_source import MitsubaSource
 from lippmann.scene.parsing.files import read_bytes
 from lippmann.scene.parsing.name_hints import closest_name_hint
 from lippmann.scene.readers.ply import UP_NOTE
 from lippmann.scene.scene import Scene, check_description, override_light
-from lippmann.scene.values.description import Camera, Color, Environment, Material, SceneDescription
+from lippmann.scene.splat_clouds import moved
+from lippmann.scene.splat_selection import Crop, SplatSelection
+from lippmann.scene.values.description import Camera, Color, Environment, Material, Matrix, SceneDescription
 from lippmann.scene.values.whitted_lighting import Background
 from lippmann.scene.values.whitted_scene import ClassicScene
 from lippmann.scene.whitted.world_frame import world_camera
@@ -36,6 +39,8 @@ _READERS = {
     ".nff": "lippmann.scene.readers.nff:read_nff",
     ".obj": "lippmann.scene.readers.obj:read_obj",
     ".ply": "lippmann.scene.readers.ply:read_ply",
+    ".sog": "lippmann.scene.readers.splats.sog:read_sog",
+    ".spz": "lippmann.scene.readers.splats.spz:read_spz",
     ".stl": "lippmann.scene.readers.stl:read_stl",
     ".usd": "lippmann.scene.readers.usd:read_usd",
     ".usda": "lippmann.scene.readers.usd:read_usd",
@@ -83,9 +88,14 @@ _ELSEWHERE = {
 }
 
 #: Kinds of files that do not say which way is up, and which way it mostly is: for 3D printing, z.
-Up = Literal["y", "z"]
-_USUAL_UP: dict[str, Up] = {".obj": "y", ".ply": "y", ".stl": "z"}
-_Y_FROM_Z = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, -1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
+Up = Literal["y", "z", "-y"]
+_USUAL_UP: dict[str, Up] = {".obj": "y", ".ply": "y", ".sog": "-y", ".spz": "y", ".stl": "z"}
+#: Rotations that bring such an axis to +y, about x.
+_UPRIGHT: dict[Up, Matrix] = {
+    "y": np.eye(4),
+    "z": np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, -1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]]),
+    "-y": np.diag([1.0, -1.0, -1.0, 1.0]),
+}
 
 
 def load_scene(
@@ -96,6 +106,10 @@ def load_scene(
     allow_outside: bool = False,
     multiple_scattering: bool = True,
     up: Up | None = None,
+    crop: Crop | None = None,
+    unit_scale: float | None = None,
+    min_opacity: float | None = None,
+    light: LightOptions | None = None,
     variants: Mapping[str, str] | None = None,
     depth_map: Path | None = None,
 ) -> Scene:
@@ -118,8 +132,12 @@ def load_scene(
         Give back the light that rough surfaces reflect more than once between microfacets. False: as dark as glTF's
         formulas make them.
     up:
-        The axis that points up in a file that does not say so: OBJ, PLY (None: "y") and STL (None: "z", as 3D printing
-        has it).
+        The axis that points up in a file that does not say so: OBJ, PLY (None: "y"; with Gaussian splats "-y", as
+        trainers have it), SOG (None: "-y"), SPZ (None: "y") and STL (None: "z", as 3D printing has it).
+    crop, unit_scale, min_opacity:
+        Of Gaussian splats; see :class:`~lippmann.scene.splat_selection.SplatSelection`.
+    light:
+        Direction and strength of the scene's light; None: as the file has them.
     variants:
         Of a USD stage: ``{"set": "choice"}`` for every prim that has them, ``{"/prim:set": "choice"}`` for one.
     depth_map:
@@ -130,8 +148,8 @@ def load_scene(
     SceneError
         The scene or something it needs is missing, damaged, foreign, or has nothing to see.
     UsageError
-        The background is no colour, ``source`` is an object that is not understood, or materials that Mitsuba
-        describes are to be changed.
+        The background is no colour, a choice of splats is for a scene without any, ``source`` is an object that is not
+        understood, or materials that Mitsuba describes are to be changed.
     """
     sky = _environment(environment)
     color = _background(background)
@@ -143,6 +161,8 @@ def load_scene(
         asked = {"up": up, "variants": variants, "depth_map": depth_map}
         parameter = next(name for name, value in asked.items() if value)
         raise UsageError("is for files", parameter=parameter, fix="leave it out")
+    scene = SplatSelection(crop, unit_scale, min_opacity).of(scene)
+    scene = scene if light is None else replace(scene, light=light)
     studio = scene.studio and str(environment) != NO_ENVIRONMENT
     if scene.classic is not None and color is not None:
         scene = replace(scene, classic=replace(scene.classic, background=Background(color=color)))
@@ -198,7 +218,7 @@ def _from_name(
     suffix = path.suffix.lower()
     if up is not None and (up not in get_args(Up) or suffix not in _USUAL_UP):
         what = f"'{up}'" if up not in get_args(Up) else f"{path.name} says itself which way is up"
-        raise UsageError(what, parameter="up", rule=f"y or z, for {', '.join(_USUAL_UP)}", fix="leave it out")
+        raise UsageError(what, parameter="up", rule=f"y, z or -y, for {', '.join(_USUAL_UP)}", fix="leave it out")
     if variants and kind_of_file(source) not in STAGES:
         raise UsageError(
             f"{path.name} has no variants", parameter="variants", rule=f"{', '.join(STAGES)} files may have some"
@@ -243,17 +263,25 @@ def _upright(description: SceneDescription, suffix: str, up: Up | None) -> Scene
     """A description of a file that does not say which way is up, with y up, and a note where that was guessed."""
     if suffix not in _USUAL_UP:
         return description
-    axis = up or _USUAL_UP[suffix]
+    splats = description.splats
+    usual: Up = "-y" if splats is not None and suffix == ".ply" else _USUAL_UP[suffix]
+    axis = up or usual
     notes = [note for note in description.notes if note != UP_NOTE or up is None]
     if up is None and axis == "z":
         notes.append(f"up is taken as +z, as 3D printing has it, for nothing in {suffix} files says it (else up=y)")
+    if up is None and axis == "-y":
+        notes.append(
+            f"up is taken as -y, as trainers of splats have it, for nothing in {suffix} files says it (else up=y)"
+        )
     if axis == "y":
         return replace(description, notes=notes)
+    matrix = _UPRIGHT[axis]
     instances = [
-        replace(each, world_from_mesh=_Y_FROM_Z @ np.asarray(each.world_from_mesh, np.float64))
+        replace(each, world_from_mesh=matrix @ np.asarray(each.world_from_mesh, np.float64))
         for each in description.instances
     ]
-    return replace(description, instances=instances, notes=notes)
+    splats = None if splats is None else moved(splats, matrix)
+    return replace(description, instances=instances, splats=splats, notes=notes)
 
 
 def _with_remarks(description: SceneDescription) -> SceneDescription:

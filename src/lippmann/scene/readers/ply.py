@@ -17,9 +17,10 @@ from numpy.typing import NDArray
 from lippmann.color.transfer import decode_srgb
 from lippmann.errors import SceneError
 from lippmann.scene.parsing.files import read_bytes, read_image, resolve
+from lippmann.scene.parsing.ply_header import Element, Header, read_header
 from lippmann.scene.parsing.points_lines import MOST, as_mesh, thinned, width_of
 from lippmann.scene.parsing.triangulation import triangulate
-from lippmann.scene.readers.ply_header import Element, Header, read_header
+from lippmann.scene.readers.splats.ply import holds_splats, read_splat_ply
 from lippmann.scene.values.description import Instance, Material, Mesh, SceneDescription, Texture
 
 UP_NOTE = "up is taken as +y, for nothing in the data says it (else up=z)"
@@ -47,7 +48,7 @@ Columns = Mapping[str, "Numbers | _Lists"]
 
 
 def read_ply(path: Path, *, allow_outside: bool = False) -> SceneDescription:
-    """Read a PLY mesh with its vertex normals, colours and texture coordinates, or a cloud of points.
+    """Read a PLY mesh with its vertex normals, colours and texture coordinates, a cloud of points, or Gaussian splats.
 
     Colours are taken as sRGB-coded. Without normals the facets are flat. Points become balls, unshaded where they
     have colours.
@@ -60,6 +61,8 @@ def read_ply(path: Path, *, allow_outside: bool = False) -> SceneDescription:
     where = path.name
     data = read_bytes(path)
     header = read_header(data, where)
+    if holds_splats(header):
+        return read_splat_ply(data, header, path.stem, where)
     columns = _read_body(data, header, where)
     if not all(isinstance(columns.get("vertex", {}).get(axis), np.ndarray) for axis in "xyz"):
         raise SceneError("holds no vertices with x, y and z", where=where)

@@ -26,7 +26,7 @@ from lippmann.display.panel import Panel, SubpixelOffsets
 from lippmann.display.units import stripe
 from lippmann.errors import UsageError
 from lippmann.runtime.atomic_write import replacing
-from lippmann.viewer.http_server import RefusedError, Request, Response, file_response, json_response
+from lippmann.viewer.responses import RefusedError, Request, Response, file_response, json_response
 
 #: Orders of sub-pixels in stripes; "none" means that the three lie in one place.
 _ORDERS = ("rgb", "bgr", "rbg", "brg", "gbr", "grb", "none")
@@ -39,7 +39,7 @@ _KEYS = {"pitch", "slope", "center", "order"}
 
 
 class CalibrationSite:
-    """The calibration page of one monitor; a :class:`~lippmann.viewer.http_server.Site`.
+    """The calibration page of one monitor; a :class:`~lippmann.viewer.responses.Site`.
 
     Parameters
     ----------

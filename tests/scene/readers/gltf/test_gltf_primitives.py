@@ -89,7 +89,8 @@ def test_points_without_normals_show_colour_and_emission_unshaded(writer, read, 
 
 
 def test_lines_of_no_length_are_nothing_to_see(writer, read):
-    assert "shows no triangles, lines or points" in _refusal(read, writer.triangle(positions=[[1, 1, 1]] * 2, mode=1))
+    said = _refusal(read, writer.triangle(positions=[[1, 1, 1]] * 2, mode=1))
+    assert "shows no triangles, lines, points or splats" in said
 
 
 def test_of_too_many_points_some_are_drawn(writer, read, monkeypatch):

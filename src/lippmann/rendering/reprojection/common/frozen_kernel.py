@@ -1,7 +1,8 @@
 """Kernels that are traced once per picture and then only launched.
 
-The reuse renderers trace many short lists of pixels. Telling Dr.Jit anew, list by list, what to compute takes longer
-than computing it; a frozen function does so once. It must be shown all device arrays that the kernel reads.
+The reuse renderers trace many short lists of pixels, and the live renderer frame after frame. Telling Dr.Jit anew, list
+by list, what to compute takes longer than computing it; a frozen function does so once. It must be shown all device
+arrays that the kernel reads.
 """
 
 from __future__ import annotations
@@ -11,11 +12,30 @@ from collections.abc import Callable
 
 import drjit as dr
 import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
 
 from lippmann.device.types import Array
 
 #: Integrators are shallow; what lies deeper belongs to others.
 _DEEPEST = 12
+
+#: Bytes: the widest vector of a processor.
+_ALIGNMENT = 64
+
+Numbers = NDArray[np.uint32]
+
+
+def aligned(numbers: Numbers) -> Numbers:
+    """A copy that begins at a whole number of :data:`_ALIGNMENT` bytes.
+
+    The device reads host memory in place and would record the kernel anew for every new alignment.
+    """
+    raw = np.empty(numbers.nbytes + _ALIGNMENT, dtype=np.uint8)
+    start = -raw.ctypes.data % _ALIGNMENT
+    copy = raw[start : start + numbers.nbytes].view(np.uint32)
+    copy[:] = numbers
+    return copy
 
 
 class Frozen:
@@ -27,13 +47,15 @@ class Frozen:
         A function of Dr.Jit arrays of one width (or of width 1), whose results have that width.
     reads:
         An object through whose attributes all other device arrays are reached that the kernel reads.
+    changes:
+        Whether other arrays may take their places between two launches.
     """
 
-    def __init__(self, kernel: Callable[..., Array | tuple[Array, ...]], reads: object) -> None:
-        state: list[Array] = []
-        _collect(reads, state, set(), 0)
-        dr.make_opaque(state)
-        self._recorded = dr.freeze(kernel, state_fn=lambda *_, **__: state)
+    def __init__(
+        self, kernel: Callable[..., Array | tuple[Array, ...]], reads: object, *, changes: bool = False
+    ) -> None:
+        known = None if changes else _opaque_arrays(reads)
+        self._recorded = dr.freeze(kernel, state_fn=lambda *_, **__: known or _opaque_arrays(reads))
 
     def __call__(self, *arguments: Array) -> Array:
         # The cyclic collector may free arrays of an earlier picture at any moment. Dr.Jit cannot record that, and
@@ -50,6 +72,13 @@ class Frozen:
     def recordings(self) -> int:
         """How often the kernel had to be told anew."""
         return int(self._recorded.n_recordings)
+
+
+def _opaque_arrays(reads: object) -> list[Array]:
+    state: list[Array] = []
+    _collect(reads, state, set(), 0)
+    dr.make_opaque(state)
+    return state
 
 
 def _collect(value: object, found: list[Array], seen: set[int], depth: int) -> None:

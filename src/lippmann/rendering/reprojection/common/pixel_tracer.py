@@ -14,7 +14,7 @@ from lippmann.device.types import Array, Float, Ray3f, UInt32
 from lippmann.rendering.film.sample_batches import STREAMS
 from lippmann.rendering.film.wavefront import RayTotals, compile_seconds, divide
 from lippmann.rendering.reprojection.common.array_types import BoolArray, IntArray, RealArray
-from lippmann.rendering.reprojection.common.frozen_kernel import Frozen
+from lippmann.rendering.reprojection.common.frozen_kernel import Frozen, aligned
 from lippmann.rendering.reprojection.common.point_image import BACKGROUND, SMALLEST_HEIGHT, TRACED, PointImage
 from lippmann.rendering.transport.integrator import ReusableIntegrator
 from lippmann.rendering.transport.ray_source import DisplayRays
@@ -23,9 +23,6 @@ from lippmann.runtime.row_threads import Bands
 
 #: Samples of one pixel whose disparities differ by more than this part of the nearest's see different surfaces.
 _ONE_SURFACE = 0.2
-
-#: Bytes: the widest vector of a processor.
-_ALIGNMENT = 64
 
 Pixels = NDArray[np.uint32]
 
@@ -77,7 +74,7 @@ class PixelTracer:
 
     def _trace(self, numbers: Pixels) -> tuple[NDArray[np.generic], ...]:
         """Red, green, blue, disparity and whether it is fragile of all samples, pixel by pixel."""
-        pixel = mi.UInt32(_aligned(numbers))
+        pixel = mi.UInt32(aligned(numbers))
         sample = mi.UInt32(0)
         if self._samples > 1:
             chosen, sample = divide(dr.arange(mi.UInt32, len(numbers) * self._samples), self._samples)
@@ -120,18 +117,6 @@ class PixelTracer:
         z = a * p.x + b * p.y + c * p.z + d
         z = dr.copysign(dr.maximum(dr.abs(z), SMALLEST_HEIGHT), z)
         return dr.select(hit, self._source.display.gap / z, BACKGROUND)
-
-
-def _aligned(numbers: Pixels) -> Pixels:
-    """A copy that begins at a whole number of :data:`_ALIGNMENT` bytes.
-
-    The device reads host memory in place and would record the kernel anew for every new alignment.
-    """
-    raw = np.empty(numbers.nbytes + _ALIGNMENT, dtype=np.uint8)
-    start = -raw.ctypes.data % _ALIGNMENT
-    copy = raw[start : start + numbers.nbytes].view(np.uint32)
-    copy[:] = numbers
-    return copy
 
 
 def _total(counts: IntArray) -> int:

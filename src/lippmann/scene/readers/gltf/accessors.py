@@ -71,6 +71,10 @@ COLOR_CHANGE = Storage(("VEC3", "VEC4"), normalized=_UNSIGNED | _SIGNED, always_
 TRANSLATION = Storage(("VEC3",))
 ROTATION = Storage(("VEC4",), normalized=_SIGNED)
 SCALE = Storage(("VEC3",))
+# Of Gaussian splats, whose every number may be quantised (KHR_gaussian_splatting).
+SPLAT_SCALE = Storage(("VEC3",), plain=frozenset({_FLOAT}) | _UNSIGNED | _SIGNED, normalized=_UNSIGNED | _SIGNED)
+SPLAT_OPACITY = Storage(("SCALAR",), normalized=_UNSIGNED)
+SPLAT_HARMONIC = Storage(("VEC3",), normalized=_UNSIGNED | _SIGNED)
 # Of animations.
 KEY_TIMES = Storage(("SCALAR",))
 KEY_ROTATION = Storage(("VEC4",), normalized=_SIGNED | _UNSIGNED)

@@ -35,6 +35,9 @@ _CHUNK_HEADER = struct.Struct("<II")
 
 DRACO = "KHR_draco_mesh_compression"
 BASISU = "KHR_texture_basisu"
+SPLATS = "KHR_gaussian_splatting"
+#: Extensions of that one, which hold the splats as an SPZ file.
+SPLATS_IN_SPZ = ("KHR_gaussian_splatting_compression_spz_2", "KHR_gaussian_splatting_compression_spz")
 
 # Extensions whose members are read.
 _UNDERSTOOD = frozenset(
@@ -44,6 +47,8 @@ _UNDERSTOOD = frozenset(
         "EXT_texture_avif",
         "EXT_texture_webp",
         DRACO,
+        SPLATS,
+        *SPLATS_IN_SPZ,
         "KHR_lights_punctual",
         "KHR_materials_anisotropy",
         "KHR_materials_clearcoat",

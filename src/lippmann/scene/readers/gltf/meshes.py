@@ -13,6 +13,7 @@ from lippmann.scene.readers.gltf.json_fields import Fields
 from lippmann.scene.readers.gltf.materials import Materials
 from lippmann.scene.readers.gltf.primitives import Geometry, Primitives
 from lippmann.scene.readers.gltf.skinning import Skin
+from lippmann.scene.readers.gltf.splats import is_splats
 from lippmann.scene.values.description import FloatArray, Material, Mesh, Texture
 
 _Key = tuple[Hashable, ...]
@@ -59,6 +60,8 @@ class Meshes:
         primitives = fields.children("primitives")
         places: list[int] = []
         for primitive in primitives:
+            if is_splats(primitive):
+                continue
             key = _key(primitive, weights, skin)
             if key not in self._geometries:
                 self._geometries[key] = self.primitives.read(primitive, weights, skin)

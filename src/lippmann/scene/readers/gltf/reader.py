@@ -19,6 +19,7 @@ from lippmann.scene.readers.gltf.nodes import Nodes, instance_matrices, ranks
 from lippmann.scene.readers.gltf.points_lines import ThinWidth, draw_points_and_lines
 from lippmann.scene.readers.gltf.primitives import Primitives
 from lippmann.scene.readers.gltf.skinning import read_skin
+from lippmann.scene.readers.gltf.splats import SplatClouds
 from lippmann.scene.readers.gltf.textures import Textures
 from lippmann.scene.values.description import Camera, Instance, Light, Matrix, Mesh, SceneDescription
 
@@ -38,7 +39,7 @@ def read_gltf(path: Path, *, allow_outside: bool = False) -> SceneDescription:
     ------
     SceneError
         The file, or one that it names, is missing, damaged or beyond its bounds; it requires an extension that is not
-        understood; it holds no triangles.
+        understood; it holds nothing to see.
     """
     document = open_document(path, allow_outside=allow_outside)
     check_extensions(document)
@@ -64,6 +65,7 @@ class Contents:
     accessors: Accessors
     nodes: Nodes
     meshes: Meshes
+    splats: SplatClouds
     placements: list[_Placements] = field(default_factory=list)
     lights: list[Light] = field(default_factory=list)
     cameras: list[Camera] = field(default_factory=list)
@@ -76,13 +78,14 @@ class Contents:
         accessors = Accessors(document, buffers)
         materials = Materials(document, Textures(document, buffers))
         meshes = Meshes(document, Primitives(document, accessors), materials)
-        return cls(document, accessors, Nodes(document), meshes)
+        return cls(document, accessors, Nodes(document), meshes, SplatClouds(document, accessors))
 
     def posed(self, nodes: list[Fields]) -> Contents:
         """Contents of the same file with other ``nodes``; bytes, materials and meshes without skin are shared."""
         document = self.document.with_nodes(nodes)
         meshes = self.meshes.posed(document, Primitives(document, self.accessors))
-        return Contents(document, self.accessors, Nodes(document), meshes, thin_width=self.thin_width)
+        splats = SplatClouds(document, self.accessors)
+        return Contents(document, self.accessors, Nodes(document), meshes, splats, thin_width=self.thin_width)
 
     def description(self, name: str) -> SceneDescription:
         """The scene that the nodes make; to be asked for once.
@@ -95,9 +98,10 @@ class Contents:
         for index, visible in self.nodes.traverse():
             self._add(index, visible=visible)
         meshes, instances = _instantiate(self.meshes.read, self.placements, self.thin_width, self.document)
-        if not instances:
+        splats = self.splats.joined()
+        if not instances and splats is None:
             raise self.document.error(
-                "the file shows no triangles, lines or points",
+                "the file shows no triangles, lines, points or splats",
                 rule="a scene needs a mesh on a node of its default scene",
             )
         return SceneDescription(
@@ -109,6 +113,7 @@ class Contents:
             physical_lights=bool(self.lights),
             cameras=tuple(self.cameras),
             notes=self.document.notes.lines(),
+            splats=splats,
         )
 
     def _add(self, index: int, *, visible: bool) -> None:
@@ -133,6 +138,7 @@ class Contents:
             copies = instance_matrices(node, self.document, self.accessors)
             worlds = world[None] if len(copies) == 1 and (copies[0] == _IDENTITY).all() else world @ copies
             places = self.meshes.places(mesh, node, None)
+            self.splats.add(self.document.all("meshes")[mesh], worlds)
         else:
             # A skin places its mesh in the world by itself, whatever the node's own transformation (section 3.7.3.3).
             worlds = np.eye(4)[None]

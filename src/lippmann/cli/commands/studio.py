@@ -1,0 +1,138 @@
+"""``lippmann studio``, a display seen live while it is set up, and ``lippmann show``, a picture on its display."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from lippmann.cli.commands import view as viewing
+from lippmann.cli.shared import options, parse
+from lippmann.cli.shared.console import Console
+from lippmann.runtime.temporary_names import scratch_folder
+
+if TYPE_CHECKING:
+    from lippmann.display import Display
+    from lippmann.rendering.live.renderer import LiveRenderer
+    from lippmann.scene.scene import Scene
+    from lippmann.studio.state import StudioState
+
+Model = Annotated[
+    str | None, typer.Argument(help="Scene file, or a bundled scene's name; by default the teapot.", show_default=False)
+]
+DisplayChoice = Annotated[
+    str | None, typer.Option("--display", help="Name, TOML file or short form of the display.", show_default=False)
+]
+State = Annotated[
+    Path | None, typer.Option("--state", help="State that the studio saved (.toml); options win over it.")
+]
+Folder = Annotated[Path, typer.Option("--folder", help="Folder that renders are written into.")]
+
+
+def studio(
+    model: Model = None,
+    display: DisplayChoice = None,
+    state: State = None,
+    environment: options.Environment = None,
+    up: options.Up = None,
+    allow_outside: options.AllowOutside = False,
+    folder: Folder = Path(),
+    host: viewing.Host = "127.0.0.1",
+    port: viewing.Port = 0,
+    no_browser: viewing.NoBrowser = False,
+    device: options.Device = "auto",
+    threads: options.Threads = None,
+    memory: options.Memory = None,
+    as_json: options.Json = False,
+    quiet: options.Quiet = False,
+) -> None:
+    """Set up a display by hand in a browser, see live what it will show, and render."""
+    from lippmann.rendering.request.render_request import RenderRequest
+    from lippmann.runtime.atomic_write import check_writable
+    from lippmann.studio.session import StudioSession
+    from lippmann.studio.site import StudioSite
+    from lippmann.studio.uploads import Uploads
+    from lippmann.viewer.secret_folder import secret_folder
+
+    console = Console(quiet, as_json)
+    first = _state(state, model, display, environment, up)
+    first.load_display()
+    _check_scene(first)
+    check_writable(folder / "picture.png")
+    machine = RenderRequest(device=device, threads=threads, memory=parse.memory(memory))
+
+    def make_renderer(scene: Scene, display: Display) -> LiveRenderer:
+        from lippmann.rendering.live.renderer import LiveRenderer
+
+        return LiveRenderer(scene, display, machine=machine)
+
+    with scratch_folder("lippmann-studio-") as uploads:
+        session = StudioSession(
+            first,
+            uploads=Uploads(Path(uploads)),
+            outputs=folder.resolve(),
+            make_renderer=make_renderer,
+            allow_outside=allow_outside,
+        )
+        try:
+            viewing.serve(
+                StudioSite(session, "jpeg" if viewing.is_remote() else "rgb"),
+                f"studio, {Path(first.scene).name} on {first.display}",
+                console,
+                host=host,
+                port=port,
+                browser=not no_browser,
+                folder=secret_folder(),
+                started=session.warm_up,
+            )
+        finally:
+            session.close()
+
+
+def show(
+    picture: options.Picture,
+    display: options.PictureDisplay = None,
+    host: viewing.Host = "127.0.0.1",
+    port: viewing.Port = 0,
+    no_browser: viewing.NoBrowser = False,
+    as_json: options.Json = False,
+    quiet: options.Quiet = False,
+) -> None:
+    """Show a picture on the display itself: a window to put full screen there, native pixels one to one."""
+    from lippmann.studio.panel_site import PanelSite
+    from lippmann.viewer.served_picture import PictureFile
+
+    file = PictureFile(picture, parse.display(display), "png" if viewing.is_remote() else "rgb")
+    viewing.serve(PanelSite(file), str(picture), Console(quiet, as_json), host=host, port=port, browser=not no_browser)
+
+
+def _state(
+    path: Path | None, model: str | None, display: str | None, environment: Path | None, up: str | None
+) -> StudioState:
+    """The first state: that of the file, or a new one, with what the options say."""
+    from lippmann.studio.state import StudioState
+    from lippmann.studio.state_toml import read_state
+
+    given = {
+        "scene": model,
+        "display": display,
+        "environment": None if environment is None else str(environment),
+        "up": up,
+    }
+    changed = {name: value for name, value in given.items() if value is not None}
+    return replace(StudioState() if path is None else read_state(path), **changed)  # type: ignore[arg-type]
+
+
+def _check_scene(state: StudioState) -> None:
+    """Refuse a scene that is not there before a page opens; what its file holds is said on the page."""
+    from lippmann.scene.readers.load import kind_of_file
+
+    if kind_of_file(state.scene) is None:
+        from lippmann.errors import SceneError
+        from lippmann.scene import bundled
+
+        if state.scene not in bundled.names():
+            rule = f"bundled are {', '.join(bundled.names())}"
+            raise SceneError(f"no bundled scene or file is named '{state.scene}'", rule=rule)

@@ -1,0 +1,81 @@
+"""What a live frame shows, and the frame."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lippmann.display.pixel_window import PixelWindow
+from lippmann.errors import UsageError
+from lippmann.rendering.request.render_request import RenderRequest
+from lippmann.scene.light_options import LightOptions
+from lippmann.scene.placement import Placement
+
+Vector = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class LiveView:
+    """What is looked at, how it is placed and lit. Equal views show the same picture.
+
+    Parameters
+    ----------
+    eye:
+        The eye's place in the display's frame, mm, in front of the lens plane. None: the native pixels themselves.
+    size:
+        Width and height in pixels of the eye's picture, which is the panel's rectangle in the lens plane.
+    window:
+        Where ``eye`` is None: the native pixels shown; None for the whole panel.
+    request:
+        As of a render. ``placement``, ``exposure``, ``subpixels``, ``tone_map``, ``pixel_filter``, ``seed``,
+        ``integrator`` (auto, path or direct) and ``depth`` count. Samples and method are the live renderer's own.
+    light:
+        Direction and strength of the scene's light.
+
+    Raises
+    ------
+    UsageError
+        The eye is not in front of the lens plane, or the size is below 1x1.
+    """
+
+    eye: Vector | None
+    size: tuple[int, int] = (512, 512)
+    window: PixelWindow | None = None
+    request: RenderRequest = field(default_factory=RenderRequest)
+    light: LightOptions = field(default_factory=LightOptions)
+
+    def __post_init__(self) -> None:
+        if self.eye is not None and not (np.isfinite(self.eye).all() and self.eye[2] > 0):
+            raise UsageError(f"{self.eye!r}", parameter="eye", rule="z above 0: in front of the lens plane")
+        if min(self.size) < 1:
+            raise UsageError(f"{self.size!r}", parameter="size", rule="at least 1x1 pixels")
+
+
+@dataclass(frozen=True, eq=False)
+class LiveFrame:
+    """A picture of a :class:`LiveView`.
+
+    Attributes
+    ----------
+    pixels:
+        ``(height, width, 3)`` uint8, sRGB-coded and tone-mapped.
+    samples:
+        Samples of each native (sub-)pixel behind it.
+    is_denoised:
+        Whether noise was taken out.
+    placement:
+        Where the display stands, with the depth range of the scene and warnings.
+    exposure:
+        Stops (EV) in effect.
+    seconds:
+        Time of its stages: ``place``, ``map`` (eye to pixels), ``trace``, ``denoise``, ``encode``.
+    """
+
+    pixels: NDArray[np.uint8]
+    samples: int
+    is_denoised: bool
+    placement: Placement
+    exposure: float
+    seconds: dict[str, float]

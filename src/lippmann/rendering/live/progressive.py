@@ -1,0 +1,187 @@
+"""A view at rest: light gathers, step by step, and its noise is taken out now and then.
+
+Two streams of samples make two half-buffers, as in :mod:`lippmann.rendering.denoise.dual_buffer`. Each half judges what
+the denoiser made of the other: where that is wrong, the samples themselves are shown
+(:mod:`lippmann.rendering.denoise.noisy_blend`). The share of the samples grows with their number.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lippmann.display import Display
+from lippmann.rendering.denoise.noisy_blend import own_share
+from lippmann.rendering.denoise.oidn import denoise, load_denoiser
+from lippmann.rendering.film.sample_batches import STREAMS
+from lippmann.rendering.live.develop import arrange, develop, develop_picture
+from lippmann.rendering.live.live_tracer import Lanes, PlacedDisplay
+from lippmann.rendering.live.live_view import LiveFrame, LiveView
+from lippmann.rendering.live.seen_pixels import PixelSet
+from lippmann.rendering.request.render_request import RenderRequest
+from lippmann.scene.placement import Placement
+
+if TYPE_CHECKING:
+    from lippmann.rendering.live.scene_kernels import SceneKernels
+
+Floats = NDArray[np.float32]
+
+#: Seconds that a step of sampling takes, about.
+STEP_SECONDS = 0.06
+#: Most samples of a pixel: its noise is below a code's step then.
+MOST_SAMPLES = 1 << 14
+#: Samples of the feature buffers.
+_FEATURE_SAMPLES = 8
+#: The noise is taken out anew once there are so many times the samples of the last time.
+_MORE = 1.7
+#: From so many samples on the halves judge each other.
+_JUDGED_FROM = 8
+
+
+class Progressive:
+    """The growing picture of one view."""
+
+    def __init__(
+        self,
+        view: LiveView,
+        kernels: SceneKernels,
+        display: Display,
+        request: RenderRequest,
+        placement: Placement,
+        placed: PlacedDisplay,
+        pixels: PixelSet,
+        exposure: float,
+    ) -> None:
+        self.view = view
+        self._kernels, self._display, self._request = kernels, display, request
+        self._placement, self._placed, self._pixels, self._exposure = placement, placed, pixels, exposure
+        count = len(pixels.column)
+        self._sums = np.zeros((STREAMS, count, 3), np.float32)
+        #: Samples of each stream.
+        self._taken = 0
+        self._features: tuple[Floats, Floats] | None = None
+        self._denoised_at = 0
+        self._task: Iterator[Floats | None] | None = None
+        self._parts = [
+            slice(start, min(start + kernels.most_lanes // STREAMS, count))
+            for start in range(0, count, kernels.most_lanes // STREAMS)
+        ]
+        self._part = 0
+        self._each = 1
+        self._lanes: Lanes | None = None
+        self._denoises = view.eye is not None and request.box_filter
+
+    @property
+    def samples(self) -> int:
+        """Samples of each pixel."""
+        return STREAMS * self._taken
+
+    def step(self, seconds: dict[str, float]) -> LiveFrame | None:
+        """One step of work; the picture if it changed."""
+        if self._task is not None:
+            return self._denoise(seconds)
+        if self._denoises and self._taken and self._features is None:
+            self._trace_features(seconds)
+            return self._denoise(seconds)
+        if self.samples >= MOST_SAMPLES:
+            return None
+        if not self._sample(seconds):
+            return None
+        if not self._denoises:
+            return self._frame(develop(self._mean(), self._pixels, self._request), seconds, is_denoised=False)
+        if self._features is not None and self._taken >= _MORE * self._denoised_at:
+            return self._denoise(seconds)
+        return None
+
+    def _sample(self, seconds: dict[str, float]) -> bool:
+        """Samples of one part of the pixels; whether all pixels have them now."""
+        part = self._parts[self._part]
+        if self._lanes is None or len(self._parts) > 1:
+            self._lanes = Lanes(self._pixels, part, STREAMS, self._each)
+        started = time.perf_counter()
+        tracer = self._kernels.tracer(self._display, self._request)
+        found = tracer.trace(self._lanes, self._placed, first=self._taken, seed=self._request.seed)
+        self._sums[:, part] += found.sums
+        spent = time.perf_counter() - started
+        seconds["trace"] = seconds.get("trace", 0.0) + spent
+        self._part = (self._part + 1) % len(self._parts)
+        if self._part:
+            return False
+        self._taken += self._each
+        # As many samples as a step's time allows, doubling at most: the first launch may have compiled.
+        most = max(1, self._kernels.most_lanes // (STREAMS * len(self._pixels.column)))
+        each = min(max(1, int(self._each * STEP_SECONDS / spent)), 2 * self._each, most)
+        if each != self._each:
+            self._each, self._lanes = each, None
+        return True
+
+    def _trace_features(self, seconds: dict[str, float]) -> None:
+        started = time.perf_counter()
+        tracer = self._kernels.feature_tracer(self._display, self._request)
+        count = len(self._pixels.column)
+        albedo, normal = np.empty((count, 3), np.float32), np.empty((count, 3), np.float32)
+        step = self._kernels.most_lanes // _FEATURE_SAMPLES
+        for start in range(0, count, step):
+            part = slice(start, min(start + step, count))
+            lanes = Lanes(self._pixels, part, 1, _FEATURE_SAMPLES)
+            albedo[part], normal[part] = tracer.trace(lanes, self._placed, seed=self._request.seed + 1)
+        self._features = albedo, normal
+        seconds["features"] = time.perf_counter() - started
+
+    def _mean(self) -> Floats:
+        return np.asarray(self._sums.sum(axis=0) / np.float32(self.samples), np.float32)
+
+    def _denoise(self, seconds: dict[str, float]) -> LiveFrame | None:
+        """One of the steps that take the noise out; the picture after the last."""
+        started = time.perf_counter()
+        if self._task is None:
+            load_denoiser()
+            self._denoised_at = self._taken
+            self._task = self._denoising()
+        picture = next(self._task)
+        seconds["denoise"] = time.perf_counter() - started
+        if picture is None:
+            return None
+        self._task = None
+        return self._frame(self._developed(picture), seconds, is_denoised=True)
+
+    def _denoising(self) -> Iterator[Floats | None]:
+        """Steps of taking the noise out, the last of which brings the picture: no step takes long."""
+        assert self._features is not None
+        albedo, normal = (self._picture(values) for values in self._features)
+        noisy = [self._picture(sums / np.float32(self._taken)) for sums in self._sums]
+        threads = self._kernels.session.engine.threads
+        mean = np.asarray((noisy[0] + noisy[1]) / 2, np.float32)
+        if self.samples < _JUDGED_FROM:
+            yield denoise(mean, albedo, normal, effort="fast", threads=threads)
+            return
+        clean = []
+        for half in noisy:
+            clean.append(denoise(half, albedo, normal, effort="fast", threads=threads))
+            yield None
+        share = own_share((noisy[0], noisy[1]), (clean[0], clean[1]), "srgb", threads=threads)
+        yield np.asarray((clean[0] + clean[1]) / 2 * (1 - share) + mean * share, np.float32)
+
+    def _picture(self, values: Floats) -> Floats:
+        """Values ``(n, 3)`` of the pixels as the picture that the denoiser sees: of lenses, where they are blocks."""
+        blocks = self._pixels.blocks
+        if blocks is None:
+            return arrange(values, self._pixels)
+        with_black = np.concatenate([values, np.zeros((1, 3), np.float32)])
+        return np.ascontiguousarray(with_black[blocks])
+
+    def _developed(self, picture: Floats) -> NDArray[np.uint8]:
+        blocks = self._pixels.blocks
+        if blocks is None:
+            return develop_picture(picture, self._pixels, self._request)
+        values = np.zeros((len(self._pixels.column), 3), np.float32)
+        shown = blocks >= 0
+        values[blocks[shown]] = picture[shown]
+        return develop(values, self._pixels, self._request)
+
+    def _frame(self, pixels: NDArray[np.uint8], seconds: dict[str, float], *, is_denoised: bool) -> LiveFrame:
+        return LiveFrame(pixels, self.samples, is_denoised, self._placement, self._exposure, seconds)

@@ -1,0 +1,149 @@
+"""A scene on the device with its warm kernels, one for each kind of picture."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from lippmann.display import Display
+from lippmann.rendering.film.exposure import gain_of, measure_exposure
+from lippmann.rendering.film.memory_model import BYTES_PER_LANE
+from lippmann.rendering.live.emitter_updates import EmitterUpdates
+from lippmann.rendering.live.hull_bounds import bounds_by_hull
+from lippmann.rendering.live.live_tracer import FeatureTracer, LiveIntegrator, LiveTracer
+from lippmann.rendering.request.region_of_interest import even_background
+from lippmann.rendering.request.render_request import RenderRequest
+from lippmann.rendering.session import Session, make_integrator
+from lippmann.rendering.transport.emitter_weights import make_light_sampler
+from lippmann.rendering.transport.first_surface import make_surfaces
+from lippmann.rendering.transport.light_sampling import SceneLightSampler
+from lippmann.rendering.transport.path import PathIntegrator
+from lippmann.rendering.transport.ray_source import DisplayRays
+from lippmann.scene.light_options import LightOptions
+from lippmann.scene.placement import Placement
+
+if TYPE_CHECKING:
+    from lippmann.device.pbr import BuiltScene
+
+#: Most lanes of a wavefront: larger ones are no faster, and longer to wait for.
+_MOST_LANES = 1 << 20
+
+
+@dataclass(frozen=True)
+class _Kind:
+    """What a tracer's kernel depends on."""
+
+    display: Display
+    integrator: str
+    depth: int
+    subpixels: bool
+    box_filter: bool
+
+
+class SceneKernels:
+    """The kernels of one scene on the device.
+
+    Parameters
+    ----------
+    session:
+        The scene, built with the light that its file says.
+    """
+
+    def __init__(self, session: Session) -> None:
+        self.session = session
+        self.built: BuiltScene = session.built  # type: ignore[assignment]  # live pictures are physically based
+        self._updates = EmitterUpdates(session.scene, self.built)
+        self._integrators: dict[tuple[str, int], LiveIntegrator] = {}
+        self._tracers: dict[_Kind, LiveTracer] = {}
+        self._features: dict[_Kind, FeatureTracer] = {}
+        self._exposure: float | None = None
+        self._bounds_in = bounds_by_hull(session.scene)
+
+    @property
+    def most_lanes(self) -> int:
+        """Lanes of the largest wavefront that fits the memory."""
+        return max(1 << 14, min(_MOST_LANES, self.session.memory // BYTES_PER_LANE))
+
+    @property
+    def recordings(self) -> int:
+        """How often kernels were recorded."""
+        tracers: tuple[LiveTracer | FeatureTracer, ...] = (*self._tracers.values(), *self._features.values())
+        return sum(each.recordings for each in tracers)
+
+    def forget_display(self) -> None:
+        """Drop the kernels of displays."""
+        self._tracers.clear()
+        self._features.clear()
+
+    def place(self, display: Display, request: RenderRequest) -> Placement:
+        """Where a display stands by a resolved request."""
+        return replace(self.session, request=request).find_place(display, self._bounds_in)
+
+    def can_light(self, light: LightOptions) -> bool:
+        """Whether a change of light needs no other scene on the device."""
+        return self._updates.can_apply(light)
+
+    def light(self, light: LightOptions, world_from_viewer: np.ndarray) -> None:
+        """Set the scene's light; see :meth:`EmitterUpdates.apply`."""
+        self._updates.apply(light, world_from_viewer)
+
+    def tracer(self, display: Display, request: RenderRequest) -> LiveTracer:
+        """The tracer of a resolved request."""
+        kind = _kind(display, request)
+        if kind not in self._tracers:
+            self._tracers[kind] = LiveTracer(
+                display, self._integrator(request), subpixels=kind.subpixels, box_filter=kind.box_filter
+            )
+        return self._tracers[kind]
+
+    def feature_tracer(self, display: Display, request: RenderRequest) -> FeatureTracer:
+        """The tracer of feature buffers of a resolved request."""
+        kind = replace(_kind(display, request), integrator="", depth=0)
+        if kind not in self._features:
+            self._features[kind] = FeatureTracer(
+                display, make_surfaces(self.built), subpixels=kind.subpixels, box_filter=kind.box_filter
+            )
+        return self._features[kind]
+
+    def expose(self, display: Display, request: RenderRequest, placement: Placement, *, measure: bool) -> float:
+        """Set the exposure of a resolved request, and return it in stops.
+
+        Where it is "auto" it is measured for the placement if ``measure`` is set, or was not yet; so are the weights by
+        which emitters are sampled.
+        """
+        integrator = self._integrator(request)
+        if not isinstance(integrator, PathIntegrator):
+            return 0.0
+        exposure = request.exposure
+        source = DisplayRays(display, placement.world_from_display, bool(request.subpixels))
+        is_new = integrator.gain is None
+        integrator.gain = dr.opaque(mi.Float, 1.0)
+        if (measure or is_new) and not self.built.borrowed:
+            integrator.light_sampler = SceneLightSampler(integrator.scene)
+            integrator.light_sampler = make_light_sampler(integrator, source)
+        if exposure == "auto":
+            if measure or self._exposure is None:
+                background = even_background(self.built, request)
+                self._exposure = measure_exposure(integrator, source, background, request.seed)
+            exposure = self._exposure
+        gain = gain_of(exposure)
+        integrator.gain = dr.opaque(mi.Float, gain)
+        if request.clamp_indirect is not None:
+            integrator.most_indirect = dr.opaque(mi.Float, request.clamp_indirect / gain)
+        return exposure
+
+    def _integrator(self, request: RenderRequest) -> LiveIntegrator:
+        kind = request.integrator, request.surfaces
+        if kind not in self._integrators:
+            made = make_integrator(self.built, request, np.eye(4), None)
+            assert isinstance(made, LiveIntegrator)
+            self._integrators[kind] = made
+        return self._integrators[kind]
+
+
+def _kind(display: Display, request: RenderRequest) -> _Kind:
+    return _Kind(display, request.integrator, request.surfaces, bool(request.subpixels), request.box_filter)

@@ -1,0 +1,133 @@
+"""The native (sub-)pixels that an eye sees, found in milliseconds for one eye after the other.
+
+Which lens covers a place of the picture does not depend on the eye. It is found once; for each eye there remains a
+line through the lens's centre, see :meth:`lippmann.display.Display.panel_point_seen_by`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lippmann.display import NUMPY, Display
+from lippmann.display.pixel_window import PixelWindow
+from lippmann.rendering.live.seen_pixels_kernel import number_pixels
+
+Vector = tuple[float, float, float]
+Indices = NDArray[np.uint32]
+
+#: Lenses wider than this many pixels of the picture are seen as blocks, each of one colour.
+_BLOCK_WIDTH = 1.5
+
+
+@dataclass(frozen=True, eq=False)
+class PixelSet:
+    """The (sub-)pixels of a panel behind a picture.
+
+    Attributes
+    ----------
+    column, row, channel:
+        ``(n,)`` uint32, each pixel once, at least two; ``channel`` is 0 where the colours of a pixel share their rays.
+    number:
+        ``(height, width, channels)`` int32: which of them each value of the picture shows; -1 past the panel.
+    blocks:
+        ``(rows, columns)`` int32: the picture of the lenses, one value a lens (and panel row), as numbers of pixels; -1
+        where no pixel is seen. None where lenses are about as fine as the picture's pixels.
+    """
+
+    column: Indices
+    row: Indices
+    channel: Indices
+    number: NDArray[np.int32]
+    blocks: NDArray[np.int32] | None = None
+
+    @property
+    def channels(self) -> int:
+        """3 where sub-pixels have rays of their own, else 1."""
+        return int(self.number.shape[2])
+
+
+class EyeMap:
+    """Finds the pixels behind pictures of one size of one display.
+
+    Parameters
+    ----------
+    display:
+        The display.
+    size:
+        Width and height of the pictures in pixels.
+    subpixels:
+        Whether sub-pixels have rays of their own.
+    """
+
+    def __init__(self, display: Display, size: tuple[int, int], *, subpixels: bool) -> None:
+        self.display, self.size, self.subpixels = display, size, subpixels
+        width, height = size
+        panel = display.panel
+        u = (np.arange(width) + 0.5) * (panel.width / width)
+        v = (np.arange(height) + 0.5) * (panel.height / height)
+        x, y = display.panel_point(*np.meshgrid(u, v))
+        i, j = display.lattice.lens_at(x, y, NUMPY)
+        self._center_x, self._center_y = display.lattice.center(i, j, x, y, NUMPY)
+        self._lens = (np.rint(j - j.min()).astype(np.int64), np.rint(i - i.min()).astype(np.int64))
+        channels = 3 if subpixels else 1
+        #: For each (sub-)pixel of the panel the number that it had last.
+        self._last = np.zeros(panel.width * panel.height * channels, np.int32)
+        offsets = np.array(panel.subpixel_offsets if subpixels else [(0.0, 0.0)], np.float64)
+        cells = panel.subpixel_cells if subpixels else None
+        self._cells = np.array(offsets[None, None] if cells is None else cells, np.float64)
+
+    def seen_by(self, eye: Vector) -> PixelSet:
+        """The pixels seen by an eye at ``eye`` (mm in the display's frame, z > 0)."""
+        display, (width, height) = self.display, self.size
+        panel = display.panel
+        number = np.empty((height, width, 3 if self.subpixels else 1), np.int32)
+        keys = np.empty(number.size + 2, np.int64)
+        found = number_pixels(
+            self._center_x,
+            self._center_y,
+            (float(eye[0]), float(eye[1]), display.gap / float(eye[2])),
+            (panel.width, panel.height, panel.pixel_pitch),
+            self._cells,
+            self._last,
+            keys,
+            number,
+        )
+        return _pixel_set(keys[: max(found, 2)], number, panel.width, self._blocks(number))
+
+    def _blocks(self, number: NDArray[np.int32]) -> NDArray[np.int32] | None:
+        display = self.display
+        scale = self.size[0] / display.size_mm[0]
+        if self.subpixels or display.lens_array.slant or display.lens_array.pitch * scale < _BLOCK_WIDTH:
+            return None
+        lens_row, lens_column = self._lens
+        rows = lens_row
+        if display.lens_array.layout == "lenticular":
+            rows = np.broadcast_to(np.arange(self.size[1])[:, None], lens_row.shape)
+        blocks = np.full((int(rows.max()) + 1, int(lens_column.max()) + 1), -1, np.int32)
+        blocks[rows, lens_column] = number[..., 0]
+        return blocks
+
+
+def window_pixels(display: Display, window: PixelWindow | None, *, subpixels: bool) -> PixelSet:
+    """All (sub-)pixels of a window of the panel, or of the whole panel."""
+    panel = display.panel
+    window = window or PixelWindow(0, 0, panel.width, panel.height)
+    channels = 3 if subpixels else 1
+    rows, columns, colors = np.meshgrid(
+        np.arange(window.top, window.bottom), np.arange(window.left, window.right), np.arange(channels), indexing="ij"
+    )
+    keys = ((rows * panel.width + columns) * channels + colors).ravel()
+    number = np.arange(keys.size, dtype=np.int32).reshape(window.height, window.width, channels)
+    return _pixel_set(np.resize(keys, max(keys.size, 2)), number, panel.width, None)
+
+
+def _pixel_set(
+    keys: NDArray[np.int64], number: NDArray[np.int32], width: int, blocks: NDArray[np.int32] | None
+) -> PixelSet:
+    channels = number.shape[2]
+    pixel = keys // channels
+    column, row, channel = ((part).astype(np.uint32) for part in (pixel % width, pixel // width, keys % channels))
+    return PixelSet(column, row, channel, number, blocks)

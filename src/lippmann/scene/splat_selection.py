@@ -1,0 +1,97 @@
+"""Which Gaussian splats of a scan are shown, and in which unit its coordinates count."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from lippmann.errors import UsageError
+from lippmann.scene.matrices import scaling
+from lippmann.scene.scene import Scene
+from lippmann.scene.splat_clouds import check_splats, cropped, moved
+from lippmann.scene.values.description import SceneDescription
+from lippmann.scene.values.splats import Splats
+
+#: Lowest corner x, y and z of a box, then its highest.
+Crop = tuple[float, float, float, float, float, float]
+
+_LARGEST_FACTOR = 1e9
+
+
+@dataclass(frozen=True)
+class SplatSelection:
+    """A choice of Gaussian splats; None where nothing is asked for.
+
+    Parameters
+    ----------
+    crop:
+        Splats are kept whose centres lie in this box of the upright scene, after ``unit_scale``.
+    unit_scale:
+        Factor on the scene's coordinates, above 0.
+    min_opacity:
+        Splats of less opacity are left out; 0 to 1.
+
+    Raises
+    ------
+    UsageError
+        A value is out of its range.
+    """
+
+    crop: Crop | None = None
+    unit_scale: float | None = None
+    min_opacity: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.crop is not None:
+            box = np.asarray(self.crop, np.float64)
+            if box.shape != (6,) or not np.isfinite(box).all() or (box[:3] >= box[3:]).any():
+                rule = "six numbers: the lowest corner x, y, z of a box, then its highest"
+                raise UsageError(f"{self.crop!r}", parameter="crop", rule=rule)
+        if self.unit_scale is not None and not 1 / _LARGEST_FACTOR <= self.unit_scale <= _LARGEST_FACTOR:
+            raise UsageError(f"{self.unit_scale:g}", parameter="unit_scale", rule="a factor above 0")
+        if self.min_opacity is not None and not 0.0 <= self.min_opacity <= 1.0:
+            raise UsageError(f"{self.min_opacity:g}", parameter="min_opacity", rule="a number from 0 to 1")
+
+    def of(self, scene: Scene) -> Scene:
+        """The scene with the chosen splats alone.
+
+        Raises
+        ------
+        UsageError
+            The scene has no splats, or none is left.
+        """
+        asked = {name: value for name, value in vars(self).items() if value is not None}
+        if not asked:
+            return scene
+        description = scene.description
+        if not isinstance(description, SceneDescription) or description.splats is None:
+            raise UsageError(
+                f"'{scene.name}' holds no Gaussian splats",
+                parameter=next(iter(asked)),
+                rule="it is for scenes that do",
+                fix="leave it out",
+            )
+        if self.unit_scale is not None and description.placements:
+            raise UsageError(
+                f"'{scene.name}' holds surfaces beside its splats",
+                parameter="unit_scale",
+                rule="it is for scenes of splats alone",
+                fix="leave it out",
+            )
+        splats = description.splats
+        if self.unit_scale is not None:
+            splats = moved(splats, scaling(self.unit_scale))
+            check_splats(splats, scene.name)
+        if self.crop is not None:
+            splats = _some(cropped(splats, np.array([self.crop[:3], self.crop[3:]])), "crop", scene.name)
+        if self.min_opacity is not None:
+            kept = splats.chosen(splats.opacities >= np.float32(self.min_opacity))
+            splats = _some(kept, "min_opacity", scene.name)
+        return replace(scene, description=replace(description, splats=splats))
+
+
+def _some(splats: Splats, parameter: str, name: str) -> Splats:
+    if splats.count == 0:
+        raise UsageError("leaves no Gaussian splat", where=name, parameter=parameter, fix="ask for less")
+    return splats

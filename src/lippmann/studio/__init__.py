@@ -1,0 +1,1 @@
+"""The studio: a display seen live while everything is set up by hand."""

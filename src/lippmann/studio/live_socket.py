@@ -1,0 +1,268 @@
+"""The WebSocket of a page: views come in, frames go out as fast as the page shows them, the newest first."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+import anyio.to_thread
+from starlette.websockets import WebSocket, WebSocketDisconnect
+
+from lippmann.display.pixel_window import PixelWindow
+from lippmann.errors import LippmannError, UsageError
+from lippmann.rendering.live.live_view import LiveView
+from lippmann.studio.command_line import render_command
+from lippmann.studio.page_values import facts_of_view, optics_of, shell_line, state_of_values, title_of, values_of_state
+from lippmann.studio.render_jobs import KINDS, Job
+from lippmann.studio.render_thread import Shown, Watcher
+from lippmann.studio.session import StudioSession, opened_state
+from lippmann.studio.state import StudioState
+from lippmann.studio.state_toml import text_of_state
+from lippmann.studio.wire import Coding, FrameHeader, encode_frame, number_of, numbers_of, parse_message
+
+#: Frames on their way that the page has not shown yet: one travels while the next is made.
+_MOST_ON_THE_WAY = 2
+
+#: Longest side of a picture in pixels, and the farthest that an eye may stand, in mm.
+_MOST_SIDE, _FARTHEST = 4096, 1e5
+_LARGEST_NUMBER = 2**32 - 1
+
+#: From so many samples on a picture is worth coding without loss.
+_LOSSLESS_FROM = 32
+
+
+class LiveSocket:
+    """One page of a studio.
+
+    Parameters
+    ----------
+    session:
+        What the page shows.
+    socket:
+        The accepted WebSocket.
+    coding:
+        How pictures are sent while they change.
+    follows:
+        Whether the page shows all native pixels of whatever state others set, as a panel does, and sets none.
+    """
+
+    def __init__(self, session: StudioSession, socket: WebSocket, coding: Coding, *, follows: bool = False) -> None:
+        self._session = session
+        self._socket = socket
+        self._coding = coding
+        self._follows = follows
+        self._loop = asyncio.get_running_loop()
+        self._changed = asyncio.Event()
+        self._messages: dict[str, dict[str, Any]] = {}
+        self._shown: Shown | None = None
+        self._sent = self._acknowledged = self._view = 0
+        self._told: tuple[object, ...] | None = None
+        self._states: dict[int, StudioState] = {}
+        self._watcher = Watcher(self._take_frame, self._take_error, self._take_busy)
+
+    async def run(self) -> None:
+        """Serve the page until it leaves."""
+        session = self._session
+        session.thread.add(self._watcher)
+        session.job_listeners.append(self._take_job)
+        session.state_listeners.append(self._take_state)
+        sender = asyncio.create_task(self._send_all())
+        try:
+            self._say(self._hello())
+            if session.jobs.last is not None:
+                self._say(session.jobs.last.message())
+            if self._follows:
+                self._want_all()
+            while True:
+                await self._receive()
+        except (WebSocketDisconnect, ConnectionError):
+            pass
+        finally:
+            session.job_listeners.remove(self._take_job)
+            session.state_listeners.remove(self._take_state)
+            session.thread.remove(self._watcher)
+            sender.cancel()
+
+    # ---- From the page ---------------------------------------------------------------------------------------------
+
+    async def _receive(self) -> None:
+        message = await self._socket.receive()
+        if message["type"] == "websocket.disconnect":
+            raise WebSocketDisconnect
+        try:
+            said = parse_message(message.get("text"))
+            handlers: dict[str, Callable[[dict[str, Any]], None]] = {
+                "shown": self._acknowledge,
+                **({} if self._follows else self._commands()),
+            }
+            if said["type"] not in handlers:
+                raise UsageError(f"'{said['type'][:40]}' is no message", rule=f"known are {', '.join(handlers)}")
+            handlers[said["type"]](said)
+        except LippmannError as error:
+            self._say({"type": "error", "line": str(error)})
+
+    def _commands(self) -> dict[str, Callable[[dict[str, Any]], None]]:
+        return {
+            "view": self._want,
+            "pick": self._pick,
+            "render": self._render,
+            "cancel": lambda _: self._session.jobs.cancel(),
+            "resume": lambda _: self._session.jobs.resume(),
+            "save": self._save,
+            "open": self._open,
+        }
+
+    def _acknowledge(self, said: dict[str, Any]) -> None:
+        self._acknowledged = max(self._acknowledged, min(self._sent, int(number_of(said, "frame", 0, _LARGEST_NUMBER))))
+        self._changed.set()
+
+    def _want(self, said: dict[str, Any]) -> None:
+        self._view = int(number_of(said, "number", 0, _LARGEST_NUMBER))
+        width, height = (max(1, round(side)) for side in numbers_of(said, "size", 2, _MOST_SIDE))
+        state = state_of_values(said.get("state"))
+        self._session.set_state(state)
+        make: Callable[[StudioState], LiveView]
+        if said.get("eye") is None:
+            left, top, columns, rows = (round(part) for part in numbers_of(said, "window", 4, _LARGEST_NUMBER))
+            panel = self._session.display(state).panel
+            left, top = min(max(left, 0), panel.width - 1), min(max(top, 0), panel.height - 1)
+            columns, rows = min(max(columns, 1), panel.width - left), min(max(rows, 1), panel.height - top)
+            window = PixelWindow(left, top, columns, rows)
+            make = lambda state: state.native_view(window)  # noqa: E731
+        else:
+            x, y, z = numbers_of(said, "eye", 3, _FARTHEST)
+            make = lambda state: state.view((x, y, z), (width, height))  # noqa: E731
+        self._session.thread.want(self._watcher, self._session.wanted(self._view, make))
+
+    def _want_all(self) -> None:
+        self._view += 1
+        wanted = self._session.wanted(self._view, lambda state: state.native_view())
+        self._session.thread.want(self._watcher, wanted)
+
+    def _pick(self, said: dict[str, Any]) -> None:
+        u, v = numbers_of(said, "place", 2, 1.0)
+
+        def tell(depth: float | None) -> None:
+            self._say_soon({"type": "picked", "depth": depth})
+
+        self._session.thread.pick(self._watcher, u, v, tell)
+
+    def _render(self, said: dict[str, Any]) -> None:
+        kind = said.get("kind")
+        if kind not in KINDS:
+            raise UsageError(f"{str(kind)[:40]!r} cannot be rendered", rule=f"known are {', '.join(KINDS)}")
+        self._session.render(kind)
+
+    def _save(self, _: dict[str, Any]) -> None:
+        state = self._session.state
+        stem = title_of(state).rpartition(".")[0] or title_of(state)
+        self._say({"type": "saved", "name": f"{stem}.toml", "text": text_of_state(state)})
+
+    def _open(self, said: dict[str, Any]) -> None:
+        text = said.get("text")
+        if not isinstance(text, str):
+            raise UsageError("this is no state", rule="the text of a TOML file")
+        state = opened_state(text, self._session.state)
+        self._session.check_files(state)
+        self._say({"type": "state", "state": values_of_state(state)})
+
+    # ---- From the studio, in other threads -------------------------------------------------------------------------
+
+    def _take_frame(self, shown: Shown) -> None:
+        self._soon(partial(self._put_frame, shown))
+
+    def _take_error(self, error: LippmannError) -> None:
+        self._say_soon({"type": "error", "line": str(error)})
+
+    def _take_busy(self, line: str | None) -> None:
+        self._say_soon({"type": "busy", "line": line})
+
+    def _take_job(self, job: Job) -> None:
+        self._say_soon(job.message())
+
+    def _take_state(self) -> None:
+        if self._follows:
+            self._soon(self._want_all)
+
+    def _say_soon(self, message: dict[str, Any]) -> None:
+        self._soon(partial(self._say, message))
+
+    def _soon(self, call: Callable[[], None]) -> None:
+        if not self._loop.is_closed():
+            self._loop.call_soon_threadsafe(call)
+
+    # ---- To the page -----------------------------------------------------------------------------------------------
+
+    def _hello(self) -> dict[str, Any]:
+        session, state = self._session, self._session.state
+        return {
+            "type": "hello",
+            "state": values_of_state(state),
+            "optics": optics_of(session.display(state), subpixels=state.subpixels),
+            "displays": session.display_names(),
+            "accepts_files": session.uploads is not None,
+            "has_renders": session.has_renders,
+        }
+
+    def _facts(self, shown: Shown) -> dict[str, Any] | None:
+        """What is to be said of a frame beside it; None if it has been."""
+        session, state, frame = self._session, self._session.state, shown.frame
+        display = session.display(state)
+        known = (state, display, round(frame.exposure, 3))
+        told, self._told = self._told, known
+        if told == known:
+            return None
+        is_new = told is None or told[1] is not display
+        return {
+            "type": "facts",
+            "title": title_of(state),
+            "command": shell_line(render_command(state)),
+            "optics": optics_of(display, subpixels=state.subpixels) if is_new else None,
+            **facts_of_view(display, frame.placement, frame.exposure),
+        }
+
+    def _put_frame(self, shown: Shown) -> None:
+        facts = self._facts(shown)
+        if facts is not None:
+            self._say(facts)
+        self._shown = shown
+        self._changed.set()
+
+    def _say(self, message: dict[str, Any]) -> None:
+        """Say something, in place of anything of the same type that has not been said yet."""
+        self._messages[message["type"]] = message
+        self._changed.set()
+
+    async def _send_all(self) -> None:
+        while True:
+            await self._changed.wait()
+            self._changed.clear()
+            while self._messages:
+                message = self._messages.pop(next(iter(self._messages)))
+                await self._socket.send_text(json.dumps(message, allow_nan=False))
+            if self._shown is not None and self._sent - self._acknowledged < _MOST_ON_THE_WAY:
+                shown, self._shown = self._shown, None
+                await self._send_frame(shown)
+                self._changed.set()
+
+    async def _send_frame(self, shown: Shown) -> None:
+        frame = shown.frame
+        height, width = frame.pixels.shape[:2]
+        is_good = self._follows or shown.is_final or frame.samples >= _LOSSLESS_FROM
+        header = FrameHeader(
+            "png" if is_good and self._coding == "jpeg" else self._coding,
+            self._sent + 1,
+            shown.number,
+            width,
+            height,
+            frame.samples,
+            sum(frame.seconds.values()),
+            shown.is_final,
+            frame.is_denoised,
+        )
+        body = await anyio.to_thread.run_sync(encode_frame, header, frame.pixels)
+        self._sent += 1
+        await self._socket.send_bytes(body)

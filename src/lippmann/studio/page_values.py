@@ -1,0 +1,135 @@
+"""A state as the page has it: an object of JSON with all fields of :class:`StudioState`, and what the page displays."""
+
+from __future__ import annotations
+
+import math
+import os
+import re
+import shlex
+import subprocess
+import types
+from collections.abc import Mapping
+from dataclasses import asdict, fields
+from functools import cache
+from pathlib import Path
+from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
+
+from lippmann.display import Display
+from lippmann.errors import UsageError
+from lippmann.scene.placement import Placement
+from lippmann.studio.state import StudioState
+from lippmann.viewer.manifest import optics
+
+#: Longest text of a field: a path or a short form.
+_MOST_TEXT = 4096
+
+#: Settings as warnings name them for programs.
+_PARAMETER = re.compile(r"\b([a-z]+(?:_[a-z]+)*)=(\S+)")
+
+
+def values_of_state(state: StudioState) -> dict[str, object]:
+    """Fields of a state as types of JSON."""
+    return {name: list(value) if isinstance(value, tuple) else value for name, value in asdict(state).items()}
+
+
+def state_of_values(values: object) -> StudioState:
+    """State of fields as types of JSON; fields left out have their default.
+
+    Raises
+    ------
+    UsageError
+        A field is unknown, or a value is of another type or out of its range.
+    """
+    if not isinstance(values, Mapping):
+        raise UsageError("the state will not do", rule="an object of JSON")
+    kinds = _kinds()
+    found: dict[str, Any] = {}
+    for name, value in values.items():
+        if name not in kinds:
+            raise UsageError(f"'{str(name)[:60]}' is no setting", rule=f"known are {', '.join(kinds)}")
+        found[name] = _value_of(kinds[name], value, name)
+    return StudioState(**found)
+
+
+def facts_of_view(display: Display, placement: Placement, exposure: float) -> dict[str, object]:
+    """What the page displays of a picture beside it: depth (mm toward the viewer), warnings, automatic values."""
+    return {
+        "depth": {"scene": _pair(placement.depth_range), "sharp": _pair(placement.resolvable_range)},
+        "warnings": [_in_words(line) for line in placement.warnings],
+        "depth_scale": placement.depth_scale,
+        "exposure": exposure,
+        "display_facts": _display_facts(display),
+    }
+
+
+def optics_of(display: Display, *, subpixels: bool | None) -> dict[str, object]:
+    """Geometry of a display for the page's eye; see :func:`lippmann.viewer.manifest.optics`."""
+    return optics(display, subpixels=bool(subpixels))
+
+
+def title_of(state: StudioState) -> str:
+    """Name of a state's scene for people."""
+    return Path(state.scene).name
+
+
+def _display_facts(display: Display) -> list[list[str]]:
+    grid, panel, (across, down) = display.lens_grid, display.panel, display.pixels_per_lens
+    width, height = display.size_mm
+    rows = [
+        ("Panel", f"{panel.width} x {panel.height} pixels"),
+        ("Size", f"{width:.4g} x {height:.4g} mm"),
+        ("Lenses", f"{grid.columns}" + ("" if down is None else f" x {grid.rows}")),
+        ("Pixels per lens", f"{across:.3g}" + ("" if down is None else f" x {down:.3g}")),
+        ("Field of view", f"{display.field_of_view:.3g}°"),
+    ]
+    if math.isfinite(display.viewing_distance):
+        rows.append(("Viewing distance", f"{display.viewing_distance:.4g} mm"))
+    return [list(row) for row in rows]
+
+
+def _in_words(warning: str) -> str:
+    return _PARAMETER.sub(lambda found: f"{found[1].replace('_', ' ')} {found[2]}", warning)
+
+
+def _pair(ends: tuple[float, float]) -> list[float | None]:
+    return [end if math.isfinite(end) else None for end in ends]
+
+
+@cache
+def _kinds() -> dict[str, Any]:
+    hints = get_type_hints(StudioState)
+    return {field.name: hints[field.name] for field in fields(StudioState)}
+
+
+def _value_of(kind: Any, value: object, name: str) -> Any:
+    """``value`` as the annotated type ``kind``."""
+    origin, arguments = get_origin(kind), get_args(kind)
+    if origin in (Union, types.UnionType):
+        for each in arguments:
+            try:
+                return _value_of(each, value, name)
+            except UsageError:
+                continue
+    elif origin is Literal:
+        if isinstance(value, str) and value in arguments:
+            return value
+    elif origin is tuple:
+        if isinstance(value, list) and len(value) == len(arguments):
+            return tuple(_value_of(float, part, name) for part in value)
+    elif kind is type(None):
+        if value is None:
+            return None
+    elif kind is float:
+        if isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) < 1e12:
+            return float(value)
+    elif kind is str:
+        if isinstance(value, str) and 0 < len(value) <= _MOST_TEXT and value.isprintable():
+            return value
+    elif kind in (int, bool) and type(value) is kind:
+        return value
+    raise UsageError(f"{str(value)[:60]!r} will not do", parameter=name, rule="a value of the setting's type")
+
+
+def shell_line(words: list[str]) -> str:
+    """The words as one line to paste into the system's shell."""
+    return subprocess.list2cmdline(words) if os.name == "nt" else shlex.join(words)

@@ -1,0 +1,45 @@
+"""Content of the window that ``lippmann show`` puts on a display: one picture, native pixels one to one.
+
+GET /                         the window
+GET /panel.json               size of the display
+GET /assets/..., /viewer/...  scripts, style sheets, the icon
+GET /pictures/0/...           manifest and tiles of the picture, as the viewer's server has them
+"""
+
+from __future__ import annotations
+
+from http import HTTPStatus
+
+from lippmann.studio.pages import static_files
+from lippmann.viewer.responses import RefusedError, Request, Response, json_response
+from lippmann.viewer.served_picture import PictureFile
+from lippmann.viewer.server import ViewerSite
+
+
+class PanelSite:
+    """The window for one picture; a :class:`~lippmann.viewer.responses.Site`."""
+
+    def __init__(self, picture: PictureFile) -> None:
+        self._picture = picture
+        self._viewer = ViewerSite([picture])
+        self._static = {f"/{name}": found for name, found in static_files().items() if name not in ("", "panel")}
+        self._static["/"] = static_files()["panel"]
+
+    def get(self, request: Request) -> Response:
+        if request.path in self._static:
+            return self._static[request.path]
+        if request.path == "/panel.json":
+            return json_response(self._size())
+        # The viewer's own page and files are not part of this one.
+        if not request.path.startswith("/pictures/"):
+            raise RefusedError(HTTPStatus.NOT_FOUND, "there is nothing here")
+        return self._viewer.get(request)
+
+    def post(self, request: Request, body: bytes) -> Response:
+        raise RefusedError(HTTPStatus.METHOD_NOT_ALLOWED, "nothing is taken here")
+
+    def _size(self) -> dict[str, object]:
+        manifest = self._picture.current().manifest
+        tiles = manifest["tiles"]
+        assert isinstance(tiles, dict)
+        return {"width": tiles["width"], "height": tiles["height"], "name": manifest["display"], "live": None}

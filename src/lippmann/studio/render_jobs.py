@@ -1,0 +1,273 @@
+"""Full renders beside the live picture: each is a command line, run in a process of its own.
+
+A process can be stopped at once, keeps what it needs of memory to itself, and leaves the engine of the studio to the
+live picture. What is run is what the page shows to copy.
+"""
+
+from __future__ import annotations
+
+import re
+import shlex
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Literal
+
+from lippmann.errors import UsageError
+from lippmann.runtime.child_python import python_command
+
+Kind = Literal["picture", "quilt", "turntable", "print"]
+Phase = Literal["running", "done", "failed", "cancelled"]
+
+KINDS: tuple[Kind, ...] = ("picture", "quilt", "turntable", "print")
+
+#: Frames of a turntable; a loop of two seconds.
+TURNTABLE_FRAMES = 48
+#: Margin with alignment marks around a print.
+PRINT_MARGIN = "10mm"
+
+_ENDINGS: dict[Kind, str] = {"picture": ".png", "quilt": ".png", "turntable": ".mp4", "print": ".tif"}
+
+_SHOWS: dict[Kind, Literal["picture", "image", "film", "file"]] = {
+    "picture": "picture",
+    "quilt": "image",
+    "turntable": "film",
+    "print": "file",
+}
+
+_PROGRESS = re.compile(r"(\d{1,3}) %: (.{1,200})")
+
+#: Options of ``lippmann render`` that quilts, whose views have no sub-pixels, lack.
+_NOT_FOR_QUILTS = ("--subpixels", "--no-subpixels")
+
+_CODE = "from lippmann.cli.render_process import main; main()"
+
+
+@dataclass(frozen=True)
+class Job:
+    """A full render.
+
+    Attributes
+    ----------
+    number:
+        Counted from 1.
+    kind, words:
+        What is made, and its command line from ``lippmann`` on.
+    output:
+        The file that it makes.
+    phase, share, stage:
+        How far it is: ``share`` is 0 to 1, or None while that is unknown.
+    line:
+        The last line of an ended one: its result, or what went wrong.
+    can_resume:
+        Whether a cancelled or failed one goes on where it stopped.
+    """
+
+    number: int
+    kind: Kind
+    words: tuple[str, ...]
+    output: Path
+    phase: Phase = "running"
+    share: float | None = None
+    stage: str = ""
+    line: str = ""
+    can_resume: bool = False
+
+    @property
+    def shows(self) -> Literal["picture", "image", "film", "file"]:
+        """How the page can show the output: as its display does, as it is, as a film, or not at all."""
+        return _SHOWS[self.kind]
+
+    def message(self) -> dict[str, object]:
+        """The job as a message for the page."""
+        return {
+            "type": "job",
+            "number": self.number,
+            "kind": self.kind,
+            "name": self.output.name,
+            "phase": self.phase,
+            "share": self.share,
+            "stage": self.stage,
+            "line": self.line,
+            "can_resume": self.can_resume,
+            "shows": self.shows,
+            "command": shlex.join(self.words),
+        }
+
+
+def command_of(kind: Kind, words: list[str], output: Path) -> tuple[str, ...]:
+    """Command line that makes ``output``.
+
+    Parameters
+    ----------
+    kind:
+        What to make.
+    words:
+        ``lippmann render`` of the state, with all its options.
+    output:
+        A new file.
+    """
+    head, options = words[:2], _without(words[2:], ("-o", "--output"), has_value=True)
+    if kind == "quilt":
+        return ("lippmann", "quilt", "render", *_without(options, _NOT_FOR_QUILTS), "-o", str(output))
+    if kind == "turntable":
+        frames = output.with_name(f"{output.stem}-frames")
+        film = ("--turntable", str(TURNTABLE_FRAMES), "--video", str(output), "--resume")
+        return (*head, *options, *film, "-o", str(frames))
+    if kind == "print":
+        return (*head, *options, "--marks", PRINT_MARGIN, "-o", str(output))
+    return (*head, *options, "--resume", "-o", str(output))
+
+
+class JobRunner:
+    """Runs one full render at a time.
+
+    Parameters
+    ----------
+    folder:
+        Where outputs are written.
+    changed:
+        Called with the job after every change, in a thread of the runner.
+    """
+
+    def __init__(self, folder: Path, changed: Callable[[Job], None]) -> None:
+        self._folder = folder
+        self._changed = changed
+        self._lock = threading.Lock()
+        self._process: subprocess.Popen[str] | None = None
+        self._is_cancelled = False
+        self._jobs: list[Job] = []
+
+    @property
+    def last(self) -> Job | None:
+        """The last job."""
+        return self._jobs[-1] if self._jobs else None
+
+    def finished(self, number: int) -> Job | None:
+        """The job of this number if it is done."""
+        with self._lock:
+            found = self._jobs[number - 1] if 1 <= number <= len(self._jobs) else None
+        return found if found is not None and found.phase == "done" else None
+
+    def start(self, kind: Kind, words: list[str], stem: str, ending: str | None = None) -> None:
+        """Begin a render.
+
+        Parameters
+        ----------
+        kind, words:
+            As for :func:`command_of`.
+        stem, ending:
+            Beginning and end of the output's name; a number comes between them where a file of that name exists.
+
+        Raises
+        ------
+        UsageError
+            If one is running.
+        """
+        with self._lock:
+            self._check_idle()
+            output = self._new_file(stem, ending or _ENDINGS[kind])
+            self._jobs.append(Job(len(self._jobs) + 1, kind, command_of(kind, words, output), output))
+            self._launch()
+
+    def resume(self) -> None:
+        """Go on with the last render, if it can be; a UsageError otherwise."""
+        with self._lock:
+            self._check_idle()
+            job = self.last
+            if job is None or not job.can_resume:
+                raise UsageError("there is nothing to go on with", fix="start a render")
+            self._jobs[-1] = replace(job, phase="running", share=None, stage="", line="", can_resume=False)
+            self._launch()
+
+    def cancel(self) -> None:
+        """End the render that runs, as Ctrl-C does."""
+        with self._lock:
+            if self._process is not None:
+                self._is_cancelled = True
+                self._process.send_signal(signal.SIGINT if sys.platform != "win32" else signal.SIGTERM)
+
+    def close(self) -> None:
+        """End the render that runs, and wait for its end."""
+        self.cancel()
+        process = self._process
+        if process is not None:
+            try:
+                process.wait(10.0)
+            except subprocess.TimeoutExpired:
+                process.kill()
+
+    def _check_idle(self) -> None:
+        if self._process is not None:
+            raise UsageError("a render is running", fix="cancel it, or wait for its end")
+
+    def _new_file(self, stem: str, ending: str) -> Path:
+        number = 1
+        while True:
+            path = self._folder / f"{stem}{'' if number == 1 else f'-{number}'}{ending}"
+            if not path.exists() and all(job.output != path for job in self._jobs):
+                return path
+            number += 1
+
+    def _launch(self) -> None:
+        job = self._jobs[-1]
+        command, environment = python_command(_CODE, *job.words[1:])
+        self._is_cancelled = False
+        self._process = subprocess.Popen(
+            command,
+            cwd=self._folder,
+            env=environment,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+            text=True,
+            encoding="utf-8",
+            errors="replace",
+        )
+        threading.Thread(target=self._watch, args=(self._process,), daemon=True).start()
+        self._changed(job)
+
+    def _watch(self, process: subprocess.Popen[str]) -> None:
+        """Read what the process says until it ends."""
+        said = ""
+        assert process.stderr is not None
+        with process.stderr:
+            for line in process.stderr:
+                told = _PROGRESS.match(line)
+                if told is None:
+                    said = line.strip()[:500] or said
+                else:
+                    self._update(share=min(1.0, int(told[1]) / 100), stage=told[2].strip())
+        code = process.wait()
+        with self._lock:
+            self._process = None
+            job = self._jobs[-1]
+            is_done = code == 0 and job.output.exists()
+            phase: Phase = "done" if is_done else "cancelled" if self._is_cancelled else "failed"
+            line = said.removeprefix("lippmann: ") if phase == "failed" else str(job.output) if is_done else ""
+            can_resume = not is_done and "--resume" in job.words
+            job = self._jobs[-1] = replace(job, phase=phase, line=line, can_resume=can_resume)
+        self._changed(job)
+
+    def _update(self, *, share: float, stage: str) -> None:
+        with self._lock:
+            job = self._jobs[-1] = replace(self._jobs[-1], share=share, stage=stage)
+        self._changed(job)
+
+
+def _without(words: list[str], options: tuple[str, ...], *, has_value: bool = False) -> list[str]:
+    """The words without these options and, if they have some, their values."""
+    kept: list[str] = []
+    skips = False
+    for word in words:
+        if skips:
+            skips = False
+        elif word in options:
+            skips = has_value
+        else:
+            kept.append(word)
+    return kept

@@ -1,0 +1,191 @@
+"""What a studio is about: its state, the files that it was given, the thread that renders, and full renders."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from lippmann.display import Display, list_displays
+from lippmann.display.formats.inline_spec import is_short_form
+from lippmann.errors import UsageError
+from lippmann.scene import bundled
+from lippmann.studio.command_line import render_command
+from lippmann.studio.render_jobs import Job, JobRunner, Kind
+from lippmann.studio.render_thread import Renderer, RenderThread, Wanted, Watcher
+from lippmann.studio.state import StudioState
+from lippmann.studio.state_toml import state_of_text
+from lippmann.studio.uploads import Uploads
+from lippmann.viewing.replay import default_eye
+
+if TYPE_CHECKING:
+    from lippmann.rendering.live.live_view import LiveView
+    from lippmann.scene.scene import Scene
+#: Width and height of the picture that warms kernels up.
+_FIRST_SIZE = (256, 256)
+
+
+class StudioSession:
+    """State and work of one studio, which several pages may watch. Safe for use from several threads.
+
+    Parameters
+    ----------
+    state:
+        The first state. Its files are open to the pages; other files are not.
+    uploads:
+        Folder for dropped files; None if none may be dropped.
+    outputs:
+        Folder that renders are written into.
+    make_renderer:
+        Makes the live renderer of a scene and a display.
+    allow_outside:
+        Whether scenes may name files outside their folders.
+    scene:
+        An object to show in place of the file that the state names; full renders are then not offered.
+    """
+
+    def __init__(
+        self,
+        state: StudioState,
+        *,
+        uploads: Uploads | None,
+        outputs: Path,
+        make_renderer: Callable[[Scene, Display], Renderer],
+        allow_outside: bool = False,
+        scene: Scene | None = None,
+    ) -> None:
+        self._lock = threading.Lock()
+        self._state = state
+        self._scene = scene
+        self._allow_outside = allow_outside
+        self._displays: dict[str, Display] = {}
+        self._presets = {display.name: display for display in list_displays()}
+        self._files = {name for name in (state.scene, state.environment, state.display) if name is not None}
+        self.uploads = uploads
+        self.has_renders = scene is None
+        self.job_listeners: list[Callable[[Job], None]] = []
+        self.state_listeners: list[Callable[[], None]] = []
+        self.jobs = JobRunner(outputs, self._job_changed)
+        self.thread = RenderThread(make_renderer)
+
+    @property
+    def state(self) -> StudioState:
+        """The last state that was set."""
+        with self._lock:
+            return self._state
+
+    def set_state(self, state: StudioState) -> None:
+        """Take over a state.
+
+        Raises
+        ------
+        UsageError, DisplayError
+            It names a file that was not opened, or its display does not exist.
+        """
+        if state == self._state:
+            return
+        self.check_files(state)
+        self.display(state)
+        with self._lock:
+            self._state = state
+        for listener in tuple(self.state_listeners):
+            listener()
+
+    def check_files(self, state: StudioState) -> None:
+        """Raise :class:`UsageError` if a state names a file that was not opened."""
+        with self._lock:
+            scenes = {*self._files, *bundled.names()}
+            opened = {"scene": scenes, "environment": self._files, "display": {*self._files, *self._presets}}
+        for name, known in opened.items():
+            value = getattr(state, name)
+            if value is None or value in known or (name == "display" and is_short_form(value)):
+                continue
+            rule = "the page opens what the command was given, and what is dropped onto it"
+            raise UsageError(f"'{Path(value).name[:80]}' was not opened", parameter=name, rule=rule)
+
+    def open_file(self, path: Path) -> None:
+        """Let the pages use a file."""
+        with self._lock:
+            self._files.add(str(path))
+
+    def display(self, state: StudioState) -> Display:
+        """The display of a state."""
+        with self._lock:
+            found = self._displays.get(state.display)
+        if found is None:
+            found = state.load_display()
+            with self._lock:
+                self._displays[state.display] = found
+        return found
+
+    def display_names(self) -> list[tuple[str, list[tuple[str, str]]]]:
+        """Presets for a list: groups of names and titles."""
+        groups: dict[str, list[tuple[str, str]]] = {"Panels and lens arrays": [], "Looking Glass": [], "Prints": []}
+        for name, display in self._presets.items():
+            kind = "Looking Glass" if name.startswith("looking") else "Prints" if "print" in name else None
+            groups[kind or "Panels and lens arrays"].append((name, display.title or name))
+        return list(groups.items())
+
+    def wanted(self, number: int, view: Callable[[StudioState], LiveView]) -> Wanted:
+        """What to render for a view of the present state."""
+        state = self.state
+        scene = self._scene
+        key = ("object",) if scene else (state.scene, state.environment, state.background, state.up)
+        load = (lambda: scene) if scene else (lambda: state.load_scene(allow_outside=self._allow_outside))
+        return Wanted(number, key, load, self.display(state), view(state))
+
+    def command(self, state: StudioState) -> list[str]:
+        """The command line that renders a state."""
+        return render_command(state)
+
+    def render(self, kind: Kind) -> None:
+        """Begin a full render of the present state; a UsageError if one is running."""
+        if not self.has_renders:
+            raise UsageError("a scene made by a program has no command line", fix="render it by lippmann.render")
+        state = self.state
+        words = self.command(state)
+        ending: str | None = None
+        if kind == "quilt":
+            from lippmann.quilts.quilt import quilt_of_display
+
+            ending = f"{quilt_of_display(self.display(state), None, None).layout.ending}.png"
+        elif kind == "print" and not _is_print(self.display(state)):
+            raise UsageError(f"{self.display(state).name} is no print", fix="choose a print, or render a picture")
+        display = state.display if state.display in self._presets else self.display(state).name
+        self.jobs.start(kind, words, f"{Path(state.scene).stem}-{display}", ending)
+
+    def warm_up(self) -> None:
+        """Begin to load the scene and to compile its kernels, before a page asks for a frame."""
+        watcher = Watcher(lambda _: self.thread.remove(watcher), lambda _: self.thread.remove(watcher))
+        self.thread.add(watcher)
+        eye = default_eye(self.display(self.state))
+        self.thread.want(watcher, self.wanted(0, lambda state: state.view(eye, _FIRST_SIZE)))
+
+    def close(self) -> None:
+        """End all work."""
+        self.jobs.close()
+        self.thread.close()
+
+    def _job_changed(self, job: Job) -> None:
+        self.thread.gather(job.phase != "running")
+        for listener in tuple(self.job_listeners):
+            listener(job)
+
+
+def _is_print(display: Display) -> bool:
+    return display.name.startswith("print")
+
+
+def opened_state(text: str, current: StudioState) -> StudioState:
+    """State of a TOML file's text. A scene file is the present one, if that has its name.
+
+    Raises
+    ------
+    UsageError
+        The text is no state.
+    """
+    state = state_of_text(text)
+    same = Path(state.scene).name == Path(current.scene).name
+    return replace(state, scene=current.scene) if same else state

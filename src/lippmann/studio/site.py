@@ -1,0 +1,130 @@
+"""The studio's server, as an ASGI application below a secret folder.
+
+    GET  /                                      the studio's page
+    GET  /panel                                 the window for the display itself
+    GET  /panel.json                            size of the display, and what the window shows
+    GET  /assets/NAME, /viewer/NAME             scripts, style sheets, the icon
+    GET  /pictures/N/...                        manifest and tiles of the picture that the Nth render made
+    GET  /results/N/NAME                        the file that it made
+    POST /files/NAME                            a model or an environment dropped onto the page
+    WS   /live, /live-panel                     frames and messages, see live_socket.py
+
+All other paths are refused, and so are all without the folder's name, which only the printed address tells.
+"""
+
+from __future__ import annotations
+
+from http import HTTPStatus
+
+import anyio.to_thread
+from starlette.requests import Request as ServerRequest
+from starlette.responses import FileResponse, Response
+from starlette.routing import BaseRoute, Route, Router, WebSocketRoute
+from starlette.websockets import WebSocket
+
+from lippmann.errors import PictureError
+from lippmann.studio.live_socket import LiveSocket
+from lippmann.studio.pages import static_files
+from lippmann.studio.session import StudioSession
+from lippmann.studio.wire import Coding
+from lippmann.viewer.request_guard import Receive, Scope, Send, send_response
+from lippmann.viewer.responses import RefusedError, Request, json_response, not_found
+from lippmann.viewer.responses import Response as PlainResponse
+from lippmann.viewer.served_picture import PictureFile
+from lippmann.viewer.server import ViewerSite
+
+#: Pages at a time; each has a socket.
+MOST_PAGES = 8
+
+
+class StudioSite:
+    """Routes of a studio.
+
+    Parameters
+    ----------
+    session:
+        What the pages show.
+    coding:
+        How pictures are sent while they change: ``rgb`` within one machine, ``jpeg`` through a wire.
+    """
+
+    def __init__(self, session: StudioSession, coding: Coding = "jpeg") -> None:
+        self._session = session
+        self._coding = coding
+        self._pictures: dict[int, ViewerSite] = {}
+        self._pages = 0
+        routes: list[BaseRoute] = [
+            Route("/panel.json", self._panel),
+            Route("/pictures/{number:int}/{rest:path}", self._picture),
+            Route("/results/{number:int}/{name}", self._result),
+            Route("/files/{name}", self._file, methods=["POST"]),
+            WebSocketRoute("/live", self._live),
+            WebSocketRoute("/live-panel", self._live_panel),
+        ]
+        self._router = Router(routes, redirect_slashes=False, default=_static)
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        await self._router(scope, receive, send)
+
+    async def _live(self, socket: WebSocket) -> None:
+        await self._serve(socket, follows=False)
+
+    async def _live_panel(self, socket: WebSocket) -> None:
+        await self._serve(socket, follows=True)
+
+    async def _serve(self, socket: WebSocket, *, follows: bool) -> None:
+        if self._pages >= MOST_PAGES:
+            raise RefusedError(HTTPStatus.SERVICE_UNAVAILABLE, "the studio is open in too many pages; close some")
+        self._pages += 1
+        try:
+            await socket.accept()
+            await LiveSocket(self._session, socket, self._coding, follows=follows).run()
+        finally:
+            self._pages -= 1
+
+    async def _panel(self, request: ServerRequest) -> Response:
+        display = self._session.display(self._session.state)
+        panel = display.panel
+        size = {"width": panel.width, "height": panel.height, "name": display.title or display.name}
+        return _as_response(json_response({**size, "live": "live-panel"}))
+
+    async def _picture(self, request: ServerRequest) -> Response:
+        number, rest = request.path_params["number"], request.path_params["rest"]
+        job = self._session.jobs.finished(number)
+        if job is None or job.shows != "picture":
+            raise not_found()
+        if number not in self._pictures:
+            try:
+                self._pictures[number] = ViewerSite([PictureFile(job.output)])
+            except PictureError as error:
+                raise RefusedError(HTTPStatus.NOT_FOUND, str(error)) from None
+        plain = Request(f"/pictures/0/{rest}", request.headers)
+        found = await anyio.to_thread.run_sync(self._pictures[number].get, plain)
+        return _as_response(found)
+
+    async def _result(self, request: ServerRequest) -> Response:
+        job = self._session.jobs.finished(request.path_params["number"])
+        if job is None or request.path_params["name"] != job.output.name or not job.output.is_file():
+            raise not_found()
+        return FileResponse(job.output)
+
+    async def _file(self, request: ServerRequest) -> Response:
+        if self._session.uploads is None:
+            raise not_found()
+        path = await self._session.uploads.receive(request.path_params["name"], request)
+        self._session.open_file(path)
+        return _as_response(json_response({"path": str(path)}))
+
+
+async def _static(scope: Scope, receive: Receive, send: Send) -> None:
+    path = scope["path"].removeprefix("/")
+    found = static_files().get(path)
+    if scope["type"] != "http" or found is None:
+        raise not_found()
+    if scope["method"] == "POST":
+        raise RefusedError(HTTPStatus.METHOD_NOT_ALLOWED, "nothing is taken here")
+    await send_response(send, found)
+
+
+def _as_response(plain: PlainResponse) -> Response:
+    return Response(plain.body, int(plain.status), dict(plain.headers), plain.kind)

@@ -1,0 +1,221 @@
+"""Studio states as TOML files: a line for each setting, by the names of the options of ``lippmann render``.
+
+Names have ``_`` for ``-``, and several numbers are a list::
+
+    scene = "models/dragon.glb"     # beside this file, or absolute, or a bundled scene's name
+    display = "looking-glass-portrait"
+    turn = [30.0, 10.0, 0.0]
+    light_turn = [20.0, 0.0]
+    exposure = 0.5
+
+What a file does not say is as in a new studio. Files that a state names are found beside it.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import sys
+from collections.abc import Callable, Mapping
+from dataclasses import fields
+from pathlib import Path
+from typing import Any, cast
+
+from lippmann.errors import UsageError
+from lippmann.runtime.atomic_write import replacing
+from lippmann.runtime.regular_file import check_kind
+from lippmann.scene.parsing.name_hints import closest_name_hint
+from lippmann.studio.state import StudioState
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
+_MOST_BYTES = 1_000_000  # a picture given by mistake is not read to its end
+_KIND = "a state is a TOML file that the studio wrote"
+
+#: Settings that name files, beside their other meanings.
+_FILES = ("scene", "display", "environment")
+
+
+def read_state(path: Path) -> StudioState:
+    """The state of a file.
+
+    Raises
+    ------
+    UsageError
+        The file cannot be read, is no TOML, or holds a setting that is unknown or will not do; with file and line.
+    """
+    check_kind(path, UsageError)
+    try:
+        with path.open("rb") as file:
+            content = file.read(_MOST_BYTES + 1)
+        if len(content) > _MOST_BYTES:
+            raise UsageError("this file is too large", where=str(path), rule=_KIND)
+        text = content.decode("utf-8")
+    except UnicodeDecodeError:
+        raise UsageError("this is not a text file", where=str(path), rule=_KIND) from None
+    except OSError as error:
+        raise UsageError(f"cannot be read: {error.strerror}", where=str(path), rule=_KIND) from None
+    return state_of_text(text, where=str(path), folder=path.parent)
+
+
+def write_state(state: StudioState, path: Path) -> None:
+    """Write a state to a file, which appears whole or not at all.
+
+    Raises
+    ------
+    OutputError
+        The file cannot be written.
+    """
+    text = text_of_state(state, path.parent)
+    with replacing(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
+def state_of_text(text: str, *, where: str = "state", folder: Path | None = None) -> StudioState:
+    """The state that a text describes; ``folder`` is where the files that it names are found.
+
+    Raises
+    ------
+    UsageError
+        As :func:`read_state`; ``where`` stands for the file.
+    """
+    try:
+        values = tomllib.loads(text)
+    except (ValueError, RecursionError) as error:  # also numbers of absurd length, lists in lists in lists
+        raise _syntax_error(str(error), where) from None
+    known = [each.name for each in fields(StudioState)]
+    settings: dict[str, Any] = {}
+    for name, value in values.items():
+        place = f"{where}:{_line_of(text, name)}"
+        if name not in known:
+            rule, fix = "settings are the options of lippmann render with _ for -", closest_name_hint(name, known)
+            raise UsageError(f"'{name}' is no setting", where=place, rule=rule, fix=fix or "leave it out")
+        try:
+            settings[name] = _RULES[name](value)
+            # Alone, so that the line of what is wrong is known; what goes together is checked below.
+            StudioState(**{name: settings[name]}) if name != "pop_out" else None
+        except UsageError as error:
+            what = error.what if error.what else repr(value)
+            raise UsageError(what, where=place, parameter=name, rule=error.rule, fix=error.fix) from None
+        if folder is not None and name in _FILES:
+            settings[name] = _found(settings[name], folder)
+    try:
+        return StudioState(**settings)
+    except UsageError as error:
+        line = _line_of(text, error.parameter if error.parameter in values else next(iter(values)))
+        place = f"{where}:{line}"
+        raise UsageError(error.what, where=place, parameter=error.parameter, rule=error.rule, fix=error.fix) from None
+
+
+def text_of_state(state: StudioState, folder: Path | None = None) -> str:
+    """A state as TOML: scene, display, and what differs from a new studio.
+
+    ``folder`` is where the file will lie: names of files in it or below it are told from there.
+    """
+    plain = StudioState()
+    lines = []
+    for each in fields(StudioState):
+        value = getattr(state, each.name)
+        if value is None or (value == getattr(plain, each.name) and each.name not in ("scene", "display")):
+            continue
+        if folder is not None and each.name in _FILES:
+            value = _told_from(value, folder)
+        lines.append(f"{each.name} = {_toml(value)}")
+    return "\n".join(lines) + "\n"
+
+
+def _toml(value: object) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, str):
+        # JSON's strings are TOML's, but for this one control character.
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007F")
+    if isinstance(value, tuple):
+        return f"[{', '.join(_toml(float(part)) for part in value)}]"
+    return repr(value)
+
+
+def _found(name: str, folder: Path) -> str:
+    """A file's name as seen from the working directory, if there is such a file in ``folder``; else the name itself."""
+    path = folder / name
+    return str(path) if not Path(name).is_absolute() and path.is_file() else name
+
+
+def _told_from(name: str, folder: Path) -> str:
+    path = Path(name)
+    if not path.is_file():
+        return name
+    absolute, base = path.resolve(), folder.resolve()
+    return absolute.relative_to(base).as_posix() if absolute.is_relative_to(base) else str(absolute)
+
+
+def _syntax_error(message: str, where: str) -> UsageError:
+    """One line for what the TOML parser says, which names the line last."""
+    found = re.search(r"\(at line (\d+), column \d+\)", message)
+    place = f"{where}:{found[1]}" if found else where
+    return UsageError(f"not valid TOML: {message}", where=place, rule=_KIND)
+
+
+def _line_of(text: str, name: str) -> int:
+    for number, line in enumerate(text.split("\n"), start=1):
+        if re.match(rf"\s*[\[\"']*{re.escape(name)}[\]\"']*\s*([=.]|$)", line):
+            return number
+    return 1
+
+
+def _word(value: object) -> str:
+    if not isinstance(value, str):
+        raise UsageError(_shown(value), rule="a text in quotation marks")
+    return value
+
+
+def _number(value: object) -> float:
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        raise UsageError(_shown(value), rule="a number")
+    return float(value)
+
+
+def _whole(value: object) -> int:
+    if isinstance(value, bool) or not isinstance(value, int):
+        raise UsageError(_shown(value), rule="a whole number")
+    return value
+
+
+def _switch(value: object) -> bool:
+    if not isinstance(value, bool):
+        raise UsageError(_shown(value), rule="true or false")
+    return value
+
+
+def _exposure(value: object) -> float | str:
+    return value if value == "auto" and isinstance(value, str) else _number(value)
+
+
+def _numbers(count: int) -> Callable[[object], tuple[float, ...]]:
+    def read(value: object) -> tuple[float, ...]:
+        if not isinstance(value, list) or len(value) != count:
+            raise UsageError(_shown(value), rule=f"a list of {count} numbers")
+        return tuple(_number(part) for part in value)
+
+    return read
+
+
+def _shown(value: object) -> str:
+    text = repr(value)
+    return text if len(text) <= 60 else f"{text[:57]}..."
+
+
+_RULES: Mapping[str, Callable[[object], object]] = {
+    **dict.fromkeys(("scene", "display", "up", "environment", "camera", "place"), _word),
+    **dict.fromkeys(("tone_map", "integrator", "method", "pixel_filter", "denoise", "caustics"), _word),
+    **dict.fromkeys(("background", "turn", "shift", "eye"), _numbers(3)),
+    "light_turn": _numbers(2),
+    **dict.fromkeys(("scale", "depth_scale", "pop_out", "light_strength", "environment_strength"), _number),
+    **dict.fromkeys(("quality", "max_time", "clamp_indirect"), _number),
+    **dict.fromkeys(("depth", "spp", "seed"), _whole),
+    "subpixels": _switch,
+    "exposure": cast("Callable[[object], object]", _exposure),
+}

@@ -1,0 +1,209 @@
+"""Live frames show what replay shows of a render, and nothing is compiled while things move."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import lippmann
+from lippmann.color.transfer import quantize
+from lippmann.display import Display, LensArray, Panel
+from lippmann.display.pixel_window import PixelWindow
+from lippmann.errors import UsageError
+from lippmann.rendering.live.live_view import LiveView
+from lippmann.rendering.live.renderer import LiveRenderer
+from lippmann.rendering.request.render_request import RenderRequest
+from lippmann.scene.light_options import LightOptions
+from lippmann.scene.placement import PlacementOptions
+
+pytestmark = pytest.mark.usefixtures("engine")
+
+DISPLAYS = {
+    "lenticular": Display("lenticular", Panel(96, 64, 0.5), LensArray("lenticular", 4.0), 3.0, "", 300.0, 20.0),
+    "slanted": Display("slanted", Panel(90, 60, 0.5), LensArray("lenticular", 2.3, 12.0), 3.0, "", 400.0, 20.0),
+    "square": Display("square", Panel(96, 64, 0.5), LensArray("square", 4.0), 3.0, "", float("inf"), 20.0),
+}
+EYES = [(0.0, 0.0, 300.0), (25.0, -10.0, 220.0)]
+SIZE = 60, 40
+PLACED = PlacementOptions(mode="fit", turn=(20.0, 10.0, 0.0), shift=(1.0, 0.0, -2.0))
+
+
+@pytest.fixture(scope="module")
+def teapot():
+    return lippmann.load_scene("teapot")
+
+
+@pytest.fixture(scope="module")
+def renderers(teapot):
+    made = {}
+
+    def renderer(name):
+        if name not in made:
+            made[name] = LiveRenderer(teapot, DISPLAYS[name])
+        return made[name]
+
+    return renderer
+
+
+def psnr(codes, others):
+    error = np.mean((codes.astype(float) / 255 - others.astype(float) / 255) ** 2)
+    return -10 * np.log10(max(error, 1e-12))
+
+
+def render(scene, name, **options):
+    return lippmann.render(
+        scene, DISPLAYS[name], method="full", denoise="none", **{"placement": PLACED, "integrator": "direct"} | options
+    )
+
+
+@pytest.mark.parametrize("eye", EYES)
+@pytest.mark.parametrize("name", DISPLAYS)
+def test_a_frame_is_the_replay_of_a_render(teapot, renderers, name, eye):
+    tone_map = "none" if name == "slanted" else "pbr-neutral"
+    request = RenderRequest(placement=PLACED, seed=5, tone_map=tone_map)
+    frame = renderers(name).frame(LiveView(eye, SIZE, request=request))
+    image = render(teapot, name, spp=1, seed=5, tone_map=tone_map)
+    replayed = quantize(image.replay(eye, size=SIZE), 8, "srgb")
+    assert replayed.std() > 20
+    assert psnr(frame.pixels, replayed) > 60
+
+
+@pytest.mark.parametrize("name", ["slanted", "square"])
+def test_native_pixels_at_rest_are_those_of_a_render_with_as_many_samples(teapot, renderers, name):
+    window = PixelWindow(20, 10, 30, 25)
+    request = RenderRequest(placement=PLACED, integrator="path", depth=3, tone_map="pbr-neutral")
+    view = LiveView(None, window=window, request=request)
+    frames = [renderers(name).refine(view) for _ in range(3)]
+    assert [frame.is_denoised for frame in frames] == [False] * 3
+    assert frames[0].samples == 2 < frames[1].samples < frames[2].samples
+    image = render(
+        teapot, name, integrator="path", depth=3, spp=frames[2].samples, caustics="paths", tone_map="pbr-neutral"
+    )
+    assert psnr(frames[2].pixels, quantize(image.pixels[window.slices], 8, "srgb")) > 60
+
+
+def test_rest_comes_near_a_long_render(teapot, renderers):
+    renderer, eye = renderers("lenticular"), EYES[0]
+    view = LiveView(eye, SIZE, request=RenderRequest(placement=PLACED, tone_map="pbr-neutral"))
+    image = render(teapot, "lenticular", integrator="path", spp=512, caustics="paths", tone_map="pbr-neutral")
+    reference = quantize(image.replay(eye, size=SIZE), 8, "srgb")
+    found = {}
+    while max(found, default=0) < 64:
+        frame = renderer.refine(view)
+        if frame is not None:
+            assert frame.is_denoised
+            found[frame.samples] = psnr(frame.pixels, reference)
+    first, last = found[min(found)], found[max(found)]
+    assert last > 35
+    assert last > first + 3
+
+
+def test_a_move_compiles_nothing(teapot):
+    import drjit as dr
+
+    renderer = LiveRenderer(teapot, DISPLAYS["square"])
+    views = [
+        LiveView(
+            (5.0 * number, 0.0, 300.0 + number),
+            SIZE,
+            request=RenderRequest(
+                placement=PlacementOptions(
+                    mode="fit", turn=(number, 2.0 * number, 0.0), scale=1.0 + 0.01 * number, depth_scale=0.5
+                ),
+                exposure=0.1 * number,
+                seed=number,
+            ),
+            light=LightOptions((3.0 * number, number), 1.0 + number, 2.0 + number),
+        )
+        for number in range(6)
+    ]
+
+    def work(view):
+        renderer.frame(view)
+        renderer.refine(view)
+        renderer.refine(view)
+        renderer.refine(view)
+
+    with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
+        for view in views[:2]:
+            work(view)
+        dr.kernel_history_clear()
+        recordings = renderer.recordings
+        for view in views[2:]:
+            work(view)
+        history = dr.kernel_history()
+    assert len(history) > 8
+    assert [
+        kernel["hash"] for kernel in history if kernel["type"] == dr.KernelType.JIT and not kernel["cache_hit"]
+    ] == []
+    assert renderer.recordings == recordings
+
+
+def test_light_is_that_of_a_render(renderers):
+    scene = lippmann.load_scene("gears")
+    display = DISPLAYS["square"]
+    renderer = LiveRenderer(scene, display)
+    light = LightOptions((40.0, 20.0), 1.5, 0.7)
+    request = RenderRequest(placement=PLACED, tone_map="pbr-neutral", exposure=0.5)
+    plain = renderer.frame(LiveView(EYES[0], SIZE, request=request)).pixels
+    lit = renderer.frame(LiveView(EYES[0], SIZE, request=request, light=light), settled=True).pixels
+    again = renderer.frame(LiveView(EYES[0], SIZE, request=request), settled=True).pixels
+    image = render(replace(scene, light=light), "square", spp=1, tone_map="pbr-neutral", exposure=0.5)
+    assert psnr(lit, quantize(image.replay(EYES[0], size=SIZE), 8, "srgb")) > 60
+    assert psnr(plain, lit) < 30
+    assert psnr(plain, again) > 60
+
+
+def test_a_frame_that_is_not_wanted_any_more_is_given_up(renderers):
+    renderer = renderers("square")
+    view = LiveView(EYES[0], SIZE, request=RenderRequest(placement=PLACED))
+    before = renderer.frame(view)
+    assert renderer.frame(replace(view, eye=EYES[1]), is_stale=lambda: True) is None
+    assert (renderer.frame(view).pixels == before.pixels).all()
+
+
+def test_a_newer_view_drops_the_samples_of_the_last(renderers):
+    renderer = renderers("square")
+    view = LiveView(None, request=RenderRequest(placement=PLACED))
+    assert renderer.refine(view).samples < renderer.refine(view).samples
+    assert renderer.refine(replace(view, request=RenderRequest(placement=PLACED, seed=1))).samples == 2
+
+
+def test_heights_are_the_depth_that_a_render_shows(teapot, renderers):
+    request = RenderRequest(placement=PLACED, pixel_filter="point")
+    view = LiveView(EYES[0], SIZE, request=request)
+    found = renderers("square").heights(view)
+    image = render(teapot, "square", integrator="depth", pixel_filter="point", spp=1)
+    expected = image.replay(EYES[0], size=SIZE)[..., 0]
+    seen = np.isfinite(found)
+    assert 0.2 < seen.mean() < 0.9
+    assert np.abs(found - expected)[seen].max() < 1e-2
+    row, column = np.argwhere(seen)[len(np.argwhere(seen)) // 2]
+    picked = renderers("square").pick(view, (column + 0.5) / SIZE[0], (row + 0.5) / SIZE[1])
+    assert picked == pytest.approx(found[row, column])
+
+
+def test_what_cannot_be_shown_is_said(renderers):
+    with pytest.raises(UsageError, match="in front of the lens plane"):
+        LiveView((0.0, 0.0, -1.0), SIZE)
+    with pytest.raises(UsageError, match="at least 1x1"):
+        LiveView(EYES[0], (0, 5))
+    with pytest.raises(UsageError, match="path and direct"):
+        renderers("square").frame(LiveView(EYES[0], SIZE, request=RenderRequest(integrator="normal")))
+    with pytest.raises(UsageError, match="0 to 1"):
+        renderers("square").pick(LiveView(EYES[0], SIZE), 2.0, 0.0)
+
+
+def test_a_display_or_a_scene_takes_the_place_of_another(teapot):
+    renderer = LiveRenderer(teapot, DISPLAYS["square"])
+    view = LiveView(EYES[0], SIZE, request=RenderRequest(placement=PLACED))
+    square = renderer.frame(view).pixels
+    renderer.set_display(DISPLAYS["lenticular"])
+    assert psnr(renderer.frame(view).pixels, square) < 40
+    renderer.set_scene(lippmann.load_scene("gears"))
+    renderer.set_display(DISPLAYS["square"])
+    assert psnr(renderer.frame(view).pixels, square) < 30
+    renderer.set_scene(teapot)
+    assert (renderer.frame(view).pixels == square).all()

@@ -1,0 +1,162 @@
+"""The window for the display itself: native pixels reach the screen one to one, or it complains."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from lippmann.color.transfer import quantize
+from lippmann.display import Display, LensArray, Panel
+from lippmann.image import IntegralImage
+from lippmann.studio.panel_site import PanelSite
+from lippmann.viewer.http_server import WebServer
+from lippmann.viewer.responses import RefusedError, Request
+from lippmann.viewer.served_picture import PictureFile
+
+SIZE = (1338, 642)  # two tiles across
+DISPLAY = Display("wall", Panel(*SIZE, 0.1), LensArray("lenticular", 0.8), gap=2.5, viewing_distance=500.0)
+MAPPING = "document.body.dataset.mapping"
+COMPLAINT = "(a => a.hidden ? '' : a.textContent)(document.querySelector('[role=alert]'))"
+
+
+@pytest.fixture(scope="module")
+def picture(tmp_path_factory):
+    """A picture of noise: a pixel beside the right one is seen as wrong."""
+    path = tmp_path_factory.mktemp("panel") / "picture.png"
+    values = np.random.default_rng(3).random((SIZE[1], SIZE[0], 3), np.float32)
+    IntegralImage(values, DISPLAY).save(path)
+    return path
+
+
+@pytest.fixture(scope="module")
+def address(picture):
+    with WebServer(PanelSite(PictureFile(picture))) as server:
+        yield server.address
+
+
+def screen(tab, tmp_path):
+    with Image.open(tab.screenshot(tmp_path / "screen.png")) as shot:
+        return np.asarray(shot.convert("RGB"))
+
+
+def opened(open_tab, address, **options):
+    tab = open_tab(**{"size": SIZE, **options}).open(address)
+    tab.wait_for("Number(document.body.dataset.drawn) > 0")
+    return tab
+
+
+def test_every_pixel_of_the_picture_is_a_pixel_of_the_screen(open_tab, address, picture, tmp_path):
+    tab = opened(open_tab, address)
+    tab.wait_for(f"{MAPPING} === 'exact'")
+    tab.page.keyboard.press("h")
+    with Image.open(picture) as file:
+        np.testing.assert_array_equal(screen(tab, tmp_path), np.asarray(file.convert("RGB")))
+    tab.assert_clean()
+
+
+def test_pictures_through_a_wire_are_the_same(open_tab, picture, tmp_path):
+    with WebServer(PanelSite(PictureFile(picture, tile_format="png"))) as server:
+        tab = opened(open_tab, server.address)
+        tab.page.keyboard.press("h")
+        with Image.open(picture) as file:
+            np.testing.assert_array_equal(screen(tab, tmp_path), np.asarray(file.convert("RGB")))
+
+
+def pattern():
+    height, width = SIZE[1], SIZE[0]
+    y, x = np.mgrid[:height, :width]
+    found = np.where(((x + y) % 2 == 0)[..., None], 255, 0) * np.ones(3, int)
+    found[(x % 100 == 0) | (y % 100 == 0)] = (0, 255, 0)
+    found[:, -1], found[-1] = (0, 0, 255), (255, 0, 0)
+    found[:, 0], found[0] = (255, 255, 255), (255, 255, 255)
+    return found
+
+
+def test_the_pattern_reaches_the_screen_pixel_by_pixel(open_tab, address, tmp_path):
+    tab = opened(open_tab, address)
+    tab.page.keyboard.press("p")
+    tab.wait_for("Number(document.body.dataset.drawn) > 1")
+    tab.page.keyboard.press("h")
+    np.testing.assert_array_equal(screen(tab, tmp_path), pattern())
+    tab.page.keyboard.press("h")
+    assert tab.page.get_by_role("button", name="Test pattern").is_visible()
+    tab.assert_clean()
+
+
+@pytest.mark.parametrize("ratio", [2, 1.5])
+def test_a_dense_screen_of_the_right_size_is_exact(open_tab, address, picture, tmp_path, ratio):
+    """Where the system scales, the window divides by the ratio that the browser tells."""
+    size = tuple(int(np.ceil(side / ratio)) for side in SIZE)
+    tab = opened(open_tab, address, size=size, device_scale_factor=ratio)
+    tab.page.keyboard.press("h")
+    tab.evaluate("document.querySelector('.bar').style.visibility = 'hidden'")
+    with Image.open(picture) as file:
+        width, height = SIZE
+        np.testing.assert_array_equal(screen(tab, tmp_path)[:height, :width], np.asarray(file.convert("RGB")))
+
+
+def test_another_screen_is_complained_of(open_tab, address):
+    tab = opened(open_tab, address, size=(1000, 600))
+    assert "This screen has 1000 x 600 pixels, wall has 1338 x 642" in tab.wait_for(COMPLAINT)
+    assert tab.evaluate(MAPPING) == "wrong"
+    tab.page.keyboard.press("h")
+    assert tab.page.get_by_role("alert").is_visible()
+
+
+CHECK = """async (changed) => {
+  const { complaint } = await import('studio/native_check.js');
+  const panel = { width: 1338, height: 642, name: 'wall' };
+  const screen = [1338, 642];
+  const right = { panel, box: screen, ratio: 1, screen, zoom: 1, inside: screen, isFull: true };
+  return complaint({ ...right, ...changed });
+}"""
+
+
+CAUSES = [
+    ({}, None),
+    ({"box": None}, None),
+    ({"isFull": False, "inside": [1338, 500]}, None),
+    ({"box": [1339, 642]}, "The browser scales"),
+    ({"zoom": 1.2}, "zoomed by fingers"),
+    ({"ratio": 1.25}, "This screen has 1673 x 803 pixels"),
+    ({"screen": [1920, 1080]}, "This screen has 1920 x 1080"),
+    ({"inside": [1338, 600]}, "does not give the whole screen"),
+]
+
+
+def test_each_complaint_has_its_cause(open_tab, address):
+    tab = opened(open_tab, address)
+    for changed, words in CAUSES:
+        found = tab.evaluate(CHECK, changed)
+        assert found is None if words is None else words in found, (changed, found)
+
+
+def test_only_the_window_and_its_picture_are_served(picture):
+    site = PanelSite(PictureFile(picture))
+    assert site.get(Request("/", {})).kind.startswith("text/html")
+    for path in ("/panel", "/assets/viewer.js", "/picture.png", "/pictures/1/manifest.json", "/../x", str(picture)):
+        with pytest.raises(RefusedError):
+            site.get(Request(path, {}))
+    with pytest.raises(RefusedError):
+        site.post(Request("/", {}), b"{}")
+
+
+def test_the_studio_is_shown_live_on_the_panel(studio, open_tab, tmp_path):
+    panel = studio.session.display(studio.session.state).panel
+    tab = open_tab(size=(max(panel.width, 300), max(panel.height, 300))).open(f"{studio.address}panel?live")
+    tab.wait_for("Number(document.body.dataset.drawn) > 0")
+    tab.evaluate("document.querySelector('.bar').style.visibility = 'hidden'")
+    expected = np.zeros((panel.height, panel.width, 3), np.uint8)
+    expected[..., 0] = int(studio.session.state.turn[0])
+    expected[..., 1] = 128
+    expected[::2, ::2, 2] = 255
+    tab.wait_for("parseInt(document.querySelector('.state').textContent) > 1")
+    shown = screen(tab, tmp_path)[: panel.height, : panel.width]
+    np.testing.assert_array_equal(shown, expected)
+
+
+def test_quantized_values_are_what_the_file_holds(picture):
+    values = np.random.default_rng(3).random((SIZE[1], SIZE[0], 3), np.float32)
+    with Image.open(picture) as file:
+        np.testing.assert_array_equal(np.asarray(file.convert("RGB")), quantize(values, 8, "srgb"))

@@ -1,0 +1,170 @@
+"""The thread that renders: the newest view wins, and pictures get better while nothing moves."""
+
+from __future__ import annotations
+
+import threading
+import time
+
+import pytest
+from stand_in import TINY, StandIn
+
+from lippmann.errors import SceneError
+from lippmann.studio import render_thread
+from lippmann.studio.render_thread import RenderThread, Wanted, Watcher, _next_share
+from lippmann.studio.state import StudioState
+
+STATE = StudioState(display=TINY)
+DISPLAY = STATE.load_display()
+
+
+class Record:
+    """A watcher that keeps what it is shown."""
+
+    def __init__(self):
+        self.frames, self.errors, self.busy = [], [], []
+        self.watcher = Watcher(self.frames.append, self.errors.append, self.busy.append)
+
+    def wait_for(self, holds, seconds=10.0):
+        until = time.monotonic() + seconds
+        while not holds(self):
+            assert time.monotonic() < until, (self.frames, self.errors)
+            time.sleep(0.005)
+
+
+def wanted(number, scene="teapot", load=lambda: "scene", display=DISPLAY, eye=(0.0, 0.0, 300.0)):
+    return Wanted(number, scene, load, display, STATE.view(eye, (40, 30)))
+
+
+@pytest.fixture
+def start(monkeypatch):
+    """``start(make)``: a thread with one watcher; ended after the test."""
+    monkeypatch.setattr(render_thread, "REST", 0.02)
+    threads = []
+
+    def begin(make=StandIn):
+        thread, record = RenderThread(make), Record()
+        threads.append(thread)
+        thread.add(record.watcher)
+        return thread, record
+
+    yield begin
+    for thread in threads:
+        thread.close()
+
+
+def test_a_resting_view_is_refined_until_it_is_final(start):
+    thread, record = start()
+    thread.want(record.watcher, wanted(1))
+    record.wait_for(lambda r: r.frames and r.frames[-1].is_final)
+    assert [shown.number for shown in record.frames] == [1] * len(record.frames)
+    assert [shown.frame.samples for shown in record.frames] == sorted(shown.frame.samples for shown in record.frames)
+    count = len(record.frames)
+    time.sleep(0.1)
+    assert len(record.frames) == count
+
+
+def test_the_newest_view_wins(start):
+    allowed, begun = threading.Event(), threading.Event()
+
+    class Slow(StandIn):
+        def frame(self, view, is_stale=None):
+            begun.set()
+            allowed.wait(10.0)
+            return super().frame(view)
+
+    thread, record = start(Slow)
+    thread.want(record.watcher, wanted(1))
+    assert begun.wait(10.0)
+    for number in range(2, 200):
+        thread.want(record.watcher, wanted(number))
+    allowed.set()
+    record.wait_for(lambda r: r.frames and r.frames[-1].number == 199)
+    assert {shown.number for shown in record.frames} == {1, 199}
+
+
+def test_scene_and_display_are_set_when_they_change(start):
+    made = []
+
+    def make(scene, display):
+        made.append(StandIn(scene, display))
+        return made[-1]
+
+    thread, record = start(make)
+    other = StudioState(display="mla-square").load_display()
+    steps = [wanted(1), wanted(2), wanted(3, scene="room"), wanted(4, scene="room", display=other)]
+    for step in steps:
+        thread.want(record.watcher, step)
+        record.wait_for(lambda r, n=step.number: r.frames and r.frames[-1].number == n)
+    assert len(made) == 1
+    assert made[0].calls == ["scene", "display"]
+    assert record.busy == ["Opening the scene", None] * 2
+
+
+def test_a_scene_that_cannot_be_loaded_is_said_and_the_last_one_stays(start):
+    def broken():
+        raise SceneError("is damaged", where="a.glb")
+
+    thread, record = start()
+    thread.want(record.watcher, wanted(1))
+    record.wait_for(lambda r: r.frames)
+    thread.want(record.watcher, wanted(2, scene="a.glb", load=broken))
+    record.wait_for(lambda r: r.errors)
+    assert str(record.errors[0]) == "a.glb: is damaged"
+    thread.want(record.watcher, wanted(3))
+    record.wait_for(lambda r: r.frames[-1].number == 3)
+
+
+def test_a_fault_is_reported_and_the_thread_goes_on(start, capfd):
+    class Faulty(StandIn):
+        def frame(self, view, is_stale=None):
+            if view.eye[0] == 1.0:
+                raise ZeroDivisionError("a fault")
+            return super().frame(view)
+
+    thread, record = start(Faulty)
+    thread.want(record.watcher, wanted(1, eye=(1.0, 0.0, 300.0)))
+    record.wait_for(lambda r: r.errors)
+    thread.want(record.watcher, wanted(2))
+    record.wait_for(lambda r: r.frames)
+    assert "ZeroDivisionError: a fault" in capfd.readouterr().err
+
+
+def test_nothing_is_gathered_while_a_render_runs_beside(start):
+    thread, record = start()
+    thread.gather(False)
+    thread.want(record.watcher, wanted(1))
+    record.wait_for(lambda r: r.frames)
+    time.sleep(0.1)
+    assert [shown.frame.samples for shown in record.frames] == [1]
+    thread.gather(True)
+    record.wait_for(lambda r: r.frames[-1].is_final)
+
+
+def test_depth_is_told_of_the_picture_that_is_shown(start):
+    thread, record = start()
+    told = []
+    thread.want(record.watcher, wanted(1))
+    record.wait_for(lambda r: r.frames and r.frames[-1].is_final)
+    thread.pick(record.watcher, 0.7, 0.5, told.append)
+    record.wait_for(lambda r: told)
+    assert told == [3.0]
+
+
+def test_those_who_left_are_served_no_more(start):
+    thread, record = start()
+    thread.remove(record.watcher)
+    thread.want(record.watcher, wanted(1))
+    time.sleep(0.05)
+    assert record.frames == []
+
+
+def test_slow_frames_shrink_to_the_time_that_there_is_and_grow_again():
+    share = 1.0
+    for _ in range(30):
+        share = _next_share(share, 0.2 * share**2)
+    assert 0.2 * share**2 == pytest.approx(render_thread.FRAME_SECONDS, rel=0.05)
+    assert _next_share(1.0, 10.0) == 0.75
+    assert _next_share(render_thread.LEAST_SHARE, 10.0) == render_thread.LEAST_SHARE
+    for _ in range(30):
+        share = _next_share(share, 0.01)
+    assert share == 1.0

@@ -1,0 +1,296 @@
+"""The studio's server: who gets in, what they get, and what is refused."""
+
+from __future__ import annotations
+
+import contextlib
+import http.client
+import json
+import time
+from contextlib import ExitStack, closing
+from urllib.parse import quote
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from stand_in import FOLDER, TINY, running, said, view
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+
+from lippmann.studio import site as studio_site
+from lippmann.studio import uploads
+from lippmann.studio.page_values import values_of_state
+from lippmann.studio.pages import static_files
+from lippmann.studio.state import StudioState
+
+STATE = values_of_state(StudioState(display=TINY))
+
+
+def ask(studio, path, method="GET", body=None, **headers):
+    """Status, headers and body of one request, whose path is sent just as it is said."""
+    with closing(http.client.HTTPConnection("127.0.0.1", studio.server.port, timeout=10)) as connection:
+        named = {name.replace("_", "-"): value for name, value in headers.items()}
+        connection.request(method, path, body, named)
+        answer = connection.getresponse()
+        return answer.status, answer.headers, answer.read()
+
+
+def test_pages_and_their_files(studio):
+    for name, found in static_files().items():
+        status, headers, body = ask(studio, f"/{FOLDER}/{name}")
+        assert (status, body) == (200, found.body), name
+        assert headers["Content-Type"] == found.kind
+        assert "default-src 'none'" in headers["Content-Security-Policy"]
+        assert "unsafe" not in headers["Content-Security-Policy"]
+        assert headers["Cache-Control"] == "no-store"
+    size = json.loads(ask(studio, f"/{FOLDER}/panel.json")[2])
+    display = StudioState(display=TINY).load_display()
+    assert (size["width"], size["height"]) == (display.panel.width, display.panel.height)
+
+
+@pytest.mark.parametrize("folder", ["", "secre", "secrett", "SECRET", "secre%74", "%73ecret", "x" * 32])
+def test_without_the_token_there_is_nothing(studio, folder):
+    for path in ("", "panel", "panel.json", "assets/app.js", "live"):
+        assert ask(studio, f"/{folder}/{path}")[0] == 404
+    assert ask(studio, "/")[0] == 404
+    assert ask(studio, f"/{FOLDER}")[0] == 404
+
+
+@pytest.mark.parametrize("path", ["../live", "%2e%2e/live", "wrong/live"])
+def test_no_socket_without_the_token(studio, path):
+    with pytest.raises(InvalidStatus) as caught:
+        studio.connect(path)
+    assert caught.value.response.status_code == 404
+
+
+@pytest.mark.parametrize(
+    ("options", "status"),
+    [
+        ({"origin": "http://evil.example"}, 403),
+        ({"origin": "null"}, 403),
+        ({"origin": "http://127.0.0.1:1"}, 403),
+        ({"origin": None}, 403),
+    ],
+)
+def test_no_socket_for_other_pages(studio, options, status):
+    with pytest.raises(InvalidStatus) as caught:
+        studio.connect(**options)
+    assert caught.value.response.status_code == status
+    assert "error" in json.loads(caught.value.response.body)
+
+
+def test_no_socket_for_other_hosts(studio):
+    status, _, body = ask(
+        studio,
+        f"/{FOLDER}/live",
+        Host="evil.example",
+        Origin="http://evil.example",
+        Connection="Upgrade",
+        Upgrade="websocket",
+        Sec_WebSocket_Version="13",
+        Sec_WebSocket_Key="dGhlIHNhbXBsZSBub25jZQ==",
+    )
+    assert status == 403
+    assert b"not served" in body
+
+
+UP = ("..", "%2e%2e", ".%2e", "%252e%252e", "..%00", "..%c0%af", "..;", "\\..", "%5c..")
+
+
+@pytest.mark.parametrize("base", ["", "assets/", "viewer/", "results/1/", "pictures/1/", "files/"])
+def test_files_outside_are_never_served(studio, tmp_path, base):
+    secret = tmp_path / "secret.txt"
+    secret.write_bytes(b"not for the page")
+    tried = [f"{base}{quote(str(secret), safe='')}", f"{base}/{secret}", f"{base}file://{secret}"]
+    tried += [base + (up + slash) * 12 + str(secret)[1:] for up in UP for slash in ("/", "%2f", "\\")]
+    for path in tried:
+        status, _, body = ask(studio, f"/{FOLDER}/{path}")
+        assert status in (400, 404, 405), path
+        assert b"not for the page" not in body
+
+
+def test_frames_come_with_what_is_said_of_them(studio):
+    with studio.connect() as socket:
+        hello = said(socket, "hello")
+        assert hello["state"] == STATE
+        assert ["looking-glass-portrait" in json.dumps(hello["displays"])] == [True]
+        socket.send(view(STATE | {"turn": [40, 0, 0]}, 5))
+        facts = said(socket, "facts")
+        assert "--turn 40,0,0" in facts["command"]
+        frame = said(socket, "frame")
+        assert int.from_bytes(frame[8:12], "little") == 5
+        assert (int.from_bytes(frame[12:14], "little"), int.from_bytes(frame[14:16], "little")) == (40, 30)
+    assert studio.session.state.turn == (40.0, 0.0, 0.0)
+
+
+def test_no_frame_is_sent_before_others_were_shown(studio):
+    with studio.connect() as socket:
+        for number in range(1, 30):
+            socket.send(view(STATE | {"turn": [number, 0, 0]}, number))
+            time.sleep(0.01)
+        frames = []
+        with contextlib.suppress(TimeoutError):
+            while True:
+                frames.append(said(socket, "frame", 0.4))
+        assert len(frames) == 2
+        socket.send(json.dumps({"type": "shown", "frame": 2}))
+        newest = said(socket, "frame")
+        assert int.from_bytes(newest[8:12], "little") == 29
+
+
+def test_native_pixels_are_those_of_the_panel(studio):
+    panel = StudioState(display=TINY).load_display().panel
+    with studio.connect() as socket:
+        socket.send(view(STATE, 1, eye=None, window=[panel.width - 4, -3, 1000, 7]))
+        frame = said(socket, "frame")
+        assert (int.from_bytes(frame[12:14], "little"), int.from_bytes(frame[14:16], "little")) == (4, 7)
+
+
+def test_the_window_on_the_panel_follows_and_sets_nothing(studio):
+    panel = StudioState(display=TINY).load_display().panel
+    with studio.connect() as page, studio.connect("live-panel") as window:
+        frame = said(window, "frame")
+        assert int.from_bytes(frame[12:14], "little") == panel.width
+        page.send(view(STATE | {"turn": [77, 0, 0]}))
+        said(page, "frame")
+        window.send(json.dumps({"type": "shown", "frame": 1}))
+        assert said(window, "frame")
+        window.send(view(STATE))
+        assert "is no message" in said(window, "error")["line"]
+
+
+def test_picked_depth_and_saved_states(studio):
+    with studio.connect() as socket:
+        socket.send(view(STATE | {"scale": 2}))
+        said(socket, "frame")
+        socket.send(json.dumps({"type": "pick", "place": [0.9, 0.5]}))
+        assert said(socket, "picked")["depth"] == 3.0
+        socket.send(json.dumps({"type": "save"}))
+        saved = said(socket, "saved")
+        assert saved["name"] == "teapot.toml"
+        assert "scale = 2.0" in saved["text"]
+        socket.send(json.dumps({"type": "open", "text": saved["text"].replace("2.0", "3.0")}))
+        assert said(socket, "state")["state"]["scale"] == 3.0
+
+
+@pytest.mark.parametrize("name", ["scene", "environment", "display"])
+def test_states_open_no_files_that_were_not_given(studio, tmp_path, name):
+    file = tmp_path / {"scene": "a.glb", "environment": "a.exr", "display": "a.toml"}[name]
+    file.write_bytes(b"x")
+    with studio.connect() as socket:
+        socket.send(view(STATE | {name: str(file)}))
+        line = said(socket, "error")["line"]
+        assert "was not opened" in line
+        assert str(tmp_path) not in line
+        socket.send(json.dumps({"type": "open", "text": f"{name} = {json.dumps(str(file))}\n"}))
+        assert "was not opened" in said(socket, "error")["line"]
+
+
+def post(studio, name, body=b"data", kind="application/octet-stream", **headers):
+    own = f"http://127.0.0.1:{studio.server.port}"
+    return ask(studio, f"/{FOLDER}/files/{name}", "POST", body, Content_Type=kind, **({"Origin": own} | headers))
+
+
+def test_a_dropped_model_can_be_used(studio):
+    status, _, body = post(studio, "my%20model.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    path = json.loads(body)["path"]
+    assert status == 200
+    assert path.endswith("my model.obj")
+    with studio.connect() as socket:
+        socket.send(view(STATE | {"scene": path}))
+        assert said(socket, "facts")["title"] == "my model.obj"
+
+
+def test_a_bad_model_is_one_line(studio):
+    path = json.loads(post(studio, "bad.glb", b"no model")[2])["path"]
+    with studio.connect() as socket:
+        socket.send(view(STATE | {"scene": path}))
+        line = said(socket, "error")["line"]
+        assert "bad.glb" in line
+        assert "\n" not in line
+
+
+@pytest.mark.parametrize(
+    ("name", "headers", "status"),
+    [
+        ("a.exe", {}, 415),
+        ("a.glb.html", {}, 415),
+        ("..%2fa.glb", {}, 404),
+        ("..", {}, 415),
+        (".glb", {}, 415),
+        ("a%00.glb", {}, 415),
+        ("a%0a.glb", {}, 415),
+        ("a.glb", {"kind": "application/json"}, 415),
+        ("a.glb", {"kind": "multipart/form-data"}, 415),
+        ("a.glb", {"Origin": "http://evil.example"}, 403),
+        ("a.glb", {"Content_Length": "99999999999"}, 413),
+    ],
+)
+def test_other_files_are_refused(studio, name, headers, status):
+    assert post(studio, name, **headers)[0] == status
+
+
+def test_dropped_files_have_a_limit(studio, monkeypatch):
+    monkeypatch.setattr(uploads, "MOST_BYTES", 100)
+    assert post(studio, "a.glb", b"x" * 101)[0] == 413
+    monkeypatch.setattr(uploads, "MOST_BYTES_IN_ALL", 10)
+    status, _, body = post(studio, "a.glb", b"x" * 50)
+    assert status == 507
+    assert b"too many models" in body
+
+
+def test_a_long_message_ends_the_connection(studio):
+    with studio.connect() as socket:
+        socket.send("x" * 100_000)
+        with pytest.raises(ConnectionClosed) as caught:
+            said(socket, "frame")
+    assert caught.value.rcvd.code == 1009
+    assert ask(studio, f"/{FOLDER}/")[0] == 200
+
+
+MESSAGES = st.sampled_from(["view", "shown", "pick", "render", "open", "resume", "cancel", "x"]).flatmap(
+    lambda kind: st.fixed_dictionaries(
+        {"type": st.just(kind)},
+        optional={
+            name: st.none() | st.integers() | st.text(max_size=5) | st.lists(st.floats() | st.integers(), max_size=4)
+            for name in ("number", "state", "eye", "size", "window", "place", "frame", "kind", "text")
+        },
+    ).map(json.dumps)
+)
+
+
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.lists(MESSAGES | st.text(max_size=20) | st.binary(max_size=20), max_size=6))
+def test_any_messages_leave_the_studio_alive(studio, messages):
+    with studio.connect() as socket:
+        for message in messages:
+            socket.send(message)
+        socket.send(view(STATE, 77))
+        while True:
+            if int.from_bytes(said(socket, "frame")[8:12], "little") == 77:
+                break
+
+
+def test_pages_are_counted(studio, monkeypatch):
+    monkeypatch.setattr(studio_site, "MOST_PAGES", 2)
+    with ExitStack() as stack:
+        for _ in range(2):
+            stack.enter_context(studio.connect())
+        with pytest.raises(InvalidStatus) as caught:
+            stack.enter_context(studio.connect())
+        assert caught.value.response.status_code == 503
+    time.sleep(0.2)
+    with studio.connect() as again:
+        assert said(again, "hello")
+
+
+def test_pages_end_with_the_studio(tmp_path):
+    with ExitStack() as stack:
+        with running(tmp_path) as made:
+            socket = stack.enter_context(made.connect())
+            assert said(socket, "hello")
+        with pytest.raises(ConnectionClosed):
+            said(socket, "frame")
+
+
+@pytest.mark.parametrize("path", ["results/1/a.png", "pictures/1/manifest.json", "results/0/x", "results/a/b"])
+def test_there_are_no_results_before_a_render(studio, path):
+    assert ask(studio, f"/{FOLDER}/{path}")[0] == 404

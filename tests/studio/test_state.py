@@ -1,0 +1,174 @@
+"""States survive their files, and their command line makes the same picture."""
+
+from __future__ import annotations
+
+import dataclasses
+import shlex
+import subprocess
+import sys
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from lippmann.cli import run
+from lippmann.errors import LippmannError, UsageError
+from lippmann.studio.command_line import render_command, words_of_state
+from lippmann.studio.state import StudioState
+from lippmann.studio.state_toml import read_state, state_of_text, text_of_state, write_state
+
+NUMBERS = st.floats(-1e6, 1e6)
+ANGLES = st.floats(-179, 179)
+FACTORS = st.floats(1e-3, 1e3)
+NAMES = st.text(st.characters(exclude_categories=["Cs"]), min_size=1, max_size=12)
+
+STATES = st.builds(
+    StudioState,
+    scene=NAMES,
+    display=NAMES,
+    up=st.sampled_from([None, "y", "z"]),
+    environment=st.none() | NAMES,
+    background=st.none() | st.tuples(*[st.floats(0, 1)] * 3),
+    place=st.sampled_from([None, "fit"]),
+    turn=st.tuples(ANGLES, ANGLES, ANGLES),
+    shift=st.tuples(NUMBERS, NUMBERS, NUMBERS),
+    scale=FACTORS,
+    depth_scale=st.none() | FACTORS,
+    pop_out=st.none() | st.floats(0, 1),
+    light_turn=st.tuples(ANGLES, ANGLES),
+    light_strength=st.floats(0, 100),
+    environment_strength=st.floats(0, 100),
+    exposure=st.just("auto") | st.floats(-10, 10),
+    tone_map=st.sampled_from(["auto", "none", "pbr-neutral"]),
+    integrator=st.sampled_from(["path", "direct", "auto"]),
+    depth=st.none() | st.integers(1, 64),
+    method=st.sampled_from(["auto", "full", "pooled"]),
+    spp=st.none() | st.integers(1, 1000),
+    quality=st.none() | st.floats(1, 80),
+    seed=st.integers(0, 2**32 - 1),
+    subpixels=st.none() | st.booleans(),
+    eye=st.none() | st.tuples(NUMBERS, NUMBERS, st.floats(1, 1e4)),
+)
+
+
+@settings(max_examples=60)
+@given(STATES)
+def test_a_file_says_all_of_a_state(state):
+    text = text_of_state(state)
+    assert state_of_text(text) == state
+    assert text.count("\n") <= len(dataclasses.fields(StudioState))
+
+
+@settings(max_examples=30)
+@given(STATES)
+def test_the_command_line_says_all_but_the_eye(state):
+    """Words are read as the command reads them: by its own parser, without the work."""
+    import typer
+
+    from lippmann.cli.app import app
+    from lippmann.cli.shared import parse
+
+    command = typer.main.get_command(app).commands["render"]
+    words = words_of_state(state)
+    assert shlex.split(shlex.join(words)) == words
+    read = command.make_context("render", list(words)).params
+    assert read["scene"].removeprefix("./") == state.scene.removeprefix("./")
+    placed = parse.placement(
+        *(read[n] for n in ("camera", "place", "turn", "shift", "scale", "depth_scale", "pop_out"))
+    )
+    assert placed == state.placement()
+    assert parse.light(read["light_turn"], read["light_strength"], read["environment_strength"]) == state.light()
+    assert parse.color(read["background"]) == state.background
+    assert parse.exposure(read["exposure"]) == state.exposure
+    for name in ("display", "up", "tone_map", "integrator", "depth", "method", "spp", "quality", "seed", "subpixels"):
+        assert read[name] == getattr(state, name), name
+
+
+def test_a_file_and_its_command_line_make_the_same_bytes(engine, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "small.toml").write_text(
+        "gap = 3.0\nviewing_distance = 300\naperture_distance = 20\n[panel]\nwidth = 48\nheight = 32\n"
+        'pixel_pitch = 1.0\n[lens_array]\nlayout = "lenticular"\npitch = 4.0\n'
+    )
+    state = StudioState(
+        scene="gears",
+        display="small.toml",
+        turn=(20.0, -5.5, 0.0),
+        shift=(1.0, 0.0, -2.25),
+        scale=0.9,
+        light_turn=(-30.0, 12.0),
+        light_strength=1.5,
+        environment_strength=0.5,
+        exposure=0.25,
+        method="full",
+        spp=2,
+    )
+    write_state(state, tmp_path / "state.toml")
+    assert (
+        read_state(tmp_path / "state.toml") == dataclasses.replace(state, display=str(tmp_path / "small.toml"))
+        or read_state(tmp_path / "state.toml") == state
+    )
+    assert run(["render", "--state", "state.toml", "-o", "a.png", "--quiet"]) == 0
+    assert run([*render_command(state, "b.png")[1:], "--quiet"]) == 0
+    assert run(["render", "--state", "state.toml", "--turn", "0", "-o", "c.png", "--quiet"]) == 0
+    assert run(["render", "gears", "--display", "small.toml", "-o", "d.png", "--quiet"]) == 0
+    first, second, turned, plain = ((tmp_path / f"{name}.png").read_bytes() for name in "abcd")
+    assert first == second
+    assert first != turned
+    assert turned != plain
+
+
+def test_files_that_a_state_names_lie_beside_it(tmp_path, monkeypatch):
+    (tmp_path / "folder").mkdir()
+    (tmp_path / "folder" / "model.glb").write_bytes(b"")
+    monkeypatch.chdir(tmp_path)
+    state = StudioState(scene="folder/model.glb")
+    write_state(state, tmp_path / "folder" / "state.toml")
+    assert 'scene = "model.glb"' in (tmp_path / "folder" / "state.toml").read_text()
+    assert read_state(tmp_path / "folder" / "state.toml").scene == str(tmp_path / "folder" / "model.glb")
+    monkeypatch.chdir(tmp_path / "folder")
+    assert StudioState(scene=read_state(tmp_path / "folder" / "state.toml").scene).scene.endswith("model.glb")
+
+
+@pytest.mark.parametrize(
+    ("text", "line"),
+    [
+        ("turn = 3", "state:1: turn: 3; a list of 3 numbers"),
+        ("scale = 1\n\nlight = 2", "state:3: 'light' is no setting"),
+        ("tunr = [1, 2, 3]", "is 'turn' meant?"),
+        ("scene = ", "not valid TOML"),
+        ("scale = 2\nscale = 3\n", "state:2: not valid TOML"),
+        ('turn = [1.0, "a", 3.0]', "state:1: turn: 'a'; a number"),
+        ("seed = 1.5", "state:1: seed: 1.5; a whole number"),
+        ("subpixels = 1", "state:1: subpixels: 1; true or false"),
+        ('method = "fast"', "known are auto, full"),
+        ("\npop_out = 2.0", "state:2: pop_out: 2; a share of the depth"),
+        ("light_strength = -1.0", "state:1: light_strength: -1; a factor from 0"),
+        ("exposure = inf", "exposure"),
+        ('place = "display"\npop_out = 0.5', "state:2: pop_out"),
+        ("[scene]\nname = 1", "state:1: scene"),
+        ("eye = [0.0, 0.0, 0.0]", "z above 0"),
+        ("background = [0.0, 2.0, 0.0]", "from 0 to 1"),
+        ('scene = ""', "state:1: scene: is empty"),
+    ],
+)
+def test_what_is_wrong_in_a_file_is_told_in_one_line(text, line):
+    with pytest.raises(UsageError) as raised:
+        state_of_text(text)
+    assert line in str(raised.value)
+    assert "\n" not in str(raised.value)
+
+
+def test_what_is_no_text_is_no_state(tmp_path):
+    (tmp_path / "picture.png").write_bytes(b"\x89PNG\xff\xfe")
+    for name in ("picture.png", "none.toml", "."):
+        with pytest.raises(LippmannError, match="a state is a TOML file"):
+            read_state(tmp_path / name)
+
+
+def test_a_state_loads_no_engine():
+    code = (
+        "import sys, lippmann.studio.state_toml, lippmann.studio.command_line, lippmann.rendering.live.renderer; "
+        "assert 'mitsuba' not in sys.modules and 'drjit' not in sys.modules"
+    )
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

@@ -1,0 +1,229 @@
+"""The studio's page in a real browser, before a studio whose pictures a stand-in draws."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from stand_in import TINY
+
+from lippmann.studio.state import StudioState
+
+STUDIO = "window.lippmann.studio"
+COMMAND = "document.querySelector('footer code').textContent"
+#: Codes of the picture's pixel, read from a copy: browsers warn of reading a canvas that they draw on graphics memory.
+PIXEL = """(([x, y]) => {
+  const copy = new OffscreenCanvas(1, 1).getContext("2d", { willReadFrequently: true });
+  copy.drawImage(window.lippmann.studio.page.canvas, -x, -y);
+  return [...copy.getImageData(0, 0, 1, 1).data];
+})"""
+ALERT = "(a => a.hidden ? '' : a.textContent)(document.querySelector('.failure'))"
+
+
+@pytest.fixture
+def page(studio, open_tab):
+    """``page(**options)``: a tab that shows the studio and its first picture."""
+
+    def opened(**options):
+        studio.session.set_state(StudioState(display=TINY))
+        tab = open_tab(**{"size": (1440, 900), **options}).open(studio.address)
+        tab.wait_for(f"({STUDIO}?.stage?.header?.number ?? 0) > 0 && {COMMAND} !== ''")
+        return tab
+
+    return opened
+
+
+def drag(tab, by, *, touches=None):
+    box = tab.page.locator("canvas").first.bounding_box()
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    tab.page.mouse.move(x, y)
+    tab.page.mouse.down()
+    tab.page.mouse.move(x + by[0] / 2, y + by[1] / 2)
+    tab.page.mouse.move(x + by[0], y + by[1])
+    tab.page.mouse.up()
+
+
+def state(tab):
+    return tab.evaluate(f"{STUDIO}.store.state")
+
+
+def test_the_model_is_turned_by_hand_and_undone(page):
+    tab = page()
+    tab.page.keyboard.press("t")
+    assert tab.evaluate("document.querySelector('.deck input:checked').value") == "orbit"
+    drag(tab, (200, 0))
+    yaw = state(tab)["turn"][0]
+    assert yaw > 10
+    text = tab.wait_for(f"{COMMAND}.includes('--turn') && {COMMAND}")
+    assert text.startswith(f"lippmann render teapot --display {TINY} --turn {yaw:g},0,0")
+    # The picture follows: the stand-in's red is the turn.
+    tab.wait_until(lambda: abs(tab.evaluate(PIXEL, [3, 3])[0] - int(yaw)) <= 4)
+    tab.page.keyboard.press("Control+z")
+    assert state(tab)["turn"] == [0, 0, 0]
+    tab.page.keyboard.press("Control+y")
+    assert state(tab)["turn"][0] == yaw
+    tab.page.get_by_role("button", name="Undo").click()
+    assert state(tab)["turn"] == [0, 0, 0]
+    assert tab.page.get_by_role("button", name="Undo").is_disabled()
+    tab.assert_clean()
+
+
+def test_the_pointer_moves_the_eye(page):
+    tab = page()
+    box = tab.page.locator("canvas").first.bounding_box()
+    tab.page.mouse.move(box["x"] + 0.9 * box["width"], box["y"] + box["height"] / 2)
+    eye = tab.evaluate(f"{STUDIO}.stage.eye")
+    assert eye["x"] > 20
+    tab.wait_until(lambda: abs(tab.evaluate(PIXEL, [3, 3])[1] - int(128 + eye["x"]) % 256) <= 4)
+    tab.page.keyboard.press("s")
+    assert tab.page.get_by_role("button", name="Sway").get_attribute("aria-pressed") == "true"
+    tab.wait_until(lambda: tab.evaluate(f"{STUDIO}.stage.eye.x") != eye["x"])
+    tab.page.keyboard.press("Home")
+    assert tab.evaluate(f"{STUDIO}.stage.eye.x") == 0
+    assert tab.page.get_by_role("button", name="Sway").get_attribute("aria-pressed") == "false"
+    tab.assert_clean()
+
+
+def test_values_are_typed_and_automatic_ones_are_given_back(page):
+    tab = page()
+    tab.page.get_by_role("spinbutton", name="Size").fill("2.5")
+    tab.page.keyboard.press("Tab")
+    tab.wait_for(f"{COMMAND}.includes('--scale 2.5')")
+    auto = tab.page.locator(".automatic", has_text="Depth scale").get_by_role("checkbox")
+    auto.uncheck()
+    tab.wait_for(f"{COMMAND}.includes('--depth-scale')")
+    auto.check()
+    tab.wait_for(f"!{COMMAND}.includes('--depth-scale')")
+    tab.page.get_by_label("Display", exact=True).select_option("mla-square")
+    tab.wait_for(f"{STUDIO}.stage.optics.lenses.layout === 'square'")
+    assert "--display mla-square" in tab.wait_for(f"{COMMAND}.includes('mla-square') && {COMMAND}")
+    assert "depth scale 1 shows it whole" in tab.page.locator(".warnings").inner_text()
+    assert "blur" in tab.page.locator(".depth-bars .note").inner_text()
+    tab.assert_clean()
+
+
+def test_a_clicked_point_comes_into_the_lens_plane(page):
+    tab = page()
+    tab.page.keyboard.press("l")
+    box = tab.page.locator("canvas").first.bounding_box()
+    tab.page.mouse.click(box["x"] + 0.8 * box["width"], box["y"] + box["height"] / 2)
+    tab.wait_for(f"{STUDIO}.store.state.shift[2] === -3")
+    tab.page.mouse.click(box["x"] + 0.2 * box["width"], box["y"] + box["height"] / 2)
+    assert "nothing at this place" in tab.wait_for(ALERT)
+    tab.assert_clean()
+
+
+def test_native_pixels_are_shown_one_by_one(page):
+    tab = page()
+    tab.page.keyboard.press("n")
+    tab.wait_for(f"{STUDIO}.stage.header.width < 200 && {STUDIO}.stage.header.width === {STUDIO}.stage.view().size[0]")
+    zoom = tab.evaluate(f"{STUDIO}.stage.nativeZoom")
+    size = tab.evaluate(f"[{STUDIO}.page.canvas.width, {STUDIO}.stage.header.width]")
+    assert size[0] == zoom * size[1]
+    first = [tab.evaluate(PIXEL, [x, 0])[2] for x in (0, zoom - 1, zoom, 2 * zoom - 1)]
+    assert {tuple(first[:2]), tuple(first[2:])} == {(255, 255), (0, 0)}
+    tab.assert_clean()
+
+
+def test_models_are_dropped_and_bad_ones_are_one_line(page):
+    tab = page()
+    drop = """async ([name, text]) => {
+      const data = new DataTransfer();
+      data.items.add(new File([text], name));
+      document.dispatchEvent(new DragEvent('dragenter', { dataTransfer: data, bubbles: true }));
+      document.dispatchEvent(new DragEvent('drop', { dataTransfer: data, bubbles: true }));
+    }"""
+    tab.evaluate(drop, ["wedge.obj", "v 0 0 0\nv 1 0 0\nv 0 1 1\nf 1 2 3\n"])
+    tab.wait_for(f"{COMMAND}.includes('wedge.obj')")
+    assert tab.evaluate("document.title").startswith("wedge.obj")
+    assert tab.evaluate("document.querySelector('.drop-shade').hidden")
+    tab.evaluate(drop, ["bad.glb", "no model"])
+    assert "bad.glb" in tab.wait_for(ALERT)
+    tab.evaluate(drop, ["notes.txt", "x"])
+    assert "notes.txt: this cannot be opened" in tab.wait_for(f"{ALERT}.includes('notes') && {ALERT}")
+    tab.evaluate(drop, ["mine.toml", 'scene = "teapot"\nscale = 1.75\n'])
+    tab.wait_for(f"{STUDIO}.store.state.scale === 1.75")
+    tab.assert_clean()
+
+
+def test_everything_has_a_name_and_is_reached_by_keys(page):
+    tab = page()
+    nameless = tab.evaluate(
+        """[...document.querySelectorAll('button, input, select, [tabindex="0"], summary')]
+        .filter((e) => e.checkVisibility() && e.type !== 'file')
+        .filter((e) => !(e.getAttribute('aria-label') || e.textContent.trim() || e.labels?.length))
+        .map((e) => e.outerHTML)"""
+    )
+    assert nameless == []
+    reached = set()
+    for _ in range(80):
+        tab.page.keyboard.press("Tab")
+        reached.add(tab.evaluate("document.activeElement.outerHTML.slice(0, 90)"))
+        assert tab.evaluate(
+            "document.activeElement === document.body || document.activeElement.matches(':focus-visible')"
+        )
+    for word in ("primary", "<canvas", "Direction of the light", "<summary", "<code", "<select"):
+        assert any(word in each for each in reached), word
+    tab.page.keyboard.press("Escape")
+    tab.evaluate("document.activeElement.blur()")
+    tab.page.keyboard.press("?")
+    assert tab.page.get_by_role("dialog").is_visible()
+    tab.page.keyboard.press("Escape")
+    tab.assert_clean()
+
+
+@pytest.mark.parametrize(
+    ("size", "options"),
+    [
+        ((1440, 900), {}),
+        ((1024, 768), {}),
+        ((820, 1180), {"has_touch": True, "device_scale_factor": 2, "is_mobile": True}),
+    ],
+    ids=["desk", "small", "tablet"],
+)
+def test_nothing_is_cut_off(page, size, options):
+    tab = page(size=size, **options)
+    cut = tab.evaluate(
+        """[...document.querySelectorAll('header > *, .deck > *, .number > *, .choice > *, .automatic, .bar > button')]
+        .filter((e) => e.checkVisibility()).map((e) => [e, e.getBoundingClientRect()])
+        .filter(([e, r]) => r.left < -0.5 || r.right > innerWidth + 0.5 || e.scrollWidth > e.clientWidth + 1
+          && !e.matches('.title, .hint, select, input, code, .status'))
+        .map(([e]) => e.outerHTML.slice(0, 200))"""
+    )
+    assert cut == []
+    picture = tab.page.locator("canvas").first.bounding_box()
+    assert picture["width"] * picture["height"] > 0.15 * size[0] * size[1]
+    tab.assert_clean()
+
+
+def test_two_fingers_change_the_size(page):
+    tab = page(size=(820, 1180), has_touch=True)
+    before = state(tab)["scale"]
+    tab.evaluate(
+        """() => {
+      const canvas = document.querySelector('canvas');
+      canvas.setPointerCapture = () => {};
+      const box = canvas.getBoundingClientRect();
+      const fire = (type, id, x) => canvas.dispatchEvent(new PointerEvent(type, { pointerId: id, pointerType: 'touch',
+        button: 0, clientX: box.left + x * box.width, clientY: box.top + box.height / 2, bubbles: true }));
+      fire('pointerdown', 1, 0.45); fire('pointerdown', 2, 0.55);
+      fire('pointermove', 1, 0.3); fire('pointermove', 2, 0.7);
+      fire('pointerup', 1, 0.3); fire('pointerup', 2, 0.7);
+    }"""
+    )
+    assert state(tab)["scale"] == pytest.approx(4 * before, rel=1e-3)
+    tab.assert_clean()
+
+
+def test_a_studio_that_died_is_said(tmp_path, open_tab):
+    from stand_in import running
+
+    with running(tmp_path) as made:
+        tab = open_tab().open(made.address)
+        tab.wait_for(f"({STUDIO}?.stage?.header?.number ?? 0) > 0")
+    assert "still running" in tab.wait_for(ALERT)
+
+
+def test_the_page_is_refused_without_its_token(studio, open_tab):
+    tab = open_tab().open(studio.address.replace("secret", "guess"))
+    assert json.loads(tab.page.inner_text("body")) == {"error": "there is nothing here"}
