@@ -137,6 +137,16 @@ def _depth_map(data: bytes, folder: Path) -> object:
         return read_depth_map(folder / f"d{ending}").inverse.shape
 
 
+def _molecule(name: str) -> Read:
+    """A molecule, which a process of its own reads: a library that is not installed is not under fire."""
+    still = _scene(name)
+
+    def read(data: bytes, folder: Path) -> object:
+        return still(data, folder) if find_spec("gemmi") else None
+
+    return read
+
+
 def _usd(name: str) -> Read:
     """A stage, which a process of its own opens: a library that is not installed is not under fire."""
     still = _scene(name)
@@ -510,6 +520,8 @@ _READERS: dict[str, Target] = {
     "mitsuba-xml": Target(_mitsuba),
     "photograph": Target(_scene("s.jpg")),
     "depth-map": Target(_depth_map),
+    "molecule-pdb": Target(_molecule("s.pdb")),
+    "molecule-cif": Target(_molecule("s.cif")),
     "usd": Target(_usd("s.usda")),
     "usd-package": Target(_usd("s.usdz")),
     "environment": Target(_environment),

@@ -39,6 +39,8 @@ PLANE RING TRI STRI BOX SCAPE VERTEXARRAY POLYCYLINDER EXTBOX SCALARVOL
 """,
     "photograph": 'GDepth:Format="RangeLinear" GDepth:Near="0" GDepth:Far="inf" GDepth:Data=" http://ns.adobe.com/xap/1.0/',
     "depth-map": "NUMPY descr fortran_order shape True False <f8 |O8 |u1 Pf PF -1.0 channels Z IHDR IDAT",
+    "molecule-pdb": "ATOM HETATM ANISOU CONECT MODEL ENDMDL TER CRYST1 SCALE1 ORIGX1 END REMARK LINK NAN -999.999",
+    "molecule-cif": "data_ loop_ save_ _atom_site_fract_x _atom_site.Cartn_x _atom_site.type_symbol ? . ' \" ;",
     "usd": """
 def over class Mesh Xform PointInstancer Material Shader SkelRoot Skeleton SkelAnimation Sphere Cube Capsule DomeLight
 RectLight SphereLight Camera GeomSubset references payload subLayers variantSet variants point3f[] int[] token float

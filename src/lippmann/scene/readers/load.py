@@ -47,6 +47,7 @@ _READERS = {
     ".usdc": "lippmann.scene.readers.usd:read_usd",
     ".usdz": "lippmann.scene.readers.usd:read_usd",
     ".xml": "lippmann.scene.mitsuba_source:read_mitsuba",
+    **dict.fromkeys((".pdb", ".ent", ".cif"), "lippmann.scene.readers.molecule:read_molecule"),
     **dict.fromkeys(PHOTOS, "lippmann.scene.readers.depth_photo:read_depth_photo"),
 }
 

@@ -1,0 +1,148 @@
+"""Molecules: atoms of every kind of file, bonds by distance, colours, damaged files."""
+
+import numpy as np
+import pytest
+
+from lippmann.errors import LippmannError, SceneError
+from lippmann.scene.readers import molecule
+from lippmann.scene.readers.load import load_scene
+
+WATER = """\
+HETATM    1  O   HOH A   1       0.000   0.000   0.000  1.00  0.00           O
+HETATM    2  H1  HOH A   1       0.957   0.000   0.000  1.00  0.00           H
+HETATM    3  H2  HOH A   1      -0.240   0.927   0.000  1.00  0.00           H
+HETATM    4  C1 ALIG A   2      20.000   0.000   0.000  0.60  0.00           C
+HETATM    5  C1 BLIG A   2      21.000   0.000   0.000  0.40  0.00           C
+END
+"""
+
+SALT = """\
+data_salt
+_cell_length_a 10
+_cell_length_b 20
+_cell_length_c 10
+_cell_angle_alpha 90
+_cell_angle_beta 90
+_cell_angle_gamma 90
+_symmetry_space_group_name_H-M 'P 1'
+loop_
+_atom_site_label
+_atom_site_type_symbol
+_atom_site_fract_x
+_atom_site_fract_y
+_atom_site_fract_z
+Na1 Na 0.1 0.1 0
+Cl1 Cl 0.1 0.225 0
+"""
+
+
+@pytest.fixture
+def read(tmp_path):
+    pytest.importorskip("gemmi", reason="gemmi is not installed")
+
+    def read(text, name="m.pdb"):
+        (tmp_path / name).write_bytes(text if isinstance(text, bytes) else text.encode())
+        return load_scene(tmp_path / name).description
+
+    return read
+
+
+def places(scene, name):
+    """Centres or starts of all copies of a mesh."""
+    number = next(number for number, mesh in enumerate(scene.meshes) if mesh.name == name)
+    return scene.placements[number][:, :3, 3]
+
+
+def test_atoms_and_bonds_of_water(read):
+    scene = read(WATER)
+    assert scene.notes == ["4 atoms, 2 bonds by their distance"]
+    assert places(scene, "balls of element 8").tolist() == [[0, 0, 0]]
+    assert places(scene, "balls of element 1") == pytest.approx(np.array([[0.957, 0, 0], [-0.24, 0.927, 0]]))
+    # Of alternative places the first.
+    assert places(scene, "balls of element 6").tolist() == [[20, 0, 0]]
+    assert len(places(scene, "sticks of element 8")) == 2
+
+
+def test_sticks_reach_half_way(read):
+    scene = read(WATER)
+    number = next(number for number, mesh in enumerate(scene.meshes) if mesh.name == "sticks of element 8")
+    mesh = scene.meshes[number]
+    ends = [world[:3, :3] @ [0, 0, 1] + world[:3, 3] for world in scene.placements[number]]
+    assert sorted(np.round(ends, 6).tolist()) == [[-0.12, 0.4635, 0], [0.4785, 0, 0]]
+    for world in scene.placements[number]:
+        assert np.linalg.norm(world[:3, 0]) == np.linalg.norm(world[:3, 1]) == pytest.approx(molecule.STICK)
+        assert np.linalg.det(world[:3, :3]) > 0
+    corners = mesh.positions[mesh.faces].astype(float)
+    outward = corners.mean(axis=1) * (1, 1, 0)
+    facing = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    assert (np.einsum("ij,ij->i", facing, outward) > 0).all()
+
+
+def test_balls_have_a_quarter_of_the_van_der_waals_radius_and_their_colour(read):
+    scene = read(WATER)
+    oxygen = next(mesh for mesh in scene.meshes if mesh.name == "balls of element 8")
+    assert np.linalg.norm(oxygen.positions, axis=1) == pytest.approx(1)
+    red, green, blue = scene.materials[oxygen.material].base_color
+    assert red == 1
+    assert green == blue < 0.01
+    low, high = load_scene(scene).bounds
+    assert low[0] == pytest.approx(-0.24 - 0.25 * 1.10, rel=1e-2)
+    assert high[0] == pytest.approx(20 + 0.25 * 1.70, rel=1e-3)
+    assert low[2] == pytest.approx(-0.25 * 1.70, rel=1e-3)
+
+
+def test_a_small_molecules_crystal(read):
+    scene = read(SALT, "salt.cif")
+    assert places(scene, "balls of element 11") == pytest.approx(np.array([[1, 2, 0]]))
+    assert places(scene, "balls of element 17") == pytest.approx(np.array([[1, 4.5, 0]]))
+    assert scene.notes == ["2 atoms, 1 bonds by their distance"]
+
+
+def test_mmcif(read, tmp_path):
+    import gemmi
+
+    (tmp_path / "w.pdb").write_text(WATER)
+    gemmi.read_structure(str(tmp_path / "w.pdb")).make_mmcif_document().write_file(str(tmp_path / "w.cif"))
+    assert load_scene(tmp_path / "w.cif").description.notes == ["4 atoms, 2 bonds by their distance"]
+
+
+def test_hydrogens_do_not_bond_to_each_other(read):
+    near = WATER.replace("-0.240   0.927", " 0.900   0.700")
+    assert read(near).notes == ["4 atoms, 2 bonds by their distance"]
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "line"),
+    [
+        ("m.pdb", "END\n", "m.pdb: holds 0 atoms; 1 to 1048576 are read"),
+        ("m.cif", "loop_ nothing", "m.cif: is no molecule that is understood ("),
+        ("m.cif", b"data_\xff\xfe_x", "m.cif: is no molecule that is understood ("),
+        ("m.cif", "data_x\n_a b\n", "m.cif: holds 0 atoms"),
+    ],
+)
+def test_files_without_atoms_are_refused(read, name, text, line):
+    with pytest.raises(SceneError) as caught:
+        read(text, name)
+    assert str(caught.value).startswith(line)
+
+
+def test_without_the_library_one_line_says_what_to_install(read, monkeypatch):
+    monkeypatch.setattr(molecule.importlib.util, "find_spec", lambda name: None)
+    with pytest.raises(SceneError, match=r"molecules need the library gemmi; install it: pip install 'lippmann\[mol"):
+        read(WATER)
+
+
+def test_damaged_molecules_end_in_a_scene_or_one_line(read):
+    rng = np.random.default_rng(1)
+    outcomes = set()
+    for number in range(80):
+        data = bytearray((WATER, SALT)[number % 2].encode())
+        for place in rng.integers(0, len(data), 3):
+            data[place] = rng.integers(256)
+        try:
+            read(bytes(data), ("m.pdb", "m.cif")[number % 2])
+            outcomes.add("read")
+        except LippmannError as error:
+            outcomes.add(f"refused in {len(str(error).splitlines())} line")
+    assert outcomes <= {"read", "refused in 1 line"}
+    assert "read" in outcomes
