@@ -17,12 +17,13 @@ assert app  # whose making says which commands there are
 SOURCE = Path(package.__file__).parent
 #: Parameters of the library that no command has.
 OF_THE_LIBRARY = {"form", "effort"}
-#: Files whose texts are for other programs: pip, a style sheet's variables, Dask's own command.
+#: Files whose texts are for other programs: pip, a style sheet's variables, Dask's own command, a shell.
 OTHER_PROGRAMS = {
     "runtime/engine.py",
     "scene/mitsuba_plugins.py",
     "reproduce/style.py",
     "cluster/worker_preload.py",
+    "studio/command_line.py",
 }
 #: Whole commands, named as such.
 COMMANDS = re.compile(r"lippmann (?:export|compare)[\w `-]*--\w+|``--json``")
