@@ -71,7 +71,7 @@ def main() -> None:
     parser.add_argument("--minutes", type=float, default=0.0)
     parser.add_argument("--only", default="")
     asked = parser.parse_args()
-    cases: dict[str, Any] = dict(saved("studio")["cases"]) if asked.only else {}
+    cases: dict[str, Any] = dict(saved("studio").get("cases", {})) if asked.only else {}
     for display in DISPLAYS:
         for scene, source in SCENES.items():
             name = f"{display}/{scene}"
