@@ -221,7 +221,7 @@ class LiveRenderer:
             None where nothing is seen there.
         """
         if not (0.0 <= u <= 1.0 and 0.0 <= v <= 1.0):
-            raise UsageError(f"({u:g}, {v:g})", parameter="pick", rule="a place in the picture, 0 to 1 each")
+            raise UsageError(f"({u:g}, {v:g}) will not do", where="pick", rule="a place in the picture, 0 to 1 each")
         heights = self.heights(view)
         height, width = heights.shape
         found = float(heights[min(int(v * height), height - 1), min(int(u * width), width - 1)])
