@@ -46,7 +46,9 @@ DISPLAYS = {
     "mla-square": ((512, 512), (512, 512)),
     "looking-glass-portrait": ((192, 256), (192, 256)),
 }
-ORBIT, REST_SECONDS, REFERENCE_SAMPLES, GOAL = 40, 6.0, 256, 35.0
+ORBIT, REST_SECONDS, GOAL = 40, 6.0, 35.0
+#: Samples that each reference has in all, and of each pixel at most.
+REFERENCE_WORK, REFERENCE_SAMPLES = 1 << 22, 256
 
 _START = """
 import time, sys
@@ -159,7 +161,8 @@ def _reference(renderer: Any, view: Any) -> np.ndarray:
     renderer.refine(view)
     progressive = renderer._progressive
     progressive._denoises = False
-    while progressive.samples < REFERENCE_SAMPLES:
+    enough = min(REFERENCE_SAMPLES, max(16, REFERENCE_WORK // len(progressive._pixels.column)))
+    while progressive.samples < enough:
         frame = renderer.refine(view)
     assert isinstance(view, LiveView)
     return np.asarray(frame.pixels / 255.0)

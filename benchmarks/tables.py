@@ -17,6 +17,7 @@ import estimate_coverage_tables
 import first_picture_tables
 import goals_tables
 import kernel_profile_tables
+import studio_tables
 from harness import RESULTS, saved
 
 README = Path(__file__).parent.parent / "README.md"
@@ -404,6 +405,7 @@ SECTIONS = {
     "huge_commands": _huge_commands,
     "command": _command,
     "viewer": _viewer,
+    "studio": studio_tables.section,
     "cluster": _cluster,
     "fuzz": _fuzz,
     "conformance": conformance_tables.describe,

@@ -29,7 +29,8 @@ _LARGEST_NOISE = 1e-3
 
 #: The scale is searched between these multiples of the one that fills the panel where all views are parallel.
 _SEARCHED = (1.0 / 16.0, 2.0)
-_HALVINGS = 40
+#: In so many rounds, each of which divides what is left into so many parts.
+_ROUNDS, _PARTS = 10, 16
 _CENTERINGS = 24
 
 
@@ -101,10 +102,13 @@ def fit_scene(
         matrix = translation((0.0, 0.0, front)) @ depth_scaling(shown) @ scaling(size) @ anchor
         return Fit(matrix, depth * size, shown, front, full_front)
 
-    def fills(size: float) -> float:
-        """Share of the panel that the silhouette fills, on the axis where it fills more."""
-        extents = np.ptp(_project(seen, at(size).display_from_turned, middle, display), axis=0)
-        return float((extents / display.size_mm).max())
+    def fills(sizes: Bounds) -> Bounds:
+        """Share of the panel that the silhouette fills, on the axis where it fills more, for sizes ``(m,)``."""
+        shown = np.minimum(1.0, resolved / sizes) if depth_scale is None else np.full(len(sizes), depth_scale)
+        front = np.minimum(share * depth * sizes * shown, display.aperture_distance)
+        nearness, center = _centers(seen, sizes, shown, front, display)
+        silhouettes = sizes[:, None, None] * (seen[:, :2] - center[:, None]) / nearness[..., None]
+        return np.asarray((np.ptp(silhouettes, axis=1) / display.size_mm).max(axis=1), np.float64)
 
     if width > 0.0 or height > 0.0:
         size = FILL * min(
@@ -118,30 +122,36 @@ def fit_scene(
     return at(size * scale)
 
 
-def _largest(fills: Callable[[float], float], size: float) -> float:
+def _largest(fills: Callable[[Bounds], Bounds], size: float) -> float:
     """The size, near the given one, whose silhouette fills the panel as it should."""
     least, most = (np.log(size * factor) for factor in _SEARCHED)
-    for _ in range(_HALVINGS):
-        middle = (least + most) / 2.0
-        least, most = (middle, most) if fills(float(np.exp(middle))) <= FILL else (least, middle)
+    for _ in range(_ROUNDS):
+        places = least + (most - least) * np.arange(1, _PARTS) / _PARTS
+        fitting = int((fills(np.exp(places)) <= FILL).cumprod().sum())
+        bounds = [least, *places, most]
+        least, most = bounds[fitting], bounds[fitting + 1]
     return float(np.exp(least))
 
 
 def _center(seen: Bounds, size: float, shown: float, front: float, display: Display) -> tuple[float, float]:
     """Where, in world units from the box's middle, a scene has its centre as seen from the viewing point."""
-    nearness = 1.0 - (front + seen[:, 2] * size * shown) / display.viewing_distance
-    center = np.zeros(2)
+    _, centers = _centers(seen, np.array([size]), np.array([shown]), np.array([front]), display)
+    return float(centers[0, 0]), float(centers[0, 1])
+
+
+def _centers(seen: Bounds, sizes: Bounds, shown: Bounds, front: Bounds, display: Display) -> tuple[Bounds, Bounds]:
+    """Nearness ``(m, n)`` of points ``(n, 3)`` to the viewing point, and :func:`_center` ``(m, 2)``, for m sizes."""
+    nearness = 1.0 - (front[:, None] + seen[:, 2] * (sizes * shown)[:, None]) / display.viewing_distance
+    center = np.zeros((len(sizes), 2))
     if np.isfinite(display.viewing_distance):
+        # Rows of numbers are quicker than pairs.
+        inverse, mean = 1.0 / nearness, nearness.mean(axis=1) / 2.0
+        points = seen[:, 0] * inverse, seen[:, 1] * inverse
         for _ in range(_CENTERINGS):
-            silhouette = (seen[:, :2] - center) / nearness[:, None]
-            center += (silhouette.max(axis=0) + silhouette.min(axis=0)) / 2.0 * nearness.mean()
-    return float(center[0]), float(center[1])
-
-
-def _project(seen: Bounds, display_from_turned: Matrix, middle: Bounds, display: Display) -> Bounds:
-    """Points ``(n, 2)`` of the lens plane at which the viewing point sees points, mm."""
-    placed = (seen + middle) @ display_from_turned[:3, :3].T + display_from_turned[:3, 3]
-    return np.asarray(placed[:, :2] / (1.0 - placed[:, 2:] / display.viewing_distance), np.float64)
+            for axis in (0, 1):
+                silhouette = points[axis] - center[:, axis, None] * inverse
+                center[:, axis] += (silhouette.max(axis=1) + silhouette.min(axis=1)) * mean
+    return nearness, center
 
 
 def _extents(bounds: Bounds) -> Vector:

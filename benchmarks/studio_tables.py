@@ -1,0 +1,65 @@
+"""The table of live frames in ``docs/background/measurements.md``."""
+
+from __future__ import annotations
+
+from typing import Any
+
+_HEADS = (
+    "display, scene",
+    "picture",
+    "frames/s by the clock",
+    "of idle cores",
+    "first after a move",
+    "35 dB after",
+    "of processors",
+    "against replay",
+)
+
+
+def section(result: dict[str, Any]) -> str:
+    """The section of ``benchmarks/studio.py``."""
+    start = result["start"]
+    lines = [
+        "## Live frames",
+        "",
+        "An orbit of single samples in direct light; then a view at rest, of paths, denoised (PSNR against long",
+        "references of the same eye); and how far a frame is from the replay of a whole render by the same settings.",
+        "Other programs ran on the machine: beside frames by the clock stand those that idle cores would make of the",
+        "same processor time.",
+        "",
+        f"| {' | '.join(_HEADS)} |",
+        f"|{'---|' * len(_HEADS)}",
+        *(_row(name, case) for name, case in result["cases"].items()),
+        "",
+        f"From starting a process to its first frame: {start['s']:.1f} s by the clock, {start['processor_s']:.1f} s of "
+        "processors.",
+    ]
+    endless = result.get("endless")
+    if endless:
+        lines += [
+            "",
+            f"Moves for {endless['minutes']:g} minutes: {endless['frames']} frames, the oldest "
+            f"{endless['oldest_s']:.2f} s; memory {endless['early_mib']:.0f} MiB after the first tenth, "
+            f"{endless['last_mib']:.0f} MiB at the end.",
+        ]
+    return "\n".join(lines) + "\n"
+
+
+def _row(name: str, case: dict[str, Any]) -> str:
+    if "skipped" in case:
+        return f"| {name} | {case['skipped']} | | | | | | |"
+    reached = case["rest"]["reached"]
+    soon = (
+        f"{reached['s']:.1f} s | {reached['processor_s']:.1f} s"
+        if reached
+        else f"not in {case['rest']['last']['s']:.0f} s ({case['rest']['last']['db']:.1f} dB) | "
+    )
+    width, height = case["size"]
+    return (
+        f"| {name} | {width}x{height} | {case['frames_per_second']:.0f} | {case['idle_frames_per_second']:.0f} | "
+        f"{case['first_after_move_ms']:.0f} ms | {soon} | {_decibels(case['replay_db'])} |"
+    )
+
+
+def _decibels(value: float) -> str:
+    return "equal" if value >= 120 else f"{value:.0f} dB"
