@@ -109,9 +109,8 @@ def serve_once(content, what, console, *, host, port, browser, folder="", starte
     """In place of a server that runs until Ctrl-C: the page is fetched, once."""
     from lippmann.viewer.http_server import WebServer
 
-    with WebServer(content, host, port, folder=folder) as server:
-        with urllib.request.urlopen(server.address, timeout=20) as answer:
-            assert b"<main" in answer.read()
+    with WebServer(content, host, port, folder=folder) as server, urllib.request.urlopen(server.address) as answer:
+        assert b"<main" in answer.read()
     console.result({"address": server.address}, server.address)
 
 
