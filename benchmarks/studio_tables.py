@@ -8,7 +8,7 @@ _HEADS = (
     "display, scene",
     "picture",
     "frames/s by the clock",
-    "of idle cores",
+    "at most, of idle cores",
     "first after a move",
     "35 dB after",
     "of processors",
@@ -39,7 +39,7 @@ def section(result: dict[str, Any]) -> str:
         lines += [
             "",
             f"Moves for {endless['minutes']:g} minutes: {endless['frames']} frames, the oldest "
-            f"{endless['oldest_s']:.2f} s; memory {endless['early_mib']:.0f} MiB after the first tenth, "
+            f"{endless['oldest_s']:.2f} s; memory {endless['early_mib']:.0f} MiB early on, "
             f"{endless['last_mib']:.0f} MiB at the end.",
         ]
     return "\n".join(lines) + "\n"
