@@ -94,6 +94,9 @@ def test_values_are_typed_and_automatic_ones_are_given_back(page):
     tab.wait_for(f"{COMMAND}.includes('--depth-scale')")
     auto.check()
     tab.wait_for(f"!{COMMAND}.includes('--depth-scale')")
+    # The stand-in's scene reaches from -10 to 5 mm, where 8 mm are sharp on both sides.
+    tab.page.get_by_role("button", name="Fit into the sharp range").click()
+    tab.wait_for(f"{COMMAND}.includes('--depth-scale 0.8')")
     tab.page.get_by_label("Display", exact=True).select_option("mla-square")
     tab.wait_for(f"{STUDIO}.stage.optics.lenses.layout === 'square'")
     assert "--display mla-square" in tab.wait_for(f"{COMMAND}.includes('mla-square') && {COMMAND}")

@@ -112,13 +112,19 @@ export class Panel {
     });
     const near = { min: -200, max: 200, step: 0.1, unit: "mm", digits: 2, fallback: 0 };
     this.warnings = h("ul", { class: "warnings", hidden: true });
-    const onclick = () => store.set({ depth_scale: null, pop_out: null, shift: [...store.state.shift.slice(0, 2), 0] });
+    const onclick = () => {
+      if (this.facts === undefined) return;
+      const [x, y, z] = store.state.shift;
+      const { scene, sharp } = this.facts.depth;
+      const fitting = fittingScale([scene[0] - z, scene[1] - z], sharp, this.facts.depth_scale);
+      store.set({ depth_scale: fitting, shift: [x, y, 0] });
+    };
     return section(
       "Depth",
       this.bars.element,
       scale.row,
       out.row,
-      this.#slider("Toward viewer", "shift", 2, near),
+      this.#slider("Forward", "shift", 2, near),
       h("button", { type: "button", class: "quiet reset", onclick }, "Fit into the sharp range"),
       this.warnings,
     );
@@ -156,11 +162,10 @@ export class Panel {
   }
 
   #picture() {
-    const exposure = automatic("Exposure", {
+    const exposure = automatic("Exposure, EV", {
       min: -8,
       max: 8,
       step: 0.05,
-      unit: "EV",
       fallback: 0,
       onchange: (value) => this.store.set({ exposure: value ?? "auto" }),
       onhold: this.#hold,
@@ -195,6 +200,17 @@ export class Panel {
     });
     return section("Display", list.row, subpixels.row, facts);
   }
+}
+
+/**
+ * Scale of depth that brings a scene into the sharp range: never more than it has.
+ *
+ * @param scene, sharp ends in mm, back and front of the lens plane; `null` where nothing blurs
+ * @param scale that the scene has now
+ */
+export function fittingScale(scene, sharp, scale) {
+  const shares = scene.map((end, side) => (sharp[side] === null || end * sharp[side] <= 0 ? 1 : sharp[side] / end));
+  return Math.floor(1000 * scale * Math.min(1, ...shares)) / 1000;
 }
 
 /** Turns a placement by degrees: yaw, pitch, roll. */
