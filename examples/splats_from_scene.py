@@ -106,13 +106,9 @@ def scan(
     floaters: float = 0.0,
     *,
     views: int = _VIEWS,
-    traced: int | None = None,
     seed: int = 0,
 ) -> Splats:
-    """Splats of a bundled scene in its own coordinates, +y up, each looked at in so many directions.
-
-    Only the first ``traced`` splats are looked at; the others show what the nearest of those shows.
-    """
+    """Splats of a bundled scene in its own coordinates, +y up, each looked at in so many directions."""
     random = np.random.default_rng(seed)
     description = lippmann.load_scene(name).physical
     assert isinstance(description, SceneDescription)
@@ -125,10 +121,7 @@ def scan(
     height = 0.25 + 0.75 * (number + 0.5) / views
     turn = number * np.pi * (3 - np.sqrt(5))
     lattice = np.stack([np.sqrt(1 - height**2) * np.cos(turn), np.sqrt(1 - height**2) * np.sin(turn), height], axis=1)
-    seen = slice(None if traced is None else traced)
-    harmonics = fitted_harmonics(name, points[seen], frames[seen], lattice, degree, 2e-3 * diagonal, seed)
-    if len(harmonics) < count:
-        harmonics = harmonics[cKDTree(points[seen]).query(points)[1]]
+    harmonics = fitted_harmonics(name, points, frames, lattice, degree, 2e-3 * diagonal, seed)
     spacing = _spacing(points)
     scales = np.stack([_ALONG * spacing, _ALONG * spacing, _ACROSS * spacing], axis=1)
     opacities = random.uniform(0.75, 0.98, count)
