@@ -370,6 +370,28 @@ plain suite replays them.
 """
 
 
+def _splats(result: dict[str, Any]) -> str:
+    rows = [
+        "| splats | file | rays | reading | preparing | whole render | per ray | memory at most |",
+        "|---|---|---|---|---|---|---|---|",
+    ]
+    for row in result["rows"]:
+        rows.append(
+            f"| {row['splats']:,} | {row['file_bytes'] / 1e6:.0f} MB | {row['rays'] / 1e6:.1f} M | "
+            f"{row['load_seconds']:.1f} s | {row['build_seconds']:.1f} s | {row['render_seconds']:.0f} s | "
+            f"{1e6 * row['render_seconds'] / row['rays']:.1f} us | {row['peak_bytes'] / 2**30:.1f} GiB |"
+        )
+    width, height = result["rows"][0]["pixels"]
+    return f"""## Gaussian splats (`splats.py`)
+
+Splats sampled from the bundled `{result["scene"]}`, with harmonics of degree 3, for `{result["display"]}`:
+{width}x{height} pixels, whose sub-pixels have rays of their own. Seconds are the processor's, of all threads together,
+as the machine was shared: two cores of one's own take half of them.
+
+{chr(10).join(rows)}
+"""
+
+
 def _viewer(result: dict[str, Any]) -> str:
     found = result["median"]
     width, height = result["pixels"]
@@ -396,6 +418,7 @@ SECTIONS = {
     "reuse": _reuse,
     "weave": _weave,
     "cycles": _cycles,
+    "splats": _splats,
     "tachyon": _tachyon,
     "full_rate": _full_rate,
     "kernel_profile": kernel_profile_tables.describe,

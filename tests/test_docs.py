@@ -69,6 +69,7 @@ def workplace(tmp_path, monkeypatch, moving_ball):
     (tmp_path / "model.glb").write_bytes(trimesh.exchange.gltf.export_glb(scene))
     trimesh.creation.box().export(tmp_path / "model.obj")
     trimesh.creation.box().export(tmp_path / "model.stl")
+    save_splats(tmp_path / "scan.ply")
     sky = np.ones((8, 16, 3), dtype=np.float32)
     write_plain_picture(sky, tmp_path / "sky.exr")
     body = "CAMERA ZOOM 1 ASPECTRATIO 1 ANTIALIASING 0 RAYDEPTH 2 CENTER 0 0 -5 VIEWDIR 0 0 1 UPDIR 0 1 0 END_CAMERA"
@@ -93,6 +94,17 @@ def workplace(tmp_path, monkeypatch, moving_ball):
     shutil.copytree(moving_ball.parent, tmp_path, dirs_exist_ok=True)
     monkeypatch.chdir(tmp_path)
     return tmp_path
+
+
+def save_splats(path: Path) -> None:
+    """A ball of Gaussian splats, as trainers write them."""
+    names = ["x", "y", "z", "f_dc_0", "f_dc_1", "f_dc_2", "opacity", "scale_0", "scale_1", "scale_2"]
+    names += ["rot_0", "rot_1", "rot_2", "rot_3"]
+    rows = np.zeros((200, len(names)), "<f4")
+    rows[:, :3] = np.random.default_rng(0).normal(scale=10, size=(200, 3))
+    rows[:, 6:11] = 2, 1, 1, 1, 1
+    lines = ["ply", "format binary_little_endian 1.0", "element vertex 200", *(f"property float {n}" for n in names)]
+    path.write_bytes("\n".join([*lines, "end_header", ""]).encode() + rows.tobytes())
 
 
 def save_named_files(page: Path, folder: Path) -> None:

@@ -6,6 +6,7 @@ python tests/fuzz/seeds.py
 from __future__ import annotations
 
 import base64
+import gzip
 import io
 import json
 import shutil
@@ -50,6 +51,7 @@ def main() -> None:
 def _all() -> Iterator[tuple[str, str, bytes]]:
     yield from _gltf()
     yield "ply", "binary", _ply()
+    yield from _splats()
     yield "stl", "binary", b"made by hand".ljust(80) + struct.pack("<I", 1) + struct.pack("<12fH", *range(12), 0)
     depth = {"depth": np.arange(24, dtype=np.float32).reshape(4, 6), "normal": np.ones((4, 6, 3), np.float32)}
     for target, name, stored, maps in (
@@ -202,6 +204,112 @@ def _gltf() -> Iterator[tuple[str, str, bytes]]:
     yield "glb", "scene", struct.pack("<4sII", b"glTF", 2, 12 + len(body)) + body
     tree["buffers"][0]["uri"] = "data:application/octet-stream;base64," + base64.b64encode(data).decode()
     yield "gltf", "scene", json.dumps(tree, separators=(",", ":")).encode()
+
+
+def _splats() -> Iterator[tuple[str, str, bytes]]:
+    """Three Gaussian splats in every kind of file."""
+    random = np.random.default_rng(5)
+    names = ["x", "y", "z", *(f"f_dc_{n}" for n in range(3)), *(f"f_rest_{n}" for n in range(9)), "opacity"]
+    names += [*(f"scale_{n}" for n in range(3)), *(f"rot_{n}" for n in range(4))]
+    yield "ply-splats", "trained", _rows("vertex", names, "float", random.normal(size=(3, len(names))).astype("<f4"))
+    bounds = [f"{end}{part}{axis}" for part in ("_", "_scale_") for end in ("min", "max") for axis in "xyz"]
+    bounds += [f"{end}_{color}" for end in ("min", "max") for color in "rgb"]
+    chunk = _rows("chunk", bounds, "float", np.repeat([-1, 1, -4, -1, 0, 1], 3).astype("<f4")[None])
+    packed_names = [f"packed_{part}" for part in ("position", "rotation", "scale", "color")]
+    words = random.integers(0, 2**32, (3, 4), dtype=np.uint32)
+    sh = random.integers(0, 256, (3, 9), dtype=np.uint8)
+    parts = [
+        chunk,
+        _rows("vertex", packed_names, "uint", words),
+        _rows("sh", [f"f_rest_{n}" for n in range(9)], "uchar", sh),
+    ]
+    heads, bodies = zip(*(part.split(b"end_header\n", 1) for part in parts), strict=True)
+    start = b"ply\nformat binary_little_endian 1.0\n"
+    yield (
+        "ply-splats",
+        "packed",
+        start + b"".join(h.removeprefix(start) for h in heads) + b"end_header\n" + b"".join(bodies),
+    )
+    payload = struct.pack("<4sIIBBBB", b"NGSP", 3, 3, 1, 12, 0, 0) + random.bytes(3 * (9 + 1 + 3 + 3 + 4 + 9))
+    yield "spz", "unpacked", payload
+    yield "spz", "packed.spz", gzip.compress(payload, mtime=0)
+    yield "sog", "bundled", _sog()
+    yield "gltf", "splats", _gltf_splats()
+
+
+def _rows(element: str, names: list[str], kind: str, rows: Any) -> bytes:
+    """A PLY file of one element."""
+    lines = ["ply", "format binary_little_endian 1.0", f"element {element} {len(rows)}"]
+    lines += [f"property {kind} {name}" for name in names]
+    return "\n".join([*lines, "end_header", ""]).encode() + rows.tobytes()
+
+
+def _sog() -> bytes:
+    random = np.random.default_rng(6)
+    book = random.normal(size=256).round(2).tolist()
+    meta = {
+        "version": 2,
+        "count": 3,
+        "means": {"mins": [-1, -1, -1], "maxs": [1, 1, 1], "files": ["l.webp", "u.webp"]},
+        "scales": {"codebook": book, "files": ["s.webp"]},
+        "quats": {"files": ["q.webp"]},
+        "sh0": {"codebook": book, "files": ["c.webp"]},
+        "shN": {"count": 64, "bands": 1, "codebook": book, "files": ["p.webp", "n.webp"]},
+    }
+
+    def write(path: Path) -> None:
+        from PIL import Image as Pillow
+
+        path.mkdir()
+        (path / "meta.json").write_text(json.dumps(meta))
+        for name in ("l", "u", "s", "q", "c", "n", "p"):
+            pixels = random.integers(0, 256, (1, 192, 4) if name == "p" else (2, 2, 4), dtype=np.uint8)
+            if name == "n":
+                pixels[..., :2] = 0
+            Pillow.fromarray(pixels).save(path / f"{name}.webp", "WEBP", lossless=True, exact=True)
+
+    return _written(write, "sog")
+
+
+def _gltf_splats() -> bytes:
+    random = np.random.default_rng(7)
+    widths = {"POSITION": 3, "SCALE": 3, "ROTATION": 4, "OPACITY": 1, "SH_DEGREE_0_COEF_0": 3}
+    widths |= {f"SH_DEGREE_1_COEF_{n}": 3 for n in range(3)}
+    shapes = {1: "SCALAR", 3: "VEC3", 4: "VEC4"}
+    data, views, accessors, attributes = b"", [], [], {}
+    values_of = {name: random.uniform(0.1, 1, (3, width)).astype("<f4") for name, width in widths.items()}
+    values_of |= {"times": np.array([[0], [1]], "<f4"), "places": np.array([[0, 0, 0], [0, 0, 1]], "<f4")}
+    for name, values in values_of.items():
+        views.append({"buffer": 0, "byteOffset": len(data), "byteLength": values.nbytes})
+        data += values.tobytes()
+        if name in widths:
+            attributes[name if name == "POSITION" else f"KHR_gaussian_splatting:{name}"] = len(accessors)
+        accessors.append(
+            {"bufferView": len(accessors), "componentType": 5126, "count": len(values), "type": shapes[values.shape[1]]}
+        )
+    splats = {"KHR_gaussian_splatting": {"kernel": "ellipse", "colorSpace": "srgb_rec709_display"}}
+    tree = {
+        "asset": {"version": "2.0"},
+        "extensionsUsed": ["KHR_gaussian_splatting"],
+        "scenes": [{"nodes": [0]}],
+        "nodes": [{"mesh": 0, "rotation": [0, 0.6, 0, 0.8], "scale": [1, 2, 1]}],
+        "animations": [
+            {
+                "samplers": [{"input": len(accessors) - 2, "output": len(accessors) - 1}],
+                "channels": [{"sampler": 0, "target": {"node": 0, "path": "translation"}}],
+            }
+        ],
+        "meshes": [{"primitives": [{"mode": 0, "attributes": attributes, "extensions": splats}]}],
+        "accessors": accessors,
+        "bufferViews": views,
+        "buffers": [
+            {
+                "byteLength": len(data),
+                "uri": "data:application/octet-stream;base64," + base64.b64encode(data).decode(),
+            }
+        ],
+    }
+    return json.dumps(tree, separators=(",", ":")).encode()
 
 
 def _texture() -> bytes:

@@ -6,11 +6,13 @@ Formats whose reader follows references (materials, chunks, views) take whole fo
 from __future__ import annotations
 
 import asyncio
+import gzip
 import io
 import json
 import os
 import re
 import shutil
+import zipfile
 from collections.abc import Callable
 from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass, replace
@@ -187,6 +189,26 @@ def _mitsuba(data: bytes, folder: Path) -> object:
     finally:
         if before is not None:
             mitsuba.set_variant(before)
+
+
+def _spz(data: bytes, folder: Path) -> object:
+    """A file as it is, or what it packs."""
+    (folder / "s.spz").write_bytes(data if data.startswith(b"\x1f\x8b") else gzip.compress(data, 1))
+    return load_scene(folder / "s.spz").bounds
+
+
+def _sog(data: bytes, folder: Path) -> object:
+    """A file as it is, or what it bundles."""
+    if data.startswith(b"PK"):
+        (folder / "s.sog").write_bytes(data)
+    else:
+        (folder / "s").mkdir()
+        unpack(data, folder / "s")
+        with zipfile.ZipFile(folder / "s.sog", "w") as archive:
+            for path in sorted((folder / "s").rglob("*")):
+                if path.is_file():
+                    archive.write(path, path.relative_to(folder / "s"))
+    return load_scene(folder / "s.sog").bounds
 
 
 def _environment(data: bytes, folder: Path) -> object:
@@ -513,6 +535,9 @@ _READERS: dict[str, Target] = {
     "glb": Target(_gltf("s.glb"), tree=glb_tree, repair=glb_repaired),
     "obj": Target(_obj),
     "ply": Target(_scene("s.ply")),
+    "ply-splats": Target(_scene("s.ply")),
+    "spz": Target(_spz),
+    "sog": Target(_sog, tree=part_tree(b"meta.json")),
     "stl": Target(_scene("s.stl")),
     "tachyon": Target(_scene("s.dat")),
     "cam": Target(_cam),
@@ -528,6 +553,7 @@ _READERS: dict[str, Target] = {
     "texture": Target(_texture, repair=png_repaired),
     "ktx2": Target(_ktx2),
     "rendered-gltf": Target(_rendered("s.gltf"), tree=json_tree, seconds=COMPILED),
+    "rendered-ply-splats": Target(_rendered("s.ply"), seconds=COMPILED),
     "rendered-obj": Target(_rendered("s.obj"), seconds=COMPILED),
     "rendered-mitsuba-xml": Target(_rendered("s.xml"), seconds=COMPILED),
     "parcel": Target(_parcel),

@@ -18,7 +18,8 @@ Transfer-Encoding: chunked Expect: 100-continue If-Match: /pictures/0/manifest.j
 _GLTF = """
 KHR_draco_mesh_compression EXT_meshopt_compression KHR_texture_basisu KHR_techniques_webgl KHR_animation_pointer
 EXT_mesh_gpu_instancing extensionsRequired ATTRIBUTES TRIANGLES INDICES OCTAHEDRAL QUATERNION EXPONENTIAL
-"mode":0 "mode":1 "mode":2 "mode":3 "version":"1.0"
+KHR_gaussian_splatting KHR_gaussian_splatting:SCALE KHR_gaussian_splatting:SH_DEGREE_1_COEF_0 lin_rec709_display
+KHR_gaussian_splatting_compression_spz_2 "mode":0 "mode":1 "mode":2 "mode":3 "version":"1.0"
 """
 
 _WORDS = {
@@ -31,6 +32,16 @@ t.png s.mtl 1/2/3 1//2 -1 # none.mtl Meshlab
     "ply": """
 ply format ascii binary_little_endian binary_big_endian 1.0 element vertex face property list char uchar short ushort
 int uint float double end_header comment obj_info tristrips TextureFile t.png # -1 gap red green blue
+""",
+    "ply-splats": """
+ply format ascii binary_little_endian binary_big_endian 1.0 element vertex chunk sh property float double half uint
+uchar list end_header x f_dc_0 f_rest_0 f_rest_8 opacity scale_0 rot_0 packed_position packed_rotation packed_scale
+packed_color min_x max_scale_z min_r nan inf
+""",
+    "spz": "NGSP",
+    "sog": """
+version count means scales quats sh0 shN mins maxs files codebook bands shape meta.json l.webp u.webp RIFF WEBP
+VP8L VP8X
 """,
     "stl": "solid facet normal outer loop vertex endloop endfacet endsolid # // ; nan",
     "tachyon": """

@@ -107,7 +107,9 @@ def render_eye_preview(
     UsageError, SceneError, MemoryLimitError, EngineError
         As the stages find them.
     """
-    plain = replace(request, method="full", denoise="none", order=None, respect_gloss=None, layers=False)
+    # Of splats nothing is denoised, and a denoiser that is asked for is refused.
+    denoiser = request.denoise if scene.has_splats else "none"
+    plain = replace(request, method="full", denoise=denoiser, order=None, respect_gloss=None, layers=False)
     resolved = resolve(plain, scene, display)
     width, height = _size_of(display, size)
     session = open_session(scene, resolved, (width, height), progress=progress)
@@ -129,6 +131,7 @@ def render_eye_preview(
     # Where lenses are larger than the picture's pixels, it is made of blocks, which the denoiser has never seen.
     is_fine = 2 * source.width > width * height * whole.channels
     denoises = samples < _CLEAN_FROM and is_fine and request.denoise != "none" and resolved.integrator in LIGHT
+    denoises &= not scene.has_splats
     if denoises:
         load_denoiser()
         guides = trace_guides(
@@ -165,7 +168,7 @@ def _picture(values: NDArray[np.float32], seen: SeenPixels) -> NDArray[np.float3
 
 
 def _choose_samples(asked: RenderRequest, resolved: RenderRequest, pixels: int) -> int:
-    if asked.spp is not None or resolved.integrator not in POOLED_LIGHT:
+    if asked.spp is not None or resolved.spp == 1 or resolved.integrator not in POOLED_LIGHT:
         return resolved.samples
     return min(max(1, _SAMPLE_BUDGET // max(1, pixels)), _MOST_SAMPLES)
 

@@ -104,7 +104,7 @@ class PhysicalSurfaces:
         self._background = built.background
         self._has_null = built.has_null
         pointers = np.array(dr.reinterpret_array(mi.UInt32, self._scene.shapes_dr()))
-        numbers = np.zeros(int(pointers.max()) + 1, dtype=np.uint32)
+        numbers = np.zeros(int(pointers.max(initial=0)) + 1, dtype=np.uint32)
         numbers[pointers] = np.arange(len(pointers))
         self._numbers = mi.UInt32(numbers)
 

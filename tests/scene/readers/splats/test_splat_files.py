@@ -202,6 +202,15 @@ def test_splats_that_are_no_numbers_are_left_out(tmp_path):
         load_scene(path)
 
 
+@pytest.mark.parametrize("length", [1e-30, 1e30])
+def test_quaternions_of_any_length_are_read(tmp_path, length):
+    row = ROW.copy()
+    row[10:] = np.float32(length) * np.float32([0.5, -0.5, 0.5, 0.5])
+    path = tmp_path / "a.ply"
+    path.write_bytes(header([(name, "float") for name in NAMES]) + row.tobytes())
+    np.testing.assert_allclose(splats_of(path).rotations, [[-0.5, 0.5, 0.5, 0.5]], atol=1e-6)
+
+
 FLOATS = [(name, "float") for name in NAMES]
 
 

@@ -90,8 +90,9 @@ def cleaned(
     """As :func:`activated`, of standard deviations themselves; ``linear`` is that of the splats."""
     if not len(centers):
         raise SceneError("holds no Gaussian splats", where=where)
-    length = np.sqrt(np.square(quaternions).sum(axis=1, keepdims=True))
-    rotations = (quaternions / length).astype(np.float32, copy=False)
+    # In double precision, which holds the square of every single number.
+    wide = quaternions.astype(np.float64)
+    rotations = (wide / np.sqrt(np.square(wide).sum(axis=1, keepdims=True))).astype(np.float32)
     sound = (np.abs(centers) < _FARTHEST).all(axis=1) & ((scales >= 0.0) & (scales < _FARTHEST)).all(axis=1)
     sound &= np.isfinite(rotations).all(axis=1) & (opacities >= 0.0) & (opacities <= 1.0)
     sound &= (np.abs(harmonics) < _FARTHEST).all(axis=(1, 2))
