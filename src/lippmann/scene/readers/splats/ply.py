@@ -179,9 +179,9 @@ def _packed(rows: Mapping[str, Rows], where: str) -> tuple[Splats, tuple[str, ..
     harmonics = np.empty((len(vertex), count, 3), np.float32)
     harmonics[:, 0] = (rgb - np.float32(0.5)) / np.float32(SH_0)
     if sh is not None and count > 1:
-        bytes_ = sh.view(np.uint8).reshape(len(sh), -1)[: len(vertex)]
+        bytes_ = sh.view(np.uint8).reshape(len(sh), rest)[: len(vertex)]
         values = (bytes_.astype(np.float32) - np.float32(127.5)) / np.float32(32.0)
-        harmonics[:, 1:] = values.reshape(-1, 3, count - 1).transpose(0, 2, 1)
+        harmonics[:, 1:] = values.reshape(len(vertex), 3, count - 1).transpose(0, 2, 1)
     return activated(
         within(_CORNERS, _parts(word["packed_position"], (21, 11, 0), (11, 10, 11))),
         within(_SCALES, _parts(word["packed_scale"], (21, 11, 0), (11, 10, 11))),

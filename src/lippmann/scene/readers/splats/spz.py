@@ -82,7 +82,7 @@ def decode_spz(data: bytes | memoryview, *, where: str) -> tuple[Splats, tuple[s
     )
     harmonics = np.empty((count, coefficients, 3), np.float32)
     harmonics[:, 0] = (colors.astype(np.float32) / 255.0 - 0.5) / _COLOR_SCALE
-    harmonics[:, 1:] = (rest.astype(np.float32).reshape(count, -1, 3) - 128.0) / 128.0
+    harmonics[:, 1:] = (rest.astype(np.float32).reshape(count, coefficients - 1, 3) - 128.0) / 128.0
     return activated(
         _halves(places) if version == 1 else _fixed_point(places, fraction),
         scales.astype(np.float32) / 16.0 - 10.0,
