@@ -203,8 +203,6 @@ class LiveSocket:
             "state": values_of_state(state),
             "optics": optics_of(session.display(state), subpixels=state.subpixels),
             "displays": session.display_names(),
-            "accepts_files": session.uploads is not None,
-            "has_renders": session.has_renders,
         }
 
     def _facts(self, shown: Shown) -> dict[str, Any] | None:

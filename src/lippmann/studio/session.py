@@ -35,36 +35,31 @@ class StudioSession:
     state:
         The first state. Its files are open to the pages; other files are not.
     uploads:
-        Folder for dropped files; None if none may be dropped.
+        Folder for dropped files.
     outputs:
         Folder that renders are written into.
     make_renderer:
         Makes the live renderer of a scene and a display.
     allow_outside:
         Whether scenes may name files outside their folders.
-    scene:
-        An object to show in place of the file that the state names; full renders are then not offered.
     """
 
     def __init__(
         self,
         state: StudioState,
         *,
-        uploads: Uploads | None,
+        uploads: Uploads,
         outputs: Path,
         make_renderer: Callable[[Scene, Display], Renderer],
         allow_outside: bool = False,
-        scene: Scene | None = None,
     ) -> None:
         self._lock = threading.Lock()
         self._state = state
-        self._scene = scene
         self._allow_outside = allow_outside
         self._displays: dict[str, Display] = {}
         self._presets = {display.name: display for display in list_displays()}
         self._files = {name for name in (state.scene, state.environment, state.display) if name is not None}
         self.uploads = uploads
-        self.has_renders = scene is None
         self.job_listeners: list[Callable[[Job], None]] = []
         self.state_listeners: list[Callable[[], None]] = []
         self.jobs = JobRunner(outputs, self._job_changed)
@@ -131,9 +126,11 @@ class StudioSession:
     def wanted(self, number: int, view: Callable[[StudioState], LiveView]) -> Wanted:
         """What to render for a view of the present state."""
         state = self.state
-        scene = self._scene
-        key = ("object",) if scene else (state.scene, state.environment, state.background, state.up)
-        load = (lambda: scene) if scene else (lambda: state.load_scene(allow_outside=self._allow_outside))
+        key = (state.scene, state.environment, state.background, state.up)
+
+        def load() -> Scene:
+            return state.load_scene(allow_outside=self._allow_outside)
+
         return Wanted(number, key, load, self.display(state), view(state))
 
     def command(self, state: StudioState) -> list[str]:
@@ -142,8 +139,6 @@ class StudioSession:
 
     def render(self, kind: Kind) -> None:
         """Begin a full render of the present state; a UsageError if one is running."""
-        if not self.has_renders:
-            raise UsageError("a scene made by a program has no command line", fix="render it by lippmann.render")
         state = self.state
         words = self.command(state)
         ending: str | None = None

@@ -109,8 +109,6 @@ class StudioSite:
         return FileResponse(job.output)
 
     async def _file(self, request: ServerRequest) -> Response:
-        if self._session.uploads is None:
-            raise not_found()
         path = await self._session.uploads.receive(request.path_params["name"], request)
         self._session.open_file(path)
         return _as_response(json_response({"path": str(path)}))
