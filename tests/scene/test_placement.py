@@ -246,7 +246,7 @@ class TestFit:
         assert points[:, 2].min() >= -50 - 1e-6
         assert points[:, 2].max() <= 50 + 1e-6
         fill = np.abs(silhouette(placed, corners(bounds), distance)).max(axis=0) * 2 / found.size_mm
-        assert fill.max() == pytest.approx(FILL, rel=4e-3) or fill.max() < 1e-3
+        assert fill.max() == pytest.approx(FILL, rel=1e-6) or fill.max() < 1e-3
 
 
 class TestCamera:

@@ -31,7 +31,7 @@ _LARGEST_NOISE = 1e-3
 _SEARCHED = (1.0 / 16.0, 2.0)
 #: In so many rounds, each of which divides what is left into so many parts.
 _ROUNDS, _PARTS = 10, 16
-_CENTERINGS = 24
+_CENTERINGS = 12
 
 
 @dataclass(frozen=True)
@@ -144,13 +144,16 @@ def _centers(seen: Bounds, sizes: Bounds, shown: Bounds, front: Bounds, display:
     nearness = 1.0 - (front[:, None] + seen[:, 2] * (sizes * shown)[:, None]) / display.viewing_distance
     center = np.zeros((len(sizes), 2))
     if np.isfinite(display.viewing_distance):
-        # Rows of numbers are quicker than pairs.
-        inverse, mean = 1.0 / nearness, nearness.mean(axis=1) / 2.0
+        # What lies farthest to either side is to lie equally far from the middle: Newton steps, since that difference
+        # falls as the centre moves, by the two points' own slopes. Rows of numbers are quicker than pairs.
+        inverse, each = 1.0 / nearness, np.arange(len(sizes))
         points = seen[:, 0] * inverse, seen[:, 1] * inverse
         for _ in range(_CENTERINGS):
             for axis in (0, 1):
                 silhouette = points[axis] - center[:, axis, None] * inverse
-                center[:, axis] += (silhouette.max(axis=1) + silhouette.min(axis=1)) * mean
+                right, left = silhouette.argmax(axis=1), silhouette.argmin(axis=1)
+                apart = silhouette[each, right] + silhouette[each, left]
+                center[:, axis] += apart / (inverse[each, right] + inverse[each, left])
     return nearness, center
 
 
