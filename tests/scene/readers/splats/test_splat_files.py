@@ -51,6 +51,11 @@ def check_same(splats, data, *, exact=False):
         np.testing.assert_allclose(splats.harmonics[:, 1:], data.shN, **near)
 
 
+def name_of(value):
+    """Of a parameter, for the test's name: packed files hold the time at which they are made."""
+    return "bytes" if isinstance(value, bytes) else None
+
+
 @pytest.mark.parametrize("degree", [0, 1, 2, 3])
 def test_ply_of_trainers_is_read_as_gsply_reads_it(tmp_path, degree):
     gsply.plywrite(tmp_path / "a.ply", *trained(degree))
@@ -151,6 +156,7 @@ def test_sog_is_read_as_gsply_reads_it(tmp_path, degree, version):
 @pytest.mark.parametrize(
     ("name", "data", "usual"),
     [("a.ply", None, "-y"), ("a.sog", sog(), "-y"), ("a.spz", spz(2, bytes(9) + bytes([51] + [128] * 9)), "y")],
+    ids=name_of,
 )
 def test_up_is_what_trainers_mostly_have(tmp_path, name, data, usual):
     path = tmp_path / name
@@ -245,6 +251,7 @@ FLOATS = [(name, "float") for name in NAMES]
         ("a.sog", sog(1, count=10, shN__bands=2), "a palette 192 pixels wide"),
         ("a.sog", sog(count=10, means=[]), "'means' is missing or wrong"),
     ],
+    ids=name_of,
 )
 def test_damaged_files_are_refused_in_one_line(tmp_path, name, data, said):
     (tmp_path / name).write_bytes(data)
