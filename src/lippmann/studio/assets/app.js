@@ -78,13 +78,13 @@ class Studio {
   }
 
   #showFacts(facts) {
-    this.page.fail(null);
     if (facts.optics !== null) this.stage.setOptics(facts.optics);
     this.panel.showFacts(facts);
     this.page.showCommand(facts.command, facts.title);
   }
 
   #changed() {
+    this.page.fail(null);
     this.panel.show(this.store.state);
     this.page.showHistory(this.store);
     this.#ask();
