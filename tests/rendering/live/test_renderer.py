@@ -11,12 +11,15 @@ import lippmann
 from lippmann.color.transfer import quantize
 from lippmann.display import Display, LensArray, Panel
 from lippmann.display.pixel_window import PixelWindow
-from lippmann.errors import UsageError
+from lippmann.errors import SceneError, UsageError
 from lippmann.rendering.live.live_view import LiveView
 from lippmann.rendering.live.renderer import LiveRenderer
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.scene.light_options import LightOptions
 from lippmann.scene.placement import PlacementOptions
+from lippmann.scene.scene import Scene
+from lippmann.scene.values.description import SceneDescription
+from lippmann.scene.values.splats import Splats
 
 pytestmark = pytest.mark.usefixtures("engine")
 
@@ -194,6 +197,16 @@ def test_what_cannot_be_shown_is_said(renderers):
         renderers("square").frame(LiveView(EYES[0], SIZE, request=RenderRequest(integrator="normal")))
     with pytest.raises(UsageError, match="0 to 1"):
         renderers("square").pick(LiveView(EYES[0], SIZE), 2.0, 0.0)
+
+
+def test_splats_are_refused_and_the_scene_before_stays(renderers):
+    ones = np.ones((1, 3), np.float32)
+    splats = Splats(ones, ones, np.float32([[0, 0, 0, 1]]), np.float32([1]), np.ones((1, 1, 3), np.float32))
+    renderer = renderers("square")
+    scene = renderer.scene
+    with pytest.raises(SceneError, match="splats cannot be shown live"):
+        renderer.set_scene(Scene("scan", SceneDescription("scan", splats=splats)))
+    assert renderer.scene is scene
 
 
 def test_a_display_or_a_scene_takes_the_place_of_another(teapot):

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.display import Display
-from lippmann.errors import UsageError
+from lippmann.errors import SceneError, UsageError
 from lippmann.progress import ProgressCallback, silent
 from lippmann.rendering.live.develop import develop
 from lippmann.rendering.live.live_view import LiveFrame, LiveView
@@ -234,6 +234,12 @@ class LiveRenderer:
     # ---- Stages ----------------------------------------------------------------------------------------------------
 
     def _open(self, scene: Scene) -> SceneKernels:
+        if scene.has_splats:
+            raise SceneError(
+                "Gaussian splats cannot be shown live",
+                rule="live pictures show surfaces",
+                fix="use preview or render, which trace splats",
+            )
         request = replace(_moving(self._machine), device=self._machine.device, threads=self._machine.threads)
         session = open_session(
             scene, resolve(request, scene, self._display), memory=self._machine.memory, progress=self._progress
