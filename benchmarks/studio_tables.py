@@ -20,7 +20,7 @@ def section(result: dict[str, Any]) -> str:
     """The section of ``benchmarks/studio.py``."""
     start = result["start"]
     lines = [
-        "## Live frames",
+        "## Live frames (`studio.py`)",
         "",
         "An orbit of single samples in direct light; then a view at rest, of paths, denoised (PSNR against long",
         "references of the same eye); and how far a frame is from the replay of a whole render by the same settings.",
@@ -41,6 +41,33 @@ def section(result: dict[str, Any]) -> str:
             f"Moves for {endless['minutes']:g} minutes: {endless['frames']} frames, the oldest "
             f"{endless['oldest_s']:.2f} s; memory {endless['early_mib']:.0f} MiB early on, "
             f"{endless['last_mib']:.0f} MiB at the end.",
+        ]
+    return "\n".join(lines) + "\n"
+
+
+def command_section(result: dict[str, Any]) -> str:
+    """The section of ``benchmarks/studio_command.py``."""
+    lines = [
+        "## The studio as a page meets it (`studio_command.py`)",
+        "",
+        "`lippmann studio teapot`, its own process, over its WebSocket: a page sends a view every 16 ms as the model",
+        "turns and the eye sways. A frame's age is counted from the sending of its view.",
+        "",
+        "| display | first frame after the command | frames/s | median age | 99 of 100 are younger than | oldest |",
+        "|---|---|---|---|---|---|",
+    ]
+    for name, case in result["cases"].items():
+        lines.append(
+            f"| {name} | {case['start_s']:.1f} s | {case['frames_per_second']:.0f} | "
+            f"{case['median_age_ms']:.0f} ms | {case['age_of_99_in_100_ms']:.0f} ms | {case['oldest_ms']:.0f} ms |"
+        )
+    endless = result.get("endless")
+    if endless:
+        lines += [
+            "",
+            f"{endless['minutes']:g} minutes of moves on one connection: {endless['frames']} frames, half of them "
+            f"younger than {endless['median_age_ms']:.0f} ms, the oldest {endless['oldest_ms']:.0f} ms; memory "
+            f"{endless['early_mib']:.0f} MiB when they begin, {endless['last_mib']:.0f} MiB at their end.",
         ]
     return "\n".join(lines) + "\n"
 

@@ -429,6 +429,7 @@ SECTIONS = {
     "command": _command,
     "viewer": _viewer,
     "studio": studio_tables.section,
+    "studio_command": studio_tables.command_section,
     "cluster": _cluster,
     "fuzz": _fuzz,
     "conformance": conformance_tables.describe,
