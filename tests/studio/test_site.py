@@ -94,7 +94,13 @@ def test_no_socket_for_other_hosts(studio):
 
 @pytest.mark.parametrize(
     ("method", "path"),
-    [("POST", "panel.json"), ("GET", "files/a.glb"), ("POST", "results/1/a.png"), ("POST", ""), ("DELETE", "panel.json")],
+    [
+        ("POST", "panel.json"),
+        ("GET", "files/a.glb"),
+        ("POST", "results/1/a.png"),
+        ("POST", ""),
+        ("DELETE", "a"),
+    ],
 )
 def test_other_methods_are_one_line_of_json(studio, method, path):
     status, headers, body = ask(studio, f"/{FOLDER}/{path}", method)
