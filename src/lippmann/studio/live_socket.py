@@ -14,7 +14,15 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from lippmann.display.pixel_window import PixelWindow
 from lippmann.errors import LippmannError, UsageError
 from lippmann.rendering.live.live_view import LiveView
-from lippmann.studio.page_values import facts_of_view, optics_of, shell_line, state_of_values, title_of, values_of_state
+from lippmann.studio.page_values import (
+    display_size,
+    facts_of_view,
+    optics_of,
+    shell_line,
+    state_of_values,
+    title_of,
+    values_of_state,
+)
 from lippmann.studio.render_jobs import KINDS, Job
 from lippmann.studio.render_thread import Shown, Watcher
 from lippmann.studio.session import WITHOUT_FILE, StudioSession, opened_state
@@ -219,6 +227,7 @@ class LiveSocket:
             "title": title_of(state),
             "command": self._command_line(state),
             "optics": optics_of(display, subpixels=state.subpixels) if is_new else None,
+            "display_size": display_size(state),
             **facts_of_view(display, frame.placement, frame.exposure),
         }
 
