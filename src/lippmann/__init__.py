@@ -11,7 +11,16 @@ from typing import TYPE_CHECKING, Any
 from lippmann import _version
 
 if TYPE_CHECKING:
-    from lippmann.api import load_scene, plan, preview, render, render_quilt, render_to_file, render_turntable
+    from lippmann.api import (
+        load_scene,
+        open_studio,
+        plan,
+        preview,
+        render,
+        render_quilt,
+        render_to_file,
+        render_turntable,
+    )
     from lippmann.display import Display, LensArray, Panel, list_displays, load_display
     from lippmann.errors import LippmannError
     from lippmann.image import IntegralImage, read_picture
@@ -27,6 +36,7 @@ __version__ = _version.VERSION
 
 _HOME = {
     "load_scene": "lippmann.api",
+    "open_studio": "lippmann.api",
     "plan": "lippmann.api",
     "preview": "lippmann.api",
     "render": "lippmann.api",
@@ -66,6 +76,7 @@ __all__ = [
     "list_displays",
     "load_display",
     "load_scene",
+    "open_studio",
     "plan",
     "preview",
     "read_picture",

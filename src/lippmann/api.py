@@ -15,7 +15,7 @@ Everything else hangs on what they return.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, cast
@@ -45,6 +45,7 @@ if TYPE_CHECKING:
     from lippmann.rendering.preview import Preview
     from lippmann.scene.light_options import LightOptions
     from lippmann.scene.values.description import Environment
+    from lippmann.studio.notebook import NotebookStudio
     from lippmann.tiles.tiled_render import Rendered, Runner
 
 #: Keywords that :func:`render` took before ``placement``, and what they are called there.
@@ -511,6 +512,76 @@ def plan(
         return forecast(_scene(scene), _display(display), _request(placement, options), told)
 
 
+def open_studio(
+    scene: Scene | object = "teapot",
+    display: str | Path = "seed-lenticular",
+    *,
+    folder: str | Path = ".",
+    height: int = 760,
+    port: int = 0,
+    framed_by: Iterable[str] = (),
+    allow_outside: bool = False,
+    device: Device = "auto",
+    threads: int | None = None,
+    memory: int | None = None,
+    **settings: object,
+) -> NotebookStudio:
+    """Open the studio for a scene; as the value of a notebook's cell it is shown there.
+
+    The studio is served from this process to browsers on this machine; elsewhere forward its port. It renders in a
+    thread of its own: other renders of the process take turns with it, and its pictures stand still meanwhile.
+
+    Parameters
+    ----------
+    scene:
+        A file, a bundled scene's name, or a scene (or another library's object, as for :func:`load_scene`). An object
+        has no file: the page shows it and sets everything, but has no command line, no full render and no saved state
+        for it; :func:`render` has.
+    display:
+        Name, TOML file or short form of a display.
+    folder:
+        Where renders of the page are written.
+    height:
+        Height of the cell in CSS pixels, 200 to 4000. Default 760.
+    port:
+        Port to listen on; 0 takes a free one.
+    framed_by:
+        Origins of pages that may show the studio beside those of ``localhost``, such as ``https://hub.example:8000``.
+    allow_outside:
+        As for :func:`load_scene`.
+    device, threads, memory:
+        As for :func:`render`.
+    **settings:
+        First values of settings: fields of :class:`~lippmann.studio.state.StudioState`, such as ``turn`` or
+        ``exposure``.
+
+    Returns
+    -------
+    NotebookStudio
+        With ``.address``, ``.state`` (what the page set last) and ``.close()``; also a context manager. It is closed
+        when the process ends.
+
+    Raises
+    ------
+    LippmannError
+        Of the kind that says what was wrong.
+    """
+    from lippmann.studio.notebook import NotebookStudio, state_of_settings
+
+    held = None if isinstance(scene, (str, Path)) else _scene(scene)
+    name = f"{held.name} (object)" if held is not None else str(scene)
+    return NotebookStudio(
+        state_of_settings(name, display, settings, held),
+        held=held,
+        machine=RenderRequest(device=device, threads=threads, memory=memory),
+        folder=Path(folder),
+        height=height,
+        port=port,
+        framed_by=framed_by,
+        allow_outside=allow_outside,
+    )
+
+
 def _scene(source: Scene | object) -> Scene:
     return source if isinstance(source, Scene) else load_scene(source)
 
@@ -541,4 +612,4 @@ def _placement(
     return placement or PlacementOptions()
 
 
-__all__ = ["load_scene", "plan", "preview", "render", "render_quilt", "render_to_file"]
+__all__ = ["load_scene", "open_studio", "plan", "preview", "render", "render_quilt", "render_to_file"]

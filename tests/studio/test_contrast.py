@@ -44,7 +44,7 @@ def test_text_and_edges_can_be_seen(sheet):
     assert contrast(found["on-accent"], found["accent"]) >= 4.5
 
 
-@pytest.mark.parametrize("sheet", ["studio.css", "settings.css", "panel_window.css"])
+@pytest.mark.parametrize("sheet", ["studio.css", "result.css", "settings.css", "panel_window.css"])
 def test_text_has_no_other_colours(sheet):
     text = static_files()[f"assets/{sheet}"].body.decode()
     used = re.findall(r"[^-]color: ([^;]+);", text)

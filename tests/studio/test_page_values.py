@@ -12,7 +12,14 @@ from stand_in import TINY, placement
 
 from lippmann.display import load_display
 from lippmann.errors import UsageError
-from lippmann.studio.page_values import facts_of_view, optics_of, shell_line, state_of_values, values_of_state
+from lippmann.studio.page_values import (
+    display_size,
+    facts_of_view,
+    optics_of,
+    shell_line,
+    state_of_values,
+    values_of_state,
+)
 from lippmann.studio.state import StudioState
 
 STATE = StudioState(
@@ -72,6 +79,29 @@ def test_facts_are_plain_values_in_the_words_of_the_page():
     assert facts["warnings"] == ["depth scale 1 shows it whole"]
     assert ["Panel", f"{display.panel.width} x {display.panel.height} pixels"] in facts["display_facts"]
     assert optics_of(display, subpixels=None)["panel"]["subpixels"] is False
+
+
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [
+        (TINY, (10.0, 8.0, "mm")),
+        ("print:lpi=60, size = 8x10in ,ppi=720", (203.2, 254.0, "mm")),
+        ("monitor:dpi=282,size=400x300,pitch=45.5,slope=-6,center=0", (400, 300, "px")),
+        ("seed-lenticular", None),
+        ("looking-glass-portrait", None),
+    ],
+)
+def test_sizes_that_can_be_set(name, expected):
+    size = display_size(StudioState(display=name))
+    if expected is None:
+        assert size is None
+        return
+    assert (size["width"], size["height"], size["unit"]) == pytest.approx(expected)
+    # The text around the size is the same display in that size, and in another.
+    same = load_display(f"{size['head']}{size['width']:g}x{size['height']:g}{size['tail']}")
+    assert same == load_display(name)
+    twice = load_display(f"{size['head']}{2 * size['width']:g}x{2 * size['height']:g}{size['tail']}")
+    assert twice.panel.width == pytest.approx(2 * same.panel.width, abs=1)
 
 
 def test_command_lines_are_quoted():

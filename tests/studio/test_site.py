@@ -92,6 +92,22 @@ def test_no_socket_for_other_hosts(studio):
     assert b"not served" in body
 
 
+@pytest.mark.parametrize(
+    ("method", "path"),
+    [
+        ("POST", "panel.json"),
+        ("GET", "files/a.glb"),
+        ("POST", "results/1/a.png"),
+        ("POST", ""),
+        ("DELETE", "a"),
+    ],
+)
+def test_other_methods_are_one_line_of_json(studio, method, path):
+    status, headers, body = ask(studio, f"/{FOLDER}/{path}", method)
+    assert (status, headers["Content-Type"]) == (405, "application/json")
+    assert list(json.loads(body)) == ["error"]
+
+
 UP = ("..", "%2e%2e", ".%2e", "%252e%252e", "..%00", "..%c0%af", "..;", "\\..", "%5c..")
 
 

@@ -106,6 +106,41 @@ def test_values_are_typed_and_automatic_ones_are_given_back(page):
     tab.assert_clean()
 
 
+def test_a_print_and_a_monitor_are_given_another_size(page):
+    tab = page(size=(1024, 768))
+    width = tab.page.get_by_role("spinbutton", name="Size, width")
+    assert (width.input_value(), tab.page.locator(".size .unit").inner_text()) == ("10", "mm")
+    width.fill("12.5")
+    tab.page.keyboard.press("Tab")
+    tab.wait_for(f"{COMMAND}.includes('size=12.5x8mm')")
+    tab.wait_for(f"{STUDIO}.stage.optics.panel.width === 148")
+    assert tab.page.get_by_label("Display", exact=True).locator(":scope > option").count() == 1
+    # A size that cannot be is one line, and what was typed stays to be put right.
+    width.fill("0.001")
+    tab.page.keyboard.press("Tab")
+    assert "size" in tab.wait_for(ALERT)
+    assert width.input_value() == "0.001"
+    width.fill("")
+    tab.page.keyboard.press("Tab")
+    assert width.input_value() == "12.5"
+    undo = tab.page.get_by_role("button", name="Undo")
+    while undo.is_enabled():
+        undo.click()
+    tab.wait_for(f"{COMMAND}.includes('size=10x8mm')", 10)
+    tab.wait_until(lambda: width.input_value() == "10")
+    monitor = "monitor:size=400x300,dpi=282,pitch=45.5,slope=-6,center=0"
+    tab.evaluate(f"display => {STUDIO}.store.set({{ display }})", monitor)
+    tab.wait_until(lambda: width.input_value() == "400")
+    tab.page.get_by_role("spinbutton", name="Size, height").fill("200")
+    tab.page.keyboard.press("Tab")
+    tab.wait_for(f"{COMMAND}.includes('size=400x200,dpi')")
+    assert "px" in tab.page.locator(".size .unit").inner_text()
+    tab.page.get_by_label("Display", exact=True).select_option("mla-square")
+    tab.wait_for(f"{COMMAND}.includes('mla-square')")
+    assert tab.page.locator(".size").is_hidden()
+    tab.assert_clean()
+
+
 def test_a_clicked_point_comes_into_the_lens_plane(page):
     tab = page()
     tab.page.keyboard.press("l")

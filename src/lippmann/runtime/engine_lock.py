@@ -13,7 +13,7 @@ import os
 import sys
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager, nullcontext, suppress
 from typing import Any, NoReturn
 
 from lippmann.errors import EngineError
@@ -22,6 +22,8 @@ from lippmann.errors import EngineError
 _THREADED = ("drjit", "pyoidn")
 
 _lock = threading.RLock()
+_next = threading.Lock()  # held by the one thread that waits for its turn
+_depth = threading.local()  # ``of_thread``: how often this thread holds the lock
 _lost = False  # whether this process was forked from one that had loaded such a library
 
 
@@ -29,7 +31,8 @@ _lost = False  # whether this process was forked from one that had loaded such a
 def exclusive() -> Iterator[None]:
     """Exclusive use of the engine by the calling thread; a context manager, and as ``@exclusive()`` a decorator.
 
-    The call waits until no other thread uses the engine; Ctrl-C ends the wait. The lock is reentrant.
+    The call waits until no other thread uses the engine; Ctrl-C ends the wait. The lock is reentrant, and fair: a
+    thread that takes it again and again, as live rendering does, lets one that waits go first.
 
     Raises
     ------
@@ -42,15 +45,23 @@ def exclusive() -> Iterator[None]:
             rule="the engine's threads do not survive a fork",
             fix="start workers by the spawn method: multiprocessing.get_context('spawn')",
         )
-    with _lock:
+    lock = _lock  # a fork within the block replaces it, and this one is released all the same
+    depth = getattr(_depth, "of_thread", 0)
+    with nullcontext() if depth else _next:
+        lock.acquire()
+    _depth.of_thread = depth + 1
+    try:
         yield
+    finally:
+        _depth.of_thread -= 1
+        lock.release()
 
 
 def _after_fork() -> None:
     """Set up the child: without a lock that a thread of the parent held, and without the engine."""
-    global _lock, _lost
+    global _lock, _next, _lost
     in_use = not _lock.acquire(blocking=False)
-    _lock = threading.RLock()
+    _lock, _next = threading.RLock(), threading.Lock()
     if not _lost and any(name in sys.modules for name in _THREADED):
         _lost = True
         if in_use:

@@ -14,11 +14,18 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from lippmann.display.pixel_window import PixelWindow
 from lippmann.errors import LippmannError, UsageError
 from lippmann.rendering.live.live_view import LiveView
-from lippmann.studio.command_line import render_command
-from lippmann.studio.page_values import facts_of_view, optics_of, shell_line, state_of_values, title_of, values_of_state
+from lippmann.studio.page_values import (
+    display_size,
+    facts_of_view,
+    optics_of,
+    shell_line,
+    state_of_values,
+    title_of,
+    values_of_state,
+)
 from lippmann.studio.render_jobs import KINDS, Job
 from lippmann.studio.render_thread import Shown, Watcher
-from lippmann.studio.session import StudioSession, opened_state
+from lippmann.studio.session import WITHOUT_FILE, StudioSession, opened_state
 from lippmann.studio.state import StudioState
 from lippmann.studio.state_toml import text_of_state
 from lippmann.studio.wire import Coding, FrameHeader, encode_frame, number_of, numbers_of, parse_message
@@ -158,6 +165,7 @@ class LiveSocket:
 
     def _save(self, _: dict[str, Any]) -> None:
         state = self._session.state
+        self._session.check_has_file(state, "a saved state")
         stem = title_of(state).rpartition(".")[0] or title_of(state)
         self._say({"type": "saved", "name": f"{stem}.toml", "text": text_of_state(state)})
 
@@ -217,10 +225,15 @@ class LiveSocket:
         return {
             "type": "facts",
             "title": title_of(state),
-            "command": shell_line(render_command(state)),
+            "command": self._command_line(state),
             "optics": optics_of(display, subpixels=state.subpixels) if is_new else None,
+            "display_size": display_size(state),
             **facts_of_view(display, frame.placement, frame.exposure),
         }
+
+    def _command_line(self, state: StudioState) -> str:
+        words = self._session.command(state)
+        return f"# This scene has no file: {WITHOUT_FILE}" if words is None else shell_line(words)
 
     def _put_frame(self, shown: Shown) -> None:
         facts = self._facts(shown)

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 
 from lippmann.display import Display
+from lippmann.display.formats.inline_spec import size_of_short_form
 from lippmann.errors import UsageError
 from lippmann.scene.placement import Placement
 from lippmann.studio.state import StudioState
@@ -60,6 +61,12 @@ def facts_of_view(display: Display, placement: Placement, exposure: float) -> di
         "exposure": exposure,
         "display_facts": _display_facts(display),
     }
+
+
+def display_size(state: StudioState) -> dict[str, object] | None:
+    """Size of a display that can have another one, see :class:`ShortFormSize`; None for a fixed device."""
+    size = size_of_short_form(state.display)
+    return None if size is None else asdict(size)
 
 
 def optics_of(display: Display, *, subpixels: bool | None) -> dict[str, object]:

@@ -33,7 +33,8 @@ _PAGE = """<!doctype html>
 </html>
 """
 
-_STUDIO_SHEETS = ("viewer/controls.css", "viewer/viewer.css", "assets/studio.css", "assets/settings.css")
+_OWN_SHEETS = ("studio.css", "result.css", "settings.css")
+_STUDIO_SHEETS = ("viewer/controls.css", "viewer/viewer.css", *(f"assets/{name}" for name in _OWN_SHEETS))
 _PANEL_SHEETS = ("assets/panel_window.css",)
 
 
@@ -62,7 +63,7 @@ def modules() -> dict[str, str]:
 def style() -> str:
     """All rules of the studio's page but those of the viewer."""
     folder = files(__package__) / "assets"
-    return "".join((folder / name).read_text(encoding="utf-8") for name in ("studio.css", "settings.css"))
+    return "".join((folder / name).read_text(encoding="utf-8") for name in _OWN_SHEETS)
 
 
 def _page(title: str, script: str, sheets: tuple[str, ...]) -> Response:

@@ -23,6 +23,10 @@ from lippmann.viewing.replay import default_eye
 if TYPE_CHECKING:
     from lippmann.rendering.live.live_view import LiveView
     from lippmann.scene.scene import Scene
+
+#: What to do with a scene that has no file.
+WITHOUT_FILE = "call lippmann.render with it, or open the studio with a file"
+
 #: Width and height of the picture that warms kernels up.
 _FIRST_SIZE = (256, 256)
 
@@ -42,6 +46,9 @@ class StudioSession:
         Makes the live renderer of a scene and a display.
     allow_outside:
         Whether scenes may name files outside their folders.
+    held:
+        A scene without a file, which the first state's ``scene`` only names: it is shown, but a command line cannot
+        render it, and no file of a state can name it.
     """
 
     def __init__(
@@ -52,10 +59,12 @@ class StudioSession:
         outputs: Path,
         make_renderer: Callable[[Scene, Display], Renderer],
         allow_outside: bool = False,
+        held: Scene | None = None,
     ) -> None:
         self._lock = threading.Lock()
         self._state = state
         self._allow_outside = allow_outside
+        self._held, self._held_name = held, state.scene
         self._displays: dict[str, Display] = {}
         self._presets = {display.name: display for display in list_displays()}
         self._files = {name for name in (state.scene, state.environment, state.display) if name is not None}
@@ -129,18 +138,24 @@ class StudioSession:
         key = (state.scene, state.environment, state.background, state.up)
 
         def load() -> Scene:
-            return state.load_scene(allow_outside=self._allow_outside)
+            return state.load_scene(allow_outside=self._allow_outside, source=self._held_scene(state))
 
         return Wanted(number, key, load, self.display(state), view(state))
 
-    def command(self, state: StudioState) -> list[str]:
-        """The command line that renders a state."""
-        return render_command(state)
+    def command(self, state: StudioState) -> list[str] | None:
+        """The command line that renders a state; None for a scene that has no file."""
+        return None if self._held_scene(state) is not None else render_command(state)
+
+    def check_has_file(self, state: StudioState, what: str) -> None:
+        """Raise :class:`UsageError` if the scene of a state has no file, which ``what`` needs."""
+        if self._held_scene(state) is not None:
+            raise UsageError(f"{what} needs a scene that is a file", parameter="scene", fix=WITHOUT_FILE)
 
     def render(self, kind: Kind) -> None:
         """Begin a full render of the present state; a UsageError if one is running."""
         state = self.state
-        words = self.command(state)
+        self.check_has_file(state, "a render from the page")
+        words = render_command(state)
         ending: str | None = None
         if kind == "quilt":
             from lippmann.quilts.quilt import quilt_of_display
@@ -162,6 +177,9 @@ class StudioSession:
         """End all work."""
         self.jobs.close()
         self.thread.close()
+
+    def _held_scene(self, state: StudioState) -> Scene | None:
+        return self._held if state.scene == self._held_name else None
 
     def _job_changed(self, job: Job) -> None:
         self.thread.gather(job.phase != "running")

@@ -54,10 +54,10 @@ class StudioSite:
         self._pictures: dict[int, ViewerSite] = {}
         self._pages = 0
         routes: list[BaseRoute] = [
-            Route("/panel.json", self._panel),
-            Route("/pictures/{number:int}/{rest:path}", self._picture),
-            Route("/results/{number:int}/{name}", self._result),
-            Route("/files/{name}", self._file, methods=["POST"]),
+            _Route("/panel.json", self._panel),
+            _Route("/pictures/{number:int}/{rest:path}", self._picture),
+            _Route("/results/{number:int}/{name}", self._result),
+            _Route("/files/{name}", self._file, methods=["POST"]),
             WebSocketRoute("/live", self._live),
             WebSocketRoute("/live-panel", self._live_panel),
         ]
@@ -112,6 +112,15 @@ class StudioSite:
         path = await self._session.uploads.receive(request.path_params["name"], request)
         self._session.open_file(path)
         return _as_response(json_response({"path": str(path)}))
+
+
+class _Route(Route):
+    """A route that refuses other methods as the guard refuses requests: with one line of JSON."""
+
+    async def handle(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if self.methods is not None and scope["method"] not in self.methods:
+            raise RefusedError(HTTPStatus.METHOD_NOT_ALLOWED, HTTPStatus.METHOD_NOT_ALLOWED.phrase)
+        await super().handle(scope, receive, send)
 
 
 async def _static(scope: Scope, receive: Receive, send: Send) -> None:

@@ -147,8 +147,10 @@ caustics, clamp_indirect:
         """Native pixels of a window of the panel, or of all of it."""
         return LiveView(None, window=window, request=self.request(), light=self.light())
 
-    def load_scene(self, *, allow_outside: bool = False) -> Scene:
+    def load_scene(self, *, allow_outside: bool = False, source: Scene | None = None) -> Scene:
         """The scene with its surroundings, in the light of its file: that of :meth:`light` is set by the view.
+
+        ``source`` is a scene that has no file, in place of the one that is named.
 
         Raises
         ------
@@ -158,7 +160,7 @@ caustics, clamp_indirect:
         from lippmann.scene.readers.load import load_scene
 
         return load_scene(
-            self.scene,
+            self.scene if source is None else source,
             environment=None if self.environment is None else Path(self.environment),
             background=self.background,
             allow_outside=allow_outside,

@@ -39,6 +39,8 @@ class WebServer:
         Port to listen on, 0 to 65535; 0 takes a free one.
     folder:
         First part of every path of the content, such as ``secret``; only the address tells it.
+    framed_by:
+        Pages that may embed those of the content, as sources of ``frame-ancestors``; by default none may.
 
     Raises
     ------
@@ -46,7 +48,15 @@ class WebServer:
         If the port is taken or not allowed, or the address is not this machine's.
     """
 
-    def __init__(self, content: Site | Application, host: str = LOOPBACK, port: int = 0, *, folder: str = "") -> None:
+    def __init__(
+        self,
+        content: Site | Application,
+        host: str = LOOPBACK,
+        port: int = 0,
+        *,
+        folder: str = "",
+        framed_by: tuple[str, ...] = (),
+    ) -> None:
         if not 0 <= port <= 65535:
             raise UsageError(f"{port} is no port", parameter="port", rule="it must lie between 1 and 65535, or be 0")
         try:
@@ -60,7 +70,7 @@ class WebServer:
             application = SecretFolder(application, folder)
         self._server = uvicorn.Server(
             uvicorn.Config(
-                RequestGuard(application, host),
+                RequestGuard(application, host, framed_by),
                 http=TimedProtocol,
                 ws=WebSocketsSansIOProtocol,
                 ws_max_size=_MAX_MESSAGE,

@@ -1,7 +1,8 @@
 """Checks and headers that all pages of a server have in common, as ASGI middleware.
 
 The guard refuses requests whose Host header names another machine, which stops DNS rebinding: a foreign page whose name
-resolves to this address. No other site's page can embed or read a response, send a body or open a WebSocket.
+resolves to this address. No other site's page can read a response, send a body or open a WebSocket. Pages that embed a
+response must be of the origins that the server is given; by default there are none.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from urllib.parse import urlsplit
 
 from lippmann.errors import LippmannError
 from lippmann.printable import one_line
-from lippmann.viewer.responses import RefusedError, Response, content_security_policy, error_response
+from lippmann.viewer.responses import NO_FRAMING, RefusedError, Response, content_security_policy, error_response
 
 Scope = MutableMapping[str, Any]
 Receive = Callable[[], Awaitable[MutableMapping[str, Any]]]
@@ -54,14 +55,17 @@ class RequestGuard:
         Answers the requests that pass; may raise :class:`RefusedError` or :class:`LippmannError` before it answers.
     host:
         Address that the server listens on.
+    framed_by:
+        Sources of ``frame-ancestors``: pages that may embed the answers. By default none may.
     """
 
-    def __init__(self, application: Application, host: str) -> None:
+    def __init__(self, application: Application, host: str, framed_by: tuple[str, ...] = ()) -> None:
         self._application = application
         self._host = host
+        self._framed_by = framed_by
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        sender = _Sender(send)
+        sender = _Sender(send, self._framed_by)
         try:
             self._check(scope)
             await self._application(scope, receive, sender)
@@ -97,17 +101,28 @@ class RequestGuard:
 class _Sender:
     """``send`` of ASGI with the headers of every response and a limit of time for a client that takes nothing."""
 
-    def __init__(self, send: Send) -> None:
+    def __init__(self, send: Send, framed_by: tuple[str, ...]) -> None:
         self._send = send
+        self._framed_by = framed_by
         self.has_begun = False
 
     async def __call__(self, message: MutableMapping[str, Any]) -> None:
         if message["type"] in ("http.response.start", "websocket.http.response.start"):
             named = {name.lower() for name, _ in message["headers"]}
             extra = [(n.encode(), v.encode()) for n, v in _HEADERS.items() if n.lower().encode() not in named]
-            message = {**message, "headers": [*message["headers"], *extra]}
+            message = {**message, "headers": _embeddable([*message["headers"], *extra], self._framed_by)}
         self.has_begun = True
         await asyncio.wait_for(self._send(message), _SEND_TIMEOUT)
+
+
+def _embeddable(headers: list[tuple[bytes, bytes]], framed_by: tuple[str, ...]) -> list[tuple[bytes, bytes]]:
+    """Headers that let pages of these origins embed an answer; X-Frame-Options cannot name any."""
+    if not framed_by:
+        return headers
+    none, some = NO_FRAMING.encode(), f"frame-ancestors {' '.join(framed_by)}".encode("ascii")
+    policy = b"content-security-policy"
+    kept = [(name, value) for name, value in headers if name.lower() != b"x-frame-options"]
+    return [(name, value.replace(none, some) if name.lower() == policy else value) for name, value in kept]
 
 
 async def send_response(send: Send, response: Response) -> None:

@@ -29,6 +29,10 @@ class Response:
     headers: Mapping[str, str] = field(default_factory=dict)
 
 
+#: The directive that every policy ends with: no page may embed this one. A server may put others in its place.
+NO_FRAMING = "frame-ancestors 'none'"
+
+
 class RefusedError(Exception):
     """A refused request: HTTP status, and one line that tells the user why."""
 
@@ -55,7 +59,7 @@ def content_security_policy(*inline_scripts: str) -> str:
     scripts = " ".join(["'self'", *inline_scripts])
     return (
         f"default-src 'none'; script-src {scripts}; style-src 'self'; "
-        "img-src 'self' blob: data:; connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+        f"img-src 'self' blob: data:; connect-src 'self'; base-uri 'none'; form-action 'none'; {NO_FRAMING}"
     )
 
 

@@ -11,12 +11,8 @@ import typer
 from lippmann.cli.commands import view as viewing
 from lippmann.cli.shared import options, parse
 from lippmann.cli.shared.console import Console
-from lippmann.runtime.temporary_names import scratch_folder
 
 if TYPE_CHECKING:
-    from lippmann.display import Display
-    from lippmann.rendering.live.renderer import LiveRenderer
-    from lippmann.scene.scene import Scene
     from lippmann.studio.state import StudioState
 
 Model = Annotated[
@@ -50,45 +46,24 @@ def studio(
 ) -> None:
     """Set up a display by hand in a browser, see live what it will show, and render."""
     from lippmann.rendering.request.render_request import RenderRequest
-    from lippmann.runtime.atomic_write import check_writable
-    from lippmann.studio.session import StudioSession
+    from lippmann.studio.open_session import open_session
     from lippmann.studio.site import StudioSite
-    from lippmann.studio.uploads import Uploads
     from lippmann.viewer.secret_folder import secret_folder
 
     console = Console(quiet, as_json)
     first = _state(state, model, display, environment, up)
-    first.load_display()
-    _check_scene(first)
-    check_writable(folder / "picture.png")
     machine = RenderRequest(device=device, threads=threads, memory=parse.memory(memory))
-
-    def make_renderer(scene: Scene, display: Display) -> LiveRenderer:
-        from lippmann.rendering.live.renderer import LiveRenderer
-
-        return LiveRenderer(scene, display, machine=machine)
-
-    with scratch_folder("lippmann-studio-") as uploads:
-        session = StudioSession(
-            first,
-            uploads=Uploads(Path(uploads)),
-            outputs=folder.resolve(),
-            make_renderer=make_renderer,
-            allow_outside=allow_outside,
+    with open_session(first, folder, machine, allow_outside=allow_outside) as session:
+        viewing.serve(
+            StudioSite(session, "jpeg" if viewing.is_remote() else "rgb"),
+            f"studio, {Path(first.scene).name} on {first.display}",
+            console,
+            host=host,
+            port=port,
+            browser=not no_browser,
+            folder=secret_folder(),
+            started=session.warm_up,
         )
-        try:
-            viewing.serve(
-                StudioSite(session, "jpeg" if viewing.is_remote() else "rgb"),
-                f"studio, {Path(first.scene).name} on {first.display}",
-                console,
-                host=host,
-                port=port,
-                browser=not no_browser,
-                folder=secret_folder(),
-                started=session.warm_up,
-            )
-        finally:
-            session.close()
 
 
 def show(
@@ -123,16 +98,3 @@ def _state(
     }
     changed = {name: value for name, value in given.items() if value is not None}
     return replace(StudioState() if path is None else read_state(path), **changed)  # type: ignore[arg-type]
-
-
-def _check_scene(state: StudioState) -> None:
-    """Refuse a scene that is not there before a page opens; what its file holds is said on the page."""
-    from lippmann.scene.readers.load import kind_of_file
-
-    if kind_of_file(state.scene) is None:
-        from lippmann.errors import SceneError
-        from lippmann.scene import bundled
-
-        if state.scene not in bundled.names():
-            rule = f"bundled are {', '.join(bundled.names())}"
-            raise SceneError(f"no bundled scene or file is named '{state.scene}'", rule=rule)

@@ -8,7 +8,10 @@ The kind, a colon, and ``key=value`` pairs with commas between them. The keys ar
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
 
+from lippmann.display import units
 from lippmann.display.display import Display
 from lippmann.display.formats.monitor_toml import monitor_of_texts
 from lippmann.display.formats.print_sheet import print_of_texts
@@ -42,6 +45,52 @@ def display_of_short_form(name: str) -> Display:
 def display_of_texts(kind: str, texts: Mapping[str, str]) -> Display:
     """The ``print`` or ``monitor`` of values by their keys; raises as :func:`display_of_short_form`."""
     return print_of_texts(texts).display() if kind == "print" else monitor_of_texts(texts).display()
+
+
+@dataclass(frozen=True)
+class ShortFormSize:
+    """The size in a short form, and the text around it: ``head``, ``WxH``, ``tail`` is the form with another one.
+
+    Attributes
+    ----------
+    width, height:
+        Sides in ``unit``.
+    unit:
+        ``mm`` for prints, ``px`` for monitors.
+    head, tail:
+        Text before and after ``WxH``; ``tail`` begins with the unit of a print.
+    """
+
+    width: float
+    height: float
+    unit: Literal["mm", "px"]
+    head: str
+    tail: str
+
+
+def size_of_short_form(name: str) -> ShortFormSize | None:
+    """The size that a display's name sets; None for fixed devices, whose names are no short forms.
+
+    Raises
+    ------
+    DisplayError
+        As :func:`display_of_short_form`.
+    """
+    if not is_short_form(name):
+        return None
+    kind, _, rest = name.partition(":")
+    parts = rest.split(",")
+    at = next((k for k, part in enumerate(parts) if part.partition("=")[0].strip() == "size"), None)
+    if at is None:
+        raise DisplayError("size is missing", where=kind, rule="it has no default", fix="add it")
+    text = parts[at].partition("=")[2].strip()
+    head = f"{kind}:{','.join([*parts[:at], 'size='])}"
+    tail = "".join(f",{part}" for part in parts[at + 1 :])
+    if kind == "print":
+        width, height = units.size(text, "size")
+        return ShortFormSize(width, height, "mm", head, f"mm{tail}")
+    panel = display_of_short_form(name).panel
+    return ShortFormSize(panel.width, panel.height, "px", head, tail)
 
 
 def _pairs(text: str) -> dict[str, str]:

@@ -87,6 +87,28 @@ export function choice(label, choices, onchange) {
   return { row, fill, list, show: (value) => (list.value = value) };
 }
 
+/** Creates two boxes for a width and a height; `onchange(width, height)` gets both once they are above 0. */
+export function size(label, onchange) {
+  const box = (side) =>
+    h("input", { type: "number", min: 0, step: "any", inputmode: "decimal", "aria-label": side, onchange: change });
+  const [width, height] = [`${label}, width`, `${label}, height`].map(box);
+  const unit = h("span", { class: "unit" });
+  const row = h("div", { class: "size", role: "group", "aria-label": label }, label, width, "×", height, unit);
+  let shown = { width: 0, height: 0, unit: "" };
+  function change() {
+    const sides = [Number(width.value), Number(height.value)];
+    if (sides.every((side) => Number.isFinite(side) && side > 0)) onchange(...sides);
+    else show(shown);
+  }
+  function show(next) {
+    shown = next;
+    width.value = next.width;
+    height.value = next.height;
+    unit.textContent = next.unit;
+  }
+  return { row, show };
+}
+
 /** Creates a tick box. */
 export function check(label, onchange, note = null) {
   const id = newId();

@@ -2,7 +2,7 @@
 
 import { h } from "lippmann/dom.js";
 import { depthBars } from "studio/depth_bars.js";
-import { automatic, choice, color, number, section } from "studio/fields.js";
+import { automatic, choice, color, number, section, size } from "studio/fields.js";
 import { lightBall, wrapped } from "studio/light_ball.js";
 
 const QUALITIES = [
@@ -188,17 +188,29 @@ export class Panel {
     const subpixels = choice("Sub-pixels", SUBPIXELS, (value) =>
       store.set({ subpixels: { auto: null, yes: true, no: false }[value] }),
     );
+    const sides = size("Size", (width, height) => {
+      const { head, tail } = this.facts.display_size;
+      store.set({ display: `${head}${width}x${height}${tail}` });
+    });
     const facts = h("dl", { class: "facts" });
+    let told = null;
     this.#rows.push((state) => {
       if (![...list.list.options].some(({ value }) => value === state.display)) {
+        // One place for a display that the list does not have: a size that is set makes another.
+        list.list.querySelector(":scope > option")?.remove();
         list.list.prepend(h("option", { value: state.display }, state.display.split(/[\\/]/).at(-1)));
       }
       list.show(state.display);
       subpixels.show(state.subpixels === null ? "auto" : state.subpixels ? "yes" : "no");
+      // What is known is of the last display that was shown; a size that is being set stays as it is typed.
+      const known = this.facts?.display_size ?? null;
+      sides.row.hidden = known === null || !state.display.startsWith(known.head);
+      if (known !== null && known !== told) sides.show({ ...known, width: tidy(known.width), height: tidy(known.height) });
+      told = known;
       const rows = this.facts?.display_facts ?? [];
       facts.replaceChildren(...rows.flatMap(([label, text]) => [h("dt", {}, label), h("dd", {}, text)]));
     });
-    return section("Display", list.row, subpixels.row, facts);
+    return section("Display", list.row, sides.row, subpixels.row, facts);
   }
 }
 
@@ -217,6 +229,9 @@ export function fittingScale(scene, sharp, scale) {
 export function turned([yaw, pitch, roll], [right, up, around]) {
   return [wrapped(yaw + right), Math.max(-90, Math.min(90, Math.round(10 * (pitch + up)) / 10)), wrapped(roll + around)];
 }
+
+/** A length without the digits that come of inches. */
+const tidy = (value) => Number(value.toFixed(3));
 
 const tenThousandth = (value) => Math.round(1e4 * value) / 1e4;
 
