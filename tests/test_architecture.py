@@ -70,7 +70,7 @@ ORDER = (
     "reproduce",
     "viewer",
     "viewer.calibrate",
-    "studio",
+    "studio_app",
     "sequences",
     "api",
     "",

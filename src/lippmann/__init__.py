@@ -13,13 +13,13 @@ from lippmann import _version
 if TYPE_CHECKING:
     from lippmann.api import (
         load_scene,
-        open_studio,
         plan,
         preview,
         render,
         render_quilt,
         render_to_file,
         render_turntable,
+        studio,
     )
     from lippmann.display import Display, LensArray, Panel, list_displays, load_display
     from lippmann.errors import LippmannError
@@ -36,7 +36,7 @@ __version__ = _version.VERSION
 
 _HOME = {
     "load_scene": "lippmann.api",
-    "open_studio": "lippmann.api",
+    "studio": "lippmann.api",
     "plan": "lippmann.api",
     "preview": "lippmann.api",
     "render": "lippmann.api",
@@ -76,7 +76,6 @@ __all__ = [
     "list_displays",
     "load_display",
     "load_scene",
-    "open_studio",
     "plan",
     "preview",
     "read_picture",
@@ -85,6 +84,7 @@ __all__ = [
     "render_to_file",
     "render_turntable",
     "replay_stereo",
+    "studio",
 ]
 
 

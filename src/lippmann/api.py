@@ -45,7 +45,7 @@ if TYPE_CHECKING:
     from lippmann.rendering.preview import Preview
     from lippmann.scene.light_options import LightOptions
     from lippmann.scene.values.description import Environment
-    from lippmann.studio.notebook import NotebookStudio
+    from lippmann.studio_app.notebook import NotebookStudio
     from lippmann.tiles.tiled_render import Rendered, Runner
 
 #: Keywords that :func:`render` took before ``placement``, and what they are called there.
@@ -512,7 +512,7 @@ def plan(
         return forecast(_scene(scene), _display(display), _request(placement, options), told)
 
 
-def open_studio(
+def studio(
     scene: Scene | object = "teapot",
     display: str | Path = "seed-lenticular",
     *,
@@ -552,7 +552,7 @@ def open_studio(
     device, threads, memory:
         As for :func:`render`.
     **settings:
-        First values of settings: fields of :class:`~lippmann.studio.state.StudioState`, such as ``turn`` or
+        First values of settings: fields of :class:`~lippmann.studio_app.state.StudioState`, such as ``turn`` or
         ``exposure``.
 
     Returns
@@ -566,7 +566,7 @@ def open_studio(
     LippmannError
         Of the kind that says what was wrong.
     """
-    from lippmann.studio.notebook import NotebookStudio, state_of_settings
+    from lippmann.studio_app.notebook import NotebookStudio, state_of_settings
 
     held = None if isinstance(scene, (str, Path)) else _scene(scene)
     name = f"{held.name} (object)" if held is not None else str(scene)
@@ -612,4 +612,4 @@ def _placement(
     return placement or PlacementOptions()
 
 
-__all__ = ["load_scene", "open_studio", "plan", "preview", "render", "render_quilt", "render_to_file"]
+__all__ = ["load_scene", "plan", "preview", "render", "render_quilt", "render_to_file", "studio"]

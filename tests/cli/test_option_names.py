@@ -22,8 +22,8 @@ OTHER_PROGRAMS = {
     "runtime/engine.py",
     "scene/mitsuba_plugins.py",
     "reproduce/style.py",
-    "studio/command_line.py",
-    "studio/render_jobs.py",
+    "studio_app/command_line.py",
+    "studio_app/render_jobs.py",
     "cluster/worker_preload.py",
     "runtime/llvm_install.py",
 }

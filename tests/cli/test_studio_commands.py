@@ -17,8 +17,8 @@ from websockets.sync.client import connect
 
 from lippmann.display import Display, LensArray, Panel
 from lippmann.image import IntegralImage
-from lippmann.studio.page_values import values_of_state
-from lippmann.studio.state import StudioState
+from lippmann.studio_app.page_values import values_of_state
+from lippmann.studio_app.state import StudioState
 
 DISPLAY = Display("d", Panel(32, 24, 0.1), LensArray("lenticular", 0.4), gap=1.0, viewing_distance=500.0)
 TINY = "print:lpi=30,ppi=300,size=10x8mm"

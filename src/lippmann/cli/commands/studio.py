@@ -13,7 +13,7 @@ from lippmann.cli.shared import options, parse
 from lippmann.cli.shared.console import Console
 
 if TYPE_CHECKING:
-    from lippmann.studio.state import StudioState
+    from lippmann.studio_app.state import StudioState
 
 Model = Annotated[
     str | None, typer.Argument(help="Scene file, or a bundled scene's name; by default the teapot.", show_default=False)
@@ -46,8 +46,8 @@ def studio(
 ) -> None:
     """Set up a display by hand in a browser, see live what it will show, and render."""
     from lippmann.rendering.request.render_request import RenderRequest
-    from lippmann.studio.open_session import open_session
-    from lippmann.studio.site import StudioSite
+    from lippmann.studio_app.open_session import open_session
+    from lippmann.studio_app.site import StudioSite
     from lippmann.viewer.secret_folder import secret_folder
 
     console = Console(quiet, as_json)
@@ -76,7 +76,7 @@ def show(
     quiet: options.Quiet = False,
 ) -> None:
     """Show a picture on the display itself: a window to put full screen there, native pixels one to one."""
-    from lippmann.studio.panel_site import PanelSite
+    from lippmann.studio_app.panel_site import PanelSite
     from lippmann.viewer.served_picture import PictureFile
 
     file = PictureFile(picture, parse.display(display), "png" if viewing.is_remote() else "rgb")
@@ -87,8 +87,8 @@ def _state(
     path: Path | None, model: str | None, display: str | None, environment: Path | None, up: str | None
 ) -> StudioState:
     """The first state: that of the file, or a new one, with what the options say."""
-    from lippmann.studio.state import StudioState
-    from lippmann.studio.state_toml import read_state
+    from lippmann.studio_app.state import StudioState
+    from lippmann.studio_app.state_toml import read_state
 
     given = {
         "scene": model,

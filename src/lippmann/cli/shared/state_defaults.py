@@ -20,8 +20,8 @@ def read_defaults(context: typer.Context, state: Path | None) -> Path | None:
     """
     if state is None or context.resilient_parsing:
         return state
-    from lippmann.studio.command_line import option_texts
-    from lippmann.studio.state_toml import read_state
+    from lippmann.studio_app.command_line import option_texts
+    from lippmann.studio_app.state_toml import read_state
 
     read = read_state(state)
     known = {parameter.name for parameter in context.command.params}

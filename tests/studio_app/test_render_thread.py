@@ -9,9 +9,9 @@ import pytest
 from stand_in import TINY, StandIn
 
 from lippmann.errors import SceneError
-from lippmann.studio import render_thread
-from lippmann.studio.render_thread import RenderThread, Wanted, Watcher, _next_share
-from lippmann.studio.state import StudioState
+from lippmann.studio_app import render_thread
+from lippmann.studio_app.render_thread import RenderThread, Wanted, Watcher, _next_share
+from lippmann.studio_app.state import StudioState
 
 STATE = StudioState(display=TINY)
 DISPLAY = STATE.load_display()

@@ -12,12 +12,12 @@ from lippmann.display import Display, list_displays
 from lippmann.display.formats.inline_spec import is_short_form
 from lippmann.errors import UsageError
 from lippmann.scene import bundled
-from lippmann.studio.command_line import render_command
-from lippmann.studio.render_jobs import Job, JobRunner, Kind
-from lippmann.studio.render_thread import Renderer, RenderThread, Wanted, Watcher
-from lippmann.studio.state import StudioState
-from lippmann.studio.state_toml import state_of_text
-from lippmann.studio.uploads import Uploads
+from lippmann.studio_app.command_line import render_command
+from lippmann.studio_app.render_jobs import Job, JobRunner, Kind
+from lippmann.studio_app.render_thread import Renderer, RenderThread, Wanted, Watcher
+from lippmann.studio_app.state import StudioState
+from lippmann.studio_app.state_toml import state_of_text
+from lippmann.studio_app.uploads import Uploads
 from lippmann.viewing.replay import default_eye
 
 if TYPE_CHECKING:

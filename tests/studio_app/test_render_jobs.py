@@ -9,10 +9,10 @@ import pytest
 from stand_in import TINY
 
 from lippmann.errors import UsageError
-from lippmann.studio import render_jobs
-from lippmann.studio.command_line import render_command
-from lippmann.studio.render_jobs import JobRunner, command_of
-from lippmann.studio.state import StudioState
+from lippmann.studio_app import render_jobs
+from lippmann.studio_app.command_line import render_command
+from lippmann.studio_app.render_jobs import JobRunner, command_of
+from lippmann.studio_app.state import StudioState
 
 WORDS = render_command(StudioState(display=TINY, turn=(30.0, 0.0, 0.0), subpixels=True))
 

@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING
 
 from lippmann.errors import UsageError
 from lippmann.rendering.request.render_request import RenderRequest
-from lippmann.studio.open_session import open_session
-from lippmann.studio.page_values import state_of_values
-from lippmann.studio.site import StudioSite
-from lippmann.studio.state import StudioState
+from lippmann.studio_app.open_session import open_session
+from lippmann.studio_app.page_values import state_of_values
+from lippmann.studio_app.site import StudioSite
+from lippmann.studio_app.state import StudioState
 from lippmann.viewer.http_server import WebServer
 from lippmann.viewer.secret_folder import secret_folder
 
@@ -38,7 +38,7 @@ class NotebookStudio:
 
     Each has a server of its own on ``127.0.0.1``, so the browser must run on the machine of the kernel, or the port
     must be forwarded to it under the same number. As a context manager it is closed at the end of the block.
-    :func:`lippmann.open_studio` makes it.
+    :func:`lippmann.studio` makes it.
 
     Parameters
     ----------
@@ -111,7 +111,7 @@ class NotebookStudio:
 
     @property
     def state(self) -> StudioState:
-        """What the page has set last: :class:`~lippmann.studio.state.StudioState`."""
+        """What the page has set last: :class:`~lippmann.studio_app.state.StudioState`."""
         return self._session.state
 
     @property

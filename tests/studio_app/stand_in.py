@@ -14,10 +14,10 @@ from websockets.sync.client import ClientConnection, connect
 
 from lippmann.rendering.live.live_view import LiveFrame, LiveView
 from lippmann.scene.placement import Placement
-from lippmann.studio.session import StudioSession
-from lippmann.studio.site import StudioSite
-from lippmann.studio.state import StudioState
-from lippmann.studio.uploads import Uploads
+from lippmann.studio_app.session import StudioSession
+from lippmann.studio_app.site import StudioSite
+from lippmann.studio_app.state import StudioState
+from lippmann.studio_app.uploads import Uploads
 from lippmann.viewer.http_server import WebServer
 
 FOLDER = "secret"

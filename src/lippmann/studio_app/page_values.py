@@ -18,7 +18,7 @@ from lippmann.display import Display
 from lippmann.display.formats.inline_spec import size_of_short_form
 from lippmann.errors import UsageError
 from lippmann.scene.placement import Placement
-from lippmann.studio.state import StudioState
+from lippmann.studio_app.state import StudioState
 from lippmann.viewer.manifest import optics
 
 #: Longest text of a field: a path or a short form.

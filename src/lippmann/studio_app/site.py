@@ -23,10 +23,10 @@ from starlette.routing import BaseRoute, Route, Router, WebSocketRoute
 from starlette.websockets import WebSocket
 
 from lippmann.errors import PictureError
-from lippmann.studio.live_socket import LiveSocket
-from lippmann.studio.pages import static_files
-from lippmann.studio.session import StudioSession
-from lippmann.studio.wire import Coding
+from lippmann.studio_app.live_socket import LiveSocket
+from lippmann.studio_app.pages import static_files
+from lippmann.studio_app.session import StudioSession
+from lippmann.studio_app.wire import Coding
 from lippmann.viewer.request_guard import Receive, Scope, Send, send_response
 from lippmann.viewer.responses import RefusedError, Request, json_response, not_found
 from lippmann.viewer.responses import Response as PlainResponse

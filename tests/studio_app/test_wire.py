@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from PIL import Image
 
 from lippmann.errors import UsageError
-from lippmann.studio.wire import CODINGS, FrameHeader, encode_frame, number_of, numbers_of, parse_message
+from lippmann.studio_app.wire import CODINGS, FrameHeader, encode_frame, number_of, numbers_of, parse_message
 
 PIXELS = np.random.default_rng(1).integers(0, 256, (12, 20, 3), np.uint8)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import fields
 
-from lippmann.studio.state import StudioState
+from lippmann.studio_app.state import StudioState
 
 #: Settings that are said otherwise than by an option with their value.
 _SCENE, _EYE, _SUBPIXELS = "scene", "eye", "subpixels"

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from http import HTTPStatus
 
-from lippmann.studio.pages import static_files
+from lippmann.studio_app.pages import static_files
 from lippmann.viewer.responses import RefusedError, Request, Response, json_response
 from lippmann.viewer.served_picture import PictureFile
 from lippmann.viewer.server import ViewerSite

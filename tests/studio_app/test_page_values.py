@@ -12,7 +12,7 @@ from stand_in import TINY, placement
 
 from lippmann.display import load_display
 from lippmann.errors import UsageError
-from lippmann.studio.page_values import (
+from lippmann.studio_app.page_values import (
     display_size,
     facts_of_view,
     optics_of,
@@ -20,7 +20,7 @@ from lippmann.studio.page_values import (
     state_of_values,
     values_of_state,
 )
-from lippmann.studio.state import StudioState
+from lippmann.studio_app.state import StudioState
 
 STATE = StudioState(
     "teapot", TINY, background=(0.1, 0.2, 0.3), turn=(10.0, -5.0, 0.0), depth_scale=0.5, exposure=1.5, subpixels=True

@@ -9,7 +9,7 @@ from PIL import Image
 from lippmann.color.transfer import quantize
 from lippmann.display import Display, LensArray, Panel
 from lippmann.image import IntegralImage
-from lippmann.studio.panel_site import PanelSite
+from lippmann.studio_app.panel_site import PanelSite
 from lippmann.viewer.http_server import WebServer
 from lippmann.viewer.responses import RefusedError, Request
 from lippmann.viewer.served_picture import PictureFile

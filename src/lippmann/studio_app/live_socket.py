@@ -14,7 +14,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from lippmann.display.pixel_window import PixelWindow
 from lippmann.errors import LippmannError, UsageError
 from lippmann.rendering.live.live_view import LiveView
-from lippmann.studio.page_values import (
+from lippmann.studio_app.page_values import (
     display_size,
     facts_of_view,
     optics_of,
@@ -23,12 +23,12 @@ from lippmann.studio.page_values import (
     title_of,
     values_of_state,
 )
-from lippmann.studio.render_jobs import KINDS, Job
-from lippmann.studio.render_thread import Shown, Watcher
-from lippmann.studio.session import WITHOUT_FILE, StudioSession, opened_state
-from lippmann.studio.state import StudioState
-from lippmann.studio.state_toml import text_of_state
-from lippmann.studio.wire import Coding, FrameHeader, encode_frame, number_of, numbers_of, parse_message
+from lippmann.studio_app.render_jobs import KINDS, Job
+from lippmann.studio_app.render_thread import Shown, Watcher
+from lippmann.studio_app.session import WITHOUT_FILE, StudioSession, opened_state
+from lippmann.studio_app.state import StudioState
+from lippmann.studio_app.state_toml import text_of_state
+from lippmann.studio_app.wire import Coding, FrameHeader, encode_frame, number_of, numbers_of, parse_message
 
 #: Frames on their way that the page has not shown yet: one travels while the next is made.
 _MOST_ON_THE_WAY = 2

@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 
 from lippmann.cli import run
 from lippmann.errors import LippmannError, UsageError
-from lippmann.studio.command_line import render_command, words_of_state
-from lippmann.studio.state import StudioState
-from lippmann.studio.state_toml import read_state, state_of_text, text_of_state, write_state
+from lippmann.studio_app.command_line import render_command, words_of_state
+from lippmann.studio_app.state import StudioState
+from lippmann.studio_app.state_toml import read_state, state_of_text, text_of_state, write_state
 
 NUMBERS = st.floats(-1e6, 1e6)
 ANGLES = st.floats(-179, 179)
@@ -168,7 +168,8 @@ def test_what_is_no_text_is_no_state(tmp_path):
 
 def test_a_state_loads_no_engine():
     code = (
-        "import sys, lippmann.studio.state_toml, lippmann.studio.command_line, lippmann.rendering.live.renderer; "
+        "import sys, lippmann.studio_app.state_toml, lippmann.studio_app.command_line; "
+        "import lippmann.rendering.live.renderer; "
         "assert 'mitsuba' not in sys.modules and 'drjit' not in sys.modules"
     )
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

@@ -15,11 +15,11 @@ from hypothesis import strategies as st
 from stand_in import FOLDER, TINY, running, said, view
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
-from lippmann.studio import site as studio_site
-from lippmann.studio import uploads
-from lippmann.studio.page_values import values_of_state
-from lippmann.studio.pages import static_files
-from lippmann.studio.state import StudioState
+from lippmann.studio_app import site as studio_site
+from lippmann.studio_app import uploads
+from lippmann.studio_app.page_values import values_of_state
+from lippmann.studio_app.pages import static_files
+from lippmann.studio_app.state import StudioState
 
 STATE = values_of_state(StudioState(display=TINY))
 

@@ -6,7 +6,7 @@ import re
 
 import pytest
 
-from lippmann.studio.pages import static_files
+from lippmann.studio_app.pages import static_files
 
 
 def colours(sheet):

@@ -13,9 +13,9 @@ from lippmann.runtime.atomic_write import check_writable
 from lippmann.runtime.temporary_names import scratch_folder
 from lippmann.scene import bundled
 from lippmann.scene.readers.load import kind_of_file
-from lippmann.studio.session import StudioSession
-from lippmann.studio.state import StudioState
-from lippmann.studio.uploads import Uploads
+from lippmann.studio_app.session import StudioSession
+from lippmann.studio_app.state import StudioState
+from lippmann.studio_app.uploads import Uploads
 
 if TYPE_CHECKING:
     from lippmann.display import Display

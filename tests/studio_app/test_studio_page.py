@@ -7,14 +7,14 @@ import json
 import pytest
 from stand_in import TINY
 
-from lippmann.studio.state import StudioState
+from lippmann.studio_app.state import StudioState
 
 STUDIO = "window.lippmann.studio"
 COMMAND = "document.querySelector('footer code').textContent"
 #: Codes of the picture's pixel, read from a copy: browsers warn of reading a canvas that they draw on graphics memory.
 PIXEL = """(([x, y]) => {
   const copy = new OffscreenCanvas(1, 1).getContext("2d", { willReadFrequently: true });
-  copy.drawImage(window.lippmann.studio.page.canvas, -x, -y);
+  copy.drawImage(window.lippmann.studio_app.page.canvas, -x, -y);
   return [...copy.getImageData(0, 0, 1, 1).data];
 })"""
 ALERT = "(a => a.hidden ? '' : a.textContent)(document.querySelector('.failure'))"

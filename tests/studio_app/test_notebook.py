@@ -19,8 +19,8 @@ from websockets.sync.client import connect
 
 import lippmann
 from lippmann.errors import LippmannError
-from lippmann.studio.page_values import values_of_state
-from lippmann.studio.state import StudioState
+from lippmann.studio_app.page_values import values_of_state
+from lippmann.studio_app.state import StudioState
 
 LIVE = "window.lippmann?.studio?.stage?.header?.number ?? 0"
 
@@ -40,7 +40,7 @@ def headers_of(studio):
 
 @pytest.fixture(scope="module")
 def studio(engine):
-    with lippmann.open_studio("teapot", TINY, turn=(30, 0, 0), height=500) as made:
+    with lippmann.studio("teapot", TINY, turn=(30, 0, 0), height=500) as made:
         yield made
 
 
@@ -56,7 +56,7 @@ def test_only_pages_of_this_machine_may_frame_it(studio):
     assert "X-Frame-Options" not in headers
     found = re.findall(r"frame-ancestors ([^;]*)", headers["Content-Security-Policy"])
     assert found == ["http://localhost:* http://127.0.0.1:* https://localhost:* https://127.0.0.1:*"]
-    with lippmann.open_studio("teapot", TINY, framed_by=["https://hub.example:8000"]) as other:
+    with lippmann.studio("teapot", TINY, framed_by=["https://hub.example:8000"]) as other:
         assert other.address != studio.address
         assert headers_of(other)["Content-Security-Policy"].endswith(" https://hub.example:8000; media-src 'self'")
 
@@ -94,7 +94,7 @@ def test_renders_take_turns_with_the_studio(studio):
 
 def test_a_scene_without_a_file_is_shown_but_not_rendered_from_the_page(engine):
     scene = lippmann.load_scene("teapot", light=lippmann.LightOptions(turn=(20.0, 0.0)))
-    with lippmann.open_studio(scene, TINY) as studio, page_of(studio) as socket:
+    with lippmann.studio(scene, TINY) as studio, page_of(studio) as socket:
         assert studio.state.light_turn == (20.0, 0.0)
         state = said(socket, "hello")["state"]
         socket.send(view(state | {"background": [0, 0, 1]}))
@@ -108,7 +108,7 @@ def test_a_scene_without_a_file_is_shown_but_not_rendered_from_the_page(engine):
 
 
 def test_a_closed_studio_is_gone(tmp_path, engine):
-    studio = lippmann.open_studio("teapot", TINY, folder=tmp_path)
+    studio = lippmann.studio("teapot", TINY, folder=tmp_path)
     address, thread = urlsplit(studio.address), studio._session.thread._thread
     studio.close()
     studio.close()
@@ -137,7 +137,7 @@ def test_a_closed_studio_is_gone(tmp_path, engine):
 )
 def test_what_will_not_do_is_one_line(arguments, words):
     with pytest.raises(LippmannError) as caught:
-        lippmann.open_studio(**{"display": TINY, **arguments})
+        lippmann.studio(**{"display": TINY, **arguments})
     assert words in str(caught.value)
     assert "\n" not in str(caught.value)
 
@@ -146,7 +146,7 @@ def test_the_interpreter_ends_with_an_open_studio():
     """Also in the middle of rendering, once the engine is loaded."""
     code = f"""
 import lippmann, time
-studio = lippmann.open_studio("teapot", {TINY!r})
+studio = lippmann.studio("teapot", {TINY!r})
 until = time.monotonic() + 60
 while studio._session.thread._renderer is None and time.monotonic() < until:
     time.sleep(0.05)

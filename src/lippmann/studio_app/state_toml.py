@@ -25,7 +25,7 @@ from lippmann.errors import UsageError
 from lippmann.runtime.atomic_write import replacing
 from lippmann.runtime.regular_file import check_kind
 from lippmann.scene.parsing.name_hints import closest_name_hint
-from lippmann.studio.state import StudioState
+from lippmann.studio_app.state import StudioState
 
 if sys.version_info >= (3, 11):
     import tomllib
