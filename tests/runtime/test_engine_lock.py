@@ -5,9 +5,12 @@ import signal
 import subprocess
 import sys
 import textwrap
+import threading
 import time
 
 import pytest
+
+from lippmann.runtime.engine_lock import exclusive
 
 needs_fork = pytest.mark.skipif(not hasattr(os, "fork"), reason="this system has no fork")
 
@@ -427,3 +430,28 @@ def test_workers_that_are_forked_are_refused_and_those_that_are_spawned_render(t
     )
     assert done.returncode == 0, done.stderr
     assert done.stdout.splitlines() == [f"fork {REFUSAL}"] * 2 + ["spawn True"] * 2
+
+
+def test_a_thread_that_waits_goes_before_one_that_takes_the_lock_again():
+    """Live rendering takes it again at once, for as long as light is gathered."""
+    turns, ends = [], threading.Event()
+
+    def take_again_and_again():
+        while not ends.is_set():
+            with exclusive():
+                turns.append(time.perf_counter())
+                time.sleep(0.002)
+
+    thread = threading.Thread(target=take_again_and_again, daemon=True)
+    thread.start()
+    try:
+        waited = []
+        for _ in range(20):
+            before = len(turns)
+            with exclusive(), exclusive():
+                waited.append(len(turns) - before)
+        # The turn that was running, and at most one that began before this thread asked.
+        assert max(waited) <= 2
+    finally:
+        ends.set()
+        thread.join()
