@@ -6,6 +6,7 @@ import base64
 import json
 import math
 import signal
+from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
@@ -174,3 +175,25 @@ def moving_ball(tmp_path_factory) -> Path:
         tree["nodes"][node].pop("matrix", None)
     path.write_text(json.dumps(tree))
     return path
+
+
+@pytest.fixture(scope="session")
+def browser():
+    """Chromium, once for all tests of pages; a test is skipped where none is installed."""
+    from browser import started
+
+    with ExitStack() as stack:
+        try:
+            running = stack.enter_context(started())
+        except LookupError as error:
+            pytest.skip(f"{error}: scripts/setup.sh --dev installs it")
+        yield running
+
+
+@pytest.fixture
+def open_tab(browser):
+    """``open_tab(**options)``: a fresh :class:`browser.Tab`, closed after the test; options as for ``browser.tab``."""
+    from browser import tab
+
+    with ExitStack() as stack:
+        yield lambda **options: stack.enter_context(tab(browser, **options))

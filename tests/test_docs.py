@@ -91,6 +91,8 @@ def workplace(tmp_path, monkeypatch, moving_ball):
     (tmp_path / "photos").mkdir()
     for number in range(3):
         Image.new("RGB", (80, 60), (50 + 50 * number,) * 3).save(tmp_path / "photos" / f"IMG_{number}.jpg")
+    Image.new("RGB", (32, 24), (200, 120, 60)).save(tmp_path / "photo.png")
+    np.save(tmp_path / "photo-depth.npy", np.where(np.arange(32) < 16, 1.0, 3.0) * np.ones((24, 1)))
     shutil.copytree(moving_ball.parent, tmp_path, dirs_exist_ok=True)
     monkeypatch.chdir(tmp_path)
     return tmp_path

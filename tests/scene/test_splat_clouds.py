@@ -38,7 +38,7 @@ def colors(splats, directions):
     return np.einsum("dj,njc->ndc", basis, splats.harmonics)
 
 
-@settings(max_examples=30, derandomize=True, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(st.integers(0, 10**6), st.integers(0, 3), st.booleans(), st.booleans())
 def test_a_move_takes_places_shapes_and_colors_along(seed, degree, stretches, mirrors):
     random = np.random.default_rng(seed)
@@ -58,7 +58,7 @@ def test_a_move_takes_places_shapes_and_colors_along(seed, degree, stretches, mi
     np.testing.assert_allclose(colors(found, directions @ (left @ right).T), colors(splats, directions), atol=2e-4)
 
 
-@settings(max_examples=20, derandomize=True, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(st.integers(0, 10**6), st.floats(0.0, 0.04), st.floats(10.0, 1e4))
 def test_floaters_do_not_change_the_extent(seed, share, far):
     random = np.random.default_rng(seed)

@@ -1,9 +1,8 @@
-"""What the tests of the studio share: studios that render by a stand-in, and a browser."""
+"""What the tests of the studio share: studios that render by a stand-in."""
 
 from __future__ import annotations
 
 import sys
-from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
@@ -19,25 +18,3 @@ def studio(tmp_path_factory):
 
     with running(tmp_path_factory.mktemp("studio")) as made:
         yield made
-
-
-@pytest.fixture(scope="session")
-def browser():
-    """Chromium; the test is skipped where none is installed."""
-    from browser import started
-
-    with ExitStack() as stack:
-        try:
-            running = stack.enter_context(started())
-        except LookupError as error:
-            pytest.skip(f"{error}: scripts/setup.sh --dev installs it")
-        yield running
-
-
-@pytest.fixture
-def open_tab(browser):
-    """``open_tab(**options)``: a fresh :class:`browser.Tab`, closed after the test; options as for ``browser.tab``."""
-    from browser import tab
-
-    with ExitStack() as stack:
-        yield lambda **options: stack.enter_context(tab(browser, **options))

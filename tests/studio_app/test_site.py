@@ -273,7 +273,9 @@ MESSAGES = st.sampled_from(["view", "shown", "pick", "render", "open", "resume",
 )
 
 
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(
+    max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow, HealthCheck.function_scoped_fixture]
+)
 @given(st.lists(MESSAGES | st.text(max_size=20) | st.binary(max_size=20), max_size=6))
 def test_any_messages_leave_the_studio_alive(studio, messages):
     with studio.connect() as socket:

@@ -14,7 +14,7 @@ COMMAND = "document.querySelector('footer code').textContent"
 #: Codes of the picture's pixel, read from a copy: browsers warn of reading a canvas that they draw on graphics memory.
 PIXEL = """(([x, y]) => {
   const copy = new OffscreenCanvas(1, 1).getContext("2d", { willReadFrequently: true });
-  copy.drawImage(window.lippmann.studio_app.page.canvas, -x, -y);
+  copy.drawImage(window.lippmann.studio.page.canvas, -x, -y);
   return [...copy.getImageData(0, 0, 1, 1).data];
 })"""
 ALERT = "(a => a.hidden ? '' : a.textContent)(document.querySelector('.failure'))"
@@ -87,7 +87,7 @@ def test_the_pointer_moves_the_eye(page):
 
 def test_values_are_typed_and_automatic_ones_are_given_back(page):
     tab = page()
-    tab.page.get_by_role("spinbutton", name="Size").fill("2.5")
+    tab.page.get_by_role("spinbutton", name="Size", exact=True).fill("2.5")
     tab.page.keyboard.press("Tab")
     tab.wait_for(f"{COMMAND}.includes('--scale 2.5')")
     auto = tab.page.locator(".automatic", has_text="Depth scale").get_by_role("checkbox")

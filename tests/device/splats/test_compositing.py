@@ -116,7 +116,7 @@ def test_small_and_flat_splats_far_away_are_met():
     assert psnr(colors, true) > 60
 
 
-@settings(max_examples=12, derandomize=True, deadline=None)
+@settings(max_examples=12, deadline=None)
 @given(st.integers(1, 60), st.integers(0, 10**6), st.floats(0.0, 5.0))
 def test_order_threads_and_ends_change_nothing_but_what_they_should(count, seed, end):
     splats, (origins, directions) = random_splats(count, 1, seed=seed), random_rays(20, seed=seed)
@@ -136,7 +136,9 @@ def test_peaks_behind_the_origin_are_not_seen():
     true, true_left = twin(splats, origins, directions)
     assert np.abs(colors - true).max() < 5e-4
     assert abs(left[0] - true_left[0]) < 1.1e-4
-    assert abs(left[0] - twin(splats, [*origins, 0, 0, 4], directions)[1][0]) > 1e-3  # something lies behind it
+    assert (
+        abs(left[0] - twin(splats, origins + np.float32([0, 0, 4]), directions)[1][0]) > 1e-3
+    )  # something lies behind it
 
 
 def test_thousands_of_faint_splats_lie_on_one_ray():
@@ -156,7 +158,7 @@ def test_thousands_of_faint_splats_lie_on_one_ray():
     assert left[0] == pytest.approx((1 - 1.02 / 255) ** 1500, rel=1e-3)
 
 
-@settings(max_examples=30, derandomize=True, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(st.integers(1, 300), st.integers(0, 10**6), st.sampled_from([0.0, 1e-3, 1.0, 1e6]))
 def test_hierarchies_hold_every_box_once(count, seed, spread):
     random = np.random.default_rng(seed)
