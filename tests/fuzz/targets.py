@@ -14,6 +14,7 @@ import re
 import shutil
 import zipfile
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass, replace
 from functools import cache
@@ -498,7 +499,9 @@ async def _talk(site: object, said: bytes) -> bytes:
 
 def _asked(site: object, data: bytes) -> bytes:
     """What is answered to a connection; a ValueError if that is no answer of a sound server."""
-    answer = asyncio.run(_talk(site, data))
+    # Not in this thread, which may have a loop already: that of a test's browser.
+    with ThreadPoolExecutor(1) as pool:
+        answer = pool.submit(lambda: asyncio.run(_talk(site, data))).result()
     if answer and not re.match(rb"HTTP/1\.1 ([1-4]\d\d|50[57]) ", answer):
         raise ValueError(f"the answer begins with {answer[:60]!r}")
     return answer

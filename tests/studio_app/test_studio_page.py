@@ -156,6 +156,7 @@ def test_native_pixels_are_shown_one_by_one(page):
     tab = page()
     tab.page.keyboard.press("n")
     tab.wait_for(f"{STUDIO}.stage.header.width < 200 && {STUDIO}.stage.header.width === {STUDIO}.stage.view().size[0]")
+    tab.wait_for(f"{STUDIO}.stage.header.samples > 1")  # until then pictures are coded with losses
     zoom = tab.evaluate(f"{STUDIO}.stage.nativeZoom")
     size = tab.evaluate(f"[{STUDIO}.page.canvas.width, {STUDIO}.stage.header.width]")
     assert size[0] == zoom * size[1]
