@@ -25,6 +25,7 @@ from typing import Any
 
 import psutil
 from websockets.sync.client import ClientConnection, connect
+from websockets.typing import Origin
 
 from harness import save, saved
 
@@ -47,6 +48,7 @@ def main() -> None:
             with _studio(name) as studio:
                 cases[name] = studio.first_frame(size) | studio.orbit(size, ORBIT_SECONDS)
             print(name, cases[name], flush=True)
+    save("studio_command", {"cases": cases, "endless": result.get("endless")})
     if asked.minutes:
         name, size = next(iter(DISPLAYS.items()))
         with _studio(name) as studio:
@@ -56,7 +58,7 @@ def main() -> None:
             found = studio.orbit(size, 60 * asked.minutes)
             result["endless"] = found | {"minutes": asked.minutes, "early_mib": before, "last_mib": studio.memory()}
         print(result["endless"], flush=True)
-    save("studio_command", {"cases": cases, "endless": result.get("endless")})
+        save("studio_command", {"cases": cases, "endless": result["endless"]})
 
 
 class Studio:
@@ -142,7 +144,8 @@ def _studio(display: str) -> Iterator[Studio]:
             try:
                 assert process.stdout is not None
                 address = process.stdout.readline().split()[-1].rstrip("/")
-                with connect(f"ws{address.removeprefix('http')}/live", max_size=None) as socket:
+                origin = Origin(address.rpartition("/")[0])  # only the studio's own pages are let in
+                with connect(f"ws{address.removeprefix('http')}/live", origin=origin, max_size=None) as socket:
                     yield Studio(process, socket, began)
             finally:
                 process.kill()
