@@ -15,7 +15,7 @@ help:
 	@echo 'make demo    set up and render a teapot for a lenticular display into $(PICTURE)'
 	@echo 'make setup   set up only: virtual environment, package, LLVM runtime'
 	@echo 'make test    set up, lint and run the tests (JOBS=2 PYTEST="-k replay")'
-	@echo 'make check   the same in three minutes: lint, types and the quick tests'
+	@echo 'make check   the same in a few minutes: lint, types and the quick tests'
 	@echo 'make search  look for random examples that break a property test (ROUNDS=20)'
 	@echo 'make test-oldest  run the tests of picture files with the oldest libraries that are allowed'
 	@echo 'make lint    set up, check style and types'
