@@ -142,10 +142,8 @@ class LiveTracer:
         rows: Rows,
         height_row: list[Float],
     ) -> tuple[Array, ...]:
-        number = self._rays.number(column, row, channel)
-        stream = SampleStream.of_pixels(number, sample + first, seed + stream_of * SEED_STEP)
+        ray, stream = self._rays.sampled((column, row, channel), stream_of, sample + first, seed, rows)
         stream.half = stream_of
-        ray = self._rays.along(column, row, channel, stream, rows)
         integrator = self._integrator
         if isinstance(integrator, PathIntegrator):
             radiance, _, hit = integrator.sample_with_hit(ray, stream, mi.Bool(True))
@@ -206,9 +204,7 @@ class FeatureTracer:
         seed: UInt32,
         rows: Rows,
     ) -> tuple[Array, ...]:
-        number = self._rays.number(column, row, channel)
-        stream = SampleStream.of_pixels(number, sample + first, seed + stream_of * SEED_STEP)
-        ray = self._rays.along(column, row, channel, stream, rows)
+        ray, _ = self._rays.sampled((column, row, channel), stream_of, sample + first, seed, rows)
         albedo, normal, _ = self._surfaces.features(ray)
         # Of the lanes' width, also where all lanes see the same.
         zero = mi.Float(sample) * 0
@@ -222,10 +218,12 @@ class _Rays:
         self._source = DisplayRays(display, np.eye(4), subpixels)
         self._box_filter = box_filter
 
-    def number(self, column: UInt32, row: UInt32, channel: UInt32) -> UInt32:
-        """Index of the (sub-)pixel in the whole picture."""
-        return (row * self._source.width + column) * self._source.channels + channel
-
-    def along(self, column: UInt32, row: UInt32, channel: UInt32, stream: SampleStream, rows: Rows) -> Ray3f:
+    def sampled(
+        self, pixel: tuple[UInt32, UInt32, UInt32], stream_of: UInt32, sample: UInt32, seed: UInt32, rows: Rows
+    ) -> tuple[Ray3f, SampleStream]:
+        """The ray of a sample of a pixel (column, row, channel), and the random numbers of what follows it."""
+        column, row, channel = pixel
+        number = (row * self._source.width + column) * self._source.channels + channel
+        stream = SampleStream.of_pixels(number, sample, seed + stream_of * SEED_STEP)
         jitter = stream.next_2d(PIXEL_DIMENSION) if self._box_filter else mi.Point2f(0.5)
-        return world_ray_by(rows, *self._source.light_rays(column, row, channel, jitter))
+        return world_ray_by(rows, *self._source.light_rays(column, row, channel, jitter)), stream

@@ -113,6 +113,10 @@ def sigmoid(logits: FloatArray) -> FloatArray:
         return np.asarray(1.0 / (1.0 + np.exp(-logits.astype(np.float32, copy=False))), np.float32)
 
 
+#: Most that a component of a unit quaternion can be which is not its largest: two may share that rank.
+MOST_SMALL = np.float32(np.sqrt(0.5))
+
+
 def largest_left_out(three: FloatArray, largest: NDArray[np.integer]) -> FloatArray:
     """Unit quaternions ``(n, 4)`` of which three components ``(n, 3)`` are stored, in order, without the largest.
 

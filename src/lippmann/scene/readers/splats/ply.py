@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from lippmann.errors import SceneError
 from lippmann.scene.parsing.ply_header import Element, Header
 from lippmann.scene.readers.splats.activation import (
+    MOST_SMALL,
     SH_0,
     activated,
     ask_memory,
@@ -36,7 +37,6 @@ _SCALES = [f"{end}_scale_{axis}" for end in ("min", "max") for axis in "xyz"]
 _COLORS = [f"{end}_{color}" for end in ("min", "max") for color in "rgb"]
 
 #: What a quaternion's smaller components are at most.
-_MOST_SMALL = np.float32(np.sqrt(0.5))
 
 Rows = NDArray[np.void]
 Words = NDArray[np.uint32]
@@ -174,7 +174,7 @@ def _packed(rows: Mapping[str, Rows], where: str) -> tuple[Splats, tuple[str, ..
     word = {name: vertex[name].astype(np.uint32) for name in _PACKED}
     color = _parts(word["packed_color"], (24, 16, 8, 0), (8, 8, 8, 8))
     rgb = within(_COLORS, color[:, :3]) if names >= set(_COLORS) else color[:, :3]
-    turn = (_parts(word["packed_rotation"], (20, 10, 0), (10, 10, 10)) - np.float32(0.5)) * 2 * _MOST_SMALL
+    turn = (_parts(word["packed_rotation"], (20, 10, 0), (10, 10, 10)) - np.float32(0.5)) * 2 * MOST_SMALL
     w_first = largest_left_out(turn, word["packed_rotation"] >> 30)
     harmonics = np.empty((len(vertex), count, 3), np.float32)
     harmonics[:, 0] = (rgb - np.float32(0.5)) / np.float32(SH_0)

@@ -21,7 +21,7 @@ from lippmann.codecs.pillow_formats import open_picture
 from lippmann.errors import LippmannError, SceneError
 from lippmann.runtime.input_memory import check_input
 from lippmann.scene.parsing.files import read_bytes
-from lippmann.scene.readers.splats.activation import Bytes, activated, ask_memory, largest_left_out, sigmoid
+from lippmann.scene.readers.splats.activation import MOST_SMALL, Bytes, activated, ask_memory, largest_left_out, sigmoid
 from lippmann.scene.values.description import SceneDescription
 from lippmann.scene.values.splats import COEFFICIENTS, MOST_DEGREE, FloatArray
 
@@ -30,7 +30,6 @@ _LARGEST_META = 1 << 20
 #: Splats of a palette lie so many to a row.
 _PALETTE_COLUMNS = 64
 _FIRST_TURN = 252
-_MOST_SMALL = np.float32(np.sqrt(0.5))
 
 
 def read_sog(path: Path, *, allow_outside: bool = False) -> SceneDescription:
@@ -180,7 +179,7 @@ def _read(bundle: _Bundle, name: str) -> SceneDescription:
         both = _between(sh0, 4, colors)
         dc, opacities = both[:, :3], sigmoid(both[:, 3])
     w_first = largest_left_out(
-        (turns[:, :3].astype(np.float32) / np.float32(127.5) - 1.0) * _MOST_SMALL,
+        (turns[:, :3].astype(np.float32) / np.float32(127.5) - 1.0) * MOST_SMALL,
         np.maximum(turns[:, 3].astype(np.int64) - _FIRST_TURN, 0),
     )
     harmonics = np.zeros((count, coefficients, 3), np.float32)

@@ -15,7 +15,7 @@ import numpy as np
 from lippmann.errors import SceneError
 from lippmann.runtime.input_memory import check_input
 from lippmann.scene.parsing.files import read_bytes
-from lippmann.scene.readers.splats.activation import Bytes, activated, ask_memory, largest_left_out
+from lippmann.scene.readers.splats.activation import MOST_SMALL, Bytes, activated, ask_memory, largest_left_out
 from lippmann.scene.values.description import SceneDescription
 from lippmann.scene.values.splats import COEFFICIENTS, FloatArray, Splats
 
@@ -26,7 +26,6 @@ _VERSIONS = (1, 2, 3)
 _MOST_FRACTION = 24
 #: Colours are stored so that those somewhat beyond black and white find room, too.
 _COLOR_SCALE = 0.15
-_MOST_SMALL = np.float32(np.sqrt(0.5))
 
 
 def read_spz(path: Path, *, allow_outside: bool = False) -> SceneDescription:
@@ -126,5 +125,5 @@ def _smallest_three(turns: Bytes) -> FloatArray:
     """Quaternions in 32 bits: the place of the largest component, then signs and magnitudes of the others."""
     words = np.ascontiguousarray(turns).view("<u4")[:, 0]
     parts = np.stack([words >> np.uint32(20), words >> np.uint32(10), words], axis=1) & np.uint32(1023)
-    magnitudes = (parts & np.uint32(511)).astype(np.float32) / np.float32(511.0) * _MOST_SMALL
+    magnitudes = (parts & np.uint32(511)).astype(np.float32) / np.float32(511.0) * MOST_SMALL
     return largest_left_out(np.where(parts >> np.uint32(9) == 1, -magnitudes, magnitudes), words >> np.uint32(30))
