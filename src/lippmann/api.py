@@ -45,6 +45,7 @@ if TYPE_CHECKING:
     from lippmann.rendering.preview import Preview
     from lippmann.scene.light_options import LightOptions
     from lippmann.scene.values.description import Environment
+    from lippmann.scene.values.volume import TransferFunction
     from lippmann.studio_app.notebook import NotebookStudio
     from lippmann.tiles.tiled_render import Rendered, Runner
 
@@ -66,6 +67,9 @@ def load_scene(
     light: LightOptions | None = None,
     variants: Mapping[str, str] | None = None,
     depth_map: str | Path | None = None,
+    transfer_function: str | Path | TransferFunction | None = None,
+    window: tuple[float, float] | None = None,
+    series: str | None = None,
 ) -> Scene:
     """Load a scene from a file, a bundled scene's name, or an object of another library.
 
@@ -73,8 +77,9 @@ def load_scene(
     ----------
     source:
         Path of a ``.glb``, ``.gltf``, ``.obj``, ``.ply``, ``.spz``, ``.sog``, ``.stl``, ``.usd`` (``.usda``, ``.usdc``,
-        ``.usdz``), Mitsuba ``.xml``, Tachyon ``.dat`` or ``.nff`` file; name of a bundled scene; a ``mi.Scene`` or
-        Mitsuba dict; a trimesh scene or mesh; a PyVista mesh; a
+        ``.usdz``), Mitsuba ``.xml``, Tachyon ``.dat`` or ``.nff`` file; of a volume (``.nii``, ``.nii.gz``, ``.npy``,
+        ``.npz``, Mitsuba ``.vol``, ``.dcm`` or a folder of such) or of VTK (``.vtp``, ``.vtu``, ``.vtk``, ``.vti``); name of a bundled scene; a ``mi.Scene`` or
+        Mitsuba dict; a trimesh scene or mesh; a PyVista data set or plotter; a
         :class:`~lippmann.scene.values.description.SceneDescription`.
     environment:
         An equirectangular EXR or HDR file (or an ``Environment``) that lights the scene in place of its own.
@@ -89,7 +94,7 @@ def load_scene(
         ``y``, ``z`` or ``-y``: the axis that points up in a file that does not say so. By default ``y`` in OBJ, PLY and
         SPZ files, ``z`` in STL files, ``-y`` in PLY files of Gaussian splats and in SOG files.
     crop:
-        Of Gaussian splats those are kept whose centres lie in the box from ``(x0, y0, z0)`` to ``(x1, y1, z1)``, all in
+        Of Gaussian splats and voxels those are kept whose centres lie in the box from ``(x0, y0, z0)`` to ``(x1, y1, z1)``, all in
         one tuple: coordinates with +y up, after ``unit_scale``.
     unit_scale:
         Factor on the coordinates of Gaussian splats, whose files have no unit: what one of their units is in the unit
@@ -102,6 +107,14 @@ def load_scene(
         Of a USD stage: ``{"set": "choice"}`` for every prim that has them, ``{"/prim:set": "choice"}`` for one.
     depth_map:
         The depth of a photograph (``.jpg``, ``.png``, ``.webp``), as a file; None for one that a JPEG file holds.
+    transfer_function:
+        Colour and opacity of a volume's values: ``ct-bone``, ``ct-soft``, ``mr``, ``grey``, ``fire``, a ``.toml`` or
+        ``.json`` file, or a :class:`~lippmann.scene.values.volume.TransferFunction`. By default what suits the values.
+    window:
+        Lowest and highest value, between which the transfer function is laid. By default its own values.
+    series:
+        Of a folder of DICOM files the series to show (its number in the list that an error prints, description or UID),
+        of a NIfTI file with several volumes its number, of an ``.npz`` file the name of the array.
 
     Raises
     ------
@@ -121,6 +134,9 @@ def load_scene(
         light=light,
         variants=variants,
         depth_map=None if depth_map is None else Path(depth_map),
+        transfer_function=transfer_function,
+        window=window,
+        series=series,
     )
 
 

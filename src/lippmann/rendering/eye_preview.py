@@ -107,8 +107,8 @@ def render_eye_preview(
     UsageError, SceneError, MemoryLimitError, EngineError
         As the stages find them.
     """
-    # Of splats nothing is denoised, and a denoiser that is asked for is refused.
-    denoiser = request.denoise if scene.has_splats else "none"
+    # Of splats and volumes nothing is denoised, and a denoiser that is asked for is refused.
+    denoiser = request.denoise if scene.lies_off_surfaces else "none"
     plain = replace(request, method="full", denoise=denoiser, order=None, respect_gloss=None, layers=False)
     resolved = resolve(plain, scene, display)
     width, height = _size_of(display, size)
@@ -131,7 +131,7 @@ def render_eye_preview(
     # Where lenses are larger than the picture's pixels, it is made of blocks, which the denoiser has never seen.
     is_fine = 2 * source.width > width * height * whole.channels
     denoises = samples < _CLEAN_FROM and is_fine and request.denoise != "none" and resolved.integrator in LIGHT
-    denoises &= not scene.has_splats
+    denoises &= not scene.lies_off_surfaces
     if denoises:
         load_denoiser()
         guides = trace_guides(

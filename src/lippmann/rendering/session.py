@@ -168,19 +168,26 @@ class Session:
         """
         return self.watch.stage(
             "build",
-            lambda: self._before_splats(
-                self._prepare_light(make_integrator(self.built, self.request, frame_from_world, source), source)
+            lambda: self._in_front(
+                self._prepare_light(make_integrator(self.built, self.request, frame_from_world, source), source),
+                frame_from_world,
             ),
         )
 
-    def _before_splats(self, integrator: Integrator) -> Integrator:
+    def _in_front(self, integrator: Integrator, frame_from_world: Matrix) -> Integrator:
+        """An integrator with the splats or the volume that stand in front of what it shows."""
         from lippmann.device.pbr import BuiltScene
+        from lippmann.rendering.transport.grid_volume import GridVolumeIntegrator
         from lippmann.rendering.transport.splats import SplatIntegrator
 
         built = self.built
-        if not isinstance(built, BuiltScene) or built.splats is None:
+        if not isinstance(built, BuiltScene):
             return integrator
-        return SplatIntegrator(integrator, built, built.splats, self.engine.threads)
+        if built.volume is not None:
+            return GridVolumeIntegrator(integrator, built, built.volume, frame_from_world, self.engine.threads)
+        if built.splats is not None:
+            return SplatIntegrator(integrator, built, built.splats, self.engine.threads)
+        return integrator
 
     def _prepare_light(self, integrator: Integrator, source: RaySource) -> Integrator:
         from lippmann.rendering.film.exposure import gain_of, measure_exposure

@@ -10,6 +10,7 @@ import numpy as np
 from lippmann.scene.matrices import Bounds
 from lippmann.scene.splat_clouds import typical_points
 from lippmann.scene.values.description import Matrix, Mesh, SceneDescription
+from lippmann.scene.volumes.grid import visible_corners
 
 #: Directions in which the farthest points are looked for, on a Fibonacci lattice: the hull of those points is at most
 #: 0.6 % of the scene's radius short of the scene's. Of large meshes fewer are, for time: 3 % short.
@@ -25,9 +26,9 @@ _COPIED_POINTS = 5_000_000
 def extreme_points_of(description: SceneDescription) -> Bounds:
     """Points ``(n, 3)`` in world units, between which all triangles lie up to a hundredth of the scene's radius.
 
-    Of splats those between which all lie but floaters.
+    Of splats those between which all lie but floaters, of a volume the corners of what is seen.
 
-    Empty for a description that places neither.
+    Empty for a description that places none of these.
     """
     found = []
     for mesh, places in description.placements.items():
@@ -39,6 +40,8 @@ def extreme_points_of(description: SceneDescription) -> Bounds:
         found.append(farthest_points(_copies(points, places)))
     if description.splats is not None:
         found.append(typical_points(description.splats))
+    if description.volume is not None:
+        found.append(visible_corners(description.volume))
     return farthest_points(np.concatenate(found)) if found else np.zeros((0, 3))
 
 

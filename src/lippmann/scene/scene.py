@@ -26,6 +26,7 @@ from lippmann.scene.values.description import (
     SceneDescription,
 )
 from lippmann.scene.values.whitted_scene import ClassicScene
+from lippmann.scene.volumes.grid import check_volume, visible_corners
 from lippmann.scene.whitted.world_frame import world_bounds
 
 Bounds = NDArray[np.float64]
@@ -169,6 +170,16 @@ class Scene:
         return isinstance(self.description, SceneDescription) and self.description.splats is not None
 
     @property
+    def has_volume(self) -> bool:
+        """Whether there is a volume."""
+        return isinstance(self.description, SceneDescription) and self.description.volume is not None
+
+    @property
+    def lies_off_surfaces(self) -> bool:
+        """Whether there is light that lies on no surface: Gaussian splats or a volume."""
+        return self.has_splats or self.has_volume
+
+    @property
     def in_studio(self) -> bool:
         """Whether the built-in studio lights the scene, for want of other light."""
         return self.studio and not self.has_lights
@@ -300,7 +311,7 @@ def box(bounds: Bounds) -> tuple[Bounds, Bounds]:
 
 
 def bounds_of(description: SceneDescription, frame: Matrix | None = None) -> Bounds:
-    """The box ``(2, 3)`` around all vertices that some triangle of some instance uses, and most splats.
+    """The box ``(2, 3)`` around all vertices that some triangle of some instance uses, most splats, and what is seen of a volume.
 
     Its sides run along the axes of the world, or of the frame that the 4x4 matrix ``frame`` (from world) leads to.
 
@@ -319,6 +330,8 @@ def bounds_of(description: SceneDescription, frame: Matrix | None = None) -> Bou
             boxes.append(_box_of_copies(points, places, frame))
     if description.splats is not None:
         boxes.append(_box_of_copies(typical_points(description.splats), np.eye(4)[None], frame))
+    if description.volume is not None:
+        boxes.append(_box_of_copies(visible_corners(description.volume), np.eye(4)[None], frame))
     if not boxes:
         raise SceneError("the scene holds no triangles", where=description.name, rule="there must be something to see")
     return np.stack([np.min(boxes, axis=0)[0], np.max(boxes, axis=0)[1]])
@@ -352,7 +365,7 @@ def has_lights(description: SceneDescription) -> bool:
     indices = {description.meshes[mesh].material for mesh in description.placements}
     materials = [description.materials[index] for index in indices]
     if not materials:
-        return description.splats is not None  # which nothing lights
+        return description.splats is not None or description.volume is not None  # which nothing lights
     return any(max(material.emission) > 1.0 for material in materials) or all(material.unlit for material in materials)
 
 
@@ -378,7 +391,11 @@ def check_description(description: SceneDescription, where: str) -> SceneDescrip
         raise _no_matrix(next(number for number, own in enumerate(matrices) if not np.isfinite(own).all()), where)
     if description.splats is not None:
         check_splats(description.splats, where)
-    elif not any(
+    if description.volume is not None:
+        check_volume(description.volume, where)
+        if description.splats is not None:
+            raise SceneError("has both Gaussian splats and a volume", where=where, rule="one of them is rendered")
+    elif description.splats is None and not any(
         len(places) and len(description.meshes[mesh].faces) for mesh, places in description.placements.items()
     ):
         raise SceneError("the scene has no geometry", where=where, rule="there must be at least one triangle")

@@ -43,11 +43,7 @@ class SplatSelection:
     min_opacity: float | None = None
 
     def __post_init__(self) -> None:
-        if self.crop is not None:
-            box = np.asarray(self.crop, np.float64)
-            if box.shape != (6,) or not np.isfinite(box).all() or (box[:3] >= box[3:]).any():
-                rule = "six numbers: the lowest corner x, y, z of a box, then its highest"
-                raise UsageError(f"{self.crop!r}", parameter="crop", rule=rule)
+        check_crop(self.crop)
         if self.unit_scale is not None and not 1 / _LARGEST_FACTOR <= self.unit_scale <= _LARGEST_FACTOR:
             raise UsageError(f"{self.unit_scale:g}", parameter="unit_scale", rule="a factor above 0")
         if self.min_opacity is not None and not 0.0 <= self.min_opacity <= 1.0:
@@ -89,6 +85,22 @@ class SplatSelection:
             kept = splats.chosen(splats.opacities >= np.float32(self.min_opacity))
             splats = _some(kept, "min_opacity", scene.name)
         return replace(scene, description=replace(description, splats=splats))
+
+
+def check_crop(crop: Crop | None) -> None:
+    """Check that a box, if there is one, has an extent.
+
+    Raises
+    ------
+    UsageError
+        It has none.
+    """
+    if crop is None:
+        return
+    box = np.asarray(crop, np.float64)
+    if box.shape != (6,) or not np.isfinite(box).all() or (box[:3] >= box[3:]).any():
+        rule = "six numbers: the lowest corner x, y, z of a box, then its highest"
+        raise UsageError(f"{crop!r}", parameter="crop", rule=rule)
 
 
 def _some(splats: Splats, parameter: str, name: str) -> Splats:

@@ -21,6 +21,7 @@ from lippmann.scene.splat_clouds import moved
 from lippmann.scene.values.description import Matrix, SceneDescription
 from lippmann.scene.values.whitted_lighting import Background, ClassicLight
 from lippmann.scene.values.whitted_scene import ClassicScene
+from lippmann.scene.volumes.grid import moved as moved_volume
 from lippmann.scene.whitted.world_frame import world_from_scene
 
 #: Steps (degrees) in which the outline of a scene and the space that it sweeps are measured. A circle's radius is exact
@@ -78,8 +79,9 @@ def with_meshes_moved(scene: Scene, matrix: Matrix) -> Scene:
         for instance in description.instances
     ]
     splats = None if description.splats is None else moved(description.splats, matrix)
+    volume = None if description.volume is None else moved_volume(description.volume, matrix)
     # A form for the classic light models would not have turned.
-    return replace(scene, description=replace(description, instances=instances, splats=splats), classic=None)
+    return replace(scene, description=replace(description, instances=instances, splats=splats, volume=volume), classic=None)
 
 
 def with_lights_moved(scene: Scene, matrix: Matrix) -> Scene:

@@ -41,6 +41,9 @@ def preview(
     min_opacity: options.MinOpacity = None,
     variants: options.Variants = None,
     depth_map: options.DepthMap = None,
+    transfer_function: options.TransferFunction = None,
+    window: options.Window = None,
+    series: options.Series = None,
     integrator: options.Integrator = "auto",
     depth: options.Depth = None,
     spp: options.Spp = None,
@@ -119,6 +122,9 @@ def preview(
         light=parse.light(light_turn, light_strength, environment_strength),
         variants=parse.variants(variants),
         depth_map=depth_map,
+        transfer_function=transfer_function,
+        window=parse.window(window),
+        series=series,
     )
     with console.progress() as progress:
         started = time.perf_counter()

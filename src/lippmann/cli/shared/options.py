@@ -42,8 +42,8 @@ PictureDisplay = Annotated[
 Scene = Annotated[
     str,
     typer.Argument(
-        help="A .glb, .gltf, .obj, .ply, .spz, .sog, .stl, .usd, Mitsuba .xml, Tachyon .dat or .nff file, a photograph "
-        "with depth, or a bundled scene's name.",
+        help="A .glb, .gltf, .obj, .ply, .spz, .sog, .stl, .usd, Mitsuba .xml, Tachyon .dat or .nff file, a volume "
+        "(.nii, .nii.gz, .npy, .npz, .vol, a DICOM folder), a VTK file, a photograph with depth, or a bundled scene's name.",
         autocompletion=complete_scenes,
     ),
 ]
@@ -59,7 +59,7 @@ Crop = Annotated[
     str | None,
     typer.Option(
         "--crop",
-        help="Of Gaussian splats, keep those in the box X0,Y0,Z0,X1,Y1,Z1 (y up, after --unit-scale).",
+        help="Of Gaussian splats and volumes, keep what is in the box X0,Y0,Z0,X1,Y1,Z1 (y up, after --unit-scale).",
         show_default=False,
     ),
 ]
@@ -94,6 +94,33 @@ DepthMap = Annotated[
         "--depth-map",
         help="The depth of a photograph: .pfm, .npy, .exr (metres), a picture of 16 bits (millimetres) or of 8 bits "
         "(brighter is nearer).",
+        show_default=False,
+    ),
+]
+TransferFunction = Annotated[
+    str | None,
+    typer.Option(
+        "--transfer-function",
+        help="Colours and opacities of a volume: ct-bone, ct-soft, mr, grey, fire, or a .toml or .json file. By default "
+        "what suits its values.",
+        show_default=False,
+    ),
+]
+Window = Annotated[
+    str | None,
+    typer.Option(
+        "--window",
+        metavar="LOW,HIGH",
+        help="Lay the transfer function of a volume between these values.",
+        show_default=False,
+    ),
+]
+Series = Annotated[
+    str | None,
+    typer.Option(
+        "--series",
+        help="Of several volumes the one to show: a DICOM series' number, description or UID, a NIfTI volume's number, "
+        "an array's name.",
         show_default=False,
     ),
 ]

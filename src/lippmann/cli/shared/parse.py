@@ -116,6 +116,14 @@ def crop(text: str | None) -> Crop | None:
     return x0, y0, z0, x1, y1, z1
 
 
+def window(text: str | None) -> tuple[float, float] | None:
+    """Lowest and highest value from what was typed."""
+    if text is None:
+        return None
+    low, high = numbers(text, "--window", (2,))
+    return low, high
+
+
 def display(name: str | None) -> Display | None:
     """The display of that name or file; None if no name is given."""
     from lippmann.display import load_display

@@ -30,6 +30,9 @@ class SceneSource:
     light: LightOptions | None = None
     variants: Mapping[str, str] | None = None
     depth_map: Path | None = None
+    transfer_function: str | None = None
+    window: tuple[float, float] | None = None
+    series: str | None = None
 
     def load(self) -> Scene:
         """The scene.
@@ -54,4 +57,7 @@ class SceneSource:
             light=self.light,
             variants=self.variants,
             depth_map=self.depth_map,
+            transfer_function=self.transfer_function,
+            window=self.window,
+            series=self.series,
         )

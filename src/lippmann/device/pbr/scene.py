@@ -19,6 +19,8 @@ from lippmann.device.pbr.straight_through import has_null, may_pass
 from lippmann.device.pbr.textures import TextureStore
 from lippmann.device.splats.table import SplatTable, make_table
 from lippmann.device.types import Emitter, MitsubaScene, Shape
+from lippmann.device.volumes.table import VolumeTable
+from lippmann.device.volumes.table import make_table as make_volume_table
 from lippmann.errors import SceneError, UsageError
 from lippmann.runtime import engine as engines
 from lippmann.runtime import machine
@@ -49,6 +51,8 @@ class BuiltScene:
         Whether there are participating media.
     splats:
         Gaussian splats that can be seen, which are no part of the ``mi.Scene``.
+    volume:
+        A volume, which is no part of it, either.
     notes:
         What could not be honoured, one line each.
     seconds:
@@ -65,6 +69,7 @@ class BuiltScene:
     borrowed: bool = False
     has_media: bool = False
     splats: SplatTable | None = None
+    volume: VolumeTable | None = None
 
 
 def build(scene: Scene, engine: engines.Engine | None = None, *, memory: int | None = None) -> BuiltScene:
@@ -106,7 +111,7 @@ def build_description(description: SceneDescription, *, memory: int | None = Non
     seconds: dict[str, float] = {}
     notes: list[str] = []
     placed = _placements(description, notes)
-    if not placed and description.splats is None:
+    if not placed and description.splats is None and description.volume is None:
         raise SceneError(
             "the scene has no geometry", where=description.name, rule="there must be at least one triangle"
         )
@@ -121,6 +126,10 @@ def build_description(description: SceneDescription, *, memory: int | None = Non
     if description.splats is not None:
         with _time_stage(seconds, "splats"):
             splats = make_table(description.splats, available, name=description.name)
+    volume = None
+    if description.volume is not None:
+        with _time_stage(seconds, "volume"):
+            volume = make_volume_table(description.volume, available, name=description.name)
     with _time_stage(seconds, "lights"):
         lights = [light_object(light) for light in description.lights if max(light.color) > 0]
         if description.environment is not None:
@@ -135,6 +144,7 @@ def build_description(description: SceneDescription, *, memory: int | None = Non
         notes=tuple(notes),
         seconds=seconds,
         splats=splats,
+        volume=volume,
     )
 
 

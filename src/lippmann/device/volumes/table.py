@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from lippmann.errors import MemoryLimitError
 from lippmann.runtime.numba_jit import compiled, inlined
-from lippmann.runtime.row_threads import Bands
 from lippmann.scene.values.volume import TransferFunction, Volume
 
 #: Cells along a side of a brick, as a power of two.
@@ -67,15 +66,13 @@ class VolumeTable:
         return np.stack([corners.min(axis=0), corners.max(axis=0)])
 
 
-def make_table(volume: Volume, memory: int, *, threads: int = 1, name: str = "") -> VolumeTable:
+def make_table(volume: Volume, memory: int, *, name: str = "") -> VolumeTable:
     """The table of a volume.
 
     Parameters
     ----------
     memory:
         Bytes that the picture may use, the grid among them.
-    threads:
-        CPU threads.
     name:
         Name of the scene, for the error.
 
@@ -107,7 +104,7 @@ def make_table(volume: Volume, memory: int, *, threads: int = 1, name: str = "")
         bin_offset=bin_offset,
         extinction=extinction,
         integral=integral,
-        occupied=_occupied(volume.grid, extinction[:, 0], bin_scale, bin_offset, threads),
+        occupied=_occupied(volume.grid, extinction[:, 0], bin_scale, bin_offset),
         shading=transfer.shading,
     )
 
@@ -124,15 +121,14 @@ def _extinction(transfer: TransferFunction, low: float, high: float, longest_sid
 
 
 def _occupied(
-    grid: NDArray[np.generic], coefficient: Numbers, bin_scale: float, bin_offset: float, threads: int
+    grid: NDArray[np.generic], coefficient: Numbers, bin_scale: float, bin_offset: float
 ) -> NDArray[np.bool_]:
     """Which bricks hold a value, or one between those of neighbours, whose extinction is above 0."""
     bricks = [max(1, -(-(count - 1) >> BRICK_BITS)) for count in grid.shape]
     occupied = np.empty(bricks, np.bool_)
     # The number of bins below each edge that are seen: between any two edges something is seen if it differs.
     seen = np.concatenate([[0], np.cumsum(coefficient > 0.0)])
-    with Bands(threads) as bands:
-        bands.lines(_find_occupied, bricks[0], grid, seen, bin_scale, bin_offset, occupied)
+    _find_occupied(grid, seen, bin_scale, bin_offset, occupied)
     return occupied
 
 
@@ -147,8 +143,6 @@ def bin_of(value: float, bins: int) -> int:
 
 @compiled
 def _find_occupied(
-    first: int,
-    last: int,
     grid: NDArray[np.generic],
     seen: NDArray[np.int64],
     bin_scale: float,
@@ -158,7 +152,7 @@ def _find_occupied(
     depth, height, width = grid.shape
     bins = len(seen) - 3
     side = 1 << BRICK_BITS
-    for bz in range(first, last):
+    for bz in range(occupied.shape[0]):
         for by in range(occupied.shape[1]):
             for bx in range(occupied.shape[2]):
                 low = grid[bz * side, by * side, bx * side]

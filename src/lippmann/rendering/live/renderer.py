@@ -234,11 +234,12 @@ class LiveRenderer:
     # ---- Stages ----------------------------------------------------------------------------------------------------
 
     def _open(self, scene: Scene) -> SceneKernels:
-        if scene.has_splats:
+        if scene.lies_off_surfaces:
+            what = "Gaussian splats" if scene.has_splats else "volumes"
             raise SceneError(
-                "Gaussian splats cannot be shown live",
+                f"{what} cannot be shown live",
                 rule="live pictures show surfaces",
-                fix="use preview or render, which trace splats",
+                fix="use preview or render, which trace them",
             )
         request = replace(_moving(self._machine), device=self._machine.device, threads=self._machine.threads)
         session = open_session(

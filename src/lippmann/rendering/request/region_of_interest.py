@@ -40,6 +40,8 @@ def scene_corners(built: BuiltScene, display_from_world: NDArray[np.float64]) ->
     low, high = np.array(box.min, dtype=np.float64), np.array(box.max, dtype=np.float64)
     if built.splats is not None:
         low, high = np.minimum(low, built.splats.bounds[0]), np.maximum(high, built.splats.bounds[1])
+    if built.volume is not None:
+        low, high = np.minimum(low, built.volume.bounds[0]), np.maximum(high, built.volume.bounds[1])
     corners = np.array(list(itertools.product(*zip(low, high, strict=True))))
     moved: NDArray[np.float64] = corners @ display_from_world[:3, :3].T + display_from_world[:3, 3]
     return moved

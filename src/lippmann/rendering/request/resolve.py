@@ -19,9 +19,9 @@ from dataclasses import replace
 from lippmann.display import Display
 from lippmann.errors import UsageError
 from lippmann.rendering.request.choices import LIGHT, POOLED_LIGHT, REUSING, Denoiser, Integrator
+from lippmann.rendering.request.off_surface_request import with_light_off_surfaces
 from lippmann.rendering.request.preconditions import Form, check
 from lippmann.rendering.request.render_request import DEFAULT_SPP, RenderRequest
-from lippmann.rendering.request.splat_request import with_splats
 from lippmann.scene.light_options import LightOptions
 from lippmann.scene.scene import Scene
 
@@ -70,8 +70,8 @@ def resolve(
     UsageError, PictureError
         What is asked for cannot be done in this form, or for this scene or display.
     """
-    if scene.has_splats:
-        request = with_splats(request, scene)
+    if scene.lies_off_surfaces:
+        request = with_light_off_surfaces(request, scene)
     lit = _with_light(request, scene, of_own_camera=form == "preview")
     complete = _with_subpixels(_with_method(lit, form), None if form == "quilt" else display)
     if complete.spp is None and not complete.is_open_ended:

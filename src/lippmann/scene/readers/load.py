@@ -16,12 +16,16 @@ from lippmann.scene.mitsuba_source import MitsubaSource
 from lippmann.scene.parsing.files import read_bytes
 from lippmann.scene.parsing.name_hints import closest_name_hint
 from lippmann.scene.readers.ply import UP_NOTE
+from lippmann.scene.readers.volumes.dicom_files import DICOM, holds_dicom
 from lippmann.scene.scene import Scene, check_description, override_light
 from lippmann.scene.splat_clouds import moved
 from lippmann.scene.splat_selection import Crop, SplatSelection
 from lippmann.scene.values.description import Camera, Color, Environment, Material, Matrix, SceneDescription
+from lippmann.scene.values.volume import TransferFunction
 from lippmann.scene.values.whitted_lighting import Background
 from lippmann.scene.values.whitted_scene import ClassicScene
+from lippmann.scene.volume_selection import VolumeSelection
+from lippmann.scene.volumes.grid import moved as moved_volume
 from lippmann.scene.whitted.world_frame import world_camera
 
 #: Words in place of an environment file: the built-in studio, and no light but the scene's own.
@@ -47,6 +51,10 @@ _READERS = {
     ".usdc": "lippmann.scene.readers.usd:read_usd",
     ".usdz": "lippmann.scene.readers.usd:read_usd",
     ".xml": "lippmann.scene.mitsuba_source:read_mitsuba",
+    **dict.fromkeys((".nii", ".nii.gz"), "lippmann.scene.readers.volumes.nifti:read_nifti"),
+    **dict.fromkeys((".npy", ".npz"), "lippmann.scene.readers.volumes.numpy_arrays:read_array"),
+    ".dcm": "lippmann.scene.readers.volumes.dicom:read_dicom",
+    ".vol": "lippmann.scene.readers.volumes.mitsuba_grid:read_mitsuba_grid",
     **dict.fromkeys((".pdb", ".ent", ".cif"), "lippmann.scene.readers.molecule:read_molecule"),
     **dict.fromkeys(PHOTOS, "lippmann.scene.readers.depth_photo:read_depth_photo"),
 }
@@ -61,6 +69,10 @@ _BEGINNINGS = {
     b"<": ".xml",
     b"{": ".gltf",
 }
+
+#: Kinds of files that hold volumes, and those of them that may hold several.
+VOLUMES = (".nii", ".nii.gz", ".npy", ".npz", ".dcm", ".vol", ".vti")
+SEVERAL_VOLUMES = (".nii", ".nii.gz", ".npz", ".dcm")
 
 #: Kinds of files whose variants can be chosen.
 STAGES = (".usd", ".usda", ".usdc", ".usdz")
@@ -84,12 +96,16 @@ _ELSEWHERE = {
     ".stp": "open it in FreeCAD, then File > Export > glTF (.glb)",
     ".iges": "open it in FreeCAD, then File > Export > glTF (.glb)",
     ".igs": "open it in FreeCAD, then File > Export > glTF (.glb)",
+    ".vdb": "no reader is at hand: in Python, openvdb's copyToArray gives an array for numpy.save (.npy)",
+    ".nrrd": "save it as .nii.gz, in 3D Slicer for instance",
+    ".mha": "save it as .nii.gz, in 3D Slicer for instance",
+    ".hdr": "save it as .nii or .nii.gz, which hold header and voxels in one file",
     ".3mf": "save it from the slicer as .stl or .obj",
 }
 
 #: Kinds of files that do not say which way is up, and which way it mostly is: for 3D printing, z.
 Up = Literal["y", "z", "-y"]
-_USUAL_UP: dict[str, Up] = {".obj": "y", ".ply": "y", ".sog": "-y", ".spz": "y", ".stl": "z"}
+_USUAL_UP: dict[str, Up] = {".npy": "y", ".npz": "y", ".obj": "y", ".ply": "y", ".sog": "-y", ".spz": "y", ".stl": "z"}
 #: Rotations that bring such an axis to +y, about x.
 _UPRIGHT: dict[Up, Matrix] = {
     "y": np.eye(4),
@@ -112,6 +128,9 @@ def load_scene(
     light: LightOptions | None = None,
     variants: Mapping[str, str] | None = None,
     depth_map: Path | None = None,
+    transfer_function: str | Path | TransferFunction | None = None,
+    window: tuple[float, float] | None = None,
+    series: str | None = None,
 ) -> Scene:
     """Load a scene.
 
@@ -142,6 +161,11 @@ def load_scene(
         Of a USD stage: ``{"set": "choice"}`` for every prim that has them, ``{"/prim:set": "choice"}`` for one.
     depth_map:
         The depth of a photograph, as a file; None for one that a JPEG file holds.
+    transfer_function, window:
+        Of a volume; see :class:`~lippmann.scene.volume_selection.VolumeSelection`, also for ``crop``.
+    series:
+        Of files with several volumes the one to show: number, name or UID of a DICOM series, number of a NIfTI volume,
+        name of an array.
 
     Raises
     ------
@@ -154,14 +178,17 @@ def load_scene(
     sky = _environment(environment)
     color = _background(background)
     if isinstance(source, str | Path):
-        scene = _from_name(source, allow_outside, up, variants, depth_map)
-    elif up is None and not variants and depth_map is None:
+        scene = _from_name(source, allow_outside, up, variants, depth_map, series)
+    elif up is None and not variants and depth_map is None and series is None:
         scene = _from_object(source)
     else:
-        asked = {"up": up, "variants": variants, "depth_map": depth_map}
+        asked = {"up": up, "variants": variants, "depth_map": depth_map, "series": series}
         parameter = next(name for name, value in asked.items() if value)
         raise UsageError("is for files", parameter=parameter, fix="leave it out")
-    scene = SplatSelection(crop, unit_scale, min_opacity).of(scene)
+    if scene.has_volume:
+        scene = VolumeSelection(crop, transfer_function, window).of(SplatSelection(None, unit_scale, min_opacity).of(scene))
+    else:
+        scene = SplatSelection(crop, unit_scale, min_opacity).of(VolumeSelection(None, transfer_function, window).of(scene))
     scene = scene if light is None else replace(scene, light=light)
     studio = scene.studio and str(environment) != NO_ENVIRONMENT
     if scene.classic is not None and color is not None:
@@ -204,7 +231,12 @@ def kind_of_file(source: str | Path) -> str | None:
     path = Path(source)
     if isinstance(source, str) and not path.suffix and path.name == source and not path.exists():
         return None
-    return _suffix_by_content(path) or path.suffix.lower()
+    return _suffix_by_content(path) or _ending(path)
+
+
+def _ending(path: Path) -> str:
+    """The ending that names a file's kind, that of packed volumes in whole."""
+    return ".nii.gz" if path.name.lower().endswith(".nii.gz") else path.suffix.lower()
 
 
 def _from_name(
@@ -213,9 +245,10 @@ def _from_name(
     up: Up | None = None,
     variants: Mapping[str, str] | None = None,
     depth_map: Path | None = None,
+    series: str | None = None,
 ) -> Scene:
     path = Path(source)
-    suffix = path.suffix.lower()
+    suffix = _ending(path)
     if up is not None and (up not in get_args(Up) or suffix not in _USUAL_UP):
         what = f"'{up}'" if up not in get_args(Up) else f"{path.name} says itself which way is up"
         raise UsageError(what, parameter="up", rule=f"y, z or -y, for {', '.join(_USUAL_UP)}", fix="leave it out")
@@ -225,6 +258,10 @@ def _from_name(
         )
     if depth_map is not None and suffix not in PHOTOS:
         raise UsageError(f"{path.name} is no photograph", parameter="depth_map", rule=f"for {', '.join(PHOTOS)} files")
+    if series is not None and kind_of_file(source) not in SEVERAL_VOLUMES:
+        raise UsageError(
+            f"{path.name} holds no several volumes", parameter="series", rule=f"for {', '.join(SEVERAL_VOLUMES)} files"
+        )
     if isinstance(source, str) and not suffix and path.name == source:
         from lippmann.scene import bundled
 
@@ -249,7 +286,7 @@ def _from_name(
             rule=f"known are {', '.join(_READERS)}",
             fix=_ELSEWHERE.get(suffix, ""),
         )
-    chosen = {key: value for key, value in (("variants", variants), ("depth_map", depth_map)) if value}
+    chosen = {key: value for key, value in (("variants", variants), ("depth_map", depth_map), ("series", series)) if value}
     module, function = reader.split(":")
     description = getattr(import_module(module), function)(path, allow_outside=allow_outside, **chosen)
     if isinstance(description, ClassicScene):
@@ -281,7 +318,8 @@ def _upright(description: SceneDescription, suffix: str, up: Up | None) -> Scene
         for each in description.instances
     ]
     splats = None if splats is None else moved(splats, matrix)
-    return replace(description, instances=instances, splats=splats, notes=notes)
+    volume = None if description.volume is None else moved_volume(description.volume, matrix)
+    return replace(description, instances=instances, splats=splats, volume=volume, notes=notes)
 
 
 def _with_remarks(description: SceneDescription) -> SceneDescription:
@@ -305,7 +343,12 @@ def _is_invisible(material: Material) -> bool:
 
 def _suffix_by_content(path: Path) -> str | None:
     """The suffix that the first bytes of a file imply; None if they imply none."""
-    head = read_bytes(path, 64).removeprefix(b"\xef\xbb\xbf").lstrip()
+    if path.is_dir() and holds_dicom(path):
+        return ".dcm"
+    head = read_bytes(path, 132)
+    if head[128:] == DICOM:
+        return ".dcm"
+    head = head.removeprefix(b"\xef\xbb\xbf").lstrip()
     return next((suffix for beginning, suffix in _BEGINNINGS.items() if head.startswith(beginning)), None)
 
 

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from lippmann.runtime.cached_property import cached_property
 from lippmann.scene.values.splats import Splats
+from lippmann.scene.values.volume import Volume
 
 FloatArray = NDArray[np.float32]
 IndexArray = NDArray[np.uint32]
@@ -199,7 +200,7 @@ class SceneDescription:
     ``notes`` are one-line remarks of the reader: features that it ignored, and its assumptions.
     ``multiple_scattering`` gives back the light that rough surfaces reflect more than once between microfacets; without
     it they are as dark as glTF's formulas make them. ``physical_lights`` says that the file tells its light sources in
-    lux or candela. ``splats`` stand in the world.
+    lux or candela. ``splats`` and ``volume`` stand in the world.
     """
 
     name: str
@@ -214,6 +215,7 @@ class SceneDescription:
     multiple_scattering: bool = True
     physical_lights: bool = False
     splats: Splats | None = None
+    volume: Volume | None = None
 
     @cached_property
     def placements(self) -> Mapping[int, Matrix]:

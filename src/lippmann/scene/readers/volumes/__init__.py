@@ -1,0 +1,1 @@
+"""Readers of volumes: NIfTI, DICOM series, arrays of NumPy, and grids of Mitsuba's."""

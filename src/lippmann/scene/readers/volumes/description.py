@@ -1,0 +1,47 @@
+"""From a grid that was read to a scene."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lippmann.scene.values.description import SceneDescription
+from lippmann.scene.values.volume import Numbers, Volume
+from lippmann.scene.volumes.grid import storable
+from lippmann.scene.volumes.presets import Kind, automatic, sample
+
+#: From the axes of medical files, millimetres toward a patient's right, front and head, to the world: who looks along
+#: -z with +y up faces the patient, head up.
+WORLD_FROM_RAS = np.array([[-1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
+#: The same from left, back and head.
+WORLD_FROM_LPS = WORLD_FROM_RAS @ np.diag([-1.0, -1.0, 1.0, 1.0])
+
+
+def describe_volume(
+    name: str,
+    grid: NDArray[np.generic],
+    world_from_voxel: Numbers,
+    *,
+    slope: float = 1.0,
+    intercept: float = 0.0,
+    kind: Kind | None = None,
+    notes: Sequence[str] = (),
+) -> SceneDescription:
+    """A scene of one volume, shown by the transfer function that suits it; a note says which.
+
+    ``grid`` ``(nz, ny, nx)`` may hold numbers of any kind. A negative ``slope`` turns them round.
+    """
+    if slope < 0.0:
+        grid, slope = -np.asarray(grid, np.float32), -slope
+    stored, remark = storable(grid)
+    transfer = automatic(sample(stored, slope, intercept), kind)
+    first, last = transfer.values[[0, -1]]
+    shown = f"shown by the transfer function '{transfer.name}', values {first:.5g} to {last:.5g} (transfer_function)"
+    depth, height, width = stored.shape
+    volume = Volume(stored, np.asarray(world_from_voxel, np.float64), transfer, slope, intercept)
+    size = f"{width} x {height} x {depth} voxels of {' x '.join(f'{side:.3g}' for side in volume.spacing)}"
+    return SceneDescription(
+        name, notes=[size, *notes, *([remark] if remark else []), shown], volume=volume
+    )

@@ -1,0 +1,209 @@
+"""The process that reads DICOM files by ``pydicom`` and its decoders, with nothing else in it."""
+
+from __future__ import annotations
+
+import json
+import os
+import struct
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pydicom
+
+from lippmann.runtime.helper_process import limit_memory, serve
+from lippmann.scene.readers.volumes.dicom_files import files_in, is_dicom
+from lippmann.scene.readers.volumes.dicom_slices import (
+    Frame,
+    SeriesError,
+    Stack,
+    choose_series,
+    interpolated,
+    make_stack,
+)
+
+_LENGTH = struct.Struct("<Q")
+#: What is read of a file before its pixels: nothing that tells of the patient.
+_TAGS = [
+    *("SeriesInstanceUID", "SeriesDescription", "SeriesNumber", "Modality", "InstanceNumber", "Rows", "Columns"),
+    *("ImagePositionPatient", "ImageOrientationPatient", "PixelSpacing", "SliceThickness", "SamplesPerPixel"),
+    *("SpacingBetweenSlices", "NumberOfFrames", "RescaleSlope", "RescaleIntercept", "PhotometricInterpretation"),
+    *("SharedFunctionalGroupsSequence", "PerFrameFunctionalGroupsSequence", "BitsAllocated"),
+]
+
+
+def main() -> None:
+    """Answer requests, JSON with ``path``, ``series`` and ``memory``, by JSON after its length, and the grid's bytes."""
+    serve(_answer)
+
+
+def _answer(data: bytes) -> bytes:
+    request = json.loads(data)
+    limit_memory(request["memory"])
+    body = b""
+    try:
+        head, body = _read(request["path"], request["series"], request["memory"])
+    except SeriesError as error:
+        head = error.said
+    except MemoryError:
+        head = {"error": "takes more memory than is left"}
+    except Exception as error:  # noqa: BLE001  # it raises errors of many kinds
+        head = {"error": f"cannot be read ({_words(error, request['path'])})", "fix": "are the files whole?"}
+    text = json.dumps(head).encode()
+    return b"".join([_LENGTH.pack(len(text)), text, body])
+
+
+def _words(error: Exception, path: str) -> str:
+    said = " ".join(str(error).split()).replace(os.path.join(os.path.dirname(path), ""), "")
+    return said[:200] or type(error).__name__
+
+
+def _read(path: str, series: str | None, memory: int) -> tuple[dict[str, Any], bytes]:
+    own = None
+    names = files_in(Path(path))
+    if not os.path.isdir(path):
+        own = str(_header(path).get("SeriesInstanceUID", ""))
+        beside = [name for name in files_in(Path(path).parent) if os.path.dirname(name) == os.path.dirname(path)]
+        names = [path, *(name for name in beside if name != path)] if own else [path]
+    frames: list[Frame] = []
+    notes: list[str] = []
+    broken = 0
+    for name in names:
+        if name != path and not is_dicom(name):
+            continue
+        try:
+            frames.extend(_frames(name, _header(name)))
+        except Exception as error:  # noqa: BLE001  # as above; other files may be whole
+            if name == path:
+                raise SeriesError(error=f"is no DICOM file ({_words(error, path)})") from None
+            broken += 1
+    if broken:
+        notes.append(f"{broken} damaged files are left out")
+    chosen, remarks = choose_series(frames, series, own)
+    stack = make_stack(chosen)
+    return _fill(stack, [*notes, *remarks, *stack.notes], memory)
+
+
+def _header(name: str) -> pydicom.Dataset:
+    return pydicom.dcmread(name, stop_before_pixels=True, specific_tags=_TAGS, force=name.lower().endswith(".dcm"))
+
+
+def _frames(name: str, header: pydicom.Dataset) -> Iterator[Frame]:
+    """The slices of a file that have pixels of one number."""
+    if "Rows" not in header or "Columns" not in header:
+        return  # a directory of files, a report
+    count = int(header.get("NumberOfFrames", 1) or 1)
+    shared = _first(header, "SharedFunctionalGroupsSequence")
+    own = list(header.get("PerFrameFunctionalGroupsSequence", None) or [])
+    for index in range(min(count, 1 << 16)):
+        groups = [own[index]] if index < len(own) else []
+        if shared is not None:
+            groups.append(shared)
+
+        def find(sequence: str, tag: str, groups: list[pydicom.Dataset] = groups) -> Any:
+            for group in groups:
+                item = _first(group, sequence)
+                if item is not None and tag in item:
+                    return item.get(tag)
+            return header.get(tag)
+
+        position = find("PlanePositionSequence", "ImagePositionPatient")
+        orientation = find("PlaneOrientationSequence", "ImageOrientationPatient")
+        spacing = find("PixelMeasuresSequence", "PixelSpacing")
+        slope = find("PixelValueTransformationSequence", "RescaleSlope")
+        intercept = find("PixelValueTransformationSequence", "RescaleIntercept")
+        yield Frame(
+            file=name,
+            index=index,
+            count=count,
+            series=str(header.get("SeriesInstanceUID", "")),
+            description=str(header.get("SeriesDescription", "") or ""),
+            modality=str(header.get("Modality", "") or ""),
+            number=float(header.get("InstanceNumber", 0) or 0),
+            shape=(int(header.Rows), int(header.Columns)),
+            channels=int(header.get("SamplesPerPixel", 1) or 1),
+            is_inverted=str(header.get("PhotometricInterpretation", "")).strip() == "MONOCHROME1",
+            is_palette=str(header.get("PhotometricInterpretation", "")).startswith("PALETTE"),
+            position=_numbers(position, 3),
+            orientation=_numbers(orientation, 6),
+            spacing=_numbers(spacing, 2),
+            thickness=float(
+                find("PixelMeasuresSequence", "SpacingBetweenSlices")
+                or find("PixelMeasuresSequence", "SliceThickness")
+                or 0.0
+            ),
+            slope=1.0 if slope is None or slope == "" else float(slope),
+            intercept=0.0 if intercept is None or intercept == "" else float(intercept),
+        )
+
+
+def _first(dataset: pydicom.Dataset, sequence: str) -> pydicom.Dataset | None:
+    items = dataset.get(sequence, None)
+    return items[0] if items else None
+
+
+def _numbers(values: Any, count: int) -> tuple[float, ...] | None:
+    if values is None or isinstance(values, str) or len(values) != count:
+        return None
+    found = tuple(float(value) for value in values)
+    return found if np.isfinite(found).all() else None
+
+
+def _fill(stack: Stack, notes: list[str], memory: int) -> tuple[dict[str, Any], bytes]:
+    """The grid of a stack, slice by slice."""
+    frames = stack.frames
+    is_one_scale = len({(frame.slope, frame.intercept) for frame in frames}) == 1
+    inverted = frames[0].is_inverted
+    rows, columns = frames[0].shape
+    if len(frames) * rows * columns * 4 > memory:
+        raise MemoryError
+    grid: np.ndarray[Any, Any] | None = None
+    held: tuple[str, Any] = ("", None)
+    for place, frame in enumerate(frames):
+        if held[0] != frame.file:
+            held = (frame.file, _pixels(frame))
+        pixels = held[1] if frame.count == 1 else held[1][frame.index]
+        if pixels.shape != frame.shape:
+            raise SeriesError(error=f"{os.path.basename(frame.file)} holds pixels {pixels.shape}, not {frame.shape}")
+        if not is_one_scale:
+            pixels = pixels.astype(np.float32) * np.float32(frame.slope) + np.float32(frame.intercept)
+        if grid is None:
+            grid = np.empty((len(frames), rows, columns), pixels.dtype)
+        elif not np.can_cast(pixels.dtype, grid.dtype):
+            grid = grid.astype(np.result_type(pixels.dtype, grid.dtype))
+        grid[place] = pixels
+    assert grid is not None
+    if stack.places is not None:
+        grid = interpolated(grid, stack.places)
+    slope, intercept = (frames[0].slope, frames[0].intercept) if is_one_scale else (1.0, 0.0)
+    if inverted:
+        slope = -slope
+    head = {
+        "shape": grid.shape,
+        "dtype": grid.dtype.str,
+        "patient_from_voxel": stack.patient_from_voxel.tolist(),
+        "slope": slope,
+        "intercept": intercept,
+        "modality": frames[0].modality,
+        "notes": notes,
+    }
+    return head, grid.tobytes()
+
+
+def _pixels(frame: Frame) -> np.ndarray[Any, Any]:
+    dataset = pydicom.dcmread(frame.file, force=frame.file.lower().endswith(".dcm"))
+    syntax = getattr(getattr(dataset, "file_meta", None), "TransferSyntaxUID", None)
+    if syntax is None:
+        dataset.file_meta = pydicom.dataset.FileMetaDataset()
+        dataset.file_meta.TransferSyntaxUID = syntax = pydicom.uid.ImplicitVRLittleEndian
+    try:
+        return np.asarray(dataset.pixel_array)
+    except (RuntimeError, NotImplementedError) as error:
+        if not syntax.is_compressed:
+            raise
+        raise SeriesError(
+            error=f"its pixels are compressed as {syntax.name}",
+            rule=f"no decoder is installed that reads them ({_words(error, frame.file)})"[:200],
+            fix="pip install pylibjpeg pylibjpeg-libjpeg pylibjpeg-openjpeg",
+        ) from None

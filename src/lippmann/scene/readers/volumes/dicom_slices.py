@@ -1,0 +1,182 @@
+"""Slices of DICOM files become a stack: which belong together, how they lie, and how far they are apart."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Numbers = NDArray[np.float64]
+
+#: Slices of the same orientation to so many decimals lie in one stack.
+_DECIMALS = 3
+#: Distances that differ by no more than this share are one, as are places that lie nearer than this share of it.
+_EVEN = 0.05
+#: Slices of a stack whose gaps are filled.
+_MOST_SLICES = 8192
+#: Series that a line names.
+_NAMED = 8
+
+
+class SeriesError(Exception):
+    """Files that show nothing: ``said`` holds ``error``, ``rule`` and ``fix`` of a line, or ``usage``."""
+
+    def __init__(self, **said: str) -> None:
+        super().__init__(said)
+        self.said: dict[str, Any] = dict(said)
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A slice: picture ``index`` of ``count`` in a file, and what its header tells. Lengths are millimetres.
+
+    ``position`` is that of the middle of the first pixel, ``orientation`` the direction along a row, then down a
+    column, ``spacing`` the distance of rows, then of columns; None where the header lacks it.
+    """
+
+    file: str
+    index: int
+    count: int
+    series: str
+    description: str
+    modality: str
+    number: float
+    shape: tuple[int, int]
+    channels: int = 1
+    is_inverted: bool = False
+    is_palette: bool = False
+    position: tuple[float, ...] | None = None
+    orientation: tuple[float, ...] | None = None
+    spacing: tuple[float, ...] | None = None
+    thickness: float = 0.0
+    slope: float = 1.0
+    intercept: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Stack:
+    """Slices in order.
+
+    ``patient_from_voxel`` ``(4, 4)`` leads to millimetres toward the left, the back and the head. ``places`` ``(n,)``
+    are the slices of an even stack, counted in those that are there, fractions between two; None if it is even.
+    """
+
+    frames: list[Frame]
+    patient_from_voxel: Numbers
+    notes: list[str]
+    places: Numbers | None = None
+
+
+def choose_series(frames: list[Frame], wanted: str | None, own: str | None) -> tuple[list[Frame], list[str]]:
+    """The slices of one series that fit together, and remarks on the others.
+
+    Parameters
+    ----------
+    wanted:
+        Number, description or UID; None for the series ``own``, or without one that with the most slices.
+
+    Raises
+    ------
+    SeriesError
+        There is none, or none of that name.
+    """
+    shown = [frame for frame in frames if frame.channels == 1 and not frame.is_palette]
+    if not shown:
+        what = "colour pictures alone" if frames else "no pictures"
+        raise SeriesError(error=f"holds {what}", rule="series of one number a pixel are shown")
+    counts = Counter(frame.series for frame in shown)
+    order = list(counts)
+    names = {frame.series: frame.description for frame in reversed(shown)}
+    listed = [f"{place} '{names[uid][:40]}' ({counts[uid]})" for place, uid in enumerate(order[:_NAMED], 1)]
+    list_of = ", ".join(listed) + (f" and {len(order) - _NAMED} more" if len(order) > _NAMED else "")
+    if wanted is not None:
+        fits = [uid for place, uid in enumerate(order, 1) if wanted in (str(place), uid)]
+        fits = fits or [uid for uid in order if names[uid].casefold() == wanted.casefold()]
+        if not fits:
+            raise SeriesError(usage=f"series (and their slices) are {list_of}")
+        chosen = fits[0]
+    else:
+        chosen = own if own in counts else max(order, key=lambda uid: counts[uid])
+    notes = []
+    if len(order) > 1 and wanted is None:
+        place = order.index(chosen) + 1
+        notes.append(f"series {place} of {len(order)} is shown; series (and their slices) are {list_of}")
+    kinds: dict[object, list[Frame]] = {}
+    for frame in shown:
+        if frame.series == chosen:
+            turned = None if frame.orientation is None else tuple(np.round(frame.orientation, _DECIMALS).tolist())
+            kinds.setdefault((frame.shape, turned, frame.spacing), []).append(frame)
+    largest = max(kinds.values(), key=len)
+    others = counts[chosen] - len(largest)
+    if others:
+        notes.append(f"{others} slices of another size or orientation are left out")
+    return largest, notes
+
+
+def make_stack(frames: list[Frame]) -> Stack:
+    """Slices of one size and orientation in the order in which they lie."""
+    notes: list[str] = []
+    first = frames[0]
+    rows_apart, columns_apart = first.spacing or (1.0, 1.0)
+    if first.spacing is None or min(first.spacing) <= 0.0:
+        rows_apart = columns_apart = 1.0
+        notes.append("the size of pixels is not told: 1 mm is taken")
+    axes = np.array(first.orientation or (1.0, 0.0, 0.0, 0.0, 1.0, 0.0)).reshape(2, 3)
+    lengths = np.linalg.norm(axes, axis=1)
+    if lengths.min() < 0.5 or np.linalg.norm(np.cross(*axes)) < 0.5:
+        raise SeriesError(error="its slices have no orientation", rule="two directions at right angles")
+    axes = axes / lengths[:, None]
+    normal = np.cross(axes[0], axes[1])
+    matrix = np.eye(4)
+    matrix[:3, 0], matrix[:3, 1] = axes[0] * columns_apart, axes[1] * rows_apart
+    thickness = first.thickness if np.isfinite(first.thickness) and first.thickness > 0.0 else 1.0
+    if any(frame.position is None for frame in frames):
+        ordered = sorted(frames, key=lambda frame: (frame.number, frame.file, frame.index))
+        if len(ordered) > 1:
+            notes.append("the slices' places are not told: they are taken in the order of their numbers")
+        # Nothing says that the first is the lowest: in most scanners' order it is not.
+        matrix[:3, 2] = normal * thickness
+        return Stack(ordered, matrix, notes)
+    heights = np.array([np.dot(normal, np.array(frame.position)) for frame in frames])
+    order = sorted(range(len(frames)), key=lambda each: (heights[each], frames[each].number, frames[each].file))
+    heights, ordered = heights[order], [frames[each] for each in order]
+    distances = np.diff(heights)
+    real = distances[distances > 1e-3]
+    step = float(np.median(real)) if len(real) else thickness
+    keep = np.concatenate([[True], distances > _EVEN * step])
+    if not keep.all():
+        notes.append(f"{int((~keep).sum())} slices lie where others lie, and are left out")
+        heights, ordered = heights[keep], [frame for frame, kept in zip(ordered, keep, strict=True) if kept]
+    origin = np.array(ordered[0].position)
+    matrix[:3, 3] = origin
+    if len(ordered) == 1:
+        matrix[:3, 2] = normal * thickness
+        return Stack(ordered, matrix, notes)
+    distances = np.diff(heights)
+    whole = np.array(ordered[-1].position) - origin
+    if np.abs(distances - step).max() <= _EVEN * step:
+        # From the first to the last, which also tells of a gantry that is tilted.
+        matrix[:3, 2] = whole / (len(ordered) - 1)
+        return Stack(ordered, matrix, notes)
+    count = round((heights[-1] - heights[0]) / step) + 1
+    if count > _MOST_SLICES:
+        raise SeriesError(error="its slices lie too far apart", rule=f"{_MOST_SLICES} at their usual distance")
+    matrix[:3, 2] = whole / (count - 1)
+    even = np.linspace(heights[0], heights[-1], count)
+    notes.append(f"slices are missing or unevenly spaced: {count} are interpolated from {len(ordered)}")
+    return Stack(ordered, matrix, notes, np.interp(even, heights, np.arange(len(ordered))))
+
+
+def interpolated(grid: NDArray[np.generic], places: Numbers) -> NDArray[np.generic]:
+    """Slices between those of a grid ``(n, h, w)``, of the same kind of number; ``places`` as of :class:`Stack`."""
+    made = np.empty((len(places), *grid.shape[1:]), grid.dtype)
+    for number, place in enumerate(places):
+        below = min(int(place), len(grid) - 1)
+        above = min(below + 1, len(grid) - 1)
+        share = place - below
+        mixed = (1.0 - share) * grid[below].astype(np.float64) + share * grid[above].astype(np.float64)
+        made[number] = np.rint(mixed) if grid.dtype.kind in "iu" else mixed
+    return made

@@ -1,0 +1,100 @@
+"""Volumes in NumPy's files: an array of three axes, (z, y, x), slice 0 in front and row 0 on top."""
+
+from __future__ import annotations
+
+import math
+import zipfile
+import zlib
+from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lippmann.errors import SceneError, UsageError
+from lippmann.runtime.input_memory import check_input
+from lippmann.scene.parsing.files import read_bytes
+from lippmann.scene.readers.volumes.description import describe_volume
+from lippmann.scene.values.description import SceneDescription
+
+#: The array of an ``.npz`` file with the distances of voxels along its axes z, y and x.
+SPACING = "spacing"
+_RULE = "an array (z, y, x) of real numbers"
+
+
+def read_array(path: Path, *, allow_outside: bool = False, series: str | None = None) -> SceneDescription:
+    """Read an array of three axes; voxels are 1 mm wide, or as ``spacing`` (z, y, x) of an ``.npz`` file says.
+
+    Parameters
+    ----------
+    allow_outside:
+        Without effect: such files name no others.
+    series:
+        Name of an array of an ``.npz`` file; None for the only one of three axes.
+
+    Raises
+    ------
+    SceneError
+        The file is missing or damaged, or holds no such array.
+    MemoryLimitError
+        It holds more than the memory that is left.
+    UsageError
+        There is no array of that name.
+    """
+    where = path.name
+    is_archive = read_bytes(path, 64).startswith(b"PK")
+    if series is not None and not is_archive:
+        raise UsageError(f"'{series}'", parameter="series", rule=f"{where} holds one array")
+    spacing = np.ones(3)
+    try:
+        if is_archive:
+            grid, spacing = _of_archive(path, series)
+        else:
+            with path.open("rb") as file:
+                grid = _array(file, where, where)
+    except (OSError, ValueError, EOFError, zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError) as error:
+        raise SceneError(f"cannot be read ({str(error)[:200]})", where=where, rule=_RULE) from None
+    if grid.ndim != 3:
+        raise SceneError(f"its array is {grid.shape}", where=where, rule=_RULE)
+    depth_step, height_step, width_step = spacing
+    world_from_voxel = np.diag([width_step, -height_step, -depth_step, 1.0])
+    return describe_volume(path.stem, grid, world_from_voxel)
+
+
+def _of_archive(path: Path, series: str | None) -> tuple[NDArray[np.generic], NDArray[np.float64]]:
+    where = path.name
+    with zipfile.ZipFile(path) as archive:
+        names = [name.removesuffix(".npy") for name in archive.namelist()[:1000] if name.endswith(".npy")]
+        spacing = np.ones(3)
+        if SPACING in names:
+            with archive.open(f"{SPACING}.npy") as file:
+                spacing = np.asarray(_array(file, SPACING, where), np.float64).ravel()
+            if len(spacing) != 3 or not np.isfinite(spacing).all() or spacing.min() <= 0.0:
+                raise SceneError("its spacing is no distance along z, y and x", where=where, rule="three numbers > 0")
+        others = [name for name in names if name != SPACING]
+        if series is not None and series not in others:
+            raise UsageError(f"'{series}'", parameter="series", rule=f"the file has {', '.join(others[:20])}")
+        if series is None and len(others) != 1:
+            listed = ", ".join(others[:20]) or "no array"
+            raise SceneError(f"holds {listed}", where=where, rule="one array is shown", fix="choose it with series=...")
+        chosen = series or others[0]
+        with archive.open(f"{chosen}.npy") as file:
+            return _array(file, chosen, where), spacing
+
+
+def _array(file: BinaryIO | zipfile.ZipExtFile, name: str, where: str) -> NDArray[np.generic]:
+    """The array of a file, its memory asked for before it is taken."""
+    version = np.lib.format.read_magic(file)  # type: ignore[arg-type]  # it reads, and no more
+    read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
+    shape, is_fortran, dtype = read(file)  # type: ignore[arg-type]
+    if dtype.kind not in "iufb" or dtype.itemsize > 8:
+        raise SceneError(f"'{name}' is of {dtype}", where=where, rule=_RULE)
+    if any(side < 0 or side > 1 << 40 for side in shape):
+        raise SceneError(f"'{name}' is {shape}", where=where, rule=_RULE)
+    size = math.prod(shape)
+    check_input(size * (dtype.itemsize + 4), f"'{name}'", where=where)
+    data = file.read(size * dtype.itemsize)
+    if len(data) < size * dtype.itemsize:
+        raise SceneError(f"holds {len(data)} of {size * dtype.itemsize} bytes of '{name}'", where=where)
+    array = np.frombuffer(data, dtype)
+    return array.reshape(shape[::-1]).T if is_fortran else array.reshape(shape)

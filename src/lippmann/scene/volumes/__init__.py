@@ -1,0 +1,1 @@
+"""Volumes as a whole: checked, moved, cropped, and the transfer functions that show them."""
