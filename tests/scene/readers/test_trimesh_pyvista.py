@@ -190,7 +190,7 @@ def test_colours_and_scalars_of_pyvista():
     (mesh,) = load_scene(PolyData(np.array([[255, 0, 0], [0, 255, 0]], np.uint8), SQUARE)).description.meshes
     assert mesh.colors[mesh.faces][:, 0].tolist() == [[1, 0, 0], [0, 1, 0]]
     scene = load_scene(PolyData(np.arange(4.0), SQUARE))
-    assert "the scalars 'heat' are not colours (bytes, RGB) and are not shown" in scene.notes
+    assert "the scalars 'heat' from 0 to 3 are coloured by viridis" in scene.notes
 
 
 @pytest.mark.usefixtures("stand_in")

@@ -53,6 +53,7 @@ _READERS = {
     ".xml": "lippmann.scene.mitsuba_source:read_mitsuba",
     **dict.fromkeys((".nii", ".nii.gz"), "lippmann.scene.readers.volumes.nifti:read_nifti"),
     **dict.fromkeys((".npy", ".npz"), "lippmann.scene.readers.volumes.numpy_arrays:read_array"),
+    **dict.fromkeys((".vtp", ".vtu", ".vtk", ".vti"), "lippmann.scene.readers.vtk.files:read_vtk"),
     ".dcm": "lippmann.scene.readers.volumes.dicom:read_dicom",
     ".vol": "lippmann.scene.readers.volumes.mitsuba_grid:read_mitsuba_grid",
     **dict.fromkeys((".pdb", ".ent", ".cif"), "lippmann.scene.readers.molecule:read_molecule"),
@@ -105,7 +106,7 @@ _ELSEWHERE = {
 
 #: Kinds of files that do not say which way is up, and which way it mostly is: for 3D printing, z.
 Up = Literal["y", "z", "-y"]
-_USUAL_UP: dict[str, Up] = {".npy": "y", ".npz": "y", ".obj": "y", ".ply": "y", ".sog": "-y", ".spz": "y", ".stl": "z"}
+_USUAL_UP: dict[str, Up] = {".npy": "y", ".npz": "y", ".obj": "y", ".ply": "y", **dict.fromkeys((".vtp", ".vtu", ".vtk", ".vti"), "y"), ".sog": "-y", ".spz": "y", ".stl": "z"}
 #: Rotations that bring such an axis to +y, about x.
 _UPRIGHT: dict[Up, Matrix] = {
     "y": np.eye(4),
@@ -394,7 +395,10 @@ def _from_object(source: object) -> Scene:
             rule="a path, a bundled scene's name, or a scene of Mitsuba, trimesh or PyVista is",
         )
     description = adapter(source)
-    return Scene(description.name, check_description(description, description.name))
+    check_description(description, description.name)
+    # A plotter shows its scene by its camera.
+    home = description.cameras[0].name if hasattr(source, "renderers") else None
+    return Scene(description.name, description, home_camera=home, home_may_move=True)
 
 
 def _environment(environment: str | Path | Environment | None) -> Environment | None:

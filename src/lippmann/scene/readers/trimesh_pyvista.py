@@ -5,16 +5,17 @@ Neither library is imported here: whoever has an object of one has loaded it.
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from lippmann.color.transfer import decode_srgb
 from lippmann.errors import SceneError
 from lippmann.scene.parsing.files import texels_of
+from lippmann.scene.readers.volumes.description import describe_volume
+from lippmann.scene.readers.vtk.data_set import COLORED, GREY, image_of, linear_colors, mesh_of, surface_of
+from lippmann.scene.readers.vtk.plotter import from_plotter
 from lippmann.scene.values.description import (
     AlphaMode,
     Camera,
@@ -34,9 +35,6 @@ if TYPE_CHECKING:
     from PIL import Image as Pillow
 
 _UP_NOTE = "up is taken as +y, for nothing in the data says it (turn 0,-90 sets a model upright whose up is +z)"
-
-_GREY = Material("grey", base_color=(0.7, 0.7, 0.7), roughness=0.6, double_sided=True)
-_COLORED = Material("vertex colours", roughness=0.6, double_sided=True)
 
 _LIGHT_KINDS: dict[str, Literal["point", "spot", "directional"]] = {
     "PointLight": "point",
@@ -94,17 +92,17 @@ def _from_trimesh_mesh(
     normals = np.asarray(geometry.vertex_normals) if "vertex_normals" in geometry._cache else None
     uvs: tuple[NDArray[np.float32], ...] = ()
     colors = None
-    surface = _GREY
+    surface = GREY
     if kind == "texture":
         if visual.uv is not None and len(visual.uv) == len(positions):
             uvs = ((np.asarray(visual.uv)[:, :2] * (1.0, -1.0) + (0.0, 1.0)).astype(np.float32),)  # v runs upwards
         surface = _from_trimesh_material(visual.material, images)
     elif kind == "vertex":
-        colors, surface = _linear_colors(visual.vertex_colors), _COLORED
+        colors, surface = linear_colors(visual.vertex_colors), COLORED
     elif kind == "face":
         corners = faces.ravel()
         positions, normals = positions[corners], None if normals is None else normals[corners]
-        colors, surface = np.repeat(_linear_colors(visual.face_colors), 3, axis=0), _COLORED
+        colors, surface = np.repeat(linear_colors(visual.face_colors), 3, axis=0), COLORED
         faces = np.arange(len(corners)).reshape(-1, 3)
     mesh = Mesh(
         name=name,
@@ -122,7 +120,7 @@ def _from_trimesh_material(material: trimesh.visual.material.Material, images: d
     if hasattr(material, "materials"):  # several in one mesh: trimesh itself falls back to the first
         material = material.materials[0] if len(material.materials) else None
     if material is None:
-        return _GREY
+        return GREY
 
     def texture(picture: Pillow.Image | None, *, srgb: bool) -> Texture | None:
         if picture is None:
@@ -196,49 +194,24 @@ def _from_trimesh_light(scene: trimesh.Scene, light: trimesh.scene.lighting.Ligh
 
 
 def from_pyvista(source: pyvista.DataSet | pyvista.MultiBlock) -> SceneDescription:
-    """A PyVista data set: its surface, cut into triangles.
+    """A PyVista data set: of an image with active scalars the volume, else its surface, cut into triangles.
 
-    Point normals and texture coordinates are taken where they are active. Colours are taken where the active scalars
-    are bytes with three or four channels (sRGB-coded); numbers without colours are not mapped to any.
+    See :mod:`lippmann.scene.readers.vtk.data_set`.
 
     Raises
     ------
     SceneError
         The data set has no surface.
     """
-    if hasattr(source, "combine"):  # a collection of blocks
-        source = source.combine()
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of defaults to come, whose new names older versions do not know
-        surface = (source if hasattr(source, "verts") else source.extract_surface()).triangulate()
-    faces = np.asarray(surface.faces).reshape(-1, 4)[:, 1:]
-    positions = np.asarray(surface.points, np.float64)
-    if len(faces) == 0:
-        raise SceneError("the PyVista data set has no surface", rule="there must be at least one face")
-    notes = [_UP_NOTE]
-    normals, uvs, colors = surface.point_data.active_normals, surface.active_texture_coordinates, None
-    scalars = surface.active_scalars
-    if scalars is not None and scalars.dtype == np.uint8 and scalars.ndim == 2 and scalars.shape[1] in (3, 4):
-        colors = _linear_colors(scalars)
-        if len(colors) != len(positions):  # one colour per face
-            corners = faces.ravel()
-            colors, positions = np.repeat(colors, 3, axis=0), positions[corners]
-            normals = None if normals is None else np.asarray(normals)[corners]
-            uvs = None if uvs is None else np.asarray(uvs)[corners]
-            faces = np.arange(len(corners)).reshape(-1, 3)
-    elif scalars is not None:
-        notes.append(f"the scalars '{surface.active_scalars_name}' are not colours (bytes, RGB) and are not shown")
-    mesh = Mesh(
-        name="pyvista",
-        positions=positions.astype(np.float32),
-        faces=faces.astype(np.uint32),
-        material=0,
-        normals=None if normals is None else np.asarray(normals, np.float32),
-        uvs=() if uvs is None else ((np.asarray(uvs) * (1.0, -1.0) + (0.0, 1.0)).astype(np.float32),),
-        colors=colors,
+    image = image_of(source) if hasattr(source, "direction_matrix") else None
+    if image is not None:
+        return describe_volume("pyvista", *image, notes=[f"the scalars '{source.active_scalars_name}'"])
+    surface = surface_of(source)
+    material = GREY if surface.colors is None else COLORED
+    mesh = mesh_of(surface, "pyvista", 0)
+    return SceneDescription(
+        "pyvista", [mesh], [material], [Instance(0, np.eye(4))], notes=[_UP_NOTE, *surface.notes]
     )
-    material = _GREY if colors is None else _COLORED
-    return SceneDescription("pyvista", [mesh], [material], [Instance(0, np.eye(4))], notes=notes)
 
 
 def adapter_for(source: object) -> Callable[[object], SceneDescription] | None:
@@ -246,13 +219,9 @@ def adapter_for(source: object) -> Callable[[object], SceneDescription] | None:
     libraries = {kind.__module__.partition(".")[0] for kind in type(source).__mro__}
     if "trimesh" in libraries and (hasattr(source, "graph") or hasattr(source, "faces")):
         return from_trimesh
+    if "pyvista" in libraries and hasattr(source, "renderers"):
+        return from_plotter
     return from_pyvista if "pyvista" in libraries else None
-
-
-def _linear_colors(colors: ArrayLike) -> NDArray[np.float32]:
-    """Linear RGBA of sRGB-coded bytes ``(n, 3 or 4)``."""
-    fraction = np.asarray(colors, np.float64) / 255.0
-    return np.concatenate([decode_srgb(fraction[:, :3]), fraction[:, 3:]], axis=1).astype(np.float32)
 
 
 def _fraction(color: ArrayLike | None, default: tuple[int, ...]) -> NDArray[np.float64]:

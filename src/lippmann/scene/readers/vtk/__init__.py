@@ -1,0 +1,1 @@
+"""Data of VTK: PyVista's data sets and plotters, and VTK's files."""

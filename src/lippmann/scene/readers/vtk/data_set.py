@@ -1,0 +1,170 @@
+"""Data sets of PyVista as plain values: surfaces with their colours, and images as volumes.
+
+PyVista is not imported here: whoever has an object of it has loaded it.
+"""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from lippmann.color.transfer import decode_srgb
+from lippmann.errors import SceneError
+from lippmann.scene.values.description import Material, Mesh
+
+if TYPE_CHECKING:
+    import pyvista
+
+#: The colour map of numbers, as PyVista has it.
+COLOR_MAP = "viridis"
+#: Colour of what is no number, in sRGB codes.
+_NO_NUMBER = (160, 160, 160, 255)
+
+GREY = Material("grey", base_color=(0.7, 0.7, 0.7), roughness=0.6, double_sided=True)
+COLORED = Material("vertex colours", roughness=0.6, double_sided=True)
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """Triangles of a data set.
+
+    ``positions`` ``(n, 3)``, ``faces`` ``(m, 3)``, ``normals`` ``(n, 3)`` and ``uvs`` ``(n, 2)`` (v up) or None;
+    ``colors`` ``(n, 4)`` sRGB bytes or None. ``notes`` are remarks, one line each.
+    """
+
+    positions: NDArray[np.float64]
+    faces: NDArray[np.int64]
+    normals: NDArray[np.float32] | None = None
+    uvs: NDArray[np.float32] | None = None
+    colors: NDArray[np.uint8] | None = None
+    notes: list[str] = field(default_factory=list)
+
+
+def surface_of(source: pyvista.DataSet | pyvista.MultiBlock) -> Surface:
+    """The outer surface of a data set, cut into triangles.
+
+    Bytes with three or four channels are colours; other scalars are coloured by :data:`COLOR_MAP` over their range,
+    vectors by their length.
+
+    Raises
+    ------
+    SceneError
+        The data set has no surface.
+    """
+    if hasattr(source, "combine"):  # a collection of blocks
+        source = source.combine()
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of defaults to come, whose new names older versions do not know
+        surface = (source if hasattr(source, "verts") else source.extract_surface()).triangulate()
+    faces = np.asarray(surface.faces).reshape(-1, 4)[:, 1:]
+    positions = np.asarray(surface.points, np.float64)
+    if len(faces) == 0:
+        raise SceneError("the PyVista data set has no surface", rule="there must be at least one face")
+    normals, uvs = surface.point_data.active_normals, surface.active_texture_coordinates
+    notes: list[str] = []
+    colors = None
+    scalars = surface.active_scalars
+    if scalars is not None:
+        colors = _colors(np.asarray(scalars), str(surface.active_scalars_name), notes)
+    if colors is not None and len(colors) != len(positions):  # one colour per face
+        corners = faces.ravel()
+        colors, positions = np.repeat(colors, 3, axis=0), positions[corners]
+        normals = None if normals is None else np.asarray(normals)[corners]
+        uvs = None if uvs is None else np.asarray(uvs)[corners]
+        faces = np.arange(len(corners)).reshape(-1, 3)
+    return Surface(
+        positions,
+        faces,
+        None if normals is None else np.asarray(normals, np.float32),
+        None if uvs is None else np.asarray(uvs, np.float32),
+        colors,
+        notes,
+    )
+
+
+def mesh_of(surface: Surface, name: str, material: int) -> Mesh:
+    """The triangles as a scene's mesh, whose material has that index."""
+    uvs = surface.uvs
+    return Mesh(
+        name=name,
+        positions=surface.positions.astype(np.float32),
+        faces=surface.faces.astype(np.uint32),
+        material=material,
+        normals=surface.normals,
+        uvs=() if uvs is None else ((uvs * (1.0, -1.0) + (0.0, 1.0)).astype(np.float32),),
+        colors=None if surface.colors is None else linear_colors(surface.colors),
+    )
+
+
+def linear_colors(colors: ArrayLike) -> NDArray[np.float32]:
+    """Linear RGBA of sRGB-coded bytes ``(n, 3 or 4)``."""
+    fraction = np.asarray(colors, np.float64) / 255.0
+    return np.concatenate([decode_srgb(fraction[:, :3]), fraction[:, 3:]], axis=1).astype(np.float32)
+
+
+def _colors(scalars: NDArray[np.generic], name: str, notes: list[str]) -> NDArray[np.uint8] | None:
+    """sRGB bytes ``(n, 3 or 4)`` of active scalars."""
+    if scalars.dtype == np.uint8 and scalars.ndim == 2 and scalars.shape[1] in (3, 4):
+        return np.asarray(scalars, np.uint8)
+    if scalars.dtype.kind not in "iufb":
+        notes.append(f"the scalars '{name[:60]}' are no numbers, and are not shown")
+        return None
+    values = np.asarray(scalars, np.float64)
+    what = name[:60]
+    if values.ndim > 1:
+        values, what = np.linalg.norm(values.reshape(len(values), -1), axis=1), f"length of {what}"
+    finite = values[np.isfinite(values)]
+    if not len(finite):
+        notes.append(f"the scalars '{what}' hold no finite number, and are not shown")
+        return None
+    low, high = float(finite.min()), float(finite.max())
+    notes.append(f"the scalars '{what}' from {low:.5g} to {high:.5g} are coloured by {COLOR_MAP}")
+    return color_table(values, low, high, color_map(COLOR_MAP))
+
+
+def color_map(name: str) -> NDArray[np.uint8]:
+    """256 sRGB colours ``(256, 4)`` of a colour map of Matplotlib's."""
+    import matplotlib
+
+    table: NDArray[np.uint8] = matplotlib.colormaps[name](np.arange(256), bytes=True)
+    return table
+
+
+def color_table(
+    values: NDArray[np.float64], low: float, high: float, table: NDArray[np.uint8], *, logarithmic: bool = False
+) -> NDArray[np.uint8]:
+    """Colours ``(n, 4)`` of values: those of a table laid over a range; grey where a value is no number."""
+    with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+        if logarithmic and low > 0.0:
+            values, low, high = np.log(values), float(np.log(low)), float(np.log(high))
+        share = (values - low) / (high - low) if high > low else np.zeros(len(values))
+    finite = np.isfinite(share)
+    index = np.clip(np.where(finite, share, 0.0) * len(table), 0, len(table) - 1).astype(np.int64)
+    colors = np.asarray(table, np.uint8)[index]
+    colors[~finite] = _NO_NUMBER
+    return colors
+
+
+def image_of(source: pyvista.ImageData) -> tuple[NDArray[np.generic], NDArray[np.float64]] | None:
+    """Grid ``(nz, ny, nx)`` and ``world_from_voxel`` ``(4, 4)`` of an image's active scalars; None without real numbers.
+
+    Scalars of cells lie in the middles of cells.
+    """
+    scalars = source.active_scalars
+    if scalars is None or np.asarray(scalars).dtype.kind not in "iufb" or np.asarray(scalars).ndim != 1:
+        return None
+    counts = np.array(source.dimensions)
+    matrix = np.eye(4)
+    matrix[:3, :3] = np.asarray(source.direction_matrix, np.float64) * np.asarray(source.spacing, np.float64)
+    matrix[:3, 3] = source.origin
+    if len(scalars) != counts.prod():
+        counts = np.maximum(counts - 1, 1)
+        matrix[:3, 3] += matrix[:3, :3] @ np.full(3, 0.5)
+    if len(scalars) != counts.prod():
+        return None
+    width, height, depth = counts.tolist()
+    return np.asarray(scalars).reshape(depth, height, width), matrix

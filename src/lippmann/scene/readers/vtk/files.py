@@ -1,0 +1,77 @@
+"""VTK's files: surfaces (``.vtp``, ``.vtu``, ``.vtk``) with their scalars in colour, and images (``.vti``) as volumes."""
+
+from __future__ import annotations
+
+import io
+import json
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lippmann.errors import SceneError
+from lippmann.runtime.helper_process import HelperEndedError, HelperProcess
+from lippmann.runtime.input_memory import check_input, input_memory_left
+from lippmann.runtime.optional_import import check_installed
+from lippmann.scene.parsing.files import read_bytes
+from lippmann.scene.readers.volumes.description import describe_volume
+from lippmann.scene.readers.vtk.data_set import COLORED, GREY, Surface, mesh_of
+from lippmann.scene.values.description import Instance, SceneDescription
+
+_MOST_SECONDS = 300.0
+
+_process = HelperProcess("from lippmann.scene.readers.vtk.child import main; main()", _MOST_SECONDS)
+
+
+def read_vtk(path: Path, *, allow_outside: bool = False) -> SceneDescription:
+    """Read a data set of VTK's: its outer surface, or of an image with scalars the volume.
+
+    Parameters
+    ----------
+    allow_outside:
+        Without effect: such files name no others.
+
+    Raises
+    ------
+    SceneError
+        PyVista is not installed; the file is missing or damaged, or has no surface.
+    MemoryLimitError
+        It holds more than the memory that is left.
+    """
+    where = path.name
+    read_bytes(path, 64)
+    check_installed("pyvista", "vtk", "VTK's files need it", where)
+    request = json.dumps({"path": str(path.resolve()), "memory": input_memory_left()}).encode()
+    try:
+        answer = _process.ask(request, where=where)
+    except HelperEndedError as error:
+        raise SceneError(f"VTK breaks down at the file ({error})", where=where, fix="is it whole?") from None
+    with np.load(io.BytesIO(answer), allow_pickle=False) as found:
+        if "error" in found:
+            raise SceneError(f"is no data set that is understood ({found['error']})", where=where)
+        arrays = {name: found[name] for name in found.files}
+    check_input(2 * sum(array.nbytes for array in arrays.values()), "the data set", where=where)
+    notes = arrays["notes"].tolist()
+    if "grid" in arrays:
+        return describe_volume(path.stem, arrays["grid"], arrays["matrix"], notes=notes)
+    return _surface(path.stem, arrays, notes, where)
+
+
+def _surface(name: str, arrays: dict[str, NDArray[np.generic]], notes: list[str], where: str) -> SceneDescription:
+    positions, faces = np.asarray(arrays["positions"], np.float64), np.asarray(arrays["faces"], np.int64)
+    finite = np.isfinite(positions).all(axis=1) & (np.abs(positions) < 1e30).all(axis=1)
+    if len(faces) and not 0 <= int(faces.min()) <= int(faces.max()) < len(positions):
+        raise SceneError("a face names a point that is not there", where=where)
+    whole = finite[faces].all(axis=1)
+    if not whole.all():
+        notes = [*notes, f"{int((~whole).sum())} triangles with points that are not finite are left out"]
+        faces, positions = faces[whole], np.where(finite[:, None], positions, 0.0)
+    if not len(faces):
+        raise SceneError("has no surface", where=where, rule="there must be at least one face")
+    normals = arrays.get("normals")
+    if normals is not None and not (np.isfinite(normals).all() and normals.shape == positions.shape):
+        normals = None
+    surface = Surface(positions, faces, normals, None, arrays.get("colors"))  # type: ignore[arg-type]  # as written
+    material = GREY if surface.colors is None else COLORED
+    mesh = mesh_of(surface, name, 0)
+    return SceneDescription(name, [mesh], [material], [Instance(0, np.eye(4))], notes=notes)
