@@ -73,6 +73,7 @@ _BEGINNINGS = {
 
 #: Kinds of files that hold volumes, and those of them that may hold several.
 VOLUMES = (".nii", ".nii.gz", ".npy", ".npz", ".dcm", ".vol", ".vti")
+VTK = (".vtp", ".vtu", ".vtk", ".vti")
 SEVERAL_VOLUMES = (".nii", ".nii.gz", ".npz", ".dcm")
 
 #: Kinds of files whose variants can be chosen.
@@ -350,6 +351,8 @@ def _suffix_by_content(path: Path) -> str | None:
     if head[128:] == DICOM:
         return ".dcm"
     head = head.removeprefix(b"\xef\xbb\xbf").lstrip()
+    if _ending(path) in VTK and head.startswith(b"<"):  # they are XML, too
+        return None
     return next((suffix for beginning, suffix in _BEGINNINGS.items() if head.startswith(beginning)), None)
 
 

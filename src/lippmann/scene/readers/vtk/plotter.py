@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,6 +20,9 @@ if TYPE_CHECKING:
 
 #: Name of the plotter's camera in the scene.
 CAMERA = "plotter"
+
+#: VTK's numbers of ways to shade.
+_FLAT, _PBR = 0, 3
 
 _COLORS = "colours of the plotter"
 
@@ -45,6 +49,8 @@ def from_plotter(plotter: pyvista.Plotter) -> SceneDescription:
     ignored = 0
     for name, actor in renderer.actors.items():
         mapper = getattr(actor, "mapper", None)
+        if mapper is not None and mapper.GetInputAlgorithm() is not None:
+            mapper.GetInputAlgorithm().Update()  # data are made of others when they are first drawn
         source = getattr(mapper, "dataset", None)
         if source is None or not actor.GetVisibility():
             ignored += 1
@@ -57,6 +63,8 @@ def from_plotter(plotter: pyvista.Plotter) -> SceneDescription:
         except SceneError:
             notes.append(f"'{str(name)[:40]}' has no surface, and is not shown")
             continue
+        if actor.prop.GetInterpolation() == _FLAT:
+            surface = replace(surface, normals=None)
         meshes.append(mesh_of(surface, str(name), len(materials)))
         materials.append(_material(actor.prop, str(name), has_colors=surface.colors is not None))
         instances.append(Instance(len(meshes) - 1, _matrix(actor.GetMatrix())))
@@ -72,7 +80,7 @@ def from_plotter(plotter: pyvista.Plotter) -> SceneDescription:
         meshes,
         materials,
         instances,
-        cameras=[_camera(renderer.camera)],
+        cameras=[_camera(renderer)],
         background=_linear(renderer.background_color.float_rgb),
         notes=notes,
         volume=volumes[0] if volumes else None,
@@ -107,9 +115,7 @@ def _colors(mapper: Any, values: NDArray[np.generic]) -> NDArray[np.uint8]:
 
 def _material(look: Any, name: str, *, has_colors: bool) -> Material:
     opacity = float(look.opacity)
-    is_physical = str(getattr(look.interpolation, "name", look.interpolation)).upper().startswith("P") and (
-        look.GetInterpolation() == 3  # VTK_PBR
-    )
+    is_physical = look.GetInterpolation() == _PBR
     # With colours of its own a surface may let light through where they say so.
     blends = opacity < 1.0 or has_colors
     return Material(
@@ -146,12 +152,20 @@ def _volume(actor: Any, source: Any, name: str) -> Volume:
     return Volume(stored, _matrix(actor.GetMatrix()) @ matrix, transfer)
 
 
-def _camera(camera: Any) -> Camera:
-    eye, focus = np.array(camera.position, float), np.array(camera.focal_point, float)
+def _camera(renderer: Any) -> Camera:
+    """The camera as it is set; else as the plotter would set it when it is shown, around all that it holds."""
+    camera = renderer.camera
+    eye, focus, up = (np.array(value, float) for value in (camera.position, camera.focal_point, camera.up))
+    if not renderer.camera_set:
+        start, focus, up = (np.array(value, float) for value in renderer.get_default_cam_pos())
+        low, high = np.reshape(renderer.bounds, (3, 2)).T
+        toward = (start - focus) / (np.linalg.norm(start - focus) or 1.0)
+        radius = float(np.linalg.norm(high - low)) / 2.0
+        eye = focus + toward * radius / np.sin(np.radians(camera.view_angle) / 2.0)
     back = eye - focus
     distance = float(np.linalg.norm(back)) or 1.0
     back /= distance
-    right = np.cross(np.array(camera.up, float), back)
+    right = np.cross(up, back)
     right /= np.linalg.norm(right) or 1.0
     pose = np.eye(4)
     pose[:3, 0], pose[:3, 1], pose[:3, 2], pose[:3, 3] = right, np.cross(back, right), back, eye
