@@ -20,6 +20,7 @@ from lippmann.scene.placement import PlacementOptions
 from lippmann.scene.scene import Scene
 from lippmann.scene.values.description import SceneDescription
 from lippmann.scene.values.splats import Splats
+from lippmann.scene.values.volume import TransferFunction, Volume
 
 pytestmark = pytest.mark.usefixtures("engine")
 
@@ -199,13 +200,17 @@ def test_what_cannot_be_shown_is_said(renderers):
         renderers("square").pick(LiveView(EYES[0], SIZE), 2.0, 0.0)
 
 
-def test_splats_are_refused_and_the_scene_before_stays(renderers):
+def test_splats_and_volumes_are_refused_and_the_scene_before_stays(renderers):
     ones = np.ones((1, 3), np.float32)
     splats = Splats(ones, ones, np.float32([[0, 0, 0, 1]]), np.float32([1]), np.ones((1, 1, 3), np.float32))
     renderer = renderers("square")
     scene = renderer.scene
     with pytest.raises(SceneError, match="splats cannot be shown live"):
         renderer.set_scene(Scene("scan", SceneDescription("scan", splats=splats)))
+    transfer = TransferFunction(np.array([0.0, 1.0]), np.ones((2, 3)), np.array([0.0, 0.5]))
+    volume = Volume(np.zeros((2, 2, 2), np.float32), np.eye(4), transfer)
+    with pytest.raises(SceneError, match="volumes cannot be shown live"):
+        renderer.set_scene(Scene("ct", SceneDescription("ct", volume=volume)))
     assert renderer.scene is scene
 
 

@@ -74,7 +74,7 @@ def read_nifti(path: Path, *, allow_outside: bool = False, series: str | None = 
             unit = _MILLIMETRES.get(int(header["xyzt_units"]) & 7, 1.0)
     except (EOFError, zlib.error, gzip.BadGzipFile) as error:
         raise SceneError(f"cannot be unpacked ({error})", where=where, fix="is it whole?") from None
-    except (OSError, nibabel.spatialimages.HeaderDataError, ValueError, OverflowError) as error:
+    except (OSError, nibabel.spatialimages.HeaderDataError, ValueError, LookupError, OverflowError) as error:
         raise SceneError(f"has a damaged header ({str(error)[:200]})", where=where, rule=_RULE) from None
     if len(data) < voxels * dtype.itemsize:
         raise SceneError(f"holds {len(data)} of {voxels * dtype.itemsize} bytes of voxels", where=where)
