@@ -52,6 +52,7 @@ def _all() -> Iterator[tuple[str, str, bytes]]:
     yield from _gltf()
     yield "ply", "binary", _ply()
     yield from _splats()
+    yield from _volumes()
     yield "stl", "binary", b"made by hand".ljust(80) + struct.pack("<I", 1) + struct.pack("<12fH", *range(12), 0)
     depth = {"depth": np.arange(24, dtype=np.float32).reshape(4, 6), "normal": np.ones((4, 6, 3), np.float32)}
     for target, name, stored, maps in (
@@ -204,6 +205,40 @@ def _gltf() -> Iterator[tuple[str, str, bytes]]:
     yield "glb", "scene", struct.pack("<4sII", b"glTF", 2, 12 + len(body)) + body
     tree["buffers"][0]["uri"] = "data:application/octet-stream;base64," + base64.b64encode(data).decode()
     yield "gltf", "scene", json.dumps(tree, separators=(",", ":")).encode()
+
+
+def _volumes() -> Iterator[tuple[str, str, bytes]]:
+    """A grid of 3 x 2 x 2 voxels in every kind of file."""
+    import nibabel
+    import pydicom
+
+    grid = np.arange(12, dtype=np.int16).reshape(2, 2, 3)
+    nifti = nibabel.Nifti1Image(grid.T, np.eye(4)).to_bytes()
+    yield "nifti", "1", nifti
+    yield "nifti", "2", nibabel.Nifti2Image(grid.T, np.eye(4)).to_bytes()
+    yield "nifti-packed", "1", gzip.compress(nifti, mtime=0)
+    npy = io.BytesIO()
+    np.save(npy, grid)
+    yield "volume-npy", "plain", npy.getvalue()
+    npz = io.BytesIO()
+    np.savez(npz, grid=grid, spacing=np.ones(3))
+    yield "volume-npz", "plain", npz.getvalue()
+    header = struct.pack("<3sB5i6f", b"VOL", 3, 1, 3, 2, 2, 1, 0, 0, 0, 1, 1, 1)
+    yield "volume-vol", "plain", header + grid.astype("<f4").tobytes()
+    meta = pydicom.dataset.FileMetaDataset()
+    meta.TransferSyntaxUID = pydicom.uid.ExplicitVRLittleEndian
+    meta.MediaStorageSOPClassUID, meta.MediaStorageSOPInstanceUID = "1.2.840.10008.5.1.4.1.1.2", "1.2.3"
+    data = pydicom.dataset.FileDataset("", {}, file_meta=meta, preamble=b"\0" * 128)
+    data.SOPClassUID, data.SOPInstanceUID, data.SeriesInstanceUID = meta.MediaStorageSOPClassUID, "1.2.3", "1.2.4"
+    data.Rows, data.Columns, data.SamplesPerPixel, data.PhotometricInterpretation = 2, 3, 1, "MONOCHROME2"
+    data.BitsAllocated, data.BitsStored, data.HighBit, data.PixelRepresentation = 16, 16, 15, 1
+    data.PixelSpacing, data.ImagePositionPatient, data.ImageOrientationPatient = [1, 1], [0, 0, 0], [1, 0, 0, 0, 1, 0]
+    data.RescaleSlope, data.RescaleIntercept, data.SliceThickness = 1, -1024, 2
+    data.PixelData = grid[0].tobytes()
+    data["PixelData"].VR = "OW"
+    written = io.BytesIO()
+    data.save_as(written, enforce_file_format=True)
+    yield "dicom", "slice", written.getvalue()
 
 
 def _splats() -> Iterator[tuple[str, str, bytes]]:

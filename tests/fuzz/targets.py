@@ -55,6 +55,7 @@ from lippmann.scene.readers.environment_map import read_environment
 from lippmann.scene.readers.gltf_animation.animated_file import MovingGltf
 from lippmann.scene.readers.load import load_scene
 from lippmann.scene.readers.tachyon.reader import read_cam
+from lippmann.scene.volumes.transfer_file import read_transfer_function
 from lippmann.tiles.job import make_job
 from lippmann.viewer.calibrate.site import CalibrationSite
 from lippmann.viewer.request_guard import RequestGuard
@@ -138,6 +139,26 @@ def _depth_map(data: bytes, folder: Path) -> object:
     (folder / f"d{ending}").write_bytes(data)
     with np.errstate(all="ignore"):
         return read_depth_map(folder / f"d{ending}").inverse.shape
+
+
+def _volume(name: str, library: str | None = None) -> Read:
+    """A volume; of a file that a library reads only where there is that library."""
+    still = _scene(name)
+
+    def read(data: bytes, folder: Path) -> object:
+        if library is not None and not find_spec(library):
+            return None
+        with np.errstate(all="ignore"):
+            return still(data, folder)
+
+    return read
+
+
+def _transfer_function(data: bytes, folder: Path) -> object:
+    """A transfer function as JSON if it begins so, else as TOML."""
+    path = folder / ("t.json" if data.lstrip().startswith(b"{") else "t.toml")
+    path.write_bytes(data)
+    return read_transfer_function(path)
 
 
 def _molecule(name: str) -> Read:
@@ -550,6 +571,16 @@ _READERS: dict[str, Target] = {
     "depth-map": Target(_depth_map),
     "molecule-pdb": Target(_molecule("s.pdb")),
     "molecule-cif": Target(_molecule("s.cif")),
+    "nifti": Target(_volume("s.nii", "nibabel")),
+    "nifti-packed": Target(_volume("s.nii.gz", "nibabel")),
+    "dicom": Target(_volume("s.dcm", "pydicom")),
+    "volume-npy": Target(_volume("s.npy")),
+    "volume-npz": Target(_volume("s.npz")),
+    "volume-vol": Target(_volume("s.vol")),
+    "vtk-vtp": Target(_volume("s.vtp", "pyvista")),
+    "vtk-vtk": Target(_volume("s.vtk", "pyvista")),
+    "vtk-vti": Target(_volume("s.vti", "pyvista")),
+    "transfer-function": Target(_transfer_function),
     "usd": Target(_usd("s.usda")),
     "usd-package": Target(_usd("s.usdz")),
     "environment": Target(_environment),

@@ -77,7 +77,7 @@ def test_files(tmp_path):
         ("points = [[0, 1], [2, 3]]", "number 1 is no point"),
         ('points = [[0, "#000000", 0], [1, "#000000", 1]]\nper = "cm"', "per"),
         ('points = [[0, "#000000", 0], [1, "#000000", 1]]\nshading = 2', "shading"),
-        ("colour = 3", "colour: is not known"),
+        ("colour = 3", "'colour': is not known"),
         ("points = [", "cannot be read"),
     ],
 )

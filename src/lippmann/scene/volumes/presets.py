@@ -129,5 +129,8 @@ def _range(values: Numbers) -> tuple[float, float]:
     sums = np.cumsum(counts * middles)
     with np.errstate(invalid="ignore", divide="ignore"):
         apart = np.square(sums / below - (sums[-1] - sums) / above) * below * above
-    threshold = edges[1 + int(np.nanargmax(np.where(above > 0, apart, -1.0)))]
-    return (lowest + float(threshold)) / 2.0, highest
+    apart = np.where(above > 0, apart, -1.0)
+    # All thresholds in a gap part the values alike: the middle one.
+    best = np.flatnonzero(apart >= apart.max() * (1.0 - 1e-9))
+    threshold = float(edges[1 + best].mean())
+    return (lowest + threshold) / 2.0, highest

@@ -50,20 +50,20 @@ def read_transfer_function(path: Path) -> TransferFunction:
         raise SceneError("holds no table", where=where, rule=f"the keys {', '.join(_KEYS)}")
     for key in tables:
         if key not in _KEYS:
-            raise SceneError("is not known", where=where, parameter=str(key)[:40], rule=f"known are {', '.join(_KEYS)}")
+            raise SceneError("is not known", where=f"{where}: {str(key)[:40]!r}", rule=f"known are {', '.join(_KEYS)}")
     points = tables.get("points")
     if not isinstance(points, list) or not 2 <= len(points) <= _MOST_POINTS:
-        raise SceneError(f"lists no 2 to {_MOST_POINTS} points", where=where, parameter="points", rule=_POINT)
+        raise SceneError(f"lists no 2 to {_MOST_POINTS} points", where=f"{where}: points", rule=_POINT)
     rows = [_point(point, number, where) for number, point in enumerate(points, 1)]
     values = np.array([value for value, _, _ in rows])
     if (np.diff(values) <= 0.0).any():
-        raise SceneError("are not in order", where=where, parameter="points", rule="each value above the one before")
+        raise SceneError("are not in order", where=f"{where}: points", rule="each value above the one before")
     per = tables.get("per", "mm")
     if per not in ("mm", "percent"):
-        raise SceneError(f"{str(per)[:40]!r}", where=where, parameter="per", rule="mm, or percent of the longest side")
+        raise SceneError(f"{str(per)[:40]!r}", where=f"{where}: per", rule="mm, or percent of the longest side")
     shading = tables.get("shading", 1.0)
     if not _is_number(shading) or not 0.0 <= shading <= 1.0:
-        raise SceneError(f"{str(shading)[:40]}", where=where, parameter="shading", rule="a number from 0 to 1")
+        raise SceneError(f"{str(shading)[:40]}", where=f"{where}: shading", rule="a number from 0 to 1")
     colors = np.array([linear_of_hex(color) for _, color, _ in rows])
     opacities = np.array([opacity for _, _, opacity in rows])
     return TransferFunction(values, colors, opacities, cast("Per", per), float(shading), path.name)
@@ -71,14 +71,14 @@ def read_transfer_function(path: Path) -> TransferFunction:
 
 def _point(point: object, number: int, where: str) -> tuple[float, str, float]:
     if not isinstance(point, list) or len(point) != 3:
-        raise SceneError(f"number {number} is no point", where=where, parameter="points", rule=_POINT)
+        raise SceneError(f"number {number} is no point", where=f"{where}: points", rule=_POINT)
     value, color, opacity = point
     if not _is_number(value) or abs(value) > 1e30:
-        raise SceneError(f"number {number} has no value", where=where, parameter="points", rule="a finite number")
+        raise SceneError(f"number {number} has no value", where=f"{where}: points", rule="a finite number")
     if not isinstance(color, str) or not re.fullmatch(r"#[0-9a-fA-F]{6}", color):
-        raise SceneError(f"number {number} has no colour", where=where, parameter="points", rule='"#rrggbb"')
+        raise SceneError(f"number {number} has no colour", where=f"{where}: points", rule='"#rrggbb"')
     if not _is_number(opacity) or not 0.0 <= opacity <= 1.0:
-        raise SceneError(f"number {number} has no opacity", where=where, parameter="points", rule="a number of 0 to 1")
+        raise SceneError(f"number {number} has no opacity", where=f"{where}: points", rule="a number of 0 to 1")
     return float(value), color, float(opacity)
 
 

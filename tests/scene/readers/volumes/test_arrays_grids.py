@@ -46,7 +46,7 @@ def test_arrays_that_show_nothing_are_refused_in_one_line(tmp_path):
         (np.zeros((3, 3)), r"its array is \(3, 3\)"),
         (np.zeros((2, 2, 2, 3)), r"its array is \(2, 2, 2, 3\)"),
         (np.zeros((2, 2, 2), complex), "is of complex128"),
-        (np.zeros((0, 2, 2)), r"the volume's grid is \(0, 2, 2\)|cannot be read"),
+        (np.zeros((0, 2, 2)), r"its grid is \(0, 2, 2\)"),
         (np.array([[["a"]]]), "is of <U1"),
     ]:
         np.save(path, values)

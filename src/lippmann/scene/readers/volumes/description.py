@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from lippmann.errors import SceneError
 from lippmann.scene.values.description import SceneDescription
 from lippmann.scene.values.volume import Numbers, Volume
 from lippmann.scene.volumes.grid import storable
@@ -32,7 +33,14 @@ def describe_volume(
     """A scene of one volume, shown by the transfer function that suits it; a note says which.
 
     ``grid`` ``(nz, ny, nx)`` may hold numbers of any kind. A negative ``slope`` turns them round.
+
+    Raises
+    ------
+    SceneError
+        The grid holds no voxel.
     """
+    if grid.ndim != 3 or not grid.size:
+        raise SceneError(f"its grid is {grid.shape}", where=name, rule="1 voxel or more along each of three axes")
     if slope < 0.0:
         grid, slope = -np.asarray(grid, np.float32), -slope
     stored, remark = storable(grid)

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import math
 import zipfile
-import zlib
 from pathlib import Path
 from typing import BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.errors import SceneError, UsageError
+from lippmann.errors import LippmannError, SceneError, UsageError
 from lippmann.runtime.input_memory import check_input
 from lippmann.scene.parsing.files import read_bytes
 from lippmann.scene.readers.volumes.description import describe_volume
@@ -52,8 +51,10 @@ def read_array(path: Path, *, allow_outside: bool = False, series: str | None = 
         else:
             with path.open("rb") as file:
                 grid = _array(file, where, where)
-    except (OSError, ValueError, EOFError, zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError) as error:
-        raise SceneError(f"cannot be read ({str(error)[:200]})", where=where, rule=_RULE) from None
+    except LippmannError:
+        raise
+    except Exception as error:  # it parses headers as Python, and raises errors of many kinds
+        raise SceneError(f"cannot be read ({" ".join(str(error).split())[:200]})", where=where, rule=_RULE) from None
     if grid.ndim != 3:
         raise SceneError(f"its array is {grid.shape}", where=where, rule=_RULE)
     depth_step, height_step, width_step = spacing

@@ -1,0 +1,138 @@
+"""PyVista's plotters and VTK's files as scenes."""
+
+import numpy as np
+import pytest
+
+import lippmann
+from lippmann.color.transfer import decode_srgb
+from lippmann.errors import LippmannError, SceneError
+from lippmann.scene.readers.load import load_scene
+
+pyvista = pytest.importorskip("pyvista", reason="PyVista is not installed")
+
+
+@pytest.fixture
+def plotter(monkeypatch):
+    made = pyvista.Plotter(off_screen=True)
+    yield made
+    made.close()
+
+
+def test_actors_keep_their_colours_places_and_maps(plotter):
+    sphere = pyvista.Sphere()
+    sphere["height"] = sphere.points[:, 2]
+    plotter.add_mesh(sphere, scalars="height", cmap=["black", "red"], smooth_shading=True)
+    cube = plotter.add_mesh(pyvista.Cube(), color="lime", opacity=0.5)
+    cube.position = (3, 0, 0)
+    plotter.set_background("blue")
+    scene = load_scene(plotter)
+    ball, box = scene.description.meshes
+    top, bottom = np.argmax(ball.positions[:, 2]), np.argmin(ball.positions[:, 2])
+    assert ball.colors[top, :3].tolist() == [1, 0, 0]
+    assert ball.colors[bottom, :3].tolist() == [0, 0, 0]
+    assert ball.normals is not None
+    assert box.normals is None  # shaded flat
+    assert scene.description.materials[1].base_color == (0, 1, 0)
+    assert (scene.description.materials[1].alpha, scene.description.materials[1].alpha_mode) == (0.5, "blend")
+    assert scene.description.instances[1].world_from_mesh[:3, 3].tolist() == [3, 0, 0]
+    assert scene.background == (0, 0, 1)
+    assert any("1 annotations and hidden objects" in note for note in scene.notes)  # the scalar bar
+
+
+def test_the_camera_is_the_plotter_s(plotter):
+    plotter.add_mesh(pyvista.Cube())
+    before = load_scene(plotter).cameras[0]
+    assert before.world_from_camera[:3, 2] == pytest.approx(np.full(3, 3**-0.5))  # from (1, 1, 1), z up
+    assert before.world_from_camera[2, 1] > 0.8
+    plotter.camera_position = [(0, -5, 0), (0, -1, 0), (0, 0, 1)]
+    plotter.camera.view_angle = 40
+    scene = load_scene(plotter)
+    (camera,) = scene.cameras
+    assert (scene.home_camera, camera.focus_distance) == ("plotter", 4)
+    assert camera.fov_y == pytest.approx(np.radians(40))
+    assert camera.world_from_camera == pytest.approx(
+        np.array([[1, 0, 0, 0], [0, 0, -1, -5], [0, 1, 0, 0], [0, 0, 0, 1]]), abs=1e-12
+    )
+    plotter.camera.parallel_projection = True
+    plotter.camera.parallel_scale = 3
+    assert load_scene(plotter).cameras[0].height == 6
+
+
+def test_scalars_of_cells_and_hidden_actors(plotter):
+    plane = pyvista.Plane(i_resolution=2, j_resolution=1)
+    plane.cell_data["side"] = [0.0, 1.0]
+    plotter.add_mesh(plane, scalars="side", cmap=["black", "white"])
+    plotter.add_mesh(pyvista.Cube()).visibility = False
+    (mesh,) = load_scene(plotter).description.meshes
+    colors = mesh.colors[mesh.faces][:, :, 0]
+    assert sorted(colors.mean(axis=1).tolist()) == [0, 0, 1, 1]
+
+
+def test_a_volume_of_a_plotter(plotter):
+    image = pyvista.ImageData(dimensions=(5, 4, 3), spacing=(1, 2, 3), origin=(7, 8, 9))
+    image["density"] = np.arange(60.0)
+    plotter.add_volume(image, cmap=["black", "white"], opacity="linear", shade=True)
+    volume = load_scene(plotter).description.volume
+    assert volume.size == (5, 4, 3)
+    assert volume.world_from_voxel[:3, 3].tolist() == [7, 8, 9]
+    assert volume.transfer.opacities[0] == 0
+    assert volume.transfer.opacities[-1] > 0.5
+    assert volume.transfer.shading == 1
+
+
+def test_an_empty_plotter_is_refused(plotter):
+    with pytest.raises(SceneError, match="the plotter shows no surface and no volume"):
+        load_scene(plotter)
+
+
+def test_a_plotter_is_rendered(engine, plotter):
+    plotter.add_mesh(pyvista.Sphere(), color="red")
+    image = lippmann.render(plotter, "seed-lenticular", spp=1, method="full")
+    assert image.pixels[200:300, 200:300, 0].mean() > 4 * image.pixels[200:300, 200:300, 1].mean()
+
+
+def wavelet():
+    return pyvista.ImageData(dimensions=(4, 3, 2), spacing=(1, 2, 3), origin=(5, 6, 7))
+
+
+def test_files(tmp_path):
+    sphere = pyvista.Sphere()
+    sphere["height"] = sphere.points[:, 2]
+    for name in ("a.vtp", "a.vtk"):
+        sphere.save(tmp_path / name)
+        scene = load_scene(tmp_path / name)
+        assert any("the scalars 'height' from -0.5 to 0.5 are coloured by viridis" in note for note in scene.notes)
+        (mesh,) = scene.description.meshes
+        top = np.argmax(mesh.positions[:, 2])
+        assert mesh.colors[top, :3] == pytest.approx(decode_srgb(np.array([253, 231, 36]) / 255), abs=1e-3)
+    wavelet().cast_to_unstructured_grid().save(tmp_path / "a.vtu")
+    assert load_scene(tmp_path / "a.vtu").bounds.tolist() == [[5, 6, 7], [8, 10, 10]]
+    image = wavelet()
+    image.cell_data["v"] = np.arange(6.0)
+    image.save(tmp_path / "a.vti")
+    volume = load_scene(tmp_path / "a.vti").description.volume
+    assert (volume.size, volume.world_from_voxel[:3, 3].tolist()) == ((3, 2, 1), [5.5, 7, 8.5])
+    assert volume.grid.ravel().tolist() == [0, 1, 2, 3, 4, 5]
+
+
+def test_damaged_files_are_refused_in_one_line(tmp_path):
+    pyvista.Sphere().save(tmp_path / "a.vtp")
+    data = (tmp_path / "a.vtp").read_bytes()
+    for name, content in [
+        ("a.vtp", data[: len(data) // 3]),
+        ("a.vtk", b"# vtk DataFile Version 3.0\nx\nASCII\nDATASET POLYDATA\nPOINTS 99999999999 float\n0 0 0\n"),
+        ("a.vtu", b"<VTKFile type='UnstructuredGrid'></VTKFile>"),
+        ("a.vti", b"nothing"),
+    ]:
+        (tmp_path / name).write_bytes(content)
+        with pytest.raises(LippmannError, match=name) as error:
+            load_scene(tmp_path / name)
+        assert "\n" not in str(error.value)
+        assert str(tmp_path) not in str(error.value)
+
+
+def test_without_the_library_the_line_says_how_to_get_it(tmp_path, monkeypatch):
+    (tmp_path / "a.vtp").write_bytes(b"<VTKFile>")
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    with pytest.raises(SceneError, match=r"pyvista is not installed; VTK's files need it"):
+        load_scene(tmp_path / "a.vtp")
