@@ -70,6 +70,7 @@ def workplace(tmp_path, monkeypatch, moving_ball):
     trimesh.creation.box().export(tmp_path / "model.obj")
     trimesh.creation.box().export(tmp_path / "model.stl")
     save_splats(tmp_path / "scan.ply")
+    save_head(tmp_path)
     sky = np.ones((8, 16, 3), dtype=np.float32)
     write_plain_picture(sky, tmp_path / "sky.exr")
     body = "CAMERA ZOOM 1 ASPECTRATIO 1 ANTIALIASING 0 RAYDEPTH 2 CENTER 0 0 -5 VIEWDIR 0 0 1 UPDIR 0 1 0 END_CAMERA"
@@ -96,6 +97,16 @@ def workplace(tmp_path, monkeypatch, moving_ball):
     shutil.copytree(moving_ball.parent, tmp_path, dirs_exist_ok=True)
     monkeypatch.chdir(tmp_path)
     return tmp_path
+
+
+def save_head(folder: Path) -> None:
+    """A bone in tissue in air, as NIfTI, and a transfer function."""
+    import nibabel
+
+    values = np.full((12, 12, 12), -1000, np.int16)
+    values[2:10, 2:10, 2:10] = 40
+    values[4:8, 4:8, 4:8] = 900
+    nibabel.save(nibabel.Nifti1Image(values, np.diag([15.0, 15, 15, 1])), folder / "head.nii.gz")
 
 
 def save_splats(path: Path) -> None:

@@ -78,8 +78,8 @@ def load_scene(
     source:
         Path of a ``.glb``, ``.gltf``, ``.obj``, ``.ply``, ``.spz``, ``.sog``, ``.stl``, ``.usd`` (``.usda``, ``.usdc``,
         ``.usdz``), Mitsuba ``.xml``, Tachyon ``.dat`` or ``.nff`` file; of a volume (``.nii``, ``.nii.gz``, ``.npy``,
-        ``.npz``, Mitsuba ``.vol``, ``.dcm`` or a folder of such) or of VTK (``.vtp``, ``.vtu``, ``.vtk``, ``.vti``); name of a bundled scene; a ``mi.Scene`` or
-        Mitsuba dict; a trimesh scene or mesh; a PyVista data set or plotter; a
+        ``.npz``, Mitsuba ``.vol``, ``.dcm`` or a folder of such) or of VTK (``.vtp``, ``.vtu``, ``.vtk``, ``.vti``);
+        name of a bundled scene; a ``mi.Scene`` or Mitsuba dict; a trimesh scene or mesh; a PyVista data set or plotter; a
         :class:`~lippmann.scene.values.description.SceneDescription`.
     environment:
         An equirectangular EXR or HDR file (or an ``Environment``) that lights the scene in place of its own.
@@ -94,8 +94,8 @@ def load_scene(
         ``y``, ``z`` or ``-y``: the axis that points up in a file that does not say so. By default ``y`` in OBJ, PLY and
         SPZ files, ``z`` in STL files, ``-y`` in PLY files of Gaussian splats and in SOG files.
     crop:
-        Of Gaussian splats and voxels those are kept whose centres lie in the box from ``(x0, y0, z0)`` to ``(x1, y1, z1)``, all in
-        one tuple: coordinates with +y up, after ``unit_scale``.
+        Of Gaussian splats and voxels those are kept whose centres lie in the box from ``(x0, y0, z0)`` to
+        ``(x1, y1, z1)``, all in one tuple: coordinates with +y up, after ``unit_scale``.
     unit_scale:
         Factor on the coordinates of Gaussian splats, whose files have no unit: what one of their units is in the unit
         that ``crop`` and placements shall count in.

@@ -56,7 +56,7 @@ PLANE RING TRI STRI BOX SCAPE VERTEXARRAY POLYCYLINDER EXTBOX SCALARVOL
     "volume-npz": "NUMPY spacing.npy PK descr shape",
     "volume-vol": "VOL",
     "vtk-vtp": "VTKFile PolyData Piece NumberOfPoints NumberOfPolys DataArray appended ascii base64 offset format",
-    "vtk-vtk": "DATASET POLYDATA UNSTRUCTURED_GRID STRUCTURED_POINTS DIMENSIONS POINTS POLYGONS CELLS POINT_DATA SCALARS",
+    "vtk-vtk": "DATASET POLYDATA UNSTRUCTURED_GRID STRUCTURED_POINTS POINTS POLYGONS CELLS POINT_DATA SCALARS",
     "vtk-vti": "VTKFile ImageData WholeExtent Spacing Origin Direction Piece DataArray Int64 Float32 ascii",
     "transfer-function": "points per mm percent shading nan inf #ff8000 [ ] true",
     "molecule-pdb": "ATOM HETATM ANISOU CONECT MODEL ENDMDL TER CRYST1 SCALE1 ORIGX1 END REMARK LINK NAN -999.999",

@@ -311,7 +311,7 @@ def box(bounds: Bounds) -> tuple[Bounds, Bounds]:
 
 
 def bounds_of(description: SceneDescription, frame: Matrix | None = None) -> Bounds:
-    """The box ``(2, 3)`` around all vertices that some triangle of some instance uses, most splats, and what is seen of a volume.
+    """The box ``(2, 3)`` around all vertices of triangles of instances, most splats, and what is seen of a volume.
 
     Its sides run along the axes of the world, or of the frame that the 4x4 matrix ``frame`` (from world) leads to.
 

@@ -81,7 +81,9 @@ def with_meshes_moved(scene: Scene, matrix: Matrix) -> Scene:
     splats = None if description.splats is None else moved(description.splats, matrix)
     volume = None if description.volume is None else moved_volume(description.volume, matrix)
     # A form for the classic light models would not have turned.
-    return replace(scene, description=replace(description, instances=instances, splats=splats, volume=volume), classic=None)
+    return replace(
+        scene, description=replace(description, instances=instances, splats=splats, volume=volume), classic=None
+    )
 
 
 def with_lights_moved(scene: Scene, matrix: Matrix) -> Scene:

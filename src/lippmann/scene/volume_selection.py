@@ -45,7 +45,7 @@ class VolumeSelection:
         check_crop(self.crop)
         if self.window is not None:
             low, high = self.window
-            if not (np.isfinite([low, high]).all() and low < high):
+            if not (np.isfinite([low, high]).all() and max(abs(low), abs(high)) <= 1e30 and low + 1e-30 < high):
                 raise UsageError(f"{low:g}, {high:g}", parameter="window", rule="two numbers, the lower first")
 
     def of(self, scene: Scene) -> Scene:

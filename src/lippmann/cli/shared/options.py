@@ -43,7 +43,8 @@ Scene = Annotated[
     str,
     typer.Argument(
         help="A .glb, .gltf, .obj, .ply, .spz, .sog, .stl, .usd, Mitsuba .xml, Tachyon .dat or .nff file, a volume "
-        "(.nii, .nii.gz, .npy, .npz, .vol, a DICOM folder), a VTK file, a photograph with depth, or a bundled scene's name.",
+        "(.nii, .nii.gz, .npy, .npz, .vol, a DICOM folder), a VTK file, a photograph with depth, or a bundled scene's "
+        "name.",
         autocompletion=complete_scenes,
     ),
 ]
@@ -101,8 +102,8 @@ TransferFunction = Annotated[
     str | None,
     typer.Option(
         "--transfer-function",
-        help="Colours and opacities of a volume: ct-bone, ct-soft, mr, grey, fire, or a .toml or .json file. By default "
-        "what suits its values.",
+        help="Colours and opacities of a volume: ct-bone, ct-soft, mr, grey, fire, or a .toml or .json file. By "
+        "default what suits its values.",
         show_default=False,
     ),
 ]

@@ -84,7 +84,7 @@ def _value(grid: NDArray[np.generic], x: float, y: float, z: float) -> float:
     b = (1.0 - u) * grid[k, j1, i] + u * grid[k, j1, i1]
     c = (1.0 - u) * grid[k1, j, i] + u * grid[k1, j, i1]
     d = (1.0 - u) * grid[k1, j1, i] + u * grid[k1, j1, i1]
-    return (1.0 - w) * ((1.0 - v) * a + v * b) + w * ((1.0 - v) * c + v * d)
+    return float((1.0 - w) * ((1.0 - v) * a + v * b) + w * ((1.0 - v) * c + v * d))
 
 
 @compiled
@@ -94,10 +94,10 @@ def _integral(integral: Numbers, extinction: Numbers, value: float, channel: int
     bin_ = min(int(inside), bins - 1)
     total = integral[bin_, channel] + (inside - bin_) * extinction[bin_ + 1, channel]
     if value < 0.0:
-        return total + value * extinction[0, channel]
+        return float(total + value * extinction[0, channel])
     if value > bins:
-        return total + (value - bins) * extinction[bins + 1, channel]
-    return total
+        return float(total + (value - bins) * extinction[bins + 1, channel])
+    return float(total)
 
 
 @compiled
@@ -252,9 +252,7 @@ def _composite(
                         middle = 0.5 * (begins + stops)
                         for k in range(3):
                             p[k] = start[k] + middle * d[k]
-                        own, white = _shade(
-                            grid, p, world, light, voxel_from_world, bin_scale, bins, shading, finest
-                        )
+                        own, white = _shade(grid, p, world, light, voxel_from_world, bin_scale, bins, shading, finest)
                     for c in range(3):
                         sums[c] += left * alpha * (own * mean[c + 1] / mean[0] + white)
                     left *= 1.0 - alpha

@@ -99,7 +99,7 @@ def make_table(volume: Volume, memory: int, *, name: str = "") -> VolumeTable:
     bin_offset = (volume.intercept - low) * bins_per_value
     return VolumeTable(
         grid=volume.grid,
-        voxel_from_world=np.linalg.inv(volume.world_from_voxel),
+        voxel_from_world=np.linalg.inv(np.asarray(volume.world_from_voxel, np.float64)).astype(np.float64),
         bin_scale=bin_scale,
         bin_offset=bin_offset,
         extinction=extinction,

@@ -107,7 +107,16 @@ _ELSEWHERE = {
 
 #: Kinds of files that do not say which way is up, and which way it mostly is: for 3D printing, z.
 Up = Literal["y", "z", "-y"]
-_USUAL_UP: dict[str, Up] = {".npy": "y", ".npz": "y", ".obj": "y", ".ply": "y", **dict.fromkeys((".vtp", ".vtu", ".vtk", ".vti"), "y"), ".sog": "-y", ".spz": "y", ".stl": "z"}
+_USUAL_UP: dict[str, Up] = {
+    ".npy": "y",
+    ".npz": "y",
+    ".obj": "y",
+    ".ply": "y",
+    **dict.fromkeys((".vtp", ".vtu", ".vtk", ".vti"), "y"),
+    ".sog": "-y",
+    ".spz": "y",
+    ".stl": "z",
+}
 #: Rotations that bring such an axis to +y, about x.
 _UPRIGHT: dict[Up, Matrix] = {
     "y": np.eye(4),
@@ -188,9 +197,13 @@ def load_scene(
         parameter = next(name for name, value in asked.items() if value)
         raise UsageError("is for files", parameter=parameter, fix="leave it out")
     if scene.has_volume:
-        scene = VolumeSelection(crop, transfer_function, window).of(SplatSelection(None, unit_scale, min_opacity).of(scene))
+        scene = VolumeSelection(crop, transfer_function, window).of(
+            SplatSelection(None, unit_scale, min_opacity).of(scene)
+        )
     else:
-        scene = SplatSelection(crop, unit_scale, min_opacity).of(VolumeSelection(None, transfer_function, window).of(scene))
+        scene = SplatSelection(crop, unit_scale, min_opacity).of(
+            VolumeSelection(None, transfer_function, window).of(scene)
+        )
     scene = scene if light is None else replace(scene, light=light)
     studio = scene.studio and str(environment) != NO_ENVIRONMENT
     if scene.classic is not None and color is not None:
@@ -288,7 +301,9 @@ def _from_name(
             rule=f"known are {', '.join(_READERS)}",
             fix=_ELSEWHERE.get(suffix, ""),
         )
-    chosen = {key: value for key, value in (("variants", variants), ("depth_map", depth_map), ("series", series)) if value}
+    chosen = {
+        key: value for key, value in (("variants", variants), ("depth_map", depth_map), ("series", series)) if value
+    }
     module, function = reader.split(":")
     description = getattr(import_module(module), function)(path, allow_outside=allow_outside, **chosen)
     if isinstance(description, ClassicScene):

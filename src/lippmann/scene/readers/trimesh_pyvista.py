@@ -209,9 +209,7 @@ def from_pyvista(source: pyvista.DataSet | pyvista.MultiBlock) -> SceneDescripti
     surface = surface_of(source)
     material = GREY if surface.colors is None else COLORED
     mesh = mesh_of(surface, "pyvista", 0)
-    return SceneDescription(
-        "pyvista", [mesh], [material], [Instance(0, np.eye(4))], notes=[_UP_NOTE, *surface.notes]
-    )
+    return SceneDescription("pyvista", [mesh], [material], [Instance(0, np.eye(4))], notes=[_UP_NOTE, *surface.notes])
 
 
 def adapter_for(source: object) -> Callable[[object], SceneDescription] | None:

@@ -15,6 +15,8 @@ from lippmann.scene.values.volume import STORED, Numbers, Volume
 MOST_VOXELS = 1 << 16
 #: Coordinates beyond this are damage.
 _FARTHEST = 1e15
+#: Values beyond this are damage.
+_LARGEST = 1e30
 #: Voxels that tell where something can be seen.
 _MOST_TELLING = 1 << 21
 #: Shares of the opacity that lie outside of what counts as seen, on either side of each axis.
@@ -63,8 +65,22 @@ def check_volume(volume: Volume, where: str) -> None:
     lengths = volume.spacing
     if lengths.min() <= 0.0 or abs(np.linalg.det(matrix[:3, :3] / lengths)) < 1e-6:
         raise SceneError("the volume's voxels have no extent", where=where, rule="three axes that span space")
-    if not (np.isfinite([volume.slope, volume.intercept]).all() and volume.slope > 0.0):
+    check_values(volume.grid, volume.slope, volume.intercept, where)
+
+
+def check_values(grid: NDArray[np.generic], slope: float, intercept: float, where: str) -> None:
+    """Check that values, ``slope`` times stored numbers plus ``intercept``, are within bounds.
+
+    Raises
+    ------
+    SceneError
+        They are not.
+    """
+    if not (np.isfinite([slope, intercept]).all() and slope > 0.0):
         raise SceneError("the volume's values have no scale", where=where, rule="a slope above 0")
+    ends = np.array([grid.min(), grid.max()], np.float64) * slope + intercept
+    if not np.abs(ends).max() <= _LARGEST:
+        raise SceneError(f"the volume's values reach {ends[1]:g}", where=where, rule=f"numbers up to {_LARGEST:g}")
 
 
 def moved(volume: Volume, matrix: Numbers) -> Volume:
@@ -103,6 +119,8 @@ def visible_corners(volume: Volume) -> Numbers:
         if total[-1] <= 0.0:
             return _corners(volume, np.zeros(3), np.array(volume.size, float))
         seen = np.flatnonzero((total > _OUTER * total[-1]) & (total - share < (1.0 - _OUTER) * total[-1]))
+        if not len(seen):  # opacities so faint that shares of them are nothing
+            return _corners(volume, np.zeros(3), np.array(volume.size, float))
         low[axis], high[axis] = seen[0] * step, min((seen[-1] + 1) * step, high[axis])
     return _corners(volume, low, high)
 

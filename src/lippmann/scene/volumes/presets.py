@@ -59,6 +59,8 @@ _BRIGHTEST = 0.998
 #: Least share of bone for which a CT is shown as bone.
 _BONE, _BONE_SHARE = 250.0, 0.004
 _HISTOGRAM = 256
+#: Values that differ by less than this share, or than this, are one.
+_SAME, _LEAST = 1e-9, 1e-30
 
 
 def preset(name: str, values: Numbers) -> TransferFunction:
@@ -120,8 +122,9 @@ def _range(values: Numbers) -> tuple[float, float]:
     lowest, highest = float(values.min()), float(np.quantile(values, _BRIGHTEST))
     if highest <= lowest:
         highest = float(values.max())
-    if highest <= lowest:
-        return lowest - 1.0, lowest
+    size = max(abs(lowest), abs(highest))
+    if highest - lowest <= max(_SAME * size, _LEAST):
+        return highest - max(1.0, size / 1e6), highest
     counts, edges = np.histogram(values.clip(lowest, highest), _HISTOGRAM)
     middles = (edges[:-1] + edges[1:]) / 2.0
     below = np.cumsum(counts)

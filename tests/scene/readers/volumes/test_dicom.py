@@ -121,7 +121,9 @@ def test_an_unknown_compression_is_named(tmp_path):
     data.PixelData = encapsulate([b"\xff\xd8\xff\xd9"])
     data["PixelData"].is_undefined_length = True
     data["PixelData"].VR = "OB"
-    data.file_meta.TransferSyntaxUID = pydicom.uid.JPEGXL if hasattr(pydicom.uid, "JPEGXL") else "1.2.840.10008.1.2.4.80"
+    data.file_meta.TransferSyntaxUID = (
+        pydicom.uid.JPEGXL if hasattr(pydicom.uid, "JPEGXL") else "1.2.840.10008.1.2.4.80"
+    )
     data.save_as(path)
     with pytest.raises(SceneError, match=r"ls: (its pixels are compressed as|cannot be read)"):
         load_scene(tmp_path / "ls")

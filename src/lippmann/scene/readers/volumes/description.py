@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from lippmann.errors import SceneError
 from lippmann.scene.values.description import SceneDescription
 from lippmann.scene.values.volume import Numbers, Volume
-from lippmann.scene.volumes.grid import storable
+from lippmann.scene.volumes.grid import check_values, storable
 from lippmann.scene.volumes.presets import Kind, automatic, sample
 
 #: From the axes of medical files, millimetres toward a patient's right, front and head, to the world: who looks along
@@ -44,12 +44,11 @@ def describe_volume(
     if slope < 0.0:
         grid, slope = -np.asarray(grid, np.float32), -slope
     stored, remark = storable(grid)
+    check_values(stored, slope, intercept, name)
     transfer = automatic(sample(stored, slope, intercept), kind)
     first, last = transfer.values[[0, -1]]
     shown = f"shown by the transfer function '{transfer.name}', values {first:.5g} to {last:.5g} (transfer_function)"
     depth, height, width = stored.shape
     volume = Volume(stored, np.asarray(world_from_voxel, np.float64), transfer, slope, intercept)
     size = f"{width} x {height} x {depth} voxels of {' x '.join(f'{side:.3g}' for side in volume.spacing)}"
-    return SceneDescription(
-        name, notes=[size, *notes, *([remark] if remark else []), shown], volume=volume
-    )
+    return SceneDescription(name, notes=[size, *notes, *([remark] if remark else []), shown], volume=volume)

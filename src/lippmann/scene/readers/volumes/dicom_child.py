@@ -34,7 +34,7 @@ _TAGS = [
 
 
 def main() -> None:
-    """Answer requests, JSON with ``path``, ``series`` and ``memory``, by JSON after its length, and the grid's bytes."""
+    """Answer requests, JSON with ``path``, ``series`` and ``memory``, by JSON after its length and a grid's bytes."""
     serve(_answer)
 
 

@@ -99,9 +99,9 @@ def choose_series(frames: list[Frame], wanted: str | None, own: str | None) -> t
             raise SeriesError(usage=f"series (and their slices) are {list_of}")
         chosen = fits[0]
     else:
-        chosen = own if own in counts else max(order, key=lambda uid: counts[uid])
+        chosen = own if own is not None and own in counts else max(order, key=lambda uid: counts[uid])
     notes = []
-    if len(order) > 1 and wanted is None:
+    if len(order) > 1 and wanted is None and chosen != own:
         place = order.index(chosen) + 1
         notes.append(f"series {place} of {len(order)} is shown; series (and their slices) are {list_of}")
     kinds: dict[object, list[Frame]] = {}

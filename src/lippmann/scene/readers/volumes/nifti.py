@@ -17,6 +17,7 @@ from lippmann.runtime.input_memory import check_input
 from lippmann.runtime.optional_import import optional
 from lippmann.scene.parsing.files import read_bytes
 from lippmann.scene.readers.volumes.description import WORLD_FROM_RAS, describe_volume
+from lippmann.scene.readers.volumes.parts import read_up_to
 from lippmann.scene.values.description import SceneDescription
 
 #: First bytes of a file, and the length of its header.
@@ -68,7 +69,7 @@ def read_nifti(path: Path, *, allow_outside: bool = False, series: str | None = 
             if not 0 <= offset <= _MOST_OFFSET:
                 raise SceneError(f"its voxels begin at byte {offset}", where=where, rule=f"0 to {_MOST_OFFSET}")
             file.seek(offset + (number - 1) * voxels * dtype.itemsize)
-            data = file.read(voxels * dtype.itemsize)
+            data = read_up_to(file, voxels * dtype.itemsize)
             affine = _affine(header)
             slope, intercept = header.get_slope_inter()
             unit = _MILLIMETRES.get(int(header["xyzt_units"]) & 7, 1.0)
@@ -78,6 +79,7 @@ def read_nifti(path: Path, *, allow_outside: bool = False, series: str | None = 
         raise SceneError(f"has a damaged header ({str(error)[:200]})", where=where, rule=_RULE) from None
     if len(data) < voxels * dtype.itemsize:
         raise SceneError(f"holds {len(data)} of {voxels * dtype.itemsize} bytes of voxels", where=where)
+    scale, zero = _scaled(slope, intercept)
     grid = np.frombuffer(data, dtype).reshape(shape[::-1])
     scaling = np.diag([unit, unit, unit, 1.0])
     notes = [f"volume {number} of {count} (series)"] if count > 1 else []
@@ -85,7 +87,8 @@ def read_nifti(path: Path, *, allow_outside: bool = False, series: str | None = 
         path.name.removesuffix(".gz").removesuffix(".nii"),
         grid,
         WORLD_FROM_RAS @ scaling @ affine,
-        **_scaled(slope, intercept),
+        slope=scale,
+        intercept=zero,
         notes=notes,
     )
 
@@ -127,8 +130,8 @@ def _affine(header: Any) -> NDArray[np.float64]:
     return np.asarray(header.get_base_affine(), np.float64)
 
 
-def _scaled(slope: float | None, intercept: float | None) -> dict[str, float]:
-    """Scale of values, where the header has one that means something."""
+def _scaled(slope: float | None, intercept: float | None) -> tuple[float, float]:
+    """Slope and intercept of values, where the header has some that mean something."""
     if slope is None or intercept is None or not np.isfinite([slope, intercept]).all() or slope == 0.0:
-        return {}
-    return {"slope": float(slope), "intercept": float(intercept)}
+        return 1.0, 0.0
+    return float(slope), float(intercept)

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
+import warnings
 import zipfile
 from pathlib import Path
-from typing import BinaryIO
+from typing import IO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,7 @@ from lippmann.errors import LippmannError, SceneError, UsageError
 from lippmann.runtime.input_memory import check_input
 from lippmann.scene.parsing.files import read_bytes
 from lippmann.scene.readers.volumes.description import describe_volume
+from lippmann.scene.readers.volumes.parts import read_up_to
 from lippmann.scene.values.description import SceneDescription
 
 #: The array of an ``.npz`` file with the distances of voxels along its axes z, y and x.
@@ -53,8 +55,8 @@ def read_array(path: Path, *, allow_outside: bool = False, series: str | None = 
                 grid = _array(file, where, where)
     except LippmannError:
         raise
-    except Exception as error:  # it parses headers as Python, and raises errors of many kinds
-        raise SceneError(f"cannot be read ({" ".join(str(error).split())[:200]})", where=where, rule=_RULE) from None
+    except Exception as error:  # noqa: BLE001  # it parses headers as Python, and raises errors of many kinds
+        raise SceneError(f"cannot be read ({' '.join(str(error).split())[:200]})", where=where, rule=_RULE) from None
     if grid.ndim != 3:
         raise SceneError(f"its array is {grid.shape}", where=where, rule=_RULE)
     depth_step, height_step, width_step = spacing
@@ -83,18 +85,20 @@ def _of_archive(path: Path, series: str | None) -> tuple[NDArray[np.generic], ND
             return _array(file, chosen, where), spacing
 
 
-def _array(file: BinaryIO | zipfile.ZipExtFile, name: str, where: str) -> NDArray[np.generic]:
+def _array(file: IO[bytes], name: str, where: str) -> NDArray[np.generic]:
     """The array of a file, its memory asked for before it is taken."""
-    version = np.lib.format.read_magic(file)  # type: ignore[arg-type]  # it reads, and no more
-    read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
-    shape, is_fortran, dtype = read(file)  # type: ignore[arg-type]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # Python's on damaged headers, NumPy's on old ones
+        version = np.lib.format.read_magic(file)
+        read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
+        shape, is_fortran, dtype = read(file)
     if dtype.kind not in "iufb" or dtype.itemsize > 8:
         raise SceneError(f"'{name}' is of {dtype}", where=where, rule=_RULE)
     if any(side < 0 or side > 1 << 40 for side in shape):
         raise SceneError(f"'{name}' is {shape}", where=where, rule=_RULE)
     size = math.prod(shape)
     check_input(size * (dtype.itemsize + 4), f"'{name}'", where=where)
-    data = file.read(size * dtype.itemsize)
+    data = read_up_to(file, size * dtype.itemsize)
     if len(data) < size * dtype.itemsize:
         raise SceneError(f"holds {len(data)} of {size * dtype.itemsize} bytes of '{name}'", where=where)
     array = np.frombuffer(data, dtype)

@@ -146,11 +146,11 @@ def color_table(
     index = np.clip(np.where(finite, share, 0.0) * len(table), 0, len(table) - 1).astype(np.int64)
     colors = np.asarray(table, np.uint8)[index]
     colors[~finite] = _NO_NUMBER
-    return colors
+    return np.asarray(colors, np.uint8)
 
 
 def image_of(source: pyvista.ImageData) -> tuple[NDArray[np.generic], NDArray[np.float64]] | None:
-    """Grid ``(nz, ny, nx)`` and ``world_from_voxel`` ``(4, 4)`` of an image's active scalars; None without real numbers.
+    """Grid ``(nz, ny, nx)`` and ``world_from_voxel`` ``(4, 4)`` of an image's active scalars, if they are numbers.
 
     Scalars of cells lie in the middles of cells.
     """

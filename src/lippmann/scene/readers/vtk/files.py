@@ -1,4 +1,4 @@
-"""VTK's files: surfaces (``.vtp``, ``.vtu``, ``.vtk``) with their scalars in colour, and images (``.vti``) as volumes."""
+"""VTK's files: surfaces (``.vtp``, ``.vtu``, ``.vtk``) in colour, and images (``.vti``) as volumes."""
 
 from __future__ import annotations
 
@@ -59,10 +59,10 @@ def read_vtk(path: Path, *, allow_outside: bool = False) -> SceneDescription:
 
 def _surface(name: str, arrays: dict[str, NDArray[np.generic]], notes: list[str], where: str) -> SceneDescription:
     positions, faces = np.asarray(arrays["positions"], np.float64), np.asarray(arrays["faces"], np.int64)
-    finite = np.isfinite(positions).all(axis=1) & (np.abs(positions) < 1e30).all(axis=1)
+    finite = np.asarray((np.abs(positions) < 1e30).all(axis=1))
     if len(faces) and not 0 <= int(faces.min()) <= int(faces.max()) < len(positions):
         raise SceneError("a face names a point that is not there", where=where)
-    whole = finite[faces].all(axis=1)
+    whole = np.asarray(finite[faces].all(axis=1))
     if not whole.all():
         notes = [*notes, f"{int((~whole).sum())} triangles with points that are not finite are left out"]
         faces, positions = faces[whole], np.where(finite[:, None], positions, 0.0)
