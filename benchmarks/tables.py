@@ -392,6 +392,28 @@ as the machine was shared: two cores of one's own take half of them.
 """
 
 
+def _volumes(result: dict[str, Any]) -> str:
+    rows = [
+        "| transfer function | rays | reading | processor, reading and rendering | per ray | memory at most |",
+        "|---|---|---|---|---|---|",
+    ]
+    for row in result["rows"]:
+        rows.append(
+            f"| `{row['transfer_function']}` | {row['rays'] / 1e6:.1f} M | {row['seconds_read']:.1f} s | "
+            f"{row['processor_seconds']:.0f} s | {1e6 * row['processor_seconds'] / row['rays']:.1f} us | "
+            f"{row['peak_bytes'] / 2**30:.1f} GiB |"
+        )
+    width, height = result["rows"][0]["panel"]
+    size = " x ".join(map(str, result["size"]))
+    return f"""## Volumes (`volumes.py`)
+
+A synthetic CT of a head, {size} voxels of 16 bits, for `{result["display"]}`: {width}x{height} pixels, whose sub-pixels
+have rays of their own. Seconds of the processor are those of all threads together, as the machine was shared.
+
+{chr(10).join(rows)}
+"""
+
+
 def _viewer(result: dict[str, Any]) -> str:
     found = result["median"]
     width, height = result["pixels"]
@@ -419,6 +441,7 @@ SECTIONS = {
     "weave": _weave,
     "cycles": _cycles,
     "splats": _splats,
+    "volumes": _volumes,
     "tachyon": _tachyon,
     "full_rate": _full_rate,
     "kernel_profile": kernel_profile_tables.describe,
