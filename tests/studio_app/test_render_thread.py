@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
+from dataclasses import replace
 
 import pytest
 from stand_in import TINY, StandIn
@@ -168,3 +169,18 @@ def test_slow_frames_shrink_to_the_time_that_there_is_and_grow_again():
     for _ in range(30):
         share = _next_share(share, 0.01)
     assert share == 1.0
+
+
+def test_memory_of_the_denoiser_is_given_back(start, monkeypatch):
+    class Denoising(StandIn):
+        def refine(self, view):
+            frame = super().refine(view)
+            return frame and replace(frame, is_denoised=frame.samples % 4 == 0)
+
+    returned = []
+    monkeypatch.setattr(render_thread, "return_freed_memory", lambda: returned.append(1))
+    thread, record = start(Denoising)
+    thread.want(record.watcher, wanted(1))
+    record.wait_for(lambda r: r.frames and r.frames[-1].is_final)
+    thread.close()
+    assert len(returned) == sum(shown.frame.is_denoised for shown in record.frames) > 0

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from lippmann.errors import LippmannError
 from lippmann.printable import one_line
+from lippmann.runtime.heap import return_freed_memory
 
 if TYPE_CHECKING:
     from lippmann.display import Display
@@ -238,6 +239,8 @@ class RenderThread:
                     watcher._resting = None
         if frame is not None:
             watcher.on_frame(Shown(wanted.number, frame, is_done))
+            if frame.is_denoised:
+                return_freed_memory()
 
     def _tell(self, wanted: Wanted, u: float, v: float, then: Callable[[float | None], None]) -> None:
         assert self._renderer is not None
