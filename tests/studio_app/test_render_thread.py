@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import threading
 import time
-from dataclasses import replace
 
 import pytest
 from stand_in import TINY, StandIn
@@ -171,16 +171,15 @@ def test_slow_frames_shrink_to_the_time_that_there_is_and_grow_again():
     assert share == 1.0
 
 
-def test_memory_of_the_denoiser_is_given_back(start, monkeypatch):
-    class Denoising(StandIn):
-        def refine(self, view):
-            frame = super().refine(view)
-            return frame and replace(frame, is_denoised=frame.samples % 4 == 0)
-
+def test_freed_memory_is_given_back_now_and_then(start, monkeypatch):
     returned = []
-    monkeypatch.setattr(render_thread, "return_freed_memory", lambda: returned.append(1))
-    thread, record = start(Denoising)
-    thread.want(record.watcher, wanted(1))
-    record.wait_for(lambda r: r.frames and r.frames[-1].is_final)
+    monkeypatch.setattr(render_thread, "return_freed_memory", lambda: returned.append(time.monotonic()))
+    monkeypatch.setattr(render_thread, "TIDYING", 0.05)
+    thread, record = start()
+    for number in range(1, 200):
+        thread.want(record.watcher, wanted(number))
+        time.sleep(0.001)
+    record.wait_for(lambda r: r.frames and r.frames[-1].number == 199)
     thread.close()
-    assert len(returned) == sum(shown.frame.is_denoised for shown in record.frames) > 0
+    assert 1 <= len(returned) < len(record.frames)
+    assert all(later - earlier > 0.05 for earlier, later in itertools.pairwise(returned))

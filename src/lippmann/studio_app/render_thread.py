@@ -26,7 +26,8 @@ if TYPE_CHECKING:
 REST = 0.12
 #: Seconds of gathering after which a picture is as good as it gets here, and samples of each native pixel likewise.
 LONGEST_GATHERING, MOST_SAMPLES = 60.0, 2048
-
+#: Seconds after which freed memory is given back: frames, their codes and the denoiser's pictures leave holes.
+TIDYING = 5.0
 
 #: Seconds that a frame of a moving picture may take; its size shrinks until it does, down to this share of the sides.
 FRAME_SECONDS, LEAST_SHARE = 0.05, 0.25
@@ -175,8 +176,12 @@ class RenderThread:
     # ---- In the thread ---------------------------------------------------------------------------------------------
 
     def _run(self) -> None:
+        tidied = time.monotonic()
         while (step := self._next()) is not None:
             watcher, work = step
+            if time.monotonic() - tidied > TIDYING:
+                return_freed_memory()
+                tidied = time.monotonic()
             try:
                 work()
             except LippmannError as error:
@@ -239,8 +244,6 @@ class RenderThread:
                     watcher._resting = None
         if frame is not None:
             watcher.on_frame(Shown(wanted.number, frame, is_done))
-            if frame.is_denoised:
-                return_freed_memory()
 
     def _tell(self, wanted: Wanted, u: float, v: float, then: Callable[[float | None], None]) -> None:
         assert self._renderer is not None
