@@ -140,22 +140,11 @@ def _depth_map(data: bytes, folder: Path) -> object:
         return read_depth_map(folder / f"d{ending}").inverse.shape
 
 
-def _molecule(name: str) -> Read:
-    """A molecule, which a process of its own reads: a library that is not installed is not under fire."""
-    still = _scene(name)
+def _with(library: str, reader: Read) -> Read:
+    """A reader by a library of an extra: one that is not installed is not under fire."""
 
     def read(data: bytes, folder: Path) -> object:
-        return still(data, folder) if find_spec("gemmi") else None
-
-    return read
-
-
-def _usd(name: str) -> Read:
-    """A stage, which a process of its own opens: a library that is not installed is not under fire."""
-    still = _scene(name)
-
-    def read(data: bytes, folder: Path) -> object:
-        return still(data, folder) if find_spec("pxr") else None
+        return reader(data, folder) if find_spec(library) else None
 
     return read
 
@@ -547,11 +536,12 @@ _READERS: dict[str, Target] = {
     "nff": Target(_scene("s.nff")),
     "mitsuba-xml": Target(_mitsuba),
     "photograph": Target(_scene("s.jpg")),
+    "heif": Target(_with("pillow_heif", _scene("s.heic"))),
     "depth-map": Target(_depth_map),
-    "molecule-pdb": Target(_molecule("s.pdb")),
-    "molecule-cif": Target(_molecule("s.cif")),
-    "usd": Target(_usd("s.usda")),
-    "usd-package": Target(_usd("s.usdz")),
+    "molecule-pdb": Target(_with("gemmi", _scene("s.pdb"))),
+    "molecule-cif": Target(_with("gemmi", _scene("s.cif"))),
+    "usd": Target(_with("pxr", _scene("s.usda"))),
+    "usd-package": Target(_with("pxr", _scene("s.usdz"))),
     "environment": Target(_environment),
     "texture": Target(_texture, repair=png_repaired),
     "ktx2": Target(_ktx2),
