@@ -49,7 +49,7 @@ BEGIN_SCENE END_SCENE CAMERA END_CAMERA TEXTURE TEXDEF TEXALIAS INCLUDE IMAGEDEF
 PLANE RING TRI STRI BOX SCAPE VERTEXARRAY POLYCYLINDER EXTBOX SCALARVOL
 """,
     "photograph": 'GDepth:Format="RangeLinear" GDepth:Near="0" GDepth:Far="inf" GDepth:Data=" http://ns.adobe.com/xap/1.0/',
-    "heif": "ftyp meta iloc iinf iprp ipco ipma iref auxl auxC hvcC ispe irot pixi mdat heic urn:mpeg:hevc:2015:auxid:2",
+    "heif": "ftyp meta iloc iinf iprp ipco ipma iref auxl auxC hvcC ispe irot pixi mdat heic :hevc:2015:auxid:2",
     "depth-map": "NUMPY descr fortran_order shape True False <f8 |O8 |u1 Pf PF -1.0 channels Z IHDR IDAT",
     "molecule-pdb": "ATOM HETATM ANISOU CONECT MODEL ENDMDL TER CRYST1 SCALE1 ORIGX1 END REMARK LINK NAN -999.999",
     "molecule-cif": "data_ loop_ save_ _atom_site_fract_x _atom_site.Cartn_x _atom_site.type_symbol ? . ' \" ;",
