@@ -38,7 +38,7 @@ _HEADER = struct.Struct("<BBBBIIHHIf")
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--minutes", type=float, default=0.0)
+    parser.add_argument("--minutes", type=int, default=0)
     parser.add_argument("--only", default="")
     asked = parser.parse_args()
     result = saved("studio_command")
@@ -54,9 +54,7 @@ def main() -> None:
         with _studio(name) as studio:
             studio.first_frame(size)
             studio.orbit(size, ORBIT_SECONDS)  # all kernels are there
-            before = studio.memory()
-            found = studio.orbit(size, 60 * asked.minutes)
-            result["endless"] = found | {"minutes": asked.minutes, "early_mib": before, "last_mib": studio.memory()}
+            result["endless"] = studio.endless(size, asked.minutes)
         print(result["endless"], flush=True)
         save("studio_command", {"cases": cases, "endless": result["endless"]})
 
@@ -81,7 +79,7 @@ class Studio:
             pass
         return {"start_s": time.perf_counter() - self._began}
 
-    def orbit(self, size: tuple[int, int], seconds: float) -> dict[str, float]:
+    def orbit(self, size: tuple[int, int], seconds: float) -> dict[str, Any]:
         ages, moved, frames = [], 0.0, 0
         began = now = time.perf_counter()
         while now - began < seconds:
@@ -105,6 +103,20 @@ class Studio:
             "median_age_ms": 1000 * statistics.median(ages),
             "age_of_99_in_100_ms": 1000 * ages[int(0.99 * (len(ages) - 1))],
             "oldest_ms": 1000 * ages[-1],
+        }
+
+    def endless(self, size: tuple[int, int], minutes: int) -> dict[str, Any]:
+        """Orbits of a minute each, and the memory before the first and after each."""
+        memory, orbits = [self.memory()], []
+        for _ in range(minutes):
+            orbits.append(self.orbit(size, 60.0))
+            memory.append(self.memory())
+        return {
+            "frames": sum(orbit["frames"] for orbit in orbits),
+            "frames_per_second": statistics.mean(orbit["frames_per_second"] for orbit in orbits),
+            "oldest_ms": max(orbit["oldest_ms"] for orbit in orbits),
+            "minutes": minutes,
+            "memory_mib": [round(each) for each in memory],
         }
 
     def _look(self, size: tuple[int, int], moved: float) -> None:

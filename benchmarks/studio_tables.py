@@ -65,9 +65,9 @@ def command_section(result: dict[str, Any]) -> str:
     if endless:
         lines += [
             "",
-            f"{endless['minutes']:g} minutes of moves on one connection: {endless['frames']} frames, half of them "
-            f"younger than {endless['median_age_ms']:.0f} ms, the oldest {endless['oldest_ms']:.0f} ms; memory "
-            f"{endless['early_mib']:.0f} MiB when they begin, {endless['last_mib']:.0f} MiB at their end.",
+            f"{endless['minutes']} minutes of moves on one connection: {endless['frames']} frames, the oldest "
+            f"{endless['oldest_ms']:.0f} ms; memory in MiB when they begin and after each minute: "
+            f"{', '.join(str(each) for each in endless['memory_mib'])}.",
         ]
     return "\n".join(lines) + "\n"
 

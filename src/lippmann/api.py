@@ -106,7 +106,8 @@ def load_scene(
     variants:
         Of a USD stage: ``{"set": "choice"}`` for every prim that has them, ``{"/prim:set": "choice"}`` for one.
     depth_map:
-        The depth of a photograph (``.jpg``, ``.png``, ``.webp``), as a file; None for one that a JPEG file holds.
+        The depth of a photograph (``.jpg``, ``.png``, ``.webp``, ``.heic``), as a file; None for one that a JPEG or
+        HEIF file holds.
     transfer_function:
         Colour and opacity of a volume's values: ``ct-bone``, ``ct-soft``, ``mr``, ``grey``, ``fire``, a ``.toml`` or
         ``.json`` file, or a :class:`~lippmann.scene.values.volume.TransferFunction`. By default what suits the values.

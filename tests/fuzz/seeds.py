@@ -11,6 +11,7 @@ import io
 import json
 import shutil
 import struct
+import sys
 import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -28,6 +29,9 @@ from lippmann.journal import FrameJournal, TileResult, TileStore, encode
 
 from parcels import packed  # isort: skip
 from targets import GRID  # isort: skip
+
+sys.path.insert(0, str(Path(__file__).parent.parent / "scene" / "readers"))
+from heif_files import gradient, heif  # isort: skip
 
 CORPUS = Path(__file__).parent / "corpus"
 
@@ -53,6 +57,8 @@ def _all() -> Iterator[tuple[str, str, bytes]]:
     yield "ply", "binary", _ply()
     yield from _splats()
     yield from _volumes()
+    pixels, depth = gradient(16, 16)
+    yield "heif", "depth", heif(pixels, depth, representation=1)
     yield "stl", "binary", b"made by hand".ljust(80) + struct.pack("<I", 1) + struct.pack("<12fH", *range(12), 0)
     depth = {"depth": np.arange(24, dtype=np.float32).reshape(4, 6), "normal": np.ones((4, 6, 3), np.float32)}
     for target, name, stored, maps in (

@@ -141,13 +141,11 @@ def _depth_map(data: bytes, folder: Path) -> object:
         return read_depth_map(folder / f"d{ending}").inverse.shape
 
 
-def _volume(name: str, library: str | None = None) -> Read:
-    """A volume; of a file that a library reads only where there is that library."""
+def _volume(name: str) -> Read:
+    """A volume."""
     still = _scene(name)
 
     def read(data: bytes, folder: Path) -> object:
-        if library is not None and not find_spec(library):
-            return None
         with np.errstate(all="ignore"):
             return still(data, folder)
 
@@ -161,22 +159,11 @@ def _transfer_function(data: bytes, folder: Path) -> object:
     return read_transfer_function(path)
 
 
-def _molecule(name: str) -> Read:
-    """A molecule, which a process of its own reads: a library that is not installed is not under fire."""
-    still = _scene(name)
+def _with(library: str, reader: Read) -> Read:
+    """A reader by a library of an extra: one that is not installed is not under fire."""
 
     def read(data: bytes, folder: Path) -> object:
-        return still(data, folder) if find_spec("gemmi") else None
-
-    return read
-
-
-def _usd(name: str) -> Read:
-    """A stage, which a process of its own opens: a library that is not installed is not under fire."""
-    still = _scene(name)
-
-    def read(data: bytes, folder: Path) -> object:
-        return still(data, folder) if find_spec("pxr") else None
+        return reader(data, folder) if find_spec(library) else None
 
     return read
 
@@ -568,21 +555,22 @@ _READERS: dict[str, Target] = {
     "nff": Target(_scene("s.nff")),
     "mitsuba-xml": Target(_mitsuba),
     "photograph": Target(_scene("s.jpg")),
+    "heif": Target(_with("pillow_heif", _scene("s.heic"))),
     "depth-map": Target(_depth_map),
-    "molecule-pdb": Target(_molecule("s.pdb")),
-    "molecule-cif": Target(_molecule("s.cif")),
-    "nifti": Target(_volume("s.nii", "nibabel")),
-    "nifti-packed": Target(_volume("s.nii.gz", "nibabel")),
-    "dicom": Target(_volume("s.dcm", "pydicom")),
+    "molecule-pdb": Target(_with("gemmi", _scene("s.pdb"))),
+    "molecule-cif": Target(_with("gemmi", _scene("s.cif"))),
+    "usd": Target(_with("pxr", _scene("s.usda"))),
+    "usd-package": Target(_with("pxr", _scene("s.usdz"))),
+    "nifti": Target(_with("nibabel", _volume("s.nii"))),
+    "nifti-packed": Target(_with("nibabel", _volume("s.nii.gz"))),
+    "dicom": Target(_with("pydicom", _volume("s.dcm"))),
     "volume-npy": Target(_volume("s.npy")),
     "volume-npz": Target(_volume("s.npz")),
     "volume-vol": Target(_volume("s.vol")),
-    "vtk-vtp": Target(_volume("s.vtp", "pyvista")),
-    "vtk-vtk": Target(_volume("s.vtk", "pyvista")),
-    "vtk-vti": Target(_volume("s.vti", "pyvista")),
+    "vtk-vtp": Target(_with("pyvista", _volume("s.vtp"))),
+    "vtk-vtk": Target(_with("pyvista", _volume("s.vtk"))),
+    "vtk-vti": Target(_with("pyvista", _volume("s.vti"))),
     "transfer-function": Target(_transfer_function),
-    "usd": Target(_usd("s.usda")),
-    "usd-package": Target(_usd("s.usdz")),
     "environment": Target(_environment),
     "texture": Target(_texture, repair=png_repaired),
     "ktx2": Target(_ktx2),

@@ -49,6 +49,7 @@ BEGIN_SCENE END_SCENE CAMERA END_CAMERA TEXTURE TEXDEF TEXALIAS INCLUDE IMAGEDEF
 PLANE RING TRI STRI BOX SCAPE VERTEXARRAY POLYCYLINDER EXTBOX SCALARVOL
 """,
     "photograph": 'GDepth:Format="RangeLinear" GDepth:Near="0" GDepth:Far="inf" GDepth:Data=" http://ns.adobe.com/xap/1.0/',
+    "heif": "ftyp meta iloc iinf iprp ipco ipma iref auxl auxC hvcC ispe irot pixi mdat heic :hevc:2015:auxid:2",
     "depth-map": "NUMPY descr fortran_order shape True False <f8 |O8 |u1 Pf PF -1.0 channels Z IHDR IDAT",
     "nifti": "n+1 n+2 ni1",
     "dicom": "DICM 1.2.840.10008.1.2 1.2.840.10008.1.2.4.70 1.2.840.10008.1.2.5 MONOCHROME1 RGB US SS OB OW SQ DS CT",

@@ -18,7 +18,9 @@ WORDS = render_command(StudioState(display=TINY, turn=(30.0, 0.0, 0.0), subpixel
 
 #: A process that says how far it is; its first run waits to be stopped, later ones finish.
 PROCESS = """
-import pathlib, sys, time
+import pathlib, signal, sys, time
+if "deaf" in sys.argv:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
 output = pathlib.Path(sys.argv[sys.argv.index("-o") + 1])
 begun = output.with_suffix(".begun")
 waits = "wait" in sys.argv and not begun.exists()
@@ -103,6 +105,17 @@ def test_a_cancelled_render_goes_on(runner):
     assert until(lambda job: job.phase == "done").output.read_bytes() == b"made"
     with pytest.raises(UsageError, match="nothing to go on with"):
         jobs.resume()
+
+
+def test_a_render_that_hears_nothing_is_killed(runner, monkeypatch):
+    monkeypatch.setattr(render_jobs, "PATIENCE", 0.3)
+    jobs, _, until = runner
+    jobs.start("picture", ["lippmann", "render", "wait", "deaf"], "teapot")
+    until(lambda job: job.share == 0.4)
+    jobs.cancel()
+    until(lambda job: job.stage == "cancelling")
+    job = until(lambda job: job.phase != "running")
+    assert (job.phase, job.can_resume) == ("cancelled", True)
 
 
 def test_a_failed_render_says_why_in_one_line(runner):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import threading
 import time
 
@@ -168,3 +169,17 @@ def test_slow_frames_shrink_to_the_time_that_there_is_and_grow_again():
     for _ in range(30):
         share = _next_share(share, 0.01)
     assert share == 1.0
+
+
+def test_freed_memory_is_given_back_now_and_then(start, monkeypatch):
+    returned = []
+    monkeypatch.setattr(render_thread, "return_freed_memory", lambda: returned.append(time.monotonic()))
+    monkeypatch.setattr(render_thread, "TIDYING", 0.05)
+    thread, record = start()
+    for number in range(1, 200):
+        thread.want(record.watcher, wanted(number))
+        time.sleep(0.001)
+    record.wait_for(lambda r: r.frames and r.frames[-1].number == 199)
+    thread.close()
+    assert 1 <= len(returned) < len(record.frames)
+    assert all(later - earlier > 0.05 for earlier, later in itertools.pairwise(returned))

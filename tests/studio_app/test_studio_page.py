@@ -267,3 +267,22 @@ def test_a_studio_that_died_is_said(tmp_path, open_tab):
 def test_the_page_is_refused_without_its_token(studio, open_tab):
     tab = open_tab().open(studio.address.replace("secret", "guess"))
     assert json.loads(tab.page.inner_text("body")) == {"error": "there is nothing here"}
+
+
+def test_a_print_is_rendered_and_seen_through_its_sheet(page, studio):
+    """A whole render, by the command that the page shows."""
+    tab = page()
+    studio.session.set_state(StudioState(display=TINY, integrator="direct", spp=1))
+    tab.page.get_by_label("What to render").select_option("print")
+    tab.page.get_by_role("button", name="Render", exact=True).click()
+    phase = "document.querySelector('.job').dataset.phase"
+    tab.wait_until(lambda: tab.evaluate(phase) in ("done", "failed"), seconds=120)
+    assert tab.evaluate(phase) == "done", tab.evaluate("document.querySelector('.job-stage').textContent")
+    heading = tab.page.locator(".result > header h2")
+    assert heading.inner_text().endswith(".tif")
+    tab.wait_until(lambda: tab.page.locator(".result canvas").count() > 0)
+    tab.wait_until(lambda: "30-lpi lenticular print" in tab.page.locator(".result-frame").inner_text())
+    assert tab.page.get_by_role("button", name="Show on the display").count() == 0
+    tab.page.get_by_role("button", name="Back to the live view").click()
+    assert tab.page.locator(".result").is_hidden()
+    tab.assert_clean()

@@ -67,7 +67,6 @@ class LiveSocket:
         self._shown: Shown | None = None
         self._sent = self._acknowledged = self._view = 0
         self._told: tuple[object, ...] | None = None
-        self._states: dict[int, StudioState] = {}
         self._watcher = Watcher(self._take_frame, self._take_error, self._take_busy)
 
     async def run(self) -> None:

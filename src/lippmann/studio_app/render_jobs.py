@@ -21,6 +21,7 @@ from lippmann.errors import UsageError
 from lippmann.runtime.child_python import python_command
 
 Kind = Literal["picture", "quilt", "turntable", "print"]
+Shows = Literal["picture", "image", "film"]
 Phase = Literal["running", "done", "failed", "cancelled"]
 
 KINDS: tuple[Kind, ...] = ("picture", "quilt", "turntable", "print")
@@ -30,14 +31,12 @@ TURNTABLE_FRAMES = 48
 #: Margin with alignment marks around a print.
 PRINT_MARGIN = "10mm"
 
+#: Seconds that a cancelled render is given to end by itself.
+PATIENCE = 5.0
+
 _ENDINGS: dict[Kind, str] = {"picture": ".png", "quilt": ".png", "turntable": ".mp4", "print": ".tif"}
 
-_SHOWS: dict[Kind, Literal["picture", "image", "film", "file"]] = {
-    "picture": "picture",
-    "quilt": "image",
-    "turntable": "film",
-    "print": "file",
-}
+_SHOWS: dict[Kind, Shows] = {"picture": "picture", "quilt": "image", "turntable": "film", "print": "picture"}
 
 _PROGRESS = re.compile(r"(\d{1,3}) %: (.{1,200})")
 
@@ -78,8 +77,8 @@ class Job:
     can_resume: bool = False
 
     @property
-    def shows(self) -> Literal["picture", "image", "film", "file"]:
-        """How the page can show the output: as its display does, as it is, as a film, or not at all."""
+    def shows(self) -> Shows:
+        """How the page shows the output: as its display does, as it is, or as a film."""
         return _SHOWS[self.kind]
 
     def message(self) -> dict[str, object]:
@@ -185,11 +184,19 @@ class JobRunner:
             self._launch()
 
     def cancel(self) -> None:
-        """End the render that runs, as Ctrl-C does."""
+        """End the render that runs, as Ctrl-C does; one that is not heard is killed soon.
+
+        A long kernel hears nothing. What is killed can go on as after a power cut: finished tiles are kept.
+        """
         with self._lock:
-            if self._process is not None:
-                self._is_cancelled = True
-                self._process.send_signal(signal.SIGINT if sys.platform != "win32" else signal.SIGTERM)
+            process = self._process
+            if process is None or self._is_cancelled:
+                return
+            self._is_cancelled = True
+            self._jobs[-1] = job = replace(self._jobs[-1], share=None, stage="cancelling")
+            process.send_signal(signal.SIGINT if sys.platform != "win32" else signal.SIGTERM)
+        self._changed(job)
+        threading.Thread(target=_kill_late, args=(process,), daemon=True).start()
 
     def close(self) -> None:
         """End the render that runs, and wait for its end."""
@@ -255,8 +262,17 @@ class JobRunner:
 
     def _update(self, *, share: float, stage: str) -> None:
         with self._lock:
+            if self._is_cancelled:
+                return
             job = self._jobs[-1] = replace(self._jobs[-1], share=share, stage=stage)
         self._changed(job)
+
+
+def _kill_late(process: subprocess.Popen[str]) -> None:
+    try:
+        process.wait(PATIENCE)
+    except subprocess.TimeoutExpired:
+        process.kill()
 
 
 def _without(words: list[str], options: tuple[str, ...], *, has_value: bool = False) -> list[str]:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from lippmann.errors import LippmannError
 from lippmann.printable import one_line
+from lippmann.runtime.heap import return_freed_memory
 
 if TYPE_CHECKING:
     from lippmann.display import Display
@@ -25,7 +26,8 @@ if TYPE_CHECKING:
 REST = 0.12
 #: Seconds of gathering after which a picture is as good as it gets here, and samples of each native pixel likewise.
 LONGEST_GATHERING, MOST_SAMPLES = 60.0, 2048
-
+#: Seconds after which freed memory is given back: frames, their codes and the denoiser's pictures leave holes.
+TIDYING = 5.0
 
 #: Seconds that a frame of a moving picture may take; its size shrinks until it does, down to this share of the sides.
 FRAME_SECONDS, LEAST_SHARE = 0.05, 0.25
@@ -174,8 +176,12 @@ class RenderThread:
     # ---- In the thread ---------------------------------------------------------------------------------------------
 
     def _run(self) -> None:
+        tidied = time.monotonic()
         while (step := self._next()) is not None:
             watcher, work = step
+            if time.monotonic() - tidied > TIDYING:
+                return_freed_memory()
+                tidied = time.monotonic()
             try:
                 work()
             except LippmannError as error:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import itertools
 import os
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
@@ -32,18 +32,29 @@ Codec = Literal["h264", "hevc", "av1"]
 
 @dataclass(frozen=True)
 class _Encoder:
-    """An encoder of FFmpeg, its options, and the sample entry that names the codec in the file."""
+    """An encoder of FFmpeg, its options, and the sample entry that names the codec in the file.
+
+    ``of_few`` are options of a film of fewer than :data:`_REORDERED` frames, beside the others.
+    """
 
     name: str
     options: dict[str, str]
     tag: str
+    of_few: dict[str, str] = field(default_factory=dict)
 
 
+#: Frames that libx265 puts into another order: of a film of two it gives decoding times that it never set, and an MP4
+#: file holds none of those.
+_REORDERED = 3
+
+
+#: libx265 prints on standard error.
+_QUIET = "log-level=error"
 #: Constant rate factors near the one that is considered visually lossless (18 in H.264); lower is better. Apple's
 #: players take HEVC as ``hvc1`` alone.
 _ENCODERS: dict[Codec, _Encoder] = {
     "h264": _Encoder("libx264", {"crf": "16"}, "avc1"),
-    "hevc": _Encoder("libx265", {"crf": "18", "x265-params": "log-level=error"}, "hvc1"),
+    "hevc": _Encoder("libx265", {"crf": "18", "x265-params": _QUIET}, "hvc1", {"x265-params": f"{_QUIET}:bframes=0"}),
     "av1": _Encoder("libsvtav1", {"crf": "20", "preset": "8"}, "av01"),
 }
 
@@ -137,24 +148,26 @@ def _write_mp4(
     # SVT-AV1 prints its settings on standard error, unless told to print errors alone before it is first used.
     os.environ.setdefault("SVT_LOG", "1")
 
-    first = next(frames)
-    height, width = first.shape[:2]
+    head = list(itertools.islice(frames, _REORDERED))
+    height, width = head[0].shape[:2]
+    options = encoder.options | (encoder.of_few if len(head) < _REORDERED else {})
     try:
         with av.open(str(path), "w", format="mp4") as container:
             rate = Fraction(frames_per_second).limit_denominator(1001)
             container.metadata["title"] = place.stem
             if quilt is not None:
                 container.metadata["comment"] = layout_text(quilt)
-            stream = container.add_stream(encoder.name, rate=rate, options=encoder.options)
+            stream = container.add_stream(encoder.name, rate=rate, options=options)
             stream.codec_context.codec_tag = encoder.tag
             stream.width, stream.height, stream.pix_fmt = width + width % 2, height + height % 2, "yuv420p"
             context = stream.codec_context
             context.color_primaries, context.colorspace = _BT709, _BT709
             context.color_trc, context.color_range = _SRGB_TRANSFER, _LIMITED_RANGE
-            for codes in itertools.chain([first], frames):
+            for number, codes in enumerate(itertools.chain(head, frames)):
                 even = np.pad(codes, ((0, height % 2), (0, width % 2), (0, 0)), mode="edge")
                 frame = av.VideoFrame.from_ndarray(even, format="rgb24")
                 frame = frame.reformat(format="yuv420p", dst_colorspace="ITU709", dst_color_range="MPEG")
+                frame.pts, frame.time_base = number, 1 / rate
                 container.mux(stream.encode(frame))
             container.mux(stream.encode())
     except av.codec.codec.UnknownCodecError:

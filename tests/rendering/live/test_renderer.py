@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import gc
+import weakref
 from dataclasses import replace
 
 import numpy as np
@@ -72,6 +74,28 @@ def test_a_frame_is_the_replay_of_a_render(teapot, renderers, name, eye):
     replayed = quantize(image.replay(eye, size=SIZE), 8, "srgb")
     assert replayed.std() > 20
     assert psnr(frame.pixels, replayed) > 60
+
+
+def test_a_rest_that_is_left_half_way_frees_its_pictures(renderers):
+    """At once, not when Python looks for objects that hold each other, which may be hours later."""
+    renderer = renderers("lenticular")
+    view = LiveView(EYES[0], SIZE, request=RenderRequest(placement=PLACED))
+    for _ in range(10):  # recording a kernel leaves such circles of its own, once
+        renderer.refine(LiveView(EYES[1], SIZE, request=view.request))
+    gc.collect()
+    gc.disable()
+    try:
+        for _ in range(20):
+            renderer.refine(view)
+            if renderer._progressive._task is not None:
+                break
+        else:
+            pytest.fail("no picture was being denoised")
+        left = weakref.ref(renderer._progressive)
+        renderer.frame(view)
+        assert left() is None
+    finally:
+        gc.enable()
 
 
 @pytest.mark.parametrize("name", ["slanted", "square"])

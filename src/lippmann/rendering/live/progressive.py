@@ -141,7 +141,8 @@ class Progressive:
         if self._task is None:
             load_denoiser()
             self._denoised_at = self._taken
-            self._task = self._denoising()
+            threads = self._kernels.session.engine.threads
+            self._task = _denoised(self._noisy(), self._guides(), self.samples, threads)
         picture = next(self._task)
         seconds["denoise"] = time.perf_counter() - started
         if picture is None:
@@ -149,22 +150,14 @@ class Progressive:
         self._task = None
         return self._frame(self._developed(picture), seconds, is_denoised=True)
 
-    def _denoising(self) -> Iterator[Floats | None]:
-        """Steps of taking the noise out, the last of which brings the picture: no step takes long."""
+    def _noisy(self) -> tuple[Floats, Floats]:
+        first, second = (self._picture(sums / np.float32(self._taken)) for sums in self._sums)
+        return first, second
+
+    def _guides(self) -> tuple[Floats, Floats]:
         assert self._features is not None
         albedo, normal = (self._picture(values) for values in self._features)
-        noisy = [self._picture(sums / np.float32(self._taken)) for sums in self._sums]
-        threads = self._kernels.session.engine.threads
-        mean = np.asarray((noisy[0] + noisy[1]) / 2, np.float32)
-        if self.samples < _JUDGED_FROM:
-            yield denoise(mean, albedo, normal, effort="fast", threads=threads)
-            return
-        clean = []
-        for half in noisy:
-            clean.append(denoise(half, albedo, normal, effort="fast", threads=threads))
-            yield None
-        share = own_share((noisy[0], noisy[1]), (clean[0], clean[1]), "srgb", threads=threads)
-        yield np.asarray((clean[0] + clean[1]) / 2 * (1 - share) + mean * share, np.float32)
+        return albedo, normal
 
     def _picture(self, values: Floats) -> Floats:
         """Values ``(n, 3)`` of the pixels as the picture that the denoiser sees: of lenses, where they are blocks."""
@@ -185,3 +178,24 @@ class Progressive:
 
     def _frame(self, pixels: NDArray[np.uint8], seconds: dict[str, float], *, is_denoised: bool) -> LiveFrame:
         return LiveFrame(pixels, self.samples, is_denoised, self._placement, self._exposure, seconds)
+
+
+def _denoised(
+    noisy: tuple[Floats, Floats], guides: tuple[Floats, Floats], samples: int, threads: int
+) -> Iterator[Floats | None]:
+    """Steps of taking the noise out, the last of which brings the picture: no step takes long.
+
+    A function, not a method: a picture that is left half-way and held by its own steps would stay in memory until
+    Python looks for such circles, which in a process of many objects it hardly ever does.
+    """
+    albedo, normal = guides
+    mean = np.asarray((noisy[0] + noisy[1]) / 2, np.float32)
+    if samples < _JUDGED_FROM:
+        yield denoise(mean, albedo, normal, effort="fast", threads=threads)
+        return
+    clean = []
+    for half in noisy:
+        clean.append(denoise(half, albedo, normal, effort="fast", threads=threads))
+        yield None
+    share = own_share(noisy, (clean[0], clean[1]), "srgb", threads=threads)
+    yield np.asarray((clean[0] + clean[1]) / 2 * (1 - share) + mean * share, np.float32)

@@ -14,8 +14,11 @@ from lippmann.runtime.input_memory import check_input
 from lippmann.scene.parsing.files import decode_image, read_bytes
 from lippmann.scene.readers.depth_layers import Layers, split_layers
 from lippmann.scene.readers.depth_map import embedded_depth, read_depth_map
+from lippmann.scene.readers.heif_photo import read_heif_photo
 from lippmann.scene.values.description import Image, Instance, Material, Mesh, SceneDescription, Texture
 
+#: Endings of HEIF pictures.
+HEIF = (".heic", ".heif", ".hif")
 #: How deep the height field is, over the shorter side of the picture; displays scale it to what they resolve.
 DEPTH = 0.5
 #: Points of the height field; of larger depth maps one pixel in so many is taken.
@@ -38,7 +41,7 @@ def read_depth_photo(path: Path, *, allow_outside: bool = False, depth_map: Path
     allow_outside:
         Without effect: the files are named by the caller.
     depth_map:
-        A depth map; None for one within the picture (XMP GDepth in JPEG files).
+        A depth map; None for one within the picture (XMP GDepth in JPEG files, an auxiliary picture in HEIF files).
 
     Raises
     ------
@@ -46,8 +49,12 @@ def read_depth_photo(path: Path, *, allow_outside: bool = False, depth_map: Path
         A file is missing or damaged; the picture holds no depth and none is given; their sides differ in proportion.
     """
     data = read_bytes(path)
-    image = decode_image(data, path.name, where=path.name)
-    found = read_depth_map(depth_map) if depth_map is not None else embedded_depth(data, path.name)
+    if path.suffix.lower() in HEIF:
+        image, own = read_heif_photo(data, path.name)
+    else:
+        image = decode_image(data, path.name, where=path.name)
+        own = None if depth_map is not None else embedded_depth(data, path.name)
+    found = own if depth_map is None else read_depth_map(depth_map)
     if found is None:
         raise SceneError(
             "is a picture without depth", where=path.name, rule="a scene has depth", fix="name its map: depth_map=..."

@@ -32,7 +32,7 @@ from lippmann.scene.whitted.world_frame import world_camera
 STUDIO, NO_ENVIRONMENT = "studio", "none"
 
 #: Pictures, which are scenes if they have depth.
-PHOTOS = (".jpg", ".jpeg", ".png", ".webp")
+PHOTOS = (".jpg", ".jpeg", ".png", ".webp", ".heic", ".heif", ".hif")
 
 # Suffix -> "module:function" of its reader: read(path, *, allow_outside) gives a SceneDescription, a MitsubaSource or a
 # ClassicScene.
@@ -84,7 +84,6 @@ _PAPER_DEPTH = 2
 #: Files of other programs, and how a glTF file is made of them.
 _ELSEWHERE = {
     ".blend": "in Blender: File > Export > glTF 2.0 (.glb)",
-    ".heic": "save it as .jpg, and its depth as a picture of its own for depth_map=...",
     ".fbx": "open it in Blender, then File > Export > glTF 2.0 (.glb)",
     ".dae": "open it in Blender, then File > Export > glTF 2.0 (.glb)",
     ".3ds": "open it in Blender, then File > Export > glTF 2.0 (.glb)",

@@ -83,8 +83,9 @@ export class Jobs {
     const onpanel = h("button", { type: "button", onclick: () => this.onpanel(job.number) }, "Show on the display");
     const title = h("h2", { tabindex: -1 }, job.name);
     const isPicture = job.shows === "picture";
+    const isForPanel = job.kind === "picture";
     this.result.replaceChildren(
-      h("header", {}, title, h("span", { class: "quiet-text" }, job.line), save, isPicture ? onpanel : null, close),
+      h("header", {}, title, h("span", { class: "quiet-text" }, job.line), save, isForPanel ? onpanel : null, close),
       frame,
     );
     this.result.hidden = false;
@@ -96,9 +97,7 @@ export class Jobs {
       this.#viewer.ready.catch(() => {}); // the viewer displays its errors itself
     } else if (job.shows === "film") {
       frame.append(h("video", { src: `results/${job.number}/${job.name}`, controls: true, loop: true, autoplay: true }));
-    } else if (job.shows === "image") {
-      frame.append(h("img", { src: `results/${job.number}/${job.name}`, alt: "All views of the quilt" }));
-    } else frame.append(h("p", { class: "note" }, "This file is for other programs; download it."));
+    } else frame.append(h("img", { src: `results/${job.number}/${job.name}`, alt: "All views of the quilt" }));
   }
 
   get isShown() {

@@ -155,7 +155,7 @@ export class Panel {
     return section(
       "Light",
       h("div", { class: "ball-row" }, ball.element, beside),
-      this.#slider("Lamps", "light_strength", null, factor),
+      this.#slider("Lights", "light_strength", null, factor),
       this.#slider("Surroundings", "environment_strength", null, factor),
       h("div", { class: "environment" }, h("span", { class: "label" }, "Environment"), name, pick, none),
     );

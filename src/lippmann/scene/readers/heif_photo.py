@@ -1,0 +1,66 @@
+"""HEIF photographs (``.heic``) with the depth that telephones keep beside them."""
+
+from __future__ import annotations
+
+import importlib.util
+import io
+
+import numpy as np
+
+from lippmann.errors import SceneError
+from lippmann.runtime.input_memory import check_input
+from lippmann.scene.readers.depth_map import DepthMap
+from lippmann.scene.values.description import Image
+
+#: Bytes of a pixel while it is decoded: what the decoder holds of it, and its values.
+_BYTES_PER_PIXEL = 12
+#: Depth representations that are linear in inverse depth (H.265, G.14.3.3): of inverse depth, and of disparity. Of
+#: others, values would have to be told from near to far.
+_INVERSE = (0, 1)
+
+
+def read_heif_photo(data: bytes, where: str) -> tuple[Image, DepthMap | None]:
+    """The first picture of a HEIF file, and its depth map; None where it has none.
+
+    Returns
+    -------
+    Image, DepthMap | None
+        8 bits a channel, in the file's own colour space, upright. Maps are linear in inverse depth; scale and shift do
+        not matter.
+
+    Raises
+    ------
+    SceneError
+        ``pillow-heif`` is not installed; the file is damaged; its depth is of a representation that is not read.
+    MemoryLimitError
+        It takes more memory than is left.
+    """
+    if importlib.util.find_spec("pillow_heif") is None:
+        fix = "install it: pip install 'lippmann[heif]'; or save the picture as .jpg"
+        raise SceneError("HEIF pictures need the library pillow-heif", where=where, fix=fix)
+    import pillow_heif
+
+    try:
+        file = pillow_heif.open_heif(io.BytesIO(data))
+        depths = file.info.get("depth_images", [])
+        for each in (file, *depths):
+            width, height = each.size
+            check_input(_BYTES_PER_PIXEL * width * height, f"a picture of {width} x {height} pixels", where=where)
+        pixels = np.array(file)
+        values = np.asarray(depths[0], np.float32) if depths else None
+    except (ValueError, RuntimeError, EOFError, OSError, SyntaxError, KeyError, IndexError) as error:
+        raise SceneError(f"cannot be decoded ({error})", where=where, rule="a HEIF picture") from None
+    if pixels.ndim == 2:
+        pixels = pixels[..., None]
+    if pixels.ndim != 3 or pixels.dtype != np.uint8:
+        raise SceneError(
+            f"holds an array {pixels.shape} of {pixels.dtype}", where=where, rule="8 bits a channel are read"
+        )
+    image = Image(where, np.ascontiguousarray(pixels[..., :3] if pixels.shape[2] >= 3 else pixels[..., :1]))
+    if values is None:
+        return image, None
+    kind = (depths[0].info.get("metadata") or {}).get("representation_type", _INVERSE[1])
+    if kind not in _INVERSE or values.ndim != 2:
+        rule = "inverse depth and disparity are read"
+        raise SceneError(f"has depth of representation {kind}", where=where, rule=rule, fix="name a map: depth_map=...")
+    return image, DepthMap(values)
