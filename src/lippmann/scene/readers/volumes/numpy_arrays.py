@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import math
 import warnings
 import zipfile
@@ -20,6 +21,8 @@ from lippmann.scene.values.description import SceneDescription
 
 #: The array of an ``.npz`` file with the distances of voxels along its axes z, y and x.
 SPACING = "spacing"
+#: Most bytes of the text that tells of an array.
+_LONGEST_HEADER = 1 << 16
 _RULE = "an array (z, y, x) of real numbers"
 
 
@@ -87,11 +90,18 @@ def _of_archive(path: Path, series: str | None) -> tuple[NDArray[np.generic], ND
 
 def _array(file: IO[bytes], name: str, where: str) -> NDArray[np.generic]:
     """The array of a file, its memory asked for before it is taken."""
+    begin = read_up_to(file, 10)
+    wide = begin[6:7] != b"\x01"  # the length of the header takes four bytes
+    begin += read_up_to(file, 2 if wide else 0)
+    length = int.from_bytes(begin[8:], "little")
+    if length > _LONGEST_HEADER:
+        raise SceneError(f"'{name}' has a header of {length} bytes", where=where, rule=f"at most {_LONGEST_HEADER}")
+    head = io.BytesIO(begin + read_up_to(file, length))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # Python's on damaged headers, NumPy's on old ones
-        version = np.lib.format.read_magic(file)
-        read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
-        shape, is_fortran, dtype = read(file)
+        np.lib.format.read_magic(head)
+        parse = np.lib.format.read_array_header_2_0 if wide else np.lib.format.read_array_header_1_0
+        shape, is_fortran, dtype = parse(head)
     if dtype.kind not in "iufb" or dtype.itemsize > 8:
         raise SceneError(f"'{name}' is of {dtype}", where=where, rule=_RULE)
     if any(side < 0 or side > 1 << 40 for side in shape):
