@@ -5,14 +5,16 @@ from __future__ import annotations
 import contextlib
 import http.client
 import json
+import threading
 import time
 from contextlib import ExitStack, closing
+from dataclasses import replace
 from urllib.parse import quote
 
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from stand_in import FOLDER, TINY, running, said, view
+from stand_in import FOLDER, TINY, StandIn, placement, running, said, view
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from lippmann.studio_app import site as studio_site
@@ -135,6 +137,32 @@ def test_frames_come_with_what_is_said_of_them(studio):
         assert int.from_bytes(frame[8:12], "little") == 5
         assert (int.from_bytes(frame[12:14], "little"), int.from_bytes(frame[14:16], "little")) == (40, 30)
     assert studio.session.state.turn == (40.0, 0.0, 0.0)
+
+
+def test_facts_are_those_of_the_last_frame_though_an_older_one_came_late(tmp_path):
+    begun, may_go = threading.Event(), threading.Event()
+
+    class Slow(StandIn):
+        def frame(self, view, is_stale=None):
+            begun.set()
+            assert may_go.wait(10.0)
+            return replace(super().frame(view), placement=placement(10.0 + view.request.placement.turn[0]))
+
+    with running(tmp_path, make=Slow) as studio, studio.connect() as socket:
+        socket.send(view(STATE, 1))
+        assert begun.wait(10.0)
+        socket.send(view(STATE | {"turn": [40, 0, 0]}, 2))
+        until = time.monotonic() + 10.0
+        while studio.session.state.turn[0] != 40.0:
+            assert time.monotonic() < until
+            time.sleep(0.005)
+        may_go.set()
+        depths = []
+        while not depths or depths[-1] != -50.0:
+            facts = said(socket, "facts")
+            assert "--turn 40,0,0" in facts["command"]
+            depths.append(facts["depth"]["scene"][0])
+        assert depths in ([-10.0, -50.0], [-50.0])
 
 
 def test_no_frame_is_sent_before_others_were_shown(studio):

@@ -216,7 +216,9 @@ class LiveSocket:
         """What is to be said of a frame beside it; None if it has been."""
         session, state, frame = self._session, self._session.state, shown.frame
         display = session.display(state)
-        known = (state, display, round(frame.exposure, 3))
+        # Of the frame too: one of an older view may come after the state has changed.
+        facts = facts_of_view(display, frame.placement, round(frame.exposure, 3))
+        known = (state, display, facts)
         told, self._told = self._told, known
         if told == known:
             return None
@@ -227,7 +229,7 @@ class LiveSocket:
             "command": self._command_line(state),
             "optics": optics_of(display, subpixels=state.subpixels) if is_new else None,
             "display_size": display_size(state),
-            **facts_of_view(display, frame.placement, frame.exposure),
+            **facts,
         }
 
     def _command_line(self, state: StudioState) -> str:
