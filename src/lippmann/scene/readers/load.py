@@ -55,6 +55,7 @@ _READERS = {
     **dict.fromkeys((".npy", ".npz"), "lippmann.scene.readers.volumes.numpy_arrays:read_array"),
     **dict.fromkeys((".vtp", ".vtu", ".vtk", ".vti"), "lippmann.scene.readers.vtk.files:read_vtk"),
     ".dcm": "lippmann.scene.readers.volumes.dicom:read_dicom",
+    ".vdb": "lippmann.scene.readers.volumes.vdb:read_vdb",
     ".vol": "lippmann.scene.readers.volumes.mitsuba_grid:read_mitsuba_grid",
     **dict.fromkeys((".pdb", ".ent", ".cif"), "lippmann.scene.readers.molecule:read_molecule"),
     **dict.fromkeys(PHOTOS, "lippmann.scene.readers.depth_photo:read_depth_photo"),
@@ -72,9 +73,9 @@ _BEGINNINGS = {
 }
 
 #: Kinds of files that hold volumes, and those of them that may hold several.
-VOLUMES = (".nii", ".nii.gz", ".npy", ".npz", ".dcm", ".vol", ".vti")
+VOLUMES = (".nii", ".nii.gz", ".npy", ".npz", ".dcm", ".vdb", ".vol", ".vti")
 VTK = (".vtp", ".vtu", ".vtk", ".vti")
-SEVERAL_VOLUMES = (".nii", ".nii.gz", ".npz", ".dcm")
+SEVERAL_VOLUMES = (".nii", ".nii.gz", ".npz", ".dcm", ".vdb")
 
 #: Kinds of files whose variants can be chosen.
 STAGES = (".usd", ".usda", ".usdc", ".usdz")
@@ -97,7 +98,6 @@ _ELSEWHERE = {
     ".stp": "open it in FreeCAD, then File > Export > glTF (.glb)",
     ".iges": "open it in FreeCAD, then File > Export > glTF (.glb)",
     ".igs": "open it in FreeCAD, then File > Export > glTF (.glb)",
-    ".vdb": "no reader is at hand: in Python, openvdb's copyToArray gives an array for numpy.save (.npy)",
     ".nrrd": "save it as .nii.gz, in 3D Slicer for instance",
     ".mha": "save it as .nii.gz, in 3D Slicer for instance",
     ".hdr": "save it as .nii or .nii.gz, which hold header and voxels in one file",
@@ -115,6 +115,7 @@ _USUAL_UP: dict[str, Up] = {
     ".sog": "-y",
     ".spz": "y",
     ".stl": "z",
+    ".vdb": "y",
 }
 #: Rotations that bring such an axis to +y, about x.
 _UPRIGHT: dict[Up, Matrix] = {

@@ -96,9 +96,3 @@ def test_grids_of_mitsuba(tmp_path):
     path.write_bytes(b"VOX")
     with pytest.raises(SceneError, match="is no grid of Mitsuba's"):
         load_scene(path)
-
-
-def test_grids_of_openvdb_are_told_what_to_become(tmp_path):
-    (tmp_path / "a.vdb").write_bytes(b" BDV")
-    with pytest.raises(SceneError, match=r"'\.vdb' is no known kind.*numpy\.save"):
-        load_scene(tmp_path / "a.vdb")

@@ -1,0 +1,68 @@
+"""Volumes in OpenVDB files (``.vdb``): smoke, clouds, and what else holds a density."""
+
+from __future__ import annotations
+
+import io
+import json
+from pathlib import Path
+
+import numpy as np
+
+from lippmann.errors import SceneError, UsageError
+from lippmann.runtime.helper_process import HelperEndedError, HelperProcess
+from lippmann.runtime.input_memory import check_input, input_memory_left
+from lippmann.runtime.optional_import import check_installed
+from lippmann.scene.parsing.files import read_bytes
+from lippmann.scene.readers.volumes.description import describe_volume
+from lippmann.scene.values.description import SceneDescription
+
+#: First bytes of such a file.
+_BEGINNING = b" BDV\0\0\0\0"
+_MOST_SECONDS = 300.0
+
+_process = HelperProcess("from lippmann.scene.readers.volumes.vdb_child import main; main()", _MOST_SECONDS)
+
+
+def read_vdb(path: Path, *, allow_outside: bool = False, series: str | None = None) -> SceneDescription:
+    """Read a grid of one number a voxel; the box of its active voxels is shown.
+
+    World units are the file's; +y is up.
+
+    Parameters
+    ----------
+    allow_outside:
+        Without effect: such files name no others.
+    series:
+        Name of a grid; None for ``density``, and where there is none for the first.
+
+    Raises
+    ------
+    SceneError
+        ``tinyvdb`` is not installed; the file is missing or damaged, or holds no such grid, or one that is stored in a
+        way that is not read (level sets, active tiles, frustums).
+    MemoryLimitError
+        It holds more than the memory that is left.
+    UsageError
+        There is no grid of that name.
+    """
+    where = path.name
+    if read_bytes(path, len(_BEGINNING)) != _BEGINNING:
+        raise SceneError("is no OpenVDB file", where=where, rule="it begins with ' BDV'")
+    check_installed("tinyvdb", "volumes", "OpenVDB files need it, and Python 3.11", where)
+    request = json.dumps({"path": str(path.resolve()), "series": series, "memory": input_memory_left()}).encode()
+    try:
+        answer = _process.ask(request, where=where)
+    except HelperEndedError as error:
+        raise SceneError(f"tinyvdb breaks down at the file ({error})", where=where, fix="is it whole?") from None
+    with np.load(io.BytesIO(answer), allow_pickle=False) as found:
+        if "usage" in found:
+            raise UsageError(f"'{series}'", where=where, parameter="series", rule=str(found["usage"]))
+        if "refused" in found:
+            raise SceneError(str(found["refused"]), where=where)
+        if "error" in found:
+            raise SceneError(f"cannot be read ({found['error']})", where=where, rule="an OpenVDB file")
+        grid, matrix, notes = found["grid"], found["matrix"], found["notes"].tolist()
+    check_input(2 * grid.nbytes, "the grid", where=where)
+    if not np.isfinite(matrix).all() or abs(np.linalg.det(matrix[:3, :3])) == 0.0:
+        raise SceneError("its voxels have no extent", where=where)
+    return describe_volume(path.stem, grid, matrix, notes=notes)
