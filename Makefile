@@ -9,7 +9,7 @@ ROUNDS ?= 20
 OPEN := $(if $(filter Darwin,$(shell uname -s)),open,xdg-open)
 
 .DEFAULT_GOAL := help
-.PHONY: audit check docs help setup setup-dev demo test test-oldest measure-tests search lint clean
+.PHONY: addon audit check docs help setup setup-dev demo test test-oldest measure-tests search lint clean
 
 help:
 	@echo 'make demo    set up and render a teapot for a lenticular display into $(PICTURE)'
@@ -19,6 +19,7 @@ help:
 	@echo 'make search  look for random examples that break a property test (ROUNDS=20)'
 	@echo 'make test-oldest  run the tests of picture files with the oldest libraries that are allowed'
 	@echo 'make lint    set up, check style and types'
+	@echo 'make addon   pack the add-on for Blender into dist/'
 	@echo 'make docs    set up, build the documentation into $(SITE)'
 	@echo 'make audit   set up, look installed packages up in the list of known vulnerabilities'
 	@echo 'make clean   remove what set-up and tests made; pictures in out/ stay'
@@ -40,6 +41,9 @@ docs: setup-dev
 	NO_MKDOCS_2_WARNING=1 .venv/bin/python -m mkdocs build --strict --site-dir $(SITE)
 	@echo 'The site lies in $(CURDIR)/$(SITE). Read it with:'
 	@echo '  $(OPEN) $(SITE)/index.html'
+
+addon: setup
+	.venv/bin/python scripts/pack_addon.py
 
 audit: setup-dev
 	.venv/bin/python scripts/audit.py

@@ -414,6 +414,27 @@ have rays of their own. Seconds of the processor are those of all threads togeth
 """
 
 
+def _blender(result: dict[str, Any]) -> str:
+    rows = [
+        "| instances | triangles | `.blend` | as glTF | Blender, start to end | reading the glTF file |",
+        "|---|---|---|---|---|---|",
+    ]
+    for row in result["rows"]:
+        export, read = (row[f"{step}_seconds"]["median"] for step in ("export", "read"))
+        rows.append(
+            f"| {row['instances']} of {row['meshes']} meshes | {row['triangles']:,} "
+            f"| {row['blend_bytes'] / 1e6:.1f} MB | {row['glb_bytes'] / 1e6:.1f} MB "
+            f"| {export:.1f} s | {1000 * read:.0f} ms |"
+        )
+    return f"""## Blender files (`blender.py`)
+
+The scene of `examples/blender_scene.py`, exported by Blender {result["blender"]} (its Python module) and read; medians
+of {result["runs"]} runs.
+
+{chr(10).join(rows)}
+"""
+
+
 def _viewer(result: dict[str, Any]) -> str:
     found = result["median"]
     width, height = result["pixels"]
@@ -441,6 +462,7 @@ SECTIONS = {
     "weave": _weave,
     "cycles": _cycles,
     "splats": _splats,
+    "blender": _blender,
     "volumes": _volumes,
     "tachyon": _tachyon,
     "full_rate": _full_rate,

@@ -76,11 +76,11 @@ def load_scene(
     Parameters
     ----------
     source:
-        Path of a ``.glb``, ``.gltf``, ``.obj``, ``.ply``, ``.spz``, ``.sog``, ``.stl``, ``.usd`` (``.usda``, ``.usdc``,
-        ``.usdz``), Mitsuba ``.xml``, Tachyon ``.dat`` or ``.nff`` file; of a volume (``.nii``, ``.nii.gz``, ``.npy``,
-        ``.npz``, ``.vdb``, Mitsuba ``.vol``, ``.dcm`` or a folder of such) or of VTK (``.vtp``, ``.vtu``, ``.vtk``, ``.vti``);
-        name of a bundled scene; a ``mi.Scene`` or Mitsuba dict; a trimesh scene or mesh; a PyVista data set or plotter;
-        a :class:`~lippmann.scene.values.description.SceneDescription`.
+        Path of a ``.glb``, ``.gltf``, ``.obj``, ``.ply``, ``.spz``, ``.sog``, ``.stl``, ``.blend``, ``.usd``
+        (``.usda``, ``.usdc``, ``.usdz``), Mitsuba ``.xml``, Tachyon ``.dat`` or ``.nff`` file; of a volume (``.nii``,
+        ``.nii.gz``, ``.vdb``, ``.npy``, ``.npz``, Mitsuba ``.vol``, ``.dcm`` or a folder of such) or of VTK (``.vtp``,
+        ``.vtu``, ``.vtk``, ``.vti``); name of a bundled scene; a ``mi.Scene`` or Mitsuba dict; a trimesh scene or
+        mesh; a PyVista data set or plotter; a :class:`~lippmann.scene.values.description.SceneDescription`.
     environment:
         An equirectangular EXR or HDR file (or an ``Environment``) that lights the scene in place of its own.
     background:

@@ -17,10 +17,14 @@ assert app  # whose making says which commands there are
 SOURCE = Path(package.__file__).parent
 #: Parameters of the library that no command has.
 OF_THE_LIBRARY = {"form", "effort", "stereo", "pick", "framed_by", "height"}
-#: Files whose texts are for other programs: pip, a style sheet's variables, Dask's own command, commands that are run.
+#: Files whose texts are for other programs: pip, a style sheet's variables, Dask's own command, Blender, commands that
+#: are run.
 OTHER_PROGRAMS = {
     "runtime/engine.py",
     "scene/mitsuba_plugins.py",
+    "scene/readers/blend/export.py",
+    "scene/readers/blend/export_script.py",
+    "scene/readers/blend/find_blender.py",
     "reproduce/style.py",
     "studio_app/command_line.py",
     "studio_app/render_jobs.py",

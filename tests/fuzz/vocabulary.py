@@ -56,7 +56,7 @@ PLANE RING TRI STRI BOX SCAPE VERTEXARRAY POLYCYLINDER EXTBOX SCALARVOL
     "volume-npy": "NUMPY descr fortran_order shape True False <f8 |O8 |u1 >i2",
     "volume-npz": "NUMPY spacing.npy PK descr shape",
     "volume-vol": "VOL",
-    "volume-vdb": " BDV density Tree_float_5_4_3 UniformScaleMap AffineMap file_voxel_count file_bbox_min vec3i int64 class",
+    "volume-vdb": " BDV density Tree_float_5_4_3 UniformScaleMap AffineMap file_voxel_count file_bbox_min vec3i int64",
     "vtk-vtp": "VTKFile PolyData Piece NumberOfPoints NumberOfPolys DataArray appended ascii base64 offset format",
     "vtk-vtk": "DATASET POLYDATA UNSTRUCTURED_GRID STRUCTURED_POINTS POINTS POLYGONS CELLS POINT_DATA SCALARS",
     "vtk-vti": "VTKFile ImageData WholeExtent Spacing Origin Direction Piece DataArray Int64 Float32 ascii",

@@ -31,7 +31,7 @@ def extreme_points_of(description: SceneDescription) -> Bounds:
     Empty for a description that places none of these.
     """
     found = []
-    for mesh, places in description.placements.items():
+    for mesh, places in description.fitted_placements.items():
         points = farthest_points(used_positions(description.meshes[mesh]))
         if not len(points) or not len(places):
             continue

@@ -311,7 +311,7 @@ def box(bounds: Bounds) -> tuple[Bounds, Bounds]:
 
 
 def bounds_of(description: SceneDescription, frame: Matrix | None = None) -> Bounds:
-    """The box ``(2, 3)`` around all vertices of triangles of instances, most splats, and what is seen of a volume.
+    """The box ``(2, 3)`` around all triangles of fitted meshes, most splats, and what is seen of a volume.
 
     Its sides run along the axes of the world, or of the frame that the 4x4 matrix ``frame`` (from world) leads to.
 
@@ -320,10 +320,12 @@ def bounds_of(description: SceneDescription, frame: Matrix | None = None) -> Bou
     SceneError
         The description places no triangle.
     """
-    used = {mesh: used_positions(description.meshes[mesh]) for mesh in description.placements}
-    exact = sum(len(used[mesh]) * len(places) for mesh, places in description.placements.items()) <= _EXACT_VERTICES
+    used = {mesh: used_positions(description.meshes[mesh]) for mesh in description.fitted_placements}
+    exact = (
+        sum(len(used[mesh]) * len(places) for mesh, places in description.fitted_placements.items()) <= _EXACT_VERTICES
+    )
     boxes = []
-    for mesh, places in description.placements.items():
+    for mesh, places in description.fitted_placements.items():
         points = used[mesh]
         if len(points) and len(places):
             points = points if exact else box_corners(np.stack([points.min(axis=0), points.max(axis=0)]))

@@ -1,4 +1,4 @@
-"""Scenes that move: the frames of a glTF animation or a USD stage, and flights of a camera through a Tachyon scene."""
+"""Scenes that move: animations of glTF, USD and Blender files, and flights of a camera through a Tachyon scene."""
 
 from __future__ import annotations
 
@@ -24,6 +24,7 @@ from lippmann.scene.values.whitted_scene import ClassicScene
 from lippmann.scene.whitted.world_frame import world_camera
 
 if TYPE_CHECKING:
+    from lippmann.scene.readers.blend.moving import MovingBlend
     from lippmann.scene.readers.gltf_animation.animated_file import MovingGltf
     from lippmann.scene.readers.usd.moving_stage import MovingStage
 
@@ -72,7 +73,7 @@ class Motion(ABC):
 
 
 class AnimatedFile(Motion):
-    """The frames of a glTF animation or a USD stage; beyond its end the scene stands still.
+    """The frames of a glTF animation, a USD stage or a Blender file; beyond its end the scene stands still.
 
     Parameters
     ----------
@@ -86,8 +87,9 @@ class AnimatedFile(Motion):
     Raises
     ------
     SceneError
-        As :class:`lippmann.scene.readers.gltf_animation.animated_file.MovingGltf` and
-        :class:`lippmann.scene.readers.usd.moving_stage.MovingStage`.
+        As :class:`lippmann.scene.readers.gltf_animation.animated_file.MovingGltf`,
+        :class:`lippmann.scene.readers.usd.moving_stage.MovingStage` and
+        :class:`lippmann.scene.readers.blend.moving.MovingBlend`.
     """
 
     def __init__(
@@ -147,7 +149,11 @@ class AnimatedFile(Motion):
 
 def _open_moving(
     path: Path, animation: str | None, allow_outside: bool, variants: Mapping[str, str] | None
-) -> MovingGltf | MovingStage:
+) -> MovingBlend | MovingGltf | MovingStage:
+    if kind_of_file(path) == ".blend":
+        from lippmann.scene.readers.blend.moving import MovingBlend
+
+        return MovingBlend(path, animation=animation, allow_outside=allow_outside)
     if kind_of_file(path) in STAGES:
         from lippmann.scene.readers.usd.moving_stage import MovingStage
 
@@ -217,7 +223,7 @@ def open_motion(
     Parameters
     ----------
     fps, animation:
-        Of a glTF file or USD stage, see :class:`AnimatedFile`.
+        Of a glTF file, USD stage or Blender file, see :class:`AnimatedFile`.
     camera_path:
         A Tachyon ``.cam`` file: the display flies along it.
     environment, background, allow_outside, multiple_scattering, light, variants:
@@ -245,11 +251,11 @@ def open_motion(
             light=light,
         )
         return Flight(scene, read_cam(camera_path))
-    if kind_of_file(source) not in (".glb", ".gltf", *STAGES):
+    if kind_of_file(source) not in (".blend", ".glb", ".gltf", *STAGES):
         raise UsageError(
             f"nothing moves in '{source}'",
             parameter="frames",
-            rule="glTF files and USD stages have animations; Tachyon and NFF scenes are flown through",
+            rule="glTF and Blender files and USD stages have animations; Tachyon and NFF scenes are flown through",
             fix="add camera_path=FILE.cam for a flight, or turntable=48 for a turn",
         )
     return AnimatedFile(

@@ -67,11 +67,11 @@ def test_up_of_what_says_it_itself_is_refused():
 
 
 @pytest.mark.parametrize(
-    ("name", "said"), [("car.blend", "in Blender: File > Export > glTF"), ("part.STEP", "FreeCAD")]
+    ("name", "said"), [("car.fbx", "open it in Blender, then File > Export > glTF"), ("part.STEP", "FreeCAD")]
 )
 def test_files_of_other_programs_are_told_how_to_become_gltf(save, name, said):
     with pytest.raises(SceneError, match="is no known kind of scene file; .*" + said):
-        load_scene(save(name, b"BLENDER-v402"))
+        load_scene(save(name, b"ISO-10303-21;"))
 
 
 def test_mitsuba_files_are_not_loaded_yet(save):
@@ -102,7 +102,11 @@ def test_content_counts_where_the_name_says_nothing(save):
         ("a.stl", OBJ.encode(), r"a\.stl: is no STL file"),
         ("a.xml", b"<html></html>", r"a\.xml: is XML of a 'html'"),
         ("a.xml", XML.encode()[:-3], r"a\.xml:1: is no well-formed XML"),
-        ("a.fbx", b"Kaydara FBX", r"a\.fbx: '\.fbx' is no known kind of scene file; known are \.dat, \.glb, \.gltf"),
+        (
+            "a.fbx",
+            b"Kaydara FBX",
+            r"a\.fbx: '\.fbx' is no known kind of scene file; known are \.blend, \.dat, \.glb, \.gltf",
+        ),
         ("a.obj", b"", r"a\.obj: the file is empty"),
         ("a.glb", b"", r"a\.glb: the file is empty"),
         ("a.glb", b"glTF", r"a\.glb"),

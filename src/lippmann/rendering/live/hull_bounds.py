@@ -27,7 +27,9 @@ def bounds_by_hull(scene: Scene) -> Callable[[Matrix], Bounds]:
     description = scene.description
     if not isinstance(description, SceneDescription):
         return scene.bounds_in
-    placed = [(used_positions(description.meshes[mesh]), places) for mesh, places in description.placements.items()]
+    placed = [
+        (used_positions(description.meshes[mesh]), places) for mesh, places in description.fitted_placements.items()
+    ]
     if sum(len(points) * len(places) for points, places in placed) > _MOST_VERTICES:
         return scene.bounds_in
     corners = [_hull(points) for points, _ in placed]

@@ -26,7 +26,10 @@ if TYPE_CHECKING:
 
 #: Endings of files that name other files.
 _NAMING_FILES = frozenset(
-    {".dat", ".glb", ".gltf", ".mtl", ".nff", ".obj", ".ply", ".stl", ".usd", ".usda", ".usdc", ".usdz", ".xml"}
+    {
+        *(".blend", ".dat", ".glb", ".gltf", ".mtl", ".nff", ".obj", ".ply", ".stl"),
+        *(".usd", ".usda", ".usdc", ".usdz", ".xml"),
+    }
 )
 
 

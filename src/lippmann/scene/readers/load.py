@@ -37,6 +37,7 @@ PHOTOS = (".jpg", ".jpeg", ".png", ".webp", ".heic", ".heif", ".hif")
 # Suffix -> "module:function" of its reader: read(path, *, allow_outside) gives a SceneDescription, a MitsubaSource or a
 # ClassicScene.
 _READERS = {
+    ".blend": "lippmann.scene.readers.blend:read_blend",
     ".dat": "lippmann.scene.readers.tachyon.reader:read_tachyon",
     ".glb": "lippmann.scene.readers.gltf:read_gltf",
     ".gltf": "lippmann.scene.readers.gltf:read_gltf",
@@ -63,6 +64,7 @@ _READERS = {
 
 # First bytes of a file -> its suffix, for unmistakable formats.
 _BEGINNINGS = {
+    b"BLENDER": ".blend",
     b"glTF": ".glb",
     b"ply\n": ".ply",
     b"ply\r": ".ply",
@@ -84,7 +86,6 @@ _PAPER_DEPTH = 2
 
 #: Files of other programs, and how a glTF file is made of them.
 _ELSEWHERE = {
-    ".blend": "in Blender: File > Export > glTF 2.0 (.glb)",
     ".fbx": "open it in Blender, then File > Export > glTF 2.0 (.glb)",
     ".dae": "open it in Blender, then File > Export > glTF 2.0 (.glb)",
     ".3ds": "open it in Blender, then File > Export > glTF 2.0 (.glb)",

@@ -119,7 +119,8 @@ class Mesh:
 
     ``positions`` ``(n, 3)``, ``faces`` ``(m, 3)`` counter-clockwise seen from the front, ``normals`` ``(n, 3)`` unit or
     None (flat), ``uvs`` a tuple of ``(n, 2)`` (v down from the image's top row, as in glTF), ``colors`` ``(n, 3 or 4)``
-    linear or None. Normal maps take the tangent frame of the uv parametrisation.
+    linear or None. Normal maps take the tangent frame of the uv parametrisation. ``fitted``: whether displays are
+    fitted to it; not so a light source around the scene.
     """
 
     name: str
@@ -129,6 +130,7 @@ class Mesh:
     normals: FloatArray | None = None
     uvs: tuple[FloatArray, ...] = ()
     colors: FloatArray | None = None
+    fitted: bool = True
 
 
 @dataclass(frozen=True, eq=False)
@@ -225,3 +227,9 @@ class SceneDescription:
             own = np.asarray(instance.world_from_mesh, np.float64).reshape(-1, 4, 4)
             matrices.setdefault(instance.mesh, []).append(own)
         return {mesh: stacks[0] if len(stacks) == 1 else np.concatenate(stacks) for mesh, stacks in matrices.items()}
+
+    @cached_property
+    def fitted_placements(self) -> Mapping[int, Matrix]:
+        """:attr:`placements` of the meshes that displays are fitted to; all where there is no such mesh."""
+        fitted = {mesh: places for mesh, places in self.placements.items() if self.meshes[mesh].fitted}
+        return fitted or self.placements

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Hashable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -75,7 +75,8 @@ class Meshes:
                 self._places[key, material] = len(self.read)
                 name = fields.text("name") or fields.place
                 name = name if len(primitives) == 1 else f"{name}/{len(places)}"
-                self.read.append(self._mesh(name, geometry, material, primitive))
+                mesh = self._mesh(name, geometry, material, primitive)
+                self.read.append(replace(mesh, fitted=_is_fitted(fields)))
             places.append(self._places[key, material])
         return places
 
@@ -96,6 +97,12 @@ class Meshes:
             missing: FloatArray = np.zeros((len(geometry.positions), 2), np.float32)
             uvs += (missing,) * (uv_sets - len(uvs))
         return Mesh(name, geometry.positions, geometry.faces, material, geometry.normals, uvs, geometry.colors)
+
+
+def _is_fitted(mesh: Fields) -> bool:
+    # Extras may hold anything; only this value of this name means something.
+    extras = mesh.values.get("extras")
+    return not (isinstance(extras, dict) and extras.get("fitted") is False)
 
 
 def _has_normals(primitive: Fields) -> bool:

@@ -1,0 +1,101 @@
+"""Export of Blender's present scene: ``scene.glb``, ``world.exr`` if the world shines, and notes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import bpy
+
+from .additions import add_focus, add_lights, scale_to_metres
+from .glb import Glb
+from .lights import describe_lights, focus_distances
+from .remarks import remark_lights, remark_materials, remark_objects
+from .render_view import as_rendered
+from .world import write_world
+
+SCENE, WORLD = "scene.glb", "world.exr"
+
+
+@dataclass(frozen=True)
+class Exported:
+    """What :func:`export_scene` wrote.
+
+    Attributes
+    ----------
+    scene, world:
+        The GLB file, and the picture of the world (None of a world without light).
+    camera:
+        The name of the active camera; empty without one.
+    exposure:
+        Stops by which Blender raises its pictures of the scene.
+    notes:
+        Lines on what is left out.
+    """
+
+    scene: Path
+    world: Path | None
+    camera: str
+    exposure: float
+    notes: tuple[str, ...]
+
+
+def export_scene(folder: Path, *, is_animated: bool = False) -> Exported:
+    """Write the scene of ``bpy.context`` into a folder: modifiers applied, without what renders do not show.
+
+    Parameters
+    ----------
+    is_animated:
+        Write the frames of the scene's range as one animation; else the present frame alone.
+    """
+    scene, view_layer = bpy.context.scene, bpy.context.view_layer
+    notes: dict[str, None] = {}
+
+    def remark(line: str) -> None:
+        notes[line] = None
+
+    path = folder / SCENE
+    unit = float(scene.unit_settings.scale_length) if scene.unit_settings.system != "NONE" else 1.0
+    with as_rendered(scene, view_layer):
+        depsgraph = bpy.context.evaluated_depsgraph_get()
+        for look in (remark_objects, remark_materials, remark_lights):
+            look(depsgraph, remark)
+        lights = describe_lights(depsgraph, remark)
+        focus = focus_distances(scene)
+        bpy.ops.export_scene.gltf(filepath=str(path), **_options(is_animated=is_animated))
+    if not is_animated and any(item.animation_data and item.animation_data.action for item in scene.objects):
+        remark(f"the scene is shown at its frame {scene.frame_current}: frames of motion are for sequences")
+    glb = Glb.read(path)
+    add_lights(glb, lights, unit)
+    add_focus(glb, focus, unit)
+    scale_to_metres(glb, unit)
+    glb.write(path)
+    world = folder / WORLD
+    has_world = write_world(scene, world, remark)
+    camera: Any = scene.camera
+    return Exported(
+        path,
+        world if has_world else None,
+        "" if camera is None else camera.name,
+        float(scene.view_settings.exposure),
+        tuple(notes),
+    )
+
+
+def _options(*, is_animated: bool) -> dict[str, Any]:
+    options: dict[str, Any] = {
+        "export_format": "GLB",
+        "export_apply": True,
+        "export_cameras": True,
+        "export_lights": True,
+        "export_yup": True,
+        "export_gn_mesh": True,
+        "use_active_scene": True,
+        "use_renderable": True,
+        "export_animations": is_animated,
+    }
+    if is_animated:
+        # All objects together, over the frames of the scene, from time 0.
+        options |= {"export_animation_mode": "SCENE", "export_anim_slide_to_zero": True, "export_force_sampling": True}
+    return options

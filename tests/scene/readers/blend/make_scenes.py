@@ -1,0 +1,144 @@
+"""Run by Blender: writes files for tests into the folder of the last word."""
+
+import sys
+from pathlib import Path
+
+import bpy
+
+FOLDER = Path(sys.argv[-1])
+
+
+def fresh():
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    scene = bpy.context.scene
+    scene.world = bpy.data.worlds.new("world")
+    scene.world.use_nodes = True
+    return scene
+
+
+def put(scene, name, data, location=(0.0, 0.0, 0.0), **settings):
+    item = bpy.data.objects.new(name, data)
+    item.location = location
+    for key, value in settings.items():
+        setattr(item, key, value)
+    scene.collection.objects.link(item)
+    return item
+
+
+def cube(name="cube", size=1.0):
+    mesh = bpy.data.meshes.new(name)
+    half = size / 2
+    corners = [(x, y, z) for x in (-half, half) for y in (-half, half) for z in (-half, half)]
+    faces = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    mesh.from_pydata(corners, [], faces)
+    return mesh
+
+
+def light(kind, **settings):
+    made = bpy.data.lights.new(kind, kind)
+    for key, value in settings.items():
+        setattr(made, key, value)
+    return made
+
+
+def save(name):
+    bpy.ops.wm.save_as_mainfile(filepath=str(FOLDER / name), check_existing=False)
+
+
+def everything():
+    scene = fresh()
+    background = scene.world.node_tree.nodes["Background"]
+    background.inputs["Color"].default_value = (0.1, 0.2, 0.4, 1.0)
+    background.inputs["Strength"].default_value = 0.5
+
+    put(scene, "Spare", bpy.data.cameras.new("spare"))
+    scene.camera = put(
+        scene, "Active", bpy.data.cameras.new("active"), (0.0, -5.0, 1.0), rotation_euler=(1.4, 0.0, 0.0)
+    )
+    scene.camera.data.dof.use_dof = True
+    scene.camera.data.dof.focus_distance = 4.0
+
+    put(scene, "Bulb", light("POINT", energy=100.0, color=(1.0, 0.5, 0.25)), (1.0, 2.0, 3.0))
+    put(scene, "Cone", light("SPOT", energy=50.0, spot_size=1.0, spot_blend=0.5))
+    put(scene, "Sky", light("SUN", energy=3.0))
+    put(scene, "Panel", light("AREA", energy=10.0, shape="RECTANGLE", size=2.0, size_y=0.5), scale=(2.0, 2.0, 2.0))
+    put(scene, "Disc", light("AREA", energy=10.0, shape="DISK", size=2.0, spread=1.0))
+
+    put(scene, "Seen", cube("seen"), hide_viewport=True)
+    put(scene, "Unseen", cube("unseen"), hide_render=True)
+    smooth = put(scene, "Smooth", cube("smooth")).modifiers.new("smooth", "SUBSURF")
+    smooth.levels, smooth.render_levels = 0, 2
+
+    collection = bpy.data.collections.new("group")
+    collection.objects.link(bpy.data.objects.new("Member", cube("member")))
+    for place in (1.0, 2.0, 3.0):
+        put(scene, f"Copy{place:g}", None, (place, 0, 0), instance_type="COLLECTION", instance_collection=collection)
+
+    noisy = bpy.data.materials.new("noisy")
+    noisy.use_nodes = True
+    nodes = noisy.node_tree.nodes
+    noise = nodes.new("ShaderNodeTexNoise")
+    noisy.node_tree.links.new(noise.outputs["Color"], nodes["Principled BSDF"].inputs["Base Color"])
+    mesh = cube("rough")
+    mesh.materials.append(noisy)
+    put(scene, "Rough", mesh)
+    put(scene, "Fog", bpy.data.volumes.new("fog"))
+    scene.view_settings.exposure = 1.5
+    save("everything.blend")
+
+
+def moving():
+    scene = fresh()
+    scene.unit_settings.scale_length = 0.01
+    scene.render.fps = 10
+    scene.frame_start, scene.frame_end = 1, 11
+    item = put(scene, "Cube", cube("cube", 100.0))
+    item.keyframe_insert("location", frame=1)
+    item.location.z = 200.0
+    item.keyframe_insert("location", frame=11)
+    put(scene, "Bulb", light("POINT", energy=4.0e4), (0.0, 0.0, 300.0))
+    scene.camera = put(scene, "Camera", bpy.data.cameras.new("camera"), (0.0, -500.0, 0.0), rotation_euler=(1.57, 0, 0))
+    scene.camera.data.dof.use_dof = True
+    scene.camera.data.dof.focus_distance = 500.0
+
+    # Red to the right (+x) of who looks along +y, green ahead, blue straight up.
+    picture = bpy.data.images.new("sky", 64, 32, float_buffer=True)
+    pixels = []
+    for row in range(32):
+        for column in range(64):
+            color = (0.0, 0.0, 1.0) if row >= 30 else (0.0, 1.0, 0.0) if 28 <= column < 36 else (0.0, 0.0, 0.0)
+            pixels += [*((1.0, 0.0, 0.0) if 44 <= column < 52 and row < 30 else color), 1.0]
+    picture.pixels[:] = pixels
+    picture.pack()
+    tree = scene.world.node_tree
+    texture = tree.nodes.new("ShaderNodeTexEnvironment")
+    texture.image = picture
+    mapping = tree.nodes.new("ShaderNodeMapping")
+    place = tree.nodes.new("ShaderNodeTexCoord")
+    # Blender has the middle of such a picture at +x: turned so that it lies at +y.
+    mapping.inputs["Rotation"].default_value[2] = -1.5707963
+    tree.links.new(place.outputs["Generated"], mapping.inputs["Vector"])
+    tree.links.new(mapping.outputs["Vector"], texture.inputs["Vector"])
+    tree.links.new(texture.outputs["Color"], tree.nodes["Background"].inputs["Color"])
+    save("moving.blend")
+
+
+def outside():
+    scene = fresh()
+    put(scene, "Cube", cube())
+    picture = bpy.data.images.new("secret", 4, 4)
+    picture.filepath_raw = str(FOLDER.parent / "secret.png")
+    picture.file_format = "PNG"
+    picture.save()
+    picture = bpy.data.images.load(str(FOLDER.parent / "secret.png"))
+    picture.use_fake_user = True
+    save("outside.blend")
+
+
+def empty():
+    fresh()
+    save("empty.blend")
+
+
+for make in (everything, moving, outside, empty):
+    make()

@@ -1,0 +1,153 @@
+"""Files of a real Blender: lights in physical units, visibility, instances, the world, units, motion."""
+
+import math
+
+import numpy as np
+import pytest
+
+from lippmann.errors import SceneError
+from lippmann.scene.readers.blend import read_blend
+from lippmann.scene.readers.blend.find_blender import VARIABLE
+from lippmann.scene.readers.load import load_scene
+from lippmann.sequences.motion import open_motion
+
+
+@pytest.fixture
+def everything(read_real):
+    return read_real("everything.blend")
+
+
+@pytest.fixture
+def moving(read_real):
+    return read_real("moving.blend")
+
+
+def lamp(description, name):
+    return next(light for light in description.lights if light.name == name)
+
+
+def glow(description, name):
+    """Radiance and area of a glowing surface, and the direction that it shines along."""
+    (instance,) = (each for each in description.instances if description.meshes[each.mesh].name == name)
+    mesh = description.meshes[instance.mesh]
+    corners = (mesh.positions @ instance.world_from_mesh[:3, :3].T)[mesh.faces]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    area = np.linalg.norm(normals, axis=1).sum() / 2
+    return description.materials[mesh.material].emission, area, normals.sum(axis=0) / (2 * area)
+
+
+def test_a_point_light_sends_its_watts_all_around(everything):
+    bulb = lamp(everything, "Bulb")
+    assert bulb.kind == "point"
+    assert bulb.color == pytest.approx(np.array([1.0, 0.5, 0.25]) * 100.0 / (4.0 * math.pi))
+    assert bulb.world_from_light[:3, 3] == pytest.approx([1.0, 3.0, -2.0])
+
+
+def test_a_spot_is_as_strong_as_a_point_light_along_its_axis(everything):
+    cone = lamp(everything, "Cone")
+    assert (cone.kind, cone.color) == ("spot", pytest.approx([50.0 / (4.0 * math.pi)] * 3))
+    assert cone.outer_angle == pytest.approx(0.5)
+    assert 0.2 < cone.inner_angle < 0.4
+    assert -cone.world_from_light[:3, 2] == pytest.approx([0.0, -1.0, 0.0])
+
+
+def test_a_sun_is_an_irradiance(everything):
+    assert (lamp(everything, "Sky").kind, lamp(everything, "Sky").color) == ("directional", pytest.approx([3.0] * 3))
+
+
+@pytest.mark.parametrize(("name", "area"), [("Panel", 4.0), ("Disc", math.pi)])
+def test_area_lights_keep_their_power(everything, name, area):
+    emission, own, along = glow(everything, name)
+    assert own == pytest.approx(area, rel=1e-3)
+    assert np.array(emission) * own * math.pi == pytest.approx([10.0] * 3, rel=1e-3)
+    assert along == pytest.approx([0.0, -1.0, 0.0], abs=1e-6)
+
+
+def test_the_world_of_one_colour(everything):
+    pixels = everything.environment.pixels
+    assert pixels.reshape(-1, 3) == pytest.approx(np.tile([0.05, 0.1, 0.2], (pixels.size // 3, 1)), rel=1e-3)
+    assert not everything.physical_lights
+
+
+def test_the_active_camera_comes_first(everything):
+    assert [camera.name for camera in everything.cameras] == ["Active", "Spare"]
+    assert everything.cameras[0].focus_distance == pytest.approx(4.0)
+    assert everything.cameras[0].world_from_camera[:3, 3] == pytest.approx([0.0, 1.0, 5.0])
+    assert everything.cameras[1].focus_distance is None
+
+
+def test_what_renders_show_is_read(everything):
+    names = {mesh.name for mesh in everything.meshes}
+    assert "seen" in names
+    assert "unseen" not in names
+    # Two triangles on each of six sides that are halved twice, as in renders; in the viewport it stays a cube.
+    assert 2 * 6 * 4**2 in [len(mesh.faces) for mesh in everything.meshes]
+
+
+def test_instances_share_their_mesh(everything):
+    (member,) = (index for index, mesh in enumerate(everything.meshes) if mesh.name == "member")
+    assert sorted(everything.placements[member][:, 0, 3]) == pytest.approx([1.0, 2.0, 3.0])
+
+
+def test_what_is_left_out_is_named(everything):
+    said = "\n".join(everything.notes)
+    for line in (
+        "object 'Fog': a volume is left out",
+        "material 'noisy': glTF has no word for its nodes (Noise Texture)",
+        "light 'Disc': an area light's narrower spread is not honoured",
+        "raises its pictures by 1.5 stops: exposure=1.5 does so here",
+        "their shadows are sharp",
+    ):
+        assert line in said
+    assert "Smooth" not in said
+
+
+def test_the_picture_of_the_world_is_upright_and_not_mirrored(moving):
+    pixels = moving.environment.pixels
+    height, width = pixels.shape[:2]
+    assert (height, width) == (32, 64)
+    assert pixels[height // 2, width // 2].argmax() == 1  # green ahead, along -z
+    assert pixels[height // 2, 3 * width // 4].argmax() == 0  # red to the right
+    assert pixels[0, width // 2].argmax() == 2  # blue straight up
+    assert pixels[height // 2, width // 4].max() < 0.01
+
+
+def test_lengths_are_metres_and_light_falls_the_same(moving):
+    (cube,) = (mesh for mesh in moving.meshes if mesh.name == "cube")
+    (place,) = moving.placements[moving.meshes.index(cube)]
+    reach = cube.positions @ place[:3, :3].T
+    assert np.ptp(reach, axis=0) == pytest.approx([1.0, 1.0, 1.0])
+    bulb = lamp(moving, "Bulb")
+    assert bulb.world_from_light[1, 3] == pytest.approx(3.0)
+    # 300 units from the cube's middle in Blender, 3 m here.
+    assert np.array(bulb.color) / 3.0**2 == pytest.approx([4.0e4 / (4.0 * math.pi) / 300.0**2] * 3)
+    assert moving.cameras[0].focus_distance == pytest.approx(5.0)
+    assert any("shown at its frame" in note for note in moving.notes)
+
+
+def test_a_moving_scene(real_blender, real_scenes, monkeypatch):
+    monkeypatch.setenv(VARIABLE, real_blender)
+    motion = open_motion(real_scenes / "moving.blend", fps=10.0)
+    assert motion.count == 11
+    heights = []
+    for frame in (0, 5, 10):
+        description = motion.scene(frame).physical
+        assert description.environment is not None
+        (cube,) = (index for index, mesh in enumerate(description.meshes) if mesh.name == "cube")
+        heights.append(description.placements[cube][0, 1, 3])
+    assert heights == pytest.approx([0.0, 1.0, 2.0], abs=0.01)
+
+
+def test_files_that_blender_cannot_give(real_blender, real_scenes, monkeypatch, tmp_path):
+    monkeypatch.setenv(VARIABLE, real_blender)
+    with pytest.raises(
+        SceneError, match=r"^outside\.blend: names the file '.*secret\.png' outside its folder; pack it"
+    ):
+        read_blend(real_scenes / "outside.blend")
+    assert read_blend(real_scenes / "outside.blend", allow_outside=True).meshes
+    with pytest.raises(SceneError, match=r"^empty\.blend: the file shows no triangles"):
+        load_scene(real_scenes / "empty.blend")
+    cut = tmp_path / "cut.blend"
+    cut.write_bytes(b"BLENDER-v405" + bytes(100))
+    with pytest.raises(SceneError, match=r"^cut\.blend: Blender fails at the file \("):
+        read_blend(cut)
