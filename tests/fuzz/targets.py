@@ -567,7 +567,7 @@ _READERS: dict[str, Target] = {
     "volume-npy": Target(_volume("s.npy")),
     "volume-npz": Target(_volume("s.npz")),
     "volume-vol": Target(_volume("s.vol")),
-    "volume-vdb": Target(_with("tinyvdb", _volume("s.vdb"))),
+    "volume-vdb": Target(_with("pyopenvdb", _volume("s.vdb"))),
     "vtk-vtp": Target(_with("pyvista", _volume("s.vtp"))),
     "vtk-vtk": Target(_with("pyvista", _volume("s.vtk"))),
     "vtk-vti": Target(_with("pyvista", _volume("s.vti"))),

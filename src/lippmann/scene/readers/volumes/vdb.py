@@ -11,9 +11,9 @@ import numpy as np
 from lippmann.errors import SceneError, UsageError
 from lippmann.runtime.helper_process import HelperEndedError, HelperProcess
 from lippmann.runtime.input_memory import check_input, input_memory_left
-from lippmann.runtime.optional_import import check_installed
 from lippmann.scene.parsing.files import read_bytes
 from lippmann.scene.readers.volumes.description import describe_volume
+from lippmann.scene.readers.volumes.vdb_module import module_name
 from lippmann.scene.values.description import SceneDescription
 
 #: First bytes of such a file.
@@ -38,8 +38,8 @@ def read_vdb(path: Path, *, allow_outside: bool = False, series: str | None = No
     Raises
     ------
     SceneError
-        ``tinyvdb`` is not installed; the file is missing or damaged, or holds no such grid, or one that is stored in a
-        way that is not read (level sets, active tiles, frustums).
+        OpenVDB's module is not installed; the file is missing or damaged, or holds no such grid, or one that is no box
+        of densities (a level set, a frustum).
     MemoryLimitError
         It holds more than the memory that is left.
     UsageError
@@ -48,12 +48,19 @@ def read_vdb(path: Path, *, allow_outside: bool = False, series: str | None = No
     where = path.name
     if read_bytes(path, len(_BEGINNING)) != _BEGINNING:
         raise SceneError("is no OpenVDB file", where=where, rule="it begins with ' BDV'")
-    check_installed("tinyvdb", "volumes", "OpenVDB files need it, and Python 3.11", where)
+    if module_name() is None:
+        raise SceneError(
+            "OpenVDB's Python module is not installed",
+            where=where,
+            rule="conda-forge's openvdb and Debian's python3-openvdb have it",
+            fix="install it, or save an array by its copyToArray as .npy",
+        )
     request = json.dumps({"path": str(path.resolve()), "series": series, "memory": input_memory_left()}).encode()
     try:
         answer = _process.ask(request, where=where)
     except HelperEndedError as error:
-        raise SceneError(f"tinyvdb breaks down at the file ({error})", where=where, fix="is it whole?") from None
+        fix = "is it whole, and was the module built for this NumPy?"
+        raise SceneError(f"OpenVDB breaks down at the file ({error})", where=where, fix=fix) from None
     with np.load(io.BytesIO(answer), allow_pickle=False) as found:
         if "usage" in found:
             raise UsageError(f"'{series}'", where=where, parameter="series", rule=str(found["usage"]))

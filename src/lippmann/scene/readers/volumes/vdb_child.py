@@ -1,25 +1,25 @@
-"""The process that reads OpenVDB files by ``tinyvdb``: native code, with nothing else in it."""
+"""The process that reads OpenVDB files by the library's own module: native code, with nothing else in it."""
 
 from __future__ import annotations
 
+import importlib
 import io
 import json
 import os
 from typing import Any
 
 import numpy as np
-import tinyvdb
 from numpy.typing import NDArray
 
 from lippmann.runtime.helper_process import limit_memory, serve
+from lippmann.scene.readers.volumes.vdb_module import module_name
 
-#: Kinds of grids that hold one number a voxel, by the beginning of their type's name.
-_SCALAR = ("Tree_float", "Tree_double", "Tree_half")
+#: Kinds of grids that hold one number a voxel.
+_SCALAR = ("float", "double", "half", "int32", "int64")
 #: The grid that is shown of several, where nothing is chosen: what programs call smoke.
 _USUAL = "density"
 _LEVEL_SET = "level set"
-#: Bytes of a voxel: the library's, and those that are handed over.
-_BYTES_PER_VOXEL = 8
+_BYTES_PER_VOXEL = 4
 
 
 class RefusedError(Exception):
@@ -51,60 +51,44 @@ def _answer(data: bytes) -> bytes:
 
 
 def _read(path: str, series: str | None, memory: int) -> dict[str, NDArray[np.generic]]:
-    file = tinyvdb.open(path)
-    file.read_grids()
-    names = [str(file.grid_name(number)) for number in range(file.grid_count)]
-    scalar = [n for n in range(len(names)) if str(file.grid_type_name(n)).startswith(_SCALAR)]
-    listed = ", ".join(names[:20])
+    openvdb = importlib.import_module(module_name() or "openvdb")
+    told = openvdb.readAllGridMetadata(path)
+    names = [str(each.name) for each in told]
+    scalar = [number for number, each in enumerate(told) if str(each.valueTypeName) in _SCALAR]
     if series is not None and series not in (names[number] for number in scalar):
         raise KeyError(", ".join(names[number] for number in scalar[:20]) or "no grid of one number a voxel")
     if not scalar:
-        raise RefusedError(f"its grids ({listed or 'none'}) hold no single numbers")
+        raise RefusedError(f"its grids ({', '.join(names[:20]) or 'none'}) hold no single numbers")
     wanted = series if series is not None else _USUAL
-    number = next((n for n in scalar if names[n] == wanted), scalar[0])
-    grid = file.grid(number)
-    metadata = dict(grid.metadata)
-    if metadata.get("class") == _LEVEL_SET:
-        raise RefusedError(f"the grid '{names[number]}' is a level set, a surface: make it a mesh or a fog volume")
-    low, high = _box(grid, metadata)
-    counted = metadata.get("file_voxel_count")
-    if isinstance(counted, int) and counted != grid.active_voxel_count():
-        share = 1.0 - grid.active_voxel_count() / max(counted, 1)
-        raise RefusedError(
-            f"{share:.0%} of the voxels of '{names[number]}' are stored as tiles, which tinyvdb does not hand out: "
-            "densify it (openvdb's voxelizeActiveTiles)"
-        )
-    if _BYTES_PER_VOXEL * int(np.prod(high - low, dtype=object)) > memory:
+    name = names[next((number for number in scalar if names[number] == wanted), scalar[0])]
+    grid = openvdb.read(path, name)
+    if str(grid.gridClass) == _LEVEL_SET:
+        raise RefusedError(f"the grid '{name}' is a level set, a surface: make it a mesh or a fog volume")
+    if grid.activeVoxelCount() == 0:
+        raise RefusedError(f"the grid '{name}' is empty")
+    low, high = (np.array(corner, np.int64) for corner in grid.evalActiveVoxelBoundingBox())
+    shape = high - low + 1
+    if _BYTES_PER_VOXEL * int(np.prod(shape, dtype=object)) > memory:
         raise MemoryError
-    dense = grid.materialize_dense(tuple(low.tolist()), tuple(high.tolist()))
-    values = np.frombuffer(dense.to_bytes(), np.float32).reshape((high - low)[::-1])
-    notes = [f"the grid '{names[number]}' of {listed}"] if len(names) > 1 else []
-    return {"grid": values, "matrix": _matrix(grid.transform, low), "notes": np.array(notes, dtype=np.str_)}
+    values = np.empty(shape, np.float32)
+    grid.copyToArray(values, ijk=tuple(low.tolist()))
+    notes = [f"the grid '{name}' of {', '.join(names[:20])}"] if len(names) > 1 else []
+    return {
+        "grid": np.ascontiguousarray(values.T),
+        "matrix": _matrix(grid.transform, low),
+        "notes": np.array(notes, dtype=np.str_),
+    }
 
 
-def _box(grid: Any, metadata: dict[str, Any]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """The lowest voxel that holds something, and the one beyond the highest."""
-    leaves = grid.active_bbox()
-    if leaves is None:
-        raise RefusedError(f"the grid '{grid.name}' is empty")
-    low, high = (np.array(corner, np.int64) for corner in leaves)
-    told = metadata.get("file_bbox_min"), metadata.get("file_bbox_max")
-    if all(isinstance(corner, tuple) and len(corner) == 3 for corner in told):
-        # It is narrower than the leaves, which are blocks of eight voxels a side.
-        first, last = (np.clip(np.array(corner, np.int64), -(1 << 31), 1 << 31) for corner in told)
-        inner = np.maximum(low, first), np.minimum(high, last + 1)
-        if (inner[1] > inner[0]).all():
-            return inner
-    return low, high
-
-
-def _matrix(transform: dict[str, Any], low: NDArray[np.int64]) -> NDArray[np.float64]:
-    """From numbers of voxels, the first at ``low``, to the world. OpenVDB multiplies rows by its matrices."""
-    if transform["type"] == "affine":
-        matrix = np.array(transform["matrix"], np.float64).T
-    else:
-        matrix = np.diag([*transform["scale"], 1.0])
-        matrix[:3, 3] = transform["translation"]
-    origin = np.eye(4)
-    origin[:3, 3] = low
-    return np.asarray(matrix @ origin, np.float64)
+def _matrix(transform: Any, low: NDArray[np.int64]) -> NDArray[np.float64]:
+    """From numbers of voxels, the first at ``low``, to the world."""
+    if not transform.isLinear:
+        raise RefusedError("its voxels lie in a frustum: resample it to a box")
+    origin, *ends = (
+        np.array(transform.indexToWorld(tuple((low + step).tolist())), np.float64)
+        for step in ((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1))
+    )
+    matrix = np.eye(4)
+    matrix[:3, :3] = np.stack([end - origin for end in ends], axis=1)
+    matrix[:3, 3] = origin
+    return matrix
