@@ -51,7 +51,7 @@ def rendered(scene, layout="lenticular", **options):
     return lippmann.render(scene, DISPLAYS[layout], exposure=0, tone_map="none", **(chosen | options))
 
 
-@pytest.mark.parametrize("layout", DISPLAYS)
+@pytest.mark.parametrize("layout", ["lenticular", "hexagonal", pytest.param("square", marks=pytest.mark.long)])
 def test_photons_bring_what_paths_do_not_find(layout):
     """Every lens that sees the focus sees it by photons alone; nothing else differs."""
     scene = lamp_over_glass()

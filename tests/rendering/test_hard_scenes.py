@@ -47,7 +47,13 @@ def hard_scenes():
     return module.HARD_SCENES
 
 
-@pytest.fixture(scope="module", params=list(CASES))
+#: Scenes whose light the others have, too.
+LONG = ("crack", "mixed")
+
+
+@pytest.fixture(
+    scope="module", params=[pytest.param(name, marks=pytest.mark.long if name in LONG else ()) for name in CASES]
+)
 def case(request, judged_scene):
     import lippmann
 

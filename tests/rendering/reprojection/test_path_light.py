@@ -60,8 +60,8 @@ def means_of_lenses(image):
     ("preset", "size", "spp", "method", "careful"),
     [
         ("seed-lenticular", (128, 96), 2, "lens-view", True),
-        ("seed-lenticular", (128, 96), 4, "interpolated", True),
-        ("seed-lenticular", (128, 96), 4, "lens-view", False),
+        pytest.param("seed-lenticular", (128, 96), 4, "interpolated", True, marks=pytest.mark.long),
+        pytest.param("seed-lenticular", (128, 96), 4, "lens-view", False, marks=pytest.mark.long),
         ("seed-lenticular", (128, 96), 4, "interpolated", False),
         ("mla-square", (120, 120), 2, "interpolated", True),
     ],

@@ -122,7 +122,14 @@ def pooled(case, samples, seed=7):
     return case.picture(samples, "pooled", "oidn", seed)
 
 
-@pytest.fixture(scope="module", params=list(SCENES))
+#: Kinds of light that others of the plain suite have, too: the hard scenes, caustics, environment maps.
+ELSEWHERE = ("mirror", "glass", "leaves", "surroundings")
+
+
+@pytest.fixture(
+    scope="module",
+    params=[pytest.param(name, marks=pytest.mark.long if name in ELSEWHERE else ()) for name in SCENES],
+)
 def case(request, made):
     make, kind = SCENES[request.param]
     return made(request.param, make(), kind)
