@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from lippmann.errors import ClusterError, UsageError
 from lippmann.scene.mitsuba_source import MitsubaSource
 from lippmann.scene.mitsuba_xml import MitsubaXml
+from lippmann.scene.values.description import SceneDescription
 from lippmann.tiles.job import TileJob
 
 #: Arrays with fewer bytes stay in the outline.
@@ -59,7 +60,10 @@ def pack(job: TileJob) -> Parcel:
     files = _scene_files(job, parts)
     stream = io.BytesIO()
     # Fresh copies drop cached values (a scene's bounds, its hash), by which equal jobs would differ.
-    plain = replace(job, scene=replace(job.scene))
+    description = job.scene.description
+    if isinstance(description, SceneDescription):
+        description = replace(description)
+    plain = replace(job, scene=replace(job.scene, description=description))
     if files is not None:
         plain = _with_files(plain, {})
     _Packer(stream, parts).dump((plain, files))
