@@ -190,7 +190,8 @@ def serve(
         sys.stdout.flush()
         started()
         if browser and has_screen():
-            webbrowser.open(server.address)
+            # Not in this thread: some browsers are waited for, and what is started there can swallow Ctrl-C.
+            threading.Thread(target=webbrowser.open, args=(server.address,), daemon=True).start()
         try:
             threading.Event().wait()
         except KeyboardInterrupt:
