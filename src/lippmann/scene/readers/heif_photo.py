@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import importlib.util
 import io
 
 import numpy as np
 
 from lippmann.errors import SceneError
 from lippmann.runtime.input_memory import check_input
+from lippmann.runtime.optional_import import check_installed
 from lippmann.scene.readers.depth_map import DepthMap
 from lippmann.scene.values.description import Image
 
@@ -35,9 +35,7 @@ def read_heif_photo(data: bytes, where: str) -> tuple[Image, DepthMap | None]:
     MemoryLimitError
         It takes more memory than is left.
     """
-    if importlib.util.find_spec("pillow_heif") is None:
-        fix = "install it: pip install 'lippmann[heif]'; or save the picture as .jpg"
-        raise SceneError("HEIF pictures need the library pillow-heif", where=where, fix=fix)
+    check_installed("pillow_heif", "heif", "HEIF pictures need it", where)
     import pillow_heif
 
     try:
