@@ -62,12 +62,7 @@ class SplatSelection:
             return scene
         description = scene.description
         if not isinstance(description, SceneDescription) or description.splats is None:
-            raise UsageError(
-                f"'{scene.name}' holds no Gaussian splats",
-                parameter=next(iter(asked)),
-                rule="it is for scenes that do",
-                fix="leave it out",
-            )
+            raise holds_none(scene, "Gaussian splats", next(iter(asked)))
         if self.unit_scale is not None and description.placements:
             raise UsageError(
                 f"'{scene.name}' holds surfaces beside its splats",
@@ -85,6 +80,13 @@ class SplatSelection:
             kept = splats.chosen(splats.opacities >= np.float32(self.min_opacity))
             splats = _some(kept, "min_opacity", scene.name)
         return replace(scene, description=replace(description, splats=splats))
+
+
+def holds_none(scene: Scene, what: str, parameter: str) -> UsageError:
+    """The error of an option for something that a scene does not hold."""
+    return UsageError(
+        f"'{scene.name}' holds no {what}", parameter=parameter, rule="it is for scenes that do", fix="leave it out"
+    )
 
 
 def check_crop(crop: Crop | None) -> None:

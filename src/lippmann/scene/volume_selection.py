@@ -10,7 +10,7 @@ import numpy as np
 from lippmann.errors import UsageError
 from lippmann.scene.parsing.name_hints import closest_name_hint
 from lippmann.scene.scene import Scene
-from lippmann.scene.splat_selection import Crop, check_crop
+from lippmann.scene.splat_selection import Crop, check_crop, holds_none
 from lippmann.scene.values.description import SceneDescription
 from lippmann.scene.values.volume import TransferFunction, Volume
 from lippmann.scene.volumes.grid import cropped
@@ -63,12 +63,7 @@ class VolumeSelection:
             return scene
         description = scene.description
         if not isinstance(description, SceneDescription) or description.volume is None:
-            raise UsageError(
-                f"'{scene.name}' holds no volume",
-                parameter=next(iter(asked)),
-                rule="it is for scenes that do",
-                fix="leave it out",
-            )
+            raise holds_none(scene, "volume", next(iter(asked)))
         volume = description.volume
         if self.crop is not None:
             part = cropped(volume, np.array([self.crop[:3], self.crop[3:]]))
