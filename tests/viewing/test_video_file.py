@@ -67,6 +67,22 @@ def test_a_film_of_quilts_says_its_layout(tmp_path, codec):
         assert "comment" not in video.metadata
 
 
+@pytest.mark.skipif(not hasattr(os, "sched_getscheduler"), reason="this system has no such scheduling policies")
+@pytest.mark.parametrize("codec", ["h264", "hevc", "av1"])
+def test_no_encoder_puts_the_process_into_real_time(tmp_path, codec):
+    policies = []
+
+    def watched():
+        for frame in frames(40):
+            policies.extend(os.sched_getscheduler(int(thread)) for thread in os.listdir("/proc/self/task"))
+            yield frame
+
+    before = os.sched_getscheduler(0)
+    write_animation(watched(), tmp_path / "a.mp4", codec=codec)
+    assert os.sched_getscheduler(0) == before
+    assert set(policies) == {before}
+
+
 def test_a_codec_that_cannot_be(tmp_path, monkeypatch):
     with pytest.raises(UsageError, match="codec: only MP4 has a choice of codecs"):
         write_animation(frames(), tmp_path / "a.png", codec="av1")

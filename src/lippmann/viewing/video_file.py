@@ -22,6 +22,7 @@ from lippmann.image.stored_values import FloatArray
 from lippmann.quilts.quilt import QuiltLayout
 from lippmann.quilts.quilt_metadata import layout_text
 from lippmann.runtime.atomic_write import replacing
+from lippmann.runtime.thread_policy import kept_policy
 
 #: Endings of the file names.
 ANIMATIONS = (".png", ".apng", ".mp4")
@@ -163,6 +164,8 @@ def _write_mp4(
             context = stream.codec_context
             context.color_primaries, context.colorspace = _BT709, _BT709
             context.color_trc, context.color_range = _SRGB_TRANSFER, _LIMITED_RANGE
+            with kept_policy():
+                context.open()
             for number, codes in enumerate(itertools.chain(head, frames)):
                 even = np.pad(codes, ((0, height % 2), (0, width % 2), (0, 0)), mode="edge")
                 frame = av.VideoFrame.from_ndarray(even, format="rgb24")

@@ -1,0 +1,48 @@
+"""The scheduling policy of this process's threads, kept while a library starts threads of its own."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+_THREADS = Path("/proc/self/task")
+
+
+@contextmanager
+def kept_policy() -> Iterator[None]:
+    """Leave the scheduling policy of every thread as it was, and give new ones that of the calling thread (Linux).
+
+    SVT-AV1, where the user may (as root), puts the thread that opens it into real time (``SCHED_FIFO``, priority 99),
+    with all its own: the process, and all that it starts from then on, would take a core from every other program, and
+    two threads that wait for each other on one core would wait for ever.
+
+    Elsewhere nothing is done: no other system's schedulers are met this way.
+    """
+    if not hasattr(os, "sched_getscheduler") or not _THREADS.is_dir():
+        yield
+        return
+    before, own = _policies(), _policy(0)
+    try:
+        yield
+    finally:
+        for thread, policy in _policies().items():
+            if policy != before.get(thread, own):
+                # A thread may have ended since.
+                with suppress(OSError):
+                    scheduler, priority = before.get(thread, own)
+                    os.sched_setscheduler(thread, scheduler, os.sched_param(priority))
+
+
+def _policies() -> dict[int, tuple[int, int]]:
+    """The policy and priority of each thread, by its number."""
+    found = {}
+    for name in os.listdir(_THREADS):
+        with suppress(OSError):
+            found[int(name)] = _policy(int(name))
+    return found
+
+
+def _policy(thread: int) -> tuple[int, int]:
+    return os.sched_getscheduler(thread), os.sched_getparam(thread).sched_priority
