@@ -9,12 +9,13 @@ ROUNDS ?= 20
 OPEN := $(if $(filter Darwin,$(shell uname -s)),open,xdg-open)
 
 .DEFAULT_GOAL := help
-.PHONY: addon audit check docs help setup setup-dev demo test test-oldest measure-tests search lint clean
+.PHONY: addon audit check docs help setup setup-dev demo test test-long test-oldest measure-tests search lint clean
 
 help:
 	@echo 'make demo    set up and render a teapot for a lenticular display into $(PICTURE)'
 	@echo 'make setup   set up only: virtual environment, package, LLVM runtime'
 	@echo 'make test    set up, lint and run the tests (JOBS=2 PYTEST="-k replay")'
+	@echo 'make test-long  run the tests that take longest, half an hour of them'
 	@echo 'make check   the same in a few minutes: lint, types and the quick tests'
 	@echo 'make search  look for random examples that break a property test (ROUNDS=20)'
 	@echo 'make test-oldest  run the tests of picture files with the oldest libraries that are allowed'
@@ -54,7 +55,11 @@ lint: setup-dev
 	.venv/bin/mypy
 
 test: lint
-	.venv/bin/python -m pytest -n $(JOBS) -m 'not long' $(PYTEST)
+	.venv/bin/python -m pytest -n $(JOBS) --dist worksteal -m 'not long' $(PYTEST)
+
+# The tests of tests/long.txt, and those that bear the marker.
+test-long: setup-dev
+	.venv/bin/python -m pytest -n $(JOBS) --dist worksteal -m long $(PYTEST)
 
 # The tests that are not in tests/slow.txt.
 check: lint

@@ -35,12 +35,26 @@ def pytest_addoption(parser):
 
 def slow_tests() -> dict[str, float]:
     """Tests that `make check` leaves out, and their processor seconds."""
-    lines = (ROOT / "tests" / "slow.txt").read_text(encoding="utf-8").splitlines()
+    return _listed("slow.txt")
+
+
+def long_tests() -> dict[str, float]:
+    """Tests, or cases of them in brackets, that `make test` leaves out, and their seconds."""
+    return _listed("long.txt")
+
+
+def _listed(name: str) -> dict[str, float]:
+    lines = (ROOT / "tests" / name).read_text(encoding="utf-8").splitlines()
     pairs = (line.split(" ", 1) for line in lines if line and not line.startswith("#"))
     return {name: float(seconds) for seconds, name in pairs}
 
 
+@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config, items):
+    long = long_tests()
+    for item in items:
+        if item.nodeid in long or item.nodeid.partition("[")[0] in long:
+            item.add_marker("long")
     if not config.getoption("--quick"):
         return
     slow = slow_tests()

@@ -1,4 +1,4 @@
-"""The list of tests that ``make check`` leaves out is true of the suite, and what it leaves in keeps to its budget."""
+"""The lists of tests that ``make check`` and ``make test`` leave out are true, and keep to their budget."""
 
 from __future__ import annotations
 
@@ -12,6 +12,11 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 TEXT = (ROOT / "tests" / "slow.txt").read_text(encoding="utf-8")
 LISTED = [line.split(" ", 1) for line in TEXT.splitlines() if not line.startswith("#")]
+LONG = [
+    line.split(" ", 1)
+    for line in (ROOT / "tests" / "long.txt").read_text(encoding="utf-8").splitlines()
+    if not line.startswith("#")
+]
 
 
 @pytest.fixture(scope="module")
@@ -23,15 +28,29 @@ def measure():
     return module
 
 
-def test_every_listed_test_is_there():
+@pytest.mark.parametrize("listed", [LISTED, LONG])
+def test_every_listed_test_is_there(listed):
     functions = {}
-    for _, name in LISTED:
-        path, *_, function = name.split("::")
+    for _, name in listed:
+        path, *_, function = name.partition("[")[0].split("::")
         if path not in functions:
             tree = ast.parse((ROOT / path).read_text(encoding="utf-8"))
             functions[path] = {node.name for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)}
         assert function in functions[path], name
-    assert len({name for _, name in LISTED}) == len(LISTED) > 10
+    assert len({name for _, name in listed}) == len(listed) > 10
+
+
+@pytest.mark.long
+def test_every_case_that_is_listed_is_one_of_its_test():
+    """A case whose name has changed would be run again, unseen."""
+    import subprocess
+    import sys
+
+    files = sorted({name.partition("::")[0] for _, name in LONG})
+    command = [sys.executable, "-m", "pytest", "--collect-only", "-q", "-m", "long", "-p", "no:cacheprovider", *files]
+    found = subprocess.run(command, cwd=ROOT, capture_output=True, text=True).stdout.splitlines()
+    names = set(found) | {line.partition("[")[0] for line in found}
+    assert [name for _, name in LONG if name not in names] == []
 
 
 def test_what_is_left_keeps_to_the_budget(measure):
@@ -52,7 +71,8 @@ def test_the_slowest_are_listed_until_the_others_keep_to_the_budget(measure):
 def test_a_listed_test_is_left_out_and_one_of_the_same_file_is_run(pytester_folder):
     run = pytester_folder
     assert run("--quick") == {"test_fast"}
-    assert run() == {"test_fast", "test_slow", "test_very_slow"}
+    assert run("-m", "not long") == {"test_fast", "test_slow[1]"}
+    assert run("-m", "long") == {"test_very_slow", "test_slow[2]", "test_listed[3]", "test_listed[4]"}
 
 
 @pytest.fixture
@@ -66,8 +86,10 @@ def pytester_folder(tmp_path):
     tests.mkdir()
     (tests / "conftest.py").write_text((ROOT / "tests" / "conftest.py").read_text(encoding="utf-8"))
     (tests / "slow.txt").write_text("# head\n2.5 tests/test_some.py::test_slow\n")
+    (tests / "long.txt").write_text("# head\n9 tests/test_some.py::test_slow[2]\n9 tests/test_some.py::test_listed\n")
     (tests / "test_some.py").write_text(
         "import pytest\n\n\n@pytest.mark.parametrize('a', [1, 2])\ndef test_slow(a):\n    pass\n\n\n"
+        "@pytest.mark.parametrize('a', [3, 4])\ndef test_listed(a):\n    pass\n\n\n"
         "def test_fast():\n    pass\n\n\n@pytest.mark.long\ndef test_very_slow():\n    pass\n"
     )
     (tmp_path / "pytest.ini").write_text("[pytest]\nmarkers =\n    long: slow\n")
@@ -81,6 +103,6 @@ def pytester_folder(tmp_path):
             check=True,
             env={key: value for key, value in os.environ.items() if key != "PYTEST_ADDOPTS"},
         )
-        return set(re.findall(r"::(\w+)", done.stdout))
+        return set(re.findall(r"::(\S+)", done.stdout))
 
     return run

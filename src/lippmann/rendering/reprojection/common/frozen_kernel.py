@@ -85,7 +85,7 @@ def _collect(value: object, found: list[Array], seen: set[int], depth: int) -> N
     if id(value) in seen or depth > _DEEPEST:
         return
     seen.add(id(value))
-    if isinstance(value, mi.Object) or type(value).__module__.startswith(("drjit.", "mitsuba.")):
+    if isinstance(value, mi.Object) or type(value).__module__.split(".")[0] in ("drjit", "mitsuba"):
         # Arrays without entries have no variable behind them.
         if not dr.is_array_v(value) or dr.width(value) > 0:
             found.append(value)
