@@ -1,17 +1,18 @@
 """``lippmann studio`` as a page meets it: a process is started, and gets views by its WebSocket as a pointer sends.
 
-For each display: seconds from starting the command to the first frame; then an orbit of the model and the eye, a view
-every 16 ms, whether or not frames come: frames a second, and how old a frame is when it comes (since the page sent its
-view, coding and sockets included). With ``--minutes`` the orbit of the first display goes on for so long, with a rest
-of a second in every twenty, and the process's memory is watched.
+For each display and scene: seconds from starting the command to the first frame; then an orbit of the model and the
+eye, a view every 16 ms, whether or not frames come: frames a second, how old a frame is when it comes (since the page
+sent its view, coding and sockets included), and the size of the pictures that are traced. With ``--minutes`` the orbit
+of the first display goes on for so long, with a rest of a second in every twenty, and the process's memory is watched.
 
-python benchmarks/studio_command.py [--minutes 10] [--only mla-square]
+python benchmarks/studio_command.py [--minutes 10] [--only mla-square/teapot]
 """
 
 from __future__ import annotations
 
 import argparse
 import contextlib
+import itertools
 import json
 import math
 import statistics
@@ -21,6 +22,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import psutil
@@ -28,6 +30,7 @@ from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Origin
 
 from harness import save, saved
+from studio import SCENES
 
 #: Displays and the size of the page's picture; the studio traces fewer pixels where it must to be quick.
 DISPLAYS = {"seed-lenticular": (512, 512), "mla-square": (512, 512), "looking-glass-portrait": (384, 512)}
@@ -43,15 +46,19 @@ def main() -> None:
     asked = parser.parse_args()
     result = saved("studio_command")
     cases = result.get("cases", {})
-    for name, size in DISPLAYS.items():
+    for (display, size), (scene, source) in itertools.product(DISPLAYS.items(), SCENES.items()):
+        name = f"{display}/{scene}"
         if asked.only in name:
-            with _studio(name) as studio:
-                cases[name] = studio.first_frame(size) | studio.orbit(size, ORBIT_SECONDS)
+            if scene != source and not Path(source).exists():
+                cases[name] = {"skipped": "the scene is not there"}
+                continue
+            with _studio(display, source) as studio:
+                cases[name] = {"asked": size} | studio.first_frame(size) | studio.orbit(size, ORBIT_SECONDS)
             print(name, cases[name], flush=True)
     save("studio_command", {"cases": cases, "endless": result.get("endless")})
     if asked.minutes:
         name, size = next(iter(DISPLAYS.items()))
-        with _studio(name) as studio:
+        with _studio(name, "teapot") as studio:
             studio.first_frame(size)
             studio.orbit(size, ORBIT_SECONDS)  # all kernels are there
             result["endless"] = studio.endless(size, asked.minutes)
@@ -80,7 +87,7 @@ class Studio:
         return {"start_s": time.perf_counter() - self._began}
 
     def orbit(self, size: tuple[int, int], seconds: float) -> dict[str, Any]:
-        ages, moved, frames = [], 0.0, 0
+        ages, sizes, moved, frames = [], [], 0.0, 0
         began = now = time.perf_counter()
         while now - began < seconds:
             rests = (now - began) % REST_EVERY > REST_EVERY - REST_SECONDS
@@ -91,10 +98,11 @@ class Studio:
             while (wait := due - time.perf_counter()) > 0:
                 frame = self._next(wait)
                 if frame is not None and not rests:
-                    view, samples = frame
+                    view, samples, traced = frame
                     frames += 1
                     if samples == 1 and view in self._sent:
                         ages.append(time.perf_counter() - self._sent[view])
+                        sizes.append(traced)
             now = time.perf_counter()
         ages.sort()
         return {
@@ -103,6 +111,7 @@ class Studio:
             "median_age_ms": 1000 * statistics.median(ages),
             "age_of_99_in_100_ms": 1000 * ages[int(0.99 * (len(ages) - 1))],
             "oldest_ms": 1000 * ages[-1],
+            "size": sorted(sizes)[len(sizes) // 2],
         }
 
     def endless(self, size: tuple[int, int], minutes: int) -> dict[str, Any]:
@@ -129,8 +138,8 @@ class Studio:
         view = {"type": "view", "number": self._number, "size": list(size), "eye": eye, "state": state}
         self._socket.send(json.dumps(view))
 
-    def _next(self, seconds: float) -> tuple[int, int] | None:
-        """Number of the view and samples of the next frame, acknowledged; None of other messages, or of none."""
+    def _next(self, seconds: float) -> tuple[int, int, tuple[int, int]] | None:
+        """View, samples and (width, height) of the next frame, acknowledged; None of other messages, or of none."""
         try:
             message = self._socket.recv(seconds)
         except TimeoutError:
@@ -140,14 +149,14 @@ class Studio:
             if said["type"] == "error":
                 raise RuntimeError(said["line"])
             return None
-        *_, number, view, _, _, samples, _ = _HEADER.unpack_from(message)
+        *_, number, view, width, height, samples, _ = _HEADER.unpack_from(message)
         self._socket.send(json.dumps({"type": "shown", "frame": number}))
-        return view, samples
+        return view, samples, (width, height)
 
 
 @contextlib.contextmanager
-def _studio(display: str) -> Iterator[Studio]:
-    command = [sys.executable, "-c", "from lippmann.cli import main; main()", "studio", "teapot"]
+def _studio(display: str, scene: str) -> Iterator[Studio]:
+    command = [sys.executable, "-c", "from lippmann.cli import main; main()", "studio", scene]
     with tempfile.TemporaryDirectory() as folder:
         began = time.perf_counter()
         with subprocess.Popen(

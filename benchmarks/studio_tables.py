@@ -50,15 +50,22 @@ def command_section(result: dict[str, Any]) -> str:
     lines = [
         "## The studio as a page meets it (`studio_command.py`)",
         "",
-        "`lippmann studio teapot`, its own process, over its WebSocket: a page sends a view every 16 ms as the model",
-        "turns and the eye sways. A frame's age is counted from the sending of its view.",
+        "`lippmann studio`, its own process, over its WebSocket: a page sends a view every 16 ms as the model turns",
+        "and the eye sways. A frame's age is counted from the sending of its view. The picture shrinks until it takes",
+        "30 ms, from half of its sides on 50 ms: its median size stands beside the one that was asked for.",
         "",
-        "| display | first frame after the command | frames/s | median age | 99 of 100 are younger than | oldest |",
-        "|---|---|---|---|---|---|",
+        "| display and scene | asked for | traced | first frame after the command | frames/s | median age "
+        "| 99 of 100 are younger than | oldest |",
+        "|---|---|---|---|---|---|---|---|",
     ]
     for name, case in result["cases"].items():
+        if "skipped" in case:
+            lines.append(f"| {name} | {case['skipped']} | | | | | | |")
+            continue
+        (asked_width, asked_height), (width, height) = case["asked"], case["size"]
         lines.append(
-            f"| {name} | {case['start_s']:.1f} s | {case['frames_per_second']:.0f} | "
+            f"| {name} | {asked_width}x{asked_height} | {width}x{height} | {case['start_s']:.1f} s | "
+            f"{case['frames_per_second']:.0f} | "
             f"{case['median_age_ms']:.0f} ms | {case['age_of_99_in_100_ms']:.0f} ms | {case['oldest_ms']:.0f} ms |"
         )
     endless = result.get("endless")

@@ -159,16 +159,30 @@ def test_those_who_left_are_served_no_more(start):
     assert record.frames == []
 
 
-def test_slow_frames_shrink_to_the_time_that_there_is_and_grow_again():
-    share = 1.0
-    for _ in range(30):
-        share = _next_share(share, 0.2 * share**2)
-    assert 0.2 * share**2 == pytest.approx(render_thread.FRAME_SECONDS, rel=0.05)
+@pytest.mark.parametrize(
+    ("whole", "seconds", "share"),
+    [
+        (0.02, 0.02, 1.0),
+        (0.06, render_thread.FRAME_SECONDS, 0.707),  # still above half of the sides
+        (0.16, 0.04, 0.5),  # half of the sides, rather than a finer pace
+        (0.4, render_thread.COARSE_FRAME_SECONDS, 0.354),
+        (4.0, 0.25, 0.25),  # however slow
+    ],
+)
+def test_slow_frames_shrink_to_the_time_that_there_is_and_grow_again(whole, seconds, share):
+    now = 1.0
+    for _ in range(40):
+        now = _next_share(now, whole * now**2)
+    assert whole * now**2 == pytest.approx(seconds, rel=0.05)
+    assert now == pytest.approx(share, rel=0.03)
+    for _ in range(40):
+        now = _next_share(now, 0.01)
+    assert now == 1.0
+
+
+def test_one_slow_frame_shrinks_the_next_by_a_quarter_at_most():
     assert _next_share(1.0, 10.0) == 0.75
     assert _next_share(render_thread.LEAST_SHARE, 10.0) == render_thread.LEAST_SHARE
-    for _ in range(30):
-        share = _next_share(share, 0.01)
-    assert share == 1.0
 
 
 def test_freed_memory_is_given_back_now_and_then(start, monkeypatch):

@@ -29,8 +29,11 @@ LONGEST_GATHERING, MOST_SAMPLES = 60.0, 2048
 #: Seconds after which freed memory is given back: frames, their codes and the denoiser's pictures leave holes.
 TIDYING = 5.0
 
-#: Seconds that a frame of a moving picture may take; its size shrinks until it does, down to this share of the sides.
-FRAME_SECONDS, LEAST_SHARE = 0.05, 0.25
+#: Seconds that a frame of a moving picture may take, a thirtieth with what coding and sending it takes: its size
+#: shrinks until it does, down to half of the sides.
+FRAME_SECONDS, COARSE_SHARE = 0.03, 0.5
+#: Below that detail counts more than pace: a frame may take so long, and shrinks down to this share of the sides.
+COARSE_FRAME_SECONDS, LEAST_SHARE = 0.05, 0.25
 
 
 class Renderer(Protocol):
@@ -283,5 +286,8 @@ def _next_share(share: float, seconds: float) -> float:
     Rays, and so seconds, go at most with the square of the sides. The first frame of a scene compiles kernels, so that
     one slow frame never shrinks the next by more than a quarter.
     """
-    best = share * math.sqrt(FRAME_SECONDS / max(seconds, 1e-4))
+    of_a_second = share / math.sqrt(max(seconds, 1e-4))
+    best = of_a_second * math.sqrt(FRAME_SECONDS)
+    if best < COARSE_SHARE:
+        best = min(COARSE_SHARE, of_a_second * math.sqrt(COARSE_FRAME_SECONDS))
     return min(1.0, max(LEAST_SHARE, 0.75 * share, min(best, 1.1 * share)))
