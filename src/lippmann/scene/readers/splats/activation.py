@@ -109,7 +109,7 @@ def cleaned(
 
 def sigmoid(logits: FloatArray) -> FloatArray:
     """Opacities in [0, 1] of what trainers optimize."""
-    with np.errstate(over="ignore"):
+    with np.errstate(over="ignore", invalid="ignore"):  # of damaged numbers, which are left out
         return np.asarray(1.0 / (1.0 + np.exp(-logits.astype(np.float32, copy=False))), np.float32)
 
 

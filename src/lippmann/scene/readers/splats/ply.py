@@ -83,6 +83,8 @@ def _rows_of(data: bytes, header: Header, where: str) -> Mapping[str, Rows]:
     position, length = (0, len(words)) if header.order is None else (header.end, len(data))
     for element in header.elements:
         names = [each.name for each in element.properties]
+        if element.name in rows:
+            raise SceneError(f"has element '{element.name[:40]}' twice", where=where, rule="names of elements differ")
         if any(each.count_type is not None for each in element.properties) or len(set(names)) < len(names):
             raise SceneError(
                 f"'{element.name[:40]}' has a list, or a property twice", where=where, rule="splats do not"
@@ -177,7 +179,8 @@ def _packed(rows: Mapping[str, Rows], where: str) -> tuple[Splats, tuple[str, ..
     turn = (_parts(word["packed_rotation"], (20, 10, 0), (10, 10, 10)) - np.float32(0.5)) * 2 * MOST_SMALL
     w_first = largest_left_out(turn, word["packed_rotation"] >> 30)
     harmonics = np.empty((len(vertex), count, 3), np.float32)
-    harmonics[:, 0] = (rgb - np.float32(0.5)) / np.float32(SH_0)
+    with np.errstate(over="ignore", invalid="ignore"):
+        harmonics[:, 0] = (rgb - np.float32(0.5)) / np.float32(SH_0)
     if sh is not None and count > 1:
         bytes_ = sh.view(np.uint8).reshape(len(sh), rest)[: len(vertex)]
         values = (bytes_.astype(np.float32) - np.float32(127.5)) / np.float32(32.0)
