@@ -22,11 +22,13 @@ python benchmarks/studio.py [--minutes 10] [--only mla-square], which keeps the 
 from __future__ import annotations
 
 import argparse
+import itertools
 import os
 import statistics
 import subprocess
 import sys
 import time
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -72,22 +74,27 @@ def main() -> None:
     parser.add_argument("--only", default="")
     asked = parser.parse_args()
     cases: dict[str, Any] = dict(saved("studio").get("cases", {})) if asked.only else {}
-    for display in DISPLAYS:
-        for scene, source in SCENES.items():
-            name = f"{display}/{scene}"
-            if asked.only not in name:
-                continue
-            if source != scene and not Path(source).exists():
-                cases[name] = {"skipped": f"{Path(source).name} is not there"}
-                continue
-            cases[name] = _case(display, source)
-            print(name, cases[name], flush=True)
+    for name, display, source in wanted_cases(DISPLAYS, asked.only, cases):
+        cases[name] = _case(display, source)
+        print(name, cases[name], flush=True)
     result: dict[str, Any] = {"cases": cases, "start": _start()}
     if asked.minutes:
         result["endless"] = _endless(asked.minutes)
     elif asked.only:
         result["endless"] = saved("studio").get("endless")
     save("studio", result)
+
+
+def wanted_cases(displays: Iterable[str], only: str, cases: dict[str, Any]) -> Iterator[tuple[str, str, str]]:
+    """Name, display and scene of each case with ``only`` in its name; ``cases`` is told which scenes are missing."""
+    for display, (scene, source) in itertools.product(displays, SCENES.items()):
+        name = f"{display}/{scene}"
+        if only not in name:
+            continue
+        if source != scene and not Path(source).exists():
+            cases[name] = {"skipped": f"{Path(source).name} is not there"}
+            continue
+        yield name, display, source
 
 
 def _view(display: Any, size: tuple[int, int], turn: float, **request: Any) -> Any:

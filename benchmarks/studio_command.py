@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-import itertools
 import json
 import math
 import statistics
@@ -22,7 +21,6 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import psutil
@@ -30,7 +28,7 @@ from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Origin
 
 from harness import save, saved
-from studio import SCENES
+from studio import wanted_cases
 
 #: Displays and the size of the page's picture; the studio traces fewer pixels where it must to be quick.
 DISPLAYS = {"seed-lenticular": (512, 512), "mla-square": (512, 512), "looking-glass-portrait": (384, 512)}
@@ -46,15 +44,11 @@ def main() -> None:
     asked = parser.parse_args()
     result = saved("studio_command")
     cases = result.get("cases", {})
-    for (display, size), (scene, source) in itertools.product(DISPLAYS.items(), SCENES.items()):
-        name = f"{display}/{scene}"
-        if asked.only in name:
-            if scene != source and not Path(source).exists():
-                cases[name] = {"skipped": "the scene is not there"}
-                continue
-            with _studio(display, source) as studio:
-                cases[name] = {"asked": size} | studio.first_frame(size) | studio.orbit(size, ORBIT_SECONDS)
-            print(name, cases[name], flush=True)
+    for name, display, source in wanted_cases(DISPLAYS, asked.only, cases):
+        size = DISPLAYS[display]
+        with _studio(display, source) as studio:
+            cases[name] = {"asked": size} | studio.first_frame(size) | studio.orbit(size, ORBIT_SECONDS)
+        print(name, cases[name], flush=True)
     save("studio_command", {"cases": cases, "endless": result.get("endless")})
     if asked.minutes:
         name, size = next(iter(DISPLAYS.items()))
@@ -111,7 +105,7 @@ class Studio:
             "median_age_ms": 1000 * statistics.median(ages),
             "age_of_99_in_100_ms": 1000 * ages[int(0.99 * (len(ages) - 1))],
             "oldest_ms": 1000 * ages[-1],
-            "size": sorted(sizes)[len(sizes) // 2],
+            "size": statistics.median_high(sizes),
         }
 
     def endless(self, size: tuple[int, int], minutes: int) -> dict[str, Any]:

@@ -10,13 +10,10 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
-TEXT = (ROOT / "tests" / "slow.txt").read_text(encoding="utf-8")
-LISTED = [line.split(" ", 1) for line in TEXT.splitlines() if not line.startswith("#")]
-LONG = [
-    line.split(" ", 1)
-    for line in (ROOT / "tests" / "long.txt").read_text(encoding="utf-8").splitlines()
-    if not line.startswith("#")
-]
+TEXT, LONG_TEXT = ((ROOT / "tests" / name).read_text(encoding="utf-8") for name in ("slow.txt", "long.txt"))
+LISTED, LONG = (
+    [line.split(" ", 1) for line in text.splitlines() if not line.startswith("#")] for text in (TEXT, LONG_TEXT)
+)
 
 
 @pytest.fixture(scope="module")

@@ -28,10 +28,9 @@ def kept_policy() -> Iterator[None]:
         yield
     finally:
         for thread, policy in _policies().items():
-            if policy != before.get(thread, own):
-                # A thread may have ended since.
-                with suppress(OSError):
-                    scheduler, priority = before.get(thread, own)
+            kept = scheduler, priority = before.get(thread, own)
+            if policy != kept:
+                with suppress(OSError):  # it may have ended since
                     os.sched_setscheduler(thread, scheduler, os.sched_param(priority))
 
 

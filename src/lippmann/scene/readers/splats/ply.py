@@ -152,6 +152,7 @@ def _trained(rows: Rows, where: str) -> tuple[Splats, tuple[str, ...]]:
     )
 
 
+@np.errstate(over="ignore", invalid="ignore")  # of damaged bounds, whose splats are left out
 def _packed(rows: Mapping[str, Rows], where: str) -> tuple[Splats, tuple[str, ...]]:
     vertex, chunk, sh = rows["vertex"], rows.get("chunk"), rows.get("sh")
     names = set() if chunk is None else set(chunk.dtype.names or ())
@@ -170,8 +171,7 @@ def _packed(rows: Mapping[str, Rows], where: str) -> tuple[Splats, tuple[str, ..
         """What lies at ``shares`` between the bounds of each splat's chunk."""
         bounds = _floats(chunk, names)
         low, high = bounds[:, :3][own], bounds[:, 3:][own]
-        with np.errstate(over="ignore", invalid="ignore"):
-            return low + shares * (high - low)
+        return low + shares * (high - low)
 
     word = {name: vertex[name].astype(np.uint32) for name in _PACKED}
     color = _parts(word["packed_color"], (24, 16, 8, 0), (8, 8, 8, 8))
@@ -179,8 +179,7 @@ def _packed(rows: Mapping[str, Rows], where: str) -> tuple[Splats, tuple[str, ..
     turn = (_parts(word["packed_rotation"], (20, 10, 0), (10, 10, 10)) - np.float32(0.5)) * 2 * MOST_SMALL
     w_first = largest_left_out(turn, word["packed_rotation"] >> 30)
     harmonics = np.empty((len(vertex), count, 3), np.float32)
-    with np.errstate(over="ignore", invalid="ignore"):
-        harmonics[:, 0] = (rgb - np.float32(0.5)) / np.float32(SH_0)
+    harmonics[:, 0] = (rgb - np.float32(0.5)) / np.float32(SH_0)
     if sh is not None and count > 1:
         bytes_ = sh.view(np.uint8).reshape(len(sh), rest)[: len(vertex)]
         values = (bytes_.astype(np.float32) - np.float32(127.5)) / np.float32(32.0)
