@@ -175,8 +175,9 @@ def _reference(renderer: Any, view: Any) -> np.ndarray:
     progressive = renderer._progressive
     progressive._denoises = False
     enough = min(REFERENCE_SAMPLES, max(16, REFERENCE_WORK // len(progressive._pixels.column)))
-    while progressive.samples < enough:
-        frame = renderer.refine(view)
+    frame = None
+    while frame is None or progressive.samples < enough:
+        frame = renderer.refine(view) or frame
     assert isinstance(view, LiveView)
     return np.asarray(frame.pixels / 255.0)
 

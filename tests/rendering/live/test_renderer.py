@@ -128,6 +128,22 @@ def test_rest_comes_near_a_long_render(teapot, renderers):
     assert last > first + 3
 
 
+def test_samples_go_where_the_noise_is(renderers):
+    """An empty background needs few; each pixel of it has some, and no sample is counted twice."""
+    renderer = renderers("square")
+    view = LiveView(EYES[0], SIZE, request=RenderRequest(placement=PLACED))
+    renderer.frame(view)
+    seen = np.isfinite(renderer.heights(view))
+    frame = None
+    while frame is None or frame.samples < 40:
+        frame = renderer.refine(view) or frame
+    rest = renderer._progressive
+    taken = rest._taken[rest._pixels.number[..., 0]]
+    assert taken.min() >= 1
+    assert taken[seen].mean() > 1.5 * taken[~seen].mean()
+    assert frame.samples == round(2 * rest._taken.mean())
+
+
 def test_a_move_compiles_nothing(teapot):
     import drjit as dr
 

@@ -18,6 +18,7 @@ import math
 from collections.abc import Callable
 
 from lippmann.device.pbr import microfacet
+from lippmann.device.pbr.array_parts import arrays_of
 from lippmann.device.pbr.gltf_bsdf_parameters import Lobe, Point, Sheen, SurfaceModel
 from lippmann.device.pbr.texture_lookup import Place
 from lippmann.device.types import (
@@ -72,9 +73,14 @@ def _bsdf_class(variant: str) -> type[BSDF]:
     class SurfaceBSDF(mi.BSDF):  # type: ignore[misc, unused-ignore]
         """See the module."""
 
+        # At each launch of a frozen kernel Dr.Jit looks through the attributes of all plugins for arrays. In slots it
+        # does not look: through a model with its many parts, most of them not there, it takes longer than the launch.
+        __slots__ = ("__dict__", "_is_directional", "_is_glossy", "_may_be_sharp", "kinds", "model")
+
         def __init__(self, props: Properties, model: SurfaceModel) -> None:
             super().__init__(props)
             self.model = model
+            self.arrays = arrays_of(model)
             self._is_glossy = model.metal or not model.dull
             present = {
                 scattering: not model.metal,

@@ -51,6 +51,11 @@ def leave_one_out_mean(values: Floats, reach: int, errors: float, bands: Bands) 
     return np.asarray(np.where(count > 2, np.maximum(known, 0), 0), dtype=np.float32)
 
 
+def mean_of_others(values: Floats, reach: int, bands: Bands) -> Floats:
+    """Means of ``(H, W)`` over the other pixels up to ``reach`` pixels away, cut at the edges."""
+    return _mean_of_others(values, _pixels_around(values.shape, reach), reach, bands)
+
+
 def _mean_of_others(values: Floats, count: NDArray[np.float64], reach: int, bands: Bands) -> Floats:
     others = mean_around(values, reach, bands) * count - values
     return np.asarray(others / np.maximum(count - 1, 1), dtype=np.float32)

@@ -21,7 +21,7 @@ def develop(values: Floats, pixels: PixelSet, request: RenderRequest) -> Codes:
     """Codes ``(height, width, 3)`` of the picture of pixels whose linear radiance is ``values`` ``(n, 3)``."""
     if pixels.channels == 3:
         return develop_picture(arrange(values, pixels), pixels, request)
-    codes = _encode(values, request)
+    codes = codes_of(values, request)
     number = pixels.number.reshape(-1)
     picture = np.empty((number.size, 3), np.uint8)
     spread_rows(0, number.size, codes, number, picture)
@@ -30,7 +30,7 @@ def develop(values: Floats, pixels: PixelSet, request: RenderRequest) -> Codes:
 
 def develop_picture(picture: Floats, pixels: PixelSet, request: RenderRequest) -> Codes:
     """Codes of a linear picture ``(height, width, 3)``, black where no pixel is seen."""
-    codes = _encode(picture.reshape(-1, 3), request).reshape(picture.shape)
+    codes = codes_of(picture.reshape(-1, 3), request).reshape(picture.shape)
     codes[pixels.number < 0 if pixels.channels == 3 else (pixels.number < 0)[..., 0]] = 0
     return codes
 
@@ -47,7 +47,8 @@ def arrange(values: Floats, pixels: PixelSet) -> Floats:
     return picture.reshape(number.shape)
 
 
-def _encode(values: Floats, request: RenderRequest) -> Codes:
+def codes_of(values: Floats, request: RenderRequest) -> Codes:
+    """Codes ``(n, 3)`` of linear radiance ``(n, 3)``."""
     codes = np.empty(values.shape, np.uint8)
     encode_rows(
         0, len(values), np.ascontiguousarray(values, np.float32), request.tone_map == "pbr-neutral", *_tables(), codes

@@ -27,6 +27,7 @@ from lippmann.rendering.transport.volume_path import VolumePathIntegrator
 from lippmann.scene.matrices import inverse, rotation_of
 
 Floats = NDArray[np.float32]
+Indices = NDArray[np.int64]
 Matrix = NDArray[np.float64]
 Rows = list[list[Float64]]
 #: Integrators of physically based light.
@@ -38,7 +39,7 @@ WARMING_LAUNCHES = 4
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """Samples of n pixels.
+    """Samples of the n pixels of a wavefront.
 
     Attributes
     ----------
@@ -53,27 +54,53 @@ class Samples:
 
 
 class Lanes:
-    """The lanes of a wavefront: some pixels, so many samples of each in each of so many streams, in this order."""
+    """The lanes of a wavefront: so many samples of some pixels in each of so many streams, in this order.
 
-    def __init__(self, pixels: PixelSet, part: slice, streams: int, count: int) -> None:
-        self.streams, self.count = streams, count
-        each = streams * count
-        column, row, channel = (np.repeat(values[part], each) for values in (pixels.column, pixels.row, pixels.channel))
-        self.pixels = len(column) // each
-        stream = np.tile(np.repeat(np.arange(streams, dtype=np.uint32), count), self.pixels)
-        sample = np.tile(np.arange(count, dtype=np.uint32), self.pixels * streams)
+    Parameters
+    ----------
+    pixels:
+        The pixels of a picture.
+    streams:
+        Streams of samples.
+    counts:
+        ``(n,)``: samples of each of them in each stream.
+    first:
+        ``(n,)``: number of the first of them; 0 for all if left out.
+    """
+
+    def __init__(self, pixels: PixelSet, streams: int, counts: Indices, first: Indices | None = None) -> None:
+        #: Numbers of the pixels that have lanes.
+        self.pixels = np.flatnonzero(counts)
+        each = counts[self.pixels]
+        self._shape = len(self.pixels), streams
+        self._is_even = bool((each == each[0]).all())
+        # Of each run of samples of a pixel in a stream: how long it is, and where it begins.
+        runs = np.repeat(each, streams)
+        self._starts = np.cumsum(runs) - runs
+        column, row, channel = (
+            np.repeat(values[self.pixels], each * streams) for values in (pixels.column, pixels.row, pixels.channel)
+        )
+        stream = np.repeat(np.tile(np.arange(streams, dtype=np.uint32), len(each)), runs)
+        begin = np.zeros(len(each), np.int64) if first is None else first[self.pixels]
+        sample = np.arange(len(stream)) + np.repeat(np.repeat(begin, streams) - self._starts, runs)
         # Held here, since the device reads them in place.
-        self._host = [aligned(values) for values in (column, row, channel, stream, sample)]
+        self._host = [aligned(values) for values in (column, row, channel, stream, sample.astype(np.uint32))]
         self.arrays = [mi.UInt32(values) for values in self._host]
 
-    def numbers(self, first: int, seed: int) -> list[UInt32]:
-        """The number of the first sample of each stream, and the seed of the first stream, on the device."""
-        return [dr.opaque(mi.UInt32, first), dr.opaque(mi.UInt32, seed)]
+    def sums(self, values: Floats) -> Floats:
+        """Sums ``(pixels, streams)`` of the values of lanes."""
+        if self._is_even:
+            return np.asarray(values.reshape(*self._shape, -1).sum(axis=2))
+        return np.add.reduceat(values, self._starts).reshape(self._shape)
+
+    def firsts(self, values: Floats) -> Floats:
+        """The values ``(pixels,)`` of each pixel's first lane."""
+        return np.asarray(values[self._starts[:: self._shape[1]]])
 
 
 def _two_lanes() -> Lanes:
     pair = np.zeros(2, np.uint32)
-    return Lanes(PixelSet(pair, pair, pair, np.zeros((1, 1, 1), np.int32)), slice(0, 2), 1, 1)
+    return Lanes(PixelSet(pair, pair, pair, np.zeros((1, 1, 1), np.int32)), 1, np.ones(2, np.int64))
 
 
 class PlacedDisplay:
@@ -118,17 +145,14 @@ class LiveTracer:
     def _warm_up(self) -> None:
         """Record the kernel: the first launches change how scenes of several emitters lie on the device."""
         for _ in range(WARMING_LAUNCHES):
-            self.trace(_two_lanes(), PlacedDisplay(np.eye(4)), first=0, seed=0)
+            self.trace(_two_lanes(), PlacedDisplay(np.eye(4)), seed=0)
 
-    def trace(self, lanes: Lanes, placed: PlacedDisplay, *, first: int, seed: int) -> Samples:
-        """Samples ``first`` to ``first + lanes.count`` of each stream of the pixels of ``lanes``."""
-        found = self._kernel(*lanes.arrays, *lanes.numbers(first, seed), placed.rows, placed.height)
+    def trace(self, lanes: Lanes, placed: PlacedDisplay, *, seed: int) -> Samples:
+        """The samples of ``lanes``."""
+        found = self._kernel(*lanes.arrays, dr.opaque(mi.UInt32, seed), placed.rows, placed.height)
         red, green, blue, height = (np.asarray(values) for values in found)
-        shape = lanes.pixels, lanes.streams, lanes.count
-        sums = np.empty((lanes.streams, lanes.pixels, 3), np.float32)
-        for color, values in enumerate((red, green, blue)):
-            sums[:, :, color] = values.reshape(shape).sum(axis=2).T
-        return Samples(sums, height.reshape(lanes.pixels, -1)[:, 0].copy())
+        sums = np.stack([lanes.sums(values).T for values in (red, green, blue)], axis=-1)
+        return Samples(sums, lanes.firsts(height))
 
     def _sample(
         self,
@@ -137,12 +161,11 @@ class LiveTracer:
         channel: UInt32,
         stream_of: UInt32,
         sample: UInt32,
-        first: UInt32,
         seed: UInt32,
         rows: Rows,
         height_row: list[Float],
     ) -> tuple[Array, ...]:
-        ray, stream = self._rays.sampled((column, row, channel), stream_of, sample + first, seed, rows)
+        ray, stream = self._rays.sampled((column, row, channel), stream_of, sample, seed, rows)
         stream.half = stream_of
         integrator = self._integrator
         if isinstance(integrator, PathIntegrator):
@@ -186,12 +209,10 @@ class FeatureTracer:
         return self._kernel.recordings
 
     def trace(self, lanes: Lanes, placed: PlacedDisplay, *, seed: int) -> tuple[Floats, Floats]:
-        """Means of albedo and normal ``(n, 3)`` over the samples of ``lanes``; normals in the display's frame."""
-        found = self._kernel(*lanes.arrays, *lanes.numbers(0, seed), placed.rows)
-        means = np.stack(
-            [np.asarray(values).reshape(lanes.pixels, -1).mean(axis=1, dtype=np.float32) for values in found], axis=-1
-        )
-        return means[:, :3], means[:, 3:] @ placed.rotation.T
+        """Sums of albedo and normal ``(n, 3)`` over the samples of ``lanes``; normals in the display's frame."""
+        found = self._kernel(*lanes.arrays, dr.opaque(mi.UInt32, seed), placed.rows)
+        sums = np.concatenate([lanes.sums(np.asarray(values)) for values in found], axis=1)
+        return sums[:, :3], sums[:, 3:] @ placed.rotation.T
 
     def _features(
         self,
@@ -200,11 +221,10 @@ class FeatureTracer:
         channel: UInt32,
         stream_of: UInt32,
         sample: UInt32,
-        first: UInt32,
         seed: UInt32,
         rows: Rows,
     ) -> tuple[Array, ...]:
-        ray, _ = self._rays.sampled((column, row, channel), stream_of, sample + first, seed, rows)
+        ray, _ = self._rays.sampled((column, row, channel), stream_of, sample, seed, rows)
         albedo, normal, _ = self._surfaces.features(ray)
         # Of the lanes' width, also where all lanes see the same.
         zero = mi.Float(sample) * 0

@@ -26,7 +26,7 @@ from lippmann.scene.placement import Placement
 from lippmann.scene.scene import Scene
 
 if TYPE_CHECKING:
-    from lippmann.rendering.live.live_tracer import PlacedDisplay
+    from lippmann.rendering.live.live_tracer import Lanes, PlacedDisplay
     from lippmann.rendering.live.progressive import Progressive
     from lippmann.rendering.live.scene_kernels import SceneKernels
 
@@ -83,6 +83,7 @@ class LiveRenderer:
         self._display = display
         self._map: EyeMap | None = None
         self._last_pixels: tuple[object, PixelSet] | None = None
+        self._last_lanes: tuple[PixelSet, list[Lanes]] | None = None
         self._shown: _Stand | None = None
         self._height: Floats = np.zeros(0, np.float32)
         self._progressive: Progressive | None = None
@@ -250,7 +251,8 @@ class LiveRenderer:
         return SceneKernels(session)
 
     def _forget(self) -> None:
-        self._map, self._last_pixels, self._shown, self._progressive = None, None, None, None
+        self._map, self._last_pixels, self._last_lanes = None, None, None
+        self._shown, self._progressive = None, None
 
     def _stand(self, view: LiveView, request: RenderRequest, seconds: dict[str, float]) -> _Stand:
         from lippmann.rendering.live.live_tracer import PlacedDisplay
@@ -282,19 +284,26 @@ class LiveRenderer:
         return pixels
 
     def _trace_once(self, stand: _Stand, is_stale: IsStale) -> tuple[Floats, Floats] | None:
-        from lippmann.rendering.live.live_tracer import Lanes
-
         tracer = self._kernels.tracer(self._display, stand.request)
-        count, step = len(stand.pixels.column), self._kernels.most_lanes
+        count = len(stand.pixels.column)
         values, heights = np.empty((count, 3), np.float32), np.empty(count, np.float32)
-        for start in range(0, count, step):
+        for lanes in self._lanes_of(stand.pixels):
             if is_stale():
                 return None
-            part = slice(start, min(start + step, count))
-            lanes = Lanes(stand.pixels, part, 1, 1)
-            found = tracer.trace(lanes, stand.placed, first=0, seed=stand.request.seed)
-            values[part], heights[part] = found.sums[0], found.height
+            found = tracer.trace(lanes, stand.placed, seed=stand.request.seed)
+            values[lanes.pixels], heights[lanes.pixels] = found.sums[0], found.height
         return values, heights
+
+    def _lanes_of(self, pixels: PixelSet) -> list[Lanes]:
+        """Wavefronts of one sample of each pixel: kept, since an eye that rests sees the same pixels of what moves."""
+        from lippmann.rendering.live.live_tracer import Lanes
+
+        if self._last_lanes is None or self._last_lanes[0] is not pixels:
+            count, step = len(pixels.column), self._kernels.most_lanes
+            number = np.arange(count)
+            parts = [(number // step == part).astype(np.int64) for part in range(-(-count // step))]
+            self._last_lanes = pixels, [Lanes(pixels, 1, once) for once in parts]
+        return self._last_lanes[1]
 
 
 def _moving(request: RenderRequest) -> RenderRequest:
