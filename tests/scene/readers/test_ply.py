@@ -133,6 +133,12 @@ def test_properties_that_fill_gaps_may_share_a_name(read):
         read(text_file().replace(b"property float y", b"property float x"))
 
 
+def test_an_element_that_comes_twice_is_refused(read):
+    again = b"element vertex 1\nproperty float x\nend_header"
+    with pytest.raises(SceneError, match="has element 'vertex' twice"):
+        read(text_file().replace(b"end_header", again))
+
+
 def strips(*lists):
     rows = "\n".join(" ".join(map(str, vertex)) for vertex in VERTICES)
     lines = "\n".join(f"{len(one)} " + " ".join(map(str, one)) for one in lists)

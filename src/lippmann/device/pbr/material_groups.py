@@ -43,11 +43,16 @@ _USES: dict[str, tuple[tuple[int, ...], ...]] = {
 
 @dataclass(frozen=True)
 class Variant:
-    """A material as one mesh wears it: ``tinted`` and ``faded`` say that its vertex colours and their alpha count."""
+    """A material as one mesh wears it.
+
+    ``tinted`` and ``faded`` say that the mesh's vertex colours and their alpha count, ``alone`` that its shape cannot
+    tell several materials apart.
+    """
 
     material: int
     tinted: bool = False
     faded: bool = False
+    alone: bool = False
 
 
 @dataclass(frozen=True)
@@ -155,10 +160,10 @@ def textures_of(m: Material) -> dict[str, Texture]:
 def _key(m: Material, variant: Variant, store: TextureStore) -> tuple[object, ...]:
     structure = structure_of(m, variant.faded, store)
     glass = structure.kind in ("glass", "pane")  # their refractive index is no texture
-    alone = glass or absorption(m) is not None or (glows(m, store) and not m.unlit)
+    alone = variant.alone or glass or absorption(m) is not None or (glows(m, store) and not m.unlit)
     looks: list[object] = []
     for name, texture in textures_of(m).items():
         varying = [store.constant(texture, channels) is None for channels in _USES.get(name, ())]
         unpoolable = None if texture.image.pixels.dtype == np.uint8 else id(texture.image)
         looks.append((name, sampler_key(texture), tuple(varying), unpoolable))
-    return (variant.material if alone else None, structure, tuple(looks), variant.tinted, variant.faded)
+    return (variant.material if alone else None, structure, tuple(looks), variant.tinted, variant.faded, variant.alone)

@@ -204,7 +204,7 @@ def _variant(description: SceneDescription, mesh: int) -> Variant:
     colors = description.meshes[mesh].colors
     material = description.meshes[mesh].material
     if colors is None:
-        return Variant(material)
+        return Variant(material, alone=description.meshes[mesh].stands_for is not None)
     fades = colors.shape[1] == 4 and description.materials[material].alpha_mode != "opaque"
     return Variant(material, tinted=True, faded=fades)
 

@@ -18,6 +18,7 @@ from lippmann.device.pbr.emitters import glow
 from lippmann.device.pbr.instancing import CopiedMesh, choose_instances
 from lippmann.device.pbr.material_groups import Variant
 from lippmann.device.pbr.materials import Finish
+from lippmann.device.pbr.round_shapes import can_wear, keeps_round, round_shape
 from lippmann.device.pbr.texture_lookup import ALPHA_ATTRIBUTE, COLOR_ATTRIBUTE, MEMBER_ATTRIBUTE, uv_attribute
 from lippmann.device.types import Float, Shape
 from lippmann.scene.values.description import FloatArray, IndexArray, Matrix, Mesh
@@ -80,6 +81,7 @@ def make_shapes(
     SceneError
         The shapes do not fit the memory.
     """
+    round_shapes, placements = _make_round(placements)
     # Meshes that are always placed together, as the primitives of one glTF mesh are, share their instances.
     together: dict[tuple[bool, bytes], list[Piece]] = {}
     for dress, matrices in placements:
@@ -88,8 +90,8 @@ def make_shapes(
     groups = {number: _count_copies(pieces) for number, pieces in enumerate(together.values())}
     instanced = choose_instances(groups, memory, name=name)
     merged = [piece for number, pieces in enumerate(together.values()) if number not in instanced for piece in pieces]
-    shapes: list[Shape] = []
-    finishes: list[Finish | None] = []
+    shapes: list[Shape] = [shape for shape, _ in round_shapes]
+    finishes: list[Finish | None] = [finish for _, finish in round_shapes]
     for shape, finish in _merge(merged):
         shapes.append(shape)
         finishes.append(finish)
@@ -99,6 +101,24 @@ def make_shapes(
             shapes.extend(instances)
             finishes.extend([None] * len(instances))
     return shapes, finishes
+
+
+def _make_round(
+    placements: Sequence[tuple[Dress, Matrix]],
+) -> tuple[list[tuple[Shape, Finish]], list[tuple[Dress, Matrix]]]:
+    """Shapes of what stands for round bodies that can be traced as such, and the placements that are left."""
+    made: list[tuple[Shape, Finish]] = []
+    left: list[tuple[Dress, Matrix]] = []
+    for dress, matrices in placements:
+        body, finish = dress.mesh.stands_for, dress.finish
+        fits = np.zeros(len(matrices), bool)
+        if body is not None and can_wear(finish):
+            fits = keeps_round(body, matrices)
+        if body is not None and fits.any():
+            made.append((round_shape(body, matrices[fits], finish.bsdf), finish))
+        if not fits.all():
+            left.append((dress, matrices[~fits]))
+    return made, left
 
 
 def _is_instantiable(dress: Dress) -> bool:

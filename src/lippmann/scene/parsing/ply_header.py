@@ -64,7 +64,8 @@ def read_header(data: bytes, where: str) -> Header:
     Raises
     ------
     SceneError
-        The bytes are no PLY file, or its header has no end, or a line or a format that no header has.
+        The bytes are no PLY file, or its header has no end, or a line or a format that no header has, or an element or
+        a property twice.
     """
     if not data.startswith((b"ply\n", b"ply\r")):
         raise SceneError("is no PLY file", where=where, rule="one begins with the line 'ply'")
@@ -92,6 +93,10 @@ def read_header(data: bytes, where: str) -> Header:
             _read_declaration(header, words, f"{where}:{number}")
     if form != "ascii" and form not in _BYTE_ORDERS:
         raise SceneError(f"format '{form}'", where=where, rule=f"known are ascii, {', '.join(_BYTE_ORDERS)}")
+    known = [element.name for element in header.elements]
+    if len(set(known)) < len(known):
+        twice = next(name for name in known if known.count(name) > 1)
+        raise SceneError(f"has element '{twice[:40]}' twice", where=where, rule="names of elements differ")
     for element in header.elements:
         names = [each.name for each in element.properties if each.name in _MEANINGFUL]
         if len(set(names)) < len(names):

@@ -163,7 +163,8 @@ def _ball(name: str, detail: int, material: int) -> Mesh:
 
     sphere = trimesh.creation.icosphere(subdivisions=detail)
     points = np.asarray(sphere.vertices, np.float32)
-    return Mesh(name, points, np.asarray(sphere.faces, np.uint32), material, normals=points)
+    faces = np.asarray(sphere.faces, np.uint32)
+    return Mesh(name, points, faces, material, normals=points, stands_for="ball")
 
 
 def _stick(name: str, material: int) -> Mesh:
@@ -175,4 +176,5 @@ def _stick(name: str, material: int) -> Mesh:
     upper = np.stack([here, after + _SIDES, here + _SIDES], axis=1)
     points = np.concatenate([ring, ring + np.array([0.0, 0.0, 1.0])]).astype(np.float32)
     faces = np.concatenate([lower, upper]).astype(np.uint32)
-    return Mesh(name, points, faces, material, normals=np.concatenate([ring, ring]).astype(np.float32))
+    normals = np.concatenate([ring, ring]).astype(np.float32)
+    return Mesh(name, points, faces, material, normals=normals, stands_for="rod")

@@ -26,6 +26,7 @@ Color = tuple[float, float, float]
 Wrap = Literal["repeat", "mirror", "clamp"]
 Filter = Literal["linear", "nearest"]
 AlphaMode = Literal["opaque", "mask", "blend"]
+Round = Literal["ball", "rod"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,7 +121,9 @@ class Mesh:
     ``positions`` ``(n, 3)``, ``faces`` ``(m, 3)`` counter-clockwise seen from the front, ``normals`` ``(n, 3)`` unit or
     None (flat), ``uvs`` a tuple of ``(n, 2)`` (v down from the image's top row, as in glTF), ``colors`` ``(n, 3 or 4)``
     linear or None. Normal maps take the tangent frame of the uv parametrisation. ``fitted``: whether displays are
-    fitted to it; not so a light source around the scene.
+    fitted to it; not so a light source around the scene. ``stands_for``: the round body that the triangles stand for, a
+    ball of radius 1 about the origin, or a rod of radius 1 from there to (0, 0, 1), open at its ends; what can trace
+    such bodies does so instead.
     """
 
     name: str
@@ -131,6 +134,7 @@ class Mesh:
     uvs: tuple[FloatArray, ...] = ()
     colors: FloatArray | None = None
     fitted: bool = True
+    stands_for: Round | None = None
 
 
 @dataclass(frozen=True, eq=False)
