@@ -6,6 +6,7 @@ import itertools
 from functools import lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lippmann.scene.matrices import Bounds
 from lippmann.scene.splat_clouds import typical_points
@@ -21,6 +22,8 @@ _LARGE = 1_000_000
 _VERTICES_AT_A_TIME = 1 << 14
 #: Of more points of copies than this a box stands for them.
 _COPIED_POINTS = 5_000_000
+#: Of more points of copies those copies are left out first that lie within the others.
+_MANY = 100_000
 
 
 def extreme_points_of(description: SceneDescription) -> Bounds:
@@ -35,6 +38,8 @@ def extreme_points_of(description: SceneDescription) -> Bounds:
         points = farthest_points(used_positions(description.meshes[mesh]))
         if not len(points) or not len(places):
             continue
+        if len(points) * len(places) > _MANY:
+            places = places[_may_lie_outside(points, places)]
         if len(points) * len(places) > _COPIED_POINTS:
             points = np.array(list(itertools.product(*zip(points.min(axis=0), points.max(axis=0), strict=True))))
         found.append(farthest_points(_copies(points, places)))
@@ -63,6 +68,30 @@ def farthest_points(points: Bounds) -> Bounds:
         index = np.where(farthest > best, start + first, index)
         best = np.maximum(farthest, best)
     return points[np.unique(index)]
+
+
+def _may_lie_outside(points: Bounds, places: Matrix) -> NDArray[np.bool_]:
+    """Which of the copies of points ``(n, 3)`` at ``(k, 4, 4)`` may hold a point that lies farthest in a direction.
+
+    All points of a copy lie within its radius of its origin. So nothing of it lies farthest where another's origin lies
+    farther by both radii.
+    """
+    centers = places[:, :3, 3] - (places[:, :3, 3].min(axis=0) + places[:, :3, 3].max(axis=0)) / 2.0
+    radius = np.linalg.norm(places[:, :3, :3], axis=(1, 2)) * np.linalg.norm(points, axis=1).max()
+    directions = _directions(_DIRECTIONS)
+    least = np.full(len(directions), -np.inf, np.float32)
+    parts = [slice(start, start + _VERTICES_AT_A_TIME) for start in range(0, len(places), _VERTICES_AT_A_TIME)]
+    for part in parts:
+        reach = centers[part].astype(np.float32) @ directions.T - radius[part, None].astype(np.float32)
+        least = np.maximum(least, reach.max(axis=0))
+    slack = np.float32(1e-5) * np.float32(np.abs(centers).max() + radius.max())
+    found = [
+        (centers[part].astype(np.float32) @ directions.T + radius[part, None].astype(np.float32) >= least - slack).any(
+            axis=1
+        )
+        for part in parts
+    ]
+    return np.concatenate(found)
 
 
 def used_positions(mesh: Mesh) -> Bounds:

@@ -68,9 +68,9 @@ class LightReader:
         kind = record["kind"]
         if kind is None:
             return
-        world = self.scene_from_stage @ np.array(record["world"], np.float64).reshape(4, 4)
+        world = _world(record, self.scene_from_stage)
         if kind.startswith("DomeLight"):
-            self._add_dome(record, np.array(record["world"], np.float64).reshape(4, 4))
+            self._add_dome(record, world)
         elif kind == "DistantLight":
             self._add_distant(record, world)
         elif kind == "SphereLight":
@@ -143,16 +143,22 @@ class LightReader:
         else:
             pixels = np.ones((2, 4, 3), np.float32)
         stands_on_z = record["pole"] == "Z" or (record["pole"] == "scene" and self.up == "Z")
-        turn = rigid(self.scene_from_stage @ world @ (_Y_TO_Z if stands_on_z else np.eye(4)))
+        turn = rigid(world @ (_Y_TO_Z if stands_on_z else np.eye(4)))
         turn[:3, 3] = 0.0
         self.environment = Environment(
             np.asarray(pixels * np.array(color, np.float32), np.float32), turn @ _HALF_TURN, record["name"]
         )
 
 
+def _world(record: Record, scene_from_stage: Matrix) -> Matrix:
+    """Where a record stands in the scene; numbers of damaged files need not be finite."""
+    with np.errstate(invalid="ignore", over="ignore"):
+        return np.asarray(scene_from_stage @ np.array(record["world"], np.float64).reshape(4, 4), np.float64)
+
+
 def camera_of(record: Record, scene_from_stage: Matrix) -> Camera | None:
     """A camera; None of one without extent."""
-    world = scene_from_stage @ np.array(record["world"], np.float64).reshape(4, 4)
+    world = _world(record, scene_from_stage)
     width, height, focal = record["width"], record["height"], record["focal_length"]
     unit = float(np.cbrt(np.linalg.det(scene_from_stage[:3, :3])))
     focus = record["focus_distance"] * unit

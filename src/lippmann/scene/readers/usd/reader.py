@@ -75,7 +75,8 @@ def describe(tree: Record, arrays: Sequence[NDArray[np.generic]], path: Path, as
     reader = MeshReader(arrays, {number: each.uv_names for number, each in enumerate(surfaces)}, path.name)
     content = _Content(surfaces)
     for record in tree["meshes"]:
-        worlds = scene_from_stage @ np.asarray(arrays[record["worlds"]], np.float64)
+        with np.errstate(invalid="ignore", over="ignore"):  # such places are refused next
+            worlds = scene_from_stage @ np.asarray(arrays[record["worlds"]], np.float64)
         if not np.abs(worlds).max() < _FARTHEST:
             raise SceneError(f"mesh {record['name']} lies beyond all bounds", where=path.name)
         for part in reader.parts(record):
