@@ -191,8 +191,8 @@ def photograph(path: Path) -> None:
         depth[seen] = (away - bulge)[seen]
         color[seen] = (rng.uniform(0.2, 0.9, 3) * (0.3 + 0.7 * bulge[..., None] / radius))[seen]
     Image.fromarray((255 * color.clip(0, 1)).astype(np.uint8)).save(path, quality=92)
-    near = (65535 * (3.0 - depth[::4, ::4]) / 2.2).clip(0, 65535).astype(np.uint16)
-    Image.fromarray(near).save(path.with_name(f"{path.stem}-depth.png"))
+    millimeters = (1000 * depth[::4, ::4]).astype(np.uint16)
+    Image.fromarray(millimeters).save(path.with_name(f"{path.stem}-depth.png"))
 
 
 FILES: dict[str, Callable[[Path], None]] = {

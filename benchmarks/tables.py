@@ -17,6 +17,7 @@ import estimate_coverage_tables
 import first_picture_tables
 import goals_tables
 import kernel_profile_tables
+import scene_file_tables
 import studio_tables
 from harness import RESULTS, saved
 
@@ -370,71 +371,6 @@ plain suite replays them.
 """
 
 
-def _splats(result: dict[str, Any]) -> str:
-    rows = [
-        "| splats | file | rays | reading | preparing | whole render | per ray | memory at most |",
-        "|---|---|---|---|---|---|---|---|",
-    ]
-    for row in result["rows"]:
-        rows.append(
-            f"| {row['splats']:,} | {row['file_bytes'] / 1e6:.0f} MB | {row['rays'] / 1e6:.1f} M | "
-            f"{row['load_seconds']:.1f} s | {row['build_seconds']:.1f} s | {row['render_seconds']:.0f} s | "
-            f"{1e6 * row['render_seconds'] / row['rays']:.1f} us | {row['peak_bytes'] / 2**30:.1f} GiB |"
-        )
-    width, height = result["rows"][0]["pixels"]
-    return f"""## Gaussian splats (`splats.py`)
-
-Splats sampled from the bundled `{result["scene"]}`, with harmonics of degree 3, for `{result["display"]}`:
-{width}x{height} pixels, whose sub-pixels have rays of their own. Seconds are the processor's, of all threads together,
-as the machine was shared: two cores of one's own take half of them.
-
-{chr(10).join(rows)}
-"""
-
-
-def _volumes(result: dict[str, Any]) -> str:
-    rows = [
-        "| transfer function | rays | reading | processor, reading and rendering | per ray | memory at most |",
-        "|---|---|---|---|---|---|",
-    ]
-    for row in result["rows"]:
-        rows.append(
-            f"| `{row['transfer_function']}` | {row['rays'] / 1e6:.1f} M | {row['seconds_read']:.1f} s | "
-            f"{row['processor_seconds']:.0f} s | {1e6 * row['processor_seconds'] / row['rays']:.1f} us | "
-            f"{row['peak_bytes'] / 2**30:.1f} GiB |"
-        )
-    width, height = result["rows"][0]["panel"]
-    size = " x ".join(map(str, result["size"]))
-    return f"""## Volumes (`volumes.py`)
-
-A synthetic CT of a head, {size} voxels of 16 bits, for `{result["display"]}`: {width}x{height} pixels, whose sub-pixels
-have rays of their own. Seconds of the processor are those of all threads together, as the machine was shared.
-
-{chr(10).join(rows)}
-"""
-
-
-def _blender(result: dict[str, Any]) -> str:
-    rows = [
-        "| instances | triangles | `.blend` | as glTF | Blender, start to end | reading the glTF file |",
-        "|---|---|---|---|---|---|",
-    ]
-    for row in result["rows"]:
-        export, read = (row[f"{step}_seconds"]["median"] for step in ("export", "read"))
-        rows.append(
-            f"| {row['instances']} of {row['meshes']} meshes | {row['triangles']:,} "
-            f"| {row['blend_bytes'] / 1e6:.1f} MB | {row['glb_bytes'] / 1e6:.1f} MB "
-            f"| {export:.1f} s | {1000 * read:.0f} ms |"
-        )
-    return f"""## Blender files (`blender.py`)
-
-The scene of `examples/blender_scene.py`, exported by Blender {result["blender"]} (its Python module) and read; medians
-of {result["runs"]} runs.
-
-{chr(10).join(rows)}
-"""
-
-
 def _viewer(result: dict[str, Any]) -> str:
     found = result["median"]
     width, height = result["pixels"]
@@ -461,9 +397,10 @@ SECTIONS = {
     "reuse": _reuse,
     "weave": _weave,
     "cycles": _cycles,
-    "splats": _splats,
-    "blender": _blender,
-    "volumes": _volumes,
+    "splats": scene_file_tables.splats,
+    "blender": scene_file_tables.blender,
+    "volumes": scene_file_tables.volumes,
+    "formats": scene_file_tables.formats,
     "tachyon": _tachyon,
     "full_rate": _full_rate,
     "kernel_profile": kernel_profile_tables.describe,

@@ -1,5 +1,7 @@
 """A helper process answers, ends by itself, and is replaced where it broke down."""
 
+import subprocess
+import sys
 import time
 
 import pytest
@@ -72,6 +74,16 @@ def test_a_process_that_had_nothing_to_do_is_started_anew(helper):
         time.sleep(0.05)
     assert process.ask(b"cd", where="f") == b"dc"
     assert process._process is not first
+
+
+def test_it_ends_with_the_process_that_started_it():
+    program = f"""
+from lippmann.runtime.helper_process import HelperProcess
+process = HelperProcess({ECHO.format(idle=10.0)!r}, 30.0)
+assert process.ask(b"ab", where="f") == b"ba"
+"""
+    ended = subprocess.run([sys.executable, "-W", "error", "-c", program], capture_output=True, check=True)
+    assert ended.stderr == b""
 
 
 def test_an_answer_beyond_the_memory_is_refused(helper):

@@ -6,6 +6,7 @@ Requests and answers are bytes, each after its length.
 
 from __future__ import annotations
 
+import atexit
 import os
 import select
 import struct
@@ -50,6 +51,7 @@ class HelperProcess:
         self._process: subprocess.Popen[bytes] | None = None
         self._parent = 0
         self._lock = threading.Lock()
+        atexit.register(self._end)
 
     def ask(self, request: bytes, *, where: str) -> bytes:
         """The answer to a request; ``where`` is the file that it is about.
