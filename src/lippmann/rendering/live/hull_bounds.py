@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 
 from lippmann.scene.extreme_points import used_positions
@@ -16,6 +17,10 @@ from lippmann.scene.values.description import Matrix, SceneDescription
 _MOST_VERTICES = 2_000_000
 #: Vertices below which a hull saves nothing.
 _FEW = 64
+#: Vertices of copies above which those copies are left out first that lie within the others.
+_MANY = 100_000
+#: Distances of copies from sides of a hull that are looked at together.
+_DISTANCES_AT_A_TIME = 1 << 24
 
 
 def bounds_by_hull(scene: Scene) -> Callable[[Matrix], Bounds]:
@@ -29,6 +34,10 @@ def bounds_by_hull(scene: Scene) -> Callable[[Matrix], Bounds]:
         return scene.bounds_in
     placed = [
         (used_positions(description.meshes[mesh]), places) for mesh, places in description.fitted_placements.items()
+    ]
+    placed = [
+        (points, places[_may_lie_outside(points, places)] if len(points) * len(places) > _MANY else places)
+        for points, places in placed
     ]
     if sum(len(points) * len(places) for points, places in placed) > _MOST_VERTICES:
         return scene.bounds_in
@@ -46,6 +55,27 @@ def bounds_by_hull(scene: Scene) -> Callable[[Matrix], Bounds]:
         return np.stack([points.min(axis=0), points.max(axis=0)])
 
     return bounds_in
+
+
+def _may_lie_outside(points: Bounds, places: Matrix) -> NDArray[np.bool_]:
+    """Which of the copies of points ``(n, 3)`` at ``(k, 4, 4)`` may hold a corner of the hull of all.
+
+    All points of a copy lie within its radius of its origin. Where the origin lies below all sides of the hull of the
+    origins by more than twice the largest radius, some other copy lies farther out in every direction.
+    """
+    origins = places[:, :3, 3]
+    radius = float(np.linalg.norm(places[:, :3, :3], axis=(1, 2)).max() * np.linalg.norm(points, axis=1).max())
+    try:
+        sides = ConvexHull(origins).equations  # normals outward, and distances
+    except QhullError:
+        return np.ones(len(places), bool)
+    step = max(1, _DISTANCES_AT_A_TIME // len(sides))
+    return np.concatenate(
+        [
+            (origins[start : start + step] @ sides[:, :3].T + sides[:, 3] >= -2.001 * radius).any(axis=1)
+            for start in range(0, len(origins), step)
+        ]
+    )
 
 
 def _hull(points: Bounds) -> Bounds:
