@@ -23,7 +23,10 @@ def scene_of(seed, count, spread):
     return Scene("copies", SceneDescription("copies", [mesh], [Material()], [Instance(0, places)])), points, places
 
 
-@given(seed=st.integers(0, 10_000), count=st.integers(1, 400), spread=st.sampled_from([(1, 1, 1), (1, 1, 0), (1, 0, 0)]))
+SPREADS = [(1, 1, 1), (1, 1, 0), (1, 0, 0)]
+
+
+@given(seed=st.integers(0, 10_000), count=st.integers(1, 400), spread=st.sampled_from(SPREADS))
 def test_boxes_are_those_of_all_vertices(seed, count, spread):
     scene, _, _ = scene_of(seed, count, spread)
     kept, hull_bounds._MANY = hull_bounds._MANY, 0
@@ -35,6 +38,15 @@ def test_boxes_are_those_of_all_vertices(seed, count, spread):
         frame = np.eye(4)
         frame[:3, :3] = turn
         np.testing.assert_allclose(bounds_in(frame), scene.bounds_in(frame), atol=1e-5)
+
+
+def test_a_large_copy_among_small_ones_is_kept():
+    """Its origin lies well inside the hull of the others', and it reaches beyond them."""
+    _, points, places = scene_of(1, 300, (1, 1, 1))
+    places[:, :3, 3] *= 10.0 / np.linalg.norm(places[:, :3, 3], axis=1, keepdims=True)
+    places[0, :3] = np.eye(4)[:3] * (5, 5, 5, 1)
+    assert np.linalg.norm(5 * points, axis=1).max() > 12
+    assert hull_bounds._may_lie_outside(points, places)[0]
 
 
 def test_most_copies_are_left_out():
