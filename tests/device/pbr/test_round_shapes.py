@@ -1,4 +1,4 @@
-"""Balls and rods lie where their formulas say, whatever their placement, and triangles stay where they must."""
+"""Balls and rods lie where their formulas say at every placement, and triangles stay where they must."""
 
 from __future__ import annotations
 

@@ -17,8 +17,8 @@ import functools
 import math
 from collections.abc import Callable
 
+from lippmann.device.array_parts import arrays_of
 from lippmann.device.pbr import microfacet
-from lippmann.device.pbr.array_parts import arrays_of
 from lippmann.device.pbr.gltf_bsdf_parameters import Lobe, Point, Sheen, SurfaceModel
 from lippmann.device.pbr.texture_lookup import Place
 from lippmann.device.types import (

@@ -11,14 +11,11 @@ import gc
 from collections.abc import Callable
 
 import drjit as dr
-import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from lippmann.device.array_parts import arrays_of
 from lippmann.device.types import Array
-
-#: Integrators are shallow; what lies deeper belongs to others.
-_DEEPEST = 12
 
 #: Bytes: the widest vector of a processor.
 _ALIGNMENT = 64
@@ -74,26 +71,7 @@ class Frozen:
         return int(self._recorded.n_recordings)
 
 
-def _opaque_arrays(reads: object) -> list[Array]:
-    state: list[Array] = []
-    _collect(reads, state, set(), 0)
+def _opaque_arrays(reads: object) -> list[object]:
+    state = arrays_of(reads)
     dr.make_opaque(state)
     return state
-
-
-def _collect(value: object, found: list[Array], seen: set[int], depth: int) -> None:
-    if id(value) in seen or depth > _DEEPEST:
-        return
-    seen.add(id(value))
-    if isinstance(value, mi.Object) or type(value).__module__.split(".")[0] in ("drjit", "mitsuba"):
-        # Arrays without entries have no variable behind them.
-        if not dr.is_array_v(value) or dr.width(value) > 0:
-            found.append(value)
-    elif isinstance(value, dict):
-        for item in value.values():
-            _collect(item, found, seen, depth + 1)
-    elif isinstance(value, (list, tuple, set, frozenset)):
-        for item in value:
-            _collect(item, found, seen, depth + 1)
-    elif hasattr(value, "__dict__") and type(value).__module__.startswith("lippmann."):
-        _collect(vars(value), found, seen, depth + 1)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import pytest
 
-from lippmann.device.pbr.array_parts import arrays_of
+from lippmann.device.array_parts import arrays_of
 
 pytestmark = pytest.mark.usefixtures("engine")
 
