@@ -123,10 +123,12 @@ class Case:
         return parts / rounds, 128 * rounds * REFERENCE_PARTS
 
     def _shoot(self, request: Any) -> None:
-        """Photons for a request, where there are caustics: references and pictures must not share any."""
+        """Photons and chains for a request, where there are caustics: references and pictures must not share any."""
         from lippmann.rendering.film.caustics import give_photons
+        from lippmann.rendering.film.seen_chains import give_chains
 
-        give_photons(self.integrator, request, self.source, MEMORY)
+        if give_photons(self.integrator, request, self.source, MEMORY) == "photons":
+            give_chains(self.integrator, request, self.source)
 
     def trace(self, way: str, seed: int, **asked: Any) -> Any:
         """A picture made that way, as the whole program makes it."""

@@ -118,7 +118,7 @@ def _kernels(stage: Stage) -> dict[str, Any]:
     def traced(integrator: path.PathIntegrator, parts: int = path.PHOTON_PARTS) -> Any:
         def call(seed: int) -> Any:
             path.PHOTON_PARTS = parts
-            ray, stream = rays_of_tile(source, plan, tile, run, seed, True)
+            ray, stream, _ = rays_of_tile(source, plan, tile, run, seed, True)
             radiance, counts = integrator.sample(ray, stream, mi.Bool(True))
             dr.eval(radiance, counts.secondary, counts.shadow)
             return np.array(counts.secondary)
@@ -141,7 +141,7 @@ def _kernels(stage: Stage) -> dict[str, Any]:
         return way, steps
 
     def walks(seed: int) -> Any:
-        ray, stream = rays_of_tile(source, plan, tile, run, seed, True)
+        ray, stream, _ = rays_of_tile(source, plan, tile, run, seed, True)
         way, steps = walk(ray, stream)
         dr.eval(way, steps)
         return np.array(steps) - 1

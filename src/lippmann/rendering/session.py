@@ -196,6 +196,7 @@ class Session:
         if not isinstance(integrator, PathIntegrator):
             return integrator
         from lippmann.rendering.film.caustics import give_photons
+        from lippmann.rendering.film.seen_chains import give_chains
         from lippmann.rendering.transport.beam import beam_of
         from lippmann.rendering.transport.casters import has_sharp_surfaces
 
@@ -219,6 +220,8 @@ class Session:
         if self.request.clamp_indirect is not None:
             most = self.request.clamp_indirect / (gain_of(exposure) if exposure else 1.0)
             integrator.most_indirect = mi.Float(most)
+        if caustics == "photons":
+            self.choices.update(give_chains(integrator, request, source))
         return integrator
 
     def provenance(

@@ -121,7 +121,7 @@ def _trace_tile(
     """Sums over the samples of one pass, for every pixel and channel: colours, world-space normals, and heights."""
     lanes = tile.rows * plan.width * plan.channels * run.count
     # Lanes are those of a picture.
-    ray, _ = rays_of_tile(source, plan, tile, run, seed, box_filter)
+    ray, _, _ = rays_of_tile(source, plan, tile, run, seed, box_filter)
     albedo, normal, distance = surfaces.features(ray)
     x, y, z = mi.Point3f(ray.o) + mi.Vector3f(ray.d) * distance
     weights = [dr.opaque(mi.Float, float(weight)) for weight in z_from_world]

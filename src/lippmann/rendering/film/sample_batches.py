@@ -27,10 +27,19 @@ from lippmann.rendering.estimate.pixel_errors import OWN_NOISE, PixelErrors
 from lippmann.rendering.film import memory_model
 from lippmann.rendering.film.caustic_blur import SquaredBlur
 from lippmann.rendering.film.caustics import stretches
-from lippmann.rendering.film.wavefront import Frame, RayTotals, compile_seconds, divide, evaluated, shown_colors
+from lippmann.rendering.film.wavefront import (
+    Frame,
+    RayTotals,
+    compile_seconds,
+    divide,
+    evaluated,
+    sample_pixels,
+    shown_colors,
+)
 from lippmann.rendering.film.wavefront_plan import Run, cut_batches
 from lippmann.rendering.transport.integrator import Integrator
 from lippmann.rendering.transport.ray_source import RaySource, pixel_number
+from lippmann.rendering.transport.seen_light import PixelRays
 
 Floats = NDArray[np.float32]
 
@@ -263,7 +272,8 @@ class FullInBatches:
         stream.half = stream_of
         jitter = stream.next_2d(PIXEL_DIMENSION) if self._box_filter else mi.Point2f(0.5)
         ray = self._source.rays(column, row, channel, jitter)
-        radiance, counts = self._integrator.sample(ray, stream, mi.Bool(True))
+        pixels = PixelRays(self._source, column, row, channel) if self._box_filter else None
+        radiance, counts = sample_pixels(self._integrator, pixels, ray, stream)
         radiance = evaluated(radiance, counts, lanes, self.rays)
         return _sums(radiance, channels, number, run.count)
 

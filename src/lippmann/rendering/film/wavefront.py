@@ -15,7 +15,9 @@ from lippmann.device.types import Ray3f, Spectrum, UInt32
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.rendering.film.wavefront_plan import Pass, Plan, Tile
 from lippmann.rendering.transport.integrator import Integrator, RayCounts
+from lippmann.rendering.transport.path import PathIntegrator
 from lippmann.rendering.transport.ray_source import RaySource, pixel_number
+from lippmann.rendering.transport.seen_light import PixelRays
 
 
 @dataclass
@@ -118,8 +120,8 @@ class _Tracer:
     def trace(self, tile: Tile, run: Pass, totals: RayTotals) -> NDArray[np.float32]:
         """Sums over the samples of one pass, ``(pixels of the tile, 3)``; ``totals`` grows by the rays it took."""
         plan = self._plan
-        ray, stream = rays_of_tile(self._source, plan, tile, run, self._seed, self._box_filter, self._corner)
-        radiance, counts = self._integrator.sample(ray, stream, mi.Bool(True))
+        ray, stream, pixels = rays_of_tile(self._source, plan, tile, run, self._seed, self._box_filter, self._corner)
+        radiance, counts = sample_pixels(self._integrator, pixels if self._box_filter else None, ray, stream)
         lanes = tile.rows * plan.width * plan.channels * run.count
         radiance = evaluated(radiance, counts, lanes, totals)
         return _channel_sums(radiance, plan.channels, run.count)
@@ -133,8 +135,8 @@ def rays_of_tile(
     seed: int,
     box_filter: bool,
     corner: tuple[int, int] = (0, 0),
-) -> tuple[Ray3f, SampleStream]:
-    """The rays and sample streams of one wavefront, lanes ordered pixel, then channel, then sample.
+) -> tuple[Ray3f, SampleStream, PixelRays]:
+    """The rays, sample streams and pixels of one wavefront, lanes ordered pixel, then channel, then sample.
 
     ``corner``: row and column at which the part of the picture begins that ``plan`` is of.
     """
@@ -149,7 +151,16 @@ def rays_of_tile(
     number = pixel_number(source, column, row) * plan.channels + channel
     stream = SampleStream.of_pixels(number, sample, dr.opaque(mi.UInt32, seed))
     jitter = stream.next_2d(PIXEL_DIMENSION) if box_filter else mi.Point2f(0.5)
-    return source.rays(column, row, channel, jitter), stream
+    return source.rays(column, row, channel, jitter), stream, PixelRays(source, column, row, channel)
+
+
+def sample_pixels(
+    integrator: Integrator, pixels: PixelRays | None, ray: Ray3f, stream: SampleStream
+) -> tuple[Spectrum, RayCounts]:
+    """One sample along ``ray`` per lane; where ``pixels`` are given, seen light may come from other rays of theirs."""
+    if pixels is not None and isinstance(integrator, PathIntegrator):
+        return integrator.sample_pixel(pixels, ray, stream, mi.Bool(True))
+    return integrator.sample(ray, stream, mi.Bool(True))
 
 
 def evaluated(radiance: Spectrum, counts: RayCounts, lanes: int, totals: RayTotals) -> Spectrum:

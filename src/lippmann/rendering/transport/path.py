@@ -24,6 +24,7 @@ from lippmann.device.types import (
     Color3f,
     DirectionSample3f,
     Float,
+    Interaction3f,
     MitsubaScene,
     Point2f,
     Ray3f,
@@ -37,6 +38,7 @@ from lippmann.rendering.transport.integrator import FirstHit, RayCounts
 from lippmann.rendering.transport.light_sampling import LightSampler, SceneLightSampler
 from lippmann.rendering.transport.photon_map import PhotonMap
 from lippmann.rendering.transport.scene_features import SceneFeatures
+from lippmann.rendering.transport.seen_light import PixelRays, seen_light
 from lippmann.rendering.transport.shadow_rays import MAX_CROSSINGS, ShadowRays
 from lippmann.rendering.transport.sharp_events import (
     MOST_EVENTS,
@@ -125,6 +127,8 @@ class PathIntegrator:
         self.photons: PhotonMap | None = None
         #: Gives :attr:`photons` for each part of a picture's samples; None where they are the same for all.
         self.photon_passes: CausticPhotons | None = None
+        #: Further chains of sharp events through the pixel of each path, see :mod:`.seen_light`; None for none.
+        self.seen_chains: UInt32 | None = None
         #: Beam of a sample, by which lobes of curved surfaces are widened; None for lobes as they are.
         self.beam: Beam | None = None
         self.shadow_rays = ShadowRays(scene, features.has_null)
@@ -137,12 +141,30 @@ class PathIntegrator:
         radiance, counts, _ = self.sample_with_hit(ray, stream, active)
         return radiance, counts
 
+    def sample_pixel(
+        self, pixel: PixelRays, ray: Ray3f, stream: SampleStream, active: Bool
+    ) -> tuple[Spectrum, RayCounts]:
+        """As :meth:`sample`, for one of the rays of ``pixel``: with :attr:`seen_chains` more of seen light."""
+        if self.seen_chains is None or self.photons is None:
+            return self.sample(ray, stream, active)
+        share = dr.rcp(1 + mi.Float(self.seen_chains))
+        radiance, counts, _ = self.sample_with_hit(ray, stream, active, share)
+        light, rays = seen_light(self, pixel, stream, self.seen_chains, active)
+        light *= share
+        return radiance + (light if self.gain is None else light * self.gain), RayCounts(
+            counts.secondary + rays, counts.shadow
+        )
+
     @dr.syntax
-    def sample_with_hit(self, ray: Ray3f, stream: SampleStream, active: Bool) -> tuple[Spectrum, RayCounts, FirstHit]:
-        """As :meth:`sample`, with the first hit. Every surface that is not purely diffuse is view-dependent."""
+    def sample_with_hit(
+        self, ray: Ray3f, stream: SampleStream, active: Bool, seen_share: Float | None = None
+    ) -> tuple[Spectrum, RayCounts, FirstHit]:
+        """As :meth:`sample`, with the first hit. Every surface that is not purely diffuse is view-dependent.
+
+        Emission that is met by sharp events alone counts ``seen_share``, where photons bring caustics.
+        """
         scene = self.scene
         context = mi.BSDFContext()
-        background = self.features.background
 
         ray = mi.Ray3f(ray)  # current ray
         active = mi.Bool(active)
@@ -170,9 +192,6 @@ class PathIntegrator:
             beam = cast("Beam", self.beam)
             width, spread = mi.Vector2f(beam.width), mi.Vector2f(beam.spread)
             needed = mi.RayFlags.All | mi.RayFlags.dNSdUV
-        shown_background = mi.Spectrum(0 if background is None else background)
-        if dr.hint(self.gain is not None, mode="scalar"):
-            shown_background /= self.gain  # a colour that is to be seen as it was said
 
         pi = scene.ray_intersect_preliminary(ray, coherent=True, active=active)
         first_distance = mi.Float(pi.t)
@@ -191,18 +210,13 @@ class PathIntegrator:
                 throughput *= dr.exp(-absorption * distance)
 
             # ---- emission ----
-            ds = mi.DirectionSample3f(scene, si=si, ref=vertex)
-            emitter_pdf = self.light_sampler.pdf_direction(vertex, ds, ~vertex_delta) * mi.Float(vertex_samples)
-            weight = mis_weight(vertex_pdf, emitter_pdf)
-            emission = ds.emitter.eval(si) * weight
-            if dr.hint(background is not None, mode="scalar"):
-                emission = dr.select((depth == 0) & ~si.is_valid(), shown_background, emission)
+            emission = self.emission(si, vertex, vertex_pdf, vertex_delta, vertex_samples, depth)
             if dr.hint(self.photons is not None, mode="scalar"):
                 is_caustic = ~seen & (sharp > 0) & (sharp <= MOST_EVENTS) & si.is_valid()
                 emission = dr.select(is_caustic, emission * (1 - by_photons), emission)
-            met = throughput * emission
-            if dr.hint(self.most_indirect is not None, mode="scalar"):
-                met = dr.select(depth > 1, self._clamped(met), met)
+            met = self.limited(throughput * emission, depth)
+            if dr.hint(seen_share is not None, mode="scalar"):
+                met = dr.select(seen, met * seen_share, met)
             radiance += met
 
             # ---- next-event estimation ----
@@ -337,6 +351,43 @@ class PathIntegrator:
         wide = active & wide & (dr.max(found.flux) > 0) & (wo.z * si.wi.z > 0)
         rest = bsdf.eval(mi.BSDFContext(), si, wo, wide) / dr.abs(wo.z) - lambert * dr.inv_pi
         return dr.select(active, light, 0) + dr.select(wide, rest * found.flux, 0)
+
+    def emission(
+        self,
+        si: SurfaceInteraction3f,
+        vertex: Interaction3f,
+        vertex_pdf: Float,
+        vertex_delta: Bool,
+        vertex_samples: UInt32,
+        depth: UInt32,
+    ) -> Spectrum:
+        """Radiance that a path meets after ``depth`` surfaces, by MIS against emitter sampling at its last vertex.
+
+        Parameters
+        ----------
+        si:
+            What the path meets; the environment where it is not valid.
+        vertex, vertex_pdf, vertex_delta, vertex_samples:
+            The last scattering vertex, the pdf of the direction taken there, whether its lobe had no width, and how
+            many emitter samples are taken there.
+        """
+        ds = mi.DirectionSample3f(self.scene, si=si, ref=vertex)
+        emitter_pdf = self.light_sampler.pdf_direction(vertex, ds, ~vertex_delta) * mi.Float(vertex_samples)
+        emission = ds.emitter.eval(si) * mis_weight(vertex_pdf, emitter_pdf)
+        if self.features.background is None:
+            return emission
+        shown = mi.Spectrum(self.features.background)
+        if self.gain is not None:
+            shown /= self.gain  # a colour that is to be seen as it was said
+        return dr.select((depth == 0) & ~si.is_valid(), shown, emission)
+
+    def limited(self, met: Spectrum, depth: UInt32) -> Spectrum:
+        """What a path brings that it met after ``depth`` surfaces, with :attr:`most_indirect`."""
+        return met if self.most_indirect is None else dr.select(depth > 1, self._clamped(met), met)
+
+    def first_emitter_samples(self, sample: UInt32) -> UInt32:
+        """Emitter samples at the first surface that is not purely specular, of a pixel's path number ``sample``."""
+        return mi.UInt32(1) if self._single_delta else first_emitter_samples(sample)[0]
 
     def _clamped(self, light: Spectrum) -> Spectrum:
         """``light`` with no component above :attr:`most_indirect`, its hue unchanged."""

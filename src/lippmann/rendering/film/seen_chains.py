@@ -1,0 +1,142 @@
+"""How many further chains of sharp events each path of a picture comes with: by a look at how seen light varies.
+
+What samples of each kind cost is best as the root of the variance that they take away times their cost (Neyman
+allocation). The variance of seen light within pixels is measured, that of the rest and the cost of a chain are those of
+usual scenes. A look may miss emitters that are seen so small that one chain in a million meets one; a part of what that
+would bring is added.
+"""
+
+from __future__ import annotations
+
+import math
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from lippmann.color.transfer import Transfer, coding_slope
+from lippmann.device.sobol import SampleStream
+from lippmann.device.types import MitsubaScene
+from lippmann.rendering.film.scattered_rays import ScatteredRays
+from lippmann.rendering.film.wavefront import divide, shown_colors
+from lippmann.rendering.request.render_request import RenderRequest
+from lippmann.rendering.transport.path import PathIntegrator
+from lippmann.rendering.transport.ray_source import RaySource
+from lippmann.rendering.transport.seen_light import PixelRays, seen_light
+
+#: Chains of a path, at most.
+MOST = 32
+#: Share of a picture's time that the look takes, about; its chains within limits, and those of one pixel, at least.
+LOOK_COST, FEWEST_LOOKS, MOST_LOOKS, LOOKS_OF_PIXEL = 0.02, 1 << 14, 1 << 20, 8
+#: Variance of a path's light, seen light apart, in codes; and what a chain costs of a path: those of usual scenes.
+REST_VARIANCE, CHAIN_COST = 0.01, 0.03
+#: Meetings with the brightest emitter that count beside those of the look: as many as may well have been missed.
+MISSED = 0.25
+#: Samples that a picture is taken to need of which it is not known.
+OPEN_ENDED = 128
+#: Linear radiance at which the slope of the codes is taken where seen light brings less: mid-grey.
+_GREY = 0.18
+#: Points from which emitters are looked at.
+_POINTS = 1 << 10
+
+
+def give_chains(integrator: PathIntegrator, request: RenderRequest, source: RaySource) -> dict[str, object]:
+    """Give the integrator the chains for the picture of ``source``; what there is to say of it in the picture's file.
+
+    Parameters
+    ----------
+    integrator:
+        Ready for the picture, with photons.
+    request:
+        How the picture is to be made.
+    source:
+        Rays of the whole picture: parts of one picture must be told the same.
+    """
+    if not request.box_filter:  # all rays of a pixel are one
+        return {}
+    samples = OPEN_ENDED if request.is_open_ended else request.samples
+    chains = seen_chains(integrator, source, samples, request.transfer, request.seed)
+    integrator.seen_chains = dr.opaque(mi.UInt32, chains) if chains else None
+    return {"seen_chains": chains} if chains else {}
+
+
+def seen_chains(integrator: PathIntegrator, source: RaySource, samples: int, transfer: Transfer, seed: int) -> int:
+    """Chains of each path, 0 or a power of two up to :data:`MOST`.
+
+    Parameters
+    ----------
+    integrator:
+        Ready for the picture.
+    source:
+        Rays of the whole picture: parts of one picture must be told the same.
+    samples:
+        Of each pixel, about. What a single one of them shows does not count beyond white.
+    transfer:
+        How values become codes.
+    seed:
+        Of the picture.
+    """
+    looks = _looks(integrator, source, samples, seed)
+    variance = variance_of(looks, samples, transfer)
+    brightest = min(_brightest(integrator, source, seed), samples)
+    slope = float(coding_slope(np.array(_GREY), transfer))
+    variance += MISSED * (slope * brightest) ** 2 / (looks.size / 3)
+    wanted = math.sqrt(variance * (1 - CHAIN_COST) / (REST_VARIANCE * CHAIN_COST)) - 1
+    return 0 if wanted < 1 else min(MOST, 1 << round(math.log2(wanted)))
+
+
+def variance_of(looks: NDArray[np.float64], samples: int, transfer: Transfer) -> float:
+    """Mean variance of one chain in codes, as far as the others of its pixel leave the code a slope.
+
+    Parameters
+    ----------
+    looks:
+        ``(pixels, looks, 3)`` linear radiance of single chains, two or more of each pixel.
+    samples:
+        Of a pixel: what one of them shows does not count beyond white.
+    transfer:
+        How values become codes.
+    """
+    number = looks.shape[1]
+    others = (looks.sum(axis=1, keepdims=True) - looks) / (number - 1)
+    slope = coding_slope(np.maximum(others, _GREY), transfer)
+    apart = np.minimum(np.abs(looks - others), samples)
+    # The mean of the others varies, too.
+    variance: float = np.square(slope * apart).mean() * (number - 1) / number
+    return variance
+
+
+def _looks(integrator: PathIntegrator, source: RaySource, samples: int, seed: int) -> NDArray[np.float64]:
+    """``(pixels, looks, 3)``: what single chains meet, the gain included."""
+    paths = source.width * source.height * source.channels * samples
+    wanted = int(np.clip(paths * LOOK_COST / CHAIN_COST, FEWEST_LOOKS, MOST_LOOKS))
+    few = ScatteredRays(source, max(1, math.isqrt(wanted // (LOOKS_OF_PIXEL * source.channels))))
+    count = max(LOOKS_OF_PIXEL, wanted // (few.width * few.height * few.channels))
+    rest, look = divide(
+        dr.arange(mi.UInt32, few.width * few.height * few.channels * count), dr.opaque(mi.UInt32, count)
+    )
+    pixel, channel = divide(rest, few.channels)
+    row, column = divide(pixel, dr.opaque(mi.UInt32, few.width))
+    stream = SampleStream.of_pixels(rest, look, dr.opaque(mi.UInt32, seed))
+    pixels = PixelRays(few, column, row, channel)
+    light, _ = seen_light(integrator, pixels, stream, dr.opaque(mi.UInt32, 1), mi.Bool(True))
+    if integrator.gain is not None:
+        light *= integrator.gain
+    values = np.array(dr.ravel(mi.Color3f(light)), dtype=np.float32)
+    return shown_colors(values.reshape(-1, few.channels, count, 3)).astype(np.float64)
+
+
+def _brightest(integrator: PathIntegrator, source: RaySource, seed: int) -> float:
+    """Greatest radiance of an emitter of some size, the gain included, by samples from what the picture shows."""
+    few = ScatteredRays(source, math.isqrt(_POINTS))
+    place = dr.arange(mi.UInt32, few.width * few.height)
+    row, column = divide(place, few.width)
+    scene: MitsubaScene = integrator.scene
+    si = scene.ray_intersect(few.rays(column, row, mi.UInt32(0), mi.Point2f(0.5)))
+    point = SampleStream.of_pixels(mi.UInt32(0), place, dr.opaque(mi.UInt32, seed)).next_2d(1)
+    ds, weight = scene.sample_emitter_direction(si, point, False, si.is_valid())
+    radiance = dr.select(ds.delta | ~si.is_valid(), 0, dr.max(weight) * ds.pdf)
+    if integrator.gain is not None:
+        radiance *= integrator.gain
+    return float(np.max(np.array(radiance)))

@@ -1,0 +1,136 @@
+"""Light that the eye sees by sharp events alone: emitters and sky, directly, in mirrors, through clear glass.
+
+Small emitters seen so, and emitters mirrored in small curved things, fill a small part of a pixel, and few paths of the
+pixel meet them. They have no noise of transport, and a chain of sharp events is cheap beside a path: no emitters are
+sampled along it, no photons are looked up, and it ends at the first rough surface. So each path of a pixel comes with
+further chains through other points of it. All meet the same light by the same chances, so their mean has its
+expectation.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, cast
+
+import drjit as dr
+import mitsuba as mi
+
+from lippmann.device.pbr.surface_point import widen_lobes
+from lippmann.device.sobol import PIXEL_DIMENSION, SampleStream, hash32
+from lippmann.device.types import Bool, Ray3f, Spectrum, UInt32
+from lippmann.rendering.transport.beam import Beam, turn_of_normals, widening
+from lippmann.rendering.transport.shadow_rays import MAX_CROSSINGS
+from lippmann.rendering.transport.sharp_events import follows_sharply, sharp_lobe
+
+if TYPE_CHECKING:
+    from lippmann.rendering.transport.path import PathIntegrator
+    from lippmann.rendering.transport.ray_source import RaySource
+
+#: Tells the streams of chains from those of paths.
+_CHAINS = 0x5EE21147
+#: Sample dimensions used at one vertex.
+_DIMENSIONS_PER_VERTEX = 2
+
+
+class PixelRays:
+    """Rays through any points of the pixels of a wavefront's lanes."""
+
+    # Not a dataclass: Dr.Jit would take it for loop state and write its fields.
+    def __init__(self, source: RaySource, column: UInt32, row: UInt32, channel: UInt32) -> None:
+        self._source = source
+        self._at = column, row, channel
+
+    def ray(self, stream: SampleStream) -> Ray3f:
+        """The ray of a sample, at its point of the pixel."""
+        return self._source.rays(*self._at, stream.next_2d(PIXEL_DIMENSION))
+
+
+@dr.syntax
+def seen_light(
+    integrator: PathIntegrator, pixel: PixelRays, stream: SampleStream, chains: UInt32, active: Bool
+) -> tuple[Spectrum, UInt32]:
+    """Sum of the light that so many further chains of each lane's pixel meet, before the gain, and the rays traced."""
+    light = mi.Spectrum(0)
+    rays = mi.UInt32(0)
+    number = mi.UInt32(0)
+    own = SampleStream(hash32(stream.key ^ _CHAINS), stream.index, stream.half)
+    first = stream.index * chains
+    tracing = active & (number < chains)
+    while dr.hint(tracing, label="chains"):
+        further = own.at(first + number)
+        met, traced = _chain(integrator, pixel.ray(further), further, stream.index, tracing)
+        light += dr.select(dr.isfinite(dr.sum(met)), met, 0)
+        rays += traced
+        number += 1
+        tracing &= number < chains
+    return light, rays
+
+
+@dr.syntax
+def _chain(
+    integrator: PathIntegrator, ray: Ray3f, stream: SampleStream, path: UInt32, active: Bool
+) -> tuple[Spectrum, UInt32]:
+    """What one chain meets, as the path of number ``path`` would weigh it, and the rays traced."""
+    scene = integrator.scene
+    context = mi.BSDFContext()
+    ray = mi.Ray3f(ray)
+    active = mi.Bool(active)
+    light, throughput = mi.Spectrum(0), mi.Spectrum(1)
+    depth, crossings, rays = mi.UInt32(0), mi.UInt32(0), mi.UInt32(0)
+    absorption = mi.Color3f(0)
+    vertex = dr.zeros(mi.Interaction3f)
+    vertex_pdf, vertex_delta, vertex_samples = mi.Float(1), mi.Bool(True), mi.UInt32(1)
+    all_specular = mi.Bool(True)
+    at_first = integrator.first_emitter_samples(path)
+    width, spread, is_beam = mi.Vector2f(0), mi.Vector2f(0), mi.Bool(True)
+    needed = mi.RayFlags.All
+    if dr.hint(integrator.beam is not None, mode="scalar"):
+        beam = cast("Beam", integrator.beam)
+        width, spread = mi.Vector2f(beam.width), mi.Vector2f(beam.spread)
+        needed = mi.RayFlags.All | mi.RayFlags.dNSdUV
+
+    while dr.hint(active, label="chain"):
+        pi = scene.ray_intersect_preliminary(ray, coherent=False, active=active)
+        rays += dr.select(active, mi.UInt32(1), mi.UInt32(0))
+        si = pi.compute_surface_interaction(ray, ray_flags=needed)
+        bsdf = si.bsdf(ray)
+        if dr.hint(integrator.features.has_absorption, mode="scalar"):
+            throughput *= dr.exp(-absorption * dr.select(si.is_valid(), si.t, 0))
+        emission = integrator.emission(si, vertex, vertex_pdf, vertex_delta, vertex_samples, depth)
+        light += integrator.limited(throughput * emission, depth)
+
+        continues = active & si.is_valid() & (depth < integrator.depth)
+        lobe = sharp_lobe(si, bsdf, continues)
+        goes_on = (bsdf.flags() & int(mi.BSDFFlags.Delta | mi.BSDFFlags.Null)) != 0
+        continues &= goes_on | (dr.squared_norm(lobe) > 0)
+        turn = mi.Float(0)
+        if dr.hint(integrator.beam is not None, mode="scalar"):
+            width += spread * dr.select(si.is_valid(), si.t, 0)
+            turn = dr.select(continues & is_beam, turn_of_normals(si, width), 0)
+            widen_lobes(si, widening(turn))
+        dimension = (depth * 2 + crossings) * _DIMENSIONS_PER_VERTEX + 1
+        bs, weight = bsdf.sample(context, si, stream.next_1d(dimension), stream.next_2d(dimension + 1), continues)
+        passes = mi.has_flag(bs.sampled_type, mi.BSDFFlags.Null)
+        continues &= passes | follows_sharply(si, lobe, bs)
+        throughput *= weight
+        if dr.hint(integrator.beam is not None, mode="scalar"):
+            is_beam &= ~mi.has_flag(bs.sampled_type, mi.BSDFFlags.DiffuseReflection)
+            spread += dr.select(mi.has_flag(bs.sampled_type, mi.BSDFFlags.GlossyReflection), 2 * turn, 0)
+        if dr.hint(integrator.features.has_absorption, mode="scalar"):
+            crosses = mi.has_flag(bs.sampled_type, mi.BSDFFlags.Transmission) & ~passes
+            inside = dr.dot(bs.wo, mi.Vector3f(0, 0, 1)) < 0
+            absorption = dr.select(
+                crosses, dr.select(inside, integrator.features.absorption_of(si.shape), 0), absorption
+            )
+        ray = si.spawn_ray(si.to_world(bs.wo))
+        if ~passes:
+            smooth = mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
+            vertex = mi.Interaction3f(si)
+            vertex_pdf = bs.pdf
+            vertex_delta = mi.has_flag(bs.sampled_type, mi.BSDFFlags.Delta)
+            vertex_samples = dr.select(all_specular, at_first, mi.UInt32(1))
+            all_specular &= ~smooth
+            depth += 1
+        else:
+            crossings += 1
+        active = continues & (dr.max(throughput) > 0) & (crossings < MAX_CROSSINGS)
+    return light, rays

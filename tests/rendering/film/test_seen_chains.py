@@ -1,0 +1,83 @@
+"""How many chains paths come with: by what seen light varies, and by what a look may have missed."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+pytestmark = pytest.mark.usefixtures("engine")
+
+
+def test_the_variance_is_that_of_single_chains():
+    from lippmann.color.transfer import coding_slope
+    from lippmann.rendering.film.seen_chains import variance_of
+
+    random = np.random.default_rng(4)
+    looks = random.normal(0.5, 0.05, (4000, 8, 1)).repeat(3, axis=2)
+    expected = 0.05**2 * float(coding_slope(np.array(0.5), "srgb")) ** 2
+    assert variance_of(looks, 16, "srgb") == pytest.approx(expected, rel=0.05)
+    assert variance_of(looks, 16, "linear") == pytest.approx(0.05**2, rel=0.05)
+
+
+def test_what_is_white_anyway_does_not_vary():
+    from lippmann.rendering.film.seen_chains import variance_of
+
+    random = np.random.default_rng(4)
+    half_covered = 300.0 * (random.random((500, 8, 1)) < 0.5).repeat(3, axis=2)
+    lone = np.zeros((500, 8, 3))
+    lone[0, 0] = 300.0
+    # A pixel half covered by a lamp is white with any few samples; a lone hit makes a white pixel of a grey one.
+    assert variance_of(half_covered, 16, "linear") < 0.2 * 16**2 * 0.25
+    assert variance_of(lone, 16, "linear") == pytest.approx(16**2 / lone[..., 0].size, rel=0.15)
+    assert variance_of(np.full((5, 8, 3), 300.0), 16, "srgb") == 0
+
+
+@pytest.fixture(scope="module")
+def balls(engine):
+    import lippmann
+    from lippmann.scene.values.description import Instance, Light, Material, Mesh, SceneDescription
+
+    trimesh = pytest.importorskip("trimesh")
+    ball, wall = trimesh.creation.icosphere(3, 12), trimesh.creation.box((300, 200, 2))
+    meshes = [Mesh("", m.vertices.astype(np.float32), m.faces.astype(np.uint32), n) for n, m in enumerate((wall, ball))]
+    materials = [Material("wall", roughness=1.0, specular=0.0), Material("chrome", metallic=1.0, roughness=0.0)]
+
+    def scene(radius):
+        at, behind, before = np.eye(4), np.eye(4), np.eye(4)
+        at[:3, 3] = 30, 40, 90
+        behind[2, 3], before[2, 3] = -20, 4
+        light = Light("point", (4e4,) * 3, at, radius=radius)
+        instances = [Instance(0, behind), Instance(1, before)]
+        return lippmann.load_scene(SceneDescription("balls", meshes, materials, instances, lights=[light]))
+
+    return scene
+
+
+def rendered(scene, **options):
+    import lippmann
+    from lippmann.display import Display, LensArray, Panel
+    from lippmann.scene.placement import PlacementOptions
+
+    display = Display("test", Panel(96, 64, 1.0), LensArray("square", 8.0), 30.0, "", 500.0, 80.0)
+    chosen = {"integrator": "path", "spp": 16, "placement": PlacementOptions(mode="display"), "exposure": 0}
+    return lippmann.render(scene, display, tone_map="none", **(chosen | options))
+
+
+def chains(picture):
+    return picture.provenance.options.get("seen_chains", 0)
+
+
+def test_small_lamps_in_mirrors_get_chains(balls):
+    assert chains(rendered(balls(3.0))) >= 1
+    # Emitters without size are not met; rays through the centre of a pixel are all the same.
+    assert chains(rendered(balls(0.0))) == 0
+    assert chains(rendered(balls(3.0), pixel_filter="point")) == 0
+    assert chains(rendered(balls(3.0), caustics="paths")) == 0
+
+
+def test_pictures_with_them_state_their_error_as_before(balls):
+    scene = balls(3.0)
+    first, second = (rendered(scene, seed=seed, spp=32) for seed in (1, 2))
+    apart = np.square(np.clip(first.pixels, 0, 1) - np.clip(second.pixels, 0, 1)).mean() / 2
+    told = first.provenance.estimate
+    assert told["psnr_low"] - 3 < -10 * np.log10(apart) < told["psnr_high"] + 3

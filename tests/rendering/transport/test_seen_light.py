@@ -1,0 +1,205 @@
+"""Further chains of sharp events: they bring what paths would have met, and no more, with less noise."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+pytestmark = pytest.mark.usefixtures("engine")
+
+SIDE, BLOCK = 24, 4
+
+
+def rgb(*values):
+    return {"type": "rgb", "value": list(values) if len(values) > 1 else values[0]}
+
+
+def scene_of_all_events():
+    """Balls of each kind of surface before a wall, under a lamp that they mirror, and a sky."""
+    import mitsuba as mi
+
+    place = mi.ScalarTransform4f
+    gloss = {"type": "principled", "base_color": rgb(0.2, 0.3, 0.6), "roughness": 0.1, "clearcoat": 1.0}
+    hole = {"type": "mask", "opacity": 0.4, "nested": {"type": "conductor", "material": "Al"}}
+    surfaces = {
+        "mirror": {"type": "conductor", "material": "Al"},
+        "glass": {"type": "dielectric", "int_ior": 1.5},
+        "plastic": {"type": "plastic", "diffuse_reflectance": rgb(0.5, 0.2, 0.1)},
+        "gloss": gloss,
+        "hole": hole,
+        "matt": {"type": "diffuse", "reflectance": rgb(0.6)},
+    }
+    balls = {
+        name: {
+            "type": "sphere",
+            "center": [(number % 3 - 1) * 0.7, 0.35 - 0.7 * (number // 3), 0],
+            "radius": 0.3,
+            "bsdf": surface,
+        }
+        for number, (name, surface) in enumerate(surfaces.items())
+    }
+    return {
+        "type": "scene",
+        **balls,
+        "wall": {
+            "type": "rectangle",
+            "to_world": place().translate([0, 0, -1]).scale(2),
+            "bsdf": {"type": "diffuse", "reflectance": rgb(0.4)},
+        },
+        "lamp": {
+            "type": "sphere",
+            "center": [0.8, 0.9, 1.2],
+            "radius": 0.25,
+            "emitter": {"type": "area", "radiance": rgb(15, 12, 9)},
+        },
+        "sky": {"type": "constant", "radiance": rgb(0.2, 0.3, 0.4)},
+    }
+
+
+def described(description):
+    """Integrator of a description's scene, with the photons of its caustics, and the eye."""
+    from lippmann.device.pbr import build_description
+
+    built = build_description(description)
+    return prepared(built.mitsuba, has_null=built.has_null)
+
+
+def prepared(scene, *, has_null):
+    from lippmann.rendering.film.caustics import give_photons
+    from lippmann.rendering.request.render_request import RenderRequest
+    from lippmann.rendering.transport.path import PathIntegrator
+    from lippmann.rendering.transport.ray_source import CameraRays
+    from lippmann.rendering.transport.scene_features import make_scene_features
+    from lippmann.scene.values.description import Camera
+
+    integrator = PathIntegrator(scene, make_scene_features(scene, has_null=has_null), 6)
+    pose = np.eye(4)
+    pose[2, 3] = 3.0
+    source = CameraRays(Camera("eye", pose, fov_y=0.6), SIDE, SIDE)
+    request = RenderRequest(integrator="path", caustics="photons", spp=8)
+    assert give_photons(integrator, request, source, 1 << 30) == "photons"
+    return integrator, source
+
+
+def pictures(integrator, source, chains, *, seeds, spp=8):
+    import drjit as dr
+    import mitsuba as mi
+
+    from lippmann.rendering.film.wavefront import trace_frame
+    from lippmann.rendering.film.wavefront_plan import make_plan
+
+    integrator.seen_chains = dr.opaque(mi.UInt32, chains) if chains else None
+    plan = make_plan(SIDE, SIDE, spp, memory=2**30)
+    return np.stack([trace_frame(integrator, source, plan, seed=seed).pixels for seed in seeds]).astype(np.float64)
+
+
+def agree(plain, further):
+    """Blocks of pixels agree by the scatter of pictures of independent seeds."""
+    blocks = [p.reshape(len(p), SIDE // BLOCK, BLOCK, SIDE // BLOCK, BLOCK, 3).mean((2, 4)) for p in (plain, further)]
+    error = np.sqrt(sum(b.var(axis=0, ddof=1) / len(b) for b in blocks))
+    apart = np.abs(blocks[0].mean(axis=0) - blocks[1].mean(axis=0))
+    np.testing.assert_array_less(apart, 5 * error + 1e-4)
+
+
+@pytest.fixture(scope="module")
+def all_events(engine):
+    import mitsuba as mi
+
+    return prepared(mi.load_dict(scene_of_all_events()), has_null=True)
+
+
+@pytest.mark.parametrize("beam", [False, pytest.param(True, marks=pytest.mark.long)])
+def test_every_kind_of_surface_shows_as_much_light(all_events, beam):
+    from lippmann.rendering.transport.beam import beam_of
+
+    integrator, source = all_events
+    integrator.beam = beam_of(source, 8) if beam else None
+    plain, further = (pictures(integrator, source, chains, seeds=range(40)) for chains in (0, 3))
+    integrator.beam = None
+    agree(plain, further)
+    assert further.mean() == pytest.approx(plain.mean(), rel=2e-3)
+
+
+def small_lamp_in_glazed_balls():
+    """Lobes of some width, matt below, coloured glass, under a small lamp: MIS, lobes by chance, absorption."""
+    import trimesh
+
+    from lippmann.scene.values.description import Instance, Light, Material, Mesh, SceneDescription
+
+    ball = trimesh.creation.icosphere(3, 0.3)
+    wall = trimesh.creation.box((4, 4, 0.1))
+    materials = [
+        Material("metal", metallic=1.0, roughness=0.1, base_color=(0.9, 0.7, 0.4)),
+        Material("glaze", base_color=(0.5, 0.1, 0.1), roughness=0.8, clearcoat=1.0, clearcoat_roughness=0.08),
+        Material("chrome", metallic=1.0, roughness=0.0),
+        Material(
+            "glass",
+            transmission=1.0,
+            roughness=0.0,
+            thickness=1.0,
+            attenuation_color=(0.9, 0.4, 0.2),
+            attenuation_distance=0.5,
+        ),
+        Material("wall", base_color=(0.5, 0.5, 0.5), roughness=1.0),
+    ]
+    meshes = [
+        Mesh("", ball.vertices.astype(np.float32), ball.faces.astype(np.uint32), n, ball.vertex_normals.astype("f4"))
+        for n in range(4)
+    ]
+    meshes.append(Mesh("", wall.vertices.astype(np.float32), wall.faces.astype(np.uint32), 4))
+    instances = []
+    for number, (x, y) in enumerate([(-0.35, 0.35), (0.35, 0.35), (-0.35, -0.35), (0.35, -0.35), (0, 0)]):
+        place = np.eye(4)
+        place[:3, 3] = x, y, -1.0 if number == 4 else 0.0
+        instances.append(Instance(number, place))
+    at = np.eye(4)
+    at[:3, 3] = 0.6, 0.8, 1.5
+    light = Light("point", (6.0, 6.0, 6.0), at, radius=0.12)
+    return SceneDescription("balls", meshes, materials, instances, lights=[light])
+
+
+def test_narrow_lobes_are_weighed_as_paths_weigh_them():
+    integrator, source = described(small_lamp_in_glazed_balls())
+    plain, further = (pictures(integrator, source, chains, seeds=range(40)) for chains in (0, 7))
+    agree(plain, further)
+    # Highlights of a small lamp: what chains are for.
+    assert further.var(axis=0).mean() < 0.5 * plain.var(axis=0).mean()
+
+
+def test_gain_limit_and_background_are_those_of_paths(all_events):
+    import mitsuba as mi
+
+    integrator, source = all_events
+    before = integrator.gain, integrator.most_indirect, integrator.features
+    try:
+        integrator.gain, integrator.most_indirect = mi.Float(3.0), mi.Float(0.5)
+        integrator.features = replace(integrator.features, background=(0.1, 0.2, 0.3))
+        plain, further = (pictures(integrator, source, chains, seeds=range(20)) for chains in (0, 3))
+        agree(plain, further)
+    finally:
+        integrator.gain, integrator.most_indirect, integrator.features = before
+
+
+def test_chains_count_as_rays_and_depend_on_the_seed_alone(all_events):
+    import drjit as dr
+    import mitsuba as mi
+
+    from lippmann.rendering.film.sample_batches import FullInBatches
+
+    integrator, source = all_events
+    integrator.seen_chains = dr.opaque(mi.UInt32, 4)
+    whole = FullInBatches(integrator, source, seed=5, memory=1 << 30)
+    whole.add(8)
+    again = FullInBatches(integrator, source, seed=5, memory=(1 << 21))
+    again.add(8)
+    assert whole.picture() == pytest.approx(again.picture(), rel=1e-5)
+    integrator.seen_chains = None
+    plain = FullInBatches(integrator, source, seed=5, memory=1 << 30)
+    plain.add(8)
+    lanes = SIDE * SIDE * 8
+    assert whole.rays.primary == plain.rays.primary == lanes
+    assert whole.rays.secondary - plain.rays.secondary >= 4 * lanes
+    a, b = whole.halves()
+    assert not np.array_equal(a, b)
