@@ -11,12 +11,23 @@ python benchmarks/caustics.py [--references FOLDER]
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from equal_error import CORES, REFERENCE, Judge, Picture, Stage, once, prepare, trace_paths
+from equal_error import (
+    CORES,
+    REFERENCE,
+    Judge,
+    Picture,
+    Stage,
+    light_up,
+    once,
+    prepare,
+    reference_pair,
+    trace_paths,
+    widen_lobes,
+)
 from harness import kept, save
 
 SCENES = ("primitives", "small-balls", "gears")
@@ -36,10 +47,9 @@ def main() -> None:
 
 
 def measure(name: str, file: Path | None) -> dict[str, Any]:
-    stage = prepare(name, DISPLAY)
-    found = kept(file, lambda: {"pictures": np.stack([with_photons(stage, REFERENCE, seed) for seed in (1001, 2002)])})
-    stage.integrator.photons = None
-    judge = Judge(stage, None, found["pictures"])
+    stage = prepare(name, DISPLAY, "auto")
+    found = kept(file, lambda: {"pictures": reference_pair(stage, REFERENCE)})
+    judge = Judge(stage, found["pictures"])
     rows: list[dict[str, Any]] = []
     for samples in SAMPLES:
         for way in ("paths", "photons"):
@@ -48,24 +58,14 @@ def measure(name: str, file: Path | None) -> dict[str, Any]:
                 seconds, pixels = once(lambda s=samples, w=way, m=method: picture(stage, w, m, s))
                 rows.append({"spp": samples, "way": way, "method": method, "seconds": seconds, **judge(pixels)})
                 print(name, rows[-1], flush=True)
-    stage.integrator.photons = None
+    _by_paths(stage)
     light = {"paths": float(trace_paths(stage, REFERENCE, 5).mean()), "photons": float(found["pictures"].mean())}
     return {"judge_psnr": judge.own_psnr, "mean_light": light, "rows": rows}
 
 
-def with_photons(stage: Stage, samples: int, seed: int) -> Picture:
-    shoot(stage, samples, seed)
-    return trace_paths(stage, samples, seed)
-
-
-def shoot(stage: Stage, samples: int, seed: int) -> None:
-    from lippmann.rendering.transport.casters import find_casters
-    from lippmann.rendering.transport.caustic_photons import CausticPhotons
-
+def _by_paths(stage: Stage) -> None:
     paths = stage.integrator
-    casters = find_casters(paths.scene)
-    whole = samples * stage.source.width * stage.source.height
-    paths.photons = CausticPhotons(paths.scene, paths.features, casters, samples=whole, seed=seed).of_pass(0)
+    paths.photons = paths.photon_passes = paths.seen_chains = None
 
 
 def picture(stage: Stage, way: str, method: str, samples: int) -> Picture:
@@ -75,11 +75,14 @@ def picture(stage: Stage, way: str, method: str, samples: int) -> Picture:
     from lippmann.rendering.denoise.guided_denoiser import GuidedDenoiser
     from lippmann.rendering.film.sample_batches import FullInBatches
 
-    stage.integrator.photons = None
+    _by_paths(stage)
     if way == "photons":
-        shoot(stage, samples, 3)
+        light_up(stage, replace(stage.session.request, spp=samples, seed=3))
+    if method == "pooled":
+        widen_lobes(stage, samples)
     batches = FullInBatches(stage.integrator, stage.source, seed=3, memory=4 << 30)
     batches.add(samples)
+    stage.integrator.beam = None
     if method == "full":
         return batches.picture()
     rays = batches.rays

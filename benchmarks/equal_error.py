@@ -5,12 +5,14 @@ displays: the paper's 64 lenses of 8 pixels, 64 lenses of 48 pixels, and 34 x 34
 rendered, about the middle: references would take hours otherwise.
 
 A picture p is judged by two independent references a, b of the full renderer: the mean of (p - a)(p - b), in codes,
-is its squared error, free of the references' own noise. Time is that of the processors over their number, so that
-what else runs on the machine does not count; medians of three, warm. Denoised pictures are made with either effort of
-Open Image Denoise, guides included, and every way counts with the better one. Where full rendering does not come to a
-PSNR, its time is drawn out by the law of its noise, error times time being constant, and the scene is named.
+is its squared error, free of the references' own noise. Caustics come by photons where there are any, in references
+and pictures alike; photons and the look at seen light are in the pictures' time. Time is that of the processors over
+their number, so that what else runs on the machine does not count; medians of three, warm. Denoised pictures are made
+with either effort of Open Image Denoise, guides included, and every way counts with the better one. Where full
+rendering does not come to a PSNR, its time is drawn out by the law of its noise, error times time being constant, and
+the scene is named.
 
-python benchmarks/equal_error.py [DISPLAY ...] [--scenes NAME,...] [--references FOLDER]
+python benchmarks/equal_error.py [DISPLAY ...] [--scenes NAME,...] [--references FOLDER] [--reference-samples N]
 
 References are kept in FOLDER, where one is given: they take most of the time.
 """
@@ -23,7 +25,7 @@ import os
 import statistics
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -76,11 +78,14 @@ def main() -> None:
     results = saved("equal_error").get("results", {})
     words = argparse.ArgumentParser(description=__doc__)
     words.add_argument("--references", type=Path)
+    words.add_argument("--reference-samples", type=int, default=REFERENCE)
     given, scenes = asked(words)
     for name, displays in scenes:
         for display in displays:
-            file = given.references and given.references / f"{display}-{name}-{REFERENCE}.npz"
-            results.setdefault(display, {})[name] = _measure(prepare(name, display), file)
+            samples = given.reference_samples
+            file = given.references and given.references / f"{display}-{name}-{samples}.npz"
+            measured = _measure(prepare(name, display, "auto"), file, samples)
+            results.setdefault(display, {})[name] = {"reference_samples": samples, **measured}
             summary = {kind: _summary(measured) for kind, measured in results.items()}
             save("equal_error", {"reference_spp": 2 * REFERENCE, "results": results, "summary": summary})
 
@@ -98,8 +103,6 @@ def asked(words: argparse.ArgumentParser) -> tuple[argparse.Namespace, list[tupl
 
 def prepare(name: str, display_name: str, caustics: str = "paths") -> Stage:
     """The scene on the device, before the display."""
-    from dataclasses import replace
-
     import lippmann
     from lippmann.rendering.request.render_request import RenderRequest
     from lippmann.rendering.session import open_session
@@ -114,7 +117,8 @@ def prepare(name: str, display_name: str, caustics: str = "paths") -> Stage:
     scene = lippmann.load_scene(GLTF.get(name, name))
     at = place(scene.bounds, whole, cameras=scene.cameras, home_camera=scene.home_camera, bounds_in=scene.bounds_in)
     display = whole if rows is None else whole.resized(whole.panel.width, rows)
-    session = open_session(scene, RenderRequest(integrator="path", caustics=caustics), memory=4 << 30)
+    request = RenderRequest(integrator="path", caustics=caustics, pixel_filter="box")
+    session = open_session(scene, request, memory=4 << 30)
 
     from lippmann.rendering.transport.ray_source import DisplayRays
 
@@ -123,11 +127,12 @@ def prepare(name: str, display_name: str, caustics: str = "paths") -> Stage:
     return Stage(session, integrator, source, display, at.display_from_world)
 
 
-def _measure(stage: Stage, references: Path | None) -> dict[str, Any]:
-    judge = Judge(stage, references)
+def _measure(stage: Stage, references: Path | None, reference_samples: int) -> dict[str, Any]:
+    pictures = kept(references, lambda: {"pictures": reference_pair(stage, reference_samples)})["pictures"]
+    judge = Judge(stage, pictures)
     curves: dict[str, list[Point]] = {"full": [], "full + oidn": [], "pooled": []}
     for samples in SAMPLES:
-        traced, picture = timed(lambda samples=samples: trace_paths(stage, samples, 3))
+        traced, picture = timed(lambda samples=samples: trace_lit(stage, samples, 3))
         curves["full"].append({"spp": samples, "seconds": traced, **judge(picture)})
         for effort in ("fast", "high"):
             _denoised(stage, judge, curves, (samples, effort), traced, picture)
@@ -156,7 +161,9 @@ def _denoised(
         return share_light(cleaned, stage.display, guides, stop=SHARING_STOP[effort], threads=CORES)
 
     batches = FullInBatches(stage.integrator, stage.source, seed=3, memory=4 << 30)
+    widen_lobes(stage, samples)
     batches.add(samples)
+    stage.integrator.beam = None
     for way, call in (
         ("full + oidn", lambda: clean(picture)),
         ("pooled", lambda: Denoised(batches, clean, "srgb", CORES, share).picture()),
@@ -182,16 +189,18 @@ def once(call: Callable[[], T]) -> tuple[float, T]:
     return (time.process_time() - started) / CORES, result
 
 
-class Judge:
-    """Squared errors by two references that know nothing of each other: ``pictures``, or long ones of paths."""
+def reference_pair(stage: Stage, samples: int) -> NDArray[np.float32]:
+    """Two long pictures that know nothing of each other."""
+    return np.stack([trace_lit(stage, samples, seed) for seed in (1001, 2002)])
 
-    def __init__(self, stage: Stage, file: Path | None, pictures: NDArray[np.float32] | None = None) -> None:
+
+class Judge:
+    """Squared errors by two long pictures that know nothing of each other."""
+
+    def __init__(self, stage: Stage, pictures: NDArray[np.float32]) -> None:
         from lippmann.metrics.mse_psnr import micro_image_means
 
         self._display, self._means = stage.display, micro_image_means
-        if pictures is None:
-            found = kept(file, lambda: {"pictures": [trace_paths(stage, REFERENCE, seed) for seed in (1001, 2002)]})
-            pictures = found["pictures"]
         self._references = [coded(picture) for picture in pictures]
         own = ((self._references[0] - self._references[1]) ** 2).mean() / 2
         #: PSNR of a single reference.
@@ -212,6 +221,32 @@ def coded(picture: Picture) -> NDArray[np.float64]:
 
 def _psnr(error: float) -> float:
     return -10 * math.log10(max(error, 1e-9))
+
+
+def light_up(stage: Stage, request: Any) -> None:
+    """What the program gives the integrator for a picture: photons of its own where there are caustics, and chains."""
+    from lippmann.rendering.film.caustics import give_photons
+    from lippmann.rendering.film.seen_chains import give_chains
+
+    paths = stage.integrator
+    paths.photons = paths.photon_passes = paths.seen_chains = None
+    if give_photons(paths, request, stage.source, 4 << 30) == "photons":
+        give_chains(paths, request, stage.source)
+
+
+def widen_lobes(stage: Stage, samples: int) -> None:
+    """Lobes as wide as samples' beams, as the program has them where so many samples are pooled."""
+    from lippmann.rendering.transport.beam import beam_of
+    from lippmann.rendering.transport.casters import has_sharp_surfaces
+
+    if has_sharp_surfaces(stage.integrator.scene):
+        stage.integrator.beam = beam_of(stage.source, samples)
+
+
+def trace_lit(stage: Stage, samples: int, seed: int) -> Picture:
+    """A picture of so many samples as the program makes it, caustics included."""
+    light_up(stage, replace(stage.session.request, spp=samples, seed=seed))
+    return trace_paths(stage, samples, seed)
 
 
 def trace_paths(stage: Stage, samples: int, seed: int) -> Picture:

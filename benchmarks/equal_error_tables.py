@@ -28,14 +28,13 @@ def describe(result: dict[str, Any]) -> str:
 Path light of depth 8, two cores, warm. Every way counts with the better effort of Open Image Denoise; guides, denoising
 and sharing are in its time. Pooled pictures are made in two halves, as the program makes them: each is denoised and
 shared, and gives way to samples that are nearer. Full + OIDN is denoised once, as a whole. Pictures are judged by two
-references of {result["reference_spp"] // 2} samples each, whose own noise is left out of the figures. Where full does
+references of {_reference_samples(result)} samples each, whose own noise is left out of the figures. Where full does
 not come to a PSNR, its time is drawn out by the law of its noise, which flatters it where few paths find much light.
 "Best" is the highest PSNR that full + OIDN comes to with up to 64 samples.
 
-Small balls and primitives have small lamps and glass, and few paths find the caustics. What a reference lacks of them
-is not missed in a picture: on the display with 8 pixels small balls, pooled from 64 samples with the fast effort, have
-34.5 dB by two references of 128 samples, 33.2 by two of 256, and 30.5 by two of 1536, which still are full of single
-bright pixels. There all figures are too good, and more samples seem worse.
+Small balls, primitives and gears have small lamps, mirrors and glass. Their caustics come by photons, emitters seen in
+mirrors by [further chains](caustics.md#seen-light), in references and pictures alike: references of paths lack a part
+of that light, and by them all figures were too good, by up to 3 dB.
 
 ![PSNR against seconds for every scene and display](../images/equal-error.png)"""
     ]
@@ -44,6 +43,16 @@ bright pixels. There all figures are too good, and more samples seem worse.
             parts += [f"### {title}", *_pooled_gains(scenes, result["summary"][name], *rest)]
             parts += ["\n".join(_times_to(scenes)), "\n".join(_curve_rows(scenes))]
     return "\n\n".join(parts) + "\n"
+
+
+def _reference_samples(result: dict[str, Any]) -> str:
+    """Of the references of all scenes."""
+    found = {
+        scene.get("reference_samples", result["reference_spp"] // 2)
+        for scenes in result["results"].values()
+        for scene in scenes.values()
+    }
+    return " or ".join(str(samples) for samples in sorted(found))
 
 
 def _pooled_gains(scenes: dict[str, Any], summary: dict[str, Any], bound: str, *targets: int) -> list[str]:

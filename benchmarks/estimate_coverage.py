@@ -90,7 +90,7 @@ class Case:
         from lippmann.rendering.session import open_session
         from lippmann.scene.matrices import rotation
 
-        request = RenderRequest(integrator="path", depth=DEPTH, threads=THREADS)
+        request = RenderRequest(integrator="path", depth=DEPTH, threads=THREADS, pixel_filter="box")
         self.session = open_session(load_scene(SCENES[scene]()), request, memory=MEMORY)
 
         from lippmann.rendering.transport.ray_source import DisplayRays

@@ -1,13 +1,13 @@
 """What a quality takes that is asked for: by full, by full with Open Image Denoise, by pooled, and by stock views.
 
 The scenes, displays and rows of equal_error.py. Each way is asked for a PSNR of the whole picture (``--quality``)
-and works until its own estimate says that it is there, judging included, with at most 256 samples a pixel. Where full
+and works until its own estimate says that it is there, judging included, with at most 64 samples a pixel. Where full
 does not come to the PSNR with these, its time is drawn out by the law of its noise. Time is that of the processors over
-their number; each way has run before, for a low quality. Caustics come as by default.
+their number, photons included; each way has run before, for a low quality. Caustics come as by default.
 
 *Stock views* are what there is without Lippmann: Mitsuba's own ``path`` along the very rays of the display, so that
 nothing is lost by weaving, each view denoised by Open Image Denoise with albedo and normals, all views interlaced. They
-know nothing of their error, so they are told: of 1, 2, 4 ... 256 samples the fewest count with which they are there by
+know nothing of their error, so they are told: of 1, 2, 4 ... 64 samples the fewest count with which they are there by
 two references with photons, denoised with the cheaper effort that gets there, and only that picture's time.
 
 python benchmarks/goals.py [DISPLAY ...] [--scenes NAME,...] [--references FOLDER]
@@ -23,11 +23,11 @@ from typing import Any
 
 import numpy as np
 
-from equal_error import Judge, Picture, Stage, asked, once, prepare
+from equal_error import Judge, Picture, Stage, asked, light_up, once, prepare
 from harness import kept, save, saved
 
 QUALITIES = (35.0, 40.0)
-MOST_SAMPLES = 256
+MOST_SAMPLES = 64
 #: Samples of either reference by which stock views are told their error. The mean of the products of the differences
 #: from both is free of the references' own noise, so few samples do.
 REFERENCE = 64
@@ -61,7 +61,7 @@ def _measured(stage: Stage, references: Path | None) -> dict[str, Any]:
         for quality in QUALITIES:
             found[f"{quality:g}"][way] = _reached(stage, quality, options)
     pictures = kept(references, lambda: {"pictures": np.stack([_reference(stage, seed) for seed in (1001, 2002)])})
-    judge = Judge(stage, None, pictures["pictures"])
+    judge = Judge(stage, pictures["pictures"])
     for quality in QUALITIES:
         found[f"{quality:g}"][STOCK] = _stock(stage, judge, quality)
     return found
@@ -74,7 +74,9 @@ def _reference(stage: Stage, seed: int) -> Picture:
 def _picture(stage: Stage, options: dict[str, Any]) -> Picture:
     from lippmann.rendering.methods import trace
 
-    picture: Picture = trace(_job(stage, options)).frame.pixels
+    job = _job(stage, options)
+    light_up(stage, job.request)
+    picture: Picture = trace(job).frame.pixels
     return picture
 
 
@@ -143,7 +145,12 @@ def _reached(stage: Stage, quality: float, options: dict[str, Any]) -> dict[str,
     from lippmann.rendering.methods import trace
 
     job = _job(stage, {"quality": quality, "spp": MOST_SAMPLES, **options})
-    seconds, traced = once(lambda: trace(job))
+
+    def lit() -> Any:
+        light_up(stage, job.request)
+        return trace(job)
+
+    seconds, traced = once(lit)
     assert traced.estimate is not None
     short = max(0.0, quality - traced.estimate.psnr)
     if options["denoise"] == "none":

@@ -33,8 +33,8 @@ LOOK_COST, FEWEST_LOOKS, MOST_LOOKS, LOOKS_OF_PIXEL = 0.02, 1 << 14, 1 << 20, 8
 REST_VARIANCE, CHAIN_COST = 0.01, 0.03
 #: Meetings with the brightest emitter that count beside those of the look: as many as may well have been missed.
 MISSED = 0.25
-#: Samples that a picture is taken to need of which it is not known.
-OPEN_ENDED = 128
+#: Samples that a picture is taken to need at most, and at least, of which it is not known.
+OPEN_ENDED, FEWEST_OPEN_ENDED = 128, 16
 #: Linear radiance at which the slope of the codes is taken where seen light brings less: mid-grey.
 _GREY = 0.18
 #: Points from which emitters are looked at.
@@ -55,8 +55,7 @@ def give_chains(integrator: PathIntegrator, request: RenderRequest, source: RayS
     """
     if not request.box_filter:  # all rays of a pixel are one
         return {}
-    samples = OPEN_ENDED if request.is_open_ended else request.samples
-    chains = seen_chains(integrator, source, samples, request.transfer, request.seed)
+    chains = seen_chains(integrator, source, _expected_samples(request), request.transfer, request.seed)
     integrator.seen_chains = dr.opaque(mi.UInt32, chains) if chains else None
     return {"seen_chains": chains} if chains else {}
 
@@ -84,6 +83,18 @@ def seen_chains(integrator: PathIntegrator, source: RaySource, samples: int, tra
     variance += MISSED * (slope * brightest) ** 2 / (looks.size / 3)
     wanted = math.sqrt(variance * (1 - CHAIN_COST) / (REST_VARIANCE * CHAIN_COST)) - 1
     return 0 if wanted < 1 else min(MOST, 1 << round(math.log2(wanted)))
+
+
+def _expected_samples(request: RenderRequest) -> int:
+    """Samples of a pixel that the picture will take, about.
+
+    The worst micro-image is that of a rare highlight, as a rule: where it is to be good, no few samples are counted on.
+    """
+    if not request.is_open_ended:
+        return request.samples
+    if request.quality is None or request.quality_worst is not None:
+        return OPEN_ENDED
+    return int(np.clip(REST_VARIANCE * 10 ** (request.quality / 10), FEWEST_OPEN_ENDED, OPEN_ENDED))
 
 
 def variance_of(looks: NDArray[np.float64], samples: int, transfer: Transfer) -> float:
