@@ -168,6 +168,7 @@ def test_narrow_lobes_are_weighed_as_paths_weigh_them():
     assert further.var(axis=0).mean() < 0.5 * plain.var(axis=0).mean()
 
 
+@pytest.mark.long
 def test_gain_limit_and_background_are_those_of_paths(all_events):
     import mitsuba as mi
 

@@ -30,7 +30,7 @@ MOST = 32
 #: Share of a picture's time that the look takes, about; its chains within limits, and those of one pixel, at least.
 LOOK_COST, FEWEST_LOOKS, MOST_LOOKS, LOOKS_OF_PIXEL = 0.02, 1 << 14, 1 << 20, 8
 #: Variance of a path's light, seen light apart, in codes; and what a chain costs of a path: those of usual scenes.
-REST_VARIANCE, CHAIN_COST = 0.01, 0.03
+REST_VARIANCE, CHAIN_COST = 0.01, 0.05
 #: Meetings with the brightest emitter that count beside those of the look: as many as may well have been missed.
 MISSED = 0.25
 #: Samples that a picture is taken to need at most, and at least, of which it is not known.

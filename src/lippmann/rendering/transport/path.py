@@ -381,6 +381,11 @@ class PathIntegrator:
             shown /= self.gain  # a colour that is to be seen as it was said
         return dr.select((depth == 0) & ~si.is_valid(), shown, emission)
 
+    @property
+    def has_surroundings(self) -> bool:
+        """Whether rays that meet nothing show something."""
+        return self._environment is not None or self.features.background is not None
+
     def limited(self, met: Spectrum, depth: UInt32) -> Spectrum:
         """What a path brings that it met after ``depth`` surfaces, with :attr:`most_indirect`."""
         return met if self.most_indirect is None else dr.select(depth > 1, self._clamped(met), met)

@@ -14,9 +14,10 @@ from typing import TYPE_CHECKING, cast
 import drjit as dr
 import mitsuba as mi
 
+from lippmann.device.pbr.gltf_bsdf import SHARP_LOBE
 from lippmann.device.pbr.surface_point import widen_lobes
 from lippmann.device.sobol import PIXEL_DIMENSION, SampleStream, hash32
-from lippmann.device.types import Bool, Ray3f, Spectrum, UInt32
+from lippmann.device.types import Bool, BSDFPtr, PreliminaryIntersection3f, Ray3f, Spectrum, UInt32
 from lippmann.rendering.transport.beam import Beam, turn_of_normals, widening
 from lippmann.rendering.transport.shadow_rays import MAX_CROSSINGS
 from lippmann.rendering.transport.sharp_events import follows_sharply, sharp_lobe
@@ -75,7 +76,8 @@ def _chain(
     ray = mi.Ray3f(ray)
     active = mi.Bool(active)
     light, throughput = mi.Spectrum(0), mi.Spectrum(1)
-    depth, crossings, rays = mi.UInt32(0), mi.UInt32(0), mi.UInt32(0)
+    depth, crossings = mi.UInt32(0), mi.UInt32(0)
+    rays = dr.select(active, mi.UInt32(1), mi.UInt32(0))
     absorption = mi.Color3f(0)
     vertex = dr.zeros(mi.Interaction3f)
     vertex_pdf, vertex_delta, vertex_samples = mi.Float(1), mi.Bool(True), mi.UInt32(1)
@@ -88,9 +90,9 @@ def _chain(
         width, spread = mi.Vector2f(beam.width), mi.Vector2f(beam.spread)
         needed = mi.RayFlags.All | mi.RayFlags.dNSdUV
 
+    pi = scene.ray_intersect_preliminary(ray, coherent=True, active=active)
+    active &= _matters(integrator, pi)
     while dr.hint(active, label="chain"):
-        pi = scene.ray_intersect_preliminary(ray, coherent=False, active=active)
-        rays += dr.select(active, mi.UInt32(1), mi.UInt32(0))
         si = pi.compute_surface_interaction(ray, ray_flags=needed)
         bsdf = si.bsdf(ray)
         if dr.hint(integrator.features.has_absorption, mode="scalar"):
@@ -100,8 +102,7 @@ def _chain(
 
         continues = active & si.is_valid() & (depth < integrator.depth)
         lobe = sharp_lobe(si, bsdf, continues)
-        goes_on = (bsdf.flags() & int(mi.BSDFFlags.Delta | mi.BSDFFlags.Null)) != 0
-        continues &= goes_on | (dr.squared_norm(lobe) > 0)
+        continues &= _has_no_width(bsdf) | (dr.squared_norm(lobe) > 0)
         turn = mi.Float(0)
         if dr.hint(integrator.beam is not None, mode="scalar"):
             width += spread * dr.select(si.is_valid(), si.t, 0)
@@ -133,4 +134,21 @@ def _chain(
         else:
             crossings += 1
         active = continues & (dr.max(throughput) > 0) & (crossings < MAX_CROSSINGS)
+        pi = scene.ray_intersect_preliminary(ray, coherent=False, active=active)
+        rays += dr.select(active, mi.UInt32(1), mi.UInt32(0))
+        active &= _matters(integrator, pi)
     return light, rays
+
+
+def _matters(integrator: PathIntegrator, pi: PreliminaryIntersection3f) -> Bool:
+    """Whether a chain may meet light where it has arrived, or go on: most end at rough surfaces, at little cost."""
+    bsdf = pi.shape.bsdf()
+    surface = pi.is_valid() & (
+        pi.shape.is_emitter() | _has_no_width(bsdf) | bsdf.has_attribute(SHARP_LOBE, pi.is_valid())
+    )
+    return surface | ~pi.is_valid() if integrator.has_surroundings else surface
+
+
+def _has_no_width(bsdf: BSDFPtr) -> Bool:
+    """Whether a surface has lobes without width, or lets rays straight through."""
+    return (bsdf.flags() & int(mi.BSDFFlags.Delta | mi.BSDFFlags.Null)) != 0
