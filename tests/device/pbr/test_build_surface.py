@@ -462,3 +462,18 @@ def test_coat_has_a_normal_map_of_its_own(build, parts):
     under = evaluate(bsdf_of(build, parts, body), wi, ways)[0][:, 0]
     assert plain[0] - under[0] > 0.5 > plain[1] - under[1]
     assert mapped[1] - under[1] > 0.5 > mapped[0] - under[0]
+
+
+@pytest.mark.parametrize(("roughness", "root"), [(0.05, True), (0.8, False)])
+def test_narrow_lobes_are_sampled_oftener_than_they_reflect(build, parts, roughness, root):
+    """What they show differs most from sample to sample."""
+    import mitsuba as mi
+
+    material = Material("glaze", base_color=(0.8, 0.8, 0.8), roughness=roughness)
+    wi = np.array([0.0, 0.0, 1.0])
+    kinds = draw(bsdf_of(build, parts, material), wi, 20000)[3]
+    chance = np.mean((kinds & int(mi.BSDFFlags.GlossyReflection)) != 0)
+    gloss = float(reflected_share(F0, wi[None], roughness).max())
+    share = gloss / (gloss + (1 - gloss) * 0.8)
+    expected = np.sqrt(share) if root else share
+    assert chance == pytest.approx(expected, rel=0.12)

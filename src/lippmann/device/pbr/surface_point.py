@@ -24,6 +24,8 @@ from lippmann.device.types import Bool, Color3f, Float, SurfaceInteraction3f, Ve
 
 #: Reflectance of the clear coat seen head-on (refractive index 1.5).
 COAT_F0 = 0.04
+#: GGX width from which on what a lobe shows is much the same for all samples.
+MUCH_THE_SAME_ALPHA = 0.1
 
 
 def widen_lobes(si: SurfaceInteraction3f, by: Float) -> None:
@@ -160,7 +162,7 @@ def _weigh_lobes(model: SurfaceModel, point: Point, place: Place, outside: Bool)
         diffuse += dr.max(point.sheen.color) * point.sheen.albedo(cosine)
     sharp = dr.lerp(1 - point.below, dr.mean(metal), point.metallic) + entering * point.transmission
     total = diffuse + sharp
-    point.diffuse_chance = dr.select(total > 0, diffuse / total, 1)
+    point.diffuse_chance = dr.select(total > 0, 1 - _chance(sharp / total, point.lobe), 1)
     if model.clearcoat is None:
         return
     assert model.clearcoat_roughness is not None
@@ -169,12 +171,22 @@ def _weigh_lobes(model: SurfaceModel, point: Point, place: Place, outside: Bool)
     weight *= dr.clip(model.clearcoat.eval(place), 0, 1)
     if model.solid:
         weight = dr.select(outside, weight, 0)
-    chance = dr.select(weight > 0, weight / (weight + (1 - weight) * total), 0)
+    chance = dr.select(weight > 0, _chance(weight / (weight + (1 - weight) * total), lobe), 0)
     gain = mi.Float(1)
     if model.compensates:
         albedo = _gloss_albedo(model, lobe)
         gain = dr.rcp(albedo.x + albedo.y)
     point.coat = Coat(lobe, weight, chance, gain)
+
+
+def _chance(share: Float, lobe: Lobe) -> Float:
+    """Chance of sampling a lobe that sends back a ``share`` of the light: the root of it where the lobe is narrow.
+
+    What narrow lobes show differs from sample to sample, what wide ones do is much the same; and samples are best shared
+    out by how their light varies.
+    """
+    width = dr.maximum(lobe.alpha.x, lobe.alpha.y) / MUCH_THE_SAME_ALPHA
+    return dr.lerp(dr.sqrt(share), share, dr.minimum(width, 1))
 
 
 def _gloss_albedo(model: SurfaceModel, lobe: Lobe) -> Color3f:
