@@ -182,8 +182,8 @@ def _weigh_lobes(model: SurfaceModel, point: Point, place: Place, outside: Bool)
 def _chance(share: Float, lobe: Lobe) -> Float:
     """Chance of sampling a lobe that sends back a ``share`` of the light: the root of it where the lobe is narrow.
 
-    What narrow lobes show differs from sample to sample, what wide ones do is much the same; and samples are best shared
-    out by how their light varies.
+    What narrow lobes show differs from sample to sample, what wide ones do is much the same; and samples are best
+    shared out by how their light varies.
     """
     width = dr.maximum(lobe.alpha.x, lobe.alpha.y) / MUCH_THE_SAME_ALPHA
     return dr.lerp(dr.sqrt(share), share, dr.minimum(width, 1))
