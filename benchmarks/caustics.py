@@ -1,11 +1,13 @@
 """Caustics by photons and by paths: light found, error of pictures of few samples, and time.
 
 Three bundled scenes on the paper's display (160 rows of pixels), path light. References a and b are two long renderings
-with photons, 256 samples and two million emissions each, that know nothing of each other; the error of a picture p is
-the mean of (p - a)(p - b) in codes. Time is that of the processors over their number, photons included. How far the
+with photons and chains, of 256 samples each, that know nothing of each other; the error of a picture p is the mean of
+(p - a)(p - b) in codes. Time is that of the processors over their number, photons included. How far the
 references agree is told beside.
 
-python benchmarks/caustics.py [--references FOLDER]
+python benchmarks/caustics.py [--references FOLDER] [--reference-samples N]
+
+FOLDER may be that of equal_error.py, whose references of as many samples are the same.
 """
 
 from __future__ import annotations
@@ -38,28 +40,32 @@ SAMPLES = (4, 16, 64)
 def main() -> None:
     words = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     words.add_argument("--references", type=Path)
+    words.add_argument("--reference-samples", type=int, default=REFERENCE)
     given = words.parse_args()
     results = {}
     for name in SCENES:
-        file = given.references and given.references / f"caustics-{name}.npz"
-        results[name] = measure(name, file)
-        save("caustics", {"reference_spp": 2 * REFERENCE, "scenes": results})
+        file = given.references and given.references / f"{DISPLAY}-{name}-{given.reference_samples}.npz"
+        results[name] = measure(name, file, given.reference_samples)
+        save("caustics", {"reference_spp": 2 * given.reference_samples, "scenes": results})
 
 
-def measure(name: str, file: Path | None) -> dict[str, Any]:
+def measure(name: str, file: Path | None, reference_samples: int) -> dict[str, Any]:
     stage = prepare(name, DISPLAY, "auto")
-    found = kept(file, lambda: {"pictures": reference_pair(stage, REFERENCE)})
+    found = kept(file, lambda: {"pictures": reference_pair(stage, reference_samples)})
     judge = Judge(stage, found["pictures"])
     rows: list[dict[str, Any]] = []
     for samples in SAMPLES:
         for way in ("paths", "photons"):
             for method in ("full", "pooled"):
-                picture(stage, way, method, samples)  # compiles
+                picture(stage, way, method, 2)  # compiles
                 seconds, pixels = once(lambda s=samples, w=way, m=method: picture(stage, w, m, s))
                 rows.append({"spp": samples, "way": way, "method": method, "seconds": seconds, **judge(pixels)})
                 print(name, rows[-1], flush=True)
     _by_paths(stage)
-    light = {"paths": float(trace_paths(stage, REFERENCE, 5).mean()), "photons": float(found["pictures"].mean())}
+    light = {
+        "paths": float(trace_paths(stage, reference_samples, 5).mean()),
+        "photons": float(found["pictures"].mean()),
+    }
     return {"judge_psnr": judge.own_psnr, "mean_light": light, "rows": rows}
 
 

@@ -43,18 +43,18 @@ def _gains(summary: dict[str, Any]) -> str:
 def _rows(scenes: dict[str, Any]) -> list[str]:
     first = next(iter(scenes.values()))
     qualities = list(first)
-    measured = [way for way in _WAYS if way in first[qualities[0]]]
+    measured = [way for way in _WAYS if any(way in goals[qualities[0]] for goals in scenes.values())]
     ways = " | ".join(name_of(way) for way in measured)
     rows = [f"| scene | {' | '.join(f'{quality} dB: {ways}' for quality in qualities)} |"]
     rows.append("|" + "---|" * (1 + len(qualities) * len(measured)))
     for name, goals in scenes.items():
-        cells = [_cell(goals[quality][way], way) for quality in qualities for way in measured]
+        cells = [_cell(goals[quality].get(way), way) for quality in qualities for way in measured]
         rows.append(f"| {name} | {' | '.join(cells)} |")
     return rows
 
 
-def _cell(found: dict[str, Any], way: str) -> str:
-    if found["short"] and way != "full":
+def _cell(found: dict[str, Any] | None, way: str) -> str:
+    if found is None or (found["short"] and way != "full"):
         return ""
     told = f"{found['seconds']:.2f} s{' *' if found['short'] else ''} ({found['spp']})"
     return f"*{told}*" if way == "pooled" and not found["denoised"] else told
