@@ -34,7 +34,7 @@ from harness import kept, save
 
 SCENES = ("primitives", "small-balls", "gears")
 DISPLAY = "lenticular-8"
-SAMPLES = (4, 16, 64)
+SAMPLES = (4, 16)
 
 
 def main() -> None:
