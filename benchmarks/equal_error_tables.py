@@ -32,9 +32,7 @@ references of {_reference_samples(result)} samples each, whose own noise is left
 not come to a PSNR, its time is drawn out by the law of its noise, which flatters it where few paths find much light.
 "Best" is the highest PSNR that full + OIDN comes to with up to 64 samples.
 
-Small balls, primitives and gears have small lamps, mirrors and glass. Their caustics come by photons, emitters seen in
-mirrors by [further chains](caustics.md#seen-light), in references and pictures alike: references of paths lack a part
-of that light, and by them all figures were too good, by up to 3 dB.
+{_about_caustics(result)}
 
 ![PSNR against seconds for every scene and display](../images/equal-error.png)"""
     ]
@@ -53,6 +51,22 @@ def _reference_samples(result: dict[str, Any]) -> str:
         for scene in scenes.values()
     }
     return " or ".join(str(samples) for samples in sorted(found))
+
+
+def _about_caustics(result: dict[str, Any]) -> str:
+    """Which rows of the scenes with caustics are by references that have them."""
+    by_display = [
+        f"{' and '.join(names)} ({DISPLAYS[display][0]})"
+        for display, scenes in result["results"].items()
+        if (names := [name for name, scene in scenes.items() if "reference_samples" in scene])
+    ]
+    text = (
+        "Small balls, primitives and gears have small lamps, mirrors and glass. Their caustics come by photons, "
+        "emitters seen in mirrors by [further chains](caustics.md#seen-light), in references and pictures alike, in the rows of "
+        f"{', '.join(by_display)}. References of paths lack a part of that light: the other rows of these three scenes "
+        "are by such, and too good, by up to 3 dB."
+    )
+    return textwrap.fill(text, 120, break_long_words=False, break_on_hyphens=False)
 
 
 def _pooled_gains(scenes: dict[str, Any], summary: dict[str, Any], bound: str, *targets: int) -> list[str]:
