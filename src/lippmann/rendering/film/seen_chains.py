@@ -9,6 +9,7 @@ would bring is added.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 import drjit as dr
 import mitsuba as mi
@@ -37,6 +38,8 @@ MISSED = 0.25
 OPEN_ENDED, FEWEST_OPEN_ENDED = 128, 16
 #: Linear radiance at which the slope of the codes is taken where seen light brings less: mid-grey.
 _GREY = 0.18
+#: Pixels whose variance is worked out at once.
+_AT_ONCE = 1 << 12
 #: Points from which emitters are looked at.
 _POINTS = 1 << 10
 
@@ -77,7 +80,7 @@ def seen_chains(integrator: PathIntegrator, source: RaySource, samples: int, tra
         Of the picture.
     """
     looks = _looks(integrator, source, samples, seed)
-    variance = variance_of(looks, samples, transfer)
+    variance = sum(variance_of(part, samples, transfer) * len(part) for part in _parts(looks)) / len(looks)
     brightest = min(_brightest(integrator, source, seed), samples)
     slope = float(coding_slope(np.array(_GREY), transfer))
     variance += MISSED * (slope * brightest) ** 2 / (looks.size / 3)
@@ -97,7 +100,7 @@ def _expected_samples(request: RenderRequest) -> int:
     return int(np.clip(REST_VARIANCE * 10 ** (request.quality / 10), FEWEST_OPEN_ENDED, OPEN_ENDED))
 
 
-def variance_of(looks: NDArray[np.float64], samples: int, transfer: Transfer) -> float:
+def variance_of(looks: NDArray[np.floating], samples: int, transfer: Transfer) -> float:
     """Mean variance of one chain in codes, as far as the others of its pixel leave the code a slope.
 
     Parameters
@@ -118,7 +121,7 @@ def variance_of(looks: NDArray[np.float64], samples: int, transfer: Transfer) ->
     return variance
 
 
-def _looks(integrator: PathIntegrator, source: RaySource, samples: int, seed: int) -> NDArray[np.float64]:
+def _looks(integrator: PathIntegrator, source: RaySource, samples: int, seed: int) -> NDArray[np.float32]:
     """``(pixels, looks, 3)``: what single chains meet, the gain included."""
     paths = source.width * source.height * source.channels * samples
     wanted = int(np.clip(paths * LOOK_COST / CHAIN_COST, FEWEST_LOOKS, MOST_LOOKS))
@@ -135,7 +138,13 @@ def _looks(integrator: PathIntegrator, source: RaySource, samples: int, seed: in
     if integrator.gain is not None:
         light *= integrator.gain
     values = np.array(dr.ravel(mi.Color3f(light)), dtype=np.float32)
-    return shown_colors(values.reshape(-1, few.channels, count, 3)).astype(np.float64)
+    return shown_colors(values.reshape(-1, few.channels, count, 3))
+
+
+def _parts(looks: NDArray[np.float32]) -> Iterator[NDArray[np.floating]]:
+    """Some pixels at a time: what is worked out of them takes several times their memory."""
+    for first in range(0, len(looks), _AT_ONCE):
+        yield looks[first : first + _AT_ONCE].astype(np.float64)
 
 
 def _brightest(integrator: PathIntegrator, source: RaySource, seed: int) -> float:
