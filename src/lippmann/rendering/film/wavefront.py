@@ -17,7 +17,7 @@ from lippmann.rendering.film.wavefront_plan import Pass, Plan, Tile
 from lippmann.rendering.transport.integrator import Integrator, RayCounts
 from lippmann.rendering.transport.path import PathIntegrator
 from lippmann.rendering.transport.ray_source import RaySource, pixel_number
-from lippmann.rendering.transport.seen_light import PixelRays
+from lippmann.rendering.transport.seen_light import PixelRays, sample_pixel
 
 
 @dataclass
@@ -159,7 +159,7 @@ def sample_pixels(
 ) -> tuple[Spectrum, RayCounts]:
     """One sample along ``ray`` per lane; where ``pixels`` are given, seen light may come from other rays of theirs."""
     if pixels is not None and isinstance(integrator, PathIntegrator):
-        return integrator.sample_pixel(pixels, ray, stream, mi.Bool(True))
+        return sample_pixel(integrator, pixels, ray, stream, mi.Bool(True))
     return integrator.sample(ray, stream, mi.Bool(True))
 
 

@@ -38,7 +38,6 @@ from lippmann.rendering.transport.integrator import FirstHit, RayCounts
 from lippmann.rendering.transport.light_sampling import LightSampler, SceneLightSampler
 from lippmann.rendering.transport.photon_map import PhotonMap
 from lippmann.rendering.transport.scene_features import SceneFeatures
-from lippmann.rendering.transport.seen_light import PixelRays, seen_light
 from lippmann.rendering.transport.shadow_rays import MAX_CROSSINGS, ShadowRays
 from lippmann.rendering.transport.sharp_events import (
     MOST_EVENTS,
@@ -140,20 +139,6 @@ class PathIntegrator:
         """Radiance along ``ray``, and the rays traced for it."""
         radiance, counts, _ = self.sample_with_hit(ray, stream, active)
         return radiance, counts
-
-    def sample_pixel(
-        self, pixel: PixelRays, ray: Ray3f, stream: SampleStream, active: Bool
-    ) -> tuple[Spectrum, RayCounts]:
-        """As :meth:`sample`, for one of the rays of ``pixel``: with :attr:`seen_chains` more of seen light."""
-        if self.seen_chains is None or self.photons is None:
-            return self.sample(ray, stream, active)
-        share = dr.rcp(1 + mi.Float(self.seen_chains))
-        radiance, counts, _ = self.sample_with_hit(ray, stream, active, share)
-        light, rays = seen_light(self, pixel, stream, self.seen_chains, active)
-        light *= share
-        return radiance + (light if self.gain is None else light * self.gain), RayCounts(
-            counts.secondary + rays, counts.shadow
-        )
 
     @dr.syntax
     def sample_with_hit(

@@ -9,7 +9,7 @@ expectation.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, cast
+from typing import cast
 
 import drjit as dr
 import mitsuba as mi
@@ -19,12 +19,11 @@ from lippmann.device.pbr.surface_point import widen_lobes
 from lippmann.device.sobol import PIXEL_DIMENSION, SampleStream, hash32
 from lippmann.device.types import Bool, BSDFPtr, PreliminaryIntersection3f, Ray3f, Spectrum, UInt32
 from lippmann.rendering.transport.beam import Beam, turn_of_normals, widening
+from lippmann.rendering.transport.integrator import RayCounts
+from lippmann.rendering.transport.path import PathIntegrator
+from lippmann.rendering.transport.ray_source import RaySource
 from lippmann.rendering.transport.shadow_rays import MAX_CROSSINGS
 from lippmann.rendering.transport.sharp_events import follows_sharply, sharp_lobe
-
-if TYPE_CHECKING:
-    from lippmann.rendering.transport.path import PathIntegrator
-    from lippmann.rendering.transport.ray_source import RaySource
 
 #: Tells the streams of chains from those of paths.
 _CHAINS = 0x5EE21147
@@ -43,6 +42,22 @@ class PixelRays:
     def ray(self, stream: SampleStream) -> Ray3f:
         """The ray of a sample, at its point of the pixel."""
         return self._source.rays(*self._at, stream.next_2d(PIXEL_DIMENSION))
+
+
+def sample_pixel(
+    integrator: PathIntegrator, pixel: PixelRays, ray: Ray3f, stream: SampleStream, active: Bool
+) -> tuple[Spectrum, RayCounts]:
+    """One sample of ``pixel`` per lane along ``ray``, which is one of its rays, and the rays traced for it.
+
+    Where the integrator has chains, with as many through other points of the pixel.
+    """
+    if integrator.seen_chains is None or integrator.photons is None:
+        return integrator.sample(ray, stream, active)
+    share = dr.rcp(1 + mi.Float(integrator.seen_chains))
+    radiance, counts, _ = integrator.sample_with_hit(ray, stream, active, share)
+    light, rays = seen_light(integrator, pixel, stream, integrator.seen_chains, active)
+    light *= share if integrator.gain is None else share * integrator.gain
+    return radiance + light, RayCounts(counts.secondary + rays, counts.shadow)
 
 
 @dr.syntax
