@@ -204,3 +204,29 @@ def test_chains_count_as_rays_and_depend_on_the_seed_alone(all_events):
     assert whole.rays.secondary - plain.rays.secondary >= 4 * lanes
     a, b = whole.halves()
     assert not np.array_equal(a, b)
+
+
+def polished_plate():
+    """A plate whose lobe is as wide as the lamp that it mirrors, so that either way of sampling counts; and a wall."""
+    import trimesh
+
+    from lippmann.scene.values.description import Instance, Light, Material, Mesh, SceneDescription
+
+    plate, wall = trimesh.creation.box((1.6, 1.6, 0.02)), trimesh.creation.box((0.02, 1.6, 1.0))
+    meshes = [
+        Mesh("", m.vertices.astype(np.float32), m.faces.astype(np.uint32), number)
+        for number, m in enumerate((plate, wall))
+    ]
+    materials = [Material("metal", metallic=1.0, roughness=0.13), Material("wall", roughness=1.0, specular=0.0)]
+    at, beside = np.eye(4), np.eye(4)
+    at[:3, 3], beside[:3, 3] = (0.2, 0.0, 2.0), (-0.9, 0.0, 0.3)
+    light = Light("point", (3.0, 3.0, 3.0), at, radius=0.12)
+    return SceneDescription("plate", meshes, materials, [Instance(0, np.eye(4)), Instance(1, beside)], lights=[light])
+
+
+def test_chains_count_the_emitter_samples_of_their_path():
+    """With one sample a pixel the first surface has four, which the weights of what is met there know."""
+    integrator, source = described(polished_plate())
+    plain, further = (pictures(integrator, source, chains, seeds=range(100), spp=1) for chains in (0, 7))
+    agree(plain, further)
+    assert further.mean() == pytest.approx(plain.mean(), rel=0.01)
