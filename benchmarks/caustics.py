@@ -23,6 +23,7 @@ from equal_error import (
     Judge,
     Picture,
     Stage,
+    by_paths,
     light_up,
     once,
     prepare,
@@ -61,17 +62,12 @@ def measure(name: str, file: Path | None, reference_samples: int) -> dict[str, A
                 seconds, pixels = once(lambda s=samples, w=way, m=method: picture(stage, w, m, s))
                 rows.append({"spp": samples, "way": way, "method": method, "seconds": seconds, **judge(pixels)})
                 print(name, rows[-1], flush=True)
-    _by_paths(stage)
+    by_paths(stage)
     light = {
         "paths": float(trace_paths(stage, reference_samples, 5).mean()),
         "photons": float(found["pictures"].mean()),
     }
     return {"judge_psnr": judge.own_psnr, "mean_light": light, "rows": rows}
-
-
-def _by_paths(stage: Stage) -> None:
-    paths = stage.integrator
-    paths.photons = paths.photon_passes = paths.seen_chains = None
 
 
 def picture(stage: Stage, way: str, method: str, samples: int) -> Picture:
@@ -81,7 +77,7 @@ def picture(stage: Stage, way: str, method: str, samples: int) -> Picture:
     from lippmann.rendering.denoise.guided_denoiser import GuidedDenoiser
     from lippmann.rendering.film.sample_batches import FullInBatches
 
-    _by_paths(stage)
+    by_paths(stage)
     if way == "photons":
         light_up(stage, replace(stage.session.request, spp=samples, seed=3))
     if method == "pooled":

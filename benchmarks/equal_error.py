@@ -223,13 +223,19 @@ def _psnr(error: float) -> float:
     return -10 * math.log10(max(error, 1e-9))
 
 
+def by_paths(stage: Stage) -> None:
+    """All light by paths."""
+    paths = stage.integrator
+    paths.photons = paths.photon_passes = paths.seen_chains = None
+
+
 def light_up(stage: Stage, request: Any) -> None:
     """What the program gives the integrator for a picture: photons of its own where there are caustics, and chains."""
     from lippmann.rendering.film.caustics import give_photons
     from lippmann.rendering.film.seen_chains import give_chains
 
+    by_paths(stage)
     paths = stage.integrator
-    paths.photons = paths.photon_passes = paths.seen_chains = None
     if give_photons(paths, request, stage.source, 4 << 30) == "photons":
         give_chains(paths, request, stage.source)
 

@@ -61,10 +61,10 @@ def _about_caustics(result: dict[str, Any]) -> str:
         if (names := [name for name, scene in scenes.items() if "reference_samples" in scene])
     ]
     text = (
-        "Small balls, primitives and gears have small lamps, mirrors and glass. Their caustics come by photons, "
-        "emitters seen in mirrors by [further chains](caustics.md#seen-light), in references and pictures alike, "
-        f"in the rows of {', '.join(by_display)}. References of paths lack a part of that light: the other rows of "
-        "these three scenes are by such, and too good, by up to 3 dB."
+        "Small balls, primitives and gears have small emitters, mirrors and glass. Their caustics come by photons, "
+        "what is seen of them in mirrors by [further chains](caustics.md#seen-light), in references and pictures "
+        f"alike, in the rows of {', '.join(by_display)}. References of paths lack a part of that light: the other rows "
+        "of these three scenes are by such, and too good, by up to 3 dB."
     )
     return textwrap.fill(text, 120, break_long_words=False, break_on_hyphens=False)
 

@@ -84,7 +84,7 @@ def _kernels(stage: Stage) -> dict[str, Any]:
     import drjit as dr
     import mitsuba as mi
 
-    from lippmann.rendering.film.wavefront import rays_of_tile
+    from lippmann.rendering.film.wavefront import samples_of_tile
     from lippmann.rendering.film.wavefront_plan import make_plan
     from lippmann.rendering.transport import path
 
@@ -118,8 +118,8 @@ def _kernels(stage: Stage) -> dict[str, Any]:
     def traced(integrator: path.PathIntegrator, parts: int = path.PHOTON_PARTS) -> Any:
         def call(seed: int) -> Any:
             path.PHOTON_PARTS = parts
-            ray, stream, _ = rays_of_tile(source, plan, tile, run, seed, True)
-            radiance, counts = integrator.sample(ray, stream, mi.Bool(True))
+            pixels, stream = samples_of_tile(source, plan, tile, run, seed, True)
+            radiance, counts = integrator.sample(pixels.ray(stream), stream, mi.Bool(True))
             dr.eval(radiance, counts.secondary, counts.shadow)
             return np.array(counts.secondary)
 
@@ -141,8 +141,8 @@ def _kernels(stage: Stage) -> dict[str, Any]:
         return way, steps
 
     def walks(seed: int) -> Any:
-        ray, stream, _ = rays_of_tile(source, plan, tile, run, seed, True)
-        way, steps = walk(ray, stream)
+        pixels, stream = samples_of_tile(source, plan, tile, run, seed, True)
+        way, steps = walk(pixels.ray(stream), stream)
         dr.eval(way, steps)
         return np.array(steps) - 1
 

@@ -24,11 +24,11 @@ def test_what_is_white_anyway_does_not_vary():
 
     random = np.random.default_rng(4)
     half_covered = 300.0 * (random.random((500, 8, 1)) < 0.5).repeat(3, axis=2)
-    lone = np.zeros((500, 8, 3))
-    lone[0, 0] = 300.0
-    # A pixel half covered by a lamp is white with any few samples; a lone hit makes a white pixel of a grey one.
+    single = np.zeros((500, 8, 3))
+    single[0, 0] = 300.0
+    # A pixel half covered by an emitter is white with any few samples; a single hit makes a white pixel of a grey one.
     assert variance_of(half_covered, 16, "linear") < 0.2 * 16**2 * 0.25
-    assert variance_of(lone, 16, "linear") == pytest.approx(16**2 / lone[..., 0].size, rel=0.15)
+    assert variance_of(single, 16, "linear") == pytest.approx(16**2 / single[..., 0].size, rel=0.15)
     assert variance_of(np.full((5, 8, 3), 300.0), 16, "srgb") == 0
 
 
@@ -67,7 +67,7 @@ def chains(picture):
     return picture.provenance.options.get("seen_chains", 0)
 
 
-def test_small_lamps_in_mirrors_get_chains(balls):
+def test_small_emitters_in_mirrors_get_chains(balls):
     assert chains(rendered(balls(3.0))) >= 1
     # Emitters without size are not met; rays through the centre of a pixel are all the same.
     assert chains(rendered(balls(0.0))) == 0

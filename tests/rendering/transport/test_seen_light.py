@@ -17,7 +17,7 @@ def rgb(*values):
 
 
 def scene_of_all_events():
-    """Balls of each kind of surface before a wall, under a lamp that they mirror, and a sky."""
+    """Balls of each kind of surface before a wall, under an emitter that they mirror, and a sky."""
     import mitsuba as mi
 
     place = mi.ScalarTransform4f
@@ -48,7 +48,7 @@ def scene_of_all_events():
             "to_world": place().translate([0, 0, -1]).scale(2),
             "bsdf": {"type": "diffuse", "reflectance": rgb(0.4)},
         },
-        "lamp": {
+        "light": {
             "type": "sphere",
             "center": [0.8, 0.9, 1.2],
             "radius": 0.25,
@@ -122,8 +122,8 @@ def test_every_kind_of_surface_shows_as_much_light(all_events, beam):
     assert further.mean() == pytest.approx(plain.mean(), rel=2e-3)
 
 
-def small_lamp_in_glazed_balls():
-    """Lobes of some width, matt below, coloured glass, under a small lamp: MIS, lobes by chance, absorption."""
+def small_emitter_in_glazed_balls():
+    """Lobes of some width, matt below, coloured glass, under a small emitter: MIS, lobes by chance, absorption."""
     import trimesh
 
     from lippmann.scene.values.description import Instance, Light, Material, Mesh, SceneDescription
@@ -161,10 +161,10 @@ def small_lamp_in_glazed_balls():
 
 
 def test_narrow_lobes_are_weighed_as_paths_weigh_them():
-    integrator, source = described(small_lamp_in_glazed_balls())
+    integrator, source = described(small_emitter_in_glazed_balls())
     plain, further = (pictures(integrator, source, chains, seeds=range(40)) for chains in (0, 7))
     agree(plain, further)
-    # Highlights of a small lamp: what chains are for.
+    # Highlights of a small emitter: what chains are for.
     assert further.var(axis=0).mean() < 0.5 * plain.var(axis=0).mean()
 
 
@@ -207,7 +207,7 @@ def test_chains_count_as_rays_and_depend_on_the_seed_alone(all_events):
 
 
 def polished_plate():
-    """A plate whose lobe is as wide as the lamp that it mirrors, so that either way of sampling counts; and a wall."""
+    """A plate whose lobe is as wide as the emitter that it mirrors, so that both ways of sampling count; and a wall."""
     import trimesh
 
     from lippmann.scene.values.description import Instance, Light, Material, Mesh, SceneDescription

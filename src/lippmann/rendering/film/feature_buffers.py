@@ -14,7 +14,7 @@ from lippmann.device.types import Color3f, Float, Vector3f
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.rendering.film.aov import to_numpy
 from lippmann.rendering.film.memory_model import FEATURE_BUFFERS
-from lippmann.rendering.film.wavefront import rays_of_tile
+from lippmann.rendering.film.wavefront import samples_of_tile
 from lippmann.rendering.film.wavefront_plan import Pass, Plan, Tile, make_plan
 from lippmann.rendering.transport.first_surface import Surfaces, make_surfaces
 from lippmann.rendering.transport.ray_source import RaySource
@@ -121,7 +121,8 @@ def _trace_tile(
     """Sums over the samples of one pass, for every pixel and channel: colours, world-space normals, and heights."""
     lanes = tile.rows * plan.width * plan.channels * run.count
     # Lanes are those of a picture.
-    ray, _, _ = rays_of_tile(source, plan, tile, run, seed, box_filter)
+    pixels, stream = samples_of_tile(source, plan, tile, run, seed, box_filter)
+    ray = pixels.ray(stream)
     albedo, normal, distance = surfaces.features(ray)
     x, y, z = mi.Point3f(ray.o) + mi.Vector3f(ray.d) * distance
     weights = [dr.opaque(mi.Float, float(weight)) for weight in z_from_world]

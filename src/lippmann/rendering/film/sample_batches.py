@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.color.transfer import Transfer, coding_slope
-from lippmann.device.sobol import PIXEL_DIMENSION, SEED_STEP, SampleStream
+from lippmann.device.sobol import SEED_STEP, SampleStream
 from lippmann.device.types import Spectrum, UInt32
 from lippmann.display.pixel_window import PixelWindow
 from lippmann.errors import UsageError
@@ -38,8 +38,7 @@ from lippmann.rendering.film.wavefront import (
 )
 from lippmann.rendering.film.wavefront_plan import Run, cut_batches
 from lippmann.rendering.transport.integrator import Integrator
-from lippmann.rendering.transport.ray_source import RaySource, pixel_number
-from lippmann.rendering.transport.seen_light import PixelRays
+from lippmann.rendering.transport.ray_source import PixelRays, RaySource, pixel_number
 
 Floats = NDArray[np.float32]
 
@@ -270,10 +269,8 @@ class FullInBatches:
 
         stream = SampleStream.of_pixels(pixel * channels + channel, sample, seed)
         stream.half = stream_of
-        jitter = stream.next_2d(PIXEL_DIMENSION) if self._box_filter else mi.Point2f(0.5)
-        ray = self._source.rays(column, row, channel, jitter)
-        pixels = PixelRays(self._source, column, row, channel) if self._box_filter else None
-        radiance, counts = sample_pixels(self._integrator, pixels, ray, stream)
+        pixels = PixelRays(self._source, column, row, channel, self._box_filter)
+        radiance, counts = sample_pixels(self._integrator, pixels, stream)
         radiance = evaluated(radiance, counts, lanes, self.rays)
         return _sums(radiance, channels, number, run.count)
 

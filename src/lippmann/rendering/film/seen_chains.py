@@ -23,8 +23,8 @@ from lippmann.rendering.film.scattered_rays import ScatteredRays
 from lippmann.rendering.film.wavefront import divide, shown_colors
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.rendering.transport.path import PathIntegrator
-from lippmann.rendering.transport.ray_source import RaySource
-from lippmann.rendering.transport.seen_light import PixelRays, seen_light
+from lippmann.rendering.transport.ray_source import PixelRays, RaySource
+from lippmann.rendering.transport.seen_light import seen_light
 
 #: Chains of a path, at most.
 MOST = 32

@@ -10,14 +10,14 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.device.sobol import PIXEL_DIMENSION, SampleStream
-from lippmann.device.types import Ray3f, Spectrum, UInt32
+from lippmann.device.sobol import SampleStream
+from lippmann.device.types import Spectrum, UInt32
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.rendering.film.wavefront_plan import Pass, Plan, Tile
 from lippmann.rendering.transport.integrator import Integrator, RayCounts
 from lippmann.rendering.transport.path import PathIntegrator
-from lippmann.rendering.transport.ray_source import RaySource, pixel_number
-from lippmann.rendering.transport.seen_light import PixelRays, sample_pixel
+from lippmann.rendering.transport.ray_source import PixelRays, RaySource, pixel_number
+from lippmann.rendering.transport.seen_light import sample_pixel
 
 
 @dataclass
@@ -120,14 +120,14 @@ class _Tracer:
     def trace(self, tile: Tile, run: Pass, totals: RayTotals) -> NDArray[np.float32]:
         """Sums over the samples of one pass, ``(pixels of the tile, 3)``; ``totals`` grows by the rays it took."""
         plan = self._plan
-        ray, stream, pixels = rays_of_tile(self._source, plan, tile, run, self._seed, self._box_filter, self._corner)
-        radiance, counts = sample_pixels(self._integrator, pixels if self._box_filter else None, ray, stream)
+        pixels, stream = samples_of_tile(self._source, plan, tile, run, self._seed, self._box_filter, self._corner)
+        radiance, counts = sample_pixels(self._integrator, pixels, stream)
         lanes = tile.rows * plan.width * plan.channels * run.count
         radiance = evaluated(radiance, counts, lanes, totals)
         return _channel_sums(radiance, plan.channels, run.count)
 
 
-def rays_of_tile(
+def samples_of_tile(
     source: RaySource,
     plan: Plan,
     tile: Tile,
@@ -135,8 +135,8 @@ def rays_of_tile(
     seed: int,
     box_filter: bool,
     corner: tuple[int, int] = (0, 0),
-) -> tuple[Ray3f, SampleStream, PixelRays]:
-    """The rays, sample streams and pixels of one wavefront, lanes ordered pixel, then channel, then sample.
+) -> tuple[PixelRays, SampleStream]:
+    """The pixels and sample streams of one wavefront, lanes ordered pixel, then channel, then sample.
 
     ``corner``: row and column at which the part of the picture begins that ``plan`` is of.
     """
@@ -150,17 +150,14 @@ def rays_of_tile(
     # The stream of a sub-pixel is its own; a picture has fewer than 2^32 sub-pixels.
     number = pixel_number(source, column, row) * plan.channels + channel
     stream = SampleStream.of_pixels(number, sample, dr.opaque(mi.UInt32, seed))
-    jitter = stream.next_2d(PIXEL_DIMENSION) if box_filter else mi.Point2f(0.5)
-    return source.rays(column, row, channel, jitter), stream, PixelRays(source, column, row, channel)
+    return PixelRays(source, column, row, channel, box_filter), stream
 
 
-def sample_pixels(
-    integrator: Integrator, pixels: PixelRays | None, ray: Ray3f, stream: SampleStream
-) -> tuple[Spectrum, RayCounts]:
-    """One sample along ``ray`` per lane; where ``pixels`` are given, seen light may come from other rays of theirs."""
-    if pixels is not None and isinstance(integrator, PathIntegrator):
-        return sample_pixel(integrator, pixels, ray, stream, mi.Bool(True))
-    return integrator.sample(ray, stream, mi.Bool(True))
+def sample_pixels(integrator: Integrator, pixels: PixelRays, stream: SampleStream) -> tuple[Spectrum, RayCounts]:
+    """One sample of each lane's pixel, and the rays traced for it."""
+    if isinstance(integrator, PathIntegrator):
+        return sample_pixel(integrator, pixels, stream, mi.Bool(True))
+    return integrator.sample(pixels.ray(stream), stream, mi.Bool(True))
 
 
 def evaluated(radiance: Spectrum, counts: RayCounts, lanes: int, totals: RayTotals) -> Spectrum:

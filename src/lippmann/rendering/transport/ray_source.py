@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.device.drjit_ops import DEVICE
+from lippmann.device.sobol import PIXEL_DIMENSION, SampleStream
 from lippmann.device.types import Float64, Point2f, Ray3f, UInt32
 from lippmann.display import Display
 from lippmann.display.pixel_window import PixelWindow
@@ -54,6 +55,29 @@ def pixel_number(source: RaySource, column: UInt32, row: UInt32) -> UInt32:
     if isinstance(source, WindowRays | SubpixelRays | SinglePixelRays):
         return source.number(column, row)
     return row * source.width + column
+
+
+class PixelRays:
+    """Rays through the pixels or sub-pixels of a wavefront's lanes, see :meth:`RaySource.rays`.
+
+    Parameters
+    ----------
+    box_filter:
+        Samples are spread over the pixel; else all go through its centre.
+    """
+
+    # Not a dataclass: Dr.Jit would take it for loop state and write its fields.
+    def __init__(
+        self, source: RaySource, column: UInt32, row: UInt32, channel: UInt32, box_filter: bool = True
+    ) -> None:
+        self._source = source
+        self._at = column, row, channel
+        self._box_filter = box_filter
+
+    def ray(self, stream: SampleStream) -> Ray3f:
+        """The ray of each lane's sample."""
+        jitter = stream.next_2d(PIXEL_DIMENSION) if self._box_filter else mi.Point2f(0.5)
+        return self._source.rays(*self._at, jitter)
 
 
 class _OnePicture:

@@ -16,12 +16,12 @@ import mitsuba as mi
 
 from lippmann.device.pbr.gltf_bsdf import SHARP_LOBE
 from lippmann.device.pbr.surface_point import widen_lobes
-from lippmann.device.sobol import PIXEL_DIMENSION, SampleStream, hash32
+from lippmann.device.sobol import SampleStream, hash32
 from lippmann.device.types import Bool, BSDFPtr, PreliminaryIntersection3f, Ray3f, Spectrum, UInt32
 from lippmann.rendering.transport.beam import Beam, turn_of_normals, widening
 from lippmann.rendering.transport.integrator import RayCounts
 from lippmann.rendering.transport.path import PathIntegrator
-from lippmann.rendering.transport.ray_source import RaySource
+from lippmann.rendering.transport.ray_source import PixelRays
 from lippmann.rendering.transport.shadow_rays import MAX_CROSSINGS
 from lippmann.rendering.transport.sharp_events import follows_sharply, sharp_lobe
 
@@ -31,26 +31,14 @@ _CHAINS = 0x5EE21147
 _DIMENSIONS_PER_VERTEX = 2
 
 
-class PixelRays:
-    """Rays through any points of the pixels of a wavefront's lanes."""
-
-    # Not a dataclass: Dr.Jit would take it for loop state and write its fields.
-    def __init__(self, source: RaySource, column: UInt32, row: UInt32, channel: UInt32) -> None:
-        self._source = source
-        self._at = column, row, channel
-
-    def ray(self, stream: SampleStream) -> Ray3f:
-        """The ray of a sample, at its point of the pixel."""
-        return self._source.rays(*self._at, stream.next_2d(PIXEL_DIMENSION))
-
-
 def sample_pixel(
-    integrator: PathIntegrator, pixel: PixelRays, ray: Ray3f, stream: SampleStream, active: Bool
+    integrator: PathIntegrator, pixel: PixelRays, stream: SampleStream, active: Bool
 ) -> tuple[Spectrum, RayCounts]:
-    """One sample of ``pixel`` per lane along ``ray``, which is one of its rays, and the rays traced for it.
+    """One sample of ``pixel`` per lane, and the rays traced for it.
 
     Where the integrator has chains, with as many through other points of the pixel.
     """
+    ray = pixel.ray(stream)
     if integrator.seen_chains is None or integrator.photons is None:
         return integrator.sample(ray, stream, active)
     share = dr.rcp(1 + mi.Float(integrator.seen_chains))
