@@ -167,7 +167,13 @@ def _one_stream(job: Job, why: str) -> Traced:
     request, source = job.request, job.traced
     plan = make_plan(source.width, source.height, request.samples, channels=source.channels, memory=job.session.memory)
     frame = trace_frame(
-        job.integrator, source, plan, seed=request.seed, box_filter=job.request.box_filter, progress=job.progress
+        job.integrator,
+        source,
+        plan,
+        seed=request.seed,
+        box_filter=request.box_filter,
+        keeps_seen=request.denoise != "none",
+        progress=job.progress,
     )
     return Traced(frame, request.samples, notes=(why,))
 
@@ -249,6 +255,7 @@ def _batches(job: Job) -> FullInBatches:
         box_filter=job.request.box_filter,
         transfer=job.request.transfer,
         memory=job.session.memory,
+        keeps_seen=job.request.denoise != "none",
     )
 
 
@@ -346,7 +353,8 @@ def _denoised_whole(job: Job, traced: Traced) -> Traced:
     denoiser = _denoiser(job, lambda: _rays_per_pixel(job, traced.frame.rays))
     if denoiser is None:
         return traced
-    cleaned, source = denoiser(traced.frame.pixels), job.traced
+    noisy, seen, source = traced.frame.pixels, traced.frame.seen, job.traced
+    cleaned = denoiser(noisy) if seen is None else denoiser(noisy - seen) + seen
     traced.frame.pixels = source.own_colors(cleaned) if isinstance(source, SubpixelRays) else cleaned
     return replace(traced, options=_denoiser_options(job, denoiser), seconds={"denoise": denoiser.seconds})
 

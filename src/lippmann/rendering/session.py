@@ -202,7 +202,8 @@ class Session:
 
         request = self.request
         # A goal may be reached by samples alone, which are to have no blur.
-        if request.shares_light and not request.is_open_ended and has_sharp_surfaces(integrator.scene):
+        has_sharp = has_sharp_surfaces(integrator.scene)
+        if request.shares_light and not request.is_open_ended and has_sharp:
             integrator.beam = beam_of(source, request.samples)
         caustics = give_photons(integrator, request, source, memory_limit(request))
         if caustics is not None:
@@ -220,8 +221,12 @@ class Session:
         if self.request.clamp_indirect is not None:
             most = self.request.clamp_indirect / (gain_of(exposure) if exposure else 1.0)
             integrator.most_indirect = mi.Float(most)
-        if caustics == "photons":
-            self.choices.update(give_chains(integrator, request, source))
+        if has_sharp:
+            chains = give_chains(integrator, request, source)
+            if chains:
+                self.choices["seen_chains"] = chains
+                if integrator.beam is not None:
+                    integrator.beam = beam_of(source, request.samples * chains)
         return integrator
 
     def provenance(

@@ -28,6 +28,14 @@ class Noise:
 
     samples = 2
     blurred = None
+    #: Of each half.
+    of_seen = None
+
+    def seen(self):
+        return None if self.of_seen is None else self.of_seen[0]
+
+    def seen_halves(self):
+        return self.of_seen
 
     def picture(self):
         return self._halves[0]
@@ -94,6 +102,29 @@ def test_what_the_halves_differ_by_is_known():
     # With a blur they agree better than its samples do, but not wholly.
     blurred = Denoised(renderer, blur, "srgb").squared_error()
     assert 0.01 < float(blurred.apart.mean()) / float(told.apart.mean()) < 0.3
+
+
+@pytest.mark.parametrize("shares", [False, True])
+def test_seen_light_goes_past_the_denoiser_and_past_what_is_shared(shares, as_denoised):
+    """A highlight of one pixel, which a blur would wipe out."""
+    renderer = Noise()
+    highlights = [np.zeros_like(half) for half in renderer.halves()]
+    for light, half, strength in zip(highlights, renderer.halves(), (5.0, 5.4), strict=True):
+        light[100, 100] = strength
+        half += light
+    given = []
+
+    def denoise(picture, turned):
+        given.append(picture.max())
+        return blur(picture)
+
+    renderer.of_seen = tuple(highlights)
+    picture = Denoised(renderer, denoise, "srgb", share=blur if shares else None).picture()
+    assert max(given) < 2
+    assert picture[100, 100] == pytest.approx(renderer.truth[100, 100] + 5.2, rel=0.05)
+    renderer.samples = 1
+    alone = Denoised(renderer, denoise, "srgb", share=blur if shares else None).picture()
+    assert alone[100, 100] == pytest.approx(renderer.truth[100, 100] + 5.0, rel=0.05)
 
 
 @pytest.mark.parametrize(("samples", "hidden"), [(4, True), (64, False)])

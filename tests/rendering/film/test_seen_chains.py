@@ -67,12 +67,62 @@ def chains(picture):
     return picture.provenance.options.get("seen_chains", 0)
 
 
+@pytest.mark.parametrize(
+    ("variance", "samples", "is_clean", "expected"),
+    [
+        (0.0, 16, False, 0),
+        (1e-4, 16, False, 0),  # a chain would bring no more than the path
+        (0.01, 16, False, 4),
+        (10.0, 16, False, 32),
+        (1e-4, 16, True, 0),
+        (1e-3, 16, True, 4),  # beside a denoiser, which leaves little of the rest's noise
+        (1e-3, 4, True, 8),  # few would be worse than what the denoiser makes of none
+        (1e-3, 1, True, 16),
+        (5e-4, 1, True, 0),
+        (0.1, 16, True, 32),
+    ],
+)
+def test_chains_by_variance(variance, samples, is_clean, expected):
+    from lippmann.rendering.film.seen_chains import CHAIN_COST, chains_for
+
+    assert chains_for(variance, samples, CHAIN_COST, is_clean) == expected
+
+
+def test_dear_chains_are_fewer():
+    from lippmann.rendering.film.seen_chains import CHAIN_COST, PLAIN_CHAIN_COST, chains_for
+
+    for variance in np.geomspace(1e-5, 10, 25):
+        assert chains_for(variance, 16, PLAIN_CHAIN_COST, True) <= chains_for(variance, 16, CHAIN_COST, True)
+
+
+def test_smooth_gloss_under_a_sky_gets_chains_without_photons(engine):
+    """A sky has no caustics that paths would not find, but a polished ball mirrors its edges."""
+    import lippmann
+    from lippmann.scene.values.description import Environment, Instance, Material, Mesh, SceneDescription
+
+    trimesh = pytest.importorskip("trimesh")
+    ball = trimesh.creation.icosphere(3, 12)
+    mesh = Mesh("", ball.vertices.astype(np.float32), ball.faces.astype(np.uint32), 0, ball.vertex_normals.astype("f4"))
+    sky = np.zeros((64, 128, 3), np.float32)
+    sky[::4, ::4] = 8.0
+
+    def picture(**material):
+        materials = [Material("ball", metallic=1.0, **material)]
+        environment = Environment(sky)
+        scene = SceneDescription("ball", [mesh], materials, [Instance(0, np.eye(4))], environment=environment)
+        return rendered(lippmann.load_scene(scene))
+
+    assert chains(picture(roughness=0.02)) >= 2
+    assert chains(picture(roughness=0.8)) == 0
+
+
 def test_small_emitters_in_mirrors_get_chains(balls):
-    assert chains(rendered(balls(3.0))) >= 1
+    assert chains(rendered(balls(3.0))) >= 2
     # Emitters without size are not met; rays through the centre of a pixel are all the same.
     assert chains(rendered(balls(0.0))) == 0
     assert chains(rendered(balls(3.0), pixel_filter="point")) == 0
-    assert chains(rendered(balls(3.0), caustics="paths")) == 0
+    # What a look may have missed counts with photons alone.
+    assert chains(rendered(balls(3.0), caustics="paths")) < chains(rendered(balls(3.0)))
 
 
 def test_pictures_with_them_state_their_error_as_before(balls):

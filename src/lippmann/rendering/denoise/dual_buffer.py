@@ -8,6 +8,9 @@ of noisy ones a and b, the mean of (a - D(a)) (b - D(b)) is that of the product 
 they have wrong in common. The squared error of their mean is that and a quarter of (D(a) - D(b))^2, what they differ
 by.
 
+Seen light, where the renderer keeps it apart, has hardly any noise, and highlights that a denoiser takes for such: it
+goes past the network and past what is shared.
+
 Micro-images may share the light of a denoised half, and it keeps its own where that is judged to be better
 (:mod:`lippmann.rendering.denoise.unshared_blend`). Where what comes of that is judged to be worse than its samples,
 they take its place (:mod:`lippmann.rendering.denoise.noisy_blend`), so that with ever more samples the picture comes to
@@ -65,6 +68,10 @@ class Halved(Protocol):
     def picture(self) -> Floats: ...
 
     def halves(self) -> tuple[Floats, Floats]: ...
+
+    def seen(self) -> Floats | None: ...
+
+    def seen_halves(self) -> tuple[Floats, Floats] | None: ...
 
     def squared_error(self) -> PixelErrors: ...
 
@@ -147,7 +154,7 @@ class Denoised:
         return self._cleaned
 
     def _clean_picture(self) -> Floats:
-        return self._cleaned_and_shared(self._renderer.picture())[-1]
+        return self._cleaned_and_shared(self._renderer.picture(), self._renderer.seen())[-1]
 
     def _best_of_halves(self, noisy: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
         """The halves without their noise, shared where that is better."""
@@ -160,12 +167,14 @@ class Denoised:
 
     def _versions(self, noisy: tuple[Floats, Floats]) -> tuple[list[Floats], list[Floats]]:
         """Of each half what :meth:`_cleaned_and_shared` gives."""
-        return self._cleaned_and_shared(noisy[0]), self._cleaned_and_shared(noisy[1], turned=True)
+        seen = self._renderer.seen_halves() or (None, None)
+        return self._cleaned_and_shared(noisy[0], seen[0]), self._cleaned_and_shared(noisy[1], seen[1], turned=True)
 
-    def _cleaned_and_shared(self, noisy: Floats, turned: bool = False) -> list[Floats]:
+    def _cleaned_and_shared(self, noisy: Floats, seen: Floats | None, turned: bool = False) -> list[Floats]:
         """A picture without its noise; and, where light is shared, that with shared light."""
-        clean = self._denoise(noisy, turned)
-        return [clean] if self._share is None else [clean, self._share(clean)]
+        clean = self._denoise(noisy if seen is None else noisy - seen, turned)
+        versions = [clean] if self._share is None else [clean, self._share(clean)]
+        return versions if seen is None else [version + seen for version in versions]
 
     def _slope(self, noisy: tuple[Floats, Floats]) -> Floats:
         """By how much a pixel's code differs from that of the truth, per linear difference between the two."""

@@ -57,10 +57,10 @@ class DenoisedSubpixels(Denoised):
     _renderer: SubpixelBatches
 
     def _clean_picture(self) -> Floats:
-        return self._cleaned_and_shared(self._renderer.picture_of_all())[-1]
+        return self._cleaned_and_shared(self._renderer.picture_of_all(), self._renderer.seen())[-1]
 
     def _versions(self, noisy: tuple[Floats, Floats]) -> tuple[list[Floats], list[Floats]]:
         return super()._versions(self._renderer.halves_of_all())
 
-    def _cleaned_and_shared(self, noisy: Floats, turned: bool = False) -> list[Floats]:
-        return [self._renderer.own_colors(version) for version in super()._cleaned_and_shared(noisy, turned)]
+    def _cleaned_and_shared(self, noisy: Floats, seen: Floats | None, turned: bool = False) -> list[Floats]:
+        return [self._renderer.own_colors(version) for version in super()._cleaned_and_shared(noisy, seen, turned)]

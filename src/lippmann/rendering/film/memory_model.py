@@ -22,6 +22,8 @@ ERROR_MAPS = 8
 BATCH = 12
 #: The errors that are made from batches.
 BATCH_ERRORS = 12
+#: Seen light of two halves, apart from the batches.
+SEEN = 2 * BATCH
 #: One emission of photons, which lands about once, with what sorting takes, in bytes.
 PHOTON = 128
 #: What reuse of points takes: points without colours, plain rows, maps and lists of pixels. The paper's order takes
@@ -44,7 +46,7 @@ def batches(number: int) -> int:
 
 
 #: A pixel of a tile: eight batches and a wavefront; with what denoising adds, a pixel of a tile with its margin.
-TILE, DENOISED_TILE = batches(8) + BYTES_PER_LANE, 768
+TILE, DENOISED_TILE = batches(8) + BYTES_PER_LANE, 832
 
 
 def lanes_within(memory: int, kept: int, needed: int, what: str, preferred: int = PREFERRED_LANES) -> int:

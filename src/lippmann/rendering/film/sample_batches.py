@@ -32,12 +32,13 @@ from lippmann.rendering.film.wavefront import (
     RayTotals,
     compile_seconds,
     divide,
-    evaluated,
+    evaluate,
     sample_pixels,
     shown_colors,
 )
 from lippmann.rendering.film.wavefront_plan import Run, cut_batches
 from lippmann.rendering.transport.integrator import Integrator
+from lippmann.rendering.transport.path import PathIntegrator
 from lippmann.rendering.transport.ray_source import PixelRays, RaySource, pixel_number
 
 Floats = NDArray[np.float32]
@@ -70,6 +71,8 @@ class FullInBatches:
         Bytes that may be used, the picture's own included; the fewer, the fewer batches are kept apart.
     window:
         The part of the picture that is rendered; None for all of it. Parts rendered apart are the same as in one piece.
+    keeps_seen:
+        Seen light is kept apart, too, where the integrator tells it: for a denoiser, see :meth:`seen_halves`.
 
     Attributes
     ----------
@@ -92,6 +95,7 @@ class FullInBatches:
         transfer: Transfer = "srgb",
         memory: int,
         window: PixelWindow | None = None,
+        keeps_seen: bool = False,
     ) -> None:
         self._integrator = integrator
         self._source = source
@@ -104,8 +108,10 @@ class FullInBatches:
         self._window = window or PixelWindow(0, 0, source.width, source.height)
         self._shape = self._window.shape
         pixels = self._window.pixels
-        batches, self._lanes = _sizes(pixels, source.channels, memory)
+        keeps_seen = keeps_seen and isinstance(integrator, PathIntegrator) and integrator.seen_chains is not None
+        batches, self._lanes = _sizes(pixels, source.channels, memory, keeps_seen)
         self._sums = np.zeros((batches, pixels, 3), dtype=np.float32)
+        self._seen = np.zeros((STREAMS, pixels, 3), dtype=np.float32) if keeps_seen else None
         self._taken = [0] * batches
         # Plain and denoised pictures of the same samples both ask for their errors.
         self._errors: PixelErrors | None = None
@@ -123,18 +129,20 @@ class FullInBatches:
 
     def add(self, samples: int, progress: ProgressCallback = silent) -> None:
         """Take ``samples`` more of every pixel."""
-        channels, pixels = self._source.channels, self._sums.shape[1]
+        channels, pixels, per_stream = self._source.channels, self._sums.shape[1], len(self._sums) // STREAMS
         started, done, compiled = time.perf_counter(), 0, 0.0
         self._errors = None
         for stretch in stretches(self._integrator, self.samples, samples):
             taken = list(self._taken)
             for run in self._runs(stretch):
                 with dr.scoped_set_flag(dr.JitFlag.KernelHistory, done == 0):
-                    sums = self._trace(run)
+                    sums, seen = self._trace(run)
                     if done == 0:
                         compiled = compile_seconds()
                 for place, batch in enumerate(run.batches):
                     self._sums[batch, run.first : run.last] += sums[:, place]
+                    if self._seen is not None and seen is not None:
+                        self._seen[batch // per_stream, run.first : run.last] += seen[:, place]
                     if run.last == pixels:
                         taken[batch] += run.count
                 done += (run.last - run.first) * channels * run.count * len(run.batches)
@@ -184,11 +192,27 @@ class FullInBatches:
     def halves(self) -> tuple[Floats, Floats]:
         """The means of either stream's samples, ``(H, W, 3)`` each; they know nothing of each other."""
         per_stream = len(self._sums) // STREAMS
-        parts = []
-        for begin in range(0, len(self._sums), per_stream):
-            taken = sum(self._taken[begin : begin + per_stream])
-            total = self._sums[begin : begin + per_stream].sum(axis=0)
-            parts.append((total * np.float32(1 / max(1, taken))).reshape(*self.shape, 3))
+        return self._means([self._sums[s * per_stream : (s + 1) * per_stream].sum(axis=0) for s in range(STREAMS)])
+
+    def seen_halves(self) -> tuple[Floats, Floats] | None:
+        """What of :meth:`halves` is seen light; None where that is not told, or not kept."""
+        return None if self._seen is None else self._means(list(self._seen))
+
+    def seen(self) -> Floats | None:
+        """What of :meth:`picture` is seen light; None where that is not told, or not kept."""
+        if self._seen is None:
+            return None
+        total: Floats = self._seen.sum(axis=0)
+        total *= np.float32(1 / max(1, self.samples))
+        return total.reshape(*self.shape, 3)
+
+    def _means(self, sums: Sequence[Floats]) -> tuple[Floats, Floats]:
+        """Of the sums of each stream."""
+        per_stream = len(self._sums) // STREAMS
+        taken = [sum(self._taken[s * per_stream : (s + 1) * per_stream]) for s in range(STREAMS)]
+        parts = [
+            (total * np.float32(1 / max(1, n))).reshape(*self.shape, 3) for total, n in zip(sums, taken, strict=True)
+        ]
         return parts[0], parts[1]
 
     def squared_error(self) -> PixelErrors:
@@ -246,8 +270,8 @@ class FullInBatches:
                 pixels, lanes = self._sums.shape[1], self._lanes // self._source.channels
                 yield from cut_batches(pixels, batches, tuple(starts), count, lanes)
 
-    def _trace(self, run: Run) -> Floats:
-        """Sums over the samples of a run, ``(pixels, batches of the run, 3)``.
+    def _trace(self, run: Run) -> tuple[Floats, Floats | None]:
+        """Sums over the samples of a run, ``(pixels, batches of the run, 3)``, and of their seen light, where kept.
 
         Lanes are ordered pixel, then channel, then batch, then sample. What differs from run to run is opaque to the
         compiler, so that all share a kernel.
@@ -270,9 +294,12 @@ class FullInBatches:
         stream = SampleStream.of_pixels(pixel * channels + channel, sample, seed)
         stream.half = stream_of
         pixels = PixelRays(self._source, column, row, channel, self._box_filter)
-        radiance, counts = sample_pixels(self._integrator, pixels, stream)
-        radiance = evaluated(radiance, counts, lanes, self.rays)
-        return _sums(radiance, channels, number, run.count)
+        traced = sample_pixels(self._integrator, pixels, stream)
+        if self._seen is None:
+            traced.seen = None
+        evaluate(traced, lanes, self.rays)
+        seen = None if traced.seen is None else _sums(traced.seen, channels, number, run.count)
+        return _sums(traced.radiance, channels, number, run.count), seen
 
 
 def trace_in_batches(
@@ -339,10 +366,10 @@ def _alternate(number: int) -> tuple[int, ...]:
     return tuple(stream * per_stream + place for place in range(per_stream) for stream in range(STREAMS))
 
 
-def _sizes(pixels: int, channels: int, memory: int) -> tuple[int, int]:
+def _sizes(pixels: int, channels: int, memory: int, keeps_seen: bool) -> tuple[int, int]:
     """How many batches are kept, and the lanes of a wavefront."""
     for batches in (MOST_BATCHES, MOST_BATCHES // 2, STREAMS):
-        kept = pixels * memory_model.batches(batches)
+        kept = pixels * (memory_model.batches(batches) + memory_model.SEEN * keeps_seen)
         needed = min(memory_model.SMALLEST_LANES, pixels * channels * batches)
         fits = memory >= kept + needed * memory_model.BYTES_PER_LANE
         if fits or batches == STREAMS:

@@ -1,9 +1,12 @@
-"""How many further chains of sharp events each path of a picture comes with: by a look at how seen light varies.
+"""How many chains of sharp events each path of a picture comes with: by a look at how seen light varies.
 
 What samples of each kind cost is best as the root of the variance that they take away times their cost (Neyman
 allocation). The variance of seen light within pixels is measured, that of the rest and the cost of a chain are those of
-usual scenes. A look may miss emitters that are seen so small that one chain in a million meets one; a part of what that
-would bring is added.
+usual scenes. Where there are caustics, a look may miss emitters that are seen so small that one chain in a million
+meets one; a part of what that would bring is added.
+
+Where a picture is denoised, hardly anything is left of the rest's variance, and all of that of seen light, which goes
+past the denoiser: more chains are worth their time then, and too few of them are worse than none.
 """
 
 from __future__ import annotations
@@ -28,10 +31,18 @@ from lippmann.rendering.transport.seen_light import seen_light
 
 #: Chains of a path, at most.
 MOST = 32
-#: Share of a picture's time that the look takes, about; its chains within limits, and those of one pixel, at least.
-LOOK_COST, FEWEST_LOOKS, MOST_LOOKS, LOOKS_OF_PIXEL = 0.02, 1 << 14, 1 << 20, 8
-#: Variance of a path's light, seen light apart, in codes; and what a chain costs of a path: those of usual scenes.
-REST_VARIANCE, CHAIN_COST = 0.01, 0.05
+#: Share of a picture's time that the look takes, about: where there are caustics, and elsewhere. Its chains within
+#: limits, and those of one pixel, at least.
+LOOK_COST, PLAIN_LOOK_COST = 0.02, 0.005
+FEWEST_LOOKS, MOST_LOOKS, LOOKS_OF_PIXEL = 1 << 13, 1 << 20, 8
+#: Variance of a path's light, seen light apart, in codes; and where a denoiser takes most of it away: those of usual
+#: scenes.
+REST_VARIANCE, CLEAN_REST_VARIANCE = 0.01, 0.001
+#: What a chain costs of a path that looks up photons, and of one that does not.
+CHAIN_COST, PLAIN_CHAIN_COST = 0.05, 0.15
+#: Chains of a pixel whose mean is as clean as a denoiser would have made of its paths; and of one path, at most that
+#: many at least.
+CLEAN, MOST_FOR_CLEAN = 32, 16
 #: Meetings with the brightest emitter that count beside those of the look: as many as may well have been missed.
 MISSED = 0.25
 #: Samples that a picture is taken to need at most, and at least, of which it is not known.
@@ -44,8 +55,8 @@ _AT_ONCE = 1 << 12
 _POINTS = 1 << 10
 
 
-def give_chains(integrator: PathIntegrator, request: RenderRequest, source: RaySource) -> dict[str, object]:
-    """Give the integrator the chains for the picture of ``source``; what there is to say of it in the picture's file.
+def give_chains(integrator: PathIntegrator, request: RenderRequest, source: RaySource) -> int:
+    """Give the integrator the chains for the picture of ``source``; how many each path comes with, 0 for none.
 
     Parameters
     ----------
@@ -57,14 +68,22 @@ def give_chains(integrator: PathIntegrator, request: RenderRequest, source: RayS
         Rays of the whole picture: parts of one picture must be told the same.
     """
     if not request.box_filter:  # all rays of a pixel are one
-        return {}
-    chains = seen_chains(integrator, source, _expected_samples(request), request.transfer, request.seed)
+        return 0
+    samples, is_clean = _expected_samples(request), request.denoise != "none"
+    chains = seen_chains(integrator, source, samples, request.transfer, request.seed, is_clean)
     integrator.seen_chains = dr.opaque(mi.UInt32, chains) if chains else None
-    return {"seen_chains": chains} if chains else {}
+    return chains
 
 
-def seen_chains(integrator: PathIntegrator, source: RaySource, samples: int, transfer: Transfer, seed: int) -> int:
-    """Chains of each path, 0 or a power of two up to :data:`MOST`.
+def seen_chains(
+    integrator: PathIntegrator,
+    source: RaySource,
+    samples: int,
+    transfer: Transfer,
+    seed: int,
+    is_clean: bool,
+) -> int:
+    """Chains of each path: 0, or a power of two from 2 to :data:`MOST`, as one brings no more than the path itself.
 
     Parameters
     ----------
@@ -78,14 +97,27 @@ def seen_chains(integrator: PathIntegrator, source: RaySource, samples: int, tra
         How values become codes.
     seed:
         Of the picture.
+    is_clean:
+        A denoiser takes the noise out of all but seen light.
     """
+    beside_photons = integrator.photons is not None
     looks = _looks(integrator, source, samples, seed)
     variance = sum(variance_of(part, samples, transfer) * len(part) for part in _parts(looks)) / len(looks)
-    brightest = min(_brightest(integrator, source, seed), samples)
-    slope = float(coding_slope(np.array(_GREY), transfer))
-    variance += MISSED * (slope * brightest) ** 2 / (looks.size / 3)
-    wanted = math.sqrt(variance * (1 - CHAIN_COST) / (REST_VARIANCE * CHAIN_COST)) - 1
-    return 0 if wanted < 1 else min(MOST, 1 << round(math.log2(wanted)))
+    if beside_photons:
+        brightest = min(_brightest(integrator, source, seed), samples)
+        slope = float(coding_slope(np.array(_GREY), transfer))
+        variance += MISSED * (slope * brightest) ** 2 / (looks.size / 3)
+    return chains_for(variance, samples, CHAIN_COST if beside_photons else PLAIN_CHAIN_COST, is_clean)
+
+
+def chains_for(variance: float, samples: int, cost: float, is_clean: bool) -> int:
+    """As :func:`seen_chains`, by the variance of a chain in codes, and what it costs of a path."""
+    rest = CLEAN_REST_VARIANCE if is_clean else REST_VARIANCE
+    wanted = math.sqrt(variance * (1 - cost) / (rest * cost))
+    fewest = min(max(2.0, CLEAN / samples), MOST_FOR_CLEAN) if is_clean else 2.0
+    if wanted < (max(2.0, fewest / 4) if is_clean else math.sqrt(2)):
+        return 0
+    return min(MOST, 1 << round(math.log2(max(wanted, fewest))))
 
 
 def _expected_samples(request: RenderRequest) -> int:
@@ -124,7 +156,8 @@ def variance_of(looks: NDArray[np.floating], samples: int, transfer: Transfer) -
 def _looks(integrator: PathIntegrator, source: RaySource, samples: int, seed: int) -> NDArray[np.float32]:
     """``(pixels, looks, 3)``: what single chains meet, the gain included."""
     paths = source.width * source.height * source.channels * samples
-    wanted = int(np.clip(paths * LOOK_COST / CHAIN_COST, FEWEST_LOOKS, MOST_LOOKS))
+    share = LOOK_COST / CHAIN_COST if integrator.photons is not None else PLAIN_LOOK_COST / PLAIN_CHAIN_COST
+    wanted = int(np.clip(paths * share, FEWEST_LOOKS, MOST_LOOKS))
     few = ScatteredRays(source, max(1, math.isqrt(wanted // (LOOKS_OF_PIXEL * source.channels))))
     count = max(LOOKS_OF_PIXEL, wanted // (few.width * few.height * few.channels))
     rest, look = divide(

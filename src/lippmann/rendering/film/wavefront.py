@@ -14,7 +14,7 @@ from lippmann.device.sobol import SampleStream
 from lippmann.device.types import Spectrum, UInt32
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.rendering.film.wavefront_plan import Pass, Plan, Tile
-from lippmann.rendering.transport.integrator import Integrator, RayCounts
+from lippmann.rendering.transport.integrator import Integrator, PixelSample
 from lippmann.rendering.transport.path import PathIntegrator
 from lippmann.rendering.transport.ray_source import PixelRays, RaySource, pixel_number
 from lippmann.rendering.transport.seen_light import sample_pixel
@@ -50,6 +50,8 @@ class Frame:
         Further layers ``(height, width)`` of the methods that have any.
     shares:
         How the pixels came about, as shares of all; empty where all were traced.
+    seen:
+        What of ``pixels`` is seen light; None where that is not told.
     """
 
     pixels: NDArray[np.float32]
@@ -59,6 +61,7 @@ class Frame:
     seconds_reuse: float = 0.0
     maps: dict[str, NDArray[np.generic]] = field(default_factory=dict)
     shares: dict[str, float] = field(default_factory=dict)
+    seen: NDArray[np.float32] | None = None
 
 
 def trace_frame(
@@ -69,15 +72,17 @@ def trace_frame(
     seed: int = 0,
     box_filter: bool = True,
     corner: tuple[int, int] = (0, 0),
+    keeps_seen: bool = False,
     progress: ProgressCallback = silent,
 ) -> Frame:
     """Trace all samples of ``plan`` and average them per pixel.
 
     Where ``plan`` is of a part of the picture, ``corner`` is the row and column of that part's first pixel; its pixels
-    are then the same as those of the whole.
+    are then the same as those of the whole. Seen light is kept apart, too, where the integrator tells it and
+    ``keeps_seen``.
     """
     frame = Frame(np.zeros((plan.height, plan.width, 3), dtype=np.float32))
-    tracer = _Tracer(integrator, source, plan, seed, box_filter, corner)
+    tracer = _Tracer(integrator, source, plan, seed, box_filter, corner, keeps_seen)
     started = time.perf_counter()
     done = 0
     for tile, run in plan:
@@ -86,8 +91,12 @@ def trace_frame(
             sums = tracer.trace(tile, run, frame.rays)
             if first:
                 frame.seconds_compile = compile_seconds()
-        sums *= 1 / plan.samples
-        frame.pixels[tile.first_row : tile.first_row + tile.rows] += sums.reshape(tile.rows, plan.width, 3)
+        if len(sums) > 1 and frame.seen is None:
+            frame.seen = np.zeros_like(frame.pixels)
+        for whole, part in zip((frame.pixels, frame.seen), sums, strict=False):
+            assert whole is not None
+            part *= 1 / plan.samples
+            whole[tile.first_row : tile.first_row + tile.rows] += part.reshape(tile.rows, plan.width, 3)
         done += tile.rows * plan.width * plan.channels * run.count
         progress(Progress("trace", done, plan.work))
     frame.seconds_trace = time.perf_counter() - started - frame.seconds_compile
@@ -109,6 +118,7 @@ class _Tracer:
         seed: int,
         box_filter: bool,
         corner: tuple[int, int],
+        keeps_seen: bool,
     ) -> None:
         self._integrator = integrator
         self._source = source
@@ -116,15 +126,21 @@ class _Tracer:
         self._seed = seed
         self._box_filter = box_filter
         self._corner = corner
+        self._keeps_seen = keeps_seen
 
-    def trace(self, tile: Tile, run: Pass, totals: RayTotals) -> NDArray[np.float32]:
-        """Sums over the samples of one pass, ``(pixels of the tile, 3)``; ``totals`` grows by the rays it took."""
+    def trace(self, tile: Tile, run: Pass, totals: RayTotals) -> list[NDArray[np.float32]]:
+        """Sums over the samples of one pass, ``(pixels of the tile, 3)``, and of their seen light where it is kept.
+
+        ``totals`` grows by the rays it took.
+        """
         plan = self._plan
         pixels, stream = samples_of_tile(self._source, plan, tile, run, self._seed, self._box_filter, self._corner)
-        radiance, counts = sample_pixels(self._integrator, pixels, stream)
-        lanes = tile.rows * plan.width * plan.channels * run.count
-        radiance = evaluated(radiance, counts, lanes, totals)
-        return _channel_sums(radiance, plan.channels, run.count)
+        sample = sample_pixels(self._integrator, pixels, stream)
+        if not self._keeps_seen:
+            sample.seen = None
+        evaluate(sample, tile.rows * plan.width * plan.channels * run.count, totals)
+        both = (sample.radiance, sample.seen)
+        return [_channel_sums(light, plan.channels, run.count) for light in both if light is not None]
 
 
 def samples_of_tile(
@@ -153,24 +169,26 @@ def samples_of_tile(
     return PixelRays(source, column, row, channel, box_filter), stream
 
 
-def sample_pixels(integrator: Integrator, pixels: PixelRays, stream: SampleStream) -> tuple[Spectrum, RayCounts]:
-    """One sample of each lane's pixel, and the rays traced for it."""
+def sample_pixels(integrator: Integrator, pixels: PixelRays, stream: SampleStream) -> PixelSample:
+    """One sample of each lane's pixel."""
     if isinstance(integrator, PathIntegrator):
         return sample_pixel(integrator, pixels, stream, mi.Bool(True))
-    return integrator.sample(pixels.ray(stream), stream, mi.Bool(True))
+    return PixelSample(*integrator.sample(pixels.ray(stream), stream, mi.Bool(True)))
 
 
-def evaluated(radiance: Spectrum, counts: RayCounts, lanes: int, totals: RayTotals) -> Spectrum:
-    """The radiance of a wavefront, evaluated, black where it is not finite; ``totals`` grows by the rays it took."""
+def evaluate(sample: PixelSample, lanes: int, totals: RayTotals) -> None:
+    """Evaluate the light of a wavefront; it is black where it is not finite. ``totals`` grows by the rays it took."""
+    counts, radiance = sample.counts, sample.radiance
     finite = dr.isfinite(radiance.x) & dr.isfinite(radiance.y) & dr.isfinite(radiance.z)
-    radiance = dr.select(finite, radiance, mi.Color3f(0))
+    sample.radiance = dr.select(finite, radiance, mi.Color3f(0))
+    if sample.seen is not None:
+        sample.seen = dr.select(finite, sample.seen, mi.Color3f(0))
     # All at once: a sum of an unevaluated radiance would run the path loop anew.
-    dr.eval(radiance, counts.secondary, counts.shadow, finite)
+    dr.eval(sample.radiance, sample.seen, counts.secondary, counts.shadow, finite)
     totals.primary += lanes
     totals.secondary += lane_total(counts.secondary)
     totals.shadow += lane_total(counts.shadow)
     totals.discarded += lanes - int(dr.count(finite)[0])
-    return radiance
 
 
 def divide(number: UInt32, by: UInt32 | int) -> tuple[UInt32, UInt32]:

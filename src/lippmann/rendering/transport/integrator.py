@@ -29,6 +29,19 @@ class FirstHit:
     view_dependent: Bool
 
 
+@dataclass
+class PixelSample:
+    """One sample of each lane's pixel.
+
+    ``seen`` is what of ``radiance`` is seen light: emitters and sky that are met by sharp events alone; None where that
+    is not told apart.
+    """
+
+    radiance: Spectrum
+    counts: RayCounts
+    seen: Spectrum | None = None
+
+
 class Integrator(Protocol):
     """Estimates radiance along rays of its own scene, for wavefronts of any size."""
 

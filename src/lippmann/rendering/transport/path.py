@@ -142,11 +142,12 @@ class PathIntegrator:
 
     @dr.syntax
     def sample_with_hit(
-        self, ray: Ray3f, stream: SampleStream, active: Bool, seen_share: Float | None = None
+        self, ray: Ray3f, stream: SampleStream, active: Bool, without_seen: bool = False
     ) -> tuple[Spectrum, RayCounts, FirstHit]:
         """As :meth:`sample`, with the first hit. Every surface that is not purely diffuse is view-dependent.
 
-        Emission that is met by sharp events alone counts ``seen_share``, where photons bring caustics.
+        Emission that is met by sharp events alone is left out ``without_seen``, but for sky behind nothing: at
+        outlines samples of both sides belong together.
         """
         scene = self.scene
         context = mi.BSDFContext()
@@ -181,6 +182,8 @@ class PathIntegrator:
         pi = scene.ray_intersect_preliminary(ray, coherent=True, active=active)
         first_distance = mi.Float(pi.t)
         view_dependent = mi.Bool(False)
+        # Paths that leave nothing to others need not know which events are sharp.
+        divides = self.photons is not None or without_seen
 
         while dr.hint(active, label="paths"):
             si = pi.compute_surface_interaction(ray, ray_flags=needed)
@@ -200,8 +203,8 @@ class PathIntegrator:
                 is_caustic = ~seen & (sharp > 0) & (sharp <= MOST_EVENTS) & si.is_valid()
                 emission = dr.select(is_caustic, emission * (1 - by_photons), emission)
             met = self.limited(throughput * emission, depth)
-            if dr.hint(seen_share is not None, mode="scalar"):
-                met = dr.select(seen, met * seen_share, met)
+            if dr.hint(without_seen, mode="scalar"):
+                met = dr.select(seen & ((depth > 0) | si.is_valid()), 0, met)
             radiance += met
 
             # ---- next-event estimation ----
@@ -215,8 +218,9 @@ class PathIntegrator:
                     dr.select(all_specular, start, number),
                 )
             lobe, lambert, wide, lands = mi.Vector3f(0), mi.Color3f(0), mi.Bool(False), mi.Bool(False)
-            if dr.hint(self.photons is not None, mode="scalar"):
+            if dr.hint(divides, mode="scalar"):
                 lobe = sharp_lobe(si, bsdf, continues)
+            if dr.hint(self.photons is not None, mode="scalar"):
                 lambert = lambertian(si, bsdf, continues)
                 wide = has_wide_lobes(si, bsdf, continues)
                 lands = continues & (wide | (dr.max(lambert) > 0))
@@ -252,16 +256,16 @@ class PathIntegrator:
                 context, si, stream.next_1d(dimension + 1), stream.next_2d(dimension + 2), continues
             )
             passes = mi.has_flag(bs.sampled_type, mi.BSDFFlags.Null)
-            if dr.hint(self.photons is not None, mode="scalar"):
-                is_event = continues & ~passes
-                keeps_sharp = follows_sharply(si, lobe, bs)
-                scattered = mi.Color3f(bsdf_weight) * bs.pdf
-                share = dr.select(scattered > 0, lambert * (dr.abs(bs.wo.z) * dr.inv_pi) / scattered, 0)
-                becomes_rough = is_event & ~keeps_sharp
-                share = dr.select(wide & (si.wi.z * bs.wo.z > 0), 1, dr.clip(share, 0, 1))
-                by_photons = dr.select(becomes_rough, share, by_photons)
+            is_event, becomes_rough = continues & ~passes, mi.Bool(False)
+            if dr.hint(divides, mode="scalar"):
+                becomes_rough = is_event & ~follows_sharply(si, lobe, bs)
                 is_beam &= ~becomes_rough
                 seen &= ~becomes_rough
+            if dr.hint(self.photons is not None, mode="scalar"):
+                scattered = mi.Color3f(bsdf_weight) * bs.pdf
+                share = dr.select(scattered > 0, lambert * (dr.abs(bs.wo.z) * dr.inv_pi) / scattered, 0)
+                share = dr.select(wide & (si.wi.z * bs.wo.z > 0), 1, dr.clip(share, 0, 1))
+                by_photons = dr.select(becomes_rough, share, by_photons)
                 sharp = dr.select(becomes_rough, mi.UInt32(0), sharp + dr.select(is_event, mi.UInt32(1), mi.UInt32(0)))
             throughput *= bsdf_weight
             eta *= bs.eta

@@ -19,7 +19,7 @@ from lippmann.device.pbr.surface_point import widen_lobes
 from lippmann.device.sobol import SampleStream, hash32
 from lippmann.device.types import Bool, BSDFPtr, PreliminaryIntersection3f, Ray3f, Spectrum, UInt32
 from lippmann.rendering.transport.beam import Beam, turn_of_normals, widening
-from lippmann.rendering.transport.integrator import RayCounts
+from lippmann.rendering.transport.integrator import PixelSample, RayCounts
 from lippmann.rendering.transport.path import PathIntegrator
 from lippmann.rendering.transport.ray_source import PixelRays
 from lippmann.rendering.transport.shadow_rays import MAX_CROSSINGS
@@ -31,36 +31,32 @@ _CHAINS = 0x5EE21147
 _DIMENSIONS_PER_VERTEX = 2
 
 
-def sample_pixel(
-    integrator: PathIntegrator, pixel: PixelRays, stream: SampleStream, active: Bool
-) -> tuple[Spectrum, RayCounts]:
-    """One sample of ``pixel`` per lane, and the rays traced for it.
-
-    Where the integrator has chains, with as many through other points of the pixel.
-    """
+def sample_pixel(integrator: PathIntegrator, pixel: PixelRays, stream: SampleStream, active: Bool) -> PixelSample:
+    """One sample of ``pixel`` per lane; seen light by chains, where the integrator has them."""
     ray = pixel.ray(stream)
-    if integrator.seen_chains is None or integrator.photons is None:
-        return integrator.sample(ray, stream, active)
-    share = dr.rcp(1 + mi.Float(integrator.seen_chains))
-    radiance, counts, _ = integrator.sample_with_hit(ray, stream, active, share)
-    light, rays = seen_light(integrator, pixel, stream, integrator.seen_chains, active)
-    light *= share if integrator.gain is None else share * integrator.gain
-    return radiance + light, RayCounts(counts.secondary + rays, counts.shadow)
+    if integrator.seen_chains is None:
+        return PixelSample(*integrator.sample(ray, stream, active))
+    rest, counts, _ = integrator.sample_with_hit(ray, stream, active, without_seen=True)
+    seen, rays = seen_light(integrator, pixel, stream, integrator.seen_chains, active)
+    seen /= mi.Float(integrator.seen_chains)
+    if integrator.gain is not None:
+        seen *= integrator.gain
+    return PixelSample(rest + seen, RayCounts(counts.secondary + rays, counts.shadow), seen)
 
 
 @dr.syntax
 def seen_light(
     integrator: PathIntegrator, pixel: PixelRays, stream: SampleStream, chains: UInt32, active: Bool
 ) -> tuple[Spectrum, UInt32]:
-    """Sum of the light that so many further chains of each lane's pixel meet, before the gain, and the rays traced."""
+    """Sum of the light that so many chains of each lane's pixel meet, before the gain, and the rays traced."""
     light = mi.Spectrum(0)
     rays = mi.UInt32(0)
     number = mi.UInt32(0)
-    own = SampleStream(hash32(stream.key ^ _CHAINS), stream.index, stream.half)
+    of_chains = SampleStream(hash32(stream.key ^ _CHAINS), stream.index, stream.half)
     first = stream.index * chains
     tracing = active & (number < chains)
     while dr.hint(tracing, label="chains"):
-        further = own.at(first + number)
+        further = of_chains.at(first + number)
         met, traced = _chain(integrator, pixel.ray(further), further, stream.index, tracing)
         light += dr.select(dr.isfinite(dr.sum(met)), met, 0)
         rays += traced
@@ -101,6 +97,7 @@ def _chain(
         if dr.hint(integrator.features.has_absorption, mode="scalar"):
             throughput *= dr.exp(-absorption * dr.select(si.is_valid(), si.t, 0))
         emission = integrator.emission(si, vertex, vertex_pdf, vertex_delta, vertex_samples, depth)
+        emission = dr.select((depth > 0) | si.is_valid(), emission, 0)
         light += integrator.limited(throughput * emission, depth)
 
         continues = active & si.is_valid() & (depth < integrator.depth)
