@@ -29,7 +29,6 @@ from equal_error import (
     prepare,
     reference_pair,
     trace_paths,
-    widen_lobes,
 )
 from harness import kept, save
 
@@ -77,14 +76,11 @@ def picture(stage: Stage, way: str, method: str, samples: int) -> Picture:
     from lippmann.rendering.denoise.guided_denoiser import GuidedDenoiser
     from lippmann.rendering.film.sample_batches import FullInBatches
 
-    by_paths(stage)
-    if way == "photons":
-        light_up(stage, replace(stage.session.request, spp=samples, seed=3))
-    if method == "pooled":
-        widen_lobes(stage, samples)
-    batches = FullInBatches(stage.integrator, stage.source, seed=3, memory=4 << 30)
+    denoise = "oidn" if method == "pooled" else "none"
+    request = replace(stage.session.request, method=method, denoise=denoise, spp=samples, seed=3)
+    light_up(stage, replace(request, caustics="auto" if way == "photons" else "paths"))
+    batches = FullInBatches(stage.integrator, stage.source, seed=3, memory=4 << 30, keeps_seen=method == "pooled")
     batches.add(samples)
-    stage.integrator.beam = None
     if method == "full":
         return batches.picture()
     rays = batches.rays

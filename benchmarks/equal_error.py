@@ -160,16 +160,19 @@ def _denoised(
     def share(cleaned: Picture) -> Picture:
         return share_light(cleaned, stage.display, guides, stop=SHARING_STOP[effort], threads=CORES)
 
-    batches = FullInBatches(stage.integrator, stage.source, seed=3, memory=4 << 30)
-    widen_lobes(stage, samples)
-    batches.add(samples)
-    stage.integrator.beam = None
-    for way, call in (
-        ("full + oidn", lambda: clean(picture)),
-        ("pooled", lambda: Denoised(batches, clean, "srgb", CORES, share).picture()),
+    def pooled() -> Any:
+        light_up(stage, replace(stage.session.request, method="pooled", denoise="oidn", spp=samples, seed=3))
+        batches = FullInBatches(stage.integrator, stage.source, seed=3, memory=4 << 30, keeps_seen=True)
+        batches.add(samples)
+        return batches
+
+    traced_for_pooled, batches = timed(pooled)
+    for way, tracing, call in (
+        ("full + oidn", traced, lambda: clean(picture)),
+        ("pooled", traced_for_pooled, lambda: Denoised(batches, clean, "srgb", CORES, share).picture()),
     ):
         seconds, result = timed(call)
-        parts = {"trace": traced, "guides": looked, "clean": seconds}
+        parts = {"trace": tracing, "guides": looked, "clean": seconds}
         found = {"spp": samples, "effort": effort, "seconds": sum(parts.values()), "parts": parts}
         curves[way].append({**found, **judge(result)})
 
@@ -226,32 +229,21 @@ def _psnr(error: float) -> float:
 def by_paths(stage: Stage) -> None:
     """All light by paths."""
     paths = stage.integrator
-    paths.photons = paths.photon_passes = paths.seen_chains = None
+    paths.photons = paths.photon_passes = paths.seen_chains = paths.beam = None
 
 
 def light_up(stage: Stage, request: Any) -> None:
-    """What the program gives the integrator for a picture: photons of its own where there are caustics, and chains."""
-    from lippmann.rendering.film.caustics import give_photons
-    from lippmann.rendering.film.seen_chains import give_chains
+    """What the program gives the integrator for a picture: photons of its own, where there are caustics, and chains."""
+    from lippmann.rendering.film.prepared_light import prepare_light
 
-    by_paths(stage)
-    paths = stage.integrator
-    if give_photons(paths, request, stage.source, 4 << 30) == "photons":
-        give_chains(paths, request, stage.source)
-
-
-def widen_lobes(stage: Stage, samples: int) -> None:
-    """Lobes as wide as samples' beams, as the program has them where so many samples are pooled."""
-    from lippmann.rendering.transport.beam import beam_of
-    from lippmann.rendering.transport.casters import has_sharp_surfaces
-
-    if has_sharp_surfaces(stage.integrator.scene):
-        stage.integrator.beam = beam_of(stage.source, samples)
+    # All pictures of a stage are exposed alike.
+    request = replace(request, exposure=stage.session.choices.get("exposure", 0.0))
+    prepare_light(stage.integrator, request, stage.source, 4 << 30)
 
 
 def trace_lit(stage: Stage, samples: int, seed: int) -> Picture:
     """A picture of so many samples as the program makes it, caustics included."""
-    light_up(stage, replace(stage.session.request, spp=samples, seed=seed))
+    light_up(stage, replace(stage.session.request, method="full", denoise="none", spp=samples, seed=seed))
     return trace_paths(stage, samples, seed)
 
 

@@ -117,18 +117,18 @@ class Case:
         while rounds == 0 or time.process_time() - start < seconds:
             for part in range(REFERENCE_PARTS):
                 seed = 1_000_000 + rounds * REFERENCE_PARTS + part
-                self._shoot(replace(self.session.request, seed=seed, spp=128))
+                self._shoot(replace(self.session.request, method="full", denoise="none", seed=seed, spp=128))
                 parts[part] += trace_frame(self.integrator, self.source, plan, seed=seed).pixels
             rounds += 1
         return parts / rounds, 128 * rounds * REFERENCE_PARTS
 
     def _shoot(self, request: Any) -> None:
         """Photons and chains for a request, where there are caustics: references and pictures must not share any."""
-        from lippmann.rendering.film.caustics import give_photons
-        from lippmann.rendering.film.seen_chains import give_chains
+        from lippmann.rendering.film.prepared_light import prepare_light
 
-        if give_photons(self.integrator, request, self.source, MEMORY) == "photons":
-            give_chains(self.integrator, request, self.source)
+        # All pictures are exposed alike.
+        request = replace(request, exposure=self.session.choices.get("exposure", 0.0))
+        prepare_light(self.integrator, request, self.source, MEMORY)
 
     def trace(self, way: str, seed: int, **asked: Any) -> Any:
         """A picture made that way, as the whole program makes it."""

@@ -190,43 +190,13 @@ class Session:
         return integrator
 
     def _prepare_light(self, integrator: Integrator, source: RaySource) -> Integrator:
-        from lippmann.rendering.film.exposure import gain_of, measure_exposure
+        from lippmann.rendering.film.prepared_light import prepare_light
         from lippmann.rendering.transport.path import PathIntegrator
 
-        if not isinstance(integrator, PathIntegrator):
-            return integrator
-        from lippmann.rendering.film.caustics import give_photons
-        from lippmann.rendering.film.seen_chains import give_chains
-        from lippmann.rendering.transport.beam import beam_of
-        from lippmann.rendering.transport.casters import has_sharp_surfaces
-
-        request = self.request
-        # A goal may be reached by samples alone, which are to have no blur.
-        has_sharp = has_sharp_surfaces(integrator.scene)
-        if request.shares_light and not request.is_open_ended and has_sharp:
-            integrator.beam = beam_of(source, request.samples)
-        caustics = give_photons(integrator, request, source, memory_limit(request))
-        if caustics is not None:
-            self.choices["caustics"] = caustics
-        exposure = self.request.exposure
-        if exposure == "auto":
-            exposure = measure_exposure(
-                integrator, source, even_background(self.built, self.request), self.request.seed
-            )
-        import mitsuba as mi
-
-        if exposure:
-            integrator.gain = mi.Float(gain_of(exposure))
-            self.choices["exposure"] = exposure
-        if self.request.clamp_indirect is not None:
-            most = self.request.clamp_indirect / (gain_of(exposure) if exposure else 1.0)
-            integrator.most_indirect = mi.Float(most)
-        if has_sharp:
-            chains = give_chains(integrator, request, source)
-            if chains:
-                self.choices["seen_chains"] = chains
-                if integrator.beam is not None:
-                    integrator.beam = beam_of(source, request.samples * chains)
+        if isinstance(integrator, PathIntegrator):
+            background = even_background(self.built, self.request)
+            told = prepare_light(integrator, self.request, source, memory_limit(self.request), background)
+            self.choices.update(told)
         return integrator
 
     def provenance(

@@ -1,0 +1,66 @@
+"""What an integrator is given before a picture, by looks at the scene: photons, exposure, chains, and the beam."""
+
+from __future__ import annotations
+
+import mitsuba as mi
+
+from lippmann.rendering.film.caustics import give_photons
+from lippmann.rendering.film.exposure import gain_of, measure_exposure
+from lippmann.rendering.film.seen_chains import give_chains
+from lippmann.rendering.request.render_request import RenderRequest
+from lippmann.rendering.transport.beam import beam_of
+from lippmann.rendering.transport.casters import has_sharp_surfaces
+from lippmann.rendering.transport.path import PathIntegrator
+from lippmann.rendering.transport.ray_source import RaySource
+from lippmann.scene.values.description import Color
+
+
+def prepare_light(
+    integrator: PathIntegrator, request: RenderRequest, source: RaySource, memory: int, background: Color | None = None
+) -> dict[str, object]:
+    """Make the integrator ready for the picture of ``source``; what there is to say of it in the picture's file.
+
+    Parameters
+    ----------
+    integrator:
+        What an earlier picture was given is forgotten.
+    request:
+        How the picture is to be made.
+    source:
+        Rays of the whole picture: parts of one picture must be told the same.
+    memory:
+        Bytes that the photons may take.
+    background:
+        What rays see that meet nothing, see :func:`~lippmann.rendering.film.exposure.measure_exposure`.
+
+    Raises
+    ------
+    MemoryLimitError
+        ``memory`` bytes do not hold the photons that were asked for.
+    """
+    integrator.photons = integrator.photon_passes = integrator.seen_chains = None
+    integrator.beam = integrator.gain = integrator.most_indirect = None
+    told: dict[str, object] = {}
+    has_sharp = has_sharp_surfaces(integrator.scene)
+    # A goal may be reached by samples alone, which are to have no blur.
+    is_widened = request.shares_light and not request.is_open_ended and has_sharp
+    if is_widened:
+        integrator.beam = beam_of(source, request.samples)
+    caustics = give_photons(integrator, request, source, memory)
+    if caustics is not None:
+        told["caustics"] = caustics
+    exposure = request.exposure
+    if exposure == "auto":
+        exposure = measure_exposure(integrator, source, background, request.seed)
+    if exposure:
+        integrator.gain = mi.Float(gain_of(exposure))
+        told["exposure"] = exposure
+    if request.clamp_indirect is not None:
+        most = request.clamp_indirect / (gain_of(exposure) if exposure else 1.0)
+        integrator.most_indirect = mi.Float(most)
+    chains = give_chains(integrator, request, source) if has_sharp else 0
+    if chains:
+        told["seen_chains"] = chains
+        if is_widened:
+            integrator.beam = beam_of(source, request.samples * chains)
+    return told
