@@ -41,6 +41,17 @@ def test_memory_is_what_is_asked_for_or_a_share_of_what_is_free(monkeypatch):
     assert memory_limit(replace(DIRECT, memory=5)) == 5
 
 
+def test_the_scene_is_built_on_the_engine_that_was_asked_for(teapot, monkeypatch):
+    """Building started another: the GPU, wherever there was one, and all threads."""
+    import drjit as dr
+
+    from lippmann.runtime import machine
+
+    monkeypatch.setattr(machine, "usable_cores", lambda: 2)
+    session = open_session(teapot, replace(DIRECT, device="cpu", threads=1))
+    assert (session.engine.threads, dr.thread_count()) == (1, 1)
+
+
 def test_a_placement_found_before_is_taken_as_it_is(teapot):
     display = load_display("seed-lenticular")
     turned = replace(DIRECT, placement=PlacementOptions(turn=(30.0, 0.0, 0.0)))

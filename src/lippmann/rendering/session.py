@@ -324,7 +324,7 @@ def open_session(
     if request.denoises:
         load_denoiser()
     engine = watch.stage("load", lambda: engines.start(request.device, request.threads))
-    built = watch.stage("build", lambda: _build(scene, request, memory))
+    built = watch.stage("build", lambda: _build(scene, request, engine, memory))
     request = _without_pooling(request, built)
     return Session(scene, request, engine, built, memory, watch)
 
@@ -352,7 +352,7 @@ def memory_limit(request: RenderRequest) -> int:
     return request.memory or int(machine.available_memory() * DEFAULT_MEMORY_SHARE)
 
 
-def _build(scene: Scene, request: RenderRequest, memory: int) -> BuiltScene | BuiltClassic:
+def _build(scene: Scene, request: RenderRequest, engine: engines.Engine, memory: int) -> BuiltScene | BuiltClassic:
     """The scene on the device, in the form that the integrator needs."""
     if request.integrator == "classic":
         from lippmann.device.whitted.scene import build_classic
@@ -361,7 +361,7 @@ def _build(scene: Scene, request: RenderRequest, memory: int) -> BuiltScene | Bu
         return build_classic(scene.classic)
     from lippmann.device.pbr import build
 
-    return build(scene, memory=memory)
+    return build(scene, engine, memory=memory)
 
 
 def make_integrator(
