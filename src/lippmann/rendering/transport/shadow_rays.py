@@ -74,8 +74,9 @@ def _divided(scene: MitsubaScene) -> tuple[MitsubaScene, MitsubaScene]:
     others = [shape for shape, passes in zip(shapes, passing, strict=True) if passes]
     if not others:
         return scene, None
-    # Instances need their groups, which no scene tells.
-    undivided = any(is_instance(shape) for shape in others)
+    # Instances need their groups, which no scene tells. A kernel of the GPU traces rays in one scene alone: those in a
+    # second one meet nothing, and Dr.Jit only warns.
+    undivided = dr.backend_v(mi.Float) == dr.JitBackend.CUDA or any(is_instance(shape) for shape in others)
     if undivided or not opaque or sum(shape.primitive_count() for shape in opaque) > MOST_OPAQUE:
         return None, scene
     return _scene_of(opaque), _scene_of(others)
