@@ -47,12 +47,15 @@ class Casters:
         not numbers for others.
     areas:
         ``(len(shapes),)``: of the shapes, or of their boxes.
+    triangles:
+        ``len(shapes)``: those of the meshes; None for other shapes.
     """
 
     emitters: NDArray[np.uint32]
     shapes: NDArray[np.uint32]
     boxes: NDArray[np.float32]
     areas: NDArray[np.float32]
+    triangles: tuple[Triangles | None, ...]
 
     @property
     def boxed(self) -> NDArray[np.bool_]:
@@ -65,15 +68,46 @@ class Casters:
         return len(self.emitters) * len(self.shapes)
 
 
+class Triangles:
+    """Points spread evenly over a mesh, the same each time.
+
+    Mitsuba's own are not, on the GPU: it sums the triangles' areas in the order in which threads come by, and every sum
+    is rounded another way. A point moves by little then, but shares of the emissions follow from points.
+    """
+
+    def __init__(self, mesh: mi.Mesh) -> None:
+        faces = np.array(mesh.faces_buffer()).reshape(-1, 3)
+        corners = np.array(mesh.vertex_positions_buffer(), dtype=np.float64).reshape(-1, 3)[faces]
+        sides = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        upto = np.cumsum(0.5 * np.linalg.norm(sides, axis=1))
+        self.area = float(upto[-1])
+        self._mesh = mesh
+        self._last = len(faces) - 1
+        self._upto = mi.Float((upto / (self.area or 1.0)).astype(np.float32))
+
+    def point(self, sample: Point2f) -> tuple[Point3f, Vector3f]:
+        """A point and its unit geometric normal."""
+        number = dr.binary_search(0, self._last, lambda place: dr.gather(mi.Float, self._upto, place) <= sample.y)
+        before = dr.gather(mi.Float, self._upto, number - 1, number > 0)
+        share = dr.gather(mi.Float, self._upto, number) - before
+        at = mi.warp.square_to_uniform_triangle(mi.Point2f(sample.x, (sample.y - before) / share))
+        face = self._mesh.face_indices(number)
+        a, b, c = (self._mesh.vertex_position(corner) for corner in (face.x, face.y, face.z))
+        n = dr.normalize(dr.cross(b - a, c - a))
+        p = dr.fma(b - a, at.x, dr.fma(c - a, at.y, a))
+        return mi.Point3f(p), mi.Vector3f(-n if self._mesh.has_flipped_normals() else n)
+
+
 def find_casters(scene: MitsubaScene) -> Casters:
     """Emitters other than the environment, and shapes with lobes that may be sharp; all instances may show such."""
     environment = scene.environment()
     emitters = [number for number, each in enumerate(scene.emitters()) if each is not environment]
-    shapes, boxes, areas = [], [], []
+    shapes, boxes, areas, triangles = [], [], [], []
     for number, shape in enumerate(scene.shapes() if emitters else ()):
         if not (is_instance(shape) or _may_be_sharp(shape.bsdf())):
             continue
-        box, area = np.full(6, np.nan), _area(shape)
+        of_mesh = Triangles(shape) if shape.is_mesh() and _gives_points(shape) else None
+        box, area = np.full(6, np.nan), of_mesh.area if of_mesh is not None else _area(shape)
         if not (0 < area < math.inf and _gives_points(shape)):
             box = _box_about(shape)
             sides = box[3:] - box[:3]
@@ -81,11 +115,13 @@ def find_casters(scene: MitsubaScene) -> Casters:
         shapes.append(number)
         boxes.append(box)
         areas.append(area)
+        triangles.append(of_mesh)
     return Casters(
         np.array(emitters, np.uint32),
         np.array(shapes, np.uint32),
         np.array(boxes, np.float32).reshape(-1, 6),
         np.array(areas, np.float32),
+        tuple(triangles),
     )
 
 
@@ -166,8 +202,8 @@ class CasterPoints:
         self.p, self._n = dr.switch(
             caster,
             [
-                _no_point if is_boxed else _point_of(shapes[int(number)])
-                for number, is_boxed in zip(casters.shapes, boxed.tolist(), strict=True)
+                _no_point if is_boxed else triangles.point if triangles else _point_of(shapes[int(number)])
+                for number, is_boxed, triangles in zip(casters.shapes, boxed.tolist(), casters.triangles, strict=True)
             ],
             sample,
         )
