@@ -40,6 +40,8 @@ FEWEST_LOOKS, MOST_LOOKS, LOOKS_OF_PIXEL = 1 << 13, 1 << 20, 8
 REST_VARIANCE, CLEAN_REST_VARIANCE = 0.01, 0.001
 #: What a chain costs of a path that looks up photons, and of one that does not.
 CHAIN_COST, PLAIN_CHAIN_COST = 0.05, 0.15
+#: Chains of a path by which what single ones meet is held to be too bright or not.
+USUAL = 2
 #: Chains of a pixel whose mean is as clean as a denoiser would have made of its paths; and of one path, at most that
 #: many at least.
 CLEAN, MOST_FOR_CLEAN = 32, 16
@@ -92,7 +94,7 @@ def seen_chains(
     source:
         Rays of the whole picture: parts of one picture must be told the same.
     samples:
-        Of each pixel, about. What a single one of them shows does not count beyond white.
+        Of each pixel, about.
     transfer:
         How values become codes.
     seed:
@@ -102,7 +104,8 @@ def seen_chains(
     """
     beside_photons = integrator.photons is not None
     looks = _looks(integrator, source, samples, seed)
-    variance = sum(variance_of(part, samples, transfer) * len(part) for part in _parts(looks)) / len(looks)
+    together = samples * USUAL
+    variance = sum(variance_of(part, together, transfer) * len(part) for part in _parts(looks)) / len(looks)
     if beside_photons:
         brightest = min(_brightest(integrator, source, seed), samples)
         slope = float(coding_slope(np.array(_GREY), transfer))
@@ -132,22 +135,22 @@ def _expected_samples(request: RenderRequest) -> int:
     return int(np.clip(REST_VARIANCE * 10 ** (request.quality / 10), FEWEST_OPEN_ENDED, OPEN_ENDED))
 
 
-def variance_of(looks: NDArray[np.floating], samples: int, transfer: Transfer) -> float:
+def variance_of(looks: NDArray[np.floating], together: int, transfer: Transfer) -> float:
     """Mean variance of one chain in codes, as far as the others of its pixel leave the code a slope.
 
     Parameters
     ----------
     looks:
         ``(pixels, looks, 3)`` linear radiance of single chains, two or more of each pixel.
-    samples:
-        Of a pixel: what one of them shows does not count beyond white.
+    together:
+        Chains whose mean a pixel shows: what one of them meets does not count beyond what makes that white.
     transfer:
         How values become codes.
     """
     number = looks.shape[1]
     others = (looks.sum(axis=1, keepdims=True) - looks) / (number - 1)
     slope = coding_slope(np.maximum(others, _GREY), transfer)
-    apart = np.minimum(np.abs(looks - others), samples)
+    apart = np.minimum(np.abs(looks - others), together)
     # The mean of the others varies, too.
     variance: float = np.square(slope * apart).mean() * (number - 1) / number
     return variance
