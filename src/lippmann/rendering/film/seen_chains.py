@@ -107,7 +107,7 @@ def seen_chains(
     together = samples * USUAL
     variance = sum(variance_of(part, together, transfer) * len(part) for part in _parts(looks)) / len(looks)
     if beside_photons:
-        brightest = min(_brightest(integrator, source, seed), samples)
+        brightest = min(_brightest(integrator, source, seed), together)
         slope = float(coding_slope(np.array(_GREY), transfer))
         variance += MISSED * (slope * brightest) ** 2 / (looks.size / 3)
     return chains_for(variance, samples, CHAIN_COST if beside_photons else PLAIN_CHAIN_COST, is_clean)
