@@ -10,6 +10,8 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from lippmann.rendering.film.caustic_worth import LEAST_WORTH, variance_by_paths
+from lippmann.rendering.film.exposure import gain_of
 from lippmann.rendering.film.memory_model import PHOTON, too_small
 from lippmann.rendering.film.scattered_rays import ScatteredRays
 from lippmann.rendering.request.render_request import RenderRequest
@@ -80,6 +82,7 @@ def give_photons(
         if request.caustics == "auto":
             return _left_to_paths(integrator)
         raise too_small(memory, "photons of caustics", required)
+    seen = _seen_points(integrator, source)
     photons = CausticPhotons(
         integrator.scene,
         integrator.features,
@@ -87,10 +90,10 @@ def give_photons(
         samples=whole,
         samples_of_pixel=each,
         seed=request.seed,
-        region=_seen_region(integrator, source),
+        region=_region_about(seen),
         kept=max(1, min(passes, int(KEPT_SHARE * memory) // required)),
     )
-    if photons.are_none:
+    if photons.are_none or (request.caustics == "auto" and not _are_missed(photons, seen, request)):
         return None
     integrator.photons = photons.of_pass(0)
     integrator.photon_passes = photons
@@ -101,14 +104,27 @@ def _left_to_paths(integrator: PathIntegrator) -> Literal["paths"] | None:
     return "paths" if hides_caustics(integrator.scene) else None
 
 
-def _seen_region(integrator: PathIntegrator, source: RaySource) -> NDArray[np.float64] | None:
-    """Corners ``(2, 3)`` of a box about what the picture's rays meet first; None where they meet nothing."""
+def _are_missed(photons: CausticPhotons, seen: NDArray[np.float64], request: RenderRequest) -> bool:
+    """Whether paths would show the photons' caustics so that it is seen."""
+    if request.exposure == "auto" or not len(seen):
+        return True  # what light is bright is not known yet
+    noise = variance_by_paths(photons.pilot, photons.pilot_radiance, seen, SEEN_SIDE**2)
+    return noise * gain_of(request.exposure) ** 2 > LEAST_WORTH
+
+
+def _seen_points(integrator: PathIntegrator, source: RaySource) -> NDArray[np.float64]:
+    """``(n, 3)``: what the picture's rays meet first, of some of them that lie evenly in it."""
     few = ScatteredRays(source, SEEN_SIDE)
     place = dr.arange(mi.UInt32, few.width * few.height)
     row = place // few.width
     ray = few.rays(place - row * few.width, row, mi.UInt32(0), mi.Point2f(0.5))
     si = integrator.scene.ray_intersect(ray)
-    points = np.array(si.p, dtype=np.float64).T[np.array(si.is_valid())]
+    points: NDArray[np.float64] = np.array(si.p, dtype=np.float64).T[np.array(si.is_valid())]
+    return points
+
+
+def _region_about(points: NDArray[np.float64]) -> NDArray[np.float64] | None:
+    """Corners ``(2, 3)`` of a box about points that are seen; None where there are none."""
     if not len(points):
         return None
     corners: NDArray[np.float64] = np.quantile(points, [APART, 1 - APART], axis=0)

@@ -20,7 +20,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.device.sobol import SampleStream
-from lippmann.device.types import Bool, Color3f, MitsubaScene, Spectrum, SurfaceInteraction3f, UInt32
+from lippmann.device.types import (
+    Bool,
+    Color3f,
+    DirectionSample3f,
+    MitsubaScene,
+    Spectrum,
+    SurfaceInteraction3f,
+    UInt32,
+)
 from lippmann.rendering.transport.casters import CasterPoints, Casters
 from lippmann.rendering.transport.photon_map import PhotonMap, Photons
 from lippmann.rendering.transport.scene_features import SceneFeatures
@@ -47,7 +55,9 @@ NEIGHBOURS, EMISSIONS_OF_NEIGHBOURS = 50, 1 << 18
 #: Photons by which the radius is found.
 _PROBED = 2000
 _SEED_STEPS = (0xB5297A4D, 0x68E31DA4)
-_PILOT_STEP, _PASS_STEP = 0x1B56C4E9, 0x632BE5AB
+_PILOT_STEP, _PASS_STEP, _LOOK_STEP = 0x1B56C4E9, 0x632BE5AB, 0x7F4A7C15
+#: Directions to emitters by which their radiance is found: in all, and of one emitter and caster.
+_LOOKS, _MOST_LOOKS_OF_PAIR = 1 << 14, 256
 #: How far a ray goes on behind a straight-through surface, relative to its coordinates.
 _CLEARANCE = 1e-4
 #: Dimensions of the sample stream at one surface.
@@ -107,6 +117,8 @@ class CausticPhotons:
         self._kept = kept
         self._maps: dict[int, PhotonMap] = {}
         self._radius = 0.0
+        #: What a few emissions of each pair brought to what is seen, and the radiance of each photon's emitter.
+        self.pilot, self.pilot_radiance = _NONE, np.zeros(0)
         self._chances = self._pilot(casters)
 
     @property
@@ -141,7 +153,10 @@ class CausticPhotons:
         seen = photons.are_inside(self._region)
         if not seen.any():
             return None
-        power = photons.power[seen].astype(np.float64)
+        self.pilot = photons.chosen(seen)
+        emitter = pair[seen] % len(casters.emitters)
+        self.pilot_radiance = self._shooter.radiances((self._seed + _PILOT_STEP) % 2**32)[emitter]
+        power = self.pilot.power.astype(np.float64)
         roots = np.sqrt(np.bincount(pair[seen], np.square(power).sum(axis=1), minlength=casters.pairs))
         return np.asarray(_UNIFORM_SHARE * even + (1 - _UNIFORM_SHARE) * roots / roots.sum())
 
@@ -187,22 +202,41 @@ class PhotonShooter:
                 pairs.append(part[lanes])
         return Photons.joined([_NONE, *landed]), np.concatenate([np.zeros(0, np.int64), *pairs])
 
+    def radiances(self, seed: int) -> NDArray[np.float64]:
+        """The greatest radiance that each emitter is found to show to the casters; infinite for those without size."""
+        pairs = self._casters.pairs
+        pair = np.repeat(np.arange(pairs), min(_MOST_LOOKS_OF_PAIR, max(1, _LOOKS // pairs)))
+        stream = SampleStream.of_pixels(
+            mi.UInt32(0), dr.arange(mi.UInt32, len(pair)), dr.opaque(mi.UInt32, (seed + _LOOK_STEP) % 2**32)
+        )
+        _, ds, light = self._lit_points(pair, stream)
+        shown = dr.select((ds.pdf > 0) & (dr.max(light) > 0), dr.select(ds.delta, dr.inf, dr.max(light) * ds.pdf), 0)
+        greatest = np.zeros(len(self._casters.emitters))
+        np.maximum.at(greatest, pair % len(greatest), np.array(shown, dtype=np.float64))
+        return greatest
+
+    def _lit_points(
+        self, pair: NDArray[np.int64], stream: SampleStream
+    ) -> tuple[CasterPoints, DirectionSample3f, Spectrum]:
+        """For each pair a point on the caster, a direction to the emitter, and radiance over the direction's pdf."""
+        numbers, scene = mi.UInt32(pair.astype(np.uint32)), self._scene
+        caster = numbers // len(self._casters.emitters)
+        source = numbers - caster * len(self._casters.emitters)
+        emitter = dr.gather(mi.EmitterPtr, scene.emitters_dr(), dr.gather(mi.UInt32, self._emitter_numbers, source))
+        point = CasterPoints(scene, self._casters, caster, stream.next_2d(0), stream.next_1d(2))
+        ds, light = emitter.sample_direction(point.reference(), stream.next_2d(1), mi.Bool(True))
+        return point, ds, light
+
     def _wavefront(
         self, pair: NDArray[np.int64], each: NDArray[np.int64], first: int, seed: int
     ) -> list[tuple[Photons, NDArray[np.int64]]]:
         """Photons that land after one sharp event, after two and so on, and the lanes of each."""
         scene, lanes = self._scene, len(pair)
-        numbers = mi.UInt32(pair.astype(np.uint32))
         share = mi.Float((1.0 / each[pair]).astype(np.float32))
         # What differs from wavefront to wavefront is opaque to the compiler, so that all share their kernels.
         index = dr.arange(mi.UInt32, lanes) + dr.opaque(mi.UInt32, first)
         stream = SampleStream.of_pixels(mi.UInt32(0), index, dr.opaque(mi.UInt32, seed))
-        caster = numbers // len(self._casters.emitters)
-        source = numbers - caster * len(self._casters.emitters)
-        emitter = dr.gather(mi.EmitterPtr, scene.emitters_dr(), dr.gather(mi.UInt32, self._emitter_numbers, source))
-
-        point = CasterPoints(scene, self._casters, caster, stream.next_2d(0), stream.next_1d(2))
-        ds, light = emitter.sample_direction(point.reference(), stream.next_2d(1), mi.Bool(True))
+        point, ds, light = self._lit_points(pair, stream)
         active = (ds.pdf > 0) & (dr.max(light) > 0)
         power = mi.Color3f(light) * share
         # From the emitter to the point: tells whether one sees the other, and what surface is met there.
