@@ -194,8 +194,14 @@ class Session:
         from lippmann.rendering.transport.path import PathIntegrator
 
         if isinstance(integrator, PathIntegrator):
-            background = even_background(self.built, self.request)
-            told = prepare_light(integrator, self.request, source, memory_limit(self.request), background)
+            told = prepare_light(
+                integrator,
+                self.request,
+                source,
+                memory_limit(self.request),
+                even_background(self.built, self.request),
+                stands_alone=not self.scene.lies_off_surfaces,
+            )
             self.choices.update(told)
         return integrator
 

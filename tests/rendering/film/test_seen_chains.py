@@ -121,6 +121,7 @@ def test_small_emitters_in_mirrors_get_chains(balls):
     # Emitters without size are not met; rays through the centre of a pixel are all the same.
     assert chains(rendered(balls(0.0))) == 0
     assert chains(rendered(balls(3.0), pixel_filter="point")) == 0
+    assert chains(rendered(balls(3.0), method="lens-view")) == 0
     # What a look may have missed counts with photons alone.
     assert chains(rendered(balls(3.0), caustics="paths")) < chains(rendered(balls(3.0)))
 

@@ -16,7 +16,12 @@ from lippmann.scene.values.description import Color
 
 
 def prepare_light(
-    integrator: PathIntegrator, request: RenderRequest, source: RaySource, memory: int, background: Color | None = None
+    integrator: PathIntegrator,
+    request: RenderRequest,
+    source: RaySource,
+    memory: int,
+    background: Color | None = None,
+    stands_alone: bool = True,
 ) -> dict[str, object]:
     """Make the integrator ready for the picture of ``source``; what there is to say of it in the picture's file.
 
@@ -32,6 +37,8 @@ def prepare_light(
         Bytes that the photons may take.
     background:
         What rays see that meet nothing, see :func:`~lippmann.rendering.film.exposure.measure_exposure`.
+    stands_alone:
+        Nothing lies in front of what the integrator shows, such as splats: whole pixels are its own.
 
     Raises
     ------
@@ -58,7 +65,7 @@ def prepare_light(
     if request.clamp_indirect is not None:
         most = request.clamp_indirect / (gain_of(exposure) if exposure else 1.0)
         integrator.most_indirect = mi.Float(most)
-    chains = give_chains(integrator, request, source) if has_sharp else 0
+    chains = give_chains(integrator, request, source) if has_sharp and stands_alone else 0
     if chains:
         told["seen_chains"] = chains
         if is_widened:

@@ -24,6 +24,7 @@ from lippmann.device.sobol import SampleStream
 from lippmann.device.types import MitsubaScene
 from lippmann.rendering.film.scattered_rays import ScatteredRays
 from lippmann.rendering.film.wavefront import divide, shown_colors
+from lippmann.rendering.request.choices import REUSING
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.rendering.transport.path import PathIntegrator
 from lippmann.rendering.transport.ray_source import PixelRays, RaySource
@@ -69,7 +70,8 @@ def give_chains(integrator: PathIntegrator, request: RenderRequest, source: RayS
     source:
         Rays of the whole picture: parts of one picture must be told the same.
     """
-    if not request.box_filter:  # all rays of a pixel are one
+    # Where all rays of a pixel are one, or its points are taken from others, further ones show nothing.
+    if not request.box_filter or request.method in REUSING:
         return 0
     samples, is_clean = _expected_samples(request), request.denoise != "none"
     chains = seen_chains(integrator, source, samples, request.transfer, request.seed, is_clean)
