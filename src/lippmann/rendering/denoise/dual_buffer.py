@@ -141,7 +141,22 @@ class Denoised:
         if self._renderer.samples < LONE_TOLD_FROM:
             # Any hit may be.
             samples = replace(samples, lone=np.maximum(samples.values, 0))
-        return PixelErrors(common + apart, None, CROSS_NOISE, samples, apart)
+        return PixelErrors(common + apart, self._lone_seen(samples, slope), CROSS_NOISE, samples, apart)
+
+    def _lone_seen(self, samples: PixelErrors, slope: Floats) -> Floats | None:
+        """What of ``apart`` rests on lone hits of seen light: what one half has met of it, and the other has not.
+
+        No denoiser brings them together, and what neither has met is in no difference.
+        """
+        seen = self._renderer.seen_halves()
+        if seen is None or samples.lone is None:
+            return None
+        apart: Floats = (np.float32(0.25) * np.square(slope * self._shown(seen[0] - seen[1]))).mean(axis=2)
+        return np.minimum(apart, samples.lone)
+
+    def _shown(self, values: Floats) -> Floats:
+        """Of values in the denoiser's order those that the picture shows."""
+        return values
 
     def _clean_halves(self) -> tuple[Floats, Floats]:
         # The samples may have come by another way than through :meth:`add`.

@@ -64,3 +64,6 @@ class DenoisedSubpixels(Denoised):
 
     def _cleaned_and_shared(self, noisy: Floats, seen: Floats | None, turned: bool = False) -> list[Floats]:
         return [self._renderer.own_colors(version) for version in super()._cleaned_and_shared(noisy, seen, turned)]
+
+    def _shown(self, values: Floats) -> Floats:
+        return self._renderer.own_colors(values)

@@ -11,6 +11,9 @@ it says. Its own measurement corrects it as far as that can be believed. Where a
 does not explain, it is: what a denoiser is wrong by where it meets an edge or an emitter is large in few pixels, where
 the samples themselves are good. One of few pixels, in a corner of the panel, may differ by chance.
 
+Seen light that goes past the denoiser has its own noise: where one half has met what the other has not, there is as
+a rule more that neither has met. Errors that rest on such lone hits widen the interval downward, as those of samples.
+
 The constants were chosen on ``benchmarks/hard_scenes.py``.
 """
 
@@ -26,6 +29,7 @@ from lippmann.rendering.estimate.pixel_errors import CROSS_NOISE, ErrorSums, Pix
 from lippmann.rendering.estimate.psnr import (
     DRAWS,
     LEAN,
+    LONE_DOUBT,
     MODEL_UNCERTAINTY,
     NORMAL_95,
     Estimate,
@@ -82,7 +86,9 @@ def estimate_denoised(judged: ErrorSums, samples: ErrorSums, grid: tuple[int, in
     likely = likely_error(max(by_chance, LEAST_OF_SAMPLES * of_samples / pixels), error - by_chance, deviation, lone)
     middle = float(likely.quantiles(0.5))
     model = math.exp(NORMAL_95 * MODEL_UNCERTAINTY)
-    worse, better = likely.quantiles(np.array([0.975, 0.025])) * (model, OFTEN_BETTER / model)
+    # What no half has met is in no difference between them.
+    doubt = 1 + LONE_DOUBT * min(1.0, float(judged.lone.sum()) / (middle * pixels))
+    worse, better = likely.quantiles(np.array([0.975, 0.025])) * (model * doubt, OFTEN_BETTER / model)
 
     parts = _parts(judged, samples.squares, index, grid, middle)
     worst = np.quantile(_worst_drawn(parts, likely.quantiles((np.arange(DRAWS) + 0.5) / DRAWS) / middle), _OF_WORST)
@@ -124,4 +130,5 @@ def _parts(
     expected = np.maximum(around + trust * (measured - around), LEAST_EXPECTED * around)
     variance = np.log1p(trust * noise / np.square(expected))
     fewer = np.maximum(1 / count - 1 / np.median(count), 0)
-    return PartErrors(index, expected, expected, variance, np.log1p(FEW * fewer))
+    doubted = expected + LONE_DOUBT * np.clip(judged.lone / count, 0, expected)
+    return PartErrors(index, expected, doubted, variance, np.log1p(FEW * fewer))

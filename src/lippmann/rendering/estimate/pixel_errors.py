@@ -49,7 +49,7 @@ class PixelErrors:
         ``(H, W)`` float32, unbiased; single ones may be negative.
     lone:
         ``(H, W)`` float32 of at least 0: the part of ``values`` that rests on single bright hits; None if there is no
-        such thing.
+        such thing. Of a denoised picture it is a part of ``apart``.
     noise:
         How uncertain ``values`` are.
     samples:
@@ -96,8 +96,9 @@ class ErrorSums:
         if errors.lone is not None:
             lone = errors.lone.astype(np.float64).ravel()
             self.lone[:] += self._sum(owner, lone)
-            # A lone hit shows in the picture as it does in the estimate.
-            uncertain = values - LONE_CERTAIN * lone
+            if errors.apart is None:
+                # A lone hit shows in the picture as it does in the estimate.
+                uncertain = values - LONE_CERTAIN * lone
         if errors.apart is not None:
             apart = errors.apart.astype(np.float64).ravel()
             self.apart[:] += self._sum(owner, apart)
