@@ -174,7 +174,7 @@ def small_emitter_in_glazed_balls():
 
 def test_narrow_lobes_are_weighed_as_paths_weigh_them():
     integrator, source = described(small_emitter_in_glazed_balls())
-    plain, further = (pictures(integrator, source, chains, seeds=range(40)) for chains in (0, 16))
+    plain, further = (pictures(integrator, source, chains, seeds=range(40)) for chains in (0, 7))
     agree(plain, further)
     # Highlights of a small emitter: what chains are for.
     assert further.var(axis=0).mean() < 0.5 * plain.var(axis=0).mean()
@@ -202,7 +202,7 @@ def test_chains_count_as_rays_and_depend_on_the_seed_alone(all_events):
     from lippmann.rendering.film.sample_batches import FullInBatches
 
     integrator, source = all_events
-    integrator.seen_chains = dr.opaque(mi.UInt32, 16)
+    integrator.seen_chains = dr.opaque(mi.UInt32, 4)
     whole = FullInBatches(integrator, source, seed=5, memory=1 << 30)
     whole.add(8)
     again = FullInBatches(integrator, source, seed=5, memory=(1 << 21))
@@ -213,9 +213,7 @@ def test_chains_count_as_rays_and_depend_on_the_seed_alone(all_events):
     plain.add(8)
     lanes = SIDE * SIDE * 8
     assert whole.rays.primary == plain.rays.primary == lanes
-    # Fewer where the path itself meets a surface that shows none.
-    further = whole.rays.secondary - plain.rays.secondary
-    assert 3 * lanes < further < 14 * lanes
+    assert whole.rays.secondary - plain.rays.secondary >= 4 * lanes
     a, b = whole.halves()
     assert not np.array_equal(a, b)
 

@@ -22,13 +22,11 @@ class FirstHit:
     """First hit of a primary ray.
 
     ``distance`` is in world units, infinite where nothing is hit. ``view_dependent`` is True where the radiance depends
-    on the direction from which the surface is seen (mirrors, glass, highlights). ``shows_seen`` is True where the
-    surface emits, or may be followed sharply; None where that is not asked for.
+    on the direction from which the surface is seen (mirrors, glass, highlights).
     """
 
     distance: Float
     view_dependent: Bool
-    shows_seen: Bool | None = None
 
 
 @dataclass

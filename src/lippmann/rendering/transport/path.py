@@ -47,7 +47,6 @@ from lippmann.rendering.transport.sharp_events import (
     is_sharp,
     lambertian,
     sharp_lobe,
-    shows_seen_light,
 )
 
 if TYPE_CHECKING:
@@ -185,7 +184,6 @@ class PathIntegrator:
         view_dependent = mi.Bool(False)
         # Paths that leave nothing to others need not know which events are sharp.
         divides = self.photons is not None or without_seen
-        shows_seen = shows_seen_light(pi) if without_seen else None
 
         while dr.hint(active, label="paths"):
             si = pi.compute_surface_interaction(ray, ray_flags=needed)
@@ -302,7 +300,7 @@ class PathIntegrator:
 
         if dr.hint(self.gain is not None, mode="scalar"):
             radiance *= self.gain
-        return radiance, RayCounts(secondary, shadow), FirstHit(first_distance, view_dependent, shows_seen)
+        return radiance, RayCounts(secondary, shadow), FirstHit(first_distance, view_dependent)
 
     def _caustics(
         self,

@@ -14,25 +14,19 @@ from typing import cast
 import drjit as dr
 import mitsuba as mi
 
+from lippmann.device.pbr.gltf_bsdf import SHARP_LOBE
 from lippmann.device.pbr.surface_point import widen_lobes
 from lippmann.device.sobol import SampleStream, hash32
-from lippmann.device.types import Bool, Ray3f, Spectrum, UInt32
+from lippmann.device.types import Bool, BSDFPtr, PreliminaryIntersection3f, Ray3f, Spectrum, UInt32
 from lippmann.rendering.transport.beam import Beam, turn_of_normals, widening
 from lippmann.rendering.transport.integrator import PixelSample, RayCounts
 from lippmann.rendering.transport.path import PathIntegrator
 from lippmann.rendering.transport.ray_source import PixelRays
 from lippmann.rendering.transport.shadow_rays import MAX_CROSSINGS
-from lippmann.rendering.transport.sharp_events import (
-    follows_sharply,
-    has_no_width,
-    sharp_lobe,
-    shows_seen_light,
-)
+from lippmann.rendering.transport.sharp_events import follows_sharply, sharp_lobe
 
 #: Tells the streams of chains from those of paths.
 _CHAINS = 0x5EE21147
-#: By how many times fewer chains there are where a path meets a surface that shows no seen light.
-FEWER = 8
 #: Sample dimensions used at one vertex.
 _DIMENSIONS_PER_VERTEX = 2
 
@@ -42,13 +36,9 @@ def sample_pixel(integrator: PathIntegrator, pixel: PixelRays, stream: SampleStr
     ray = pixel.ray(stream)
     if integrator.seen_chains is None:
         return PixelSample(*integrator.sample(ray, stream, active))
-    rest, counts, hit = integrator.sample_with_hit(ray, stream, active, without_seen=True)
-    # Where the path itself met a surface that shows none, it is rare in the pixel. Chains know nothing of that, so
-    # their mean stays what it is.
-    most = integrator.seen_chains
-    chains = dr.select(cast("Bool", hit.shows_seen), most, dr.maximum(1, most // FEWER))
-    seen, rays = seen_light(integrator, pixel, stream, most, chains, active)
-    seen /= mi.Float(chains)
+    rest, counts, _ = integrator.sample_with_hit(ray, stream, active, without_seen=True)
+    seen, rays = seen_light(integrator, pixel, stream, integrator.seen_chains, active)
+    seen /= mi.Float(integrator.seen_chains)
     if integrator.gain is not None:
         seen *= integrator.gain
     return PixelSample(rest + seen, RayCounts(counts.secondary + rays, counts.shadow), seen)
@@ -56,17 +46,14 @@ def sample_pixel(integrator: PathIntegrator, pixel: PixelRays, stream: SampleStr
 
 @dr.syntax
 def seen_light(
-    integrator: PathIntegrator, pixel: PixelRays, stream: SampleStream, most: UInt32, chains: UInt32, active: Bool
+    integrator: PathIntegrator, pixel: PixelRays, stream: SampleStream, chains: UInt32, active: Bool
 ) -> tuple[Spectrum, UInt32]:
-    """Sum of the light that so many chains of each lane's pixel meet, before the gain, and the rays traced.
-
-    ``most`` is how many they are at most in any lane.
-    """
+    """Sum of the light that so many chains of each lane's pixel meet, before the gain, and the rays traced."""
     light = mi.Spectrum(0)
     rays = mi.UInt32(0)
     number = mi.UInt32(0)
     of_chains = SampleStream(hash32(stream.key ^ _CHAINS), stream.index, stream.half)
-    first = stream.index * most
+    first = stream.index * chains
     tracing = active & (number < chains)
     while dr.hint(tracing, label="chains"):
         further = of_chains.at(first + number)
@@ -103,7 +90,7 @@ def _chain(
         needed = mi.RayFlags.All | mi.RayFlags.dNSdUV
 
     pi = scene.ray_intersect_preliminary(ray, coherent=True, active=active)
-    active &= shows_seen_light(pi)
+    active &= _matters(integrator, pi)
     while dr.hint(active, label="chain"):
         si = pi.compute_surface_interaction(ray, ray_flags=needed)
         bsdf = si.bsdf(ray)
@@ -115,7 +102,7 @@ def _chain(
 
         continues = active & si.is_valid() & (depth < integrator.depth)
         lobe = sharp_lobe(si, bsdf, continues)
-        continues &= has_no_width(bsdf) | (dr.squared_norm(lobe) > 0)
+        continues &= _has_no_width(bsdf) | (dr.squared_norm(lobe) > 0)
         turn = mi.Float(0)
         if dr.hint(integrator.beam is not None, mode="scalar"):
             width += spread * dr.select(si.is_valid(), si.t, 0)
@@ -149,6 +136,19 @@ def _chain(
         active = continues & (dr.max(throughput) > 0) & (crossings < MAX_CROSSINGS)
         pi = scene.ray_intersect_preliminary(ray, coherent=False, active=active)
         rays += dr.select(active, mi.UInt32(1), mi.UInt32(0))
-        # Sky counts where it is mirrored.
-        active &= shows_seen_light(pi) | (integrator.has_surroundings & ~pi.is_valid() & (depth > 0))
+        active &= _matters(integrator, pi)
     return light, rays
+
+
+def _matters(integrator: PathIntegrator, pi: PreliminaryIntersection3f) -> Bool:
+    """Whether a chain may meet light where it has arrived, or go on: most end at rough surfaces, at little cost."""
+    bsdf = pi.shape.bsdf()
+    surface = pi.is_valid() & (
+        pi.shape.is_emitter() | _has_no_width(bsdf) | bsdf.has_attribute(SHARP_LOBE, pi.is_valid())
+    )
+    return surface | ~pi.is_valid() if integrator.has_surroundings else surface
+
+
+def _has_no_width(bsdf: BSDFPtr) -> Bool:
+    """Whether a surface has lobes without width, or lets rays straight through."""
+    return (bsdf.flags() & int(mi.BSDFFlags.Delta | mi.BSDFFlags.Null)) != 0

@@ -17,15 +17,7 @@ import drjit as dr
 import mitsuba as mi
 
 from lippmann.device.pbr.gltf_bsdf import LAMBERTIAN, SHARP_LOBE, WIDE_LOBES
-from lippmann.device.types import (
-    Bool,
-    BSDFPtr,
-    BSDFSample3f,
-    Color3f,
-    PreliminaryIntersection3f,
-    SurfaceInteraction3f,
-    Vector3f,
-)
+from lippmann.device.types import Bool, BSDFPtr, BSDFSample3f, Color3f, SurfaceInteraction3f, Vector3f
 
 #: Sharp events between an emitter and a caustic, at most; light of more is left to paths.
 MOST_EVENTS = 6
@@ -51,17 +43,6 @@ def follows_sharply(si: SurfaceInteraction3f, lobe: Vector3f, bs: BSDFSample3f) 
     """Whether a sampled direction goes on sharply: by a lobe without width, or by ``lobe`` (:func:`sharp_lobe`)."""
     has_no_width = (bs.sampled_type & int(mi.BSDFFlags.Delta | mi.BSDFFlags.Null)) != 0
     return has_no_width | is_sharp(si, lobe, bs.wo)
-
-
-def has_no_width(bsdf: BSDFPtr) -> Bool:
-    """Whether a surface has lobes without width, or lets rays straight through."""
-    return (bsdf.flags() & int(mi.BSDFFlags.Delta | mi.BSDFFlags.Null)) != 0
-
-
-def shows_seen_light(pi: PreliminaryIntersection3f) -> Bool:
-    """Whether what a ray meets may emit, or let it go on sharply; by far the most surfaces do neither."""
-    bsdf = pi.shape.bsdf()
-    return pi.is_valid() & (pi.shape.is_emitter() | has_no_width(bsdf) | bsdf.has_attribute(SHARP_LOBE, pi.is_valid()))
 
 
 def has_wide_lobes(si: SurfaceInteraction3f, bsdf: BSDFPtr, active: Bool) -> Bool:
