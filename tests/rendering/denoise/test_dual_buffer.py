@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -125,6 +127,32 @@ def test_seen_light_goes_past_the_denoiser_and_past_what_is_shared(shares, as_de
     renderer.samples = 1
     alone = Denoised(renderer, denoise, "srgb", share=blur if shares else None).picture()
     assert alone[100, 100] == pytest.approx(renderer.truth[100, 100] + 5.0, rel=0.05)
+
+
+def test_lone_hits_of_seen_light_are_told():
+    """What one half alone has met of it, where the samples' batches say so, too."""
+    renderer = Noise()
+    renderer.samples = 64
+    hits = [np.zeros_like(half) for half in renderer.halves()]
+    hits[0][100, 100] = 0.4
+    for light, half in zip(hits, renderer.halves(), strict=True):
+        light[50, 50] = 0.3
+        half += light
+    whole = renderer.squared_error
+
+    def lone_at(*places):
+        lone = np.zeros(SHAPE[:2], np.float32)
+        for place in places:
+            lone[place] = 1.0
+        renderer.squared_error = lambda: replace(whole(), lone=lone)
+        return Denoised(renderer, blur, "linear").squared_error()
+
+    assert lone_at((100, 100)).lone is None  # seen light is not kept apart
+    renderer.of_seen = tuple(hits)
+    told = lone_at((100, 100), (50, 50))
+    assert told.lone[100, 100] == pytest.approx(0.25 * 0.4**2, rel=1e-3)
+    assert told.lone.sum() == pytest.approx(told.lone[100, 100])
+    assert lone_at((50, 50)).lone.sum() == 0
 
 
 @pytest.mark.parametrize(("samples", "hidden"), [(4, True), (64, False)])

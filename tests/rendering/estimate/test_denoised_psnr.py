@@ -98,6 +98,23 @@ def test_lone_hits_are_doubted_where_nothing_else_is_known(noise, least, most):
         assert least < getattr(calm, name) - getattr(found, name) < most
 
 
+def test_lone_hits_of_seen_light_widen_the_interval_downward():
+    """One half has met what the other has not; nothing is lone where that is no part of what the halves differ by."""
+    errors, _ = made(5)
+    estimator = DenoisedEstimator(SHOWN)
+    plain = estimator.estimate(errors)
+    some, all_of_it = (
+        estimator.estimate(replace(errors, lone=(share * errors.apart).astype(np.float32))) for share in (0.2, 1.0)
+    )
+    assert plain.psnr_low > some.psnr_low > all_of_it.psnr_low > plain.psnr_low - 3
+    assert plain.worst_low >= some.worst_low > all_of_it.worst_low > plain.worst_low - 3
+    for each in (some, all_of_it):
+        assert (each.psnr, each.psnr_high) == (plain.psnr, plain.psnr_high)
+        assert abs(each.worst - plain.worst) < 1.0
+    none = estimator.estimate(replace(errors, lone=np.zeros_like(errors.apart)))
+    assert none == plain
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_a_few_pixels_that_are_badly_wrong_make_a_worst_micro_image(seed):
     """As beside a lamp whose light the denoiser spreads: the samples there are as good as anywhere."""
