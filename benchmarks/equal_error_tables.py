@@ -54,18 +54,22 @@ def _reference_samples(result: dict[str, Any]) -> str:
 
 
 def _about_caustics(result: dict[str, Any]) -> str:
-    """Which rows of the scenes with caustics are by references that have them."""
-    by_display = [
-        f"{' and '.join(names)} ({DISPLAYS[display][0]})"
-        for display, scenes in result["results"].items()
-        if (names := [name for name, scene in scenes.items() if "reference_samples" in scene])
-    ]
+    """What brings the light that paths hardly find; and which rows were measured before that."""
     text = (
-        "Small balls, primitives and gears have small emitters, mirrors and glass. Their caustics come by photons, "
-        "what is seen of them in mirrors by [further chains](caustics.md#seen-light), in references and pictures "
-        f"alike, in the rows of {', '.join(by_display)}. References of paths lack a part of that light: the other rows "
-        "of these three scenes are by such, and too good, by up to 3 dB."
+        "Small balls, primitives, room and gears have small emitters, mirrors and glass. Their caustics come by "
+        "photons, what is seen of them in mirrors by [chains](caustics.md#seen-light), in references and pictures "
+        "alike. Chains serve smooth gloss, too, and their time is in that of the pictures."
     )
+    older = [
+        f"{', '.join(names)} ({DISPLAYS[display][0]})"
+        for display, scenes in result["results"].items()
+        if (names := [name for name, scene in scenes.items() if "reference_samples" not in scene])
+    ]
+    if older:
+        text += (
+            f" Older are the rows of {'; '.join(older)}: their highlights went through the denoiser, and references of "
+            "scenes with caustics were of paths, which lack a part of that light."
+        )
     return textwrap.fill(text, 120, break_long_words=False, break_on_hyphens=False)
 
 
