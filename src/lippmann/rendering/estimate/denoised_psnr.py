@@ -29,7 +29,6 @@ from lippmann.rendering.estimate.pixel_errors import CROSS_NOISE, ErrorSums, Pix
 from lippmann.rendering.estimate.psnr import (
     DRAWS,
     LEAN,
-    LONE_DOUBT,
     MODEL_UNCERTAINTY,
     NORMAL_95,
     Estimate,
@@ -55,6 +54,9 @@ LEAST_EXPECTED, LEAST_OF_MEAN = 0.2, 1e-3
 LEAST_OF_SAMPLES = 1e-4
 #: Pixels that one micro-image has fewer than the usual one count so many times, for its error to be another one.
 FEW = 40.0
+#: By how much more than what lone hits of seen light show the error may be: on heaps of mirror balls under small
+#: emitters, of few samples, there was up to that much more.
+SEEN_DOUBT = 1.5
 #: As parts of the error stated for all and for the worst: pictures that are hard to judge are often better by that.
 OFTEN_BETTER, WORST_OFTEN_BETTER = 0.8, 0.6
 #: Of the draws of the worst error: what is stated, and the ends of its interval.
@@ -87,7 +89,7 @@ def estimate_denoised(judged: ErrorSums, samples: ErrorSums, grid: tuple[int, in
     middle = float(likely.quantiles(0.5))
     model = math.exp(NORMAL_95 * MODEL_UNCERTAINTY)
     # What no half has met is in no difference between them.
-    doubt = 1 + LONE_DOUBT * min(1.0, float(judged.lone.sum()) / (middle * pixels))
+    doubt = 1 + SEEN_DOUBT * min(1.0, float(judged.lone.sum()) / (middle * pixels))
     worse, better = likely.quantiles(np.array([0.975, 0.025])) * (model * doubt, OFTEN_BETTER / model)
 
     parts = _parts(judged, samples.squares, index, grid, middle)
@@ -130,5 +132,5 @@ def _parts(
     expected = np.maximum(around + trust * (measured - around), LEAST_EXPECTED * around)
     variance = np.log1p(trust * noise / np.square(expected))
     fewer = np.maximum(1 / count - 1 / np.median(count), 0)
-    doubted = expected + LONE_DOUBT * np.clip(judged.lone / count, 0, expected)
+    doubted = expected + SEEN_DOUBT * np.clip(judged.lone / count, 0, expected)
     return PartErrors(index, expected, doubted, variance, np.log1p(FEW * fewer))
