@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from lippmann.rendering.transport.photon_map import Photons
 
-#: Mean variance of a sample, in linear radiance, below which photons would not be missed: a hundredth of what the rest
-#: of a path's light has as a rule, and a tenth of what a denoiser leaves of it.
-LEAST_WORTH = 1e-4
+#: Mean variance of a sample, in linear radiance, below which photons would not be missed: the rest of a path's light
+#: has thirty times as much as a rule, and photons take a third of its time.
+LEAST_WORTH = 3e-4
 #: Points that are seen lie about a photon if they are nearer than this part of the diagonal of what is seen.
 _REACH = 0.03
 
