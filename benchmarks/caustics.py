@@ -23,7 +23,6 @@ from equal_error import (
     Judge,
     Picture,
     Stage,
-    by_paths,
     light_up,
     once,
     prepare,
@@ -61,12 +60,18 @@ def measure(name: str, file: Path | None, reference_samples: int) -> dict[str, A
                 seconds, pixels = once(lambda s=samples, w=way, m=method: picture(stage, w, m, s))
                 rows.append({"spp": samples, "way": way, "method": method, "seconds": seconds, **judge(pixels)})
                 print(name, rows[-1], flush=True)
-    by_paths(stage)
+    _by_paths(stage)
     light = {
         "paths": float(trace_paths(stage, reference_samples, 5).mean()),
         "photons": float(found["pictures"].mean()),
     }
     return {"judge_psnr": judge.own_psnr, "mean_light": light, "rows": rows}
+
+
+def _by_paths(stage: Stage) -> None:
+    """All light by paths."""
+    paths = stage.integrator
+    paths.photons = paths.photon_passes = paths.seen_chains = paths.beam = None
 
 
 def picture(stage: Stage, way: str, method: str, samples: int) -> Picture:

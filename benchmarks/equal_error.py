@@ -134,20 +134,37 @@ def _measure(stage: Stage, references: Path | None, reference_samples: int) -> d
     for samples in SAMPLES:
         traced, picture = timed(lambda samples=samples: trace_lit(stage, samples, 3))
         curves["full"].append({"spp": samples, "seconds": traced, **judge(picture)})
+        traced_for_pooled, batches = timed(lambda samples=samples: _pooled(stage, samples))
         for effort in ("fast", "high"):
-            _denoised(stage, judge, curves, (samples, effort), traced, picture)
+            times = {"full + oidn": traced, "pooled": traced_for_pooled}
+            _denoised(stage, judge, curves, (samples, effort), times, picture, batches)
     return {"judge_psnr": judge.own_psnr, "curves": curves, "to": _costs(curves)}
 
 
+def _pooled(stage: Stage, samples: int) -> Any:
+    """The samples of a pooled picture, as the program traces them: chains go by what a denoiser leaves."""
+    from lippmann.rendering.film.sample_batches import FullInBatches
+
+    light_up(stage, replace(stage.session.request, method="pooled", denoise="oidn", spp=samples, seed=3))
+    batches = FullInBatches(stage.integrator, stage.source, seed=3, memory=4 << 30, keeps_seen=True)
+    batches.add(samples)
+    return batches
+
+
 def _denoised(
-    stage: Stage, judge: Judge, curves: dict[str, list[Point]], how: tuple[int, Any], traced: float, picture: Picture
+    stage: Stage,
+    judge: Judge,
+    curves: dict[str, list[Point]],
+    how: tuple[int, Any],
+    traced: dict[str, float],
+    picture: Picture,
+    batches: Any,
 ) -> None:
     """One picture's noise taken out; and pooled light, as the program makes it: by halves, shared, beside samples."""
     from lippmann.rendering.denoise.cost_model import GUIDE_SAMPLES, SHARING_STOP
     from lippmann.rendering.denoise.dual_buffer import Denoised
     from lippmann.rendering.denoise.pixel_order import denoise_views
     from lippmann.rendering.film.feature_buffers import plan_guides, trace_guides
-    from lippmann.rendering.film.sample_batches import FullInBatches
     from lippmann.rendering.sharing.cross_lens import share_light
 
     samples, effort = how
@@ -160,19 +177,12 @@ def _denoised(
     def share(cleaned: Picture) -> Picture:
         return share_light(cleaned, stage.display, guides, stop=SHARING_STOP[effort], threads=CORES)
 
-    def pooled() -> Any:
-        light_up(stage, replace(stage.session.request, method="pooled", denoise="oidn", spp=samples, seed=3))
-        batches = FullInBatches(stage.integrator, stage.source, seed=3, memory=4 << 30, keeps_seen=True)
-        batches.add(samples)
-        return batches
-
-    traced_for_pooled, batches = timed(pooled)
-    for way, tracing, call in (
-        ("full + oidn", traced, lambda: clean(picture)),
-        ("pooled", traced_for_pooled, lambda: Denoised(batches, clean, "srgb", CORES, share).picture()),
+    for way, call in (
+        ("full + oidn", lambda: clean(picture)),
+        ("pooled", lambda: Denoised(batches, clean, "srgb", CORES, share).picture()),
     ):
         seconds, result = timed(call)
-        parts = {"trace": tracing, "guides": looked, "clean": seconds}
+        parts = {"trace": traced[way], "guides": looked, "clean": seconds}
         found = {"spp": samples, "effort": effort, "seconds": sum(parts.values()), "parts": parts}
         curves[way].append({**found, **judge(result)})
 
@@ -226,19 +236,16 @@ def _psnr(error: float) -> float:
     return -10 * math.log10(max(error, 1e-9))
 
 
-def by_paths(stage: Stage) -> None:
-    """All light by paths."""
-    paths = stage.integrator
-    paths.photons = paths.photon_passes = paths.seen_chains = paths.beam = None
+def light_up(stage: Any, request: Any, memory: int = 4 << 30) -> None:
+    """What the program gives the integrator for a picture: photons of its own, where there are caustics, and chains.
 
-
-def light_up(stage: Stage, request: Any) -> None:
-    """What the program gives the integrator for a picture: photons of its own, where there are caustics, and chains."""
+    ``stage`` has the session, the integrator and the source of a :class:`Stage`.
+    """
     from lippmann.rendering.film.prepared_light import prepare_light
 
     # All pictures of a stage are exposed alike.
     request = replace(request, exposure=stage.session.choices.get("exposure", 0.0))
-    prepare_light(stage.integrator, request, stage.source, 4 << 30)
+    prepare_light(stage.integrator, request, stage.source, memory)
 
 
 def trace_lit(stage: Stage, samples: int, seed: int) -> Picture:

@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from caustic_scenes import CAUSTIC_SCENES
+from equal_error import light_up
 from hard_scenes import HARD_SCENES
 from harness import kept, save, saved
 
@@ -117,18 +118,11 @@ class Case:
         while rounds == 0 or time.process_time() - start < seconds:
             for part in range(REFERENCE_PARTS):
                 seed = 1_000_000 + rounds * REFERENCE_PARTS + part
-                self._shoot(replace(self.session.request, method="full", denoise="none", seed=seed, spp=128))
+                # References and pictures must not share any photons.
+                light_up(self, replace(self.session.request, method="full", denoise="none", seed=seed, spp=128), MEMORY)
                 parts[part] += trace_frame(self.integrator, self.source, plan, seed=seed).pixels
             rounds += 1
         return parts / rounds, 128 * rounds * REFERENCE_PARTS
-
-    def _shoot(self, request: Any) -> None:
-        """Photons and chains for a request, where there are caustics: references and pictures must not share any."""
-        from lippmann.rendering.film.prepared_light import prepare_light
-
-        # All pictures are exposed alike.
-        request = replace(request, exposure=self.session.choices.get("exposure", 0.0))
-        prepare_light(self.integrator, request, self.source, MEMORY)
 
     def trace(self, way: str, seed: int, **asked: Any) -> Any:
         """A picture made that way, as the whole program makes it."""
@@ -137,7 +131,7 @@ class Case:
         method, denoise = WAYS[way]
         request = replace(self.session.request, method=method, denoise=denoise, seed=seed, pixel_filter="box", **asked)
         session = replace(self.session, request=request)
-        self._shoot(request)
+        light_up(self, request, MEMORY)
         return trace(Job(session, self.integrator, self.source, self.display_from_world))
 
     def truth(self, picture: NDArray[np.float32]) -> tuple[float, float]:

@@ -69,6 +69,8 @@ class Halved(Protocol):
 
     def halves(self) -> tuple[Floats, Floats]: ...
 
+    def shown(self, values: Floats) -> Floats: ...
+
     def seen(self) -> Floats | None: ...
 
     def seen_halves(self) -> tuple[Floats, Floats] | None: ...
@@ -151,12 +153,8 @@ class Denoised:
         seen = self._renderer.seen_halves()
         if seen is None or samples.lone is None:
             return None
-        apart: Floats = (np.float32(0.25) * np.square(slope * self._shown(seen[0] - seen[1]))).mean(axis=2)
+        apart: Floats = (np.float32(0.25) * np.square(slope * self._renderer.shown(seen[0] - seen[1]))).mean(axis=2)
         return np.minimum(apart, samples.lone)
-
-    def _shown(self, values: Floats) -> Floats:
-        """Of values in the denoiser's order those that the picture shows."""
-        return values
 
     def _clean_halves(self) -> tuple[Floats, Floats]:
         # The samples may have come by another way than through :meth:`add`.

@@ -46,7 +46,7 @@ class SubpixelBatches(FullInBatches):
         """Of all colours, see :meth:`halves_of_all`, those that the sub-pixels show."""
         return self._source.own_colors(values)
 
-    def _shown(self, values: Floats) -> Floats:
+    def shown(self, values: Floats) -> Floats:
         return self.own_colors(values)
 
 
@@ -64,6 +64,3 @@ class DenoisedSubpixels(Denoised):
 
     def _cleaned_and_shared(self, noisy: Floats, seen: Floats | None, turned: bool = False) -> list[Floats]:
         return [self._renderer.own_colors(version) for version in super()._cleaned_and_shared(noisy, seen, turned)]
-
-    def _shown(self, values: Floats) -> Floats:
-        return self._renderer.own_colors(values)

@@ -21,6 +21,7 @@ from lippmann.rendering.transport.caustic_photons import (
     MOST,
     SAMPLES_OF_EMISSION,
     CausticPhotons,
+    IsMissed,
     emissions,
     no_photons,
 )
@@ -92,8 +93,9 @@ def give_photons(
         seed=request.seed,
         region=_region_about(seen),
         kept=max(1, min(passes, int(KEPT_SHARE * memory) // required)),
+        is_missed=_are_missed(seen, request),
     )
-    if photons.are_none or (request.caustics == "auto" and not _are_missed(photons, seen, request)):
+    if photons.are_none:
         return None
     integrator.photons = photons.of_pass(0)
     integrator.photon_passes = photons
@@ -104,12 +106,14 @@ def _left_to_paths(integrator: PathIntegrator) -> Literal["paths"] | None:
     return "paths" if hides_caustics(integrator.scene) else None
 
 
-def _are_missed(photons: CausticPhotons, seen: NDArray[np.float64], request: RenderRequest) -> bool:
-    """Whether paths would show the photons' caustics so that it is seen."""
-    if request.exposure == "auto" or not len(seen):
-        return True  # what light is bright is not known yet
-    noise = variance_by_paths(photons.pilot, photons.pilot_radiance, seen, SEEN_SIDE**2)
-    return noise * gain_of(request.exposure) ** 2 > LEAST_WORTH
+def _are_missed(seen: NDArray[np.float64], request: RenderRequest) -> IsMissed | None:
+    """Tells whether paths would show photons' caustics so that it is seen; None where they are wanted anyway."""
+    exposure = request.exposure
+    if request.caustics != "auto" or exposure == "auto" or not len(seen):
+        return None  # before it is exposed, no light is known to be bright
+    return lambda photons, radiance: (
+        variance_by_paths(photons, radiance, seen, SEEN_SIDE**2) * gain_of(exposure) ** 2 > LEAST_WORTH
+    )
 
 
 def _seen_points(integrator: PathIntegrator, source: RaySource) -> NDArray[np.float64]:

@@ -185,9 +185,7 @@ class FullInBatches:
 
     def picture(self) -> Floats:
         """``(H, W, 3)`` float32: the mean of all samples, linear; black where there are none."""
-        total: Floats = self._sums.sum(axis=0)
-        total *= np.float32(1 / max(1, self.samples))
-        return total.reshape(*self.shape, 3)
+        return self._mean(self._sums)
 
     def halves(self) -> tuple[Floats, Floats]:
         """The means of either stream's samples, ``(H, W, 3)`` each; they know nothing of each other."""
@@ -200,9 +198,11 @@ class FullInBatches:
 
     def seen(self) -> Floats | None:
         """What of :meth:`picture` is seen light; None where that is not told, or not kept."""
-        if self._seen is None:
-            return None
-        total: Floats = self._seen.sum(axis=0)
+        return None if self._seen is None else self._mean(self._seen)
+
+    def _mean(self, sums: Floats) -> Floats:
+        """Of all samples, whose sums lie in several parts."""
+        total: Floats = sums.sum(axis=0)
         total *= np.float32(1 / max(1, self.samples))
         return total.reshape(*self.shape, 3)
 
@@ -227,7 +227,7 @@ class FullInBatches:
         if self.samples < STREAMS:
             raise UsageError("one sample per pixel does not tell its own error", rule="two or more do")
         if self._errors is None:
-            error, lone = error_of_batches(self._shown(self._sums), self._taken, self._transfer)
+            error, lone = error_of_batches(self.shown(self._sums), self._taken, self._transfer)
             shape = self.shape[0], -1
             error = error.reshape(shape)
             blur = self.squared_blur()
@@ -245,10 +245,10 @@ class FullInBatches:
         if linear is None:
             return None
         slope = coding_slope(self.picture(), self._transfer)
-        blur: Floats = (np.square(slope) * self._shown(linear)).mean(axis=-1)
+        blur: Floats = (np.square(slope) * self.shown(linear)).mean(axis=-1)
         return blur
 
-    def _shown(self, values: Floats) -> Floats:
+    def shown(self, values: Floats) -> Floats:
         """Of values ``(..., W, 3)`` of what is traced those that the picture shows."""
         return values
 
@@ -294,9 +294,7 @@ class FullInBatches:
         stream = SampleStream.of_pixels(pixel * channels + channel, sample, seed)
         stream.half = stream_of
         pixels = PixelRays(self._source, column, row, channel, self._box_filter)
-        traced = sample_pixels(self._integrator, pixels, stream)
-        if self._seen is None:
-            traced.seen = None
+        traced = sample_pixels(self._integrator, pixels, stream, self._seen is not None)
         evaluate(traced, lanes, self.rays)
         seen = None if traced.seen is None else _sums(traced.seen, channels, number, run.count)
         return _sums(traced.radiance, channels, number, run.count), seen

@@ -64,7 +64,7 @@ def give_chains(integrator: PathIntegrator, request: RenderRequest, source: RayS
     Parameters
     ----------
     integrator:
-        Ready for the picture, with photons.
+        Ready for the picture.
     request:
         How the picture is to be made.
     source:

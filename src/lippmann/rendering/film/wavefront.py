@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import drjit as dr
 import mitsuba as mi
@@ -135,9 +135,7 @@ class _Tracer:
         """
         plan = self._plan
         pixels, stream = samples_of_tile(self._source, plan, tile, run, self._seed, self._box_filter, self._corner)
-        sample = sample_pixels(self._integrator, pixels, stream)
-        if not self._keeps_seen:
-            sample.seen = None
+        sample = sample_pixels(self._integrator, pixels, stream, self._keeps_seen)
         evaluate(sample, tile.rows * plan.width * plan.channels * run.count, totals)
         both = (sample.radiance, sample.seen)
         return [_channel_sums(light, plan.channels, run.count) for light in both if light is not None]
@@ -169,10 +167,11 @@ def samples_of_tile(
     return PixelRays(source, column, row, channel, box_filter), stream
 
 
-def sample_pixels(integrator: Integrator, pixels: PixelRays, stream: SampleStream) -> PixelSample:
-    """One sample of each lane's pixel."""
+def sample_pixels(integrator: Integrator, pixels: PixelRays, stream: SampleStream, keeps_seen: bool) -> PixelSample:
+    """One sample of each lane's pixel; seen light apart where the integrator tells it and ``keeps_seen``."""
     if isinstance(integrator, PathIntegrator):
-        return sample_pixel(integrator, pixels, stream, mi.Bool(True))
+        sample = sample_pixel(integrator, pixels, stream, mi.Bool(True))
+        return sample if keeps_seen else replace(sample, seen=None)
     return PixelSample(*integrator.sample(pixels.ray(stream), stream, mi.Bool(True)))
 
 

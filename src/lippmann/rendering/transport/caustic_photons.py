@@ -13,6 +13,7 @@ wide enough to be told from photons.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import drjit as dr
 import mitsuba as mi
@@ -63,6 +64,7 @@ _CLEARANCE = 1e-4
 #: Dimensions of the sample stream at one surface.
 _DIMENSIONS = 2
 _NONE = Photons.dark(0)
+IsMissed = Callable[[Photons, NDArray[np.float64]], bool]
 
 
 def no_photons() -> PhotonMap:
@@ -95,6 +97,8 @@ class CausticPhotons:
         Corners ``(2, 3)`` of the box that is seen: emitters and casters are given photons by what they bring there.
     kept:
         Passes whose photons are kept for others that ask, at least 1.
+    is_missed:
+        Asked of the pilot's photons that are seen, with the radiance of each one's emitter: whether they are worth it.
     """
 
     def __init__(
@@ -108,6 +112,7 @@ class CausticPhotons:
         samples_of_pixel: int | None = None,
         region: NDArray[np.float64] | None = None,
         kept: int = 1,
+        is_missed: IsMissed | None = None,
     ) -> None:
         self._shooter = PhotonShooter(scene, features, casters)
         self.samples_of_pixel = samples_of_pixel or 1 << 32
@@ -117,13 +122,11 @@ class CausticPhotons:
         self._kept = kept
         self._maps: dict[int, PhotonMap] = {}
         self._radius = 0.0
-        #: What a few emissions of each pair brought to what is seen, and the radiance of each photon's emitter.
-        self.pilot, self.pilot_radiance = _NONE, np.zeros(0)
-        self._chances = self._pilot(casters)
+        self._chances = self._pilot(casters, is_missed)
 
     @property
     def are_none(self) -> bool:
-        """Whether a few emissions of each emitter and caster brought nothing that is seen."""
+        """Whether a few emissions of each emitter and caster brought nothing that is seen, or missed."""
         return self._chances is None
 
     def of_pass(self, number: int) -> PhotonMap:
@@ -143,7 +146,7 @@ class CausticPhotons:
             self._maps[number] = PhotonMap((first, second), self._radius * radius_of_pass(number))
         return self._maps[number]
 
-    def _pilot(self, casters: Casters) -> NDArray[np.float64] | None:
+    def _pilot(self, casters: Casters, is_missed: IsMissed | None) -> NDArray[np.float64] | None:
         """Shares of the emissions of each emitter and caster: as the roots of the second moments of what they bring."""
         if casters.pairs == 0:
             return None
@@ -153,10 +156,11 @@ class CausticPhotons:
         seen = photons.are_inside(self._region)
         if not seen.any():
             return None
-        self.pilot = photons.chosen(seen)
-        emitter = pair[seen] % len(casters.emitters)
-        self.pilot_radiance = self._shooter.radiances((self._seed + _PILOT_STEP) % 2**32)[emitter]
-        power = self.pilot.power.astype(np.float64)
+        if is_missed is not None:
+            radiance = self._shooter.radiances((self._seed + _PILOT_STEP) % 2**32)
+            if not is_missed(photons.chosen(seen), radiance[pair[seen] % len(casters.emitters)]):
+                return None
+        power = photons.power[seen].astype(np.float64)
         roots = np.sqrt(np.bincount(pair[seen], np.square(power).sum(axis=1), minlength=casters.pairs))
         return np.asarray(_UNIFORM_SHARE * even + (1 - _UNIFORM_SHARE) * roots / roots.sum())
 

@@ -126,7 +126,7 @@ class PathIntegrator:
         self.photons: PhotonMap | None = None
         #: Gives :attr:`photons` for each part of a picture's samples; None where they are the same for all.
         self.photon_passes: CausticPhotons | None = None
-        #: Further chains of sharp events through the pixel of each path, see :mod:`.seen_light`; None for none.
+        #: Chains of sharp events that stand for the seen light of each path, see :mod:`.seen_light`; None for none.
         self.seen_chains: UInt32 | None = None
         #: Beam of a sample, by which lobes of curved surfaces are widened; None for lobes as they are.
         self.beam: Beam | None = None

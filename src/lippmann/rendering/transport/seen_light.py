@@ -1,10 +1,10 @@
-"""Light that the eye sees by sharp events alone: emitters and sky, directly, in mirrors, through clear glass.
+"""Light that the eye sees by sharp events alone: emitters, and the sky in mirrors, gloss and through clear glass.
 
 Small emitters seen so, and emitters mirrored in small curved things, fill a small part of a pixel, and few paths of the
 pixel meet them. They have no noise of transport, and a chain of sharp events is cheap beside a path: no emitters are
-sampled along it, no photons are looked up, and it ends at the first rough surface. So each path of a pixel comes with
-further chains through other points of it. All meet the same light by the same chances, so their mean has its
-expectation.
+sampled along it, no photons are looked up, and it ends at the first rough surface. So chains through other points of
+the pixel stand for what a path would have met of such light: all meet the same by the same chances, so their mean has
+its expectation. Sky behind nothing stays with the path.
 """
 
 from __future__ import annotations
@@ -90,14 +90,13 @@ def _chain(
         needed = mi.RayFlags.All | mi.RayFlags.dNSdUV
 
     pi = scene.ray_intersect_preliminary(ray, coherent=True, active=active)
-    active &= _matters(integrator, pi)
+    active &= _may_show_light(pi)
     while dr.hint(active, label="chain"):
         si = pi.compute_surface_interaction(ray, ray_flags=needed)
         bsdf = si.bsdf(ray)
         if dr.hint(integrator.features.has_absorption, mode="scalar"):
             throughput *= dr.exp(-absorption * dr.select(si.is_valid(), si.t, 0))
         emission = integrator.emission(si, vertex, vertex_pdf, vertex_delta, vertex_samples, depth)
-        emission = dr.select((depth > 0) | si.is_valid(), emission, 0)
         light += integrator.limited(throughput * emission, depth)
 
         continues = active & si.is_valid() & (depth < integrator.depth)
@@ -136,17 +135,15 @@ def _chain(
         active = continues & (dr.max(throughput) > 0) & (crossings < MAX_CROSSINGS)
         pi = scene.ray_intersect_preliminary(ray, coherent=False, active=active)
         rays += dr.select(active, mi.UInt32(1), mi.UInt32(0))
-        active &= _matters(integrator, pi)
+        # Before its first event, where nothing is met, a chain has met nothing but sky.
+        active &= _may_show_light(pi) | (integrator.has_surroundings & ~pi.is_valid() & (depth > 0))
     return light, rays
 
 
-def _matters(integrator: PathIntegrator, pi: PreliminaryIntersection3f) -> Bool:
-    """Whether a chain may meet light where it has arrived, or go on: most end at rough surfaces, at little cost."""
+def _may_show_light(pi: PreliminaryIntersection3f) -> Bool:
+    """Whether what a chain has met may emit, or let it go on: most are rough surfaces that do neither."""
     bsdf = pi.shape.bsdf()
-    surface = pi.is_valid() & (
-        pi.shape.is_emitter() | _has_no_width(bsdf) | bsdf.has_attribute(SHARP_LOBE, pi.is_valid())
-    )
-    return surface | ~pi.is_valid() if integrator.has_surroundings else surface
+    return pi.is_valid() & (pi.shape.is_emitter() | _has_no_width(bsdf) | bsdf.has_attribute(SHARP_LOBE, pi.is_valid()))
 
 
 def _has_no_width(bsdf: BSDFPtr) -> Bool:
