@@ -241,6 +241,7 @@ def test_chains_count_the_emitter_samples_of_their_path():
     integrator, source = described(polished_plate())
     plain, further = (pictures(integrator, source, chains, seeds=range(100), spp=1) for chains in (0, 7))
     agree(plain, further)
+    assert further.mean() == pytest.approx(plain.mean(), rel=0.01)
 
 
 def test_seen_light_is_told_apart_and_is_all_that_is_seen(all_events):
