@@ -9,7 +9,7 @@ random numbers and bookkeeping. Parts overlap in a processor, so that shares are
 *Lanes at work*: a vector unit goes on until the longest of its 16 paths has ended; the share of its lanes that have
 still something to do.
 
-*Before*: opaque surfaces without an acceleration structure of their own where others let rays straight through,
+*Before*: pixels in the order of rows (:mod:`lippmann.rendering.film.lane_order`), opaque surfaces without an acceleration structure of their own where others let rays straight through,
 look-ups of all photons about a point by every sample, and photons in NumPy's memory, whose rows cannot be fetched at
 once (:mod:`lippmann.rendering.transport.shadow_rays`, ``PHOTON_PARTS`` of :mod:`lippmann.rendering.transport.path`,
 :mod:`lippmann.device.kernel_ops`).
@@ -24,7 +24,9 @@ from __future__ import annotations
 import argparse
 import copy
 import statistics
+from contextlib import nullcontext
 from typing import Any
+from unittest import mock
 
 import numpy as np
 
@@ -84,6 +86,7 @@ def _kernels(stage: Stage) -> dict[str, Any]:
     import drjit as dr
     import mitsuba as mi
 
+    from lippmann.rendering.film import wavefront
     from lippmann.rendering.film.wavefront import samples_of_tile
     from lippmann.rendering.film.wavefront_plan import make_plan
     from lippmann.rendering.transport import path
@@ -115,10 +118,11 @@ def _kernels(stage: Stage) -> dict[str, Any]:
             setattr(other, name, getattr(paths, name))
         return other
 
-    def traced(integrator: path.PathIntegrator, parts: int = path.PHOTON_PARTS) -> Any:
+    def traced(integrator: path.PathIntegrator, parts: int = path.PHOTON_PARTS, in_rows: bool = False) -> Any:
         def call(seed: int) -> Any:
             path.PHOTON_PARTS = parts
-            pixels, stream = samples_of_tile(source, plan, tile, run, seed, True)
+            with mock.patch.object(wavefront, "in_strips", lambda *_: 0) if in_rows else nullcontext():
+                pixels, stream = samples_of_tile(source, plan, tile, run, seed, True)
             radiance, counts = integrator.sample(pixels.ray(stream), stream, mi.Bool(True))
             dr.eval(radiance, counts.secondary, counts.shadow)
             return np.array(counts.secondary)
@@ -153,7 +157,7 @@ def _kernels(stage: Stage) -> dict[str, Any]:
         before.photons = _unaligned(paths.photons)
     kernels = {
         "whole": traced(paths),
-        "before": traced(before, parts=1),
+        "before": traced(before, parts=1, in_rows=True),
         "shadow rays": traced(alike(Unshadowed)),
         "evaluation": traced(alike(Unevaluated)),
         "emitters": traced(alike(Unlit)),

@@ -64,17 +64,20 @@ def test_equal_parts_are_few_and_no_longer_than_allowed(total, most):
     starts=st.lists(st.integers(0, 9), min_size=1, max_size=5),
     count=st.integers(1, 12),
     lanes=st.integers(1, 300),
+    strip=st.integers(1, 50),
 )
-def test_every_sample_of_every_batch_once(pixels, starts, count, lanes):
+def test_every_sample_of_every_batch_once(pixels, starts, count, lanes, strip):
     batches = tuple(range(len(starts)))
     seen = [
         (pixel, batch, start + sample)
-        for run in cut_batches(pixels, batches, tuple(starts), count, lanes)
+        for run in cut_batches(pixels, batches, tuple(starts), count, lanes, strip)
         for pixel in range(run.first, run.last)
         for batch, start in zip(run.batches, run.starts, strict=True)
         for sample in range(run.count)
     ]
     expected = [(p, b, starts[b] + s) for p in range(pixels) for b in batches for s in range(count)]
     assert sorted(seen) == sorted(expected)
-    for run in cut_batches(pixels, batches, tuple(starts), count, lanes):
+    for run in cut_batches(pixels, batches, tuple(starts), count, lanes, strip):
         assert (run.last - run.first) * len(run.batches) * run.count <= lanes
+        assert not run.in_strips or run.first % strip == 0
+        assert not run.in_strips or run.last % strip == 0 or run.last == pixels

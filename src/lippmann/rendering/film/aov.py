@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from lippmann.device.types import Float, Vector3f
 from lippmann.progress import Progress, ProgressCallback, silent
+from lippmann.rendering.film.lane_order import divide
 from lippmann.rendering.film.memory_model import AOVS
-from lippmann.rendering.film.wavefront import divide
 from lippmann.rendering.film.wavefront_plan import Plan, Tile, make_plan
 from lippmann.rendering.transport.first_surface import Surfaces, make_surfaces
 from lippmann.rendering.transport.ray_source import RaySource

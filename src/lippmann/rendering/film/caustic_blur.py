@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from lippmann.device.sobol import PIXEL_DIMENSION, SEED_STEP, SampleStream
 from lippmann.display.pixel_window import PixelWindow
-from lippmann.rendering.film.wavefront import divide, shown_colors
+from lippmann.rendering.film.lane_order import divide
+from lippmann.rendering.film.wavefront import shown_colors
 from lippmann.rendering.transport.caustic_blur import CausticBlur
 from lippmann.rendering.transport.caustic_photons import radius_of_pass
 from lippmann.rendering.transport.integrator import Integrator

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from lippmann.device.types import Color3f, Float, Vector3f
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.rendering.film.aov import to_numpy
+from lippmann.rendering.film.lane_order import to_rows
 from lippmann.rendering.film.memory_model import FEATURE_BUFFERS
 from lippmann.rendering.film.wavefront import samples_of_tile
 from lippmann.rendering.film.wavefront_plan import Pass, Plan, Tile, make_plan
@@ -95,10 +96,10 @@ def trace_guides(
     done = 0
     for tile, run in plan:
         rows = slice(tile.first_row, tile.first_row + tile.rows)
-        *found, heights = _trace_tile(surfaces, source, plan, tile, run, seed, box_filter, matrix[2])
-        shape = (tile.rows, plan.width, plan.channels, 3)
-        colors, normals = (to_numpy(part, shape[0] * shape[1] * shape[2]).reshape(shape) for part in found)
-        height[rows] += np.array(heights, dtype=np.float32).reshape(shape[:3]).mean(axis=2) / plan.samples
+        found = _trace_tile(surfaces, source, plan, tile, run, seed, box_filter, matrix[2])
+        shape = (tile.rows, plan.width, plan.channels)
+        colors, normals, heights = (_in_rows(part, shape) for part in found)
+        height[rows] += heights.mean(axis=2) / plan.samples
         if plan.channels == 3:
             colors = np.diagonal(colors, axis1=2, axis2=3)[:, :, None]
         albedo[rows] += colors[:, :, 0] / plan.samples
@@ -106,6 +107,14 @@ def trace_guides(
         done += tile.rows * plan.width * plan.channels * run.count
         progress(Progress("guides", done, plan.work))
     return Guides(albedo, normal, height)
+
+
+def _in_rows(values: Float | Vector3f, shape: tuple[int, int, int]) -> FloatArray:
+    """``(rows, columns, channels)`` or ``(rows, columns, channels, 3)`` from sums in the order of lanes."""
+    rows, width, channels = shape
+    lanes = to_numpy(values, rows * width * channels)
+    pixels = to_rows(lanes.reshape(rows * width, -1), width)
+    return pixels.reshape(*shape, *lanes.shape[1:])
 
 
 def _trace_tile(
@@ -118,7 +127,8 @@ def _trace_tile(
     box_filter: bool,
     z_from_world: NDArray[np.float64],
 ) -> tuple[Color3f, Vector3f, Float]:
-    """Sums over the samples of one pass, for every pixel and channel: colours, world-space normals, and heights."""
+    """Sums over the samples of one pass, for every pixel and channel in the order of lanes: colours, world-space
+    normals, and heights."""
     lanes = tile.rows * plan.width * plan.channels * run.count
     # Lanes are those of a picture.
     pixels, stream = samples_of_tile(source, plan, tile, run, seed, box_filter)

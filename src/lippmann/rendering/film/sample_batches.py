@@ -27,11 +27,11 @@ from lippmann.rendering.estimate.pixel_errors import OWN_NOISE, PixelErrors
 from lippmann.rendering.film import memory_model
 from lippmann.rendering.film.caustic_blur import SquaredBlur
 from lippmann.rendering.film.caustics import stretches
+from lippmann.rendering.film.lane_order import STRIP_ROWS, divide, in_strips, pixel_at, to_rows
 from lippmann.rendering.film.wavefront import (
     Frame,
     RayTotals,
     compile_seconds,
-    divide,
     evaluate,
     sample_pixels,
     shown_colors,
@@ -268,13 +268,14 @@ class FullInBatches:
                 had[batch // per_stream] += count
             if batches and count:
                 pixels, lanes = self._sums.shape[1], self._lanes // self._source.channels
-                yield from cut_batches(pixels, batches, tuple(starts), count, lanes)
+                strip = STRIP_ROWS * self._window.width
+                yield from cut_batches(pixels, batches, tuple(starts), count, lanes, strip)
 
     def _trace(self, run: Run) -> tuple[Floats, Floats | None]:
         """Sums over the samples of a run, ``(pixels, batches of the run, 3)``, and of their seen light, where kept.
 
-        Lanes are ordered pixel, then channel, then batch, then sample. What differs from run to run is opaque to the
-        compiler, so that all share a kernel.
+        Lanes are ordered pixel (see :mod:`.lane_order`), then channel, then batch, then sample. What differs from run
+        to run is opaque to the compiler, so that all share a kernel.
         """
         channels, window = self._source.channels, self._window
         number, per_stream = len(run.batches), len(self._sums) // STREAMS
@@ -283,7 +284,8 @@ class FullInBatches:
         rest, place = divide(rest, dr.opaque(mi.UInt32, number))
         pixel, channel = divide(rest, channels)
         pixel = dr.opaque(mi.UInt32, run.first) + pixel * dr.opaque(mi.UInt32, run.step)
-        row, column = divide(pixel, window.width)
+        strips = in_strips(self._sums.shape[1], window.width) if run.in_strips else 0
+        row, column = pixel_at(pixel, window.width, dr.opaque(mi.UInt32, strips))
         row += dr.opaque(mi.UInt32, window.top)
         column += dr.opaque(mi.UInt32, window.left)
         pixel = pixel_number(self._source, column, row)
@@ -296,8 +298,12 @@ class FullInBatches:
         pixels = PixelRays(self._source, column, row, channel, self._box_filter)
         traced = sample_pixels(self._integrator, pixels, stream, self._seen is not None)
         evaluate(traced, lanes, self.rays)
-        seen = None if traced.seen is None else _sums(traced.seen, channels, number, run.count)
-        return _sums(traced.radiance, channels, number, run.count), seen
+
+        def sums(light: Spectrum) -> Floats:
+            found = _sums(light, channels, number, run.count)
+            return to_rows(found, window.width) if run.in_strips else found
+
+        return sums(traced.radiance), None if traced.seen is None else sums(traced.seen)
 
 
 def trace_in_batches(

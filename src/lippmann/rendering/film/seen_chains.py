@@ -22,8 +22,9 @@ from numpy.typing import NDArray
 from lippmann.color.transfer import Transfer, coding_slope
 from lippmann.device.sobol import SampleStream
 from lippmann.device.types import MitsubaScene
+from lippmann.rendering.film.lane_order import divide
 from lippmann.rendering.film.scattered_rays import ScatteredRays
-from lippmann.rendering.film.wavefront import divide, shown_colors
+from lippmann.rendering.film.wavefront import shown_colors
 from lippmann.rendering.request.choices import REUSING
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.rendering.transport.path import PathIntegrator

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from lippmann.device.sobol import SampleStream
 from lippmann.device.types import Spectrum, UInt32
 from lippmann.progress import Progress, ProgressCallback, silent
+from lippmann.rendering.film.lane_order import divide, in_strips, pixel_at, to_rows
 from lippmann.rendering.film.wavefront_plan import Pass, Plan, Tile
 from lippmann.rendering.transport.integrator import Integrator, PixelSample
 from lippmann.rendering.transport.path import PathIntegrator
@@ -96,7 +97,8 @@ def trace_frame(
         for whole, part in zip((frame.pixels, frame.seen), sums, strict=False):
             assert whole is not None
             part *= 1 / plan.samples
-            whole[tile.first_row : tile.first_row + tile.rows] += part.reshape(tile.rows, plan.width, 3)
+            in_rows = to_rows(part, plan.width).reshape(tile.rows, plan.width, 3)
+            whole[tile.first_row : tile.first_row + tile.rows] += in_rows
         done += tile.rows * plan.width * plan.channels * run.count
         progress(Progress("trace", done, plan.work))
     frame.seconds_trace = time.perf_counter() - started - frame.seconds_compile
@@ -106,8 +108,8 @@ def trace_frame(
 class _Tracer:
     """Traces the wavefronts of one plan.
 
-    Lanes are ordered pixel, then channel, then sample. Whatever differs from tile to tile is opaque to the compiler, so
-    that all tiles run the same kernel.
+    Lanes are ordered pixel (see :mod:`.lane_order`), then channel, then sample. Whatever differs from tile to tile is
+    opaque to the compiler, so that all tiles run the same kernel.
     """
 
     def __init__(
@@ -129,7 +131,8 @@ class _Tracer:
         self._keeps_seen = keeps_seen
 
     def trace(self, tile: Tile, run: Pass, totals: RayTotals) -> list[NDArray[np.float32]]:
-        """Sums over the samples of one pass, ``(pixels of the tile, 3)``, and of their seen light where it is kept.
+        """Sums over the samples of one pass, ``(pixels of the tile, 3)``, and of their seen light where it is kept, in
+        the order of lanes.
 
         ``totals`` grows by the rays it took.
         """
@@ -150,14 +153,15 @@ def samples_of_tile(
     box_filter: bool,
     corner: tuple[int, int] = (0, 0),
 ) -> tuple[PixelRays, SampleStream]:
-    """The pixels and sample streams of one wavefront, lanes ordered pixel, then channel, then sample.
+    """The pixels and sample streams of one wavefront, lanes ordered pixel (see :mod:`.lane_order`), then channel, then
+    sample.
 
     ``corner``: row and column at which the part of the picture begins that ``plan`` is of.
     """
     lanes = tile.rows * plan.width * plan.channels * run.count
     per_channel, sample = divide(dr.arange(mi.UInt32, lanes), dr.opaque(mi.UInt32, run.count))
     pixel, channel = divide(per_channel, plan.channels)
-    row, column = divide(pixel, plan.width)
+    row, column = pixel_at(pixel, plan.width, dr.opaque(mi.UInt32, in_strips(tile.rows * plan.width, plan.width)))
     row += dr.opaque(mi.UInt32, tile.first_row + corner[0])
     column += dr.opaque(mi.UInt32, corner[1])
     sample += dr.opaque(mi.UInt32, run.first)
@@ -188,12 +192,6 @@ def evaluate(sample: PixelSample, lanes: int, totals: RayTotals) -> None:
     totals.secondary += lane_total(counts.secondary)
     totals.shadow += lane_total(counts.shadow)
     totals.discarded += lanes - int(dr.count(finite)[0])
-
-
-def divide(number: UInt32, by: UInt32 | int) -> tuple[UInt32, UInt32]:
-    """Quotient and remainder of whole numbers on the device."""
-    quotient = number // by
-    return quotient, number - quotient * by
 
 
 def _channel_sums(radiance: Spectrum, channels: int, count: int) -> NDArray[np.float32]:

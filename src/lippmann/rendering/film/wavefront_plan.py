@@ -35,6 +35,7 @@ class Run:
     """One wavefront of batches: ``count`` samples in each of ``batches`` for the pixels ``first`` to ``last``.
 
     ``starts``: the number of the first sample of each batch in its stream. ``step``: from pixel to pixel.
+    ``in_strips``: whether pixels are counted as places in whole strips, see :mod:`.lane_order`, else in rows.
     """
 
     first: int
@@ -43,6 +44,7 @@ class Run:
     starts: tuple[int, ...]
     count: int
     step: int = 1
+    in_strips: bool = False
 
 
 @dataclass(frozen=True)
@@ -109,7 +111,7 @@ def make_plan(
 
 
 def cut_batches(
-    pixels: int, batches: tuple[int, ...], starts: tuple[int, ...], count: int, lanes: int
+    pixels: int, batches: tuple[int, ...], starts: tuple[int, ...], count: int, lanes: int, strip: int
 ) -> Iterator[Run]:
     """Divide ``count`` samples of each of ``batches`` for all pixels into wavefronts of at most about ``lanes`` lanes.
 
@@ -119,8 +121,12 @@ def cut_batches(
         Number of the first sample of each batch in its stream.
     lanes:
         Lanes of one colour channel.
+    strip:
+        Pixels of a strip. Runs consist of whole ones, but for the last, unless a run holds less than one.
     """
-    per_run = equal_length(pixels, lanes // (count * len(batches)) or lanes // count or lanes)
+    most = lanes // (count * len(batches)) or lanes // count or lanes
+    in_strips = most >= strip
+    per_run = equal_length(-(-pixels // strip), most // strip) * strip if in_strips else equal_length(pixels, most)
     together = max(1, min(len(batches), lanes // (per_run * count)))
     length = max(1, min(count, lanes // per_run))
     for first in range(0, pixels, per_run):
@@ -132,6 +138,7 @@ def cut_batches(
                     batches[batch : batch + together],
                     tuple(start + before for start in starts[batch : batch + together]),
                     min(length, count - before),
+                    in_strips=in_strips,
                 )
 
 
