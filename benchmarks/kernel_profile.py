@@ -9,10 +9,11 @@ random numbers and bookkeeping. Parts overlap in a processor, so that shares are
 *Lanes at work*: a vector unit goes on until the longest of its 16 paths has ended; the share of its lanes that have
 still something to do.
 
-*Before*: pixels in the order of rows (:mod:`lippmann.rendering.film.lane_order`), opaque surfaces without an acceleration structure of their own where others let rays straight through,
-look-ups of all photons about a point by every sample, and photons in NumPy's memory, whose rows cannot be fetched at
-once (:mod:`lippmann.rendering.transport.shadow_rays`, ``PHOTON_PARTS`` of :mod:`lippmann.rendering.transport.path`,
-:mod:`lippmann.device.kernel_ops`).
+*Before*: pixels in the order of rows (:mod:`lippmann.rendering.film.lane_order`), opaque surfaces without an
+acceleration structure of their own where others let rays straight through
+(:mod:`lippmann.rendering.transport.shadow_rays`), look-ups of all photons about a point by every sample
+(``PHOTON_PARTS`` of :mod:`lippmann.rendering.transport.path`), and photons in NumPy's memory, whose rows cannot be
+fetched at once (:mod:`lippmann.device.kernel_ops`).
 
 python benchmarks/kernel_profile.py [--scenes NAME,...]
 
@@ -121,7 +122,7 @@ def _kernels(stage: Stage) -> dict[str, Any]:
     def traced(integrator: path.PathIntegrator, parts: int = path.PHOTON_PARTS, in_rows: bool = False) -> Any:
         def call(seed: int) -> Any:
             path.PHOTON_PARTS = parts
-            with mock.patch.object(wavefront, "in_strips", lambda *_: 0) if in_rows else nullcontext():
+            with mock.patch.object(wavefront, "in_strips", return_value=0) if in_rows else nullcontext():
                 pixels, stream = samples_of_tile(source, plan, tile, run, seed, True)
             radiance, counts = integrator.sample(pixels.ray(stream), stream, mi.Bool(True))
             dr.eval(radiance, counts.secondary, counts.shadow)

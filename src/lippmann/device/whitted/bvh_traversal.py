@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import drjit as dr
 import mitsuba as mi
 import numpy as np
@@ -11,7 +13,10 @@ from lippmann.device.types import Bool, Float, Int32, Point3f, UInt32, Vector3f
 from lippmann.device.whitted.bvh import GRID, LEAF, make_bvh
 from lippmann.device.whitted.clip_planes import Clipping
 from lippmann.device.whitted.intersections import Row, crossings, fetch, formulas, literal, reciprocal, serves
+from lippmann.device.whitted.light_buffer import make_light_buffer
+from lippmann.device.whitted.light_buffer_lookup import LightBufferLookup
 from lippmann.device.whitted.shape_table import Column, Kind, ShapeTable
+from lippmann.scene.values.whitted_lighting import ClassicLight
 
 #: Up to this many listed shapes are written into the kernel; more are looped over.
 MOST_LITERAL = 64
@@ -23,7 +28,7 @@ class ShapeTracer:
     ``closest`` finds the nearest crossing beyond the origin, ``passing`` the light that gets past the shapes.
     """
 
-    def __init__(self, table: ShapeTable, clipping: Clipping) -> None:
+    def __init__(self, table: ShapeTable, clipping: Clipping, lights: Sequence[ClassicLight]) -> None:
         self._table = table
         self._clipping = clipping if (table.rows[:, Column.CLIP] >= 0).any() else None
         self._inside_only = bool(table.rows[:, Column.INSIDE].any())
@@ -32,6 +37,8 @@ class ShapeTracer:
         if table.walked:
             self._bvh = make_bvh(table.boxes)
             self._nodes = upload(self._bvh.nodes)
+        buffer = make_light_buffer(table, lights)
+        self._light_buffer = None if buffer is None else LightBufferLookup(buffer)
 
     def closest(self, o: Point3f, d: Vector3f, t: Float, index: UInt32, active: Bool) -> tuple[Float, UInt32]:
         """Distance and row of the nearest crossing before ``t``; where there is none, ``t`` and ``index``."""
@@ -46,8 +53,11 @@ class ShapeTracer:
             t, index = self._nearest_walked(o, d, t, index, active)
         return t, index
 
-    def passing(self, o: Point3f, d: Vector3f, t: Float, light: Float) -> Float:
-        """What remains of ``light`` past all shapes crossed before ``t``."""
+    def passing(self, o: Point3f, d: Vector3f, t: Float, light: Float, source: UInt32 | None = None) -> Float:
+        """What remains of ``light`` past all shapes crossed before ``t``.
+
+        ``source``: the number of the light source that the rays end at; None where they end elsewhere.
+        """
         rows = self._table.listed_rows
         if len(rows) <= MOST_LITERAL:
             for number in rows:
@@ -55,7 +65,9 @@ class ShapeTracer:
                 light = self._past(Kind(int(row.kind)), row, o, d, t, light)
         else:
             light = self._past_list(rows, o, d, t, light)
-        if self._table.walked:
+        if source is not None and self._light_buffer is not None:
+            light = self._past_buffered(self._light_buffer, source, o, d, t, light)
+        elif self._table.walked:
             light = self._past_walked(o, d, t, light)
         return light
 
@@ -122,6 +134,19 @@ class ShapeTracer:
             if second >= 0:
                 light = self._past_row(kinds, mi.UInt32(second), o, d, t, light)
             node += step
+        return light
+
+    @dr.syntax
+    def _past_buffered(
+        self, buffer: LightBufferLookup, source: UInt32, o: Point3f, d: Vector3f, t: Float, light: Float
+    ) -> Float:
+        kinds = self._formulas(self._table.walked_rows)
+        place, end, depth = buffer.find(source, o, d, t)
+        while dr.hint((place < end) & (light > 0), label="shadows by the light buffer"):
+            near, number = buffer.entry(place)
+            light = self._past_row(kinds, number, o, d, t, light)
+            # What lies behind the ray's start casts no shadow on it, nor does all that follows.
+            place = dr.select(near < depth, place + 1, end)
         return light
 
     @dr.syntax

@@ -69,7 +69,7 @@ class Geometry:
         self._table = make_shape_table(scene)
         clipping = Clipping(scene.clip_groups)
         self._engine = EngineTracer(scene, self._order, self._table, clipping)
-        self._shapes = ShapeTracer(self._table, clipping)
+        self._shapes = ShapeTracer(self._table, clipping, scene.lights)
         self._triangles = len(self._order)
         self._smooth = bool(scene.triangles.smooth.any())
         self._colored = bool(scene.triangles.colored.any())
@@ -104,10 +104,13 @@ class Geometry:
         nearer, row = self._shapes.closest(o, d, t, beyond, active)
         return Hit(nearer, dr.select(row == NONE, index, row + self._triangles), uv)
 
-    def passing(self, o: Point3f, d: Vector3f, t: Float, active: Bool) -> Float:
-        """Share of light that gets from ``o`` as far as ``t`` along ``d``; 0 where not active."""
+    def passing(self, o: Point3f, d: Vector3f, t: Float, active: Bool, source: UInt32 | None = None) -> Float:
+        """Share of light that gets from ``o`` as far as ``t`` along ``d``; 0 where not active.
+
+        ``source``: the number of the light source that is there; None for anything else.
+        """
         light = dr.select(active, mi.Float(1), mi.Float(0))
-        return self._engine.passing(o, d, t, self._shapes.passing(o, d, t, light))
+        return self._engine.passing(o, d, t, self._shapes.passing(o, d, t, light, source))
 
     def find_light(self, hit: Hit) -> tuple[Bool, UInt32]:
         """Whether a hit is the visible sphere of a light source, and that light's index."""

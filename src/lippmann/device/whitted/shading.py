@@ -132,7 +132,7 @@ class Shader:
             lit = strength > LEAST
             if dr.hint(self._shadows, mode="scalar"):
                 start = p + face * dr.copysign(lift, dr.dot(face, light.toward))
-                passes = self._geometry.passing(start, light.toward, light.distance, lit)
+                passes = self._geometry.passing(start, light.toward, light.distance, lit, index)
                 shadow += dr.select(lit, mi.UInt32(1), mi.UInt32(0))
                 lit &= passes > 0
                 strength *= passes
