@@ -83,16 +83,24 @@ def chains(picture):
     ],
 )
 def test_chains_by_variance(variance, samples, is_clean, expected):
-    from lippmann.rendering.film.seen_chains import CHAIN_COST, chains_for
+    from lippmann.rendering.film.seen_chains import chains_for
 
-    assert chains_for(variance, samples, CHAIN_COST, is_clean) == expected
+    assert chains_for(variance, samples, True, is_clean) == expected
 
 
 def test_dear_chains_are_fewer():
-    from lippmann.rendering.film.seen_chains import CHAIN_COST, PLAIN_CHAIN_COST, chains_for
+    from lippmann.rendering.film.seen_chains import chains_for
 
     for variance in np.geomspace(1e-5, 10, 25):
-        assert chains_for(variance, 16, PLAIN_CHAIN_COST, True) <= chains_for(variance, 16, CHAIN_COST, True)
+        assert chains_for(variance, 16, False, True) <= chains_for(variance, 16, True, True)
+
+
+@pytest.mark.parametrize(("samples", "expected"), [(4, 16), (16, 16), (64, 4), (100, 2), (256, 2)])
+def test_without_photons_more_samples_need_fewer_chains(samples, expected):
+    from lippmann.rendering.film.seen_chains import chains_for
+
+    assert chains_for(0.04, samples, False, True) == expected
+    assert chains_for(0.04, samples, True, True) == 32
 
 
 def test_smooth_gloss_under_a_sky_gets_chains_without_photons(engine):

@@ -365,3 +365,35 @@ def test_emitters_are_chosen_as_mitsubas_own_distribution_chooses_them():
         np.testing.assert_allclose(one, np.array(other), atol=1e-6)
     assert found[1].min() >= -1e-6
     assert found[1].max() < 1 + 1e-6
+
+
+def test_emitters_without_size_are_as_likely_as_each_other():
+    """Their mean over the unit square is the sum of what each brings; others are never drawn."""
+    import drjit as dr
+    import mitsuba as mi
+
+    from lippmann.rendering.transport.light_sampling import WithoutSize
+
+    scene = mi.load_dict(
+        room()
+        | {
+            "point": {"type": "point", "position": [0, 0.5, 0], "intensity": {"type": "rgb", "value": [3, 0, 0]}},
+            "sun": {"type": "directional", "direction": [0, -1, 0], "irradiance": {"type": "rgb", "value": [0, 2, 0]}},
+        }
+    )
+    emitters = WithoutSize(scene.emitters())
+    assert len(emitters) == 2
+    reference = dr.zeros(mi.SurfaceInteraction3f, 1000)
+    x = (dr.arange(mi.Float, 1000) + 0.5) / 1000
+    sample, radiance = emitters.sample_direction(reference, mi.Point2f(x, 0.5), mi.Bool(True))
+    assert np.all(np.array(sample.delta))
+    np.testing.assert_allclose(np.array(sample.pdf), 0.5)
+    np.testing.assert_allclose(np.array(radiance).mean(axis=1), [3 / 0.5**2, 2, 0], rtol=1e-5)
+
+
+def test_a_scene_may_have_none():
+    import mitsuba as mi
+
+    from lippmann.rendering.transport.light_sampling import WithoutSize
+
+    assert len(WithoutSize(mi.load_dict(room()).emitters())) == 0

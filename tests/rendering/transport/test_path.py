@@ -178,6 +178,48 @@ def test_coloured_glass_fades_with_the_distance():
     assert pixels.mean(axis=(0, 1)) == pytest.approx(np.exp([-1.0, -0.5, 0.0]), rel=2e-3)
 
 
+@pytest.mark.parametrize(
+    ("throughput", "eta", "expected"),
+    [((0.04, 0.01, 0.0), 1.0, 0.2), ((0.16, 0.16, 0.16), 1.5, 0.6), ((1.0, 0.5, 0.5), 1.0, 0.95), ((0, 0, 0), 1, 0)],
+)
+def test_roulette_lets_faint_paths_go_on_by_the_root(throughput, eta, expected):
+    import mitsuba as mi
+
+    from lippmann.rendering.transport.path import roulette_survival
+
+    survival = np.array(roulette_survival(mi.Spectrum(*throughput), mi.Float(eta)))
+    np.testing.assert_allclose(survival, expected, rtol=1e-5)
+
+
+def test_roulette_changes_no_mean():
+    """A closed white box of radiance 1 whose walls reflect two thirds: light of each bounce is known."""
+    import mitsuba as mi
+
+    from lippmann.rendering.film.wavefront import trace_frame
+    from lippmann.rendering.film.wavefront_plan import make_plan
+    from lippmann.rendering.transport.path import PathIntegrator
+    from lippmann.rendering.transport.ray_source import CameraRays
+    from lippmann.rendering.transport.scene_features import make_scene_features
+    from lippmann.scene.values.description import Camera
+
+    albedo, depth = 0.66, 12
+    walls = {
+        "type": "cube",
+        "flip_normals": True,
+        "bsdf": {"type": "diffuse", "reflectance": {"type": "rgb", "value": albedo}},
+        "emitter": {"type": "area", "radiance": {"type": "rgb", "value": 1.0}},
+    }
+    scene = mi.load_dict({"type": "scene", "walls": walls})
+    integrator = PathIntegrator(scene, make_scene_features(scene), depth)
+    source = CameraRays(Camera("inside", np.eye(4), fov_y=1.0), 16, 16)
+    frames = [
+        trace_frame(integrator, source, make_plan(16, 16, 256, memory=2**30), seed=seed).pixels.mean()
+        for seed in range(8)
+    ]
+    expected = sum(albedo**k for k in range(depth + 1))
+    assert abs(np.mean(frames) - expected) < 4 * np.std(frames, ddof=1) / np.sqrt(8) + 1e-3 * expected
+
+
 def test_rays_are_counted():
     """One white floor under a point light: each hit tests one shadow; the ray scattered there looks for emitters."""
     import mitsuba as mi

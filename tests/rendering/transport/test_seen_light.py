@@ -180,6 +180,44 @@ def test_narrow_lobes_are_weighed_as_paths_weigh_them():
     assert further.var(axis=0).mean() < 0.5 * plain.var(axis=0).mean()
 
 
+def test_emitters_without_size_are_seen_in_narrow_lobes():
+    """No ray meets them: chains sample them where the half vector makes the event sharp, and paths leave out just that.
+
+    Lobes narrow enough to be sharp, wide enough for pixels to agree.
+    """
+    from lippmann.scene.values.description import Light
+
+    scene = small_emitter_in_glazed_balls()
+    sun, at = np.eye(4), scene.lights[0].world_from_light
+    sun[:3, :3] = [[1, 0, 0], [0, 0.8, 0.6], [0, -0.6, 0.8]]
+    lights = [Light("point", (4.0, 5.0, 6.0), at), Light("directional", (1.5, 1.2, 0.9), sun)]
+    integrator, source = described(replace(scene, lights=lights))
+    assert len(integrator.without_size) == 2
+    for depth in (1, 6):
+        integrator.depth = depth
+        plain, further = (pictures(integrator, source, chains, seeds=range(40)) for chains in (0, 5))
+        agree(plain, further)
+        assert further.var(axis=0).mean() < 0.7 * plain.var(axis=0).mean()
+
+
+def test_their_highlights_go_past_a_denoiser():
+    """All that is seen in sharp lobes is told apart, that of emitters without size, too."""
+    import drjit as dr
+    import mitsuba as mi
+
+    from lippmann.rendering.film.sample_batches import FullInBatches
+    from lippmann.scene.values.description import Light
+
+    scene = small_emitter_in_glazed_balls()
+    light = Light("directional", (3.0, 3.0, 3.0), np.eye(4))
+    integrator, source = described(replace(scene, lights=[light]))
+    integrator.seen_chains = dr.opaque(mi.UInt32, 8)
+    batches = FullInBatches(integrator, source, seed=1, memory=1 << 30, keeps_seen=True)
+    batches.add(16)
+    assert batches.seen().max() > 1
+    assert (batches.picture() - batches.seen()).max() < 1
+
+
 @pytest.mark.long
 def test_gain_limit_and_background_are_those_of_paths(all_events):
     import mitsuba as mi

@@ -6,7 +6,8 @@ usual scenes. Where there are caustics, a look may miss emitters that are seen s
 meets one; a part of what that would bring is added.
 
 Where a picture is denoised, hardly anything is left of the rest's variance, and all of that of seen light, which goes
-past the denoiser: more chains are worth their time then, and too few of them are worse than none.
+past the denoiser: more chains are worth their time then, and too few of them are worse than none. So are, where there
+are no photons, more than leave a difference that is seen: the more samples, the fewer chains each comes with.
 """
 
 from __future__ import annotations
@@ -47,6 +48,9 @@ USUAL = 2
 #: Chains of a pixel whose mean is as clean as a denoiser would have made of its paths; and of one path, at most that
 #: many at least.
 CLEAN, MOST_FOR_CLEAN = 32, 16
+#: Chains of a pixel beyond which those beside a denoiser bring nothing that is worth their time, where there are no
+#: photons: highlights of a sky, where they are not met by hundreds, are rarer than a look can tell.
+ENOUGH = 256
 #: Meetings with the brightest emitter that count beside those of the look: as many as may well have been missed.
 MISSED = 0.25
 #: Samples that a picture is taken to need at most, and at least, of which it is not known.
@@ -113,17 +117,19 @@ def seen_chains(
         brightest = min(_brightest(integrator, source, seed), together)
         slope = float(coding_slope(np.array(_GREY), transfer))
         variance += MISSED * (slope * brightest) ** 2 / (looks.size / 3)
-    return chains_for(variance, samples, CHAIN_COST if beside_photons else PLAIN_CHAIN_COST, is_clean)
+    return chains_for(variance, samples, beside_photons, is_clean)
 
 
-def chains_for(variance: float, samples: int, cost: float, is_clean: bool) -> int:
-    """As :func:`seen_chains`, by the variance of a chain in codes, and what it costs of a path."""
+def chains_for(variance: float, samples: int, beside_photons: bool, is_clean: bool) -> int:
+    """As :func:`seen_chains`, by the variance of a chain in codes, and whether paths look up photons."""
+    cost = CHAIN_COST if beside_photons else PLAIN_CHAIN_COST
+    most = MOST if beside_photons or not is_clean else min(MOST, max(2, ENOUGH // samples))
     rest = CLEAN_REST_VARIANCE if is_clean else REST_VARIANCE
     wanted = math.sqrt(variance * (1 - cost) / (rest * cost))
     fewest = min(max(2.0, CLEAN / samples), MOST_FOR_CLEAN) if is_clean else 2.0
     if wanted < (max(2.0, fewest / 4) if is_clean else math.sqrt(2)):
         return 0
-    return min(MOST, 1 << round(math.log2(max(wanted, fewest))))
+    return 1 << min(most.bit_length() - 1, round(math.log2(max(wanted, fewest))))
 
 
 def _expected_samples(request: RenderRequest) -> int:

@@ -116,3 +116,31 @@ class WeightedLightSampler:
     def pdf_direction(self, reference: Interaction3f, sample: DirectionSample3f, active: Bool) -> Float:
         probability = dr.gather(mi.Float, self._pmf, dr.reinterpret_array(mi.UInt32, sample.emitter), active)
         return sample.emitter.pdf_direction(reference, sample, active) * probability
+
+
+class WithoutSize:
+    """The emitters of a scene that no ray meets: points, spots, and directional ones; each is as likely as the others.
+
+    Parameters
+    ----------
+    emitters:
+        All of the scene's.
+    """
+
+    def __init__(self, emitters: list[mi.Emitter]) -> None:
+        chosen = [each for each in emitters if bool(mi.has_flag(each.flags(), mi.EmitterFlags.Delta))]
+        self._count = len(chosen)
+        self._emitters = mi.EmitterPtr(chosen) if chosen else None
+
+    def __len__(self) -> int:
+        return self._count
+
+    def sample_direction(
+        self, reference: Interaction3f, point: Point2f, active: Bool
+    ) -> tuple[DirectionSample3f, Spectrum]:
+        """As :meth:`LightSampler.sample_direction`, of one of these emitters; there must be one."""
+        index = dr.minimum(mi.UInt32(point.x * self._count), self._count - 1)
+        emitter = dr.gather(mi.EmitterPtr, self._emitters, index, active)
+        sample, radiance = emitter.sample_direction(reference, point, active)
+        sample.pdf /= self._count
+        return sample, radiance * self._count

@@ -1,5 +1,8 @@
 """Light that the eye sees by sharp events alone: emitters, and the sky in mirrors, gloss and through clear glass.
 
+Emitters without size, which no ray meets, are sampled at each sharp surface, and count where the half vector makes the
+event sharp.
+
 Small emitters seen so, and emitters mirrored in small curved things, fill a small part of a pixel, and few paths of the
 pixel meet them. They have no noise of transport, and a chain of sharp events is cheap beside a path: no emitters are
 sampled along it, no photons are looked up, and it ends at the first rough surface. So chains through other points of
@@ -17,18 +20,30 @@ import mitsuba as mi
 from lippmann.device.pbr.gltf_bsdf import SHARP_LOBE
 from lippmann.device.pbr.surface_point import widen_lobes
 from lippmann.device.sobol import SampleStream, hash32
-from lippmann.device.types import Bool, BSDFPtr, PreliminaryIntersection3f, Ray3f, Spectrum, UInt32
+from lippmann.device.types import (
+    Bool,
+    BSDFPtr,
+    Point2f,
+    PreliminaryIntersection3f,
+    Ray3f,
+    Spectrum,
+    SurfaceInteraction3f,
+    UInt32,
+    Vector3f,
+)
 from lippmann.rendering.transport.beam import Beam, turn_of_normals, widening
 from lippmann.rendering.transport.integrator import PixelSample, RayCounts
 from lippmann.rendering.transport.path import PathIntegrator
 from lippmann.rendering.transport.ray_source import PixelRays
 from lippmann.rendering.transport.shadow_rays import MAX_CROSSINGS
-from lippmann.rendering.transport.sharp_events import follows_sharply, sharp_lobe
+from lippmann.rendering.transport.sharp_events import follows_sharply, is_sharp, sharp_lobe
 
 #: Tells the streams of chains from those of paths.
 _CHAINS = 0x5EE21147
 #: Sample dimensions used at one vertex.
 _DIMENSIONS_PER_VERTEX = 2
+#: Sample dimension, from a vertex's first, of the emitter without size that is sampled there.
+_EMITTER_DIMENSION = 1 << 24
 
 
 def sample_pixel(integrator: PathIntegrator, pixel: PixelRays, stream: SampleStream, active: Bool) -> PixelSample:
@@ -37,46 +52,48 @@ def sample_pixel(integrator: PathIntegrator, pixel: PixelRays, stream: SampleStr
     if integrator.seen_chains is None:
         return PixelSample(*integrator.sample(ray, stream, active))
     rest, counts, _ = integrator.sample_with_hit(ray, stream, active, without_seen=True)
-    seen, rays = seen_light(integrator, pixel, stream, integrator.seen_chains, active)
+    seen, traced = seen_light(integrator, pixel, stream, integrator.seen_chains, active)
     seen /= mi.Float(integrator.seen_chains)
     if integrator.gain is not None:
         seen *= integrator.gain
-    return PixelSample(rest + seen, RayCounts(counts.secondary + rays, counts.shadow), seen)
+    counts = RayCounts(counts.secondary + traced.secondary, counts.shadow + traced.shadow)
+    return PixelSample(rest + seen, counts, seen)
 
 
 @dr.syntax
 def seen_light(
     integrator: PathIntegrator, pixel: PixelRays, stream: SampleStream, chains: UInt32, active: Bool
-) -> tuple[Spectrum, UInt32]:
+) -> tuple[Spectrum, RayCounts]:
     """Sum of the light that so many chains of each lane's pixel meet, before the gain, and the rays traced."""
     light = mi.Spectrum(0)
-    rays = mi.UInt32(0)
+    rays, shadow = mi.UInt32(0), mi.UInt32(0)
     number = mi.UInt32(0)
     of_chains = SampleStream(hash32(stream.key ^ _CHAINS), stream.index, stream.half)
     first = stream.index * chains
     tracing = active & (number < chains)
     while dr.hint(tracing, label="chains"):
         further = of_chains.at(first + number)
-        met, traced = _chain(integrator, pixel.ray(further), further, stream.index, tracing)
+        met, traced, tests = _chain(integrator, pixel.ray(further), further, stream.index, tracing)
         light += dr.select(dr.isfinite(dr.sum(met)), met, 0)
         rays += traced
+        shadow += tests
         number += 1
         tracing &= number < chains
-    return light, rays
+    return light, RayCounts(rays, shadow)
 
 
 @dr.syntax
 def _chain(
     integrator: PathIntegrator, ray: Ray3f, stream: SampleStream, path: UInt32, active: Bool
-) -> tuple[Spectrum, UInt32]:
-    """What one chain meets, as the path of number ``path`` would weigh it, and the rays traced."""
+) -> tuple[Spectrum, UInt32, UInt32]:
+    """What one chain meets, as the path of number ``path`` would weigh it, and the rays and shadow rays traced."""
     scene = integrator.scene
     context = mi.BSDFContext()
     ray = mi.Ray3f(ray)
     active = mi.Bool(active)
     light, throughput = mi.Spectrum(0), mi.Spectrum(1)
     depth, crossings = mi.UInt32(0), mi.UInt32(0)
-    rays = dr.select(active, mi.UInt32(1), mi.UInt32(0))
+    rays, shadow = dr.select(active, mi.UInt32(1), mi.UInt32(0)), mi.UInt32(0)
     absorption = mi.Color3f(0)
     vertex = dr.zeros(mi.Interaction3f)
     vertex_pdf, vertex_delta, vertex_samples = mi.Float(1), mi.Bool(True), mi.UInt32(1)
@@ -108,6 +125,11 @@ def _chain(
             turn = dr.select(continues & is_beam, turn_of_normals(si, width), 0)
             widen_lobes(si, widening(turn))
         dimension = (depth * 2 + crossings) * _DIMENSIONS_PER_VERTEX + 1
+        if dr.hint(len(integrator.without_size) > 0, mode="scalar"):
+            point = stream.next_2d(dimension + _EMITTER_DIMENSION)
+            drawn, tests = _without_size(integrator, si, bsdf, lobe, point, continues)
+            light += integrator.limited(throughput * drawn, depth + 1)
+            shadow += tests
         bs, weight = bsdf.sample(context, si, stream.next_1d(dimension), stream.next_2d(dimension + 1), continues)
         passes = mi.has_flag(bs.sampled_type, mi.BSDFFlags.Null)
         continues &= passes | follows_sharply(si, lobe, bs)
@@ -137,7 +159,20 @@ def _chain(
         rays += dr.select(active, mi.UInt32(1), mi.UInt32(0))
         # Before its first event, where nothing is met, a chain has met nothing but sky.
         active &= _may_show_light(pi) | (integrator.has_surroundings & ~pi.is_valid() & (depth > 0))
-    return light, rays
+    return light, rays, shadow
+
+
+def _without_size(
+    integrator: PathIntegrator, si: SurfaceInteraction3f, bsdf: BSDFPtr, lobe: Vector3f, point: Point2f, active: Bool
+) -> tuple[Spectrum, UInt32]:
+    """Radiance toward ``si.wi`` by a sharp event from an emitter without size, and the shadow rays traced."""
+    ds, radiance = integrator.without_size.sample_direction(si, point, active)
+    wo = si.to_local(ds.d)
+    lit = active & is_sharp(si, lobe, wo) & (dr.max(radiance) > 0)
+    reflected = bsdf.eval(mi.BSDFContext(), si, wo, lit) * radiance
+    lit &= dr.max(reflected) > 0
+    visible, tests = integrator.visibility(si, ds, lit)
+    return dr.select(lit, reflected * visible, 0), tests
 
 
 def _may_show_light(pi: PreliminaryIntersection3f) -> Bool:

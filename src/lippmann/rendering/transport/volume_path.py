@@ -30,7 +30,7 @@ from lippmann.device.types import (
 )
 from lippmann.rendering.transport.integrator import FirstHit, RayCounts
 from lippmann.rendering.transport.light_sampling import LightSampler, SceneLightSampler
-from lippmann.rendering.transport.path import ROULETTE_DEPTH, mis_weight
+from lippmann.rendering.transport.path import ROULETTE_DEPTH, mis_weight, roulette_survival
 from lippmann.rendering.transport.scene_features import Color
 from lippmann.rendering.transport.shadow_rays import MAX_CROSSINGS
 
@@ -192,7 +192,7 @@ class VolumePathIntegrator:
             continues &= (crossings < MAX_CROSSINGS) & (event < MAX_COLLISIONS)
 
             # ---- Russian roulette ----
-            survival = dr.minimum(dr.max(throughput) * dr.square(eta), 0.95)
+            survival = roulette_survival(throughput, eta)
             at_risk = continues & bounces & (depth >= ROULETTE_DEPTH)
             throughput = dr.select(at_risk, throughput * dr.rcp(survival), throughput)
             continues &= ~at_risk | (stream.next_1d(dimension + 6) < survival)
