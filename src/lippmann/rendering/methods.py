@@ -42,10 +42,6 @@ Floats = NDArray[np.float32]
 #: The layer of a picture with the number of samples that each pixel had.
 SAMPLES_LAYER = "samples"
 
-#: Fewest samples at which a picture may be held to have reached a quality where sharp surfaces may mirror emitters, as
-#: photons show: with fewer, both halves may miss a mirrored emitter alike, by up to 10 dB of the worst micro-image.
-FIRST_AMONG_MIRRORS = 16
-
 #: What putting a picture together and writing it takes, as a rule.
 _SECONDS_PER_PIXEL_WRITTEN = 1e-7
 
@@ -311,7 +307,7 @@ def _estimator(job: Job, kind: type[PictureEstimator] = PictureEstimator) -> Pic
     """Judges a display's picture by its micro-images, a quilt by its views."""
     estimator = _estimator_of_parts(job, kind)
     if isinstance(job.integrator, PathIntegrator) and job.integrator.photons is not None:
-        estimator.first = estimator.fewest = FIRST_AMONG_MIRRORS
+        estimator.expect_mirrors()
     return estimator
 
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from lippmann.rendering.estimate.pixel_errors import PixelErrors
-from lippmann.rendering.estimate.psnr import Estimate, PictureEstimator
+from lippmann.rendering.estimate.psnr import Estimate, Margin, PictureEstimator
 
 #: Power of the number of samples by which the squared error of Monte Carlo noise falls.
 PLAIN_SLOPE = 1.0
@@ -39,7 +39,7 @@ class Assessor(Protocol):
         """Samples per pixel below which an estimate counts only beyond :meth:`margin`."""
         ...
 
-    def margin(self, samples: int) -> float:
+    def margin(self, samples: int) -> Margin:
         """dB by which the estimate of so few ``samples`` per pixel must exceed the quality asked for."""
         ...
 
@@ -98,7 +98,7 @@ class ErrorTrack:
         """The estimator's, but at least :attr:`first`."""
         return max(self._estimator.fewest, self.first)
 
-    def margin(self, samples: int) -> float:
+    def margin(self, samples: int) -> Margin:
         """The estimator's."""
         return self._estimator.margin(samples)
 

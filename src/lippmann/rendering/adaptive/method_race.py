@@ -16,6 +16,7 @@ from typing import Literal
 from lippmann.rendering.adaptive.convergence import Assessment, ErrorTrack
 from lippmann.rendering.adaptive.stopping import LEAST_GROWTH, Goal, missing_with_margin, samples_to_trust
 from lippmann.rendering.denoise.cost_model import look_cost
+from lippmann.rendering.estimate.psnr import Margin
 
 Way = Literal["plain", "pooled"]
 
@@ -75,7 +76,7 @@ class MethodRace:
         """The leader's; at first that of pooled light, which is trusted sooner."""
         return (self._leading or self._pooled).fewest
 
-    def margin(self, samples: int) -> float:
+    def margin(self, samples: int) -> Margin:
         """The leader's; at first that of plain samples."""
         return (self._leading or self._plain).margin(samples)
 

@@ -17,7 +17,7 @@ from typing import Literal
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.rendering.adaptive.convergence import Assessment, Assessor
 from lippmann.rendering.estimate.pixel_errors import PixelErrors
-from lippmann.rendering.estimate.psnr import Estimate
+from lippmann.rendering.estimate.psnr import NO_MARGIN, Estimate, Margin
 from lippmann.rendering.request.render_request import RenderRequest
 
 End = Literal["quality", "time", "samples"]
@@ -76,17 +76,19 @@ class Goal:
         """Whether some quality is asked for."""
         return self.quality is not None or self.quality_worst is not None
 
-    def missing(self, estimate: Estimate) -> float:
-        """How many dB the picture is short of the quality; at most 0 if it has it.
+    def missing(self, estimate: Estimate, margin: Margin = NO_MARGIN) -> float:
+        """How many dB the picture is short of the quality and a ``margin``; at most 0 if it has both.
 
-        It has it where the quality is the likely one, and is missed by more than ``TOLERANCE`` only with a probability
-        of 2.5 %.
+        It has the quality where that is the likely one, and is missed by more than ``TOLERANCE`` only with a
+        probability of 2.5 %.
         """
-        short = [self.likely_missing(estimate)]
+        short = [-math.inf]
         if self.quality is not None:
-            short.append(self.quality - TOLERANCE - estimate.psnr_low)
+            has = min(estimate.psnr, estimate.psnr_low + TOLERANCE)
+            short.append(self.quality + margin.whole - has)
         if self.least_worst is not None:
-            short.append(self.least_worst - TOLERANCE - estimate.worst_low)
+            has = min(estimate.worst, estimate.worst_low + TOLERANCE)
+            short.append(self.least_worst + margin.worst - has)
         return max(short)
 
     def likely_missing(self, estimate: Estimate) -> float:
@@ -183,7 +185,7 @@ def reach(
 
 def missing_with_margin(goal: Goal, estimate: Estimate, samples: int, assessor: Assessor) -> float:
     """dB by which ``estimate`` is short of ``goal`` and the margin that ``assessor`` asks of so few samples."""
-    return goal.missing(estimate) + assessor.margin(samples)
+    return goal.missing(estimate, assessor.margin(samples))
 
 
 def samples_to_trust(goal: Goal, assessment: Assessment, samples: int, assessor: Assessor) -> int:
