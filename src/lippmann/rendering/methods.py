@@ -291,11 +291,11 @@ def _denoised_candidate(job: Job, goal: Goal, batches: FullInBatches, rays: Call
     renderer = _denoised(job, batches, denoiser)
     seconds = 0.0 if goal.max_time is None else denoiser.probe()
 
-    def is_expensive() -> bool:
+    def worth_from() -> float:
         spent = rays()
-        return 0 < spent < look_cost(spent)
+        return batches.samples * look_cost(spent) / spent if spent else 0.0
 
-    track = ErrorTrack(renderer, _estimator(job, DenoisedEstimator), DENOISED_SLOPE, seconds, is_expensive)
+    track = ErrorTrack(renderer, _estimator(job, DenoisedEstimator), DENOISED_SLOPE, seconds, worth_from)
     return _Candidate(renderer, track, denoiser)
 
 

@@ -62,9 +62,9 @@ class Sooner(PictureEstimator):
 
 @pytest.mark.parametrize(("dear_until", "first"), [(0, 4), (5, 8), (100, 8)])
 def test_the_first_look_waits_while_it_takes_more_than_samples(dear_until, first):
-    """Not longer than for twice the fewest samples; whatever comes then is a multiple of the batches again."""
+    """Not longer than for 8 samples; whatever comes then is a multiple of the batches again."""
     renderer = Noise(error=0.2)
-    track = ErrorTrack(renderer, Sooner(SHOWN), is_expensive=lambda: 0 < renderer.samples < dear_until)
+    track = ErrorTrack(renderer, Sooner(SHOWN), worth_from=lambda: dear_until if renderer.samples else 0)
     outcome = reach(Goal(quality=40), renderer.add, track, clock=renderer.clock)
     found = [each.samples for each in outcome.rounds]
     assert found[0] == first

@@ -13,6 +13,8 @@ from lippmann.rendering.estimate.psnr import Estimate, Margin, PictureEstimator
 
 #: Power of the number of samples by which the squared error of Monte Carlo noise falls.
 PLAIN_SLOPE = 1.0
+#: Samples per pixel after which a first assessment waits no longer for its cost.
+LONGEST_WAIT = 8
 #: Range of powers taken from two noisy estimates.
 MIN_SLOPE, MAX_SLOPE = 0.3, 1.2
 
@@ -69,8 +71,8 @@ class ErrorTrack:
         Power of the sample count by which its squared error is expected to fall.
     seconds:
         Cost of an assessment before any was made.
-    is_expensive:
-        Whether an assessment costs more than all samples so far; then the first one waits.
+    worth_from:
+        Samples per pixel that cost as much as an assessment, 0 where that is not known; the first one waits for these.
     """
 
     def __init__(
@@ -79,19 +81,22 @@ class ErrorTrack:
         estimator: PictureEstimator,
         slope: float = PLAIN_SLOPE,
         seconds: float = 0.0,
-        is_expensive: Callable[[], bool] = lambda: False,
+        worth_from: Callable[[], float] = lambda: 0.0,
     ) -> None:
         self._picture = picture
         self._estimator = estimator
         self._expected = slope
         self._seconds = seconds
-        self._is_expensive = is_expensive
+        self._worth_from = worth_from
         self._rounds: list[tuple[int, Estimate]] = []
 
     @property
     def first(self) -> int:
-        """The estimator's; twice as many while an assessment is expensive, as it may have to be repeated."""
-        return self._estimator.first * (2 if self._is_expensive() else 1)
+        """The estimator's; doubled while an assessment, which may have to be repeated, costs more than the samples."""
+        first, most = self._estimator.first, max(self._estimator.first, LONGEST_WAIT)
+        while first < most and first < self._worth_from():
+            first *= 2
+        return first
 
     @property
     def fewest(self) -> int:

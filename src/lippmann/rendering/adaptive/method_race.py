@@ -68,8 +68,8 @@ class MethodRace:
 
     @property
     def first(self) -> int:
-        """The leader's; at first that of plain samples, whose assessment is cheap."""
-        return (self._leading or self._plain).first
+        """The leader's; at first that of the method that may be assessed sooner."""
+        return self._leading.first if self._leading else min(self._plain.first, self._pooled.first)
 
     @property
     def fewest(self) -> int:

@@ -24,7 +24,7 @@ End = Literal["quality", "time", "samples"]
 
 #: The fewest samples that tell an error.
 FEWEST = 2
-#: Samples add up to multiples of this, so that all batches get the same.
+#: Samples add up to multiples of this, so that all batches get the same; the first few of them to half of it.
 STEP = 8
 #: The most by which one round multiplies the samples of a pixel, and the least.
 MOST_GROWTH, LEAST_GROWTH = 4.0, 1.2
@@ -91,13 +91,13 @@ class Goal:
             short.append(self.least_worst + margin.worst - has)
         return max(short)
 
-    def likely_missing(self, estimate: Estimate) -> float:
+    def likely_missing(self, estimate: Estimate, margin: Margin = NO_MARGIN) -> float:
         """How many dB the likely PSNR is short, whatever its interval: that gets narrower as samples grow."""
         short = [-math.inf]
         if self.quality is not None:
-            short.append(self.quality - estimate.psnr)
+            short.append(self.quality + margin.whole - estimate.psnr)
         if self.least_worst is not None:
-            short.append(self.least_worst - estimate.worst)
+            short.append(self.least_worst + margin.worst - estimate.worst)
         return max(short)
 
     @property
@@ -191,12 +191,14 @@ def missing_with_margin(goal: Goal, estimate: Estimate, samples: int, assessor: 
 def samples_to_trust(goal: Goal, assessment: Assessment, samples: int, assessor: Assessor) -> int:
     """Samples per pixel at which ``assessor`` is expected to be trusted, after an ``assessment`` at ``samples``.
 
-    Doubled until the picture should exceed ``goal`` by the margin, or no margin is needed any more.
+    Doubled until the likely PSNR should exceed ``goal`` by the margin, or no margin is needed any more.
     """
     needed = samples
+    if missing_with_margin(goal, assessment.estimate, samples, assessor) > 0:
+        needed *= 2
     while needed < assessor.fewest:
         gained = 10 * assessment.slope * math.log10(needed / samples)
-        if missing_with_margin(goal, assessment.estimate, needed, assessor) <= gained:
+        if goal.likely_missing(assessment.estimate, assessor.margin(needed)) <= gained:
             break
         needed *= 2
     return needed
@@ -282,7 +284,8 @@ class _AdaptiveLoop:
             wanted = float(samples_to_trust(self.goal, assessment, self.spent, self.assessor))
         else:
             wanted = max(self.spent * self._growth(assessment.estimate), self.assessor.fewest)
-        total = max(STEP * round(wanted / STEP), STEP * (self.spent // STEP + 1))
+        step = STEP if self.spent >= STEP // 2 else STEP // 2
+        total = max(step * round(wanted / step), step * (self.spent // step + 1))
         samples = min(total, self._most) - self.spent
         return samples if self.goal.max_time is None else min(samples, self._affordable())
 

@@ -73,7 +73,7 @@ class DenoisedEstimator(PictureEstimator):
     """Estimates for denoised pictures; their errors carry those of the samples, and what the halves differ by."""
 
     #: With these intervals are honest on scenes that are hard to judge.
-    first = fewest = 4
+    first = fewest = 2
 
     def margin(self, samples: int) -> Margin:
         """By how many dB the estimate of a picture of ``samples`` must be better than what is asked for."""
