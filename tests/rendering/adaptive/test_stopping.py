@@ -73,7 +73,7 @@ def test_the_first_look_waits_while_it_takes_more_than_samples(dear_until, first
 
 def test_where_time_is_short_no_look_waits():
     renderer = Noise(error=0.2, seconds=1.0)
-    track = ErrorTrack(renderer, Sooner(SHOWN), is_expensive=lambda: True)
+    track = ErrorTrack(renderer, Sooner(SHOWN), worth_from=lambda: 100.0)
     goal = Goal(quality=40, max_time=5.5)
     outcome = reach(goal, renderer.add, track, clock=renderer.clock, probe=lambda: 1.0)
     assert renderer.now <= 5.5

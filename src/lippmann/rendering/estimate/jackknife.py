@@ -37,7 +37,7 @@ _CHUNK = 1 << 18
 LONE_SHARE = 0.8 * 8 / 7
 #: ... this: below it the curve is nearly straight, and what is missing elsewhere is small as well.
 LONE_STEP = 0.15
-#: Of fewer batches any hit may be lone.
+#: Of fewer batches any hit may be lone, and none is told to be.
 LONE_TOLD_FROM = 4
 
 
@@ -104,6 +104,7 @@ class _Batches:
             spread += size
             largest = dr.maximum(largest, size)
         decides = (largest > LONE_SHARE * (weight - 1) / weight * spread) & (largest > LONE_STEP * LONE_STEP / 3)
+        decides &= weight >= LONE_TOLD_FROM
         return error, dr.select(decides, error, 0)
 
     def evenness(self) -> Float:
