@@ -42,6 +42,8 @@ Floats = NDArray[np.float32]
 #: The layer of a picture with the number of samples that each pixel had.
 SAMPLES_LAYER = "samples"
 
+#: Samples per pixel that are taken at once where paths come without chains: launches have a cost of their own.
+_CHEAP_TOGETHER = 4.0
 #: What putting a picture together and writing it takes, as a rule.
 _SECONDS_PER_PIXEL_WRITTEN = 1e-7
 
@@ -291,9 +293,13 @@ def _denoised_candidate(job: Job, goal: Goal, batches: FullInBatches, rays: Call
     renderer = _denoised(job, batches, denoiser)
     seconds = 0.0 if goal.max_time is None else denoiser.probe()
 
+    has_chains = isinstance(job.integrator, PathIntegrator) and job.integrator.seen_chains is not None
+
     def worth_from() -> float:
         spent = rays()
-        return batches.samples * look_cost(spent) / spent if spent else 0.0
+        if not spent:
+            return 0.0 if has_chains else _CHEAP_TOGETHER
+        return batches.samples * look_cost(spent) / spent
 
     track = ErrorTrack(renderer, _estimator(job, DenoisedEstimator), DENOISED_SLOPE, seconds, worth_from)
     return _Candidate(renderer, track, denoiser)
