@@ -95,14 +95,19 @@ class MethodRace:
         if self._goal.has_quality and samples < self._pooled.first and room > 1:
             return plain
         pooled = self._pooled.assess(samples)
-        there = self._goal.has_quality and self._goal.missing(pooled.estimate) <= 0
-        with_noise_out = self._outlook(pooled, rays, room, 0.0 if there else look)
+        there = missing_with_margin(self._goal, pooled.estimate, samples, self._pooled) <= 0
+        least = samples_to_trust(self._goal, pooled, samples, self._pooled)
+        with_noise_out = self._outlook(
+            pooled, rays, room, 0.0 if self._goal.has_quality and there else look, least / samples
+        )
         stand = f"after {samples} samples {self._value(pooled)} pooled and {self._value(plain)} plain"
         if with_noise_out < outlook:
             self._lead(self._pooled, stand)
             return pooled
-        # Plain noise falls more reliably than the error left by denoising, unless few paths find the light.
-        self._closed_to = ASKED_AGAIN * samples
+        # Plain noise falls more reliably than the error left by denoising, unless few paths find the light. A picture
+        # that lacks nothing but the margin is assessed again when none is asked for.
+        lacks_margin = self._goal.has_quality and self._goal.missing(pooled.estimate) <= 0
+        self._closed_to = 0.0 if lacks_margin else ASKED_AGAIN * samples
         self._lead(self._plain, f"{stand}, which reaches the goal sooner" if self._goal.has_quality else stand)
         return plain
 
