@@ -235,13 +235,14 @@ def summaries(cases: list[dict[str, Any]], promises: list[dict[str, Any]]) -> di
 
 def summary_of_few(cases: list[dict[str, Any]]) -> dict[str, Any]:
     """By the number of samples: the most by which estimates were too good, in dB, and the margin."""
-    from lippmann.rendering.estimate.psnr import PictureEstimator
+    from lippmann.rendering.estimate.psnr import PictureEstimator, margin_of_few
 
     found: dict[str, Any] = {}
     for samples in FEW_SAMPLES:
         some = [one for one in cases if one["samples"] == samples]
         too_good = {key: max(one["stated"][key] - one[key] for one in some) for key in ("psnr", "worst")}
-        found[str(samples)] = too_good | {"margin": PictureEstimator.margin(samples), "pictures": len(some)}
+        margin = margin_of_few(samples, PictureEstimator.fewest)
+        found[str(samples)] = too_good | {"margin": margin, "pictures": len(some)}
     return found
 
 

@@ -42,10 +42,8 @@ Floats = NDArray[np.float32]
 #: The layer of a picture with the number of samples that each pixel had.
 SAMPLES_LAYER = "samples"
 
-#: Fewest samples at which a picture may be held to have reached a quality where sharp surfaces may mirror emitters, as
-#: photons show: with fewer, both halves may miss a mirrored emitter alike, by up to 10 dB of the worst micro-image.
-FIRST_AMONG_MIRRORS = 16
-
+#: Samples per pixel that are taken at once where paths come without chains: launches have a cost of their own.
+_CHEAP_TOGETHER = 4.0
 #: What putting a picture together and writing it takes, as a rule.
 _SECONDS_PER_PIXEL_WRITTEN = 1e-7
 
@@ -295,11 +293,15 @@ def _denoised_candidate(job: Job, goal: Goal, batches: FullInBatches, rays: Call
     renderer = _denoised(job, batches, denoiser)
     seconds = 0.0 if goal.max_time is None else denoiser.probe()
 
-    def is_expensive() -> bool:
-        spent = rays()
-        return 0 < spent < look_cost(spent)
+    has_chains = isinstance(job.integrator, PathIntegrator) and job.integrator.seen_chains is not None
 
-    track = ErrorTrack(renderer, _estimator(job, DenoisedEstimator), DENOISED_SLOPE, seconds, is_expensive)
+    def worth_from() -> float:
+        spent = rays()
+        if not spent:
+            return 0.0 if has_chains else _CHEAP_TOGETHER
+        return batches.samples * look_cost(spent) / spent
+
+    track = ErrorTrack(renderer, _estimator(job, DenoisedEstimator), DENOISED_SLOPE, seconds, worth_from)
     return _Candidate(renderer, track, denoiser)
 
 
@@ -311,7 +313,7 @@ def _estimator(job: Job, kind: type[PictureEstimator] = PictureEstimator) -> Pic
     """Judges a display's picture by its micro-images, a quilt by its views."""
     estimator = _estimator_of_parts(job, kind)
     if isinstance(job.integrator, PathIntegrator) and job.integrator.photons is not None:
-        estimator.first = estimator.fewest = FIRST_AMONG_MIRRORS
+        estimator.expect_mirrors()
     return estimator
 
 

@@ -62,9 +62,9 @@ class Sooner(PictureEstimator):
 
 @pytest.mark.parametrize(("dear_until", "first"), [(0, 4), (5, 8), (100, 8)])
 def test_the_first_look_waits_while_it_takes_more_than_samples(dear_until, first):
-    """Not longer than for twice the fewest samples; whatever comes then is a multiple of the batches again."""
+    """Not longer than for 8 samples; whatever comes then is a multiple of the batches again."""
     renderer = Noise(error=0.2)
-    track = ErrorTrack(renderer, Sooner(SHOWN), is_expensive=lambda: 0 < renderer.samples < dear_until)
+    track = ErrorTrack(renderer, Sooner(SHOWN), worth_from=lambda: dear_until if renderer.samples else 0)
     outcome = reach(Goal(quality=40), renderer.add, track, clock=renderer.clock)
     found = [each.samples for each in outcome.rounds]
     assert found[0] == first
@@ -73,7 +73,7 @@ def test_the_first_look_waits_while_it_takes_more_than_samples(dear_until, first
 
 def test_where_time_is_short_no_look_waits():
     renderer = Noise(error=0.2, seconds=1.0)
-    track = ErrorTrack(renderer, Sooner(SHOWN), is_expensive=lambda: True)
+    track = ErrorTrack(renderer, Sooner(SHOWN), worth_from=lambda: 100.0)
     goal = Goal(quality=40, max_time=5.5)
     outcome = reach(goal, renderer.add, track, clock=renderer.clock, probe=lambda: 1.0)
     assert renderer.now <= 5.5

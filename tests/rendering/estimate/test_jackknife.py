@@ -33,7 +33,10 @@ def slow_errors(sums, taken):
     moves = {k: np.square(without[k] - middle).mean(axis=1) for k in held}
     jackknife = sum(moves[k] * (count - taken[k]) / count for k in held)
     largest, spread = np.max(list(moves.values()), axis=0), sum(moves.values())
-    lone = np.where((largest > 0.8 * spread) & (largest > 0.15**2 / 3), jackknife, 0)
+    # Of the largest share that one of so many can have.
+    share = 0.8 * 8 / 7 * (len(held) - 1) / len(held)
+    is_lone = (len(held) >= 4) & (largest > share * spread) & (largest > 0.15**2 / 3)
+    lone = np.where(is_lone, jackknife, 0)
 
     def apart(half):
         """Squared error of the mean by what a half and the rest differ by; None if one of them has no samples."""
@@ -67,7 +70,7 @@ def test_errors_are_those_of_the_definition(taken):
     expected, expected_lone = slow_errors(sums, taken)
     np.testing.assert_allclose(found, expected, rtol=1e-3, atol=2e-6)
     np.testing.assert_allclose(lone, expected_lone, rtol=1e-3, atol=2e-6)
-    assert (expected_lone > 0).any() == (np.count_nonzero(taken) >= 6)
+    assert (expected_lone > 0).any() == (np.count_nonzero(taken) >= 4)
 
 
 def picture(batches, taken=None):

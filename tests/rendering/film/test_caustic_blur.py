@@ -16,10 +16,14 @@ WHOLE = PixelWindow(0, 0, SIZE, SIZE)
 class PlaneOfPhotons:
     """Stands in for photons of passes: spread over a plane, as dense as ``light`` says at their places."""
 
-    samples_of_pixel = 8
-
     def __init__(self, light, radius, count=400_000):
+        from lippmann.rendering.transport.caustic_photons import PassSchedule
+
         self._light, self._radius, self._count = light, radius, count
+        self.schedule = PassSchedule(8, 8)
+
+    def relative_radius(self, number):
+        return (5 / 6) ** (number / 2)
 
     def of_pass(self, number):
         from lippmann.rendering.transport.photon_map import PhotonMap, Photons
@@ -31,7 +35,7 @@ class PlaneOfPhotons:
             up = np.tile(np.float32([0, 0, 1]), (self._count, 1))
             power = np.repeat(self._light(position[:, :1]) * 16 / self._count, 3, axis=1).astype(np.float32)
             halves.append(Photons(position, up, up, power, np.ones(self._count, np.uint32)))
-        return PhotonMap((halves[0], halves[1]), self._radius)
+        return PhotonMap((halves[0], halves[1]), self._radius * self.relative_radius(number))
 
 
 def matt_plane(passes):
@@ -89,7 +93,11 @@ def test_an_edge_is_told_to_a_factor():
     assert found == pytest.approx(true / 2.315, rel=0.15)
 
 
-def test_pixels_are_the_same_in_parts_and_fewer_stand_for_all():
+def test_pixels_are_the_same_in_parts_and_fewer_stand_for_all(monkeypatch):
+    from lippmann.rendering.film import caustic_blur
+
+    monkeypatch.setattr(caustic_blur, "SAMPLES_OF_LOOK", 16)
+    monkeypatch.setattr(caustic_blur, "FEWEST_LOOKED_AT", 0)
     light = lambda x: np.where(x > 0, 1.0, 0.0)  # noqa: E731
     whole = blur_of(light, 0.1, samples=8)
     looked = (whole != 0).any(axis=2)
@@ -97,9 +105,22 @@ def test_pixels_are_the_same_in_parts_and_fewer_stand_for_all():
     part = PixelWindow(8, 4, 16, 12)
     np.testing.assert_array_equal(blur_of(light, 0.1, samples=8, window=part), whole[part.slices])
     every = blur_of(light, 0.1, samples=16)
-    # In two passes, of which the second has a smaller radius.
-    shrunk = np.square((1 + 5 / 6) / 2)
-    assert whole.mean() * shrunk == pytest.approx(every.mean(), rel=0.3)
+    # In two passes, of which the second is looked at: its radius is smaller, and what an edge adds is as that.
+    looked_at = whole.mean() * np.sqrt(5 / 6)
+    assert every.mean() == pytest.approx(looked_at * np.square((1 + 5 / 6) / 2 / (5 / 6)), rel=0.3)
+
+
+def test_a_look_is_repeated_at_twice_the_share(monkeypatch):
+    from lippmann.rendering.film import caustic_blur
+
+    monkeypatch.setattr(caustic_blur, "SAMPLES_OF_LOOK", 64)
+    monkeypatch.setattr(caustic_blur, "FEWEST_LOOKED_AT", SIZE * SIZE // 4)
+    integrator, source = matt_plane(PlaneOfPhotons(lambda x: 1 + 5 * x**2, 0.2))
+    blur = caustic_blur.SquaredBlur(integrator, source, WHOLE, 3)
+    looked = [float((blur.after(samples) != 0).any(axis=2).mean()) for samples in (8, 24, 32, 64)]
+    assert looked[0] == looked[1] == pytest.approx(0.25, abs=0.1)
+    assert looked[2] == pytest.approx(0.5, abs=0.1)
+    assert looked[3] > 0.95
 
 
 def test_the_estimate_of_a_picture_counts_it():

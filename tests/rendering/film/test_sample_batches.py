@@ -201,11 +201,12 @@ def test_samples_of_one_pass_are_taken_together():
     import mitsuba as mi
 
     from lippmann.rendering.film.caustics import stretches
+    from lippmann.rendering.transport.caustic_photons import PassSchedule
     from lippmann.rendering.transport.path import PathIntegrator
     from lippmann.rendering.transport.scene_features import make_scene_features
 
     class Passes:
-        samples_of_pixel = 32
+        schedule = PassSchedule(32, 32)
 
         def of_pass(self, number):
             return f"photons {number}"

@@ -309,7 +309,7 @@ def photons_of(scene_dict, **options):
 
     scene = mi.load_dict({"type": "scene"} | scene_dict)
     features = make_scene_features(scene, has_null=False)
-    return CausticPhotons(scene, features, find_casters(scene), samples=1, seed=2, **options)
+    return CausticPhotons(scene, features, find_casters(scene), **({"samples": 1, "seed": 2} | options))
 
 
 def test_passes_have_photons_of_their_own_and_shrinking_radii():
@@ -342,3 +342,29 @@ def test_what_is_not_seen_gets_few_photons():
         chosen.inside(region).power.sum(axis=0), everywhere.inside(region).power.sum(axis=0), rtol=0.02
     )
     assert photons_of(scene, region=np.array([[50.0, 50, 50], [51, 51, 51]])).are_none
+
+
+def test_later_passes_serve_as_many_samples_as_all_before():
+    from lippmann.rendering.transport.caustic_photons import PassSchedule
+
+    schedule = PassSchedule(8, 32)
+    assert [schedule.samples(number) for number in range(6)] == [8, 8, 16, 32, 32, 32]
+    ends = np.cumsum([schedule.samples(number) for number in range(40)])
+    for sample in range(1200):
+        number = int(np.searchsorted(ends, sample, side="right"))
+        assert schedule.at(sample) == (number, ends[number] - sample)
+    alike = PassSchedule(1 << 32, 1 << 32)
+    assert alike.at(1 << 20) == (0, (1 << 32) - (1 << 20))
+
+
+def test_passes_of_more_photons_have_smaller_radii():
+    from lippmann.rendering.transport.caustic_photons import FEWEST, SAMPLES_OF_EMISSION, PassSchedule, radius_of_pass
+
+    ball = {"ball": {"type": "sphere", "bsdf": {"type": "dielectric"}}, "room": room(), "lamp": lamp([0, 0, 4.0])}
+    samples = FEWEST * SAMPLES_OF_EMISSION
+    photons = photons_of(ball, samples=samples, schedule=PassSchedule(8, 16))
+    for number, times in enumerate((1, 1, 2, 2)):
+        shrunk = radius_of_pass(number) / times**0.25
+        assert photons.relative_radius(number) == pytest.approx(shrunk, rel=1e-6)
+    few, many = (len(photons.of_pass(number).halves[0]) for number in (1, 2))
+    assert many == pytest.approx(2 * few, rel=0.05)

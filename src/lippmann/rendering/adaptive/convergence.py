@@ -9,10 +9,12 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from lippmann.rendering.estimate.pixel_errors import PixelErrors
-from lippmann.rendering.estimate.psnr import Estimate, PictureEstimator
+from lippmann.rendering.estimate.psnr import Estimate, Margin, PictureEstimator
 
 #: Power of the number of samples by which the squared error of Monte Carlo noise falls.
 PLAIN_SLOPE = 1.0
+#: Samples per pixel after which a first assessment waits no longer for its cost.
+LONGEST_WAIT = 8
 #: Range of powers taken from two noisy estimates.
 MIN_SLOPE, MAX_SLOPE = 0.3, 1.2
 
@@ -39,7 +41,7 @@ class Assessor(Protocol):
         """Samples per pixel below which an estimate counts only beyond :meth:`margin`."""
         ...
 
-    def margin(self, samples: int) -> float:
+    def margin(self, samples: int) -> Margin:
         """dB by which the estimate of so few ``samples`` per pixel must exceed the quality asked for."""
         ...
 
@@ -69,8 +71,8 @@ class ErrorTrack:
         Power of the sample count by which its squared error is expected to fall.
     seconds:
         Cost of an assessment before any was made.
-    is_expensive:
-        Whether an assessment costs more than all samples so far; then the first one waits.
+    worth_from:
+        Samples per pixel that cost as much as an assessment, 0 where that is not known; the first one waits for these.
     """
 
     def __init__(
@@ -79,26 +81,29 @@ class ErrorTrack:
         estimator: PictureEstimator,
         slope: float = PLAIN_SLOPE,
         seconds: float = 0.0,
-        is_expensive: Callable[[], bool] = lambda: False,
+        worth_from: Callable[[], float] = lambda: 0.0,
     ) -> None:
         self._picture = picture
         self._estimator = estimator
         self._expected = slope
         self._seconds = seconds
-        self._is_expensive = is_expensive
+        self._worth_from = worth_from
         self._rounds: list[tuple[int, Estimate]] = []
 
     @property
     def first(self) -> int:
-        """The estimator's; twice as many while an assessment is expensive, as it may have to be repeated."""
-        return self._estimator.first * (2 if self._is_expensive() else 1)
+        """The estimator's; doubled while an assessment, which may have to be repeated, costs more than the samples."""
+        first, most = self._estimator.first, max(self._estimator.first, LONGEST_WAIT)
+        while first < most and first < self._worth_from():
+            first *= 2
+        return first
 
     @property
     def fewest(self) -> int:
         """The estimator's, but at least :attr:`first`."""
         return max(self._estimator.fewest, self.first)
 
-    def margin(self, samples: int) -> float:
+    def margin(self, samples: int) -> Margin:
         """The estimator's."""
         return self._estimator.margin(samples)
 

@@ -16,6 +16,7 @@ from typing import Literal
 from lippmann.rendering.adaptive.convergence import Assessment, ErrorTrack
 from lippmann.rendering.adaptive.stopping import LEAST_GROWTH, Goal, missing_with_margin, samples_to_trust
 from lippmann.rendering.denoise.cost_model import look_cost
+from lippmann.rendering.estimate.psnr import Margin
 
 Way = Literal["plain", "pooled"]
 
@@ -67,15 +68,15 @@ class MethodRace:
 
     @property
     def first(self) -> int:
-        """The leader's; at first that of plain samples, whose assessment is cheap."""
-        return (self._leading or self._plain).first
+        """The leader's; at first that of the method that may be assessed sooner."""
+        return self._leading.first if self._leading else min(self._plain.first, self._pooled.first)
 
     @property
     def fewest(self) -> int:
         """The leader's; at first that of pooled light, which is trusted sooner."""
         return (self._leading or self._pooled).fewest
 
-    def margin(self, samples: int) -> float:
+    def margin(self, samples: int) -> Margin:
         """The leader's; at first that of plain samples."""
         return (self._leading or self._plain).margin(samples)
 
@@ -94,14 +95,19 @@ class MethodRace:
         if self._goal.has_quality and samples < self._pooled.first and room > 1:
             return plain
         pooled = self._pooled.assess(samples)
-        there = self._goal.has_quality and self._goal.missing(pooled.estimate) <= 0
-        with_noise_out = self._outlook(pooled, rays, room, 0.0 if there else look)
+        there = missing_with_margin(self._goal, pooled.estimate, samples, self._pooled) <= 0
+        least = samples_to_trust(self._goal, pooled, samples, self._pooled)
+        with_noise_out = self._outlook(
+            pooled, rays, room, 0.0 if self._goal.has_quality and there else look, least / samples
+        )
         stand = f"after {samples} samples {self._value(pooled)} pooled and {self._value(plain)} plain"
         if with_noise_out < outlook:
             self._lead(self._pooled, stand)
             return pooled
-        # Plain noise falls more reliably than the error left by denoising, unless few paths find the light.
-        self._closed_to = ASKED_AGAIN * samples
+        # Plain noise falls more reliably than the error left by denoising, unless few paths find the light. A picture
+        # that lacks nothing but the margin is assessed again when none is asked for.
+        lacks_margin = self._goal.has_quality and self._goal.missing(pooled.estimate) <= 0
+        self._closed_to = 0.0 if lacks_margin else ASKED_AGAIN * samples
         self._lead(self._plain, f"{stand}, which reaches the goal sooner" if self._goal.has_quality else stand)
         return plain
 

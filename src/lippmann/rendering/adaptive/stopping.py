@@ -17,14 +17,14 @@ from typing import Literal
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.rendering.adaptive.convergence import Assessment, Assessor
 from lippmann.rendering.estimate.pixel_errors import PixelErrors
-from lippmann.rendering.estimate.psnr import Estimate
+from lippmann.rendering.estimate.psnr import NO_MARGIN, Estimate, Margin
 from lippmann.rendering.request.render_request import RenderRequest
 
 End = Literal["quality", "time", "samples"]
 
 #: The fewest samples that tell an error.
 FEWEST = 2
-#: Samples add up to multiples of this, so that all batches get the same.
+#: Samples add up to multiples of this, so that all batches get the same; the first few of them to half of it.
 STEP = 8
 #: The most by which one round multiplies the samples of a pixel, and the least.
 MOST_GROWTH, LEAST_GROWTH = 4.0, 1.2
@@ -76,26 +76,28 @@ class Goal:
         """Whether some quality is asked for."""
         return self.quality is not None or self.quality_worst is not None
 
-    def missing(self, estimate: Estimate) -> float:
-        """How many dB the picture is short of the quality; at most 0 if it has it.
+    def missing(self, estimate: Estimate, margin: Margin = NO_MARGIN) -> float:
+        """How many dB the picture is short of the quality and a ``margin``; at most 0 if it has both.
 
-        It has it where the quality is the likely one, and is missed by more than ``TOLERANCE`` only with a probability
-        of 2.5 %.
+        It has the quality where that is the likely one, and is missed by more than ``TOLERANCE`` only with a
+        probability of 2.5 %.
         """
-        short = [self.likely_missing(estimate)]
+        short = [-math.inf]
         if self.quality is not None:
-            short.append(self.quality - TOLERANCE - estimate.psnr_low)
+            has = min(estimate.psnr, estimate.psnr_low + TOLERANCE)
+            short.append(self.quality + margin.whole - has)
         if self.least_worst is not None:
-            short.append(self.least_worst - TOLERANCE - estimate.worst_low)
+            has = min(estimate.worst, estimate.worst_low + TOLERANCE)
+            short.append(self.least_worst + margin.worst - has)
         return max(short)
 
-    def likely_missing(self, estimate: Estimate) -> float:
+    def likely_missing(self, estimate: Estimate, margin: Margin = NO_MARGIN) -> float:
         """How many dB the likely PSNR is short, whatever its interval: that gets narrower as samples grow."""
         short = [-math.inf]
         if self.quality is not None:
-            short.append(self.quality - estimate.psnr)
+            short.append(self.quality + margin.whole - estimate.psnr)
         if self.least_worst is not None:
-            short.append(self.least_worst - estimate.worst)
+            short.append(self.least_worst + margin.worst - estimate.worst)
         return max(short)
 
     @property
@@ -183,18 +185,20 @@ def reach(
 
 def missing_with_margin(goal: Goal, estimate: Estimate, samples: int, assessor: Assessor) -> float:
     """dB by which ``estimate`` is short of ``goal`` and the margin that ``assessor`` asks of so few samples."""
-    return goal.missing(estimate) + assessor.margin(samples)
+    return goal.missing(estimate, assessor.margin(samples))
 
 
 def samples_to_trust(goal: Goal, assessment: Assessment, samples: int, assessor: Assessor) -> int:
     """Samples per pixel at which ``assessor`` is expected to be trusted, after an ``assessment`` at ``samples``.
 
-    Doubled until the picture should exceed ``goal`` by the margin, or no margin is needed any more.
+    Doubled until the likely PSNR should exceed ``goal`` by the margin, or no margin is needed any more.
     """
     needed = samples
+    if missing_with_margin(goal, assessment.estimate, samples, assessor) > 0:
+        needed *= 2
     while needed < assessor.fewest:
         gained = 10 * assessment.slope * math.log10(needed / samples)
-        if missing_with_margin(goal, assessment.estimate, needed, assessor) <= gained:
+        if goal.likely_missing(assessment.estimate, assessor.margin(needed)) <= gained:
             break
         needed *= 2
     return needed
@@ -280,7 +284,8 @@ class _AdaptiveLoop:
             wanted = float(samples_to_trust(self.goal, assessment, self.spent, self.assessor))
         else:
             wanted = max(self.spent * self._growth(assessment.estimate), self.assessor.fewest)
-        total = max(STEP * round(wanted / STEP), STEP * (self.spent // STEP + 1))
+        step = STEP if self.spent >= STEP // 2 else STEP // 2
+        total = max(step * round(wanted / step), step * (self.spent // step + 1))
         samples = min(total, self._most) - self.spent
         return samples if self.goal.max_time is None else min(samples, self._affordable())
 

@@ -49,6 +49,8 @@ FAR_ABOVE = 4.0
 DROWNED = 8.0
 #: With fewer samples a single one is farther off, and more likely all there is of its light: less is left out then.
 MANY = 16
+#: Share of the samples' error that is taken to rest on lone hits where too few batches tell them.
+UNTOLD_LONE = 0.25
 #: Linear steps below this are as good as a slope, and hold rounding.
 _LEAST_STEP = 1e-4
 #: A clean picture from a noisy one; and whether that is to be turned, see
@@ -142,7 +144,7 @@ class Denoised:
         samples = self._renderer.squared_error()
         if self._renderer.samples < LONE_TOLD_FROM:
             # Any hit may be.
-            samples = replace(samples, lone=np.maximum(samples.values, 0))
+            samples = replace(samples, lone=np.float32(UNTOLD_LONE) * np.maximum(samples.values, 0))
         return PixelErrors(common + apart, self._lone_seen(samples, slope), CROSS_NOISE, samples, apart)
 
     def _lone_seen(self, samples: PixelErrors, slope: Floats) -> Floats | None:

@@ -32,12 +32,13 @@ Floats = NDArray[np.float32]
 
 #: Pixels worked on at a time.
 _CHUNK = 1 << 18
-#: A hit is lone if it makes up this share of what the batches differ by, and moves the code by as much as ...
-LONE_SHARE = 0.8
+#: A hit is lone if it makes up this part of the largest share of what the batches differ by that one can have,
+#: ``(batches - 1) / batches``, and moves the code by as much as ...
+LONE_SHARE = 0.8 * 8 / 7
 #: ... this: below it the curve is nearly straight, and what is missing elsewhere is small as well.
 LONE_STEP = 0.15
-#: Of fewer batches a hit in one is never that large a share, ``(batches - 1) / batches``.
-LONE_TOLD_FROM = 6
+#: Of fewer batches any hit may be lone, and none is told to be.
+LONE_TOLD_FROM = 4
 
 
 def error_of_batches(sums: Floats, taken: Sequence[int], transfer: Transfer) -> tuple[Floats, Floats]:
@@ -102,7 +103,8 @@ class _Batches:
             error += size * (self.count - count) / self.count
             spread += size
             largest = dr.maximum(largest, size)
-        decides = (largest > LONE_SHARE * spread) & (largest > LONE_STEP * LONE_STEP / 3)
+        decides = (largest > LONE_SHARE * (weight - 1) / weight * spread) & (largest > LONE_STEP * LONE_STEP / 3)
+        decides &= weight >= LONE_TOLD_FROM
         return error, dr.select(decides, error, 0)
 
     def evenness(self) -> Float:

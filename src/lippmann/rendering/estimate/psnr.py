@@ -90,6 +90,10 @@ LONE_DOUBT = 0.8
 #: In dB, for half the samples of which estimates are believed. On scenes that are hard to judge, those of 4 were up to
 #: 6.7 dB too good, those of 8 up to 3.6.
 MARGIN_OF_HALF = 4.0
+#: Where sharp surfaces may mirror emitters, as photons show: the samples at which a picture may first be believed, and
+#: with fewer of which the worst micro-image must be better by so many dB. All samples may have missed an emitter that
+#: is mirrored in a few pixels; then the statement was up to 7.7 dB above what is true.
+FIRST_AMONG_MIRRORS, FEWEST_AMONG_MIRRORS, WORST_AMONG_MIRRORS = 8, 16, 8.0
 #: Micro-images that may be the worst are drawn this many times.
 DRAWS = 2000
 #: Of very many micro-images only so many can be the worst.
@@ -100,6 +104,17 @@ NORMAL_95 = 1.96
 #: Of the draws of the worst error: lenses that are worse pull their neighbours, so the better side goes farther.
 LOW_QUANTILE = 0.01
 _FLOOR = 10 ** (-CEILING / 10)
+
+
+@dataclass(frozen=True)
+class Margin:
+    """dB by which an estimate must exceed what is asked for: of the ``whole`` picture, and of its ``worst`` part."""
+
+    whole: float = 0.0
+    worst: float = 0.0
+
+
+NO_MARGIN = Margin()
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,6 +161,7 @@ class PictureEstimator:
     """
 
     first, fewest = 4, 16
+    _is_among_mirrors = False
 
     def __init__(self, of: Display | Parts) -> None:
         parts = Parts.micro_images(of) if isinstance(of, Display) else of
@@ -153,10 +169,16 @@ class PictureEstimator:
         self._owner = parts.owner.ravel()
         self._pixels = np.bincount(self._owner, minlength=parts.rows * parts.columns) + parts.known
 
-    @classmethod
-    def margin(cls, samples: int) -> float:
+    def expect_mirrors(self) -> None:
+        """Believe later: sharp surfaces may mirror emitters."""
+        self.first, self.fewest = FIRST_AMONG_MIRRORS, FEWEST_AMONG_MIRRORS
+        self._is_among_mirrors = True
+
+    def margin(self, samples: int) -> Margin:
         """By how many dB the estimate of a picture of ``samples`` must be better than what is asked for."""
-        return MARGIN_OF_HALF * max(0.0, math.log2(cls.fewest / samples))
+        of_few = margin_of_few(samples, self.fewest)
+        mirrored = self._is_among_mirrors and samples < self.fewest
+        return Margin(of_few, max(of_few, WORST_AMONG_MIRRORS) if mirrored else of_few)
 
     def estimate(self, errors: PixelErrors) -> Estimate:
         """PSNR of the whole and of the worst micro-image."""
@@ -170,6 +192,11 @@ class PictureEstimator:
         for first, last in row_blocks(height, width):
             sums.add(self._owner[first * width : last * width], errors.part(slice(first, last)))
         return sums
+
+
+def margin_of_few(samples: int, fewest: int) -> float:
+    """dB by which plain pictures of ``samples`` must exceed what is asked for, where ``fewest`` are trusted."""
+    return MARGIN_OF_HALF * max(0.0, math.log2(fewest / samples))
 
 
 def estimate_of_sums(sums: ErrorSums, grid: tuple[int, int], noise: NoiseShares) -> Estimate:

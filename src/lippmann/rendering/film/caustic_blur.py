@@ -16,7 +16,7 @@ from lippmann.display.pixel_window import PixelWindow
 from lippmann.rendering.film.lane_order import divide
 from lippmann.rendering.film.wavefront import shown_colors
 from lippmann.rendering.transport.caustic_blur import CausticBlur
-from lippmann.rendering.transport.caustic_photons import radius_of_pass
+from lippmann.rendering.transport.caustic_photons import CausticPhotons
 from lippmann.rendering.transport.integrator import Integrator
 from lippmann.rendering.transport.path import PathIntegrator
 from lippmann.rendering.transport.photon_map import PhotonMap
@@ -24,8 +24,9 @@ from lippmann.rendering.transport.ray_source import RaySource, pixel_number
 
 Floats = NDArray[np.float32]
 
-#: Of a picture of fewer samples only so many pixels are looked at, one for each in this many samples.
-SAMPLES_OF_LOOK = 16
+#: Of a picture of fewer samples only some pixels are looked at, one for each in this many samples; and so many of the
+#: whole picture, at least.
+SAMPLES_OF_LOOK, FEWEST_LOOKED_AT = 64, 1 << 14
 _LOOK_SEED = 0x2545F491
 _LANES = 1 << 20
 
@@ -46,8 +47,8 @@ class SquaredBlur:
         self._source = source
         self._window = window
         self._seed = seed
-        self._share = 0.0
-        self._of_first_pass = np.zeros((0, 3), np.float32)
+        self._share, self._pass = 0.0, 0
+        self._of_pass = np.zeros((0, 3), np.float32)
 
     def after(self, samples: int) -> Floats | None:
         """``(H, W, 3)`` for a picture of so many samples per pixel; None where no photons are in passes.
@@ -57,14 +58,15 @@ class SquaredBlur:
         passes = self._integrator.photon_passes if isinstance(self._integrator, PathIntegrator) else None
         if passes is None:
             return None
-        share = min(1.0, samples / SAMPLES_OF_LOOK)
-        if share != self._share:
-            self._share, self._of_first_pass = share, self._looked(passes.of_pass(0), share)
-        # Later passes blur less: in proportion to the squares of their radii.
-        count = -(-samples // passes.samples_of_pixel)
-        in_pass = np.minimum(samples - np.arange(count) * passes.samples_of_pixel, passes.samples_of_pixel)
-        shrunk = float((in_pass * np.square([radius_of_pass(k) for k in range(count)])).sum() / samples)
-        return (self._of_first_pass * np.float32(shrunk**2)).reshape(*self._window.shape, 3)
+        pixels = self._source.width * self._source.height
+        share = min(1.0, max(samples / SAMPLES_OF_LOOK, FEWEST_LOOKED_AT / pixels))
+        # A look is worth its time again at twice the share.
+        if share >= 2 * self._share or share == 1.0 > self._share:
+            # The photons that the last sample met are at hand.
+            self._share, (self._pass, _) = share, passes.schedule.at(samples - 1)
+            self._of_pass = self._looked(passes.of_pass(self._pass), share)
+        scaled = _mean_area(passes, samples) / passes.relative_radius(self._pass) ** 2
+        return (self._of_pass * np.float32(scaled**2)).reshape(*self._window.shape, 3)
 
     def _looked(self, photons: PhotonMap, share: float) -> Floats:
         """``(pixels, 3)`` by a look at this share of the pixels, each of which stands for its like."""
@@ -77,6 +79,16 @@ class SquaredBlur:
             part = looked[first : first + step]
             found[part] = _products(blur, self._source, self._window, part, self._seed) / np.float32(share)
         return found
+
+
+def _mean_area(passes: CausticPhotons, samples: int) -> float:
+    """Mean squared radius of the passes that serve so many samples, over that of the first: blur is as that."""
+    total, sample = 0.0, 0
+    while sample < samples:
+        number, left = passes.schedule.at(sample)
+        total += min(left, samples - sample) * passes.relative_radius(number) ** 2
+        sample += left
+    return total / samples
 
 
 def _looked_at(source: RaySource, window: PixelWindow, seed: int, share: float) -> NDArray[np.intp]:

@@ -22,6 +22,7 @@ from lippmann.rendering.transport.caustic_photons import (
     SAMPLES_OF_EMISSION,
     CausticPhotons,
     IsMissed,
+    PassSchedule,
     emissions,
     no_photons,
 )
@@ -29,8 +30,8 @@ from lippmann.rendering.transport.integrator import Integrator
 from lippmann.rendering.transport.path import PathIntegrator
 from lippmann.rendering.transport.ray_source import RaySource
 
-#: Samples of a pixel that one pass of photons serves, at least.
-PASS_SAMPLES = 32
+#: Samples of a pixel that one pass of photons serves, at least; and the first one of a picture that may need no more.
+PASS_SAMPLES, FIRST_PASS_SAMPLES = 32, 8
 #: Share of the memory for photons of passes that tiles and bands ask for in turn.
 KEPT_SHARE = 0.25
 #: Rays that tell what is seen, to the side of a square; the share of their ends that may lie apart from the others, to
@@ -46,9 +47,9 @@ def stretches(integrator: Integrator, first: int, samples: int) -> Iterator[int]
         return
     assert isinstance(integrator, PathIntegrator)
     while samples > 0:
-        number, within = divmod(first, passes.samples_of_pixel)
+        number, left = passes.schedule.at(first)
         integrator.photons = passes.of_pass(number)
-        count = min(samples, passes.samples_of_pixel - within)
+        count = min(samples, left)
         yield count
         first, samples = first + count, samples - count
 
@@ -74,11 +75,12 @@ def give_photons(
     if casters.pairs == 0:
         return None
     pixels = source.width * source.height * source.channels
-    each = max(PASS_SAMPLES, (FEWEST if request.is_open_ended else MOST) * SAMPLES_OF_EMISSION // pixels)
-    passes = 1 if request.is_open_ended else -(-request.samples // each)
-    whole = pixels * (each if request.is_open_ended else min(each, request.samples))
+    schedule = _schedule(pixels, request.is_open_ended)
+    passes = 1 if request.is_open_ended else -(-request.samples // schedule.most)
+    # Where the samples are known, a single pass is for no more than these.
+    most = schedule.most if request.is_open_ended else min(schedule.most, request.samples)
     # No fewer where memory is short: it does not change a picture.
-    required = 2 * emissions(whole) * PHOTON
+    required = 2 * emissions(pixels * most) * PHOTON
     if required > memory:
         if request.caustics == "auto":
             return _left_to_paths(integrator)
@@ -88,8 +90,8 @@ def give_photons(
         integrator.scene,
         integrator.features,
         casters,
-        samples=whole,
-        samples_of_pixel=each,
+        samples=pixels * min(schedule.first, most),
+        schedule=schedule,
         seed=request.seed,
         region=_region_about(seen),
         kept=max(1, min(passes, int(KEPT_SHARE * memory) // required)),
@@ -100,6 +102,13 @@ def give_photons(
     integrator.photons = photons.of_pass(0)
     integrator.photon_passes = photons
     return "photons"
+
+
+def _schedule(pixels: int, is_open_ended: bool) -> PassSchedule:
+    """Passes of photons for a picture of so many pixels, channels apart."""
+    fewest = (FEWEST if is_open_ended else MOST) * SAMPLES_OF_EMISSION // pixels
+    most = max(PASS_SAMPLES, fewest)
+    return PassSchedule(max(FIRST_PASS_SAMPLES, fewest) if is_open_ended else most, most)
 
 
 def _left_to_paths(integrator: PathIntegrator) -> Literal["paths"] | None:

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import drjit as dr
 import mitsuba as mi
@@ -77,20 +78,55 @@ def emissions(samples: int) -> int:
     return int(np.clip(samples // SAMPLES_OF_EMISSION, FEWEST, MOST))
 
 
+@dataclass(frozen=True)
+class PassSchedule:
+    """Which samples of a pixel each pass of photons serves.
+
+    Parameters
+    ----------
+    first:
+        Samples of a pixel that the first pass serves, at least 1.
+    most:
+        A later pass serves as many samples as all passes before it together, but at most so many; at least ``first``.
+    """
+
+    first: int
+    most: int
+
+    def samples(self, number: int) -> int:
+        """Samples of a pixel that pass ``number`` serves, from 0 on."""
+        before, count = 0, self.first
+        for _ in range(number):
+            if count == self.most:
+                break
+            before += count
+            count = min(before, self.most)
+        return count
+
+    def at(self, sample: int) -> tuple[int, int]:
+        """The pass that serves ``sample``, from 0 on, and how many samples it still serves, this one included."""
+        number, before, count = 0, 0, self.first
+        while sample >= before + count and count < self.most:
+            number, before = number + 1, before + count
+            count = min(before, self.most)
+        more, within = divmod(sample - before, count)
+        return number + more, count - within
+
+
 class CausticPhotons:
     """Photons of a picture's caustics in passes, each for the next samples of every pixel.
 
     Passes know nothing of each other, and their radii shrink (Knaus and Zwicker 2011, with alpha = 2/3), so that the
-    mean over them comes to have neither noise nor blur.
+    mean over them comes to have neither noise nor blur. Passes of more photons have smaller radii, too.
 
     Parameters
     ----------
     scene, features, casters:
         What they are shot in.
     samples:
-        Of all pixels together for which the photons of one pass are.
-    samples_of_pixel:
-        Those of one pixel; None where one pass is for all.
+        Of all pixels together for which the photons of the first pass are.
+    schedule:
+        Samples of one pixel that each pass serves; None where one pass is for all.
     seed:
         0 to 2**32 - 1: the same gives the same photons.
     region:
@@ -109,14 +145,14 @@ class CausticPhotons:
         *,
         samples: int,
         seed: int,
-        samples_of_pixel: int | None = None,
+        schedule: PassSchedule | None = None,
         region: NDArray[np.float64] | None = None,
         kept: int = 1,
         is_missed: IsMissed | None = None,
     ) -> None:
         self._shooter = PhotonShooter(scene, features, casters)
-        self.samples_of_pixel = samples_of_pixel or 1 << 32
-        self._count = emissions(samples)
+        self.schedule = schedule or PassSchedule(1 << 32, 1 << 32)
+        self._samples = samples
         self._seed = seed
         self._region = region
         self._kept = kept
@@ -129,6 +165,15 @@ class CausticPhotons:
         """Whether a few emissions of each emitter and caster brought nothing that is seen, or missed."""
         return self._chances is None
 
+    def relative_radius(self, number: int) -> float:
+        """Radius of a look-up in pass ``number`` over that in the first."""
+        # The area of a look-up is as the number of photons in it, the root of all, over their density.
+        return radius_of_pass(number) * math.sqrt(math.sqrt(self._emissions(0) / self._emissions(number)))
+
+    def _emissions(self, number: int) -> int:
+        """Of each half in a pass."""
+        return emissions(self._samples * self.schedule.samples(number) // self.schedule.first)
+
     def of_pass(self, number: int) -> PhotonMap:
         """The photons of pass ``number``, from 0 on; a map without any where there are none."""
         if self._chances is None:
@@ -139,11 +184,12 @@ class CausticPhotons:
             while len(self._maps) >= self._kept:
                 del self._maps[next(iter(self._maps))]
             seeds = [(self._seed + step + number * _PASS_STEP) % 2**32 for step in _SEED_STEPS]
-            first, second = (self._shooter.shoot(self._count, self._chances, seed)[0] for seed in seeds)
+            count = self._emissions(number)
+            first, second = (self._shooter.shoot(count, self._chances, seed)[0] for seed in seeds)
             if number == 0 and not self._radius:
-                neighbours = NEIGHBOURS * math.sqrt(self._count / EMISSIONS_OF_NEIGHBOURS)
+                neighbours = NEIGHBOURS * math.sqrt(count / EMISSIONS_OF_NEIGHBOURS)
                 self._radius = _radius(first.inside(self._region), neighbours)
-            self._maps[number] = PhotonMap((first, second), self._radius * radius_of_pass(number))
+            self._maps[number] = PhotonMap((first, second), self._radius * self.relative_radius(number))
         return self._maps[number]
 
     def _pilot(self, casters: Casters, is_missed: IsMissed | None) -> NDArray[np.float64] | None:
@@ -166,7 +212,7 @@ class CausticPhotons:
 
 
 def radius_of_pass(number: int) -> float:
-    """Radius of a look-up in pass ``number`` over that in the first: Knaus and Zwicker 2011, eq. 20."""
+    """Radius in a pass over that in the first, of as many photons: Knaus and Zwicker 2011, eq. 20."""
     squares = [(k + 2 / 3) / (k + 1) for k in range(1, number + 1)]
     return math.sqrt(math.prod(squares))
 
