@@ -62,6 +62,9 @@ _PILOT_STEP, _PASS_STEP, _LOOK_STEP = 0x1B56C4E9, 0x632BE5AB, 0x7F4A7C15
 _LOOKS, _MOST_LOOKS_OF_PAIR = 1 << 14, 256
 #: How far a ray goes on behind a straight-through surface, relative to its coordinates.
 _CLEARANCE = 1e-4
+#: Share of what met the casters below which a pilot's light is followed no further: it tells little, and each event of
+#: a wavefront has a cost of its own.
+_PILOT_ENDS = 1 / 16
 #: Dimensions of the sample stream at one surface.
 _DIMENSIONS = 2
 _NONE = Photons.dark(0)
@@ -198,7 +201,7 @@ class CausticPhotons:
             return None
         count = min(PILOT_OF_PAIR, max(_FEWEST_OF_PAIR, PILOT // casters.pairs)) * casters.pairs
         even = np.full(casters.pairs, 1 / casters.pairs)
-        photons, pair = self._shooter.shoot(count, even, (self._seed + _PILOT_STEP) % 2**32)
+        photons, pair = self._shooter.shoot(count, even, (self._seed + _PILOT_STEP) % 2**32, _PILOT_ENDS)
         seen = photons.are_inside(self._region)
         if not seen.any():
             return None
@@ -238,8 +241,13 @@ class PhotonShooter:
         self._casters = casters
         self._emitter_numbers = mi.UInt32(casters.emitters)
 
-    def shoot(self, count: int, chances: NDArray[np.float64], seed: int) -> tuple[Photons, NDArray[np.int64]]:
-        """``count`` emissions of pairs drawn by ``chances``: photons that landed, and their pairs."""
+    def shoot(
+        self, count: int, chances: NDArray[np.float64], seed: int, ends: float = 0.0
+    ) -> tuple[Photons, NDArray[np.int64]]:
+        """``count`` emissions of pairs drawn by ``chances``: photons that landed, and their pairs.
+
+        Light is followed until no more than the share ``ends`` of what met the casters goes on.
+        """
         # Every pair gets its number of emissions, not a chance of them.
         each = np.maximum(1, np.round(chances * count)).astype(np.int64)
         pair = np.repeat(np.arange(len(each)), each)
@@ -247,7 +255,7 @@ class PhotonShooter:
         pairs: list[NDArray[np.int64]] = []
         for first in range(0, len(pair), 1 << 18):
             part = pair[first : first + (1 << 18)]
-            for photons, lanes in self._wavefront(part, each, first, seed):
+            for photons, lanes in self._wavefront(part, each, first, seed, ends):
                 landed.append(photons)
                 pairs.append(part[lanes])
         return Photons.joined([_NONE, *landed]), np.concatenate([np.zeros(0, np.int64), *pairs])
@@ -278,7 +286,7 @@ class PhotonShooter:
         return point, ds, light
 
     def _wavefront(
-        self, pair: NDArray[np.int64], each: NDArray[np.int64], first: int, seed: int
+        self, pair: NDArray[np.int64], each: NDArray[np.int64], first: int, seed: int, ends: float
     ) -> list[tuple[Photons, NDArray[np.int64]]]:
         """Photons that land after one sharp event, after two and so on, and the lanes of each."""
         scene, lanes = self._scene, len(pair)
@@ -308,6 +316,7 @@ class PhotonShooter:
         found = []
         events, absorption = dr.zeros(mi.UInt32, lanes), dr.zeros(mi.Color3f, lanes)
         dr.eval(si, power, events, absorption, active)
+        few = ends * int(dr.count(active)[0])
         for step in range(MOST_EVENTS + (_MOST_CROSSINGS if self._features.has_null else 0)):
             si, power, events, absorption, active = self._next_surface(
                 si, power, events, absorption, active, stream, dr.opaque(mi.UInt32, 3 + _DIMENSIONS * step)
@@ -321,7 +330,7 @@ class PhotonShooter:
             kept = np.flatnonzero(np.array(lands))
             if len(kept):
                 found.append((_photons(kept, si, normal, toward, power, events), kept))
-            if not dr.any(active):
+            if int(dr.count(active)[0]) <= few:
                 break
         return found
 
