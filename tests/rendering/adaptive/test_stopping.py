@@ -188,3 +188,23 @@ def test_missing_is_by_the_likely_value_and_by_the_low_end():
     narrow = Estimate(45, 44.9, 45.1, 41.0, 40.8, 41.2, (0, 0))
     assert Goal(quality_worst=42).missing(narrow) == pytest.approx(1.0)
     assert Goal(quality=44).missing(wide) <= 0
+
+
+def test_among_mirrors_few_samples_need_a_margin_of_their_own_for_the_worst():
+    from lippmann.rendering.estimate.denoised_psnr import AMONG_MIRRORS, DenoisedEstimator
+    from lippmann.rendering.estimate.psnr import NO_MARGIN, Estimate, Margin
+
+    plain, denoised = PictureEstimator(SHOWN), DenoisedEstimator(SHOWN)
+    assert plain.margin(8) == Margin(4.0, 4.0)
+    assert denoised.margin(2) == NO_MARGIN
+    for each in (plain, denoised):
+        each.expect_mirrors()
+        assert (each.first, each.fewest) == (8, 16)
+        assert each.margin(16) == NO_MARGIN
+    assert plain.margin(8) == Margin(4.0, 8.0)
+    assert denoised.margin(8) == AMONG_MIRRORS
+    estimate = Estimate(38.0, 37.0, 39.0, 26.0, 25.0, 27.0, (0, 0))
+    assert Goal(quality=35).missing(estimate) == pytest.approx(-3)
+    # The worst micro-image may have 12 dB less than the whole.
+    assert Goal(quality=35).missing(estimate, AMONG_MIRRORS) == pytest.approx(23 + 5 - 26)
+    assert Goal(quality=35).missing(estimate, Margin(2.0, 0.0)) == pytest.approx(-1)
