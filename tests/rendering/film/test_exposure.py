@@ -101,3 +101,33 @@ def test_a_sequence_keeps_the_exposure_of_the_motions_first_frame():
     assert held.exposure == picture(scene()).provenance.options["exposure"]
     assert picture(Sunset().scene(3), exposure=held.exposure).pixels.max() < 0.05
     assert hold_exposure(RenderRequest(exposure=2.0), Sunset(), display, place).exposure == 2.0
+
+
+def lit_by_few_paths(seed):
+    """Pixels of 0.5 in the mean, of which one in twenty has met all of the light, and the others next to none."""
+    hit = np.random.default_rng(seed).random((64, 64, 1)) < 0.05
+    return np.where(hit, 9.62, 0.02).astype(np.float32).repeat(3, axis=2)
+
+
+def test_light_that_few_paths_find_is_exposed_for_by_means():
+    from lippmann.rendering.film.exposure import exposure_for
+
+    found = exposure_for(lit_by_few_paths(1), None, lambda: lit_by_few_paths(2))
+    assert found == pytest.approx(np.log2(0.18 / 0.5), abs=0.5)
+
+
+def test_a_dark_pattern_is_no_noise():
+    """A second look shows it again."""
+    from lippmann.rendering.film.exposure import exposure_for
+
+    found = exposure_for(lit_by_few_paths(1), None, lambda: lit_by_few_paths(1) * np.float32(1.01))
+    assert found == pytest.approx(np.log2(0.18 / 0.02), abs=0.01)
+
+
+def test_a_second_look_is_taken_only_where_the_first_leaves_doubt():
+    from lippmann.rendering.film.exposure import exposure_for
+
+    pixels = np.random.default_rng(3).uniform(0.1, 0.5, (64, 64, 1)).astype(np.float32).repeat(3, axis=2)
+    pixels[:20] = 0  # nothing is lit there
+    found = exposure_for(pixels, None, lambda: pytest.fail("looked again"))
+    assert found == pytest.approx(np.log2(0.18 / 0.3), abs=0.1)
