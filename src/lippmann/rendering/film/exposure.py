@@ -30,7 +30,7 @@ SIDE, SAMPLES, MEMORY = 64, 4, 1 << 26
 #: Pixels along each side of a block of a look; and the share of them that is lit where a block counts.
 BLOCK, LIT_SHARE = 8, 0.25
 #: The median of blocks counts where it is that many times the median of pixels (at most 1.4 times on bundled scenes),
-#: and a second look differs: where it correlates with the first by less than this.
+#: and less than this share of a block's light is in both of two looks.
 NOISY, ALIKE = 2.0, 0.5
 #: Tells the seed of the second look from that of the first.
 _SECOND = 0x3C6EF372
@@ -83,25 +83,25 @@ def exposure_for(
     of_blocks = _median_of_blocks(luminance, lit)
     if of_blocks > NOISY * median:
         again = look_again().astype(np.float64) @ _LUMINANCE
-        if not _are_alike(luminance[lit], again[lit]):
-            median = of_blocks
+        both = (luminance + again) / 2
+        if _median_of_blocks(np.minimum(luminance, again), lit, both) < ALIKE:
+            median = _median_of_blocks(both, lit)
     return round(math.log2(MID_GREY / median) * STEPS) / STEPS
 
 
-def _are_alike(first: NDArray[np.float64], second: NDArray[np.float64]) -> bool:
-    """Whether two looks at the same pixels show the same scene, and not their own noise."""
-    spread = first.std() * second.std()
-    return bool(((first - first.mean()) * (second - second.mean())).mean() > ALIKE * spread)
-
-
-def _median_of_blocks(luminance: NDArray[np.float64], lit: NDArray[np.bool_]) -> float:
-    """Median over blocks of pixels of the mean luminance of their lit ones; 0 where no block is lit enough."""
+def _median_of_blocks(
+    luminance: NDArray[np.float64], lit: NDArray[np.bool_], over: NDArray[np.float64] | None = None
+) -> float:
+    """Median over blocks of pixels of the mean luminance of their lit ones, or of their luminance ``over`` another; 0
+    where no block is lit enough."""
     rows, columns = (size // BLOCK for size in luminance.shape)
 
     def sums(values: NDArray[np.generic]) -> NDArray[np.float64]:
         blocks = values[: rows * BLOCK, : columns * BLOCK].reshape(rows, BLOCK, columns, BLOCK)
         return np.asarray(blocks.sum(axis=(1, 3)), dtype=np.float64)
 
-    light, count = sums(np.where(lit, luminance, 0.0)), sums(lit)
-    counts = count >= LIT_SHARE * BLOCK**2
-    return float(np.median(light[counts] / count[counts])) if counts.any() else 0.0
+    counts = sums(lit) >= LIT_SHARE * BLOCK**2
+    shares = (
+        sums(np.where(lit, luminance, 0.0))[counts] / sums(lit if over is None else np.where(lit, over, 0.0))[counts]
+    )
+    return float(np.median(shares)) if counts.any() else 0.0
