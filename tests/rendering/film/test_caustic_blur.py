@@ -65,8 +65,7 @@ def blur_of(light, radius, *, samples=8, window=WHOLE, seed=3):
     from lippmann.rendering.film.caustic_blur import SquaredBlur
 
     integrator, source = matt_plane(PlaneOfPhotons(light, radius))
-    blur = SquaredBlur(integrator, source, window, seed)
-    return blur.after(samples) / blur.share
+    return SquaredBlur(integrator, source, window, seed).after(samples)
 
 
 def test_pictures_without_photons_have_none():
@@ -125,7 +124,7 @@ def test_a_look_is_repeated_at_twice_the_share(monkeypatch):
 
 
 def test_the_estimate_of_a_picture_counts_it():
-    from lippmann.rendering.film.caustic_blur import squared_steps
+    from lippmann.color.transfer import coding_slope
     from lippmann.rendering.film.sample_batches import FullInBatches
 
     integrator, source = matt_plane(PlaneOfPhotons(lambda x: np.where(x > 0, 1.0, 0.0), 0.1))
@@ -138,18 +137,6 @@ def test_the_estimate_of_a_picture_counts_it():
     plain.add(8)
     assert plain.squared_blur() is None
     np.testing.assert_allclose(counted - plain.squared_error().values, blur, atol=1e-7)
+    slope = coding_slope(batches.picture(), "srgb")
     linear = blur_of(lambda x: np.where(x > 0, 1.0, 0.0), 0.1)
-    np.testing.assert_allclose(blur, squared_steps(batches.picture(), linear, "srgb").mean(axis=2), rtol=1e-5)
-
-
-def test_steps_of_codes_end_where_codes_do():
-    from lippmann.color.transfer import coding_slope
-    from lippmann.rendering.film.caustic_blur import squared_steps
-
-    picture = np.float32([0.2, 0.2, 0.2, 0.001, 0.001, 1.0])
-    squared = np.float32([1e-8, -1e-8, 0.0, 25.0, -25.0, 25.0])
-    found = squared_steps(picture, squared, "srgb")
-    slope = np.square(coding_slope(picture[:1], "srgb"))[0]
-    np.testing.assert_allclose(found[:3], [slope * 1e-8, -slope * 1e-8, 0.0], rtol=0.01)
-    # By its slope the dark pixel's code would be off by 64.
-    np.testing.assert_allclose(found[3:], [0.975, -0.975, 1.0], atol=0.01)
+    np.testing.assert_allclose(blur, (slope**2 * linear).mean(axis=2), rtol=1e-5)

@@ -11,7 +11,6 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.color.transfer import Transfer, encode
 from lippmann.device.sobol import PIXEL_DIMENSION, SEED_STEP, SampleStream
 from lippmann.display.pixel_window import PixelWindow
 from lippmann.rendering.film.lane_order import divide
@@ -51,14 +50,8 @@ class SquaredBlur:
         self._share, self._pass = 0.0, 0
         self._of_pass = np.zeros((0, 3), np.float32)
 
-    @property
-    def share(self) -> float:
-        """Share of the pixels that were looked at, each of which stands for its like; 0 before any look."""
-        return self._share
-
     def after(self, samples: int) -> Floats | None:
-        """``(H, W, 3)`` for a picture of so many samples per pixel, 0 where no look was taken; None where no photons
-        are in passes.
+        """``(H, W, 3)`` for a picture of so many samples per pixel; None where no photons are in passes.
 
         Values of single pixels are noisy, and may be negative; their sums are not biased.
         """
@@ -76,7 +69,7 @@ class SquaredBlur:
         return (self._of_pass * np.float32(scaled**2)).reshape(*self._window.shape, 3)
 
     def _looked(self, photons: PhotonMap, share: float) -> Floats:
-        """``(pixels, 3)`` by a look at this share of the pixels."""
+        """``(pixels, 3)`` by a look at this share of the pixels, each of which stands for its like."""
         assert isinstance(self._integrator, PathIntegrator)
         blur = CausticBlur(self._integrator, photons)
         looked = _looked_at(self._source, self._window, self._seed, share)
@@ -84,21 +77,8 @@ class SquaredBlur:
         step = max(1, _LANES // (2 * self._source.channels))
         for first in range(0, len(looked), step):
             part = looked[first : first + step]
-            found[part] = _products(blur, self._source, self._window, part, self._seed)
+            found[part] = _products(blur, self._source, self._window, part, self._seed) / np.float32(share)
         return found
-
-
-def squared_steps(picture: Floats, squared: Floats, transfer: Transfer) -> Floats:
-    """By how much codes of ``picture`` may be off, squared, where linear values are off by the roots of ``squared``.
-
-    The greater of a step up and one down: the slope of the curve would lead far beyond the codes that there are. What
-    is negative, as estimates of a square may be, stays so. All arrays have one shape.
-    """
-    step = np.sqrt(np.abs(squared))
-    code = encode(picture, transfer)
-    up, down = encode(picture + step, transfer) - code, code - encode(picture - step, transfer)
-    steps: Floats = np.copysign(np.square(np.maximum(up, down)), squared)
-    return steps
 
 
 def _mean_area(passes: CausticPhotons, samples: int) -> float:

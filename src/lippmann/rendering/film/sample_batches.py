@@ -16,7 +16,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.color.transfer import Transfer
+from lippmann.color.transfer import Transfer, coding_slope
 from lippmann.device.sobol import SEED_STEP, SampleStream
 from lippmann.device.types import Spectrum, UInt32
 from lippmann.display.pixel_window import PixelWindow
@@ -25,7 +25,7 @@ from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.rendering.estimate.jackknife import error_of_batches
 from lippmann.rendering.estimate.pixel_errors import OWN_NOISE, PixelErrors
 from lippmann.rendering.film import memory_model
-from lippmann.rendering.film.caustic_blur import SquaredBlur, squared_steps
+from lippmann.rendering.film.caustic_blur import SquaredBlur
 from lippmann.rendering.film.caustics import stretches
 from lippmann.rendering.film.lane_order import STRIP_ROWS, divide, in_strips, pixel_at, to_rows
 from lippmann.rendering.film.wavefront import (
@@ -244,8 +244,8 @@ class FullInBatches:
         linear = self._blur.after(self.samples)
         if linear is None:
             return None
-        steps = squared_steps(self.picture(), self.shown(linear), self._transfer)
-        blur: Floats = steps.mean(axis=-1) / np.float32(self._blur.share)
+        slope = coding_slope(self.picture(), self._transfer)
+        blur: Floats = (np.square(slope) * self.shown(linear)).mean(axis=-1)
         return blur
 
     def shown(self, values: Floats) -> Floats:
