@@ -39,7 +39,7 @@ def _few(few: dict[str, Any]) -> str:
         f"| {samples} | {one['psnr']:.1f} dB | {one['worst']:.1f} dB | {one['margin']:g} dB | {one['pictures']} |"
         for samples, one in few["summary"].items()
     ]
-    head = """With fewer than 16 samples plain pictures are believed only beyond a margin. By how much what they say of
+    head = """With fewer than 16 samples plain pictures are trusted only beyond a margin. By how much what they say of
 themselves was too good, at most:
 
 | samples | PSNR | worst micro-image | margin | pictures |

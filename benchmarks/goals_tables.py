@@ -16,9 +16,9 @@ def describe(result: dict[str, Any]) -> str:
 
 Seconds, judging included, until a picture says of itself that it has the PSNR (`--quality`), and the samples per
 pixel that it took: by `full`, by `full --denoise oidn`, and by `pooled`, which stops at plain samples where these are
-there sooner (then in italics), as `auto` does. Plain samples are believed from 16 on, or from 4 where they are 8 dB
+there sooner (then in italics), as `auto` does. Plain samples are trusted from 16 on, or from 4 where they are 8 dB
 better than what is asked for, or 8 and 4 dB; denoised ones from 2, or up to 8 where samples cost less than a look at
-them. Where photons show that surfaces may mirror emitters, both are believed from 16 on, or from 8 beyond a margin.
+them. Where photons show that surfaces may mirror emitters, both are trusted from 16 on, or from 8 beyond a margin.
 No picture has more than {result["most_samples"]}; rows without stock views are older, with up to 256. Where full
 does not get there with these, its time is drawn out by the law of its noise (*): that is long where single bright hits
 of caustics come late, and outweighs other scenes in the mean. Where another does not, its cell is empty. *Stock views*

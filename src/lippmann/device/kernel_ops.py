@@ -9,7 +9,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.device.types import Array
+from lippmann.device.types import Array, UInt32
 
 
 def upload(values: NDArray[Any]) -> Array:
@@ -26,6 +26,12 @@ def upload(values: NDArray[Any]) -> Array:
         dr.eval(table)
         dr.sync_thread()  # the caller may write into its array again
     return table
+
+
+def divide(number: UInt32, by: UInt32 | int) -> tuple[UInt32, UInt32]:
+    """Quotient and remainder of whole numbers, by one division."""
+    quotient = number // by
+    return quotient, number - quotient * by
 
 
 def smaller(a: Array, b: Array) -> Array:

@@ -69,7 +69,8 @@ class Geometry:
         self._table = make_shape_table(scene)
         clipping = Clipping(scene.clip_groups)
         self._engine = EngineTracer(scene, self._order, self._table, clipping)
-        self._shapes = ShapeTracer(self._table, clipping, scene.lights)
+        casts_shadows = scene.shading.mode == "full"
+        self._shapes = ShapeTracer(self._table, clipping, scene.lights if casts_shadows else ())
         self._triangles = len(self._order)
         self._smooth = bool(scene.triangles.smooth.any())
         self._colored = bool(scene.triangles.colored.any())

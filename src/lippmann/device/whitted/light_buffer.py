@@ -29,8 +29,8 @@ MOST_CELLS, MOST_ENTRIES = 1 << 22, 1 << 21
 MOST_GRIDS = 64
 #: Entries that a ray's cell may have on the average: with more, walking is as fast.
 MOST_IN_CELL = 48
-#: A source that sees all shapes within this cone (cosine of its half angle) has one grid.
-_NARROW = np.cos(np.radians(60))
+#: A source that sees all shapes within a cone of this half angle has one grid.
+_NARROW = np.radians(60)
 #: Room around a shape for rounding: relative to the coordinates, and in cells.
 _MARGIN, _CELL_MARGIN = 2e-6, 0.05
 #: Slope beyond which a shape lies beside or behind a grid.
@@ -150,8 +150,8 @@ def _views(light: ClassicLight, shapes: _Shapes) -> list[_View]:
     if length > 0 and (distance > shapes.radii).all():
         # Angle of the farthest side of each shape off the axis.
         off = np.arccos(np.clip(offset @ axis / (distance * length), -1, 1)) + np.arcsin(shapes.radii / distance)
-        if off.max() < np.arccos(_NARROW):
-            return [_central_view(source, _frame(axis / length), shapes, 1 / np.finfo(np.float64).eps)]
+        if off.max() < _NARROW:
+            return [_central_view(source, _frame(axis / length), shapes, np.inf)]
     faces = [_frame(sign * np.eye(3)[direction]) for direction in range(3) for sign in (1.0, -1.0)]
     return [_central_view(source, frame, shapes, 1.0) for frame in faces]
 

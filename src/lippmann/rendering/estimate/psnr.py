@@ -87,10 +87,10 @@ CEILING = 116.0
 MODEL_UNCERTAINTY = 0.08
 #: By how much more than what lone hits show the error may be: measured where they are most of it.
 LONE_DOUBT = 0.8
-#: In dB, for half the samples of which estimates are believed. On scenes that are hard to judge, those of 4 were up to
+#: In dB, for half the samples of which estimates are trusted. On scenes that are hard to judge, those of 4 were up to
 #: 6.7 dB too good, those of 8 up to 3.6.
 MARGIN_OF_HALF = 4.0
-#: Where sharp surfaces may mirror emitters, as photons show: the samples at which a picture may first be believed, and
+#: Where sharp surfaces may mirror emitters, as photons show: the samples at which a picture may first be trusted, and
 #: with fewer of which the worst micro-image must be better by so many dB. All samples may have missed an emitter that
 #: is mirrored in a few pixels; then the statement was up to 7.7 dB above what is true.
 FIRST_AMONG_MIRRORS, FEWEST_AMONG_MIRRORS, WORST_AMONG_MIRRORS = 8, 16, 8.0
@@ -157,7 +157,7 @@ class PictureEstimator:
     ----------
     first, fewest:
         Samples of a pixel with which an estimate first tells something, and with fewer of which it is too rough to be
-        believed by one who asks for a quality, unless it is better than that by :meth:`margin`.
+        trusted by one who asks for a quality, unless it is better than that by :meth:`margin`.
     """
 
     first, fewest = 4, 16
@@ -170,7 +170,7 @@ class PictureEstimator:
         self._pixels = np.bincount(self._owner, minlength=parts.rows * parts.columns) + parts.known
 
     def expect_mirrors(self) -> None:
-        """Believe later: sharp surfaces may mirror emitters."""
+        """Trust later: sharp surfaces may mirror emitters."""
         self.first, self.fewest = FIRST_AMONG_MIRRORS, FEWEST_AMONG_MIRRORS
         self._is_among_mirrors = True
 

@@ -13,9 +13,9 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from lippmann.device.kernel_ops import divide
 from lippmann.device.types import Float, Vector3f
 from lippmann.progress import Progress, ProgressCallback, silent
-from lippmann.rendering.film.lane_order import divide
 from lippmann.rendering.film.memory_model import AOVS
 from lippmann.rendering.film.wavefront_plan import Plan, Tile, make_plan
 from lippmann.rendering.transport.first_surface import Surfaces, make_surfaces

@@ -11,9 +11,9 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from lippmann.device.kernel_ops import divide
 from lippmann.device.sobol import PIXEL_DIMENSION, SEED_STEP, SampleStream
 from lippmann.display.pixel_window import PixelWindow
-from lippmann.rendering.film.lane_order import divide
 from lippmann.rendering.film.wavefront import shown_colors
 from lippmann.rendering.transport.caustic_blur import CausticBlur
 from lippmann.rendering.transport.caustic_photons import CausticPhotons

@@ -80,28 +80,27 @@ def exposure_for(
     if not lit.any():
         return 0.0
     median = float(np.median(luminance[lit]))
-    of_blocks = _median_of_blocks(luminance, lit)
-    if of_blocks > NOISY * median:
+    if _median_of_blocks(luminance, lit, lit) > NOISY * median:
         again = look_again().astype(np.float64) @ _LUMINANCE
         both = (luminance + again) / 2
-        if _median_of_blocks(np.minimum(luminance, again), lit, both) < ALIKE:
-            median = _median_of_blocks(both, lit)
+        if _median_of_blocks(np.minimum(luminance, again), both, lit) < ALIKE:
+            median = _median_of_blocks(both, lit, lit)
     return round(math.log2(MID_GREY / median) * STEPS) / STEPS
 
 
 def _median_of_blocks(
-    luminance: NDArray[np.float64], lit: NDArray[np.bool_], over: NDArray[np.float64] | None = None
+    values: NDArray[np.float64], over: NDArray[np.float64 | np.bool_], lit: NDArray[np.bool_]
 ) -> float:
-    """Median over blocks of pixels of the mean luminance of their lit ones, or of their luminance ``over`` another; 0
-    where no block is lit enough."""
-    rows, columns = (size // BLOCK for size in luminance.shape)
+    """Median over blocks of pixels of the sum of ``values`` over another sum, of lit pixels; 0 where no block has
+    enough of these."""
+    counts = _sums_of_blocks(lit) >= LIT_SHARE * BLOCK**2
+    if not counts.any():
+        return 0.0
+    shares = _sums_of_blocks(np.where(lit, values, 0.0))[counts] / _sums_of_blocks(np.where(lit, over, 0.0))[counts]
+    return float(np.median(shares))
 
-    def sums(values: NDArray[np.generic]) -> NDArray[np.float64]:
-        blocks = values[: rows * BLOCK, : columns * BLOCK].reshape(rows, BLOCK, columns, BLOCK)
-        return np.asarray(blocks.sum(axis=(1, 3)), dtype=np.float64)
 
-    counts = sums(lit) >= LIT_SHARE * BLOCK**2
-    shares = (
-        sums(np.where(lit, luminance, 0.0))[counts] / sums(lit if over is None else np.where(lit, over, 0.0))[counts]
-    )
-    return float(np.median(shares)) if counts.any() else 0.0
+def _sums_of_blocks(values: NDArray[np.generic]) -> NDArray[np.float64]:
+    rows, columns = (size // BLOCK for size in values.shape)
+    blocks = values[: rows * BLOCK, : columns * BLOCK].reshape(rows, BLOCK, columns, BLOCK)
+    return np.asarray(blocks.sum(axis=(1, 3)), dtype=np.float64)

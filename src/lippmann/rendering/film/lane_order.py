@@ -15,18 +15,13 @@ import drjit as dr
 import numpy as np
 from numpy.typing import NDArray
 
+from lippmann.device.kernel_ops import divide
 from lippmann.device.types import UInt32
 
 T = TypeVar("T", bound=np.generic)
 
 #: Rows of a strip: with one sample a pixel, 16 lanes are a square.
 STRIP_ROWS = 4
-
-
-def divide(number: UInt32, by: UInt32 | int) -> tuple[UInt32, UInt32]:
-    """Quotient and remainder of whole numbers on the device."""
-    quotient = number // by
-    return quotient, number - quotient * by
 
 
 def in_strips(pixels: int, width: int) -> int:

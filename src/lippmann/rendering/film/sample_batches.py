@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.color.transfer import Transfer, coding_slope
+from lippmann.device.kernel_ops import divide
 from lippmann.device.sobol import SEED_STEP, SampleStream
 from lippmann.device.types import Spectrum, UInt32
 from lippmann.display.pixel_window import PixelWindow
@@ -27,7 +28,7 @@ from lippmann.rendering.estimate.pixel_errors import OWN_NOISE, PixelErrors
 from lippmann.rendering.film import memory_model
 from lippmann.rendering.film.caustic_blur import SquaredBlur
 from lippmann.rendering.film.caustics import stretches
-from lippmann.rendering.film.lane_order import STRIP_ROWS, divide, in_strips, pixel_at, to_rows
+from lippmann.rendering.film.lane_order import STRIP_ROWS, in_strips, pixel_at, to_rows
 from lippmann.rendering.film.wavefront import (
     Frame,
     RayTotals,

@@ -21,9 +21,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.color.transfer import Transfer, coding_slope
+from lippmann.device.kernel_ops import divide
 from lippmann.device.sobol import SampleStream
 from lippmann.device.types import MitsubaScene
-from lippmann.rendering.film.lane_order import divide
 from lippmann.rendering.film.scattered_rays import ScatteredRays
 from lippmann.rendering.film.wavefront import shown_colors
 from lippmann.rendering.request.choices import REUSING

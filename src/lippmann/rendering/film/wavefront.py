@@ -10,10 +10,11 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from lippmann.device.kernel_ops import divide
 from lippmann.device.sobol import SampleStream
 from lippmann.device.types import Spectrum, UInt32
 from lippmann.progress import Progress, ProgressCallback, silent
-from lippmann.rendering.film.lane_order import divide, in_strips, pixel_at, to_rows
+from lippmann.rendering.film.lane_order import in_strips, pixel_at, to_rows
 from lippmann.rendering.film.wavefront_plan import Pass, Plan, Tile
 from lippmann.rendering.transport.integrator import Integrator, PixelSample
 from lippmann.rendering.transport.path import PathIntegrator

@@ -21,6 +21,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from lippmann.device.kernel_ops import divide
 from lippmann.device.sobol import SampleStream
 from lippmann.device.types import (
     Bool,
@@ -98,13 +99,7 @@ class PassSchedule:
 
     def samples(self, number: int) -> int:
         """Samples of a pixel that pass ``number`` serves, from 0 on."""
-        before, count = 0, self.first
-        for _ in range(number):
-            if count == self.most:
-                break
-            before += count
-            count = min(before, self.most)
-        return count
+        return min(self.most, self.first << max(0, number - 1))
 
     def at(self, sample: int) -> tuple[int, int]:
         """The pass that serves ``sample``, from 0 on, and how many samples it still serves, this one included."""
@@ -278,8 +273,7 @@ class PhotonShooter:
     ) -> tuple[CasterPoints, DirectionSample3f, Spectrum]:
         """For each pair a point on the caster, a direction to the emitter, and radiance over the direction's pdf."""
         numbers, scene = mi.UInt32(pair.astype(np.uint32)), self._scene
-        caster = numbers // len(self._casters.emitters)
-        source = numbers - caster * len(self._casters.emitters)
+        caster, source = divide(numbers, len(self._casters.emitters))
         emitter = dr.gather(mi.EmitterPtr, scene.emitters_dr(), dr.gather(mi.UInt32, self._emitter_numbers, source))
         point = CasterPoints(scene, self._casters, caster, stream.next_2d(0), stream.next_1d(2))
         ds, light = emitter.sample_direction(point.reference(), stream.next_2d(1), mi.Bool(True))

@@ -14,6 +14,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from lippmann.device.kernel_ops import divide
 from lippmann.device.sobol import PIXEL_DIMENSION, SampleStream
 from lippmann.device.types import Float, Ray3f, UInt32
 from lippmann.rendering.transport.light_sampling import LightSampler, SceneLightSampler, WeightedLightSampler
@@ -80,8 +81,7 @@ def _second_moments(integrator: PathIntegrator, source: RaySource, emitters: int
     """
     paths = max(PILOT_PATHS // emitters, MIN_PATHS_PER_EMITTER)
     lane = dr.arange(mi.UInt32, paths * emitters)
-    emitter = lane // dr.opaque(mi.UInt32, paths)
-    path = lane - emitter * dr.opaque(mi.UInt32, paths)
+    emitter, path = divide(lane, dr.opaque(mi.UInt32, paths))
     stream = SampleStream.of_pixels(mi.UInt32(0), path, dr.opaque(mi.UInt32, _SEED))
     point = stream.next_2d(PIXEL_DIMENSION)
     x, y = point.x * dr.opaque(mi.Float, source.width), point.y * dr.opaque(mi.Float, source.height)
