@@ -114,6 +114,34 @@ def test_plain_samples_win_where_the_quality_is_near():
     assert "less than pooling takes" in race.reason
 
 
+@pytest.mark.parametrize(("plain", "looked_at"), [(0.02, 2), (0.5, 8)])
+def test_very_few_samples_are_pooled_where_that_may_be_enough(plain, looked_at):
+    samples, seen = Samples(), []
+    clean = Picture(samples, 1e-5, noise=CROSS_NOISE)
+    look = clean.squared_error
+
+    class FromTwo(PictureEstimator):
+        first = fewest = 2
+
+    class FromEight(PictureEstimator):
+        first = 8
+
+    def squared_error():
+        seen.append(samples.taken)
+        return look()
+
+    clean.squared_error = squared_error
+    race = MethodRace(
+        Goal(quality=30),
+        ErrorTrack(Picture(samples, plain), FromEight(SHOWN)),
+        ErrorTrack(clean, FromTwo(SHOWN), 0.6),
+        lambda: RAYS * samples.taken,
+    )
+    outcome = reach(Goal(quality=30), samples.add, race, clock=lambda: samples.now)
+    assert seen == [looked_at]
+    assert (race.leader, outcome.samples) == ("pooled", looked_at)
+
+
 def test_a_denoised_picture_that_stays_wrong_is_left():
     """It is better at first, but its bias keeps it from the goal."""
     race, outcome, clean = run(Goal(quality_worst=33), plain=0.2, denoised=0.005, floor=1e-3)

@@ -71,6 +71,17 @@ def test_the_first_look_waits_while_it_takes_more_than_samples(dear_until, first
     assert all(samples % STEP == 0 for samples in found[1:])
 
 
+def test_what_very_few_samples_say_multiplies_them_no_more_than_other_rounds():
+    class FromTwo(PictureEstimator):
+        first = 2
+
+    renderer = Noise(error=0.5)
+    outcome = reach(
+        Goal(quality=30, spp=1000), renderer.add, ErrorTrack(renderer, FromTwo(SHOWN)), clock=renderer.clock
+    )
+    assert [each.samples for each in outcome.rounds][:3] == [2, 8, 16]
+
+
 def test_where_time_is_short_no_look_waits():
     renderer = Noise(error=0.2, seconds=1.0)
     track = ErrorTrack(renderer, Sooner(SHOWN), worth_from=lambda: 100.0)
@@ -191,7 +202,7 @@ def test_missing_is_by_the_likely_value_and_by_the_low_end():
 
 
 def test_among_mirrors_few_samples_need_a_margin_of_their_own_for_the_worst():
-    from lippmann.rendering.estimate.denoised_psnr import AMONG_MIRRORS, DenoisedEstimator
+    from lippmann.rendering.estimate.denoised_psnr import AMONG_MIRRORS, FEW_AMONG_MIRRORS, DenoisedEstimator
     from lippmann.rendering.estimate.psnr import NO_MARGIN, Estimate, Margin
 
     plain, denoised = PictureEstimator(SHOWN), DenoisedEstimator(SHOWN)
@@ -199,10 +210,13 @@ def test_among_mirrors_few_samples_need_a_margin_of_their_own_for_the_worst():
     assert denoised.margin(2) == NO_MARGIN
     for each in (plain, denoised):
         each.expect_mirrors()
-        assert (each.first, each.fewest) == (8, 16)
+        assert each.fewest == 16
         assert each.margin(16) == NO_MARGIN
+    assert (plain.first, denoised.first) == (8, 2)
     assert plain.margin(8) == Margin(4.0, 8.0)
     assert denoised.margin(8) == AMONG_MIRRORS
+    assert denoised.margin(2) == denoised.margin(4) == FEW_AMONG_MIRRORS
+    assert FEW_AMONG_MIRRORS.whole > AMONG_MIRRORS.whole
     estimate = Estimate(38.0, 37.0, 39.0, 26.0, 25.0, 27.0, (0, 0))
     assert Goal(quality=35).missing(estimate) == pytest.approx(-3)
     # The worst micro-image may have 12 dB less than the whole.

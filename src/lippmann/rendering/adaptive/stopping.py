@@ -191,14 +191,15 @@ def missing_with_margin(goal: Goal, estimate: Estimate, samples: int, assessor: 
 def samples_to_trust(goal: Goal, assessment: Assessment, samples: int, assessor: Assessor) -> int:
     """Samples per pixel at which ``assessor`` is expected to be trusted, after an ``assessment`` at ``samples``.
 
-    Doubled until the likely PSNR should exceed ``goal`` by the margin, or no margin is needed any more.
+    Doubled until the estimate should exceed ``goal`` by the margin, or no margin is needed any more; but at most so
+    far as one round may go, as what very few samples say of the rest is rough.
     """
     needed = samples
     if missing_with_margin(goal, assessment.estimate, samples, assessor) > 0:
         needed *= 2
-    while needed < assessor.fewest:
+    while needed < min(assessor.fewest, MOST_GROWTH * samples):
         gained = 10 * assessment.slope * math.log10(needed / samples)
-        if goal.likely_missing(assessment.estimate, assessor.margin(needed)) <= gained:
+        if goal.missing(assessment.estimate, assessor.margin(needed)) <= gained:
             break
         needed *= 2
     return needed

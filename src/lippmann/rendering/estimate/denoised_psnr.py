@@ -28,6 +28,8 @@ from lippmann.rendering.estimate.bias_posterior import likely_error
 from lippmann.rendering.estimate.pixel_errors import CROSS_NOISE, ErrorSums, PixelErrors, parts_with_pixels
 from lippmann.rendering.estimate.psnr import (
     DRAWS,
+    FEWEST_AMONG_MIRRORS,
+    FIRST_AMONG_MIRRORS,
     LEAN,
     MODEL_UNCERTAINTY,
     NO_MARGIN,
@@ -59,10 +61,10 @@ FEW = 40.0
 #: By how much more than what lone hits of seen light show the error may be: on heaps of mirror balls under small
 #: emitters, of few samples, there was up to that much more.
 SEEN_DOUBT = 1.5
-#: In dB, with fewer samples than are trusted where sharp surfaces may mirror emitters: on scenes made for that the
-#: statements of 8 samples were up to 1.5 dB too good for the picture; for its worst micro-image more than 5 dB in
-#: 2 of 104 cases.
-AMONG_MIRRORS = Margin(2.0, 5.0)
+#: In dB, with fewer samples than are trusted where sharp surfaces may mirror emitters, and with fewer than a plain
+#: picture's first: on scenes made for that statements were up to 2.5 dB too good for the picture with either, and up to
+#: 3.8 dB for small-balls; for its worst micro-image up to 5.2 dB with few, and more than 5 dB in 2 of 160 with others.
+AMONG_MIRRORS, FEW_AMONG_MIRRORS = Margin(2.0, 5.0), Margin(5.0, 7.0)
 #: As parts of the error stated for all and for the worst: pictures that are hard to judge are often better by that.
 OFTEN_BETTER, WORST_OFTEN_BETTER = 0.8, 0.6
 #: Of the draws of the worst error: what is stated, and the ends of its interval.
@@ -76,9 +78,15 @@ class DenoisedEstimator(PictureEstimator):
     #: With these intervals are honest on scenes that are hard to judge.
     first = fewest = 2
 
+    def expect_mirrors(self) -> None:
+        """Trust without a margin later: sharp surfaces may mirror emitters."""
+        self.fewest = FEWEST_AMONG_MIRRORS
+
     def margin(self, samples: int) -> Margin:
         """By how many dB the estimate of a picture of ``samples`` must be better than what is asked for."""
-        return AMONG_MIRRORS if samples < self.fewest else NO_MARGIN
+        if samples >= self.fewest:
+            return NO_MARGIN
+        return AMONG_MIRRORS if samples >= FIRST_AMONG_MIRRORS else FEW_AMONG_MIRRORS
 
     def estimate(self, errors: PixelErrors) -> Estimate:
         """PSNR of the whole and of the worst micro-image."""

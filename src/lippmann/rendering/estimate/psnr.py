@@ -90,9 +90,9 @@ LONE_DOUBT = 0.8
 #: In dB, for half the samples of which estimates are trusted. On scenes that are hard to judge, those of 4 were up to
 #: 6.7 dB too good, those of 8 up to 3.6.
 MARGIN_OF_HALF = 4.0
-#: Where sharp surfaces may mirror emitters, as photons show: the samples at which a picture may first be trusted, and
-#: with fewer of which the worst micro-image must be better by so many dB. All samples may have missed an emitter that
-#: is mirrored in a few pixels; then the statement was up to 7.7 dB above what is true.
+#: Where sharp surfaces may mirror emitters, as photons show: the samples at which a plain picture may first be trusted,
+#: and with fewer of which the worst micro-image must be better by so many dB. All samples may have missed an emitter
+#: that is mirrored in a few pixels; then the statement was up to 7.7 dB above what is true.
 FIRST_AMONG_MIRRORS, FEWEST_AMONG_MIRRORS, WORST_AMONG_MIRRORS = 8, 16, 8.0
 #: Micro-images that may be the worst are drawn this many times.
 DRAWS = 2000
