@@ -10,6 +10,7 @@ import pytest
 from lippmann.rendering.estimate.pixel_errors import (
     CROSS_NOISE,
     LONE_CERTAIN,
+    MOST_LESS,
     OWN_NOISE,
     ErrorSums,
     PixelErrors,
@@ -19,9 +20,9 @@ from lippmann.rendering.estimate.pixel_errors import (
 
 @pytest.fixture
 def errors():
-    values, lone, apart, of_samples = np.random.default_rng(1).exponential(0.01, (4, 12, 10)).astype(np.float32)
+    values, lone, apart, less, of_samples = np.random.default_rng(1).exponential(0.01, (5, 12, 10)).astype(np.float32)
     samples = PixelErrors(of_samples, lone * np.float32(0.1), OWN_NOISE)
-    return PixelErrors(values, None, CROSS_NOISE, samples, apart * np.float32(0.1))
+    return PixelErrors(values, None, CROSS_NOISE, samples, apart * np.float32(0.1), less * np.float32(0.1))
 
 
 OWNER = np.arange(120).reshape(12, 10) // 30
@@ -51,12 +52,23 @@ def test_only_what_is_uncertain_is_squared(errors):
     np.testing.assert_allclose(of_samples.lone, errors.samples.lone.reshape(4, 30).sum(axis=1), rtol=1e-5)
 
 
+def test_the_mean_may_be_less_by_a_share_that_is_bounded(errors):
+    sums = ErrorSums.none(4, 30)
+    sums.add(OWNER, errors)
+    less = float(errors.perhaps_less.mean())
+    assert sums.share_less(10 * less) == pytest.approx(0.1, rel=1e-5)
+    assert sums.share_less(less) == MOST_LESS
+    sums.perhaps_less[:] *= -1
+    assert sums.share_less(less) == 0
+
+
 def test_a_part_has_all_that_the_whole_has(errors):
     part = errors.part((slice(2, 5), slice(3, 9)))
     assert part.noise is errors.noise
     for mine, whole in (
         (part.values, errors.values),
         (part.apart, errors.apart),
+        (part.perhaps_less, errors.perhaps_less),
         (part.samples.lone, errors.samples.lone),
     ):
         assert np.array_equal(mine, whole[2:5, 3:9])

@@ -134,6 +134,17 @@ def test_lone_hits_widen_the_interval_to_the_worse_side_only():
     assert doubted.worst_low < calm.worst_low
 
 
+def test_what_may_not_be_there_widens_the_interval_of_the_whole_to_the_better_side_only():
+    shown = display()
+    errors, _ = noisy_picture(shown, 1)
+    calm, told = (
+        PictureEstimator(shown).estimate(PixelErrors(errors.values, None, OWN_NOISE, perhaps_less=less))
+        for less in (None, np.float32(0.5) * errors.values)
+    )
+    assert told.psnr_high == pytest.approx(calm.psnr_high + 10 * math.log10(2), abs=0.05)
+    assert (told.psnr, told.psnr_low, told.worst) == (calm.psnr, calm.psnr_low, calm.worst)
+
+
 def test_no_error_at_all_is_the_ceiling():
     shown = display()
     found = PictureEstimator(shown).estimate(PixelErrors(np.zeros((64, 64), np.float32), None, OWN_NOISE))

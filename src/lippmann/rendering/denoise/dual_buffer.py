@@ -145,7 +145,8 @@ class Denoised:
         if self._renderer.samples < LONE_TOLD_FROM:
             # Any hit may be.
             samples = replace(samples, lone=np.float32(UNTOLD_LONE) * np.maximum(samples.values, 0))
-        return PixelErrors(common + apart, self._lone_seen(samples, slope), CROSS_NOISE, samples, apart)
+        lone = self._lone_seen(samples, slope)
+        return PixelErrors(common + apart, lone, CROSS_NOISE, samples, apart, samples.perhaps_less)
 
     def _lone_seen(self, samples: PixelErrors, slope: Floats) -> Floats | None:
         """What of ``apart`` rests on lone hits of seen light: what one half has met of it, and the other has not.

@@ -108,7 +108,8 @@ def estimate_denoised(judged: ErrorSums, samples: ErrorSums, grid: tuple[int, in
     model = math.exp(NORMAL_95 * MODEL_UNCERTAINTY)
     # What no half has met is in no difference between them.
     doubt = 1 + SEEN_DOUBT * min(1.0, float(judged.lone.sum()) / (middle * pixels))
-    worse, better = likely.quantiles(np.array([0.975, 0.025])) * (model * doubt, OFTEN_BETTER / model)
+    often_better = OFTEN_BETTER * (1 - judged.share_less(middle))
+    worse, better = likely.quantiles(np.array([0.975, 0.025])) * (model * doubt, often_better / model)
 
     parts = _parts(judged, samples.squares, index, grid, middle)
     worst = np.quantile(_worst_drawn(parts, likely.quantiles((np.arange(DRAWS) + 0.5) / DRAWS) / middle), _OF_WORST)

@@ -16,6 +16,8 @@ Floats = NDArray[np.float32]
 
 #: The share of a lone hit's estimate that is no estimate but the error itself.
 LONE_CERTAIN = 0.7
+#: No error may be less than stated by more than this share.
+MOST_LESS = 0.9
 
 
 @dataclass(frozen=True)
@@ -57,6 +59,9 @@ class PixelErrors:
     apart:
         Of a denoised picture, ``(H, W)`` float32 of at least 0: the part of ``values`` that is no estimate, which is
         what its halves differ by.
+    perhaps_less:
+        ``(H, W)`` float32: the part of ``values`` that the picture may not have, as it is an upper bound; None if there
+        is no such thing. Single ones may be negative.
     """
 
     values: Floats
@@ -64,29 +69,33 @@ class PixelErrors:
     noise: NoiseShares = CROSS_NOISE
     samples: PixelErrors | None = None
     apart: Floats | None = None
+    perhaps_less: Floats | None = None
 
     def part(self, inside: slice | tuple[slice, slice]) -> PixelErrors:
         """Those of some pixels."""
-        lone, apart = (None if values is None else values[inside] for values in (self.lone, self.apart))
+        lone, apart, perhaps_less = (
+            None if values is None else values[inside] for values in (self.lone, self.apart, self.perhaps_less)
+        )
         samples = None if self.samples is None else self.samples.part(inside)
-        return PixelErrors(self.values[inside], lone, self.noise, samples, apart)
+        return PixelErrors(self.values[inside], lone, self.noise, samples, apart, perhaps_less)
 
 
 @dataclass(frozen=True, eq=False)
 class ErrorSums:
     """Sums over the pixels of each part, ``(parts,)`` each: their number, their estimates, the squares of what is
-    uncertain of those, their lone parts, and what halves differ by."""
+    uncertain of those, their lone parts, what halves differ by, and what the error may be less by."""
 
     pixels: Real
     values: Real
     squares: Real
     lone: Real
     apart: Real
+    perhaps_less: Real
 
     @classmethod
     def none(cls, parts: int, pixels: NDArray[np.generic] | int = 0) -> ErrorSums:
         """Sums of so many parts to which nothing was added yet, with ``pixels`` in each."""
-        return cls(np.full(parts, pixels, dtype=np.float64), *np.zeros((4, parts)))
+        return cls(np.full(parts, pixels, dtype=np.float64), *np.zeros((5, parts)))
 
     def add(self, owner: NDArray[np.integer], errors: PixelErrors) -> None:
         """Add the estimates of some pixels, any shape, to the parts that ``owner`` names; not to their number."""
@@ -103,6 +112,8 @@ class ErrorSums:
             apart = errors.apart.astype(np.float64).ravel()
             self.apart[:] += self._sum(owner, apart)
             uncertain = uncertain - apart
+        if errors.perhaps_less is not None:
+            self.perhaps_less[:] += self._sum(owner, errors.perhaps_less.astype(np.float64).ravel())
         self.squares[:] += self._sum(owner, np.square(uncertain))
 
     def add_sums(self, parts: NDArray[np.generic], sums: ErrorSums) -> None:
@@ -112,6 +123,11 @@ class ErrorSums:
         self.squares[parts] += sums.squares
         self.lone[parts] += sums.lone
         self.apart[parts] += sums.apart
+        self.perhaps_less[parts] += sums.perhaps_less
+
+    def share_less(self, mean: float) -> float:
+        """By what share of a ``mean`` over all pixels that may be less at the most."""
+        return min(MOST_LESS, max(0.0, float(self.perhaps_less.sum() / self.pixels.sum()) / mean))
 
     def _sum(self, owner: NDArray[np.integer], values: Real) -> Real:
         return np.asarray(np.bincount(owner, weights=values, minlength=len(self.pixels)), dtype=np.float64)

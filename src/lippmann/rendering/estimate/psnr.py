@@ -329,7 +329,7 @@ def _whole(sums: ErrorSums, noise: NoiseShares) -> tuple[float, float, float]:
     relative = deviation / (mean * pixels)
     spread = NORMAL_95 * math.sqrt(math.log1p(relative**2) + MODEL_UNCERTAINTY**2)
     doubt = 1 + LONE_DOUBT * min(1.0, float(sums.lone.sum()) / (mean * pixels))
-    ends = mean * math.exp(spread) * doubt, mean * math.exp(-spread)
+    ends = mean * math.exp(spread) * doubt, mean * math.exp(-spread) * (1 - sums.share_less(mean))
     low, high = (float(end) for end in psnr_of(np.array(ends)))
     return float(psnr_of(np.array(mean))), low, high
 
