@@ -104,15 +104,15 @@ def test_the_sums_of_tiles_give_the_estimate_of_the_whole(engine, layout):
 
     display = Display("test", Panel(90, 70, 0.25), LensArray(layout, 1.9), gap=6.8, aperture_distance=5.0)
     rng = np.random.default_rng(0)
-    values, lone = (rng.exponential(0.01, (70, 90)).astype(np.float32) for _ in range(2))
+    values, outliers = (rng.exponential(0.01, (70, 90)).astype(np.float32) for _ in range(2))
     grid = display.lens_grid
     sums = ErrorSums.none(grid.rows * grid.columns)
     for window in TileGrid(90, 70, 32):
-        errors = PixelErrors(values[window.slices], lone[window.slices] * 0.5, OWN_NOISE)
+        errors = PixelErrors(values[window.slices], outliers[window.slices] * 0.5, OWN_NOISE)
         found = lens_sums(display, window, errors)
         for name in SUMS:
             getattr(sums, name)[found[LENSES]] += found[name]
-    whole = PictureEstimator(display).estimate(PixelErrors(values, lone * 0.5, OWN_NOISE))
+    whole = PictureEstimator(display).estimate(PixelErrors(values, outliers * 0.5, OWN_NOISE))
     assert estimate_of_sums(sums, (grid.rows, grid.columns), OWN_NOISE).to_dict() == whole.to_dict()
 
 

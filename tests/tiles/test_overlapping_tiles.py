@@ -190,8 +190,8 @@ def test_the_sums_of_tiles_give_the_estimate_of_the_whole():
     from lippmann.tiles.tile_render import LENSES, OF_SAMPLES, SUMS, lens_sums
 
     random = np.random.default_rng(0)
-    values, noisy, lone, apart = (random.exponential(0.01, (128, 128)).astype(np.float32) for _ in range(4))
-    errors = PixelErrors(values - 0.005, None, CROSS_NOISE, PixelErrors(noisy, lone * 0.1, OWN_NOISE), apart * 0.1)
+    values, noisy, outliers, apart = (random.exponential(0.01, (128, 128)).astype(np.float32) for _ in range(4))
+    errors = PixelErrors(values - 0.005, None, CROSS_NOISE, PixelErrors(noisy, outliers * 0.1, OWN_NOISE), apart * 0.1)
     made, lenses = job(DENOISED), DISPLAY.lens_grid
     sums = {before: ErrorSums.none(lenses.columns) for before in ("", OF_SAMPLES)}
     for window in made.grid:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from lippmann.color.transfer import encode_srgb
-from lippmann.rendering.denoise.dual_buffer import UNTOLD_LONE, Denoised
+from lippmann.rendering.denoise.dual_buffer import UNTOLD_OUTLIERS, Denoised
 from lippmann.rendering.estimate.pixel_errors import CROSS_NOISE, OWN_NOISE, PixelErrors
 
 SHAPE = (256, 256, 3)
@@ -132,7 +132,7 @@ def test_seen_light_goes_past_the_denoiser_and_past_what_is_shared(shares, as_de
     assert alone[100, 100] == pytest.approx(renderer.truth[100, 100] + 5.0, rel=0.05)
 
 
-def test_lone_hits_of_seen_light_are_told():
+def test_outliers_of_seen_light_are_told():
     """What one half alone has met of it, where the samples' batches say so, too."""
     renderer = Noise()
     renderer.samples = 64
@@ -143,19 +143,19 @@ def test_lone_hits_of_seen_light_are_told():
         half += light
     whole = renderer.squared_error
 
-    def lone_at(*places):
-        lone = np.zeros(SHAPE[:2], np.float32)
+    def outliers_at(*places):
+        outliers = np.zeros(SHAPE[:2], np.float32)
         for place in places:
-            lone[place] = 1.0
-        renderer.squared_error = lambda: replace(whole(), lone=lone)
+            outliers[place] = 1.0
+        renderer.squared_error = lambda: replace(whole(), outliers=outliers)
         return Denoised(renderer, blur, "linear").squared_error()
 
-    assert lone_at((100, 100)).lone is None  # seen light is not kept apart
+    assert outliers_at((100, 100)).outliers is None  # seen light is not kept apart
     renderer.of_seen = tuple(hits)
-    told = lone_at((100, 100), (50, 50))
-    assert told.lone[100, 100] == pytest.approx(0.25 * 0.4**2, rel=1e-3)
-    assert told.lone.sum() == pytest.approx(told.lone[100, 100])
-    assert lone_at((50, 50)).lone.sum() == 0
+    told = outliers_at((100, 100), (50, 50))
+    assert told.outliers[100, 100] == pytest.approx(0.25 * 0.4**2, rel=1e-3)
+    assert told.outliers.sum() == pytest.approx(told.outliers[100, 100])
+    assert outliers_at((50, 50)).outliers.sum() == 0
 
 
 @pytest.mark.parametrize(("samples", "hidden"), [(4, True), (64, False)])
@@ -171,13 +171,13 @@ def test_a_pixel_that_both_halves_hit_hard_does_not_hide_what_is_wrong_elsewhere
 
 
 @pytest.mark.parametrize(("samples", "all_may_be"), [(2, True), (3, True), (4, False), (64, False)])
-def test_of_few_samples_any_hit_may_be_lone(samples, all_may_be):
+def test_of_few_samples_any_hit_may_be_an_outlier(samples, all_may_be):
     renderer = Noise()
     renderer.samples = samples
     told = Denoised(renderer, blur, "srgb").squared_error().samples
-    assert (told.lone is not None) == all_may_be
+    assert (told.outliers is not None) == all_may_be
     if all_may_be:
-        assert np.array_equal(told.lone, np.float32(UNTOLD_LONE) * told.values)
+        assert np.array_equal(told.outliers, np.float32(UNTOLD_OUTLIERS) * told.values)
 
 
 def test_more_samples_are_cleaned_anew():

@@ -7,36 +7,36 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lippmann.rendering.estimate.bias_posterior import LONE_RATIO, USUAL_RATIO, likely_error
+from lippmann.rendering.estimate.bias_posterior import OUTLIER_RATIO, USUAL_RATIO, likely_error
 
 ENDS = np.array([0.025, 0.5, 0.975])
 chances = st.floats(1e-8, 1e-2)
 
 
 @given(chances, st.floats(-10, 100), st.floats(1e-3, 100), st.floats(0, 1))
-def test_no_picture_is_better_than_what_its_halves_differ_by(by_chance, ratio, deviation, lone):
-    low, middle, high = likely_error(by_chance, ratio * by_chance, deviation * by_chance, lone).quantiles(ENDS)
+def test_no_picture_is_better_than_what_its_halves_differ_by(by_chance, ratio, deviation, outliers):
+    low, middle, high = likely_error(by_chance, ratio * by_chance, deviation * by_chance, outliers).quantiles(ENDS)
     assert by_chance <= low < middle < high
 
 
 @given(chances, st.floats(0.1, 300), st.floats(0, 1))
-def test_what_is_measured_well_is_the_error(by_chance, ratio, lone):
-    found = likely_error(by_chance, ratio * by_chance, 1e-3 * ratio * by_chance, lone)
+def test_what_is_measured_well_is_the_error(by_chance, ratio, outliers):
+    found = likely_error(by_chance, ratio * by_chance, 1e-3 * ratio * by_chance, outliers)
     assert found.quantiles(0.5) == pytest.approx((1 + ratio) * by_chance, rel=0.02)
 
 
 @given(chances, st.floats(0, 1))
-def test_where_nothing_is_measured_the_usual_ratio_stands(by_chance, lone):
-    found = likely_error(by_chance, 0.0, 1e6 * by_chance, lone)
+def test_where_nothing_is_measured_the_usual_ratio_stands(by_chance, outliers):
+    found = likely_error(by_chance, 0.0, 1e6 * by_chance, outliers)
     assert found.quantiles(0.5) == pytest.approx(
-        (1 + USUAL_RATIO ** (1 - lone) * LONE_RATIO**lone) * by_chance, rel=0.02
+        (1 + USUAL_RATIO ** (1 - outliers) * OUTLIER_RATIO**outliers) * by_chance, rel=0.02
     )
 
 
 @given(chances, st.floats(-3, 30), st.floats(0.1, 10), st.floats(0, 1), st.floats(1e-2, 1e2))
-def test_only_ratios_count(by_chance, ratio, deviation, lone, scale):
-    one = likely_error(by_chance, ratio * by_chance, deviation * by_chance, lone).quantiles(ENDS)
-    other = likely_error(*(scale * by_chance * factor for factor in (1, ratio, deviation)), lone).quantiles(ENDS)
+def test_only_ratios_count(by_chance, ratio, deviation, outliers, scale):
+    one = likely_error(by_chance, ratio * by_chance, deviation * by_chance, outliers).quantiles(ENDS)
+    other = likely_error(*(scale * by_chance * factor for factor in (1, ratio, deviation)), outliers).quantiles(ENDS)
     np.testing.assert_allclose(other, scale * one, rtol=1e-6)
 
 

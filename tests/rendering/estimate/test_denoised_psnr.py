@@ -88,30 +88,30 @@ def test_where_the_halves_differ_the_picture_is_not_believed_to_be_good():
 
 
 @pytest.mark.parametrize(("noise", "least", "most"), [(0.2, 1, 6), (0.005, -0.1, 0.3)])
-def test_lone_hits_are_doubted_where_nothing_else_is_known(noise, least, most):
+def test_outliers_are_doubted_where_nothing_else_is_known(noise, least, most):
     """Where few paths find the light, both halves lack it; but what is measured well is known."""
     errors, _ = made(2, noise)
     calm = DenoisedEstimator(SHOWN).estimate(errors)
-    alone = replace(errors.samples, lone=errors.samples.values)
+    alone = replace(errors.samples, outliers=errors.samples.values)
     found = DenoisedEstimator(SHOWN).estimate(replace(errors, samples=alone))
     for name in ("psnr", "psnr_low", "worst", "worst_low"):
         assert least < getattr(calm, name) - getattr(found, name) < most
 
 
-def test_lone_hits_of_seen_light_widen_the_interval_downward():
-    """One half has met what the other has not; nothing is lone where that is no part of what the halves differ by."""
+def test_outliers_of_seen_light_widen_the_interval_downward():
+    """One half has met what the other has not; nothing is an outlier where that is no part of what the halves differ by."""
     errors, _ = made(5)
     estimator = DenoisedEstimator(SHOWN)
     plain = estimator.estimate(errors)
     some, all_of_it = (
-        estimator.estimate(replace(errors, lone=(share * errors.apart).astype(np.float32))) for share in (0.2, 1.0)
+        estimator.estimate(replace(errors, outliers=(share * errors.apart).astype(np.float32))) for share in (0.2, 1.0)
     )
     assert plain.psnr_low > some.psnr_low > all_of_it.psnr_low > plain.psnr_low - 3
     assert plain.worst_low >= some.worst_low > all_of_it.worst_low > plain.worst_low - 3
     for each in (some, all_of_it):
         assert (each.psnr, each.psnr_high) == (plain.psnr, plain.psnr_high)
         assert abs(each.worst - plain.worst) < 1.0
-    none = estimator.estimate(replace(errors, lone=np.zeros_like(errors.apart)))
+    none = estimator.estimate(replace(errors, outliers=np.zeros_like(errors.apart)))
     assert none == plain
 
 

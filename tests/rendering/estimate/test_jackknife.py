@@ -20,7 +20,7 @@ def errors(batches, taken=None, transfer="srgb"):
 
 
 def slow_errors(sums, taken):
-    """Errors and lone parts of ``(K, pixels, 3)`` sums, by the definition, batch by batch.
+    """Errors and outliers' parts of ``(K, pixels, 3)`` sums, by the definition, batch by batch.
 
     The jackknife of the sRGB codes; and (n - 2) / (n - 1) times what the streams differ by less what three halves
     differ by that hold as much of either stream, n being the batches that hold samples.
@@ -35,8 +35,8 @@ def slow_errors(sums, taken):
     largest, spread = np.max(list(moves.values()), axis=0), sum(moves.values())
     # Of the largest share that one of so many can have.
     share = 0.8 * 8 / 7 * (len(held) - 1) / len(held)
-    is_lone = (len(held) >= 4) & (largest > share * spread) & (largest > 0.15**2 / 3)
-    lone = np.where(is_lone, jackknife, 0)
+    is_outlier = (len(held) >= 4) & (largest > share * spread) & (largest > 0.15**2 / 3)
+    outliers = np.where(is_outlier, jackknife, 0)
 
     def apart(half):
         """Squared error of the mean by what a half and the rest differ by; None if one of them has no samples."""
@@ -54,7 +54,7 @@ def slow_errors(sums, taken):
     if mixed:
         streams = apart(np.arange(number // 2))
         evenness = (len(held) - 2) / max(len(held) - 1, 1) * (streams - np.mean(mixed, axis=0))
-    return jackknife + evenness, lone
+    return jackknife + evenness, outliers
 
 
 @pytest.mark.parametrize(
@@ -66,11 +66,11 @@ def test_errors_are_those_of_the_definition(taken):
     random = np.random.default_rng(3)
     values = random.lognormal(-1, 0.7, (len(taken), 500, 3)) + 30 * (random.random((len(taken), 500, 1)) < 0.02)
     sums = (values * np.array(taken)[:, None, None]).astype(np.float32)
-    found, lone = error_of_batches(sums, taken, "srgb")
-    expected, expected_lone = slow_errors(sums, taken)
+    found, outliers = error_of_batches(sums, taken, "srgb")
+    expected, expected_outliers = slow_errors(sums, taken)
     np.testing.assert_allclose(found, expected, rtol=1e-3, atol=2e-6)
-    np.testing.assert_allclose(lone, expected_lone, rtol=1e-3, atol=2e-6)
-    assert (expected_lone > 0).any() == (np.count_nonzero(taken) >= 4)
+    np.testing.assert_allclose(outliers, expected_outliers, rtol=1e-3, atol=2e-6)
+    assert (expected_outliers > 0).any() == (np.count_nonzero(taken) >= 4)
 
 
 def picture(batches, taken=None):
@@ -87,9 +87,9 @@ def true_error(batches, truth, taken=None, transfer="srgb"):
 def test_plain_noise_is_measured_without_bias(number, transfer):
     random = np.random.default_rng(number)
     batches = 0.4 + 0.05 * random.standard_normal((number, 60000))
-    found, lone = errors(batches, transfer=transfer)
+    found, outliers = errors(batches, transfer=transfer)
     assert found.mean() == pytest.approx(true_error(batches, 0.4, transfer=transfer), rel=0.04)
-    assert lone.sum() < 0.05 * found.sum()
+    assert outliers.sum() < 0.05 * found.sum()
 
 
 def test_evenly_spread_samples_are_given_their_due():
@@ -136,18 +136,18 @@ def test_noise_that_clips_is_measured_as_it_shows():
     assert carried_by_slope > 1.4 * true
 
 
-def test_fireflies_count_as_what_they_show_and_are_called_lone():
+def test_fireflies_count_as_what_they_show_and_are_called_outliers():
     random = np.random.default_rng(1)
     batches = 0.2 + 100.0 * (random.random((8, 60000)) < 1e-4)
     hit = (batches > 1).any(axis=0)
-    found, lone = errors(batches)
+    found, outliers = errors(batches)
     shown = np.square(encode_srgb(np.ones(1)) - encode_srgb(np.full(1, 0.2)))[0]
     assert found[hit].mean() == pytest.approx(shown, rel=0.3)
     assert found[~hit].max() < 1e-6
-    assert lone[hit] == pytest.approx(found[hit], rel=0.2)
+    assert outliers[hit] == pytest.approx(found[hit], rel=0.2)
 
 
 def test_what_no_sample_changes_has_no_error():
-    found, lone = errors(np.full((8, 100), 0.3))
+    found, outliers = errors(np.full((8, 100), 0.3))
     assert np.abs(found).max() < 1e-10
-    assert lone.max() == 0
+    assert outliers.max() == 0

@@ -9,8 +9,8 @@ import pytest
 
 from lippmann.rendering.estimate.pixel_errors import (
     CROSS_NOISE,
-    LONE_CERTAIN,
     MOST_LESS,
+    OUTLIERS_CERTAIN,
     OWN_NOISE,
     ErrorSums,
     PixelErrors,
@@ -20,8 +20,10 @@ from lippmann.rendering.estimate.pixel_errors import (
 
 @pytest.fixture
 def errors():
-    values, lone, apart, less, of_samples = np.random.default_rng(1).exponential(0.01, (5, 12, 10)).astype(np.float32)
-    samples = PixelErrors(of_samples, lone * np.float32(0.1), OWN_NOISE)
+    values, outliers, apart, less, of_samples = (
+        np.random.default_rng(1).exponential(0.01, (5, 12, 10)).astype(np.float32)
+    )
+    samples = PixelErrors(of_samples, outliers * np.float32(0.1), OWN_NOISE)
     return PixelErrors(values, None, CROSS_NOISE, samples, apart * np.float32(0.1), less * np.float32(0.1))
 
 
@@ -47,9 +49,9 @@ def test_only_what_is_uncertain_is_squared(errors):
     np.testing.assert_allclose(known.apart, errors.apart.reshape(4, 30).sum(axis=1), rtol=1e-5)
     of_samples = ErrorSums.none(4, 30)
     of_samples.add(OWNER, errors.samples)
-    uncertain = errors.samples.values - LONE_CERTAIN * errors.samples.lone.astype(np.float64)
+    uncertain = errors.samples.values - OUTLIERS_CERTAIN * errors.samples.outliers.astype(np.float64)
     np.testing.assert_allclose(of_samples.squares, np.square(uncertain).reshape(4, 30).sum(axis=1), rtol=1e-5)
-    np.testing.assert_allclose(of_samples.lone, errors.samples.lone.reshape(4, 30).sum(axis=1), rtol=1e-5)
+    np.testing.assert_allclose(of_samples.outliers, errors.samples.outliers.reshape(4, 30).sum(axis=1), rtol=1e-5)
 
 
 def test_the_mean_may_be_less_by_a_share_that_is_bounded(errors):
@@ -69,10 +71,10 @@ def test_a_part_has_all_that_the_whole_has(errors):
         (part.values, errors.values),
         (part.apart, errors.apart),
         (part.perhaps_less, errors.perhaps_less),
-        (part.samples.lone, errors.samples.lone),
+        (part.samples.outliers, errors.samples.outliers),
     ):
         assert np.array_equal(mine, whole[2:5, 3:9])
-    assert part.lone is None
+    assert part.outliers is None
 
 
 def test_parts_without_pixels_are_left_out():

@@ -123,7 +123,7 @@ def test_a_lens_that_met_nothing_among_equals_is_not_believed_to_be_perfect(kind
     assert believed > 0.3 * values.mean()
 
 
-def test_lone_hits_widen_the_interval_to_the_worse_side_only():
+def test_outliers_widen_the_interval_to_the_worse_side_only():
     shown = display()
     errors, _ = noisy_picture(shown, 1)
     calm = PictureEstimator(shown).estimate(errors)

@@ -36,8 +36,8 @@ from lippmann.progress import ProgressCallback, silent
 from lippmann.rendering.denoise.local_statistics import mean_around
 from lippmann.rendering.denoise.noisy_blend import own_share
 from lippmann.rendering.denoise.unshared_blend import own_light
-from lippmann.rendering.estimate.bias_posterior import LONE_RATIO
-from lippmann.rendering.estimate.jackknife import LONE_TOLD_FROM
+from lippmann.rendering.estimate.bias_posterior import OUTLIER_RATIO
+from lippmann.rendering.estimate.jackknife import OUTLIERS_TOLD_FROM
 from lippmann.rendering.estimate.pixel_errors import CROSS_NOISE, PixelErrors
 from lippmann.runtime.row_threads import Bands
 
@@ -45,12 +45,12 @@ Floats = NDArray[np.float32]
 #: Of the halves' mean difference nearby: a pixel that is brighter than its samples by more is so by no accident.
 FAR_ABOVE = 4.0
 #: Samples that are farther off, in codes, than any error is by so many times hide what is wrong in their pixel, and few
-#: of them what is wrong in the picture: there the ratio of lone hits is taken. With 4 some pictures are flattered.
+#: of them what is wrong in the picture: there the ratio of outliers is taken. With 4 some pictures are flattered.
 DROWNED = 8.0
 #: With fewer samples a single one is farther off, and more likely all there is of its light: less is left out then.
 MANY = 16
-#: Share of the samples' error that is taken to rest on lone hits where too few batches tell them.
-UNTOLD_LONE = 0.25
+#: Share of the samples' error that is taken to rest on outliers where too few batches tell them.
+UNTOLD_OUTLIERS = 0.25
 #: Linear steps below this are as good as a slope, and hold rounding.
 _LEAST_STEP = 1e-4
 #: A clean picture from a noisy one; and whether that is to be turned, see
@@ -137,27 +137,27 @@ class Denoised:
         common = (left[0] * left[1]).mean(axis=2)
         limit = DROWNED * max(1.0, MANY / self._renderer.samples)
         drowned = np.maximum(np.abs(left[0]), np.abs(left[1])).max(axis=2) > limit
-        common[drowned] = np.float32(LONE_RATIO) * apart[drowned]
+        common[drowned] = np.float32(OUTLIER_RATIO) * apart[drowned]
         blur = self._renderer.squared_blur()
         if blur is not None:
             common += blur
         samples = self._renderer.squared_error()
-        if self._renderer.samples < LONE_TOLD_FROM:
+        if self._renderer.samples < OUTLIERS_TOLD_FROM:
             # Any hit may be.
-            samples = replace(samples, lone=np.float32(UNTOLD_LONE) * np.maximum(samples.values, 0))
-        lone = self._lone_seen(samples, slope)
-        return PixelErrors(common + apart, lone, CROSS_NOISE, samples, apart, samples.perhaps_less)
+            samples = replace(samples, outliers=np.float32(UNTOLD_OUTLIERS) * np.maximum(samples.values, 0))
+        outliers = self._seen_outliers(samples, slope)
+        return PixelErrors(common + apart, outliers, CROSS_NOISE, samples, apart, samples.perhaps_less)
 
-    def _lone_seen(self, samples: PixelErrors, slope: Floats) -> Floats | None:
-        """What of ``apart`` rests on lone hits of seen light: what one half has met of it, and the other has not.
+    def _seen_outliers(self, samples: PixelErrors, slope: Floats) -> Floats | None:
+        """What of ``apart`` rests on outliers of seen light: what one half has met of it, and the other has not.
 
         No denoiser brings them together, and what neither has met is in no difference.
         """
         seen = self._renderer.seen_halves()
-        if seen is None or samples.lone is None:
+        if seen is None or samples.outliers is None:
             return None
         apart: Floats = (np.float32(0.25) * np.square(slope * self._renderer.shown(seen[0] - seen[1]))).mean(axis=2)
-        return np.minimum(apart, samples.lone)
+        return np.minimum(apart, samples.outliers)
 
     def _clean_halves(self) -> tuple[Floats, Floats]:
         # The samples may have come by another way than through :meth:`add`.

@@ -9,7 +9,7 @@ two noises, which is far larger than any error left.
 Yet whatever the scene, C keeps to D. The scenes of ``benchmarks/hard_scenes.py``, made to mislead denoisers, and the
 bundled ones, on four kinds of displays with 8 to 128 samples, have ratios C / D of 0.05 to 18, half of them within 1.3
 and 4.6: a denoiser balances what it blurs against the noise it leaves. It is larger where much of the samples' error
-rests on lone hits, for what one half has not met the other has most likely not met either.
+rests on outliers, for what one half has not met the other has most likely not met either.
 
 So the ratio has a prior with heavy tails about these values, and the measurement speaks as loud as its own uncertainty
 lets it (Bayes). Stripes that are taken for noise, 10 times the usual ratio, are plain in the measurement.
@@ -25,8 +25,8 @@ from numpy.typing import NDArray
 
 Real = NDArray[np.float64]
 
-#: The usual ratio where no hit is lone, and where all are.
-USUAL_RATIO, LONE_RATIO = 3.0, 10.0
+#: The usual ratio where no hit is an outlier, and where all are.
+USUAL_RATIO, OUTLIER_RATIO = 3.0, 10.0
 #: The prior of its logarithm, a t distribution, has this scale and so many degrees of freedom.
 SCALE, FREEDOM = 0.6, 4.0
 #: Degrees of freedom of the measurement: single hits decide what it says and how uncertain it seems.
@@ -57,7 +57,7 @@ class LikelyError:
         return np.asarray(self.by_chance * (1 + np.exp(np.interp(shares, below, _LOGARITHMS))))
 
 
-def likely_error(by_chance: float, common: float, deviation: float, lone: float) -> LikelyError:
+def likely_error(by_chance: float, common: float, deviation: float, outliers: float) -> LikelyError:
     """The posterior of the error.
 
     Parameters
@@ -66,11 +66,11 @@ def likely_error(by_chance: float, common: float, deviation: float, lone: float)
         D and C as measured, means over all pixels, in squared codes.
     deviation:
         The standard deviation of ``common``.
-    lone:
-        The share of the samples' error that rests on lone hits, 0 to 1.
+    outliers:
+        The share of the samples' error that rests on outliers, 0 to 1.
     """
     by_chance = max(by_chance, _BEYOND * (common - 3 * deviation), _FLOOR)
-    middle = (1 - lone) * math.log(USUAL_RATIO) + lone * math.log(LONE_RATIO)
+    middle = (1 - outliers) * math.log(USUAL_RATIO) + outliers * math.log(OUTLIER_RATIO)
     prior = _log_t((_LOGARITHMS - middle) / SCALE, FREEDOM)
     off = (common - _RATIOS * by_chance) / max(deviation, LEAST_DEVIATION * by_chance)
     weights = prior + _log_t(off, MEASURED_FREEDOM)

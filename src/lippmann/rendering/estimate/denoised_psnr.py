@@ -12,7 +12,7 @@ does not explain, it is: what a denoiser is wrong by where it meets an edge or a
 the samples themselves are good. One of few pixels, in a corner of the panel, may differ by chance.
 
 Seen light that goes past the denoiser has its own noise: where one half has met what the other has not, there is as
-a rule more that neither has met. Errors that rest on such lone hits widen the interval downward, as those of samples.
+a rule more that neither has met. Errors that rest on such outliers widen the interval downward, as those of samples.
 
 The constants were chosen on ``benchmarks/hard_scenes.py``.
 """
@@ -58,7 +58,7 @@ LEAST_EXPECTED, LEAST_OF_MEAN = 0.2, 1e-3
 LEAST_OF_SAMPLES = 1e-4
 #: Pixels that one micro-image has fewer than the usual one count so many times, for its error to be another one.
 FEW = 40.0
-#: By how much more than what lone hits of seen light show the error may be: on heaps of mirror balls under small
+#: By how much more than what outliers of seen light show the error may be: on heaps of mirror balls under small
 #: emitters, of few samples, there was up to that much more.
 SEEN_DOUBT = 1.5
 #: In dB, with fewer samples than are trusted where sharp surfaces may mirror emitters, and with fewer than a plain
@@ -102,12 +102,14 @@ def estimate_denoised(judged: ErrorSums, samples: ErrorSums, grid: tuple[int, in
     by_chance, error = float(judged.apart.sum()) / pixels, float(judged.values.sum()) / pixels
     deviation = math.sqrt(CROSS_NOISE.estimate * float(judged.squares.sum())) / pixels
     of_samples = max(float(samples.values.sum()), _NOTHING)
-    lone = min(1.0, float(samples.lone.sum()) / of_samples)
-    likely = likely_error(max(by_chance, LEAST_OF_SAMPLES * of_samples / pixels), error - by_chance, deviation, lone)
+    outliers = min(1.0, float(samples.outliers.sum()) / of_samples)
+    likely = likely_error(
+        max(by_chance, LEAST_OF_SAMPLES * of_samples / pixels), error - by_chance, deviation, outliers
+    )
     middle = float(likely.quantiles(0.5))
     model = math.exp(NORMAL_95 * MODEL_UNCERTAINTY)
     # What no half has met is in no difference between them.
-    doubt = 1 + SEEN_DOUBT * min(1.0, float(judged.lone.sum()) / (middle * pixels))
+    doubt = 1 + SEEN_DOUBT * min(1.0, float(judged.outliers.sum()) / (middle * pixels))
     often_better = OFTEN_BETTER * (1 - judged.share_less(middle))
     worse, better = likely.quantiles(np.array([0.975, 0.025])) * (model * doubt, often_better / model)
 
@@ -151,5 +153,5 @@ def _parts(
     expected = np.maximum(around + trust * (measured - around), LEAST_EXPECTED * around)
     variance = np.log1p(trust * noise / np.square(expected))
     fewer = np.maximum(1 / count - 1 / np.median(count), 0)
-    doubted = expected + SEEN_DOUBT * np.clip(judged.lone / count, 0, expected)
+    doubted = expected + SEEN_DOUBT * np.clip(judged.outliers / count, 0, expected)
     return PartErrors(index, expected, doubted, variance, np.log1p(FEW * fewer))

@@ -11,7 +11,7 @@ things are summed:
   the latter is added.
 
 Where single samples decide (a batch with a bright hit that no other has), the pixels that were *not* hit are wrong,
-too, and nothing in them says so. That part of the error is told apart as *lone*, to be met with doubt.
+too, and nothing in them says so. That part of the error is told apart as *outliers*, to be met with doubt.
 """
 
 from __future__ import annotations
@@ -32,13 +32,13 @@ Floats = NDArray[np.float32]
 
 #: Pixels worked on at a time.
 _CHUNK = 1 << 18
-#: A hit is lone if it makes up this part of the largest share of what the batches differ by that one can have,
+#: A hit is an outlier if it makes up this part of the largest share of what the batches differ by that one can have,
 #: ``(batches - 1) / batches``, and moves the code by as much as ...
-LONE_SHARE = 0.8 * 8 / 7
+OUTLIER_SHARE = 0.8 * 8 / 7
 #: ... this: below it the curve is nearly straight, and what is missing elsewhere is small as well.
-LONE_STEP = 0.15
-#: Of fewer batches any hit may be lone, and none is told to be.
-LONE_TOLD_FROM = 4
+OUTLIER_STEP = 0.15
+#: Of fewer batches any hit may be an outlier, and none is told to be.
+OUTLIERS_TOLD_FROM = 4
 
 
 def error_of_batches(sums: Floats, taken: Sequence[int], transfer: Transfer) -> tuple[Floats, Floats]:
@@ -57,12 +57,12 @@ def error_of_batches(sums: Floats, taken: Sequence[int], transfer: Transfer) -> 
     Returns
     -------
     ``(pixels,)`` errors, unbiased (and noisy: single ones may be negative) unless bright hits are rare, and the part of
-    them that lone hits make up, at least 0.
+    them that outliers make up, at least 0.
     """
     pixels = sums.shape[1]
     # Opaque to the compiler, so that every round runs the same kernel.
     counts = [dr.opaque(mi.Float, number) for number in taken]
-    error, lone = np.empty(pixels, dtype=np.float32), np.empty(pixels, dtype=np.float32)
+    error, outliers = np.empty(pixels, dtype=np.float32), np.empty(pixels, dtype=np.float32)
     for first in range(0, pixels, _CHUNK):
         part = slice(first, min(first + _CHUNK, pixels))
         values = [mi.Color3f(np.ascontiguousarray(batch[part].T)) for batch in sums]
@@ -70,8 +70,8 @@ def error_of_batches(sums: Floats, taken: Sequence[int], transfer: Transfer) -> 
         jackknife, alone = of_part.jackknife()
         result = jackknife + of_part.evenness()
         dr.eval(result, alone)
-        error[part], lone[part] = np.array(result), np.array(alone)
-    return error, lone
+        error[part], outliers[part] = np.array(result), np.array(alone)
+    return error, outliers
 
 
 @dataclass
@@ -87,7 +87,7 @@ class _Batches:
         self.count = sum(self.counts[1:], self.counts[0])
 
     def jackknife(self) -> tuple[Float, Float]:
-        """Squared error by leaving out one batch at a time, and what of it is lone."""
+        """Squared error by leaving out one batch at a time, and what of it is outliers."""
         without = [
             encode((self.total - value) / dr.maximum(self.count - count, 1), self.transfer)
             for value, count in zip(self.sums, self.counts, strict=True)
@@ -103,8 +103,10 @@ class _Batches:
             error += size * (self.count - count) / self.count
             spread += size
             largest = dr.maximum(largest, size)
-        decides = (largest > LONE_SHARE * (weight - 1) / weight * spread) & (largest > LONE_STEP * LONE_STEP / 3)
-        decides &= weight >= LONE_TOLD_FROM
+        decides = (largest > OUTLIER_SHARE * (weight - 1) / weight * spread) & (
+            largest > OUTLIER_STEP * OUTLIER_STEP / 3
+        )
+        decides &= weight >= OUTLIERS_TOLD_FROM
         return error, dr.select(decides, error, 0)
 
     def evenness(self) -> Float:

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 Real = NDArray[np.float64]
 Floats = NDArray[np.float32]
 
-#: The share of a lone hit's estimate that is no estimate but the error itself.
-LONE_CERTAIN = 0.7
+#: The share of an outlier's estimate that is no estimate but the error itself.
+OUTLIERS_CERTAIN = 0.7
 #: No error may be less than stated by more than this share.
 MOST_LESS = 0.9
 
@@ -49,8 +49,8 @@ class PixelErrors:
     ----------
     values:
         ``(H, W)`` float32, unbiased; single ones may be negative.
-    lone:
-        ``(H, W)`` float32 of at least 0: the part of ``values`` that rests on single bright hits; None if there is no
+    outliers:
+        ``(H, W)`` float32 of at least 0: the part of ``values`` that rests on outliers; None if there is no
         such thing. Of a denoised picture it is a part of ``apart``.
     noise:
         How uncertain ``values`` are.
@@ -65,7 +65,7 @@ class PixelErrors:
     """
 
     values: Floats
-    lone: Floats | None = None
+    outliers: Floats | None = None
     noise: NoiseShares = CROSS_NOISE
     samples: PixelErrors | None = None
     apart: Floats | None = None
@@ -73,22 +73,22 @@ class PixelErrors:
 
     def part(self, inside: slice | tuple[slice, slice]) -> PixelErrors:
         """Those of some pixels."""
-        lone, apart, perhaps_less = (
-            None if values is None else values[inside] for values in (self.lone, self.apart, self.perhaps_less)
+        outliers, apart, perhaps_less = (
+            None if values is None else values[inside] for values in (self.outliers, self.apart, self.perhaps_less)
         )
         samples = None if self.samples is None else self.samples.part(inside)
-        return PixelErrors(self.values[inside], lone, self.noise, samples, apart, perhaps_less)
+        return PixelErrors(self.values[inside], outliers, self.noise, samples, apart, perhaps_less)
 
 
 @dataclass(frozen=True, eq=False)
 class ErrorSums:
     """Sums over the pixels of each part, ``(parts,)`` each: their number, their estimates, the squares of what is
-    uncertain of those, their lone parts, what halves differ by, and what the error may be less by."""
+    uncertain of those, what rests on outliers, what halves differ by, and what the error may be less by."""
 
     pixels: Real
     values: Real
     squares: Real
-    lone: Real
+    outliers: Real
     apart: Real
     perhaps_less: Real
 
@@ -102,12 +102,12 @@ class ErrorSums:
         owner = owner.ravel()
         uncertain = values = errors.values.astype(np.float64).ravel()
         self.values[:] += self._sum(owner, values)
-        if errors.lone is not None:
-            lone = errors.lone.astype(np.float64).ravel()
-            self.lone[:] += self._sum(owner, lone)
+        if errors.outliers is not None:
+            outliers = errors.outliers.astype(np.float64).ravel()
+            self.outliers[:] += self._sum(owner, outliers)
             if errors.apart is None:
-                # A lone hit shows in the picture as it does in the estimate.
-                uncertain = values - LONE_CERTAIN * lone
+                # An outlier shows in the picture as it does in the estimate.
+                uncertain = values - OUTLIERS_CERTAIN * outliers
         if errors.apart is not None:
             apart = errors.apart.astype(np.float64).ravel()
             self.apart[:] += self._sum(owner, apart)
@@ -121,7 +121,7 @@ class ErrorSums:
         self.pixels[parts] += sums.pixels
         self.values[parts] += sums.values
         self.squares[parts] += sums.squares
-        self.lone[parts] += sums.lone
+        self.outliers[parts] += sums.outliers
         self.apart[parts] += sums.apart
         self.perhaps_less[parts] += sums.perhaps_less
 

@@ -10,7 +10,7 @@ Three things stand between the estimates and a statement about a micro-image:
 - The worst of many is not the one with the worst estimate. Each micro-image's estimate is drawn towards what its
   neighbours say, as far as its own noise asks for (empirical Bayes), then pictures that fit are drawn
   at random, and the worst of each is looked at.
-- Light that few paths find is missing from most pixels before it shows in any. Errors that rest on lone hits widen the
+- Light that few paths find is missing from most pixels before it shows in any. Errors that rest on outliers widen the
   interval to the worse side.
 """
 
@@ -85,8 +85,8 @@ class Estimate:
 CEILING = 116.0
 #: What curve and clipping leave of bias, as a share of the error; measured, see ``benchmarks/estimate_coverage.py``.
 MODEL_UNCERTAINTY = 0.08
-#: By how much more than what lone hits show the error may be: measured where they are most of it.
-LONE_DOUBT = 0.8
+#: By how much more than what outliers show the error may be: measured where they are most of it.
+OUTLIER_DOUBT = 0.8
 #: In dB, for half the samples of which estimates are trusted. On scenes that are hard to judge, those of 4 were up to
 #: 6.7 dB too good, those of 8 up to 3.6.
 MARGIN_OF_HALF = 4.0
@@ -247,7 +247,7 @@ def _lenses(sums: ErrorSums, grid: tuple[int, int], noise: NoiseShares) -> PartE
     """Micro-images whose noisy means are drawn towards their neighbours', and those towards the mean of all."""
     index, sums = parts_with_pixels(sums)
     count = sums.pixels
-    mean, lone = sums.values / count, sums.lone / count
+    mean, outliers = sums.values / count, sums.outliers / count
     average = likely_mean(sums, noise)
     # The mean square of one lens is noisy itself, so it leans on that of its neighbours.
     nearby, neighbours = neighbourhood(np.stack([mean, sums.squares / count]), index, grid)
@@ -268,7 +268,7 @@ def _lenses(sums: ErrorSums, grid: tuple[int, int], noise: NoiseShares) -> PartE
     between = np.maximum(usual, other)
     trust = between / (between + of_estimate)
     expected = np.maximum(around + trust * (mean - around), 1e-3 * average)
-    doubted = expected + LONE_DOUBT * np.clip(lone, 0, expected)
+    doubted = expected + OUTLIER_DOUBT * np.clip(outliers, 0, expected)
     variance, fluctuation = (np.log1p(v / np.square(expected)) for v in (trust * of_estimate, of_picture))
     return PartErrors(index, expected, doubted, variance, fluctuation)
 
@@ -328,7 +328,7 @@ def _whole(sums: ErrorSums, noise: NoiseShares) -> tuple[float, float, float]:
     deviation = math.sqrt((noise.estimate + noise.picture) * float(sums.squares.sum()))
     relative = deviation / (mean * pixels)
     spread = NORMAL_95 * math.sqrt(math.log1p(relative**2) + MODEL_UNCERTAINTY**2)
-    doubt = 1 + LONE_DOUBT * min(1.0, float(sums.lone.sum()) / (mean * pixels))
+    doubt = 1 + OUTLIER_DOUBT * min(1.0, float(sums.outliers.sum()) / (mean * pixels))
     ends = mean * math.exp(spread) * doubt, mean * math.exp(-spread) * (1 - sums.share_less(mean))
     low, high = (float(end) for end in psnr_of(np.array(ends)))
     return float(psnr_of(np.array(mean))), low, high

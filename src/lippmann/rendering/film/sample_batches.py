@@ -229,14 +229,14 @@ class FullInBatches:
         if self.samples < STREAMS:
             raise UsageError("one sample per pixel does not tell its own error", rule="two or more do")
         if self._errors is None:
-            error, lone = error_of_batches(self.shown(self._sums), self._taken, self._transfer)
+            error, outliers = error_of_batches(self.shown(self._sums), self._taken, self._transfer)
             shape = self.shape[0], -1
             error = error.reshape(shape)
             blur = self.squared_blur()
             if blur is not None:
                 error += blur
             perhaps_less = None if blur is None else TOO_MUCH_WHERE_SMOOTH * blur
-            self._errors = PixelErrors(error, lone.reshape(shape), OWN_NOISE, perhaps_less=perhaps_less)
+            self._errors = PixelErrors(error, outliers.reshape(shape), OWN_NOISE, perhaps_less=perhaps_less)
         return self._errors
 
     def squared_blur(self) -> Floats | None:
@@ -333,7 +333,7 @@ def trace_in_batches(
     """
     width, height = source.width, source.height
     whole = np.zeros((height, width, 3), dtype=np.float32)
-    error, lone, perhaps_less = np.zeros((3, height, width), dtype=np.float32)
+    error, outliers, perhaps_less = np.zeros((3, height, width), dtype=np.float32)
     frame = Frame(whole)
     left = memory - height * width * (memory_model.PICTURE + memory_model.ERROR_MAPS)
     # Half of what is left for the batches, half for the wavefronts.
@@ -355,12 +355,12 @@ def trace_in_batches(
         whole[first:last] = band.picture()
         found = band.squared_error()
         error[first:last] = found.values
-        lone[first:last] = 0 if found.lone is None else found.lone
+        outliers[first:last] = 0 if found.outliers is None else found.outliers
         perhaps_less[first:last] = 0 if found.perhaps_less is None else found.perhaps_less
         frame.rays += band.rays
         frame.seconds_compile += band.seconds_compile
         frame.seconds_trace += band.seconds_trace
-    return frame, PixelErrors(error, lone, OWN_NOISE, perhaps_less=perhaps_less)
+    return frame, PixelErrors(error, outliers, OWN_NOISE, perhaps_less=perhaps_less)
 
 
 def _of_band(progress: ProgressCallback, before: float, share: float, total: int) -> ProgressCallback:
