@@ -99,7 +99,7 @@ def test_outliers_are_doubted_where_nothing_else_is_known(noise, least, most):
 
 
 def test_outliers_of_seen_light_widen_the_interval_downward():
-    """One half has met what the other has not; nothing is an outlier where that is no part of what the halves differ by."""
+    """One half has met what the other has not; there is none where that is no part of what the halves differ by."""
     errors, _ = made(5)
     estimator = DenoisedEstimator(SHOWN)
     plain = estimator.estimate(errors)

@@ -103,9 +103,8 @@ class _Batches:
             error += size * (self.count - count) / self.count
             spread += size
             largest = dr.maximum(largest, size)
-        decides = (largest > OUTLIER_SHARE * (weight - 1) / weight * spread) & (
-            largest > OUTLIER_STEP * OUTLIER_STEP / 3
-        )
+        decides = largest > OUTLIER_SHARE * (weight - 1) / weight * spread
+        decides &= largest > OUTLIER_STEP * OUTLIER_STEP / 3
         decides &= weight >= OUTLIERS_TOLD_FROM
         return error, dr.select(decides, error, 0)
 
