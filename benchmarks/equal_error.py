@@ -218,12 +218,14 @@ class Judge:
         own = ((self._references[0] - self._references[1]) ** 2).mean() / 2
         #: PSNR of a single reference.
         self.own_psnr = _psnr(own)
+        #: What the noise of both leaves in the mean of a picture's products, two deviations.
+        self._least = 2 * own / math.sqrt(self._references[0][..., 0].size)
 
     def __call__(self, picture: Picture) -> dict[str, float]:
         errors = [coded(picture) - reference for reference in self._references]
         product = (errors[0] * errors[1]).mean(axis=2)
         lenses, _ = self._means(product, self._display)
-        return {"psnr": _psnr(float(product.mean())), "worst_psnr": _psnr(float(np.nanmax(lenses)))}
+        return {"psnr": _psnr(max(float(product.mean()), self._least)), "worst_psnr": _psnr(float(np.nanmax(lenses)))}
 
 
 def coded(picture: Picture) -> NDArray[np.float64]:
