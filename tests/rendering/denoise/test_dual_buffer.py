@@ -50,10 +50,7 @@ class Noise:
 
     def squared_error(self):
         difference = np.square(self._halves[0] - self._halves[1]).mean(axis=2) / 4
-        return PixelErrors(difference, None, OWN_NOISE)
-
-    def squared_blur(self):
-        return self.blurred
+        return PixelErrors(difference, None, OWN_NOISE, blur=self.blurred)
 
 
 def blur(picture, turned=False):
@@ -255,11 +252,4 @@ def test_blur_of_caustics_counts_in_full():
     renderer.blurred = np.full(plain.values.shape, 0.01, np.float32)
     counted = Denoised(renderer, blur, "srgb").squared_error()
     np.testing.assert_allclose(counted.values - plain.values, 0.01, rtol=1e-4)
-
-
-def test_what_the_samples_may_have_less_the_denoised_picture_may_too():
-    renderer = Noise(seed=1)
-    less = np.full(SHAPE[:2], 0.002, np.float32)
-    of_samples = replace(renderer.squared_error(), perhaps_less=less)
-    renderer.squared_error = lambda: of_samples
-    assert Denoised(renderer, blur, "srgb").squared_error().perhaps_less is less
+    assert counted.blur is renderer.blurred

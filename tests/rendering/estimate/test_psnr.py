@@ -138,8 +138,8 @@ def test_what_may_not_be_there_widens_the_interval_of_the_whole_to_the_better_si
     shown = display()
     errors, _ = noisy_picture(shown, 1)
     calm, told = (
-        PictureEstimator(shown).estimate(PixelErrors(errors.values, None, OWN_NOISE, perhaps_less=less))
-        for less in (None, np.float32(0.5) * errors.values)
+        PictureEstimator(shown).estimate(PixelErrors(errors.values, None, OWN_NOISE, blur=blur))
+        for blur in (None, np.float32(0.5 * 9 / 8) * errors.values)
     )
     assert told.psnr_high == pytest.approx(calm.psnr_high + 10 * math.log10(2), abs=0.05)
     assert (told.psnr, told.psnr_low, told.worst) == (calm.psnr, calm.psnr_low, calm.worst)

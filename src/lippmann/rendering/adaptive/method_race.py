@@ -120,8 +120,10 @@ class MethodRace:
 
     def _is_too_early(self, plain: Assessment, samples: int) -> bool:
         """Whether a look at the pooled picture would be lost, by its cost or by how far plain samples are off."""
-        if samples < self._pooled.first or samples >= self._plain.first:
-            return samples < self._pooled.first
+        if samples < self._pooled.first:
+            return True
+        if samples >= self._plain.first:
+            return False
         return self._goal.likely_missing(plain.estimate, self._pooled.margin(samples)) > MOST_GAINED
 
     def _is_last_chance(self, plain: Assessment, samples: int, room: float) -> bool:

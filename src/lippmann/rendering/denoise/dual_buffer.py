@@ -79,8 +79,6 @@ class Halved(Protocol):
 
     def squared_error(self) -> PixelErrors: ...
 
-    def squared_blur(self) -> Floats | None: ...
-
 
 class Denoised:
     """The pictures of ``renderer`` after ``denoise``; see the head of this module.
@@ -138,15 +136,14 @@ class Denoised:
         limit = DROWNED * max(1.0, MANY / self._renderer.samples)
         drowned = np.maximum(np.abs(left[0]), np.abs(left[1])).max(axis=2) > limit
         common[drowned] = np.float32(OUTLIER_RATIO) * apart[drowned]
-        blur = self._renderer.squared_blur()
-        if blur is not None:
-            common += blur
         samples = self._renderer.squared_error()
+        if samples.blur is not None:
+            common += samples.blur
         if self._renderer.samples < OUTLIERS_TOLD_FROM:
             # Any hit may be.
             samples = replace(samples, outliers=np.float32(UNTOLD_OUTLIERS) * np.maximum(samples.values, 0))
         outliers = self._seen_outliers(samples, slope)
-        return PixelErrors(common + apart, outliers, CROSS_NOISE, samples, apart, samples.perhaps_less)
+        return PixelErrors(common + apart, outliers, CROSS_NOISE, samples, apart, samples.blur)
 
     def _seen_outliers(self, samples: PixelErrors, slope: Floats) -> Floats | None:
         """What of ``apart`` rests on outliers of seen light: what one half has met of it, and the other has not.

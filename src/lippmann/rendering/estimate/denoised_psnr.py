@@ -7,7 +7,7 @@ whole picture's error.
 
 A micro-image's share of it is in proportion to what the halves differ by there, drawn a little towards its neighbours:
 that tells micro-images apart far better than the samples' errors do, and the worst of all lies within a few dB of where
-it says. Its own measurement corrects it as far as that can be believed. Where a micro-image seems worse by what noise
+it says. Its own measurement corrects it as far as that can be trusted. Where a micro-image seems worse by what noise
 does not explain, it is: what a denoiser is wrong by where it meets an edge or an emitter is large in few pixels, where
 the samples themselves are good. One of few pixels, in a corner of the panel, may differ by chance.
 

@@ -16,8 +16,9 @@ Floats = NDArray[np.float32]
 
 #: The share of an outlier's estimate that is no estimate but the error itself.
 OUTLIERS_CERTAIN = 0.7
-#: No error may be less than stated by more than this share.
-MOST_LESS = 0.9
+#: The share by which the blur of caustics is told too high where light is smooth, see
+#: :mod:`lippmann.rendering.transport.caustic_blur`; and that by which no error is less than stated.
+BLUR_TOO_MUCH, MOST_LESS = 8 / 9, 0.9
 
 
 @dataclass(frozen=True)
@@ -59,9 +60,9 @@ class PixelErrors:
     apart:
         Of a denoised picture, ``(H, W)`` float32 of at least 0: the part of ``values`` that is no estimate, which is
         what its halves differ by.
-    perhaps_less:
-        ``(H, W)`` float32: the part of ``values`` that the picture may not have, as it is an upper bound; None if there
-        is no such thing. Single ones may be negative.
+    blur:
+        ``(H, W)`` float32: the part of ``values`` that is blur of caustics, as an upper bound; None if there is no such
+        thing. Single ones may be negative.
     """
 
     values: Floats
@@ -69,33 +70,33 @@ class PixelErrors:
     noise: NoiseShares = CROSS_NOISE
     samples: PixelErrors | None = None
     apart: Floats | None = None
-    perhaps_less: Floats | None = None
+    blur: Floats | None = None
 
     def part(self, inside: slice | tuple[slice, slice]) -> PixelErrors:
         """Those of some pixels."""
-        outliers, apart, perhaps_less = (
-            None if values is None else values[inside] for values in (self.outliers, self.apart, self.perhaps_less)
+        outliers, apart, blur = (
+            None if values is None else values[inside] for values in (self.outliers, self.apart, self.blur)
         )
         samples = None if self.samples is None else self.samples.part(inside)
-        return PixelErrors(self.values[inside], outliers, self.noise, samples, apart, perhaps_less)
+        return PixelErrors(self.values[inside], outliers, self.noise, samples, apart, blur)
 
 
 @dataclass(frozen=True, eq=False)
 class ErrorSums:
     """Sums over the pixels of each part, ``(parts,)`` each: their number, their estimates, the squares of what is
-    uncertain of those, what rests on outliers, what halves differ by, and what the error may be less by."""
+    uncertain of those, what rests on outliers, what halves differ by, and blur."""
 
     pixels: Real
     values: Real
     squares: Real
     outliers: Real
     apart: Real
-    perhaps_less: Real
+    blur: Real
 
     @classmethod
     def none(cls, parts: int, pixels: NDArray[np.generic] | int = 0) -> ErrorSums:
         """Sums of so many parts to which nothing was added yet, with ``pixels`` in each."""
-        return cls(np.full(parts, pixels, dtype=np.float64), *np.zeros((5, parts)))
+        return cls(np.full(parts, pixels, dtype=np.float64), *np.zeros((len(fields(cls)) - 1, parts)))
 
     def add(self, owner: NDArray[np.integer], errors: PixelErrors) -> None:
         """Add the estimates of some pixels, any shape, to the parts that ``owner`` names; not to their number."""
@@ -112,22 +113,19 @@ class ErrorSums:
             apart = errors.apart.astype(np.float64).ravel()
             self.apart[:] += self._sum(owner, apart)
             uncertain = uncertain - apart
-        if errors.perhaps_less is not None:
-            self.perhaps_less[:] += self._sum(owner, errors.perhaps_less.astype(np.float64).ravel())
+        if errors.blur is not None:
+            self.blur[:] += self._sum(owner, errors.blur.astype(np.float64).ravel())
         self.squares[:] += self._sum(owner, np.square(uncertain))
 
     def add_sums(self, parts: NDArray[np.generic], sums: ErrorSums) -> None:
         """Add sums of the parts with these numbers, each at most once; their numbers of pixels, too."""
-        self.pixels[parts] += sums.pixels
-        self.values[parts] += sums.values
-        self.squares[parts] += sums.squares
-        self.outliers[parts] += sums.outliers
-        self.apart[parts] += sums.apart
-        self.perhaps_less[parts] += sums.perhaps_less
+        for field in fields(self):
+            getattr(self, field.name)[parts] += getattr(sums, field.name)
 
     def share_less(self, mean: float) -> float:
         """By what share of a ``mean`` over all pixels that may be less at the most."""
-        return min(MOST_LESS, max(0.0, float(self.perhaps_less.sum() / self.pixels.sum()) / mean))
+        blur = float(self.blur.sum() / self.pixels.sum())
+        return min(MOST_LESS, max(0.0, BLUR_TOO_MUCH * blur / mean))
 
     def _sum(self, owner: NDArray[np.integer], values: Real) -> Real:
         return np.asarray(np.bincount(owner, weights=values, minlength=len(self.pixels)), dtype=np.float64)

@@ -16,8 +16,7 @@ SMALLEST_LANES = 1 << 14
 
 #: The picture: float32 RGB, and the copy that a file writer makes of it.
 PICTURE = 24
-#: The squared error of each pixel, its outliers' share and what it may be less by, where a picture is judged band by
-#: band.
+#: The squared error of each pixel, its outliers' share and its blur, where a picture is judged band by band.
 ERROR_MAPS = 12
 #: The sums of one batch of samples, float32 RGB.
 BATCH = 12

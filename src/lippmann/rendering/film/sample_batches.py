@@ -38,7 +38,6 @@ from lippmann.rendering.film.wavefront import (
     shown_colors,
 )
 from lippmann.rendering.film.wavefront_plan import Run, cut_batches
-from lippmann.rendering.transport.caustic_blur import TOO_MUCH_WHERE_SMOOTH
 from lippmann.rendering.transport.integrator import Integrator
 from lippmann.rendering.transport.path import PathIntegrator
 from lippmann.rendering.transport.ray_source import PixelRays, RaySource, pixel_number
@@ -235,8 +234,7 @@ class FullInBatches:
             blur = self.squared_blur()
             if blur is not None:
                 error += blur
-            perhaps_less = None if blur is None else TOO_MUCH_WHERE_SMOOTH * blur
-            self._errors = PixelErrors(error, outliers.reshape(shape), OWN_NOISE, perhaps_less=perhaps_less)
+            self._errors = PixelErrors(error, outliers.reshape(shape), OWN_NOISE, blur=blur)
         return self._errors
 
     def squared_blur(self) -> Floats | None:
@@ -333,7 +331,7 @@ def trace_in_batches(
     """
     width, height = source.width, source.height
     whole = np.zeros((height, width, 3), dtype=np.float32)
-    error, outliers, perhaps_less = np.zeros((3, height, width), dtype=np.float32)
+    error, outliers, blur = np.zeros((3, height, width), dtype=np.float32)
     frame = Frame(whole)
     left = memory - height * width * (memory_model.PICTURE + memory_model.ERROR_MAPS)
     # Half of what is left for the batches, half for the wavefronts.
@@ -356,11 +354,11 @@ def trace_in_batches(
         found = band.squared_error()
         error[first:last] = found.values
         outliers[first:last] = 0 if found.outliers is None else found.outliers
-        perhaps_less[first:last] = 0 if found.perhaps_less is None else found.perhaps_less
+        blur[first:last] = 0 if found.blur is None else found.blur
         frame.rays += band.rays
         frame.seconds_compile += band.seconds_compile
         frame.seconds_trace += band.seconds_trace
-    return frame, PixelErrors(error, outliers, OWN_NOISE, perhaps_less=perhaps_less)
+    return frame, PixelErrors(error, outliers, OWN_NOISE, blur=blur)
 
 
 def _of_band(progress: ProgressCallback, before: float, share: float, total: int) -> ProgressCallback:

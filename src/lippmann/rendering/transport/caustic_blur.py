@@ -20,8 +20,6 @@ from lippmann.rendering.transport.sharp_events import facing_normal, follows_sha
 
 #: Radius of the wider look-up over that of the picture's.
 WIDER = 2.0
-#: The share by which the square of that is too much where light is smooth.
-TOO_MUCH_WHERE_SMOOTH = 8 / 9
 
 
 class CausticBlur:
