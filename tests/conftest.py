@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import base64
+import faulthandler
 import json
 import math
 import os
+import re
 import signal
+import tempfile
 from contextlib import ExitStack
 from pathlib import Path
+from typing import TextIO
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -25,6 +29,11 @@ PATIENT = settings(settings.get_profile("default"), deadline=None, print_blob=Tr
 settings.register_profile("ci", PATIENT, derandomize=True, database=None)
 settings.register_profile("search", PATIENT, suppress_health_check=[*BY_CLOCK, *OF_ROUNDS])
 settings.load_profile("ci")
+
+#: The folder in which a worker that crashes says where, one file a worker; and, in a worker, its file.
+CRASHES = pytest.StashKey[tempfile.TemporaryDirectory]()
+CRASH = pytest.StashKey[TextIO]()
+OF_PYTEST = re.compile(r"site-packages.(pluggy|_pytest|xdist|execnet)\b")
 
 
 def pytest_addoption(parser):
@@ -70,10 +79,32 @@ def pytest_generate_tests(metafunc):
         metafunc.parametrize("search_round", range(1, rounds + 1))
 
 
-def pytest_configure():
+@pytest.hookimpl(trylast=True)  # after pytest's own choice of where to write what a crash says
+def pytest_configure(config):
     _keep_to_own_cores()
+    worker = getattr(config, "workerinput", None)
+    if worker is not None:
+        config.stash[CRASH] = open(Path(worker["crashes"], worker["workerid"]), "w", encoding="utf-8")  # noqa: SIM115
+        faulthandler.enable(config.stash[CRASH])
     # A shell lets what it starts in the background ignore Ctrl-C, and so would all programs that tests start.
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_configure_node(node):
+    if CRASHES not in node.config.stash:
+        node.config.stash[CRASHES] = tempfile.TemporaryDirectory()
+    node.workerinput["crashes"] = node.config.stash[CRASHES].name
+
+
+def pytest_terminal_summary(terminalreporter, config):
+    """Where native code brought a worker down, at the end, beside the name of the test."""
+    folder = config.stash.get(CRASHES, None)
+    for path in sorted(Path(folder.name).iterdir()) if folder else []:
+        lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
+        if lines:
+            terminalreporter.section(f"crash of {path.name}")
+            terminalreporter.write("\n".join(line for line in lines if not OF_PYTEST.search(line)) + "\n")
 
 
 def _keep_to_own_cores():
