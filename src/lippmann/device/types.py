@@ -68,6 +68,8 @@ Frame3f: TypeAlias = Any
 BSDFPtr: TypeAlias = Any
 #: ``mi.MediumPtr``: the participating medium around a point.
 MediumPtr: TypeAlias = Any
+#: ``mi.EmitterPtr``: an emitter of the scene.
+EmitterPtr: TypeAlias = Any
 #: ``mi.ShapePtr``: a shape of the scene.
 ShapePtr: TypeAlias = Any
 #: ``mi.BSDF``, ``mi.Emitter``, ``mi.Medium``, ``mi.Texture``, ``mi.Shape`` and ``mi.Mesh``: plugins of a scene.

@@ -41,15 +41,19 @@ SEEN_SIDE, APART, WIDER = 64, 0.002, 0.25
 
 def stretches(integrator: Integrator, first: int, samples: int) -> Iterator[int]:
     """Numbers of samples that make ``samples``, from ``first`` on; the integrator is ready for each in turn."""
-    passes = integrator.photon_passes if isinstance(integrator, PathIntegrator) else None
-    if passes is None:
+    if not isinstance(integrator, PathIntegrator):
         yield samples
         return
-    assert isinstance(integrator, PathIntegrator)
     while samples > 0:
-        number, left = passes.schedule.at(first)
-        integrator.photons = passes.of_pass(number)
-        count = min(samples, left)
+        count = samples
+        if integrator.photon_passes is not None:
+            number, left = integrator.photon_passes.schedule.at(first)
+            integrator.photons = integrator.photon_passes.of_pass(number)
+            count = min(count, left)
+        if integrator.vertex_passes is not None:
+            number, left = integrator.vertex_passes.schedule.at(first)
+            integrator.light_vertices = integrator.vertex_passes.of_pass(number)
+            count = min(count, left)
         yield count
         first, samples = first + count, samples - count
 
@@ -85,7 +89,7 @@ def give_photons(
         if request.caustics == "auto":
             return _left_to_paths(integrator)
         raise too_small(memory, "photons of caustics", required)
-    seen = _seen_points(integrator, source)
+    seen = seen_points(integrator, source)
     photons = CausticPhotons(
         integrator.scene,
         integrator.features,
@@ -93,7 +97,7 @@ def give_photons(
         samples=pixels * min(schedule.first, most),
         schedule=schedule,
         seed=request.seed,
-        region=_region_about(seen),
+        region=region_about(seen),
         kept=max(1, min(passes, int(KEPT_SHARE * memory) // required)),
         is_missed=_are_missed(seen, request),
     )
@@ -125,7 +129,7 @@ def _are_missed(seen: NDArray[np.float64], request: RenderRequest) -> IsMissed |
     )
 
 
-def _seen_points(integrator: PathIntegrator, source: RaySource) -> NDArray[np.float64]:
+def seen_points(integrator: PathIntegrator, source: RaySource) -> NDArray[np.float64]:
     """``(n, 3)``: what the picture's rays meet first, of some of them that lie evenly in it."""
     few = ScatteredRays(source, SEEN_SIDE)
     place = dr.arange(mi.UInt32, few.width * few.height)
@@ -136,7 +140,7 @@ def _seen_points(integrator: PathIntegrator, source: RaySource) -> NDArray[np.fl
     return points
 
 
-def _region_about(points: NDArray[np.float64]) -> NDArray[np.float64] | None:
+def region_about(points: NDArray[np.float64]) -> NDArray[np.float64] | None:
     """Corners ``(2, 3)`` of a box about points that are seen; None where there are none."""
     if not len(points):
         return None

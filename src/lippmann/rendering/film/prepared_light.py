@@ -6,10 +6,12 @@ import mitsuba as mi
 
 from lippmann.rendering.film.caustics import give_photons
 from lippmann.rendering.film.exposure import gain_of, measure_exposure
+from lippmann.rendering.film.lit_surfaces import give_light_vertices
 from lippmann.rendering.film.seen_chains import give_chains
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.rendering.transport.beam import beam_of
 from lippmann.rendering.transport.casters import has_sharp_surfaces
+from lippmann.rendering.transport.light_vertices import POINTS
 from lippmann.rendering.transport.path import PathIntegrator
 from lippmann.rendering.transport.ray_source import RaySource
 from lippmann.scene.values.description import Color
@@ -46,6 +48,7 @@ def prepare_light(
         ``memory`` bytes do not hold the photons that were asked for.
     """
     integrator.photons = integrator.photon_passes = integrator.seen_chains = None
+    integrator.light_vertices = integrator.vertex_passes = None
     integrator.beam = integrator.gain = integrator.most_indirect = None
     told: dict[str, object] = {}
     has_sharp = has_sharp_surfaces(integrator.scene)
@@ -62,6 +65,8 @@ def prepare_light(
     if exposure:
         integrator.gain = mi.Float(gain_of(exposure))
         told["exposure"] = exposure
+    if give_light_vertices(integrator, request, source, gain_of(exposure) if exposure else 1.0):
+        told["light_vertices"] = POINTS
     if request.clamp_indirect is not None:
         most = request.clamp_indirect / (gain_of(exposure) if exposure else 1.0)
         integrator.most_indirect = mi.Float(most)

@@ -33,6 +33,9 @@ _SAME_POINT, _SAME_SIDE = 1e-5, 0.5
 #: Boxes about shapes that give no points are wider than these by this part of their diagonal.
 _MARGIN = 1e-3
 
+#: Gives a point and its unit normal for a sample in [0, 1)^2.
+PointOf = Callable[[Point2f], tuple[Point3f, Vector3f]]
+
 
 @dataclass(frozen=True, eq=False)
 class Casters:
@@ -202,7 +205,7 @@ class CasterPoints:
         self.p, self._n = dr.switch(
             caster,
             [
-                _no_point if is_boxed else triangles.point if triangles else _point_of(shapes[int(number)])
+                no_point if is_boxed else triangles.point if triangles else _point_of(shapes[int(number)])
                 for number, is_boxed, triangles in zip(casters.shapes, boxed.tolist(), casters.triangles, strict=True)
             ],
             sample,
@@ -237,7 +240,18 @@ class CasterPoints:
         return dr.select(self._boxed, (si.instance == self._shape) | (si.shape == self._shape), near)
 
 
-def _point_of(shape: mi.Shape) -> Callable[[Point2f], tuple[Point3f, Vector3f]]:
+def evenly(shape: mi.Shape) -> tuple[PointOf | None, float]:
+    """What spreads points evenly over a shape, and the shape's area; None for shapes that give no points."""
+    if not _gives_points(shape):
+        return None, 0.0
+    triangles = Triangles(shape) if shape.is_mesh() else None
+    area = _area(shape) if triangles is None else triangles.area
+    if not 0 < area < math.inf:
+        return None, 0.0
+    return _point_of(shape) if triangles is None else triangles.point, area
+
+
+def _point_of(shape: mi.Shape) -> PointOf:
     def sampled(sample: Point2f) -> tuple[Point3f, Vector3f]:
         point = shape.sample_position(mi.Float(0), sample, mi.Bool(True))
         return mi.Point3f(point.p), mi.Vector3f(point.n)
@@ -245,7 +259,7 @@ def _point_of(shape: mi.Shape) -> Callable[[Point2f], tuple[Point3f, Vector3f]]:
     return sampled
 
 
-def _no_point(sample: Point2f) -> tuple[Point3f, Vector3f]:
+def no_point(sample: Point2f) -> tuple[Point3f, Vector3f]:
     return mi.Point3f(sample.x * 0), mi.Vector3f(sample.x * 0)
 
 

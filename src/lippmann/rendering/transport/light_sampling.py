@@ -12,7 +12,17 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.device.types import Bool, DirectionSample3f, Float, Interaction3f, MitsubaScene, Point2f, Spectrum, UInt32
+from lippmann.device.types import (
+    Bool,
+    DirectionSample3f,
+    EmitterPtr,
+    Float,
+    Interaction3f,
+    MitsubaScene,
+    Point2f,
+    Spectrum,
+    UInt32,
+)
 
 
 class LightSampler(Protocol):
@@ -47,6 +57,10 @@ class LightSampler(Protocol):
         """
         ...
 
+    def probability(self, emitter: EmitterPtr) -> Float:
+        """Probability with which :meth:`sample_direction` chooses ``emitter``."""
+        ...
+
 
 class SceneLightSampler:
     """Samples emitters by the scene's own sampling weights, which are uniform unless its author set them."""
@@ -64,6 +78,13 @@ class SceneLightSampler:
 
     def pdf_direction(self, reference: Interaction3f, sample: DirectionSample3f, active: Bool) -> Float:
         return self._scene.pdf_emitter_direction(reference, sample, active)
+
+    def probability(self, emitter: EmitterPtr) -> Float:
+        emitters = self._scene.emitters_dr()
+        weights = np.array(emitters.sampling_weight(), dtype=np.float64).reshape(-1)
+        return dr.gather(
+            mi.Float, _by_registry(emitters, weights / weights.sum()), dr.reinterpret_array(mi.UInt32, emitter)
+        )
 
 
 class WeightedLightSampler:
@@ -88,11 +109,7 @@ class WeightedLightSampler:
         self._weights, self._cumulative = mi.Float(single), mi.Float(cumulative.astype(np.float32))
         self._total = dr.opaque(mi.Float, float(np.float32(cumulative[-1])))
         self._normalization = dr.opaque(mi.Float, float(np.float32(1 / cumulative[-1])))
-        # A scattered ray knows the emitter that it hit by its index in Dr.Jit's registry; index 0 is no emitter.
-        registry = np.array(dr.reinterpret_array(mi.UInt32, self._emitters))
-        pmf = np.zeros(int(registry.max()) + 1, np.float32)
-        pmf[registry] = single * np.float32(1 / cumulative[-1])
-        self._pmf = mi.Float(pmf)
+        self._pmf = _by_registry(self._emitters, single * np.float32(1 / cumulative[-1]))
 
     def sample_direction(
         self, reference: Interaction3f, point: Point2f, active: Bool
@@ -116,6 +133,20 @@ class WeightedLightSampler:
     def pdf_direction(self, reference: Interaction3f, sample: DirectionSample3f, active: Bool) -> Float:
         probability = dr.gather(mi.Float, self._pmf, dr.reinterpret_array(mi.UInt32, sample.emitter), active)
         return sample.emitter.pdf_direction(reference, sample, active) * probability
+
+    def probability(self, emitter: EmitterPtr) -> Float:
+        return dr.gather(mi.Float, self._pmf, dr.reinterpret_array(mi.UInt32, emitter))
+
+
+def _by_registry(emitters: EmitterPtr, values: NDArray[np.floating]) -> Float:
+    """A table of numbers of emitters by their index in Dr.Jit's registry, in which 0 is no emitter.
+
+    A scattered ray knows the emitter that it hit by that index.
+    """
+    registry = np.array(dr.reinterpret_array(mi.UInt32, emitters)).reshape(-1)
+    table = np.zeros(int(registry.max()) + 1, np.float32)
+    table[registry] = values
+    return mi.Float(table)
 
 
 class WithoutSize:

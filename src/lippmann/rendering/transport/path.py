@@ -36,6 +36,7 @@ from lippmann.device.types import (
 from lippmann.rendering.transport.beam import Beam, turn_of_normals, widening
 from lippmann.rendering.transport.integrator import FirstHit, RayCounts
 from lippmann.rendering.transport.light_sampling import LightSampler, SceneLightSampler, WithoutSize
+from lippmann.rendering.transport.light_vertices import JointLight, lambert_share
 from lippmann.rendering.transport.photon_map import PhotonMap
 from lippmann.rendering.transport.scene_features import SceneFeatures
 from lippmann.rendering.transport.shadow_rays import MAX_CROSSINGS, ShadowRays
@@ -51,11 +52,14 @@ from lippmann.rendering.transport.sharp_events import (
 
 if TYPE_CHECKING:
     from lippmann.rendering.transport.caustic_photons import CausticPhotons
+    from lippmann.rendering.transport.light_vertices import LightVertexPasses, LightVertices
 
 #: Sample dimensions used at one vertex.
 DIMENSIONS_PER_VERTEX = 4
 #: Sample dimension, from a vertex's first, of the photon chosen there.
 GATHER_DIMENSION = 1 << 24
+#: Sample dimension, from a vertex's first, of the light vertex that it is joined to.
+JOIN_DIMENSION = 1 << 25
 #: Parts of the photons about a point that is seen: a power of two. Successive samples of a pixel look at one part each.
 PHOTON_PARTS = 4
 #: Surfaces after which Russian roulette may end a path.
@@ -136,6 +140,10 @@ class PathIntegrator:
         self.photons: PhotonMap | None = None
         #: Gives :attr:`photons` for each part of a picture's samples; None where they are the same for all.
         self.photon_passes: CausticPhotons | None = None
+        #: Points lit by emitters, to which paths are joined; None where paths find all light themselves.
+        self.light_vertices: LightVertices | None = None
+        #: Gives :attr:`light_vertices` for each part of a picture's samples; None where there are none.
+        self.vertex_passes: LightVertexPasses | None = None
         #: Chains of sharp events that stand for the seen light of each path, see :mod:`.seen_light`; None for none.
         self.seen_chains: UInt32 | None = None
         #: Beam of a sample, by which lobes of curved surfaces are widened; None for lobes as they are.
@@ -181,6 +189,8 @@ class PathIntegrator:
         seen = mi.Bool(True)  # all events were sharp
         sharp = mi.UInt32(0)  # sharp events since the last rough one, straight-through surfaces excluded
         by_photons = mi.Spectrum(0)  # share of the light met by sharp events from that one on that photons bring
+        departure = mi.Float(0)  # pdf of the way here from a vertex that was joined to light vertices; 0 from others
+        vertex_share, vertex_reach, vertex_cosine = mi.Spectrum(0), mi.Float(0), mi.Float(0)  # of a JointLight
         samples_at_start, start = first_emitter_samples(stream.index)
         width, spread = mi.Vector2f(0), mi.Vector2f(0)  # of the beam
         is_beam = mi.Bool(True)  # no rough event has widened it beyond use
@@ -209,7 +219,15 @@ class PathIntegrator:
                 throughput *= dr.exp(-absorption * distance)
 
             # ---- emission ----
-            emission = self.emission(si, vertex, vertex_pdf, vertex_delta, vertex_samples, depth)
+            emission = self.emission(
+                si,
+                vertex,
+                vertex_pdf,
+                vertex_delta,
+                vertex_samples,
+                depth,
+                self._joint(vertex_share, vertex_reach, vertex_cosine, stream),
+            )
             if dr.hint(self.photons is not None, mode="scalar"):
                 is_caustic = ~seen & (sharp > 0) & (sharp <= MOST_EVENTS) & si.is_valid()
                 emission = dr.select(is_caustic, emission * (1 - by_photons), emission)
@@ -231,8 +249,9 @@ class PathIntegrator:
             lobe, lambert, wide, lands = mi.Vector3f(0), mi.Color3f(0), mi.Bool(False), mi.Bool(False)
             if dr.hint(divides, mode="scalar"):
                 lobe = sharp_lobe(si, bsdf, continues)
-            if dr.hint(self.photons is not None, mode="scalar"):
+            if dr.hint(self.photons is not None or self.light_vertices is not None, mode="scalar"):
                 lambert = lambertian(si, bsdf, continues)
+            if dr.hint(self.photons is not None, mode="scalar"):
                 wide = has_wide_lobes(si, bsdf, continues)
                 lands = continues & (wide | (dr.max(lambert) > 0))
             turn = mi.Float(0)
@@ -246,10 +265,30 @@ class PathIntegrator:
                 radiance += throughput * self._caustics(
                     si, bsdf, lobe, lambert, wide, stream, depth, choice, seen, lands
                 )
+            joins, reach = mi.Bool(False), mi.Float(0)
+            if dr.hint(self.light_vertices is not None, mode="scalar"):
+                vertices = cast("LightVertices", self.light_vertices)
+                arrival = departure * dr.abs(dr.dot(si.n, ray.d))
+                is_whole = continues & ~mi.has_flag(bsdf.flags(), mi.BSDFFlags.Null)
+                reach = dr.select(is_whole & (arrival > 0), dr.square(si.t) / arrival, 0)
+                joins = sampling & (depth + 1 < self.depth)
+                if dr.hint(self.features.has_absorption, mode="scalar"):
+                    joins &= dr.max(absorption) == 0
+                choice = stream.next_1d(dimension + JOIN_DIMENSION)
+                light, tests = vertices.join(
+                    si, bsdf, choice, mi.UInt32(stream.half), joins, not self.features.has_absorption
+                )
+                drawn = throughput * light
+                if dr.hint(self.most_indirect is not None, mode="scalar"):
+                    drawn = self._clamped(drawn)
+                radiance += drawn
+                shadow += tests
             last = number + samples
             while dr.hint(sampling, label="emitters"):
                 point = stream.at(number).next_2d(dimension)
-                light, ds, tests = self.direct_light(si, bsdf, point, sampling, samples=mi.Float(samples))
+                light, ds, tests = self.direct_light(
+                    si, bsdf, point, sampling, mi.Float(samples), self._joint(lambert, reach, mi.Float(0), stream)
+                )
                 if dr.hint(self.photons is not None, mode="scalar"):
                     is_caustic = ~seen & (sharp < MOST_EVENTS) & is_sharp(si, lobe, si.to_local(ds.d))
                     is_caustic &= self._is_near(ds)
@@ -280,6 +319,14 @@ class PathIntegrator:
                 share = dr.select(wide & (si.wi.z * bs.wo.z > 0), 1, dr.clip(share, 0, 1))
                 by_photons = dr.select(becomes_rough, share, by_photons)
                 sharp = dr.select(becomes_rough, mi.UInt32(0), sharp + dr.select(is_event, mi.UInt32(1), mi.UInt32(0)))
+            if dr.hint(self.light_vertices is not None, mode="scalar"):
+                vertex_share = lambert_share(lambert, mi.Color3f(bsdf_weight) * bs.pdf, si, bs.wo)
+                vertex_reach = dr.select(passes, 0, reach * dr.abs(dr.dot(si.n, si.to_world(bs.wo))))
+                vertex_cosine = dr.abs(bs.wo.z)
+                departs = joins & ~passes & ~mi.has_flag(bs.sampled_type, mi.BSDFFlags.Delta)
+                if dr.hint(self.features.has_absorption, mode="scalar"):
+                    departs &= bs.wo.z * si.wi.z > 0
+                departure = dr.select(departs, bs.pdf, 0)
             throughput *= bsdf_weight
             eta *= bs.eta
             if dr.hint(self.beam is not None, mode="scalar"):
@@ -354,6 +401,10 @@ class PathIntegrator:
         rest = bsdf.eval(mi.BSDFContext(), si, wo, wide) / dr.abs(wo.z) - lambert * dr.inv_pi
         return dr.select(active, light, 0) + dr.select(wide, rest * found.flux, 0)
 
+    def _joint(self, share: Spectrum, reach: Float, cosine: Float, stream: SampleStream) -> JointLight | None:
+        """A :class:`JointLight`, where there are light vertices."""
+        return None if self.light_vertices is None else JointLight(share, reach, cosine, mi.UInt32(stream.half))
+
     def emission(
         self,
         si: SurfaceInteraction3f,
@@ -362,6 +413,7 @@ class PathIntegrator:
         vertex_delta: Bool,
         vertex_samples: UInt32,
         depth: UInt32,
+        joint: JointLight | None = None,
     ) -> Spectrum:
         """Radiance that a path meets after ``depth`` surfaces, by MIS against emitter sampling at its last vertex.
 
@@ -372,10 +424,17 @@ class PathIntegrator:
         vertex, vertex_pdf, vertex_delta, vertex_samples:
             The last scattering vertex, the pdf of the direction taken there, whether its lobe had no width, and how
             many emitter samples are taken there.
+        joint:
+            How much of it light vertices bring too; None for nothing.
         """
         ds = mi.DirectionSample3f(self.scene, si=si, ref=vertex)
         emitter_pdf = self.light_sampler.pdf_direction(vertex, ds, ~vertex_delta) * mi.Float(vertex_samples)
-        emission = ds.emitter.eval(si) * mis_weight(vertex_pdf, emitter_pdf)
+        weight = mis_weight(vertex_pdf, emitter_pdf)
+        if joint is not None:
+            vertices = cast("LightVertices", self.light_vertices)
+            density = vertices.densities(ds, joint.half, si.is_valid())
+            weight = joint.weight(weight, joint.cosine * dr.inv_pi, emitter_pdf, density)
+        emission = ds.emitter.eval(si) * weight
         if self.features.background is None:
             return emission
         shown = mi.Spectrum(self.features.background)
@@ -401,12 +460,19 @@ class PathIntegrator:
         return light * dr.minimum(1, self.most_indirect / dr.maximum(dr.max(light), 1e-20))
 
     def direct_light(
-        self, si: SurfaceInteraction3f, bsdf: BSDFPtr, point: Point2f, active: Bool, samples: Float = 1
+        self,
+        si: SurfaceInteraction3f,
+        bsdf: BSDFPtr,
+        point: Point2f,
+        active: Bool,
+        samples: Float = 1,
+        joint: JointLight | None = None,
     ) -> tuple[Spectrum, DirectionSample3f, UInt32]:
         """Radiance toward ``si.wi`` from the emitter that ``point`` samples, that sample, and the shadow rays traced.
 
         The radiance is divided by the pdf of the sample, and weighted by MIS against BSDF sampling, as one of
-        ``samples`` emitter samples at this surface.
+        ``samples`` emitter samples at this surface. ``joint``, whose share is the albedo of the surface's Lambertian
+        part, tells how much of it light vertices bring too.
         """
         ds, light = self.light_sampler.sample_direction(si, point, active)
         lit = active & (ds.pdf != 0) & (dr.max(light) > 0)
@@ -415,6 +481,19 @@ class PathIntegrator:
         reflected = value * light * weight
         lit &= dr.max(reflected) > 0
         visible, tests = self.visibility(si, ds, lit)
+        if joint is not None:
+            wo = si.to_local(ds.d)
+            cosine = dr.abs(wo.z)
+            here = JointLight(
+                lambert_share(joint.share, mi.Color3f(value), si, wo),
+                # Rays from emitters do not pass holes and panes on their way.
+                dr.select(tests > 1, 0, joint.reach * dr.abs(dr.dot(si.n, ds.d))),
+                cosine,
+                joint.half,
+            )
+            density = cast("LightVertices", self.light_vertices).densities(ds, joint.half, lit)
+            other = dr.select(ds.delta, 0, cosine * dr.inv_pi)
+            reflected = value * light * here.weight(weight, ds.pdf * samples, other, density)
         return dr.select(lit, reflected * visible, 0), ds, tests
 
     def _is_near(self, ds: DirectionSample3f) -> Bool:

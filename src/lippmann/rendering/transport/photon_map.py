@@ -57,10 +57,7 @@ class Photons:
 
     def are_inside(self, region: NDArray[np.float64] | None) -> NDArray[np.bool_]:
         """``(n,)``: which lie in the box with these corners ``(2, 3)``; all where it is None."""
-        if region is None:
-            return np.ones(len(self), bool)
-        inside: NDArray[np.bool_] = ((self.position >= region[0]) & (self.position <= region[1])).all(axis=1)
-        return inside
+        return are_inside(self.position, region)
 
     def inside(self, region: NDArray[np.float64] | None) -> Photons:
         """Those that lie in a box."""
@@ -80,6 +77,14 @@ class Photons:
     def joined(parts: list[Photons]) -> Photons:
         """All photons of several sets."""
         return Photons(*(np.concatenate([getattr(part, each.name) for part in parts]) for each in fields(Photons)))
+
+
+def are_inside(points: NDArray[np.floating], region: NDArray[np.float64] | None) -> NDArray[np.bool_]:
+    """``(n,)``: which of the points ``(n, 3)`` lie in the box with these corners ``(2, 3)``; all where it is None."""
+    if region is None:
+        return np.ones(len(points), bool)
+    inside: NDArray[np.bool_] = ((points >= region[0]) & (points <= region[1])).all(axis=1)
+    return inside
 
 
 class Gathered:

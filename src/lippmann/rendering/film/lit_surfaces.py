@@ -1,0 +1,115 @@
+"""Light vertices for a picture whose indirect light is noisy without them."""
+
+from __future__ import annotations
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from lippmann.device.kernel_ops import divide
+from lippmann.device.sobol import SampleStream
+from lippmann.rendering.film.caustics import region_about, seen_points
+from lippmann.rendering.film.scattered_rays import ScatteredRays
+from lippmann.rendering.request.render_request import RenderRequest
+from lippmann.rendering.transport.caustic_photons import PassSchedule
+from lippmann.rendering.transport.light_vertices import JointLight, LightVertexPasses
+from lippmann.rendering.transport.path import PathIntegrator
+from lippmann.rendering.transport.ray_source import RaySource
+from lippmann.rendering.transport.sharp_events import lambertian
+
+Floats = NDArray[np.float32]
+
+#: Mean variance that light vertices must take from a sample, in linear exposed radiance, to be worth their time: a path
+#: has four times as much as a rule, and joins take a fifth to a half of its time.
+LEAST_SAVED = 2e-3
+#: Samples of a pixel that one set of light vertices serves.
+PASS_SAMPLES = 32
+#: Pixels of the look, to the side of a square; paths in each; and exposed radiance that one of them counts for at most.
+LOOK_SIDE, LOOK_PATHS, MOST = 64, 4, 4.0
+#: Seed of the look.
+_SEED = 0x6C697473
+
+
+def give_light_vertices(integrator: PathIntegrator, request: RenderRequest, source: RaySource, gain: float) -> bool:
+    """Join the paths of the picture of ``source`` to light vertices, if that saves noise; whether it does.
+
+    A look at the first indirect light that the picture shows tells it: how it varies between paths that find it
+    themselves, and between such as are joined.
+
+    Parameters
+    ----------
+    gain:
+        Exposure of the picture.
+    """
+    if request.integrator != "path" or request.surfaces < 2:
+        return False
+    look = _Look(integrator, source)
+    if look.lights_nothing:
+        return False
+    alone = look.variance(gain)
+    if alone < LEAST_SAVED:
+        return False
+    passes = LightVertexPasses(
+        integrator.scene,
+        integrator.light_sampler,
+        PassSchedule(PASS_SAMPLES, PASS_SAMPLES),
+        request.seed,
+        region_about(seen_points(integrator, source)),
+    )
+    if passes.are_none:
+        return False
+    integrator.light_vertices = passes.of_pass(0)
+    if alone - look.variance(gain) < LEAST_SAVED:
+        integrator.light_vertices = None
+        return False
+    integrator.vertex_passes = passes
+    return True
+
+
+class _Look:
+    """A few paths of two surfaces through a picture, the first of which scatters evenly."""
+
+    def __init__(self, integrator: PathIntegrator, source: RaySource) -> None:
+        self._integrator = integrator
+        self._few = ScatteredRays(source, LOOK_SIDE)
+        flags = np.array([int(emitter.flags()) for emitter in integrator.scene.emitters()], np.uint32)
+        has_place = int(mi.EmitterFlags.Surface | mi.EmitterFlags.DeltaPosition)
+        #: No emitter has a place in the scene.
+        self.lights_nothing = not (flags & has_place).any()
+
+    def variance(self, gain: float) -> float:
+        """Mean variance of a path, joined to the integrator's light vertices where it has any."""
+        ways = [np.minimum(light * gain, MOST).reshape(3, -1, LOOK_PATHS) for light in self._traced()]
+        return sum(float(pixels.var(axis=2, ddof=1, dtype=np.float64).mean()) for pixels in ways)
+
+    def _traced(self) -> list[Floats]:
+        """``(3, lanes)``: light that comes by the second surface, and what joins bring, where there are any."""
+        integrator, few = self._integrator, self._few
+        scene, vertices = integrator.scene, integrator.light_vertices
+        lane = dr.arange(mi.UInt32, few.width * few.height * LOOK_PATHS)
+        place, path = divide(lane, LOOK_PATHS)
+        row, column = divide(place, few.width)
+        stream = SampleStream.of_pixels(place, path, dr.opaque(mi.UInt32, _SEED))
+        si = scene.ray_intersect(few.rays(column, row, mi.UInt32(0), mi.Point2f(0.5)))
+        bsdf = si.bsdf()
+        albedo = lambertian(si, bsdf, si.is_valid())
+        active = si.is_valid() & (dr.max(albedo) > 0)
+
+        wo = mi.warp.square_to_cosine_hemisphere(stream.next_2d(0))
+        wo.z *= dr.sign(si.wi.z)
+        ray = si.spawn_ray(si.to_world(wo))
+        second = scene.ray_intersect(ray, mi.RayFlags.All, False, active)
+        scatters = second.bsdf()
+        smooth = active & second.is_valid() & mi.has_flag(scatters.flags(), mi.BSDFFlags.Smooth)
+        joint = None
+        if vertices is not None:
+            arrival = dr.abs(wo.z) * dr.inv_pi * dr.abs(dr.dot(second.n, ray.d))
+            reach = dr.select(smooth & (arrival > 0), dr.square(second.t) / arrival, 0)
+            joint = JointLight(lambertian(second, scatters, smooth), reach, mi.Float(0), mi.UInt32(0))
+        light, _, _ = integrator.direct_light(second, scatters, stream.next_2d(1), smooth, joint=joint)
+        found = [dr.select(active, albedo * light, 0)]
+        if vertices is not None:
+            found.append(vertices.join(si, bsdf, stream.next_1d(2), mi.UInt32(0), active, through=False)[0])
+        dr.eval(found)
+        return [np.array(mi.Color3f(each), dtype=np.float32) for each in found]

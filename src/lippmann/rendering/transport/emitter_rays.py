@@ -1,0 +1,178 @@
+"""Rays from emitters, and the surface points that they meet: one surface away from the light."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from lippmann.device.sobol import SampleStream
+from lippmann.device.types import Bool, EmitterPtr, Float, MitsubaScene, Point3f, SurfaceInteraction3f, Vector3f
+from lippmann.rendering.transport.casters import PointOf, evenly, no_point
+from lippmann.rendering.transport.light_sampling import LightSampler
+from lippmann.rendering.transport.sharp_events import facing_normal, lambertian
+
+Floats = NDArray[np.float32]
+
+
+@dataclass(frozen=True, eq=False)
+class LitPoints:
+    """Points where rays from emitters end; all arrays have ``n`` rows.
+
+    Attributes
+    ----------
+    position, normal, shading:
+        ``(n, 3)``: the point, and the unit geometric and shading normals on the side that is lit; world space.
+    glow:
+        ``(n, 3)``: radiance that the point scatters, over the density of such points per area.
+    reach:
+        ``(n,)``: density of such points per area at that of one per area of a path's own points.
+    sampled:
+        ``(n,)``: pdf with which emitter sampling at the point finds where its light comes from.
+    cosine:
+        ``(n,)``: of the angle between the shading normal and that direction.
+    """
+
+    position: Floats
+    normal: Floats
+    shading: Floats
+    glow: Floats
+    reach: Floats
+    sampled: Floats
+    cosine: Floats
+
+    def __len__(self) -> int:
+        return len(self.reach)
+
+
+class EmitterRays:
+    """Rays from the emitters of a scene that have a place: surfaces, points and spots.
+
+    Rays from surfaces start evenly over them, by the cosine about their normal; from emitters without size evenly in
+    all directions.
+
+    Parameters
+    ----------
+    scene:
+        A ``mi.Scene``.
+    sampler:
+        Of next-event estimation in it.
+    """
+
+    # Not a dataclass: Dr.Jit would take it for loop state and write its fields.
+    def __init__(self, scene: MitsubaScene, sampler: LightSampler) -> None:
+        self._scene = scene
+        self._sampler = sampler
+        self._emitters = scene.emitters_dr()
+        # Pointers are compared by their numbers in Dr.Jit's registry, in which 0 is none.
+        self._numbers = np.array(dr.reinterpret_array(mi.UInt32, self._emitters)).reshape(-1)
+        flags = np.array(self._emitters.flags()).reshape(-1)
+        has_place = (flags & int(mi.EmitterFlags.DeltaPosition)) != 0
+        areas = np.zeros(len(self._numbers))
+        starts: dict[int, PointOf] = {}
+        for shape in scene.shapes():
+            point, area = evenly(shape) if shape.is_emitter() else (None, 0.0)
+            if point is not None:
+                number = np.array(dr.reinterpret_array(mi.UInt32, mi.EmitterPtr(shape.emitter()))).reshape(-1)[0]
+                place = int(np.flatnonzero(self._numbers == number)[0])
+                areas[place], starts[place] = area, point
+        self._has_size = areas > 0
+        #: Which of the scene's emitters send rays, by their index.
+        self.senders = np.flatnonzero(self._has_size | has_place)
+        self._starts = [starts.get(int(place), no_point) for place in self.senders]
+        #: Density of rays: per projected area and steradian of a surface, per steradian about a point.
+        self._density = np.where(self._has_size, 1 / (np.pi * np.where(self._has_size, areas, 1)), 1 / (4 * np.pi))
+
+    def densities(self, chances: NDArray[np.float64]) -> Floats:
+        """Densities by the number of an emitter in Dr.Jit's registry, with the chances of the :attr:`senders`."""
+        table = np.zeros(int(self._numbers.max(initial=0)) + 1, np.float32)
+        table[self._numbers[self.senders]] = self._density[self.senders] * chances
+        return table
+
+    def meet(
+        self, chosen: NDArray[np.int64], chances: NDArray[np.float64], seed: int
+    ) -> tuple[LitPoints, NDArray[np.bool_]]:
+        """Points that scatter light of rays from emitters, and which of the rays met one.
+
+        Parameters
+        ----------
+        chosen:
+            For each ray which of the :attr:`senders` it starts from.
+        chances:
+            Share of all rays that each sender has.
+        seed:
+            0 to 2**32 - 1: the same gives the same rays.
+        """
+        scene, count = self._scene, len(chosen)
+        place = self.senders[chosen]
+        emitter = dr.gather(mi.EmitterPtr, self._emitters, mi.UInt32(place.astype(np.uint32)))
+        has_size = mi.Bool(self._has_size[place])
+        density = mi.Float((self._density[place] * chances[chosen]).astype(np.float32))
+        stream = SampleStream.of_pixels(mi.UInt32(0), dr.arange(mi.UInt32, count), dr.opaque(mi.UInt32, seed))
+        direction = stream.next_2d(1)
+        # Not a virtual call: that would ask all shapes there are, and some refuse.
+        p, n = dr.switch(mi.UInt32(chosen.astype(np.uint32)), self._starts, stream.next_2d(0))
+        anywhere = dr.zeros(mi.Interaction3f, count)
+        anywhere.p = mi.Point3f(scene.bbox().max)
+        center = emitter.sample_direction(anywhere, mi.Point2f(0.5), ~has_size)[0].p
+        start = dr.zeros(mi.SurfaceInteraction3f, count)
+        start.p, start.n = dr.select(has_size, p, center), mi.Normal3f(n)
+        from_surface = mi.Frame3f(n).to_world(mi.warp.square_to_cosine_hemisphere(direction))
+        from_point = mi.warp.square_to_uniform_sphere(direction)
+        ray = dr.select(has_size, start.spawn_ray(from_surface), mi.Ray3f(center, from_point))
+        si = scene.ray_intersect(ray, mi.RayFlags.All, False, mi.Bool(True))
+        return self._scattered(si, ray.d, emitter, center, has_size, density)
+
+    def _scattered(
+        self,
+        si: SurfaceInteraction3f,
+        along: Vector3f,
+        emitter: EmitterPtr,
+        center: Point3f,
+        has_size: Bool,
+        density: Float,
+    ) -> tuple[LitPoints, NDArray[np.bool_]]:
+        scene = self._scene
+        bsdf = si.bsdf()
+        lit = si.is_valid()
+        albedo = lambertian(si, bsdf, lit)
+        normal, shading = facing_normal(si), si.sh_frame.n * dr.sign(si.wi.z)
+        cosine, geometric = dr.abs(si.wi.z), dr.dot(normal, -along)
+        lit &= ~mi.has_flag(bsdf.flags(), mi.BSDFFlags.Null)
+        lit &= (dr.max(albedo) > 0) & (cosine > 0) & (geometric > 0)
+        # A surface of one side reflects nothing on the other.
+        mirrored = mi.Vector3f(-si.wi.x, -si.wi.y, si.wi.z)
+        lit &= dr.max(bsdf.eval(mi.BSDFContext(), si, mirrored, lit)) > 0
+        # What comes from there, by the emitter's own word, and the pdf of emitter sampling.
+        back = scene.ray_intersect(si.spawn_ray(-along), mi.RayFlags.All, False, lit & has_size)
+        ds = mi.DirectionSample3f(scene, si=back, ref=si)
+        of_surface = dr.select(ds.emitter == emitter, mi.Color3f(emitter.eval(back, lit & has_size)), 0)
+        sampled = self._sampler.pdf_direction(si, ds, lit & has_size)
+        _, of_point = emitter.sample_direction(si, mi.Point2f(0.5), lit & ~has_size)
+        squared = dr.squared_norm(center - si.p)
+        light = dr.select(has_size, of_surface, mi.Color3f(of_point))
+        density = dr.select(has_size, density, density / squared)
+        sampled = dr.select(has_size, sampled, self._sampler.probability(emitter))
+        lit &= dr.max(light) > 0
+        glow = dr.select(lit, albedo * dr.inv_pi * light * (cosine / geometric) / density, 0)
+        dr.eval(si.p, normal, shading, glow, geometric, density, sampled, cosine, lit)
+        kept = np.array(lit).reshape(-1)
+
+        def rows(values: Vector3f) -> Floats:
+            return np.ascontiguousarray(np.array(values, dtype=np.float32).T[kept])
+
+        def numbers(values: Float) -> Floats:
+            return np.asarray(np.array(values, dtype=np.float32).reshape(-1)[kept])
+
+        return LitPoints(
+            rows(si.p),
+            rows(normal),
+            rows(shading),
+            rows(glow),
+            numbers(density * geometric),
+            numbers(sampled),
+            numbers(cosine),
+        ), kept
