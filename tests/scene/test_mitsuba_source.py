@@ -107,6 +107,27 @@ def test_a_loaded_scene_is_taken_as_it_is(engine):
     assert scene.bounds == pytest.approx(np.array([[-1, -1, -1], [1, 1, 1]]))
 
 
+@pytest.mark.parametrize("kind", ["rectangle", "cube"])
+@pytest.mark.parametrize("is_loaded", [False, True])
+def test_shapes_of_one_material_have_their_place(engine, kind, is_loaded):
+    """Mitsuba merges them, and forgets the box of merged rectangles."""
+    import mitsuba as mi
+
+    place = mi.ScalarTransform4f
+    paint = {"type": "diffuse"}
+    content = {
+        "type": "scene",
+        **{f"wall {x}": {"type": kind, "to_world": place().translate([x, 0, 0]), "bsdf": paint} for x in (0, 5)},
+        "ball": {"type": "sphere", "center": [1, 2, 3], "radius": 0.5},
+        "sky": {"type": "constant"},
+    }
+    source = MitsubaSource("walls", mi.load_dict(content) if is_loaded else content)
+    depth = 0.0 if kind == "rectangle" else -1.0
+    np.testing.assert_allclose(source.bounds(), [[-1, -1, depth], [6, 2.5, 3.5]])
+    assert source.scene().environment() is not None
+    assert len(source.scene().emitters()) == 1
+
+
 def test_a_loaded_scene_of_another_variant(engine):
     import mitsuba as mi
 

@@ -105,7 +105,7 @@ class MitsubaSource:
                     rule=f"the engine runs '{variant}'",
                     fix="load it after mitsuba.set_variant of that name",
                 )
-            return content
+            return _with_boxes(content)
         try:
             if isinstance(content, Mapping):
                 check_plugins_of(content, self.name)
@@ -123,7 +123,7 @@ class MitsubaSource:
             raise SceneError(f"Mitsuba refuses the scene: {message}", where=self.name) from None
         if not isinstance(loaded, mi.Scene):
             raise SceneError(f"holds a Mitsuba {type(loaded).__name__}", where=self.name, rule="it must be a scene")
-        return loaded
+        return _with_boxes(loaded)
 
     def _with_origins(self, message: str) -> str:
         """A message of Mitsuba's, its lines of the text replaced by the files and lines that they came from."""
@@ -146,9 +146,27 @@ def read_mitsuba(path: Path, *, allow_outside: bool = False) -> MitsubaSource:
 
 def with_sky(scene: mi.Scene, sky: mi.Emitter) -> mi.Scene:
     """A ``mi.Scene`` of the same shapes and light sources, with ``sky`` as the only environment."""
+    return _rebuilt(scene, sky)
+
+
+def _with_boxes(scene: mi.Scene) -> mi.Scene:
+    """A scene that knows the boxes of all its shapes.
+
+    Rectangles of one material, which Mitsuba merges into a mesh, have none then: the scene ends where its other shapes
+    end.
+    """
+    boxless = [shape for shape in scene.shapes() if shape.is_mesh() and not shape.bbox().valid()]
+    for shape in boxless:
+        shape.recompute_bbox()
+    return _rebuilt(scene, scene.environment()) if boxless else scene
+
+
+def _rebuilt(scene: mi.Scene, environment: mi.Emitter | None) -> mi.Scene:
     import mitsuba as mi
 
-    parts: dict[str, object] = {"type": "scene", "environment": sky}
+    parts: dict[str, object] = {"type": "scene"}
+    if environment is not None:
+        parts["environment"] = environment
     # Shape groups are no shapes of a scene, but their instances need them beside them.
     nodes = mi.traverse(scene).hierarchy
     groups = [node for node in nodes if node.class_name().startswith("ShapeGroup")]
