@@ -32,8 +32,8 @@ class LitPoints:
         ``(n,)``: density of such points per area at that of one per area of a path's own points.
     sampled:
         ``(n,)``: pdf with which emitter sampling at the point finds where its light comes from.
-    cosine:
-        ``(n,)``: of the angle between the shading normal and that direction.
+    scattered:
+        ``(n,)``: ``cos / pi`` with which a path that scatters at the point goes there; 0 for emitters without size.
     """
 
     position: Floats
@@ -42,7 +42,7 @@ class LitPoints:
     glow: Floats
     reach: Floats
     sampled: Floats
-    cosine: Floats
+    scattered: Floats
 
     def __len__(self) -> int:
         return len(self.reach)
@@ -174,5 +174,5 @@ class EmitterRays:
             rows(glow),
             numbers(density * geometric),
             numbers(sampled),
-            numbers(cosine),
+            numbers(dr.select(has_size, cosine * dr.inv_pi, 0)),
         ), kept

@@ -138,7 +138,7 @@ class LightVertices:
             columns = (
                 *(half.position, half.reach * scale),
                 *(half.normal, half.sampled),
-                *(half.shading, half.cosine),
+                *(half.shading, half.scattered),
                 *(half.glow / scale, np.zeros(len(half))),
             )
             rows.append(np.column_stack([each if each.ndim == 2 else each[:, None] for each in columns]))
@@ -183,7 +183,7 @@ class LightVertices:
             active &= wo.z * si.wi.z > 0
         value, pdf = bsdf.eval_pdf(mi.BSDFContext(), si, wo, active)
         geometry = cosine / squared
-        weight = joint_weight(place.w, normal.w * (pdf * geometry), shading.w * dr.inv_pi * (pdf * geometry))
+        weight = joint_weight(place.w, normal.w * (pdf * geometry), shading.w * (pdf * geometry))
         light = value * mi.Color3f(glow.xyz) * (geometry * weight)
         active &= dr.max(light) > 0
         end = mi.Point3f(place.xyz)

@@ -1,0 +1,142 @@
+"""Which pictures are joined to light vertices, what that saves, and that it changes nothing else."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+pytestmark = pytest.mark.usefixtures("engine")
+
+SIDE = 32
+
+
+def room(emitter, *, open_to=None):
+    """A matt room with an emitter, or the floor of one alone."""
+    import mitsuba as mi
+
+    place = mi.ScalarTransform4f
+    paint = {"type": "twosided", "bsdf": {"type": "diffuse", "reflectance": {"type": "rgb", "value": [0.7, 0.6, 0.5]}}}
+    walls = {
+        "floor": place().translate([0, -1, 0]).rotate([1, 0, 0], -90),
+        "back": place().translate([0, 0, -1]),
+        "left": place().translate([-1, 0, 0]).rotate([0, 1, 0], 90),
+        "right": place().translate([1, 0, 0]).rotate([0, 1, 0], -90),
+        "ceiling": place().translate([0, 1, 0]).rotate([1, 0, 0], 90),
+    }
+    shown = {name: {"type": "rectangle", "to_world": pose, "bsdf": paint} for name, pose in walls.items()}
+    if open_to == "sky":
+        shown = {"floor": shown["floor"]}
+    return {"type": "scene", **shown, "emitter": emitter}
+
+
+def small(x=-0.8, y=0.8, radius=0.05, radiance=150.0):
+    return {
+        "type": "sphere",
+        "center": [x, y, -0.7],
+        "radius": radius,
+        "emitter": {"type": "area", "radiance": {"type": "rgb", "value": radiance}},
+    }
+
+
+SKY = {"type": "constant", "radiance": 1.0}
+
+
+def stage(scene):
+    import mitsuba as mi
+
+    from lippmann.rendering.transport.path import PathIntegrator
+    from lippmann.rendering.transport.ray_source import CameraRays
+    from lippmann.rendering.transport.scene_features import make_scene_features
+    from lippmann.scene.values.description import Camera
+
+    loaded = mi.load_dict(scene)
+    pose = np.eye(4)
+    pose[2, 3] = 3.2
+    return PathIntegrator(loaded, make_scene_features(loaded), 8), CameraRays(
+        Camera("eye", pose, fov_y=0.6), SIDE, SIDE
+    )
+
+
+def given(integrator, source, *, gain=1.0, **options):
+    from lippmann.rendering.film.lit_surfaces import give_light_vertices
+    from lippmann.rendering.request.render_request import RenderRequest
+
+    integrator.light_vertices = integrator.vertex_passes = None
+    return give_light_vertices(integrator, RenderRequest(integrator="path", **options), source, gain)
+
+
+def batches(integrator, source, memory=1 << 30, spp=16, seed=5):
+    from lippmann.rendering.film.sample_batches import FullInBatches
+
+    found = FullInBatches(integrator, source, seed=seed, memory=memory)
+    found.add(spp)
+    return found
+
+
+def test_a_small_emitter_beside_a_wall_is_worth_it():
+    integrator, source = stage(room(small()))
+    assert given(integrator, source)
+    joined = batches(integrator, source).halves()
+    integrator.light_vertices = integrator.vertex_passes = None
+    plain = batches(integrator, source).halves()
+    noise = [np.square(np.clip(a, 0, 1) - np.clip(b, 0, 1)).mean() for a, b in (joined, plain)]
+    assert noise[0] < 0.4 * noise[1]
+
+
+@pytest.mark.parametrize(
+    ("emitter", "options"),
+    [
+        (SKY, {}),
+        (small(x=0, y=0.2, radius=0.3, radiance=3.0), {}),  # in the middle: all walls are lit alike
+        (small(), {"depth": 1}),
+        (small(), {"integrator": "classic"}),
+    ],
+)
+def test_other_pictures_are_left_to_paths(emitter, options):
+    integrator, source = stage(room(emitter))
+    if "integrator" in options:
+        from lippmann.rendering.film.lit_surfaces import give_light_vertices
+        from lippmann.rendering.request.render_request import RenderRequest
+
+        assert not give_light_vertices(integrator, RenderRequest(**options), source, 1.0)
+    else:
+        assert not given(integrator, source, **options)
+    assert integrator.light_vertices is integrator.vertex_passes is None
+
+
+def test_nothing_is_joined_where_indirect_light_is_dim():
+    assert not given(*stage(room(small(), open_to="sky")))
+    # What is worth it in a picture is not in one that is exposed for the brightness of its emitter.
+    integrator, source = stage(room(small()))
+    assert not given(integrator, source, gain=0.05)
+
+
+def test_passes_serve_their_samples_and_pictures_do_not_depend_on_the_memory(monkeypatch):
+    import lippmann.rendering.film.lit_surfaces as module
+
+    monkeypatch.setattr(module, "PASS_SAMPLES", 4)
+    integrator, source = stage(room(small()))
+    assert given(integrator, source, seed=3)
+    served = []
+    of_pass = integrator.vertex_passes.of_pass
+    monkeypatch.setattr(integrator.vertex_passes, "of_pass", lambda number: served.append(number) or of_pass(number))
+    whole = batches(integrator, source)
+    assert sorted(set(served)) == [0, 1, 2, 3]
+    again = batches(integrator, source, memory=1 << 21)
+    assert whole.picture() == pytest.approx(again.picture(), rel=1e-5)
+    a, b = whole.halves()
+    assert not np.array_equal(a, b)
+
+
+def test_files_say_so():
+    import lippmann
+    from lippmann.display import Display, LensArray, Panel
+
+    display = Display("square", Panel(SIDE, SIDE, 0.25), LensArray("square", 2.0), gap=6.8, aperture_distance=10.0)
+    found = [
+        lippmann.render(lippmann.load_scene(room(emitter)), display, integrator="path", spp=2, exposure=0.0, seed=2)
+        for emitter in (small(), SKY)
+    ]
+    told = [image.provenance.options.get("light_vertices") for image in found]
+    assert told[0] > 0
+    assert told[1] is None
