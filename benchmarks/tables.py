@@ -17,6 +17,7 @@ import estimate_coverage_tables
 import first_picture_tables
 import goals_tables
 import kernel_profile_tables
+import light_vertices_tables
 import scene_file_tables
 import studio_tables
 from harness import RESULTS, saved
@@ -24,6 +25,7 @@ from harness import RESULTS, saved
 README = Path(__file__).parent.parent / "README.md"
 BEGIN, END = "<!-- methods -->", "<!-- /methods -->"
 CAUSTICS_PAGE = Path(__file__).parent.parent / "docs" / "background" / "caustics.md"
+LIGHT_VERTICES_PAGE = Path(__file__).parent.parent / "docs" / "background" / "light-vertices.md"
 PAGE = Path(__file__).parent.parent / "docs" / "background" / "measurements.md"
 
 HEAD = """# Measurements
@@ -45,6 +47,8 @@ def main() -> None:
                 _into_readme(result)
             if name == "caustics":
                 _into_page(CAUSTICS_PAGE, name, caustics_tables.rows(result))
+            if name == "light_vertices":
+                _into_page(LIGHT_VERTICES_PAGE, name, light_vertices_tables.rows(result))
             if name in QUILTS_PAGE_TABLES:
                 _into_page(QUILTS_PAGE, name, QUILTS_PAGE_TABLES[name](result))
     PAGE.write_text("\n".join(sections))
@@ -391,6 +395,7 @@ SECTIONS = {
     "methods": _methods,
     "first_picture": first_picture_tables.describe,
     "caustics": caustics_tables.describe,
+    "light_vertices": light_vertices_tables.describe,
     "equal_error": equal_error_tables.describe,
     "goals": goals_tables.describe,
     "estimate_coverage": estimate_coverage_tables.describe,

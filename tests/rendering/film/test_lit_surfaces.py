@@ -57,12 +57,12 @@ def stage(scene):
     )
 
 
-def given(integrator, source, *, gain=1.0, **options):
+def given(integrator, source, *, gain=1.0, memory=1 << 30, **options):
     from lippmann.rendering.film.lit_surfaces import give_light_vertices
     from lippmann.rendering.request.render_request import RenderRequest
 
     integrator.light_vertices = integrator.vertex_passes = None
-    return give_light_vertices(integrator, RenderRequest(integrator="path", **options), source, gain)
+    return give_light_vertices(integrator, RenderRequest(integrator="path", **options), source, memory, gain)
 
 
 def batches(integrator, source, memory=1 << 30, spp=16, seed=5):
@@ -98,7 +98,7 @@ def test_other_pictures_are_left_to_paths(emitter, options):
         from lippmann.rendering.film.lit_surfaces import give_light_vertices
         from lippmann.rendering.request.render_request import RenderRequest
 
-        assert not give_light_vertices(integrator, RenderRequest(**options), source, 1.0)
+        assert not give_light_vertices(integrator, RenderRequest(**options), source, 1 << 30, 1.0)
     else:
         assert not given(integrator, source, **options)
     assert integrator.light_vertices is integrator.vertex_passes is None
@@ -109,6 +109,7 @@ def test_nothing_is_joined_where_indirect_light_is_dim():
     # What is worth it in a picture is not in one that is exposed for the brightness of its emitter.
     integrator, source = stage(room(small()))
     assert not given(integrator, source, gain=0.05)
+    assert not given(integrator, source, memory=1 << 20)
 
 
 def test_passes_serve_their_samples_and_pictures_do_not_depend_on_the_memory(monkeypatch):

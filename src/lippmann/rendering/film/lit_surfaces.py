@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 from lippmann.device.kernel_ops import divide
 from lippmann.device.sobol import SampleStream
 from lippmann.rendering.film.caustics import region_about, seen_points
+from lippmann.rendering.film.memory_model import LIGHT_VERTEX
 from lippmann.rendering.film.scattered_rays import ScatteredRays
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.rendering.transport.caustic_photons import PassSchedule
-from lippmann.rendering.transport.light_vertices import JointLight, LightVertexPasses
+from lippmann.rendering.transport.light_vertices import POINTS, JointLight, LightVertexPasses
 from lippmann.rendering.transport.path import PathIntegrator
 from lippmann.rendering.transport.ray_source import RaySource
 from lippmann.rendering.transport.sharp_events import lambertian
@@ -31,7 +32,9 @@ LOOK_SIDE, LOOK_PATHS, MOST = 64, 4, 4.0
 _SEED = 0x6C697473
 
 
-def give_light_vertices(integrator: PathIntegrator, request: RenderRequest, source: RaySource, gain: float) -> bool:
+def give_light_vertices(
+    integrator: PathIntegrator, request: RenderRequest, source: RaySource, memory: int, gain: float
+) -> bool:
     """Join the paths of the picture of ``source`` to light vertices, if that saves noise; whether it does.
 
     A look at the first indirect light that the picture shows tells it: how it varies between paths that find it
@@ -39,10 +42,13 @@ def give_light_vertices(integrator: PathIntegrator, request: RenderRequest, sour
 
     Parameters
     ----------
+    memory:
+        Bytes that they may take; where these do not hold them, paths find all light themselves.
     gain:
         Exposure of the picture.
     """
-    if request.integrator != "path" or request.surfaces < 2:
+    integrator.light_vertices = integrator.vertex_passes = None
+    if request.integrator != "path" or request.surfaces < 2 or memory < 2 * POINTS * LIGHT_VERTEX:
         return False
     look = _Look(integrator, source)
     if look.lights_nothing:

@@ -26,6 +26,8 @@ BATCH_ERRORS = 12
 SEEN = 2 * BATCH
 #: One emission of photons, which lands about once, with what sorting takes, in bytes.
 PHOTON = 128
+#: One ray from an emitter to a light vertex, with what it takes to trace it, in bytes.
+LIGHT_VERTEX = 256
 #: What reuse of points takes: points without colours, plain rows, maps and lists of pixels. The paper's order takes
 #: the most: 6 for points, 4 for lenses, 8 for places beside centres, 12 for the sorted list.
 POINT_IMAGE = 32

@@ -36,7 +36,7 @@ def prepare_light(
     source:
         Rays of the whole picture: parts of one picture must be told the same.
     memory:
-        Bytes that the photons may take.
+        Bytes that the photons may take, and light vertices.
     background:
         What rays see that meet nothing, see :func:`~lippmann.rendering.film.exposure.measure_exposure`.
     stands_alone:
@@ -65,7 +65,7 @@ def prepare_light(
     if exposure:
         integrator.gain = mi.Float(gain_of(exposure))
         told["exposure"] = exposure
-    if give_light_vertices(integrator, request, source, gain_of(exposure) if exposure else 1.0):
+    if give_light_vertices(integrator, request, source, memory, gain_of(exposure) if exposure else 1.0):
         told["light_vertices"] = POINTS
     if request.clamp_indirect is not None:
         most = request.clamp_indirect / (gain_of(exposure) if exposure else 1.0)
