@@ -258,6 +258,53 @@ def glass_room():
     return SceneDescription("glass", meshes, materials, instances, lights=[Light("point", (2, 2, 2), at, radius=0.05)])
 
 
+def glowing_room(kind):
+    """Painted walls about a glowing plate, or a light of some size in a cone, of a description."""
+    import trimesh
+
+    from lippmann.scene.values.description import Instance, Light, Material, Mesh, SceneDescription
+
+    plate = {
+        "glow": {"emission": (30.0, 25.0, 20.0)},
+        "two-sided": {"emission": (30.0, 25.0, 20.0), "double_sided": True},
+    }
+    materials = [
+        Material("paint", base_color=(0.7, 0.5, 0.4), roughness=1.0),
+        Material("plate", base_color=(0.0, 0.0, 0.0), roughness=1.0, **plate.get(kind, {})),
+    ]
+    wall = trimesh.creation.box((2.4, 2.4, 0.1))
+    corners = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], np.float32) * 0.12
+    meshes = [
+        Mesh("", wall.vertices.astype("f4"), wall.faces.astype(np.uint32), 0),
+        Mesh("", corners, np.array([[0, 1, 2], [0, 2, 3]], np.uint32), 1),
+    ]
+    instances = []
+    for turn, offset in ((0, (0, 0, -1)), (90, (-1, 0, 0)), (-90, (1, 0, 0))):
+        place = trimesh.transformations.rotation_matrix(np.radians(turn), [0, 1, 0])
+        place[:3, 3] = offset
+        instances.append(Instance(0, place))
+    at = trimesh.transformations.rotation_matrix(np.radians(50), [1, 1, 0])
+    at[:3, 3] = -0.65, 0.3, -0.5
+    lights = []
+    if kind == "cone":
+        lights = [Light("spot", (4, 4, 3), at, radius=0.08, inner_angle=0.5, outer_angle=0.9)]
+    else:
+        instances.append(Instance(1, at))
+    return SceneDescription("glowing", meshes, materials, instances, lights=lights)
+
+
+@pytest.mark.parametrize("kind", ["glow", "two-sided", "cone"])
+def test_glowing_surfaces_and_cones_light_as_much(kind):
+    from lippmann.device.pbr import build_description
+
+    built = build_description(glowing_room(kind))
+    integrator, source = prepared(built.mitsuba, has_null=built.has_null)
+    assert not passes(integrator, 1).are_none
+    plain, joined = (pictures(integrator, source, way, seeds=range(24)) for way in (False, True))
+    agree(plain, joined)
+    assert noise(joined) < 0.8 * noise(plain)
+
+
 @pytest.mark.parametrize("radius", [0.0, 0.1, 1.0])
 def test_a_ball_lit_from_its_middle_shows_what_theory_says(radius):
     """Inside a matt ball every point receives the same of every other: each reflection brings albedo times the last."""

@@ -51,8 +51,8 @@ class LitPoints:
 class EmitterRays:
     """Rays from the emitters of a scene that have a place: surfaces, points and spots.
 
-    Rays from surfaces start evenly over them, by the cosine about their normal; from emitters without size evenly in
-    all directions.
+    Rays from surfaces start evenly over them, by the cosine about their normal, on both sides where both shine; from
+    emitters without size evenly in all directions.
 
     Parameters
     ----------
@@ -83,13 +83,19 @@ class EmitterRays:
         #: Which of the scene's emitters send rays, by their index.
         self.senders = np.flatnonzero(self._has_size | has_place)
         self._starts = [starts.get(int(place), no_point) for place in self.senders]
+        self._two_sided = self._has_size & [bool(getattr(each, "two_sided", False)) for each in scene.emitters()]
         #: Density of rays: per projected area and steradian of a surface, per steradian about a point.
         self._density = np.where(self._has_size, 1 / (np.pi * np.where(self._has_size, areas, 1)), 1 / (4 * np.pi))
+        self._density[self._two_sided] /= 2
 
     def densities(self, chances: NDArray[np.float64]) -> Floats:
-        """Densities by the number of an emitter in Dr.Jit's registry, with the chances of the :attr:`senders`."""
+        """Densities by the number of an emitter in Dr.Jit's registry, with the chances of the :attr:`senders`.
+
+        Negative for those that shine on both sides.
+        """
         table = np.zeros(int(self._numbers.max(initial=0)) + 1, np.float32)
-        table[self._numbers[self.senders]] = self._density[self.senders] * chances
+        sides = np.where(self._two_sided, -1, 1)
+        table[self._numbers[self.senders]] = (sides * self._density)[self.senders] * chances
         return table
 
     def meet(
@@ -115,6 +121,7 @@ class EmitterRays:
         direction = stream.next_2d(1)
         # Not a virtual call: that would ask all shapes there are, and some refuse.
         p, n = dr.switch(mi.UInt32(chosen.astype(np.uint32)), self._starts, stream.next_2d(0))
+        n = dr.select(mi.Bool(self._two_sided[place]) & (stream.next_1d(2) < 0.5), -n, n)
         anywhere = dr.zeros(mi.Interaction3f, count)
         anywhere.p = mi.Point3f(scene.bbox().max)
         center = emitter.sample_direction(anywhere, mi.Point2f(0.5), ~has_size)[0].p

@@ -154,8 +154,9 @@ class LightVertices:
         0 where no rays come from there.
         """
         number = dr.reinterpret_array(mi.UInt32, ds.emitter)
-        active = active & (ds.delta | (dr.dot(ds.n, ds.d) < 0))
-        density = dr.gather(mi.Float, self._densities, number + half * self._emitters, active)
+        told = dr.gather(mi.Float, self._densities, number + half * self._emitters, active)
+        active = active & (ds.delta | (told < 0) | (dr.dot(ds.n, ds.d) < 0))
+        density = dr.abs(told)
         return dr.select(active, dr.select(ds.delta, density / dr.square(ds.dist), density), 0)
 
     def join(
