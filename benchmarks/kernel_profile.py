@@ -101,12 +101,12 @@ def _kernels(stage: Stage) -> dict[str, Any]:
             return dr.select(active, mi.Spectrum(1), 0), dr.select(active, mi.UInt32(1), 0)
 
     class Unevaluated(Unshadowed):
-        def direct_light(self, si: Any, bsdf: Any, point: Any, active: Any, samples: Any = 1) -> Any:
+        def direct_light(self, si: Any, bsdf: Any, point: Any, active: Any, *_: Any) -> Any:
             ds, light = self.light_sampler.sample_direction(si, point, active)
             return dr.select(active, light * 1e-3, 0), ds, mi.UInt32(0)
 
     class Unlit(path.PathIntegrator):
-        def direct_light(self, si: Any, bsdf: Any, point: Any, active: Any, samples: Any = 1) -> Any:
+        def direct_light(self, si: Any, bsdf: Any, point: Any, active: Any, *_: Any) -> Any:
             return mi.Spectrum(0), dr.zeros(mi.DirectionSample3f), mi.UInt32(0)
 
     class Unfocused(path.PathIntegrator):

@@ -397,7 +397,7 @@ def test_a_join_is_what_its_formula_says():
 def test_weights_of_the_three_ways_add_up_to_one(a, b, c):
     import mitsuba as mi
 
-    from lippmann.rendering.transport.light_vertices import joint_weight
+    from lippmann.rendering.transport.path_weights import joint_weight
 
     numbers = [mi.Float(value) for value in (a, b, c)]
     total = sum(joint_weight(numbers[k], numbers[k - 1], numbers[k - 2])[0] for k in range(3))

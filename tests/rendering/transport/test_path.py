@@ -185,7 +185,7 @@ def test_coloured_glass_fades_with_the_distance():
 def test_roulette_lets_faint_paths_go_on_by_the_root(throughput, eta, expected):
     import mitsuba as mi
 
-    from lippmann.rendering.transport.path import roulette_survival
+    from lippmann.rendering.transport.path_weights import roulette_survival
 
     survival = np.array(roulette_survival(mi.Spectrum(*throughput), mi.Float(eta)))
     np.testing.assert_allclose(survival, expected, rtol=1e-5)
@@ -252,7 +252,7 @@ def four_emitters():
 
 
 def test_first_samples_take_several_emitter_samples_each(monkeypatch):
-    from lippmann.rendering.transport import path
+    from lippmann.rendering.transport import path_weights
 
     def noise():
         runs = np.stack([trace(four_emitters(), camera(4, 50), 16, 1, 1, seed).pixels for seed in range(8)])
@@ -260,7 +260,7 @@ def test_first_samples_take_several_emitter_samples_each(monkeypatch):
 
     several, mean = noise()
     rays = trace(four_emitters(), camera(4, 50), 16, 1, 1).rays
-    monkeypatch.setattr(path, "FIRST_EMITTER_SAMPLES", 1)
+    monkeypatch.setattr(path_weights, "FIRST_EMITTER_SAMPLES", 1)
     one, same_mean = noise()
     fewer = trace(four_emitters(), camera(4, 50), 16, 1, 1).rays
     assert (rays.shadow, fewer.shadow) == (4 * 256, 256)
@@ -284,7 +284,7 @@ def test_emitter_samples_of_all_paths_are_one_stratified_sequence():
     import mitsuba as mi
 
     from lippmann.device.sobol import SampleStream
-    from lippmann.rendering.transport.path import first_emitter_samples
+    from lippmann.rendering.transport.path_weights import first_emitter_samples
 
     count, first = (np.array(part) for part in first_emitter_samples(dr.arange(mi.UInt32, 12)))
     assert count.tolist() == [4] * 4 + [2] * 8

@@ -37,6 +37,7 @@ from lippmann.device.types import (
 from lippmann.rendering.transport.caustic_photons import PassSchedule
 from lippmann.rendering.transport.emitter_rays import EmitterRays, LitPoints
 from lippmann.rendering.transport.light_sampling import LightSampler
+from lippmann.rendering.transport.path_weights import joint_weight
 from lippmann.rendering.transport.photon_map import are_inside
 
 Floats = NDArray[np.float32]
@@ -51,16 +52,6 @@ UNIFORM_SHARE = 0.1
 MOST_EMITTERS = 1 << 6
 _SEED_STEPS = (0x2C1B3C6D, 0x297A2D39)
 _PILOT_STEP, _PASS_STEP = 0x846CA68B, 0x7FEB352D
-
-
-def joint_weight(pdf: Float, other: Float, reach: Float) -> Float:
-    """MIS weight of a sample with ``pdf`` against two other ways, by the power heuristic; 0 where all are 0.
-
-    Veach 1997, eq. 9.16 with exponent 2.
-    """
-    squared = dr.square(pdf)
-    weight = squared / (squared + dr.square(other) + dr.square(reach))
-    return dr.select(dr.isfinite(weight), weight, 0)
 
 
 class JointLight:

@@ -21,7 +21,6 @@ from lippmann.device.sobol import SampleStream
 from lippmann.device.types import (
     Bool,
     BSDFPtr,
-    Color3f,
     DirectionSample3f,
     Float,
     Interaction3f,
@@ -31,18 +30,23 @@ from lippmann.device.types import (
     Spectrum,
     SurfaceInteraction3f,
     UInt32,
-    Vector3f,
 )
 from lippmann.rendering.transport.beam import Beam, turn_of_normals, widening
+from lippmann.rendering.transport.caustic_light import caustic_light
 from lippmann.rendering.transport.integrator import FirstHit, RayCounts
 from lippmann.rendering.transport.light_sampling import LightSampler, SceneLightSampler, WithoutSize
 from lippmann.rendering.transport.light_vertices import JointLight, lambert_share
+from lippmann.rendering.transport.path_weights import (
+    ROULETTE_DEPTH,
+    first_emitter_samples,
+    mis_weight,
+    roulette_survival,
+)
 from lippmann.rendering.transport.photon_map import PhotonMap
 from lippmann.rendering.transport.scene_features import SceneFeatures
 from lippmann.rendering.transport.shadow_rays import MAX_CROSSINGS, ShadowRays
 from lippmann.rendering.transport.sharp_events import (
     MOST_EVENTS,
-    facing_normal,
     follows_sharply,
     has_wide_lobes,
     is_sharp,
@@ -60,46 +64,6 @@ DIMENSIONS_PER_VERTEX = 4
 GATHER_DIMENSION = 1 << 24
 #: Sample dimension, from a vertex's first, of the light vertex that it is joined to.
 JOIN_DIMENSION = 1 << 25
-#: Parts of the photons about a point that is seen: a power of two. Successive samples of a pixel look at one part each.
-PHOTON_PARTS = 4
-#: Surfaces after which Russian roulette may end a path.
-ROULETTE_DEPTH = 5
-#: Emitter samples at the first surface of a path that is not purely specular: ``FIRST_EMITTER_SAMPLES`` in each of a
-#: pixel's first ``FIRST_SAMPLES`` samples, then ``LATER_EMITTER_SAMPLES``. Powers of two keep all points stratified.
-FIRST_EMITTER_SAMPLES, LATER_EMITTER_SAMPLES, FIRST_SAMPLES = 4, 2, 4
-
-
-def mis_weight(pdf_a: Float, pdf_b: Float) -> Float:
-    """MIS weight of a sample with ``pdf_a`` against ``pdf_b``, by the power heuristic; 0 where both are 0.
-
-    Veach 1997, eq. 9.16 with exponent 2.
-    """
-    a2, b2 = dr.square(pdf_a), dr.square(pdf_b)
-    weight = a2 / (a2 + b2)
-    return dr.select(dr.isfinite(weight), weight, 0)
-
-
-def roulette_survival(throughput: Spectrum, eta: Float) -> Float:
-    """Probability that Russian roulette lets a path go on, by its throughput and the product of its relative indices.
-
-    The root of its unitless throughput, at most 0.95. By the throughput itself, hardly any path of a room with grey
-    walls goes on, and what the few bring that do weighs so much that two long pictures agree by 0.5 dB less.
-    """
-    survival: Float = dr.minimum(dr.sqrt(dr.max(throughput)) * eta, 0.95)
-    return survival
-
-
-def first_emitter_samples(sample: UInt32) -> tuple[UInt32, UInt32]:
-    """Count of emitter samples at the first non-specular surface of a pixel's path number ``sample``, and their start.
-
-    The start is the index of the first of them in the pixel's sequence of points, which all paths of the pixel share
-    without gaps.
-    """
-    early = sample < FIRST_SAMPLES
-    before = FIRST_EMITTER_SAMPLES * FIRST_SAMPLES
-    later = before + LATER_EMITTER_SAMPLES * (sample - FIRST_SAMPLES)
-    first = dr.select(early, FIRST_EMITTER_SAMPLES * sample, later)
-    return dr.select(early, mi.UInt32(FIRST_EMITTER_SAMPLES), LATER_EMITTER_SAMPLES), first
 
 
 class PathIntegrator:
@@ -262,8 +226,10 @@ class PathIntegrator:
                 widen_lobes(si, widening(turn))
             if dr.hint(self.photons is not None, mode="scalar"):
                 choice = stream.next_1d(dimension + GATHER_DIMENSION)
-                radiance += throughput * self._caustics(
-                    si, bsdf, lobe, lambert, wide, stream, depth, choice, seen, lands
+                photons = cast("PhotonMap", self.photons)
+                further = self.depth - depth - 1
+                radiance += throughput * caustic_light(
+                    photons, si, bsdf, lobe, lambert, wide, stream, further, choice, seen, lands
                 )
             joins, reach = mi.Bool(False), mi.Float(0)
             if dr.hint(self.light_vertices is not None, mode="scalar"):
@@ -361,45 +327,6 @@ class PathIntegrator:
         if dr.hint(self.gain is not None, mode="scalar"):
             radiance *= self.gain
         return radiance, RayCounts(secondary, shadow), FirstHit(first_distance, view_dependent)
-
-    def _caustics(
-        self,
-        si: SurfaceInteraction3f,
-        bsdf: BSDFPtr,
-        lobe: Vector3f,
-        lambert: Color3f,
-        wide: Bool,
-        stream: SampleStream,
-        depth: UInt32,
-        choice: Float,
-        seen: Bool,
-        active: Bool,
-    ) -> Spectrum:
-        """Radiance toward ``si.wi`` of the photons about a point.
-
-        The sum over all of them by the Lambertian part of the surface, and by the rest of its scattering that of one
-        for all, where its lobes are wide enough for that.
-        """
-        photons = cast("PhotonMap", self.photons)
-        parts = dr.select(seen, mi.UInt32(PHOTON_PARTS), 1)
-        part = (stream.key + stream.index) & (parts - 1)
-        found = photons.gather(
-            si,
-            facing_normal(si),
-            lobe,
-            mi.UInt32(stream.half),
-            self.depth - depth - 1,
-            choice,
-            seen,
-            active,
-            part,
-            parts,
-        )
-        light = lambert * found.irradiance * dr.inv_pi
-        wo = si.to_local(found.toward)
-        wide = active & wide & (dr.max(found.flux) > 0) & (wo.z * si.wi.z > 0)
-        rest = bsdf.eval(mi.BSDFContext(), si, wo, wide) / dr.abs(wo.z) - lambert * dr.inv_pi
-        return dr.select(active, light, 0) + dr.select(wide, rest * found.flux, 0)
 
     def _joint(self, share: Spectrum, reach: Float, cosine: Float, stream: SampleStream) -> JointLight | None:
         """A :class:`JointLight`, where there are light vertices."""

@@ -30,7 +30,7 @@ from lippmann.device.types import (
 )
 from lippmann.rendering.transport.integrator import FirstHit, RayCounts
 from lippmann.rendering.transport.light_sampling import LightSampler, SceneLightSampler
-from lippmann.rendering.transport.path import ROULETTE_DEPTH, mis_weight, roulette_survival
+from lippmann.rendering.transport.path_weights import ROULETTE_DEPTH, mis_weight, roulette_survival
 from lippmann.rendering.transport.scene_features import Color
 from lippmann.rendering.transport.shadow_rays import MAX_CROSSINGS
 
