@@ -12,8 +12,8 @@ still something to do.
 *Before*: pixels in the order of rows (:mod:`lippmann.rendering.film.lane_order`), opaque surfaces without an
 acceleration structure of their own where others let rays straight through
 (:mod:`lippmann.rendering.transport.shadow_rays`), look-ups of all photons about a point by every sample
-(``PHOTON_PARTS`` of :mod:`lippmann.rendering.transport.path`), and photons in NumPy's memory, whose rows cannot be
-fetched at once (:mod:`lippmann.device.kernel_ops`).
+(``PHOTON_PARTS`` of :mod:`lippmann.rendering.transport.caustic_light`), and photons in NumPy's memory, whose rows cannot
+be fetched at once (:mod:`lippmann.device.kernel_ops`).
 
 python benchmarks/kernel_profile.py [--scenes NAME,...]
 
@@ -90,7 +90,7 @@ def _kernels(stage: Stage) -> dict[str, Any]:
     from lippmann.rendering.film import wavefront
     from lippmann.rendering.film.wavefront import samples_of_tile
     from lippmann.rendering.film.wavefront_plan import make_plan
-    from lippmann.rendering.transport import path
+    from lippmann.rendering.transport import caustic_light, path
 
     source, paths = stage.source, stage.integrator
     plan = make_plan(source.width, source.height, SAMPLES, memory=4 << 30)
@@ -110,21 +110,25 @@ def _kernels(stage: Stage) -> dict[str, Any]:
             return mi.Spectrum(0), dr.zeros(mi.DirectionSample3f), mi.UInt32(0)
 
     class Unfocused(path.PathIntegrator):
-        def _caustics(self, *args: Any) -> Any:
-            return mi.Spectrum(0)
+        pass
 
     def alike(kind: type[path.PathIntegrator]) -> path.PathIntegrator:
         other = kind(paths.scene, paths.features, paths.depth)
-        for name in ("light_sampler", "gain", "photons", "beam"):
+        for name in ("light_sampler", "gain", "photons", "light_vertices", "beam"):
             setattr(other, name, getattr(paths, name))
         return other
 
-    def traced(integrator: path.PathIntegrator, parts: int = path.PHOTON_PARTS, in_rows: bool = False) -> Any:
+    usual = caustic_light.PHOTON_PARTS
+
+    def traced(integrator: path.PathIntegrator, parts: int = usual, in_rows: bool = False) -> Any:
+        is_dark = isinstance(integrator, Unfocused)
+
         def call(seed: int) -> Any:
-            path.PHOTON_PARTS = parts
+            caustic_light.PHOTON_PARTS = parts
             with mock.patch.object(wavefront, "in_strips", return_value=0) if in_rows else nullcontext():
                 pixels, stream = samples_of_tile(source, plan, tile, run, seed, True)
-            radiance, counts = integrator.sample(pixels.ray(stream), stream, mi.Bool(True))
+            with mock.patch.object(path, "caustic_light", return_value=mi.Spectrum(0)) if is_dark else nullcontext():
+                radiance, counts = integrator.sample(pixels.ray(stream), stream, mi.Bool(True))
             dr.eval(radiance, counts.secondary, counts.shadow)
             return np.array(counts.secondary)
 
