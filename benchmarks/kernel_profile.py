@@ -12,8 +12,8 @@ still something to do.
 *Before*: pixels in the order of rows (:mod:`lippmann.rendering.film.lane_order`), opaque surfaces without an
 acceleration structure of their own where others let rays straight through
 (:mod:`lippmann.rendering.transport.shadow_rays`), look-ups of all photons about a point by every sample
-(``PHOTON_PARTS`` of :mod:`lippmann.rendering.transport.caustic_light`), and photons in NumPy's memory, whose rows cannot
-be fetched at once (:mod:`lippmann.device.kernel_ops`).
+(``PHOTON_PARTS`` of :mod:`lippmann.rendering.transport.caustic_light`), and photons in NumPy's memory, whose rows
+cannot be fetched at once (:mod:`lippmann.device.kernel_ops`).
 
 python benchmarks/kernel_profile.py [--scenes NAME,...]
 
