@@ -112,6 +112,18 @@ def test_nothing_is_joined_where_indirect_light_is_dim():
     assert not given(integrator, source, memory=1 << 20)
 
 
+def test_scenes_of_many_emitters_are_left_to_paths():
+    from lippmann.rendering.transport.light_vertices import MOST_EMITTERS
+
+    scene = room(small())
+    more = {
+        f"point {k}": {"type": "point", "position": [-0.8, 0.8, -0.7], "intensity": 1e-3} for k in range(MOST_EMITTERS)
+    }
+    assert not given(*stage(scene | more))
+    del more["point 0"]
+    assert given(*stage(scene | more))
+
+
 def test_passes_serve_their_samples_and_pictures_do_not_depend_on_the_memory(monkeypatch):
     import lippmann.rendering.film.lit_surfaces as module
 

@@ -14,7 +14,7 @@ from lippmann.rendering.film.memory_model import LIGHT_VERTEX
 from lippmann.rendering.film.scattered_rays import ScatteredRays
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.rendering.transport.caustic_photons import PassSchedule
-from lippmann.rendering.transport.light_vertices import POINTS, JointLight, LightVertexPasses
+from lippmann.rendering.transport.light_vertices import MOST_EMITTERS, POINTS, JointLight, LightVertexPasses
 from lippmann.rendering.transport.path import PathIntegrator
 from lippmann.rendering.transport.ray_source import RaySource
 from lippmann.rendering.transport.sharp_events import lambertian
@@ -51,7 +51,7 @@ def give_light_vertices(
     if request.integrator != "path" or request.surfaces < 2 or memory < 2 * POINTS * LIGHT_VERTEX:
         return False
     look = _Look(integrator, source)
-    if look.lights_nothing:
+    if not 0 < look.emitters <= MOST_EMITTERS:
         return False
     alone = look.variance(gain)
     if alone < LEAST_SAVED:
@@ -81,8 +81,8 @@ class _Look:
         self._few = ScatteredRays(source, LOOK_SIDE)
         flags = np.array([int(emitter.flags()) for emitter in integrator.scene.emitters()], np.uint32)
         has_place = int(mi.EmitterFlags.Surface | mi.EmitterFlags.DeltaPosition)
-        #: No emitter has a place in the scene.
-        self.lights_nothing = not (flags & has_place).any()
+        #: Number of emitters that have a place in the scene.
+        self.emitters = int(np.count_nonzero(flags & has_place))
 
     def variance(self, gain: float) -> float:
         """Mean variance of a path, joined to the integrator's light vertices where it has any."""

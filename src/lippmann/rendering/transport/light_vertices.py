@@ -48,7 +48,7 @@ POINTS = 1 << 16
 PILOT_OF_EMITTER, PILOT = 1 << 12, 1 << 16
 #: Share of the rays that goes to all emitters alike, whatever the pilot met.
 UNIFORM_SHARE = 0.1
-#: Scenes of more emitters are left to paths.
+#: Scenes of more emitters are to be left to paths: each has a start of its own in the kernel of rays.
 MOST_EMITTERS = 1 << 6
 _SEED_STEPS = (0x2C1B3C6D, 0x297A2D39)
 _PILOT_STEP, _PASS_STEP = 0x846CA68B, 0x7FEB352D
@@ -231,7 +231,7 @@ class LightVertexPasses:
     def _pilot(self, region: NDArray[np.float64] | None) -> NDArray[np.float64] | None:
         """Chances of the senders, as what their rays bring within the region."""
         senders = len(self._rays.senders)
-        if not 0 < senders <= MOST_EMITTERS:
+        if senders == 0:
             return None
         even = np.full(senders, 1 / senders)
         chosen, chances = _dealt(even, min(PILOT_OF_EMITTER * senders, PILOT))
