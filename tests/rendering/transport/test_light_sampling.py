@@ -397,3 +397,22 @@ def test_a_scene_may_have_none():
     from lippmann.rendering.transport.light_sampling import WithoutSize
 
     assert len(WithoutSize(mi.load_dict(room()).emitters())) == 0
+
+
+@pytest.mark.parametrize("by_weight", [False, True])
+def test_the_probability_of_an_emitter_is_that_by_which_it_is_chosen(by_weight):
+    import drjit as dr
+    import mitsuba as mi
+
+    from lippmann.rendering.transport.light_sampling import SceneLightSampler, WeightedLightSampler
+
+    scene = mi.load_dict(room())
+    sampler = WeightedLightSampler(scene, np.array([1.0, 5.0, 2.0])) if by_weight else SceneLightSampler(scene)
+    emitters = scene.emitters_dr()
+    told = np.array(sampler.probability(emitters))
+    count = 1 << 12
+    at = dr.zeros(mi.Interaction3f, count)
+    at.p = mi.Point3f(0, 0, 0.5)
+    ds, _ = sampler.sample_direction(at, mi.Point2f((dr.arange(mi.Float, count) + 0.5) / count, 0.5), mi.Bool(True))
+    chosen = [float(dr.mean(dr.select(ds.emitter == mi.EmitterPtr(each), 1.0, 0.0))[0]) for each in scene.emitters()]
+    assert told == pytest.approx(chosen, abs=2 / count)

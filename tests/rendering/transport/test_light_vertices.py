@@ -9,8 +9,6 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 pytestmark = pytest.mark.usefixtures("engine")
 
@@ -328,26 +326,6 @@ def test_a_ball_lit_from_its_middle_shows_what_theory_says(radius):
     assert found.mean() == pytest.approx(expected, rel=2e-3 if radius else 1e-4)
 
 
-def test_points_scatter_the_power_that_emitters_send():
-    from lippmann.rendering.transport.emitter_rays import EmitterRays
-
-    intensity, albedo = 3.0, 0.4
-    ball = {"type": "sphere", "radius": 2.0, "flip_normals": True, "bsdf": diffuse(albedo)}
-    small = {"type": "sphere", "radius": 0.2, "center": [1, 0, 0], "emitter": {"type": "area", "radiance": rgb(7.0)}}
-    integrator, _ = prepared(
-        {"type": "scene", "ball": ball, "small": small, "light": {"type": "point", "intensity": rgb(intensity)}}
-    )
-    rays = EmitterRays(integrator.scene, integrator.light_sampler)
-    assert len(rays.senders) == 2
-    count = 1 << 14
-    points, met = rays.meet(np.arange(count) % 2, np.array([0.5, 0.5]), 3)
-    # The flux of a radiance L from an area A is pi A L; some from the point is in the way of the small ball.
-    sent = 4 * math.pi * intensity + math.pi * 4 * math.pi * 0.2**2 * 7.0
-    blocked = 4 * math.pi * intensity * (1 - math.sqrt(1 - 0.2**2)) / 2
-    assert met.mean() > 0.98
-    assert points.glow.sum(axis=0) * math.pi / count == pytest.approx(albedo * (sent - blocked), rel=0.01)
-
-
 def test_a_join_is_what_its_formula_says():
     """The readable twin: one light vertex, one matt point, each factor by itself."""
     import drjit as dr
@@ -391,18 +369,6 @@ def test_a_join_is_what_its_formula_says():
     expected = 0.6 / np.pi * (at_x * at_y / squared * weight)[:, None] * points.glow / scale
     np.testing.assert_allclose(np.array(light).T, np.where(faces[:, None], expected, 0), rtol=2e-4, atol=1e-6)
     np.testing.assert_array_equal(np.array(tests), faces)
-
-
-@given(*[st.floats(0, 1e6)] * 3)
-def test_weights_of_the_three_ways_add_up_to_one(a, b, c):
-    import mitsuba as mi
-
-    from lippmann.rendering.transport.path_weights import joint_weight
-
-    numbers = [mi.Float(value) for value in (a, b, c)]
-    total = sum(joint_weight(numbers[k], numbers[k - 1], numbers[k - 2])[0] for k in range(3))
-    if max(a, b, c) > 1e-10:  # whose squares are numbers
-        assert total == pytest.approx(1, rel=1e-5)
 
 
 def test_the_same_seed_gives_the_same_light_vertices_and_halves_their_own():

@@ -178,19 +178,6 @@ def test_coloured_glass_fades_with_the_distance():
     assert pixels.mean(axis=(0, 1)) == pytest.approx(np.exp([-1.0, -0.5, 0.0]), rel=2e-3)
 
 
-@pytest.mark.parametrize(
-    ("throughput", "eta", "expected"),
-    [((0.04, 0.01, 0.0), 1.0, 0.2), ((0.16, 0.16, 0.16), 1.5, 0.6), ((1.0, 0.5, 0.5), 1.0, 0.95), ((0, 0, 0), 1, 0)],
-)
-def test_roulette_lets_faint_paths_go_on_by_the_root(throughput, eta, expected):
-    import mitsuba as mi
-
-    from lippmann.rendering.transport.path_weights import roulette_survival
-
-    survival = np.array(roulette_survival(mi.Spectrum(*throughput), mi.Float(eta)))
-    np.testing.assert_allclose(survival, expected, rtol=1e-5)
-
-
 def test_roulette_changes_no_mean():
     """A closed white box of radiance 1 whose walls reflect two thirds: light of each bounce is known."""
     import mitsuba as mi
@@ -277,21 +264,6 @@ def test_later_surfaces_take_one_emitter_sample():
     rays = trace(scene, camera(0.9, 20), 16, 1, 2).rays
     assert rays.primary == 256
     assert 0.98 * (4 + 1) * 256 < rays.shadow <= (4 + 1) * 256
-
-
-def test_emitter_samples_of_all_paths_are_one_stratified_sequence():
-    import drjit as dr
-    import mitsuba as mi
-
-    from lippmann.device.sobol import SampleStream
-    from lippmann.rendering.transport.path_weights import first_emitter_samples
-
-    count, first = (np.array(part) for part in first_emitter_samples(dr.arange(mi.UInt32, 12)))
-    assert count.tolist() == [4] * 4 + [2] * 8
-    assert np.array_equal(first, np.cumsum(count) - count)
-    stream = SampleStream.of_pixels(mi.UInt32(3), mi.UInt32(5), mi.UInt32(1))
-    points = np.array(stream.at(dr.arange(mi.UInt32, 32)).next_2d(1)[0])
-    assert sorted(np.floor(points * 32)) == list(range(32))
 
 
 def test_tiles_and_passes_do_not_change_the_picture():
