@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from lippmann.progress import ProgressCallback
 from lippmann.rendering.adaptive.convergence import Assessor, ErrorTrack
 from lippmann.rendering.adaptive.extra_samples import extra_samples
-from lippmann.rendering.adaptive.method_race import DENOISED_SLOPE, MethodRace
+from lippmann.rendering.adaptive.method_race import DENOISED_SLOPE, MOST_GAINED, MOST_GAINED_WIDE, WIDE_LENS, MethodRace
 from lippmann.rendering.adaptive.stopping import Goal, Outcome, goal_of, reach
 from lippmann.rendering.denoise.cost_model import effort_of, look_cost, traced_work
 from lippmann.rendering.denoise.dual_buffer import Denoised
@@ -192,6 +192,12 @@ def _fixed_samples(job: Job) -> Traced:
     return Traced(frame, job.request.samples, _estimator(job).estimate(errors))
 
 
+def _most_gained(source: DisplayRays | WindowRays | QuiltRays) -> float:
+    """By how much pooling gains at most, by the lenses of a display; views of a quilt count as narrow ones."""
+    is_wide = not isinstance(source, QuiltRays) and source.display.pixels_per_lens[0] >= WIDE_LENS
+    return MOST_GAINED_WIDE if is_wide else MOST_GAINED
+
+
 def _until(job: Job, goal: Goal) -> Traced:
     """As many samples as the goal takes, the noise taken out of them where that is asked for or proves better."""
     writing = _SECONDS_PER_PIXEL_WRITTEN * job.source.width * job.source.height
@@ -207,7 +213,7 @@ def _until(job: Job, goal: Goal) -> Traced:
     if denoised is None:
         assessor: Assessor = plain.track
     elif job.request.denoise == "auto":
-        assessor = MethodRace(goal, plain.track, denoised.track, rays)
+        assessor = MethodRace(goal, plain.track, denoised.track, rays, _most_gained(job.source))
     else:
         assessor = denoised.track
     outcome = reach(goal, batches.add, assessor, job.progress, probe=batches.probe)

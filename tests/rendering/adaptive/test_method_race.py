@@ -114,8 +114,11 @@ def test_plain_samples_win_where_the_quality_is_near():
     assert "less than pooling takes" in race.reason
 
 
-@pytest.mark.parametrize(("plain", "looked_at"), [(0.02, 2), (0.5, 8)])
-def test_very_few_samples_are_pooled_where_that_may_be_enough(plain, looked_at):
+@pytest.mark.parametrize(
+    ("plain", "most_gained", "looked_at"),
+    [(0.02, 12.5, 2), (0.5, 12.5, 8), (0.05, 12.5, 8), (0.05, 15.0, 2), (0.5, 15.0, 8)],
+)
+def test_very_few_samples_are_pooled_where_that_may_be_enough(plain, most_gained, looked_at):
     samples, seen = Samples(), []
     clean = Picture(samples, 1e-5, noise=CROSS_NOISE)
     look = clean.squared_error
@@ -136,6 +139,7 @@ def test_very_few_samples_are_pooled_where_that_may_be_enough(plain, looked_at):
         ErrorTrack(Picture(samples, plain), FromEight(SHOWN)),
         ErrorTrack(clean, FromTwo(SHOWN), 0.6),
         lambda: RAYS * samples.taken,
+        most_gained,
     )
     outcome = reach(Goal(quality=30), samples.add, race, clock=lambda: samples.now)
     assert seen == [looked_at]
