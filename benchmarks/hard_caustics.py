@@ -65,13 +65,10 @@ def measure(name: str) -> dict[str, Any]:
 
 def rendered(scene: Any, way: Any, method: Any, spp: int, seed: int) -> Any:
     import lippmann
-    from lippmann.display import Display, LensArray, Panel
-    from lippmann.scene.placement import PlacementOptions
 
-    display = Display("small", Panel(96, 96, 2 / 96 * 8), LensArray("square", 2 / 96 * 8 * 8), 6.8, "", 500.0, 16.0)
     return lippmann.render(
         scene,
-        display,
+        small_array(),
         integrator="path",
         caustics=way,
         method=method,
@@ -79,8 +76,22 @@ def rendered(scene: Any, way: Any, method: Any, spp: int, seed: int) -> Any:
         seed=seed,
         exposure=0,
         tone_map="none",
-        placement=PlacementOptions(mode="fit", turn=(0.0, 30.0, 0.0)),
+        placement=turned(),
     )
+
+
+def small_array() -> Any:
+    """12 x 12 lenses of 8 pixels."""
+    from lippmann.display import Display, LensArray, Panel
+
+    return Display("small", Panel(96, 96, 2 / 96 * 8), LensArray("square", 2 / 96 * 8 * 8), 6.8, "", 500.0, 16.0)
+
+
+def turned() -> Any:
+    """How the scenes are placed before it."""
+    from lippmann.scene.placement import PlacementOptions
+
+    return PlacementOptions(mode="fit", turn=(0.0, 30.0, 0.0))
 
 
 def codes(picture: Any) -> Any:

@@ -109,9 +109,6 @@ def _kernels(stage: Stage) -> dict[str, Any]:
         def direct_light(self, si: Any, bsdf: Any, point: Any, active: Any, *_: Any) -> Any:
             return mi.Spectrum(0), dr.zeros(mi.DirectionSample3f), mi.UInt32(0)
 
-    class Unfocused(path.PathIntegrator):
-        pass
-
     def alike(kind: type[path.PathIntegrator]) -> path.PathIntegrator:
         other = kind(paths.scene, paths.features, paths.depth)
         for name in ("light_sampler", "gain", "photons", "light_vertices", "beam"):
@@ -120,9 +117,9 @@ def _kernels(stage: Stage) -> dict[str, Any]:
 
     usual = caustic_light.PHOTON_PARTS
 
-    def traced(integrator: path.PathIntegrator, parts: int = usual, in_rows: bool = False) -> Any:
-        is_dark = isinstance(integrator, Unfocused)
-
+    def traced(
+        integrator: path.PathIntegrator, parts: int = usual, in_rows: bool = False, is_dark: bool = False
+    ) -> Any:
         def call(seed: int) -> Any:
             caustic_light.PHOTON_PARTS = parts
             with mock.patch.object(wavefront, "in_strips", return_value=0) if in_rows else nullcontext():
@@ -169,7 +166,7 @@ def _kernels(stage: Stage) -> dict[str, Any]:
         "walks": walks,
     }
     if paths.photons is not None:
-        kernels["photons"] = traced(alike(Unfocused))
+        kernels["photons"] = traced(paths, is_dark=True)
     return kernels
 
 

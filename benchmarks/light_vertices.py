@@ -10,15 +10,16 @@ python benchmarks/light_vertices.py
 from __future__ import annotations
 
 import statistics
-from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import nullcontext
 from functools import partial
 from typing import Any
+from unittest import mock
 
 import numpy as np
 
 from caustic_scenes import CAUSTIC_SCENES
 from equal_error import Stage, coded, once, prepare, trace_lit
+from hard_caustics import psnr, small_array, turned
 from hard_scenes import HARD_SCENES
 from harness import save
 
@@ -40,15 +41,14 @@ def main() -> None:
 
 def _room(name: str) -> Stage:
     from lippmann.api import load_scene
-    from lippmann.display import Display, LensArray, Panel
     from lippmann.rendering.request.render_request import RenderRequest
     from lippmann.rendering.session import open_session
     from lippmann.rendering.transport.ray_source import DisplayRays
-    from lippmann.scene.placement import PlacementOptions, place
+    from lippmann.scene.placement import place
 
     scene = load_scene((CAUSTIC_SCENES.get(name) or HARD_SCENES[name])())
-    display = Display("small", Panel(96, 96, 1 / 6), LensArray("square", 4 / 3), 6.8, "", 500.0, 16.0)
-    at = place(scene.bounds, display, options=PlacementOptions(mode="fit", turn=(0.0, 30.0, 0.0)))
+    display = small_array()
+    at = place(scene.bounds, display, options=turned())
     session = open_session(scene, RenderRequest(integrator="path", pixel_filter="box", exposure=0.0), memory=4 << 30)
     source = DisplayRays(display, at.world_from_display)
     integrator = session.integrator(source, at.display_from_world)
@@ -56,11 +56,14 @@ def _room(name: str) -> Stage:
 
 
 def _measured(stage: Stage) -> dict[str, Any]:
+    from lippmann.rendering.film import prepared_light
+
     seconds: dict[str, list[float]] = {"alone": [], "joined": []}
     halves: dict[str, list[Any]] = {"alone": [], "joined": []}
     for run in range(RUNS + 1):
         for way, found in seconds.items():
-            with _left_out(way == "alone"):
+            left_out = mock.patch.object(prepared_light, "give_light_vertices", return_value=False)
+            with left_out if way == "alone" else nullcontext():
                 took, picture = once(partial(trace_lit, stage, SAMPLES, 1001 * (run + 1)))
             if run:  # the first is the warm-up
                 found.append(took)
@@ -69,26 +72,9 @@ def _measured(stage: Stage) -> dict[str, Any]:
                 is_joined = stage.integrator.light_vertices is not None
     return {
         "is_joined": is_joined,
-        "halves": {way: _psnr(np.square(pair[0] - pair[1]).mean()) for way, pair in halves.items()},
+        "halves": {way: psnr(np.square(pair[0] - pair[1]).mean()) for way, pair in halves.items()},
         "seconds": {way: statistics.median(found) for way, found in seconds.items()},
     }
-
-
-@contextmanager
-def _left_out(is_left_out: bool) -> Iterator[None]:
-    import lippmann.rendering.film.prepared_light as module
-
-    given = module.give_light_vertices
-    if is_left_out:
-        module.give_light_vertices = lambda *_: False
-    try:
-        yield
-    finally:
-        module.give_light_vertices = given
-
-
-def _psnr(error: float) -> float:
-    return float(-10 * np.log10(max(error, 1e-12)))
 
 
 if __name__ == "__main__":

@@ -85,6 +85,7 @@ def pytest_configure(config):
     worker = getattr(config, "workerinput", None)
     if worker is not None:
         config.stash[CRASH] = open(Path(worker["crashes"], worker["workerid"]), "w", encoding="utf-8")  # noqa: SIM115
+        config.add_cleanup(config.stash[CRASH].close)
         faulthandler.enable(config.stash[CRASH])
     # A shell lets what it starts in the background ignore Ctrl-C, and so would all programs that tests start.
     signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -94,6 +95,7 @@ def pytest_configure(config):
 def pytest_configure_node(node):
     if CRASHES not in node.config.stash:
         node.config.stash[CRASHES] = tempfile.TemporaryDirectory()
+        node.config.add_cleanup(node.config.stash[CRASHES].cleanup)
     node.workerinput["crashes"] = node.config.stash[CRASHES].name
 
 

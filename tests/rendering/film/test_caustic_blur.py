@@ -17,7 +17,7 @@ class PlaneOfPhotons:
     """Stands in for photons of passes: spread over a plane, as dense as ``light`` says at their places."""
 
     def __init__(self, light, radius, count=400_000):
-        from lippmann.rendering.transport.caustic_photons import PassSchedule
+        from lippmann.rendering.transport.pass_schedule import PassSchedule
 
         self._light, self._radius, self._count = light, radius, count
         self.schedule = PassSchedule(8, 8)

@@ -201,7 +201,7 @@ def test_samples_of_one_pass_are_taken_together():
     import mitsuba as mi
 
     from lippmann.rendering.film.caustics import stretches
-    from lippmann.rendering.transport.caustic_photons import PassSchedule
+    from lippmann.rendering.transport.pass_schedule import PassSchedule
     from lippmann.rendering.transport.path import PathIntegrator
     from lippmann.rendering.transport.scene_features import make_scene_features
 

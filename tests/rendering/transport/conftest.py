@@ -4,12 +4,17 @@ from __future__ import annotations
 
 import re
 import subprocess
+import sys
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from lippmann import api
+
+# Modules that only these tests use lie beside them.
+sys.path.insert(0, str(Path(__file__).parent))
 
 SIZE = 128
 #: Colours of neighbours that differ more than this are an edge: a hair's breadth decides what a ray meets there.

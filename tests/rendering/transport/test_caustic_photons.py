@@ -345,7 +345,7 @@ def test_what_is_not_seen_gets_few_photons():
 
 
 def test_later_passes_serve_as_many_samples_as_all_before():
-    from lippmann.rendering.transport.caustic_photons import PassSchedule
+    from lippmann.rendering.transport.pass_schedule import PassSchedule
 
     schedule = PassSchedule(8, 32)
     assert [schedule.samples(number) for number in range(6)] == [8, 8, 16, 32, 32, 32]
@@ -358,7 +358,8 @@ def test_later_passes_serve_as_many_samples_as_all_before():
 
 
 def test_passes_of_more_photons_have_smaller_radii():
-    from lippmann.rendering.transport.caustic_photons import FEWEST, SAMPLES_OF_EMISSION, PassSchedule, radius_of_pass
+    from lippmann.rendering.transport.caustic_photons import FEWEST, SAMPLES_OF_EMISSION, radius_of_pass
+    from lippmann.rendering.transport.pass_schedule import PassSchedule
 
     ball = {"ball": {"type": "sphere", "bsdf": {"type": "dielectric"}}, "room": room(), "lamp": lamp([0, 0, 4.0])}
     samples = FEWEST * SAMPLES_OF_EMISSION

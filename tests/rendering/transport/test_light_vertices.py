@@ -1,4 +1,4 @@
-"""Paths joined to points that emitters light: as much light as without, whatever the emitters and surfaces, less noise.
+"""Paths joined to points that emitters light: as much light as without by all emitters and surfaces, less noise.
 
 Pictures with and without are compared by blocks of pixels and as a whole, each seed with light vertices of its own.
 """
@@ -9,10 +9,9 @@ import math
 
 import numpy as np
 import pytest
+from block_agreement import SIDE, agree
 
 pytestmark = pytest.mark.usefixtures("engine")
-
-SIDE, BLOCK = 24, 4
 
 
 def rgb(*values):
@@ -112,8 +111,8 @@ def prepared(scene, *, has_null=False, depth=4):
 
 
 def passes(integrator, seed):
-    from lippmann.rendering.transport.caustic_photons import PassSchedule
     from lippmann.rendering.transport.light_vertices import LightVertexPasses
+    from lippmann.rendering.transport.pass_schedule import PassSchedule
 
     return LightVertexPasses(integrator.scene, integrator.light_sampler, PassSchedule(8, 8), seed, None)
 
@@ -129,15 +128,6 @@ def pictures(integrator, source, joined, *, seeds, spp=8):
         found.append(trace_frame(integrator, source, plan, seed=seed).pixels)
     integrator.light_vertices = None
     return np.stack(found).astype(np.float64)
-
-
-def agree(plain, joined):
-    """Blocks of pixels, and whole pictures, agree by the scatter of pictures of independent seeds."""
-    blocks = [p.reshape(len(p), SIDE // BLOCK, BLOCK, SIDE // BLOCK, BLOCK, 3).mean((2, 4)) for p in (plain, joined)]
-    for parts, most in ((blocks, 5), ([p.mean(axis=(1, 2)) for p in (plain, joined)], 4)):
-        error = np.sqrt(sum(part.var(axis=0, ddof=1) / len(part) for part in parts))
-        apart = np.abs(parts[0].mean(axis=0) - parts[1].mean(axis=0))
-        np.testing.assert_array_less(apart, most * error + 1e-4)
 
 
 def noise(found):

@@ -14,22 +14,22 @@ pytestmark = pytest.mark.usefixtures("engine")
 def test_weights_of_two_ways_add_up_to_one(a, b):
     import mitsuba as mi
 
-    from lippmann.rendering.transport.path_weights import joint_weight, mis_weight
+    from lippmann.rendering.transport.path_weights import mis_weight
 
     first, second = mi.Float(a), mi.Float(b)
     if max(a, b) > 1e-10:  # whose squares are numbers
         assert mis_weight(first, second)[0] + mis_weight(second, first)[0] == pytest.approx(1, rel=1e-5)
-    assert mis_weight(first, second)[0] == joint_weight(first, second, mi.Float(0))[0]
+    assert mis_weight(first, second)[0] == mis_weight(first, second, mi.Float(0))[0]
 
 
 @given(*[st.floats(0, 1e6)] * 3)
 def test_weights_of_the_three_ways_add_up_to_one(a, b, c):
     import mitsuba as mi
 
-    from lippmann.rendering.transport.path_weights import joint_weight
+    from lippmann.rendering.transport.path_weights import mis_weight
 
     numbers = [mi.Float(value) for value in (a, b, c)]
-    total = sum(joint_weight(numbers[k], numbers[k - 1], numbers[k - 2])[0] for k in range(3))
+    total = sum(mis_weight(numbers[k], numbers[k - 1], numbers[k - 2])[0] for k in range(3))
     if max(a, b, c) > 1e-10:  # whose squares are numbers
         assert total == pytest.approx(1, rel=1e-5)
 

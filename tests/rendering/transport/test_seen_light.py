@@ -6,10 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from block_agreement import SIDE, agree
 
 pytestmark = pytest.mark.usefixtures("engine")
-
-SIDE, BLOCK = 24, 4
 
 
 def rgb(*values):
@@ -93,15 +92,6 @@ def pictures(integrator, source, chains, *, seeds, spp=8):
     integrator.seen_chains = dr.opaque(mi.UInt32, chains) if chains else None
     plan = make_plan(SIDE, SIDE, spp, memory=2**30)
     return np.stack([trace_frame(integrator, source, plan, seed=seed).pixels for seed in seeds]).astype(np.float64)
-
-
-def agree(plain, further):
-    """Blocks of pixels, and whole pictures, agree by the scatter of pictures of independent seeds."""
-    blocks = [p.reshape(len(p), SIDE // BLOCK, BLOCK, SIDE // BLOCK, BLOCK, 3).mean((2, 4)) for p in (plain, further)]
-    for parts, most in ((blocks, 5), ([p.mean(axis=(1, 2)) for p in (plain, further)], 4)):
-        error = np.sqrt(sum(part.var(axis=0, ddof=1) / len(part) for part in parts))
-        apart = np.abs(parts[0].mean(axis=0) - parts[1].mean(axis=0))
-        np.testing.assert_array_less(apart, most * error + 1e-4)
 
 
 @pytest.fixture(scope="module")

@@ -5,15 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Literal
 
-import drjit as dr
-import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.rendering.film.caustic_worth import LEAST_WORTH, variance_by_paths
 from lippmann.rendering.film.exposure import gain_of
 from lippmann.rendering.film.memory_model import PHOTON, too_small
-from lippmann.rendering.film.scattered_rays import ScatteredRays
+from lippmann.rendering.film.seen_region import SEEN_SIDE, region_about, seen_points
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.rendering.transport.casters import find_casters, hides_caustics
 from lippmann.rendering.transport.caustic_photons import (
@@ -22,11 +20,11 @@ from lippmann.rendering.transport.caustic_photons import (
     SAMPLES_OF_EMISSION,
     CausticPhotons,
     IsMissed,
-    PassSchedule,
     emissions,
     no_photons,
 )
 from lippmann.rendering.transport.integrator import Integrator
+from lippmann.rendering.transport.pass_schedule import PassSchedule
 from lippmann.rendering.transport.path import PathIntegrator
 from lippmann.rendering.transport.ray_source import RaySource
 
@@ -34,9 +32,6 @@ from lippmann.rendering.transport.ray_source import RaySource
 PASS_SAMPLES, FIRST_PASS_SAMPLES = 32, 8
 #: Share of the memory for photons of passes that tiles and bands ask for in turn.
 KEPT_SHARE = 0.25
-#: Rays that tell what is seen, to the side of a square; the share of their ends that may lie apart from the others, to
-#: either side; and by how much of its size the box about the others is widened.
-SEEN_SIDE, APART, WIDER = 64, 0.002, 0.25
 
 
 def stretches(integrator: Integrator, first: int, samples: int) -> Iterator[int]:
@@ -46,14 +41,11 @@ def stretches(integrator: Integrator, first: int, samples: int) -> Iterator[int]
         return
     while samples > 0:
         count = samples
-        if integrator.photon_passes is not None:
-            number, left = integrator.photon_passes.schedule.at(first)
-            integrator.photons = integrator.photon_passes.of_pass(number)
-            count = min(count, left)
-        if integrator.vertex_passes is not None:
-            number, left = integrator.vertex_passes.schedule.at(first)
-            integrator.light_vertices = integrator.vertex_passes.of_pass(number)
-            count = min(count, left)
+        for name, passes in (("photons", integrator.photon_passes), ("light_vertices", integrator.vertex_passes)):
+            if passes is not None:
+                number, left = passes.schedule.at(first)
+                setattr(integrator, name, passes.of_pass(number))
+                count = min(count, left)
         yield count
         first, samples = first + count, samples - count
 
@@ -127,24 +119,3 @@ def _are_missed(seen: NDArray[np.float64], request: RenderRequest) -> IsMissed |
     return lambda photons, radiance: (
         variance_by_paths(photons, radiance, seen, SEEN_SIDE**2) * gain_of(exposure) ** 2 > LEAST_WORTH
     )
-
-
-def seen_points(integrator: PathIntegrator, source: RaySource) -> NDArray[np.float64]:
-    """``(n, 3)``: what the picture's rays meet first, of some of them that lie evenly in it."""
-    few = ScatteredRays(source, SEEN_SIDE)
-    place = dr.arange(mi.UInt32, few.width * few.height)
-    row = place // few.width
-    ray = few.rays(place - row * few.width, row, mi.UInt32(0), mi.Point2f(0.5))
-    si = integrator.scene.ray_intersect(ray)
-    points: NDArray[np.float64] = np.array(si.p, dtype=np.float64).T[np.array(si.is_valid())]
-    return points
-
-
-def region_about(points: NDArray[np.float64]) -> NDArray[np.float64] | None:
-    """Corners ``(2, 3)`` of a box about points that are seen; None where there are none."""
-    if not len(points):
-        return None
-    corners: NDArray[np.float64] = np.quantile(points, [APART, 1 - APART], axis=0)
-    middle, size = corners.mean(axis=0), np.ptp(corners, axis=0)
-    reach = (0.5 + WIDER) * size + WIDER * size.max()
-    return np.stack([middle - reach, middle + reach])

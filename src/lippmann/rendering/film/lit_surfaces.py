@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 
 from lippmann.device.kernel_ops import divide
 from lippmann.device.sobol import SampleStream
-from lippmann.rendering.film.caustics import region_about, seen_points
 from lippmann.rendering.film.memory_model import LIGHT_VERTEX
 from lippmann.rendering.film.scattered_rays import ScatteredRays
+from lippmann.rendering.film.seen_region import region_about, seen_points
 from lippmann.rendering.request.render_request import RenderRequest
-from lippmann.rendering.transport.caustic_photons import PassSchedule
-from lippmann.rendering.transport.light_vertices import MOST_EMITTERS, POINTS, JointLight, LightVertexPasses
+from lippmann.rendering.transport.light_vertices import MOST_EMITTERS, POINTS, Arrival, LightVertexPasses, reach_of
+from lippmann.rendering.transport.pass_schedule import PassSchedule
 from lippmann.rendering.transport.path import PathIntegrator
 from lippmann.rendering.transport.ray_source import RaySource
 from lippmann.rendering.transport.sharp_events import lambertian
@@ -47,7 +47,6 @@ def give_light_vertices(
     gain:
         Exposure of the picture.
     """
-    integrator.light_vertices = integrator.vertex_passes = None
     if request.integrator != "path" or request.surfaces < 2 or memory < 2 * POINTS * LIGHT_VERTEX:
         return False
     look = _Look(integrator, source)
@@ -108,12 +107,11 @@ class _Look:
         second = scene.ray_intersect(ray, mi.RayFlags.All, False, active)
         scatters = second.bsdf()
         smooth = active & second.is_valid() & mi.has_flag(scatters.flags(), mi.BSDFFlags.Smooth)
-        joint = None
+        arrival = None
         if vertices is not None:
-            arrival = dr.abs(wo.z) * dr.inv_pi * dr.abs(dr.dot(second.n, ray.d))
-            reach = dr.select(smooth & (arrival > 0), dr.square(second.t) / arrival, 0)
-            joint = JointLight(lambertian(second, scatters, smooth), reach, mi.Float(0), mi.UInt32(0))
-        light, _, _ = integrator.direct_light(second, scatters, stream.next_2d(1), smooth, joint=joint)
+            reach = reach_of(second, scatters, ray.d, dr.abs(wo.z) * dr.inv_pi, smooth)
+            arrival = Arrival(lambertian(second, scatters, smooth), reach, mi.UInt32(0))
+        light, _, _ = integrator.direct_light(second, scatters, stream.next_2d(1), smooth, arrival=arrival)
         found = [dr.select(active, albedo * light, 0)]
         if vertices is not None:
             found.append(vertices.join(si, bsdf, stream.next_1d(2), mi.UInt32(0), active, through=False)[0])

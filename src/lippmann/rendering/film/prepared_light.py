@@ -62,14 +62,14 @@ def prepare_light(
     exposure = request.exposure
     if exposure == "auto":
         exposure = measure_exposure(integrator, source, background, request.seed)
+    gain = gain_of(exposure) if exposure else 1.0
     if exposure:
-        integrator.gain = mi.Float(gain_of(exposure))
+        integrator.gain = mi.Float(gain)
         told["exposure"] = exposure
-    if give_light_vertices(integrator, request, source, memory, gain_of(exposure) if exposure else 1.0):
+    if give_light_vertices(integrator, request, source, memory, gain):
         told["light_vertices"] = POINTS
     if request.clamp_indirect is not None:
-        most = request.clamp_indirect / (gain_of(exposure) if exposure else 1.0)
-        integrator.most_indirect = mi.Float(most)
+        integrator.most_indirect = mi.Float(request.clamp_indirect / gain)
     chains = give_chains(integrator, request, source) if has_sharp and stands_alone else 0
     if chains:
         told["seen_chains"] = chains

@@ -50,15 +50,15 @@ class Casters:
         not numbers for others.
     areas:
         ``(len(shapes),)``: of the shapes, or of their boxes.
-    triangles:
-        ``len(shapes)``: those of the meshes; None for other shapes.
+    points:
+        ``len(shapes)``: what spreads points evenly over each; for those with boxes :func:`no_point`.
     """
 
     emitters: NDArray[np.uint32]
     shapes: NDArray[np.uint32]
     boxes: NDArray[np.float32]
     areas: NDArray[np.float32]
-    triangles: tuple[Triangles | None, ...]
+    points: tuple[PointOf, ...]
 
     @property
     def boxed(self) -> NDArray[np.bool_]:
@@ -101,30 +101,53 @@ class Triangles:
         return mi.Point3f(p), mi.Vector3f(-n if self._mesh.has_flipped_normals() else n)
 
 
+def evenly(shape: mi.Shape) -> tuple[PointOf | None, float]:
+    """What spreads points evenly over a shape, and the shape's area; None for shapes that give no points."""
+    if not _gives_points(shape):
+        return None, 0.0
+    triangles = Triangles(shape) if shape.is_mesh() else None
+    area = _area(shape) if triangles is None else triangles.area
+    if not 0 < area < math.inf:
+        return None, 0.0
+    return _point_of(shape) if triangles is None else triangles.point, area
+
+
+def _point_of(shape: mi.Shape) -> PointOf:
+    def sampled(sample: Point2f) -> tuple[Point3f, Vector3f]:
+        point = shape.sample_position(mi.Float(0), sample, mi.Bool(True))
+        return mi.Point3f(point.p), mi.Vector3f(point.n)
+
+    return sampled
+
+
+def no_point(sample: Point2f) -> tuple[Point3f, Vector3f]:
+    """The origin, in place of a point."""
+    return mi.Point3f(sample.x * 0), mi.Vector3f(sample.x * 0)
+
+
 def find_casters(scene: MitsubaScene) -> Casters:
     """Emitters other than the environment, and shapes with lobes that may be sharp; all instances may show such."""
     environment = scene.environment()
     emitters = [number for number, each in enumerate(scene.emitters()) if each is not environment]
-    shapes, boxes, areas, triangles = [], [], [], []
+    shapes, boxes, areas, points = [], [], [], []
     for number, shape in enumerate(scene.shapes() if emitters else ()):
         if not (is_instance(shape) or _may_be_sharp(shape.bsdf())):
             continue
-        of_mesh = Triangles(shape) if shape.is_mesh() and _gives_points(shape) else None
-        box, area = np.full(6, np.nan), of_mesh.area if of_mesh is not None else _area(shape)
-        if not (0 < area < math.inf and _gives_points(shape)):
+        box, (point, area) = np.full(6, np.nan), evenly(shape)
+        if point is None:
             box = _box_about(shape)
             sides = box[3:] - box[:3]
             area = 2 * float(sides @ np.roll(sides, 1))
         shapes.append(number)
         boxes.append(box)
         areas.append(area)
-        triangles.append(of_mesh)
+        points.append(point or no_point)
     return Casters(
         np.array(emitters, np.uint32),
         np.array(shapes, np.uint32),
         np.array(boxes, np.float32).reshape(-1, 6),
         np.array(areas, np.float32),
-        tuple(triangles),
+        tuple(points),
     )
 
 
@@ -200,16 +223,8 @@ class CasterPoints:
         self.area: Float = dr.gather(mi.Float, mi.Float(casters.areas), caster)
         self._boxed = mi.Bool(False)
         boxed = casters.boxed
-        shapes = scene.shapes()
         # Not a virtual call: that would ask all shapes there are, and some refuse.
-        self.p, self._n = dr.switch(
-            caster,
-            [
-                no_point if is_boxed else triangles.point if triangles else _point_of(shapes[int(number)])
-                for number, is_boxed, triangles in zip(casters.shapes, boxed.tolist(), casters.triangles, strict=True)
-            ],
-            sample,
-        )
+        self.p, self._n = dr.switch(caster, list(casters.points), sample)
         if boxed.any():
             self._boxed = dr.gather(mi.Bool, mi.Bool(boxed), caster)
             corners = [
@@ -238,29 +253,6 @@ class CasterPoints:
         near = dr.squared_norm(si.p - self.p) < dr.square(_SAME_POINT * distance)
         near &= dr.dot(si.n, self._n) > _SAME_SIDE
         return dr.select(self._boxed, (si.instance == self._shape) | (si.shape == self._shape), near)
-
-
-def evenly(shape: mi.Shape) -> tuple[PointOf | None, float]:
-    """What spreads points evenly over a shape, and the shape's area; None for shapes that give no points."""
-    if not _gives_points(shape):
-        return None, 0.0
-    triangles = Triangles(shape) if shape.is_mesh() else None
-    area = _area(shape) if triangles is None else triangles.area
-    if not 0 < area < math.inf:
-        return None, 0.0
-    return _point_of(shape) if triangles is None else triangles.point, area
-
-
-def _point_of(shape: mi.Shape) -> PointOf:
-    def sampled(sample: Point2f) -> tuple[Point3f, Vector3f]:
-        point = shape.sample_position(mi.Float(0), sample, mi.Bool(True))
-        return mi.Point3f(point.p), mi.Vector3f(point.n)
-
-    return sampled
-
-
-def no_point(sample: Point2f) -> tuple[Point3f, Vector3f]:
-    return mi.Point3f(sample.x * 0), mi.Vector3f(sample.x * 0)
 
 
 def _point_on_box(low: Vector3f, high: Vector3f, sample: Point2f, face: Float) -> tuple[Vector3f, Vector3f]:

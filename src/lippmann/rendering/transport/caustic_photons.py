@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import drjit as dr
 import mitsuba as mi
@@ -33,6 +32,7 @@ from lippmann.device.types import (
     UInt32,
 )
 from lippmann.rendering.transport.casters import CasterPoints, Casters
+from lippmann.rendering.transport.pass_schedule import PassSchedule
 from lippmann.rendering.transport.photon_map import PhotonMap, Photons
 from lippmann.rendering.transport.scene_features import SceneFeatures
 from lippmann.rendering.transport.sharp_events import (
@@ -80,35 +80,6 @@ def no_photons() -> PhotonMap:
 def emissions(samples: int) -> int:
     """Emissions of each half for a picture of so many samples in all."""
     return int(np.clip(samples // SAMPLES_OF_EMISSION, FEWEST, MOST))
-
-
-@dataclass(frozen=True)
-class PassSchedule:
-    """Which samples of a pixel each pass of photons serves.
-
-    Parameters
-    ----------
-    first:
-        Samples of a pixel that the first pass serves, at least 1.
-    most:
-        A later pass serves as many samples as all passes before it together, but at most so many; at least ``first``.
-    """
-
-    first: int
-    most: int
-
-    def samples(self, number: int) -> int:
-        """Samples of a pixel that pass ``number`` serves, from 0 on."""
-        return min(self.most, self.first << max(0, number - 1))
-
-    def at(self, sample: int) -> tuple[int, int]:
-        """The pass that serves ``sample``, from 0 on, and how many samples it still serves, this one included."""
-        number, before, count = 0, 0, self.first
-        while sample >= before + count and count < self.most:
-            number, before = number + 1, before + count
-            count = min(before, self.most)
-        more, within = divmod(sample - before, count)
-        return number + more, count - within
 
 
 class CausticPhotons:

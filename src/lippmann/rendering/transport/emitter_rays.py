@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from lippmann.device.sobol import SampleStream
 from lippmann.device.types import Bool, EmitterPtr, Float, MitsubaScene, Point3f, SurfaceInteraction3f, Vector3f
 from lippmann.rendering.transport.casters import PointOf, evenly, no_point
-from lippmann.rendering.transport.light_sampling import LightSampler
+from lippmann.rendering.transport.light_sampling import LightSampler, by_registry, registry_numbers
 from lippmann.rendering.transport.sharp_events import facing_normal, lambertian
 
 Floats = NDArray[np.float32]
@@ -67,17 +67,16 @@ class EmitterRays:
         self._scene = scene
         self._sampler = sampler
         self._emitters = scene.emitters_dr()
-        # Pointers are compared by their numbers in Dr.Jit's registry, in which 0 is none.
-        self._numbers = np.array(dr.reinterpret_array(mi.UInt32, self._emitters)).reshape(-1)
+        # Pointers are compared by these.
+        numbers = registry_numbers(self._emitters)
         flags = np.array(self._emitters.flags()).reshape(-1)
         has_place = (flags & int(mi.EmitterFlags.DeltaPosition)) != 0
-        areas = np.zeros(len(self._numbers))
+        areas = np.zeros(len(numbers))
         starts: dict[int, PointOf] = {}
         for shape in scene.shapes():
             point, area = evenly(shape) if shape.is_emitter() else (None, 0.0)
             if point is not None:
-                number = np.array(dr.reinterpret_array(mi.UInt32, mi.EmitterPtr(shape.emitter()))).reshape(-1)[0]
-                place = int(np.flatnonzero(self._numbers == number)[0])
+                place = int(np.flatnonzero(numbers == registry_numbers(mi.EmitterPtr(shape.emitter())))[0])
                 areas[place], starts[place] = area, point
         self._has_size = areas > 0
         #: Which of the scene's emitters send rays, by their index.
@@ -93,10 +92,9 @@ class EmitterRays:
 
         Negative for those that shine on both sides.
         """
-        table = np.zeros(int(self._numbers.max(initial=0)) + 1, np.float32)
-        sides = np.where(self._two_sided, -1, 1)
-        table[self._numbers[self.senders]] = (sides * self._density)[self.senders] * chances
-        return table
+        values = np.zeros(len(self._density))
+        values[self.senders] = (np.where(self._two_sided, -1, 1) * self._density)[self.senders] * chances
+        return by_registry(self._emitters, values)
 
     def meet(
         self, chosen: NDArray[np.int64], chances: NDArray[np.float64], seed: int

@@ -82,9 +82,8 @@ class SceneLightSampler:
     def probability(self, emitter: EmitterPtr) -> Float:
         emitters = self._scene.emitters_dr()
         weights = np.array(emitters.sampling_weight(), dtype=np.float64).reshape(-1)
-        return dr.gather(
-            mi.Float, _by_registry(emitters, weights / weights.sum()), dr.reinterpret_array(mi.UInt32, emitter)
-        )
+        pmf = mi.Float(by_registry(emitters, weights / weights.sum()))
+        return dr.gather(mi.Float, pmf, dr.reinterpret_array(mi.UInt32, emitter))
 
 
 class WeightedLightSampler:
@@ -109,7 +108,7 @@ class WeightedLightSampler:
         self._weights, self._cumulative = mi.Float(single), mi.Float(cumulative.astype(np.float32))
         self._total = dr.opaque(mi.Float, float(np.float32(cumulative[-1])))
         self._normalization = dr.opaque(mi.Float, float(np.float32(1 / cumulative[-1])))
-        self._pmf = _by_registry(self._emitters, single * np.float32(1 / cumulative[-1]))
+        self._pmf = mi.Float(by_registry(self._emitters, single * np.float32(1 / cumulative[-1])))
 
     def sample_direction(
         self, reference: Interaction3f, point: Point2f, active: Bool
@@ -138,15 +137,20 @@ class WeightedLightSampler:
         return dr.gather(mi.Float, self._pmf, dr.reinterpret_array(mi.UInt32, emitter))
 
 
-def _by_registry(emitters: EmitterPtr, values: NDArray[np.floating]) -> Float:
-    """A table of numbers of emitters by their index in Dr.Jit's registry, in which 0 is no emitter.
+def registry_numbers(emitters: EmitterPtr) -> NDArray[np.uint32]:
+    """``(emitters,)``: indices in Dr.Jit's registry, in which 0 is no emitter."""
+    return np.asarray(np.array(dr.reinterpret_array(mi.UInt32, emitters)).reshape(-1))
+
+
+def by_registry(emitters: EmitterPtr, values: NDArray[np.floating]) -> NDArray[np.float32]:
+    """A table of numbers of emitters by :func:`registry_numbers`.
 
     A scattered ray knows the emitter that it hit by that index.
     """
-    registry = np.array(dr.reinterpret_array(mi.UInt32, emitters)).reshape(-1)
-    table = np.zeros(int(registry.max()) + 1, np.float32)
-    table[registry] = values
-    return mi.Float(table)
+    numbers = registry_numbers(emitters)
+    table = np.zeros(int(numbers.max()) + 1, np.float32)
+    table[numbers] = values
+    return table
 
 
 class WithoutSize:

@@ -1,17 +1,17 @@
 """Light vertices: surface points that emitters light directly, to which paths from the eye are joined.
 
-What a small lamp lights brightly, such as the wall beside it, lights the rest of a room in turn, and paths that scatter
-by the surfaces alone happen upon it seldom. Rays from the emitters find it at once. So each vertex of a path is joined
-to one of the points that such rays meet (the bidirectional strategy of two light vertices; Veach 1997, chapter 10.2),
-drawn from a store that all pixels share (Davidovic et al. 2014, light vertex cache). The same light comes by next-event
-estimation at points that a path meets itself, and by paths that meet the emitter: the three share it by MIS.
+What a small emitter lights brightly, such as the wall beside it, lights the rest of a room in turn, and paths that
+scatter by the surfaces alone happen upon it seldom. Rays from the emitters find it at once. So each vertex of a path is
+joined to one of the points that such rays meet (the bidirectional strategy of two light vertices; Veach 1997, chapter
+10.2), drawn from a store that all pixels share (Davidovic et al. 2014, light vertex cache). The same light comes by
+next-event estimation at points that a path meets itself, and by paths that meet the emitter: the three share it by MIS.
 
 Only light that points scatter as Lambertian surfaces do is taken, so that a store holds numbers alone. With ``reach``
 the density of light vertices per area over that of the path's own points there, the weights of the three are as
 
 * ``reach``, in units of density per steradian about the point: of points met by rays from emitters,
 * the pdf of emitter sampling at the point,
-* ``cos / pi``, in place of the pdf of whatever samples the scattering there.
+* ``cos / pi``, in place of the pdf by which the scattering there is sampled.
 """
 
 from __future__ import annotations
@@ -34,11 +34,12 @@ from lippmann.device.types import (
     UInt32,
     Vector3f,
 )
-from lippmann.rendering.transport.caustic_photons import PassSchedule
 from lippmann.rendering.transport.emitter_rays import EmitterRays, LitPoints
 from lippmann.rendering.transport.light_sampling import LightSampler
-from lippmann.rendering.transport.path_weights import joint_weight
+from lippmann.rendering.transport.pass_schedule import PassSchedule
+from lippmann.rendering.transport.path_weights import mis_weight
 from lippmann.rendering.transport.photon_map import are_inside
+from lippmann.rendering.transport.sharp_events import lambertian_share
 
 Floats = NDArray[np.float32]
 
@@ -46,7 +47,7 @@ Floats = NDArray[np.float32]
 POINTS = 1 << 16
 #: Rays of the pilot for each emitter, and in all.
 PILOT_OF_EMITTER, PILOT = 1 << 12, 1 << 16
-#: Share of the rays that goes to all emitters alike, whatever the pilot met.
+#: Share of the rays that goes to all emitters alike, those included of which the pilot met nothing.
 UNIFORM_SHARE = 0.1
 #: Scenes of more emitters are to be left to paths: each has a start of its own in the kernel of rays.
 MOST_EMITTERS = 1 << 6
@@ -60,7 +61,7 @@ class JointLight:
     Attributes
     ----------
     share:
-        Of the light; or the albedo by which it is to be found, see :func:`lambert_share`.
+        Of the light.
     reach:
         1 over the density per area with which the path came to the point, times the cosine between the point's
         geometric normal and the way to the emitter; 0 where light vertices bring nothing.
@@ -77,24 +78,40 @@ class JointLight:
         self.cosine = cosine
         self.half = half
 
-    def weight(self, plain: Float, own: Float, other: Float, density: Float) -> Spectrum:
-        """MIS weight of light found with pdf ``own``, ``plain`` where light vertices bring nothing.
 
-        Parameters
-        ----------
-        other:
-            Pdf of the other of emitter sampling and scattering; both per steradian at the point, see the module.
-        density:
-            Of rays from where the light starts, see :meth:`LightVertices.densities`.
-        """
-        reach = self.reach * density
-        return plain + dr.select(reach > 0, self.share * (joint_weight(own, other, reach) - plain), 0)
+class Arrival:
+    """How a path came to a surface, for light there that light vertices bring, too.
+
+    Attributes
+    ----------
+    albedo:
+        Of the Lambertian part of the surface's scattering.
+    reach:
+        See :func:`reach_of`.
+    half:
+        Of the picture.
+    """
+
+    # Not a dataclass: Dr.Jit would take it for loop state and write its fields.
+    def __init__(self, albedo: Color3f, reach: Float, half: UInt32) -> None:
+        self.albedo = albedo
+        self.reach = reach
+        self.half = half
+
+    def joint(self, si: SurfaceInteraction3f, scattered: Color3f, wo: Vector3f, direction: Vector3f) -> JointLight:
+        """Of what the surface scatters from ``wo``, ``direction`` in the world: the BSDF times the cosine."""
+        share = dr.select(si.wi.z * wo.z > 0, lambertian_share(self.albedo, scattered, wo), 0)
+        return JointLight(share, self.reach * dr.abs(dr.dot(si.n, direction)), dr.abs(wo.z), self.half)
 
 
-def lambert_share(albedo: Color3f, scattered: Color3f, si: SurfaceInteraction3f, wo: Vector3f) -> Color3f:
-    """Share of its Lambertian part in what a surface scatters from ``wo``: the BSDF times the cosine."""
-    lambert = albedo * (dr.abs(wo.z) * dr.inv_pi)
-    return dr.select((scattered > 0) & (si.wi.z * wo.z > 0), dr.minimum(lambert / scattered, 1), 0)
+def reach_of(si: SurfaceInteraction3f, bsdf: BSDFPtr, d: Vector3f, pdf: Float, active: Bool) -> Float:
+    """1 over the density per area with which a path comes to ``si`` along ``d``, which it samples with ``pdf``.
+
+    0 where ``pdf`` is, and on surfaces that let light straight through, which hold no light vertices.
+    """
+    arrival = pdf * dr.abs(dr.dot(si.n, d))
+    is_whole = active & ~mi.has_flag(bsdf.flags(), mi.BSDFFlags.Null)
+    return dr.select(is_whole & (arrival > 0), dr.square(si.t) / arrival, 0)
 
 
 class LightVertices:
@@ -132,14 +149,29 @@ class LightVertices:
                 *(half.shading, half.scattered),
                 *(half.glow / scale, np.zeros(len(half))),
             )
-            rows.append(np.column_stack([each if each.ndim == 2 else each[:, None] for each in columns]))
+            rows.append(np.column_stack(columns))
         # Four numbers a row: such are fetched at once.
-        table = np.concatenate([*rows, np.zeros((1, 16))]).astype(np.float32)  # gathers need something to point at
-        self._place, self._normal, self._shading, self._glow = (
-            upload(np.ascontiguousarray(table[:, k : k + 4])) for k in (0, 4, 8, 12)
-        )
+        table = np.concatenate([*rows, np.zeros((1, 16))])  # gathers need something to point at
+        self._place, self._normal, self._shading, self._glow = (upload(table[:, k : k + 4]) for k in (0, 4, 8, 12))
 
-    def densities(self, ds: DirectionSample3f, half: UInt32, active: Bool) -> Float:
+    def weight(
+        self, joint: JointLight, ds: DirectionSample3f, plain: Float, own: Float, other: Float, active: Bool
+    ) -> Spectrum:
+        """MIS weight of light from ``ds`` that a path found with pdf ``own``.
+
+        Parameters
+        ----------
+        joint:
+            What of it light vertices bring, too.
+        plain:
+            The weight where they bring nothing.
+        other:
+            Pdf of the other of emitter sampling and scattering; both per steradian at the point, see the module.
+        """
+        reach = joint.reach * self._densities_at(ds, joint.half, active)
+        return plain + dr.select(reach > 0, joint.share * (mis_weight(own, other, reach) - plain), 0)
+
+    def _densities_at(self, ds: DirectionSample3f, half: UInt32, active: Bool) -> Float:
         """Density of light vertices per projected area at a point that is lit as ``ds`` says, in 1 per area.
 
         0 where no rays come from there.
@@ -175,7 +207,7 @@ class LightVertices:
             active &= wo.z * si.wi.z > 0
         value, pdf = bsdf.eval_pdf(mi.BSDFContext(), si, wo, active)
         geometry = cosine / squared
-        weight = joint_weight(place.w, normal.w * (pdf * geometry), shading.w * (pdf * geometry))
+        weight = mis_weight(place.w, normal.w * (pdf * geometry), shading.w * (pdf * geometry))
         light = value * mi.Color3f(glow.xyz) * (geometry * weight)
         active &= dr.max(light) > 0
         end = mi.Point3f(place.xyz)

@@ -21,6 +21,7 @@ from lippmann.device.sobol import SampleStream
 from lippmann.device.types import (
     Bool,
     BSDFPtr,
+    Color3f,
     DirectionSample3f,
     Float,
     Interaction3f,
@@ -35,7 +36,7 @@ from lippmann.rendering.transport.beam import Beam, turn_of_normals, widening
 from lippmann.rendering.transport.caustic_light import caustic_light
 from lippmann.rendering.transport.integrator import FirstHit, RayCounts
 from lippmann.rendering.transport.light_sampling import LightSampler, SceneLightSampler, WithoutSize
-from lippmann.rendering.transport.light_vertices import JointLight, lambert_share
+from lippmann.rendering.transport.light_vertices import Arrival, JointLight, reach_of
 from lippmann.rendering.transport.path_weights import (
     ROULETTE_DEPTH,
     first_emitter_samples,
@@ -51,6 +52,7 @@ from lippmann.rendering.transport.sharp_events import (
     has_wide_lobes,
     is_sharp,
     lambertian,
+    lambertian_share,
     sharp_lobe,
 )
 
@@ -234,9 +236,7 @@ class PathIntegrator:
             joins, reach = mi.Bool(False), mi.Float(0)
             if dr.hint(self.light_vertices is not None, mode="scalar"):
                 vertices = cast("LightVertices", self.light_vertices)
-                arrival = departure * dr.abs(dr.dot(si.n, ray.d))
-                is_whole = continues & ~mi.has_flag(bsdf.flags(), mi.BSDFFlags.Null)
-                reach = dr.select(is_whole & (arrival > 0), dr.square(si.t) / arrival, 0)
+                reach = reach_of(si, bsdf, ray.d, departure, continues)
                 joins = sampling & (depth + 1 < self.depth)
                 if dr.hint(self.features.has_absorption, mode="scalar"):
                     joins &= dr.max(absorption) == 0
@@ -253,7 +253,7 @@ class PathIntegrator:
             while dr.hint(sampling, label="emitters"):
                 point = stream.at(number).next_2d(dimension)
                 light, ds, tests = self.direct_light(
-                    si, bsdf, point, sampling, mi.Float(samples), self._joint(lambert, reach, mi.Float(0), stream)
+                    si, bsdf, point, sampling, mi.Float(samples), self._arrival(lambert, reach, stream)
                 )
                 if dr.hint(self.photons is not None, mode="scalar"):
                     is_caustic = ~seen & (sharp < MOST_EVENTS) & is_sharp(si, lobe, si.to_local(ds.d))
@@ -280,15 +280,16 @@ class PathIntegrator:
                 is_beam &= ~becomes_rough
                 seen &= ~becomes_rough
             if dr.hint(self.photons is not None, mode="scalar"):
-                scattered = mi.Color3f(bsdf_weight) * bs.pdf
-                share = dr.select(scattered > 0, lambert * (dr.abs(bs.wo.z) * dr.inv_pi) / scattered, 0)
-                share = dr.select(wide & (si.wi.z * bs.wo.z > 0), 1, dr.clip(share, 0, 1))
+                share = lambertian_share(lambert, mi.Color3f(bsdf_weight) * bs.pdf, bs.wo)
+                share = dr.select(wide & (si.wi.z * bs.wo.z > 0), 1, share)
                 by_photons = dr.select(becomes_rough, share, by_photons)
                 sharp = dr.select(becomes_rough, mi.UInt32(0), sharp + dr.select(is_event, mi.UInt32(1), mi.UInt32(0)))
             if dr.hint(self.light_vertices is not None, mode="scalar"):
-                vertex_share = lambert_share(lambert, mi.Color3f(bsdf_weight) * bs.pdf, si, bs.wo)
-                vertex_reach = dr.select(passes, 0, reach * dr.abs(dr.dot(si.n, si.to_world(bs.wo))))
-                vertex_cosine = dr.abs(bs.wo.z)
+                joint = Arrival(lambert, reach, mi.UInt32(stream.half)).joint(
+                    si, mi.Color3f(bsdf_weight) * bs.pdf, bs.wo, si.to_world(bs.wo)
+                )
+                vertex_share, vertex_cosine = joint.share, joint.cosine
+                vertex_reach = dr.select(passes, 0, joint.reach)
                 departs = joins & ~passes & ~mi.has_flag(bs.sampled_type, mi.BSDFFlags.Delta)
                 if dr.hint(self.features.has_absorption, mode="scalar"):
                     departs &= bs.wo.z * si.wi.z > 0
@@ -332,6 +333,10 @@ class PathIntegrator:
         """A :class:`JointLight`, where there are light vertices."""
         return None if self.light_vertices is None else JointLight(share, reach, cosine, mi.UInt32(stream.half))
 
+    def _arrival(self, albedo: Color3f, reach: Float, stream: SampleStream) -> Arrival | None:
+        """An :class:`Arrival`, where there are light vertices."""
+        return None if self.light_vertices is None else Arrival(albedo, reach, mi.UInt32(stream.half))
+
     def emission(
         self,
         si: SurfaceInteraction3f,
@@ -359,8 +364,8 @@ class PathIntegrator:
         weight = mis_weight(vertex_pdf, emitter_pdf)
         if joint is not None:
             vertices = cast("LightVertices", self.light_vertices)
-            density = vertices.densities(ds, joint.half, si.is_valid())
-            weight = joint.weight(weight, joint.cosine * dr.inv_pi, emitter_pdf, density)
+            scattered_pdf = joint.cosine * dr.inv_pi
+            weight = vertices.weight(joint, ds, weight, scattered_pdf, emitter_pdf, si.is_valid())
         emission = ds.emitter.eval(si) * weight
         if self.features.background is None:
             return emission
@@ -393,13 +398,13 @@ class PathIntegrator:
         point: Point2f,
         active: Bool,
         samples: Float = 1,
-        joint: JointLight | None = None,
+        arrival: Arrival | None = None,
     ) -> tuple[Spectrum, DirectionSample3f, UInt32]:
         """Radiance toward ``si.wi`` from the emitter that ``point`` samples, that sample, and the shadow rays traced.
 
         The radiance is divided by the pdf of the sample, and weighted by MIS against BSDF sampling, as one of
-        ``samples`` emitter samples at this surface. ``joint``, whose share is the albedo of the surface's Lambertian
-        part, tells how much of it light vertices bring too.
+        ``samples`` emitter samples at this surface; and against light vertices, where ``arrival`` tells how the path
+        came here.
         """
         ds, light = self.light_sampler.sample_direction(si, point, active)
         lit = active & (ds.pdf != 0) & (dr.max(light) > 0)
@@ -408,19 +413,13 @@ class PathIntegrator:
         reflected = value * light * weight
         lit &= dr.max(reflected) > 0
         visible, tests = self.visibility(si, ds, lit)
-        if joint is not None:
-            wo = si.to_local(ds.d)
-            cosine = dr.abs(wo.z)
-            here = JointLight(
-                lambert_share(joint.share, mi.Color3f(value), si, wo),
-                # Rays from emitters do not pass holes and panes on their way.
-                dr.select(tests > 1, 0, joint.reach * dr.abs(dr.dot(si.n, ds.d))),
-                cosine,
-                joint.half,
-            )
-            density = cast("LightVertices", self.light_vertices).densities(ds, joint.half, lit)
-            other = dr.select(ds.delta, 0, cosine * dr.inv_pi)
-            reflected = value * light * here.weight(weight, ds.pdf * samples, other, density)
+        if arrival is not None:
+            vertices = cast("LightVertices", self.light_vertices)
+            joint = arrival.joint(si, mi.Color3f(value), si.to_local(ds.d), ds.d)
+            # Rays from emitters do not pass holes and panes on their way.
+            joint.reach = dr.select(tests > 1, 0, joint.reach)
+            scattered_pdf = dr.select(ds.delta, 0, joint.cosine * dr.inv_pi)
+            reflected = value * light * vertices.weight(joint, ds, weight, ds.pdf * samples, scattered_pdf, lit)
         return dr.select(lit, reflected * visible, 0), ds, tests
 
     def _is_near(self, ds: DirectionSample3f) -> Bool:

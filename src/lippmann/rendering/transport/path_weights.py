@@ -14,23 +14,13 @@ ROULETTE_DEPTH = 5
 FIRST_EMITTER_SAMPLES, LATER_EMITTER_SAMPLES, FIRST_SAMPLES = 4, 2, 4
 
 
-def mis_weight(pdf_a: Float, pdf_b: Float) -> Float:
-    """MIS weight of a sample with ``pdf_a`` against ``pdf_b``, by the power heuristic; 0 where both are 0.
-
-    Veach 1997, eq. 9.16 with exponent 2.
-    """
-    a2, b2 = dr.square(pdf_a), dr.square(pdf_b)
-    weight = a2 / (a2 + b2)
-    return dr.select(dr.isfinite(weight), weight, 0)
-
-
-def joint_weight(pdf: Float, other: Float, reach: Float) -> Float:
-    """MIS weight of a sample with ``pdf`` against two other ways, by the power heuristic; 0 where all are 0.
+def mis_weight(pdf: Float, *others: Float) -> Float:
+    """MIS weight of a sample with ``pdf`` against ``others``, by the power heuristic; 0 where all are 0.
 
     Veach 1997, eq. 9.16 with exponent 2.
     """
     squared = dr.square(pdf)
-    weight = squared / (squared + dr.square(other) + dr.square(reach))
+    weight = squared / sum((dr.square(other) for other in others), squared)
     return dr.select(dr.isfinite(weight), weight, 0)
 
 

@@ -51,6 +51,12 @@ def has_wide_lobes(si: SurfaceInteraction3f, bsdf: BSDFPtr, active: Bool) -> Boo
     return told & (bsdf.eval_attribute_1(WIDE_LOBES, si, told) > 0)
 
 
+def lambertian_share(albedo: Color3f, scattered: Color3f, wo: Vector3f) -> Color3f:
+    """Share in [0, 1] of a part of that ``albedo`` in ``scattered``, which is the BSDF for ``wo`` times the cosine."""
+    lambert = albedo * (dr.abs(wo.z) * dr.inv_pi)
+    return dr.select(scattered > 0, dr.clip(lambert / scattered, 0, 1), 0)
+
+
 def facing_normal(si: SurfaceInteraction3f) -> Vector3f:
     """The geometric normal, in world space, on the side of ``si.wi``."""
     return mi.Vector3f(dr.select(si.wi.z * dr.dot(si.n, si.sh_frame.n) < 0, -si.n, si.n))
