@@ -104,6 +104,12 @@ def start(device: DeviceChoice = "auto", threads: int | None = None) -> Engine:
         return replace(engine, threads=count)
 
 
+def runs_on_gpu() -> bool:
+    """Whether an engine is running, and on the GPU."""
+    mitsuba = sys.modules.get("mitsuba")
+    return mitsuba is not None and VARIANTS.get(mitsuba.variant()) == "gpu"
+
+
 def _point_to_llvm(device: DeviceChoice) -> llvm.Library | None:
     """Select the LLVM library for Dr.Jit, which is not loaded yet."""
     try:

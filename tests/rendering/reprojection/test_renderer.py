@@ -173,11 +173,11 @@ def test_too_little_memory_says_how_much_it_takes(case):
 
 
 def test_lanes_follow_the_memory():
-    from lippmann.rendering.film.memory_model import PREFERRED_LANES
+    from lippmann.rendering.film.memory_model import preferred_lanes
     from lippmann.rendering.reprojection.renderer import wavefront_lanes
 
-    assert wavefront_lanes(8 << 30, 512, 512, 1) == PREFERRED_LANES
-    assert wavefront_lanes(64 << 20, 512, 512, 1) < PREFERRED_LANES
+    assert wavefront_lanes(8 << 30, 512, 512, 1) == preferred_lanes()
+    assert wavefront_lanes(64 << 20, 512, 512, 1) < preferred_lanes()
     # A pixel's samples are traced together.
     assert wavefront_lanes(8 << 30, 512, 512, 1 << 22) == 1 << 22
     with pytest.raises(MemoryLimitError):

@@ -8,6 +8,7 @@ import pytest
 import lippmann
 from lippmann.display import Display, LensArray, Panel
 from lippmann.errors import UsageError
+from lippmann.runtime.engine import start
 
 pytestmark = pytest.mark.usefixtures("engine")
 
@@ -167,6 +168,11 @@ class TestPictures:
     """Scenes with media from a dictionary to a display's pixels."""
 
     display = Display("small", Panel(36, 24, 0.25), LensArray("lenticular", 0.75), 6.8, aperture_distance=20.0)
+
+    @pytest.fixture(autouse=True)
+    def _started(self):
+        """Media are made before the scene is loaded: for the device that a picture takes by itself."""
+        start()
 
     def test_are_told_of(self):
         image = lippmann.render(fog_room(homogeneous()), self.display, spp=2)

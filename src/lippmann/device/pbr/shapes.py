@@ -187,7 +187,8 @@ def _mesh_shape(pieces: Sequence[Piece]) -> Shape:
         params["vertex_texcoords"] = _device([_uv(piece, finish.uv_sets[0]) for piece in pieces])
     params.update()
     for name, columns in _attributes(pieces, finish).items():
-        mesh.add_attribute(name, columns.shape[1], mi.Float(columns.astype(np.float32).ravel()))
+        # As a list: the numbers of an array of the device would be fetched one by one.
+        mesh.add_attribute(name, columns.shape[1], columns.astype(np.float32).ravel().tolist())
     return mesh
 
 

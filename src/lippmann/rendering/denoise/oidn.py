@@ -1,7 +1,8 @@
 """Noise taken out of a picture by Intel's Open Image Denoise, in the package ``pyoidn``.
 
 That is a neural network which knows pictures of path tracers; guides (albedo and normal of what each pixel sees) tell
-it which edges are the scene's. It runs on the CPU, with threads of its own beside Dr.Jit's: neither pins them to cores.
+it which edges are the scene's. It runs on the GPU if the engine does; else on the CPU, with threads of its own beside
+Dr.Jit's: neither pins them to cores.
 """
 
 from __future__ import annotations
@@ -12,12 +13,13 @@ from typing import TYPE_CHECKING, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.errors import EngineError, UsageError
+from lippmann.errors import UsageError
+from lippmann.rendering.denoise.oidn_device import filtered
 from lippmann.runtime import machine
 from lippmann.runtime.engine_lock import exclusive
 
 if TYPE_CHECKING:
-    from pyoidn import Device as OidnDevice
+    from pyoidn import Filter as OidnFilter
 
 FloatArray = NDArray[np.float32]
 Effort = Literal["high", "fast"]
@@ -28,8 +30,6 @@ _QUALITY = {"high": "OIDN_QUALITY_HIGH", "fast": "OIDN_QUALITY_FAST"}
 
 #: The network halves pictures four times: the pixels of such squares are seen together.
 NETWORK_STEP = 16
-
-_devices: dict[int, OidnDevice] = {}
 
 
 def denoise(
@@ -141,25 +141,17 @@ def _filtered(
     exposure: float | None = None,
 ) -> FloatArray:
     pyoidn = load_denoiser()
-    output = np.empty_like(next(iter(images.values())))
+
+    def set_up(work: OidnFilter) -> None:
+        for name, value in options.items():
+            work.set_bool(name, value)
+        if exposure is not None:
+            work.set_float("inputScale", exposure)
+        work.set_quality(getattr(pyoidn, _QUALITY[effort]))
+
     # One device serves one filter at a time, and its threads do not survive a fork.
     with exclusive():
-        device = _device(pyoidn, threads or machine.usable_cores())
-        work = pyoidn.Filter(device, pyoidn.OIDN_FILTER_TYPE_RT)
-        try:
-            for name, image in (*images.items(), ("output", output)):
-                work.set_image(name, image, pyoidn.OIDN_FORMAT_FLOAT3)
-            for name, value in options.items():
-                work.set_bool(name, value)
-            if exposure is not None:
-                work.set_float("inputScale", exposure)
-            work.set_quality(getattr(pyoidn, _QUALITY[effort]))
-            work.commit()
-            work.execute()
-            _check(device)
-        finally:
-            work.release()
-    return output
+        return filtered(pyoidn, images, set_up, threads or machine.usable_cores())
 
 
 def load_denoiser() -> ModuleType:
@@ -192,22 +184,3 @@ def denoiser_version() -> str | None:
     except (UsageError, OSError):  # not installed, or a library that does not load: reported where it is used
         return None
     return f"{'.'.join(map(str, numbers))} (pyoidn {version('pyoidn')})"
-
-
-def _device(pyoidn: ModuleType, threads: int) -> OidnDevice:
-    """A device of so many threads, made once: that takes longer than a small picture."""
-    if threads not in _devices:
-        device = pyoidn.Device(pyoidn.OIDN_DEVICE_TYPE_CPU)
-        device.set_int("numThreads", threads)
-        # Dr.Jit's threads share the cores: pinned ones would wait for each other.
-        device.set_bool("setAffinity", False)
-        device.commit()
-        _check(device)
-        _devices[threads] = device
-    return _devices[threads]
-
-
-def _check(device: OidnDevice) -> None:
-    message = device.get_error()
-    if message:
-        raise EngineError(f"Open Image Denoise fails: {message}", parameter="denoise", fix='render with denoise="none"')

@@ -6,11 +6,13 @@ Figures are bytes per pixel unless they are named otherwise. Measured: see ``doc
 from __future__ import annotations
 
 from lippmann.errors import MemoryLimitError
+from lippmann.runtime import engine
 
 #: A lane of a wavefront at its widest moment: its radiance, its ray counts, the sums and their copies.
 BYTES_PER_LANE = 96
-#: Beyond this many lanes a wavefront leaves the caches and nothing is gained.
-PREFERRED_LANES = 1 << 20
+#: Beyond this many lanes a wavefront leaves the caches of a processor and nothing is gained; a GPU is to be busy for
+#: longer than the next wavefront takes to prepare.
+PREFERRED_LANES, PREFERRED_LANES_OF_GPU = 1 << 20, 1 << 22
 #: Fewer lanes than this leave the threads idle while kernels start.
 SMALLEST_LANES = 1 << 14
 
@@ -51,7 +53,12 @@ def batches(number: int) -> int:
 TILE, DENOISED_TILE = batches(8) + BYTES_PER_LANE, 832
 
 
-def lanes_within(memory: int, kept: int, needed: int, what: str, preferred: int = PREFERRED_LANES) -> int:
+def preferred_lanes() -> int:
+    """Lanes of a wavefront where memory is not short."""
+    return PREFERRED_LANES_OF_GPU if engine.runs_on_gpu() else PREFERRED_LANES
+
+
+def lanes_within(memory: int, kept: int, needed: int, what: str, preferred: int | None = None) -> int:
     """Lanes of a wavefront beside ``kept`` bytes in ``memory`` bytes, at most ``preferred``.
 
     Parameters
@@ -60,6 +67,8 @@ def lanes_within(memory: int, kept: int, needed: int, what: str, preferred: int 
         The fewest lanes that do.
     what:
         What is to fit, for the complaint: "512x512 pixels", say.
+    preferred:
+        None for :func:`preferred_lanes`.
 
     Raises
     ------
@@ -69,7 +78,7 @@ def lanes_within(memory: int, kept: int, needed: int, what: str, preferred: int 
     lanes = (memory - kept) // BYTES_PER_LANE
     if lanes < needed:
         raise too_small(memory, what, kept + needed * BYTES_PER_LANE)
-    return min(preferred, lanes)
+    return min(preferred or preferred_lanes(), lanes)
 
 
 def too_small(memory: int, what: str, required: int, fix: str = "raise the limit") -> MemoryLimitError:

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from lippmann.rendering.film.memory_model import PICTURE, PREFERRED_LANES, SMALLEST_LANES, lanes_within
+from lippmann.rendering.film.memory_model import PICTURE, SMALLEST_LANES, lanes_within
 
 
 @dataclass(frozen=True)
@@ -90,7 +90,7 @@ def make_plan(
     channels: int = 1,
     memory: int,
     kept: int = 0,
-    preferred_lanes: int = PREFERRED_LANES,
+    preferred_lanes: int | None = None,
 ) -> Plan:
     """Divide ``width`` x ``height`` pixels of ``samples`` each so that the work fits into ``memory`` bytes.
 

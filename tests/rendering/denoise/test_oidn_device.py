@@ -1,0 +1,70 @@
+"""Open Image Denoise on the GPU: by buffers, which the CPU's device knows too, and left to the CPU where that fails."""
+
+from __future__ import annotations
+
+import numpy as np
+import pyoidn
+import pytest
+
+from lippmann.rendering.denoise import oidn_device
+from lippmann.rendering.denoise.oidn import clean_guide, denoise
+
+
+def pictures():
+    rng = np.random.default_rng(5)
+    return tuple(rng.random((48, 80, 3), dtype=np.float32) for _ in range(3))
+
+
+@pytest.fixture
+def gpu(monkeypatch):
+    """An engine on the GPU, and a device there; which one is told by its kind."""
+
+    def be(kind):
+        monkeypatch.setattr(oidn_device.engine, "runs_on_gpu", lambda: True)
+        monkeypatch.setattr(pyoidn.Device, "is_cuda_available", staticmethod(lambda number=0: True))
+        monkeypatch.setattr(pyoidn, "OIDN_DEVICE_TYPE_CUDA", kind)
+        monkeypatch.setattr(oidn_device, "_devices", {})
+
+    return be
+
+
+@pytest.mark.parametrize("effort", ["fast", "high"])
+@pytest.mark.parametrize("turned", [False, True])
+def test_buffers_hold_what_arrays_hold(gpu, effort, turned):
+    color, albedo, normal = pictures()
+    options = {"clean_guides": True, "effort": effort, "turned": turned, "exposure": 0.7, "threads": 1}
+    by_arrays = denoise(color, albedo, normal, **options)
+    gpu(pyoidn.OIDN_DEVICE_TYPE_CPU)
+    by_buffers = denoise(color, albedo, normal, **options)
+    assert list(oidn_device._devices) == [None]
+    assert np.array_equal(by_buffers, by_arrays)
+    assert np.array_equal(clean_guide(albedo, "albedo", threads=1), clean_guide(albedo, "albedo", threads=2))
+
+
+def test_what_the_gpu_cannot_do_is_left_to_the_cpu(gpu):
+    color, _, _ = pictures()
+    expected = denoise(color, threads=1)
+    gpu(pyoidn.OIDN_DEVICE_TYPE_HIP)  # such devices are in no package
+    assert np.array_equal(denoise(color, threads=1), expected)
+    assert list(oidn_device._devices) == [1]
+
+
+def test_a_gpu_that_runs_out_of_memory_is_left_too(gpu, monkeypatch):
+    color, _, _ = pictures()
+    expected = denoise(color, threads=1)
+    gpu(pyoidn.OIDN_DEVICE_TYPE_CPU)
+    released, real = [], pyoidn.Buffer
+
+    class Full(real):
+        def __init__(self, device, size):
+            super().__init__(device, size if not released else 1 << 60)
+            released.append(0)
+
+        def release(self):
+            released.pop()
+            super().release()
+
+    monkeypatch.setattr(pyoidn, "Buffer", Full)
+    assert np.array_equal(denoise(color, threads=1), expected)
+    assert not released
+    assert set(oidn_device._devices) == {None, 1}
