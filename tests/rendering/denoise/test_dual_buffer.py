@@ -129,6 +129,32 @@ def test_seen_light_goes_past_the_denoiser_and_past_what_is_shared(shares, as_de
     assert alone[100, 100] == pytest.approx(renderer.truth[100, 100] + 5.0, rel=0.05)
 
 
+def test_an_emitter_in_a_narrow_lobe_does_not_light_the_pixels_beside_it():
+    """A mirrored lamp of which a tenth is not sharp; beside it something bright that is not seen light at all."""
+    renderer = Noise()
+    rest = [half.copy() for half in renderer.halves()]
+    lamps = [np.zeros_like(half) for half in rest]
+    for light, half in zip(lamps, renderer.halves(), strict=True):
+        light[100, 100] = 300.0
+        half[100, 100] += 330.0
+        half[50, 50] += 30.0
+    given = []
+
+    def denoise(picture, turned):
+        given.append(picture)
+        return picture
+
+    renderer.of_seen = tuple(lamps)
+    picture = Denoised(renderer, denoise, "srgb").picture()
+    for shown, half in zip(given, rest, strict=True):
+        assert shown[100, 100] == pytest.approx(8.0)
+        assert shown[50, 50] == pytest.approx(half[50, 50] + 30.0)
+        shown[100, 100] = shown[50, 50] = half[100, 100] = half[50, 50] = 0
+        assert shown == pytest.approx(half)
+    expected = np.mean(renderer.halves(), axis=0)
+    assert picture == pytest.approx(expected)
+
+
 def test_outliers_of_seen_light_are_told():
     """What one half alone has met of it, where the samples' batches say so, too."""
     renderer = Noise()
