@@ -148,8 +148,12 @@ class Case:
 
     def beside_the_truth(self, traced: Any) -> dict[str, Any]:
         """What a picture says of itself, and what is true."""
+        from lippmann.rendering.estimate.psnr import stated_among_mirrors
+
         psnr, worst = self.truth(traced.frame.pixels)
         estimate = traced.estimate
+        if self.integrator.photons is not None:
+            estimate = stated_among_mirrors(estimate, traced.samples)
         return {
             "samples": traced.samples,
             "psnr": psnr,

@@ -21,6 +21,7 @@ from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.rendering.denoise.oidn import load_denoiser
 from lippmann.rendering.estimate.psnr import Estimate
 from lippmann.rendering.film.wavefront_plan import make_plan
+from lippmann.rendering.light_statements import light_notes, stated_error
 from lippmann.rendering.request.choices import POOLED_LIGHT, REUSING
 from lippmann.rendering.request.region_of_interest import even_background
 from lippmann.rendering.request.render_request import RenderRequest
@@ -238,41 +239,15 @@ class Session:
             pixel_shares=frame.shares,
             rays={"primary": rays.primary, "shadow": rays.shadow, "secondary": rays.secondary},
             seconds=_stage_seconds(self.watch, frame),
-            estimate=None if estimate is None or self._misses_caustics else estimate.to_dict(),
+            estimate=stated_error(estimate, samples, self.choices),
             options={**options, **self.choices},
             notes=(
                 *self.notes,
                 *notes,
-                *self._exposure_notes(),
-                *self._caustics_notes(),
-                *self._clamping_notes(),
+                *light_notes(request, estimate, samples, self.choices),
                 *_frame_notes(frame),
                 *self._warn_of_emptiness(frame, work, has_pixels),
             ),
-        )
-
-    def _exposure_notes(self) -> tuple[str, ...]:
-        if self.request.exposure != "auto" or "exposure" not in self.choices:
-            return ()
-        return (f"exposure {self.choices['exposure']:+.2f} EV: physical light, its median at mid-grey",)
-
-    @property
-    def _misses_caustics(self) -> bool:
-        """Whether there is light that paths hardly find, and that no difference between samples tells of."""
-        return self.choices.get("caustics") == "paths"
-
-    def _caustics_notes(self) -> tuple[str, ...]:
-        if not self._misses_caustics:
-            return ()
-        return (
-            "no estimate of the error: paths hardly find what mirrors, glass or gloss throw onto other surfaces from "
-            "emitters as small as here; photons bring it (caustics)",
-        )
-
-    def _clamping_notes(self) -> tuple[str, ...]:
-        most = self.request.clamp_indirect
-        return (
-            () if most is None else (f"indirect light above {most:g} is cut off: bright light is lost, not only noise",)
         )
 
     def _warn_of_emptiness(self, frame: Frame, work: int, has_pixels: bool) -> tuple[str, ...]:

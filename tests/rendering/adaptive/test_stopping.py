@@ -202,8 +202,8 @@ def test_missing_is_by_the_likely_value_and_by_the_low_end():
 
 
 def test_among_mirrors_few_samples_need_a_margin_of_their_own_for_the_worst():
-    from lippmann.rendering.estimate.denoised_psnr import AMONG_MIRRORS, FEW_AMONG_MIRRORS, DenoisedEstimator
-    from lippmann.rendering.estimate.psnr import NO_MARGIN, Estimate, Margin
+    from lippmann.rendering.estimate.denoised_psnr import DenoisedEstimator
+    from lippmann.rendering.estimate.psnr import AMONG_MIRRORS, FEW_AMONG_MIRRORS, NO_MARGIN, Estimate, Margin
 
     plain, denoised = PictureEstimator(SHOWN), DenoisedEstimator(SHOWN)
     assert plain.margin(8) == Margin(4.0, 4.0)

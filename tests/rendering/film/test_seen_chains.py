@@ -114,14 +114,19 @@ def test_smooth_gloss_under_a_sky_gets_chains_without_photons(engine):
     sky = np.zeros((64, 128, 3), np.float32)
     sky[::4, ::4] = 8.0
 
-    def picture(**material):
-        materials = [Material("ball", metallic=1.0, **material)]
+    def picture(roughness, **options):
+        materials = [Material("ball", metallic=1.0, roughness=roughness)]
         environment = Environment(sky)
         scene = SceneDescription("ball", [mesh], materials, [Instance(0, np.eye(4))], environment=environment)
-        return rendered(lippmann.load_scene(scene))
+        return rendered(lippmann.load_scene(scene), **options)
 
-    assert chains(picture(roughness=0.02)) >= 2
-    assert chains(picture(roughness=0.8)) == 0
+    assert chains(picture(0.02)) >= 2
+    assert chains(picture(0.8)) == 0
+    # Paths reach a quality of the whole picture sooner without, unless all the noise is left in.
+    whole = {"spp": None, "quality": 12.0}
+    assert chains(picture(0.02, **whole)) == 0
+    assert chains(picture(0.02, **whole, quality_worst=8.0)) >= 2
+    assert chains(picture(0.02, **whole, denoise="none", method="full")) >= 2
 
 
 def test_small_emitters_in_mirrors_get_chains(balls):
@@ -130,6 +135,7 @@ def test_small_emitters_in_mirrors_get_chains(balls):
     assert chains(rendered(balls(0.0))) == 0
     assert chains(rendered(balls(3.0), pixel_filter="point")) == 0
     assert chains(rendered(balls(3.0), method="lens-view")) == 0
+    assert chains(rendered(balls(3.0), spp=None, quality=12.0)) >= 2
     # What a look may have missed counts with photons alone.
     assert chains(rendered(balls(3.0), caustics="paths")) < chains(rendered(balls(3.0)))
 

@@ -29,7 +29,6 @@ from lippmann.rendering.estimate.pixel_errors import CROSS_NOISE, ErrorSums, Pix
 from lippmann.rendering.estimate.psnr import (
     DRAWS,
     FEWEST_AMONG_MIRRORS,
-    FIRST_AMONG_MIRRORS,
     LEAN,
     MODEL_UNCERTAINTY,
     NO_MARGIN,
@@ -38,6 +37,7 @@ from lippmann.rendering.estimate.psnr import (
     Margin,
     PartErrors,
     PictureEstimator,
+    margin_among_mirrors,
     neighbourhood,
     psnr_of,
 )
@@ -61,10 +61,6 @@ FEW = 40.0
 #: By how much more than what outliers of seen light show the error may be: on heaps of mirror balls under small
 #: emitters, of few samples, there was up to that much more.
 SEEN_DOUBT = 1.5
-#: In dB, with fewer samples than are trusted where sharp surfaces may mirror emitters, and with fewer than a plain
-#: picture's first: on scenes made for that statements were up to 2.5 dB too good for the picture with either, and up to
-#: 3.8 dB for small-balls; for its worst micro-image up to 5.2 dB with few, and more than 5 dB in 2 of 160 with others.
-AMONG_MIRRORS, FEW_AMONG_MIRRORS = Margin(2.0, 5.0), Margin(5.0, 7.0)
 #: As parts of the error stated for all and for the worst: pictures that are hard to judge are often better by that.
 OFTEN_BETTER, WORST_OFTEN_BETTER = 0.8, 0.6
 #: Of the draws of the worst error: what is stated, and the ends of its interval.
@@ -84,9 +80,7 @@ class DenoisedEstimator(PictureEstimator):
 
     def margin(self, samples: int) -> Margin:
         """By how many dB the estimate of a picture of ``samples`` must be better than what is asked for."""
-        if samples >= self.fewest:
-            return NO_MARGIN
-        return AMONG_MIRRORS if samples >= FIRST_AMONG_MIRRORS else FEW_AMONG_MIRRORS
+        return NO_MARGIN if samples >= self.fewest else margin_among_mirrors(samples)
 
     def estimate(self, errors: PixelErrors) -> Estimate:
         """PSNR of the whole and of the worst micro-image."""

@@ -7,7 +7,9 @@ meets one; a part of what that would bring is added.
 
 Where a picture is denoised, hardly anything is left of the rest's variance, and all of that of seen light, which goes
 past the denoiser: more chains are worth their time then, and too few of them are worse than none. So are, where there
-are no photons, more than leave a difference that is seen: the more samples, the fewer chains each comes with.
+are no photons, more than leave a difference that is seen: the more samples, the fewer chains each comes with. Such a
+picture reaches a quality as a whole sooner without any (docs/research/seen-light.md): what they gain lies in the worst
+micro-images, and where samples are few because the user says so.
 """
 
 from __future__ import annotations
@@ -79,6 +81,9 @@ def give_chains(integrator: PathIntegrator, request: RenderRequest, source: RayS
     if not request.box_filter or request.method in REUSING:
         return 0
     samples, is_clean = _expected_samples(request), request.denoise != "none"
+    is_for_whole = request.quality is not None and request.quality_worst is None
+    if is_for_whole and is_clean and integrator.photons is None:
+        return 0
     chains = seen_chains(integrator, source, samples, request.transfer, request.seed, is_clean)
     integrator.seen_chains = dr.opaque(mi.UInt32, chains) if chains else None
     return chains

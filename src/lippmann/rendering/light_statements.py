@@ -1,0 +1,58 @@
+"""What a picture's file says of its light: exposure, light that is missing or cut off, and what its error may hide."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from lippmann.rendering.estimate.psnr import FEWEST_AMONG_MIRRORS, Estimate, stated_among_mirrors
+from lippmann.rendering.request.render_request import RenderRequest
+
+
+def stated_error(estimate: Estimate | None, samples: int, choices: Mapping[str, object]) -> dict[str, object] | None:
+    """The estimate as files hold it; None where light is missing that no difference between samples tells of.
+
+    Parameters
+    ----------
+    estimate:
+        None where there is none.
+    samples:
+        Of each pixel.
+    choices:
+        What was chosen for the picture, by the names of its options: ``caustics`` here.
+    """
+    if estimate is None or _misses_caustics(choices):
+        return None
+    return (stated_among_mirrors(estimate, samples) if _is_among_mirrors(choices) else estimate).to_dict()
+
+
+def light_notes(
+    request: RenderRequest, estimate: Estimate | None, samples: int, choices: Mapping[str, object]
+) -> tuple[str, ...]:
+    """Sentences on the light of a picture that was made by ``request``; the rest as of :func:`stated_error`."""
+    notes = []
+    if request.exposure == "auto" and "exposure" in choices:
+        notes.append(f"exposure {choices['exposure']:+.2f} EV: physical light, its median at mid-grey")
+    if _misses_caustics(choices):
+        notes.append(
+            "no estimate of the error: paths hardly find what mirrors, glass or gloss throw onto other surfaces from "
+            "emitters as small as here; photons bring it (caustics)"
+        )
+    if estimate is not None and samples < FEWEST_AMONG_MIRRORS and _is_among_mirrors(choices):
+        notes.append(
+            f"fewer than {FEWEST_AMONG_MIRRORS} samples may all have missed an emitter in a mirror: the intervals of "
+            "the PSNR reach down farther"
+        )
+    if request.clamp_indirect is not None:
+        notes.append(
+            f"indirect light above {request.clamp_indirect:g} is cut off: bright light is lost, not only noise"
+        )
+    return tuple(notes)
+
+
+def _misses_caustics(choices: Mapping[str, object]) -> bool:
+    return choices.get("caustics") == "paths"
+
+
+def _is_among_mirrors(choices: Mapping[str, object]) -> bool:
+    """Whether sharp surfaces may mirror emitters, as caustics tell that are not left to paths."""
+    return choices.get("caustics", "paths") != "paths"
