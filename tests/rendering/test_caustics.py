@@ -190,3 +190,33 @@ def test_every_receiver_has_the_light_of_paths():
         own = np.s_[row : row + 4, column : column + 6]
         assert mean["photons"][own].mean() == pytest.approx(mean["paths"][own].mean(), rel=0.01), name
         assert mean["photons"][own].mean() > without[own].mean() * 1.01, name  # and there are some
+
+
+def test_what_a_frosted_sheet_lets_through_is_left_to_paths():
+    """Photons are gathered on the side that is seen: a caustic on the other side of a sheet is not theirs."""
+    corners = [(-80, -60, 0), (80, -60, 0), (80, 60, 0), (-80, 60, 0)]
+    sheet, ball, panel = (
+        trimesh.Trimesh(corners, [(0, 1, 2), (0, 2, 3)], process=False),
+        trimesh.creation.icosphere(4, 14),
+        trimesh.creation.box((120, 90, 1)),
+    )
+    meshes = [
+        Mesh("", m.vertices.astype(np.float32), m.faces.astype(np.uint32), n)
+        for n, m in enumerate((sheet, ball, panel))
+    ]
+    materials = [
+        Material("frosted", base_color=(0.9, 0.8, 0.6), transmission=0.5, roughness=0.6, double_sided=True),
+        Material("glass", transmission=1.0, roughness=0.0, ior=1.5, thickness=1.0),
+        Material("glow", base_color=(0.0, 0.0, 0.0), emission=(12.0, 11.0, 9.0)),
+    ]
+    instances = [Instance(0, place(0, 0, -4)), Instance(2, place(0, 0, -140))]
+    instances += [Instance(1, place(x, y, -24)) for x in (-28, 0, 28) for y in (-16, 16)]
+    scene = lippmann.load_scene(SceneDescription("sheet", meshes=meshes, materials=materials, instances=instances))
+    found = {
+        way: np.stack([rendered(scene, "square", caustics=way, spp=64, seed=seed).pixels for seed in range(3)])
+        for way in ("paths", "photons")
+    }
+    means = {way: pictures.mean() for way, pictures in found.items()}
+    assert means["photons"] == pytest.approx(means["paths"], rel=0.002)
+    paths, photons = (pictures.mean(axis=0).reshape(8, 8, 12, 8, 3).mean(axis=(1, 3)) for pictures in found.values())
+    assert photons == pytest.approx(paths, rel=0.03)

@@ -201,3 +201,16 @@ def test_what_cannot_be_negative_is_not(mean, deviation):
         assert found == pytest.approx(mean)
     if mean == 0:
         assert found == pytest.approx(deviation * math.sqrt(2 / math.pi))
+
+
+def test_the_better_end_of_the_worst_micro_image_leaves_out_blur_too():
+    """Blur is told too high; in the lens that has it nothing else may be wrong."""
+    errors = np.full((12, 24), 1e-6, np.float32)
+    errors[4:8, 8:16] = 1e-3
+    blur = np.where(errors > 1e-5, errors, 0).astype(np.float32)
+    shown = Display("small", Panel(24, 12, 1.0), LensArray("square", 4.0), 30.0, "", 500.0, 80.0)
+    without, told = (
+        PictureEstimator(shown).estimate(PixelErrors(errors, None, OWN_NOISE, blur=each)) for each in (None, blur)
+    )
+    assert (told.worst, told.worst_low, told.psnr) == (without.worst, without.worst_low, without.psnr)
+    assert 6 < told.worst_high - without.worst_high < 11

@@ -19,6 +19,7 @@ OUTLIERS_CERTAIN = 0.7
 #: The share by which the blur of caustics is told too high where light is smooth, see
 #: :mod:`lippmann.rendering.transport.caustic_blur`; and that by which no error is less than stated.
 BLUR_TOO_MUCH, MOST_LESS = 8 / 9, 0.9
+_NOTHING = 1e-30
 
 
 @dataclass(frozen=True)
@@ -126,6 +127,11 @@ class ErrorSums:
         """By what share of a ``mean`` over all pixels that may be less at the most."""
         blur = float(self.blur.sum() / self.pixels.sum())
         return min(MOST_LESS, max(0.0, BLUR_TOO_MUCH * blur / mean))
+
+    def shares_less(self) -> Real:
+        """``(parts,)``: the same of each part's own sum."""
+        share = BLUR_TOO_MUCH * self.blur / np.maximum(self.values, self.blur + _NOTHING)
+        return np.asarray(np.clip(share, 0, MOST_LESS))
 
     def _sum(self, owner: NDArray[np.integer], values: Real) -> Real:
         return np.asarray(np.bincount(owner, weights=values, minlength=len(self.pixels)), dtype=np.float64)

@@ -229,7 +229,9 @@ def estimate_of_sums(sums: ErrorSums, grid: tuple[int, int], noise: NoiseShares)
     psnr = _whole(sums, noise)
     lenses = _lenses(sums, grid, noise)
     draws = lenses.draws()
-    worst = psnr_of(np.quantile(draws.max(axis=0), (0.5, 0.975, LOW_QUANTILE)))
+    less = draws * (1 - parts_with_pixels(sums)[1].shares_less()[lenses.candidates, None])
+    likely, worse = np.quantile(draws.max(axis=0), (0.5, 0.975))
+    worst = psnr_of(np.array([likely, worse, np.quantile(less.max(axis=0), LOW_QUANTILE)]))
     model = 10 * math.log10(1 + MODEL_UNCERTAINTY)
     row, column = divmod(int(lenses.index[np.argmax(lenses.expected)]), grid[1])
     return Estimate(
@@ -254,10 +256,15 @@ class PartErrors:
     variance: Real
     fluctuation: Real
 
-    def draws(self) -> Real:
-        """``(candidates, draws)``: true squared errors of the micro-images that may be the worst."""
+    @property
+    def candidates(self) -> NDArray[np.intp]:
+        """The places of those that may be the worst."""
         reach = np.log(self.doubted) + 2.5 * np.sqrt(self.variance + self.fluctuation)
-        best = np.argsort(-reach)[:_CANDIDATES]
+        return np.argsort(-reach)[:_CANDIDATES]
+
+    def draws(self) -> Real:
+        """``(candidates, draws)``: true squared errors of the :attr:`candidates`."""
+        best = self.candidates
         random = np.random.default_rng(1)
         shape = (len(best), DRAWS)
         spread = np.sqrt(self.variance[best] + self.fluctuation[best])[:, None]

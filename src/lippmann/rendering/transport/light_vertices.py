@@ -100,7 +100,7 @@ class Arrival:
 
     def joint(self, si: SurfaceInteraction3f, scattered: Color3f, wo: Vector3f, direction: Vector3f) -> JointLight:
         """Of what the surface scatters from ``wo``, ``direction`` in the world: the BSDF times the cosine."""
-        share = dr.select(si.wi.z * wo.z > 0, lambertian_share(self.albedo, scattered, wo), 0)
+        share = lambertian_share(si, self.albedo, scattered, wo)
         return JointLight(share, self.reach * dr.abs(dr.dot(si.n, direction)), dr.abs(wo.z), self.half)
 
 

@@ -280,7 +280,7 @@ class PathIntegrator:
                 is_beam &= ~becomes_rough
                 seen &= ~becomes_rough
             if dr.hint(self.photons is not None, mode="scalar"):
-                share = lambertian_share(lambert, mi.Color3f(bsdf_weight) * bs.pdf, bs.wo)
+                share = lambertian_share(si, lambert, mi.Color3f(bsdf_weight) * bs.pdf, bs.wo)
                 share = dr.select(wide & (si.wi.z * bs.wo.z > 0), 1, share)
                 by_photons = dr.select(becomes_rough, share, by_photons)
                 sharp = dr.select(becomes_rough, mi.UInt32(0), sharp + dr.select(is_event, mi.UInt32(1), mi.UInt32(0)))

@@ -51,10 +51,13 @@ def has_wide_lobes(si: SurfaceInteraction3f, bsdf: BSDFPtr, active: Bool) -> Boo
     return told & (bsdf.eval_attribute_1(WIDE_LOBES, si, told) > 0)
 
 
-def lambertian_share(albedo: Color3f, scattered: Color3f, wo: Vector3f) -> Color3f:
-    """Share in [0, 1] of a part of that ``albedo`` in ``scattered``, which is the BSDF for ``wo`` times the cosine."""
+def lambertian_share(si: SurfaceInteraction3f, albedo: Color3f, scattered: Color3f, wo: Vector3f) -> Color3f:
+    """Share in [0, 1] of a part of that ``albedo`` in ``scattered``, which is the BSDF for ``wo`` times the cosine.
+
+    What comes through the surface is no part of it.
+    """
     lambert = albedo * (dr.abs(wo.z) * dr.inv_pi)
-    return dr.select(scattered > 0, dr.clip(lambert / scattered, 0, 1), 0)
+    return dr.select((si.wi.z * wo.z > 0) & (scattered > 0), dr.clip(lambert / scattered, 0, 1), 0)
 
 
 def facing_normal(si: SurfaceInteraction3f) -> Vector3f:
