@@ -29,7 +29,7 @@ from lippmann.rendering.transport.path import PathIntegrator
 from lippmann.rendering.transport.ray_source import RaySource
 
 #: Samples of a pixel that one pass of photons serves, at least; and the first one of a picture that may need no more.
-PASS_SAMPLES, FIRST_PASS_SAMPLES = 32, 8
+PASS_SAMPLES, FIRST_PASS_SAMPLES = 32, 4
 #: Share of the memory for photons of passes that tiles and bands ask for in turn.
 KEPT_SHARE = 0.25
 
