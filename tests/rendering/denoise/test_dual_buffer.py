@@ -130,11 +130,11 @@ def test_seen_light_goes_past_the_denoiser_and_past_what_is_shared(shares, as_de
 
 
 def test_an_emitter_in_a_narrow_lobe_does_not_light_the_pixels_beside_it():
-    """A mirrored lamp of which a tenth is not sharp; beside it something bright that is not seen light at all."""
+    """A mirrored emitter of which a tenth is not sharp; beside it something bright that is not seen light at all."""
     renderer = Noise()
     rest = [half.copy() for half in renderer.halves()]
-    lamps = [np.zeros_like(half) for half in rest]
-    for light, half in zip(lamps, renderer.halves(), strict=True):
+    emitters = [np.zeros_like(half) for half in rest]
+    for light, half in zip(emitters, renderer.halves(), strict=True):
         light[100, 100] = 300.0
         half[100, 100] += 330.0
         half[50, 50] += 30.0
@@ -144,7 +144,7 @@ def test_an_emitter_in_a_narrow_lobe_does_not_light_the_pixels_beside_it():
         given.append(picture)
         return picture
 
-    renderer.of_seen = tuple(lamps)
+    renderer.of_seen = tuple(emitters)
     picture = Denoised(renderer, denoise, "srgb").picture()
     for shown, half in zip(given, rest, strict=True):
         assert shown[100, 100] == pytest.approx(8.0)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from lippmann.display import Display, LensArray, Panel
+from lippmann.runtime.engine import runs_on_gpu
 
 pytestmark = pytest.mark.usefixtures("engine")
 
@@ -326,7 +327,8 @@ def test_guides_show_what_a_mirror_shows():
     built = of_mitsuba({"mirror": mirror, "ceiling": ceiling})
     guides = guided(built)
     inner = np.s_[8:-8, 8:-8]
-    assert np.abs(guides.albedo[inner] - [0.4, 0.1, 0.0]).max() < 1e-4
+    # A GPU rounds reflectances otherwise.
+    assert np.abs(guides.albedo[inner] - [0.4, 0.1, 0.0]).max() < (1e-4 if runs_on_gpu() else 1e-5)
     assert np.abs(guides.normal[inner] - [0.0, -1.0, 0.0]).max() < 1e-5
     assert traced(built)["normal"][inner] == pytest.approx(np.broadcast_to(normal, (14, 32, 3)), abs=1e-5)
 

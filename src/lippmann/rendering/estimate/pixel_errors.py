@@ -125,16 +125,19 @@ class ErrorSums:
 
     def share_less(self, mean: float) -> float:
         """By what share of a ``mean`` over all pixels that may be less at the most."""
-        blur = float(self.blur.sum() / self.pixels.sum())
-        return min(MOST_LESS, max(0.0, BLUR_TOO_MUCH * blur / mean))
+        return float(_share_less(self.blur.sum() / self.pixels.sum(), mean))
 
     def shares_less(self) -> Real:
         """``(parts,)``: the same of each part's own sum."""
-        share = BLUR_TOO_MUCH * self.blur / np.maximum(self.values, self.blur + _NOTHING)
-        return np.asarray(np.clip(share, 0, MOST_LESS))
+        return np.asarray(_share_less(self.blur, np.maximum(self.values, self.blur + _NOTHING)))
 
     def _sum(self, owner: NDArray[np.integer], values: Real) -> Real:
         return np.asarray(np.bincount(owner, weights=values, minlength=len(self.pixels)), dtype=np.float64)
+
+
+def _share_less(blur: Real | float, error: Real | float) -> Real | np.float64:
+    share: Real | np.float64 = np.clip(BLUR_TOO_MUCH * blur / error, 0, MOST_LESS)
+    return share
 
 
 def parts_with_pixels(sums: ErrorSums) -> tuple[NDArray[np.intp], ErrorSums]:
