@@ -39,12 +39,16 @@ def balls(engine):
 
     trimesh = pytest.importorskip("trimesh")
     ball, wall = trimesh.creation.icosphere(3, 12), trimesh.creation.box((300, 200, 2))
-    meshes = [Mesh("", m.vertices.astype(np.float32), m.faces.astype(np.uint32), n) for n, m in enumerate((wall, ball))]
+    normals = None, ball.vertex_normals.astype(np.float32)
+    meshes = [
+        Mesh("", m.vertices.astype(np.float32), m.faces.astype(np.uint32), n, normals[n])
+        for n, m in enumerate((wall, ball))
+    ]
     materials = [Material("wall", roughness=1.0, specular=0.0), Material("chrome", metallic=1.0, roughness=0.0)]
 
     def scene(radius):
         at, behind, before = np.eye(4), np.eye(4), np.eye(4)
-        at[:3, 3] = 30, 40, 90
+        at[:3, 3] = 3, 4, 120  # its image lies behind the middle lens
         behind[2, 3], before[2, 3] = -20, 4
         light = Light("point", (4e4,) * 3, at, radius=radius)
         instances = [Instance(0, behind), Instance(1, before)]

@@ -47,7 +47,7 @@ def prepare_light(
     MemoryLimitError
         ``memory`` bytes do not hold the photons that were asked for.
     """
-    integrator.photons = integrator.photon_passes = integrator.seen_chains = None
+    integrator.photons = integrator.photon_passes = integrator.seen_chains = integrator.mirror_images = None
     integrator.light_vertices = integrator.vertex_passes = None
     integrator.beam = integrator.gain = integrator.most_indirect = None
     told: dict[str, object] = {}
@@ -70,7 +70,7 @@ def prepare_light(
         told["light_vertices"] = POINTS
     if request.clamp_indirect is not None:
         integrator.most_indirect = mi.Float(request.clamp_indirect / gain)
-    chains = give_chains(integrator, request, source) if has_sharp and stands_alone else 0
+    chains = give_chains(integrator, request, source, memory) if has_sharp and stands_alone else 0
     if chains:
         told["seen_chains"] = chains
         if is_widened:

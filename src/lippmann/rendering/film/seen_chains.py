@@ -3,7 +3,7 @@
 What samples of each kind cost is best as the root of the variance that they take away times their cost (Neyman
 allocation). The variance of seen light within pixels is measured, that of the rest and the cost of a chain are those of
 usual scenes. Where there are caustics, a look may miss emitters that are seen so small that one chain in a million
-meets one; a part of what that would bring is added.
+meets one; a part of what that would bring is added, unless a search (:mod:`.image_search`) finds no such image.
 
 Where a picture is denoised, hardly anything is left of the rest's variance, and all of that of seen light, which goes
 past the denoiser: more chains are worth their time then, and too few of them are worse than none. So are, where there
@@ -26,6 +26,7 @@ from lippmann.color.transfer import Transfer, coding_slope
 from lippmann.device.kernel_ops import divide
 from lippmann.device.sobol import SampleStream
 from lippmann.device.types import MitsubaScene
+from lippmann.rendering.film.image_search import search_images
 from lippmann.rendering.film.scattered_rays import ScatteredRays
 from lippmann.rendering.film.wavefront import shown_colors
 from lippmann.rendering.request.choices import REUSING
@@ -65,8 +66,10 @@ _AT_ONCE = 1 << 12
 _POINTS = 1 << 10
 
 
-def give_chains(integrator: PathIntegrator, request: RenderRequest, source: RaySource) -> int:
+def give_chains(integrator: PathIntegrator, request: RenderRequest, source: RaySource, memory: int) -> int:
     """Give the integrator the chains for the picture of ``source``; how many each path comes with, 0 for none.
+
+    They are aimed at the images of small emitters that a search finds.
 
     Parameters
     ----------
@@ -76,6 +79,8 @@ def give_chains(integrator: PathIntegrator, request: RenderRequest, source: RayS
         How the picture is to be made.
     source:
         Rays of the whole picture: parts of one picture must be told the same.
+    memory:
+        Bytes that the search for images may take.
     """
     # Where all rays of a pixel are one, or its points are taken from others, further ones show nothing.
     if not request.box_filter or request.method in REUSING:
@@ -84,8 +89,12 @@ def give_chains(integrator: PathIntegrator, request: RenderRequest, source: RayS
     is_for_whole = request.quality is not None and request.quality_worst is None
     if is_for_whole and is_clean and integrator.photons is None:
         return 0
-    chains = seen_chains(integrator, source, samples, request.transfer, request.seed, is_clean)
+    search = search_images(integrator.scene, source, samples, memory)
+    integrator.mirror_images = search.images
+    chains = seen_chains(integrator, source, samples, request.transfer, request.seed, is_clean, search.found_none)
     integrator.seen_chains = dr.opaque(mi.UInt32, chains) if chains else None
+    if not chains:
+        integrator.mirror_images = None
     return chains
 
 
@@ -96,6 +105,7 @@ def seen_chains(
     transfer: Transfer,
     seed: int,
     is_clean: bool,
+    found_none: bool = False,
 ) -> int:
     """Chains of each path: 0, or a power of two from 2 to :data:`MOST`, as one brings no more than the path itself.
 
@@ -113,13 +123,15 @@ def seen_chains(
         Of the picture.
     is_clean:
         A denoiser takes the noise out of all but seen light.
+    found_none:
+        A search has found no image of an emitter that has a place: none may have been missed but the environment's.
     """
     beside_photons = integrator.photons is not None
     looks = _looks(integrator, source, samples, seed)
     together = samples * USUAL
     variance = sum(variance_of(part, together, transfer) * len(part) for part in _parts(looks)) / len(looks)
     if beside_photons:
-        brightest = min(_brightest(integrator, source, seed), together)
+        brightest = min(_brightest(integrator, source, seed, of_environment=found_none), together)
         slope = float(coding_slope(np.array(_GREY), transfer))
         variance += MISSED * (slope * brightest) ** 2 / (looks.size / 3)
     return chains_for(variance, samples, beside_photons, is_clean)
@@ -197,7 +209,7 @@ def _parts(looks: NDArray[np.float32]) -> Iterator[NDArray[np.floating]]:
         yield looks[first : first + _AT_ONCE].astype(np.float64)
 
 
-def _brightest(integrator: PathIntegrator, source: RaySource, seed: int) -> float:
+def _brightest(integrator: PathIntegrator, source: RaySource, seed: int, of_environment: bool) -> float:
     """Greatest radiance of an emitter of some size, the gain included, by samples from what the picture shows."""
     few = ScatteredRays(source, math.isqrt(_POINTS))
     place = dr.arange(mi.UInt32, few.width * few.height)
@@ -206,7 +218,10 @@ def _brightest(integrator: PathIntegrator, source: RaySource, seed: int) -> floa
     si = scene.ray_intersect(few.rays(column, row, mi.UInt32(0), mi.Point2f(0.5)))
     point = SampleStream.of_pixels(mi.UInt32(0), place, dr.opaque(mi.UInt32, seed)).next_2d(1)
     ds, weight = scene.sample_emitter_direction(si, point, False, si.is_valid())
-    radiance = dr.select(ds.delta | ~si.is_valid(), 0, dr.max(weight) * ds.pdf)
+    counts = si.is_valid() & ~ds.delta
+    if of_environment:
+        counts &= mi.has_flag(ds.emitter.flags(), mi.EmitterFlags.Infinite)
+    radiance = dr.select(counts, dr.max(weight) * ds.pdf, 0)
     if integrator.gain is not None:
         radiance *= integrator.gain
     return float(np.max(np.array(radiance)))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import drjit as dr
 import mitsuba as mi
@@ -47,12 +47,21 @@ class RaySource(Protocol):
         ...
 
 
+@runtime_checkable
+class _InPicture(Protocol):
+    """Rays of some pixels of a larger picture."""
+
+    def number(self, column: UInt32, row: UInt32) -> UInt32:
+        """Index of pixels in the whole picture."""
+        ...
+
+
 def pixel_number(source: RaySource, column: UInt32, row: UInt32) -> UInt32:
     """Index of pixels that seeds their random numbers: row by row over the whole picture, also in a window of it.
 
     A pixel thus has the same samples whichever part of the picture it is rendered with.
     """
-    if isinstance(source, WindowRays | SubpixelRays | SinglePixelRays):
+    if isinstance(source, _InPicture):
         return source.number(column, row)
     return row * source.width + column
 
@@ -76,8 +85,17 @@ class PixelRays:
 
     def ray(self, stream: SampleStream) -> Ray3f:
         """The ray of each lane's sample."""
-        jitter = stream.next_2d(PIXEL_DIMENSION) if self._box_filter else mi.Point2f(0.5)
-        return self._source.rays(*self._at, jitter)
+        return self.through(stream.next_2d(PIXEL_DIMENSION) if self._box_filter else mi.Point2f(0.5))
+
+    def through(self, point: Point2f) -> Ray3f:
+        """Rays through points of the lanes' pixels, in [0, 1)^2."""
+        return self._source.rays(*self._at, point)
+
+    @property
+    def number(self) -> UInt32:
+        """Index of each lane's pixel, or sub-pixel, in the whole picture."""
+        column, row, channel = self._at
+        return pixel_number(self._source, column, row) * self._source.channels + channel
 
 
 class _OnePicture:

@@ -12,7 +12,7 @@ its expectation. Sky behind nothing stays with the path.
 
 from __future__ import annotations
 
-from typing import cast
+from typing import TYPE_CHECKING, cast
 
 import drjit as dr
 import mitsuba as mi
@@ -37,6 +37,9 @@ from lippmann.rendering.transport.path import PathIntegrator
 from lippmann.rendering.transport.ray_source import PixelRays
 from lippmann.rendering.transport.shadow_rays import MAX_CROSSINGS
 from lippmann.rendering.transport.sharp_events import follows_sharply, is_sharp, sharp_lobe
+
+if TYPE_CHECKING:
+    from lippmann.rendering.transport.mirror_images import MirrorImages
 
 #: Tells the streams of chains from those of paths.
 _CHAINS = 0x5EE21147
@@ -73,7 +76,14 @@ def seen_light(
     tracing = active & (number < chains)
     while dr.hint(tracing, label="chains"):
         further = of_chains.at(first + number)
-        met, traced, tests = _chain(integrator, pixel.ray(further), further, stream.index, tracing)
+        weight = mi.Float(1)
+        if dr.hint(integrator.mirror_images is not None, mode="scalar"):
+            point, weight = cast("MirrorImages", integrator.mirror_images).point(pixel.number, further)
+            ray = pixel.through(point)
+        else:
+            ray = pixel.ray(further)
+        met, traced, tests = _chain(integrator, ray, further, stream.index, tracing)
+        met *= weight
         light += dr.select(dr.isfinite(dr.sum(met)), met, 0)
         rays += traced
         shadow += tests
