@@ -7,7 +7,7 @@ import mitsuba as mi
 import numpy as np
 
 from lippmann.device.types import Point2f, Ray3f, UInt32
-from lippmann.rendering.transport.ray_source import RaySource, pixel_number
+from lippmann.rendering.transport.ray_source import RaySource
 
 
 class ScatteredRays:
@@ -22,11 +22,9 @@ class ScatteredRays:
             for count, length in ((self.width, source.width), (self.height, source.height))
         )
 
-    def number(self, column: UInt32, row: UInt32) -> UInt32:
-        """Index of pixels in the whole picture."""
-        column, row = dr.gather(mi.UInt32, self._columns, column), dr.gather(mi.UInt32, self._rows, row)
-        return pixel_number(self._source, column, row)
+    def in_picture(self, column: UInt32, row: UInt32) -> tuple[UInt32, UInt32]:
+        """Column and row of pixels in the whole picture."""
+        return dr.gather(mi.UInt32, self._columns, column), dr.gather(mi.UInt32, self._rows, row)
 
     def rays(self, column: UInt32, row: UInt32, channel: UInt32, jitter: Point2f) -> Ray3f:
-        column, row = dr.gather(mi.UInt32, self._columns, column), dr.gather(mi.UInt32, self._rows, row)
-        return self._source.rays(column, row, channel, jitter)
+        return self._source.rays(*self.in_picture(column, row), channel, jitter)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Protocol, runtime_checkable
+from typing import Protocol
 
 import drjit as dr
 import mitsuba as mi
@@ -47,21 +47,12 @@ class RaySource(Protocol):
         ...
 
 
-@runtime_checkable
-class _InPicture(Protocol):
-    """Rays of some pixels of a larger picture."""
-
-    def number(self, column: UInt32, row: UInt32) -> UInt32:
-        """Index of pixels in the whole picture."""
-        ...
-
-
 def pixel_number(source: RaySource, column: UInt32, row: UInt32) -> UInt32:
     """Index of pixels that seeds their random numbers: row by row over the whole picture, also in a window of it.
 
     A pixel thus has the same samples whichever part of the picture it is rendered with.
     """
-    if isinstance(source, _InPicture):
+    if isinstance(source, WindowRays | SubpixelRays | SinglePixelRays):
         return source.number(column, row)
     return row * source.width + column
 
