@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import ctypes
+import mmap
+import sys
+
 import numpy as np
 import pytest
 
@@ -57,3 +61,20 @@ def test_smaller_and_larger():
     a, b = mi.Float([1, 5, np.nan]), mi.Float([2, -3, 7])
     assert np.array(smaller(a, b)).tolist() == [1, -3, 7]
     assert np.array(larger(a, b)).tolist() == [2, 5, 7]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="pages are protected by Linux' own call")
+@pytest.mark.parametrize("number", [1, 15, 1021, 1024])
+def test_nothing_is_read_beyond_the_end_of_a_table(number):
+    """The values end where a page does, and the next page cannot be read."""
+    from lippmann.device.kernel_ops import upload
+
+    page = mmap.PAGESIZE
+    memory = mmap.mmap(-1, 3 * page)
+    start = ctypes.addressof(ctypes.c_char.from_buffer(memory))
+    protect = ctypes.CDLL(None, use_errno=True).mprotect
+    assert protect(ctypes.c_void_p(start + 2 * page), page, 0) == 0
+    values = np.frombuffer((ctypes.c_char * (4 * number)).from_address(start + 2 * page - 4 * number), np.float32)
+    values[:] = np.arange(number)
+    np.testing.assert_array_equal(np.array(upload(values)), np.arange(number))
+    assert protect(ctypes.c_void_p(start + 2 * page), page, mmap.PROT_READ | mmap.PROT_WRITE) == 0

@@ -11,20 +11,26 @@ from numpy.typing import NDArray
 
 from lippmann.device.types import Array, UInt32
 
+#: A multiple of the lanes of any processor's vectors.
+_PACKET = 64
+
 
 def upload(values: NDArray[Any]) -> Array:
     """A flat table on the device in memory of its own: Float, Int32 or UInt32 by the type of ``values``.
 
     On the CPU Dr.Jit reads a NumPy array where it lies. It is not aligned there as packets of loads need it, so every
-    look-up of a row would become one slow gather a column.
+    look-up of a row would become one slow gather a column. And the last packet reads on beyond its end, which crashes
+    where that is the end of a page; so what is read is filled up to whole packets.
     """
     kinds = {"f": (mi.Float, np.float32), "i": (mi.Int32, np.int32), "u": (mi.UInt32, np.uint32)}
     device_type, dtype = kinds[values.dtype.kind]
-    table = device_type(np.ascontiguousarray(values, dtype).ravel())
-    if len(table):
-        table = table + dr.opaque(device_type, 0)
+    filled = np.zeros(-(-values.size // _PACKET) * _PACKET, dtype)
+    filled[: values.size] = values.ravel()
+    table = device_type(filled)
+    if values.size:
+        table = dr.gather(device_type, table, dr.arange(mi.UInt32, values.size))
         dr.eval(table)
-        dr.sync_thread()  # the caller may write into its array again
+        dr.sync_thread()  # what is read is freed
     return table
 
 

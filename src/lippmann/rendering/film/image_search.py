@@ -241,7 +241,7 @@ class _Search:
         last, arrived = _followed(self._scene, ray, lanes.events, lanes.lobe)
         middle = dr.gather(mi.Point3f, self._middles, lanes.emitter)
         along = dr.dot(middle - last.o, last.d)
-        met = self._scene.ray_intersect_preliminary(last, False, arrived)
+        met = self._scene.ray_intersect_preliminary(last, coherent=False, active=arrived)
         meets = met.is_valid() & met.shape.is_emitter()
         return _Passed(last.o + along * last.d - middle, arrived & (along > 0), meets)
 

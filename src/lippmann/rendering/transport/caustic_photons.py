@@ -20,7 +20,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.device.kernel_ops import divide
+from lippmann.device.kernel_ops import divide, upload
 from lippmann.device.sobol import SampleStream
 from lippmann.device.types import (
     Bool,
@@ -243,7 +243,7 @@ class PhotonShooter:
         self, pair: NDArray[np.int64], stream: SampleStream
     ) -> tuple[CasterPoints, DirectionSample3f, Spectrum]:
         """For each pair a point on the caster, a direction to the emitter, and radiance over the direction's pdf."""
-        numbers, scene = mi.UInt32(pair.astype(np.uint32)), self._scene
+        numbers, scene = upload(pair.astype(np.uint32)), self._scene
         caster, source = divide(numbers, len(self._casters.emitters))
         emitter = dr.gather(mi.EmitterPtr, scene.emitters_dr(), dr.gather(mi.UInt32, self._emitter_numbers, source))
         point = CasterPoints(scene, self._casters, caster, stream.next_2d(0), stream.next_1d(2))

@@ -9,6 +9,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from lippmann.device.kernel_ops import upload
 from lippmann.device.sobol import SampleStream
 from lippmann.device.types import Bool, EmitterPtr, Float, MitsubaScene, Point3f, SurfaceInteraction3f, Vector3f
 from lippmann.rendering.transport.casters import PointOf, evenly, no_point
@@ -112,14 +113,14 @@ class EmitterRays:
         """
         scene, count = self._scene, len(chosen)
         place = self.senders[chosen]
-        emitter = dr.gather(mi.EmitterPtr, self._emitters, mi.UInt32(place.astype(np.uint32)))
-        has_size = mi.Bool(self._has_size[place])
-        density = mi.Float((self._density[place] * chances[chosen]).astype(np.float32))
+        emitter = dr.gather(mi.EmitterPtr, self._emitters, upload(place.astype(np.uint32)))
+        has_size = upload(self._has_size[place].astype(np.uint32)) > 0
+        density = upload((self._density[place] * chances[chosen]).astype(np.float32))
         stream = SampleStream.of_pixels(mi.UInt32(0), dr.arange(mi.UInt32, count), dr.opaque(mi.UInt32, seed))
         direction = stream.next_2d(1)
         # Not a virtual call: that would ask all shapes there are, and some refuse.
-        p, n = dr.switch(mi.UInt32(chosen.astype(np.uint32)), self._starts, stream.next_2d(0))
-        n = dr.select(mi.Bool(self._two_sided[place]) & (stream.next_1d(2) < 0.5), -n, n)
+        p, n = dr.switch(upload(chosen.astype(np.uint32)), self._starts, stream.next_2d(0))
+        n = dr.select((upload(self._two_sided[place].astype(np.uint32)) > 0) & (stream.next_1d(2) < 0.5), -n, n)
         anywhere = dr.zeros(mi.Interaction3f, count)
         anywhere.p = mi.Point3f(scene.bbox().max)
         center = emitter.sample_direction(anywhere, mi.Point2f(0.5), ~has_size)[0].p
