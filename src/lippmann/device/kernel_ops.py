@@ -28,7 +28,8 @@ def upload(values: NDArray[Any]) -> Array:
     filled[: values.size] = values.ravel()
     table = device_type(filled)
     if values.size:
-        table = dr.gather(device_type, table, dr.arange(mi.UInt32, values.size))
+        # Something is added, as Dr.Jit would hand over the array itself where all of it is asked for.
+        table = dr.gather(device_type, table, dr.arange(mi.UInt32, values.size)) + dr.opaque(device_type, 0)
         dr.eval(table)
         dr.sync_thread()  # what is read is freed
     return table
