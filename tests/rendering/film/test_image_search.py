@@ -154,12 +154,12 @@ def test_scenes_without_emitters_of_a_size_have_none():
 
 
 def test_it_finds_the_same_in_wavefronts_of_any_size(monkeypatch):
-    from lippmann.rendering.film import image_search
+    from lippmann.rendering.film import memory_model
 
     mirrored, source = scene(mirror(), radius=0.005), eye(64)
     whole = found(searched(mirrored, source).images)
-    monkeypatch.setattr(image_search, "_PREFERRED_LANES", 1000)
-    monkeypatch.setattr(image_search, "_FEWEST_LANES", 1)
+    monkeypatch.setattr(memory_model, "preferred_lanes", lambda: 1000)
+    monkeypatch.setattr(memory_model, "SMALLEST_LANES", 1)
     parts = found(searched(mirrored, source).images)
     assert whole.keys() == parts.keys()
     assert whole

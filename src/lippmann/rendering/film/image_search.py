@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from lippmann.device.kernel_ops import divide, upload
 from lippmann.device.sobol import SampleStream
 from lippmann.device.types import Bool, Float, MitsubaScene, Point2f, Ray3f, UInt32, Vector3f
+from lippmann.rendering.film import memory_model
 from lippmann.rendering.transport.mirror_images import SLOTS, MirrorImages
 from lippmann.rendering.transport.ray_source import DisplayRays, RaySource, SubpixelRays, pixel_number
 from lippmann.rendering.transport.sharp_events import follows_sharply, sharp_lobe
@@ -41,9 +42,6 @@ _ALIKE = 1e-12
 #: Sample dimensions: of the point, the emitter, the number of events, and the choice between a surface's lobes.
 _POINT, _EMITTER, _EVENTS, _LOBE = range(4)
 _SEED = 0x4D495252
-#: A lane of the search, and a pixel of its result, in bytes.
-_BYTES_PER_LANE, _BYTES_PER_PIXEL = 256, 16
-_PREFERRED_LANES, _FEWEST_LANES = 1 << 20, 1 << 14
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,10 +91,11 @@ def search_images(scene: MitsubaScene, source: RaySource, samples: int, memory: 
     targets = find_targets(scene)
     rays = SubpixelRays(source) if isinstance(source, DisplayRays) and source.channels == 3 else source
     pixels = rays.width * rays.height * rays.channels
-    lanes = min(_PREFERRED_LANES, (memory - pixels * _BYTES_PER_PIXEL) // _BYTES_PER_LANE)
+    room = (memory - pixels * memory_model.MIRROR_IMAGES) // memory_model.IMAGE_SEARCH_LANE
+    lanes = min(memory_model.preferred_lanes(), room)
     if not len(targets):
         return ImageSearch(None, found_none=True)
-    if lanes < _FEWEST_LANES:
+    if lanes < memory_model.SMALLEST_LANES:
         return ImageSearch(None)
     search = _Search(scene, targets, rays)
     fewest = max(FEWEST, -(-FEWEST_IN_ALL // pixels))
@@ -160,8 +159,8 @@ class _Search:
     def from_pixels(self, pixels: int, numbers: range, lanes: int) -> _Found:
         """The images found from one point of each pixel for each of the ``numbers``, so many lanes at a time."""
         step = max(1, lanes // len(numbers))
-        parts = (self._from_part(first, min(step, pixels - first), numbers) for first in range(0, pixels, step))
-        return _Found.joined([_Found.none(), *parts])
+        firsts = range(0, pixels, step)
+        return _Found.joined([self._from_part(first, min(step, pixels - first), numbers) for first in firsts])
 
     def _from_part(self, first: int, pixels: int, numbers: range) -> _Found:
         source = self._source
