@@ -19,6 +19,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
+from functools import cached_property
 from typing import cast
 
 import numpy as np
@@ -256,7 +257,7 @@ class PartErrors:
     variance: Real
     fluctuation: Real
 
-    @property
+    @cached_property
     def candidates(self) -> NDArray[np.intp]:
         """The places of those that may be the worst."""
         reach = np.log(self.doubted) + 2.5 * np.sqrt(self.variance + self.fluctuation)
