@@ -12,7 +12,14 @@ from numpy.typing import NDArray
 from lippmann.progress import ProgressCallback
 from lippmann.rendering.adaptive.convergence import Assessor, ErrorTrack
 from lippmann.rendering.adaptive.extra_samples import extra_samples
-from lippmann.rendering.adaptive.method_race import DENOISED_SLOPE, MOST_GAINED, MOST_GAINED_WIDE, WIDE_LENS, MethodRace
+from lippmann.rendering.adaptive.method_race import (
+    DENOISED_SLOPE,
+    MOST_GAINED,
+    MOST_GAINED_WIDE,
+    MOST_GAINED_WIDE_AND_DEAR,
+    WIDE_LENS,
+    MethodRace,
+)
 from lippmann.rendering.adaptive.stopping import Goal, Outcome, goal_of, reach
 from lippmann.rendering.denoise.cost_model import effort_of, look_cost, traced_work
 from lippmann.rendering.denoise.dual_buffer import Denoised
@@ -42,7 +49,8 @@ Floats = NDArray[np.float32]
 #: The layer of a picture with the number of samples that each pixel had.
 SAMPLES_LAYER = "samples"
 
-#: Samples per pixel that are taken at once where paths come without chains: launches have a cost of their own.
+#: Samples per pixel that are taken at once where paths come without chains and look up no photons: launches have a cost
+#: of their own.
 _CHEAP_TOGETHER = 4.0
 #: What putting a picture together and writing it takes, as a rule.
 _SECONDS_PER_PIXEL_WRITTEN = 1e-7
@@ -192,10 +200,19 @@ def _fixed_samples(job: Job) -> Traced:
     return Traced(frame, job.request.samples, _estimator(job).estimate(errors))
 
 
-def _most_gained(source: DisplayRays | WindowRays | QuiltRays) -> float:
+def _most_gained(job: Job) -> float:
     """By how much pooling gains at most, by the lenses of a display; views of a quilt count as narrow ones."""
-    is_wide = not isinstance(source, QuiltRays) and source.display.pixels_per_lens[0] >= WIDE_LENS
-    return MOST_GAINED_WIDE if is_wide else MOST_GAINED
+    source = job.source
+    if isinstance(source, QuiltRays) or source.display.pixels_per_lens[0] < WIDE_LENS:
+        return MOST_GAINED
+    return MOST_GAINED_WIDE_AND_DEAR if _is_dear(job.integrator) else MOST_GAINED_WIDE
+
+
+def _is_dear(integrator: Integrator) -> bool:
+    """Whether each sample comes with chains, or looks up photons."""
+    if not isinstance(integrator, PathIntegrator):
+        return False
+    return integrator.photons is not None or integrator.seen_chains is not None
 
 
 def _until(job: Job, goal: Goal) -> Traced:
@@ -213,7 +230,7 @@ def _until(job: Job, goal: Goal) -> Traced:
     if denoised is None:
         assessor: Assessor = plain.track
     elif job.request.denoise == "auto":
-        assessor = MethodRace(goal, plain.track, denoised.track, rays, _most_gained(job.source))
+        assessor = MethodRace(goal, plain.track, denoised.track, rays, _most_gained(job))
     else:
         assessor = denoised.track
     outcome = reach(goal, batches.add, assessor, job.progress, probe=batches.probe)
@@ -299,12 +316,10 @@ def _denoised_candidate(job: Job, goal: Goal, batches: FullInBatches, rays: Call
     renderer = _denoised(job, batches, denoiser)
     seconds = 0.0 if goal.max_time is None else denoiser.probe()
 
-    has_chains = isinstance(job.integrator, PathIntegrator) and job.integrator.seen_chains is not None
-
     def worth_from() -> float:
         spent = rays()
         if not spent:
-            return 0.0 if has_chains else _CHEAP_TOGETHER
+            return 0.0 if _is_dear(job.integrator) else _CHEAP_TOGETHER
         return batches.samples * look_cost(spent) / spent
 
     track = ErrorTrack(renderer, _estimator(job, DenoisedEstimator), DENOISED_SLOPE, seconds, worth_from)
@@ -361,8 +376,9 @@ def _denoised_whole(job: Job, traced: Traced) -> Traced:
     denoiser = _denoiser(job, lambda: _rays_per_pixel(job, traced.frame.rays))
     if denoiser is None:
         return traced
-    noisy, seen, source = traced.frame.pixels, traced.frame.seen, job.traced
-    cleaned = denoiser(noisy) if seen is None else denoiser(noisy - seen) + seen
+    noisy, source = traced.frame.pixels, job.traced
+    seen, excess = traced.frame.seen, traced.frame.excess
+    cleaned = denoiser(noisy) if seen is None or excess is None else denoiser(noisy - seen) + (seen - excess)
     traced.frame.pixels = source.own_colors(cleaned) if isinstance(source, SubpixelRays) else cleaned
     return replace(traced, options=_denoiser_options(job, denoiser), seconds={"denoise": denoiser.seconds})
 

@@ -11,7 +11,8 @@ by.
 Seen light, where the renderer keeps it apart, has hardly any noise, and highlights that a denoiser takes for such: it
 goes past the network and past what is shared. Where it is far beyond white, so does other light as far as it is: the
 skirt of a narrow lobe is not sharp, and shows enough of a mirrored emitter for the network to make the pixels beside it
-white, too. The noise of what is beyond white is not seen.
+white, too. The noise of what is beyond white is not seen. What of it rests on single chains the picture leaves out,
+while its error is that of the mean of the halves, which is larger as a rule.
 
 Micro-images may share the light of a denoised half, and it keeps its own where that is judged to be better
 (:mod:`lippmann.rendering.denoise.unshared_blend`). Where what comes of that is judged to be worse than its samples,
@@ -82,6 +83,8 @@ class Halved(Protocol):
 
     def seen_halves(self) -> tuple[Floats, Floats] | None: ...
 
+    def excess(self) -> Floats | None: ...
+
     def squared_error(self) -> PixelErrors: ...
 
 
@@ -124,6 +127,11 @@ class Denoised:
 
     def picture(self) -> Floats:
         """``(H, W, 3)`` float32 linear RGB."""
+        excess = self._renderer.excess()
+        picture = self._mean()
+        return picture if excess is None else np.maximum(picture - excess, np.float32(0))
+
+    def _mean(self) -> Floats:
         if self._renderer.samples < 2:
             # There are no halves, and nothing is known of the error.
             return self._clean_picture()
@@ -197,7 +205,7 @@ class Denoised:
 
     def _slope(self, noisy: tuple[Floats, Floats]) -> Floats:
         """By how much a pixel's code differs from that of the truth, per linear difference between the two."""
-        picture, transfer = self.picture(), self._transfer
+        picture, transfer = self._mean(), self._transfer
         slope = coding_slope(picture, transfer)
         shown = np.float32(0.5) * (noisy[0] + noisy[1])
         scatter = np.abs(noisy[0] - noisy[1]).mean(axis=2)

@@ -24,8 +24,8 @@ ERROR_MAPS = 12
 BATCH = 12
 #: The errors that are made from batches.
 BATCH_ERRORS = 12
-#: Seen light of two halves, apart from the batches.
-SEEN = 2 * BATCH
+#: Seen light of two halves, and what of it is excess, apart from the batches.
+SEEN = 3 * BATCH
 #: One emission of photons, which lands about once, with what sorting takes, in bytes.
 PHOTON = 128
 #: One ray from an emitter to a light vertex, with what it takes to trace it, in bytes.

@@ -113,6 +113,7 @@ class FullInBatches:
         batches, self._lanes = _sizes(pixels, source.channels, memory, keeps_seen)
         self._sums = np.zeros((batches, pixels, 3), dtype=np.float32)
         self._seen = np.zeros((STREAMS, pixels, 3), dtype=np.float32) if keeps_seen else None
+        self._excess = np.zeros((1, pixels, 3), dtype=np.float32) if keeps_seen else None
         self._taken = [0] * batches
         # Plain and denoised pictures of the same samples both ask for their errors.
         self._errors: PixelErrors | None = None
@@ -130,27 +131,35 @@ class FullInBatches:
 
     def add(self, samples: int, progress: ProgressCallback = silent) -> None:
         """Take ``samples`` more of every pixel."""
-        channels, pixels, per_stream = self._source.channels, self._sums.shape[1], len(self._sums) // STREAMS
+        channels, pixels = self._source.channels, self._sums.shape[1]
+        together = self.samples + samples
         started, done, compiled = time.perf_counter(), 0, 0.0
         self._errors = None
         for stretch in stretches(self._integrator, self.samples, samples):
             taken = list(self._taken)
             for run in self._runs(stretch):
                 with dr.scoped_set_flag(dr.JitFlag.KernelHistory, done == 0):
-                    sums, seen = self._trace(run)
+                    sums = self._trace(run, together)
                     if done == 0:
                         compiled = compile_seconds()
-                for place, batch in enumerate(run.batches):
-                    self._sums[batch, run.first : run.last] += sums[:, place]
-                    if self._seen is not None and seen is not None:
-                        self._seen[batch // per_stream, run.first : run.last] += seen[:, place]
-                    if run.last == pixels:
+                self._keep(run, sums)
+                if run.last == pixels:
+                    for batch in run.batches:
                         taken[batch] += run.count
                 done += (run.last - run.first) * channels * run.count * len(run.batches)
                 progress(Progress("trace", done, pixels * channels * samples))
             self._taken = taken
         self.seconds_compile += compiled
         self.seconds_trace += time.perf_counter() - started - compiled
+
+    def _keep(self, run: Run, sums: list[Floats]) -> None:
+        """Add what :meth:`_trace` gives to its batches."""
+        pixels, per_stream = slice(run.first, run.last), len(self._sums) // STREAMS
+        for place, batch in enumerate(run.batches):
+            kept = (self._sums, batch), (self._seen, batch // per_stream), (self._excess, 0)
+            for (total, at), part in zip(kept, sums, strict=False):
+                assert total is not None
+                total[at, pixels] += part[:, place]
 
     def probe(self) -> float:
         """Seconds that one sample of every pixel takes, by a few samples that are not kept."""
@@ -181,7 +190,7 @@ class FullInBatches:
         """Of one sample of each of so many pixels, if the picture has them."""
         pixels = min(pixels, self._sums.shape[1])
         started = time.perf_counter()
-        self._trace(Run(0, pixels, (0,), (0,), 1, self._sums.shape[1] // pixels))
+        self._trace(Run(0, pixels, (0,), (0,), 1, self._sums.shape[1] // pixels), self.samples + 1)
         return time.perf_counter() - started
 
     def picture(self) -> Floats:
@@ -200,6 +209,11 @@ class FullInBatches:
     def seen(self) -> Floats | None:
         """What of :meth:`picture` is seen light; None where that is not told, or not kept."""
         return None if self._seen is None else self._mean(self._seen)
+
+    def excess(self) -> Floats | None:
+        """What of :meth:`picture` rests on single chains of seen light, see
+        :mod:`lippmann.rendering.transport.seen_light`; None where that is not told, or not kept."""
+        return None if self._excess is None else self.shown(self._mean(self._excess))
 
     def _mean(self, sums: Floats) -> Floats:
         """Of all samples, whose sums lie in several parts."""
@@ -272,8 +286,9 @@ class FullInBatches:
                 strip = STRIP_ROWS * self._window.width
                 yield from cut_batches(pixels, batches, tuple(starts), count, lanes, strip)
 
-    def _trace(self, run: Run) -> tuple[Floats, Floats | None]:
-        """Sums over the samples of a run, ``(pixels, batches of the run, 3)``, and of their seen light, where kept.
+    def _trace(self, run: Run, together: int) -> list[Floats]:
+        """Sums over the samples of a run, ``(pixels, batches of the run, 3)``; and, where these are kept, of their seen
+        light and its excess, by the samples that a pixel then has ``together``.
 
         Lanes are ordered pixel (see :mod:`.lane_order`), then channel, then batch, then sample. What differs from run
         to run is opaque to the compiler, so that all share a kernel.
@@ -297,14 +312,15 @@ class FullInBatches:
         stream = SampleStream.of_pixels(pixel * channels + channel, sample, seed)
         stream.half = stream_of
         pixels = PixelRays(self._source, column, row, channel, self._box_filter)
-        traced = sample_pixels(self._integrator, pixels, stream, self._seen is not None)
+        samples = None if self._seen is None else dr.opaque(mi.Float, together)
+        traced = sample_pixels(self._integrator, pixels, stream, samples)
         evaluate(traced, lanes, self.rays)
 
         def sums(light: Spectrum) -> Floats:
             found = _sums(light, channels, number, run.count)
             return to_rows(found, window.width) if run.in_strips else found
 
-        return sums(traced.radiance), None if traced.seen is None else sums(traced.seen)
+        return [sums(part) for part in (traced.radiance, traced.seen, traced.excess) if part is not None]
 
 
 def trace_in_batches(

@@ -196,7 +196,7 @@ def _looks(integrator: PathIntegrator, source: RaySource, samples: int, seed: in
     row, column = divide(pixel, dr.opaque(mi.UInt32, few.width))
     stream = SampleStream.of_pixels(rest, look, dr.opaque(mi.UInt32, seed))
     pixels = PixelRays(source, *few.in_picture(column, row), channel)
-    light, _ = seen_light(integrator, pixels, stream, dr.opaque(mi.UInt32, 1), mi.Bool(True))
+    light, _, _ = seen_light(integrator, pixels, stream, dr.opaque(mi.UInt32, 1), mi.Bool(True))
     if integrator.gain is not None:
         light *= integrator.gain
     values = np.array(dr.ravel(mi.Color3f(light)), dtype=np.float32)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import drjit as dr
 import mitsuba as mi
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from lippmann.device.kernel_ops import divide
 from lippmann.device.sobol import SampleStream
-from lippmann.device.types import Spectrum, UInt32
+from lippmann.device.types import Float, Spectrum, UInt32
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.rendering.film.lane_order import in_strips, pixel_at, to_rows
 from lippmann.rendering.film.wavefront_plan import Pass, Plan, Tile
@@ -64,6 +64,7 @@ class Frame:
     maps: dict[str, NDArray[np.generic]] = field(default_factory=dict)
     shares: dict[str, float] = field(default_factory=dict)
     seen: NDArray[np.float32] | None = None
+    excess: NDArray[np.float32] | None = None
 
 
 def trace_frame(
@@ -94,8 +95,8 @@ def trace_frame(
             if first:
                 frame.seconds_compile = compile_seconds()
         if len(sums) > 1 and frame.seen is None:
-            frame.seen = np.zeros_like(frame.pixels)
-        for whole, part in zip((frame.pixels, frame.seen), sums, strict=False):
+            frame.seen, frame.excess = np.zeros((2, *frame.pixels.shape), frame.pixels.dtype)
+        for whole, part in zip((frame.pixels, frame.seen, frame.excess), sums, strict=False):
             assert whole is not None
             part *= 1 / plan.samples
             in_rows = to_rows(part, plan.width).reshape(tile.rows, plan.width, 3)
@@ -132,17 +133,18 @@ class _Tracer:
         self._keeps_seen = keeps_seen
 
     def trace(self, tile: Tile, run: Pass, totals: RayTotals) -> list[NDArray[np.float32]]:
-        """Sums over the samples of one pass, ``(pixels of the tile, 3)``, and of their seen light where it is kept, in
-        the order of lanes.
+        """Sums over the samples of one pass, ``(pixels of the tile, 3)``, and of their seen light and its excess where
+        these are kept, in the order of lanes.
 
         ``totals`` grows by the rays it took.
         """
         plan = self._plan
         pixels, stream = samples_of_tile(self._source, plan, tile, run, self._seed, self._box_filter, self._corner)
-        sample = sample_pixels(self._integrator, pixels, stream, self._keeps_seen)
+        samples = dr.opaque(mi.Float, plan.samples) if self._keeps_seen else None
+        sample = sample_pixels(self._integrator, pixels, stream, samples)
         evaluate(sample, tile.rows * plan.width * plan.channels * run.count, totals)
-        both = (sample.radiance, sample.seen)
-        return [_channel_sums(light, plan.channels, run.count) for light in both if light is not None]
+        parts = (sample.radiance, sample.seen, sample.excess)
+        return [_channel_sums(light, plan.channels, run.count) for light in parts if light is not None]
 
 
 def samples_of_tile(
@@ -172,11 +174,13 @@ def samples_of_tile(
     return PixelRays(source, column, row, channel, box_filter), stream
 
 
-def sample_pixels(integrator: Integrator, pixels: PixelRays, stream: SampleStream, keeps_seen: bool) -> PixelSample:
-    """One sample of each lane's pixel; seen light apart where the integrator tells it and ``keeps_seen``."""
+def sample_pixels(
+    integrator: Integrator, pixels: PixelRays, stream: SampleStream, samples: Float | None
+) -> PixelSample:
+    """One sample of each lane's pixel; seen light apart where the integrator tells it and ``samples`` are given, those
+    of the pixel so far, these included."""
     if isinstance(integrator, PathIntegrator):
-        sample = sample_pixel(integrator, pixels, stream, mi.Bool(True))
-        return sample if keeps_seen else replace(sample, seen=None)
+        return sample_pixel(integrator, pixels, stream, mi.Bool(True), samples)
     return PixelSample(*integrator.sample(pixels.ray(stream), stream, mi.Bool(True)))
 
 
@@ -187,8 +191,9 @@ def evaluate(sample: PixelSample, lanes: int, totals: RayTotals) -> None:
     sample.radiance = dr.select(finite, radiance, mi.Color3f(0))
     if sample.seen is not None:
         sample.seen = dr.select(finite, sample.seen, mi.Color3f(0))
+        sample.excess = dr.select(finite, sample.excess, mi.Color3f(0))
     # All at once: a sum of an unevaluated radiance would run the path loop anew.
-    dr.eval(sample.radiance, sample.seen, counts.secondary, counts.shadow, finite)
+    dr.eval(sample.radiance, sample.seen, sample.excess, counts.secondary, counts.shadow, finite)
     totals.primary += lanes
     totals.secondary += lane_total(counts.secondary)
     totals.shadow += lane_total(counts.shadow)

@@ -33,13 +33,14 @@ class FirstHit:
 class PixelSample:
     """One sample of each lane's pixel.
 
-    ``seen`` is what of ``radiance`` is seen light: emitters and sky that are met by sharp events alone; None where that
-    is not told apart.
+    ``seen`` is what of ``radiance`` is seen light: emitters and sky that are met by sharp events alone. ``excess`` is
+    what of that rests on single chains. Both are None where they are not told apart.
     """
 
     radiance: Spectrum
     counts: RayCounts
     seen: Spectrum | None = None
+    excess: Spectrum | None = None
 
 
 class Integrator(Protocol):

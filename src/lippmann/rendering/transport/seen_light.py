@@ -8,6 +8,11 @@ pixel meet them. They have no noise of transport, and a chain of sharp events is
 sampled along it, no photons are looked up, and it ends at the first rough surface. So chains through other points of
 the pixel stand for what a path would have met of such light: all meet the same by the same chances, so their mean has
 its expectation. Sky behind nothing stays with the path.
+
+Where one chain alone makes a pixel bright, it more likely had luck than that the pixel is that bright: what it brings
+beyond :func:`most_of_chain` is told apart as *excess*. A picture that leaves it out is darker where images of emitters
+were not found, and its error smaller (docs/research/seen-light.md). The limit grows with the chains of a pixel, so that
+with ever more of them nothing is left out.
 """
 
 from __future__ import annotations
@@ -23,6 +28,7 @@ from lippmann.device.sobol import SampleStream, hash32
 from lippmann.device.types import (
     Bool,
     BSDFPtr,
+    Float,
     Point2f,
     PreliminaryIntersection3f,
     Ray3f,
@@ -41,6 +47,10 @@ from lippmann.rendering.transport.sharp_events import follows_sharply, is_sharp,
 if TYPE_CHECKING:
     from lippmann.rendering.transport.mirror_images import MirrorImages
 
+#: Linear value of a pixel, white being 1, up to which one of :data:`_OF_CHAINS` chains is believed. Of fewer chains one
+#: is believed more, as fewer highlights are met by one alone; so much that the limit of a chain goes with this power of
+#: their number.
+BELIEVED, _OF_CHAINS, _POWER = 0.3, 256.0, 0.75
 #: Tells the streams of chains from those of paths.
 _CHAINS = 0x5EE21147
 #: Sample dimensions used at one vertex.
@@ -49,26 +59,47 @@ _DIMENSIONS_PER_VERTEX = 2
 _EMITTER_DIMENSION = 1 << 24
 
 
-def sample_pixel(integrator: PathIntegrator, pixel: PixelRays, stream: SampleStream, active: Bool) -> PixelSample:
-    """One sample of ``pixel`` per lane; seen light by chains, where the integrator has them."""
+def sample_pixel(
+    integrator: PathIntegrator, pixel: PixelRays, stream: SampleStream, active: Bool, samples: Float | None = None
+) -> PixelSample:
+    """One sample of ``pixel`` per lane; seen light by chains, where the integrator has them.
+
+    It is told apart where ``samples`` are given: those of the pixel so far, these included.
+    """
     ray = pixel.ray(stream)
     if integrator.seen_chains is None:
         return PixelSample(*integrator.sample(ray, stream, active))
     rest, counts, _ = integrator.sample_with_hit(ray, stream, active, without_seen=True)
-    seen, traced = seen_light(integrator, pixel, stream, integrator.seen_chains, active)
-    seen /= mi.Float(integrator.seen_chains)
-    if integrator.gain is not None:
-        seen *= integrator.gain
+    chains = mi.Float(integrator.seen_chains)
+    scale = dr.rcp(chains) if integrator.gain is None else integrator.gain / chains
+    most = None if samples is None else most_of_chain(samples * chains) / (scale * chains)
+    seen, excess, traced = seen_light(integrator, pixel, stream, integrator.seen_chains, active, most)
+    seen *= scale
     counts = RayCounts(counts.secondary + traced.secondary, counts.shadow + traced.shadow)
-    return PixelSample(rest + seen, counts, seen)
+    if samples is None:
+        return PixelSample(rest + seen, counts)
+    return PixelSample(rest + seen, counts, seen, excess * scale)
+
+
+def most_of_chain(chains: Float) -> Float:
+    """Linear value, white being 1, up to which one of so many ``chains`` of a pixel counts."""
+    return BELIEVED * _OF_CHAINS * (chains / _OF_CHAINS) ** _POWER
 
 
 @dr.syntax
 def seen_light(
-    integrator: PathIntegrator, pixel: PixelRays, stream: SampleStream, chains: UInt32, active: Bool
-) -> tuple[Spectrum, RayCounts]:
-    """Sum of the light that so many chains of each lane's pixel meet, before the gain, and the rays traced."""
-    light = mi.Spectrum(0)
+    integrator: PathIntegrator,
+    pixel: PixelRays,
+    stream: SampleStream,
+    chains: UInt32,
+    active: Bool,
+    most: Float | None = None,
+) -> tuple[Spectrum, Spectrum, RayCounts]:
+    """Sum of the light that so many chains of each lane's pixel meet, before the gain; and the rays traced.
+
+    Between them stands what of the sum is from single chains beyond ``most``.
+    """
+    light, excess = mi.Spectrum(0), mi.Spectrum(0)
     rays, shadow = mi.UInt32(0), mi.UInt32(0)
     number = mi.UInt32(0)
     of_chains = SampleStream(hash32(stream.key ^ _CHAINS), stream.index, stream.half)
@@ -84,12 +115,16 @@ def seen_light(
             ray = pixel.ray(further)
         met, traced, tests = _chain(integrator, ray, further, stream.index, tracing)
         met *= weight
-        light += dr.select(dr.isfinite(dr.sum(met)), met, 0)
+        met = dr.select(dr.isfinite(dr.sum(met)), met, 0)
+        light += met
+        if dr.hint(most is not None, mode="scalar"):
+            brightest = dr.max(met)
+            excess += dr.select(brightest > most, met * (1 - most / brightest), 0)
         rays += traced
         shadow += tests
         number += 1
         tracing &= number < chains
-    return light, RayCounts(rays, shadow)
+    return light, excess, RayCounts(rays, shadow)
 
 
 @dr.syntax
