@@ -119,11 +119,11 @@ def _grid(columns: int, rows: int, steps: int) -> tuple[Vector3f, Point2f, Point
     import drjit as dr
     import mitsuba as mi
 
+    from lippmann.device.kernel_ops import upload
+
     across, even = ((np.arange(count) + 0.5) / count for count in (columns, steps))
     down = np.linspace(0, 1, rows)
-    roughness, cosine, u, v = (
-        mi.Float(part.ravel().astype(np.float32)) for part in np.meshgrid(down, across, even, even, indexing="ij")
-    )
+    roughness, cosine, u, v = (upload(part) for part in np.meshgrid(down, across, even, even, indexing="ij"))
     alpha = dr.maximum(dr.square(roughness), MIN_ALPHA)
     return mi.Vector3f(dr.sqrt(1 - dr.square(cosine)), 0, cosine), mi.Point2f(alpha), mi.Point2f(u, v)
 
@@ -209,12 +209,12 @@ def sheen_albedo_table(size: int = 32, steps: tuple[int, int] = (64, 32)) -> NDA
     import drjit as dr
     import mitsuba as mi
 
+    from lippmann.device.kernel_ops import upload
+
     centres = (np.arange(size) + 0.5) / size
     z = (np.arange(steps[0]) + 0.5) / steps[0]
     phi = (np.arange(steps[1]) + 0.5) * (math.pi / steps[1])  # the lobe is even in phi: half a turn suffices
-    roughness, cos_i, cos_o, angle = (
-        mi.Float(part.ravel().astype(np.float32)) for part in np.meshgrid(centres, centres, z, phi, indexing="ij")
-    )
+    roughness, cos_i, cos_o, angle = (upload(part) for part in np.meshgrid(centres, centres, z, phi, indexing="ij"))
     alpha = dr.maximum(dr.square(roughness), MIN_ALPHA)
     sin_i, sin_o = dr.sqrt(1 - dr.square(cos_i)), dr.sqrt(1 - dr.square(cos_o))
     h = dr.normalize(mi.Vector3f(sin_i + sin_o * dr.cos(angle), sin_o * dr.sin(angle), cos_i + cos_o))

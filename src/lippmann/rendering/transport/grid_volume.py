@@ -12,6 +12,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from lippmann.device.kernel_ops import upload
 from lippmann.device.sobol import SampleStream
 from lippmann.device.types import Bool, Ray3f, Spectrum
 from lippmann.device.volumes.ray_march import composite
@@ -66,7 +67,7 @@ class GridVolumeIntegrator:
         colors, transmittances = composite(
             self._table, rays.origins, rays.directions, rays.ends, self._toward_light, self._threads
         )
-        color, transmittance = mi.Color3f(np.ascontiguousarray(colors.T)), mi.Float(transmittances)
+        color, transmittance = mi.Color3f(np.ascontiguousarray(colors.T)), upload(transmittances)
         # Where there is no volume the radiance stays what it was, to the last bit.
         shown = color + transmittance * rays.radiance
         return mi.Spectrum(dr.select(transmittance < 1, shown, rays.radiance)), rays.counts

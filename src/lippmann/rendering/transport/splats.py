@@ -13,6 +13,7 @@ import mitsuba as mi
 import numpy as np
 
 from lippmann.color.transfer import SRGB_EXPONENT, SRGB_OFFSET, SRGB_SLOPE, SRGB_THRESHOLD
+from lippmann.device.kernel_ops import upload
 from lippmann.device.sobol import SampleStream
 from lippmann.device.splats.compositing import composite
 from lippmann.device.splats.table import SplatTable
@@ -60,7 +61,7 @@ class SplatIntegrator:
         rays = self._behind.trace(ray, stream, active)
         radiance, counts = rays.radiance, rays.counts
         colors, transmittances = composite(self._splats, rays.origins, rays.directions, rays.ends, self._threads)
-        color, transmittance = mi.Color3f(np.ascontiguousarray(colors.T)), mi.Float(transmittances)
+        color, transmittance = mi.Color3f(np.ascontiguousarray(colors.T)), upload(transmittances)
         if self._splats.linear:
             return mi.Spectrum(color + transmittance * radiance), counts
         shown = srgb_to_linear(color + transmittance * linear_to_srgb(radiance))
