@@ -206,10 +206,16 @@ def test_outliers_of_seen_light_are_told():
 
     assert outliers_at((100, 100)).outliers is None  # seen light is not kept apart
     renderer.of_seen = tuple(hits)
+    renderer.of_excess = np.zeros_like(hits[0])
     told = outliers_at((100, 100), (50, 50))
     assert told.outliers[100, 100] == pytest.approx(0.25 * 0.4**2, rel=1e-3)
     assert told.outliers.sum() == pytest.approx(told.outliers[100, 100])
     assert outliers_at((50, 50)).outliers.sum() == 0
+    # Of 0.4, that is 0.2 of the mean, a half is left out.
+    renderer.of_excess[100, 100] = 0.1
+    assert outliers_at((100, 100)).outliers[100, 100] == pytest.approx(0.25 * 0.2**2, rel=1e-3)
+    renderer.of_excess[100, 100] = 0.3
+    assert outliers_at((100, 100)).outliers.sum() == 0
 
 
 @pytest.mark.parametrize(("samples", "hidden"), [(4, True), (64, False)])

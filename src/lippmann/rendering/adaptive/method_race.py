@@ -24,6 +24,8 @@ Way = Literal["plain", "pooled"]
 DENOISED_SLOPE = 0.6
 #: A pooled picture that lost is assessed again at so many times the samples, which cost far more than that then.
 ASKED_AGAIN = 4
+#: By so much, at most, have samples to be multiplied where only the interval is too wide.
+MOST_TO_BE_SURE = 3.0
 #: In dB: by no more do pooled pictures of very few samples exceed what these state, as a rule. With 2 samples 22 of the
 #: 24 of ``benchmarks/goals.py`` do so by 3 to 12 dB for sure, the others by 14 and 19.
 MOST_GAINED = 12.5
@@ -159,8 +161,11 @@ class MethodRace:
             return _Outlook(True, -assessment.estimate.psnr - 10 * assessment.slope * math.log10(room))
         likely = min(600.0, self._goal.likely_missing(assessment.estimate))
         needed = max(1.0, least)
-        if self._goal.missing(assessment.estimate) > 0:
-            needed = max(LEAST_GROWTH, least, 10 ** (likely / (10 * assessment.slope)))
+        missing = self._goal.missing(assessment.estimate)
+        if missing > 0:
+            there, sure = (10 ** (short / (10 * assessment.slope)) for short in (likely, min(600.0, missing)))
+            # Intervals get narrower faster than pictures better.
+            needed = max(LEAST_GROWTH, least, there, min(sure, MOST_TO_BE_SURE))
         if needed <= room:
             return _Outlook(False, (needed - 1) * rays + look)
         # The likely PSNR: a wider interval makes a picture no worse.

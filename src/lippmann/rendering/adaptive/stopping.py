@@ -195,7 +195,7 @@ def samples_to_trust(goal: Goal, assessment: Assessment, samples: int, assessor:
     far as one round may go, as what very few samples say of the rest is rough.
     """
     needed = samples
-    if missing_with_margin(goal, assessment.estimate, samples, assessor) > 0:
+    if samples < assessor.fewest and missing_with_margin(goal, assessment.estimate, samples, assessor) > 0:
         needed *= 2
     while needed < min(assessor.fewest, MOST_GROWTH * samples):
         gained = 10 * assessment.slope * math.log10(needed / samples)

@@ -161,12 +161,15 @@ class Denoised:
     def _seen_outliers(self, samples: PixelErrors, slope: Floats) -> Floats | None:
         """What of ``apart`` rests on outliers of seen light: what one half has met of it, and the other has not.
 
-        No denoiser brings them together, and what neither has met is in no difference.
+        No denoiser brings them together, and what neither has met is in no difference. What the picture leaves out of
+        them is wrong in it no more.
         """
-        seen = self._renderer.seen_halves()
-        if seen is None or samples.outliers is None:
+        seen, excess = self._renderer.seen_halves(), self._renderer.excess()
+        if seen is None or excess is None or samples.outliers is None:
             return None
-        apart: Floats = (np.float32(0.25) * np.square(slope * self._renderer.shown(seen[0] - seen[1]))).mean(axis=2)
+        # Excess is that of the mean, and one half's as a rule.
+        left = np.maximum(np.abs(self._renderer.shown(seen[0] - seen[1])) - 2 * excess, np.float32(0))
+        apart: Floats = (np.float32(0.25) * np.square(slope * left)).mean(axis=2)
         return np.minimum(apart, samples.outliers)
 
     def _clean_halves(self) -> tuple[Floats, Floats]:
