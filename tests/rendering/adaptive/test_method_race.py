@@ -11,11 +11,11 @@ from lippmann.display import Display
 from lippmann.display.lens_array import LensArray
 from lippmann.display.panel import Panel
 from lippmann.progress import silent
-from lippmann.rendering.adaptive.convergence import ErrorTrack
+from lippmann.rendering.adaptive.convergence import Assessment, ErrorTrack
 from lippmann.rendering.adaptive.method_race import ASKED_AGAIN, MethodRace
 from lippmann.rendering.adaptive.stopping import Goal, reach
 from lippmann.rendering.estimate.pixel_errors import CROSS_NOISE, OWN_NOISE, PixelErrors
-from lippmann.rendering.estimate.psnr import PictureEstimator
+from lippmann.rendering.estimate.psnr import NO_MARGIN, Estimate, PictureEstimator
 
 SHOWN = Display("test", Panel(64, 64, 0.25), LensArray("square", 2.0), gap=6.8)
 RAYS = 3.0
@@ -182,6 +182,45 @@ def test_with_a_time_the_better_picture_at_its_end_wins(seconds, leader):
     """Few samples are better denoised; many are better left alone, for denoising then does more harm than good."""
     race, outcome, _ = run(Goal(max_time=20.0), floor=2e-3, slope=0.9, seconds=seconds)
     assert (race.leader, outcome.end) == (leader, "time")
+
+
+class Told:
+    """Says of a picture of 16 samples what it is told to say; later ones are good."""
+
+    first = fewest = 8
+
+    def __init__(self, likely, surely, slope):
+        self.likely, self.surely, self.slope = likely, surely, slope
+        self.looks = 0
+
+    def margin(self, samples):
+        return NO_MARGIN
+
+    def assess(self, samples):
+        self.looks += 1
+        more = 0.0 if samples <= 16 else 10.0
+        values = (self.likely + more, self.surely + more, 60.0)
+        errors = PixelErrors(np.zeros((1, 1), np.float32), None, OWN_NOISE)
+        return Assessment(errors, Estimate(*values, *values, (0, 0)), self.slope)
+
+
+@pytest.mark.parametrize(
+    ("plain", "pooled", "leader"),
+    [
+        # Plain samples are further from sure.
+        ((32.8, 30.9, 0.8), (37.0, 33.5, 0.3), "pooled"),
+        # The pooled picture is likely there, but far from sure.
+        ((33.0, 32.5, 1.0), (35.2, 30.0, 0.6), "plain"),
+        # Neither is likely there: plain noise falls faster.
+        ((32.8, 30.9, 1.0), (33.5, 32.0, 0.3), "plain"),
+        # Intervals get narrower faster than pictures better: not more than three times the samples are reckoned.
+        ((29.9, 28.8, 1.0), (36.0, 30.0, 0.3), "pooled"),
+    ],
+)
+def test_what_is_likely_there_is_to_be_sure_too(plain, pooled, leader):
+    race = MethodRace(Goal(quality=35), Told(*plain), Told(*pooled), lambda: 800.0)
+    race.assess(16, 64.0)
+    assert race.leader == leader
 
 
 def test_samples_bound_both():
