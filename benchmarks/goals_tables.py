@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import statistics
+import textwrap
 from typing import Any
 
 from equal_error_tables import DISPLAYS, name_of
 from goals import DRAWN_OUT
+from harness import saved
 
+#: Samples and effort of the picture with the fewest samples, and of the first that has halves.
+_LEAST, _HALVES = (1, "fast"), (4, "fast")
 _WAYS = ("full", "full + oidn", "stock views", "pooled")
 
 
@@ -31,7 +36,8 @@ Rows and clock are those above, and so are the scenes, but for those missing fro
     ]
     for name, (title, *_) in DISPLAYS.items():
         if scenes := result["results"].get(name):
-            parts += [f"### {title}, asked for", _gains(result["summary"][name]), "\n".join(_rows(scenes))]
+            gains = _gains(result["summary"][name])
+            parts += [f"### {title}, asked for", gains, _most_possible(name, scenes), "\n".join(_rows(scenes))]
     return "\n\n".join(parts) + "\n"
 
 
@@ -40,6 +46,25 @@ def _gained(result: dict[str, Any]) -> str:
     scenes = [scene for measured in result["results"].values() for scene in measured.values()]
     found = [way["gained"] for goals in scenes for ways in goals.values() for way in ways.values() if "gained" in way]
     return f"{min(found):.1f} to {max(found):.1f}"
+
+
+def _most_possible(display: str, scenes: dict[str, Any]) -> str:
+    """How many times as fast as stock views a picture can be that judges itself, by the parts of ``equal_error.py``."""
+    curves = saved("equal_error").get("results", {}).get(display, {})
+    told = []
+    for quality in next(iter(scenes.values())):
+        times = []
+        for name in scenes.keys() & curves.keys():
+            points = curves[name]["curves"]["pooled"]
+            parts = {(point["spp"], point["effort"]): point["parts"] for point in points}
+            least = parts[_LEAST]["trace"] + parts[_HALVES]["guides"] + parts[_HALVES]["clean"]
+            times.append(scenes[name][quality]["stock views"]["seconds"] / least)
+        told.append(f"{statistics.geometric_mean(times):.1f} (to {quality} dB)")
+    return textwrap.fill(
+        "What a picture takes at least that judges itself by two denoised halves, one sample of each pixel (photons "
+        f"included), guides and two runs of the network, would be {' and '.join(told)} times as fast as stock views.",
+        120,
+    )
 
 
 def _gains(summary: dict[str, Any]) -> str:
