@@ -52,9 +52,9 @@ _FEWEST_OF_PAIR = 64
 #: Share of the emissions that goes to all pairs alike, whatever the pilot met.
 _UNIFORM_SHARE = 0.1
 #: Emissions of each half: one for so many samples of the picture, within limits.
-SAMPLES_OF_EMISSION, FEWEST, MOST = 3, 1 << 16, 1 << 21
+SAMPLES_OF_EMISSION, FEWEST, MOST = 4, 1 << 16, 1 << 21
 #: Photons within the radius of a look-up, as a rule, where there are so many emissions.
-NEIGHBOURS, EMISSIONS_OF_NEIGHBOURS = 25, 1 << 18
+NEIGHBOURS, EMISSIONS_OF_NEIGHBOURS = 50, 1 << 18
 #: Photons by which the radius is found.
 _PROBED = 2000
 _SEED_STEPS = (0xB5297A4D, 0x68E31DA4)
