@@ -71,9 +71,8 @@ def _gains(summary: dict[str, Any]) -> str:
     rows = ["| to | against | times as fast | least | scenes |", "|---|---|---|---|---|"]
     for goal, found in summary.items():
         rival, quality = goal.split(" to ")
-        if found["scenes"]:
-            mean, least = found["times_faster"], found["least"]
-            rows.append(f"| {quality} dB | {name_of(rival)} | {mean:.1f} | {least:.2f} | {len(found['scenes'])} |")
+        mean, least = found["times_faster"], found["least"]
+        rows.append(f"| {quality} dB | {name_of(rival)} | {mean:.1f} | {least:.2f} | {len(found['scenes'])} |")
     return "\n".join(rows)
 
 

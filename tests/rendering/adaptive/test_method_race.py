@@ -191,13 +191,11 @@ class Told:
 
     def __init__(self, likely, surely, slope):
         self.likely, self.surely, self.slope = likely, surely, slope
-        self.looks = 0
 
     def margin(self, samples):
         return NO_MARGIN
 
     def assess(self, samples):
-        self.looks += 1
         more = 0.0 if samples <= 16 else 10.0
         values = (self.likely + more, self.surely + more, 60.0)
         errors = PixelErrors(np.zeros((1, 1), np.float32), None, OWN_NOISE)

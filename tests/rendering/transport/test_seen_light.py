@@ -359,8 +359,8 @@ def test_what_one_chain_brings_beyond_a_limit_is_excess(all_events):
     assert together[1] == pytest.approx(alone[1], rel=1e-4, abs=1e-3)
 
 
-def test_of_many_chains_each_is_believed(all_events):
-    """The emitter is 15 times white: one of 8 chains is believed up to 5.7 of that, one of 64 as a whole."""
+def test_of_many_chains_each_counts_as_a_whole(all_events):
+    """The emitter is 15 times white: one of 8 chains counts up to 5.7 of that, one of 64 as a whole."""
     import drjit as dr
     import mitsuba as mi
 
@@ -391,7 +391,7 @@ def test_of_many_chains_each_is_believed(all_events):
     bright = excess.max(axis=-1) > 0
     assert 5 < bright.sum() < 0.01 * bright.size
     assert np.all(excess <= seen * (1 + 1e-5))
-    # Of single hits, by one of a pixel's chains, is left what is believed of them.
+    # Of single hits, by one of a pixel's chains, is left what counts of them.
     assert (seen - excess).max(axis=-1)[bright].min() == pytest.approx(most_of_chain(8.0) / 8, rel=0.1)
 
 

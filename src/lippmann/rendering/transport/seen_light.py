@@ -47,10 +47,9 @@ from lippmann.rendering.transport.sharp_events import follows_sharply, is_sharp,
 if TYPE_CHECKING:
     from lippmann.rendering.transport.mirror_images import MirrorImages
 
-#: Linear value of a pixel, white being 1, up to which one of :data:`_OF_CHAINS` chains is believed. Of fewer chains one
-#: is believed more, as fewer highlights are met by one alone; so much that the limit of a chain goes with this power of
-#: their number.
-BELIEVED, _OF_CHAINS, _POWER = 0.3, 256.0, 0.75
+#: Linear value of a pixel, white being 1, up to which one of :data:`_OF_CHAINS` chains counts. One of fewer counts
+#: for more of it, as fewer highlights are met by one alone: the limit of a chain goes with this power of their number.
+MOST_OF_ONE, _OF_CHAINS, _POWER = 0.3, 256.0, 0.75
 #: Tells the streams of chains from those of paths.
 _CHAINS = 0x5EE21147
 #: Sample dimensions used at one vertex.
@@ -83,7 +82,7 @@ def sample_pixel(
 
 def most_of_chain(chains: Float) -> Float:
     """Linear value, white being 1, up to which one of so many ``chains`` of a pixel counts."""
-    return BELIEVED * _OF_CHAINS * (chains / _OF_CHAINS) ** _POWER
+    return MOST_OF_ONE * _OF_CHAINS * (chains / _OF_CHAINS) ** _POWER
 
 
 @dr.syntax
