@@ -84,7 +84,7 @@ def picture(stage: Stage, way: str, method: str, samples: int) -> Picture:
     denoise = "oidn" if method == "pooled" else "none"
     request = replace(stage.session.request, method=method, denoise=denoise, spp=samples, seed=3)
     light_up(stage, replace(request, caustics="auto" if way == "photons" else "paths"))
-    batches = FullInBatches(stage.integrator, stage.source, seed=3, memory=4 << 30, keeps_seen=method == "pooled")
+    batches = FullInBatches(stage.integrator, stage.source, seed=3, memory=4 << 30, for_denoiser=method == "pooled")
     batches.add(samples)
     if method == "full":
         return batches.picture()
@@ -101,7 +101,7 @@ def picture(stage: Stage, way: str, method: str, samples: int) -> Picture:
         effort=lambda: effort_of("oidn", work),
         shares=True,
     )
-    return Denoised(batches, denoiser.denoise, "srgb", CORES, denoiser.share).picture()
+    return Denoised(batches, denoiser.denoise, "srgb", CORES, denoiser.share, denoiser.coverage).picture()
 
 
 if __name__ == "__main__":

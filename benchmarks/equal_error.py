@@ -146,7 +146,7 @@ def _pooled(stage: Stage, samples: int) -> Any:
     from lippmann.rendering.film.sample_batches import FullInBatches
 
     light_up(stage, replace(stage.session.request, method="pooled", denoise="oidn", spp=samples, seed=3))
-    batches = FullInBatches(stage.integrator, stage.source, seed=3, memory=4 << 30, keeps_seen=True)
+    batches = FullInBatches(stage.integrator, stage.source, seed=3, memory=4 << 30, for_denoiser=True)
     batches.add(samples)
     return batches
 
@@ -179,7 +179,7 @@ def _denoised(
 
     for way, call in (
         ("full + oidn", lambda: clean(picture)),
-        ("pooled", lambda: Denoised(batches, clean, "srgb", CORES, share).picture()),
+        ("pooled", lambda: Denoised(batches, clean, "srgb", CORES, share, lambda: guides.coverage).picture()),
     ):
         seconds, result = timed(call)
         parts = {"trace": traced[way], "guides": looked, "clean": seconds}

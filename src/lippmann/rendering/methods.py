@@ -24,7 +24,8 @@ from lippmann.rendering.adaptive.stopping import Goal, Outcome, goal_of, reach
 from lippmann.rendering.denoise.cost_model import effort_of, look_cost, traced_work
 from lippmann.rendering.denoise.dual_buffer import Denoised
 from lippmann.rendering.denoise.guided_denoiser import GuidedDenoiser
-from lippmann.rendering.denoise.subpixels import DenoisedSubpixels, SubpixelBatches
+from lippmann.rendering.denoise.outlines import by_coverage
+from lippmann.rendering.denoise.subpixels import SubpixelBatches
 from lippmann.rendering.estimate.denoised_psnr import DenoisedEstimator
 from lippmann.rendering.estimate.pixel_errors import PixelErrors
 from lippmann.rendering.estimate.psnr import ERROR_LAYER, Estimate, Parts, PictureEstimator
@@ -178,7 +179,7 @@ def _one_stream(job: Job, why: str) -> Traced:
         plan,
         seed=request.seed,
         box_filter=request.box_filter,
-        keeps_seen=request.denoise != "none",
+        for_denoiser=request.denoise != "none",
         progress=job.progress,
     )
     return Traced(frame, request.samples, notes=(why,))
@@ -276,7 +277,7 @@ def _batches(job: Job) -> FullInBatches:
         box_filter=job.request.box_filter,
         transfer=job.request.transfer,
         memory=job.session.memory,
-        keeps_seen=job.request.denoise != "none",
+        for_denoiser=job.request.denoise != "none",
     )
 
 
@@ -305,9 +306,9 @@ class _Candidate:
 
 def _denoised(job: Job, batches: FullInBatches, denoiser: GuidedDenoiser) -> Denoised:
     share = denoiser.share if denoiser.shares_afterwards else None
-    if isinstance(batches, SubpixelBatches):
-        return DenoisedSubpixels(batches, denoiser.denoise, job.request.transfer, job.session.engine.threads, share)
-    return Denoised(batches, denoiser.denoise, job.request.transfer, job.session.engine.threads, share)
+    return Denoised(
+        batches, denoiser.denoise, job.request.transfer, job.session.engine.threads, share, denoiser.coverage
+    )
 
 
 def _denoised_candidate(job: Job, goal: Goal, batches: FullInBatches, rays: Callable[[], float]) -> _Candidate:
@@ -377,6 +378,9 @@ def _denoised_whole(job: Job, traced: Traced) -> Traced:
     if denoiser is None:
         return traced
     noisy, source = traced.frame.pixels, job.traced
+    further = None if traced.frame.coverage is None else denoiser.coverage()
+    if traced.frame.coverage is not None and further is not None:
+        noisy = by_coverage(noisy, traced.frame.coverage, further[0] + further[1])
     seen, excess = traced.frame.seen, traced.frame.excess
     cleaned = denoiser(noisy) if seen is None or excess is None else denoiser(noisy - seen) + (seen - excess)
     traced.frame.pixels = source.own_colors(cleaned) if isinstance(source, SubpixelRays) else cleaned

@@ -33,6 +33,7 @@ class Noise:
     #: Of each half.
     of_seen = None
     of_excess = None
+    covered = None
 
     def shown(self, values):
         return values
@@ -49,8 +50,14 @@ class Noise:
     def picture(self):
         return self._halves[0]
 
-    def halves(self):
+    def traced_picture(self):
+        return self._halves[0]
+
+    def traced_halves(self):
         return tuple(self._halves)
+
+    def coverage_halves(self):
+        return self.covered
 
     def squared_error(self):
         difference = np.square(self._halves[0] - self._halves[1]).mean(axis=2) / 4
@@ -95,7 +102,7 @@ def test_noise_that_both_halves_share_would_not_be_seen_but_theirs_is_their_own(
     """The judge of a half is the other one: a denoiser that does nothing is told its whole noise."""
     renderer = Noise()
     told = Denoised(renderer, lambda picture, _: picture, "srgb").squared_error()
-    noise = true_error(np.mean(renderer.halves(), axis=0), renderer.truth)
+    noise = true_error(np.mean(renderer.traced_halves(), axis=0), renderer.truth)
     assert float(told.values.mean()) == pytest.approx(noise, rel=0.2)
 
 
@@ -114,8 +121,8 @@ def test_what_the_halves_differ_by_is_known():
 def test_seen_light_goes_past_the_denoiser_and_past_what_is_shared(shares, as_denoised):
     """A highlight of one pixel, which a blur would wipe out."""
     renderer = Noise()
-    highlights = [np.zeros_like(half) for half in renderer.halves()]
-    for light, half, strength in zip(highlights, renderer.halves(), (5.0, 5.4), strict=True):
+    highlights = [np.zeros_like(half) for half in renderer.traced_halves()]
+    for light, half, strength in zip(highlights, renderer.traced_halves(), (5.0, 5.4), strict=True):
         light[100, 100] = strength
         half += light
     given = []
@@ -135,12 +142,12 @@ def test_seen_light_goes_past_the_denoiser_and_past_what_is_shared(shares, as_de
 
 def test_what_rests_on_single_chains_is_left_out_and_still_counts_as_an_error():
     renderer = Noise()
-    hits = [np.zeros_like(half) for half in renderer.halves()]
-    for hit, half in zip(hits, renderer.halves(), strict=True):
+    hits = [np.zeros_like(half) for half in renderer.traced_halves()]
+    for hit, half in zip(hits, renderer.traced_halves(), strict=True):
         hit[50, 50] = 0.25
         half += hit
     hits[0][100, 100] = 3.0
-    renderer.halves()[0][100, 100] += 3.0
+    renderer.traced_halves()[0][100, 100] += 3.0
     renderer.of_seen = tuple(hits)
     before = Denoised(renderer, blur, "srgb")
     whole = before.picture()
@@ -163,9 +170,9 @@ def test_what_rests_on_single_chains_is_left_out_and_still_counts_as_an_error():
 def test_an_emitter_in_a_narrow_lobe_does_not_light_the_pixels_beside_it():
     """A mirrored emitter of which a tenth is not sharp; beside it something bright that is not seen light at all."""
     renderer = Noise()
-    rest = [half.copy() for half in renderer.halves()]
+    rest = [half.copy() for half in renderer.traced_halves()]
     emitters = [np.zeros_like(half) for half in rest]
-    for light, half in zip(emitters, renderer.halves(), strict=True):
+    for light, half in zip(emitters, renderer.traced_halves(), strict=True):
         light[100, 100] = 300.0
         half[100, 100] += 330.0
         half[50, 50] += 30.0
@@ -182,7 +189,7 @@ def test_an_emitter_in_a_narrow_lobe_does_not_light_the_pixels_beside_it():
         assert shown[50, 50] == pytest.approx(half[50, 50] + 30.0)
         shown[100, 100] = shown[50, 50] = half[100, 100] = half[50, 50] = 0
         assert shown == pytest.approx(half)
-    expected = np.mean(renderer.halves(), axis=0)
+    expected = np.mean(renderer.traced_halves(), axis=0)
     assert picture == pytest.approx(expected)
 
 
@@ -190,9 +197,9 @@ def test_outliers_of_seen_light_are_told():
     """What one half alone has met of it, where the samples' batches say so, too."""
     renderer = Noise()
     renderer.samples = 64
-    hits = [np.zeros_like(half) for half in renderer.halves()]
+    hits = [np.zeros_like(half) for half in renderer.traced_halves()]
     hits[0][100, 100] = 0.4
-    for light, half in zip(hits, renderer.halves(), strict=True):
+    for light, half in zip(hits, renderer.traced_halves(), strict=True):
         light[50, 50] = 0.3
         half += light
     whole = renderer.squared_error
@@ -224,7 +231,7 @@ def test_a_pixel_that_both_halves_hit_hard_does_not_hide_what_is_wrong_elsewhere
     renderer = Noise()
     renderer.samples = samples
     clear = float(Denoised(renderer, lambda p, _: blur(np.minimum(p, 1)), "srgb").squared_error().values.mean())
-    for half in renderer.halves():
+    for half in renderer.traced_halves():
         half[100, 100] += 15
     told = float(Denoised(renderer, lambda p, _: blur(np.minimum(p, 1)), "srgb").squared_error().values.mean())
     assert (told > 2 * clear) == hidden

@@ -48,14 +48,15 @@ def test_own_colours_are_those_that_sub_pixels_have_alone(integrator, order, win
         batches.add(5)
     assert alone.picture().std() > 0.05
     assert together.picture() == pytest.approx(alone.picture(), rel=1e-5, abs=1e-6)
-    for half, other in zip(together.halves(), alone.halves(), strict=True):
-        assert half == pytest.approx(other, rel=1e-5, abs=1e-6)
+    for half, other in zip(together.traced_halves(), alone.traced_halves(), strict=True):
+        assert together.shown(half) == pytest.approx(other, rel=1e-5, abs=1e-6)
     assert together.squared_error().values == pytest.approx(alone.squared_error().values, rel=1e-3, abs=1e-6)
     assert together.rays == alone.rays
 
 
 def test_a_denoiser_is_given_all_colours(integrator, as_denoised):
-    from lippmann.rendering.denoise.subpixels import DenoisedSubpixels, SubpixelBatches
+    from lippmann.rendering.denoise.dual_buffer import Denoised
+    from lippmann.rendering.denoise.subpixels import SubpixelBatches
     from lippmann.rendering.transport.ray_source import SubpixelRays
 
     batches = SubpixelBatches(integrator, SubpixelRays(rays()), seed=3, memory=1 << 28)
@@ -66,15 +67,15 @@ def test_a_denoiser_is_given_all_colours(integrator, as_denoised):
         turns.append(turned)
         return pixels + np.float32(0.5)
 
-    denoised = DenoisedSubpixels(batches, keep, "srgb")
+    denoised = Denoised(batches, keep, "srgb")
     for samples in (1, 3):
         batches.add(samples)
         assert denoised.picture() == pytest.approx(batches.picture() + 0.5, abs=1e-5)
     one, *halves = given
     assert turns == [False, False, True]
     assert one.shape == halves[0].shape == (64, 288, 3)
-    for half, shown in zip(halves, batches.halves(), strict=True):
-        assert batches.own_colors(half) == pytest.approx(shown)
+    for half, traced in zip(halves, batches.traced_halves(), strict=True):
+        assert half == pytest.approx(traced)
     # All colours of a sub-pixel are there, not only its own.
     assert (one.reshape(-1, 3).max(axis=0) > 0).all()
     assert (one[:, 0::3, 1:] > 0).any()

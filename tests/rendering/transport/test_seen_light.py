@@ -223,7 +223,7 @@ def test_their_highlights_go_past_a_denoiser():
     light = Light("directional", (3.0, 3.0, 3.0), np.eye(4))
     integrator, source = described(replace(scene, lights=[light]))
     integrator.seen_chains = dr.opaque(mi.UInt32, 8)
-    batches = FullInBatches(integrator, source, seed=1, memory=1 << 30, keeps_seen=True)
+    batches = FullInBatches(integrator, source, seed=1, memory=1 << 30, for_denoiser=True)
     batches.add(16)
     assert batches.seen().max() > 1
     assert (batches.picture() - batches.seen()).max() < 1
@@ -263,7 +263,7 @@ def test_chains_count_as_rays_and_depend_on_the_seed_alone(all_events):
     lanes = SIDE * SIDE * 8
     assert whole.rays.primary == plain.rays.primary == lanes
     assert whole.rays.secondary - plain.rays.secondary >= 4 * lanes
-    a, b = whole.halves()
+    a, b = whole.traced_halves()
     assert not np.array_equal(a, b)
 
 
@@ -304,10 +304,10 @@ def test_seen_light_is_told_apart_and_is_all_that_is_seen(all_events):
 
     integrator, source = all_events
     integrator.seen_chains = dr.opaque(mi.UInt32, 4)
-    both = [FullInBatches(integrator, source, seed=5, memory=1 << 30, keeps_seen=keeps) for keeps in (True, False)]
+    both = [FullInBatches(integrator, source, seed=5, memory=1 << 30, for_denoiser=keeps) for keeps in (True, False)]
     for batches in both:
         batches.add(16)
-    frame = trace_frame(integrator, source, make_plan(SIDE, SIDE, 16, memory=2**30), seed=5, keeps_seen=True)
+    frame = trace_frame(integrator, source, make_plan(SIDE, SIDE, 16, memory=2**30), seed=5, for_denoiser=True)
     integrator.seen_chains = None
     picture, seen, halves = both[0].picture(), both[0].seen(), both[0].seen_halves()
     assert np.array_equal(picture, both[1].picture())
@@ -374,14 +374,14 @@ def test_of_many_chains_each_counts_as_a_whole(all_events):
     integrator, source = all_events
     integrator.seen_chains = dr.opaque(mi.UInt32, 4)
     try:
-        few = [FullInBatches(integrator, source, seed=seed, memory=1 << 30, keeps_seen=True) for seed in range(16)]
-        many, limited = (FullInBatches(integrator, source, seed=5, memory=1 << 30, keeps_seen=True) for _ in range(2))
+        few = [FullInBatches(integrator, source, seed=seed, memory=1 << 30, for_denoiser=True) for seed in range(16)]
+        many, limited = (FullInBatches(integrator, source, seed=5, memory=1 << 30, for_denoiser=True) for _ in range(2))
         for each in few:
             each.add(2)
         many.add(16)
         integrator.gain = mi.Float(0.25)
         limited.add(2)
-        frame = trace_frame(integrator, source, make_plan(SIDE, SIDE, 2, memory=2**30), seed=5, keeps_seen=True)
+        frame = trace_frame(integrator, source, make_plan(SIDE, SIDE, 2, memory=2**30), seed=5, for_denoiser=True)
     finally:
         integrator.seen_chains = integrator.gain = None
     assert FullInBatches(integrator, source, memory=1 << 30).excess() is None
@@ -419,9 +419,9 @@ def test_sky_at_outlines_stays_with_paths(engine):
     pose[2, 3] = 3.0
     source = CameraRays(Camera("eye", pose, fov_y=0.6), SIDE, SIDE)
     plan = make_plan(SIDE, SIDE, 4, memory=2**30)
-    plain = trace_frame(integrator, source, plan, keeps_seen=True)
+    plain = trace_frame(integrator, source, plan, for_denoiser=True)
     integrator.seen_chains = dr.opaque(mi.UInt32, 4)
-    further = trace_frame(integrator, source, plan, keeps_seen=True)
+    further = trace_frame(integrator, source, plan, for_denoiser=True)
     assert plain.seen is None
     assert np.abs(further.seen).max() == 0
     assert further.pixels == pytest.approx(plain.pixels, rel=1e-5)

@@ -20,6 +20,9 @@ they take its place (:mod:`lippmann.rendering.denoise.noisy_blend`), so that wit
 be what they show, whatever a denoiser does. The other half has a say in both, but none of its pixels in its own place,
 so that it can still judge.
 
+Outlines before the background are made sharper first, by the rays of the guides
+(:mod:`lippmann.rendering.denoise.outlines`): each half by half of them, so that what these get wrong is told, too.
+
 Errors are small and the curve of the codes is taken as straight, but for pixels that the denoiser made far brighter
 than the samples show, as it does beside emitters: where that is beyond white, the curve is cut off, and in the dark it
 is steep. There the step of the code from what the samples show counts.
@@ -38,10 +41,12 @@ from lippmann.color.transfer import Transfer, coding_slope, encode
 from lippmann.progress import ProgressCallback, silent
 from lippmann.rendering.denoise.local_statistics import mean_around
 from lippmann.rendering.denoise.noisy_blend import own_share
+from lippmann.rendering.denoise.outlines import by_coverage
 from lippmann.rendering.denoise.unshared_blend import own_light
 from lippmann.rendering.estimate.bias_posterior import OUTLIER_RATIO
 from lippmann.rendering.estimate.jackknife import OUTLIERS_TOLD_FROM
 from lippmann.rendering.estimate.pixel_errors import CROSS_NOISE, PixelErrors
+from lippmann.rendering.film.coverage import Coverage
 from lippmann.runtime.row_threads import Bands
 
 Floats = NDArray[np.float32]
@@ -73,9 +78,11 @@ class Halved(Protocol):
 
     def add(self, samples: int, progress: ProgressCallback = silent) -> None: ...
 
-    def picture(self) -> Floats: ...
+    def traced_picture(self) -> Floats: ...
 
-    def halves(self) -> tuple[Floats, Floats]: ...
+    def traced_halves(self) -> tuple[Floats, Floats]: ...
+
+    def coverage_halves(self) -> tuple[Coverage, Coverage] | None: ...
 
     def shown(self, values: Floats) -> Floats: ...
 
@@ -103,6 +110,8 @@ class Denoised:
         CPU threads.
     share:
         From a clean picture to one whose parts share their light; None where they do not.
+    coverage:
+        By either half of the rays of the denoiser's guides; None where it is not known.
     """
 
     def __init__(
@@ -112,12 +121,16 @@ class Denoised:
         transfer: Transfer,
         threads: int = 1,
         share: Share | None = None,
+        coverage: Callable[[], tuple[Coverage, Coverage] | None] | None = None,
     ) -> None:
         self._renderer = renderer
         self._denoise = denoise
         self._share = share
+        self._coverage = coverage
         self._transfer: Transfer = transfer
         self._threads = threads
+        #: What is traced of the halves, and what comes of them.
+        self._noisy: tuple[Floats, Floats] | None = None
         self._cleaned: tuple[Floats, Floats] | None = None
         self._cleaned_samples = 0
 
@@ -141,7 +154,8 @@ class Denoised:
 
     def squared_error(self) -> PixelErrors:
         """Squared error of every pixel's code, as the halves judge each other."""
-        noisy, clean = self._renderer.halves(), self._clean_halves()
+        clean = self._clean_halves()
+        noisy = self._shown_halves()
         slope = self._slope(noisy)
         apart = (np.float32(0.25) * np.square(slope * (clean[0] - clean[1]))).mean(axis=2)
         left = [slope * (half - smooth) for half, smooth in zip(noisy, clean, strict=True)]
@@ -176,35 +190,62 @@ class Denoised:
         # The samples may have come by another way than through :meth:`add`.
         if self._cleaned is None or self._cleaned_samples != self._renderer.samples:
             self._cleaned_samples = self._renderer.samples
-            noisy = self._renderer.halves()
-            clean = self._best_of_halves(noisy)
+            self._noisy = self._noisy_halves()
+            clean = self._best_of_halves()
+            noisy = self._shown_halves()
             own = own_share(noisy, clean, self._transfer, threads=self._threads)
             self._cleaned = clean[0] + own * (noisy[0] - clean[0]), clean[1] + own * (noisy[1] - clean[1])
         return self._cleaned
 
-    def _clean_picture(self) -> Floats:
-        return self._cleaned_and_shared(self._renderer.picture(), self._renderer.seen())[-1]
+    def _noisy_halves(self) -> tuple[Floats, Floats]:
+        """What is traced of the halves, outlines by all rays."""
+        halves, coverage = self._renderer.traced_halves(), self._coverages()
+        if coverage is None:
+            return halves
+        first, second = (by_coverage(half, *both) for half, both in zip(halves, coverage, strict=True))
+        return first, second
 
-    def _best_of_halves(self, noisy: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
+    def _coverages(self) -> list[tuple[Coverage, Coverage]] | None:
+        """Of each half by its paths, and by its rays of the guides; None where either is not known."""
+        paths = self._renderer.coverage_halves()
+        further = None if paths is None or self._coverage is None else self._coverage()
+        return None if paths is None or further is None else list(zip(paths, further, strict=True))
+
+    def _shown_halves(self) -> tuple[Floats, Floats]:
+        """What the picture shows of the noisy halves."""
+        assert self._noisy is not None
+        first, second = (self._renderer.shown(half) for half in self._noisy)
+        return first, second
+
+    def _clean_picture(self) -> Floats:
+        noisy, coverage = self._renderer.traced_picture(), self._coverages()
+        if coverage is not None:
+            (paths, further), (more_paths, more_further) = coverage
+            noisy = by_coverage(noisy, paths + more_paths, further + more_further)
+        return self._cleaned_and_shared(noisy, self._renderer.seen())[-1]
+
+    def _best_of_halves(self) -> tuple[Floats, Floats]:
         """The halves without their noise, shared where that is better."""
-        first, second = self._versions(noisy)
+        first, second = self._versions()
         if self._share is None:
             return first[0], second[0]
-        clean, shared = (first[0], second[0]), (first[1], second[1])
+        clean, shared, noisy = (first[0], second[0]), (first[1], second[1]), self._shown_halves()
         own = own_light(noisy, clean, shared, self._transfer, threads=self._threads)
         return shared[0] + own * (clean[0] - shared[0]), shared[1] + own * (clean[1] - shared[1])
 
-    def _versions(self, noisy: tuple[Floats, Floats]) -> tuple[list[Floats], list[Floats]]:
+    def _versions(self) -> tuple[list[Floats], list[Floats]]:
         """Of each half what :meth:`_cleaned_and_shared` gives."""
-        seen = self._renderer.seen_halves() or (None, None)
+        assert self._noisy is not None
+        noisy, seen = self._noisy, self._renderer.seen_halves() or (None, None)
         return self._cleaned_and_shared(noisy[0], seen[0]), self._cleaned_and_shared(noisy[1], seen[1], turned=True)
 
     def _cleaned_and_shared(self, noisy: Floats, seen: Floats | None, turned: bool = False) -> list[Floats]:
-        """A picture without its noise; and, where light is shared, that with shared light."""
+        """What the picture shows of what was traced without noise; and, where light is shared, of that with shared
+        light."""
         past = None if seen is None else _past_the_network(noisy, seen)
         clean = self._denoise(noisy if past is None else noisy - past, turned)
         versions = [clean] if self._share is None else [clean, self._share(clean)]
-        return versions if past is None else [version + past for version in versions]
+        return [self._renderer.shown(version if past is None else version + past) for version in versions]
 
     def _slope(self, noisy: tuple[Floats, Floats]) -> Floats:
         """By how much a pixel's code differs from that of the truth, per linear difference between the two."""

@@ -14,6 +14,7 @@ from lippmann.rendering.denoise.cost_model import GUIDE_SAMPLES, RUN_COST, SHARI
 from lippmann.rendering.denoise.oidn import Effort, denoise
 from lippmann.rendering.denoise.oidn_masked import denoise_seen
 from lippmann.rendering.denoise.pixel_order import best_form, denoise_views
+from lippmann.rendering.film.coverage import Coverage
 from lippmann.rendering.film.feature_buffers import Guides, plan_guides, trace_guides
 from lippmann.rendering.sharing.cross_lens import lens_numbers, lens_numbers_in_full_color, share_light
 from lippmann.rendering.sharing.cross_view import share_views
@@ -136,6 +137,14 @@ class GuidedDenoiser:
         )
         self.seconds += time.perf_counter() - started
         return shared
+
+    def coverage(self) -> tuple[Coverage, Coverage] | None:
+        """By either half of the rays of the guides that the next picture is cleaned with."""
+        started = time.perf_counter()
+        self.used = self._effort()
+        found = self.guides().coverage
+        self.seconds += time.perf_counter() - started
+        return found
 
     def probe(self) -> float:
         """Seconds that a picture cleaned by halves takes, guides included, by a small one."""

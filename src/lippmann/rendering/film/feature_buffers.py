@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from lippmann.device.types import Color3f, Float, Vector3f
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.rendering.film.aov import to_numpy
+from lippmann.rendering.film.coverage import Coverage
 from lippmann.rendering.film.lane_order import to_rows
 from lippmann.rendering.film.memory_model import FEATURE_BUFFERS
 from lippmann.rendering.film.wavefront import samples_of_tile
@@ -42,12 +43,14 @@ class Guides:
     """``albedo`` and ``normal``, ``(H, W, 3)`` float32 each; components in [0, 1] and in [-1, 1] (display frame).
 
     ``height`` is ``(H, W)`` float32: the z (mm) at which things seem to lie, those in mirrors behind them. None where
-    it is not known.
+    it is not known. ``coverage`` is told by the first and by the second half of their samples; None where it is not
+    known.
     """
 
     albedo: FloatArray
     normal: FloatArray
     height: FloatArray | None = None
+    coverage: tuple[Coverage, Coverage] | None = None
 
     def reflected(self) -> FloatArray:
         """``(H, W, 3)``: what colour is divided by for light that can be shared, and light multiplied by for colour.
@@ -93,20 +96,26 @@ def trace_guides(
     albedo = np.zeros((plan.height, plan.width, 3), dtype=np.float32)
     normal = np.zeros_like(albedo)
     height = np.zeros((plan.height, plan.width), dtype=np.float32)
+    covered = np.zeros((2, plan.height, plan.width, plan.channels), dtype=np.float32)
     done = 0
     for tile, run in plan:
         rows = slice(tile.first_row, tile.first_row + tile.rows)
         found = _trace_tile(surfaces, source, plan, tile, run, seed, box_filter, matrix[2])
         shape = (tile.rows, plan.width, plan.channels)
-        colors, normals, heights = (_in_rows(part, shape) for part in found)
+        colors, normals, heights, *halves = (_in_rows(part, shape) for part in found)
         height[rows] += heights.mean(axis=2) / plan.samples
         if plan.channels == 3:
             colors = np.diagonal(colors, axis1=2, axis2=3)[:, :, None]
         albedo[rows] += colors[:, :, 0] / plan.samples
         normal[rows] += normals.mean(axis=2) @ rotation.T / plan.samples
+        for half, hits in zip(covered, halves, strict=True):
+            half[rows] += hits
         done += tile.rows * plan.width * plan.channels * run.count
         progress(Progress("guides", done, plan.work))
-    return Guides(albedo, normal, height)
+    first = plan.samples // 2
+    samples = first, plan.samples - first
+    coverage = [Coverage(hits / np.float32(max(1, n)), n) for hits, n in zip(covered, samples, strict=True)]
+    return Guides(albedo, normal, height, (coverage[0], coverage[1]))
 
 
 def _in_rows(values: Float | Vector3f, shape: tuple[int, int, int]) -> FloatArray:
@@ -126,20 +135,22 @@ def _trace_tile(
     seed: int,
     box_filter: bool,
     z_from_world: NDArray[np.float64],
-) -> tuple[Color3f, Vector3f, Float]:
+) -> tuple[Color3f, Vector3f, Float, Float, Float]:
     """Sums over the samples of one pass, for every pixel and channel in the order of lanes: colours, world-space
-    normals, and heights."""
+    normals, heights, and hits of any surface by the first and by the second half of all passes' samples."""
     lanes = tile.rows * plan.width * plan.channels * run.count
     # Lanes are those of a picture.
     pixels, stream = samples_of_tile(source, plan, tile, run, seed, box_filter)
     ray = pixels.ray(stream)
-    albedo, normal, distance = surfaces.features(ray)
+    albedo, normal, distance, covered = surfaces.features(ray)
     x, y, z = mi.Point3f(ray.o) + mi.Vector3f(ray.d) * distance
     weights = [dr.opaque(mi.Float, float(weight)) for weight in z_from_world]
     height = dr.clip(x * weights[0] + y * weights[1] + z * weights[2] + weights[3], -_FARTHEST, _FARTHEST)
-    values = [mi.Float(part) + dr.zeros(mi.Float, lanes) for part in (*albedo, *normal, height)]
-    # All at once: sums one by one would follow the rays seven times.
+    is_first = stream.index < dr.opaque(mi.UInt32, plan.samples // 2)
+    hits = [dr.select(covered & of_half, mi.Float(1), mi.Float(0)) for of_half in (is_first, ~is_first)]
+    values = [mi.Float(part) + dr.zeros(mi.Float, lanes) for part in (*albedo, *normal, height, *hits)]
+    # All at once: sums one by one would follow the rays nine times.
     dr.eval(values)
     if run.count > 1:
         values = [dr.block_sum(part, run.count) for part in values]
-    return mi.Color3f(*values[:3]), mi.Vector3f(*values[3:6]), values[6]
+    return mi.Color3f(*values[:3]), mi.Vector3f(*values[3:6]), *values[6:]

@@ -26,6 +26,8 @@ BATCH = 12
 BATCH_ERRORS = 12
 #: Seen light of two halves, and what of it is excess, apart from the batches.
 SEEN = 3 * BATCH
+#: Coverage of two halves, of each channel.
+COVERAGE = 8
 #: One emission of photons, which lands about once, with what sorting takes, in bytes.
 PHOTON = 128
 #: One ray from an emitter to a light vertex, with what it takes to trace it, in bytes.
@@ -37,8 +39,8 @@ IMAGE_SEARCH_LANE, MIRROR_IMAGES = 256, 16
 POINT_IMAGE = 32
 #: Depth, normal, albedo, shape and position, and the copies that a file writer makes of them.
 AOVS = 2 * 4 * (1 + 3 + 3 + 1 + 3)
-#: Albedo, normal and height for the denoiser, and what a tile adds to them.
-FEATURE_BUFFERS = 56
+#: Albedo, normal, height and coverage for the denoiser, and what a tile adds to them.
+FEATURE_BUFFERS = 80
 #: Open Image Denoise with its feature buffers, up to the most that the library lets itself have, in bytes.
 DENOISER, DENOISER_MOST = 600, 3 << 30
 #: A picture rendered in one piece, with the copies that methods and writers make of it; where pixels are made from

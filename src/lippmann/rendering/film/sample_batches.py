@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Sequence
+from typing import cast
 
 import drjit as dr
 import mitsuba as mi
@@ -19,7 +20,7 @@ from numpy.typing import NDArray
 from lippmann.color.transfer import Transfer, coding_slope
 from lippmann.device.kernel_ops import divide
 from lippmann.device.sobol import SEED_STEP, SampleStream
-from lippmann.device.types import Spectrum, UInt32
+from lippmann.device.types import UInt32
 from lippmann.display.pixel_window import PixelWindow
 from lippmann.errors import UsageError
 from lippmann.progress import Progress, ProgressCallback, silent
@@ -28,6 +29,7 @@ from lippmann.rendering.estimate.pixel_errors import OWN_NOISE, PixelErrors
 from lippmann.rendering.film import memory_model
 from lippmann.rendering.film.caustic_blur import SquaredBlur
 from lippmann.rendering.film.caustics import stretches
+from lippmann.rendering.film.coverage import Coverage
 from lippmann.rendering.film.lane_order import STRIP_ROWS, in_strips, pixel_at, to_rows
 from lippmann.rendering.film.wavefront import (
     Frame,
@@ -35,7 +37,7 @@ from lippmann.rendering.film.wavefront import (
     compile_seconds,
     evaluate,
     sample_pixels,
-    shown_colors,
+    sums_of,
 )
 from lippmann.rendering.film.wavefront_plan import Run, cut_batches
 from lippmann.rendering.transport.integrator import Integrator
@@ -72,8 +74,9 @@ class FullInBatches:
         Bytes that may be used, the picture's own included; the fewer, the fewer batches are kept apart.
     window:
         The part of the picture that is rendered; None for all of it. Parts rendered apart are the same as in one piece.
-    keeps_seen:
-        Seen light is kept apart, too, where the integrator tells it: for a denoiser, see :meth:`seen_halves`.
+    for_denoiser:
+        What a denoiser treats apart is kept, too, where the integrator tells it: see :meth:`seen_halves` and
+        :meth:`coverage_halves`.
 
     Attributes
     ----------
@@ -96,7 +99,7 @@ class FullInBatches:
         transfer: Transfer = "srgb",
         memory: int,
         window: PixelWindow | None = None,
-        keeps_seen: bool = False,
+        for_denoiser: bool = False,
     ) -> None:
         self._integrator = integrator
         self._source = source
@@ -109,11 +112,14 @@ class FullInBatches:
         self._window = window or PixelWindow(0, 0, source.width, source.height)
         self._shape = self._window.shape
         pixels = self._window.pixels
-        keeps_seen = keeps_seen and isinstance(integrator, PathIntegrator) and integrator.seen_chains is not None
-        batches, self._lanes = _sizes(pixels, source.channels, memory, keeps_seen)
+        keeps_coverage = for_denoiser and isinstance(integrator, PathIntegrator)
+        keeps_seen = keeps_coverage and cast("PathIntegrator", integrator).seen_chains is not None
+        further = memory_model.COVERAGE * source.channels * keeps_coverage + memory_model.SEEN * keeps_seen
+        batches, self._lanes = _sizes(pixels, source.channels, memory, further)
         self._sums = np.zeros((batches, pixels, 3), dtype=np.float32)
         self._seen = np.zeros((STREAMS, pixels, 3), dtype=np.float32) if keeps_seen else None
         self._excess = np.zeros((1, pixels, 3), dtype=np.float32) if keeps_seen else None
+        self._covered = np.zeros((STREAMS, pixels, source.channels), dtype=np.float32) if keeps_coverage else None
         self._taken = [0] * batches
         # Plain and denoised pictures of the same samples both ask for their errors.
         self._errors: PixelErrors | None = None
@@ -152,12 +158,18 @@ class FullInBatches:
         self.seconds_compile += compiled
         self.seconds_trace += time.perf_counter() - started - compiled
 
-    def _keep(self, run: Run, sums: list[Floats]) -> None:
+    def _keep(self, run: Run, sums: dict[str, Floats]) -> None:
         """Add what :meth:`_trace` gives to its batches."""
         pixels, per_stream = slice(run.first, run.last), len(self._sums) // STREAMS
         for place, batch in enumerate(run.batches):
-            kept = (self._sums, batch), (self._seen, batch // per_stream), (self._excess, 0)
-            for (total, at), part in zip(kept, sums, strict=False):
+            kept = {
+                "radiance": (self._sums, batch),
+                "seen": (self._seen, batch // per_stream),
+                "excess": (self._excess, 0),
+                "covered": (self._covered, batch // per_stream),
+            }
+            for name, part in sums.items():
+                total, at = kept[name]
                 assert total is not None
                 total[at, pixels] += part[:, place]
 
@@ -195,20 +207,31 @@ class FullInBatches:
 
     def picture(self) -> Floats:
         """``(H, W, 3)`` float32: the mean of all samples, linear; black where there are none."""
+        return self.shown(self.traced_picture())
+
+    def traced_picture(self) -> Floats:
+        """:meth:`picture` with all that is traced of it, see :meth:`shown`."""
         return self._mean(self._sums)
 
-    def halves(self) -> tuple[Floats, Floats]:
-        """The means of either stream's samples, ``(H, W, 3)`` each; they know nothing of each other."""
+    def traced_halves(self) -> tuple[Floats, Floats]:
+        """The means of either stream's samples, with all that is traced; they know nothing of each other."""
         per_stream = len(self._sums) // STREAMS
         return self._means([self._sums[s * per_stream : (s + 1) * per_stream].sum(axis=0) for s in range(STREAMS)])
 
     def seen_halves(self) -> tuple[Floats, Floats] | None:
-        """What of :meth:`halves` is seen light; None where that is not told, or not kept."""
+        """What of :meth:`traced_halves` is seen light; None where that is not told, or not kept."""
         return None if self._seen is None else self._means(list(self._seen))
 
     def seen(self) -> Floats | None:
-        """What of :meth:`picture` is seen light; None where that is not told, or not kept."""
+        """What of :meth:`traced_picture` is seen light; None where that is not told, or not kept."""
         return None if self._seen is None else self._mean(self._seen)
+
+    def coverage_halves(self) -> tuple[Coverage, Coverage] | None:
+        """As the samples of either of :meth:`traced_halves` tell it; None where it is not told, or not kept."""
+        if self._covered is None:
+            return None
+        first, second = self._means(list(self._covered))
+        return Coverage(first, self._per_stream()[0]), Coverage(second, self._per_stream()[1])
 
     def excess(self) -> Floats | None:
         """What of :meth:`picture` rests on single chains of seen light, see
@@ -223,12 +246,16 @@ class FullInBatches:
 
     def _means(self, sums: Sequence[Floats]) -> tuple[Floats, Floats]:
         """Of the sums of each stream."""
-        per_stream = len(self._sums) // STREAMS
-        taken = [sum(self._taken[s * per_stream : (s + 1) * per_stream]) for s in range(STREAMS)]
         parts = [
-            (total * np.float32(1 / max(1, n))).reshape(*self.shape, 3) for total, n in zip(sums, taken, strict=True)
+            (total * np.float32(1 / max(1, n))).reshape(*self.shape, -1)
+            for total, n in zip(sums, self._per_stream(), strict=True)
         ]
         return parts[0], parts[1]
+
+    def _per_stream(self) -> list[int]:
+        """Samples of a pixel that each stream has had."""
+        each = len(self._taken) // STREAMS
+        return [sum(self._taken[s * each : (s + 1) * each]) for s in range(STREAMS)]
 
     def squared_error(self) -> PixelErrors:
         """The expected squared error of every pixel's code, see
@@ -273,7 +300,7 @@ class FullInBatches:
         per_stream = number // STREAMS
         each, rest = divmod(samples, number)
         # Where the streams go on; their batches take one stretch after the other.
-        had = [sum(self._taken[s * per_stream : (s + 1) * per_stream]) for s in range(STREAMS)]
+        had = self._per_stream()
         # The rest goes to the batches that have the fewest, in turn of their streams.
         fewest = sorted(_alternate(number), key=lambda batch: self._taken[batch])
         for batches, count in ((tuple(range(number)), each), (tuple(sorted(fewest[:rest])), 1)):
@@ -286,9 +313,9 @@ class FullInBatches:
                 strip = STRIP_ROWS * self._window.width
                 yield from cut_batches(pixels, batches, tuple(starts), count, lanes, strip)
 
-    def _trace(self, run: Run, together: int) -> list[Floats]:
-        """Sums over the samples of a run, ``(pixels, batches of the run, 3)``; and, where these are kept, of their seen
-        light and its excess, by the samples that a pixel then has ``together``.
+    def _trace(self, run: Run, together: int) -> dict[str, Floats]:
+        """What :func:`~lippmann.rendering.film.wavefront.sums_of` gives for a run; excess by the samples that a pixel
+        then has ``together``.
 
         Lanes are ordered pixel (see :mod:`.lane_order`), then channel, then batch, then sample. What differs from run
         to run is opaque to the compiler, so that all share a kernel.
@@ -312,15 +339,11 @@ class FullInBatches:
         stream = SampleStream.of_pixels(pixel * channels + channel, sample, seed)
         stream.half = stream_of
         pixels = PixelRays(self._source, column, row, channel, self._box_filter)
-        samples = None if self._seen is None else dr.opaque(mi.Float, together)
+        samples = None if self._covered is None else dr.opaque(mi.Float, together)
         traced = sample_pixels(self._integrator, pixels, stream, samples)
         evaluate(traced, lanes, self.rays)
-
-        def sums(light: Spectrum) -> Floats:
-            found = _sums(light, channels, number, run.count)
-            return to_rows(found, window.width) if run.in_strips else found
-
-        return [sums(part) for part in (traced.radiance, traced.seen, traced.excess) if part is not None]
+        sums = sums_of(traced, channels, number, run.count)
+        return {name: to_rows(part, window.width) for name, part in sums.items()} if run.in_strips else sums
 
 
 def trace_in_batches(
@@ -388,10 +411,10 @@ def _alternate(number: int) -> tuple[int, ...]:
     return tuple(stream * per_stream + place for place in range(per_stream) for stream in range(STREAMS))
 
 
-def _sizes(pixels: int, channels: int, memory: int, keeps_seen: bool) -> tuple[int, int]:
-    """How many batches are kept, and the lanes of a wavefront."""
+def _sizes(pixels: int, channels: int, memory: int, further: int) -> tuple[int, int]:
+    """How many batches are kept beside ``further`` bytes of a pixel, and the lanes of a wavefront."""
     for batches in (MOST_BATCHES, MOST_BATCHES // 2, STREAMS):
-        kept = pixels * (memory_model.batches(batches) + memory_model.SEEN * keeps_seen)
+        kept = pixels * (memory_model.batches(batches) + further)
         needed = min(memory_model.SMALLEST_LANES, pixels * channels * batches)
         fits = memory >= kept + needed * memory_model.BYTES_PER_LANE
         if fits or batches == STREAMS:
@@ -403,9 +426,3 @@ def _sizes(pixels: int, channels: int, memory: int, keeps_seen: bool) -> tuple[i
 def _table(numbers: Sequence[int]) -> UInt32:
     """``numbers`` on the device, and one more: a single number would become a constant of the kernel."""
     return mi.UInt32([*numbers, 0])
-
-
-def _sums(radiance: Spectrum, channels: int, batches: int, count: int) -> Floats:
-    """``(pixels, batches, 3)`` from lanes ordered pixel, channel, batch, sample."""
-    parts = [dr.block_sum(component, count) if count > 1 else component for component in radiance]
-    return shown_colors(np.array(dr.ravel(mi.Color3f(*parts))).reshape(-1, channels, batches, 3))

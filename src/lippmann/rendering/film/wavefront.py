@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from lippmann.device.kernel_ops import divide
 from lippmann.device.sobol import SampleStream
-from lippmann.device.types import Float, Spectrum, UInt32
+from lippmann.device.types import Float, UInt32
 from lippmann.progress import Progress, ProgressCallback, silent
+from lippmann.rendering.film.coverage import Coverage
 from lippmann.rendering.film.lane_order import in_strips, pixel_at, to_rows
 from lippmann.rendering.film.wavefront_plan import Pass, Plan, Tile
 from lippmann.rendering.transport.integrator import Integrator, PixelSample
@@ -52,8 +53,10 @@ class Frame:
         Further layers ``(height, width)`` of the methods that have any.
     shares:
         How the pixels came about, as shares of all; empty where all were traced.
-    seen:
-        What of ``pixels`` is seen light; None where that is not told.
+    seen, excess:
+        What of ``pixels`` is seen light, and what of that rests on single chains; None where that is not told.
+    coverage:
+        How much of the pixels surfaces cover; None where that is not told.
     """
 
     pixels: NDArray[np.float32]
@@ -65,6 +68,7 @@ class Frame:
     shares: dict[str, float] = field(default_factory=dict)
     seen: NDArray[np.float32] | None = None
     excess: NDArray[np.float32] | None = None
+    coverage: Coverage | None = None
 
 
 def trace_frame(
@@ -75,17 +79,18 @@ def trace_frame(
     seed: int = 0,
     box_filter: bool = True,
     corner: tuple[int, int] = (0, 0),
-    keeps_seen: bool = False,
+    for_denoiser: bool = False,
     progress: ProgressCallback = silent,
 ) -> Frame:
     """Trace all samples of ``plan`` and average them per pixel.
 
     Where ``plan`` is of a part of the picture, ``corner`` is the row and column of that part's first pixel; its pixels
-    are then the same as those of the whole. Seen light is kept apart, too, where the integrator tells it and
-    ``keeps_seen``.
+    are then the same as those of the whole. ``for_denoiser`` keeps what one treats apart, too, where the integrator
+    tells it: seen light and coverage.
     """
     frame = Frame(np.zeros((plan.height, plan.width, 3), dtype=np.float32))
-    tracer = _Tracer(integrator, source, plan, seed, box_filter, corner, keeps_seen)
+    parts = {"radiance": frame.pixels}
+    tracer = _Tracer(integrator, source, plan, seed, box_filter, corner, for_denoiser)
     started = time.perf_counter()
     done = 0
     for tile, run in plan:
@@ -94,15 +99,16 @@ def trace_frame(
             sums = tracer.trace(tile, run, frame.rays)
             if first:
                 frame.seconds_compile = compile_seconds()
-        if len(sums) > 1 and frame.seen is None:
-            frame.seen, frame.excess = np.zeros((2, *frame.pixels.shape), frame.pixels.dtype)
-        for whole, part in zip((frame.pixels, frame.seen, frame.excess), sums, strict=False):
-            assert whole is not None
+        for name, part in sums.items():
+            if name not in parts:
+                parts[name] = np.zeros((plan.height, plan.width, part.shape[1]), dtype=np.float32)
             part *= 1 / plan.samples
-            in_rows = to_rows(part, plan.width).reshape(tile.rows, plan.width, 3)
-            whole[tile.first_row : tile.first_row + tile.rows] += in_rows
+            in_rows = to_rows(part, plan.width).reshape(tile.rows, plan.width, -1)
+            parts[name][tile.first_row : tile.first_row + tile.rows] += in_rows
         done += tile.rows * plan.width * plan.channels * run.count
         progress(Progress("trace", done, plan.work))
+    frame.seen, frame.excess = parts.get("seen"), parts.get("excess")
+    frame.coverage = Coverage(parts["covered"], plan.samples) if "covered" in parts else None
     frame.seconds_trace = time.perf_counter() - started - frame.seconds_compile
     return frame
 
@@ -122,7 +128,7 @@ class _Tracer:
         seed: int,
         box_filter: bool,
         corner: tuple[int, int],
-        keeps_seen: bool,
+        for_denoiser: bool,
     ) -> None:
         self._integrator = integrator
         self._source = source
@@ -130,21 +136,21 @@ class _Tracer:
         self._seed = seed
         self._box_filter = box_filter
         self._corner = corner
-        self._keeps_seen = keeps_seen
+        self._for_denoiser = for_denoiser
 
-    def trace(self, tile: Tile, run: Pass, totals: RayTotals) -> list[NDArray[np.float32]]:
-        """Sums over the samples of one pass, ``(pixels of the tile, 3)``, and of their seen light and its excess where
-        these are kept, in the order of lanes.
+    def trace(self, tile: Tile, run: Pass, totals: RayTotals) -> dict[str, NDArray[np.float32]]:
+        """Sums over the samples of one pass, by the names of :class:`PixelSample`, in the order of lanes.
 
-        ``totals`` grows by the rays it took.
+        They are ``(pixels of the tile, 3)``; of coverage ``(pixels of the tile, channels)``. ``totals`` grows by the
+        rays it took.
         """
         plan = self._plan
         pixels, stream = samples_of_tile(self._source, plan, tile, run, self._seed, self._box_filter, self._corner)
-        samples = dr.opaque(mi.Float, plan.samples) if self._keeps_seen else None
+        samples = dr.opaque(mi.Float, plan.samples) if self._for_denoiser else None
         sample = sample_pixels(self._integrator, pixels, stream, samples)
         evaluate(sample, tile.rows * plan.width * plan.channels * run.count, totals)
-        parts = (sample.radiance, sample.seen, sample.excess)
-        return [_channel_sums(light, plan.channels, run.count) for light in parts if light is not None]
+        sums = sums_of(sample, plan.channels, 1, run.count)
+        return {name: np.ascontiguousarray(values[:, 0]) for name, values in sums.items()}
 
 
 def samples_of_tile(
@@ -177,8 +183,8 @@ def samples_of_tile(
 def sample_pixels(
     integrator: Integrator, pixels: PixelRays, stream: SampleStream, samples: Float | None
 ) -> PixelSample:
-    """One sample of each lane's pixel; seen light apart where the integrator tells it and ``samples`` are given, those
-    of the pixel so far, these included."""
+    """One sample of each lane's pixel; seen light and coverage apart where the integrator tells them and ``samples``
+    are given, those of the pixel so far, these included."""
     if isinstance(integrator, PathIntegrator):
         return sample_pixel(integrator, pixels, stream, mi.Bool(True), samples)
     return PixelSample(*integrator.sample(pixels.ray(stream), stream, mi.Bool(True)))
@@ -193,16 +199,28 @@ def evaluate(sample: PixelSample, lanes: int, totals: RayTotals) -> None:
         sample.seen = dr.select(finite, sample.seen, mi.Color3f(0))
         sample.excess = dr.select(finite, sample.excess, mi.Color3f(0))
     # All at once: a sum of an unevaluated radiance would run the path loop anew.
-    dr.eval(sample.radiance, sample.seen, sample.excess, counts.secondary, counts.shadow, finite)
+    dr.eval(sample.radiance, sample.seen, sample.excess, sample.covered, counts.secondary, counts.shadow, finite)
     totals.primary += lanes
     totals.secondary += lane_total(counts.secondary)
     totals.shadow += lane_total(counts.shadow)
     totals.discarded += lanes - int(dr.count(finite)[0])
 
 
-def _channel_sums(radiance: Spectrum, channels: int, count: int) -> NDArray[np.float32]:
-    parts = [dr.block_sum(component, count) if count > 1 else component for component in radiance]
-    return shown_colors(np.array(dr.ravel(mi.Color3f(*parts))).reshape(-1, channels, 3))
+def sums_of(sample: PixelSample, channels: int, batches: int, count: int) -> dict[str, NDArray[np.float32]]:
+    """``(pixels, batches, 3)`` sums of what is told of evaluated samples, ``(pixels, batches, channels)`` of coverage.
+
+    Lanes are ordered pixel, channel, batch, sample.
+    """
+    sums = {}
+    for name in ("radiance", "seen", "excess"):
+        light = getattr(sample, name)
+        if light is not None:
+            parts = [dr.block_sum(component, count) if count > 1 else component for component in light]
+            sums[name] = shown_colors(np.array(dr.ravel(mi.Color3f(*parts))).reshape(-1, channels, batches, 3))
+    if sample.covered is not None:
+        hits = dr.block_sum(sample.covered, count) if count > 1 else sample.covered
+        sums["covered"] = np.swapaxes(np.array(hits).reshape(-1, channels, batches), 1, 2)
+    return sums
 
 
 def shown_colors(values: NDArray[np.float32]) -> NDArray[np.float32]:

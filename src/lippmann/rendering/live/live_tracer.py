@@ -225,7 +225,7 @@ class FeatureTracer:
         rows: Rows,
     ) -> tuple[Array, ...]:
         ray, _ = self._rays.sampled((column, row, channel), stream_of, sample, seed, rows)
-        albedo, normal, _ = self._surfaces.features(ray)
+        albedo, normal, _, _ = self._surfaces.features(ray)
         # Of the lanes' width, also where all lanes see the same.
         zero = mi.Float(sample) * 0
         return tuple(mi.Float(part) + zero for part in (*albedo, *normal))

@@ -78,15 +78,15 @@ class Surfaces(Protocol):
         """The first surface that ``ray`` hits."""
         ...
 
-    def features(self, ray: Ray3f) -> tuple[Color3f, Normal3f, Float]:
+    def features(self, ray: Ray3f) -> tuple[Color3f, Normal3f, Float, Bool]:
         """Denoising features of the first surface that is not purely specular.
 
         Returns
         -------
-        Color3f, Normal3f, Float
+        Color3f, Normal3f, Float, Bool
             Albedo plus emitted radiance, clipped to [0, 1] and tinted by the specular surfaces on the way; the unit
             shading normal, 0 where nothing is hit; the length of the path there in units of the scene,
-            :data:`ENVIRONMENT_DISTANCE` where nothing is hit.
+            :data:`ENVIRONMENT_DISTANCE` where nothing is hit; whether ``ray`` hits any surface at all.
         """
         ...
 
@@ -144,7 +144,7 @@ class PhysicalSurfaces:
         return ray, pi
 
     @dr.syntax
-    def features(self, ray: Ray3f) -> tuple[Color3f, Normal3f, Float]:
+    def features(self, ray: Ray3f) -> tuple[Color3f, Normal3f, Float, Bool]:
         """As :meth:`Surfaces.features`."""
         ray = mi.Ray3f(ray)  # current ray
         active = mi.Bool(True)
@@ -153,6 +153,7 @@ class PhysicalSurfaces:
         tint = mi.Color3f(1)  # of the specular surfaces so far
         steps = mi.UInt32(0)  # specular surfaces so far
         pi = self._scene.ray_intersect_preliminary(ray, coherent=True, active=active)
+        covered = mi.Bool(pi.is_valid())
         while dr.hint(active, label="to the first rough surface"):
             si = pi.compute_surface_interaction(ray, mi.RayFlags.All)
             hit = si.is_valid()
@@ -174,7 +175,7 @@ class PhysicalSurfaces:
             ray = si.spawn_ray(si.to_world(bs.wo))
             active &= continues
             pi = self._scene.ray_intersect_preliminary(ray, coherent=False, active=active)
-        return albedo, normal, distance
+        return albedo, normal, distance, covered
 
 
 def _has_specular_lobe(flags: UInt32) -> Bool:
@@ -229,13 +230,13 @@ class WhittedSurfaces:
         """The first surface that ``ray`` hits."""
         return self._first_hit(self._mirror(mi.Vector3f(ray.o)), self._mirror(mi.Vector3f(ray.d)))
 
-    def features(self, ray: Ray3f) -> tuple[Color3f, Normal3f, Float]:
+    def features(self, ray: Ray3f) -> tuple[Color3f, Normal3f, Float, Bool]:
         """As :meth:`Surfaces.features`, of the first surface whatever it is."""
         o, d = self._mirror(mi.Vector3f(ray.o)), self._mirror(mi.Vector3f(ray.d))
         first = self._first_hit(o, d)
         behind = dr.clip(background_color(self._built.scene.background, o, d), 0, 1)
         distance = dr.select(first.hit, dr.norm(mi.Point3f(first.p) - mi.Point3f(ray.o)), ENVIRONMENT_DISTANCE)
-        return dr.select(first.hit, first.albedo, behind), first.n, distance
+        return dr.select(first.hit, first.albedo, behind), first.n, distance, first.hit
 
     def _first_hit(self, o: Vector3f, d: Vector3f) -> SurfaceHit:
         built = self._built

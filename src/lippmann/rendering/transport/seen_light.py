@@ -38,7 +38,7 @@ from lippmann.device.types import (
     Vector3f,
 )
 from lippmann.rendering.transport.beam import Beam, turn_of_normals, widening
-from lippmann.rendering.transport.integrator import PixelSample, RayCounts
+from lippmann.rendering.transport.integrator import FirstHit, PixelSample, RayCounts
 from lippmann.rendering.transport.path import PathIntegrator
 from lippmann.rendering.transport.ray_source import PixelRays
 from lippmann.rendering.transport.shadow_rays import MAX_CROSSINGS
@@ -63,12 +63,13 @@ def sample_pixel(
 ) -> PixelSample:
     """One sample of ``pixel`` per lane; seen light by chains, where the integrator has them.
 
-    It is told apart where ``samples`` are given: those of the pixel so far, these included.
+    Where ``samples`` are given, those of the pixel so far, these included, it is told apart, and so is coverage.
     """
     ray = pixel.ray(stream)
     if integrator.seen_chains is None:
-        return PixelSample(*integrator.sample(ray, stream, active))
-    rest, counts, _ = integrator.sample_with_hit(ray, stream, active, without_seen=True)
+        radiance, counts, hit = integrator.sample_with_hit(ray, stream, active)
+        return PixelSample(radiance, counts, covered=None if samples is None else _covered(hit))
+    rest, counts, hit = integrator.sample_with_hit(ray, stream, active, without_seen=True)
     chains = mi.Float(integrator.seen_chains)
     scale = dr.rcp(chains) if integrator.gain is None else integrator.gain / chains
     most = None if samples is None else most_of_chain(samples * chains) / (scale * chains)
@@ -77,7 +78,11 @@ def sample_pixel(
     counts = RayCounts(counts.secondary + traced.secondary, counts.shadow + traced.shadow)
     if samples is None:
         return PixelSample(rest + seen, counts)
-    return PixelSample(rest + seen, counts, seen, excess * scale)
+    return PixelSample(rest + seen, counts, seen, excess * scale, _covered(hit))
+
+
+def _covered(hit: FirstHit) -> Float:
+    return dr.select(dr.isfinite(hit.distance), mi.Float(1), mi.Float(0))
 
 
 def most_of_chain(chains: Float) -> Float:
