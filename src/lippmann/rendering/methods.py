@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, cast
@@ -20,10 +21,12 @@ from lippmann.rendering.adaptive.method_race import (
     WIDE_LENS,
     MethodRace,
 )
+from lippmann.rendering.adaptive.sample_allocation import SampleAllocation
 from lippmann.rendering.adaptive.stopping import Goal, Outcome, goal_of, reach
-from lippmann.rendering.denoise.cost_model import effort_of, look_cost, traced_work
+from lippmann.rendering.denoise.cost_model import denoising_cost, effort_of, look_cost, traced_work
 from lippmann.rendering.denoise.dual_buffer import Denoised
 from lippmann.rendering.denoise.guided_denoiser import GuidedDenoiser
+from lippmann.rendering.denoise.oidn import Effort
 from lippmann.rendering.denoise.outlines import by_coverage
 from lippmann.rendering.denoise.subpixels import SubpixelBatches
 from lippmann.rendering.estimate.denoised_psnr import DenoisedEstimator
@@ -53,6 +56,8 @@ SAMPLES_LAYER = "samples"
 #: Samples per pixel that are taken at once where paths come without chains and look up no photons: launches have a cost
 #: of their own.
 _CHEAP_TOGETHER = 4.0
+#: Share of the pixels that may show images of small emitters where noise is to tell which need more samples.
+MOST_WITH_IMAGES = 0.01
 #: What putting a picture together and writing it takes, as a rule.
 _SECONDS_PER_PIXEL_WRITTEN = 1e-7
 
@@ -234,10 +239,14 @@ def _until(job: Job, goal: Goal) -> Traced:
         assessor = MethodRace(goal, plain.track, denoised.track, rays, _most_gained(job))
     else:
         assessor = denoised.track
-    outcome = reach(goal, batches.add, assessor, job.progress, probe=batches.probe)
+    add: Callable[[int, ProgressCallback], None] = batches.add
+    if denoised is not None and divides_samples(job):
+        assert isinstance(denoised.renderer, Denoised)
+        add = allocation(job, batches, denoised.renderer).add
+    outcome = reach(goal, add, assessor, job.progress, probe=batches.probe)
     more = extra_samples(outcome, job.request.spp_reserve)
     if more:
-        outcome = _with_more(outcome, more, batches, assessor, job.progress)
+        outcome = _with_more(outcome, more, add, assessor, job.progress)
     options: dict[str, object] = {}
     notes = _end_notes(goal, outcome)
     method = job.request.method
@@ -251,6 +260,7 @@ def _until(job: Job, goal: Goal) -> Traced:
         elif won is plain:
             notes = (*notes, f"the light is not pooled: {assessor.reason}")
     frame = Frame(won.renderer.picture(), batches.rays, batches.seconds_compile, batches.seconds_trace)
+    frame.maps[SAMPLES_LAYER] = batches.samples_of_pixels()
     if outcome.errors is not None:
         frame.maps[ERROR_LAYER] = np.maximum(outcome.errors.values, 0)
     seconds = {} if denoised is None or denoised.denoiser is None else {"denoise": denoised.denoiser.seconds}
@@ -259,12 +269,44 @@ def _until(job: Job, goal: Goal) -> Traced:
 
 
 def _with_more(
-    outcome: Outcome, more: int, batches: FullInBatches, assessor: Assessor, progress: ProgressCallback
+    outcome: Outcome,
+    more: int,
+    add: Callable[[int, ProgressCallback], None],
+    assessor: Assessor,
+    progress: ProgressCallback,
 ) -> Outcome:
-    batches.add(more, progress)
+    add(more, progress)
     samples = outcome.samples + more
     assessment = assessor.assess(samples, 1.0)
     return replace(outcome, estimate=assessment.estimate, errors=assessment.errors, samples=samples)
+
+
+def divides_samples(job: Job) -> bool:
+    """Whether samples are divided among the pixels by their noise.
+
+    Not where a quality is promised, nor among many images of small emitters: what is noisy is seen there, but not what
+    all samples of a pixel have missed.
+    """
+    images = job.integrator.mirror_images if isinstance(job.integrator, PathIntegrator) else None
+    few = images is None or images.with_images <= MOST_WITH_IMAGES * job.traced.width * job.traced.height
+    return few and not job.request.is_open_ended
+
+
+def allocation(job: Job, batches: FullInBatches, denoised: Denoised | None = None) -> SampleAllocation:
+    """Divides the samples of ``batches``: by the ``denoised`` picture where it is at hand, else by a fast look."""
+
+    def rays() -> float:
+        return _rays_per_pixel(job, batches.rays)
+
+    quick = _denoiser(job, rays, "fast")
+    assert quick is not None
+    look = Denoised(batches, quick.denoise, job.request.transfer, job.session.engine.threads, coverage=quick.coverage)
+
+    def cost() -> float:
+        spent = rays()
+        return denoising_cost("fast") / spent if spent else math.inf
+
+    return SampleAllocation(batches, denoised or look, (look, cost), job.session.engine.threads)
 
 
 def _batches(job: Job) -> FullInBatches:
@@ -387,7 +429,8 @@ def _denoised_whole(job: Job, traced: Traced) -> Traced:
     return replace(traced, options=_denoiser_options(job, denoiser), seconds={"denoise": denoiser.seconds})
 
 
-def _denoiser(job: Job, rays_per_pixel: Callable[[], float]) -> GuidedDenoiser | None:
+def _denoiser(job: Job, rays_per_pixel: Callable[[], float], effort: Effort | None = None) -> GuidedDenoiser | None:
+    """By the effort that so many rays are worth, or by that which is given."""
     asked: Denoiser = "oidn" if job.request.denoise == "auto" else job.request.denoise
     if asked == "none":
         return None
@@ -400,7 +443,7 @@ def _denoiser(job: Job, rays_per_pixel: Callable[[], float]) -> GuidedDenoiser |
         box_filter=job.request.box_filter,
         memory=job.session.memory,
         threads=job.session.engine.threads,
-        effort=(lambda: effort_of(asked, rays_per_pixel())) if common is None else (lambda: common.effort),
+        effort=lambda: effort or (effort_of(asked, rays_per_pixel()) if common is None else common.effort),
         exposure=None if common is None else common.exposure,
         # Where a denoised picture is free to be the best one, it shares its light.
         shares=job.request.shares_light or job.request.denoise == "auto",

@@ -62,6 +62,8 @@ UNTOLD_OUTLIERS = 0.25
 #: Linear values above this go past the network where seen light alone is above it. From 1 to 8 the PSNR of the bundled
 #: scenes moves by 0.3 dB at most (docs/research/seen-light.md).
 FAR_BEYOND_WHITE = 8.0
+#: Linear value up to which noise counts for :meth:`Denoised.noise`.
+_BEYOND_WHITE = 1.5
 #: Linear steps below this are as good as a slope, and hold rounding.
 _LEAST_STEP = 1e-4
 #: A clean picture from a noisy one; and whether that is to be turned, see
@@ -157,7 +159,7 @@ class Denoised:
         clean = self._clean_halves()
         noisy = self._shown_halves()
         slope = self._slope(noisy)
-        apart = (np.float32(0.25) * np.square(slope * (clean[0] - clean[1]))).mean(axis=2)
+        apart = _apart(clean, slope)
         left = [slope * (half - smooth) for half, smooth in zip(noisy, clean, strict=True)]
         common = (left[0] * left[1]).mean(axis=2)
         limit = DROWNED * max(1.0, MANY / self._renderer.samples)
@@ -171,6 +173,21 @@ class Denoised:
             samples = replace(samples, outliers=np.float32(UNTOLD_OUTLIERS) * np.maximum(samples.values, 0))
         outliers = self._seen_outliers(samples, slope)
         return PixelErrors(common + apart, outliers, CROSS_NOISE, samples, apart, samples.blur)
+
+    @property
+    def is_current(self) -> bool:
+        """Whether the halves are clean already with the samples that there are."""
+        return self._cleaned is not None and self._cleaned_samples == self._renderer.samples
+
+    def noise(self) -> Floats:
+        """``(H, W)``: squared error of every pixel's code that is not common to both halves.
+
+        As if codes went on a little beyond white: else pixels that are white by chance would have none, and those that
+        by chance are not, some.
+        """
+        first, second = (np.minimum(half, np.float32(_BEYOND_WHITE)) for half in self._clean_halves())
+        mean = np.minimum(np.float32(0.5) * (first + second), np.float32(1))
+        return _apart((first, second), coding_slope(mean, self._transfer))
 
     def _seen_outliers(self, samples: PixelErrors, slope: Floats) -> Floats | None:
         """What of ``apart`` rests on outliers of seen light: what one half has met of it, and the other has not.
@@ -188,7 +205,7 @@ class Denoised:
 
     def _clean_halves(self) -> tuple[Floats, Floats]:
         # The samples may have come by another way than through :meth:`add`.
-        if self._cleaned is None or self._cleaned_samples != self._renderer.samples:
+        if self._cleaned is None or not self.is_current:
             self._cleaned_samples = self._renderer.samples
             self._noisy = self._noisy_halves()
             clean = self._best_of_halves()
@@ -261,6 +278,12 @@ class Denoised:
         low, high = truth[far], picture[far]
         slope[far] = (encode(high, transfer) - encode(low, transfer)) / (high - low)
         return slope
+
+
+def _apart(halves: tuple[Floats, Floats], slope: Floats) -> Floats:
+    """Squared error of the mean of two halves by what they differ."""
+    apart: Floats = (np.float32(0.25) * np.square(slope * (halves[0] - halves[1]))).mean(axis=2)
+    return apart
 
 
 def _past_the_network(noisy: Floats, seen: Floats) -> Floats:

@@ -3,6 +3,7 @@
 The samples of a pixel come from ``STREAMS`` sample streams that know nothing of each other, and those of each stream
 in equally many runs, one batch each. Samples of one stream are spread evenly over the pixel and the lights together, so
 that a picture from few streams is better than one from many; the difference between streams tells how much better.
+Pixels that are worth it may get more samples than others, but as many for each batch.
 What the batches tell is worked out in :mod:`lippmann.rendering.estimate.jackknife`.
 """
 
@@ -18,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.color.transfer import Transfer, coding_slope
-from lippmann.device.kernel_ops import divide
+from lippmann.device.kernel_ops import divide, upload
 from lippmann.device.sobol import SEED_STEP, SampleStream
 from lippmann.device.types import UInt32
 from lippmann.display.pixel_window import PixelWindow
@@ -36,6 +37,7 @@ from lippmann.rendering.film.wavefront import (
     RayTotals,
     compile_seconds,
     evaluate,
+    rays_of,
     sample_pixels,
     sums_of,
 )
@@ -115,12 +117,18 @@ class FullInBatches:
         keeps_coverage = for_denoiser and isinstance(integrator, PathIntegrator)
         keeps_seen = keeps_coverage and cast("PathIntegrator", integrator).seen_chains is not None
         further = memory_model.COVERAGE * source.channels * keeps_coverage + memory_model.SEEN * keeps_seen
+        further += memory_model.COUNTS * for_denoiser
         batches, self._lanes = _sizes(pixels, source.channels, memory, further)
         self._sums = np.zeros((batches, pixels, 3), dtype=np.float32)
         self._seen = np.zeros((STREAMS, pixels, 3), dtype=np.float32) if keeps_seen else None
         self._excess = np.zeros((1, pixels, 3), dtype=np.float32) if keeps_seen else None
         self._covered = np.zeros((STREAMS, pixels, source.channels), dtype=np.float32) if keeps_coverage else None
+        #: Samples that each batch has of every pixel; how many more of single ones, and of all on the average.
         self._taken = [0] * batches
+        self._further = np.zeros(pixels, dtype=np.uint32)
+        self._further_mean = 0
+        #: Rays of each pixel, where it is told what else differs from pixel to pixel.
+        self._rays_of_pixels = np.zeros(pixels, dtype=np.float32) if for_denoiser else None
         # Plain and denoised pictures of the same samples both ask for their errors.
         self._errors: PixelErrors | None = None
         self._blur = SquaredBlur(integrator, source, self._window, seed)
@@ -132,8 +140,29 @@ class FullInBatches:
 
     @property
     def samples(self) -> int:
-        """Samples that each pixel has had."""
-        return sum(self._taken)
+        """Samples that each pixel has had, on the average."""
+        return sum(self._taken) + self._further_mean
+
+    @property
+    def batches(self) -> int:
+        """Samples of single pixels come in multiples of this."""
+        return len(self._taken)
+
+    def samples_of_pixels(self) -> NDArray[np.uint32]:
+        """``(H, W)``: samples that each pixel of the picture has had."""
+        counts = sum(self._taken) + self.batches * self._further.astype(np.float32)
+        return self.of_picture(counts).astype(np.uint32)
+
+    def rays_of_sample(self) -> Floats:
+        """``(H, W)``: rays that a sample of each pixel takes, as its samples so far show; 1 where they do not."""
+        if self._rays_of_pixels is None:
+            return np.ones(self.of_picture(self._further.astype(np.float32)).shape, np.float32)
+        counts = sum(self._taken) + self.batches * self._further.astype(np.float32)
+        return self.of_picture(np.maximum(1, self._rays_of_pixels / np.maximum(1, counts * self._source.channels)))
+
+    def of_picture(self, values: Floats) -> Floats:
+        """``(H, W)`` of ``(pixels,)`` of what is traced."""
+        return values.reshape(self.shape)
 
     def add(self, samples: int, progress: ProgressCallback = silent) -> None:
         """Take ``samples`` more of every pixel."""
@@ -158,9 +187,52 @@ class FullInBatches:
         self.seconds_compile += compiled
         self.seconds_trace += time.perf_counter() - started - compiled
 
-    def _keep(self, run: Run, sums: dict[str, Floats]) -> None:
+    def add_at(self, chosen: NDArray[np.bool_], each: int, mean: int, progress: ProgressCallback = silent) -> None:
+        """Take more samples of some pixels.
+
+        Parameters
+        ----------
+        chosen:
+            ``(H, W)``: which pixels of the picture.
+        each:
+            Samples of each of them, a multiple of :attr:`batches`.
+        mean:
+            Samples that these are on the average of all pixels, about; as many as so many of all pixels, they share the
+            passes of photons.
+        """
+        pixels = np.flatnonzero(self.traced(chosen)).astype(np.uint32)
+        if not len(pixels):
+            return
+        channels, number = self._source.channels, self.batches
+        started, done = time.perf_counter(), 0
+        self._errors = None
+        per_batch, before, gone = each // number, 0, 0
+        for stretch in stretches(self._integrator, self.samples, mean):
+            gone += stretch
+            count = round(per_batch * gone / mean) - before
+            if count:
+                starts = [had + place * count for had in self._per_stream() for place in range(number // STREAMS)]
+                lanes = self._lanes // channels
+                for run in cut_batches(len(pixels), tuple(range(number)), tuple(starts), count, lanes, lanes + 1):
+                    self._keep(run, self._trace(run, sum(self._taken) + number * count, pixels), pixels)
+                    done += (run.last - run.first) * channels * run.count * len(run.batches)
+                    progress(Progress("trace", done, len(pixels) * channels * each))
+                self._further[pixels] += np.uint32(count)
+                before += count
+            self._further_mean += stretch
+        self.seconds_trace += time.perf_counter() - started
+
+    def traced(self, chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Of pixels ``(H, W)`` of the picture those of what is traced."""
+        return chosen
+
+    def _keep(self, run: Run, sums: dict[str, Floats], chosen: NDArray[np.uint32] | None = None) -> None:
         """Add what :meth:`_trace` gives to its batches."""
-        pixels, per_stream = slice(run.first, run.last), len(self._sums) // STREAMS
+        per_stream = len(self._sums) // STREAMS
+        pixels = slice(run.first, run.last) if chosen is None else chosen[run.first : run.last]
+        rays = sums.pop("rays", None)
+        if self._rays_of_pixels is not None and rays is not None:
+            self._rays_of_pixels[pixels] += rays
         for place, batch in enumerate(run.batches):
             kept = {
                 "radiance": (self._sums, batch),
@@ -230,8 +302,11 @@ class FullInBatches:
         """As the samples of either of :meth:`traced_halves` tell it; None where it is not told, or not kept."""
         if self._covered is None:
             return None
-        first, second = self._means(list(self._covered))
-        return Coverage(first, self._per_stream()[0]), Coverage(second, self._per_stream()[1])
+        shares, counts = self._means(list(self._covered)), self._per_stream()
+        if not self._further_mean:
+            return Coverage(shares[0], counts[0]), Coverage(shares[1], counts[1])
+        further = (self.batches // STREAMS * self._further).reshape(*self.shape, 1)
+        return Coverage(shares[0], counts[0] + further), Coverage(shares[1], counts[1] + further)
 
     def excess(self) -> Floats | None:
         """What of :meth:`picture` rests on single chains of seen light, see
@@ -241,19 +316,27 @@ class FullInBatches:
     def _mean(self, sums: Floats) -> Floats:
         """Of all samples, whose sums lie in several parts."""
         total: Floats = sums.sum(axis=0)
-        total *= np.float32(1 / max(1, self.samples))
+        total *= self._weights(sum(self._taken), self.batches)
         return total.reshape(*self.shape, 3)
+
+    def _weights(self, of_all: int, batches: int) -> Floats | np.float32:
+        """Of a sample in each pixel's mean ``(pixels, 1)`` over so many batches; one number where all have as many."""
+        if not self._further_mean:
+            return np.float32(1 / max(1, of_all))
+        counts: Floats = np.maximum(1, of_all + batches * self._further.astype(np.float32))
+        return np.reciprocal(counts)[:, None]
 
     def _means(self, sums: Sequence[Floats]) -> tuple[Floats, Floats]:
         """Of the sums of each stream."""
+        each = self.batches // STREAMS
         parts = [
-            (total * np.float32(1 / max(1, n))).reshape(*self.shape, -1)
+            (total * self._weights(n, each)).reshape(*self.shape, -1)
             for total, n in zip(sums, self._per_stream(), strict=True)
         ]
         return parts[0], parts[1]
 
     def _per_stream(self) -> list[int]:
-        """Samples of a pixel that each stream has had."""
+        """Samples of every pixel that each stream has had."""
         each = len(self._taken) // STREAMS
         return [sum(self._taken[s * each : (s + 1) * each]) for s in range(STREAMS)]
 
@@ -269,7 +352,10 @@ class FullInBatches:
         if self.samples < STREAMS:
             raise UsageError("one sample per pixel does not tell its own error", rule="two or more do")
         if self._errors is None:
-            error, outliers = error_of_batches(self.shown(self._sums), self._taken, self._transfer)
+            further = None
+            if self._further_mean:
+                further = self.of_picture(self._further.astype(np.float32))
+            error, outliers = error_of_batches(self.shown(self._sums), self._taken, self._transfer, further)
             shape = self.shape[0], -1
             error = error.reshape(shape)
             blur = self.squared_blur()
@@ -313,9 +399,11 @@ class FullInBatches:
                 strip = STRIP_ROWS * self._window.width
                 yield from cut_batches(pixels, batches, tuple(starts), count, lanes, strip)
 
-    def _trace(self, run: Run, together: int) -> dict[str, Floats]:
-        """What :func:`~lippmann.rendering.film.wavefront.sums_of` gives for a run; excess by the samples that a pixel
-        then has ``together``.
+    def _trace(self, run: Run, together: int, chosen: NDArray[np.uint32] | None = None) -> dict[str, Floats]:
+        """What :func:`~lippmann.rendering.film.wavefront.sums_of` gives for a run; excess by the samples that every
+        pixel then has ``together``, and what single ones had more.
+
+        Of the pixels that are ``chosen``, if any are; their numbers.
 
         Lanes are ordered pixel (see :mod:`.lane_order`), then channel, then batch, then sample. What differs from run
         to run is opaque to the compiler, so that all share a kernel.
@@ -327,22 +415,31 @@ class FullInBatches:
         rest, place = divide(rest, dr.opaque(mi.UInt32, number))
         pixel, channel = divide(rest, channels)
         pixel = dr.opaque(mi.UInt32, run.first) + pixel * dr.opaque(mi.UInt32, run.step)
+        is_chosen = dr.opaque(mi.Bool, chosen is not None)
+        listed = dr.gather(mi.UInt32, upload(np.zeros(1, np.uint32) if chosen is None else chosen), pixel, is_chosen)
+        pixel = dr.select(is_chosen, listed, pixel)
         strips = in_strips(self._sums.shape[1], window.width) if run.in_strips else 0
         row, column = pixel_at(pixel, window.width, dr.opaque(mi.UInt32, strips))
+        has_further = dr.opaque(mi.Bool, self._further_mean > 0)
+        table = upload(self._further if self._further_mean else np.zeros(1, np.uint32))
+        further = dr.gather(mi.UInt32, table, row * window.width + column, has_further)
         row += dr.opaque(mi.UInt32, window.top)
         column += dr.opaque(mi.UInt32, window.left)
         pixel = pixel_number(self._source, column, row)
-        sample += dr.gather(mi.UInt32, _table(run.starts), place)
+        sample += dr.gather(mi.UInt32, _table(run.starts), place) + further * per_stream
         stream_of = dr.gather(mi.UInt32, _table([batch // per_stream for batch in run.batches]), place)
         seed = dr.opaque(mi.UInt32, self._seed) + stream_of * SEED_STEP
 
         stream = SampleStream.of_pixels(pixel * channels + channel, sample, seed)
         stream.half = stream_of
         pixels = PixelRays(self._source, column, row, channel, self._box_filter)
-        samples = None if self._covered is None else dr.opaque(mi.Float, together)
+        samples = dr.opaque(mi.Float, together) + mi.Float(further * self.batches)
+        samples = None if self._covered is None else samples
         traced = sample_pixels(self._integrator, pixels, stream, samples)
         evaluate(traced, lanes, self.rays)
         sums = sums_of(traced, channels, number, run.count)
+        if self._rays_of_pixels is not None:
+            sums["rays"] = rays_of(traced, channels * number * run.count)
         return {name: to_rows(part, window.width) for name, part in sums.items()} if run.in_strips else sums
 
 

@@ -211,7 +211,7 @@ def sums_of(sample: PixelSample, channels: int, batches: int, count: int) -> dic
 
     Lanes are ordered pixel, channel, batch, sample.
     """
-    sums = {}
+    sums: dict[str, NDArray[np.float32]] = {}
     for name in ("radiance", "seen", "excess"):
         light = getattr(sample, name)
         if light is not None:
@@ -221,6 +221,12 @@ def sums_of(sample: PixelSample, channels: int, batches: int, count: int) -> dic
         hits = dr.block_sum(sample.covered, count) if count > 1 else sample.covered
         sums["covered"] = np.swapaxes(np.array(hits).reshape(-1, channels, batches), 1, 2)
     return sums
+
+
+def rays_of(sample: PixelSample, lanes: int) -> NDArray[np.float32]:
+    """``(pixels,)``: rays of evaluated samples, of so many lanes for each pixel."""
+    rays = 1 + sample.counts.secondary + sample.counts.shadow
+    return np.array(dr.block_sum(rays, lanes)).astype(np.float32)
 
 
 def shown_colors(values: NDArray[np.float32]) -> NDArray[np.float32]:

@@ -52,6 +52,8 @@ class MirrorImages:
         row = np.zeros(pixels, np.uint32)
         row[where] = 1 + np.arange(len(where), dtype=np.uint32)
         self.pixels = pixels
+        #: How many of them have boxes.
+        self.with_images = len(where)
         self._row = upload(row)
         self._number = upload(np.concatenate([np.zeros(1, np.uint32), number.astype(np.uint32)]))
         self._boxes = upload(boxes)
