@@ -298,3 +298,31 @@ def test_chosen_pixels_take_each_sample_once_across_passes_of_photons(engine, mo
     for half in found.traced_halves():
         assert half[corner()][:, 0] == pytest.approx(3.5)
         assert half[corner()][:, 1] == pytest.approx(7 * 15 / 6)
+
+
+def test_wavefronts_of_any_size_share_a_kernel(engine):
+    """With photons, light vertices and chosen pixels: the kernel of paths takes seconds to compile."""
+    import drjit as dr
+
+    import lippmann
+    from lippmann.rendering.film import sample_batches
+    from lippmann.rendering.film.prepared_light import prepare_light
+    from lippmann.rendering.request.render_request import RenderRequest
+    from lippmann.rendering.session import open_session
+
+    request = RenderRequest(integrator="path", caustics="auto", spp=8, exposure=0.0)
+    session = open_session(lippmann.load_scene("room"), request)
+    integrator = session.integrator(rays(), np.diag([0.3, 0.3, 0.3, 1.0]))
+    prepare_light(integrator, request, rays(), 1 << 30)
+    assert integrator.photons is not None
+    found = batches(integrator, for_denoiser=True)
+    with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True), pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sample_batches, "compile_seconds", lambda: 0.0)  # it takes the history
+        dr.kernel_history_clear()
+        found.add(1)
+        found.add(7)
+        found.add_at(corner(), 16, 4)
+        found.add(8)
+        kernels = [kernel["hash"] for kernel in dr.kernel_history() if kernel.get("operation_count", 0) > 5000]
+    assert len(kernels) >= 4
+    assert len(set(kernels)) == 1

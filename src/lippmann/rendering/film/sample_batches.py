@@ -416,12 +416,12 @@ class FullInBatches:
         pixel, channel = divide(rest, channels)
         pixel = dr.opaque(mi.UInt32, run.first) + pixel * dr.opaque(mi.UInt32, run.step)
         is_chosen = dr.opaque(mi.Bool, chosen is not None)
-        listed = dr.gather(mi.UInt32, upload(np.zeros(1, np.uint32) if chosen is None else chosen), pixel, is_chosen)
+        listed = dr.gather(mi.UInt32, _list(chosen), pixel, is_chosen)
         pixel = dr.select(is_chosen, listed, pixel)
         strips = in_strips(self._sums.shape[1], window.width) if run.in_strips else 0
         row, column = pixel_at(pixel, window.width, dr.opaque(mi.UInt32, strips))
         has_further = dr.opaque(mi.Bool, self._further_mean > 0)
-        table = upload(self._further if self._further_mean else np.zeros(1, np.uint32))
+        table = _list(self._further if self._further_mean else None)
         further = dr.gather(mi.UInt32, table, row * window.width + column, has_further)
         row += dr.opaque(mi.UInt32, window.top)
         column += dr.opaque(mi.UInt32, window.left)
@@ -518,6 +518,14 @@ def _sizes(pixels: int, channels: int, memory: int, further: int) -> tuple[int, 
             break
     what = f"a picture of {pixels} pixels that is to know its own error"
     return batches, memory_model.lanes_within(memory, kept, needed, what)
+
+
+def _list(numbers: NDArray[np.uint32] | None) -> UInt32:
+    """``numbers`` on the device; of none, and of one, more than one, as a single number would have another kernel."""
+    if numbers is None or len(numbers) < 2:
+        numbers = np.resize(np.zeros(1, np.uint32) if numbers is None else numbers, 2)
+    table: UInt32 = upload(numbers)
+    return table
 
 
 def _table(numbers: Sequence[int]) -> UInt32:

@@ -236,7 +236,8 @@ class PhotonMap:
                     fits &= ~is_sharp(si, lobe, wo)
                     share_of_power = dr.select(seen, 1 - distance2 / (r * r), 1)
                     power = dr.select(fits, mi.Color3f(brought.xyz) * share_of_power, 0)
-                    weight = dr.mean(power)
+                    # dr.mean would write the number of lanes into the kernel, and make one for each.
+                    weight = (power.x + power.y + power.z) / 3
                     weights += weight
                     share = dr.select(weight > 0, weight / weights, 0)
                     taken = choice < share
