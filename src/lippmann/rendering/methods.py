@@ -294,19 +294,21 @@ def divides_samples(job: Job) -> bool:
 
 def allocation(job: Job, batches: FullInBatches, denoised: Denoised | None = None) -> SampleAllocation:
     """Divides the samples of ``batches``: by the ``denoised`` picture where it is at hand, else by a fast look."""
+    threads = job.session.engine.threads
 
     def rays() -> float:
         return _rays_per_pixel(job, batches.rays)
 
-    quick = _denoiser(job, rays, "fast")
-    assert quick is not None
-    look = Denoised(batches, quick.denoise, job.request.transfer, job.session.engine.threads, coverage=quick.coverage)
+    def look() -> Denoised:
+        quick = _denoiser(job, rays, "fast")
+        assert quick is not None
+        return Denoised(batches, quick.denoise, job.request.transfer, threads, coverage=quick.coverage)
 
     def cost() -> float:
         spent = rays()
         return denoising_cost("fast") / spent if spent else math.inf
 
-    return SampleAllocation(batches, denoised or look, (look, cost), job.session.engine.threads)
+    return SampleAllocation(batches, denoised, (look, cost), threads)
 
 
 def _batches(job: Job) -> FullInBatches:

@@ -73,7 +73,7 @@ def steep():
 def test_about_half_goes_to_all_pixels(had, samples, for_all, each):
     batches, look = Recorded(had), Noisy(steep())
     reports = []
-    SampleAllocation(batches, Noisy(None), (look, lambda: 0.0)).add(samples, reports.append)
+    SampleAllocation(batches, None, (lambda: look, lambda: 0.0)).add(samples, reports.append)
     assert batches.for_all == [for_all]
     assert batches.samples == had + samples
     assert reports[-1].done == pytest.approx(reports[-1].total)
@@ -89,7 +89,7 @@ def test_about_half_goes_to_all_pixels(had, samples, for_all, each):
 
 def test_a_look_that_is_too_dear_is_left_out():
     batches, look = Recorded(), Noisy(steep())
-    SampleAllocation(batches, Noisy(None), (look, lambda: MOST_OF_LOOK * 1.01)).add(16)
+    SampleAllocation(batches, None, (lambda: look, lambda: MOST_OF_LOOK * 1.01)).add(16)
     assert batches.for_all == [8, 8]
     assert not batches.chosen
     assert look.asked == 0
@@ -97,7 +97,7 @@ def test_a_look_that_is_too_dear_is_left_out():
 
 def test_a_picture_that_is_clean_already_is_looked_at_first():
     batches, look, clean = Recorded(8), Noisy(None), Noisy(steep(), is_current=True)
-    SampleAllocation(batches, clean, (look, lambda: 0.0)).add(24)
+    SampleAllocation(batches, clean, (lambda: look, lambda: 0.0)).add(24)
     assert (look.asked, clean.asked) == (0, 1)
     assert len(batches.chosen) == 1
 
@@ -106,7 +106,7 @@ def test_noise_that_is_even_gives_all_pixels_the_same():
     noise = np.random.default_rng(1).exponential(size=SHAPE).astype(np.float32)
     for each in (noise, np.ones(SHAPE, np.float32), np.zeros(SHAPE, np.float32)):
         batches = Recorded()
-        SampleAllocation(batches, Noisy(None), (Noisy(each), lambda: 0.0)).add(16)
+        SampleAllocation(batches, None, (lambda each=each: Noisy(each), lambda: 0.0)).add(16)
         assert batches.for_all == [8, 8]
         assert not batches.chosen
 
@@ -116,11 +116,11 @@ def test_dear_pixels_are_chosen_for_more_noise_alone(monkeypatch):
     rays = np.ones(SHAPE, np.float32)
     rays[:8] = 10
     batches, noise = Recorded(rays=rays), np.ones(SHAPE, np.float32)
-    SampleAllocation(batches, Noisy(None), (Noisy(noise), lambda: 0.0)).add(16)
+    SampleAllocation(batches, None, (lambda: Noisy(noise), lambda: 0.0)).add(16)
     assert batches.chosen[0][0][9:].all()
     noise[:8] = 20
     batches = Recorded(rays=rays)
-    SampleAllocation(batches, Noisy(None), (Noisy(noise), lambda: 0.0)).add(16)
+    SampleAllocation(batches, None, (lambda: Noisy(noise), lambda: 0.0)).add(16)
     assert not batches.chosen[0][0][9:].any()
 
 
@@ -130,7 +130,7 @@ def test_chosen_pixels_cost_what_all_would_have(seed, samples, number):
     rays = random.uniform(1, 9, SHAPE).astype(np.float32)
     batches = Recorded(rays=rays, batches=number)
     with mock.patch("lippmann.rendering.adaptive.sample_allocation.LEAST_NOISE", 0.0):
-        SampleAllocation(batches, Noisy(None), (Noisy(random.exponential(size=SHAPE)), lambda: 0.0)).add(samples)
+        SampleAllocation(batches, None, (lambda: Noisy(random.exponential(size=SHAPE)), lambda: 0.0)).add(samples)
     ((chosen, each, mean),) = batches.chosen
     assert each % number == 0
     assert sum(batches.for_all) + mean == samples

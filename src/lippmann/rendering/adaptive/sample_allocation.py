@@ -63,10 +63,12 @@ class SampleAllocation:
 
     Parameters
     ----------
-    batches, denoised:
-        The samples of the picture, and what a denoiser makes of them.
+    batches:
+        The samples of the picture.
+    denoised:
+        What a denoiser makes of them, where that is at hand from time to time; else None.
     look:
-        What a denoiser makes of them in short time, and what that costs of the samples so far.
+        Gives what a denoiser makes of them in short time, for one look; and what that costs of the samples so far.
     threads:
         CPU threads.
     """
@@ -74,8 +76,8 @@ class SampleAllocation:
     def __init__(
         self,
         batches: Batches,
-        denoised: Denoising,
-        look: tuple[Denoising, Callable[[], float]],
+        denoised: Denoising | None,
+        look: tuple[Callable[[], Denoising], Callable[[], float]],
         threads: int = 1,
     ) -> None:
         self._batches = batches
@@ -86,7 +88,8 @@ class SampleAllocation:
     def add(self, samples: int, progress: ProgressCallback = silent) -> None:
         """Take as many more samples as cost what ``samples`` of each pixel do."""
         batches, denoised = self._batches, self._denoised
-        noise = denoised.noise() if denoised.is_current and batches.samples >= FEWEST else None
+        is_at_hand = denoised is not None and denoised.is_current and batches.samples >= FEWEST
+        noise = denoised.noise() if denoised is not None and is_at_hand else None
         for_all = self._for_all(samples)
         rest, share = samples - for_all, for_all / samples
         if for_all:
@@ -94,7 +97,7 @@ class SampleAllocation:
         if not rest:
             return
         if noise is None and self._look_cost() <= MOST_OF_LOOK:
-            noise = self._look.noise()
+            noise = self._look().noise()
         report = _part(progress, share, 1.0)
         each = batches.batches * max(1, round(SAMPLES_OF_CHOSEN * rest / batches.batches))
         chosen = None if noise is None else self._chosen(noise, rest / each)
