@@ -56,6 +56,8 @@ SAMPLES_LAYER = "samples"
 #: Samples per pixel that are taken at once where paths come without chains and look up no photons: launches have a cost
 #: of their own.
 _CHEAP_TOGETHER = 4.0
+#: Samples per pixel from which on cheap ones are divided among the pixels.
+FEWEST_DIVIDED = 8
 #: Share of the pixels that may show images of small emitters where noise is to tell which need more samples.
 MOST_WITH_IMAGES = 0.01
 #: What putting a picture together and writing it takes, as a rule.
@@ -285,11 +287,12 @@ def divides_samples(job: Job) -> bool:
     """Whether samples are divided among the pixels by their noise.
 
     Not where a quality is promised, nor among many images of small emitters: what is noisy is seen there, but not what
-    all samples of a pixel have missed.
+    all samples of a pixel have missed. Few samples that are cheap are taken in one launch.
     """
     images = job.integrator.mirror_images if isinstance(job.integrator, PathIntegrator) else None
     few = images is None or images.with_images <= MOST_WITH_IMAGES * job.traced.width * job.traced.height
-    return few and not job.request.is_open_ended
+    is_worth = job.request.samples >= FEWEST_DIVIDED or _is_dear(job.integrator)
+    return few and is_worth and not job.request.is_open_ended
 
 
 def allocation(job: Job, batches: FullInBatches, denoised: Denoised | None = None) -> SampleAllocation:
