@@ -21,3 +21,8 @@ ProgressCallback = Callable[[Progress], None]
 
 def silent(_: Progress) -> None:
     """The callback of those who do not want to know."""
+
+
+def of_part(progress: ProgressCallback, before: float, share: float, total: float) -> ProgressCallback:
+    """Reports of a part of the work, a ``share`` of all that comes after ``before``, as reports of ``total`` units."""
+    return lambda inner: progress(Progress(inner.stage, total * (before + share * inner.done / inner.total), total))

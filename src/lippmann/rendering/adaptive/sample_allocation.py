@@ -1,6 +1,6 @@
 """Adaptive sampling: pixels that are noisy after denoising get more samples than others.
 
-Half of the samples go to all pixels alike, whatever they look like: what looks good may only not have met light that
+Half of the samples go to all pixels alike: what looks good may only not have met light that
 few paths find. What the others would cost goes to pixels in which the denoised halves of the picture so far differ
 most, for what their rays cost: what a denoiser makes of noise, not the noise itself, is what is left in the picture.
 As halves of one pixel differ by chance, both are averaged over the pixels around. Each chosen pixel gets four times as
@@ -16,7 +16,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.progress import Progress, ProgressCallback, silent
+from lippmann.progress import ProgressCallback, of_part, silent
 from lippmann.rendering.denoise.local_statistics import mean_around
 from lippmann.runtime.row_threads import Bands
 
@@ -88,17 +88,18 @@ class SampleAllocation:
     def add(self, samples: int, progress: ProgressCallback = silent) -> None:
         """Take as many more samples as cost what ``samples`` of each pixel do."""
         batches, denoised = self._batches, self._denoised
-        is_at_hand = denoised is not None and denoised.is_current and batches.samples >= FEWEST
-        noise = denoised.noise() if denoised is not None and is_at_hand else None
+        noise = None
+        if denoised is not None and denoised.is_current and batches.samples >= FEWEST:
+            noise = denoised.noise()
         for_all = self._for_all(samples)
         rest, share = samples - for_all, for_all / samples
         if for_all:
-            batches.add(for_all, _part(progress, 0.0, share))
+            batches.add(for_all, of_part(progress, 0.0, share, samples))
         if not rest:
             return
         if noise is None and self._look_cost() <= MOST_OF_LOOK:
             noise = self._look().noise()
-        report = _part(progress, share, 1.0)
+        report = of_part(progress, share, 1.0 - share, samples)
         each = batches.batches * max(1, round(SAMPLES_OF_CHOSEN * rest / batches.batches))
         chosen = None if noise is None else self._chosen(noise, rest / each)
         if chosen is None:
@@ -128,10 +129,3 @@ class SampleAllocation:
         chosen[order[: 1 + np.searchsorted(spent, share * spent[-1])]] = True
         own, total = float(around[chosen].sum(dtype=np.float64)), float(around.sum(dtype=np.float64))
         return chosen.reshape(noise.shape) if total > 0 and own >= LEAST_NOISE * total else None
-
-
-def _part(progress: ProgressCallback, first: float, last: float) -> ProgressCallback:
-    """Reports of a part of the work as reports of all of it."""
-    return lambda inner: progress(
-        Progress(inner.stage, inner.total * (first + (last - first) * inner.done / max(inner.total, 1e-9)), inner.total)
-    )

@@ -24,7 +24,7 @@ from lippmann.device.sobol import SEED_STEP, SampleStream
 from lippmann.device.types import UInt32
 from lippmann.display.pixel_window import PixelWindow
 from lippmann.errors import UsageError
-from lippmann.progress import Progress, ProgressCallback, silent
+from lippmann.progress import Progress, ProgressCallback, of_part, silent
 from lippmann.rendering.estimate.jackknife import error_of_batches
 from lippmann.rendering.estimate.pixel_errors import OWN_NOISE, PixelErrors
 from lippmann.rendering.film import memory_model
@@ -150,15 +150,13 @@ class FullInBatches:
 
     def samples_of_pixels(self) -> NDArray[np.uint32]:
         """``(H, W)``: samples that each pixel of the picture has had."""
-        counts = sum(self._taken) + self.batches * self._further.astype(np.float32)
-        return self.of_picture(counts).astype(np.uint32)
+        return self.of_picture(self._counts(sum(self._taken), self.batches)).astype(np.uint32)
 
     def rays_of_sample(self) -> Floats:
         """``(H, W)``: rays that a sample of each pixel takes, as its samples so far show; 1 where they do not."""
-        if self._rays_of_pixels is None:
-            return np.ones(self.of_picture(self._further.astype(np.float32)).shape, np.float32)
-        counts = sum(self._taken) + self.batches * self._further.astype(np.float32)
-        return self.of_picture(np.maximum(1, self._rays_of_pixels / np.maximum(1, counts * self._source.channels)))
+        counts = np.maximum(1, self._counts(sum(self._taken), self.batches) * self._source.channels)
+        rays = np.float32(0) if self._rays_of_pixels is None else self._rays_of_pixels
+        return self.of_picture(np.maximum(1, rays / counts))
 
     def of_picture(self, values: Floats) -> Floats:
         """``(H, W)`` of ``(pixels,)`` of what is traced."""
@@ -323,8 +321,12 @@ class FullInBatches:
         """Of a sample in each pixel's mean ``(pixels, 1)`` over so many batches; one number where all have as many."""
         if not self._further_mean:
             return np.float32(1 / max(1, of_all))
-        counts: Floats = np.maximum(1, of_all + batches * self._further.astype(np.float32))
-        return np.reciprocal(counts)[:, None]
+        return np.reciprocal(np.maximum(1, self._counts(of_all, batches)))[:, None]
+
+    def _counts(self, of_all: int, batches: int) -> Floats:
+        """``(pixels,)``: samples in so many batches that together have ``of_all`` of every pixel."""
+        counts: Floats = of_all + batches * self._further.astype(np.float32)
+        return counts
 
     def _means(self, sums: Sequence[Floats]) -> tuple[Floats, Floats]:
         """Of the sums of each stream."""
@@ -416,12 +418,12 @@ class FullInBatches:
         pixel, channel = divide(rest, channels)
         pixel = dr.opaque(mi.UInt32, run.first) + pixel * dr.opaque(mi.UInt32, run.step)
         is_chosen = dr.opaque(mi.Bool, chosen is not None)
-        listed = dr.gather(mi.UInt32, _list(chosen), pixel, is_chosen)
+        listed = dr.gather(mi.UInt32, _table([] if chosen is None else chosen), pixel, is_chosen)
         pixel = dr.select(is_chosen, listed, pixel)
         strips = in_strips(self._sums.shape[1], window.width) if run.in_strips else 0
         row, column = pixel_at(pixel, window.width, dr.opaque(mi.UInt32, strips))
         has_further = dr.opaque(mi.Bool, self._further_mean > 0)
-        table = _list(self._further if self._further_mean else None)
+        table = _table(self._further if self._further_mean else [])
         further = dr.gather(mi.UInt32, table, row * window.width + column, has_further)
         row += dr.opaque(mi.UInt32, window.top)
         column += dr.opaque(mi.UInt32, window.left)
@@ -485,7 +487,7 @@ def trace_in_batches(
             memory=left,
             window=PixelWindow(0, first, width, last - first),
         )
-        band.add(samples, _of_band(progress, first / height, (last - first) / height, samples * height * width))
+        band.add(samples, of_part(progress, first / height, (last - first) / height, samples * height * width))
         whole[first:last] = band.picture()
         found = band.squared_error()
         error[first:last] = found.values
@@ -495,11 +497,6 @@ def trace_in_batches(
         frame.seconds_compile += band.seconds_compile
         frame.seconds_trace += band.seconds_trace
     return frame, PixelErrors(error, outliers, OWN_NOISE, blur=blur)
-
-
-def _of_band(progress: ProgressCallback, before: float, share: float, total: int) -> ProgressCallback:
-    """Reports of one band as reports of the whole picture."""
-    return lambda inner: progress(Progress(inner.stage, total * (before + share * inner.done / inner.total), total))
 
 
 def _alternate(number: int) -> tuple[int, ...]:
@@ -520,14 +517,7 @@ def _sizes(pixels: int, channels: int, memory: int, further: int) -> tuple[int, 
     return batches, memory_model.lanes_within(memory, kept, needed, what)
 
 
-def _list(numbers: NDArray[np.uint32] | None) -> UInt32:
-    """``numbers`` on the device; of none, and of one, more than one, as a single number would have another kernel."""
-    if numbers is None or len(numbers) < 2:
-        numbers = np.resize(np.zeros(1, np.uint32) if numbers is None else numbers, 2)
-    table: UInt32 = upload(numbers)
+def _table(numbers: Sequence[int] | NDArray[np.uint32]) -> UInt32:
+    """``numbers`` on the device, and two more: a single number would become a constant of the kernel."""
+    table: UInt32 = upload(np.append(numbers, [0, 0]).astype(np.uint32))
     return table
-
-
-def _table(numbers: Sequence[int]) -> UInt32:
-    """``numbers`` on the device, and one more: a single number would become a constant of the kernel."""
-    return mi.UInt32([*numbers, 0])
