@@ -17,11 +17,11 @@ from numpy.typing import NDArray
 
 from lippmann.device.kernel_ops import divide, upload
 from lippmann.device.sobol import SampleStream
-from lippmann.device.types import Bool, Float, MitsubaScene, Point2f, Ray3f, UInt32, Vector3f
+from lippmann.device.types import MitsubaScene
 from lippmann.rendering.film import memory_model
+from lippmann.rendering.film.image_approach import Lanes, approached, begins
 from lippmann.rendering.transport.mirror_images import SLOTS, MirrorImages
 from lippmann.rendering.transport.ray_source import DisplayRays, RaySource, SubpixelRays, pixel_number
-from lippmann.rendering.transport.sharp_events import follows_sharply, sharp_lobe
 
 Floats = NDArray[np.float32]
 
@@ -29,16 +29,8 @@ Floats = NDArray[np.float32]
 SAMPLES_OF_SEARCH, FEWEST, MOST, FEWEST_IN_ALL = 2, 2, 8, 1 << 15
 #: Sharp events between the pixel and the emitter, at most; without any, it is seen directly.
 MOST_EVENTS = 4
-#: Steps of Newton's method; how far one goes, and how far all of them may, in pixels.
-STEPS, LONGEST_STEP, FARTHEST = 6, 0.5, 3.0
-#: Boxes are so many times as wide as the image, but no narrower than this, in pixels.
-MARGIN, NARROWEST = 1.5, 1e-4
 #: Images that fill more than this part of a pixel are met by chains at random.
 LARGEST = 0.25
-#: Width of the differences by which derivatives are taken, in pixels.
-_DIFFERENCE = 1 / 64
-#: Squared sine between both derivatives below which they tell no point.
-_ALIKE = 1e-12
 #: Sample dimensions: of the point, the emitter, the number of events, and the choice between a surface's lobes.
 _POINT, _EMITTER, _EVENTS, _LOBE = range(4)
 _SEED = 0x4D495252
@@ -171,7 +163,7 @@ class _Search:
         rest, channel = divide(pixel, source.channels)
         row, column = divide(rest, dr.opaque(mi.UInt32, source.width))
         stream = SampleStream.of_pixels(pixel, number, dr.opaque(mi.UInt32, _SEED))
-        lanes = _Lanes(
+        lanes = Lanes(
             column,
             row,
             channel,
@@ -182,21 +174,17 @@ class _Search:
             stream.next_1d(_LOBE),
         )
         # Most see no sharp surface, which a single chain tells.
-        lanes = lanes.chosen(self._passes(lanes, lanes.point).arrived)
-        for _ in range(STEPS - 1):
-            if not len(lanes):
-                return _Found.none()
-            step, _, kept = self._step(lanes)
-            lanes.point = lanes.point + step
-            lanes = lanes.chosen(kept & (dr.max(dr.abs(lanes.point - 0.5)) < FARTHEST))
+        lanes = lanes.chosen(begins(self._scene, source, lanes))
         return self._met(lanes) if len(lanes) else _Found.none()
 
-    def _met(self, lanes: _Lanes) -> _Found:
-        """Where chains now meet their emitters."""
+    def _met(self, lanes: Lanes) -> _Found:
+        """Where chains come to meet their emitters."""
         source = self._source
-        step, half, kept = self._step(lanes)
-        kept &= self._passes(lanes, lanes.point).meets
-        middle = lanes.point + step
+        emitter = dr.gather(mi.Point3f, self._middles, lanes.emitter)
+        radius = dr.gather(mi.Float, self._radii, lanes.emitter)
+        middle, half, last, kept = approached(self._scene, source, lanes, emitter, radius)
+        met = self._scene.ray_intersect_preliminary(last, coherent=False, active=kept)
+        kept &= met.is_valid() & met.shape.is_emitter()
         cell = dr.floor(middle)
         column, row = mi.Int32(lanes.column) + mi.Int32(cell.x), mi.Int32(lanes.row) + mi.Int32(cell.y)
         kept &= (column >= 0) & (column < source.width) & (row >= 0) & (row < source.height) & (half.x > 0)
@@ -205,107 +193,3 @@ class _Search:
         dr.eval(kept, number, middle, half)
         met = np.array(kept)
         return _Found(np.array(number)[met], np.array(middle).T[met], np.array(half).T[met])
-
-    def _step(self, lanes: _Lanes) -> tuple[Point2f, Point2f, Bool]:
-        """The step to the image, the half sides of its box, 0 where the emitter is not met yet, and what goes on."""
-        # From each point and from those beside it, by three lanes.
-        number = len(lanes)
-        side, at = divide(dr.arange(mi.UInt32, 3 * number), dr.opaque(mi.UInt32, number))
-        beside = mi.Point2f(dr.select(side == 1, _DIFFERENCE, 0.0), dr.select(side == 2, _DIFFERENCE, 0.0))
-        every = lanes.at(at)
-        passed = self._passes(every, every.point + beside)
-        missed, arrives = passed.by, passed.arrived
-        dr.eval(missed, arrives)
-        parts = [dr.arange(mi.UInt32, number) + dr.opaque(mi.UInt32, number * part) for part in range(3)]
-        miss, right, below = (
-            mi.Vector3f(*(dr.gather(mi.Float, each, part) for each in (missed.x, missed.y, missed.z))) for part in parts
-        )
-        arrived = dr.gather(mi.Bool, arrives, parts[0])
-        for part in parts[1:]:
-            arrived &= dr.gather(mi.Bool, arrives, part)
-        a, b = (right - miss) / _DIFFERENCE, (below - miss) / _DIFFERENCE
-        # Least squares: the way past a middle is at right angles to the ray, in a plane of its own for each.
-        aa, ab, bb, am, bm = dr.dot(a, a), dr.dot(a, b), dr.dot(b, b), dr.dot(a, miss), dr.dot(b, miss)
-        determinant = aa * bb - ab * ab
-        kept = arrived & (determinant > _ALIKE * aa * bb)
-        step = mi.Point2f(ab * bm - bb * am, ab * am - aa * bm) / determinant
-        step *= dr.minimum(1, LONGEST_STEP / dr.maximum(dr.norm(mi.Vector2f(step)), 1e-9))
-        radius = dr.gather(mi.Float, self._radii, lanes.emitter)
-        half = MARGIN * radius * mi.Point2f(dr.safe_sqrt(bb / determinant), dr.safe_sqrt(aa / determinant))
-        half = dr.select(dr.norm(miss) < radius, dr.maximum(half, NARROWEST), 0)
-        return step, half, kept
-
-    def _passes(self, lanes: _Lanes, point: Point2f) -> _Passed:
-        ray = self._source.rays(lanes.column, lanes.row, lanes.channel, point)
-        last, arrived = _followed(self._scene, ray, lanes.events, lanes.lobe)
-        middle = dr.gather(mi.Point3f, self._middles, lanes.emitter)
-        along = dr.dot(middle - last.o, last.d)
-        met = self._scene.ray_intersect_preliminary(last, coherent=False, active=arrived)
-        meets = met.is_valid() & met.shape.is_emitter()
-        return _Passed(last.o + along * last.d - middle, arrived & (along > 0), meets)
-
-
-@dataclass
-class _Passed:
-    """How chains came by their emitters: the way from its middle, whether they came so far, and met any emitter."""
-
-    by: Vector3f
-    arrived: Bool
-    meets: Bool
-
-
-@dataclass
-class _Lanes:
-    """Points of pixels, and the emitters and events by which their chains are to meet them."""
-
-    column: UInt32
-    row: UInt32
-    channel: UInt32
-    point: Point2f
-    emitter: UInt32
-    events: UInt32
-    lobe: Float
-
-    def __len__(self) -> int:
-        return int(dr.width(self.column))
-
-    def chosen(self, kept: Bool) -> _Lanes:
-        """Those that are kept."""
-        every = [self.column, self.row, self.channel, self.point, self.emitter, self.events, self.lobe]
-        dr.eval(kept, every)
-        lanes = self.at(dr.compress(kept))
-        dr.eval(lanes.column, lanes.row, lanes.channel, lanes.point, lanes.emitter, lanes.events, lanes.lobe)
-        return lanes
-
-    def at(self, place: UInt32) -> _Lanes:
-        """Those at some places."""
-        column, row, channel, emitter, events = (
-            dr.gather(mi.UInt32, each, place)
-            for each in (self.column, self.row, self.channel, self.emitter, self.events)
-        )
-        x, y, lobe = (dr.gather(mi.Float, each, place) for each in (self.point.x, self.point.y, self.lobe))
-        return _Lanes(column, row, channel, mi.Point2f(x, y), emitter, events, lobe)
-
-
-@dr.syntax
-def _followed(scene: MitsubaScene, ray: Ray3f, events: UInt32, lobe: Float) -> tuple[Ray3f, Bool]:
-    """Rays after so many sharp events, and whether they get that far."""
-    context = mi.BSDFContext()
-    ray = mi.Ray3f(ray)
-    left = mi.UInt32(events)
-    active, arrived = left > 0, mi.Bool(True)
-    while dr.hint(active, label="search"):
-        si = scene.ray_intersect(ray, mi.RayFlags.All, False, active)
-        bsdf = si.bsdf(ray)
-        active &= si.is_valid()
-        narrow = sharp_lobe(si, bsdf, active)
-        bs, weight = bsdf.sample(context, si, lobe, mi.Point2f(0.5), active)
-        # Of a lobe of some width the middle, so that the way follows from the point alone.
-        is_mirrored = (dr.squared_norm(narrow) > 0) & (bs.wo.z * si.wi.z > 0)
-        bs.wo = dr.select(is_mirrored, 2 * dr.dot(si.wi, narrow) * narrow - si.wi, bs.wo)
-        active &= follows_sharply(si, narrow, bs) & (dr.max(weight) > 0)
-        arrived &= active
-        ray = si.spawn_ray(si.to_world(bs.wo))
-        left -= dr.select(mi.has_flag(bs.sampled_type, mi.BSDFFlags.Null), mi.UInt32(0), mi.UInt32(1))
-        active &= left > 0
-    return ray, arrived
