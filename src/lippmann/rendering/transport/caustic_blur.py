@@ -39,15 +39,17 @@ class CausticBlur:
         """One sample of it along ``ray`` (world space) per lane."""
         paths = self._paths
         context = mi.BSDFContext()
-        ray = mi.Ray3f(ray)
+        o, d = mi.Point3f(ray.o), mi.Vector3f(ray.d)
         active = mi.Bool(active)
         added = mi.Spectrum(0)
         throughput = mi.Spectrum(1)
         depth, crossings = mi.UInt32(0), mi.UInt32(0)
-        while dr.hint(active, label="sharp"):
-            si = paths.scene.ray_intersect(ray, mi.RayFlags.All, True, active)
+        # What does not change is no state: else Dr.Jit would record the loop a second time, without it.
+        while dr.hint(active, label="sharp", exclude=[paths, context, stream]):
+            toward = mi.Ray3f(o, d)
+            si = paths.scene.ray_intersect(toward, mi.RayFlags.All, True, active)
             active &= si.is_valid() & (depth < paths.depth)
-            bsdf = si.bsdf(ray)
+            bsdf = si.bsdf(toward)
             lobe, lambert = sharp_lobe(si, bsdf, active), lambertian(si, bsdf, active)
             lands = active & (dr.max(lambert) > 0)
             surfaces, half = paths.depth - depth - 1, mi.UInt32(stream.half)
@@ -65,7 +67,8 @@ class CausticBlur:
             else:
                 depth += 1
             active &= (dr.max(throughput) > 0) & (crossings < MAX_CROSSINGS)
-            ray = si.spawn_ray(si.to_world(bs.wo))
+            onward = si.spawn_ray(si.to_world(bs.wo))
+            o, d = mi.Point3f(onward.o), mi.Vector3f(onward.d)
         if dr.hint(paths.gain is not None, mode="scalar"):
             added *= paths.gain
         return added

@@ -102,15 +102,17 @@ def _squared_contributions(
     """Sum over the surfaces of a path of the squared contribution of ``emitter``, one of ``emitters``, per lane."""
     scene = integrator.scene
     context = mi.BSDFContext()
-    ray = mi.Ray3f(ray)
+    o, d = mi.Point3f(ray.o), mi.Vector3f(ray.d)
     throughput = mi.Spectrum(1)
     squares = mi.Float(0)
     surface = mi.UInt32(0)
     active = mi.Bool(True)
-    while dr.hint(active, label="pilot paths"):
-        si = scene.ray_intersect(ray, mi.RayFlags.All, False, active)
+    # What does not change is no state: else Dr.Jit would record the loop a second time, without it.
+    while dr.hint(active, label="pilot paths", exclude=[integrator, scene, context, stream, emitter, emitters]):
+        toward = mi.Ray3f(o, d)
+        si = scene.ray_intersect(toward, mi.RayFlags.All, False, active)
         active &= si.is_valid()
-        bsdf = si.bsdf(ray)
+        bsdf = si.bsdf(toward)
         dimension = surface * DIMENSIONS_PER_SURFACE + 1
         # Under uniform sampling each emitter has an equal part of the unit interval.
         point = stream.next_2d(dimension)
@@ -121,7 +123,8 @@ def _squared_contributions(
 
         bs, weight = bsdf.sample(context, si, stream.next_1d(dimension + 1), stream.next_2d(dimension + 2), active)
         throughput *= weight
-        ray = si.spawn_ray(si.to_world(bs.wo))
+        onward = si.spawn_ray(si.to_world(bs.wo))
+        o, d = mi.Point3f(onward.o), mi.Vector3f(onward.d)
         surface += 1
         active &= (dr.max(throughput) > 0) & (surface < min(integrator.depth, PILOT_SURFACES))
     return squares

@@ -132,21 +132,25 @@ class PhysicalSurfaces:
         """Ray and hit behind the surfaces of high null transmittance."""
         crossings = mi.UInt32(0)
         active = pi.is_valid()
-        while dr.hint(active, label="null surfaces"):
-            si = pi.compute_surface_interaction(ray, mi.RayFlags.All)
-            through = si.bsdf(ray).eval_null_transmission(si, active)
+        o, d = mi.Point3f(ray.o), mi.Vector3f(ray.d)
+        # The direction is no state: else Dr.Jit would record the loop a second time, without it.
+        while dr.hint(active, label="null surfaces", exclude=[d]):
+            toward = mi.Ray3f(o, d)
+            si = pi.compute_surface_interaction(toward, mi.RayFlags.All)
+            through = si.bsdf(toward).eval_null_transmission(si, active)
             active &= (dr.mean(through) > MAX_NULL_TRANSMITTANCE) & (crossings < MAX_CROSSINGS)
+            onward = si.spawn_ray(d)
             if active:
-                ray = si.spawn_ray(ray.d)
-                pi = self._scene.ray_intersect_preliminary(ray, coherent=False, active=active)
+                o = mi.Point3f(onward.o)
+                pi = self._scene.ray_intersect_preliminary(onward, coherent=False, active=active)
                 active &= pi.is_valid()
             crossings += 1
-        return ray, pi
+        return mi.Ray3f(o, d), pi
 
     @dr.syntax
     def features(self, ray: Ray3f) -> tuple[Color3f, Normal3f, Float, Bool]:
         """As :meth:`Surfaces.features`."""
-        ray = mi.Ray3f(ray)  # current ray
+        o, d = mi.Point3f(ray.o), mi.Vector3f(ray.d)  # current ray
         active = mi.Bool(True)
         albedo, normal = mi.Color3f(0), mi.Vector3f(0)
         distance = mi.Float(0)  # length of the path so far
@@ -154,10 +158,12 @@ class PhysicalSurfaces:
         steps = mi.UInt32(0)  # specular surfaces so far
         pi = self._scene.ray_intersect_preliminary(ray, coherent=True, active=active)
         covered = mi.Bool(pi.is_valid())
+        # Rays are told by origin and direction: else Dr.Jit would record the loop a second time, without their time.
         while dr.hint(active, label="to the first rough surface"):
-            si = pi.compute_surface_interaction(ray, mi.RayFlags.All)
+            toward = mi.Ray3f(o, d)
+            si = pi.compute_surface_interaction(toward, mi.RayFlags.All)
             hit = si.is_valid()
-            bsdf = si.bsdf(ray)
+            bsdf = si.bsdf(toward)
             emission = si.emitter(self._scene).eval(si)
             if dr.hint(self._background is not None, mode="scalar"):
                 emission = dr.select((steps == 0) & ~hit, mi.Color3f(self._background), emission)
@@ -172,9 +178,10 @@ class PhysicalSurfaces:
             distance += dr.select(active, dr.select(hit, si.t, ENVIRONMENT_DISTANCE), 0)
             tint *= weight
             steps += 1
-            ray = si.spawn_ray(si.to_world(bs.wo))
+            onward = si.spawn_ray(si.to_world(bs.wo))
+            o, d = mi.Point3f(onward.o), mi.Vector3f(onward.d)
             active &= continues
-            pi = self._scene.ray_intersect_preliminary(ray, coherent=False, active=active)
+            pi = self._scene.ray_intersect_preliminary(onward, coherent=False, active=active)
         return albedo, normal, distance, covered
 
 

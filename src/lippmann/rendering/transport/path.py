@@ -24,13 +24,14 @@ from lippmann.device.types import (
     Color3f,
     DirectionSample3f,
     Float,
-    Interaction3f,
     MitsubaScene,
     Point2f,
+    Point3f,
     Ray3f,
     Spectrum,
     SurfaceInteraction3f,
     UInt32,
+    Vector2f,
 )
 from lippmann.rendering.transport.beam import Beam, turn_of_normals, widening
 from lippmann.rendering.transport.caustic_light import caustic_light
@@ -140,44 +141,60 @@ class PathIntegrator:
         scene = self.scene
         context = mi.BSDFContext()
 
-        ray = mi.Ray3f(ray)  # current ray
+        # What does not change is no state, and rays are told by origin and direction: else Dr.Jit would record loops a
+        # second time, without what is the same in all turns.
+        o, d = mi.Point3f(ray.o), mi.Vector3f(ray.d)  # current ray
         active = mi.Bool(active)
         radiance = mi.Spectrum(0)
         throughput = mi.Spectrum(1)
         eta = mi.Float(1)  # product of relative indices, so that roulette sees unitless throughput
         depth = mi.UInt32(0)  # surfaces hit so far, straight-through ones excluded
         crossings = mi.UInt32(0)  # straight-through surfaces hit so far
-        absorption = mi.Color3f(0)  # of the medium the ray travels in, per world unit
+        # Of the medium the ray travels in, per world unit.
+        absorption: Color3f = mi.Color3f(0) if self.features.has_absorption else None
         secondary = mi.UInt32(0)
         shadow = mi.UInt32(0)
-        vertex = dr.zeros(mi.Interaction3f)  # last scattering vertex, for the pdf of emitter sampling there
+        vertex = mi.Point3f(0)  # where light last scattered, for the pdf of emitter sampling there
         vertex_pdf = mi.Float(1)
         vertex_delta = mi.Bool(True)
         vertex_samples = mi.UInt32(1)  # emitter samples taken there
         all_specular = mi.Bool(True)  # no emitter has been sampled yet
-        seen = mi.Bool(True)  # all events were sharp
-        sharp = mi.UInt32(0)  # sharp events since the last rough one, straight-through surfaces excluded
-        by_photons = mi.Spectrum(0)  # share of the light met by sharp events from that one on that photons bring
-        departure = mi.Float(0)  # pdf of the way here from a vertex that was joined to light vertices; 0 from others
-        vertex_share, vertex_reach, vertex_cosine = mi.Spectrum(0), mi.Float(0), mi.Float(0)  # of a JointLight
+        # Paths that leave nothing to others need not know which events are sharp.
+        divides = self.photons is not None or without_seen
+        seen: Bool = mi.Bool(True) if divides else None  # all events were sharp
+        sharp: UInt32 = None
+        by_photons: Spectrum = None
+        if dr.hint(self.photons is not None, mode="scalar"):
+            sharp = mi.UInt32(0)  # sharp events since the last rough one, straight-through surfaces excluded
+            by_photons = mi.Spectrum(0)  # share of the light met by sharp events from that one on that photons bring
+        departure: Float = None
+        vertex_share: Spectrum = None
+        vertex_reach: Float = None
+        vertex_cosine: Float = None
+        if dr.hint(self.light_vertices is not None, mode="scalar"):
+            departure = mi.Float(0)  # pdf of the way here from a vertex that was joined to them; 0 from others
+            vertex_share, vertex_reach, vertex_cosine = mi.Spectrum(0), mi.Float(0), mi.Float(0)  # of a JointLight
         samples_at_start, start = first_emitter_samples(stream.index)
-        width, spread = mi.Vector2f(0), mi.Vector2f(0)  # of the beam
-        is_beam = mi.Bool(True)  # no rough event has widened it beyond use
+        width: Vector2f = None
+        spread: Vector2f = None
+        is_beam: Bool = None
         needed = mi.RayFlags.All
         if dr.hint(self.beam is not None, mode="scalar"):
             beam = cast("Beam", self.beam)
             width, spread = mi.Vector2f(beam.width), mi.Vector2f(beam.spread)
+            is_beam = mi.Bool(True)  # no rough event has widened it beyond use
             needed = mi.RayFlags.All | mi.RayFlags.dNSdUV
 
         pi = scene.ray_intersect_preliminary(ray, coherent=True, active=active)
         first_distance = mi.Float(pi.t)
         view_dependent = mi.Bool(False)
-        # Paths that leave nothing to others need not know which events are sharp.
-        divides = self.photons is not None or without_seen
 
-        while dr.hint(active, label="paths"):
-            si = pi.compute_surface_interaction(ray, ray_flags=needed)
-            bsdf = si.bsdf(ray)
+        while dr.hint(
+            active, label="paths", exclude=[scene, context, stream, needed, divides, samples_at_start, start]
+        ):
+            toward = mi.Ray3f(o, d)
+            si = pi.compute_surface_interaction(toward, ray_flags=needed)
+            bsdf = si.bsdf(toward)
 
             shiny = (bsdf.flags() & int(mi.BSDFFlags.Glossy | mi.BSDFFlags.Delta | mi.BSDFFlags.Null)) != 0
             view_dependent |= (depth == 0) & si.is_valid() & shiny
@@ -239,29 +256,48 @@ class PathIntegrator:
             joins, reach = mi.Bool(False), mi.Float(0)
             if dr.hint(self.light_vertices is not None, mode="scalar"):
                 vertices = cast("LightVertices", self.light_vertices)
-                reach = reach_of(si, bsdf, ray.d, departure, continues)
+                reach = reach_of(si, bsdf, d, departure, continues)
                 joins = sampling & (depth + 1 < self.depth)
                 if dr.hint(self.features.has_absorption, mode="scalar"):
                     joins &= dr.max(absorption) == 0
                 choice = stream.next_1d(dimension + JOIN_DIMENSION)
-                light, tests = vertices.join(
+                joined, join_tests = vertices.join(
                     si, bsdf, choice, mi.UInt32(stream.half), joins, not self.features.has_absorption
                 )
-                drawn = throughput * light
+                joined = throughput * joined
                 if dr.hint(self.most_indirect is not None, mode="scalar"):
-                    drawn = self._clamped(drawn)
-                radiance += drawn
-                shadow += tests
+                    joined = self._clamped(joined)
+                radiance += joined
+                shadow += join_tests
             last = number + samples
-            while dr.hint(sampling, label="emitters"):
+            while dr.hint(
+                sampling,
+                label="emitters",
+                exclude=[
+                    stream,
+                    dimension,
+                    si,
+                    bsdf,
+                    samples,
+                    lambert,
+                    reach,
+                    lobe,
+                    seen,
+                    sharp,
+                    by_photons,
+                    throughput,
+                    depth,
+                    last,
+                ],
+            ):
                 point = stream.at(number).next_2d(dimension)
                 light, ds, tests = self.direct_light(
                     si, bsdf, point, sampling, mi.Float(samples), self._arrival(lambert, reach, stream)
                 )
                 if dr.hint(self.photons is not None, mode="scalar"):
-                    is_caustic = ~seen & (sharp < MOST_EVENTS) & is_sharp(si, lobe, si.to_local(ds.d))
-                    is_caustic &= self._is_near(ds)
-                    light = dr.select(is_caustic, light * (1 - by_photons), light)
+                    brings_caustic = ~seen & (sharp < MOST_EVENTS) & is_sharp(si, lobe, si.to_local(ds.d))
+                    brings_caustic &= self._is_near(ds)
+                    light = dr.select(brings_caustic, light * (1 - by_photons), light)
                 if dr.hint(without_seen and len(self.without_size) > 0, mode="scalar"):
                     light = dr.select(seen & ds.delta & is_sharp(si, lobe, si.to_local(ds.d)), 0, light)
                 drawn = throughput * light
@@ -280,7 +316,6 @@ class PathIntegrator:
             is_event, becomes_rough = continues & ~passes, mi.Bool(False)
             if dr.hint(divides, mode="scalar"):
                 becomes_rough = is_event & ~follows_sharply(si, lobe, bs)
-                is_beam &= ~becomes_rough
                 seen &= ~becomes_rough
             if dr.hint(self.photons is not None, mode="scalar"):
                 share = lambertian_share(si, lambert, mi.Color3f(bsdf_weight) * bs.pdf, bs.wo)
@@ -300,15 +335,16 @@ class PathIntegrator:
             throughput *= bsdf_weight
             eta *= bs.eta
             if dr.hint(self.beam is not None, mode="scalar"):
-                is_beam &= ~mi.has_flag(bs.sampled_type, mi.BSDFFlags.DiffuseReflection)
+                is_beam &= ~becomes_rough & ~mi.has_flag(bs.sampled_type, mi.BSDFFlags.DiffuseReflection)
                 spread += dr.select(mi.has_flag(bs.sampled_type, mi.BSDFFlags.GlossyReflection), 2 * turn, 0)
             if dr.hint(self.features.has_absorption, mode="scalar"):
                 crosses = mi.has_flag(bs.sampled_type, mi.BSDFFlags.Transmission) & ~passes
                 inside = dr.dot(bs.wo, mi.Vector3f(0, 0, 1)) < 0
                 absorption = dr.select(crosses, dr.select(inside, self.features.absorption_of(si.shape), 0), absorption)
-            ray = si.spawn_ray(si.to_world(bs.wo))
+            onward = si.spawn_ray(si.to_world(bs.wo))
+            o, d = mi.Point3f(onward.o), mi.Vector3f(onward.d)
             if ~passes:
-                vertex = mi.Interaction3f(si)
+                vertex = mi.Point3f(si.p)
                 vertex_pdf = bs.pdf
                 vertex_delta = mi.has_flag(bs.sampled_type, mi.BSDFFlags.Delta)
                 vertex_samples = samples
@@ -325,7 +361,7 @@ class PathIntegrator:
             continues &= ~at_risk | (stream.next_1d(dimension + 3) < survival)
 
             active = continues
-            pi = scene.ray_intersect_preliminary(ray, coherent=False, active=active)
+            pi = scene.ray_intersect_preliminary(onward, coherent=False, active=active)
             secondary += dr.select(active, mi.UInt32(1), mi.UInt32(0))
 
         if dr.hint(self.gain is not None, mode="scalar"):
@@ -343,7 +379,7 @@ class PathIntegrator:
     def emission(
         self,
         si: SurfaceInteraction3f,
-        vertex: Interaction3f,
+        vertex: Point3f,
         vertex_pdf: Float,
         vertex_delta: Bool,
         vertex_samples: UInt32,
@@ -362,8 +398,10 @@ class PathIntegrator:
         joint:
             How much of it light vertices bring too; None for nothing.
         """
-        ds = mi.DirectionSample3f(self.scene, si=si, ref=vertex)
-        emitter_pdf = self.light_sampler.pdf_direction(vertex, ds, ~vertex_delta) * mi.Float(vertex_samples)
+        reference = dr.zeros(mi.Interaction3f)
+        reference.p = vertex
+        ds = mi.DirectionSample3f(self.scene, si=si, ref=reference)
+        emitter_pdf = self.light_sampler.pdf_direction(reference, ds, ~vertex_delta) * mi.Float(vertex_samples)
         weight = mis_weight(vertex_pdf, emitter_pdf)
         if joint is not None:
             vertices = cast("LightVertices", self.light_vertices)

@@ -208,7 +208,12 @@ class PhotonMap:
         density *= mi.Float(step)
         first_bucket = half * (self._last_bucket + 2)
         looking = mi.Bool(active)
-        while dr.hint(looking, label="cells"):
+        # What does not change is no state: else Dr.Jit would record the loops a second time, without it.
+        while dr.hint(
+            looking,
+            label="cells",
+            exclude=[si, p, r, normal, lobe, surfaces, seen, base, end_corner, reach, step, first, first_bucket],
+        ):
             cell = base + mi.Vector3f(mi.Float(corner % 3), mi.Float(corner // 3 % 3), mi.Float(corner // 9))
             from_center = (cell + 0.5) * r - p
             touches = dr.abs(dr.dot(from_center, normal)) < reach
@@ -218,12 +223,12 @@ class PhotonMap:
             number += (first - number) & (step - 1)
             end = dr.gather(mi.UInt32, self._start, bucket + 1, looking)
             inside = looking & touches & (number < end)
-            while dr.hint(inside, label="photons"):
+            while dr.hint(inside, label="photons", exclude=[si, p, r, normal, lobe, surfaces, seen, step, cell, end]):
                 q = dr.gather(mi.Vector4f, self._position, number, inside).xyz
                 apart = q - p
                 distance2 = dr.squared_norm(apart)
                 near = inside & (~seen | (distance2 < r * r))
-                if near:
+                if dr.hint(near, exclude=[si, r, normal, lobe, surfaces, seen, cell, q, apart, distance2]):
                     # Two of the cells may share a bucket.
                     fits = near & dr.all(dr.floor(q / r) == cell)
                     n = dr.gather(mi.Vector4f, self._normal, number, near).xyz

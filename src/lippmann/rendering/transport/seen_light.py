@@ -28,6 +28,7 @@ from lippmann.device.sobol import SampleStream, hash32
 from lippmann.device.types import (
     Bool,
     BSDFPtr,
+    Color3f,
     Float,
     Point2f,
     PreliminaryIntersection3f,
@@ -35,6 +36,7 @@ from lippmann.device.types import (
     Spectrum,
     SurfaceInteraction3f,
     UInt32,
+    Vector2f,
     Vector3f,
 )
 from lippmann.rendering.transport.beam import Beam, turn_of_normals, widening
@@ -103,13 +105,17 @@ def seen_light(
 
     Between them stands what of the sum is from single chains beyond ``most``.
     """
-    light, excess = mi.Spectrum(0), mi.Spectrum(0)
-    rays, shadow = mi.UInt32(0), mi.UInt32(0)
+    light, excess = mi.Spectrum(0), None if most is None else mi.Spectrum(0)
+    has_emitters = len(integrator.without_size) > 0
+    rays, shadow = mi.UInt32(0), mi.UInt32(0) if has_emitters else None
     number = mi.UInt32(0)
     of_chains = SampleStream(hash32(stream.key ^ _CHAINS), stream.index, stream.half)
     first = stream.index * chains
     tracing = active & (number < chains)
-    while dr.hint(tracing, label="chains"):
+    # What does not change is no state: else Dr.Jit would record the loop a second time, without it.
+    while dr.hint(
+        tracing, label="chains", exclude=[integrator, of_chains, pixel, stream, chains, first, most, has_emitters]
+    ):
         further = of_chains.at(first + number)
         weight = mi.Float(1)
         if dr.hint(integrator.mirror_images is not None, mode="scalar"):
@@ -125,41 +131,51 @@ def seen_light(
             brightest = dr.max(met)
             excess += dr.select(brightest > most, met * (1 - most / brightest), 0)
         rays += traced
-        shadow += tests
+        if dr.hint(has_emitters, mode="scalar"):
+            shadow += tests
         number += 1
         tracing &= number < chains
-    return light, excess, RayCounts(rays, shadow)
+    return light, mi.Spectrum(0) if most is None else excess, RayCounts(rays, shadow if has_emitters else mi.UInt32(0))
 
 
 @dr.syntax
 def _chain(
     integrator: PathIntegrator, ray: Ray3f, stream: SampleStream, path: UInt32, active: Bool
-) -> tuple[Spectrum, UInt32, UInt32]:
-    """What one chain meets, as the path of number ``path`` would weigh it, and the rays and shadow rays traced."""
+) -> tuple[Spectrum, UInt32, UInt32 | None]:
+    """What one chain meets, as the path of number ``path`` would weigh it, and the rays and shadow rays traced.
+
+    Shadow rays are None where no emitter is without size.
+    """
     scene = integrator.scene
     context = mi.BSDFContext()
-    ray = mi.Ray3f(ray)
+    o, d = mi.Point3f(ray.o), mi.Vector3f(ray.d)
     active = mi.Bool(active)
     light, throughput = mi.Spectrum(0), mi.Spectrum(1)
     depth, crossings = mi.UInt32(0), mi.UInt32(0)
-    rays, shadow = dr.select(active, mi.UInt32(1), mi.UInt32(0)), mi.UInt32(0)
-    absorption = mi.Color3f(0)
-    vertex = dr.zeros(mi.Interaction3f)
+    rays = dr.select(active, mi.UInt32(1), mi.UInt32(0))
+    shadow = mi.UInt32(0) if len(integrator.without_size) > 0 else None
+    vertex = mi.Point3f(0)
     vertex_pdf, vertex_delta, vertex_samples = mi.Float(1), mi.Bool(True), mi.UInt32(1)
     all_specular = mi.Bool(True)
     at_first = integrator.first_emitter_samples(path)
-    width, spread, is_beam = mi.Vector2f(0), mi.Vector2f(0), mi.Bool(True)
+    # What does not change is no state, and rays are told by origin and direction: else Dr.Jit would record the loop a
+    # second time, without what is the same in all turns.
+    absorption: Color3f = mi.Color3f(0) if integrator.features.has_absorption else None
+    width: Vector2f = None
+    spread: Vector2f = None
+    is_beam: Bool = None
     needed = mi.RayFlags.All
     if dr.hint(integrator.beam is not None, mode="scalar"):
         beam = cast("Beam", integrator.beam)
-        width, spread = mi.Vector2f(beam.width), mi.Vector2f(beam.spread)
+        width, spread, is_beam = mi.Vector2f(beam.width), mi.Vector2f(beam.spread), mi.Bool(True)
         needed = mi.RayFlags.All | mi.RayFlags.dNSdUV
 
     pi = scene.ray_intersect_preliminary(ray, coherent=True, active=active)
     active &= _may_show_light(pi)
-    while dr.hint(active, label="chain"):
-        si = pi.compute_surface_interaction(ray, ray_flags=needed)
-        bsdf = si.bsdf(ray)
+    while dr.hint(active, label="chain", exclude=[integrator, scene, context, stream, at_first, needed]):
+        toward = mi.Ray3f(o, d)
+        si = pi.compute_surface_interaction(toward, ray_flags=needed)
+        bsdf = si.bsdf(toward)
         if dr.hint(integrator.features.has_absorption, mode="scalar"):
             throughput *= dr.exp(-absorption * dr.select(si.is_valid(), si.t, 0))
         emission = integrator.emission(si, vertex, vertex_pdf, vertex_delta, vertex_samples, depth)
@@ -192,19 +208,21 @@ def _chain(
             absorption = dr.select(
                 crosses, dr.select(inside, integrator.features.absorption_of(si.shape), 0), absorption
             )
-        ray = si.spawn_ray(si.to_world(bs.wo))
+        onward = si.spawn_ray(si.to_world(bs.wo))
+        o, d = mi.Point3f(onward.o), mi.Vector3f(onward.d)
+        samples_here = dr.select(all_specular, at_first, mi.UInt32(1))
         if ~passes:
             smooth = mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
-            vertex = mi.Interaction3f(si)
+            vertex = mi.Point3f(si.p)
             vertex_pdf = bs.pdf
             vertex_delta = mi.has_flag(bs.sampled_type, mi.BSDFFlags.Delta)
-            vertex_samples = dr.select(all_specular, at_first, mi.UInt32(1))
+            vertex_samples = samples_here
             all_specular &= ~smooth
             depth += 1
         else:
             crossings += 1
         active = continues & (dr.max(throughput) > 0) & (crossings < MAX_CROSSINGS)
-        pi = scene.ray_intersect_preliminary(ray, coherent=False, active=active)
+        pi = scene.ray_intersect_preliminary(onward, coherent=False, active=active)
         rays += dr.select(active, mi.UInt32(1), mi.UInt32(0))
         # Before its first event, where nothing is met, a chain has met nothing but sky.
         active &= _may_show_light(pi) | (integrator.has_surroundings & ~pi.is_valid() & (depth > 0))

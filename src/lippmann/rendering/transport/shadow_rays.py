@@ -53,16 +53,21 @@ class ShadowRays:
             active &= ~blocked
         if dr.hint(self.asked is not None, mode="scalar"):
             crossings = mi.UInt32(0)
-            while dr.hint(active, label="visibility"):
-                hit = self.asked.ray_intersect(ray, mi.RayFlags.All, False, active)
+            # What does not change, such as a ray's time, is no state: else Dr.Jit would record the loop a second time.
+            o, d, distance = mi.Point3f(ray.o), mi.Vector3f(ray.d), mi.Float(ray.maxt)
+            while dr.hint(active, label="visibility", exclude=[end]):
+                part = mi.Ray3f(o, d)
+                part.maxt = distance
+                hit = self.asked.ray_intersect(part, mi.RayFlags.All, False, active)
                 crosses = hit.is_valid()
-                through = hit.bsdf(ray).eval_null_transmission(hit, crosses)
+                through = hit.bsdf(part).eval_null_transmission(hit, crosses)
                 transmittance = dr.select(crosses, transmittance * through, transmittance)
                 crossings += 1
                 transmittance = dr.select(crosses & (crossings >= MAX_CROSSINGS), mi.Spectrum(0), transmittance)
                 active = crosses & (dr.max(transmittance) > 0) & (crossings < MAX_CROSSINGS)
                 tests += dr.select(active, mi.UInt32(1), mi.UInt32(0))
-                ray = hit.spawn_ray_to(end)
+                rest = hit.spawn_ray_to(end)
+                o, d, distance = mi.Point3f(rest.o), mi.Vector3f(rest.d), mi.Float(rest.maxt)
         return transmittance, tests
 
 
