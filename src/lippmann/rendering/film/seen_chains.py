@@ -7,9 +7,12 @@ meets one; a part of what that would bring is added, unless a search (:mod:`.ima
 
 Where a picture is denoised, hardly anything is left of the rest's variance, and all of that of seen light, which goes
 past the denoiser: more chains are worth their time then, and too few of them are worse than none. So are, where there
-are no photons, more than leave a difference that is seen: the more samples, the fewer chains each comes with. Such a
-picture reaches a quality as a whole sooner without any (docs/research/seen-light.md): what they gain lies in the worst
-micro-images, and where samples are few because the user says so.
+are no photons, more than leave a difference that is seen: the more samples, the fewer chains each comes with.
+
+Without photons, chains cost a third of a path, and mostly as much time is better spent on samples: light that one
+chain in many meets is noisy even with hundreds, and a denoiser makes as much of it. Chains pay where seen light is an
+image that a few of them, spread evenly over the pixel, show well: a sky in smooth gloss. Even there a picture reaches a
+quality as a whole sooner without any (docs/research/seen-light.md).
 """
 
 from __future__ import annotations
@@ -45,7 +48,10 @@ FEWEST_LOOKS, MOST_LOOKS, LOOKS_OF_PIXEL = 1 << 13, 1 << 20, 8
 #: scenes.
 REST_VARIANCE, CLEAN_REST_VARIANCE = 0.01, 0.001
 #: What a chain costs of a path that looks up photons, and of one that does not.
-CHAIN_COST, PLAIN_CHAIN_COST = 0.05, 0.15
+CHAIN_COST, PLAIN_CHAIN_COST = 0.05, 0.3
+#: Chains of a pixel, spread evenly, whose mean is to show an image; and what its variance may be of that of as many
+#: chains at random (0.1 for a sky in smooth gloss, 0.4 to 2 for spots of light in beads, metal and varnish).
+SPREAD, LEAST_EVEN = 4, 0.25
 #: Chains of a path by which what single ones meet is held to be too bright or not.
 USUAL = 2
 #: Chains of a pixel whose mean is as clean as a denoiser would have made of its paths; and of one path, at most that
@@ -89,12 +95,17 @@ def give_chains(integrator: PathIntegrator, request: RenderRequest, source: RayS
     is_for_whole = request.quality is not None and request.quality_worst is None
     if is_for_whole and is_clean and integrator.photons is None:
         return 0
-    search = search_images(integrator.scene, source, samples, memory)
-    integrator.mirror_images = search.images
-    chains = seen_chains(integrator, source, samples, request.transfer, request.seed, is_clean, search.found_none)
-    integrator.seen_chains = dr.opaque(mi.UInt32, chains) if chains else None
+    found_none = False
+    if integrator.photons is not None:
+        search = search_images(integrator.scene, source, samples, memory)
+        integrator.mirror_images, found_none = search.images, search.found_none
+    chains = seen_chains(integrator, source, samples, request.transfer, request.seed, is_clean, found_none)
     if not chains:
         integrator.mirror_images = None
+        return 0
+    integrator.seen_chains = dr.opaque(mi.UInt32, chains)
+    if integrator.photons is None:
+        integrator.mirror_images = search_images(integrator.scene, source, samples, memory).images
     return chains
 
 
@@ -129,7 +140,13 @@ def seen_chains(
     beside_photons = integrator.photons is not None
     looks = _looks(integrator, source, samples, seed)
     together = samples * USUAL
-    variance = sum(variance_of(part, together, transfer) * len(part) for part in _parts(looks)) / len(looks)
+
+    def mean_variance(looks: NDArray[np.float32]) -> float:
+        return sum(variance_of(part, together, transfer) * len(part) for part in _parts(looks)) / len(looks)
+
+    variance = mean_variance(looks)
+    if is_clean and not beside_photons and SPREAD * mean_variance(_means_of(SPREAD, looks)) > LEAST_EVEN * variance:
+        return 0
     if beside_photons:
         brightest = min(_brightest(integrator, source, seed, of_environment=found_none), together)
         slope = float(coding_slope(np.array(_GREY), transfer))
@@ -201,6 +218,13 @@ def _looks(integrator: PathIntegrator, source: RaySource, samples: int, seed: in
         light *= integrator.gain
     values = np.array(dr.ravel(mi.Color3f(light)), dtype=np.float32)
     return shown_colors(values.reshape(-1, few.channels, count, 3))
+
+
+def _means_of(number: int, looks: NDArray[np.float32]) -> NDArray[np.float32]:
+    """``(pixels, looks / number, 3)``: means of so many chains of a pixel that follow each other."""
+    pixels, count, _ = looks.shape
+    groups = count // number
+    return np.asarray(looks[:, : groups * number].reshape(pixels, groups, number, 3).mean(axis=2))
 
 
 def _parts(looks: NDArray[np.float32]) -> Iterator[NDArray[np.floating]]:
