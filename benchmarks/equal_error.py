@@ -145,7 +145,8 @@ def _pooled(stage: Stage, samples: int) -> Any:
     """The samples of a pooled picture, as the program traces them: chains go by what a denoiser leaves, and half of the
     samples to the pixels in which it leaves noise."""
     from lippmann.rendering.film.sample_batches import FullInBatches
-    from lippmann.rendering.methods import Job, allocation, divides_samples
+    from lippmann.rendering.job import Job
+    from lippmann.rendering.methods import allocation, divides_samples
 
     request = replace(stage.session.request, method="pooled", denoise="oidn", spp=samples, seed=3)
     light_up(stage, request)

@@ -187,7 +187,8 @@ class _Probe:
 
     def trace(self, integrator: Integrator, session: Session) -> _Found:
         """Sample the pixels again and again, each time with twice as many samples, until the time is up."""
-        from lippmann.rendering.film.sample_batches import STREAMS, FullInBatches
+        from lippmann.rendering.film.batched_picture import STREAMS
+        from lippmann.rendering.film.sample_batches import FullInBatches
 
         request, progress = session.request, session.watch.progress
         batches = FullInBatches(

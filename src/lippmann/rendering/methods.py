@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, cast
 
 import numpy as np
@@ -30,23 +30,21 @@ from lippmann.rendering.denoise.oidn import Effort
 from lippmann.rendering.denoise.outlines import by_coverage
 from lippmann.rendering.denoise.subpixels import SubpixelBatches
 from lippmann.rendering.estimate.denoised_psnr import DenoisedEstimator
-from lippmann.rendering.estimate.pixel_errors import PixelErrors
-from lippmann.rendering.estimate.psnr import ERROR_LAYER, Estimate, Parts, PictureEstimator
+from lippmann.rendering.estimate.psnr import ERROR_LAYER, Parts, PictureEstimator
 from lippmann.rendering.film.sample_batches import FullInBatches, trace_in_batches
 from lippmann.rendering.film.wavefront import Frame, RayTotals, trace_frame
 from lippmann.rendering.film.wavefront_plan import make_plan
+from lippmann.rendering.job import Job, Traced
 from lippmann.rendering.reprojection.common.point_image import STATUS_LAYER, TRACED
 from lippmann.rendering.reprojection.renderer import trace_reused as trace_reprojected
 from lippmann.rendering.request.choices import Denoiser, Method
 from lippmann.rendering.request.preconditions import why_no_estimate
-from lippmann.rendering.request.render_request import RenderRequest
-from lippmann.rendering.session import Session
 from lippmann.rendering.transport.integrator import Integrator, ReusableIntegrator
 from lippmann.rendering.transport.path import PathIntegrator
 from lippmann.rendering.transport.ray_source import DisplayRays, QuiltRays, SubpixelRays, WindowRays
 
 if TYPE_CHECKING:
-    from lippmann.rendering.denoise.exposure_survey import Treatment
+    pass
 
 Floats = NDArray[np.float32]
 
@@ -62,75 +60,6 @@ FEWEST_DIVIDED = 8
 MOST_WITH_IMAGES = 0.01
 #: What putting a picture together and writing it takes, as a rule.
 _SECONDS_PER_PIXEL_WRITTEN = 1e-7
-
-
-@dataclass(frozen=True, eq=False)
-class Job:
-    """What is to be traced.
-
-    Attributes
-    ----------
-    session:
-        The scene on the device, the request, and the machine's share.
-    integrator, source:
-        What is gathered along which rays.
-    display_from_world:
-        ``(4, 4)`` affine map to the display's frame (mm).
-    treatment:
-        Of a part of a picture that is denoised: how all its parts are.
-    """
-
-    session: Session
-    integrator: Integrator
-    source: DisplayRays | WindowRays | QuiltRays
-    display_from_world: NDArray[np.float64]
-    treatment: Treatment | None = None
-
-    @property
-    def request(self) -> RenderRequest:
-        """How the picture is to be made."""
-        return self.session.request
-
-    @property
-    def progress(self) -> ProgressCallback:
-        """Whom to tell how far it is."""
-        return self.session.watch.progress
-
-    @property
-    def traced(self) -> DisplayRays | WindowRays | QuiltRays | SubpixelRays:
-        """Whose samples are gathered: of sub-pixels that are denoised, all colours."""
-        source = self.source
-        if isinstance(source, QuiltRays) or not self.request.keeps_colors(source.display):
-            return source
-        return SubpixelRays(source)
-
-
-@dataclass(frozen=True)
-class Traced:
-    """What came of a job.
-
-    Attributes
-    ----------
-    samples:
-        How many each pixel had.
-    estimate:
-        How good the picture is by its own account; where it is None, ``notes`` say why.
-    options, seconds:
-        How it was done, and what stages of its own that took.
-    errors:
-        Those of the pixels, where they are known.
-    method:
-        What won, where methods competed.
-    """
-
-    frame: Frame
-    samples: int
-    estimate: Estimate | None = None
-    notes: tuple[str, ...] = ()
-    options: dict[str, object] = field(default_factory=dict)
-    seconds: dict[str, float] = field(default_factory=dict)
-    errors: PixelErrors | None = None
-    method: Method | None = None
 
 
 def trace(job: Job) -> Traced:

@@ -70,7 +70,8 @@ def render_quilt(
     placement = session.place(display)
 
     from lippmann.device.pbr import BuiltScene
-    from lippmann.rendering.methods import Job, trace
+    from lippmann.rendering.job import Job
+    from lippmann.rendering.methods import trace
     from lippmann.rendering.transport.ray_source import QuiltRays
 
     display_from_world = placement.display_from_world

@@ -18,7 +18,7 @@ from lippmann.display import Display
 from lippmann.rendering.denoise.local_statistics import mean_of_others
 from lippmann.rendering.denoise.noisy_blend import own_share
 from lippmann.rendering.denoise.oidn import denoise, load_denoiser
-from lippmann.rendering.film.sample_batches import STREAMS
+from lippmann.rendering.film.batched_picture import STREAMS
 from lippmann.rendering.live.develop import arrange, codes_of, develop, develop_picture
 from lippmann.rendering.live.live_tracer import Lanes, PlacedDisplay
 from lippmann.rendering.live.live_view import LiveFrame, LiveView

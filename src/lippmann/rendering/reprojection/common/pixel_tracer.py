@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from lippmann.device.kernel_ops import divide
 from lippmann.device.sobol import PIXEL_DIMENSION, SEED_STEP, SampleStream
 from lippmann.device.types import Array, Float, Ray3f, UInt32
-from lippmann.rendering.film.sample_batches import STREAMS
+from lippmann.rendering.film.batched_picture import STREAMS
 from lippmann.rendering.film.wavefront import RayTotals, compile_seconds
 from lippmann.rendering.reprojection.common.array_types import BoolArray, IntArray, RealArray
 from lippmann.rendering.reprojection.common.frozen_kernel import Frozen, aligned
