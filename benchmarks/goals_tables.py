@@ -35,8 +35,8 @@ error, so they are told it, and stop with the fewest samples (a power of two) th
 are not, their time is drawn out by the law of noise, too, though what is denoised gains less: {_gained(result)} dB by
 the last doubling of the samples, not 3. Caustics come by photons where there are any, in all ways but stock views.
 Rows and clock are those above, and so are the scenes, but for those missing from a table, which were not run. The
-machine was about 1.7 times slower than for most of the pictures above, but for small-balls and gears on the array, which
-are of the run before."""
+machine was about 1.7 times slower than for most of the pictures above, but for small-balls and gears on the array,
+which are of the run before."""
     ]
     for name, (title, *_) in DISPLAYS.items():
         if scenes := result["results"].get(name):
