@@ -58,9 +58,8 @@ def _about_caustics(result: dict[str, Any]) -> str:
     text = (
         "Small balls, primitives, room and gears have small emitters, mirrors and glass. Their caustics come by "
         "photons, what is seen of them in mirrors by [chains](caustics.md#seen-light), in references and pictures "
-        "alike. Chains serve a sky in smooth gloss, too, and their time is in that of the pictures. The glazed teapot "
-        "(fancy-teapot) and clear coat were measured anew while the machine was about 1.7 times slower: seconds "
-        "compare within a scene."
+        "alike. Chains serve a sky in smooth gloss, too, and their time is in that of the pictures. Scenes are not all "
+        "of one run, and the machine was not always as fast: seconds compare within a scene."
     )
     older = [
         f"{', '.join(names)} ({DISPLAYS[display][0]})"

@@ -34,9 +34,8 @@ are Mitsuba's own `path` along the same rays, each view denoised with albedo and
 error, so they are told it, and stop with the fewest samples (a power of two) that are enough, 256 at most. Where these
 are not, their time is drawn out by the law of noise, too, though what is denoised gains less: {_gained(result)} dB by
 the last doubling of the samples, not 3. Caustics come by photons where there are any, in all ways but stock views.
-Rows and clock are those above, and so are the scenes, but for those missing from a table, which were not run. The
-machine was about 1.7 times slower than for most of the pictures above, but for small-balls and gears on the array,
-which are of the run before."""
+Rows and clock are those above, and so are the scenes, but for those missing from a table, which were not run.
+{_clock(result)}"""
     ]
     for name, (title, *_) in DISPLAYS.items():
         if scenes := result["results"].get(name):
@@ -57,7 +56,7 @@ def _most_possible(display: str, scenes: dict[str, Any]) -> str:
 
     Both were timed by themselves: what full takes for as many samples tells how fast the machine was.
     """
-    curves = saved("equal_error").get("results", {}).get(display, {})
+    curves = _curves(display)
     told = []
     for quality in next(iter(scenes.values())):
         times = []
@@ -71,6 +70,26 @@ def _most_possible(display: str, scenes: dict[str, Any]) -> str:
     return textwrap.fill(
         "What a picture takes at least that judges itself by two denoised halves, one sample of each pixel (photons "
         f"included), guides and two runs of the network, would be {' and '.join(told)} times as fast as stock views.",
+        120,
+    )
+
+
+def _curves(display: str) -> dict[str, Any]:
+    found: dict[str, Any] = saved("equal_error").get("results", {}).get(display, {})
+    return found
+
+
+def _clock(result: dict[str, Any]) -> str:
+    """How fast the machine was, scene by scene, against the pictures of ``equal_error.py``."""
+    found = [
+        _slower(scenes[name], curves[name]["curves"]["full"])
+        for display, scenes in result["results"].items()
+        for curves in [_curves(display)]
+        for name in scenes.keys() & curves.keys()
+    ]
+    return textwrap.fill(
+        f"Full took {min(found):.1f} to {max(found):.1f} times as long as there for as many samples, "
+        f"{statistics.median(found):.1f} in the middle: seconds compare within a scene.",
         120,
     )
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, cast
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,9 +42,6 @@ from lippmann.rendering.request.preconditions import why_no_estimate
 from lippmann.rendering.transport.integrator import Integrator, ReusableIntegrator
 from lippmann.rendering.transport.path import PathIntegrator
 from lippmann.rendering.transport.ray_source import DisplayRays, QuiltRays, SubpixelRays, WindowRays
-
-if TYPE_CHECKING:
-    pass
 
 Floats = NDArray[np.float32]
 

@@ -86,6 +86,10 @@ class BatchedPicture:
         """Samples of single pixels come in multiples of this."""
         return len(self._taken)
 
+    @property
+    def _batches_of_stream(self) -> int:
+        return self.batches // STREAMS
+
     def samples_of_pixels(self) -> NDArray[np.uint32]:
         """``(H, W)``: samples that each pixel of the picture has had."""
         return self.of_picture(self._counts(sum(self._taken), self.batches)).astype(np.uint32)
@@ -114,7 +118,7 @@ class BatchedPicture:
 
     def traced_halves(self) -> tuple[Floats, Floats]:
         """The means of either stream's samples, with all that is traced; they know nothing of each other."""
-        per_stream = len(self._sums) // STREAMS
+        per_stream = self._batches_of_stream
         return self._means([self._sums[s * per_stream : (s + 1) * per_stream].sum(axis=0) for s in range(STREAMS)])
 
     def seen_halves(self) -> tuple[Floats, Floats] | None:
@@ -132,7 +136,7 @@ class BatchedPicture:
         shares, counts = self._means(list(self._covered)), self._per_stream()
         if not self._further_mean:
             return Coverage(shares[0], counts[0]), Coverage(shares[1], counts[1])
-        further = (self.batches // STREAMS * self._further).reshape(*self.shape, 1)
+        further = (self._batches_of_stream * self._further).reshape(*self.shape, 1)
         return Coverage(shares[0], counts[0] + further), Coverage(shares[1], counts[1] + further)
 
     def excess(self) -> Floats | None:
@@ -159,7 +163,7 @@ class BatchedPicture:
 
     def _means(self, sums: Sequence[Floats]) -> tuple[Floats, Floats]:
         """Of the sums of each stream."""
-        each = self.batches // STREAMS
+        each = self._batches_of_stream
         parts = [
             (total * self._weights(n, each)).reshape(*self.shape, -1)
             for total, n in zip(sums, self._per_stream(), strict=True)
@@ -168,7 +172,7 @@ class BatchedPicture:
 
     def _per_stream(self) -> list[int]:
         """Samples of every pixel that each stream has had."""
-        each = len(self._taken) // STREAMS
+        each = self._batches_of_stream
         return [sum(self._taken[s * each : (s + 1) * each]) for s in range(STREAMS)]
 
     def squared_error(self) -> PixelErrors:
@@ -215,7 +219,7 @@ class BatchedPicture:
         """Add to its batches what :func:`~lippmann.rendering.film.wavefront.sums_of` gives for a run: of all pixels, or
         of those with the numbers ``chosen``.
         """
-        per_stream = len(self._sums) // STREAMS
+        per_stream = self._batches_of_stream
         pixels = slice(run.first, run.last) if chosen is None else chosen[run.first : run.last]
         rays = sums.pop("rays", None)
         if self._rays_of_pixels is not None and rays is not None:

@@ -20,7 +20,7 @@ _DIFFERENCE = 1 / 64
 #: Squared sine between both derivatives below which they tell no point.
 _ALIKE = 1e-12
 #: Chains of one step: from the point, and from those beside and below it.
-_POINT, _BELOW = 0, 2
+_POINT, _BESIDE, _BELOW = range(3)
 
 
 @dataclass
@@ -120,7 +120,7 @@ def approached(
         is_first, is_last = is_end & (side == _POINT), is_end & (side == _BELOW)
         last_o, last_d = dr.select(is_first, o, last_o), dr.select(is_first, d, last_d)
         miss = dr.select(is_first, by, miss)
-        right = dr.select(is_end & ~is_first & ~is_last, by, right)
+        right = dr.select(is_end & (side == _BESIDE), by, right)
         move, box, is_solved = _solved(miss, right, by, radius)
         active &= ~is_last | is_solved
         is_last &= is_solved
@@ -131,7 +131,7 @@ def approached(
         active &= ~is_last | ((step < STEPS) & (dr.max(dr.abs(point - 0.5)) < FARTHEST))
         side = dr.select(is_end, dr.select(side == _BELOW, mi.UInt32(_POINT), side + 1), side)
         # The next chain, from this or another point.
-        beside = mi.Point2f(dr.select(side == 1, _DIFFERENCE, 0.0), dr.select(side == _BELOW, _DIFFERENCE, 0.0))
+        beside = mi.Point2f(dr.select(side == _BESIDE, _DIFFERENCE, 0.0), dr.select(side == _BELOW, _DIFFERENCE, 0.0))
         again = source.rays(column, row, channel, point + beside)
         o, d = dr.select(is_end, again.o, o), dr.select(is_end, again.d, d)
         left = dr.select(is_end, events, left)

@@ -171,7 +171,7 @@ class FullInBatches(BatchedPicture):
             gone += stretch
             count = round(per_batch * gone / mean) - before
             if count:
-                starts = [had + place * count for had in self._per_stream() for place in range(number // STREAMS)]
+                starts = [had + place * count for had in self._per_stream() for place in range(self._batches_of_stream)]
                 lanes = self._lanes // channels
                 for run in cut_batches(len(pixels), tuple(range(number)), tuple(starts), count, lanes, lanes + 1):
                     self._keep(run, self._trace(run, sum(self._taken) + number * count, pixels), pixels)
@@ -216,8 +216,7 @@ class FullInBatches(BatchedPicture):
 
     def _runs(self, samples: int) -> Iterator[Run]:
         """Wavefronts that take ``samples`` more of every pixel."""
-        number = len(self._sums)
-        per_stream = number // STREAMS
+        number, per_stream = self.batches, self._batches_of_stream
         each, rest = divmod(samples, number)
         # Where the streams go on; their batches take one stretch after the other.
         had = self._per_stream()
@@ -243,7 +242,7 @@ class FullInBatches(BatchedPicture):
         to run is opaque to the compiler, so that all share a kernel.
         """
         channels, window = self._source.channels, self._window
-        number, per_stream = len(run.batches), len(self._sums) // STREAMS
+        number, per_stream = len(run.batches), self._batches_of_stream
         lanes = (run.last - run.first) * channels * number * run.count
         rest, sample = divide(dr.arange(mi.UInt32, lanes), dr.opaque(mi.UInt32, run.count))
         rest, place = divide(rest, dr.opaque(mi.UInt32, number))

@@ -51,7 +51,7 @@ REST_VARIANCE, CLEAN_REST_VARIANCE = 0.01, 0.001
 CHAIN_COST, PLAIN_CHAIN_COST = 0.05, 0.3
 #: Chains of a pixel, spread evenly, whose mean is to show an image; and what its variance may be of that of as many
 #: chains at random (0.1 for a sky in smooth gloss, 0.4 to 2 for spots of light in beads, metal and varnish).
-SPREAD, LEAST_EVEN = 4, 0.25
+SPREAD, MOST_UNEVEN = 4, 0.25
 #: Chains of a path by which what single ones meet is held to be too bright or not.
 USUAL = 2
 #: Chains of a pixel whose mean is as clean as a denoiser would have made of its paths; and of one path, at most that
@@ -141,11 +141,11 @@ def seen_chains(
     looks = _looks(integrator, source, samples, seed)
     together = samples * USUAL
 
-    def mean_variance(looks: NDArray[np.float32]) -> float:
-        return sum(variance_of(part, together, transfer) * len(part) for part in _parts(looks)) / len(looks)
+    def mean_variance(met: NDArray[np.float32]) -> float:
+        return sum(variance_of(part, together, transfer) * len(part) for part in _parts(met)) / len(met)
 
     variance = mean_variance(looks)
-    if is_clean and not beside_photons and SPREAD * mean_variance(_means_of(SPREAD, looks)) > LEAST_EVEN * variance:
+    if is_clean and not beside_photons and SPREAD * mean_variance(_means_of(SPREAD, looks)) > MOST_UNEVEN * variance:
         return 0
     if beside_photons:
         brightest = min(_brightest(integrator, source, seed, of_environment=found_none), together)

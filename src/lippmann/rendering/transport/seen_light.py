@@ -106,15 +106,15 @@ def seen_light(
     Between them stands what of the sum is from single chains beyond ``most``.
     """
     light, excess = mi.Spectrum(0), None if most is None else mi.Spectrum(0)
-    has_emitters = len(integrator.without_size) > 0
-    rays, shadow = mi.UInt32(0), mi.UInt32(0) if has_emitters else None
+    takes_shadow_rays = len(integrator.without_size) > 0
+    rays, shadow = mi.UInt32(0), mi.UInt32(0) if takes_shadow_rays else None
     number = mi.UInt32(0)
     of_chains = SampleStream(hash32(stream.key ^ _CHAINS), stream.index, stream.half)
     first = stream.index * chains
     tracing = active & (number < chains)
     # What does not change is no state: else Dr.Jit would record the loop a second time, without it.
     while dr.hint(
-        tracing, label="chains", exclude=[integrator, of_chains, pixel, stream, chains, first, most, has_emitters]
+        tracing, label="chains", exclude=[integrator, of_chains, pixel, stream, chains, first, most, takes_shadow_rays]
     ):
         further = of_chains.at(first + number)
         weight = mi.Float(1)
@@ -131,11 +131,15 @@ def seen_light(
             brightest = dr.max(met)
             excess += dr.select(brightest > most, met * (1 - most / brightest), 0)
         rays += traced
-        if dr.hint(has_emitters, mode="scalar"):
+        if dr.hint(takes_shadow_rays, mode="scalar"):
             shadow += tests
         number += 1
         tracing &= number < chains
-    return light, mi.Spectrum(0) if most is None else excess, RayCounts(rays, shadow if has_emitters else mi.UInt32(0))
+    return (
+        light,
+        mi.Spectrum(0) if most is None else excess,
+        RayCounts(rays, shadow if takes_shadow_rays else mi.UInt32(0)),
+    )
 
 
 @dr.syntax
