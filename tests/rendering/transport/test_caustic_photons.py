@@ -32,7 +32,7 @@ def landed(scene_dict, count=1 << 17, seed=3):
     import mitsuba as mi
 
     from lippmann.rendering.transport.casters import find_casters
-    from lippmann.rendering.transport.caustic_photons import PhotonShooter
+    from lippmann.rendering.transport.photon_shooter import PhotonShooter
     from lippmann.rendering.transport.scene_features import make_scene_features
 
     scene = mi.load_dict({"type": "scene"} | scene_dict)
@@ -369,3 +369,21 @@ def test_passes_of_more_photons_have_smaller_radii():
         assert photons.relative_radius(number) == pytest.approx(shrunk, rel=1e-6)
     few, many = (len(photons.of_pass(number).halves[0]) for number in (1, 2))
     assert many == pytest.approx(2 * few, rel=0.05)
+
+
+def test_kernels_of_any_size_shoot_the_same_photons(monkeypatch):
+    from scipy.spatial import cKDTree
+
+    from lippmann.rendering.transport import photon_shooter
+
+    scene = {"room": room(), "ball": {"type": "sphere", "bsdf": {"type": "dielectric"}}, "emitter": lamp([3, 2, 4])}
+    whole = landed(scene, count=5000)
+    monkeypatch.setattr(photon_shooter, "_LANES", 700)
+    in_parts = landed(scene, count=5000)
+    assert len(whole) == len(in_parts) > 1500
+    # Of each kernel, photons come in the order of the surfaces that they have met.
+    apart, other = cKDTree(whole.position).query(in_parts.position)
+    assert apart.max() < 1e-3
+    assert np.array_equal(whole.surfaces[other], in_parts.surfaces)
+    assert np.allclose(whole.power[other], in_parts.power, rtol=1e-3)
+    assert np.allclose(whole.toward[other], in_parts.toward, atol=1e-3)

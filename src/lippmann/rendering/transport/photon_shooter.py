@@ -1,0 +1,234 @@
+"""Shoots photons from emitters by way of sharp surfaces: :mod:`.caustic_photons` says which, and for what."""
+
+from __future__ import annotations
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from lippmann.device.kernel_ops import divide, upload
+from lippmann.device.sobol import SampleStream
+from lippmann.device.types import (
+    Bool,
+    Color3f,
+    DirectionSample3f,
+    MitsubaScene,
+    Point3f,
+    Ray3f,
+    Spectrum,
+    SurfaceInteraction3f,
+    UInt32,
+    Vector3f,
+)
+from lippmann.rendering.transport.casters import CasterPoints, Casters
+from lippmann.rendering.transport.photon_map import Photons
+from lippmann.rendering.transport.scene_features import SceneFeatures
+from lippmann.rendering.transport.sharp_events import (
+    MOST_EVENTS,
+    facing_normal,
+    follows_sharply,
+    has_wide_lobes,
+    lambertian,
+    sharp_lobe,
+)
+
+#: Straight-through surfaces on the way of a photon, at most.
+_MOST_CROSSINGS = 4
+#: Emissions of one kernel.
+_LANES = 1 << 18
+_LOOK_STEP = 0x7F4A7C15
+#: Directions to emitters by which their radiance is found: in all, and of one emitter and caster.
+_LOOKS, _MOST_LOOKS_OF_PAIR = 1 << 14, 256
+#: How far a ray goes on behind a straight-through surface, relative to its coordinates.
+_CLEARANCE = 1e-4
+#: Dimensions of the sample stream before the first surface, and at each.
+_EMISSION_DIMENSIONS, _DIMENSIONS = 3, 2
+
+
+class PhotonShooter:
+    """Shoots photons of one scene."""
+
+    def __init__(self, scene: MitsubaScene, features: SceneFeatures, casters: Casters) -> None:
+        self._scene = scene
+        self._features = features
+        self._casters = casters
+        self._emitter_numbers = mi.UInt32(casters.emitters)
+
+    def shoot(self, count: int, chances: NDArray[np.float64], seed: int) -> tuple[Photons, NDArray[np.int64]]:
+        """``count`` emissions of pairs drawn by ``chances``: photons that landed, and their pairs."""
+        # Every pair gets its number of emissions, not a chance of them.
+        each = np.maximum(1, np.round(chances * count)).astype(np.int64)
+        pair = np.repeat(np.arange(len(each)), each)
+        landed: list[Photons] = []
+        pairs: list[NDArray[np.int64]] = []
+        for first in range(0, len(pair), _LANES):
+            part = pair[first : first + _LANES]
+            photons, lanes = self._wavefront(part, each, first, seed)
+            landed.append(photons)
+            pairs.append(part[lanes])
+        return Photons.joined(landed), np.concatenate(pairs)
+
+    def radiances(self, seed: int) -> NDArray[np.float64]:
+        """The greatest radiance that each emitter is found to show to the casters; infinite for those without size."""
+        pairs = self._casters.pairs
+        pair = np.repeat(np.arange(pairs), min(_MOST_LOOKS_OF_PAIR, max(1, _LOOKS // pairs)))
+        stream = SampleStream.of_pixels(
+            mi.UInt32(0), dr.arange(mi.UInt32, len(pair)), dr.opaque(mi.UInt32, (seed + _LOOK_STEP) % 2**32)
+        )
+        _, ds, light = self._lit_points(pair, stream)
+        shown = dr.select((ds.pdf > 0) & (dr.max(light) > 0), dr.select(ds.delta, dr.inf, dr.max(light) * ds.pdf), 0)
+        greatest = np.zeros(len(self._casters.emitters))
+        np.maximum.at(greatest, pair % len(greatest), np.array(shown, dtype=np.float64))
+        return greatest
+
+    def _lit_points(
+        self, pair: NDArray[np.int64], stream: SampleStream
+    ) -> tuple[CasterPoints, DirectionSample3f, Spectrum]:
+        """For each pair a point on the caster, a direction to the emitter, and radiance over the direction's pdf."""
+        numbers, scene = upload(pair.astype(np.uint32)), self._scene
+        caster, source = divide(numbers, len(self._casters.emitters))
+        emitter = dr.gather(mi.EmitterPtr, scene.emitters_dr(), dr.gather(mi.UInt32, self._emitter_numbers, source))
+        point = CasterPoints(scene, self._casters, caster, stream.next_2d(0), stream.next_1d(2))
+        ds, light = emitter.sample_direction(point.reference(), stream.next_2d(1), mi.Bool(True))
+        return point, ds, light
+
+    def _wavefront(
+        self, pair: NDArray[np.int64], each: NDArray[np.int64], first: int, seed: int
+    ) -> tuple[Photons, NDArray[np.int64]]:
+        """Photons that land, by the surfaces that they have met, and the lane of each."""
+        lanes, features = len(pair), self._features
+        share = upload((1.0 / each[pair]).astype(np.float32))
+        # What differs from wavefront to wavefront is opaque to the compiler, so that all share their kernels.
+        index = dr.arange(mi.UInt32, lanes) + dr.opaque(mi.UInt32, first)
+        stream = SampleStream.of_pixels(mi.UInt32(0), index, dr.opaque(mi.UInt32, seed))
+        ray, power = self._emitted(pair, share, stream)
+        surfaces = MOST_EVENTS + (_MOST_CROSSINGS if features.has_null else 0)
+        landed = _Landed(lanes, surfaces)
+        self._follow(ray, power, dr.max(power) > 0, stream, landed, surfaces)
+        return landed.photons()
+
+    def _emitted(self, pair: NDArray[np.int64], share: mi.Float, stream: SampleStream) -> tuple[Ray3f, Color3f]:
+        """Rays that meet the casters, and the flux that comes along each; 0 where something is in the way."""
+        scene = self._scene
+        point, ds, light = self._lit_points(pair, stream)
+        active = (ds.pdf > 0) & (dr.max(light) > 0)
+        power = mi.Color3f(light) * share
+        # From the emitter to the point: tells whether one sees the other, and what surface is met there.
+        ray = mi.Ray3f(point.p + ds.d * (ds.dist * (1 - 1e-3)), -ds.d)
+        si = scene.ray_intersect(ray, mi.RayFlags.All, False, active)
+        for _ in range(_MOST_CROSSINGS if self._features.has_null else 0):
+            other = active & si.is_valid() & ~point.is_met(si, ds.dist)
+            through = si.bsdf(ray).eval_null_transmission(si, other)
+            power = dr.select(other, power * through, power)
+            active &= ~other | (dr.max(through) > 0)
+            # Along the ray, not along the normal as the engine's own offset is: it is to end at the point.
+            step = _CLEARANCE * (1 + dr.max(dr.abs(si.p)))
+            ray = dr.select(other, mi.Ray3f(si.p + ray.d * step, ray.d), ray)
+            again = scene.ray_intersect(ray, mi.RayFlags.All, False, other & active)
+            si = dr.select(other, again, si)
+        active &= si.is_valid() & point.is_met(si, ds.dist)
+        return ray, dr.select(active, power * point.cosine(si, ds.d) * point.area, 0)
+
+    @dr.syntax
+    def _follow(
+        self, ray: Ray3f, power: Color3f, active: Bool, stream: SampleStream, landed: _Landed, surfaces: int
+    ) -> None:
+        """Follows light along sharp events, and notes where it lands after one or more.
+
+        Each turn is one surface: all of them are one kernel, and lanes whose light has ended wait for no others.
+        """
+        scene, features = self._scene, self._features
+        o, d = mi.Point3f(ray.o), mi.Vector3f(ray.d)
+        power, active = mi.Color3f(power), mi.Bool(active)
+        events, turn = mi.UInt32(0), mi.UInt32(0)
+        absorption = mi.Color3f(0) if features.has_absorption else None
+        # What does not change is no state: else Dr.Jit would record the loop a second time, without it.
+        while dr.hint(active, label="photon events", exclude=[scene, features, stream, landed, surfaces]):
+            si = scene.ray_intersect(mi.Ray3f(o, d), mi.RayFlags.All, False, active)
+            active &= si.is_valid()
+            power = _absorbed(power, absorption, si)
+            landed.note(si, power, events, turn, active & (events > 0))
+            active &= turn < surfaces
+            o, d, power, events, absorption, active = self._next_ray(
+                si, power, events, absorption, active, stream, _EMISSION_DIMENSIONS + _DIMENSIONS * turn
+            )
+            turn += 1
+
+    def _next_ray(
+        self,
+        si: SurfaceInteraction3f,
+        power: Spectrum,
+        events: UInt32,
+        absorption: Color3f | None,
+        active: Bool,
+        stream: SampleStream,
+        dimension: UInt32,
+    ) -> tuple[Point3f, Vector3f, Spectrum, UInt32, Color3f | None, Bool]:
+        """The ray after one event of light that follows sharp ones alone."""
+        bsdf = si.bsdf()
+        lobe = sharp_lobe(si, bsdf, active)
+        context = mi.BSDFContext(mi.TransportMode.Importance)
+        bs, weight = bsdf.sample(context, si, stream.next_1d(dimension), stream.next_2d(dimension + 1), active)
+        passes = mi.has_flag(bs.sampled_type, mi.BSDFFlags.Null)
+        wo = si.to_world(bs.wo)
+        # Light that passes the first surface starts at the next.
+        active &= ~passes | (events > 0)
+        active &= follows_sharply(si, lobe, bs)
+        # Adjoint of shading normals: Veach 1997, eq. 5.19.
+        into, out = dr.dot(si.n, si.to_world(si.wi)), dr.dot(si.n, wo)
+        active &= passes | ((into * si.wi.z > 0) & (out * bs.wo.z > 0))
+        correction = dr.select(passes, 1, dr.abs(si.wi.z * out / (bs.wo.z * into)))
+        power = power * weight * correction
+        events = events + dr.select(passes, mi.UInt32(0), mi.UInt32(1))
+        active &= (dr.max(power) > 0) & (events <= MOST_EVENTS)
+        if absorption is not None:
+            crosses = mi.has_flag(bs.sampled_type, mi.BSDFFlags.Transmission) & ~passes
+            within = dr.select(bs.wo.z < 0, self._features.absorption_of(si.shape), 0)
+            absorption = dr.select(crosses, within, absorption)
+        ray = si.spawn_ray(wo)
+        return ray.o, ray.d, power, events, absorption, active
+
+
+def _absorbed(power: Color3f, absorption: Color3f | None, si: SurfaceInteraction3f) -> Color3f:
+    """What is left of light on its way to ``si``."""
+    return power if absorption is None else power * dr.exp(-absorption * dr.select(si.is_valid(), si.t, 0))
+
+
+class _Landed:
+    """Photons of one kernel: at most one of each lane at each surface."""
+
+    # Not a dataclass: Dr.Jit would take it for loop state and write its fields.
+    def __init__(self, lanes: int, surfaces: int) -> None:
+        self._lanes = lanes
+        self._number = dr.opaque(mi.UInt32, lanes)
+        rows = lanes * surfaces
+        #: Sharp events on the way to each; 0 where none landed, whose other values are not written.
+        self._events = dr.zeros(mi.UInt32, rows)
+        self._values = [dr.empty(mi.Float, 3 * rows) for _ in range(4)]
+        dr.eval(self._events, self._values)
+
+    def note(self, si: SurfaceInteraction3f, power: Color3f, events: UInt32, turn: UInt32, active: Bool) -> None:
+        """Light of that flux has come to ``si``, the surface of that number after the first."""
+        bsdf = si.bsdf()
+        active = active & (dr.max(power) > 0)
+        lambert = lambertian(si, bsdf, active)
+        active &= (dr.max(lambert) > 0) | has_wide_lobes(si, bsdf, active)
+        row = dr.arange(mi.UInt32, self._lanes) + (turn - 1) * self._number
+        dr.scatter(self._events, events, row, active)
+        vectors = si.p, facing_normal(si), si.to_world(si.wi), power
+        for values, vector in zip(self._values, vectors, strict=True):
+            dr.scatter(values, mi.Vector3f(vector), row, active)
+
+    def photons(self) -> tuple[Photons, NDArray[np.int64]]:
+        """Those that landed, and their lanes."""
+        events = np.array(self._events)
+        rows = np.flatnonzero(events)
+        lanes = rows % self._lanes
+        if not len(rows):
+            return Photons.dark(0), lanes
+        row = upload(rows.astype(np.uint32))
+        vectors = [dr.gather(mi.Point3f, values, row) for values in self._values]
+        dr.eval(vectors)
+        position, normal, toward, power = (np.ascontiguousarray(np.array(vector).T) for vector in vectors)
+        return Photons(position, normal, toward, power, events[rows]), lanes
