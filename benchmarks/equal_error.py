@@ -252,7 +252,9 @@ def light_up(stage: Any, request: Any, memory: int = 4 << 30) -> None:
 
     # All pictures of a stage are exposed alike.
     request = replace(request, exposure=stage.session.choices.get("exposure", 0.0))
-    prepare_light(stage.integrator, request, stage.source, memory)
+    choices = stage.session.choices
+    choices.pop("mirror_images", None)
+    choices.update(prepare_light(stage.integrator, request, stage.source, memory))
 
 
 def trace_lit(stage: Stage, samples: int, seed: int) -> Picture:

@@ -150,10 +150,11 @@ class Case:
     def beside_the_truth(self, traced: Any) -> dict[str, Any]:
         """What a picture says of itself, and what is true."""
         from lippmann.rendering.estimate.psnr import stated_among_mirrors
+        from lippmann.rendering.light_statements import is_among_mirrors
 
         psnr, worst = self.truth(traced.frame.pixels)
         estimate = traced.estimate
-        if self.integrator.photons is not None:
+        if is_among_mirrors(self.session.choices):
             estimate = stated_among_mirrors(estimate, traced.samples)
         return {
             "samples": traced.samples,

@@ -21,6 +21,12 @@ def test_intervals_of_few_samples_among_mirrors_reach_down_farther(samples, low,
     assert any("missed an emitter in a mirror" in note for note in notes) == (samples < 16)
 
 
+def test_where_a_search_found_no_small_image_nothing_is_missed():
+    searched = {**AMONG_MIRRORS, "mirror_images": "none"}
+    assert stated_error(ESTIMATE, 2, searched) == ESTIMATE.to_dict()
+    assert light_notes(RenderRequest(), ESTIMATE, 2, searched) == ()
+
+
 def test_no_psnr_is_below_nothing():
     poor = Estimate(5.0, 3.0, 6.0, 4.0, 2.0, 5.0, (0, 0))
     stated = stated_error(poor, 2, AMONG_MIRRORS)

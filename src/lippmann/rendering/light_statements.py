@@ -18,11 +18,19 @@ def stated_error(estimate: Estimate | None, samples: int, choices: Mapping[str, 
     samples:
         Of each pixel.
     choices:
-        What was chosen for the picture, by the names of its options: ``caustics`` here.
+        What was chosen for the picture, by the names of its options, and found: ``caustics``, ``mirror_images`` here.
     """
     if estimate is None or _misses_caustics(choices):
         return None
-    return (stated_among_mirrors(estimate, samples) if _is_among_mirrors(choices) else estimate).to_dict()
+    return (stated_among_mirrors(estimate, samples) if is_among_mirrors(choices) else estimate).to_dict()
+
+
+def is_among_mirrors(choices: Mapping[str, object]) -> bool:
+    """Whether sharp surfaces may mirror emitters so small that samples miss them.
+
+    Caustics tell that are not left to paths, unless a search has found no such image.
+    """
+    return choices.get("caustics", "paths") != "paths" and choices.get("mirror_images") != "none"
 
 
 def light_notes(
@@ -37,7 +45,7 @@ def light_notes(
             "no estimate of the error: paths hardly find what mirrors, glass or gloss throw onto other surfaces from "
             "emitters as small as here; photons bring it (caustics)"
         )
-    if estimate is not None and samples < FEWEST_AMONG_MIRRORS and _is_among_mirrors(choices):
+    if estimate is not None and samples < FEWEST_AMONG_MIRRORS and is_among_mirrors(choices):
         notes.append(
             f"fewer than {FEWEST_AMONG_MIRRORS} samples may all have missed an emitter in a mirror: the intervals of "
             "the PSNR reach down farther"
@@ -51,8 +59,3 @@ def light_notes(
 
 def _misses_caustics(choices: Mapping[str, object]) -> bool:
     return choices.get("caustics") == "paths"
-
-
-def _is_among_mirrors(choices: Mapping[str, object]) -> bool:
-    """Whether sharp surfaces may mirror emitters, as caustics tell that are not left to paths."""
-    return choices.get("caustics", "paths") != "paths"

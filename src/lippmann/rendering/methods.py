@@ -35,6 +35,7 @@ from lippmann.rendering.film.sample_batches import FullInBatches, trace_in_batch
 from lippmann.rendering.film.wavefront import Frame, RayTotals, trace_frame
 from lippmann.rendering.film.wavefront_plan import make_plan
 from lippmann.rendering.job import Job, Traced
+from lippmann.rendering.light_statements import is_among_mirrors
 from lippmann.rendering.reprojection.common.point_image import STATUS_LAYER, TRACED
 from lippmann.rendering.reprojection.renderer import trace_reused as trace_reprojected
 from lippmann.rendering.request.choices import Denoiser, Method
@@ -307,7 +308,7 @@ def _rays_per_pixel(job: Job, rays: RayTotals) -> float:
 def _estimator(job: Job, kind: type[PictureEstimator] = PictureEstimator) -> PictureEstimator:
     """Judges a display's picture by its micro-images, a quilt by its views."""
     estimator = _estimator_of_parts(job, kind)
-    if isinstance(job.integrator, PathIntegrator) and job.integrator.photons is not None:
+    if is_among_mirrors(job.session.choices):
         estimator.expect_mirrors()
     return estimator
 

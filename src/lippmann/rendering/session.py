@@ -203,6 +203,7 @@ class Session:
                 even_background(self.built, self.request),
                 stands_alone=not self.scene.lies_off_surfaces,
             )
+            self.choices.pop("mirror_images", None)  # of a picture before
             self.choices.update(told)
         return integrator
 

@@ -128,12 +128,15 @@ def test_emitters_seen_directly_are_found():
     large = searched(scene({"type": "diffuse"}, radius=0.2, at=beside), samples=64)
     assert large.images is None
     assert not large.found_none
+    assert large.none_small
+    assert not small.none_small
 
 
 def test_where_nothing_is_mirrored_nothing_is_found():
     matt = searched(scene({"type": "diffuse"}))
     assert matt.images is None
     assert matt.found_none
+    assert matt.none_small
     # The emitter stands behind the floor.
     hidden = searched(scene(mirror(), at=np.array([0.8, 0.9, -1.4])))
     assert hidden.images is None
@@ -144,13 +147,23 @@ def test_without_memory_it_is_not_known():
     search = searched(scene(mirror()), memory=1 << 20)
     assert search.images is None
     assert not search.found_none
+    assert not search.none_small
 
 
 def test_scenes_without_emitters_of_a_size_have_none():
     import mitsuba as mi
 
-    sky = mi.load_dict({"type": "scene", "ball": {"type": "sphere", "bsdf": mirror()}, "sky": {"type": "constant"}})
-    assert searched(sky).found_none
+    def under(sky):
+        ball = {"type": "sphere", "bsdf": mirror()}
+        return searched(mi.load_dict({"type": "scene", "ball": ball, "sky": sky}))
+
+    even = under({"type": "constant"})
+    assert even.found_none
+    assert even.none_small
+    # Of a sky that differs, images are not looked for.
+    uneven = under({"type": "envmap", "bitmap": mi.Bitmap(np.ones((4, 8, 3), np.float32))})
+    assert uneven.found_none
+    assert not uneven.none_small
 
 
 def test_it_finds_the_same_in_wavefronts_of_any_size(monkeypatch):

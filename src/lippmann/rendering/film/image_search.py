@@ -58,12 +58,27 @@ def find_targets(scene: MitsubaScene) -> Targets:
     return Targets(0.5 * (low + high), 0.5 * (high - low).max(axis=1, initial=0))
 
 
+def _has_uneven_environment(scene: MitsubaScene) -> bool:
+    """Whether something small may shine that no search finds; emitters without size are sampled, and never missed."""
+    environment = scene.environment()
+    return environment is not None and mi.has_flag(environment.flags(), mi.EmitterFlags.SpatiallyVarying)
+
+
 @dataclass(frozen=True, eq=False)
 class ImageSearch:
-    """What a search came to: small images, None where there are none; and whether it was made and ``found_none``."""
+    """What a search came to.
+
+    Attributes
+    ----------
+    images:
+        Small ones; None where there are none.
+    found_none, none_small:
+        Whether it was made and found no image; none that is small, of emitters that are all looked for.
+    """
 
     images: MirrorImages | None
     found_none: bool = False
+    none_small: bool = False
 
 
 def search_images(scene: MitsubaScene, source: RaySource, samples: int, memory: int) -> ImageSearch:
@@ -85,8 +100,9 @@ def search_images(scene: MitsubaScene, source: RaySource, samples: int, memory: 
     pixels = rays.width * rays.height * rays.channels
     room = (memory - pixels * memory_model.MIRROR_IMAGES) // memory_model.IMAGE_SEARCH_LANE
     lanes = min(memory_model.preferred_lanes(), room)
+    looks_for_all = not _has_uneven_environment(scene)
     if not len(targets):
-        return ImageSearch(None, found_none=True)
+        return ImageSearch(None, found_none=True, none_small=looks_for_all)
     if lanes < memory_model.SMALLEST_LANES:
         return ImageSearch(None)
     search = _Search(scene, targets, rays)
@@ -95,7 +111,8 @@ def search_images(scene: MitsubaScene, source: RaySource, samples: int, memory: 
     searches = max(fewest, min(samples // SAMPLES_OF_SEARCH, MOST))
     if len(found) and searches > fewest:
         found = _Found.joined([found, search.from_pixels(pixels, range(fewest, searches), lanes)])
-    return ImageSearch(found.boxes(pixels), found_none=not len(found))
+    images = found.boxes(pixels)
+    return ImageSearch(images, found_none=not len(found), none_small=looks_for_all and images is None)
 
 
 @dataclass(frozen=True, eq=False)

@@ -70,9 +70,12 @@ def prepare_light(
         told["light_vertices"] = POINTS
     if request.clamp_indirect is not None:
         integrator.most_indirect = mi.Float(request.clamp_indirect / gain)
-    chains = give_chains(integrator, request, source, memory) if has_sharp and stands_alone else 0
-    if chains:
-        told["seen_chains"] = chains
-        if is_widened:
-            integrator.beam = beam_of(source, request.samples * chains)
+    if has_sharp and stands_alone:
+        chains = give_chains(integrator, request, source, memory)
+        if chains.without_images:
+            told["mirror_images"] = "none"
+        if chains.number:
+            told["seen_chains"] = chains.number
+            if is_widened:
+                integrator.beam = beam_of(source, request.samples * chains.number)
     return told

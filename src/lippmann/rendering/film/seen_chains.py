@@ -19,6 +19,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import drjit as dr
 import mitsuba as mi
@@ -72,8 +73,16 @@ _AT_ONCE = 1 << 12
 _POINTS = 1 << 10
 
 
-def give_chains(integrator: PathIntegrator, request: RenderRequest, source: RaySource, memory: int) -> int:
-    """Give the integrator the chains for the picture of ``source``; how many each path comes with, 0 for none.
+@dataclass(frozen=True)
+class GivenChains:
+    """How many chains each path comes with, 0 for none; whether a search found no small image."""
+
+    number: int
+    without_images: bool = False
+
+
+def give_chains(integrator: PathIntegrator, request: RenderRequest, source: RaySource, memory: int) -> GivenChains:
+    """Give the integrator the chains for the picture of ``source``.
 
     They are aimed at the images of small emitters that a search finds.
 
@@ -90,23 +99,23 @@ def give_chains(integrator: PathIntegrator, request: RenderRequest, source: RayS
     """
     # Where all rays of a pixel are one, or its points are taken from others, further ones show nothing.
     if not request.box_filter or request.method in REUSING:
-        return 0
+        return GivenChains(0)
     samples, is_clean = _expected_samples(request), request.denoise != "none"
     is_for_whole = request.quality is not None and request.quality_worst is None
     if is_for_whole and is_clean and integrator.photons is None:
-        return 0
-    found_none = False
+        return GivenChains(0)
+    found_none = none_small = False
     if integrator.photons is not None:
         search = search_images(integrator.scene, source, samples, memory)
-        integrator.mirror_images, found_none = search.images, search.found_none
+        integrator.mirror_images, found_none, none_small = search.images, search.found_none, search.none_small
     chains = seen_chains(integrator, source, samples, request.transfer, request.seed, is_clean, found_none)
     if not chains:
         integrator.mirror_images = None
-        return 0
+        return GivenChains(0, none_small)
     integrator.seen_chains = dr.opaque(mi.UInt32, chains)
     if integrator.photons is None:
         integrator.mirror_images = search_images(integrator.scene, source, samples, memory).images
-    return chains
+    return GivenChains(chains, none_small)
 
 
 def seen_chains(
