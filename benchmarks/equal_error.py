@@ -134,14 +134,14 @@ def _measure(stage: Stage, references: Path | None, reference_samples: int) -> d
     for samples in SAMPLES:
         traced, picture = timed(lambda samples=samples: trace_lit(stage, samples, 3))
         curves["full"].append({"spp": samples, "seconds": traced, **judge(picture)})
-        traced_for_pooled, batches = timed(lambda samples=samples: _pooled(stage, samples))
+        traced_for_pooled, batches = timed(lambda samples=samples: pooled_batches(stage, samples))
         for effort in ("fast", "high"):
             times = {"full + oidn": traced, "pooled": traced_for_pooled}
             _denoised(stage, judge, curves, (samples, effort), times, picture, batches)
     return {"judge_psnr": judge.own_psnr, "curves": curves, "to": _costs(curves)}
 
 
-def _pooled(stage: Stage, samples: int) -> Any:
+def pooled_batches(stage: Stage, samples: int) -> Any:
     """The samples of a pooled picture, as the program traces them: chains go by what a denoiser leaves, and half of the
     samples to the pixels in which it leaves noise."""
     from lippmann.rendering.film.sample_batches import FullInBatches

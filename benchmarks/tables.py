@@ -13,6 +13,7 @@ from typing import Any
 import caustics_tables
 import conformance_tables
 import equal_error_tables
+import equal_time_tables
 import estimate_coverage_tables
 import first_picture_tables
 import goals_tables
@@ -396,6 +397,7 @@ SECTIONS = {
     "first_picture": first_picture_tables.describe,
     "caustics": caustics_tables.describe,
     "light_vertices": light_vertices_tables.describe,
+    "equal_time": equal_time_tables.describe,
     "equal_error": equal_error_tables.describe,
     "goals": goals_tables.describe,
     "estimate_coverage": estimate_coverage_tables.describe,
