@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from pathlib import Path
 
 import numpy as np
@@ -98,6 +99,8 @@ def test_exif_orientation_is_obeyed(tmp_path):
     assert ends(read_photos(paths, (80, 40), PAPER).quilt.view_values(0)) == pytest.approx((0, 200, 0, 200), abs=2)
 
 
+# Once: a profile holds the second in which it was made.
+@functools.cache
 def profile(gamma):
     """An RGB profile with sRGB's primaries and the curve of a power."""
     data = bytearray(ImageCms.ImageCmsProfile(ImageCms.createProfile("sRGB")).tobytes())
