@@ -24,7 +24,7 @@ from lippmann.rendering.adaptive.method_race import (
 from lippmann.rendering.adaptive.sample_allocation import SampleAllocation
 from lippmann.rendering.adaptive.stopping import Goal, Outcome, goal_of, reach
 from lippmann.rendering.denoise.cost_model import denoising_cost, effort_of, look_cost, traced_work
-from lippmann.rendering.denoise.dual_buffer import Denoised
+from lippmann.rendering.denoise.dual_buffer import Apart, Denoised
 from lippmann.rendering.denoise.guided_denoiser import GuidedDenoiser
 from lippmann.rendering.denoise.oidn import Effort
 from lippmann.rendering.denoise.outlines import by_coverage
@@ -356,7 +356,10 @@ def _denoised_whole(job: Job, traced: Traced) -> Traced:
     if traced.frame.coverage is not None and further is not None:
         noisy = by_coverage(noisy, traced.frame.coverage, further[0] + further[1])
     seen, excess = traced.frame.seen, traced.frame.excess
-    cleaned = denoiser(noisy) if seen is None or excess is None else denoiser(noisy - seen) + (seen - excess)
+    apart = Apart(noisy, seen)
+    cleaned = apart.whole(denoiser(apart.rest))
+    if excess is not None:
+        cleaned -= excess
     traced.frame.pixels = source.own_colors(cleaned) if isinstance(source, SubpixelRays) else cleaned
     return replace(traced, options=_denoiser_options(job, denoiser), seconds={"denoise": denoiser.seconds})
 

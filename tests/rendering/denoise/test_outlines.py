@@ -77,6 +77,19 @@ def test_highlights_around_count_as_white():
     assert (lit >= 0).all()
 
 
+def test_a_surface_that_is_beyond_white_all_around_covers_by_that():
+    """A tenth of five times white is mid-grey, not a tenth of white."""
+    pixels = np.full((3, 6, 3), 5.0, np.float32)
+    share = np.ones((3, 6, 1), np.float32)
+    pixels[:, :3], share[:, :3] = 0.1, 0
+    further = share.copy()
+    further[1, 2] = 0.1
+    found = by_coverage(pixels, Coverage(share, 2), Coverage(further, 10**6))
+    assert found[1, 2] == pytest.approx(np.full(3, 0.1 + 0.1 * 4.9), rel=1e-3)
+    found[1, 2] = 0.1
+    assert np.array_equal(found, pixels)
+
+
 def test_each_sub_pixel_by_its_own_rays():
     pixels = np.zeros((3, 3, 3), np.float32)
     pixels[:, 2] = 0.8
@@ -105,11 +118,14 @@ def by_coverage_pixel_by_pixel(pixels, paths, further):
             for c in range(max(0, column - 1), min(share.shape[1], column + 2))
             if (r, c) != (row, column)
         ]
-        sides = []
+        sides, colors = [], np.array([pixels[p] for p in near])
         for weights in ([share[p] ** 4 for p in near], [(1 - share[p]) ** 4 for p in near]):
             if sum(weights) < 0.05:
                 break
-            sides.append(sum(w * np.minimum(pixels[p], 1) for w, p in zip(weights, near, strict=True)) / sum(weights))
+            mean = np.average(colors, axis=0, weights=weights)
+            deviation = np.sqrt(np.average((colors - mean) ** 2, axis=0, weights=weights))
+            seen = np.average(np.minimum(colors, 1), axis=0, weights=weights)
+            sides.append(np.maximum(seen, mean - deviation))
         else:
             result[row, column] += (of_all - paths.share[row, column]) * (sides[0] - sides[1])
     return np.maximum(result, 0)

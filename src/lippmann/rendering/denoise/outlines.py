@@ -56,24 +56,32 @@ def _colors_around(
     pixels: Floats, covered: Floats, rows: NDArray[np.intp], columns: NDArray[np.intp]
 ) -> tuple[Floats, Floats]:
     """``(n, 3)`` each: the colours of the surfaces and of what is behind them in the pixels around; the same where
-    either is not known."""
+    either is not known.
+
+    A colour is the mean of what is seen in the pixels around, or, where these agree that it is beyond white, their mean
+    less one standard deviation.
+    """
     height, width = pixels.shape[:2]
     # The side is told by all colours together, where sub-pixels have rays of their own, too.
     share = covered.mean(axis=2)
-    colors = np.zeros((2, len(rows), 3), dtype=np.float32)
+    # Of each side: what is seen of its colours, the colours, and their squares; a deviation is the root of little.
+    sums = np.zeros((2, 3, len(rows), 3))
     weights = np.zeros((2, len(rows), 1), dtype=np.float32)
     for down, right in _AROUND:
         row, column = rows + down, columns + right
         inside = (row >= 0) & (row < height) & (column >= 0) & (column < width)
         row, column = np.clip(row, 0, height - 1), np.clip(column, 0, width - 1)
-        # What is beyond white is not seen, and a highlight is no colour of a whole side.
-        shown = np.minimum(pixels[row, column], np.float32(1))
-        of_surface = share[row, column]
+        color, of_surface = pixels[row, column].astype(np.float64), share[row, column]
+        parts = np.stack([np.minimum(color, 1), color, np.square(color)])
         for side, of_side in enumerate((of_surface, 1 - of_surface)):
             weight = (np.where(inside, of_side, 0) ** _POWER)[:, None].astype(np.float32)
             weights[side] += weight
-            colors[side] += weight * shown
-    colors /= np.maximum(weights, np.float32(_LEAST_WEIGHT))
+            sums[side] += weight * parts
+    sums /= np.maximum(weights, np.float32(_LEAST_WEIGHT))[:, None]
+    seen, mean, square = sums.transpose(1, 0, 2, 3)
+    # What is beyond white is not seen, and a highlight is no colour of a whole side; but half of what is five times
+    # white in all pixels around is white still.
+    sure = mean - np.sqrt(np.maximum(square - np.square(mean), 0))
     known = (weights >= _LEAST_WEIGHT).all(axis=0)
-    surface, behind = np.where(known, colors, np.float32(0))
+    surface, behind = np.where(known, np.maximum(seen, sure), 0).astype(np.float32)
     return surface, behind
