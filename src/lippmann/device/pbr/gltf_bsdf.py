@@ -16,6 +16,7 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
 from lippmann.device.array_parts import arrays_of
 from lippmann.device.pbr import microfacet
@@ -44,6 +45,12 @@ SHARP_LOBE = "sharp_lobe"
 LAMBERTIAN = "lambertian"
 #: The attribute that is 1 where no lobe of a surface is too narrow for photons to show it, its sharp one apart.
 WIDE_LOBES = "wide_lobes"
+#: Asked for among the types of a ``BSDFContext``, beside those of Mitsuba: narrow lobes are drawn from where there are
+#: any, wide ones hardly ever. The weight of a sample goes by that; its pdf is that of plain sampling all the same, as
+#: MIS with emitters that plain paths sample needs it.
+SHARP_FIRST = 1 << 30
+#: What is left of a wide lobe's chance then: without it, what narrow lobes hardly reach would be rare and bright.
+_WIDE_CHANCE = 0.1
 #: A lobe is narrow whose GGX widths are below the first, and wide if they are above the second.
 NARROW_ALPHA, WIDE_ALPHA = 0.02, 0.04
 
@@ -104,15 +111,17 @@ def _bsdf_class(variant: str) -> type[BSDF]:
         def sample(
             self, ctx: BSDFContext, si: SurfaceInteraction3f, sample1: Float, sample2: Point2f, active: Bool = True
         ) -> tuple[BSDFSample3f, Color3f]:
-            del ctx
             place = Place(si, active)
             opacity = None if self.model.opacity is None else self.model.coverage(place)
             u = sample1 if opacity is None else dr.minimum(sample1 / opacity, 1)
-            point = surface_point(self.model, place)
-            wo, kind, possible = self._sample_lobes(point, u, sample2)
+            point = drawn = surface_point(self.model, place)
+            if self._may_be_sharp and ctx.type_mask & SHARP_FIRST:
+                drawn = self._sharp_first(point)
+            wo, kind, possible = self._sample_lobes(drawn, u, sample2)
             value, pdf = self._scatter(point, wo)
+            density = pdf if drawn is point else self._scatter(drawn, wo)[1]
             pdf = dr.select(possible, pdf, 0)
-            weight = dr.select(pdf > 0, value / pdf, 0)
+            weight = dr.select(possible & (density > 0), value / density, 0)
             eta: Float = dr.select(kind == transmitting, point.eta, 1) if self.model.solid else mi.Float(1)
             if opacity is not None:
                 passes = sample1 >= opacity
@@ -200,6 +209,17 @@ def _bsdf_class(variant: str) -> type[BSDF]:
         def _narrow_coat(self, point: Point) -> Bool:
             coat = point.coat
             return mi.Bool(False) if coat is None else self._narrow(coat.lobe) & (coat.weight > 0)
+
+        def _sharp_first(self, point: Point) -> Point:
+            """See :data:`SHARP_FIRST`: ``point`` with other chances."""
+            body, coat = self._narrow_body(point), point.coat
+            diffuse_chance = dr.select(body, _WIDE_CHANCE * point.diffuse_chance, point.diffuse_chance)
+            if coat is not None:
+                gloss = self._narrow_coat(point)
+                above = dr.select(body, coat.chance, 1 - _WIDE_CHANCE * (1 - coat.chance))
+                below = dr.select(body, _WIDE_CHANCE * coat.chance, coat.chance)
+                coat = replace(coat, chance=dr.select(gloss, above, below))
+            return replace(point, diffuse_chance=diffuse_chance, coat=coat)
 
         def _has_wide_lobes(self, point: Point) -> Float:
             """See :data:`WIDE_LOBES`."""

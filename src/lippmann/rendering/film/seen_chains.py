@@ -6,13 +6,12 @@ usual scenes. Where there are caustics, a look may miss emitters that are seen s
 meets one; a part of what that would bring is added, unless a search (:mod:`.image_search`) finds no such image.
 
 Where a picture is denoised, hardly anything is left of the rest's variance, and all of that of seen light, which goes
-past the denoiser: more chains are worth their time then, and too few of them are worse than none. So are, where there
-are no photons, more than leave a difference that is seen: the more samples, the fewer chains each comes with.
+past the denoiser: more chains are worth their time then, and too few of them are worse than none.
 
-Without photons, chains cost a third of a path, and mostly as much time is better spent on samples: light that one
-chain in many meets is noisy even with hundreds, and a denoiser makes as much of it. Chains pay where seen light is an
-image that a few of them, spread evenly over the pixel, show well: a sky in smooth gloss. Even there a picture reaches a
-quality as a whole sooner without any (docs/research/seen-light.md).
+Without photons, chains cost a quarter of a path each. They pay beside a denoiser alone, and where seen light is an
+image that a few of them, spread evenly over the pixel, show well: a sky in smooth gloss. Light that one chain in many
+meets is noisy even with hundreds, and a denoiser makes as much of the samples that the same time brings. The more
+samples, the fewer chains each comes with (docs/research/seen-light.md).
 """
 
 from __future__ import annotations
@@ -49,18 +48,19 @@ FEWEST_LOOKS, MOST_LOOKS, LOOKS_OF_PIXEL = 1 << 13, 1 << 20, 8
 #: scenes.
 REST_VARIANCE, CLEAN_REST_VARIANCE = 0.01, 0.001
 #: What a chain costs of a path that looks up photons, and of one that does not.
-CHAIN_COST, PLAIN_CHAIN_COST = 0.05, 0.3
-#: Chains of a pixel, spread evenly, whose mean is to show an image; and what its variance may be of that of as many
-#: chains at random (0.1 for a sky in smooth gloss, 0.4 to 2 for spots of light in beads, metal and varnish).
-SPREAD, MOST_UNEVEN = 4, 0.25
+CHAIN_COST, PLAIN_CHAIN_COST = 0.05, 0.25
+#: Chains of a pixel, spread evenly, whose mean is to show an image where there are no photons; and its variance times
+#: their number, in codes: below the first a denoiser shows it as well without chains, above the second it does better
+#: (0.0006 to 0.001 for a sky in smooth gloss, 0.008 to 0.02 for spots of light in beads, metal and varnish).
+SPREAD, LEAST_SPREAD, MOST_SPREAD = 4, 1.5e-4, 3e-3
+#: Chains of each path then where it is the only one of its pixel; their number goes with one over the root of the
+#: samples'.
+OF_ONE_SAMPLE = 8
 #: Chains of a path by which what single ones meet is held to be too bright or not.
 USUAL = 2
 #: Chains of a pixel whose mean is as clean as a denoiser would have made of its paths; and of one path, at most that
 #: many at least.
 CLEAN, MOST_FOR_CLEAN = 32, 16
-#: Chains of a pixel beyond which those beside a denoiser bring nothing that is worth their time, where there are no
-#: photons: highlights of a sky, where they are not met by hundreds, are rarer than a look can tell.
-ENOUGH = 256
 #: Meetings with the brightest emitter that count beside those of the look: as many as may well have been missed.
 MISSED = 0.25
 #: Samples that a picture is taken to need at most, and at least, of which it is not known.
@@ -101,8 +101,7 @@ def give_chains(integrator: PathIntegrator, request: RenderRequest, source: RayS
     if not request.box_filter or request.method in REUSING:
         return GivenChains(0)
     samples, is_clean = _expected_samples(request), request.denoise != "none"
-    is_for_whole = request.quality is not None and request.quality_worst is None
-    if is_for_whole and is_clean and integrator.photons is None:
+    if not is_clean and integrator.photons is None:
         return GivenChains(0)
     found_none = none_small = False
     if integrator.photons is not None:
@@ -146,33 +145,36 @@ def seen_chains(
     found_none:
         A search has found no image of an emitter that has a place: none may have been missed but the environment's.
     """
-    beside_photons = integrator.photons is not None
     looks = _looks(integrator, source, samples, seed)
     together = samples * USUAL
 
     def mean_variance(met: NDArray[np.float32]) -> float:
         return sum(variance_of(part, together, transfer) * len(part) for part in _parts(met)) / len(met)
 
-    variance = mean_variance(looks)
-    if is_clean and not beside_photons and SPREAD * mean_variance(_means_of(SPREAD, looks)) > MOST_UNEVEN * variance:
+    if integrator.photons is None:
+        return chains_of_image(SPREAD * mean_variance(_means_of(SPREAD, looks)), samples)
+    brightest = min(_brightest(integrator, source, seed, of_environment=found_none), together)
+    slope = float(coding_slope(np.array(_GREY), transfer))
+    missed = MISSED * (slope * brightest) ** 2 / (looks.size / 3)
+    return chains_for(mean_variance(looks) + missed, samples, is_clean)
+
+
+def chains_of_image(variance: float, samples: int) -> int:
+    """As :func:`seen_chains`, of a denoised picture without photons, by the variance in codes of :data:`SPREAD` chains
+    times their number."""
+    if not LEAST_SPREAD < variance < MOST_SPREAD:
         return 0
-    if beside_photons:
-        brightest = min(_brightest(integrator, source, seed, of_environment=found_none), together)
-        slope = float(coding_slope(np.array(_GREY), transfer))
-        variance += MISSED * (slope * brightest) ** 2 / (looks.size / 3)
-    return chains_for(variance, samples, beside_photons, is_clean)
+    return 1 << max(1, round(math.log2(OF_ONE_SAMPLE / math.sqrt(samples))))
 
 
-def chains_for(variance: float, samples: int, beside_photons: bool, is_clean: bool) -> int:
-    """As :func:`seen_chains`, by the variance of a chain in codes, and whether paths look up photons."""
-    cost = CHAIN_COST if beside_photons else PLAIN_CHAIN_COST
-    most = MOST if beside_photons or not is_clean else min(MOST, max(2, ENOUGH // samples))
+def chains_for(variance: float, samples: int, is_clean: bool) -> int:
+    """As :func:`seen_chains`, beside photons, by the variance of a chain in codes."""
     rest = CLEAN_REST_VARIANCE if is_clean else REST_VARIANCE
-    wanted = math.sqrt(variance * (1 - cost) / (rest * cost))
+    wanted = math.sqrt(variance * (1 - CHAIN_COST) / (rest * CHAIN_COST))
     fewest = min(max(2.0, CLEAN / samples), MOST_FOR_CLEAN) if is_clean else 2.0
     if wanted < (max(2.0, fewest / 4) if is_clean else math.sqrt(2)):
         return 0
-    return 1 << min(most.bit_length() - 1, round(math.log2(max(wanted, fewest))))
+    return 1 << min(MOST.bit_length() - 1, round(math.log2(max(wanted, fewest))))
 
 
 def _expected_samples(request: RenderRequest) -> int:

@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, cast
 import drjit as dr
 import mitsuba as mi
 
-from lippmann.device.pbr.gltf_bsdf import SHARP_LOBE
+from lippmann.device.pbr.gltf_bsdf import SHARP_FIRST, SHARP_LOBE
 from lippmann.device.pbr.surface_point import widen_lobes
 from lippmann.device.sobol import SampleStream, hash32
 from lippmann.device.types import (
@@ -152,6 +152,7 @@ def _chain(
     """
     scene = integrator.scene
     context = mi.BSDFContext()
+    context.type_mask |= SHARP_FIRST
     o, d = mi.Point3f(ray.o), mi.Vector3f(ray.d)
     active = mi.Bool(active)
     light, throughput = mi.Spectrum(0), mi.Spectrum(1)
