@@ -35,7 +35,8 @@ SAMPLES = (1, 4, 16)
 #: Of the earlier program's pictures; from 16 samples on, the curve ends where it takes longer than today's.
 EARLIER_SAMPLES = (1, 2, 4, 8, 16, 32, 64)
 REFERENCE = 96
-RUNS = 3
+#: Runs of either in turn: of pictures that take longer than so many seconds, and of others.
+LONG, RUNS, SHORT_RUNS = 1.0, 3, 9
 
 
 def main() -> None:
@@ -73,11 +74,11 @@ def _measure(earlier: Earlier, name: str, display: str, given: argparse.Namespac
     for effort in ("fast", "high"):
         latest = 0.0
         for samples in EARLIER_SAMPLES:
-            earlier.picture(samples, effort)
+            warm, _ = earlier.picture(samples, effort)
             if samples in SAMPLES:
                 picture(stage, samples, effort)
             times: dict[str, list[float]] = {"earlier": [], "today": []}
-            for _ in range(RUNS):
+            for _ in range(RUNS if warm > LONG else SHORT_RUNS):
                 seconds, before = earlier.picture(samples, effort)
                 times["earlier"].append(seconds)
                 if samples in SAMPLES:

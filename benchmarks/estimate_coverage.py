@@ -218,8 +218,9 @@ def main() -> None:
         if "plain" not in chosen.ways or one["scene"] not in chosen.scenes
     ]
     for place in range(chosen.displays):
-        for number, scene in enumerate(chosen.scenes):
-            name = list(kinds)[(number + place) % len(kinds)]
+        for scene in chosen.scenes:
+            # By the scene alone: its cases are the same whichever others are named.
+            name = list(kinds)[(list(SCENES).index(scene) + place) % len(kinds)]
             case = Case(scene, kinds[name], chosen.seconds, chosen.references)
             told = {"scene": scene, "display": name, "reference_samples": case.reference_samples}
             for way in chosen.ways:

@@ -62,7 +62,8 @@ def given(integrator, source, *, gain=1.0, memory=1 << 30, **options):
     from lippmann.rendering.request.render_request import RenderRequest
 
     integrator.light_vertices = integrator.vertex_passes = None
-    return give_light_vertices(integrator, RenderRequest(integrator="path", **options), source, memory, gain)
+    request = RenderRequest(**({"integrator": "path", "spp": 16} | options))
+    return give_light_vertices(integrator, request, source, memory, gain)
 
 
 def batches(integrator, source, memory=1 << 30, spp=16, seed=5):
@@ -89,6 +90,7 @@ def test_a_small_emitter_beside_a_wall_is_worth_it():
         (SKY, {}),
         (small(x=0, y=0.2, radius=0.3, radiance=3.0), {}),  # in the middle: all walls are lit alike
         (small(), {"depth": 1}),
+        (small(), {"spp": 1}),
         (small(), {"integrator": "classic"}),
     ],
 )
