@@ -69,18 +69,18 @@ def _lobe(
     anisotropy: Anisotropy | None = None,
 ) -> Lobe:
     wi = mi.Vector3f(place.si.wi.x, place.si.wi.y, dr.abs(place.si.wi.z))
-    alpha = dr.clip(dr.square(roughness.eval(place)), microfacet.MIN_ALPHA, 1)
-    alpha = mi.Point2f(dr.minimum(dr.sqrt(dr.square(alpha) + place.si.duv_dx.x), 1))
+    own = dr.clip(dr.square(roughness.eval(place)), microfacet.MIN_ALPHA, 1)
+    alpha = mi.Point2f(dr.minimum(dr.sqrt(dr.square(own) + place.si.duv_dx.x), 1))
     if normal_map is None and anisotropy is None:
-        return Lobe(None, wi, alpha)
+        return Lobe(None, wi, alpha, own)
     normal = mapped_normal(normal_map, place, flip)
     frame = mi.Frame3f(normal)
     if anisotropy is not None:
         along, strength = _direction(anisotropy, place)
         frame.s = dr.normalize(along - normal * dr.dot(along, normal))
         frame.t = dr.cross(normal, frame.s)
-        alpha.x = dr.lerp(alpha.x, 1, dr.square(strength))
-    return Lobe(frame, frame.to_local(wi), alpha, tilted=normal_map is not None)
+        alpha.x, own = (dr.lerp(width, 1, dr.square(strength)) for width in (alpha.x, own))
+    return Lobe(frame, frame.to_local(wi), alpha, own, tilted=normal_map is not None)
 
 
 def _direction(anisotropy: Anisotropy, place: Place) -> tuple[Vector3f, Float]:
