@@ -149,20 +149,17 @@ class Case:
 
     def beside_the_truth(self, traced: Any) -> dict[str, Any]:
         """What a picture says of itself, and what is true."""
-        from lippmann.rendering.estimate.psnr import stated_among_mirrors
-        from lippmann.rendering.light_statements import is_among_mirrors
+        from lippmann.rendering.light_statements import stated_error
 
         psnr, worst = self.truth(traced.frame.pixels)
-        estimate = traced.estimate
-        if is_among_mirrors(self.session.choices):
-            estimate = stated_among_mirrors(estimate, traced.samples)
+        told: Any = stated_error(traced.estimate, traced.samples, self.session.choices)
         return {
             "samples": traced.samples,
             "psnr": psnr,
             "worst": worst,
-            "stated": estimate.to_dict(),
-            "psnr_inside": estimate.psnr_low <= psnr <= estimate.psnr_high,
-            "worst_inside": estimate.worst_low <= worst <= estimate.worst_high,
+            "stated": told,
+            "psnr_inside": told["psnr_low"] <= psnr <= told["psnr_high"],
+            "worst_inside": told["worst_low"] <= worst <= told["worst_high"],
         }
 
 
