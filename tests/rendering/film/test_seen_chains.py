@@ -132,8 +132,9 @@ def test_smooth_gloss_under_a_sky_gets_chains_without_photons(engine):
     assert chains(picture(0.02, sky=4 * spots)) == 0
     # Where all the noise is left in, samples bring more.
     assert chains(picture(0.02, denoise="none")) == 0
+    # A low quality of the whole picture is reached by the first samples anyway.
     goal = {"spp": None, "quality": 12.0}
-    assert chains(picture(0.02, **goal)) >= 2
+    assert chains(picture(0.02, **goal)) == 0
     assert chains(picture(0.02, **goal, quality_worst=8.0)) >= 2
 
 
@@ -172,3 +173,20 @@ def test_as_many_samples_are_counted_on_as_a_quality_takes(asked, samples):
     from lippmann.rendering.request.render_request import RenderRequest
 
     assert _expected_samples(RenderRequest(**asked)) == samples
+
+
+@pytest.mark.parametrize(
+    ("asked", "expected"),
+    [
+        ({"spp": 4}, False),
+        ({"quality": 35.0}, True),
+        ({"quality": 40.0}, False),
+        ({"quality": 35.0, "quality_worst": 30.0}, False),
+        ({"max_time": 3.0}, False),
+    ],
+)
+def test_few_samples_reach_a_low_quality(asked, expected):
+    from lippmann.rendering.film.seen_chains import _is_reached_by_few
+    from lippmann.rendering.request.render_request import RenderRequest
+
+    assert _is_reached_by_few(RenderRequest(**asked)) == expected

@@ -61,6 +61,8 @@ USUAL = 2
 #: Chains of a pixel whose mean is as clean as a denoiser would have made of its paths; and of one path, at most that
 #: many at least.
 CLEAN, MOST_FOR_CLEAN = 32, 16
+#: dB that a whole picture has after its first few samples beside a denoiser, with chains or without.
+REACHED_BY_FEW = 38.0
 #: Meetings with the brightest emitter that count beside those of the look: as many as may well have been missed.
 MISSED = 0.25
 #: Samples that a picture is taken to need at most, and at least, of which it is not known.
@@ -101,7 +103,7 @@ def give_chains(integrator: PathIntegrator, request: RenderRequest, source: RayS
     if not request.box_filter or request.method in REUSING:
         return GivenChains(0)
     samples, is_clean = _expected_samples(request), request.denoise != "none"
-    if not is_clean and integrator.photons is None:
+    if integrator.photons is None and (not is_clean or _is_reached_by_few(request)):
         return GivenChains(0)
     found_none = none_small = False
     if integrator.photons is not None:
@@ -175,6 +177,11 @@ def chains_for(variance: float, samples: int, is_clean: bool) -> int:
     if wanted < (max(2.0, fewest / 4) if is_clean else math.sqrt(2)):
         return 0
     return 1 << min(MOST.bit_length() - 1, round(math.log2(max(wanted, fewest))))
+
+
+def _is_reached_by_few(request: RenderRequest) -> bool:
+    """Whether a quality is asked for, of the whole picture, to which chains without photons are only in the way."""
+    return request.quality is not None and request.quality_worst is None and request.quality < REACHED_BY_FEW
 
 
 def _expected_samples(request: RenderRequest) -> int:
