@@ -359,7 +359,7 @@ def _denoised_whole(job: Job, traced: Traced) -> Traced:
     apart = Apart(noisy, seen)
     cleaned = apart.whole(denoiser(apart.rest))
     if excess is not None:
-        cleaned -= excess
+        cleaned = cleaned - excess
     traced.frame.pixels = source.own_colors(cleaned) if isinstance(source, SubpixelRays) else cleaned
     return replace(traced, options=_denoiser_options(job, denoiser), seconds={"denoise": denoiser.seconds})
 

@@ -251,6 +251,15 @@ CASES = {
 }
 
 
+BINS = 8, 8  # of directions, in z and azimuth
+
+
+def binned(vectors, values):
+    """Sums of ``values`` by bins of directions."""
+    edges = np.linspace(-1, 1, BINS[0] + 1), np.linspace(-np.pi, np.pi, BINS[1] + 1)
+    return np.histogram2d(vectors[:, 2], np.arctan2(vectors[:, 1], vectors[:, 0]), edges, weights=values)[0]
+
+
 @pytest.mark.parametrize("cosine", [0.9, 0.3, -0.6])
 @pytest.mark.parametrize("name", CASES)
 def test_draws_follow_their_density_and_weigh_right(build, parts, name, cosine):
@@ -261,19 +270,12 @@ def test_draws_follow_their_density_and_weigh_right(build, parts, name, cosine):
     from mitsuba import BSDFFlags
 
     scattered = (pdf > 0) & (kinds != int(BSDFFlags.Null))
-    bins = 8, 8  # in z and azimuth
-    z_edges, phi_edges = np.linspace(-1, 1, bins[0] + 1), np.linspace(-np.pi, np.pi, bins[1] + 1)
-
-    def binned(vectors, values):
-        phi = np.arctan2(vectors[:, 1], vectors[:, 0])
-        return np.histogram2d(vectors[:, 2], phi, [z_edges, phi_edges], weights=values)[0]
-
     drawn = binned(wo[scattered], np.full(scattered.sum(), 1 / count))
     light = binned(wo[scattered], factor[scattered, 0] / count)
 
     steps = 96  # midpoints per bin and axis
-    z = (np.arange(bins[0] * steps) + 0.5) / (bins[0] * steps) * 2 - 1
-    phi = ((np.arange(bins[1] * steps) + 0.5) / (bins[1] * steps) * 2 - 1) * np.pi
+    z = (np.arange(BINS[0] * steps) + 0.5) / (BINS[0] * steps) * 2 - 1
+    phi = ((np.arange(BINS[1] * steps) + 0.5) / (BINS[1] * steps) * 2 - 1) * np.pi
     z, phi = (part.ravel() for part in np.meshgrid(z, phi, indexing="ij"))
     r = np.sqrt(1 - z**2)
     grid = np.column_stack([r * np.cos(phi), r * np.sin(phi), z])
@@ -314,15 +316,12 @@ def test_narrow_lobes_first_show_the_same_light(build, parts, name, cosine):
 
     bsdf = bsdf_of(build, parts, NARROW[name])
     count, wi = 400_000, at(cosine)
-    edges = [np.linspace(-1, 1, 9), np.linspace(-np.pi, np.pi, 9)]
     sums, chances = [], []
     for asked in (0, SHARP_FIRST):
         wo, factor, pdf, kinds = draw(bsdf, wi, count, seed=1 + asked % 7, asked=asked)
         scattered = (kinds != int(BSDFFlags.Null)) & (factor[:, 0] > 0)
         wo, light = wo[scattered], factor[scattered, 0] / count
-        sums.append(
-            [np.histogram2d(wo[:, 2], np.arctan2(*wo[:, 1::-1].T), edges, weights=w)[0] for w in (light, light**2)]
-        )
+        sums.append([binned(wo, part) for part in (light, light**2)])
         chances.append((pdf[scattered] > 2).mean())
         # The density is that of plain draws; below a thousandth float32 has nothing to say about narrow lobes.
         told = evaluate(bsdf, wi, wo)[1]
