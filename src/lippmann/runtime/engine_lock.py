@@ -17,6 +17,7 @@ from contextlib import contextmanager, nullcontext, suppress
 from typing import Any, NoReturn
 
 from lippmann.errors import EngineError
+from lippmann.runtime.collector import no_collection
 
 #: Libraries that start threads of their own.
 _THREADED = ("drjit", "pyoidn")
@@ -32,7 +33,8 @@ def exclusive() -> Iterator[None]:
     """Exclusive use of the engine by the calling thread; a context manager, and as ``@exclusive()`` a decorator.
 
     The call waits until no other thread uses the engine; Ctrl-C ends the wait. The lock is reentrant, and fair: a
-    thread that takes it again and again, as live rendering does, lets one that waits go first.
+    thread that takes it again and again, as live rendering does, lets one that waits go first. Python's cyclic
+    collector waits for its end.
 
     Raises
     ------
@@ -51,7 +53,8 @@ def exclusive() -> Iterator[None]:
         lock.acquire()
     _depth.of_thread = depth + 1
     try:
-        yield
+        with nullcontext() if depth else no_collection():
+            yield
     finally:
         _depth.of_thread -= 1
         lock.release()

@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
+import os
+from collections import deque
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
-from types import TracebackType
 
 #: Bands per thread: bands of equal length do not take equal time.
 _BANDS_PER_THREAD = 4
 #: Smallest band in rows and in pixels: a call costs some ten microseconds.
 SMALLEST_BAND_OF_ROWS, SMALLEST_BAND_OF_PIXELS = 16, 4096
+
+#: Helpers by their number, kept: starting threads takes as long as a kernel over a small picture.
+_helpers: dict[int, ThreadPoolExecutor] = {}
+
+if hasattr(os, "register_at_fork"):  # not on Windows, which has no fork
+    # Threads do not survive one.
+    os.register_at_fork(after_in_child=_helpers.clear)
 
 
 class Bands:
@@ -22,12 +30,11 @@ class Bands:
     Parameters
     ----------
     threads:
-        Number of threads, at least 1.
+        Number of threads, at least 1: the one that calls is among them.
     """
 
     def __init__(self, threads: int) -> None:
         self._threads = threads
-        self._pool = ThreadPoolExecutor(threads) if threads > 1 else None
 
     def lines(self, kernel: Callable[..., None], count: int, *arguments: object) -> None:
         """Call ``kernel(first_row, last_row, *arguments)`` for all of ``count`` rows, and wait."""
@@ -39,19 +46,32 @@ class Bands:
 
     def _run(self, kernel: Callable[..., None], length: int, smallest: int, arguments: tuple[object, ...]) -> None:
         count = max(1, min(self._threads * _BANDS_PER_THREAD, length // smallest))
-        if self._pool is None or count == 1:
+        if self._threads == 1 or count == 1:
             kernel(0, length, *arguments)
             return
-        edges = [length * i // count for i in range(count + 1)]
-        waiting = [self._pool.submit(kernel, a, b, *arguments) for a, b in pairwise(edges)]
-        for future in waiting:
-            future.result()
+        waiting = deque(pairwise([length * i // count for i in range(count + 1)]))
 
-    def __enter__(self) -> Bands:
-        return self
+        def take_bands() -> None:
+            while True:
+                try:
+                    first, last = waiting.popleft()
+                except IndexError:
+                    return
+                kernel(first, last, *arguments)
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        if self._pool is not None:
-            self._pool.shutdown(cancel_futures=True)
+        pool = _pool(self._threads - 1)
+        helping = [pool.submit(take_bands) for _ in range(min(self._threads, count) - 1)]
+        try:
+            take_bands()
+        finally:
+            waiting.clear()
+            # Helpers that are busy elsewhere, with whoever waits for this one perhaps, are not waited for.
+            for helper in helping:
+                if not helper.cancel():
+                    helper.result()
+
+
+def _pool(threads: int) -> ThreadPoolExecutor:
+    if threads not in _helpers:
+        _helpers[threads] = ThreadPoolExecutor(threads)
+    return _helpers[threads]

@@ -121,8 +121,8 @@ def _compiled(image: IntegralImage, planes: Sequence[float], width: int, height:
         total = np.zeros((height, width, 3), dtype=np.float32)
         steps = np.zeros((height, width + 1), dtype=np.int32)
         place = x, y, float(plane), lattice.layout == "hexagonal", np.array(numbers)
-        with Bands(usable_cores()) as bands:
-            bands.lines(add_views, height, views, masks, eyes, *place, total, steps)
+        bands = Bands(usable_cores())
+        bands.lines(add_views, height, views, masks, eyes, *place, total, steps)
         count = np.cumsum(steps[:, :-1], axis=1, dtype=np.int32).astype(np.float32)
         total /= np.maximum(count, 1)[..., None]
         yield total

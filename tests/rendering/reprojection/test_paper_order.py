@@ -53,8 +53,8 @@ def make(display, tracer, method="lens_view"):
 
     points = PointImage.empty(display.panel.height, display.panel.width)
     reported = []
-    with Bands(1) as bands:
-        getattr(PaperOrder(display, points, tracer, bands, reported.append), method)()
+    bands = Bands(1)
+    getattr(PaperOrder(display, points, tracer, bands, reported.append), method)()
     assert sum(reported) == np.count_nonzero(points.status == 0)
     return points
 

@@ -43,13 +43,13 @@ def composite(
     colors = np.empty((len(origins), 3), np.float32)
     transmittances = np.empty(len(origins), np.float32)
     bvh = table.bvh
-    with Bands(threads) as bands:
-        bands.pixels(
-            _composite,
-            len(origins),
-            *(origins, directions, ends, table.rows, table.harmonics),
-            *(bvh.boxes, bvh.first, bvh.size, bvh.order, colors, transmittances),
-        )
+    bands = Bands(threads)
+    bands.pixels(
+        _composite,
+        len(origins),
+        *(origins, directions, ends, table.rows, table.harmonics),
+        *(bvh.boxes, bvh.first, bvh.size, bvh.order, colors, transmittances),
+    )
     return colors, transmittances
 
 

@@ -56,14 +56,14 @@ def composite(
     """
     colors = np.empty((len(origins), 3), np.float32)
     transmittances = np.empty(len(origins), np.float32)
-    with Bands(threads) as bands:
-        bands.pixels(
-            _composite,
-            len(origins),
-            *(origins, directions, ends, np.ascontiguousarray(toward_light, dtype=np.float64)),
-            *(table.grid, table.voxel_from_world, table.bin_scale, table.bin_offset),
-            *(table.extinction, table.integral, table.occupied, table.shading, colors, transmittances),
-        )
+    bands = Bands(threads)
+    bands.pixels(
+        _composite,
+        len(origins),
+        *(origins, directions, ends, np.ascontiguousarray(toward_light, dtype=np.float64)),
+        *(table.grid, table.voxel_from_world, table.bin_scale, table.bin_offset),
+        *(table.extinction, table.integral, table.occupied, table.shading, colors, transmittances),
+    )
     return colors, transmittances
 
 

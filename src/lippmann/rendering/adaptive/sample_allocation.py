@@ -118,11 +118,11 @@ class SampleAllocation:
 
     def _chosen(self, noise: Floats, share: float) -> NDArray[np.bool_] | None:
         """The noisiest pixels for their cost that together cost this share of what all do; None if it is not theirs."""
-        with Bands(self._threads) as bands:
-            around, cost = (
-                mean_around(np.ascontiguousarray(values, dtype=np.float32), RADIUS, bands).ravel()
-                for values in (noise, self._batches.rays_of_sample())
-            )
+        bands = Bands(self._threads)
+        around, cost = (
+            mean_around(np.ascontiguousarray(values, dtype=np.float32), RADIUS, bands).ravel()
+            for values in (noise, self._batches.rays_of_sample())
+        )
         order = np.argsort(-around / cost, kind="stable")
         spent = np.cumsum(cost[order], dtype=np.float64)
         chosen = np.zeros(around.size, dtype=np.bool_)

@@ -275,8 +275,8 @@ class Denoised:
         slope = coding_slope(picture, transfer)
         shown = np.float32(0.5) * (noisy[0] + noisy[1])
         scatter = np.abs(noisy[0] - noisy[1]).mean(axis=2)
-        with Bands(self._threads) as bands:
-            nearby = mean_around(scatter, 1, bands)[..., None]
+        bands = Bands(self._threads)
+        nearby = mean_around(scatter, 1, bands)[..., None]
         apart = shown + np.float32(FAR_ABOVE) * nearby
         truth = np.where(picture > 1, np.minimum(shown, 1), apart)
         far = picture - truth > _LEAST_STEP

@@ -49,11 +49,11 @@ def own_share(noisy: Halves, clean: Halves, transfer: Transfer, *, threads: int)
     threads:
         CPU threads; the result does not depend on them.
     """
-    with Bands(threads) as bands:
-        noise, error = measured(judged_rows, noisy, clean, transfer=transfer, bands=bands)
-        share = np.ones_like(noise)
-        for reach in (NEAR, FAR):
-            of_noise = np.maximum(mean_around(noise, reach, bands), 0)
-            known = leave_one_out_mean(error, reach, _DEVIATIONS, bands)
-            share *= known / (known + of_noise + np.float32(_NOTHING))
+    bands = Bands(threads)
+    noise, error = measured(judged_rows, noisy, clean, transfer=transfer, bands=bands)
+    share = np.ones_like(noise)
+    for reach in (NEAR, FAR):
+        of_noise = np.maximum(mean_around(noise, reach, bands), 0)
+        known = leave_one_out_mean(error, reach, _DEVIATIONS, bands)
+        share *= known / (known + of_noise + np.float32(_NOTHING))
     return np.sqrt(share)[..., None]

@@ -44,7 +44,7 @@ def own_light(noisy: Halves, clean: Halves, shared: Halves, transfer: Transfer, 
     threads:
         CPU threads; the result does not depend on them.
     """
-    with Bands(threads) as bands:
-        gain, apart = measured(compared_rows, noisy, clean, shared, transfer=transfer, bands=bands)
-        known = leave_one_out_mean(gain, REACH, _DEVIATIONS, bands)
-        return np.minimum(known / (mean_around(apart, REACH, bands) + np.float32(_NOTHING)), 1)[..., None]
+    bands = Bands(threads)
+    gain, apart = measured(compared_rows, noisy, clean, shared, transfer=transfer, bands=bands)
+    known = leave_one_out_mean(gain, REACH, _DEVIATIONS, bands)
+    return np.minimum(known / (mean_around(apart, REACH, bands) + np.float32(_NOTHING)), 1)[..., None]

@@ -171,8 +171,8 @@ class Progressive:
         first, second = (codes_of(half.reshape(-1, 3), self._request).astype(np.float32) for half in noisy)
         taken = self._picture(np.repeat(self._taken[:, None], 3, axis=1).astype(np.float32))
         variance = (np.square(first - second).reshape(shape) * taken / 2).mean(axis=-1)
-        with Bands(threads) as bands:
-            around = mean_of_others(np.ascontiguousarray(variance), _NOISE_REACH, bands)
+        bands = Bands(threads)
+        around = mean_of_others(np.ascontiguousarray(variance), _NOISE_REACH, bands)
         noise = np.zeros(len(self._taken) + 1, np.float32)  # the last stands for places past the panel
         blocks = self._pixels.blocks
         noise[self._pixels.number if blocks is None else blocks[..., None]] = np.sqrt(np.maximum(around, 0))[..., None]

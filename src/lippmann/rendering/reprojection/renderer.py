@@ -112,7 +112,8 @@ def trace_reused(
     started = time.perf_counter()
     points = PointImage.empty(source.height, source.width)
     compiling = cast("Any", event).TimingListener()
-    with event.install_listener("numba:compile", compiling), Bands(threads) as bands:
+    bands = Bands(threads)
+    with event.install_listener("numba:compile", compiling):
         tracer = PixelTracer(
             integrator,
             source,

@@ -76,15 +76,15 @@ def share_light(
     if lenses is None:
         lenses = lens_numbers(display)
     groups = [slice(0, 3)] if len(lenses) == 1 else [slice(c, c + 1) for c in range(3)]
-    with Bands(threads) as bands:
-        for lens, group in zip(lenses, groups, strict=True):
-            part = np.ascontiguousarray(light[..., group])
-            mean = np.empty_like(part)
-            surface = (guides.normal, guides.height, lens, centers)
-            bands.lines(
-                share_rows, len(light), part, *surface, float(display.gap), *reach, is_lenticular, float(stop), mean
-            )
-            shared[..., group] = mean
+    bands = Bands(threads)
+    for lens, group in zip(lenses, groups, strict=True):
+        part = np.ascontiguousarray(light[..., group])
+        mean = np.empty_like(part)
+        surface = (guides.normal, guides.height, lens, centers)
+        bands.lines(
+            share_rows, len(light), part, *surface, float(display.gap), *reach, is_lenticular, float(stop), mean
+        )
+        shared[..., group] = mean
     return np.asarray(shared * albedo, dtype=np.float32)
 
 

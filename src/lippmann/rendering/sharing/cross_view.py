@@ -52,18 +52,18 @@ def share_views(pixels: Floats, source: QuiltRays, guides: Guides, *, threads: i
     shared = np.empty_like(light)
     step = 2 * cone_tangent(source.display) / source.views
     display_width, _ = source.display.size_mm
-    with Bands(threads) as bands:
-        bands.lines(
-            share_view_rows,
-            len(light),
-            light,
-            np.ascontiguousarray(guides.normal, dtype=np.float32),
-            np.ascontiguousarray(guides.height, dtype=np.float32),
-            slopes,
-            source.columns,
-            1 / source.display.viewing_distance,
-            source.view_size[0] / display_width,
-            int(REACH / step),
-            shared,
-        )
+    bands = Bands(threads)
+    bands.lines(
+        share_view_rows,
+        len(light),
+        light,
+        np.ascontiguousarray(guides.normal, dtype=np.float32),
+        np.ascontiguousarray(guides.height, dtype=np.float32),
+        slopes,
+        source.columns,
+        1 / source.display.viewing_distance,
+        source.view_size[0] / display_width,
+        int(REACH / step),
+        shared,
+    )
     return np.asarray(shared * albedo, dtype=np.float32)

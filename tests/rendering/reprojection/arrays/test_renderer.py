@@ -50,13 +50,13 @@ def make(display, tracer, the_rules, method="lens_view", threads=1, searching=Fa
     from lippmann.runtime.row_threads import Bands
 
     points = PointImage.empty(display.panel.height, display.panel.width)
-    with Bands(threads) as bands:
-        renderer = ArrayRenderer(display, points, tracer, bands, the_rules, lambda _: None)
-        getattr(renderer, method)()
-        if searching:
-            lens = renderer.lens_numbers()
-            looks = choose_looks(display, renderer.reach)
-            search(points, lens, renderer.reach, looks, tracer, bands, the_rules, renderer.follow, lambda _: None)
+    bands = Bands(threads)
+    renderer = ArrayRenderer(display, points, tracer, bands, the_rules, lambda _: None)
+    getattr(renderer, method)()
+    if searching:
+        lens = renderer.lens_numbers()
+        looks = choose_looks(display, renderer.reach)
+        search(points, lens, renderer.reach, looks, tracer, bands, the_rules, renderer.follow, lambda _: None)
     return points
 
 

@@ -55,12 +55,12 @@ def fill(truth, rules, edges, known=()):
     points = PointImage.empty(*truth.status.shape)
     tracer = LineTracer(truth)
     counts = []
-    with Bands(1) as bands:
-        gaps = Gaps(points, np.array([edges], dtype=np.int64), tracer, bands, rules, counts.append)
-        tracer.trace(np.array(known, dtype=np.uint32), points)
-        gaps.unsettled[:] = True
-        gaps.trace_samples()
-        gaps.complete()
+    bands = Bands(1)
+    gaps = Gaps(points, np.array([edges], dtype=np.int64), tracer, bands, rules, counts.append)
+    tracer.trace(np.array(known, dtype=np.uint32), points)
+    gaps.unsettled[:] = True
+    gaps.trace_samples()
+    gaps.complete()
     assert sum(counts) == sum(map(len, tracer.lists)) - len(known)
     assert not gaps.unsettled.any()
     return points, tracer

@@ -44,13 +44,13 @@ def make(display, tracer, the_rules, method="lens_view", threads=1):
 
     points = PointImage.empty(display.panel.height, display.panel.width)
     counts = []
-    with Bands(threads) as bands:
-        renderer = StraightRenderer(display, points, tracer, bands, the_rules, counts.append)
-        getattr(renderer, method)()
-        if the_rules.careful:
-            lens = renderer.lens_numbers()
-            looks = Looks((Look(6, 4),), (Look(6, 8),))
-            search(points, lens, renderer.reach, looks, tracer, bands, the_rules, renderer.follow, counts.append)
+    bands = Bands(threads)
+    renderer = StraightRenderer(display, points, tracer, bands, the_rules, counts.append)
+    getattr(renderer, method)()
+    if the_rules.careful:
+        lens = renderer.lens_numbers()
+        looks = Looks((Look(6, 4),), (Look(6, 8),))
+        search(points, lens, renderer.reach, looks, tracer, bands, the_rules, renderer.follow, counts.append)
     assert sum(counts) == len(tracer.traced) == len(np.unique(tracer.traced))
     return points
 

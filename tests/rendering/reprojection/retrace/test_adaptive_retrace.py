@@ -33,9 +33,9 @@ def found(truth, taken, at_edges=(), follow=lambda *_: None):
     rules = Rules(True, 0.06, False, probe_rows=4, longest_gap=3, overhang=0)
     lens = np.broadcast_to(np.repeat(np.arange(LENSES, dtype=np.int32), WIDE), points.status.shape)
     tracer, counts = KnownTracer(truth), []
-    with Bands(1) as bands:
-        looks = Looks(tuple(Look(*look) for look in at_edges), (Look(6, 8),))
-        search(points, lens, WIDE, looks, tracer, bands, rules, follow, counts.append)
+    bands = Bands(1)
+    looks = Looks(tuple(Look(*look) for look in at_edges), (Look(6, 8),))
+    search(points, lens, WIDE, looks, tracer, bands, rules, follow, counts.append)
     assert sum(counts) == tracer.traced
     return points
 

@@ -7,7 +7,6 @@ arrays that the kernel reads.
 
 from __future__ import annotations
 
-import gc
 from collections.abc import Callable
 
 import drjit as dr
@@ -16,6 +15,7 @@ from numpy.typing import NDArray
 
 from lippmann.device.array_parts import arrays_of
 from lippmann.device.types import Array
+from lippmann.runtime.collector import no_collection
 
 #: Bytes: the widest vector of a processor.
 _ALIGNMENT = 64
@@ -55,15 +55,8 @@ class Frozen:
         self._recorded = dr.freeze(kernel, state_fn=lambda *_, **__: known or _opaque_arrays(reads))
 
     def __call__(self, *arguments: Array) -> Array:
-        # The cyclic collector may free arrays of an earlier picture at any moment. Dr.Jit cannot record that, and
-        # aborts the process.
-        enabled = gc.isenabled()
-        gc.disable()
-        try:
+        with no_collection():
             return self._recorded(*arguments)
-        finally:
-            if enabled:
-                gc.enable()
 
     @property
     def recordings(self) -> int:
