@@ -166,25 +166,29 @@ def _denoised(
     batches: Any,
 ) -> None:
     """One picture's noise taken out; and pooled light, as the program makes it: by halves, shared, beside samples."""
-    from lippmann.rendering.denoise.cost_model import GUIDE_SAMPLES, SHARING_STOP
     from lippmann.rendering.denoise.dual_buffer import Denoised
-    from lippmann.rendering.denoise.pixel_order import denoise_views
-    from lippmann.rendering.film.feature_buffers import plan_guides, trace_guides
-    from lippmann.rendering.sharing.cross_lens import share_light
+    from lippmann.rendering.denoise.guided_denoiser import GuidedDenoiser
 
     samples, effort = how
-    plan = plan_guides(stage.source, GUIDE_SAMPLES[effort], 4 << 30)
-    looked, guides = timed(lambda: trace_guides(stage.built, stage.source, plan, stage.display_from_world, seed=77))
+    denoiser = GuidedDenoiser(
+        stage.built,
+        stage.source,
+        stage.display_from_world,
+        seed=77,
+        box_filter=True,
+        memory=4 << 30,
+        threads=CORES,
+        effort=lambda: effort,
+        shares=True,
+    )
+    looked, _ = timed(denoiser.coverage)
 
-    def clean(noisy: Picture, turned: bool = False) -> Picture:
-        return np.maximum(denoise_views(noisy, stage.display, guides, effort=effort, turned=turned), 0)
-
-    def share(cleaned: Picture) -> Picture:
-        return share_light(cleaned, stage.display, guides, stop=SHARING_STOP[effort], threads=CORES)
+    def pooled() -> Picture:
+        return Denoised(batches, denoiser.denoise, "srgb", CORES, denoiser.share, denoiser.coverage).picture()
 
     for way, call in (
-        ("full + oidn", lambda: clean(picture)),
-        ("pooled", lambda: Denoised(batches, clean, "srgb", CORES, share, lambda: guides.coverage).picture()),
+        ("full + oidn", lambda: denoiser.denoise(picture)),
+        ("pooled", pooled),
     ):
         seconds, result = timed(call)
         parts = {"trace": traced[way], "guides": looked, "clean": seconds}

@@ -111,12 +111,9 @@ def _prepared(name: str, display: str, whole: bool) -> Any:
 def picture(stage: Any, samples: int, effort: str) -> Any:
     """A pooled picture as the program makes it, whichever of the two it is."""
     import equal_error
-    from lippmann.rendering.denoise.cost_model import GUIDE_SAMPLES, SHARING_STOP
     from lippmann.rendering.denoise.dual_buffer import Denoised
-    from lippmann.rendering.denoise.pixel_order import denoise_views
-    from lippmann.rendering.film.feature_buffers import plan_guides, trace_guides
+    from lippmann.rendering.denoise.guided_denoiser import GuidedDenoiser
     from lippmann.rendering.film.sample_batches import FullInBatches
-    from lippmann.rendering.sharing.cross_lens import share_light
 
     is_today = "light_up" in vars(equal_error)
     if is_today:
@@ -124,18 +121,19 @@ def picture(stage: Any, samples: int, effort: str) -> Any:
     else:
         batches = FullInBatches(stage.integrator, stage.source, seed=3, memory=4 << 30)
         batches.add(samples)
-    plan = plan_guides(stage.source, GUIDE_SAMPLES[effort], 4 << 30)
-    guides = trace_guides(stage.built, stage.source, plan, stage.display_from_world, seed=77)
-
-    def clean(noisy: Any, turned: bool = False) -> Any:
-        return np.maximum(denoise_views(noisy, stage.display, guides, effort=effort, turned=turned), 0)
-
-    def share(cleaned: Any) -> Any:
-        cores = equal_error.CORES
-        return share_light(cleaned, stage.display, guides, stop=SHARING_STOP[effort], threads=cores)
-
-    coverage = [lambda: guides.coverage] if is_today else []
-    return Denoised(batches, clean, "srgb", equal_error.CORES, share, *coverage).picture()
+    denoiser = GuidedDenoiser(
+        stage.built,
+        stage.source,
+        stage.display_from_world,
+        seed=3,
+        box_filter=True,
+        memory=4 << 30,
+        threads=equal_error.CORES,
+        effort=lambda: effort,
+        shares=True,
+    )
+    coverage = [denoiser.coverage] if is_today else []
+    return Denoised(batches, denoiser.denoise, "srgb", equal_error.CORES, denoiser.share, *coverage).picture()
 
 
 class Earlier:

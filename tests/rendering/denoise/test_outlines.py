@@ -163,7 +163,7 @@ def test_leaves_before_the_sky(method, samples, monkeypatch):
     references = [tree("full", 64, seed=seed, denoise="none") for seed in (8, 9)]
     found = tree(method, samples, denoise="oidn-fast")
     for user in ("rendering.methods", "rendering.denoise.dual_buffer"):
-        monkeypatch.setattr(f"lippmann.{user}.by_coverage", lambda pixels, *_: pixels)
+        monkeypatch.setattr(f"lippmann.{user}.by_coverage", lambda pixels, *_, **__: pixels)
     without = tree(method, samples, denoise="oidn-fast")
     assert error(found, references) < 0.65 * error(without, references)
     assert found.provenance.rays == without.provenance.rays

@@ -224,7 +224,8 @@ class Denoised:
         halves, coverage = self._renderer.traced_halves(), self._coverages()
         if coverage is None:
             return halves
-        first, second = (by_coverage(half, *both) for half, both in zip(halves, coverage, strict=True))
+        threads = self._threads
+        first, second = (by_coverage(half, *both, threads=threads) for half, both in zip(halves, coverage, strict=True))
         return first, second
 
     def _coverages(self) -> list[tuple[Coverage, Coverage]] | None:
@@ -243,7 +244,7 @@ class Denoised:
         noisy, coverage = self._renderer.traced_picture(), self._coverages()
         if coverage is not None:
             (paths, further), (more_paths, more_further) = coverage
-            noisy = by_coverage(noisy, paths + more_paths, further + more_further)
+            noisy = by_coverage(noisy, paths + more_paths, further + more_further, threads=self._threads)
         return self._cleaned_and_shared(noisy, self._renderer.seen())[-1]
 
     def _best_of_halves(self) -> tuple[Floats, Floats]:

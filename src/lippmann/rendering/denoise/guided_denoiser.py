@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.rendering.denoise.cost_model import GUIDE_SAMPLES, RUN_COST, SHARING_STOP, denoising_cost
 from lippmann.rendering.denoise.oidn import Effort, denoise
-from lippmann.rendering.denoise.oidn_masked import denoise_seen
+from lippmann.rendering.denoise.oidn_masked import SurfacePart, denoise_seen
 from lippmann.rendering.denoise.pixel_order import best_form, denoise_views
 from lippmann.rendering.film.coverage import Coverage
 from lippmann.rendering.film.feature_buffers import Guides, plan_guides, trace_guides
@@ -88,6 +88,8 @@ class GuidedDenoiser:
         self._progress = progress
         self._guides: Guides | None = None
         self._guide_samples = 0
+        #: Of every tile of the source, by the guides.
+        self._surfaces: list[SurfacePart | None] = []
         self._form: Literal["raw", "views"] | None = None
         self.seconds = 0.0
         self.used: Effort = "fast"
@@ -161,12 +163,15 @@ class GuidedDenoiser:
             return denoise_views(
                 pixels, source.display, guides, form="views", effort=self.used, turned=turned, threads=self._threads
             )
+        if not self._surfaces:
+            self._surfaces = [SurfacePart.of(guides.normal[tile]) for tile in source.tiles()]
         result = np.empty_like(pixels)
-        for tile in source.tiles():
+        for tile, surfaces in zip(source.tiles(), self._surfaces, strict=True):
             result[tile] = denoise_seen(
                 pixels[tile],
                 guides.albedo[tile],
                 guides.normal[tile],
+                surfaces,
                 exposure=self._exposure,
                 effort=self.used,
                 turned=turned,
@@ -178,7 +183,7 @@ class GuidedDenoiser:
         """Albedo and normal of what the pixels see, of as many samples as the effort is worth."""
         samples = GUIDE_SAMPLES[self.used]
         if self._guides is None or samples > self._guide_samples:
-            self._guide_samples = samples
+            self._guide_samples, self._surfaces = samples, []
             self._guides = trace_guides(
                 self._built,
                 self._source,

@@ -8,7 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.color.transfer import Transfer, coding_slope
-from lippmann.rendering.denoise.local_statistics_kernels import column_mean_rows, row_mean_rows
+from lippmann.rendering.denoise.local_statistics_kernels import (
+    column_mean_rows,
+    known_rows,
+    others_mean_rows,
+    row_mean_rows,
+)
 from lippmann.runtime.row_threads import Bands
 
 Floats = NDArray[np.float32]
@@ -22,7 +27,13 @@ def measured(rows: Callable[..., None], *pictures: Halves, transfer: Transfer, b
     the codes are cut off, but what is wrong there is wrong around, too.
     """
     first, second = pictures[-1]
-    slope = coding_slope(np.clip(np.float32(0.5) * (first + second), 0, 1), transfer)
+    slope = np.empty_like(first)
+
+    def slope_rows(start: int, end: int) -> None:
+        band = slice(start, end)
+        slope[band] = coding_slope(np.clip(np.float32(0.5) * (first[band] + second[band]), 0, 1), transfer)
+
+    bands.lines(slope_rows, len(slope))
     found = np.empty(slope.shape[:2], dtype=np.float32), np.empty(slope.shape[:2], dtype=np.float32)
     bands.lines(rows, len(slope), *(half for halves in pictures for half in halves), slope, *found)
     return found
@@ -43,29 +54,14 @@ def leave_one_out_mean(values: Floats, reach: int, errors: float, bands: Bands) 
     is the sample standard deviation of those n values over the root of n, as of values that know nothing of each
     other. Where fewer than two others are left, nothing is known: 0.
     """
-    count = _pixels_around(values.shape, reach)
-    mean, squared = (_mean_of_others(part, count, reach, bands) for part in (values, np.square(values)))
-    # Of n values, n = count - 1: the mean square about the mean, over n - 1.
-    variance = np.maximum(squared - np.square(mean), 0) / np.maximum(count - 2, 1)
-    known = mean - np.float32(errors) * np.sqrt(variance)
-    return np.asarray(np.where(count > 2, np.maximum(known, 0), 0), dtype=np.float32)
+    mean, squared = (mean_around(part, reach, bands) for part in (values, np.square(values)))
+    known = np.empty_like(values)
+    bands.lines(known_rows, len(values), values, mean, squared, reach, errors, known)
+    return known
 
 
 def mean_of_others(values: Floats, reach: int, bands: Bands) -> Floats:
-    """Means of ``(H, W)`` over the other pixels up to ``reach`` pixels away, cut at the edges."""
-    return _mean_of_others(values, _pixels_around(values.shape, reach), reach, bands)
-
-
-def _mean_of_others(values: Floats, count: NDArray[np.float64], reach: int, bands: Bands) -> Floats:
-    others = mean_around(values, reach, bands) * count - values
-    return np.asarray(others / np.maximum(count - 1, 1), dtype=np.float32)
-
-
-def _pixels_around(shape: tuple[int, ...], reach: int) -> NDArray[np.float64]:
-    """``(H, W)``: how many pixels each mean is of, the pixel itself included."""
-    count = np.ones((1, 1))
-    for axis, length in enumerate(shape):
-        place = np.arange(length)
-        along = np.minimum(place + reach, length - 1) - np.maximum(place - reach, 0) + 1
-        count = count * np.expand_dims(along, 1 - axis)
-    return count
+    """Means of ``(H, W)`` over the other pixels up to ``reach`` away, cut at the edges; 0 where there is none."""
+    mean, others = mean_around(values, reach, bands), np.empty_like(values)
+    bands.lines(others_mean_rows, len(values), values, mean, reach, others)
+    return others

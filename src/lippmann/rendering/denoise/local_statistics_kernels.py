@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.runtime.numba_jit import compiled
+from lippmann.runtime.numba_jit import compiled, inlined
 
 #: Pictures and their rows.
 RealArray: TypeAlias = NDArray[np.floating]
@@ -57,6 +58,58 @@ def column_mean_rows(first: int, last: int, values: RealArray, radius: int, mean
             count = min(row + radius, height - 1) - max(row - radius, 0) + 1
             for column in range(width):
                 mean[row, column] = totals[column] / count
+
+
+@inlined
+def _pixels_around(row: int, column: int, height: int, width: int, radius: int) -> int:
+    """How many pixels the mean around a pixel is of, the pixel itself included."""
+    rows = min(row + radius, height - 1) - max(row - radius, 0) + 1
+    return rows * (min(column + radius, width - 1) - max(column - radius, 0) + 1)
+
+
+@compiled
+def others_mean_rows(first: int, last: int, values: RealArray, mean: RealArray, radius: int, others: RealArray) -> None:
+    """Rows ``[first, last)`` of ``others``: ``mean``, that of ``values`` around each pixel, without the pixel itself.
+
+    All ``(H, W)``. Where there is no other pixel: 0.
+    """
+    height, width = values.shape
+    for row in range(first, last):
+        for column in range(width):
+            count = _pixels_around(row, column, height, width, radius)
+            of_others = mean[row, column] * count - values[row, column]
+            others[row, column] = of_others / (count - 1) if count > 1 else 0.0
+
+
+@compiled
+def known_rows(
+    first: int,
+    last: int,
+    values: RealArray,
+    mean: RealArray,
+    squared: RealArray,
+    radius: int,
+    errors: float,
+    known: RealArray,
+) -> None:
+    """Rows ``[first, last)`` of ``known``: the mean of the other pixels around, less ``errors`` of its standard errors.
+
+    ``mean`` and ``squared``, ``(H, W)``, are those of ``values`` and of their squares around each pixel. Not below 0; 0
+    where there are fewer than two other pixels.
+    """
+    height, width = values.shape
+    for row in range(first, last):
+        for column in range(width):
+            count = _pixels_around(row, column, height, width, radius)
+            if count <= 2:
+                known[row, column] = 0.0
+                continue
+            value = float(values[row, column])
+            of_others = (mean[row, column] * count - value) / (count - 1)
+            square = (squared[row, column] * count - value * value) / (count - 1)
+            # Of n values, n = count - 1: the mean square about the mean, over n - 1.
+            variance = max(square - of_others * of_others, 0.0) / (count - 2)
+            known[row, column] = max(of_others - errors * math.sqrt(variance), 0.0)
 
 
 @compiled

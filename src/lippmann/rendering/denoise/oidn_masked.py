@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from lippmann.rendering.denoise.oidn import NETWORK_STEP, Effort, denoise
@@ -16,10 +17,34 @@ MARGIN = NETWORK_STEP
 EDGE = 2
 
 
+@dataclass(frozen=True, eq=False)
+class SurfacePart:
+    """The rectangle of a picture that holds all surfaces, and a margin.
+
+    Attributes
+    ----------
+    place:
+        Its rows and columns.
+    near:
+        ``(h, w, 1)`` bool: pixels of it that show surfaces or are close to one.
+    """
+
+    place: tuple[slice, slice]
+    near: NDArray[np.bool_]
+
+    @staticmethod
+    def of(normal: NDArray[np.generic]) -> SurfacePart | None:
+        """By a guide ``(H, W, 3)``, which is 0 where there is no surface; None where there is none at all."""
+        is_surface = (normal[..., 0] != 0) | (normal[..., 1] != 0) | (normal[..., 2] != 0)
+        place = _rectangle(is_surface)
+        return None if place is None else SurfacePart(place, _widened(is_surface[place])[..., None])
+
+
 def denoise_seen(
     color: NDArray[np.generic],
     albedo: NDArray[np.generic],
     normal: NDArray[np.generic],
+    surfaces: SurfacePart | None,
     *,
     exposure: float | None = None,
     effort: Effort = "high",
@@ -28,34 +53,36 @@ def denoise_seen(
 ) -> FloatArray:
     """The picture without its noise; arguments as those of :func:`~lippmann.rendering.denoise.oidn.denoise`.
 
-    The network is shown the rectangle that holds all surfaces, those pixels whose normal is not 0. What is not near one
-    is left as it is, so that nothing tells where that rectangle ends.
+    The network is shown the rectangle of the ``surfaces``, those of ``normal``. What is not near one is left as it is,
+    so that nothing tells where that rectangle ends.
     """
     result = np.array(color, dtype=np.float32)
-    is_surface = np.any(normal, axis=2)
-    part = _rectangle(is_surface)
-    if part is not None:
+    if surfaces is not None:
+        place = surfaces.place
         # The guides follow mirrors and glass without chance, so what noise they have lies along edges alone.
         cleaned = denoise(
-            color[part],
-            albedo[part],
-            normal[part],
+            color[place],
+            albedo[place],
+            normal[place],
             clean_guides=True,
             exposure=exposure,
             effort=effort,
             turned=turned,
             threads=threads,
         )
-        near = _widened(is_surface[part])
-        result[part][near] = cleaned[near]
+        np.copyto(result[place], cleaned, where=surfaces.near)
     return result
 
 
 def _widened(is_surface: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """With the pixels up to ``EDGE`` beside and above each other."""
     for axis in (0, 1):
-        wide = np.pad(is_surface, [(EDGE, EDGE) if axis == each else (0, 0) for each in (0, 1)])
-        is_surface = np.asarray(np.any(sliding_window_view(wide, 2 * EDGE + 1, axis=axis), axis=-1))
+        lines = np.swapaxes(is_surface, 0, axis)
+        wide = lines.copy()
+        for step in range(1, EDGE + 1):
+            wide[step:] |= lines[:-step]
+            wide[:-step] |= lines[step:]
+        is_surface = np.swapaxes(wide, 0, axis)
     return is_surface
 
 

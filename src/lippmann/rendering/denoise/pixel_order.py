@@ -114,9 +114,9 @@ def has_exact_views(display: Display) -> bool:
 
 
 def _mean_step(values: FloatArray, axis: int) -> float:
-    low = np.take(values, range(values.shape[axis] - 1), axis)
-    high = np.take(values, range(1, values.shape[axis]), axis)
-    return float(np.abs(high - low).mean()) if low.size else 0.0
+    lines = np.swapaxes(values, 0, axis)
+    step = lines[1:] - lines[:-1]
+    return float(np.abs(step, out=step).mean()) if step.size else 0.0
 
 
 def _view_shape(display: Display) -> tuple[int, ...]:
