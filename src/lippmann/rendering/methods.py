@@ -24,8 +24,9 @@ from lippmann.rendering.adaptive.method_race import (
 from lippmann.rendering.adaptive.sample_allocation import SampleAllocation
 from lippmann.rendering.adaptive.stopping import Goal, Outcome, goal_of, reach
 from lippmann.rendering.denoise.cost_model import denoising_cost, effort_of, look_cost, traced_work
-from lippmann.rendering.denoise.dual_buffer import Apart, Denoised
+from lippmann.rendering.denoise.dual_buffer import Denoised
 from lippmann.rendering.denoise.guided_denoiser import GuidedDenoiser
+from lippmann.rendering.denoise.light_apart import clean_light, without_excess
 from lippmann.rendering.denoise.oidn import Effort
 from lippmann.rendering.denoise.outlines import by_coverage
 from lippmann.rendering.denoise.subpixels import SubpixelBatches
@@ -351,16 +352,13 @@ def _denoised_whole(job: Job, traced: Traced) -> Traced:
     denoiser = _denoiser(job, lambda: _rays_per_pixel(job, traced.frame.rays))
     if denoiser is None:
         return traced
-    noisy, source = traced.frame.pixels, job.traced
-    further = None if traced.frame.coverage is None else denoiser.coverage()
-    if traced.frame.coverage is not None and further is not None:
-        noisy = by_coverage(noisy, traced.frame.coverage, further[0] + further[1])
-    seen, excess = traced.frame.seen, traced.frame.excess
-    apart = Apart(noisy, seen)
-    cleaned = apart.whole(denoiser(apart.rest))
-    if excess is not None:
-        cleaned = cleaned - excess
-    traced.frame.pixels = source.own_colors(cleaned) if isinstance(source, SubpixelRays) else cleaned
+    frame, source = traced.frame, job.traced
+    noisy, further = frame.pixels, None if frame.coverage is None else denoiser.coverage()
+    if frame.coverage is not None and further is not None:
+        noisy = by_coverage(noisy, frame.coverage, further[0] + further[1], threads=job.session.engine.threads)
+    (cleaned,) = clean_light(noisy, frame.seen, denoiser, None)
+    cleaned = without_excess(cleaned, frame.excess)
+    frame.pixels = source.own_colors(cleaned) if isinstance(source, SubpixelRays) else cleaned
     return replace(traced, options=_denoiser_options(job, denoiser), seconds={"denoise": denoiser.seconds})
 
 

@@ -8,14 +8,9 @@ of noisy ones a and b, the mean of (a - D(a)) (b - D(b)) is that of the product 
 they have wrong in common. The squared error of their mean is that and a quarter of (D(a) - D(b))^2, what they differ
 by.
 
-Seen light, where the renderer keeps it apart, has hardly any noise, and highlights that a denoiser takes for such: it
-goes past the network and past what is shared. Where it is far beyond white, so does other light as far as it is: the
-skirt of a narrow lobe is not sharp, and shows enough of a mirrored emitter for the network to make the pixels beside it
-white, too. The noise of what is beyond white is not seen. What of it rests on single chains the picture leaves out,
-while its error is that of the mean of the halves, which is larger as a rule.
-
-The network is shown nothing that is far beyond white: it would make the pixels around one path white that has happened
-upon an emitter. A pixel that is as bright all the same after it is as bright as its samples.
+Seen light, and what is far beyond white, goes past the denoiser (:mod:`lippmann.rendering.denoise.light_apart`). What
+of it rests on single chains the picture leaves out, while its error is that of the mean of the halves, which is larger
+as a rule.
 
 Micro-images may share the light of a denoised half, and it keeps its own where that is judged to be better
 (:mod:`lippmann.rendering.denoise.unshared_blend`). Where what comes of that is judged to be worse than its samples,
@@ -42,6 +37,7 @@ from numpy.typing import NDArray
 
 from lippmann.color.transfer import Transfer, coding_slope, encode
 from lippmann.progress import ProgressCallback, silent
+from lippmann.rendering.denoise.light_apart import clean_light, without_excess
 from lippmann.rendering.denoise.local_statistics import mean_around
 from lippmann.rendering.denoise.noisy_blend import own_share
 from lippmann.rendering.denoise.outlines import by_coverage
@@ -62,11 +58,6 @@ DROWNED = 8.0
 MANY = 16
 #: Share of the samples' error that is taken to rest on outliers where too few batches tell them.
 UNTOLD_OUTLIERS = 0.25
-#: What is above this linear value the network is not shown. From 4 to 16 the PSNR of the bundled scenes moves by 0.1 dB
-#: at most (docs/research/seen-light.md).
-FAR_BEYOND_WHITE = 8.0
-#: Part of that from which on what the network makes of a pixel is taken to be still as bright.
-_STILL_FAR = 0.75
 #: Linear value up to which noise counts for :meth:`Denoised.noise`.
 _BEYOND_WHITE = 1.5
 #: Linear steps below this are as good as a slope, and hold rounding.
@@ -147,9 +138,7 @@ class Denoised:
 
     def picture(self) -> Floats:
         """``(H, W, 3)`` float32 linear RGB."""
-        excess = self._renderer.excess()
-        picture = self._mean()
-        return picture if excess is None else np.maximum(picture - excess, np.float32(0))
+        return without_excess(self._mean(), self._renderer.excess())
 
     def _mean(self) -> Floats:
         if self._renderer.samples < 2:
@@ -265,10 +254,8 @@ class Denoised:
     def _cleaned_and_shared(self, noisy: Floats, seen: Floats | None, turned: bool = False) -> list[Floats]:
         """What the picture shows of what was traced without noise; and, where light is shared, of that with shared
         light."""
-        apart = Apart(noisy, seen)
-        clean = self._denoise(apart.rest, turned)
-        versions = [clean] if self._share is None else [clean, self._share(clean)]
-        return [self._renderer.shown(apart.whole(version)) for version in versions]
+        versions = clean_light(noisy, seen, lambda rest: self._denoise(rest, turned), self._share)
+        return [self._renderer.shown(version) for version in versions]
 
     def _slope(self, noisy: tuple[Floats, Floats]) -> Floats:
         """By how much a pixel's code differs from that of the truth, per linear difference between the two."""
@@ -290,38 +277,3 @@ def _apart(halves: tuple[Floats, Floats], slope: Floats) -> Floats:
     """Squared error of the mean of two halves by what they differ."""
     apart: Floats = (np.float32(0.25) * np.square(slope * (halves[0] - halves[1]))).mean(axis=2)
     return apart
-
-
-class Apart:
-    """Noisy light apart: what a denoiser is shown, and what goes past it.
-
-    Parameters
-    ----------
-    noisy:
-        ``(H, W, 3)`` linear.
-    seen:
-        What of it is seen light; None where that is not known.
-    """
-
-    _past: Floats | None
-    _cut: Floats | None
-    #: What a denoiser is to be shown.
-    rest: Floats
-
-    def __init__(self, noisy: Floats, seen: Floats | None) -> None:
-        limit = np.float32(FAR_BEYOND_WHITE)
-        rest, self._past, self._cut = noisy, None, None
-        if seen is not None:
-            self._past = seen + np.where(seen > limit, np.maximum(noisy - seen - limit, 0), np.float32(0))
-            rest = noisy - self._past
-        if (rest > limit).any():
-            self._cut = np.maximum(rest - limit, np.float32(0))
-            rest = np.minimum(rest, limit)
-        self.rest = rest
-
-    def whole(self, clean: Floats) -> Floats:
-        """What a denoiser has made of :attr:`rest`, and what is beside it."""
-        whole = clean
-        if self._cut is not None:
-            whole = whole + np.where(clean >= np.float32(_STILL_FAR * FAR_BEYOND_WHITE), self._cut, np.float32(0))
-        return whole if self._past is None else whole + self._past
