@@ -252,13 +252,11 @@ def light_up(stage: Any, request: Any, memory: int = 4 << 30) -> None:
 
     ``stage`` has the session, the integrator and the source of a :class:`Stage`.
     """
-    from lippmann.rendering.film.prepared_light import prepare_light
+    from lippmann.rendering.film.prepared_light import prepare_light, tell_anew
 
     # All pictures of a stage are exposed alike.
     request = replace(request, exposure=stage.session.choices.get("exposure", 0.0))
-    choices = stage.session.choices
-    choices.pop("mirror_images", None)
-    choices.update(prepare_light(stage.integrator, request, stage.source, memory))
+    tell_anew(stage.session.choices, prepare_light(stage.integrator, request, stage.source, memory))
 
 
 def trace_lit(stage: Stage, samples: int, seed: int) -> Picture:

@@ -30,7 +30,7 @@ def place(x, y, z):
     return matrix
 
 
-def lamp_over_glass(*, instances=1):
+def lamp_over_glass(*, instances=1, is_exposed=False):
     """A matt wall behind a glass ball and a glossy block, lit by a lamp that has no size."""
     shapes = [trimesh.creation.box((300, 200, 2)), trimesh.creation.icosphere(4, 18), trimesh.creation.box((20, 20, 4))]
     meshes = [Mesh("", m.vertices.astype(np.float32), m.faces.astype(np.uint32), n) for n, m in enumerate(shapes)]
@@ -42,13 +42,16 @@ def lamp_over_glass(*, instances=1):
     found = [Instance(0, place(0, 0, -20)), Instance(1, place(-15, 0, 4)), Instance(2, place(30, 0, -10))]
     found += [Instance(1, place(20 * number, 25, 4)) for number in range(instances - 1)]
     lamp = Light("point", (4e4, 4e4, 4e4), place(60.0, 40.0, 90.0))
-    description = SceneDescription("lamp", meshes=meshes, materials=materials, instances=found, lights=[lamp])
-    return lippmann.load_scene(description)
+    return lippmann.load_scene(
+        SceneDescription(
+            "lamp", meshes=meshes, materials=materials, instances=found, lights=[lamp], physical_lights=is_exposed
+        )
+    )
 
 
 def rendered(scene, layout="lenticular", **options):
     chosen = {"integrator": "path", "method": "full", "spp": 8, "placement": PlacementOptions(mode="display")}
-    return lippmann.render(scene, DISPLAYS[layout], exposure=0, tone_map="none", **(chosen | options))
+    return lippmann.render(scene, DISPLAYS[layout], **({"exposure": 0, "tone_map": "none"} | chosen | options))
 
 
 @pytest.mark.parametrize("layout", ["lenticular", "hexagonal", pytest.param("square", marks=pytest.mark.long)])
@@ -80,6 +83,36 @@ def test_photons_are_the_default_where_there_are_caustics():
     assert rendered(scene, memory=SMALL).provenance.options["caustics"] == "paths"
     for options in ({"depth": 1}, {"integrator": "direct"}):  # none, and nothing is missed
         assert "caustics" not in rendered(scene, **options).provenance.options
+
+
+def small_glass_under_a_wide_emitter():
+    """Caustics that nobody would miss."""
+    shapes = [
+        trimesh.creation.box((300, 200, 2)),
+        trimesh.creation.icosphere(3, 2),
+        trimesh.creation.box((600, 600, 1)),
+    ]
+    meshes = [Mesh("", m.vertices.astype(np.float32), m.faces.astype(np.uint32), n) for n, m in enumerate(shapes)]
+    materials = [
+        Material("wall", base_color=(0.6, 0.6, 0.6), roughness=1.0, specular=0.0),
+        Material("glass", transmission=1.0, roughness=0.0, ior=1.5, thickness=1.0),
+        Material("glow", base_color=(0.0, 0.0, 0.0), emission=(3.0, 3.0, 3.0)),
+    ]
+    found = [Instance(number, place(0, 0, z)) for number, z in enumerate((-20, -10, 120))]
+    return lippmann.load_scene(
+        SceneDescription("small", meshes=meshes, materials=materials, instances=found, physical_lights=True)
+    )
+
+
+@pytest.mark.parametrize(("made", "way"), [("lamp", "photons"), ("small", None)])
+def test_photons_go_by_the_exposure_whoever_chooses_it(made, way):
+    scene = lamp_over_glass(is_exposed=True) if made == "lamp" else small_glass_under_a_wide_emitter()
+    chosen = rendered(scene, exposure="auto")
+    stated = rendered(scene, exposure=chosen.provenance.options["exposure"])
+    assert chosen.pixels.tobytes() == stated.pixels.tobytes()
+    assert [each.provenance.options.get("caustics") for each in (chosen, stated)] == [way, way]
+    if way is None:
+        assert rendered(scene, caustics="photons", spp=1).provenance.options["caustics"] == "photons"
 
 
 def test_halves_have_photons_of_their_own():

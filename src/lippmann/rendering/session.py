@@ -191,7 +191,7 @@ class Session:
         return integrator
 
     def _prepare_light(self, integrator: Integrator, source: RaySource) -> Integrator:
-        from lippmann.rendering.film.prepared_light import prepare_light
+        from lippmann.rendering.film.prepared_light import prepare_light, tell_anew
         from lippmann.rendering.transport.path import PathIntegrator
 
         if isinstance(integrator, PathIntegrator):
@@ -203,8 +203,7 @@ class Session:
                 even_background(self.built, self.request),
                 stands_alone=not self.scene.lies_off_surfaces,
             )
-            self.choices.pop("mirror_images", None)  # of a picture before
-            self.choices.update(told)
+            tell_anew(self.choices, told)
         return integrator
 
     def provenance(

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -19,13 +21,13 @@ from lippmann.rendering.transport.caustic_photons import (
     MOST,
     SAMPLES_OF_EMISSION,
     CausticPhotons,
-    IsMissed,
     emissions,
     no_photons,
 )
 from lippmann.rendering.transport.integrator import Integrator
 from lippmann.rendering.transport.pass_schedule import PassSchedule
 from lippmann.rendering.transport.path import PathIntegrator
+from lippmann.rendering.transport.photon_map import Photons
 from lippmann.rendering.transport.ray_source import RaySource
 
 #: Samples of a pixel that one pass of photons serves, at least; and the first one of a picture that may need no more.
@@ -50,9 +52,28 @@ def stretches(integrator: Integrator, first: int, samples: int) -> Iterator[int]
         first, samples = first + count, samples - count
 
 
-def give_photons(
-    integrator: PathIntegrator, request: RenderRequest, source: RaySource, memory: int
-) -> Literal["photons", "paths", "none"] | None:
+@dataclass(frozen=True)
+class Caustics:
+    """How a picture's caustics come.
+
+    Attributes
+    ----------
+    way:
+        ``photons``, ``paths`` or ``none``.
+    variance:
+        Mean variance of one path's caustic light, in linear radiance without an exposure, where photons are given to a
+        picture that has none yet; else infinite.
+    """
+
+    way: Literal["photons", "paths", "none"]
+    variance: float = math.inf
+
+    def are_worth_photons(self, gain: float) -> bool:
+        """Whether their noise would be seen by paths, once light is multiplied by ``gain``."""
+        return self.variance * gain**2 > LEAST_WORTH
+
+
+def give_photons(integrator: PathIntegrator, request: RenderRequest, source: RaySource, memory: int) -> Caustics | None:
     """Give the integrator the photons for the picture of ``source``; how caustics come, or None if there are none.
 
     Raises
@@ -66,7 +87,7 @@ def give_photons(
         return _left_to_paths(integrator)
     if request.caustics == "none":
         integrator.photons = no_photons()
-        return "none"
+        return Caustics("none")
     casters = find_casters(integrator.scene)
     if casters.pairs == 0:
         return None
@@ -82,6 +103,7 @@ def give_photons(
             return _left_to_paths(integrator)
         raise too_small(memory, "photons of caustics", required)
     seen = seen_points(integrator, source)
+    noise = _Noise(seen, request)
     photons = CausticPhotons(
         integrator.scene,
         integrator.features,
@@ -91,13 +113,13 @@ def give_photons(
         seed=request.seed,
         region=region_about(seen),
         kept=max(1, min(passes, int(KEPT_SHARE * memory) // required)),
-        is_missed=_are_missed(seen, request),
+        is_missed=noise.is_seen,
     )
     if photons.are_none:
         return None
     integrator.photons = photons.of_pass(0)
     integrator.photon_passes = photons
-    return "photons"
+    return Caustics("photons", noise.variance)
 
 
 def _schedule(pixels: int, is_open_ended: bool) -> PassSchedule:
@@ -107,15 +129,31 @@ def _schedule(pixels: int, is_open_ended: bool) -> PassSchedule:
     return PassSchedule(max(FIRST_PASS_SAMPLES, fewest) if is_open_ended else most, most)
 
 
-def _left_to_paths(integrator: PathIntegrator) -> Literal["paths"] | None:
-    return "paths" if hides_caustics(integrator.scene) else None
+def take_photons(integrator: PathIntegrator) -> None:
+    """Leave all caustics to paths."""
+    integrator.photons = integrator.photon_passes = None
 
 
-def _are_missed(seen: NDArray[np.float64], request: RenderRequest) -> IsMissed | None:
-    """Tells whether paths would show photons' caustics so that it is seen; None where they are wanted anyway."""
-    exposure = request.exposure
-    if request.caustics != "auto" or exposure == "auto" or not len(seen):
-        return None  # before it is exposed, no light is known to be bright
-    return lambda photons, radiance: (
-        variance_by_paths(photons, radiance, seen, SEEN_SIDE**2) * gain_of(exposure) ** 2 > LEAST_WORTH
-    )
+def _left_to_paths(integrator: PathIntegrator) -> Caustics | None:
+    return Caustics("paths") if hides_caustics(integrator.scene) else None
+
+
+class _Noise:
+    """Tells by a pilot whether the noise of caustics would be seen by paths."""
+
+    def __init__(self, seen: NDArray[np.float64], request: RenderRequest) -> None:
+        self._seen = seen
+        self._exposure = request.exposure
+        self._is_asked = request.caustics == "auto" and len(seen) > 0
+        #: See :class:`Caustics`.
+        self.variance = math.inf
+
+    def is_seen(self, photons: Photons, radiance: NDArray[np.float64]) -> bool:
+        """Whether it would; where there is no exposure yet, no light is known to be bright."""
+        if not self._is_asked:
+            return True
+        variance = variance_by_paths(photons, radiance, self._seen, SEEN_SIDE**2)
+        if self._exposure == "auto":
+            self.variance = variance
+            return True
+        return Caustics("photons", variance).are_worth_photons(gain_of(self._exposure))

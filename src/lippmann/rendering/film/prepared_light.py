@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import mitsuba as mi
 
-from lippmann.rendering.film.caustics import give_photons
+from lippmann.rendering.film.caustics import give_photons, take_photons
 from lippmann.rendering.film.exposure import gain_of, measure_exposure
 from lippmann.rendering.film.lit_surfaces import give_light_vertices
 from lippmann.rendering.film.seen_chains import give_chains
@@ -15,6 +15,16 @@ from lippmann.rendering.transport.light_vertices import POINTS
 from lippmann.rendering.transport.path import PathIntegrator
 from lippmann.rendering.transport.ray_source import RaySource
 from lippmann.scene.values.description import Color
+
+#: What :func:`prepare_light` may tell.
+_TOLD = ("caustics", "exposure", "light_vertices", "mirror_images", "seen_chains")
+
+
+def tell_anew(choices: dict[str, object], told: dict[str, object]) -> None:
+    """Put what was told of a picture in place of what was of an earlier one."""
+    for name in _TOLD:
+        choices.pop(name, None)
+    choices.update(told)
 
 
 def prepare_light(
@@ -57,12 +67,15 @@ def prepare_light(
     if is_widened:
         integrator.beam = beam_of(source, request.samples)
     caustics = give_photons(integrator, request, source, memory)
-    if caustics is not None:
-        told["caustics"] = caustics
     exposure = request.exposure
     if exposure == "auto":
         exposure = measure_exposure(integrator, source, background, request.seed)
     gain = gain_of(exposure) if exposure else 1.0
+    if caustics is not None and not caustics.are_worth_photons(gain):
+        take_photons(integrator)
+        caustics = None
+    if caustics is not None:
+        told["caustics"] = caustics.way
     if exposure:
         integrator.gain = mi.Float(gain)
         told["exposure"] = exposure
