@@ -52,24 +52,33 @@ def _gained(result: dict[str, Any]) -> str:
 
 
 def _most_possible(display: str, scenes: dict[str, Any]) -> str:
-    """How many times as fast as stock views a picture can be that judges itself, by the parts of ``equal_error.py``.
+    """How many times as fast a picture can be that judges itself, and one that is told its error.
 
-    Both were timed by themselves: what full takes for as many samples tells how fast the machine was.
+    By the pictures of ``equal_error.py``, which were timed by themselves: what full takes for as many samples tells how
+    fast the machine was.
     """
     curves = _curves(display)
-    told = []
+    judging, told = [], []
     for quality in next(iter(scenes.values())):
-        times = []
+        least, stock, full = [], [], []
         for name in scenes.keys() & curves.keys():
+            rivals, slower = scenes[name][quality], _slower(scenes[name], curves[name]["curves"]["full"])
             points = curves[name]["curves"]["pooled"]
             parts = {(point["spp"], point["effort"]): point["parts"] for point in points}
-            least = parts[_LEAST]["trace"] + parts[_HALVES]["guides"] + parts[_HALVES]["clean"]
-            least *= _slower(scenes[name], curves[name]["curves"]["full"])
-            times.append(scenes[name][quality]["stock views"]["seconds"] / least)
-        told.append(f"{statistics.geometric_mean(times):.1f} (to {quality} dB)")
+            seconds = parts[_LEAST]["trace"] + parts[_HALVES]["guides"] + parts[_HALVES]["clean"]
+            least.append(rivals["stock views"]["seconds"] / (slower * seconds))
+            cheapest = min(cost["seconds"] for cost in curves[name]["to"][quality].values() if cost)
+            stock.append(rivals["stock views"]["seconds"] / (slower * cheapest))
+            full.append(rivals["full"]["seconds"] / (slower * cheapest))
+        mean = statistics.geometric_mean
+        judging.append(f"{mean(least):.1f} (to {quality} dB)")
+        told.append(f"{mean(stock):.1f} and {mean(full):.1f} times as fast as stock views and full (to {quality} dB)")
     return textwrap.fill(
         "What a picture takes at least that judges itself by two denoised halves, one sample of each pixel (photons "
-        f"included), guides and two runs of the network, would be {' and '.join(told)} times as fast as stock views.",
+        f"included), guides and two runs of the network, would be {' and '.join(judging)} times as fast as stock "
+        "views. A picture that were told its error by references, as they are, and chose the cheapest way, effort and "
+        f"number of samples on the curves of `equal_error.py`, would be {', '.join(told)}: no judgement can make more "
+        "of it.",
         120,
     )
 
