@@ -29,6 +29,7 @@ from equal_error import (
     reference_pair,
     trace_paths,
 )
+from equal_time import guided_denoiser
 from harness import kept, save
 
 SCENES = ("primitives", "small-balls", "gears")
@@ -78,7 +79,6 @@ def picture(stage: Stage, way: str, method: str, samples: int) -> Picture:
     """As the program makes it: halves with photons of their own; pooled by the effort that the rays deserve."""
     from lippmann.rendering.denoise.cost_model import effort_of, traced_work
     from lippmann.rendering.denoise.dual_buffer import Denoised
-    from lippmann.rendering.denoise.guided_denoiser import GuidedDenoiser
     from lippmann.rendering.film.sample_batches import FullInBatches
 
     denoise = "oidn" if method == "pooled" else "none"
@@ -90,17 +90,7 @@ def picture(stage: Stage, way: str, method: str, samples: int) -> Picture:
         return batches.picture()
     rays = batches.rays
     work = traced_work(rays.primary, rays.shadow, rays.secondary) / (stage.source.width * stage.source.height)
-    denoiser = GuidedDenoiser(
-        stage.built,
-        stage.source,
-        stage.display_from_world,
-        seed=3,
-        box_filter=True,
-        memory=4 << 30,
-        threads=CORES,
-        effort=lambda: effort_of("oidn", work),
-        shares=True,
-    )
+    denoiser = guided_denoiser(stage, effort_of("oidn", work))
     return Denoised(batches, denoiser.denoise, "srgb", CORES, denoiser.share, denoiser.coverage).picture()
 
 

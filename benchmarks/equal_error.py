@@ -166,22 +166,18 @@ def _denoised(
     batches: Any,
 ) -> None:
     """One picture's noise taken out; and pooled light, as the program makes it: by halves, shared, beside samples."""
+    from equal_time import guided_denoiser
     from lippmann.rendering.denoise.dual_buffer import Denoised
-    from lippmann.rendering.denoise.guided_denoiser import GuidedDenoiser
 
     samples, effort = how
-    denoiser = GuidedDenoiser(
-        stage.built,
-        stage.source,
-        stage.display_from_world,
-        seed=77,
-        box_filter=True,
-        memory=4 << 30,
-        threads=CORES,
-        effort=lambda: effort,
-        shares=True,
-    )
-    looked, _ = timed(denoiser.coverage)
+
+    def guided() -> Any:
+        # Anew each time: a denoiser traces its guides once.
+        denoiser = guided_denoiser(stage, effort)
+        denoiser.coverage()
+        return denoiser
+
+    looked, denoiser = timed(guided)
 
     def pooled() -> Picture:
         return Denoised(batches, denoiser.denoise, "srgb", CORES, denoiser.share, denoiser.coverage).picture()

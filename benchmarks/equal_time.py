@@ -112,7 +112,6 @@ def picture(stage: Any, samples: int, effort: str) -> Any:
     """A pooled picture as the program makes it, whichever of the two it is."""
     import equal_error
     from lippmann.rendering.denoise.dual_buffer import Denoised
-    from lippmann.rendering.denoise.guided_denoiser import GuidedDenoiser
     from lippmann.rendering.film.sample_batches import FullInBatches
 
     is_today = "light_up" in vars(equal_error)
@@ -121,7 +120,17 @@ def picture(stage: Any, samples: int, effort: str) -> Any:
     else:
         batches = FullInBatches(stage.integrator, stage.source, seed=3, memory=4 << 30)
         batches.add(samples)
-    denoiser = GuidedDenoiser(
+    denoiser = guided_denoiser(stage, effort)
+    coverage = [denoiser.coverage] if is_today else []
+    return Denoised(batches, denoiser.denoise, "srgb", equal_error.CORES, denoiser.share, *coverage).picture()
+
+
+def guided_denoiser(stage: Any, effort: str) -> Any:
+    """The denoiser of a pooled picture. It lies here as an earlier checkout has no other benchmark's."""
+    import equal_error
+    from lippmann.rendering.denoise.guided_denoiser import GuidedDenoiser
+
+    return GuidedDenoiser(
         stage.built,
         stage.source,
         stage.display_from_world,
@@ -132,8 +141,6 @@ def picture(stage: Any, samples: int, effort: str) -> Any:
         effort=lambda: effort,
         shares=True,
     )
-    coverage = [denoiser.coverage] if is_today else []
-    return Denoised(batches, denoiser.denoise, "srgb", equal_error.CORES, denoiser.share, *coverage).picture()
 
 
 class Earlier:

@@ -20,17 +20,14 @@ from __future__ import annotations
 
 import argparse
 import statistics
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
-from equal_error import Judge, Picture, Stage, asked, light_up, once, prepare
+from equal_error import Judge, Picture, Stage, asked, light_up, prepare, timed
 from harness import kept, save, saved
-
-T = TypeVar("T")
 
 QUALITIES = (35.0, 40.0)
 MOST_SAMPLES = 64
@@ -44,8 +41,6 @@ STOCK = "stock views"
 DRAWN_OUT = ("full", STOCK)
 #: A quality that every way has after its first round.
 LOW = 10.0
-#: What takes less than so many seconds is done so often, and the median counts.
-SHORT, RUNS = 2.0, 5
 WAYS: dict[str, dict[str, Any]] = {
     "full": {"method": "full", "denoise": "none"},
     "full + oidn": {"method": "full", "denoise": "oidn"},
@@ -102,15 +97,15 @@ def _job(stage: Stage, options: dict[str, Any]) -> Any:
 
 def _stock(stage: Stage, judge: Judge) -> dict[str, dict[str, Any]]:
     """For each quality the fewest samples with which stock views have it, and their time."""
-    looked = {effort: median_run(lambda e=effort: _guides(stage, e)) for effort in ("fast", "high")}
+    looked = {effort: timed(lambda e=effort: _guides(stage, e)) for effort in ("fast", "high")}
     _stock_views(stage, 1)  # compiles
     found: dict[str, dict[str, Any]] = {}
     samples, seconds, curve = 1, 0.0, [-1.0]
     while samples <= MOST_OF_STOCK and len(found) < len(QUALITIES):
-        traced, noisy = median_run(lambda n=samples: _stock_views(stage, n))
+        traced, noisy = timed(lambda n=samples: _stock_views(stage, n))
         curve.append(curve[-1])
         for effort, (guiding, guides) in looked.items():
-            denoising, picture = median_run(lambda e=effort, g=guides, v=noisy: _without_noise(stage, v, g, e))
+            denoising, picture = timed(lambda e=effort, g=guides, v=noisy: _without_noise(stage, v, g, e))
             psnr, seconds = judge(picture)["psnr"], traced + guiding + denoising
             curve[-1] = max(curve[-1], psnr)
             for quality in QUALITIES:
@@ -183,7 +178,7 @@ def _reached(stage: Stage, quality: float, options: dict[str, Any]) -> dict[str,
         light_up(stage, job.request)
         return trace(job)
 
-    seconds, traced = median_run(lit)
+    seconds, traced = timed(lit)
     assert traced.estimate is not None
     short = max(0.0, quality - traced.estimate.psnr)
     if options["denoise"] == "none":
@@ -195,16 +190,6 @@ def _reached(stage: Stage, quality: float, options: dict[str, Any]) -> dict[str,
         "short": short,
         "denoised": "denoise" in traced.options,
     }
-
-
-def median_run(call: Callable[[], T]) -> tuple[float, T]:
-    """The median time of what is short, and what the last run gave."""
-    seconds, result = once(call)
-    times = [seconds]
-    while seconds < SHORT and len(times) < RUNS:
-        seconds, result = once(call)
-        times.append(seconds)
-    return statistics.median(times), result
 
 
 def _drawn_out(seconds: float, short: float) -> float:
