@@ -30,8 +30,8 @@ def place(x, y, z):
     return matrix
 
 
-def lamp_over_glass(*, instances=1, is_exposed=False):
-    """A matt wall behind a glass ball and a glossy block, lit by a lamp that has no size."""
+def emitter_over_glass(*, instances=1, is_exposed=False):
+    """A matt wall behind a glass ball and a glossy block, lit by an emitter that has no size."""
     shapes = [trimesh.creation.box((300, 200, 2)), trimesh.creation.icosphere(4, 18), trimesh.creation.box((20, 20, 4))]
     meshes = [Mesh("", m.vertices.astype(np.float32), m.faces.astype(np.uint32), n) for n, m in enumerate(shapes)]
     materials = [
@@ -41,10 +41,10 @@ def lamp_over_glass(*, instances=1, is_exposed=False):
     ]
     found = [Instance(0, place(0, 0, -20)), Instance(1, place(-15, 0, 4)), Instance(2, place(30, 0, -10))]
     found += [Instance(1, place(20 * number, 25, 4)) for number in range(instances - 1)]
-    lamp = Light("point", (4e4, 4e4, 4e4), place(60.0, 40.0, 90.0))
+    emitter = Light("point", (4e4, 4e4, 4e4), place(60.0, 40.0, 90.0))
     return lippmann.load_scene(
         SceneDescription(
-            "lamp", meshes=meshes, materials=materials, instances=found, lights=[lamp], physical_lights=is_exposed
+            "emitter", meshes=meshes, materials=materials, instances=found, lights=[emitter], physical_lights=is_exposed
         )
     )
 
@@ -57,10 +57,10 @@ def rendered(scene, layout="lenticular", **options):
 @pytest.mark.parametrize("layout", ["lenticular", "hexagonal", pytest.param("square", marks=pytest.mark.long)])
 def test_photons_bring_what_paths_do_not_find(layout):
     """Every lens that sees the focus sees it by photons alone; nothing else differs."""
-    scene = lamp_over_glass()
+    scene = emitter_over_glass()
     pictures = {way: rendered(scene, layout, caustics=way) for way in ("paths", "photons", "none")}
     pixels = {way: picture.pixels for way, picture in pictures.items()}
-    # The block's gloss has a little width, by which a path may meet a lamp without size.
+    # The block's gloss has a little width, by which a path may meet an emitter without size.
     assert (np.abs(pixels["paths"] - pixels["none"]).max(axis=2) > 1e-5).mean() < 2e-3
     gained = pixels["photons"] - pixels["none"]
     assert gained.min() > -1e-5
@@ -76,7 +76,7 @@ def test_photons_bring_what_paths_do_not_find(layout):
 
 
 def test_photons_are_the_default_where_there_are_caustics():
-    scene = lamp_over_glass()
+    scene = emitter_over_glass()
     chosen, photons = rendered(scene), rendered(scene, caustics="photons")
     assert chosen.pixels.tobytes() == photons.pixels.tobytes()
     assert chosen.provenance.options["caustics"] == "photons"
@@ -104,9 +104,9 @@ def small_glass_under_a_wide_emitter():
     )
 
 
-@pytest.mark.parametrize(("made", "way"), [("lamp", "photons"), ("small", None)])
+@pytest.mark.parametrize(("made", "way"), [("emitter", "photons"), ("small", None)])
 def test_photons_go_by_the_exposure_whoever_chooses_it(made, way):
-    scene = lamp_over_glass(is_exposed=True) if made == "lamp" else small_glass_under_a_wide_emitter()
+    scene = emitter_over_glass(is_exposed=True) if made == "emitter" else small_glass_under_a_wide_emitter()
     chosen = rendered(scene, exposure="auto")
     stated = rendered(scene, exposure=chosen.provenance.options["exposure"])
     assert chosen.pixels.tobytes() == stated.pixels.tobytes()
@@ -117,7 +117,7 @@ def test_photons_go_by_the_exposure_whoever_chooses_it(made, way):
 
 def test_halves_have_photons_of_their_own():
     """The photons' noise is in the estimate: pictures of other seeds differ by what it says."""
-    scene = lamp_over_glass()
+    scene = emitter_over_glass()
     found = [rendered(scene, caustics="photons", spp=16, seed=seed) for seed in range(3)]
     told = np.mean([picture.provenance.estimate["psnr"] for picture in found])
     from lippmann.color.transfer import encode_srgb
@@ -128,12 +128,12 @@ def test_halves_have_photons_of_their_own():
 
 
 def test_pooled_light_has_them_too():
-    scene = lamp_over_glass()
+    scene = emitter_over_glass()
     plain, pooled = (rendered(scene, caustics="photons", method=method, spp=8).pixels for method in ("full", "pooled"))
     assert pooled.mean() == pytest.approx(plain.mean(), rel=0.02)
 
 
-def test_a_scene_without_lamps_is_the_same_with_photons():
+def test_a_scene_without_emitters_is_the_same_with_photons():
     shape = trimesh.creation.icosphere(3, 20)
     mesh = Mesh("", shape.vertices.astype(np.float32), shape.faces.astype(np.uint32), 0)
     mirror = Material("mirror", metallic=1.0, roughness=0.0)
@@ -146,14 +146,14 @@ def test_a_scene_without_lamps_is_the_same_with_photons():
 
 @pytest.mark.parametrize("integrator", ["direct", "classic", "depth"])
 def test_other_light_has_no_caustics(integrator):
-    scene = "primitives" if integrator == "classic" else lamp_over_glass()
+    scene = "primitives" if integrator == "classic" else emitter_over_glass()
     with pytest.raises(UsageError, match="has no caustics"):
         rendered(scene, integrator=integrator, caustics="photons")
 
 
 def test_too_little_memory_is_refused():
     with pytest.raises(MemoryLimitError, match="photons of caustics"):
-        rendered(lamp_over_glass(), caustics="photons", memory=SMALL)
+        rendered(emitter_over_glass(), caustics="photons", memory=SMALL)
 
 
 def bumps():

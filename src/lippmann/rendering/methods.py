@@ -353,8 +353,8 @@ def _denoised_whole(job: Job, traced: Traced) -> Traced:
     if denoiser is None:
         return traced
     frame, source = traced.frame, job.traced
-    noisy, further = frame.pixels, None if frame.coverage is None else denoiser.coverage()
-    if frame.coverage is not None and further is not None:
+    noisy = frame.pixels
+    if frame.coverage is not None and (further := denoiser.coverage()) is not None:
         noisy = by_coverage(noisy, frame.coverage, further[0] + further[1], threads=job.session.engine.threads)
     (cleaned,) = clean_light(noisy, frame.seen, denoiser, None)
     cleaned = without_excess(cleaned, frame.excess)

@@ -53,7 +53,7 @@ def exclusive() -> Iterator[None]:
         lock.acquire()
     _depth.of_thread = depth + 1
     try:
-        with nullcontext() if depth else no_collection():
+        with no_collection():
             yield
     finally:
         _depth.of_thread -= 1

@@ -31,8 +31,8 @@ def exchange_rows(
     each sub-pixel has rays of its own. The colour of a side is the mean of what is seen of it in the eight pixels
     around, or, where these agree that it is beyond white, their mean less one standard deviation.
     """
-    height, width, channels = share.shape
-    color = np.zeros((2, 3))
+    width, channels = share.shape[1:]
+    color, sums = np.zeros((2, 3)), np.zeros((3, 3))
     for row in range(first, last):
         for column in range(width):
             changes = False
@@ -40,42 +40,7 @@ def exchange_rows(
                 changes = changes or lacking[row, column, channel] != 0
             for c in range(3):
                 result[row, column, c] = pixels[row, column, c]
-            if not changes:
-                continue
-            is_known = True
-            for side in range(2):
-                # What is seen of the colours, the colours, and their squares; a deviation is the root of little.
-                total, seen_r, seen_g, seen_b = 0.0, 0.0, 0.0, 0.0
-                mean_r, mean_g, mean_b, square_r, square_g, square_b = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-                for y in range(max(0, row - 1), min(height, row + 2)):
-                    for x in range(max(0, column - 1), min(width, column + 2)):
-                        if y == row and x == column:
-                            continue
-                        # The side is told by all colours together, where sub-pixels have rays of their own, too.
-                        covered = 0.0
-                        for channel in range(channels):
-                            covered += share[y, x, channel] / channels
-                        weight = (covered if side == 0 else 1.0 - covered) ** _POWER
-                        total += weight
-                        r, g, b = float(pixels[y, x, 0]), float(pixels[y, x, 1]), float(pixels[y, x, 2])
-                        seen_r += weight * min(r, 1.0)
-                        seen_g += weight * min(g, 1.0)
-                        seen_b += weight * min(b, 1.0)
-                        mean_r += weight * r
-                        mean_g += weight * g
-                        mean_b += weight * b
-                        square_r += weight * r * r
-                        square_g += weight * g * g
-                        square_b += weight * b * b
-                if total < _LEAST_WEIGHT:
-                    is_known = False
-                    break
-                # What is beyond white is not seen, and a highlight is no colour of a whole side; but half of what is
-                # five times white in all pixels around is white still.
-                color[side, 0] = max(seen_r / total, _least_sure(mean_r / total, square_r / total))
-                color[side, 1] = max(seen_g / total, _least_sure(mean_g / total, square_g / total))
-                color[side, 2] = max(seen_b / total, _least_sure(mean_b / total, square_b / total))
-            if not is_known:
+            if not changes or not _colors_around(pixels, share, row, column, sums, color):
                 continue
             for c in range(3):
                 part = lacking[row, column, c if channels == 3 else 0]
@@ -83,5 +48,43 @@ def exchange_rows(
 
 
 @compiled
-def _least_sure(mean: float, square: float) -> float:
-    return mean - math.sqrt(max(square - mean * mean, 0.0))
+def _colors_around(
+    pixels: NDArray[np.float32],
+    share: NDArray[np.float32],
+    row: int,
+    column: int,
+    sums: NDArray[np.float64],
+    color: NDArray[np.float64],
+) -> bool:
+    """Find the ``color`` of either side, ``(2, 3)``, around a pixel; whether both are known.
+
+    ``sums``, ``(3, 3)``, is overwritten.
+    """
+    height, width, channels = share.shape
+    for side in range(2):
+        # What is seen of the colours, the colours, and their squares; a deviation is the root of little.
+        total = 0.0
+        sums[:] = 0.0
+        for y in range(max(0, row - 1), min(height, row + 2)):
+            for x in range(max(0, column - 1), min(width, column + 2)):
+                if y == row and x == column:
+                    continue
+                # The side is told by all colours together, where sub-pixels have rays of their own, too.
+                covered = 0.0
+                for channel in range(channels):
+                    covered += share[y, x, channel] / channels
+                weight = (covered if side == 0 else 1.0 - covered) ** _POWER
+                total += weight
+                for c in range(3):
+                    value = float(pixels[y, x, c])
+                    sums[0, c] += weight * min(value, 1.0)
+                    sums[1, c] += weight * value
+                    sums[2, c] += weight * value * value
+        if total < _LEAST_WEIGHT:
+            return False
+        for c in range(3):
+            # What is beyond white is not seen, and a highlight is no colour of a whole side; but half of what is five
+            # times white in all pixels around is white still.
+            seen, mean, square = sums[0, c] / total, sums[1, c] / total, sums[2, c] / total
+            color[side, c] = max(seen, mean - math.sqrt(max(square - mean * mean, 0.0)))
+    return True

@@ -16,6 +16,12 @@ LEAST_WORTH = 3e-4
 _REACH = 0.03
 
 
+def are_worth_photons(variance: float, gain: float) -> bool:
+    """Whether caustics of this :func:`variance_by_paths` would be seen to be noisy, once light is multiplied by
+    ``gain``."""
+    return variance * gain**2 > LEAST_WORTH
+
+
 def variance_by_paths(
     photons: Photons, radiance: NDArray[np.floating], seen: NDArray[np.floating], looked: int
 ) -> float:

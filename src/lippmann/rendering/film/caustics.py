@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.rendering.film.caustic_worth import LEAST_WORTH, variance_by_paths
+from lippmann.rendering.film.caustic_worth import are_worth_photons, variance_by_paths
 from lippmann.rendering.film.exposure import gain_of
 from lippmann.rendering.film.memory_model import PHOTON, too_small
 from lippmann.rendering.film.seen_region import SEEN_SIDE, region_about, seen_points
@@ -61,16 +61,12 @@ class Caustics:
     way:
         ``photons``, ``paths`` or ``none``.
     variance:
-        Mean variance of one path's caustic light, in linear radiance without an exposure, where photons are given to a
-        picture that has none yet; else infinite.
+        Mean variance of one path's caustic light, in linear radiance without an exposure; infinite where it was not
+        asked for.
     """
 
     way: Literal["photons", "paths", "none"]
     variance: float = math.inf
-
-    def are_worth_photons(self, gain: float) -> bool:
-        """Whether their noise would be seen by paths, once light is multiplied by ``gain``."""
-        return self.variance * gain**2 > LEAST_WORTH
 
 
 def give_photons(integrator: PathIntegrator, request: RenderRequest, source: RaySource, memory: int) -> Caustics | None:
@@ -152,8 +148,5 @@ class _Noise:
         """Whether it would; where there is no exposure yet, no light is known to be bright."""
         if not self._is_asked:
             return True
-        variance = variance_by_paths(photons, radiance, self._seen, SEEN_SIDE**2)
-        if self._exposure == "auto":
-            self.variance = variance
-            return True
-        return Caustics("photons", variance).are_worth_photons(gain_of(self._exposure))
+        self.variance = variance_by_paths(photons, radiance, self._seen, SEEN_SIDE**2)
+        return self._exposure == "auto" or are_worth_photons(self.variance, gain_of(self._exposure))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import mitsuba as mi
 
+from lippmann.rendering.film.caustic_worth import are_worth_photons
 from lippmann.rendering.film.caustics import give_photons, take_photons
 from lippmann.rendering.film.exposure import gain_of, measure_exposure
 from lippmann.rendering.film.lit_surfaces import give_light_vertices
@@ -71,7 +72,7 @@ def prepare_light(
     if exposure == "auto":
         exposure = measure_exposure(integrator, source, background, request.seed)
     gain = gain_of(exposure) if exposure else 1.0
-    if caustics is not None and not caustics.are_worth_photons(gain):
+    if caustics is not None and not are_worth_photons(caustics.variance, gain):
         take_photons(integrator)
         caustics = None
     if caustics is not None:
