@@ -43,7 +43,11 @@ def stretches(integrator: Integrator, first: int, samples: int) -> Iterator[int]
         return
     while samples > 0:
         count = samples
-        for name, passes in (("photons", integrator.photon_passes), ("light_vertices", integrator.vertex_passes)):
+        for name, passes in (
+            ("photons", integrator.photon_passes),
+            ("light_vertices", integrator.vertex_passes),
+            ("seen_chains", integrator.chain_passes),
+        ):
             if passes is not None:
                 number, left = passes.schedule.at(first)
                 setattr(integrator, name, passes.of_pass(number))

@@ -59,7 +59,7 @@ def prepare_light(
         ``memory`` bytes do not hold the photons that were asked for.
     """
     integrator.photons = integrator.photon_passes = integrator.seen_chains = integrator.mirror_images = None
-    integrator.light_vertices = integrator.vertex_passes = None
+    integrator.light_vertices = integrator.vertex_passes = integrator.chain_passes = None
     integrator.beam = integrator.gain = integrator.most_indirect = None
     told: dict[str, object] = {}
     has_sharp = has_sharp_surfaces(integrator.scene)
@@ -88,8 +88,8 @@ def prepare_light(
         chains = give_chains(integrator, request, source, memory)
         if chains.without_images:
             told["mirror_images"] = "none"
-        if chains.number:
-            told["seen_chains"] = chains.number
+        if chains.numbers:
+            told["seen_chains"] = chains.numbers[0] if len(chains.numbers) == 1 else list(chains.numbers)
             if is_widened:
-                integrator.beam = beam_of(source, request.samples * chains.number)
+                integrator.beam = beam_of(source, request.samples * chains.numbers[0])
     return told
