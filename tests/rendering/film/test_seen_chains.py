@@ -183,8 +183,16 @@ def test_each_sample_comes_with_the_chains_of_its_stage(balls, monkeypatch):
         assert chains == (2 if first < 8 else 4 if first < 16 else 8 if first < 32 else 16)
 
 
-@pytest.mark.parametrize("asked", [{"spp": 8}, {"spp": 8, "quality_worst": 80.0}])
-def test_a_picture_of_many_samples_and_a_good_micro_image_have_no_stages(balls, monkeypatch, asked):
+@pytest.mark.parametrize(
+    ("asked", "expected"),
+    [
+        ({"spp": 8}, (8,)),
+        ({"spp": 8, "quality": 42.0, "quality_worst": 80.0}, (128,)),
+        ({"spp": 8, "quality": 42.0, "max_time": 60.0}, (15,)),  # a sample takes as long as the last
+        ({"spp": 8, "quality": 42.0}, (8, 16, 32, 64, 128)),
+    ],
+)
+def test_chains_grow_where_a_quality_of_the_whole_decides(balls, monkeypatch, asked, expected):
     from lippmann.rendering.film import seen_chains
 
     totals = []
@@ -192,7 +200,7 @@ def test_a_picture_of_many_samples_and_a_good_micro_image_have_no_stages(balls, 
         seen_chains, "chains_beside_photons", lambda *given: totals.append(given[2]) or (8,) * len(given[2])
     )
     rendered(balls(3.0), **asked, method="pooled", denoise="oidn-fast")
-    assert totals == [(8,) if len(asked) == 1 else (128,)]
+    assert totals == [expected]
 
 
 def test_pictures_with_them_state_their_error_as_before(balls):

@@ -14,8 +14,8 @@ meets is noisy even with hundreds, and a denoiser makes as much of the samples t
 samples, the fewer chains each comes with (docs/research/seen-light.md).
 
 The more samples a pixel has, the brighter may one chain be without making the pixel white, and the more chains are
-worth their time. Where it is not known how many samples a picture will take, the first few come with as many chains as
-suit a picture of few, and later ones with more.
+worth their time. Where a quality is asked for, and it is not known how many samples a picture will take, the first few
+come with as many chains as suit a picture of few, and later ones with more.
 """
 
 from __future__ import annotations
@@ -103,9 +103,7 @@ def give_chains(integrator: PathIntegrator, request: RenderRequest, source: RayS
         search = search_images(integrator.scene, source, samples, memory)
         integrator.mirror_images, found_none, none_small = search.images, search.found_none, search.none_small
     look = SeenLook(integrator, source, samples, request.transfer, request.seed)
-    # All samples of a micro-image that is to be good come with the chains of a picture of many.
-    has_stages = request.is_open_ended and request.quality_worst is None
-    totals = STAGES if has_stages else (samples,)
+    totals = STAGES if _has_stages(request) else (samples,)
     numbers: tuple[int, ...]
     if integrator.photons is None:
         numbers = (chains_of_image(SPREAD * look.variance_of_means(SPREAD, samples * USUAL), samples),)
@@ -171,6 +169,15 @@ def chains_for(variance: float, samples: int, is_clean: bool) -> int:
 def _is_reached_by_few(request: RenderRequest) -> bool:
     """Whether a quality is asked for, of the whole picture, to which chains without photons are only in the way."""
     return request.quality is not None and request.quality_worst is None and request.quality < REACHED_BY_FEW
+
+
+def _has_stages(request: RenderRequest) -> bool:
+    """Whether the chains of a picture grow with its samples.
+
+    All samples of a micro-image that is to be good come with the chains of a picture of many; and where time is
+    limited, each must take as long as the last.
+    """
+    return request.quality is not None and request.quality_worst is None and request.max_time is None
 
 
 def _expected_samples(request: RenderRequest) -> int:
