@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import cast
@@ -154,7 +155,8 @@ def _is_dear(integrator: Integrator) -> bool:
 def _until(job: Job, goal: Goal) -> Traced:
     """As many samples as the goal takes, the noise taken out of them where that is asked for or proves better."""
     writing = _SECONDS_PER_PIXEL_WRITTEN * job.source.width * job.source.height
-    goal = replace(goal, began=job.request.began, reserve=writing)
+    began = time.perf_counter() if job.request.began is None else job.request.began
+    goal = replace(goal, began=began, reserve=writing)
     batches = _batches(job)
     estimator = _estimator(job)
 
@@ -182,13 +184,18 @@ def _until(job: Job, goal: Goal) -> Traced:
     method = job.request.method
     won = denoised or plain
     if isinstance(assessor, MethodRace):
-        if assessor.leader == "plain":
+        assert denoised is not None
+        reason = assessor.reason
+        if outcome.estimate is None and _has_time_for(denoised.track.seconds() / 2, goal):
+            # It takes one run, and an assessment two.
+            reason = "a single sample, which tells no error, is best without its noise"
+        elif assessor.leader == "plain":
             won = plain
         if method == "full":
             method = "full" if won is plain else "pooled"
-            options["auto"] = f"{method}: {assessor.reason}"
+            options["auto"] = f"{method}: {reason}"
         elif won is plain:
-            notes = (*notes, f"the light is not pooled: {assessor.reason}")
+            notes = (*notes, f"the light is not pooled: {reason}")
     frame = Frame(won.renderer.picture(), batches.rays, batches.seconds_compile, batches.seconds_trace)
     frame.maps[SAMPLES_LAYER] = batches.samples_of_pixels()
     if outcome.errors is not None:
@@ -196,6 +203,13 @@ def _until(job: Job, goal: Goal) -> Traced:
     seconds = {} if denoised is None or denoised.denoiser is None else {"denoise": denoised.denoiser.seconds}
     options |= _denoiser_options(job, won.denoiser)
     return Traced(frame, outcome.samples, outcome.estimate, notes, options, seconds, method=method)
+
+
+def _has_time_for(seconds: float, goal: Goal) -> bool:
+    """Whether so much is left of the time that limits the goal."""
+    assert goal.max_time is not None
+    assert goal.began is not None
+    return time.perf_counter() - goal.began + seconds <= goal.max_time - goal.reserve
 
 
 def _with_more(

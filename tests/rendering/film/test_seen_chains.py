@@ -203,6 +203,22 @@ def test_chains_grow_where_a_quality_of_the_whole_decides(balls, monkeypatch, as
     assert totals == [expected]
 
 
+@pytest.mark.parametrize(
+    ("seconds", "pixels", "threads", "expected"),
+    [(10.0, 1_000_000, 1, 2), (10.0, 1_000_000, 4, 10), (1e6, 1000, 1, 128), (0.1, 1_000_000, 2, 0)],
+)
+def test_samples_in_a_time(engine, monkeypatch, seconds, pixels, threads, expected):
+    from lippmann.rendering.film.seen_chains import samples_in
+    from lippmann.runtime import engine as device
+
+    monkeypatch.setattr(device, "runs_on_gpu", lambda: False)
+    assert samples_in(seconds, pixels, threads) == expected
+
+
+def test_there_are_none_where_time_is_short(balls):
+    assert chains(rendered(balls(3.0), spp=None, max_time=0.03, threads=1)) == 0
+
+
 def test_pictures_with_them_state_their_error_as_before(balls):
     scene = balls(3.0)
     first, second = (rendered(scene, seed=seed, spp=32) for seed in (1, 2))

@@ -36,6 +36,7 @@ from lippmann.rendering.transport.chain_passes import ChainPasses
 from lippmann.rendering.transport.pass_schedule import PassSchedule
 from lippmann.rendering.transport.path import PathIntegrator
 from lippmann.rendering.transport.ray_source import RaySource
+from lippmann.runtime import engine, machine
 
 #: Chains of a path, at most.
 MOST = 32
@@ -60,6 +61,11 @@ REACHED_BY_FEW = 38.0
 MISSED = 0.25
 #: Samples that a picture is taken to need at most, and at least, of which it is not known.
 OPEN_ENDED, FEWEST_OPEN_ENDED = 128, 8
+#: Seconds of a processor core that a path without chains takes where there are photons, in the bundled scenes; and of a
+#: GPU.
+PATH_SECONDS, PATH_SECONDS_ON_GPU = 4e-6, 1e-7
+#: Samples that a picture whose time is limited must be able to have for a search and chains to be worth theirs.
+FEWEST_IN_TIME = 4
 #: Its samples up to each of these, doubling, come with the chains of a picture of so many; further ones with those of
 #: the last.
 STAGES = 8, 16, 32, 64, 128
@@ -96,6 +102,11 @@ def give_chains(integrator: PathIntegrator, request: RenderRequest, source: RayS
     if not request.box_filter or request.method in REUSING:
         return GivenChains()
     samples, is_clean = _expected_samples(request), request.denoise != "none"
+    if request.max_time is not None:
+        in_time = samples_in(request.max_time, source.width * source.height * source.channels, request.threads)
+        if in_time < FEWEST_IN_TIME:
+            return GivenChains()
+        samples = min(samples, in_time)
     if integrator.photons is None and (not is_clean or _is_reached_by_few(request)):
         return GivenChains()
     found_none = none_small = False
@@ -169,6 +180,12 @@ def chains_for(variance: float, samples: int, is_clean: bool) -> int:
 def _is_reached_by_few(request: RenderRequest) -> bool:
     """Whether a quality is asked for, of the whole picture, to which chains without photons are only in the way."""
     return request.quality is not None and request.quality_worst is None and request.quality < REACHED_BY_FEW
+
+
+def samples_in(seconds: float, pixels: int, threads: int | None) -> int:
+    """Samples of each of so many pixels, channels apart, that a time allows, by the usual cost of a path."""
+    spent = PATH_SECONDS_ON_GPU if engine.runs_on_gpu() else PATH_SECONDS / (threads or machine.usable_cores())
+    return int(min(seconds / (pixels * spent), OPEN_ENDED))
 
 
 def _has_stages(request: RenderRequest) -> bool:
