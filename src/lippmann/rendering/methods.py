@@ -186,8 +186,8 @@ def _until(job: Job, goal: Goal) -> Traced:
     if isinstance(assessor, MethodRace):
         assert denoised is not None
         reason = assessor.reason
-        if outcome.estimate is None and _has_time_for(denoised.track.seconds() / 2, goal):
-            # It takes one run, and an assessment two.
+        if outcome.estimate is None and _has_time_for(denoised.track.seconds(), goal):
+            # An assessment takes more: it cleans halves.
             reason = "a single sample, which tells no error, is best without its noise"
         elif assessor.leader == "plain":
             won = plain

@@ -64,8 +64,9 @@ OPEN_ENDED, FEWEST_OPEN_ENDED = 128, 8
 #: Seconds of a processor core that a path without chains takes where there are photons, in the bundled scenes; and of a
 #: GPU.
 PATH_SECONDS, PATH_SECONDS_ON_GPU = 4e-6, 1e-7
-#: Samples that a picture whose time is limited must be able to have for a search and chains to be worth theirs.
-FEWEST_IN_TIME = 4
+#: Samples that a picture whose time is limited must be able to have for a search and chains to be worth theirs: few
+#: samples come with so many chains that each takes twice as long.
+FEWEST_IN_TIME = 8
 #: Its samples up to each of these, doubling, come with the chains of a picture of so many; further ones with those of
 #: the last.
 STAGES = 8, 16, 32, 64, 128
