@@ -186,7 +186,7 @@ def _until(job: Job, goal: Goal) -> Traced:
     if isinstance(assessor, MethodRace):
         assert denoised is not None
         reason = assessor.reason
-        if outcome.estimate is None and _has_time_for(denoised.track.seconds(), goal):
+        if outcome.estimate is None and goal.seconds_left(time.perf_counter() - began) >= denoised.track.seconds():
             # An assessment takes more: it cleans halves.
             reason = "a single sample, which tells no error, is best without its noise"
         elif assessor.leader == "plain":
@@ -203,13 +203,6 @@ def _until(job: Job, goal: Goal) -> Traced:
     seconds = {} if denoised is None or denoised.denoiser is None else {"denoise": denoised.denoiser.seconds}
     options |= _denoiser_options(job, won.denoiser)
     return Traced(frame, outcome.samples, outcome.estimate, notes, options, seconds, method=method)
-
-
-def _has_time_for(seconds: float, goal: Goal) -> bool:
-    """Whether so much is left of the time that limits the goal."""
-    assert goal.max_time is not None
-    assert goal.began is not None
-    return time.perf_counter() - goal.began + seconds <= goal.max_time - goal.reserve
 
 
 def _with_more(

@@ -76,6 +76,11 @@ class Goal:
         """Whether some quality is asked for."""
         return self.quality is not None or self.quality_worst is not None
 
+    def seconds_left(self, spent: float) -> float:
+        """Of ``max_time``, which is set, what is left after so many seconds and the reserve; below 0 if it is up."""
+        assert self.max_time is not None
+        return self.max_time - self.reserve - spent
+
     def missing(self, estimate: Estimate, margin: Margin = NO_MARGIN) -> float:
         """How many dB the picture is short of the quality and a ``margin``; at most 0 if it has both.
 
@@ -265,7 +270,7 @@ class _AdaptiveLoop:
         short = missing_with_margin(self.goal, estimate, self.spent, self.assessor)
         if self.goal.has_quality and short <= 0 and self.spent >= self.assessor.first:
             return "quality"
-        if self.goal.max_time is not None and self._seconds() >= self.goal.max_time - self.goal.reserve:
+        if self.goal.max_time is not None and self.goal.seconds_left(self._seconds()) <= 0:
             return "time"
         return "samples" if self.spent >= self._most else None
 
@@ -292,8 +297,7 @@ class _AdaptiveLoop:
 
     def _affordable(self) -> int:
         """Samples that fit the time left, assessment included."""
-        assert self.goal.max_time is not None
-        left = self.goal.max_time - self.goal.reserve - self._seconds() - self.assessor.seconds()
+        left = self.goal.seconds_left(self._seconds()) - self.assessor.seconds()
         return math.floor(_TIME_SHARE * max(0.0, left) * self.rate)
 
     def _time_for(self, samples: int) -> bool:

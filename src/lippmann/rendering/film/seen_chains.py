@@ -23,6 +23,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import accumulate
 
 import drjit as dr
 import mitsuba as mi
@@ -67,9 +68,9 @@ PATH_SECONDS, PATH_SECONDS_ON_GPU = 4e-6, 1e-7
 #: Samples that a picture whose time is limited must be able to have for a search and chains to be worth theirs: few
 #: samples come with so many chains that each takes twice as long.
 FEWEST_IN_TIME = 8
-#: Its samples up to each of these, doubling, come with the chains of a picture of so many; further ones with those of
-#: the last.
-STAGES = 8, 16, 32, 64, 128
+#: Its samples up to each of these come with the chains of a picture of so many; further ones with those of the last.
+_SCHEDULE = PassSchedule(first=8, most=64)
+STAGES = tuple(accumulate(_SCHEDULE.samples(number) for number in range(5)))
 
 
 @dataclass(frozen=True)
@@ -126,7 +127,7 @@ def give_chains(integrator: PathIntegrator, request: RenderRequest, source: RayS
         return GivenChains((), none_small)
     integrator.seen_chains = dr.opaque(mi.UInt32, numbers[0])
     if len(set(numbers)) > 1:
-        integrator.chain_passes = ChainPasses(PassSchedule(STAGES[0], STAGES[-2]), numbers)
+        integrator.chain_passes = ChainPasses(_SCHEDULE, numbers)
     if integrator.photons is None:
         integrator.mirror_images = search_images(integrator.scene, source, samples, memory).images
     return GivenChains(numbers if integrator.chain_passes is not None else numbers[:1], none_small)

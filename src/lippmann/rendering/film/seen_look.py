@@ -90,7 +90,7 @@ class SeenLook:
         row, column = divide(place, few.width)
         scene: MitsubaScene = self._integrator.scene
         si = scene.ray_intersect(few.rays(column, row, mi.UInt32(0), mi.Point2f(0.5)))
-        point = SampleStream.of_pixels(place, mi.UInt32(0), dr.opaque(mi.UInt32, self._seed)).next_2d(0)
+        point = SampleStream.of_pixels(mi.UInt32(0), place, dr.opaque(mi.UInt32, self._seed)).next_2d(1)
         ds, weight = scene.sample_emitter_direction(si, point, False, si.is_valid())
         counts = si.is_valid() & ~ds.delta
         if of_environment:
