@@ -48,12 +48,55 @@ def test_dark_is_bright_where_the_file_says_so(tmp_path):
 def test_missing_and_doubled_slices_are_told(tmp_path):
     save_series(tmp_path / "ct", [0, 3, 6, 12, 15])
     scene = load_scene(tmp_path / "ct")
-    assert "slices are missing or unevenly spaced: 6 are interpolated from 5" in scene.notes
+    assert "1 slice is missing: between 6 and 12 mm; 6 are interpolated from 5" in scene.notes
     assert scene.description.volume.grid[:, 1, 0].tolist() == [0, 30, 60, 90, 120, 150]
     save_slice(tmp_path / "ct" / "again", np.full((4, 5), 500), ImagePositionPatient=[-7, -9, 6], InstanceNumber=99)
     scene = load_scene(tmp_path / "ct")
     assert "1 slices lie where others lie, and are left out" in scene.notes
     assert scene.description.volume.grid[2, 1, 0] == 60
+
+
+def test_files_that_are_no_slices_are_counted(tmp_path):
+    folder = tmp_path / "ct"
+    save_series(folder, range(0, 36, 3))
+    empty, cut, half, html, link = sorted(folder.iterdir())[1:6]
+    empty.write_bytes(b"")
+    cut.write_bytes(cut.read_bytes()[:250])
+    half.write_bytes(half.read_bytes()[:-5])
+    html.write_text("<html>not found</html>")
+    link.unlink()
+    link.symlink_to("nowhere")
+    (folder / ".DS_Store").write_bytes(b"x")
+    gaps = "5 slices are missing: between 0 and 9, 9 and 15, 18 and 27 mm; 12 are interpolated from 7"
+    line = "5 of 13 files are left out: 1 empty ('a-1'), 2 damaged ('a-10'), 1 no DICOM ('a-2'), 1 link ('a-3')"
+    for path in (folder, folder / "a-0"):  # as a folder, and as one of its files
+        scene = load_scene(path)
+        assert line in scene.notes
+        assert gaps in scene.notes
+
+
+@pytest.mark.parametrize("size", [140, 200, 250, 400])
+def test_a_file_cut_anywhere_in_its_header_is_counted(tmp_path, size):
+    save_series(tmp_path / "ct", [0, 3, 6])
+    path = tmp_path / "ct" / "a-1"
+    path.write_bytes(path.read_bytes()[:size])
+    assert "1 of 3 files is left out: 1 damaged ('a-1')" in load_scene(tmp_path / "ct").notes
+
+
+def test_reports_and_directories_are_not_missed(tmp_path):
+    save_series(tmp_path / "ct", [0, 3, 6])
+    path = tmp_path / "ct" / "report"
+    save_slice(path, np.zeros((4, 5)), Rows=None, Columns=None)
+    path.write_bytes(path.read_bytes().replace(b"1.2.840.10008.5.1.4.1.1.2\0", b"1.2.840.10008.1.3.10\0\0\0\0\0\0"))
+    assert not any("left out" in note for note in load_scene(tmp_path / "ct").notes)
+
+
+def test_files_without_places_tell_which_numbers_are_missing(tmp_path):
+    for number in (1, 2, 5):
+        path = tmp_path / "old" / str(number)
+        path.parent.mkdir(exist_ok=True)
+        save_slice(path, np.full((4, 5), number), InstanceNumber=number)
+    assert "2 slices are missing: between 2 and 5 numbers" in load_scene(tmp_path / "old").notes
 
 
 def test_one_slice_is_as_thick_as_it_says(tmp_path):
@@ -88,6 +131,7 @@ def test_files_without_places_are_taken_in_the_order_of_their_numbers(tmp_path):
     save_series(tmp_path / "old", range(3), ImagePositionPatient=None, PixelSpacing=None)
     notes = load_scene(tmp_path / "old").notes
     assert any("places are not told" in note for note in notes)
+    assert not any("missing" in note for note in notes)
     assert any("size of pixels is not told" in note for note in notes)
 
 

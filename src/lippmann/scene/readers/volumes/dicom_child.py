@@ -6,6 +6,7 @@ import json
 import os
 import struct
 from collections.abc import Iterator
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -13,11 +14,10 @@ import numpy as np
 import pydicom
 
 from lippmann.runtime.helper_process import limit_memory, serve
-from lippmann.scene.readers.volumes.dicom_files import files_in, is_dicom
+from lippmann.scene.readers.volumes.dicom_files import MOST_FILES, fault_of, files_in
 from lippmann.scene.readers.volumes.dicom_slices import (
     Frame,
     SeriesError,
-    Stack,
     choose_series,
     interpolated,
     make_stack,
@@ -61,28 +61,47 @@ def _words(error: Exception, path: str) -> str:
 
 def _read(path: str, series: str | None, memory: int) -> tuple[dict[str, Any], bytes]:
     own = None
-    names = files_in(Path(path))
+    names = list(islice(files_in(Path(path)), MOST_FILES))
     if not os.path.isdir(path):
         own = str(_header(path).get("SeriesInstanceUID", ""))
-        beside = [name for name in files_in(Path(path).parent) if os.path.dirname(name) == os.path.dirname(path)]
-        names = [path, *(name for name in beside if name != path)] if own else [path]
+        beside = (name for name in files_in(Path(path).parent) if os.path.dirname(name) == os.path.dirname(path))
+        names = [path, *islice((name for name in beside if name != path), MOST_FILES)] if own else [path]
     frames: list[Frame] = []
-    notes: list[str] = []
-    broken = 0
+    lost: dict[str, list[str]] = {}
     for name in names:
-        if name != path and not is_dicom(name):
-            continue
-        try:
-            frames.extend(_frames(name, _header(name)))
-        except Exception as error:  # noqa: BLE001  # as above; other files may be whole
-            if name == path:
-                raise SeriesError(error=f"is no DICOM file ({_words(error, path)})") from None
-            broken += 1
-    if broken:
-        notes.append(f"{broken} damaged files are left out")
+        fault = fault_of(name) if name != path else None
+        if fault is None:
+            try:
+                frames.extend(_frames(name, _header(name)))
+                continue
+            except Exception as error:  # noqa: BLE001  # as above; other files may be whole
+                if name == path:
+                    raise SeriesError(error=f"is no DICOM file ({_words(error, path)})") from None
+                fault = "damaged"
+        if _may_be_slice(name, path, of_one=own is not None):
+            lost.setdefault(fault, []).append(name)
     chosen, remarks = choose_series(frames, series, own)
-    stack = make_stack(chosen)
-    return _fill(stack, [*notes, *remarks, *stack.notes], memory)
+    head, grid = _fill(chosen, lost, memory)
+    notes = _losses(lost, len(names))
+    if len(names) >= MOST_FILES:
+        notes.append(f"only the first {MOST_FILES} files are read")
+    return {**head, "notes": [*notes, *remarks, *head["notes"]]}, grid
+
+
+def _may_be_slice(name: str, path: str, *, of_one: bool) -> bool:
+    """Whether a file that cannot be read may be a slice: no hidden file, and of one file's ending if that was given."""
+    if of_one and os.path.splitext(name)[1] != os.path.splitext(path)[1]:
+        return False
+    return not any(part.startswith(".") for part in Path(os.path.relpath(name, path)).parts[of_one:])
+
+
+def _losses(lost: dict[str, list[str]], total: int) -> list[str]:
+    """One line on files that are left out, with the first of each kind by name."""
+    if not lost:
+        return []
+    parts = ", ".join(f"{len(names)} {kind} ('{os.path.basename(names[0])[:60]}')" for kind, names in lost.items())
+    count = sum(map(len, lost.values()))
+    return [f"{count} of {total} files {'is' if count == 1 else 'are'} left out: {parts}"]
 
 
 def _header(name: str) -> pydicom.Dataset:
@@ -90,8 +109,11 @@ def _header(name: str) -> pydicom.Dataset:
 
 
 def _frames(name: str, header: pydicom.Dataset) -> Iterator[Frame]:
-    """The slices of a file that have pixels of one number."""
+    """The slices of a file."""
     if "Rows" not in header or "Columns" not in header:
+        kind = header.file_meta.get("MediaStorageSOPClassUID")
+        if kind is None or kind.name == kind or "Image Storage" in kind.name:
+            raise ValueError("cut before its picture")
         return  # a directory of files, a report
     count = int(header.get("NumberOfFrames", 1) or 1)
     shared = _first(header, "SharedFunctionalGroupsSequence")
@@ -150,8 +172,9 @@ def _numbers(values: Any, count: int) -> tuple[float, ...] | None:
     return found if np.isfinite(found).all() else None
 
 
-def _fill(stack: Stack, notes: list[str], memory: int) -> tuple[dict[str, Any], bytes]:
-    """The grid of a stack, slice by slice."""
+def _fill(frames: list[Frame], lost: dict[str, list[str]], memory: int) -> tuple[dict[str, Any], bytes]:
+    """The grid of a stack, slice by slice; files whose pixels are damaged are left out and added to ``lost``."""
+    stack = make_stack(frames)
     frames = stack.frames
     is_one_scale = len({(frame.slope, frame.intercept) for frame in frames}) == 1
     inverted = frames[0].is_inverted
@@ -160,9 +183,17 @@ def _fill(stack: Stack, notes: list[str], memory: int) -> tuple[dict[str, Any], 
         raise MemoryError
     grid: np.ndarray[Any, Any] | None = None
     held: tuple[str, Any] = ("", None)
+    damaged: dict[str, Exception] = {}
     for place, frame in enumerate(frames):
         if held[0] != frame.file:
-            held = (frame.file, _pixels(frame))
+            try:
+                held = (frame.file, _pixels(frame))
+            except (SeriesError, MemoryError):
+                raise
+            except Exception as error:  # noqa: BLE001  # as above
+                damaged[frame.file] = error
+        if frame.file in damaged:
+            continue
         pixels = held[1] if frame.count == 1 else held[1][frame.index]
         if pixels.shape != frame.shape:
             raise SeriesError(error=f"{os.path.basename(frame.file)} holds pixels {pixels.shape}, not {frame.shape}")
@@ -173,7 +204,11 @@ def _fill(stack: Stack, notes: list[str], memory: int) -> tuple[dict[str, Any], 
         elif not np.can_cast(pixels.dtype, grid.dtype):
             grid = grid.astype(np.result_type(pixels.dtype, grid.dtype))
         grid[place] = pixels
-    assert grid is not None
+    if grid is None:
+        raise next(iter(damaged.values()))
+    if damaged:
+        lost.setdefault("damaged", []).extend(damaged)
+        return _fill([frame for frame in frames if frame.file not in damaged], lost, memory)
     if stack.places is not None:
         grid = interpolated(grid, stack.places)
     slope, intercept = (frames[0].slope, frames[0].intercept) if is_one_scale else (1.0, 0.0)
@@ -186,7 +221,7 @@ def _fill(stack: Stack, notes: list[str], memory: int) -> tuple[dict[str, Any], 
         "slope": slope,
         "intercept": intercept,
         "modality": frames[0].modality,
-        "notes": notes,
+        "notes": stack.notes,
     }
     return head, grid.tobytes()
 

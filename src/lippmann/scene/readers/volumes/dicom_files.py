@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import os
+import stat
+from collections.abc import Iterator
+from itertools import islice
 from pathlib import Path
 
 #: What stands after the first 128 bytes of a file.
@@ -16,28 +19,28 @@ _A_FEW = 64
 
 def holds_dicom(folder: Path) -> bool:
     """Whether one of the first files of a folder is a DICOM file."""
-    return any(is_dicom(path) for path in files_in(folder, _A_FEW))
+    return any(fault_of(path) is None for path in islice(files_in(folder), _A_FEW))
 
 
-def is_dicom(path: str) -> bool:
-    """Whether a file says that it is a DICOM file."""
+def fault_of(path: str) -> str | None:
+    """Why a file is no DICOM file: ``link``, ``empty`` or ``no DICOM``; None if it says that it is one."""
     try:
+        status = os.lstat(path)
+        if stat.S_ISLNK(status.st_mode):
+            return "link"
+        if not stat.S_ISREG(status.st_mode):
+            return "no DICOM"
+        if not status.st_size:
+            return "empty"
         with open(path, "rb") as file:
-            return file.read(132)[128:] == DICOM
+            return None if file.read(132)[128:] == DICOM else "no DICOM"
     except OSError:
-        return False
+        return "no DICOM"
 
 
-def files_in(folder: Path, most: int = MOST_FILES) -> list[str]:
-    """Paths of plain files in a folder and those below it, in order; links are left alone."""
-    found: list[str] = []
+def files_in(folder: Path) -> Iterator[str]:
+    """Paths of all that is no folder in a folder and those below it, in order."""
     root = len(folder.parts)
     for parent, folders, names in os.walk(folder):
         folders[:] = sorted(folders) if len(Path(parent).parts) - root < MOST_LEVELS else []
-        for name in sorted(names):
-            path = os.path.join(parent, name)
-            if os.path.isfile(path) and not os.path.islink(path):
-                found.append(path)
-                if len(found) >= most:
-                    return found
-    return found
+        yield from (os.path.join(parent, name) for name in sorted(names))

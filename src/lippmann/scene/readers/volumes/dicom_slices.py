@@ -17,7 +17,7 @@ _DECIMALS = 3
 _EVEN = 0.05
 #: Slices of a stack whose gaps are filled.
 _MOST_SLICES = 8192
-#: Series that a line names.
+#: Series, and gaps, that a line names.
 _NAMED = 8
 
 
@@ -137,6 +137,8 @@ def make_stack(frames: list[Frame]) -> Stack:
         ordered = sorted(frames, key=lambda frame: (frame.number, frame.file, frame.index))
         if len(ordered) > 1:
             notes.append("the slices' places are not told: they are taken in the order of their numbers")
+            gap = _gaps(np.array([frame.number for frame in ordered]), 1.0, "numbers")
+            notes.extend([gap] if gap else [])
         # Nothing says that the first is the lowest: in most scanners' order it is not.
         matrix[:3, 2] = normal * thickness
         return Stack(ordered, matrix, notes)
@@ -145,7 +147,7 @@ def make_stack(frames: list[Frame]) -> Stack:
     heights, ordered = heights[order], [frames[each] for each in order]
     distances = np.diff(heights)
     real = distances[distances > 1e-3]
-    step = float(np.median(real)) if len(real) else thickness
+    step = _usual(real) if len(real) else thickness
     keep = np.concatenate([[True], distances > _EVEN * step])
     if not keep.all():
         notes.append(f"{int((~keep).sum())} slices lie where others lie, and are left out")
@@ -166,8 +168,29 @@ def make_stack(frames: list[Frame]) -> Stack:
         raise SeriesError(error="its slices lie too far apart", rule=f"{_MOST_SLICES} at their usual distance")
     matrix[:3, 2] = whole / (count - 1)
     even = np.linspace(heights[0], heights[-1], count)
-    notes.append(f"slices are missing or unevenly spaced: {count} are interpolated from {len(ordered)}")
+    why = _gaps(heights, step, "mm") or "slices are unevenly spaced"
+    notes.append(f"{why}; {count} are interpolated from {len(ordered)}")
     return Stack(ordered, matrix, notes, np.interp(even, heights, np.arange(len(ordered))))
+
+
+def _usual(distances: Numbers) -> float:
+    """The most common distance; of several that are as common the least, as gaps are wider."""
+    ordered = np.sort(distances)
+    counts = np.searchsorted(ordered, ordered * (1.0 + _EVEN), "right") - np.searchsorted(ordered, ordered)
+    least = int(np.argmax(counts))
+    return float(np.median(ordered[least : least + counts[least]]))
+
+
+def _gaps(places: Numbers, step: float, unit: str) -> str:
+    """Where slices are missing among sorted places that lie a step apart; empty if none is."""
+    missing = np.rint(np.diff(places) / step).astype(int) - 1
+    gaps = [f"{places[at]:g} and {places[at + 1]:g}" for at in np.flatnonzero(missing > 0)]
+    if not gaps:
+        return ""
+    count = int(missing[missing > 0].sum())
+    more = f", {len(gaps) - _NAMED} more gaps" if len(gaps) > _NAMED else ""
+    is_missing = "1 slice is" if count == 1 else f"{count} slices are"
+    return f"{is_missing} missing: between {', '.join(gaps[:_NAMED])} {unit}{more}"
 
 
 def interpolated(grid: NDArray[np.generic], places: Numbers) -> NDArray[np.generic]:
