@@ -101,7 +101,7 @@ def test_a_scene_without_a_file_is_shown_but_not_rendered_from_the_page(engine):
         assert said(socket, "facts", 60)["command"].startswith("# This scene has no file: call lippmann.render")
         said(socket, "frame", 60)
         for message in ({"type": "render", "kind": "picture"}, {"type": "save"}):
-            socket.send(json.dumps(message))
+            socket.send(json.dumps(message | {"state": state}))
             line = said(socket, "error")["line"]
             assert "needs a scene that is a file" in line
             assert "\n" not in line

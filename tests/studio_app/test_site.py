@@ -207,7 +207,7 @@ def test_picked_depth_and_saved_states(studio):
         said(socket, "frame")
         socket.send(json.dumps({"type": "pick", "place": [0.9, 0.5]}))
         assert said(socket, "picked")["depth"] == 3.0
-        socket.send(json.dumps({"type": "save"}))
+        socket.send(json.dumps({"type": "save", "state": STATE | {"scale": 2}}))
         saved = said(socket, "saved")
         assert saved["name"] == "teapot.toml"
         assert "scale = 2.0" in saved["text"]
@@ -340,3 +340,47 @@ def test_pages_end_with_the_studio(tmp_path):
 @pytest.mark.parametrize("path", ["results/1/a.png", "pictures/1/manifest.json", "results/0/x", "results/a/b"])
 def test_there_are_no_results_before_a_render(studio, path):
     assert ask(studio, f"/{FOLDER}/{path}")[0] == 404
+
+
+def test_each_page_has_the_state_that_it_shows(tmp_path, monkeypatch):
+    """What a page saves, renders and has to copy is its own, whatever another page of the studio set last."""
+    started = []
+    with running(tmp_path) as studio, studio.connect() as page, studio.connect() as other:
+        monkeypatch.setattr(studio.session.jobs, "start", lambda kind, words, stem, ending=None: started.append(words))
+        mine = STATE | {"turn": [30, 0, 0]}
+        page.send(view(mine))
+        said(page, "frame")
+        other.send(view(STATE | {"turn": [60, 0, 0], "scale": 2}))
+        said(other, "frame")
+        page.send(json.dumps({"type": "save", "state": mine}))
+        saved = said(page, "saved")["text"]
+        other.send(view(STATE | {"turn": [61, 0, 0], "scale": 2}, 2))
+        page.send(json.dumps({"type": "render", "kind": "picture", "state": mine}))
+        page.send(json.dumps({"type": "render", "kind": "picture"}))
+        assert "state" in said(page, "error")["line"]
+    assert "turn = [30.0, 0.0, 0.0]" in saved
+    assert "scale" not in saved
+    (words,) = started
+    assert "30,0,0" in words
+
+
+def test_a_frame_is_told_of_with_the_state_of_its_own_page(tmp_path):
+    begun, may_go = threading.Event(), threading.Event()
+
+    class Slow(StandIn):
+        def frame(self, view, is_stale=None):
+            begun.set()
+            assert may_go.wait(10.0)
+            return super().frame(view)
+
+    with running(tmp_path, make=Slow) as studio, studio.connect() as page, studio.connect() as other:
+        page.send(view(STATE | {"turn": [30, 0, 0]}))
+        assert begun.wait(10.0)
+        other.send(view(STATE | {"turn": [60, 0, 0]}))
+        until = time.monotonic() + 10.0
+        while studio.session.state.turn[0] != 60.0:
+            assert time.monotonic() < until
+            time.sleep(0.005)
+        may_go.set()
+        assert "--turn 30,0,0" in said(page, "facts")["command"]
+        assert "--turn 60,0,0" in said(other, "facts")["command"]

@@ -272,7 +272,7 @@ def test_the_page_is_refused_without_its_token(studio, open_tab):
 def test_a_print_is_rendered_and_seen_through_its_sheet(page, studio):
     """A whole render, by the command that the page shows."""
     tab = page()
-    studio.session.set_state(StudioState(display=TINY, integrator="direct", spp=1))
+    tab.evaluate(f"{STUDIO}.store.set({{ integrator: 'direct', spp: 1 }})")
     tab.page.get_by_label("What to render").select_option("print")
     tab.page.get_by_role("button", name="Render", exact=True).click()
     phase = "document.querySelector('.job').dataset.phase"

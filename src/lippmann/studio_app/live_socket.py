@@ -13,7 +13,6 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from lippmann.display.pixel_window import PixelWindow
 from lippmann.errors import LippmannError, UsageError
-from lippmann.rendering.live.live_view import LiveView
 from lippmann.studio_app.page_values import (
     display_size,
     facts_of_view,
@@ -64,6 +63,7 @@ class LiveSocket:
         self._loop = asyncio.get_running_loop()
         self._changed = asyncio.Event()
         self._messages: dict[str, dict[str, Any]] = {}
+        self._state = session.state
         self._shown: Shown | None = None
         self._sent = self._acknowledged = self._view = 0
         self._told: tuple[object, ...] | None = None
@@ -128,25 +128,30 @@ class LiveSocket:
     def _want(self, said: dict[str, Any]) -> None:
         self._view = int(number_of(said, "number", 0, _LARGEST_NUMBER))
         width, height = (max(1, round(side)) for side in numbers_of(said, "size", 2, _MOST_SIDE))
-        state = state_of_values(said.get("state"))
-        self._session.set_state(state)
-        make: Callable[[StudioState], LiveView]
+        state = self._take_over(said)
         if said.get("eye") is None:
             left, top, columns, rows = (round(part) for part in numbers_of(said, "window", 4, _LARGEST_NUMBER))
             panel = self._session.display(state).panel
             left, top = min(max(left, 0), panel.width - 1), min(max(top, 0), panel.height - 1)
             columns, rows = min(max(columns, 1), panel.width - left), min(max(rows, 1), panel.height - top)
             window = PixelWindow(left, top, columns, rows)
-            make = lambda state: state.native_view(window)  # noqa: E731
+            view = state.native_view(window)
         else:
             x, y, z = numbers_of(said, "eye", 3, _FARTHEST)
-            make = lambda state: state.view((x, y, z), (width, height))  # noqa: E731
-        self._session.thread.want(self._watcher, self._session.wanted(self._view, make))
+            view = state.view((x, y, z), (width, height))
+        self._session.thread.want(self._watcher, self._session.wanted(self._view, state, view))
 
     def _want_all(self) -> None:
         self._view += 1
-        wanted = self._session.wanted(self._view, lambda state: state.native_view())
-        self._session.thread.want(self._watcher, wanted)
+        state = self._state = self._session.state
+        self._session.thread.want(self._watcher, self._session.wanted(self._view, state, state.native_view()))
+
+    def _take_over(self, said: dict[str, Any]) -> StudioState:
+        """The state that a message carries: that of its page, whatever other pages have set since."""
+        state = state_of_values(said.get("state"))
+        self._session.set_state(state)
+        self._state = state
+        return state
 
     def _pick(self, said: dict[str, Any]) -> None:
         u, v = numbers_of(said, "place", 2, 1.0)
@@ -160,10 +165,10 @@ class LiveSocket:
         kind = said.get("kind")
         if kind not in KINDS:
             raise UsageError(f"{str(kind)[:40]!r} cannot be rendered", rule=f"known are {', '.join(KINDS)}")
-        self._session.render(kind)
+        self._session.render(kind, self._take_over(said))
 
-    def _save(self, _: dict[str, Any]) -> None:
-        state = self._session.state
+    def _save(self, said: dict[str, Any]) -> None:
+        state = self._take_over(said)
         self._session.check_has_file(state, "a saved state")
         stem = title_of(state).rpartition(".")[0] or title_of(state)
         self._say({"type": "saved", "name": f"{stem}.toml", "text": text_of_state(state)})
@@ -172,7 +177,7 @@ class LiveSocket:
         text = said.get("text")
         if not isinstance(text, str):
             raise UsageError("this is no state", rule="the text of a TOML file")
-        state = opened_state(text, self._session.state)
+        state = opened_state(text, self._state)
         self._session.check_files(state)
         self._say({"type": "state", "state": values_of_state(state)})
 
@@ -204,7 +209,7 @@ class LiveSocket:
     # ---- To the page -----------------------------------------------------------------------------------------------
 
     def _hello(self) -> dict[str, Any]:
-        session, state = self._session, self._session.state
+        session, state = self._session, self._state
         return {
             "type": "hello",
             "state": values_of_state(state),
@@ -214,7 +219,7 @@ class LiveSocket:
 
     def _facts(self, shown: Shown) -> dict[str, Any] | None:
         """What is to be said of a frame beside it; None if it has been."""
-        session, state, frame = self._session, self._session.state, shown.frame
+        session, state, frame = self._session, self._state, shown.frame
         display = session.display(state)
         # Of the frame too: one of an older view may come after the state has changed.
         facts = facts_of_view(display, frame.placement, round(frame.exposure, 3))

@@ -132,15 +132,14 @@ class StudioSession:
             groups[kind or "Panels and lens arrays"].append((name, display.title or name))
         return list(groups.items())
 
-    def wanted(self, number: int, view: Callable[[StudioState], LiveView]) -> Wanted:
-        """What to render for a view of the present state."""
-        state = self.state
+    def wanted(self, number: int, state: StudioState, view: LiveView) -> Wanted:
+        """What to render for a view of a state."""
         key = (state.scene, state.environment, state.background, state.up)
 
         def load() -> Scene:
             return state.load_scene(allow_outside=self._allow_outside, source=self._held_scene(state))
 
-        return Wanted(number, key, load, self.display(state), view(state))
+        return Wanted(number, key, load, self.display(state), view)
 
     def command(self, state: StudioState) -> list[str] | None:
         """The command line that renders a state; None for a scene that has no file."""
@@ -151,9 +150,8 @@ class StudioSession:
         if self._held_scene(state) is not None:
             raise UsageError(f"{what} needs a scene that is a file", parameter="scene", fix=WITHOUT_FILE)
 
-    def render(self, kind: Kind) -> None:
-        """Begin a full render of the present state; a UsageError if one is running."""
-        state = self.state
+    def render(self, kind: Kind, state: StudioState) -> None:
+        """Begin a full render of a state; a UsageError if one is running."""
         self.check_has_file(state, "a render from the page")
         words = render_command(state)
         ending: str | None = None
@@ -170,8 +168,9 @@ class StudioSession:
         """Begin to load the scene and to compile its kernels, before a page asks for a frame."""
         watcher = Watcher(lambda _: self.thread.remove(watcher), lambda _: self.thread.remove(watcher))
         self.thread.add(watcher)
-        eye = default_eye(self.display(self.state))
-        self.thread.want(watcher, self.wanted(0, lambda state: state.view(eye, _FIRST_SIZE)))
+        state = self.state
+        view = state.view(default_eye(self.display(state)), _FIRST_SIZE)
+        self.thread.want(watcher, self.wanted(0, state, view))
 
     def close(self) -> None:
         """End all work."""

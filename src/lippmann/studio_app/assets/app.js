@@ -28,9 +28,12 @@ class Studio {
       busy: (line) => this.page.busy(line),
     });
     root.append(this.files.input, this.files.shade);
-    this.jobs = new Jobs((message) => this.connection.send(message), this.page.result, (number) =>
-      this.openPanel(`result=${number}`),
-    );
+    this.jobs = new Jobs({
+      onrender: (kind) => this.#sendState({ type: "render", kind }),
+      send: (message) => this.connection.send(message),
+      result: this.page.result,
+      onpanel: (number) => this.openPanel(`result=${number}`),
+    });
     this.page.placeJobs(this.jobs);
     this.stage = new Stage(this.page.stage, this.page.canvas, {
       onview: () => this.#ask(),
@@ -96,6 +99,11 @@ class Studio {
     }
   }
 
+  /** Sends a message with the state that this page shows: the studio's last one may be another page's. */
+  #sendState(message) {
+    if (this.store !== undefined) this.connection.send({ ...message, state: this.store.state });
+  }
+
   #putIntoPlane(depth) {
     if (depth === null) return this.page.fail("There is nothing at this place");
     const [x, y, z] = this.store.state.shift;
@@ -125,7 +133,7 @@ class Studio {
   native = () => this.stage.setNative(!this.stage.isNative);
   render = () => this.jobs.start();
   help = () => this.page.help.showModal();
-  save = () => this.connection.send({ type: "save" });
+  save = () => this.#sendState({ type: "save" });
 
   turn(right, up, around) {
     this.store?.set({ turn: turned(this.store.state.turn, [right, up, around]) });

@@ -15,9 +15,14 @@ export class Jobs {
   #viewer = null;
   #job = null;
 
-  /** @param send sends a message to the studio; @param result the element that results are displayed in */
-  constructor(send, result, onpanel) {
-    this.send = send;
+  /**
+   * @param onrender called with the kind to render
+   * @param send sends a message to the studio
+   * @param result the element that results are displayed in
+   * @param onpanel called with the number of a result to show on the display
+   */
+  constructor({ onrender, send, result, onpanel }) {
+    this.onrender = onrender;
     this.result = result;
     this.onpanel = onpanel;
     this.kind = "picture";
@@ -50,7 +55,7 @@ export class Jobs {
   }
 
   start() {
-    this.send({ type: "render", kind: this.kind });
+    this.onrender(this.kind);
   }
 
   /** Displays what the studio says of the render. */
