@@ -34,8 +34,13 @@ def extreme_points_of(description: SceneDescription) -> Bounds:
     Empty for a description that places none of these.
     """
     found = []
-    for mesh, places in description.fitted_placements.items():
-        points = farthest_points(used_positions(description.meshes[mesh]))
+    farthest: dict[tuple[int, int], Bounds] = {}  # of arrays that many meshes share
+    for number, places in description.fitted_placements.items():
+        mesh = description.meshes[number]
+        key = id(mesh.positions), id(mesh.faces)
+        if key not in farthest:
+            farthest[key] = farthest_points(used_positions(mesh))
+        points = farthest[key]
         if not len(points) or not len(places):
             continue
         if len(points) * len(places) > _MANY:

@@ -134,22 +134,23 @@ def test_glass_and_lamps_stay_triangles(material):
 
 
 def test_a_picture_of_round_bodies_is_that_of_fine_triangles():
-    """Each of its own colour, in every micro-image."""
+    """Each of its own colour, by its material or its vertices, in every micro-image."""
     display = Display("square", Panel(60, 40, 0.5), LensArray("square", 2.5), 3.0, "", float("inf"), 20.0)
     colors = [(0.8, 0.1, 0.1), (0.1, 0.7, 0.1), (0.1, 0.1, 0.8)]
     places = np.stack([placed(np.diag([1.0, 0.7, 0.8]), (x, 0, 0)) for x in (-2.0, 0.0, 2.0)])
-    meshes = [ball(number, detail=4) for number in range(3)]
+    meshes = [ball(number, detail=4) for number in (0, 1, 3)]
+    meshes[2] = replace(meshes[2], colors=np.broadcast_to(np.float32(colors[2]), meshes[2].positions.shape))
     round_one = SceneDescription(
         "round",
         [*meshes, rod(0)],
-        [Material(base_color=color, roughness=0.4) for color in colors],
+        [Material(base_color=color, roughness=0.4) for color in (*colors, (1.0, 1.0, 1.0))],
         [
             *(Instance(number, places[number]) for number in range(3)),
             Instance(3, placed(Rotation.from_euler("y", 90, degrees=True).as_matrix() * [0.2, 0.2, 4.0], (-2, 0, 0))),
         ],
     )
     triangles = replace(round_one, meshes=[replace(mesh, stands_for=None) for mesh in round_one.meshes])
-    assert sorted(shapes_of(round_one)) == ["Ellipsoids"] * 3 + ["LinearCurve"]
+    assert sorted(shapes_of(round_one)) == ["Ellipsoids"] * 2 + ["LinearCurve"]
     options = {"method": "full", "denoise": "none", "spp": 64, "integrator": "direct"}
     found, expected = (
         lippmann.render(Scene(name, each), display, **options).pixels
@@ -159,3 +160,16 @@ def test_a_picture_of_round_bodies_is_that_of_fine_triangles():
     assert np.ptp(blocks[1], axis=(0, 1)).min() > 0.2
     assert np.abs(blocks[0] - blocks[1]).max() < 0.03
     assert abs(found.mean() - expected.mean()) < 0.002
+
+
+def test_a_ball_of_several_colours_stays_triangles():
+    colors = np.tile(np.float32([1, 0, 0]), (len(ball().positions), 1))
+    assert shapes_of(scene_of(replace(ball(), colors=colors), [np.eye(4)])) == ["Ellipsoids"]
+    colors[0] = 0, 1, 0
+    assert shapes_of(scene_of(replace(ball(), colors=colors), [np.eye(4)])) == ["Mesh"]
+
+
+def test_a_rod_with_colours_stays_triangles():
+    """Curves are read from files that hold no colours."""
+    colors = np.ones((len(rod().positions), 3), np.float32)
+    assert shapes_of(scene_of(replace(rod(), colors=colors), [np.eye(4)])) == ["Mesh"]

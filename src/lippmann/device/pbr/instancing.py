@@ -90,7 +90,7 @@ def choose_instances(meshes: Mapping[K, CopiedMesh], memory: int, *, name: str =
             f"{copies:,} placed meshes of {triangles:,} triangles need {_size(need)}",
             where=name,
             parameter="memory",
-            rule=f"the scene may take {_size(memory)}",
+            rule=f"the scene may take {_size(memory)}, about {int(copies * memory / need):,} such copies",
             fix="allow more memory, or place fewer copies",
         )
     return chosen

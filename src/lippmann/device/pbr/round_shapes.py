@@ -1,4 +1,4 @@
-"""Balls and rods as they are, one shape for all of a kind: round from near, and quicker than triangles.
+"""Balls and rods as they are, one shape for all of a finish: round from near, and quicker than triangles.
 
 Of 5 000 balls, ellipsoids take a quarter of the time of a ray that 1 280 triangles each take, and a tenth of the
 memory.
@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import tempfile
+from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,16 +16,22 @@ from scipy.spatial.transform import Rotation
 
 from lippmann.device.pbr.materials import Finish
 from lippmann.device.types import BSDF, Shape
-from lippmann.scene.values.description import Matrix, Round
+from lippmann.scene.values.description import FloatArray, Matrix, Mesh, Round
 
 #: Share of a rod's radius by which its section may differ from a circle.
 _OVAL = 1e-3
 
 
-def can_wear(finish: Finish) -> bool:
-    """Whether round shapes can have a finish: they have no inside, no texture coordinates and cannot glow."""
+def can_wear(mesh: Mesh, finish: Finish) -> bool:
+    """Whether the round body of a mesh can have a finish.
+
+    Round shapes have no inside and no texture coordinates, and do not emit. A ball has one colour, a rod none of its
+    own.
+    """
     import mitsuba as mi
 
+    if mesh.colors is not None and (mesh.stands_for == "rod" or np.ptp(mesh.colors, axis=0).any()):
+        return False
     passes = mi.BSDFFlags.Transmission | mi.BSDFFlags.Null
     return finish.emission is None and not finish.uv_sets and not mi.has_flag(finish.bsdf.flags(), passes)
 
@@ -45,12 +52,8 @@ def keeps_round(body: Round, matrices: Matrix) -> NDArray[np.bool_]:
     return np.asarray(same & (along(x, y) <= slack) & (along(x, z) <= slack) & (along(y, z) <= slack))
 
 
-def round_shape(body: Round, matrices: Matrix, bsdf: BSDF) -> Shape:
-    """One shape of bodies that keep round at all places ``(k, 4, 4)``; rods get round ends."""
-    return _ellipsoids(matrices, bsdf) if body == "ball" else _curves(matrices, bsdf)
-
-
-def _ellipsoids(matrices: Matrix, bsdf: BSDF) -> Shape:
+def ellipsoids(matrices: Matrix, bsdf: BSDF, attributes: Mapping[str, FloatArray]) -> Shape:
+    """One shape of balls at places ``(k, 4, 4)``, whose ``attributes`` are ``(k, n)``."""
     import mitsuba as mi
 
     # The image of the unit ball under U S V^T is that under U S: V only turns the ball.
@@ -60,12 +63,14 @@ def _ellipsoids(matrices: Matrix, bsdf: BSDF) -> Shape:
         "centers": matrices[:, :3, 3],
         "scales": scales,
         "quaternions": Rotation.from_matrix(turn).as_quat(),  # x, y, z, w
+        **attributes,
     }
     tensors = {name: mi.TensorXf(np.ascontiguousarray(values, np.float32)) for name, values in numbers.items()}
     return mi.load_dict({"type": "ellipsoids", "extent": 1.0, "bsdf": bsdf, **tensors})
 
 
-def _curves(matrices: Matrix, bsdf: BSDF) -> Shape:
+def curves(matrices: Matrix, bsdf: BSDF) -> Shape:
+    """One shape of rods that keep round at all places ``(k, 4, 4)``, with round ends."""
     import mitsuba as mi
 
     start = matrices[:, :3, 3]

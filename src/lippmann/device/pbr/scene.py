@@ -203,10 +203,11 @@ def _placements(description: SceneDescription, notes: list[str]) -> dict[int, Ma
 def _variant(description: SceneDescription, mesh: int) -> Variant:
     colors = description.meshes[mesh].colors
     material = description.meshes[mesh].material
+    alone = description.meshes[mesh].stands_for == "rod"
     if colors is None:
-        return Variant(material, alone=description.meshes[mesh].stands_for is not None)
+        return Variant(material, alone=alone)
     fades = colors.shape[1] == 4 and description.materials[material].alpha_mode != "opaque"
-    return Variant(material, tinted=True, faded=fades)
+    return Variant(material, tinted=True, faded=fades, alone=alone)
 
 
 def _finishes(description: SceneDescription, meshes: Sequence[int]) -> dict[Variant, Finish]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
@@ -18,10 +18,10 @@ from lippmann.device.pbr.emitters import glow
 from lippmann.device.pbr.instancing import CopiedMesh, choose_instances
 from lippmann.device.pbr.material_groups import Variant
 from lippmann.device.pbr.materials import Finish
-from lippmann.device.pbr.round_shapes import can_wear, keeps_round, round_shape
+from lippmann.device.pbr.round_shapes import can_wear, curves, ellipsoids, keeps_round
 from lippmann.device.pbr.texture_lookup import ALPHA_ATTRIBUTE, COLOR_ATTRIBUTE, MEMBER_ATTRIBUTE, uv_attribute
 from lippmann.device.types import Float, Shape
-from lippmann.scene.values.description import FloatArray, IndexArray, Matrix, Mesh
+from lippmann.scene.values.description import FloatArray, IndexArray, Matrix, Mesh, Round
 
 Number = TypeVar("Number", bound=np.generic)
 
@@ -107,17 +107,29 @@ def _make_round(
     placements: Sequence[tuple[Dress, Matrix]],
 ) -> tuple[list[tuple[Shape, Finish]], list[tuple[Dress, Matrix]]]:
     """Shapes of what stands for round bodies that can be traced as such, and the placements that are left."""
-    made: list[tuple[Shape, Finish]] = []
+    round_pieces: dict[tuple[Round, int], list[Piece]] = {}
     left: list[tuple[Dress, Matrix]] = []
     for dress, matrices in placements:
-        body, finish = dress.mesh.stands_for, dress.finish
+        body = dress.mesh.stands_for
         fits = np.zeros(len(matrices), bool)
-        if body is not None and can_wear(finish):
+        if body is not None and can_wear(dress.mesh, dress.finish):
             fits = keeps_round(body, matrices)
-        if body is not None and fits.any():
-            made.append((round_shape(body, matrices[fits], finish.bsdf), finish))
+            # Of attributes a body has as many as a mesh of one vertex and one face.
+            one = replace(dress.mesh, faces=dress.mesh.faces[:1], positions=dress.mesh.positions[:1])
+            if one.colors is not None:
+                one = replace(one, colors=one.colors[:1])
+            piece = Piece(replace(dress, mesh=one), matrices[fits])
+            round_pieces.setdefault((body, id(dress.finish)), []).append(piece)
         if not fits.all():
             left.append((dress, matrices[~fits]))
+    made: list[tuple[Shape, Finish]] = []
+    for (body, _), pieces in round_pieces.items():
+        finish = pieces[0].dress.finish
+        places = np.concatenate([piece.world_from_mesh for piece in pieces])
+        if len(places):
+            bsdf = finish.bsdf
+            shape = ellipsoids(places, bsdf, _attributes(pieces, finish)) if body == "ball" else curves(places, bsdf)
+            made.append((shape, finish))
     return made, left
 
 
@@ -175,9 +187,11 @@ def _mesh_shape(pieces: Sequence[Piece]) -> Shape:
     )
     textured = bool(finish.uv_sets)
     name = pieces[0].dress.mesh.name
-    mesh: Shape = mi.Mesh(
-        name, int(starts[-1]), len(faces), props, has_vertex_normals=smooth, has_vertex_texcoords=textured
-    )
+    # Made empty: a mesh of full size takes attributes as Python lists only, its parameters take arrays.
+    mesh: Shape = mi.Mesh(name, 0, 0, props, has_vertex_normals=smooth, has_vertex_texcoords=textured)
+    attributes = _attributes(pieces, finish)
+    for attribute, columns in attributes.items():
+        mesh.add_attribute(attribute, columns.shape[1], [])
     params = mi.traverse(mesh)
     params["vertex_positions"] = _device([_placed_positions(piece) for piece in pieces])
     params["faces"] = mi.UInt32(faces.ravel())
@@ -185,31 +199,31 @@ def _mesh_shape(pieces: Sequence[Piece]) -> Shape:
         params["vertex_normals"] = _device([_placed_normals(piece) for piece in pieces])
     if textured:
         params["vertex_texcoords"] = _device([_uv(piece, finish.uv_sets[0]) for piece in pieces])
+    for attribute, columns in attributes.items():
+        params[attribute] = _device([columns])
     params.update()
-    for name, columns in _attributes(pieces, finish).items():
-        # As a list: the numbers of an array of the device would be fetched one by one.
-        mesh.add_attribute(name, columns.shape[1], columns.astype(np.float32).ravel().tolist())
     return mesh
 
 
 def _device(parts: Sequence[FloatArray]) -> Float:
     import mitsuba as mi
 
-    return mi.Float(np.concatenate(parts).astype(np.float32, copy=False).ravel())
+    whole = parts[0] if len(parts) == 1 else np.concatenate(parts)
+    return mi.Float(whole.astype(np.float32, copy=False).ravel())
 
 
-def _attributes(pieces: Sequence[Piece], finish: Finish) -> Mapping[str, NDArray[np.generic]]:
+def _attributes(pieces: Sequence[Piece], finish: Finish) -> Mapping[str, FloatArray]:
     """What finish and meshes say per vertex or face beyond position, normal and the first uv set."""
-    attributes: dict[str, NDArray[np.generic]] = {}
+    attributes: dict[str, FloatArray] = {}
     if finish.tinted:
         attributes[COLOR_ATTRIBUTE] = np.concatenate([_colors(piece)[:, :3] for piece in pieces])
     if finish.faded:
         attributes[ALPHA_ATTRIBUTE] = np.concatenate([_colors(piece)[:, 3:] for piece in pieces])
     for number in finish.uv_sets[1:]:
         uv = np.concatenate([_uv(piece, number) for piece in pieces])
-        attributes[uv_attribute(number)] = np.column_stack([uv, np.zeros(len(uv))])
+        attributes[uv_attribute(number)] = np.column_stack([uv, np.zeros(len(uv), np.float32)])
     if len(finish.members) > 1:
-        members = [finish.members[piece.dress.variant] for piece in pieces]
+        members = np.array([finish.members[piece.dress.variant] for piece in pieces], np.float32)
         attributes[MEMBER_ATTRIBUTE] = np.repeat(members, [_face_count(piece) for piece in pieces])[:, None]
     return attributes
 

@@ -184,9 +184,10 @@ PRIMITIVES = {
 @pytest.mark.parametrize("kind", PRIMITIVES)
 def test_primitives_are_closed_and_as_large_as_their_numbers_say(read, kind):
     numbers, size, volume = PRIMITIVES[kind]
-    (mesh,) = read(f'def {kind} "p" {{\n{numbers}\n}}').meshes
-    assert np.ptp(mesh.positions, axis=0) == pytest.approx(size, rel=2e-3)
-    triangles = corners(mesh).astype(float)
+    scene = read(f'def {kind} "p" {{\n{numbers}\n}}')
+    (mesh,) = scene.meshes
+    triangles = world_corners(scene).astype(float)
+    assert np.ptp(triangles.reshape(-1, 3), axis=0) == pytest.approx(size, rel=2e-3)
     # The divergence theorem: outward faces only.
     assert np.linalg.det(triangles).sum() / 6 == pytest.approx(volume, rel=5e-3)
     normals = mesh.normals[mesh.faces].mean(axis=1)
@@ -270,3 +271,45 @@ def test_what_is_not_drawn_is_named(read):
 def test_a_stage_without_meshes_is_refused(read):
     with pytest.raises(SceneError, match=r"^stage\.usda: the stage shows no meshes; a scene needs some$"):
         read('def Xform "x" {}')
+
+
+def test_spheres_are_traced_as_balls_whose_size_is_in_their_places(read):
+    """Copies share one mesh; spheres that differ share its triangles."""
+    body = """
+def PointInstancer "many" {
+    int[] protoIndices = [0, 0, 0]
+    point3f[] positions = [(0, 0, 0), (1, 0, 0), (2, 0, 0)]
+    float3[] scales = [(1, 1, 1), (1, 2, 1), (1, 1, 1)]
+    rel prototypes = </many/ball>
+    def Sphere "ball"
+    {
+        double radius = 0.25
+    }
+}
+def Sphere "red"
+{
+    double radius = 3
+    color3f[] primvars:displayColor = [(1, 0, 0)]
+}
+"""
+    scene = read(body)
+    copied, red = scene.meshes
+    assert copied.stands_for == red.stands_for == "ball"
+    assert copied.positions is red.positions
+    assert np.linalg.norm(copied.positions, axis=1) == pytest.approx(1.0)
+    places = scene.instances[0].world_from_mesh
+    assert places[:, 0, 3].tolist() == [0, 1, 2]
+    assert np.diagonal(places, axis1=1, axis2=2)[:, :3].tolist() == [[0.25] * 3, [0.25, 0.5, 0.25], [0.25] * 3]
+    assert scene.instances[1].world_from_mesh[0, 0] == 3
+    assert (red.colors == (1, 0, 0)).all()
+
+
+@pytest.mark.parametrize(
+    ("interpolation", "values", "vertices"),
+    [("constant", 1, 6), ("vertex", 6, 6), ("uniform", 2, 8), ("faceVarying", 8, 8)],
+)
+def test_faces_share_the_vertices_whose_values_they_share(read, interpolation, values, vertices):
+    colors = ", ".join(f"({number}, 0, 0)" for number in range(values))
+    color = f'color3f[] primvars:displayColor = [{colors}] (interpolation = "{interpolation}")'
+    (mesh,) = read(QUADS.format(color)).meshes
+    assert len(mesh.positions) == vertices

@@ -12,7 +12,7 @@ from lippmann.errors import SceneError
 from lippmann.runtime.input_memory import check_input
 from lippmann.scene.parsing.triangulation import triangulate
 from lippmann.scene.readers.gltf.skinning import unit_normals
-from lippmann.scene.readers.usd.primitives import primitive_polygons
+from lippmann.scene.readers.usd.primitives import primitive_polygons, unit_ball
 from lippmann.scene.readers.usd.records import Record
 from lippmann.scene.readers.usd.subdivision import Cage, Refined, refine, smooth_groups
 from lippmann.scene.values.description import FloatArray, Mesh
@@ -30,10 +30,11 @@ _BYTES_PER_CORNER = 200
 
 @dataclass(frozen=True)
 class Part:
-    """Faces of one mesh that share a material: its number, -1 for none, and the triangles."""
+    """Faces of one mesh that share a material: its number, -1 for none, the triangles, and their size in the prim."""
 
     material: int
     mesh: Mesh
+    scale: float = 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,16 +97,21 @@ class MeshReader:
         return self._split(record, polygons, triangles, stage_faces[owners], sampler, len(counts))
 
     def _primitive(self, record: Record) -> list[Part]:
-        shape = primitive_polygons(record["primitive"], record["numbers"])
-        triangles, _ = triangulate(shape.points, shape.indices, shape.counts)
+        if record["primitive"] == "Sphere":
+            mesh, scale = unit_ball(), float(record["numbers"]["radius"])
+        else:
+            shape = primitive_polygons(record["primitive"], record["numbers"])
+            triangles, _ = triangulate(shape.points, shape.indices, shape.counts)
+            positions = shape.points[shape.indices].astype(np.float32)
+            mesh = Mesh("", positions, triangles.astype(np.uint32), 0, shape.normals.astype(np.float32))
+            scale = 1.0
+        mesh = replace(mesh, name=record["name"])
         if record["left_handed"]:
-            triangles = triangles[:, ::-1]
-        positions = shape.points[shape.indices].astype(np.float32)
-        mesh = Mesh(record["name"], positions, triangles.astype(np.uint32), 0, shape.normals.astype(np.float32))
+            mesh = replace(mesh, faces=mesh.faces[:, ::-1], stands_for=None)
         color = self._constant_color(record)
         if color is not None:
-            mesh = replace(mesh, colors=np.repeat(color, len(positions), axis=0))
-        return [Part(record["material"], mesh)]
+            mesh = replace(mesh, colors=np.broadcast_to(color, (len(mesh.positions), 3)))
+        return [Part(record["material"], mesh, scale)]
 
     def _constant_color(self, record: Record) -> FloatArray | None:
         if record["color"] is None or record["material"] >= 0:
@@ -230,6 +236,8 @@ class MeshReader:
             if record["opacity"] is not None:
                 opacity = np.clip(self._values(sampler, record["opacity"], name, "display opacities"), 0.0, 1.0)
                 colors = np.concatenate([colors, opacity], axis=1)
+        if not self._varies_at_points(record, material):
+            triangles = _first_corners(polygons)[triangles]
         corners = np.unique(triangles)
         places = np.zeros(len(polygons.indices), np.uint32)
         places[corners] = np.arange(len(corners), dtype=np.uint32)
@@ -246,6 +254,12 @@ class MeshReader:
         if normals is None or not len(faces):
             return mesh
         return replace(mesh, normals=unit_normals(normals[corners].astype(np.float32), positions, faces)[0])
+
+    def _varies_at_points(self, record: Record, material: int) -> bool:
+        """Whether corners of faces that meet in a point may have values of their own, normals of edges apart."""
+        used = [record["uvs"].get(name) for name in self._uv_names.get(material, ())]
+        used += [record["normals"], *((record["color"], record["opacity"]) if material < 0 else ())]
+        return any(each is not None and each["interpolation"] in ("uniform", "faceVarying") for each in used)
 
     def _values(self, sampler: _Sampler, primvar: Record, name: str, what: str) -> FloatArray:
         values = np.asarray(self._arrays[primvar["values"]], np.float32)
@@ -288,6 +302,13 @@ class _Sampler:
             return None
         own = values[self.corner_of]
         return own if refined is None else np.asarray(refined.from_corners @ own, np.float32)
+
+
+def _first_corners(polygons: _Polygons) -> Integers:
+    """The first corner ``(c,)`` with the same point and normal, for each corner."""
+    groups = polygons.indices if polygons.corner_groups is None else polygons.corner_groups
+    _, first, group = np.unique(groups, return_index=True, return_inverse=True)
+    return np.asarray(first[group], np.int64)
 
 
 def _smooth_normals(polygons: _Polygons, left_handed: bool) -> FloatArray:

@@ -4,9 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
+
+from lippmann.scene.parsing.triangulation import triangulate
+from lippmann.scene.values.description import Mesh
 
 #: Sides around, and rings from pole to pole: a silhouette's error is 0.06 % of the radius.
 _AROUND, _RINGS = 96, 48
@@ -22,6 +26,15 @@ class Polygons:
     counts: NDArray[np.int64]
     indices: NDArray[np.int64]
     normals: NDArray[np.float64]
+
+
+@lru_cache(maxsize=1)
+def unit_ball() -> Mesh:
+    """Triangles of the ball of radius 1 about the origin; all spheres share their arrays."""
+    shape = primitive_polygons("Sphere", {"radius": 1.0})
+    triangles, _ = triangulate(shape.points, shape.indices, shape.counts)
+    points = shape.points.astype(np.float32)
+    return Mesh("ball", points, shape.indices[triangles].astype(np.uint32), 0, points, stands_for="ball")
 
 
 def primitive_polygons(kind: str, numbers: Mapping[str, float | str]) -> Polygons:

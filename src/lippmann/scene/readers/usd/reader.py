@@ -80,7 +80,7 @@ def describe(tree: Record, arrays: Sequence[NDArray[np.generic]], path: Path, as
         if not np.abs(worlds).max() < _FARTHEST:
             raise SceneError(f"mesh {record['name']} lies beyond all bounds", where=path.name)
         for part in reader.parts(record):
-            content.add(part, worlds)
+            content.add(part, worlds @ np.diag([part.scale, part.scale, part.scale, 1.0]))
     if not content.instances:
         raise SceneError(
             "the stage shows no meshes", where=path.name, rule="a scene needs some", fix="; ".join([*notes][:3])
