@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from PIL import Image as Pillow
 
 import lippmann
 from lippmann.display import Display, LensArray, Panel
@@ -68,3 +69,18 @@ def test_every_pixel_is_traced_once_and_what_lies_past_the_panel_not_at_all():
     assert seen.number.max() == len(seen.column) - 1
     assert (seen.number == -1).any()
     assert (seen.number[..., 0] == seen.number[..., 2]).all()
+
+
+def test_a_photograph_fills_picture_and_preview_with_its_own_colours(tmp_path):
+    """Orange, far brighter than tone mapping would leave it: one ray a pixel, no network, no edge in any view."""
+    color = np.array([250, 120, 10], np.uint8)
+    Pillow.fromarray(np.broadcast_to(color, (30, 40, 3)).copy()).save(tmp_path / "p.png")
+    np.save(tmp_path / "d.npy", 1 / np.tile(np.linspace(1, 2, 40), (30, 1)))
+    photo = lippmann.load_scene(tmp_path / "p.png", depth_map=tmp_path / "d.npy")
+    display = DISPLAYS["slanted"]
+    whole = lippmann.render(photo, display, tone_map="auto")
+    assert (whole.provenance.spp, whole.provenance.method, "denoise" in whole.provenance.options) == (1, "full", False)
+    assert np.abs(whole.srgb().astype(int) - color).max() <= 1
+    found = render_eye_preview(photo, display, EYES[1], RenderRequest(tone_map="auto"), (60, 60))
+    assert (found.provenance.spp, "denoise" in found.provenance.options) == (1, False)
+    assert found.pixels.max(axis=(0, 1)) == pytest.approx(whole.pixels.max(axis=(0, 1)))

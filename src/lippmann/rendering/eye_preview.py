@@ -131,7 +131,7 @@ def render_eye_preview(
     # Where lenses are larger than the picture's pixels, it is made of blocks, which the denoiser has never seen.
     is_fine = 2 * source.width > width * height * whole.channels
     denoises = samples < _CLEAN_FROM and is_fine and request.denoise != "none" and resolved.integrator in LIGHT
-    denoises &= not scene.lies_off_surfaces
+    denoises &= not (scene.lies_off_surfaces or scene.fills_panel)
     if denoises:
         load_denoiser()
         guides = trace_guides(

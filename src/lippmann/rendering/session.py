@@ -130,6 +130,7 @@ class Session:
             bounds_in=bounds_in or scene.bounds_in,
             extreme_points=lambda: scene.extreme_points,
             is_unbounded=scene.is_unbounded,
+            fills_panel=scene.fills_panel,
             probe=self._probe_depth,
         )
 

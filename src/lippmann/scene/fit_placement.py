@@ -31,6 +31,9 @@ _LARGEST_NOISE = 1e-3
 _SEARCHED = (1.0 / 16.0, 2.0)
 #: In so many rounds, each of which divides what is left into so many parts: to a millionth of a pixel.
 _ROUNDS, _PARTS = 8, 16
+#: What covers the panel in all views reaches beyond them by this share of its size, and is at most so many times as
+#: large as the panel: a depth that is scaled up a lot would need any size.
+_BEYOND, _MOST_ENLARGED = 1e-3, 4.0
 #: The centre is found by so many steps at most, and once none moves by more than this share of the scene's extent.
 _CENTERINGS, _CENTERED = 12, 1e-13
 
@@ -66,6 +69,7 @@ def fit_scene(
     scale: float = 1.0,
     depth_scale: float | None = None,
     pop_out: float | None = None,
+    covers: bool = False,
 ) -> Fit:
     """Fit a scene to a display.
 
@@ -84,6 +88,8 @@ def fit_scene(
         Share of the depth that is shown; None: all that the display resolves.
     pop_out:
         Share of the depth in front of the lens plane, 0 to 1; None: a third.
+    covers:
+        The scene's borders are to lie outside all views, instead of its silhouette within the panel.
     """
     low, high = bounds
     width, height, depth = _extents(bounds)
@@ -98,7 +104,7 @@ def fit_scene(
         shown = min(1.0, resolved / size) if depth_scale is None else depth_scale
         full_front = share * depth * size * shown
         front = min(full_front, display.aperture_distance)
-        x, y = _center(seen, size, shown, front, display)
+        x, y = (0.0, 0.0) if covers else _center(seen, size, shown, front, display)
         anchor = translation(-middle - (x, y, 0.0))
         matrix = translation((0.0, 0.0, front)) @ depth_scaling(shown) @ scaling(size) @ anchor
         return Fit(matrix, depth * size, shown, front, full_front)
@@ -114,7 +120,9 @@ def fit_scene(
         ]
         return np.asarray(np.maximum(*widths), np.float64)
 
-    if width > 0.0 or height > 0.0:
+    if covers and width > 0.0 and height > 0.0:
+        size = _least_covering((width, height), at, display)
+    elif width > 0.0 or height > 0.0:
         size = FILL * min(
             side / extent if extent > 0.0 else np.inf
             for side, extent in zip(display.size_mm, np.ptp(seen[:, :2], axis=0), strict=True)
@@ -135,6 +143,24 @@ def _largest(fills: Callable[[Bounds], Bounds], size: float) -> float:
         bounds = [least, *places, most]
         least, most = bounds[fitting], bounds[fitting + 1]
     return float(np.exp(least))
+
+
+def _least_covering(extents: tuple[float, float], at: Callable[[float], Fit], display: Display) -> float:
+    """The least size at which a block of ``extents`` (across, down) ends outside all views.
+
+    The larger, the deeper it is and the farther its views reach: the size grows until it suffices.
+    """
+    size = max(side / extent for side, extent in zip(display.size_mm, extents, strict=True))
+    most = _MOST_ENLARGED * size
+    for _ in range(_ROUNDS):
+        fit = at(size)
+        front, back = fit.front, fit.front - fit.depth * fit.depth_scale
+        reached = (display.reach_of_views(z) for z in (front, back))
+        covering = max(2.0 * side / extent for sides in reached for side, extent in zip(sides, extents, strict=True))
+        size = (1.0 + _BEYOND) * covering
+        if size >= most:
+            return most
+    return size
 
 
 def _center(seen: Bounds, size: float, shown: float, front: float, display: Display) -> tuple[float, float]:

@@ -141,6 +141,7 @@ def place(
     bounds_in: Callable[[Matrix], Bounds] | None = None,
     extreme_points: Callable[[], Bounds] | None = None,
     is_unbounded: bool = False,
+    fills_panel: bool = False,
     probe: DepthProbe | None = None,
 ) -> Placement:
     """Place a display in a scene.
@@ -164,6 +165,8 @@ def place(
         without it the corners of ``bounds``.
     is_unbounded:
         Whether the scene holds more than ``bounds``, such as planes without end.
+    fills_panel:
+        Whether a scene that is fitted is to cover the panel in all views, as a photograph.
     probe:
         Tells how deep a camera sees, so that a display placed by it cuts nothing off and ``pop_out`` counts what is
         seen; without it the corners of ``bounds`` stand in for what is seen.
@@ -183,7 +186,9 @@ def place(
     if mode == "fit":
         options = face_viewer(bounds, options, warnings)
         points = box_corners(bounds) if extreme_points is None else extreme_points()
-        display_from_world = _fit(bounds, display, options, warnings, points=points, bounds_in=bounds_in)
+        display_from_world = _fit(
+            bounds, display, options, warnings, points=points, bounds_in=bounds_in, covers=fills_panel
+        )
     elif mode == "camera":
         camera = _choose_camera(cameras, options.camera or home_camera)
         by_camera = place_by_camera(
@@ -255,6 +260,7 @@ def _fit(
     *,
     points: Bounds,
     bounds_in: Callable[[Matrix], Bounds] | None,
+    covers: bool,
 ) -> Matrix:
     """``display_from_world`` that fits the turned scene to the display, with warnings of what that took."""
     turned = rotation(options.turn)
@@ -266,6 +272,7 @@ def _fit(
         scale=options.scale,
         depth_scale=options.depth_scale,
         pop_out=options.pop_out,
+        covers=covers,
     )
     if options.depth_scale is None and fit.depth_scale < 1.0 - 1e-6:
         warnings.append(

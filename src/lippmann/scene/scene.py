@@ -175,6 +175,19 @@ class Scene:
         return isinstance(self.description, SceneDescription) and self.description.volume is not None
 
     @property
+    def fills_panel(self) -> bool:
+        """Whether displays show no border of the scene, as of a photograph."""
+        return isinstance(self.description, SceneDescription) and self.description.fills_panel
+
+    @cached_property
+    def is_unlit(self) -> bool:
+        """Whether all that is seen are surfaces with colours of their own, which nothing lights."""
+        description = self.description
+        if not isinstance(description, SceneDescription) or self.lies_off_surfaces:
+            return False
+        return all(description.materials[description.meshes[mesh].material].unlit for mesh in description.placements)
+
+    @property
     def lies_off_surfaces(self) -> bool:
         """Whether there is light that lies on no surface: Gaussian splats or a volume."""
         return self.has_splats or self.has_volume

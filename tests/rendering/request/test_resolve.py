@@ -2,14 +2,26 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
+from lippmann.display import load_display
 from lippmann.rendering.denoise.cost_model import HIGH_FROM, denoising_cost, effort_of, traced_work
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.rendering.request.resolve import resolve
 from lippmann.scene.readers.load import load_scene
+from lippmann.scene.values.description import Instance, Material, Mesh, SceneDescription
 
 SCENE = load_scene("teapot")
+
+
+def unlit(*, fills_panel=False, others=()):
+    """A triangle that shows its own colour, beside ``others``."""
+    corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32)
+    materials = [Material("shown", unlit=True), *others]
+    meshes = [Mesh("m", corners, np.array([[0, 1, 2]], np.uint32), i) for i in range(len(materials))]
+    instances = [Instance(i, np.eye(4)) for i in range(len(meshes))]
+    return load_scene(SceneDescription("unlit", meshes, materials, instances, fills_panel=fills_panel))
 
 
 def decided(**values):
@@ -82,3 +94,39 @@ def test_effort_follows_the_rays_unless_it_is_named():
 def test_shadow_rays_are_less_work_than_those_that_are_shaded():
     assert traced_work(4, 0, 6) == 10
     assert traced_work(4, 0, 6) < traced_work(4, 6, 6) < traced_work(4, 0, 12)
+
+
+def test_a_photograph_has_one_ray_a_pixel_and_keeps_its_colours():
+    found = resolve(RenderRequest(tone_map="auto"), unlit(fills_panel=True), load_display("seed-lenticular"))
+    assert (found.method, found.denoise, found.spp, found.pixel_filter) == ("full", "none", 1, "point")
+    assert (found.tone_map, found.exposure) == ("none", 0.0)
+    assert found.reason == "full: a photograph has no noise"
+
+
+def test_unlit_models_keep_their_colours_and_have_smooth_outlines():
+    found = resolve(RenderRequest(tone_map="auto"), unlit(), load_display("seed-lenticular"))
+    assert (found.method, found.denoise, found.pixel_filter, found.tone_map) == ("pooled", "oidn", "box", "none")
+
+
+def test_lit_surfaces_beside_unlit_ones_have_noise():
+    found = resolve(RenderRequest(tone_map="auto"), unlit(others=[Material("lit")]), load_display("seed-lenticular"))
+    assert (found.method, found.tone_map) == ("pooled", "pbr-neutral")
+
+
+@pytest.mark.parametrize(
+    ("values", "expected"),
+    [
+        ({"spp": 4}, ("full", "none", 4, "box")),
+        ({"method": "pooled"}, ("pooled", "oidn", 4, "box")),
+        ({"denoise": "oidn-fast"}, ("full", "oidn-fast", 16, "box")),
+        ({"quality": 40.0}, ("full", "none", None, "box")),
+    ],
+)
+def test_what_is_asked_of_a_photograph_wins(values, expected):
+    found = resolve(RenderRequest(**values), unlit(fills_panel=True), load_display("seed-lenticular"))
+    assert (found.method, found.denoise, found.spp, found.pixel_filter) == expected
+
+
+def test_a_tone_map_of_a_photograph_that_is_asked_for_wins():
+    found = resolve(RenderRequest(tone_map="pbr-neutral"), unlit(fills_panel=True), load_display("seed-lenticular"))
+    assert found.tone_map == "pbr-neutral"

@@ -9,10 +9,14 @@ from PIL import Image as Pillow
 
 from lippmann.codecs.exr import write_exr
 from lippmann.codecs.pfm import write_pfm
+from lippmann.display import load_display
 from lippmann.errors import SceneError, UsageError
+from lippmann.scene.matrices import transform_points
+from lippmann.scene.placement import PlacementOptions, place
 from lippmann.scene.readers.depth_layers import split_layers
 from lippmann.scene.readers.depth_map import embedded_depth, read_depth_map
 from lippmann.scene.readers.load import load_scene
+from lippmann.scene.scene import bounds_of
 
 DEPTH = np.array([[1.0, 2.0, 4.0], [2.0, 0.0, np.nan]], np.float32)
 INVERSE = np.array([[1.0, 0.5, 0.25], [0.5, np.nan, np.nan]])
@@ -54,7 +58,28 @@ def test_the_sky_is_infinitely_far(tmp_path):
 def test_grey_pictures_tell_what_is_nearer(tmp_path):
     path = tmp_path / "d.png"
     path.write_bytes(encoded(np.array([[0, 128, 255]], np.uint8)))
-    assert read_depth_map(path).inverse.tolist() == [[0, 128, 255]]
+    assert read_depth_map(path).inverse == pytest.approx(np.array([[0, 128, 255]]), abs=0.5)
+
+
+@pytest.mark.parametrize(("top", "even"), [(255, 0.6), (20, 0.3)])
+def test_a_ramp_of_few_levels_has_no_stairs(tmp_path, top, even):
+    """1000 pixels have as many depths, and steps that are near each other, though levels are far fewer."""
+    ramp = np.linspace(0, top, 1000)
+    path = tmp_path / "d.png"
+    path.write_bytes(encoded(np.tile(np.rint(ramp), (8, 1)).astype(np.uint8)))
+    found = read_depth_map(path).inverse[4]
+    assert np.abs(found - ramp).max() < 1
+    assert len(np.unique(found)) > 990
+    inner = np.diff(found)[50:-50]
+    assert inner == pytest.approx(top / 999, rel=even)
+
+
+def test_edges_of_few_levels_stay(tmp_path):
+    levels = np.full((40, 40), 60, np.uint8)
+    levels[:, 20:] = 200
+    path = tmp_path / "d.png"
+    path.write_bytes(encoded(levels))
+    assert np.abs(read_depth_map(path).inverse - levels).max() <= 0.5
 
 
 @pytest.mark.parametrize(
@@ -99,7 +124,7 @@ def test_depth_within_a_portrait(form):
     """The formulas of the depth map metadata: share 0.2 of the way from 1 to 4, in depth or its inverse."""
     found = embedded_depth(portrait([[0, 51, 255]], form=form), "p.jpg").inverse
     depth = 1 + 0.2 * 3 if form == "RangeLinear" else 4 * 1 / (4 - 0.2 * 3)
-    assert found == pytest.approx(np.array([[1, 1 / depth, 0.25]]))
+    assert found == pytest.approx(np.array([[1, 1 / depth, 0.25]]), abs=0.01)
 
 
 def test_portraits_that_mean_nothing_are_refused():
@@ -173,6 +198,43 @@ def test_nearness_is_linear_in_inverse_depth(tmp_path):
     order = np.argsort(scene.meshes[0].positions[:, 0], kind="stable")
     heights = scene.meshes[0].positions[order][::50, 2]
     assert heights == pytest.approx(np.linspace(0, 0.5, 50), abs=1e-3)
+
+
+@pytest.mark.parametrize("name", ["seed-lenticular", "looking-glass-portrait", "mla-square", "mla-hexagonal"])
+@pytest.mark.parametrize(
+    "options", [PlacementOptions(), PlacementOptions(pop_out=1.0), PlacementOptions(depth_scale=1)]
+)
+def test_no_view_shows_an_edge(tmp_path, name, options):
+    """Every light line of the panel's border crosses the photograph's block within it, at its front and its back."""
+    step_scene(tmp_path)
+    scene = load_scene(tmp_path / "photo.png", depth_map=tmp_path / "depth.npy")
+    display = load_display(name)
+    width, height = display.size_mm
+    placed = place(scene.bounds, display, options=options, fills_panel=scene.fills_panel)
+    assert placed.mode == "fit"
+    low, high = transform_points(placed.display_from_world, scene.bounds)
+    share = np.linspace(-0.5, 0.5, 4001)
+    side = np.full(len(share), 0.5)
+    inward = np.linspace(0, display.micro_image_pitch, 9)[:, None]
+    x = np.concatenate([(width * side - inward).ravel(), np.tile(width * share, 9)])
+    y = np.concatenate([np.tile(height * share, 9), (height * side - inward).ravel()])
+    (ox, oy, oz), (dx, dy, dz) = display.light_ray(np.concatenate([x, -x]), np.concatenate([y, -y]))
+    reached = []
+    for z in (low[2], high[2]):
+        along = (oz - z) / -dz
+        reached.append((np.abs(ox + along * dx).max(), np.abs(oy + along * dy).max()))
+    assert (low[:2] < -np.max(reached, axis=0)).all()
+    assert (high[:2] > np.max(reached, axis=0)).all()
+    # On one axis it reaches no farther than it must.
+    assert (high[:2] / np.max(reached, axis=0)).min() < 1.05
+
+
+def test_a_photograph_that_cannot_be_large_enough_stays_finite(tmp_path):
+    scene = scene_of(tmp_path, np.tile(1 / np.linspace(1, 1.7, 32, dtype=np.float32), (24, 1)))
+    placed = place(
+        bounds_of(scene), load_display("mla-square"), options=PlacementOptions(depth_scale=50), fills_panel=True
+    )
+    assert np.isfinite(placed.world_from_display).all()
 
 
 def test_unknown_depth_is_filled_from_beside(tmp_path):

@@ -72,6 +72,8 @@ def resolve(
     """
     if scene.lies_off_surfaces:
         request = with_light_off_surfaces(request, scene)
+    elif scene.is_unlit:
+        request = _with_unlit_surfaces(request, scene)
     lit = _with_light(request, scene, of_own_camera=form == "preview")
     complete = _with_subpixels(_with_method(lit, form), None if form == "quilt" else display)
     if complete.spp is None and not complete.is_open_ended:
@@ -81,6 +83,29 @@ def resolve(
         complete = replace(complete, spp=samples, spp_reserve=_choose_reserve(complete, form, size, samples))
     check(complete, form, display)
     return complete
+
+
+def _with_unlit_surfaces(request: RenderRequest, scene: Scene) -> RenderRequest:
+    """The request, as far as surfaces that nothing lights decide what it leaves open.
+
+    Their colours are made for displays: there are no tones to be mapped. One ray through the middle of each pixel shows
+    a photograph, which has no noise that a network could take out; other scenes are seen by their outlines, too, which
+    samples and a network make smooth.
+    """
+    if request.integrator not in ("auto", *POOLED_LIGHT):
+        return request
+    plain = scene.fills_panel and request.method in ("auto", "full") and request.denoise in ("auto", "none")
+    one_ray = plain and request.spp in (None, 1) and not request.is_open_ended
+    return replace(
+        request,
+        method="full" if plain else request.method,
+        denoise="none" if plain else request.denoise,
+        spp=1 if one_ray else request.spp,
+        pixel_filter="point" if one_ray and request.pixel_filter == "auto" else request.pixel_filter,
+        exposure=0.0 if request.exposure == "auto" else request.exposure,
+        tone_map="none" if request.tone_map == "auto" else request.tone_map,
+        reason="full: a photograph has no noise" if plain and request.method == "auto" else request.reason,
+    )
 
 
 def _with_subpixels(request: RenderRequest, display: Display | None) -> RenderRequest:

@@ -1,7 +1,7 @@
 """A height field in two layers: what the camera saw, and what goes on behind its near edges.
 
 All is reckoned in inverse depth, to which parallax on a display is proportional. A layered depth image has the same
-purpose (Shade et al. 1998); what lies behind is filled by normalised convolution (Knutsson and Westin 1993).
+purpose (Shade et al. 1998).
 """
 
 from __future__ import annotations
@@ -98,23 +98,41 @@ def _behind(nearness: Plane, colors: Plane, near_edge: Mask, far_edge: Mask) -> 
 
 
 def _fill(values: NDArray[np.float32], known: Mask) -> NDArray[np.float32]:
-    """Values ``(h, w, c)`` where they are known, elsewhere means of known ones about, as near as there are any."""
-    result = np.where(known[..., None], values, 0.0).astype(np.float32)
-    missing = ~known
-    weight = known.astype(np.float32)
-    sigma = 1.0
-    while missing.any() and sigma < 4 * max(known.shape):
-        shares = ndimage.gaussian_filter(weight, sigma, truncate=2.0)
-        reached = missing & (shares > 1e-3)
-        if reached.any():
-            for channel in range(values.shape[2]):
-                sums = ndimage.gaussian_filter(np.where(known, values[..., channel], 0.0), sigma, truncate=2.0)
-                result[..., channel][reached] = sums[reached] / shares[reached]
-            missing &= ~reached
-        sigma *= 2.0
-    if missing.any():
-        result[missing] = values[known].mean(axis=0)
-    return result
+    """Values ``(h, w, c)`` where they are known, elsewhere means of known ones about, as near as there are any.
+
+    By a pyramid: means of four, weighted by what is known of them, go down to a single one, and come up again where
+    something is missing (pull-push; Gortler et al. 1996, The Lumigraph, section 3.4).
+    """
+    weight = known[..., None].astype(np.float32)
+    return _pull_push(np.where(known[..., None], values, np.float32(0)), weight)
+
+
+def _pull_push(values: Plane, weight: Plane) -> Plane:
+    """Values ``(h, w, c)`` as far as their weights ``(h, w, 1)`` of at most 1 go, the rest from coarser values."""
+    if weight.min() >= 1.0 or values.shape[0] * values.shape[1] == 1:
+        return values
+    shares = _quartered(weight)
+    coarse = _quartered(values * weight) / np.maximum(shares, np.float32(1e-9))
+    rest = _doubled(_pull_push(coarse, np.minimum(shares, np.float32(1))), values.shape[:2])
+    return np.asarray(weight * values + (1 - weight) * rest, np.float32)
+
+
+def _quartered(values: Plane) -> Plane:
+    """Sums ``(ceil(h / 2), ceil(w / 2), c)`` of two by two values ``(h, w, c)``."""
+    for axis in (0, 1):
+        values = np.add.reduceat(values, np.arange(0, values.shape[axis], 2), axis=axis)
+    return values
+
+
+def _doubled(values: Plane, shape: tuple[int, ...]) -> Plane:
+    """Values of twice the resolution, or one row or column less, between those of ``(h, w, c)``: bilinear."""
+    for axis, count in enumerate(shape):
+        edges = [(1, 1) if each == axis else (0, 0) for each in range(3)]
+        around = np.moveaxis(np.pad(values, edges, mode="edge"), axis, 0)
+        own = np.float32(0.75) * around[1:-1]
+        pairs = np.stack([own + np.float32(0.25) * around[:-2], own + np.float32(0.25) * around[2:]], axis=1)
+        values = np.moveaxis(pairs.reshape(-1, *pairs.shape[2:])[:count], 0, axis)
+    return values
 
 
 def _triangles(shape: tuple[int, ...]) -> Faces:

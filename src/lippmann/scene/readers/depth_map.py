@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 from PIL import UnidentifiedImageError
+from scipy import ndimage
 
 from lippmann.codecs.exr import read_exr, read_exr_header
 from lippmann.codecs.pfm import read_pfm
@@ -28,6 +29,9 @@ _XMP = b"http://ns.adobe.com/xap/1.0/\0"
 _XMP_EXTENSION = b"http://ns.adobe.com/xmp/extension/\0"
 #: Of an extension: its name, its whole length, and where this part of it belongs.
 _EXTENSION_HEAD = 40
+#: Widths in pixels of the means that take the stairs out of whole numbers: plateaus of up to about the first are slopes
+#: after that, the others make what is narrower even.
+_SMOOTHING = (65, 33, 17, 9, 5, 3)
 _GDEPTH = re.compile(rb'GDepth:(Format|Near|Far|Data)="([^"]*)"')
 
 
@@ -43,6 +47,20 @@ def of_depth(depth: NDArray[np.float32]) -> DepthMap:
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         inverse = np.where(depth > 0.0, 1.0 / depth, np.nan)
     return DepthMap(np.where(np.isfinite(inverse), inverse, np.nan).astype(np.float32))
+
+
+def without_stairs(levels: NDArray[np.generic]) -> NDArray[np.float32]:
+    """Whole numbers ``(h, w)`` as the smooth surface that they may have been rounded from.
+
+    No value moves by more than the half that rounding took, so that edges and details stay; the 256 levels of a picture
+    become as many depths as a slope has pixels.
+    """
+    whole = levels.astype(np.float32)
+    smooth = whole
+    for width in _SMOOTHING:
+        mean = ndimage.uniform_filter(smooth, width, mode="nearest")
+        smooth = np.clip(mean, whole - np.float32(0.5), whole + np.float32(0.5))
+    return smooth
 
 
 def read_depth_map(path: Path) -> DepthMap:
@@ -109,7 +127,7 @@ def _picture(data: bytes, where: str) -> DepthMap:
     values, is_wide = _gray(data, where)
     if values.dtype.kind == "f" or is_wide:  # a scale is no matter
         return of_depth(values.astype(np.float32))
-    return DepthMap(values.astype(np.float32))
+    return DepthMap(without_stairs(values))
 
 
 def _gray(data: bytes, where: str) -> tuple[NDArray[np.generic], bool]:
@@ -151,7 +169,7 @@ def embedded_depth(data: bytes, where: str) -> DepthMap | None:
     if not 0.0 < near < far < np.inf:
         raise SceneError(f"has depth from {near:g} to {far:g}", where=where, rule="near is above 0, far beyond it")
     values, is_wide = _gray(encoded, where)
-    share = values.astype(np.float32) / np.float32(65535.0 if is_wide else 255.0)
+    share = values.astype(np.float32) / np.float32(65535.0) if is_wide else without_stairs(values) / np.float32(255.0)
     if found.get(b"Format") == b"RangeLinear":
         return of_depth((near + share * (far - near)).astype(np.float32))
     return DepthMap((1.0 / near + share * (1.0 / far - 1.0 / near)).astype(np.float32))

@@ -98,9 +98,9 @@ def _description(
 
     def mesh(label: str, nearness: NDArray[np.float32], faces: NDArray[np.uint32], material: int) -> Mesh:
         points = np.concatenate([across, DEPTH * nearness[..., None]], axis=-1).reshape(-1, 3)
-        used = np.unique(faces)
-        places = np.zeros(len(points), np.uint32)
-        places[used] = np.arange(len(used), dtype=np.uint32)
+        used = np.zeros(len(points), bool)
+        used[faces] = True
+        places = np.cumsum(used, dtype=np.uint32) - np.uint32(1)
         return Mesh(label, points[used].astype(np.float32), places[faces], material, uvs=(uvs[used],))
 
     behind = Image(f"{name}, behind", np.rint(layers.behind_colors * 255.0).astype(np.uint8))
@@ -115,7 +115,7 @@ def _description(
     if layers.filled:
         notes.append(f"{layers.filled:.1%} of the depth map have no depth and are filled from beside")
     instances = [Instance(number, np.eye(4)) for number in range(len(meshes))]
-    return SceneDescription(name, meshes, materials[: len(meshes)], instances, notes=notes)
+    return SceneDescription(name, meshes, materials[: len(meshes)], instances, notes=notes, fills_panel=True)
 
 
 def _rgb(image: Image) -> Image:

@@ -9,7 +9,7 @@ import numpy as np
 from lippmann.errors import SceneError
 from lippmann.runtime.input_memory import check_input
 from lippmann.runtime.optional_import import check_installed
-from lippmann.scene.readers.depth_map import DepthMap
+from lippmann.scene.readers.depth_map import DepthMap, without_stairs
 from lippmann.scene.values.description import Image
 
 #: Bytes of a pixel while it is decoded: what the decoder holds of it, and its values.
@@ -61,4 +61,4 @@ def read_heif_photo(data: bytes, where: str) -> tuple[Image, DepthMap | None]:
     if kind not in _INVERSE or values.ndim != 2:
         rule = "inverse depth and disparity are read"
         raise SceneError(f"has depth of representation {kind}", where=where, rule=rule, fix="name a map: depth_map=...")
-    return image, DepthMap(values)
+    return image, DepthMap(without_stairs(values))

@@ -206,7 +206,8 @@ class SceneDescription:
     ``notes`` are one-line remarks of the reader: features that it ignored, and its assumptions.
     ``multiple_scattering`` gives back the light that rough surfaces reflect more than once between microfacets; without
     it they are as dark as glTF's formulas make them. ``physical_lights`` says that the file tells its light sources in
-    lux or candela. ``splats`` and ``volume`` stand in the world.
+    lux or candela. ``splats`` and ``volume`` stand in the world. ``fills_panel`` says that displays are to show no
+    border of the scene, as of a photograph.
     """
 
     name: str
@@ -222,6 +223,7 @@ class SceneDescription:
     physical_lights: bool = False
     splats: Splats | None = None
     volume: Volume | None = None
+    fills_panel: bool = False
 
     @cached_property
     def placements(self) -> Mapping[int, Matrix]:
