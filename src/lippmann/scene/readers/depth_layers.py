@@ -104,7 +104,7 @@ def _fill(values: NDArray[np.float32], known: Mask) -> NDArray[np.float32]:
     something is missing (pull-push; Gortler et al. 1996, The Lumigraph, section 3.4).
     """
     weight = known[..., None].astype(np.float32)
-    return _pull_push(np.where(known[..., None], values, np.float32(0)), weight)
+    return _pull_push(np.where(known[..., None], values, 0.0).astype(np.float32), weight)
 
 
 def _pull_push(values: Plane, weight: Plane) -> Plane:
