@@ -112,8 +112,8 @@ def _pull_push(values: Plane, weight: Plane) -> Plane:
     if weight.min() >= 1.0 or values.shape[0] * values.shape[1] == 1:
         return values
     shares = _quartered(weight)
-    coarse = _quartered(values * weight) / np.maximum(shares, np.float32(1e-9))
-    rest = _doubled(_pull_push(coarse, np.minimum(shares, np.float32(1))), values.shape[:2])
+    coarse = np.asarray(_quartered(values * weight) / np.maximum(shares, 1e-9), np.float32)
+    rest = _doubled(_pull_push(coarse, np.minimum(shares, 1.0).astype(np.float32)), values.shape[:2])
     return np.asarray(weight * values + (1 - weight) * rest, np.float32)
 
 
