@@ -18,10 +18,14 @@ from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
 
+from lippmann.printable import one_line
 from lippmann.runtime import private_files
 
 #: Bytes of a name that are kept.
 _KEPT = 64
+
+#: What names of files cannot hold.
+_NOT_ON_DISK = dict.fromkeys(map(ord, '/\\:*?"<>|' if os.name == "nt" else "/"), "_")
 
 #: The number, for patterns: machine, process, random digits; or what older versions wrote.
 NUMBER = r"(?:[0-9a-f]{20}|[0-9a-f]{8})"
@@ -97,8 +101,14 @@ def _machine() -> str:
     return hashlib.sha256(platform.node().encode()).hexdigest()[:4]
 
 
-def _cut(text: str) -> str:
+def disk_name(name: str, most: int) -> str:
+    """A name of any origin as that of a file: whole if it can be, else without what file systems or terminals do not
+    take, and of at most so many bytes."""
+    return _cut(one_line(name.translate(_NOT_ON_DISK)), most)
+
+
+def _cut(text: str, most: int = _KEPT) -> str:
     """The beginning of a name, of at most so many bytes."""
-    while len(os.fsencode(text)) > _KEPT:
+    while len(os.fsencode(text)) > most:
         text = text[:-1]
     return text

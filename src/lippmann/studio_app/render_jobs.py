@@ -1,11 +1,13 @@
 """Full renders beside the live picture: each is a command line, run in a process of its own.
 
 A process can be stopped at once, keeps what it needs of memory to itself, and leaves the engine of the studio to the
-live picture. What is run is what the page shows to copy.
+live picture. What is run is what the page shows to copy. It ends with the studio, however that ends: its standard input
+is a pipe that the studio holds open (see :mod:`lippmann.cli.render_process`).
 """
 
 from __future__ import annotations
 
+import os
 import re
 import shlex
 import signal
@@ -13,12 +15,14 @@ import subprocess
 import sys
 import threading
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
 from lippmann.errors import UsageError
 from lippmann.runtime.child_python import python_command
+from lippmann.studio_app.output_names import OutputClaim, claim_output, frames_of
 
 Kind = Literal["picture", "quilt", "turntable", "print"]
 Shows = Literal["picture", "image", "film"]
@@ -114,7 +118,7 @@ def command_of(kind: Kind, words: list[str], output: Path) -> tuple[str, ...]:
     if kind == "quilt":
         return ("lippmann", "quilt", "render", *_without(options, _NOT_FOR_QUILTS), "-o", str(output))
     if kind == "turntable":
-        frames = output.with_name(f"{output.stem}-frames")
+        frames = frames_of(output)
         film = ("--turntable", str(TURNTABLE_FRAMES), "--video", str(output), "--resume")
         return (*head, *options, *film, "-o", str(frames))
     if kind == "print":
@@ -128,18 +132,20 @@ class JobRunner:
     Parameters
     ----------
     folder:
-        Where outputs are written.
+        Where outputs are written. The files that command lines name are found from the working directory of now.
     changed:
         Called with the job after every change, in a thread of the runner.
     """
 
     def __init__(self, folder: Path, changed: Callable[[Job], None]) -> None:
         self._folder = folder
+        self._start = Path.cwd()
         self._changed = changed
         self._lock = threading.Lock()
         self._process: subprocess.Popen[str] | None = None
         self._is_cancelled = False
         self._jobs: list[Job] = []
+        self._claim: OutputClaim | None = None
 
     @property
     def last(self) -> Job | None:
@@ -160,17 +166,21 @@ class JobRunner:
         kind, words:
             As for :func:`command_of`.
         stem, ending:
-            Beginning and end of the output's name; a number comes between them where a file of that name exists.
+            Beginning and end of the output's name; a number comes between them where that name is not free.
 
         Raises
         ------
         UsageError
             If one is running.
+        OutputError
+            If the folder cannot be written to.
         """
         with self._lock:
             self._check_idle()
-            output = self._new_file(stem, ending or _ENDINGS[kind])
-            self._jobs.append(Job(len(self._jobs) + 1, kind, command_of(kind, words, output), output))
+            claim = claim_output(self._folder, stem, ending or _ENDINGS[kind])
+            self._release_claim()
+            self._claim = claim
+            self._jobs.append(Job(len(self._jobs) + 1, kind, command_of(kind, words, claim.output), claim.output))
             self._launch()
 
     def resume(self) -> None:
@@ -204,21 +214,19 @@ class JobRunner:
         process = self._process
         if process is not None:
             try:
-                process.wait(10.0)
+                process.wait(2 * PATIENCE)
             except subprocess.TimeoutExpired:
-                process.kill()
+                _kill(process)
+        with self._lock:
+            self._release_claim()
+
+    def _release_claim(self) -> None:
+        if self._claim is not None:
+            self._claim.release()
 
     def _check_idle(self) -> None:
         if self._process is not None:
             raise UsageError("a render is running", fix="cancel it, or wait for its end")
-
-    def _new_file(self, stem: str, ending: str) -> Path:
-        number = 1
-        while True:
-            path = self._folder / f"{stem}{'' if number == 1 else f'-{number}'}{ending}"
-            if not path.exists() and all(job.output != path for job in self._jobs):
-                return path
-            number += 1
 
     def _launch(self) -> None:
         job = self._jobs[-1]
@@ -226,14 +234,16 @@ class JobRunner:
         self._is_cancelled = False
         self._process = subprocess.Popen(
             command,
-            cwd=self._folder,
+            cwd=self._start,
             env=environment,
-            stdin=subprocess.DEVNULL,
+            stdin=subprocess.PIPE,
             stdout=subprocess.DEVNULL,
             stderr=subprocess.PIPE,
             text=True,
             encoding="utf-8",
             errors="replace",
+            # Ctrl-C in the terminal is for the studio, which ends its render; and what a render starts ends with it.
+            start_new_session=True,
         )
         threading.Thread(target=self._watch, args=(self._process,), daemon=True).start()
         self._changed(job)
@@ -252,12 +262,16 @@ class JobRunner:
         code = process.wait()
         with self._lock:
             self._process = None
+            if process.stdin is not None:
+                process.stdin.close()
             job = self._jobs[-1]
             is_done = code == 0 and job.output.exists()
             phase: Phase = "done" if is_done else "cancelled" if self._is_cancelled else "failed"
             line = said.removeprefix("lippmann: ") if phase == "failed" else str(job.output) if is_done else ""
             can_resume = not is_done and "--resume" in job.words
             job = self._jobs[-1] = replace(job, phase=phase, line=line, can_resume=can_resume)
+            if not can_resume:
+                self._release_claim()
         self._changed(job)
 
     def _update(self, *, share: float, stage: str) -> None:
@@ -272,7 +286,16 @@ def _kill_late(process: subprocess.Popen[str]) -> None:
     try:
         process.wait(PATIENCE)
     except subprocess.TimeoutExpired:
+        _kill(process)
+
+
+def _kill(process: subprocess.Popen[str]) -> None:
+    """End a process and all that it started."""
+    if sys.platform == "win32":
         process.kill()
+    else:
+        with suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGKILL)
 
 
 def _without(words: list[str], options: tuple[str, ...], *, has_value: bool = False) -> list[str]:

@@ -11,6 +11,7 @@ import typer
 from lippmann.cli.commands import view as viewing
 from lippmann.cli.shared import options, parse
 from lippmann.cli.shared.console import Console
+from lippmann.cli.shared.end_signals import ended_by_signals
 
 if TYPE_CHECKING:
     from lippmann.studio_app.state import StudioState
@@ -53,7 +54,7 @@ def studio(
     console = Console(quiet, as_json)
     first = _state(state, model, display, environment, up)
     machine = RenderRequest(device=device, threads=threads, memory=parse.memory(memory))
-    with open_session(first, folder, machine, allow_outside=allow_outside) as session:
+    with ended_by_signals(), open_session(first, folder, machine, allow_outside=allow_outside) as session:
         viewing.serve(
             StudioSite(session, "jpeg" if viewing.is_remote() else "rgb"),
             f"studio, {Path(first.scene).name} on {first.display}",

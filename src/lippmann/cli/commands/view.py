@@ -14,6 +14,7 @@ import typer
 from lippmann.cli.commands.quilt import Aspect, Layout, layout_of
 from lippmann.cli.shared import options, parse
 from lippmann.cli.shared.console import Console
+from lippmann.cli.shared.end_signals import ended_by_signals
 from lippmann.cli.shared.exit_codes import INTERRUPTED
 from lippmann.cli.shared.option_names import in_options
 from lippmann.errors import LippmannError, UsageError
@@ -150,7 +151,7 @@ def serve(
     folder: str = "",
     started: Callable[[], None] = lambda: None,
 ) -> None:
-    """Serve a page until Ctrl-C, then exit with the code 130.
+    """Serve a page until Ctrl-C, SIGTERM or SIGHUP, then exit with the code 130.
 
     Parameters
     ----------
@@ -179,7 +180,7 @@ def serve(
     from lippmann.viewer.http_server import WebServer
     from lippmann.viewer.request_guard import is_loopback
 
-    with WebServer(content, host, port, folder=folder) as server:
+    with ended_by_signals(), WebServer(content, host, port, folder=folder) as server:
         # The address is printed last: its reader may send Ctrl-C at once.
         if not is_loopback(host):
             console.remark("everyone who can reach this machine can open the page")
