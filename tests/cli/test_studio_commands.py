@@ -21,7 +21,10 @@ from lippmann.studio_app.page_values import values_of_state
 from lippmann.studio_app.state import StudioState
 
 DISPLAY = Display("d", Panel(32, 24, 0.1), LensArray("lenticular", 0.4), gap=1.0, viewing_distance=500.0)
-TINY = "print:lpi=30,ppi=300,size=10x8mm"
+OWN_DISPLAY = (
+    "gap = 3.0\nviewing_distance = 300\naperture_distance = 20\n[panel]\nwidth = 48\nheight = 32\n"
+    'pixel_pitch = 1.0\n[lens_array]\nlayout = "lenticular"\npitch = 4.0\n'
+)
 
 
 @contextmanager
@@ -42,8 +45,8 @@ def fetch(address):
         return answer.read()
 
 
-def interrupted(process):
-    process.send_signal(signal.SIGINT)
+def interrupted(process, number=signal.SIGINT):
+    process.send_signal(number)
     _, err = process.communicate(timeout=60)
     return process.returncode, err
 
@@ -60,15 +63,19 @@ def until(socket, holds, seconds=120.0):
 
 
 def test_studio_shows_and_renders_until_ctrl_c(tmp_path):
-    """The real renderer, once: a live frame, a full render of the same state, and the end."""
-    with serving("studio", "teapot", "--display", TINY, folder=tmp_path) as (process, address):
+    """The real renderer, once: a live frame, a full render of the same state into another folder, and the end."""
+    (tmp_path / "own.toml").write_text(OWN_DISPLAY)
+    outputs = tmp_path / "outputs"
+    outputs.mkdir()
+    words = ("studio", "teapot", "--display", "own.toml", "--folder", "outputs")
+    with serving(*words, folder=tmp_path) as (process, address):
         assert address.startswith("http://127.0.0.1:")
         assert len(address.rstrip("/").rpartition("/")[2]) == 32
         assert b"Lippmann Studio" in fetch(address)
         with pytest.raises(HTTPError, match="404"):
             fetch(address[: address.index("/", 8)] + "/")
         base = address.removeprefix("http://")
-        state = values_of_state(StudioState("teapot", TINY, spp=1, method="full"))
+        state = values_of_state(StudioState("teapot", "own.toml", spp=1, method="full"))
         with connect(f"ws://{base}live", origin=f"http://{base.partition('/')[0]}") as socket:
             view = {"type": "view", "number": 3, "state": state, "eye": [0, 0, 300], "size": [60, 48], "window": None}
             socket.send(json.dumps(view))
@@ -77,24 +84,25 @@ def test_studio_shows_and_renders_until_ctrl_c(tmp_path):
             width, height = (int.from_bytes(frame[at : at + 2], "little") for at in (12, 14))
             pixels = np.frombuffer(frame[24:], np.uint8).reshape(height, width, 3)
             assert len(np.unique(pixels.reshape(-1, 3), axis=0)) > 20
-            socket.send(json.dumps({"type": "render", "kind": "picture"}))
+            socket.send(json.dumps({"type": "render", "kind": "picture", "state": state}))
             job = until(socket, lambda m: isinstance(m, dict) and m["type"] == "job" and m["phase"] != "running")
-        assert (job["phase"], job["line"]) == ("done", str(tmp_path / job["name"]))
+        assert (job["phase"], job["line"]) == ("done", str(outputs / job["name"]))
         manifest = json.loads(fetch(f"{address}pictures/1/manifest.json"))
         assert manifest["name"] == job["name"]
-        assert fetch(f"{address}results/1/{job['name']}") == (tmp_path / job["name"]).read_bytes()
+        assert fetch(f"{address}results/1/{job['name']}") == (outputs / job["name"]).read_bytes()
         code, err = interrupted(process)
     assert (code, err.strip()) == (130, "Ctrl-C ends it")
 
 
-def test_show_serves_the_picture_until_ctrl_c(tmp_path):
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGHUP])
+def test_show_serves_the_picture_until_it_is_ended(tmp_path, number):
     pixels = np.random.default_rng(1).random((24, 32, 3), dtype=np.float32)
     IntegralImage(pixels, DISPLAY).save(tmp_path / "shot.png")
     with serving("show", "shot.png", folder=tmp_path) as (process, address):
         assert b"panel_window.js" in fetch(address)
         assert json.loads(fetch(f"{address}panel.json")) == {"width": 32, "height": 24, "name": "d", "live": None}
         assert len(fetch(f"{address}pictures/0/tiles/picture/0_0")) == 3 * 32 * 24
-        code, err = interrupted(process)
+        code, err = interrupted(process, number)
     assert (code, err.strip()) == (130, "Ctrl-C ends it")
 
 

@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 import threading
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack
 from pathlib import Path
 
+import psutil
 import pytest
 from stand_in import TINY
 
-from lippmann.errors import UsageError
+from lippmann.errors import OutputError, UsageError
 from lippmann.studio_app import render_jobs
 from lippmann.studio_app.command_line import render_command
+from lippmann.studio_app.output_names import claim_output
 from lippmann.studio_app.render_jobs import JobRunner, command_of
 from lippmann.studio_app.state import StudioState
 
@@ -131,6 +137,93 @@ def test_a_render_ends_with_its_studio(runner):
     until(lambda job: job.share == 0.4)
     jobs.close()
     assert until(lambda job: job.phase != "running").phase == "cancelled"
+
+
+def test_files_are_named_as_where_the_studio_was_started(runner, monkeypatch):
+    jobs, folder, until = runner
+    monkeypatch.setattr(render_jobs, "_CODE", PROCESS + "output.write_text(str(pathlib.Path.cwd()))")
+    started = Path.cwd()
+    monkeypatch.chdir(folder)
+    jobs.start("picture", ["lippmann", "render", "a"], "teapot")
+    assert until(lambda job: job.phase == "done").output.read_text() == str(started)
+
+
+def test_a_render_ends_with_a_studio_that_is_killed(tmp_path):
+    """The real child process, whose work is a sleep that hears nothing."""
+    render = (
+        "import lippmann.cli, time; lippmann.cli.main = lambda words: [print('9 %: on', flush=True), time.sleep(99)]"
+    )
+    studio = f"""
+import sys, threading
+from pathlib import Path
+from lippmann.studio_app import render_jobs
+render_jobs._CODE = "import signal; {render}; signal.signal(signal.SIGINT, signal.SIG_IGN); " + render_jobs._CODE
+jobs = render_jobs.JobRunner(Path(sys.argv[1]), lambda job: None)
+jobs.start("picture", ["lippmann", "render", "a"], "a")
+print(jobs._process.pid, flush=True)
+threading.Event().wait()
+"""
+    with subprocess.Popen([sys.executable, "-c", studio, tmp_path], stdout=subprocess.PIPE, text=True) as process:
+        child = psutil.Process(int(process.stdout.readline()))
+        process.kill()
+    assert child.wait(10) is None or not child.is_running()
+
+
+@pytest.fixture
+def claim(tmp_path):
+    """``claim(stem)``: a claim of a picture's name in the test's folder."""
+    with ExitStack() as stack:
+
+        def claimed(stem):
+            made = claim_output(tmp_path, stem, ".png")
+            stack.callback(made.release)
+            return made
+
+        yield claimed
+
+
+def test_names_are_taken_by_one_studio(claim):
+    first, second = claim("a"), claim("a")
+    assert [each.output.name for each in (first, second)] == ["a.png", "a-2.png"]
+    first.release()
+    assert claim("a").output.name == "a.png"
+    second.output.write_bytes(b"")
+    second.release()
+    assert claim("a").output.name == "a-3.png"
+
+
+def test_names_are_claimed_once_whoever_comes_and_goes(tmp_path):
+    """Studios that claim, write and release at the same time: no name is written twice."""
+
+    def write(_):
+        claim = claim_output(tmp_path, "a", "_qs8x6.png")
+        with claim.output.open("x"):
+            pass
+        claim.release()
+
+    with ThreadPoolExecutor(8) as pool:
+        list(pool.map(write, range(60)))
+    assert len(list(tmp_path.iterdir())) == 60
+
+
+@pytest.mark.parametrize("left", ["a.png.parts", "a-frames"])
+def test_what_an_earlier_session_left_unfinished_keeps_its_name(tmp_path, claim, left):
+    (tmp_path / left).mkdir()
+    (tmp_path / ".a.png.claim").touch()  # of a studio that was killed
+    assert claim("a").output.name == "a-2.png"
+    assert not (tmp_path / ".a.png.claim").exists()
+
+
+@pytest.mark.parametrize("stem", ["b/../c", "模型" * 200, "a\nb", "'[x], y'"])
+def test_any_name_of_a_model_gives_a_name_of_a_file(tmp_path, claim, stem):
+    output = claim(stem).output
+    output.touch()
+    assert output.parent == tmp_path
+
+
+def test_a_folder_that_is_gone_is_one_line(tmp_path):
+    with pytest.raises(OutputError, match="cannot be written"):
+        claim_output(tmp_path / "gone", "a", ".png")
 
 
 @pytest.mark.parametrize("number", [-1, 0, 1, 99])

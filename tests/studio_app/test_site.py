@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
+import gc
 import http.client
 import json
 import threading
@@ -15,10 +17,12 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from stand_in import FOLDER, TINY, StandIn, placement, running, said, view
+from starlette.websockets import WebSocketDisconnect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
+from lippmann.studio_app import live_socket, uploads
 from lippmann.studio_app import site as studio_site
-from lippmann.studio_app import uploads
+from lippmann.studio_app.live_socket import LiveSocket
 from lippmann.studio_app.page_values import values_of_state
 from lippmann.studio_app.pages import static_files
 from lippmann.studio_app.state import StudioState
@@ -178,6 +182,55 @@ def test_no_frame_is_sent_before_others_were_shown(studio):
         socket.send(json.dumps({"type": "shown", "frame": 2}))
         newest = said(socket, "frame")
         assert int.from_bytes(newest[8:12], "little") == 29
+
+
+def test_facts_that_are_not_finite_leave_a_page_alive(tmp_path):
+    class Black(StandIn):
+        def frame(self, view, is_stale=None):
+            return replace(super().frame(view), exposure=float("-inf"), placement=placement(float("nan")))
+
+    with running(tmp_path, make=Black) as studio, studio.connect() as socket:
+        for number in (1, 2):
+            socket.send(view(STATE | {"turn": [number, 0, 0]}, number))
+            assert said(socket, "facts")["exposure"] is None
+            said(socket, "frame")
+
+
+def test_a_page_that_is_closed_while_a_frame_is_sent_is_no_error(studio):
+    class Leaving:
+        """A socket whose page leaves while something is sent: what is sent then fails, also where it is cancelled."""
+
+        sends = asyncio.Event()
+
+        async def receive(self):
+            await self.sends.wait()
+            return {"type": "websocket.disconnect", "code": 1001}
+
+        async def send_text(self, text):
+            self.sends.set()
+            try:
+                await asyncio.sleep(60)
+            except asyncio.CancelledError:
+                raise WebSocketDisconnect(1006) from None
+
+    async def serve():
+        told = []
+        asyncio.get_running_loop().set_exception_handler(lambda _, context: told.append(context["message"]))
+        await LiveSocket(studio.session, Leaving(), "rgb").run()
+        gc.collect()
+        await asyncio.sleep(0)
+        return told
+
+    assert asyncio.run(serve()) == []
+
+
+def test_a_fault_in_what_is_sent_ends_the_connection_and_is_one_line(tmp_path, monkeypatch, capfd):
+    monkeypatch.setattr(live_socket, "encode_frame", lambda *_: 1 / 0)
+    with running(tmp_path) as studio, studio.connect() as socket:
+        socket.send(view(STATE))
+        with pytest.raises(ConnectionClosed):
+            said(socket, "frame")
+    assert capfd.readouterr().err.count("\n") == 1
 
 
 def test_native_pixels_are_those_of_the_panel(studio):

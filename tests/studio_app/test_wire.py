@@ -13,7 +13,15 @@ from hypothesis import strategies as st
 from PIL import Image
 
 from lippmann.errors import UsageError
-from lippmann.studio_app.wire import CODINGS, FrameHeader, encode_frame, number_of, numbers_of, parse_message
+from lippmann.studio_app.wire import (
+    CODINGS,
+    FrameHeader,
+    encode_frame,
+    message_text,
+    number_of,
+    numbers_of,
+    parse_message,
+)
 
 PIXELS = np.random.default_rng(1).integers(0, 256, (12, 20, 3), np.uint8)
 
@@ -30,6 +38,16 @@ def test_pictures_arrive(coding):
     body = encode_frame(FrameHeader(coding, 1, 1, 20, 12), sent)[24:]
     arrived = np.frombuffer(body, np.uint8).reshape(sent.shape) if coding == "rgb" else Image.open(io.BytesIO(body))
     assert np.abs(np.asarray(arrived).astype(int) - sent).max() <= (2 if coding == "jpeg" else 0)
+
+
+def test_numbers_that_are_not_finite_are_null_for_the_page():
+    message = {"type": "a", "depth": [1.5, np.inf], "in": {"it": (float("nan"), -np.inf, True)}, "title": "inf"}
+    assert json.loads(message_text(message), parse_constant=pytest.fail) == {
+        "type": "a",
+        "depth": [1.5, None],
+        "in": {"it": [None, None, True]},
+        "title": "inf",
+    }
 
 
 @pytest.mark.parametrize(

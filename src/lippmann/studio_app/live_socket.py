@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import json
 from collections.abc import Callable
 from functools import partial
 from typing import Any
@@ -27,7 +26,15 @@ from lippmann.studio_app.render_thread import Shown, Watcher
 from lippmann.studio_app.session import WITHOUT_FILE, StudioSession, opened_state
 from lippmann.studio_app.state import StudioState
 from lippmann.studio_app.state_toml import text_of_state
-from lippmann.studio_app.wire import Coding, FrameHeader, encode_frame, number_of, numbers_of, parse_message
+from lippmann.studio_app.wire import (
+    Coding,
+    FrameHeader,
+    encode_frame,
+    message_text,
+    number_of,
+    numbers_of,
+    parse_message,
+)
 
 #: Frames on their way that the page has not shown yet: one travels while the next is made.
 _MOST_ON_THE_WAY = 2
@@ -35,6 +42,9 @@ _MOST_ON_THE_WAY = 2
 #: Longest side of a picture in pixels, and the farthest that an eye may stand, in mm.
 _MOST_SIDE, _FARTHEST = 4096, 1e5
 _LARGEST_NUMBER = 2**32 - 1
+
+#: How a page leaves, perhaps in the middle of a frame, and how one that takes nothing any more is left.
+_PAGE_LEFT = (WebSocketDisconnect, ConnectionError, TimeoutError, asyncio.TimeoutError)
 
 #: From so many samples on a picture is worth coding without loss.
 _LOSSLESS_FROM = 32
@@ -75,24 +85,30 @@ class LiveSocket:
         session.thread.add(self._watcher)
         session.job_listeners.append(self._take_job)
         session.state_listeners.append(self._take_state)
-        sender = asyncio.create_task(self._send_all())
+        self._say(self._hello())
+        if session.jobs.last is not None:
+            self._say(session.jobs.last.message())
+        if self._follows:
+            self._want_all()
+        tasks = asyncio.create_task(self._receive_all()), asyncio.create_task(self._send_all())
         try:
-            self._say(self._hello())
-            if session.jobs.last is not None:
-                self._say(session.jobs.last.message())
-            if self._follows:
-                self._want_all()
-            while True:
-                await self._receive()
-        except (WebSocketDisconnect, ConnectionError):
-            pass
+            await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
         finally:
             session.job_listeners.remove(self._take_job)
             session.state_listeners.remove(self._take_state)
             session.thread.remove(self._watcher)
-            sender.cancel()
+            for task in tasks:
+                task.cancel()
+            outcomes = await asyncio.gather(*tasks, return_exceptions=True)
+        for outcome in outcomes:
+            if isinstance(outcome, Exception) and not isinstance(outcome, _PAGE_LEFT):
+                raise outcome
 
     # ---- From the page ---------------------------------------------------------------------------------------------
+
+    async def _receive_all(self) -> None:
+        while True:
+            await self._receive()
 
     async def _receive(self) -> None:
         message = await self._socket.receive()
@@ -259,7 +275,7 @@ class LiveSocket:
             self._changed.clear()
             while self._messages:
                 message = self._messages.pop(next(iter(self._messages)))
-                await self._socket.send_text(json.dumps(message, allow_nan=False))
+                await self._socket.send_text(message_text(message))
             if self._shown is not None and self._sent - self._acknowledged < _MOST_ON_THE_WAY:
                 shown, self._shown = self._shown, None
                 await self._send_frame(shown)

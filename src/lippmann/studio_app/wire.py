@@ -22,6 +22,7 @@ from __future__ import annotations
 import json
 import math
 import struct
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -86,6 +87,11 @@ def encode_frame(header: FrameHeader, pixels: NDArray[np.uint8]) -> bytes:
     return header.pack() + bytes(body)
 
 
+def message_text(message: Mapping[str, object]) -> str:
+    """A message for the page as JSON, which has neither NaN nor infinities: numbers that are not finite are null."""
+    return json.dumps(_finite(message), allow_nan=False)
+
+
 def parse_message(text: object) -> dict[str, Any]:
     """Message of the page: a JSON object with a ``type``.
 
@@ -120,6 +126,14 @@ def numbers_of(message: dict[str, Any], name: str, count: int, limit: float) -> 
     if not isinstance(values, list) or len(values) != count or not all(_is_number(v, limit) for v in values):
         raise UsageError(f"{str(values)[:40]!r} will not do", parameter=name, rule=f"{count} numbers")
     return tuple(float(value) for value in values)
+
+
+def _finite(value: object) -> object:
+    if isinstance(value, Mapping):
+        return {name: _finite(part) for name, part in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_finite(part) for part in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def _is_number(value: object, limit: float) -> bool:
