@@ -13,12 +13,11 @@ from lippmann.cli.shared.end_signals import ended_by_signals
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
 def test_the_first_signal_is_ctrl_c_and_others_do_not_disturb_the_end(number):
     before = signal.getsignal(number)
-    with pytest.raises(KeyboardInterrupt), ended_by_signals():
-        try:
+    with ended_by_signals():
+        with pytest.raises(KeyboardInterrupt):
             os.kill(os.getpid(), number)
-        finally:
-            os.kill(os.getpid(), signal.SIGTERM)
-            os.kill(os.getpid(), signal.SIGHUP)
+        os.kill(os.getpid(), signal.SIGTERM)
+        os.kill(os.getpid(), signal.SIGHUP)
     assert signal.getsignal(number) == before
 
 
