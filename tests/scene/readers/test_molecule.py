@@ -55,7 +55,7 @@ def places(scene, name):
 
 def test_atoms_and_bonds_of_water(read):
     scene = read(WATER)
-    assert scene.notes == ["4 atoms, 2 bonds by their distance"]
+    assert scene.notes == ["4 atoms, 2 bonds by their distance", "1 atoms at alternative places are left out"]
     assert places(scene, "balls of element 8").tolist() == [[0, 0, 0]]
     assert places(scene, "balls of element 1") == pytest.approx(np.array([[0.957, 0, 0], [-0.24, 0.927, 0]]))
     # Of alternative places the first.
@@ -103,12 +103,77 @@ def test_mmcif(read, tmp_path):
 
     (tmp_path / "w.pdb").write_text(WATER)
     gemmi.read_structure(str(tmp_path / "w.pdb")).make_mmcif_document().write_file(str(tmp_path / "w.cif"))
-    assert load_scene(tmp_path / "w.cif").description.notes == ["4 atoms, 2 bonds by their distance"]
+    document = gemmi.read_structure(str(tmp_path / "w.pdb")).make_mmcif_document()
+    (tmp_path / "w.json").write_text(document.as_json(mmjson=True))
+    for name in ("w.cif", "w.json"):
+        assert load_scene(tmp_path / name).description.notes[0] == "4 atoms, 2 bonds by their distance"
+
+
+def test_the_first_block_with_atoms_is_shown(read):
+    """Journals and refinement programs put blocks without atoms first."""
+    head = "data_global\n_journal_name_full 'A journal'\n\n"
+    assert read(head + SALT, "salt.cif").notes == ["2 atoms, 1 bonds by their distance"]
+    twice = read(SALT + SALT.replace("data_salt", "data_more").replace("Cl1 Cl 0.1 0.225 0\n", ""), "salt.cif")
+    assert twice.notes == ["2 atoms, 1 bonds by their distance", "2 blocks hold atoms: the first, 'salt', is shown"]
+
+
+def test_cartesian_places_of_the_core_dictionary(read):
+    """Numbers with uncertainties; elements by type, or else by label."""
+    head = "data_x\nloop_\n_atom_site_label\n_atom_site_Cartn_x\n_atom_site_Cartn_y\n_atom_site_Cartn_z\n"
+    assert places(read(head + "Cl1 1.5(2) 2 3\n", "m.cif"), "balls of element 17").tolist() == [[1.5, 2, 3]]
+    typed = head.replace("_atom_site_label", "_atom_site_label\n_atom_site_type_symbol") + "X1 Fe3+ 1 2 3\n"
+    assert places(read(typed, "m.cif"), "balls of element 26").tolist() == [[1, 2, 3]]
+
+
+@pytest.mark.parametrize("form", ["fractions", "Cartesian"])
+def test_of_disordered_groups_the_first_is_shown(read, form):
+    """Group -1 lies about a special position, and has no alternative."""
+    tag = "fract" if form == "fractions" else "Cartn"
+    text = SALT.replace("_fract_z", "_fract_z\n_atom_site_disorder_group").replace("_fract_", f"_{tag}_")
+    text = text.replace("0.1 0\n", "0.1 0 .\n").replace(
+        "Cl1 Cl 0.1 0.225 0\n", "Cl1 Cl 1 0 0 2\nBr1 Br 2 0 0 1\nO1 O 3 0 0 -1\n"
+    )
+    scene = read(text, "m.cif")
+    assert [mesh.name for mesh in scene.meshes if "balls" in mesh.name] == [
+        f"balls of element {n}" for n in (8, 11, 35)
+    ]
+    assert "1 atoms at alternative places are left out" in scene.notes
+
+
+def test_of_residues_at_one_place_of_the_sequence_the_first_is_shown(read):
+    """Serine in some of the molecules, threonine in the others."""
+    residues = """\
+ATOM      1  CB ASER A   2       0.000   0.000   0.000  0.60 10.00           C
+ATOM      2  OG ASER A   2       1.430   0.000   0.000  0.60 10.00           O
+ATOM      3  CB BTHR A   2       0.000   0.120   0.000  0.40 10.00           C
+ATOM      4  OG1BTHR A   2       1.430   0.120   0.000  0.40 10.00           O
+"""
+    scene = read(residues)
+    assert places(scene, "balls of element 6").tolist() == [[0, 0, 0]]
+    assert scene.notes == ["2 atoms, 1 bonds by their distance", "2 atoms at alternative places are left out"]
+
+
+def test_of_models_the_first_is_shown(read):
+    model = "MODEL        {}\n" + WATER.replace("END\n", "ENDMDL\n")
+    assert "2 models: the first is shown" in read(model.format(1) + model.format(2) + "END\n").notes
+
+
+def test_left_justified_names_of_proteins_are_no_metals(read):
+    """``CA`` in column 13 is a calcium by the format; the second is an ion."""
+    lines = """\
+ATOM      1 CA   ALA A   1       0.000   0.000   0.000  1.00 10.00
+HETATM    2 CA    CA A   2       9.000   0.000   0.000  1.00 10.00
+ATOM      3 HG   SER A   3       0.000   9.000   0.000  1.00 10.00
+"""
+    scene = read(lines)
+    assert places(scene, "balls of element 6").tolist() == [[0, 0, 0]]
+    assert places(scene, "balls of element 20").tolist() == [[9, 0, 0]]
+    assert places(scene, "balls of element 1").tolist() == [[0, 9, 0]]
 
 
 def test_hydrogens_do_not_bond_to_each_other(read):
     near = WATER.replace("-0.240   0.927", " 0.900   0.700")
-    assert read(near).notes == ["4 atoms, 2 bonds by their distance"]
+    assert read(near).notes[0] == "4 atoms, 2 bonds by their distance"
 
 
 @pytest.mark.parametrize(

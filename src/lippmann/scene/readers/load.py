@@ -58,7 +58,7 @@ _READERS = {
     ".dcm": "lippmann.scene.readers.volumes.dicom:read_dicom",
     ".vdb": "lippmann.scene.readers.volumes.vdb:read_vdb",
     ".vol": "lippmann.scene.readers.volumes.mitsuba_grid:read_mitsuba_grid",
-    **dict.fromkeys((".pdb", ".ent", ".cif"), "lippmann.scene.readers.molecule:read_molecule"),
+    **dict.fromkeys((".pdb", ".ent", ".cif", ".json"), "lippmann.scene.readers.molecule:read_molecule"),
     **dict.fromkeys(PHOTOS, "lippmann.scene.readers.depth_photo:read_depth_photo"),
 }
 
@@ -71,6 +71,7 @@ _BEGINNINGS = {
     b"#usda": ".usda",
     b"PXR-USDC": ".usdc",
     b"<": ".xml",
+    b'{"data_': ".json",
     b"{": ".gltf",
 }
 

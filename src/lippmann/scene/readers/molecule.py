@@ -1,10 +1,11 @@
-"""Molecules (``.pdb``, ``.cif``) as balls and sticks in the colours of Corey, Pauling and Koltun."""
+"""Molecules (``.pdb``, ``.cif``, mmJSON) as balls and sticks in the colours of Corey, Pauling and Koltun."""
 
 from __future__ import annotations
 
 import importlib.util
 import io
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -60,10 +61,11 @@ _process = HelperProcess("from lippmann.scene.readers.molecule_child import main
 
 
 def read_molecule(path: Path, *, allow_outside: bool = False) -> SceneDescription:
-    """Read a molecule: PDB, mmCIF, or the CIF of a small molecule's crystal. A unit is an angstrom.
+    """Read a molecule: PDB, mmCIF, mmJSON, or the CIF of a small molecule. A unit is an angstrom.
 
-    The first model is shown, and of alternative places the first. Balls have a quarter of van der Waals radii. Two
-    atoms that lie within their covalent radii and 0.45 angstroms are joined by a stick, each half in its atom's colour.
+    The first block with atoms and the first model are shown; of residues and atoms that share a place, the first.
+    Balls have a quarter of van der Waals radii. Two atoms that lie within their covalent radii and 0.45 angstroms are
+    joined by a stick, each half in its atom's colour.
 
     Parameters
     ----------
@@ -87,13 +89,14 @@ def read_molecule(path: Path, *, allow_outside: bool = False) -> SceneDescriptio
     with np.load(io.BytesIO(answer), allow_pickle=False) as found:
         if "error" in found:
             raise SceneError(f"is no molecule that is understood ({found['error']})", where=path.name)
-        elements, positions = found["elements"], found["positions"]
+        elements, positions, notes = found["elements"], found["positions"], found["notes"].tolist()
     fit = np.isfinite(positions).all(axis=1) & (np.abs(positions) < 1e6).all(axis=1)
     elements, positions = elements[fit], positions[fit]
     if not 0 < len(elements) <= _MOST_ATOMS:
         raise SceneError(f"holds {len(elements)} atoms", where=path.name, rule=f"1 to {_MOST_ATOMS} are read")
     check_input(_BYTES_PER_ATOM * len(elements), "its atoms", where=path.name)
-    return _description(path.stem, elements, positions)
+    description = _description(path.stem, elements, positions)
+    return replace(description, notes=[*description.notes, *notes])
 
 
 def _description(name: str, elements: NDArray[np.int64], positions: NDArray[np.float64]) -> SceneDescription:

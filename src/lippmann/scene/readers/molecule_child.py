@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import itertools
 import json
 import os
 
@@ -14,10 +15,12 @@ from lippmann.runtime.helper_process import limit_memory, serve
 
 #: Atoms of a molecule.
 MOST_ATOMS = 1 << 20
+#: Places of atoms in mmCIF, in fractions of a crystal's cell, and in the core dictionary's Cartesian form.
+_PLACE_TAGS = ("_atom_site.Cartn_x", "_atom_site_fract_x", "_atom_site_Cartn_x")
 
 
 def main() -> None:
-    """Answer requests, JSON with ``path`` and ``memory``, by ``.npz``: ``positions``, ``elements``, or an ``error``."""
+    """Answer requests, JSON with ``path`` and ``memory``: ``.npz`` of positions, elements and notes, or an error."""
     serve(_answer)
 
 
@@ -25,8 +28,13 @@ def _answer(data: bytes) -> bytes:
     request = json.loads(data)
     limit_memory(request["memory"])
     try:
-        elements, positions = _atoms(request["path"])
-        found: dict[str, NDArray[np.generic]] = {"elements": elements, "positions": positions}
+        notes: list[str] = []
+        elements, positions = _atoms(request["path"], notes)
+        found: dict[str, NDArray[np.generic]] = {
+            "elements": elements,
+            "positions": positions,
+            "notes": np.array(notes, np.str_),
+        }
     except Exception as error:  # noqa: BLE001  # it raises errors of many kinds
         found = {"error": np.array(_words(error, request["path"]))}
     written = io.BytesIO()
@@ -44,31 +52,81 @@ def _words(error: Exception, path: str) -> str:
     return said.replace(os.path.join(os.path.dirname(path), ""), "")[:300] or type(error).__name__
 
 
-def _atoms(path: str) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+def _atoms(path: str, notes: list[str]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Atomic numbers ``(n,)`` and positions ``(n, 3)``, angstroms, of the first model and first of alternatives."""
-    if path.lower().endswith(".cif"):
-        block = gemmi.cif.read(path)[0]
-        if block.find_values("_atom_site_fract_x"):
-            crystal = gemmi.make_small_structure_from_block(block)
-            sites = list(crystal.sites)[: MOST_ATOMS + 1]
-            places = [crystal.cell.orthogonalize(site.fract) for site in sites]
-            return _arrays([site.element for site in sites], places)
-        structure = gemmi.make_structure_from_block(block)
-    else:
-        structure = gemmi.read_structure(path)
+    if not path.lower().endswith(".cif"):
+        return _of_structure(gemmi.read_structure(path), notes)
+    document = gemmi.cif.read(path)
+    with_atoms = [block for block in document if any(block.find_values(tag) for tag in _PLACE_TAGS)]
+    block = (with_atoms or document)[0]
+    if len(with_atoms) > 1:
+        notes.append(f"{len(with_atoms)} blocks hold atoms: the first, '{block.name}', is shown")
+    if block.find_values(_PLACE_TAGS[0]):
+        return _of_structure(gemmi.make_structure_from_block(block), notes)
+    if block.find_values(_PLACE_TAGS[1]):
+        return _of_crystal(gemmi.make_small_structure_from_block(block), notes)
+    return _of_cartesian(block, notes)
+
+
+def _of_structure(structure: gemmi.Structure, notes: list[str]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     if not len(structure):
         return _arrays([], [])
+    if len(structure) > 1:
+        notes.append(f"{len(structure)} models: the first is shown")
     elements, places = [], []
     for chain in structure[0]:
-        for residue in chain:
+        for residue in chain.first_conformer():  # the first of those that share a place of the sequence
             first = next((atom.altloc for atom in residue if atom.altloc != "\0"), "\0")
-            for atom in residue:
+            for atom in residue:  # its own first_conformer() keeps alternatives that stand apart
                 if atom.altloc in ("\0", first):
-                    elements.append(atom.element)
+                    elements.append(_element(atom, residue.name))
                     places.append(atom.pos)
         if len(elements) > MOST_ATOMS:
             break
+    _note_alternatives(structure[0].count_atom_sites() - len(elements), notes)
     return _arrays(elements, places)
+
+
+def _element(atom: gemmi.Atom, residue: str) -> gemmi.Element:
+    """The element of an atom; a carbon that a name such as ``CA`` in the first column makes a calcium.
+
+    Files without an element column tell the two apart by the column in which the name begins, which many programs get
+    wrong. The residues of proteins and nucleic acids hold no such metals.
+    """
+    tabulated = gemmi.find_tabulated_residue(residue)
+    biopolymer = tabulated.is_standard() and (tabulated.is_amino_acid() or tabulated.is_nucleic_acid())
+    return gemmi.Element(atom.name[0]) if biopolymer and len(atom.element.name) == 2 else atom.element
+
+
+def _of_crystal(crystal: gemmi.SmallStructure, notes: list[str]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    sites = list(crystal.sites)[: MOST_ATOMS + 1]
+    shown = [sites[row] for row in _first_of_disorder([site.disorder_group for site in sites], notes)]
+    return _arrays([site.element for site in shown], [crystal.cell.orthogonalize(site.fract) for site in shown])
+
+
+def _of_cartesian(block: gemmi.cif.Block, notes: list[str]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Atoms of the core dictionary's Cartesian places, which gemmi does not read; each element by type or label."""
+    tags = ["label", "Cartn_x", "Cartn_y", "Cartn_z", "?type_symbol", "?disorder_group"]
+    rows = list(block.find("_atom_site_", tags))[: MOST_ATOMS + 1]
+    groups = [gemmi.cif.as_int(row[5], 0) if row.has(5) else 0 for row in rows]
+    shown = [rows[number] for number in _first_of_disorder(groups, notes)]
+    names = [gemmi.cif.as_string(row[4] if row.has(4) else row[0]) for row in shown]
+    symbols = ["".join(itertools.takewhile(str.isalpha, name)) for name in names]
+    places = [gemmi.Position(*(gemmi.cif.as_number(row[axis]) for axis in (1, 2, 3))) for row in shown]
+    return _arrays([gemmi.Element(symbol) for symbol in symbols], places)
+
+
+def _first_of_disorder(groups: list[int], notes: list[str]) -> list[int]:
+    """Rows of the atoms that are ordered (0), lie about a special position (< 0), or belong to the first group."""
+    first = min((group for group in groups if group > 0), default=0)
+    shown = [row for row, group in enumerate(groups) if group <= 0 or group == first]
+    _note_alternatives(len(groups) - len(shown), notes)
+    return shown
+
+
+def _note_alternatives(count: int, notes: list[str]) -> None:
+    if count > 0:
+        notes.append(f"{count} atoms at alternative places are left out")
 
 
 def _arrays(
