@@ -104,6 +104,14 @@ def test_vertex_colours_are_srgb(read):
     assert mesh.colors[:, 2] == pytest.approx(np.full(3, decode_srgb(np.array(0.5))), abs=1e-6)
 
 
+def test_vertices_without_colours_beside_coloured_ones_are_white(read):
+    """The material's own grey shows there; weights are no colours."""
+    text = "v 0 0 0\nv 1 0 0 1\nv 0 1 0\nf 1 2 3\nv 0 0 1 1 0 0\nv 1 0 1 0 1 0\nv 0 1 1 0 0 1\nf 4 5 6\n"
+    (mesh,) = read(text).meshes
+    assert mesh.colors.tolist() == [[1, 1, 1]] * 3 + np.eye(3).tolist()
+    assert mesh.positions[:3].tolist() == [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
+
+
 def test_a_weight_is_no_colour(read):
     assert read("v 0 0 0 1\nv 1 0 0 1\nv 0 1 0 1\nf 1 2 3\n").meshes[0].colors is None
 

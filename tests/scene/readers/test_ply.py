@@ -231,3 +231,29 @@ def test_a_missing_texture(read):
     data = text_file().replace(b"element vertex", comment.encode() + b"element vertex")
     with pytest.raises(SceneError, match=r"model\.ply: texture 'none\.png' is not there"):
         read(data)
+
+
+@pytest.mark.parametrize("numbered", [True, False])
+def test_faces_choose_their_texture_by_texnumber(read, tmp_path, numbered):
+    """As MeshLab writes files of several textures; -1 is no texture."""
+    for name, color in (("red.png", (255, 0, 0)), ("blue.png", (0, 0, 255))):
+        Pillow.new("RGB", (2, 2), color).save(tmp_path / name)
+    comments = "comment TextureFile red.png\ncomment TextureFile blue.png\n"
+    head = header("ascii", "property float s\nproperty float t\n", faces=3, comment=comments)
+    if numbered:
+        head = head.replace("end_header", "property int texnumber\nend_header")
+    rows = "\n".join(f"{x} {y} {z} 0 0" for x, y, z in VERTICES)
+    numbers = (" 1", " -1", " 0") if numbered else ("", "", "")
+    faces = "".join(f"\n3 {face}{number}" for face, number in zip(("0 1 2", "0 2 3", "1 4 2"), numbers, strict=True))
+    scene = read((head + rows + faces + "\n").encode())
+    looks = {}
+    for instance in scene.instances:
+        mesh = scene.meshes[instance.mesh]
+        texture = scene.materials[mesh.material].base_color_texture
+        color = None if texture is None else tuple(texture.image.pixels[0, 0].tolist())
+        looks |= {tuple(face): color for face in mesh.faces.tolist()}
+    if numbered:
+        assert looks == {(0, 1, 2): (0, 0, 255), (0, 2, 3): None, (1, 4, 2): (255, 0, 0)}
+    else:
+        assert set(looks.values()) == {(255, 0, 0)}
+        assert "only the first of 2 textures is used: no face says its texnumber" in scene.notes

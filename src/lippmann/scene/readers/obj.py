@@ -226,7 +226,7 @@ def _per_face(runs: Sequence[tuple[int, int]], count: int) -> Integers:
 
 
 def _assemble(statements: _Statements, where: str) -> _Geometry:
-    positions = read_table(statements.positions, "vertex", 3, where)
+    positions = read_table(statements.positions, "vertex", 3, where, colored=True)
     # "v x y z r g b" is a vertex colour, "v x y z w" a rational weight, which faces do not use.
     colors = positions[:, 3:6] if positions.shape[1] in (6, 7) else None
     uvs = read_table(statements.uvs, "texture coordinate", 1, where)[:, :2]

@@ -27,8 +27,10 @@ class Lines:
         self.numbers.append(number)
 
 
-def read_table(lines: Lines, what: str, least: int, where: str) -> Points:
+def read_table(lines: Lines, what: str, least: int, where: str, *, colored: bool = False) -> Points:
     """Numbers ``(n, k)`` of ``v``, ``vt`` or ``vn`` lines; k is the smallest count on any line.
+
+    ``colored``: the last three of six numbers are a colour. If some lines have one, the others are white.
 
     Raises
     ------
@@ -38,13 +40,13 @@ def read_table(lines: Lines, what: str, least: int, where: str) -> Points:
     if not lines.bodies:
         return np.zeros((0, least))
     if not any(map(str.strip, lines.bodies)):  # loadtxt would only warn
-        _ragged_table(lines, what, least, where)
+        _ragged_table(lines, what, least, where, colored)
     try:
         table = np.loadtxt(lines.bodies, np.float64, ndmin=2, comments=None)
         if len(table) != len(lines.bodies):  # loadtxt skips blank bodies
-            table = _ragged_table(lines, what, least, where)
+            table = _ragged_table(lines, what, least, where, colored)
     except ValueError:
-        table = _ragged_table(lines, what, least, where)
+        table = _ragged_table(lines, what, least, where, colored)
     if table.shape[1] < least:
         raise SceneError(
             f"{what} with {table.shape[1]} numbers", where=f"{where}:{lines.numbers[0]}", rule=f"it takes {least}"
@@ -60,7 +62,7 @@ def read_table(lines: Lines, what: str, least: int, where: str) -> Points:
     return np.asarray(table, np.float64)
 
 
-def _ragged_table(lines: Lines, what: str, least: int, where: str) -> Points:
+def _ragged_table(lines: Lines, what: str, least: int, where: str, colored: bool) -> Points:
     rows: list[list[float]] = []
     for body, number in zip(lines.bodies, lines.numbers, strict=True):
         try:
@@ -71,6 +73,8 @@ def _ragged_table(lines: Lines, what: str, least: int, where: str) -> Points:
             raise SceneError(
                 f"{what} with {len(rows[-1])} numbers", where=f"{where}:{number}", rule=f"it takes {least}"
             )
+    if colored and any(len(row) >= 6 for row in rows):
+        rows = [row[:6] if len(row) >= 6 else [*row[:3], 1.0, 1.0, 1.0] for row in rows]
     width = min(len(row) for row in rows)
     return np.array([row[:width] for row in rows])
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -71,19 +71,30 @@ def read_ply(path: Path, *, allow_outside: bool = False) -> SceneDescription:
     outline = _outline(columns, where)
     if not len(outline.sizes):
         return _cloud(columns["vertex"], elements["vertex"], path.stem, notes, where)
-    texture = None
-    if header.textures:
-        image = resolve(path.parent, header.textures[0], where=where, what="texture", allow_outside=allow_outside)
-        texture = Texture(read_image(image, where=where), srgb=True)
-        if len(header.textures) > 1:
-            notes.append(f"only the first of {len(header.textures)} textures is used")
-    mesh = _mesh(columns, elements, outline, path.stem, where)
-    if texture is not None and not mesh.uvs:
+    mesh, owners = _mesh(columns, elements, outline, path.stem, where)
+    textures: list[Texture | None] = []
+    for name in header.textures:
+        image = resolve(path.parent, name, where=where, what="texture", allow_outside=allow_outside)
+        textures.append(Texture(read_image(image, where=where), srgb=True))
+    if textures and not mesh.uvs:
         notes.append("the texture is not used: the file gives no texture coordinates")
-        texture = None
+        textures = []
+    numbers = columns["face"].get("texnumber") if "face" in columns else None
+    meshes = [mesh]
+    if len(textures) > 1 and isinstance(numbers, np.ndarray):
+        textures.append(None)  # of faces whose number is that of no texture
+        chosen = np.where((numbers >= 0) & (numbers < len(textures)), numbers, -1).astype(int)[owners] % len(textures)
+        meshes = [replace(mesh, faces=mesh.faces[chosen == number], material=number) for number in range(len(textures))]
+    elif len(textures) > 1:
+        notes.append(f"only the first of {len(textures)} textures is used: no face says its texnumber")
+    materials = [_material(path.stem, texture, mesh) for texture in textures or [None]]
+    instances = [Instance(number, np.eye(4)) for number, mesh in enumerate(meshes) if len(mesh.faces)]
+    return SceneDescription(path.stem, meshes, materials, instances, notes=notes)
+
+
+def _material(name: str, texture: Texture | None, mesh: Mesh) -> Material:
     plain = (1.0, 1.0, 1.0) if texture is not None or mesh.colors is not None else (0.7, 0.7, 0.7)
-    material = Material(path.stem, base_color=plain, base_color_texture=texture, roughness=0.6, double_sided=True)
-    return SceneDescription(path.stem, [mesh], [material], [Instance(0, np.eye(4))], notes=notes)
+    return Material(name, base_color=plain, base_color_texture=texture, roughness=0.6, double_sided=True)
 
 
 def _cloud(vertex: Columns, element: Element, name: str, notes: list[str], where: str) -> SceneDescription:
@@ -306,7 +317,8 @@ def _triangles_of_strips(strips: _Lists) -> _Lists:
 @np.errstate(over="ignore")  # of normals and coordinates of textures
 def _mesh(
     columns: Mapping[str, Columns], elements: Mapping[str, Element], outline: _Lists, name: str, where: str
-) -> Mesh:
+) -> tuple[Mesh, Integers]:
+    """The triangles, and of each the number of its face."""
     vertex = {key: column for key, column in columns["vertex"].items() if isinstance(column, np.ndarray)}
     positions = np.stack([vertex[axis] for axis in "xyz"], axis=-1)
     keep = outline.sizes >= 3
@@ -337,7 +349,7 @@ def _mesh(
         if face_colors is not None and colors is None:
             colors = np.repeat(face_colors[keep][owners], 3, axis=0)
         faces = np.arange(len(flat)).reshape(-1, 3)
-    return Mesh(
+    mesh = Mesh(
         name=name,
         positions=positions.astype(np.float32),
         faces=faces.astype(np.uint32),
@@ -346,6 +358,7 @@ def _mesh(
         uvs=() if uvs is None else ((uvs * (1.0, -1.0) + (0.0, 1.0)).astype(np.float32),),  # v runs upwards in PLY
         colors=colors,
     )
+    return mesh, np.flatnonzero(keep)[owners]
 
 
 def _stack(columns: Mapping[str, Numbers], names: tuple[str, ...]) -> Numbers | None:
