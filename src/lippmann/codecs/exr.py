@@ -16,8 +16,10 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lippmann.codecs.types import Pixels
+from lippmann.color.primaries import REC709, rec709_from_rgb
 from lippmann.errors import PictureError
 from lippmann.runtime.input_memory import check_input
 from lippmann.runtime.quiet_stderr import libraries_silenced
@@ -35,12 +37,45 @@ _LARGEST_FREE_TILE = 1 << 20
 
 @dataclass(frozen=True)
 class ExrHeader:
-    """What an EXR says of itself: size, ``channels`` (name to NumPy type name) and its text attributes."""
+    """What an EXR says of itself.
+
+    Attributes
+    ----------
+    width, height:
+        Size of its display window, which is the picture.
+    channels:
+        Name to NumPy type name.
+    text:
+        Its text attributes.
+    window:
+        First column and row of the stored pixels in the picture, and their number across and down. Beyond them the
+        picture is 0, those beyond it are cropped.
+    chromaticities:
+        x and y of red, green, blue and white; None for those of Rec. 709.
+    """
 
     width: int
     height: int
     channels: Mapping[str, str]
     text: Mapping[str, str]
+    window: tuple[int, int, int, int]
+    chromaticities: tuple[float, ...] | None
+
+    def rec709(self, pixels: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Linear RGB ``(..., 3)`` of the file as that of Rec. 709; colours beyond it are clipped at 0.
+
+        Raises
+        ------
+        PictureError
+            The chromaticities mean nothing.
+        """
+        if self.chromaticities is None or np.allclose(self.chromaticities, REC709, atol=1e-3):
+            return pixels
+        try:
+            matrix = rec709_from_rgb(self.chromaticities)
+        except ValueError as error:
+            raise PictureError(str(error), where="chromaticities") from None
+        return np.asarray(np.maximum(pixels @ matrix.astype(np.float32).T, 0.0))
 
 
 def write_exr(
@@ -95,17 +130,24 @@ def exr_header(file: BinaryIO, path: Path) -> ExrHeader:
         attributes = _attributes(file)
         x0, y0, x1, y1 = struct.unpack("<4i", attributes["dataWindow"][1])
         channels = _channel_list(attributes["channels"][1])
-        width, height = x1 - x0 + 1, y1 - y0 + 1
-        if width < 1 or height < 1:
-            raise _damaged(path, f"its size is {width} x {height}")
+        stored_width, stored_height = x1 - x0 + 1, y1 - y0 + 1
+        left, top, right, bottom = struct.unpack("<4i", attributes["displayWindow"][1])
+        width, height = right - left + 1, bottom - top + 1
+        if min(width, height, stored_width, stored_height) < 1:
+            raise _damaged(
+                path, f"its size is {width} x {height}, of which {stored_width} x {stored_height} are stored"
+            )
+        window = (x0 - left, y0 - top, stored_width, stored_height)
+        primaries = attributes.get("chromaticities", ("", b""))[1]
+        chromaticities = struct.unpack("<8f", primaries) if primaries else None
         if version & _TILED:
-            _check_tiles(attributes["tiles"][1], width * height, path)
+            _check_tiles(attributes["tiles"][1], stored_width * stored_height, path)
         else:
-            _check_chunks(file, height, attributes["compression"][1][0])
+            _check_chunks(file, stored_height, attributes["compression"][1][0])
         text = {name: value.decode("utf-8") for name, (kind, value) in attributes.items() if kind == "string"}
     except (struct.error, KeyError, IndexError, EOFError, UnicodeDecodeError) as error:
         raise _damaged(path, "it is cut short or its header makes no sense") from error
-    return ExrHeader(width, height, channels, text)
+    return ExrHeader(width, height, channels, text, window, chromaticities)
 
 
 def read_exr(path: Path, header: ExrHeader) -> dict[str, Pixels]:
@@ -122,7 +164,8 @@ def read_exr(path: Path, header: ExrHeader) -> dict[str, Pixels]:
 
     pixel = sum(np.dtype(kind).itemsize for kind in header.channels.values())
     # The library's own planes, and those that it is asked for.
-    check_input(2 * pixel * header.width * header.height, "its picture", where=str(path))
+    stored = header.window[2] * header.window[3]
+    check_input(2 * pixel * max(header.width * header.height, stored), "its picture", where=str(path))
     # The binding prints a warning where it should raise; what it read then has no parts.
     with contextlib.redirect_stdout(io.StringIO()), libraries_silenced():
         try:
@@ -131,7 +174,18 @@ def read_exr(path: Path, header: ExrHeader) -> dict[str, Pixels]:
             raise _damaged(path, str(error)) from error
     if not file.parts:
         raise _damaged(path, "its pixels cannot be decoded")
-    return {name: np.asarray(channel.pixels) for name, channel in file.channels().items()}
+    return {name: _in_display_window(np.asarray(channel.pixels), header) for name, channel in file.channels().items()}
+
+
+def _in_display_window(plane: Pixels, header: ExrHeader) -> Pixels:
+    left, top, width, height = header.window
+    if header.window == (0, 0, header.width, header.height) or plane.shape[:2] != (height, width):
+        return plane
+    whole = np.zeros((header.height, header.width, *plane.shape[2:]), plane.dtype)
+    rows = slice(max(top, 0), max(min(top + height, header.height), 0))
+    columns = slice(max(left, 0), max(min(left + width, header.width), 0))
+    whole[rows, columns] = plane[rows.start - top : rows.stop - top, columns.start - left : columns.stop - left]
+    return whole
 
 
 def _check_tiles(attribute: bytes, pixels: int, path: Path) -> None:

@@ -92,3 +92,37 @@ def test_damaged_and_foreign_files(tmp_path, pixels):
         read_environment(path)
     with pytest.raises(SceneError, match="no such file"):
         read_environment(tmp_path / "none.exr")
+
+
+def test_exr_pixels_lie_in_the_display_window(tmp_path, pixels):
+    """A crop of a rendered sky: what is beyond the stored pixels is black."""
+    header = {
+        "compression": OpenEXR.ZIP_COMPRESSION,
+        "type": OpenEXR.scanlineimage,
+        "dataWindow": (np.array([2, 1], np.int32), np.array([17, 8], np.int32)),
+        "displayWindow": (np.array([0, 0], np.int32), np.array([15, 7], np.int32)),
+    }
+    with OpenEXR.File(header, {"RGB": pixels}) as file:
+        file.write(str(tmp_path / "sky.exr"))
+    found = read_environment(tmp_path / "sky.exr").pixels
+    assert found.shape == pixels.shape
+    assert (found[1:, 2:] == pixels[:-1, :-2]).all()
+    assert not found[0].any()
+    assert not found[:, :2].any()
+
+
+def test_exr_chromaticities_are_converted(tmp_path):
+    """Rec. 2020, with the matrix of ITU-R BT.2087-0; grey stays grey."""
+    pixels = np.tile(np.float32([[1.0, 0.5, 0.5]]), (8, 16, 1))
+    pixels[4:] = 0.25
+    header = {
+        "compression": OpenEXR.ZIP_COMPRESSION,
+        "type": OpenEXR.scanlineimage,
+        "chromaticities": (0.708, 0.292, 0.170, 0.797, 0.131, 0.046, 0.3127, 0.3290),
+    }
+    with OpenEXR.File(header, {"RGB": pixels}) as file:
+        file.write(str(tmp_path / "sky.exr"))
+    found = read_environment(tmp_path / "sky.exr").pixels
+    to_709 = np.array([[1.6605, -0.5876, -0.0728], [-0.1246, 1.1329, -0.0083], [-0.0182, -0.1006, 1.1187]])
+    assert found[0, 0] == pytest.approx(to_709 @ [1.0, 0.5, 0.5], abs=2e-4)
+    assert found[-1, -1] == pytest.approx(np.full(3, 0.25), abs=1e-4)

@@ -2,27 +2,19 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from lippmann.codecs import radiance
 from lippmann.codecs.exr import SIGNATURE, read_exr, read_exr_header
 from lippmann.errors import PictureError, SceneError
-from lippmann.runtime.input_memory import check_input
 from lippmann.scene.parsing.files import read_bytes
 from lippmann.scene.values.description import Environment
 
-_HDR_MAGICS = (b"#?RADIANCE", b"#?RGBE")
-#: The size, after the header's first empty line.
-_HDR_SIZE = re.compile(rb"[-+]Y +([0-9]{1,9}) +[-+]X +([0-9]{1,9})\s")
-
 #: Channels of red, green and blue: luminance alone is grey.
 _COLORS = (("R", "G", "B"), ("Y", "Y", "Y"))
-
-#: A byte of an HDR file holds less than so many pixels: at best two bytes stand for 127 values of four channels.
-_HDR_PIXELS_PER_BYTE = 16
 
 
 def read_environment(path: Path) -> Environment:
@@ -38,7 +30,7 @@ def read_environment(path: Path) -> Environment:
     where = path.name
     if data.startswith(SIGNATURE):
         pixels = _read_exr(path, where)
-    elif data.startswith(_HDR_MAGICS):
+    elif data.startswith(radiance.MAGICS):
         pixels = _read_hdr(data, where)
     else:
         raise SceneError("is no environment picture", where=where, rule="OpenEXR (.exr) and Radiance (.hdr) are read")
@@ -55,26 +47,19 @@ def _read_exr(path: Path, where: str) -> NDArray[np.float32]:
             raise SceneError(f"has the channels {held}", where=where, rule="R, G and B are needed")
         _check_size(header.height, header.width, where)
         channels = read_exr(path, header)
+        pixels = np.stack([np.asarray(channels[name], np.float32) for name in names], axis=-1)
+        return pixels if names == ("Y", "Y", "Y") else header.rec709(pixels)
     except PictureError as error:
         raise _undecodable(error.what, where) from None
-    return np.stack([np.asarray(channels[name], np.float32) for name in names], axis=-1)
 
 
 def _read_hdr(data: bytes, where: str) -> NDArray[np.float32]:
-    import imagecodecs
-
-    size = _HDR_SIZE.match(data, data.find(b"\n\n") + 2)
-    if size is None:
-        raise _undecodable("it does not say its size", where)
-    height, width = int(size[1]), int(size[2])
-    _check_size(height, width, where)
-    check_input(16 * height * width, "its picture", where=where)
-    if height * width > _HDR_PIXELS_PER_BYTE * len(data):
-        raise _undecodable(f"{len(data)} bytes hold no {width}x{height} pixels", where)
     try:
-        return np.asarray(imagecodecs.rgbe_decode(data), np.float32)
-    except (RuntimeError, ValueError) as error:
-        raise _undecodable(str(error), where) from None
+        header = radiance.read_header(data, where)
+        _check_size(header.height, header.width, where)
+        return radiance.read_radiance(data, header, where)
+    except PictureError as error:
+        raise SceneError(error.what, where=where, fix=error.fix) from None
 
 
 def _undecodable(why: str, where: str) -> SceneError:

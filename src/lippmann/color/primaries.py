@@ -1,0 +1,50 @@
+"""Linear RGB of other primaries as linear RGB of Rec. 709, the program's own."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+Matrix = NDArray[np.float64]
+
+#: Chromaticities x, y of red, green, blue and white.
+REC709 = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
+
+#: Cone responses of XYZ (Lam 1985, "Bradford"), in which whites are adapted.
+_BRADFORD = np.array([[0.8951, 0.2664, -0.1614], [-0.7502, 1.7135, 0.0367], [0.0389, -0.0685, 1.0296]])
+
+
+def xyz_from_rgb(chromaticities: Sequence[float]) -> Matrix:
+    """``(3, 3)`` from linear RGB to XYZ, with Y = 1 for white (SMPTE RP 177-1993).
+
+    Parameters
+    ----------
+    chromaticities:
+        x and y of red, green, blue and white, eight numbers.
+
+    Raises
+    ------
+    ValueError
+        They are not finite, a y is 0, or the primaries lie on a line.
+    """
+    x, y = np.asarray(chromaticities, np.float64).reshape(4, 2).T
+    if not np.isfinite([x, y]).all() or (y == 0.0).any():
+        raise ValueError("chromaticities must be finite, with y other than 0")
+    xyz = np.stack([x / y, np.ones(4), (1.0 - x - y) / y])
+    primaries, white = xyz[:, :3], xyz[:, 3]
+    if abs(np.linalg.det(primaries)) < 1e-9:
+        raise ValueError("the primaries must not lie on a line")
+    return np.asarray(primaries * np.linalg.solve(primaries, white))
+
+
+def rec709_from_rgb(chromaticities: Sequence[float]) -> Matrix:
+    """``(3, 3)`` from linear RGB of the given chromaticities to that of Rec. 709; white stays (1, 1, 1).
+
+    Errors are those of :func:`xyz_from_rgb`.
+    """
+    theirs, ours = xyz_from_rgb(chromaticities), xyz_from_rgb(REC709)
+    gains = (_BRADFORD @ ours.sum(axis=1)) / (_BRADFORD @ theirs.sum(axis=1))
+    adapted = np.linalg.solve(_BRADFORD, gains[:, None] * (_BRADFORD @ theirs))
+    return np.asarray(np.linalg.solve(ours, adapted))
