@@ -85,6 +85,22 @@ def test_another_program_s_version_7_3_is_read(tmp_path):
     np.testing.assert_array_equal(found.maps["weight"], (values[..., 3] / 255).astype(np.float32))
 
 
+@pytest.mark.parametrize("version", [5, 7.3])
+def test_grey_is_read_without_a_dimension_of_colours(tmp_path, version):
+    """As MATLAB stores it: it drops last dimensions of 1."""
+    grey = np.random.default_rng(0).integers(0, 65535, (2, 3, 4, 5), dtype=np.uint16)
+    if version == 5:
+        scipy.io.savemat(tmp_path / "x.mat", {"LF": grey})
+    else:
+        with h5py.File(tmp_path / "x.mat", "w", userblock_size=512) as file:
+            file["LF"] = grey.transpose()
+        with (tmp_path / "x.mat").open("r+b") as file:
+            file.write(b"MATLAB 7.3 MAT-file".ljust(124) + b"\x00\x02IM")
+    found = read_matlab(tmp_path / "x.mat")
+    np.testing.assert_array_equal(found.values, np.repeat(grey[..., None], 3, axis=-1))
+    assert "weight" not in found.maps
+
+
 def refused(path):
     with pytest.raises(PictureError) as error:
         read_matlab(path)
@@ -106,8 +122,8 @@ def test_files_without_a_light_field_are_refused(tmp_path, version):
 
     write(A=np.ones((2, 2)), B=np.ones((2, 2)))
     assert "has no variable LF; it holds A, B" in refused(tmp_path / "x.mat")
-    write(LF=np.ones((2, 2, 3, 3)))
-    assert "LF has the shape (2, 2, 3, 3); it must be [t, s, v, u, c]" in refused(tmp_path / "x.mat")
+    write(LF=np.ones((2, 3, 3)))
+    assert "LF has the shape (2, 3, 3); it must be [t, s, v, u, c]" in refused(tmp_path / "x.mat")
     write(LF=np.ones((2, 2, 3, 3, 2)))
     assert "LF has the shape" in refused(tmp_path / "x.mat")
     write(LF=np.ones((2, 2, 3, 3, 3), dtype=np.int16))

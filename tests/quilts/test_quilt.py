@@ -46,6 +46,7 @@ def test_rows_of_all_views_are_those_of_each():
         ("old one_qs5x9.png", (5, 9, None)),
         ("x_qs2x2a1_qs11x6a0.5625.exr", (11, 6, 0.5625)),
         ("_qs32x1a2.png", (32, 1, 2.0)),
+        ("hologram_qs5x9a1.7777777777777777.png", (5, 9, 16 / 9)),  # the maker's WebXR library
     ],
 )
 def test_names_are_read(tmp_path, name, layout):

@@ -1,7 +1,8 @@
 """Files of the Light Field Toolbox for MATLAB (D. Dansereau): a variable ``LF`` in a ``.mat`` file.
 
 ``LF`` is ``[t, s, v, u, c]`` (uint8, uint16 or single): ``s`` and ``t`` count the views across and down, ``u`` and
-``v`` the pixels of a view. A fourth colour holds the weight of each value. Files are written in version 7.3 (HDF5),
+``v`` the pixels of a view. A fourth colour holds the weight of each value. One of grey has no ``c``, since MATLAB drops
+last dimensions of 1. Files are written in version 7.3 (HDF5),
 where the axes are reversed, since MATLAB is column-major. Versions 5 to 7 are read as well.
 """
 
@@ -124,7 +125,10 @@ def read_matlab(path: Path) -> LightField:
     metadata = from_note(note, LAYOUT, str(path))
     if values.dtype == np.float64:
         values = values.astype(np.float32)
-    maps = {} if values.shape[4] == 3 else {WEIGHT: decode_weights(values[..., 3])}
+    values = values.reshape(*values.shape[:4], -1)
+    if values.shape[4] == 1:
+        values = np.repeat(values, 3, axis=4)
+    maps = {WEIGHT: decode_weights(values[..., 3])} if values.shape[4] == 4 else {}
     try:
         return LightField(values[..., :3], metadata, maps)
     except PictureError as error:
@@ -136,8 +140,8 @@ def _check_variable(shape: tuple[int, ...], names: list[str], path: Path) -> Non
     if not shape:
         held = ", ".join(names) or "nothing"
         raise PictureError(f"has no variable {_VARIABLE}; it holds {held}", where=str(path))
-    if len(shape) != 5 or shape[4] not in (3, 4):
-        rule = "it must be [t, s, v, u, c] with 3 colours, or 4 with a weight"
+    if len(shape) not in (4, 5) or shape[4:] not in ((), (1,), (3,), (4,)):
+        rule = "it must be [t, s, v, u, c] with 1 or 3 colours, or 4 with a weight"
         raise PictureError(f"{_VARIABLE} has the shape {shape}", where=str(path), rule=rule)
     check_shape((*shape[:4], 3), str(path))
 

@@ -28,7 +28,7 @@ LEAST_SIDE, MOST_SIDE, MOST_TILES = 256, 16384, 32
 #: Width in pixels of a quilt in a notebook, at most.
 _NOTEBOOK_WIDTH = 768
 
-_NAME = re.compile(r"_qs(\d{1,4})x(\d{1,4})(?:a(\d{1,4}(?:\.\d{1,12})?))?$")
+_NAME = re.compile(r"_qs(\d{1,4})x(\d{1,4})(?:a(\d{1,4}(?:\.\d{1,17})?))?$")
 _CONVENTION = "a quilt's name ends in columns x rows and aspect ratio, such as _qs8x6a0.75.png"
 
 
