@@ -150,20 +150,33 @@ class Studio:
 
 @contextlib.contextmanager
 def _studio(display: str, scene: str) -> Iterator[Studio]:
+    began = time.perf_counter()
+    with running_command(display, scene) as (process, address), live_socket(address) as socket:
+        yield Studio(process, socket, began)
+
+
+@contextlib.contextmanager
+def running_command(display: str, scene: str) -> Iterator[tuple[subprocess.Popen[str], str]]:
+    """The process of ``lippmann studio`` and the address that it prints."""
     command = [sys.executable, "-c", "from lippmann.cli import main; main()", "studio", scene]
-    with tempfile.TemporaryDirectory() as folder:
-        began = time.perf_counter()
-        with subprocess.Popen(
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        subprocess.Popen(
             [*command, "--display", display, "--no-browser"], stdout=subprocess.PIPE, text=True, cwd=folder
-        ) as process:
-            try:
-                assert process.stdout is not None
-                address = process.stdout.readline().split()[-1].rstrip("/")
-                origin = Origin(address.rpartition("/")[0])  # only the studio's own pages are let in
-                with connect(f"ws{address.removeprefix('http')}/live", origin=origin, max_size=None) as socket:
-                    yield Studio(process, socket, began)
-            finally:
-                process.kill()
+        ) as process,
+    ):
+        try:
+            assert process.stdout is not None
+            yield process, process.stdout.readline().split()[-1]
+        finally:
+            process.kill()
+
+
+def live_socket(address: str) -> ClientConnection:
+    """A page's WebSocket to the studio at ``address``."""
+    folder = address.rstrip("/")
+    origin = Origin(folder.rpartition("/")[0])  # only the studio's own pages are let in
+    return connect(f"ws{folder.removeprefix('http')}/live", origin=origin, max_size=None)
 
 
 if __name__ == "__main__":

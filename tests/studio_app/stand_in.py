@@ -44,13 +44,20 @@ class StandIn:
         self.calls.append("display")
         self.display = display
 
-    def frame(self, view: LiveView, is_stale: Any = None) -> LiveFrame:
+    def frame(self, view: LiveView) -> LiveFrame:
         self.samples = 1
         return self._draw(view)
 
     def refine(self, view: LiveView) -> LiveFrame:
         self.samples += 1023
         return self._draw(view)
+
+    def frame_steps(self, view: LiveView) -> Iterator[LiveFrame | None]:
+        yield self.frame(view)
+
+    def refine_steps(self, view: LiveView) -> Iterator[LiveFrame | None]:
+        while True:
+            yield self.refine(view)
 
     def pick(self, view: LiveView, u: float, v: float) -> float | None:
         return None if u < 0.5 else 3.0

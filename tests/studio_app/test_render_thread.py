@@ -11,7 +11,7 @@ from stand_in import TINY, StandIn
 
 from lippmann.errors import SceneError
 from lippmann.studio_app import render_thread
-from lippmann.studio_app.render_thread import RenderThread, Wanted, Watcher, _next_share
+from lippmann.studio_app.render_thread import RenderThread, Wanted, Watcher, _next_row_step, _next_share
 from lippmann.studio_app.state import StudioState
 
 STATE = StudioState(display=TINY)
@@ -68,7 +68,7 @@ def test_the_newest_view_wins(start):
     allowed, begun = threading.Event(), threading.Event()
 
     class Slow(StandIn):
-        def frame(self, view, is_stale=None):
+        def frame(self, view):
             begun.set()
             allowed.wait(10.0)
             return super().frame(view)
@@ -117,7 +117,7 @@ def test_a_scene_that_cannot_be_loaded_is_said_and_the_last_one_stays(start):
 
 def test_a_fault_is_reported_and_the_thread_goes_on(start, capfd):
     class Faulty(StandIn):
-        def frame(self, view, is_stale=None):
+        def frame(self, view):
             if view.eye[0] == 1.0:
                 raise ZeroDivisionError("a fault")
             return super().frame(view)
@@ -157,6 +157,116 @@ def test_those_who_left_are_served_no_more(start):
     thread.want(record.watcher, wanted(1))
     time.sleep(0.05)
     assert record.frames == []
+
+
+class Turns(StandIn):
+    """Notes whose step is made; all native pixels take :attr:`PARTS` steps."""
+
+    PARTS = 5
+
+    def __init__(self, scene, display):
+        super().__init__(scene, display)
+        self.made, self.may_begin = [], threading.Event()
+
+    def frame_steps(self, view):
+        assert self.may_begin.wait(10.0)
+        for _ in range(self.PARTS - 1 if view.eye is None else 0):
+            self.made.append("part")
+            yield None
+        self.made.append(view.eye)
+        yield self.frame(view)
+
+
+def moving(thread, view, most=200):
+    """A watcher that wants the next view as soon as it sees one, as pages and panels do during a drag."""
+    seen = []
+
+    def take(shown):
+        seen.append(shown)
+        if len(seen) < most:
+            thread.want(watcher, Wanted(len(seen) + 1, "teapot", lambda: "scene", DISPLAY, view))
+
+    watcher = Watcher(take, lambda error: pytest.fail(str(error)))
+    thread.add(watcher)
+    thread.want(watcher, Wanted(1, "teapot", lambda: "scene", DISPLAY, view))
+    return seen
+
+
+def test_watchers_take_turns_and_a_panel_gets_its_parts_between(start):
+    made = []
+
+    def make(scene, display):
+        made.append(Turns(scene, display))
+        return made[-1]
+
+    thread, record = start(make)
+    thread.gather(False)
+    thread.remove(record.watcher)
+    pages = [moving(thread, STATE.view((float(n), 0.0, 300.0), (40, 30))) for n in range(4)]
+    panel = moving(thread, STATE.native_view())
+    until = time.monotonic() + 10.0
+    while not made:
+        assert time.monotonic() < until
+        time.sleep(0.005)
+    made[0].may_begin.set()
+    while min(map(len, pages)) < 150:
+        assert time.monotonic() < until
+        time.sleep(0.005)
+    turns = made[0].made[1:601]  # the first one may have begun before all others were there
+    counts = [turns.count((float(n), 0.0, 300.0)) for n in range(4)]
+    assert max(counts) - min(counts) <= 1
+    native = turns.count("part") + turns.count(None)
+    assert abs(native - counts[0]) <= 1
+    # Each native frame that was begun was finished, though newer views were wanted all the time.
+    assert turns.count(None) == pytest.approx(native / Turns.PARTS, abs=1)
+    assert len(panel) > 20
+
+
+def test_a_coarse_panel_is_made_whole_at_rest_even_beside_a_render(start):
+    steps = []
+
+    class Rows(StandIn):
+        def frame(self, view):
+            steps.append(view.row_step)
+            return super().frame(view)
+
+    thread, record = start(Rows)
+    thread.gather(False)
+    thread.want(record.watcher, Wanted(1, "teapot", lambda: "scene", DISPLAY, STATE.native_view()))
+    record.wait_for(lambda r: len(r.frames) == 2)
+    time.sleep(0.1)
+    assert steps == [render_thread.MOST_ROW_STEP, 1]
+    thread.gather(True)
+    record.wait_for(lambda r: r.frames[-1].is_final)
+
+
+def test_those_at_rest_take_turns_too(start):
+    gathered = []
+
+    class Notes(StandIn):
+        def refine(self, view):
+            gathered.append(view.eye[0])
+            self.samples = len(gathered)
+            return self._draw(view)
+
+    thread, record = start(Notes)
+    thread.gather(False)
+    other = Record()
+    thread.add(other.watcher)
+    for number, each in enumerate((record, other)):
+        thread.want(each.watcher, wanted(1, eye=(float(number), 0.0, 300.0)))
+        each.wait_for(lambda r: r.frames)
+    thread.gather(True)
+    other.wait_for(lambda r: len(r.frames) > 10)
+    assert {gathered[n] + gathered[n + 1] for n in range(10)} == {1.0}
+
+
+@pytest.mark.parametrize(
+    ("row_step", "seconds", "then"),
+    [(30, 0.6, 32), (16, 0.01, 8), (8, 0.4, 7), (4, 0.125, 2), (1, 0.4, 1), (1, 0.6, 2), (2, 9.0, 4), (32, 9.0, 32)],
+)
+def test_rows_of_a_moving_panel_are_left_out_until_it_keeps_pace(row_step, seconds, then):
+    assert _next_row_step(row_step, seconds) == then
 
 
 @pytest.mark.parametrize(

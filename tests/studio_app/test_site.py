@@ -147,7 +147,7 @@ def test_facts_are_those_of_the_last_frame_though_an_older_one_came_late(tmp_pat
     begun, may_go = threading.Event(), threading.Event()
 
     class Slow(StandIn):
-        def frame(self, view, is_stale=None):
+        def frame(self, view):
             begun.set()
             assert may_go.wait(10.0)
             return replace(super().frame(view), placement=placement(10.0 + view.request.placement.turn[0]))
@@ -421,7 +421,7 @@ def test_a_frame_is_told_of_with_the_state_of_its_own_page(tmp_path):
     begun, may_go = threading.Event(), threading.Event()
 
     class Slow(StandIn):
-        def frame(self, view, is_stale=None):
+        def frame(self, view):
             begun.set()
             assert may_go.wait(10.0)
             return super().frame(view)

@@ -1,4 +1,8 @@
-"""The one thread that renders live frames: its kernels stay warm, the newest view wins, and nothing queues."""
+"""The one thread that renders live frames: its kernels stay warm, the newest view wins, and nothing queues.
+
+Watchers take turns. A turn is a step of a frame: the whole frame of an eye, or a part of all native pixels of a panel,
+which then takes several turns. The watcher whose last turn is longest ago goes first.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +10,7 @@ import math
 import sys
 import threading
 import time
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Iterator
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Protocol
 
@@ -34,6 +38,10 @@ TIDYING = 5.0
 FRAME_SECONDS, COARSE_SHARE = 0.03, 0.5
 #: Below that detail counts more than pace: a frame may take so long, and shrinks down to this share of the sides.
 COARSE_FRAME_SECONDS, LEAST_SHARE = 0.05, 0.25
+#: Seconds from the beginning of a moving frame of native pixels to its end, turns of other watchers included: half of
+#: the second within which a panel follows, as coding, sending and drawing take time, too. One of so many rows is traced
+#: until it is kept, and one of ``MOST_ROW_STEP`` however slow the machine is: 64 rows of a Looking Glass Portrait.
+NATIVE_FRAME_SECONDS, MOST_ROW_STEP = 0.5, 32
 
 
 class Renderer(Protocol):
@@ -45,11 +53,11 @@ class Renderer(Protocol):
     def set_display(self, display: Display) -> None:
         """Show it on another display."""
 
-    def frame(self, view: LiveView, is_stale: Callable[[], bool]) -> LiveFrame | None:
-        """A picture at once."""
+    def frame_steps(self, view: LiveView) -> Iterator[LiveFrame | None]:
+        """A picture at once: each step but the last, which brings it, gives None."""
 
-    def refine(self, view: LiveView) -> LiveFrame | None:
-        """A better picture of the same view."""
+    def refine_steps(self, view: LiveView) -> Iterator[LiveFrame | None]:
+        """Better and better pictures of the same view, without end; None from steps that change nothing."""
 
     def pick(self, view: LiveView, u: float, v: float) -> float | None:
         """Depth of the point seen at a place, in mm."""
@@ -110,16 +118,38 @@ class Watcher:
     on_error: Callable[[LippmannError], None]
     on_busy: Callable[[str | None], None] = lambda _: None
     _wanted: Wanted | None = field(default=None, repr=False)
+    _moving: _Frame | None = field(default=None, repr=False)
     _shown: Wanted | None = field(default=None, repr=False)
-    _resting: Wanted | None = field(default=None, repr=False)
-    _since: float = 0.0
-    _gathered: float = 0.0
+    _resting: _Rest | None = field(default=None, repr=False)
     _share: float = 1.0
+    _row_step: int = MOST_ROW_STEP
     _pick: tuple[float, float, Callable[[float | None], None]] | None = field(default=None, repr=False)
 
 
+@dataclass(eq=False)
+class _Frame:
+    """A frame on its way."""
+
+    wanted: Wanted
+    view: LiveView
+    steps: Iterator[LiveFrame | None]
+    began: float
+    busy: float = 0.0
+
+
+@dataclass(eq=False)
+class _Rest:
+    """A view that rests ``since`` a time, of which a coarse picture was shown, or one of all its pixels."""
+
+    wanted: Wanted
+    since: float
+    is_coarse: bool
+    steps: Iterator[LiveFrame | None] | None = None
+    gathered: float = 0.0
+
+
 class RenderThread:
-    """Renders the newest view of each watcher, and better and better pictures of the last one while all rest.
+    """Renders the newest view of each watcher in turns, and better and better pictures while all rest.
 
     Parameters
     ----------
@@ -142,7 +172,7 @@ class RenderThread:
     def add(self, watcher: Watcher) -> None:
         """Serve a watcher."""
         with self._changed:
-            self._watchers.append(watcher)
+            self._watchers.insert(0, watcher)
 
     def remove(self, watcher: Watcher) -> None:
         """Serve a watcher no more."""
@@ -197,60 +227,81 @@ class RenderThread:
                 watcher.on_error(LippmannError("internal error; the terminal says which"))
 
     def _next(self) -> tuple[Watcher, Callable[[], None]] | None:
-        """The next step of work, once there is one; None at the end."""
+        """The next step of work, once there is one; None at the end. Those who waited longest stand first."""
         with self._changed:
             while not self._is_ended:
                 for watcher in self._watchers:
-                    if watcher._wanted is not None:
-                        wanted, watcher._wanted = watcher._wanted, None
-                        return watcher, lambda w=watcher, x=wanted: self._show(w, x)
                     if watcher._pick is not None and watcher._shown is not None:
-                        u, v, then = watcher._pick
-                        watcher._pick = None
-                        return watcher, lambda r=watcher._shown, u=u, v=v, t=then: self._tell(r, u, v, t)
-                resting = [watcher for watcher in self._watchers if watcher._resting is not None]
-                if not resting or not self._gathers:
-                    self._changed.wait()
+                        asked, watcher._pick = watcher._pick, None
+                        return watcher, lambda w=watcher, x=watcher._shown, a=asked: self._tell(w, x, *a)
+                    if watcher._moving is not None or watcher._wanted is not None:
+                        self._go_last(watcher)
+                        return watcher, lambda w=watcher: self._show(w)
+                resting = [(watcher, watcher._resting) for watcher in self._watchers if watcher._resting is not None]
+                left = max((rest.since for _, rest in resting), default=0.0) + REST - time.monotonic()
+                # A coarse picture is made whole even where a render beside has the machine.
+                todo = [(watcher, rest) for watcher, rest in resting if self._gathers or rest.is_coarse]
+                if not todo or left > 0:
+                    self._changed.wait(left if todo else None)
                     continue
-                watcher = max(resting, key=lambda each: each._since)
-                left = watcher._since + REST - time.monotonic()
-                if left > 0:
-                    self._changed.wait(left)
-                    continue
-                return watcher, lambda w=watcher, r=watcher._resting: self._gather(w, r)
+                watcher, rest = todo[0]
+                self._go_last(watcher)
+                return watcher, lambda w=watcher, r=rest: self._gather(w, r)
         return None
 
-    def _show(self, watcher: Watcher, wanted: Wanted) -> None:
-        renderer = self._prepare(watcher, wanted)
-        view = _smaller(wanted.view, watcher._share)
-        began = time.monotonic()
-        # An eye's picture is done soon: it is shown even if the eye has moved on, or a steady move would show nothing.
-        frame = renderer.frame(view, lambda: self._is_ended or (view.eye is None and watcher._wanted is not None))
-        if frame is None:
-            return
-        watcher._share = _next_share(watcher._share, time.monotonic() - began)
-        with self._changed:
-            watcher._shown, watcher._since, watcher._gathered = wanted, time.monotonic(), 0.0
-            if watcher._wanted is None:
-                watcher._resting = wanted
-        watcher.on_frame(Shown(wanted.number, frame, False))
+    def _go_last(self, watcher: Watcher) -> None:
+        self._watchers.remove(watcher)
+        self._watchers.append(watcher)
 
-    def _gather(self, watcher: Watcher, wanted: Wanted) -> None:
-        renderer = self._prepare(watcher, wanted)
+    def _show(self, watcher: Watcher) -> None:
+        """One step of a frame. One that was begun is finished though its watcher wants a newer one."""
+        frame, watcher._moving = watcher._moving or self._begin(watcher), None
         began = time.monotonic()
-        frame = renderer.refine(wanted.view)
-        watcher._gathered += time.monotonic() - began
-        is_done = watcher._gathered > LONGEST_GATHERING or (frame is not None and frame.samples >= MOST_SAMPLES)
+        picture = next(frame.steps)
+        now = time.monotonic()
+        frame.busy += now - began
+        if picture is None:
+            watcher._moving = frame
+            return
+        wanted = frame.wanted
+        if wanted.view.eye is None:
+            watcher._row_step = _next_row_step(watcher._row_step, now - frame.began)
+        else:
+            watcher._share = _next_share(watcher._share, frame.busy)
+        with self._changed:
+            watcher._shown = wanted
+            if watcher._wanted is None:
+                watcher._resting = _Rest(wanted, now, frame.view is not wanted.view)
+        watcher.on_frame(Shown(wanted.number, picture, False))
+
+    def _begin(self, watcher: Watcher) -> _Frame:
+        with self._changed:
+            wanted, watcher._wanted = watcher._wanted, None
+        assert wanted is not None
+        renderer = self._prepare(watcher, wanted)
+        view = _coarser(wanted.view, watcher)
+        return _Frame(wanted, view, renderer.frame_steps(view), time.monotonic())
+
+    def _gather(self, watcher: Watcher, rest: _Rest) -> None:
+        wanted = rest.wanted
+        if rest.steps is None:
+            renderer = self._prepare(watcher, wanted)
+            rest.steps = (renderer.frame_steps if rest.is_coarse else renderer.refine_steps)(wanted.view)
+        began = time.monotonic()
+        frame = next(rest.steps)
+        rest.gathered += time.monotonic() - began
+        if rest.is_coarse and frame is not None:
+            rest.is_coarse, rest.steps = False, None
+        is_done = rest.gathered > LONGEST_GATHERING or (frame is not None and frame.samples >= MOST_SAMPLES)
         if is_done:
             with self._changed:
-                if watcher._resting is wanted:
+                if watcher._resting is rest:
                     watcher._resting = None
         if frame is not None:
             watcher.on_frame(Shown(wanted.number, frame, is_done))
 
-    def _tell(self, wanted: Wanted, u: float, v: float, then: Callable[[float | None], None]) -> None:
-        assert self._renderer is not None
-        then(self._renderer.pick(wanted.view, u, v))
+    def _tell(self, watcher: Watcher, wanted: Wanted, u: float, v: float, then: Callable[[float | None], None]) -> None:
+        then(self._prepare(watcher, wanted).pick(wanted.view, u, v))
 
     def _prepare(self, watcher: Watcher, wanted: Wanted) -> Renderer:
         """The renderer with the scene and the display that are wanted."""
@@ -272,12 +323,24 @@ class RenderThread:
         return self._renderer
 
 
-def _smaller(view: LiveView, share: float) -> LiveView:
-    """The view of an eye in a smaller picture; native pixels stay as they are."""
-    if view.eye is None or share >= 1.0:
+def _coarser(view: LiveView, watcher: Watcher) -> LiveView:
+    """The view as it is traced while it moves: of an eye in a smaller picture, of native pixels with fewer rows."""
+    if view.eye is None:
+        return view if watcher._row_step == 1 else replace(view, row_step=watcher._row_step)
+    if watcher._share >= 1.0:
         return view
-    width, height = (max(1, round(side * share)) for side in view.size)
+    width, height = (max(1, round(side * watcher._share)) for side in view.size)
     return replace(view, size=(width, height))
+
+
+def _next_row_step(row_step: int, seconds: float) -> int:
+    """Rows of which one is traced in the next moving frame of native pixels, by the seconds that the last one took.
+
+    The first frame of a scene compiles kernels, so that one slow frame never doubles the step more than once; and none
+    halves it more than once, as only a part of a frame's time goes with its rays.
+    """
+    best = math.ceil(row_step * seconds / NATIVE_FRAME_SECONDS)
+    return min(MOST_ROW_STEP, max(1, -(-row_step // 2), min(best, 2 * row_step)))
 
 
 def _next_share(share: float, seconds: float) -> float:

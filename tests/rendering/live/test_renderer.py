@@ -14,6 +14,7 @@ from lippmann.color.transfer import quantize
 from lippmann.display import Display, LensArray, Panel
 from lippmann.display.pixel_window import PixelWindow
 from lippmann.errors import SceneError, UsageError
+from lippmann.rendering.live import renderer as live_renderer
 from lippmann.rendering.live.live_view import LiveView
 from lippmann.rendering.live.renderer import LiveRenderer
 from lippmann.rendering.request.render_request import RenderRequest
@@ -200,12 +201,45 @@ def test_light_is_that_of_a_render(renderers):
     assert psnr(plain, again) > 60
 
 
-def test_a_frame_that_is_not_wanted_any_more_is_given_up(renderers):
-    renderer = renderers("square")
-    view = LiveView(EYES[0], SIZE, request=RenderRequest(placement=PLACED))
-    before = renderer.frame(view)
-    assert renderer.frame(replace(view, eye=EYES[1]), is_stale=lambda: True) is None
-    assert (renderer.frame(view).pixels == before.pixels).all()
+def test_pictures_in_turns_are_those_by_themselves(teapot, monkeypatch):
+    """Of other lights, exposures and displays: what one picture sets between two steps of another is put right."""
+    monkeypatch.setattr(live_renderer, "STEP_LANES", 1000)
+    renderer = LiveRenderer(teapot, DISPLAYS["square"])
+    request = RenderRequest(placement=PLACED, exposure=0.0)
+    view = LiveView(None, request=request)
+    other = LiveView(
+        EYES[0],
+        SIZE,
+        request=replace(request, exposure=2.0, placement=replace(PLACED, turn=(70.0, 0.0, 0.0))),
+        light=LightOptions((50.0, 20.0), 2.0, 0.5),
+    )
+    alone = renderer.frame(view).pixels
+    rested = next(renderer.refine_steps(view)).pixels
+    steps, number = renderer.frame_steps(view), 0
+    while (frame := next(steps)) is None:
+        renderer.set_display(DISPLAYS["slanted"])
+        renderer.frame(other)
+        number += 1
+    assert number == 96 * 64 // 1000
+    assert (frame.pixels == alone).all()
+    renderer.set_display(DISPLAYS["square"])
+    rest = renderer.refine_steps(view)
+    renderer.set_display(DISPLAYS["slanted"])
+    assert (next(rest).pixels == rested).all()
+    renderer.frame(other)
+    # Of more samples, as many as the time allows.
+    assert next(rest).pixels.mean() == pytest.approx(rested.mean(), abs=4.0)
+
+
+@pytest.mark.parametrize(("name", "top", "height"), [("square", 0, 64), ("square", 5, 22), ("slanted", 0, 60)])
+def test_of_some_rows_one_is_traced_and_stands_for_all(renderers, name, top, height):
+    panel, step = DISPLAYS[name].panel, 5
+    window = None if height == panel.height else PixelWindow(3, top, 40, height)
+    view = LiveView(None, window=window, request=RenderRequest(placement=PLACED))
+    whole = renderers(name).frame(view).pixels
+    coarse = renderers(name).frame(replace(view, row_step=step)).pixels
+    rows = np.minimum(np.arange(height) // step * step + step // 2, height - 1)
+    np.testing.assert_array_equal(coarse, whole[rows])
 
 
 def test_a_newer_view_drops_the_samples_of_the_last(renderers):

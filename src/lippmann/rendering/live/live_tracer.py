@@ -98,6 +98,26 @@ class Lanes:
         return np.asarray(values[self._starts[:: self._shape[1]]])
 
 
+class PixelRun:
+    """Lanes of the first sample of each of the pixels from ``start`` to ``stop``, in one stream."""
+
+    def __init__(self, pixels: PixelSet, start: int, stop: int) -> None:
+        self.pixels = slice(start, stop)
+        count = min(stop, len(pixels.column)) - start
+        places = (values[start:stop] for values in (pixels.column, pixels.row, pixels.channel))
+        streams, samples = np.zeros((2, count), np.uint32)
+        self._host = [aligned(values) for values in (*places, streams, samples)]
+        self.arrays = [mi.UInt32(values) for values in self._host]
+
+    def sums(self, values: Floats) -> Floats:
+        """The values themselves, ``(pixels, 1)``."""
+        return values[:, None]
+
+    def firsts(self, values: Floats) -> Floats:
+        """The values themselves."""
+        return values
+
+
 def _two_lanes() -> Lanes:
     pair = np.zeros(2, np.uint32)
     return Lanes(PixelSet(pair, pair, pair, np.zeros((1, 1, 1), np.int32)), 1, np.ones(2, np.int64))
@@ -147,7 +167,7 @@ class LiveTracer:
         for _ in range(WARMING_LAUNCHES):
             self.trace(_two_lanes(), PlacedDisplay(np.eye(4)), seed=0)
 
-    def trace(self, lanes: Lanes, placed: PlacedDisplay, *, seed: int) -> Samples:
+    def trace(self, lanes: Lanes | PixelRun, placed: PlacedDisplay, *, seed: int) -> Samples:
         """The samples of ``lanes``."""
         found = self._kernel(*lanes.arrays, dr.opaque(mi.UInt32, seed), placed.rows, placed.height)
         red, green, blue, height = (np.asarray(values) for values in found)

@@ -28,6 +28,8 @@ class LiveView:
         Width and height in pixels of the eye's picture, which is the panel's rectangle in the lens plane.
     window:
         Where ``eye`` is None: the native pixels shown; None for the whole panel.
+    row_step:
+        Where ``eye`` is None: one of so many rows is traced and stands for those around it, while something moves.
     request:
         As of a render. ``placement``, ``exposure``, ``subpixels``, ``tone_map``, ``pixel_filter``, ``seed``,
         ``integrator`` (auto, path or direct) and ``depth`` count. Samples and method are the live renderer's own.
@@ -37,12 +39,13 @@ class LiveView:
     Raises
     ------
     UsageError
-        The eye is not in front of the lens plane, or the size is below 1x1.
+        The eye is not in front of the lens plane, the size is below 1x1, or the step is below 1.
     """
 
     eye: Vector | None
     size: tuple[int, int] = (512, 512)
     window: PixelWindow | None = None
+    row_step: int = 1
     request: RenderRequest = field(default_factory=RenderRequest)
     light: LightOptions = field(default_factory=LightOptions)
 
@@ -51,6 +54,8 @@ class LiveView:
             raise UsageError(f"{self.eye!r}", parameter="eye", rule="z above 0: in front of the lens plane")
         if min(self.size) < 1:
             raise UsageError(f"{self.size!r}", parameter="size", rule="at least 1x1 pixels")
+        if self.row_step < 1:
+            raise UsageError(f"{self.row_step!r}", parameter="row_step", rule="at least 1 row")
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,7 +8,7 @@ the denoiser made of the other: where that is wrong, the samples themselves are 
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -25,6 +25,7 @@ from lippmann.rendering.live.live_view import LiveFrame, LiveView
 from lippmann.rendering.live.sample_plan import even_samples, samples_by_noise
 from lippmann.rendering.live.seen_pixels import PixelSet
 from lippmann.rendering.request.render_request import RenderRequest
+from lippmann.runtime.engine_lock import exclusive
 from lippmann.runtime.row_threads import Bands
 from lippmann.scene.placement import Placement
 
@@ -48,7 +49,7 @@ _NOISE_REACH = 2
 
 
 class Progressive:
-    """The growing picture of one view."""
+    """The growing picture of one view. ``light_up`` gives the scene its light again, which other views may change."""
 
     def __init__(
         self,
@@ -60,8 +61,10 @@ class Progressive:
         placed: PlacedDisplay,
         pixels: PixelSet,
         exposure: float,
+        light_up: Callable[[], None],
     ) -> None:
         self.view = view
+        self._light_up = light_up
         self._kernels, self._display, self._request = kernels, display, request
         self._placement, self._placed, self._pixels, self._exposure = placement, placed, pixels, exposure
         count = len(pixels.column)
@@ -86,8 +89,10 @@ class Progressive:
     def _most(self) -> int:
         return self._kernels.most_lanes // STREAMS
 
+    @exclusive()
     def step(self, seconds: dict[str, float]) -> LiveFrame | None:
         """One step of work; the picture if it changed."""
+        self._light_up()
         if self._task is not None:
             return self._denoise(seconds)
         if self._denoises and self._features is None and self._taken.all():

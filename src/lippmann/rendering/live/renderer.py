@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -26,34 +27,48 @@ from lippmann.scene.placement import Placement
 from lippmann.scene.scene import Scene
 
 if TYPE_CHECKING:
-    from lippmann.rendering.live.live_tracer import Lanes, PlacedDisplay
+    from lippmann.rendering.live.live_tracer import PlacedDisplay
     from lippmann.rendering.live.progressive import Progressive
     from lippmann.rendering.live.scene_kernels import SceneKernels
 
 Floats = NDArray[np.float32]
-IsStale = Callable[[], bool]
 
 #: Integrators whose light live frames can show.
 _LIGHT = ("path", "direct")
+
+#: Lanes of a step of a frame: on two cores about as long as a whole frame of an eye, so that such frames come between.
+STEP_LANES = 1 << 18
+#: Maps and sets of pixels that are kept: of the eyes of some pages, and of a whole panel that moves and that rests.
+_EYES, _WINDOWS = 4, 2
 
 
 @dataclass(frozen=True, eq=False)
 class _Stand:
     """Where the display stands in a view, and how the view is traced."""
 
+    kernels: SceneKernels
+    display: Display
     view: LiveView
     request: RenderRequest
     placement: Placement
     placed: PlacedDisplay
     pixels: PixelSet
 
+    def light_up(self, exposure: float) -> None:
+        """Give the scene the light and the exposure of this view, if another one was traced meanwhile."""
+        if self.kernels.lit_for is self:
+            return
+        self.kernels.light(self.view.light, rotation_of(self.placement.world_from_display))
+        self.kernels.expose(self.display, replace(self.request, exposure=exposure), self.placement, measure=False)
+        self.kernels.lit_for = self
+
 
 class LiveRenderer:
     """Renders what a display shows, frame after frame.
 
-    One thread at a time calls it: each call holds the engine's lock, as renders do. Between two calls a newer view may
-    take the place of an older one, whose samples are then dropped. No call takes much longer than one sample of each
-    pixel seen, but for the first with a scene, a display or an integrator, which compiles kernels.
+    One thread at a time calls it: each call, and each step of a picture, holds the engine's lock, as renders do. Steps
+    of several pictures may take turns. None takes much longer than one sample of each pixel that an eye sees, but for
+    the first with a scene, a display or an integrator, which compiles kernels.
 
     Parameters
     ----------
@@ -81,9 +96,9 @@ class LiveRenderer:
         self._machine = machine or RenderRequest()
         self._progress = progress
         self._display = display
-        self._map: EyeMap | None = None
-        self._last_pixels: tuple[object, PixelSet] | None = None
-        self._last_lanes: tuple[PixelSet, list[Lanes]] | None = None
+        self._map = lru_cache(_EYES)(EyeMap)
+        self._seen = lru_cache(_EYES)(lambda map, eye: map.seen_by(eye))
+        self._window = lru_cache(_WINDOWS)(window_pixels)
         self._shown: _Stand | None = None
         self._height: Floats = np.zeros(0, np.float32)
         self._progressive: Progressive | None = None
@@ -121,11 +136,9 @@ class LiveRenderer:
     def set_display(self, display: Display) -> None:
         """Show the scene on another display, or on the same one in another size."""
         self._display = display
-        self._kernels.forget_display()
         self._forget()
 
-    @exclusive()
-    def frame(self, view: LiveView, is_stale: IsStale = lambda: False, *, settled: bool = False) -> LiveFrame | None:
+    def frame(self, view: LiveView, *, settled: bool = False) -> LiveFrame:
         """A picture of one sample a pixel in direct light, for a view that changes.
 
         A render with the integrator ``direct`` and one sample a pixel shows the same to the same eye. Where a scene has
@@ -136,33 +149,51 @@ class LiveRenderer:
         ----------
         view:
             What is looked at.
-        is_stale:
-            Asked between wavefronts whether the frame is still wanted.
         settled:
             Find the weights of emitters and the exposure anew, which takes some frames' time.
-
-        Returns
-        -------
-        LiveFrame | None
-            None where the frame was not wanted any more.
 
         Raises
         ------
         UsageError, SceneError
             The view cannot be shown.
         """
+        self._progressive = None
+        return next(frame for frame in self.frame_steps(view, settled=settled) if frame is not None)
+
+    def frame_steps(self, view: LiveView, *, settled: bool = False) -> Iterator[LiveFrame | None]:
+        """The steps of :meth:`frame`: the last one brings the picture, those before None.
+
+        Between them steps of other pictures may be made, of another scene or display, too.
+        """
+        return self._frame_steps(self._kernels, self._display, view, settled)
+
+    def _frame_steps(
+        self, kernels: SceneKernels, display: Display, view: LiveView, settled: bool
+    ) -> Iterator[LiveFrame | None]:
+        from lippmann.rendering.live.live_tracer import PixelRun
+
         seconds: dict[str, float] = {}
-        stand = self._stand(view, _moving(view.request), seconds)
-        exposure = self._kernels.expose(self._display, stand.request, stand.placement, measure=settled)
-        with _timed(seconds, "trace"):
-            found = self._trace_once(stand, is_stale)
-        if found is None:
-            return None
-        values, self._height = found
-        self._shown, self._progressive = stand, None
+        with exclusive():
+            stand = self._stand(kernels, display, view, _moving(view.request), seconds)
+            exposure = kernels.expose(display, stand.request, stand.placement, measure=settled)
+            tracer = kernels.tracer(display, stand.request)
+            count, step = len(stand.pixels.column), min(STEP_LANES, kernels.most_lanes)
+            values, heights = np.empty((count, 3), np.float32), np.empty(count, np.float32)
+        for start in range(0, count, step):
+            if start:
+                yield None
+            with exclusive(), _timed(seconds, "trace"):
+                stand.light_up(exposure)
+                run = PixelRun(stand.pixels, start, start + step)
+                found = tracer.trace(run, stand.placed, seed=stand.request.seed)
+                values[run.pixels], heights[run.pixels] = found.sums[0], found.height
+        self._shown, self._height = stand, heights
         with _timed(seconds, "encode"):
             codes = develop(values, stand.pixels, stand.request)
-        return LiveFrame(codes, 1, False, stand.placement, exposure, seconds)
+            if view.eye is None and view.row_step > 1:
+                height = display.panel.height if view.window is None else view.window.height
+                codes = np.repeat(codes, view.row_step, axis=0)[:height]
+        yield LiveFrame(codes, 1, False, stand.placement, exposure, seconds)
 
     @exclusive()
     def refine(self, view: LiveView) -> LiveFrame | None:
@@ -176,18 +207,36 @@ class LiveRenderer:
         LiveFrame | None
             The picture so far; None after a step that left the picture as it was.
         """
+        if self._progressive is None or self._progressive.view != view:
+            self._progressive = self._begin_rest(self._kernels, self._display, view)
+        return self._progressive.step({})
+
+    def refine_steps(self, view: LiveView) -> Iterator[LiveFrame | None]:
+        """The steps of :meth:`refine`, between which those of other pictures may be made; see :meth:`frame_steps`."""
+        return self._refine_steps(self._kernels, self._display, view)
+
+    def _refine_steps(self, kernels: SceneKernels, display: Display, view: LiveView) -> Iterator[LiveFrame | None]:
+        progressive = self._begin_rest(kernels, display, view)
+        while True:
+            yield progressive.step({})
+
+    @exclusive()
+    def _begin_rest(self, kernels: SceneKernels, display: Display, view: LiveView) -> Progressive:
         from lippmann.rendering.live.progressive import Progressive
 
-        seconds: dict[str, float] = {}
-        progressive = self._progressive
-        if progressive is None or progressive.view != view:
-            stand = self._stand(view, _resting(view.request), seconds)
-            exposure = self._kernels.expose(self._display, stand.request, stand.placement, measure=True)
-            progressive = Progressive(
-                view, self._kernels, self._display, stand.request, stand.placement, stand.placed, stand.pixels, exposure
-            )
-            self._progressive = progressive
-        return progressive.step(seconds)
+        stand = self._stand(kernels, display, view, _resting(view.request), {})
+        exposure = kernels.expose(display, stand.request, stand.placement, measure=True)
+        return Progressive(
+            view,
+            kernels,
+            display,
+            stand.request,
+            stand.placement,
+            stand.placed,
+            stand.pixels,
+            exposure,
+            lambda: stand.light_up(exposure),
+        )
 
     @exclusive()
     def heights(self, view: LiveView) -> Floats:
@@ -230,7 +279,7 @@ class LiveRenderer:
 
     def placement(self, view: LiveView) -> Placement:
         """Where the display stands in a view, with the scene's depth range, the resolvable one, and warnings."""
-        return self._stand(view, _moving(view.request), {}).placement
+        return self._stand(self._kernels, self._display, view, _moving(view.request), {}).placement
 
     # ---- Stages ----------------------------------------------------------------------------------------------------
 
@@ -251,59 +300,36 @@ class LiveRenderer:
         return SceneKernels(session)
 
     def _forget(self) -> None:
-        self._map, self._last_pixels, self._last_lanes = None, None, None
         self._shown, self._progressive = None, None
 
-    def _stand(self, view: LiveView, request: RenderRequest, seconds: dict[str, float]) -> _Stand:
+    def _stand(
+        self,
+        kernels: SceneKernels,
+        display: Display,
+        view: LiveView,
+        request: RenderRequest,
+        seconds: dict[str, float],
+    ) -> _Stand:
         from lippmann.rendering.live.live_tracer import PlacedDisplay
 
-        if not self._kernels.can_light(view.light):
+        if not kernels.can_light(view.light):
             raise UsageError(
                 "cannot change", parameter="light_strength", rule="spots with a radius keep their strength"
             )
         with _timed(seconds, "place"):
-            resolved = resolve(request, self._scene, self._display)
-            placement = self._kernels.place(self._display, resolved)
-            self._kernels.light(view.light, rotation_of(placement.world_from_display))
+            resolved = resolve(request, kernels.session.scene, display)
+            placement = kernels.place(display, resolved)
+            kernels.light(view.light, rotation_of(placement.world_from_display))
             placed = PlacedDisplay(placement.world_from_display)
         with _timed(seconds, "map"):
-            pixels = self._pixels(view, subpixels=bool(resolved.subpixels))
-        return _Stand(view, resolved, placement, placed, pixels)
-
-    def _pixels(self, view: LiveView, *, subpixels: bool) -> PixelSet:
-        key = (view.eye, view.size, view.window, subpixels)
-        if self._last_pixels is not None and self._last_pixels[0] == key:
-            return self._last_pixels[1]
-        if view.eye is None:
-            pixels = window_pixels(self._display, view.window, subpixels=subpixels)
-        else:
-            if self._map is None or self._map.size != view.size or self._map.subpixels != subpixels:
-                self._map = EyeMap(self._display, view.size, subpixels=subpixels)
-            pixels = self._map.seen_by(view.eye)
-        self._last_pixels = (key, pixels)
-        return pixels
-
-    def _trace_once(self, stand: _Stand, is_stale: IsStale) -> tuple[Floats, Floats] | None:
-        tracer = self._kernels.tracer(self._display, stand.request)
-        count = len(stand.pixels.column)
-        values, heights = np.empty((count, 3), np.float32), np.empty(count, np.float32)
-        for lanes in self._lanes_of(stand.pixels):
-            if is_stale():
-                return None
-            found = tracer.trace(lanes, stand.placed, seed=stand.request.seed)
-            values[lanes.pixels], heights[lanes.pixels] = found.sums[0], found.height
-        return values, heights
-
-    def _lanes_of(self, pixels: PixelSet) -> list[Lanes]:
-        """Wavefronts of one sample of each pixel: kept, since an eye that rests sees the same pixels of what moves."""
-        from lippmann.rendering.live.live_tracer import Lanes
-
-        if self._last_lanes is None or self._last_lanes[0] is not pixels:
-            count, step = len(pixels.column), self._kernels.most_lanes
-            number = np.arange(count)
-            parts = [(number // step == part).astype(np.int64) for part in range(-(-count // step))]
-            self._last_lanes = pixels, [Lanes(pixels, 1, once) for once in parts]
-        return self._last_lanes[1]
+            subpixels = bool(resolved.subpixels)
+            if view.eye is None:
+                pixels = self._window(display, view.window, subpixels=subpixels, row_step=view.row_step)
+            else:
+                pixels = self._seen(self._map(display, view.size, subpixels=subpixels), view.eye)
+        stand = _Stand(kernels, display, view, resolved, placement, placed, pixels)
+        kernels.lit_for = stand
+        return stand
 
 
 def _moving(request: RenderRequest) -> RenderRequest:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import drjit as dr
 import mitsuba as mi
@@ -31,6 +31,8 @@ if TYPE_CHECKING:
 
 #: Most lanes of a wavefront: larger ones are no faster, and longer to wait for.
 _MOST_LANES = 1 << 20
+#: Most kernels of a kind that are kept: pages of a studio may show a scene on several displays.
+_MOST_KERNELS = 8
 
 
 @dataclass(frozen=True)
@@ -62,6 +64,8 @@ class SceneKernels:
         self._features: dict[_Kind, FeatureTracer] = {}
         self._exposure: float | None = None
         self._bounds_in = bounds_by_hull(session.scene)
+        #: Whose light and exposure the scene has now.
+        self.lit_for: object = None
 
     @property
     def most_lanes(self) -> int:
@@ -73,11 +77,6 @@ class SceneKernels:
         """How often kernels were recorded."""
         tracers: tuple[LiveTracer | FeatureTracer, ...] = (*self._tracers.values(), *self._features.values())
         return sum(each.recordings for each in tracers)
-
-    def forget_display(self) -> None:
-        """Drop the kernels of displays."""
-        self._tracers.clear()
-        self._features.clear()
 
     def place(self, display: Display, request: RenderRequest) -> Placement:
         """Where a display stands by a resolved request."""
@@ -95,6 +94,7 @@ class SceneKernels:
         """The tracer of a resolved request."""
         kind = _kind(display, request)
         if kind not in self._tracers:
+            _drop_oldest(self._tracers)
             self._tracers[kind] = LiveTracer(
                 display, self._integrator(request), subpixels=kind.subpixels, box_filter=kind.box_filter
             )
@@ -104,6 +104,7 @@ class SceneKernels:
         """The tracer of feature buffers of a resolved request."""
         kind = replace(_kind(display, request), integrator="", depth=0)
         if kind not in self._features:
+            _drop_oldest(self._features)
             self._features[kind] = FeatureTracer(
                 display, make_surfaces(self.built), subpixels=kind.subpixels, box_filter=kind.box_filter
             )
@@ -147,3 +148,8 @@ class SceneKernels:
 
 def _kind(display: Display, request: RenderRequest) -> _Kind:
     return _Kind(display, request.integrator, request.surfaces, bool(request.subpixels), request.box_filter)
+
+
+def _drop_oldest(kernels: dict[_Kind, Any]) -> None:
+    while len(kernels) >= _MOST_KERNELS:
+        del kernels[next(iter(kernels))]

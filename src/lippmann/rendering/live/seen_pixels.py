@@ -111,16 +111,17 @@ class EyeMap:
         return blocks
 
 
-def window_pixels(display: Display, window: PixelWindow | None, *, subpixels: bool) -> PixelSet:
-    """All (sub-)pixels of a window of the panel, or of the whole panel."""
+def window_pixels(display: Display, window: PixelWindow | None, *, subpixels: bool, row_step: int = 1) -> PixelSet:
+    """All (sub-)pixels of a window of the panel, or of the whole panel; the middle one of every ``row_step`` rows."""
     panel = display.panel
     window = window or PixelWindow(0, 0, panel.width, panel.height)
     channels = 3 if subpixels else 1
+    traced = np.minimum(np.arange(window.top, window.bottom, row_step) + row_step // 2, window.bottom - 1)
     rows, columns, colors = np.meshgrid(
-        np.arange(window.top, window.bottom), np.arange(window.left, window.right), np.arange(channels), indexing="ij"
+        traced, np.arange(window.left, window.right), np.arange(channels), indexing="ij"
     )
     keys = ((rows * panel.width + columns) * channels + colors).ravel()
-    number = np.arange(keys.size, dtype=np.int32).reshape(window.height, window.width, channels)
+    number = np.arange(keys.size, dtype=np.int32).reshape(len(traced), window.width, channels)
     return _pixel_set(np.resize(keys, max(keys.size, 2)), number, panel.width, None)
 
 
