@@ -23,7 +23,7 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from lippmann.studio_app import live_socket, uploads
 from lippmann.studio_app import site as studio_site
 from lippmann.studio_app.live_socket import LiveSocket
-from lippmann.studio_app.page_values import values_of_state
+from lippmann.studio_app.page_values import state_of_values, values_of_state
 from lippmann.studio_app.pages import static_files
 from lippmann.studio_app.state import StudioState
 
@@ -437,3 +437,33 @@ def test_a_frame_is_told_of_with_the_state_of_its_own_page(tmp_path):
         may_go.set()
         assert "--turn 30,0,0" in said(page, "facts")["command"]
         assert "--turn 60,0,0" in said(other, "facts")["command"]
+
+
+def test_a_page_that_sends_changes_without_end_still_gets_frames(tmp_path, monkeypatch):
+    """Changes come faster than they can be taken over: the newest is, frames come, and the last change is shown."""
+    taken = []
+
+    def slow(values):
+        taken.append(values)
+        time.sleep(0.005)
+        return state_of_values(values)
+
+    monkeypatch.setattr(live_socket, "state_of_values", slow)
+    with running(tmp_path) as studio, studio.connect() as socket:
+        sent = frames = 0
+        until = time.monotonic() + 30.0
+        while frames < 5:
+            assert time.monotonic() < until, f"{frames} frames for {sent} changes"
+            for _ in range(17):
+                sent += 1
+                socket.send(view(STATE | {"turn": [sent % 360, 0, 0]}, sent))
+            time.sleep(0.01)
+            with contextlib.suppress(TimeoutError):
+                message = socket.recv(0.001)
+                if isinstance(message, bytes):
+                    socket.send(json.dumps({"type": "shown", "frame": int.from_bytes(message[4:8], "little")}))
+                    frames += 1
+        while int.from_bytes(said(socket, "frame")[8:12], "little") != sent:
+            socket.send(json.dumps({"type": "shown", "frame": 1000}))
+        assert studio.session.state.turn[0] == sent % 360
+    assert len(taken) < sent / 2

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import partial
 from typing import Any
 
@@ -39,6 +40,9 @@ from lippmann.studio_app.wire import (
 #: Frames on their way that the page has not shown yet: one travels while the next is made.
 _MOST_ON_THE_WAY = 2
 
+#: Seconds between two views that are taken over, half a frame of a usual screen. Of more views the newest is taken.
+_VIEW_SECONDS = 1 / 120
+
 #: Longest side of a picture in pixels, and the farthest that an eye may stand, in mm.
 _MOST_SIDE, _FARTHEST = 4096, 1e5
 _LARGEST_NUMBER = 2**32 - 1
@@ -73,6 +77,8 @@ class LiveSocket:
         self._loop = asyncio.get_running_loop()
         self._changed = asyncio.Event()
         self._messages: dict[str, dict[str, Any]] = {}
+        self._newest: dict[str, Any] = {}
+        self._looked = asyncio.Event()
         self._state = session.state
         self._shown: Shown | None = None
         self._sent = self._acknowledged = self._view = 0
@@ -90,7 +96,8 @@ class LiveSocket:
             self._say(session.jobs.last.message())
         if self._follows:
             self._want_all()
-        tasks = asyncio.create_task(self._receive_all()), asyncio.create_task(self._send_all())
+        work = self._receive_all(), self._send_all(), self._look_all()
+        tasks = [asyncio.create_task(each) for each in work]
         try:
             await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
         finally:
@@ -114,7 +121,7 @@ class LiveSocket:
         message = await self._socket.receive()
         if message["type"] == "websocket.disconnect":
             raise WebSocketDisconnect
-        try:
+        with self._errors_said():
             said = parse_message(message.get("text"))
             handlers: dict[str, Callable[[dict[str, Any]], None]] = {
                 "shown": self._acknowledge,
@@ -123,12 +130,27 @@ class LiveSocket:
             if said["type"] not in handlers:
                 raise UsageError(f"'{said['type'][:40]}' is no message", rule=f"known are {', '.join(handlers)}")
             handlers[said["type"]](said)
+        await asyncio.sleep(0)  # where messages never end, others get their turn
+
+    @contextmanager
+    def _errors_said(self) -> Iterator[None]:
+        try:
+            yield
         except LippmannError as error:
             self._say({"type": "error", "line": str(error)})
 
+    async def _look_all(self) -> None:
+        """Take over the newest view, and again after a while."""
+        while True:
+            await self._looked.wait()
+            self._looked.clear()
+            with self._errors_said():
+                self._want(self._newest)
+            await asyncio.sleep(_VIEW_SECONDS)
+
     def _commands(self) -> dict[str, Callable[[dict[str, Any]], None]]:
         return {
-            "view": self._want,
+            "view": self._look,
             "pick": self._pick,
             "render": self._render,
             "cancel": lambda _: self._session.jobs.cancel(),
@@ -140,6 +162,10 @@ class LiveSocket:
     def _acknowledge(self, said: dict[str, Any]) -> None:
         self._acknowledged = max(self._acknowledged, min(self._sent, int(number_of(said, "frame", 0, _LARGEST_NUMBER))))
         self._changed.set()
+
+    def _look(self, said: dict[str, Any]) -> None:
+        self._newest = said
+        self._looked.set()
 
     def _want(self, said: dict[str, Any]) -> None:
         self._view = int(number_of(said, "number", 0, _LARGEST_NUMBER))
