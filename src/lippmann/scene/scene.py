@@ -373,9 +373,14 @@ def box_corners(bounds: Bounds) -> Bounds:
 def has_lights(description: SceneDescription) -> bool:
     """Whether a description has emitters: an environment, a light, a surface brighter than white, or only unlit ones.
 
-    Surfaces of radiance 1 and below are labels and screens, which do not light a scene.
+    Surfaces of radiance 1 and below are labels and screens, which do not light a scene, unless the file has them as
+    light sources.
     """
-    if description.environment is not None or any(max(light.color) > 0.0 for light in description.lights):
+    if (
+        description.environment is not None
+        or description.physical_lights
+        or any(max(light.color) > 0.0 for light in description.lights)
+    ):
         return True
     indices = {description.meshes[mesh].material for mesh in description.placements}
     materials = [description.materials[index] for index in indices]

@@ -5,6 +5,8 @@ import math
 import numpy as np
 import pytest
 
+from lippmann.scene.scene import Scene
+
 from .conftest import triangle
 from .test_stage_materials import png
 
@@ -125,3 +127,11 @@ def Camera "flat" {
 def test_lights_that_are_not_read_are_named(read):
     scene = read(triangle() + 'def PortalLight "p" {}')
     assert scene.notes == ["light sources of type PortalLight are not read"]
+
+
+@pytest.mark.parametrize("kind", ["RectLight", "DiskLight", "CylinderLight", "SphereLight"])
+def test_a_light_of_the_schemas_own_intensity_lights_the_scene(read, kind):
+    """Its radiance is 1, as bright as a label; the studio stays away all the same."""
+    scene = Scene("dim", read(triangle() + f'def {kind} "l" {{\n}}'))
+    assert scene.has_lights
+    assert not scene.in_studio

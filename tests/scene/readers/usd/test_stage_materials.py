@@ -60,6 +60,8 @@ def surface(inputs, nodes=""):
 
 
 def texture(name="t", file="t.png", st="uv", more=""):
+    """A node whose picture repeats, unless ``more`` says otherwise."""
+    more += "".join(f'\ntoken inputs:{wrap} = "repeat"' for wrap in ("wrapS", "wrapT") if wrap not in more)
     return TEXTURE.format(name=name, file=file, st=st, more=more) + READER * (st == "uv")
 
 
@@ -264,3 +266,70 @@ def packed(path, files, compression=zipfile.ZIP_STORED):
             if entry.extra:
                 entry.extra = b"\x86\x19" + (len(entry.extra) - 4).to_bytes(2, "little") + entry.extra[4:]
             archive.writestr(entry, data)
+
+
+@pytest.mark.parametrize("mode", ["black", "useMetadata"])
+def test_beyond_pictures_without_a_mode_of_their_own_is_black(read, mode):
+    """UsdPreviewSurface 2.6: ``useMetadata``, the default, is black where a picture has no metadata."""
+    node = texture(more=f'token inputs:wrapS = "{mode}"\ntoken inputs:wrapT = "repeat"')
+    scene = read(
+        surface("color3f inputs:diffuseColor.connect = </mat/t.outputs:rgb>", node),
+        files={"t.png": png([[[200, 0, 0], [0, 200, 0]]])},
+    )
+    found = scene.materials[0].base_color_texture
+    assert (found.wrap_u, found.wrap_v) == ("clamp", "repeat")
+    assert found.image.pixels[0].tolist() == [[0] * 3, [200, 0, 0], [200, 0, 0], [0, 200, 0], [0, 200, 0], [0] * 3]
+    # Coordinates of the middles of the two texels of the file.
+    assert (found.uv_transform @ [0.25, 0.5, 1.0])[:2] == pytest.approx([2.5 / 6, 0.5])
+    assert (found.uv_transform @ [0.75, 0.5, 1.0])[:2] == pytest.approx([3.5 / 6, 0.5])
+
+
+def reader(name, kind, varname, fallback):
+    return f"""
+    def Shader "{name}" {{
+        uniform token info:id = "UsdPrimvarReader_{kind}"
+        string inputs:varname = "{varname}"
+        {kind} inputs:fallback = {fallback}
+        {kind} outputs:result
+    }}
+"""
+
+
+def painted(nodes, inputs, primvars=""):
+    body = surface(inputs, nodes)
+    return body.replace("uniform token subdivisionScheme", primvars + "\nuniform token subdivisionScheme")
+
+
+def test_display_colours_and_opacities_that_a_material_reads(read):
+    nodes = reader("c", "float3", "displayColor", "(0.5, 0.25, 1)") + reader("o", "float", "displayOpacity", "0.75")
+    inputs = "color3f inputs:diffuseColor.connect = </mat/c.outputs:result>\n"
+    inputs += "float inputs:opacity.connect = </mat/o.outputs:result>\nfloat inputs:opacityThreshold = 0.5"
+    color = 'color3f[] primvars:displayColor = [(1, 0, 0), (0, 1, 0), (0, 0, 1)] (interpolation = "vertex")'
+    scene = read(painted(nodes, inputs, color))
+    (mesh,) = scene.meshes
+    material = scene.materials[mesh.material]
+    assert mesh.colors[mesh.faces[0]].tolist() == [[1, 0, 0, 0.75], [0, 1, 0, 0.75], [0, 0, 1, 0.75]]
+    assert (material.base_color, material.alpha) == ((1, 1, 1), 1)
+    assert (material.alpha_mode, material.alpha_cutoff) == ("mask", 0.5)
+    # A mesh without: the fallbacks.
+    (mesh,) = read(painted(nodes, inputs)).meshes
+    assert {tuple(row) for row in mesh.colors.tolist()} == {(0.5, 0.25, 1, 0.75)}
+
+
+def test_opacities_of_faces(read):
+    inputs = "float inputs:opacity.connect = </mat/o.outputs:result>"
+    nodes = reader("o", "float", "displayOpacity", "1")
+    scene = read(painted(nodes, inputs, 'float[] primvars:displayOpacity = [0.5] (interpolation = "uniform")'))
+    assert (scene.meshes[0].colors == (1, 1, 1, 0.5)).all()
+    assert scene.materials[0].alpha_mode == "blend"
+
+
+def test_other_primvars_are_named(read):
+    nodes = reader("c", "float3", "heat", "(0.5, 0.25, 1)") + reader("e", "float3", "displayColor", "(1, 1, 1)")
+    inputs = "color3f inputs:diffuseColor.connect = </mat/c.outputs:result>\n"
+    inputs += "color3f inputs:emissiveColor.connect = </mat/e.outputs:result>"
+    scene = read(painted(nodes, inputs))
+    assert scene.materials[0].base_color == (0.5, 0.25, 1)
+    assert scene.meshes[0].colors is None
+    assert "diffuseColor by the primvar 'heat' is not read: its fallback is taken" in scene.notes
+    assert "emissiveColor by the primvar 'displayColor' is not read: its fallback is taken" in scene.notes

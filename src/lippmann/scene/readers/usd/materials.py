@@ -14,7 +14,8 @@ from lippmann.scene.readers.usd.assets import Assets
 from lippmann.scene.readers.usd.records import Record
 from lippmann.scene.values.description import AlphaMode, Color, Image, Material, Matrix, Texture, Wrap
 
-_WRAPS: dict[str, Wrap] = {"repeat": "repeat", "mirror": "mirror", "clamp": "clamp", "black": "clamp"}
+#: Others are black beyond the picture: ``black``, and ``useMetadata``, of which pictures that are read have none.
+_WRAPS: dict[str, Wrap] = {"repeat": "repeat", "mirror": "mirror", "clamp": "clamp"}
 _CHANNELS = {"r": 0, "g": 1, "b": 2, "a": 3}
 #: Of no reflection but what the specular colour says.
 _ENDLESS_IOR = 1000.0
@@ -26,10 +27,20 @@ Plane = NDArray[np.float32]
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """A material, and the names of its texture coordinates in the order of their sets."""
+    """A material, and what it reads from meshes.
+
+    Attributes
+    ----------
+    uv_names:
+        Names of its texture coordinates in the order of their sets.
+    color, opacity:
+        Values of meshes that lack the display colour or opacity that it reads; None where it reads none.
+    """
 
     material: Material
     uv_names: tuple[str, ...]
+    color: Color | None = None
+    opacity: float | None = None
 
 
 @dataclass(eq=False)
@@ -70,8 +81,34 @@ class SurfaceReader:
         material = self._with_reflection(material, inputs)
         material = self._with_opacity(material, inputs)
         material = self._with_coat(material, inputs)
-        normal = self._normal_map(inputs)
-        return Surface(replace(material, normal_texture=normal), tuple(self._uv_names))
+        material = replace(material, normal_texture=self._normal_map(inputs))
+        by_color, by_opacity = self._reads(inputs, "diffuseColor"), self._reads(inputs, "opacity")
+        for unread in inputs.keys() - {"diffuseColor", "opacity"}:
+            if "primvar" in inputs[unread]:
+                self._note_unread(unread, inputs[unread])
+        if by_color is not None:
+            material = replace(material, base_color=(1.0, 1.0, 1.0))
+        if by_opacity is not None:
+            material = replace(material, alpha=1.0)
+        return Surface(
+            material,
+            tuple(self._uv_names),
+            None if by_color is None else _color_of(by_color.get("fallback"), (1.0, 1.0, 1.0)),
+            None if by_opacity is None else min(max(_scalar_of(by_opacity.get("fallback"), 1.0), 0.0), 1.0),
+        )
+
+    def _reads(self, inputs: Record, name: str) -> Record | None:
+        """The source of an input, if that is the display colour or opacity of the mesh."""
+        source = inputs.get(name)
+        if source is None or "primvar" not in source:
+            return None
+        if source["primvar"] not in {"diffuseColor": ("displayColor", ""), "opacity": ("displayOpacity", "")}[name]:
+            self._note_unread(name, source)
+            return None
+        return cast(Record, source)
+
+    def _note_unread(self, name: str, source: Record) -> None:
+        self.notes[f"{name} by the primvar '{source['primvar']}' is not read: its fallback is taken"] = None
 
     def _with_reflection(self, material: Material, inputs: Record) -> Material:
         roughness, rough = self._scalar(inputs, "roughness", 0.5)
@@ -93,7 +130,7 @@ class SurfaceReader:
     def _with_opacity(self, material: Material, inputs: Record) -> Material:
         opacity, texture = self._scalar(inputs, "opacity", 1.0)
         threshold = self._number(inputs, "opacityThreshold", 0.0)
-        if opacity >= 1.0 and texture is None:
+        if opacity >= 1.0 and texture is None and "primvar" not in inputs.get("opacity", {}):
             return material
         if texture is not None:
             alpha = texture_maps.unit(texture.image)[..., 0]
@@ -122,7 +159,8 @@ class SurfaceReader:
         """A factor in [0, 1] and its texture, whose first channel holds the values."""
         source = inputs.get(name)
         if source is None or "texture" not in source:
-            return min(max(_scalar_of(source, default), 0.0), 1.0), None
+            value = source["fallback"] if source is not None and "primvar" in source else source
+            return min(max(_scalar_of(value, default), 0.0), 1.0), None
         texture = self._texture(source)
         if texture is None:
             return min(max(_fallback(source["texture"])[0], 0.0), 1.0), None
@@ -137,8 +175,6 @@ class SurfaceReader:
         if source is None:
             return default, None
         if "primvar" in source:
-            if source["primvar"] not in ("displayColor", ""):
-                self.notes[f"colours by the primvar '{source['primvar']}' are not read"] = None
             return _color_of(source.get("fallback"), (1.0, 1.0, 1.0)), None
         if "texture" not in source:
             return _color_of(source, default), None
@@ -188,13 +224,14 @@ class SurfaceReader:
         uv_name, transform = _coordinates(node.get("st"))
         if uv_name not in self._uv_names:
             self._uv_names.append(uv_name)
-        wraps = [str(node.get(key, {}).get("value", "useMetadata")) for key in ("wrapS", "wrapT")]
+        wraps = [_WRAPS.get(str(node.get(key, {}).get("value", ""))) for key in ("wrapS", "wrapT")]
+        border = [2 * int(wrap is None) for wrap in wraps]
         return Texture(
-            image=image,
+            image=image if not any(border) else _with_border(image, border[0], border[1]),
             srgb=False,
-            wrap_u=_WRAPS.get(wraps[0], "repeat"),
-            wrap_v=_WRAPS.get(wraps[1], "repeat"),
-            uv_transform=transform,
+            wrap_u=wraps[0] or "clamp",
+            wrap_v=wraps[1] or "clamp",
+            uv_transform=_inside_border(image, border[0], border[1]) @ transform,
             uv_set=self._uv_names.index(uv_name),
         )
 
@@ -204,6 +241,23 @@ class SurfaceReader:
         if space == "auto":
             return image.pixels.dtype == np.uint8 and image.pixels.shape[2] >= 3
         return space.lower() == "srgb"
+
+
+def _with_border(image: Image, columns: int, rows: int) -> Image:
+    """An image with so many columns and rows more at its ends, the last of them black, which clamping repeats.
+
+    The others repeat the image's own, so that interpolation darkens nothing inside of it.
+    """
+    sides = [(max(count - 1, 0),) * 2 for count in (rows, columns)]
+    within = np.pad(image.pixels, (*sides, (0, 0)), "edge")
+    return Image(image.name, np.pad(within, ((min(rows, 1),) * 2, (min(columns, 1),) * 2, (0, 0))))
+
+
+def _inside_border(image: Image, columns: int, rows: int) -> Matrix:
+    """From coordinates of an image to those within its border."""
+    height, width = image.pixels.shape[:2]
+    wide, high = width + 2 * columns, height + 2 * rows
+    return np.array([[width / wide, 0.0, columns / wide], [0.0, height / high, rows / high], [0.0, 0.0, 1.0]])
 
 
 def _values(texture: Texture, node: Record, srgb: bool) -> NDArray[np.float32]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,10 +12,11 @@ from lippmann.errors import SceneError
 from lippmann.runtime.input_memory import check_input
 from lippmann.scene.parsing.triangulation import triangulate
 from lippmann.scene.readers.gltf.skinning import unit_normals
+from lippmann.scene.readers.usd.materials import Surface
 from lippmann.scene.readers.usd.primitives import primitive_polygons, unit_ball
 from lippmann.scene.readers.usd.records import Record
 from lippmann.scene.readers.usd.subdivision import Cage, Refined, refine, smooth_groups
-from lippmann.scene.values.description import FloatArray, Mesh
+from lippmann.scene.values.description import FloatArray, Material, Mesh
 
 Stored = Sequence[NDArray[np.generic]]
 Integers = NDArray[np.int64]
@@ -26,6 +27,10 @@ LEVELS, _MOST_QUADS = 2, 1 << 19
 _BYTES_PER_QUAD = 1000
 #: The same for a corner of a face that is not refined.
 _BYTES_PER_CORNER = 200
+
+
+#: Of meshes without a material: their display colours and opacities count.
+_PLAIN = Surface(Material(), (), (1.0, 1.0, 1.0), 1.0)
 
 
 @dataclass(frozen=True)
@@ -61,9 +66,9 @@ class MeshReader:
         What is not honoured.
     """
 
-    def __init__(self, arrays: Stored, uv_names: Mapping[int, Sequence[str]], where: str) -> None:
-        """``uv_names`` has the texture coordinates that each material asks for, in the order of its uv sets."""
-        self._arrays, self._uv_names, self._where = arrays, uv_names, where
+    def __init__(self, arrays: Stored, surfaces: Sequence[Surface], where: str) -> None:
+        """``surfaces`` are the stage's materials, which say what they read from meshes."""
+        self._arrays, self._surfaces, self._where = arrays, surfaces, where
         self.notes: dict[str, None] = {}
 
     def parts(self, record: Record) -> list[Part]:
@@ -108,15 +113,36 @@ class MeshReader:
         mesh = replace(mesh, name=record["name"])
         if record["left_handed"]:
             mesh = replace(mesh, faces=mesh.faces[:, ::-1], stands_for=None)
-        color = self._constant_color(record)
-        if color is not None:
-            mesh = replace(mesh, colors=np.broadcast_to(color, (len(mesh.positions), 3)))
+        colors = self._colors(record, record["material"], lambda primvar, _: self._array(primvar, "values")[:1])
+        if colors is not None:
+            mesh = replace(mesh, colors=np.broadcast_to(colors, (len(mesh.positions), colors.shape[1])))
         return [Part(record["material"], mesh, scale)]
 
-    def _constant_color(self, record: Record) -> FloatArray | None:
-        if record["color"] is None or record["material"] >= 0:
+    def _surface(self, material: int) -> Surface:
+        return self._surfaces[material] if material >= 0 else _PLAIN
+
+    def _colors(
+        self, record: Record, material: int, values: Callable[[Record, str], NDArray[np.generic]]
+    ) -> FloatArray | None:
+        """Display colours ``(n, 3 or 4)``, as far as the material reads them; ``values`` reads a primvar."""
+        surface = self._surface(material)
+        color = record["color"] if surface.color is not None else None
+        opacity = record["opacity"] if surface.opacity is not None else None
+        if material < 0 and color is None:
             return None
-        return np.asarray(self._arrays[record["color"]["values"]][:1], np.float32)
+        if surface.color is None and surface.opacity is None:
+            return None
+        rgb = np.array([surface.color or (1.0, 1.0, 1.0)])
+        if color is not None:
+            rgb = np.clip(values(color, "display colours"), 0.0, None)
+        if surface.opacity is None or (material < 0 and opacity is None):
+            return np.asarray(rgb, np.float32)
+        alpha = np.array([[surface.opacity]])
+        if opacity is not None:
+            alpha = np.clip(values(opacity, "display opacities"), 0.0, 1.0)
+        count = max(len(rgb), len(alpha))
+        wide = [np.broadcast_to(each, (count, each.shape[1])) for each in (rgb, alpha)]
+        return np.concatenate(wide, axis=1).astype(np.float32)
 
     def _array(self, record: Record, name: str) -> NDArray[np.generic]:
         return self._arrays[record[name]]
@@ -221,7 +247,7 @@ class MeshReader:
         elif record["normals"] is not None:
             normals = self._values(sampler, record["normals"], name, "normals")
         uvs = []
-        for uv_name in self._uv_names.get(material, ()):
+        for uv_name in self._surface(material).uv_names:
             found = record["uvs"].get(uv_name)
             if found is None:
                 self.notes[f"mesh {name} has no texture coordinates '{uv_name}': its textures show one texel"] = None
@@ -230,12 +256,9 @@ class MeshReader:
             values = self._values(sampler, found, name, f"texture coordinates '{uv_name}'")
             # A stage's v points up the picture.
             uvs.append((values * (1.0, -1.0) + (0.0, 1.0)).astype(np.float32))
-        colors = None
-        if record["color"] is not None and material < 0:
-            colors = np.clip(self._values(sampler, record["color"], name, "display colours"), 0.0, None)
-            if record["opacity"] is not None:
-                opacity = np.clip(self._values(sampler, record["opacity"], name, "display opacities"), 0.0, 1.0)
-                colors = np.concatenate([colors, opacity], axis=1)
+        colors = self._colors(record, material, lambda primvar, what: self._values(sampler, primvar, name, what))
+        if colors is not None:
+            colors = np.broadcast_to(colors, (len(polygons.indices), colors.shape[1]))
         if not self._varies_at_points(record, material):
             triangles = _first_corners(polygons)[triangles]
         corners = np.unique(triangles)
@@ -249,7 +272,7 @@ class MeshReader:
             faces,
             0,
             uvs=tuple(values[corners] for values in uvs),
-            colors=None if colors is None else colors[corners].astype(np.float32),
+            colors=None if colors is None else colors[corners],
         )
         if normals is None or not len(faces):
             return mesh
@@ -257,8 +280,10 @@ class MeshReader:
 
     def _varies_at_points(self, record: Record, material: int) -> bool:
         """Whether corners of faces that meet in a point may have values of their own, normals of edges apart."""
-        used = [record["uvs"].get(name) for name in self._uv_names.get(material, ())]
-        used += [record["normals"], *((record["color"], record["opacity"]) if material < 0 else ())]
+        surface = self._surface(material)
+        used = [record["normals"], *(record["uvs"].get(name) for name in surface.uv_names)]
+        used += [record["color"]] if surface.color is not None else []
+        used += [record["opacity"]] if surface.opacity is not None else []
         return any(each is not None and each["interpolation"] in ("uniform", "faceVarying") for each in used)
 
     def _values(self, sampler: _Sampler, primvar: Record, name: str, what: str) -> FloatArray:

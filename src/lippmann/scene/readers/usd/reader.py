@@ -72,7 +72,7 @@ def describe(tree: Record, arrays: Sequence[NDArray[np.generic]], path: Path, as
     notes: dict[str, None] = dict.fromkeys(tree["notes"])
     scene_from_stage = _scene_from_stage(tree, path)
     surfaces = [SurfaceReader(assets, notes).read(record) for record in tree["materials"]]
-    reader = MeshReader(arrays, {number: each.uv_names for number, each in enumerate(surfaces)}, path.name)
+    reader = MeshReader(arrays, surfaces, path.name)
     content = _Content(surfaces)
     for record in tree["meshes"]:
         with np.errstate(invalid="ignore", over="ignore"):  # such places are refused next
