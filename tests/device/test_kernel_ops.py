@@ -26,6 +26,20 @@ def test_upload_of_nothing():
     assert len(upload(np.zeros((0, 4)))) == 0
 
 
+@pytest.mark.parametrize("count", [1, 2, 3, 8])
+def test_a_binary_search_answers_an_array_for_any_range(count):
+    import drjit as dr
+    import mitsuba as mi
+
+    from lippmann.device.kernel_ops import binary_search
+
+    table, wanted = np.arange(1, count + 1, dtype=np.float32), np.linspace(0.5, count + 1.5, 32, dtype=np.float32)
+    found = binary_search(0, count - 1, lambda place: dr.gather(mi.Float, mi.Float(table), place) < mi.Float(wanted))
+    assert isinstance(found, mi.UInt32)
+    expected = np.minimum(np.searchsorted(table, wanted), count - 1)
+    np.testing.assert_array_equal(np.broadcast_to(np.array(found), 32), expected)
+
+
 def test_uploaded_tables_do_not_follow_the_array():
     from lippmann.device.kernel_ops import upload
 

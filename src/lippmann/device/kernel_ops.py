@@ -1,7 +1,8 @@
-"""Operations whose plain form compiles to slow code on the CPU."""
+"""Operations whose plain form compiles to slow code on the CPU, or fails at the smallest sizes."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import drjit as dr
@@ -9,7 +10,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.device.types import Array, UInt32
+from lippmann.device.types import Array, Bool, UInt32
 
 #: A multiple of the lanes of any processor's vectors.
 _PACKET = 64
@@ -39,6 +40,14 @@ def divide(number: UInt32, by: UInt32 | int) -> tuple[UInt32, UInt32]:
     """Quotient and remainder of whole numbers, by one division."""
     quotient = number // by
     return quotient, number - quotient * by
+
+
+def binary_search(first: int, last: int, goes_on: Callable[[UInt32], Bool]) -> UInt32:
+    """First index in [``first``, ``last``] at which ``goes_on`` is false; ``last`` where it holds before that.
+
+    An array for any range; ``dr.binary_search`` returns the Python number itself for a range of one.
+    """
+    return mi.UInt32(dr.binary_search(first, last, goes_on))
 
 
 def smaller(a: Array, b: Array) -> Array:

@@ -48,6 +48,23 @@ def test_points_of_a_mesh_are_spread_evenly(flip):
     assert np.all(p[~is_small, 1] / 3 + p[~is_small, 2] <= 1 + 1e-5)
 
 
+def test_points_of_a_single_triangle_are_spread_evenly():
+    import mitsuba as mi
+
+    from lippmann.rendering.transport.casters import Triangles
+
+    mesh = mi.Mesh("mesh", 3, 1)
+    parameters = mi.traverse(mesh)
+    parameters["vertex_positions"] = np.float32([0, 0, 0, 3, 0, 0, 0, 3, 0])
+    parameters["faces"] = np.uint32([0, 1, 2])
+    parameters.update()
+    y, x = (np.mgrid[0:64, 0:64] + 0.5) / 64
+    point, normal = Triangles(mesh).point(mi.Point2f(mi.Float(x.ravel()), mi.Float(y.ravel())))
+    p = np.array(point).T
+    assert p.mean(axis=0) == pytest.approx([1, 1, 0], abs=0.02)
+    assert np.unique(np.array(normal).T, axis=0).tolist() == [[0, 0, 1]]
+
+
 def test_triangles_are_those_that_mitsuba_draws():
     """Of a ball: as large as its surface, and every point lies on it."""
     import mitsuba as mi

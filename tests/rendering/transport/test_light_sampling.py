@@ -367,6 +367,18 @@ def test_emitters_are_chosen_as_mitsubas_own_distribution_chooses_them():
     assert found[1].max() < 1 + 1e-6
 
 
+def test_the_only_emitter_with_weight_is_always_chosen():
+    import mitsuba as mi
+
+    from lippmann.rendering.transport.light_sampling import WeightedLightSampler
+
+    sampler = WeightedLightSampler(mi.load_dict(room()), np.array([0.0, 1.0, 0.0]))
+    index, reused, probability = sampler._sample_emitter(mi.Float([0.0, 0.3, 0.99]), mi.Bool(True))
+    assert set(np.array(index)) == {1}
+    assert np.array(reused) == pytest.approx([0.0, 0.3, 0.99])
+    assert set(np.array(probability)) == {1.0}
+
+
 def test_emitters_without_size_are_as_likely_as_each_other():
     """Their mean over the unit square is the sum of what each brings; others are never drawn."""
     import drjit as dr

@@ -11,6 +11,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from lippmann.device.kernel_ops import binary_search
 from lippmann.device.pbr.gltf_bsdf import SHARP_LOBE
 from lippmann.device.pbr.straight_through import is_instance
 from lippmann.device.types import (
@@ -90,7 +91,7 @@ class Triangles:
 
     def point(self, sample: Point2f) -> tuple[Point3f, Vector3f]:
         """A point and its unit geometric normal."""
-        number = dr.binary_search(0, self._last, lambda place: dr.gather(mi.Float, self._upto, place) <= sample.y)
+        number = binary_search(0, self._last, lambda place: dr.gather(mi.Float, self._upto, place) <= sample.y)
         before = dr.gather(mi.Float, self._upto, number - 1, number > 0)
         share = dr.gather(mi.Float, self._upto, number) - before
         at = mi.warp.square_to_uniform_triangle(mi.Point2f(sample.x, (sample.y - before) / share))

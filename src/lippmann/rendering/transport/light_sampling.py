@@ -12,6 +12,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from lippmann.device.kernel_ops import binary_search
 from lippmann.device.types import (
     Bool,
     DirectionSample3f,
@@ -122,7 +123,7 @@ class WeightedLightSampler:
     def _sample_emitter(self, number: Float, active: Bool) -> tuple[UInt32, Float, Float]:
         """Index of an emitter, ``number`` in [0, 1) made uniform again, and the emitter's probability."""
         wanted = number * self._total
-        index = dr.binary_search(
+        index = binary_search(
             self._first, self._last, lambda place: dr.gather(mi.Float, self._cumulative, place, active) < wanted
         )
         probability = dr.gather(mi.Float, self._weights, index, active) * self._normalization
