@@ -16,7 +16,7 @@ from stand_in import TINY
 from lippmann.errors import OutputError, UsageError
 from lippmann.studio_app import render_jobs
 from lippmann.studio_app.command_line import render_command
-from lippmann.studio_app.output_names import claim_output
+from lippmann.studio_app.output_names import claim_output, frames_of, is_unfinished
 from lippmann.studio_app.render_jobs import JobRunner, command_of
 from lippmann.studio_app.state import StudioState
 
@@ -24,13 +24,19 @@ WORDS = render_command(StudioState(display=TINY, turn=(30.0, 0.0, 0.0), subpixel
 
 #: A process that says how far it is; its first run waits to be stopped, later ones finish.
 PROCESS = """
-import pathlib, signal, sys, time
+import json, pathlib, signal, sys, time
 if "deaf" in sys.argv:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 output = pathlib.Path(sys.argv[sys.argv.index("-o") + 1])
 begun = output.with_suffix(".begun")
 waits = "wait" in sys.argv and not begun.exists()
 begun.touch()
+if "tiles" in sys.argv:
+    folder = output.with_name(output.name + ".parts")
+    folder.mkdir(mode=0o700, exist_ok=True)
+    job = {"lippmann-journal": 1, "fingerprint": {}, "grid": [1, 1, 1]}
+    (folder / "job.json").write_text(json.dumps(job))
+    (folder / "r0000_c0000.tile").touch()
 print("40 %: tracing", file=sys.stderr, flush=True)
 if waits:
     try:
@@ -90,7 +96,7 @@ def test_a_render_is_done(runner):
         b"made",
         folder / "teapot.png",
         0.4,
-        "tracing",
+        "Tracing light",
     )
     assert jobs.finished(1) == job
     assert job.message()["shows"] == "picture"
@@ -100,7 +106,7 @@ def test_a_render_is_done(runner):
 
 def test_a_cancelled_render_goes_on(runner):
     jobs, _, until = runner
-    jobs.start("picture", ["lippmann", "render", "wait"], "teapot")
+    jobs.start("picture", ["lippmann", "render", "wait", "tiles"], "teapot")
     until(lambda job: job.share == 0.4)
     with pytest.raises(UsageError, match="a render is running"):
         jobs.start("picture", ["lippmann", "render", "a"], "other")
@@ -119,9 +125,11 @@ def test_a_render_that_hears_nothing_is_killed(runner, monkeypatch):
     jobs.start("picture", ["lippmann", "render", "wait", "deaf"], "teapot")
     until(lambda job: job.share == 0.4)
     jobs.cancel()
-    until(lambda job: job.stage == "cancelling")
+    until(lambda job: job.stage == "Cancelling")
     job = until(lambda job: job.phase != "running")
-    assert (job.phase, job.can_resume) == ("cancelled", True)
+    assert (job.phase, job.can_resume) == ("cancelled", False)  # no tile was finished
+    with pytest.raises(UsageError, match="nothing to go on with"):
+        jobs.resume()
 
 
 def test_a_failed_render_says_why_in_one_line(runner):
@@ -229,3 +237,55 @@ def test_a_folder_that_is_gone_is_one_line(tmp_path):
 @pytest.mark.parametrize("number", [-1, 0, 1, 99])
 def test_there_are_no_other_results(runner, number):
     assert runner[0].finished(number) is None
+
+
+def test_frames_of_a_film_are_gone_on_with_once_there_is_one(tmp_path):
+    output = tmp_path / "teapot.mp4"
+    frames = frames_of(output)
+    assert not is_unfinished(output)
+    frames.mkdir()
+    journal = frames / f"{frames.name}.journal"
+    journal.write_text('{"fingerprint": {}}\n')
+    assert not is_unfinished(output)
+    journal.write_text('{"fingerprint": {}}\n{"frame": 0}\n')
+    assert is_unfinished(output)
+
+
+def test_a_folder_that_is_no_journal_is_not_gone_on_with(tmp_path):
+    folder = tmp_path / "teapot.png.parts"
+    folder.mkdir()
+    (folder / "mine.txt").touch()
+    assert not is_unfinished(tmp_path / "teapot.png")
+
+
+@pytest.mark.parametrize(
+    ("share", "elapsed", "remark", "left"),
+    [
+        (0.5, 30.0, "", 30.0),
+        (0.25, 9.0, "tile 3 of 12", 27.0),
+        (0.04, 60.0, "", None),  # too little is done
+        (0.5, 2.0, "", None),  # kernels were compiled meanwhile
+        (0.02, 1.0, "35.1 of 40 dB, about 75 s left", 75.0),
+        (1.0, 10.0, "", 0.0),
+    ],
+)
+def test_the_time_left_is_told_once_it_is_known(share, elapsed, remark, left):
+    assert render_jobs.seconds_left(share, elapsed, remark) == left
+
+
+@pytest.mark.parametrize(
+    ("line", "stage", "left"),
+    [
+        ("40 %: tracing, 35.1 of 40 dB, about 75 s left", "Tracing light", 75.0),
+        ("40 %: denoising", "Removing noise", None),
+        ("40 %: rendering frames, frame 3 of 48", "Rendering the film", None),
+        ("40 %: something else", "Something else", None),
+    ],
+)
+def test_progress_is_told_in_words_of_people(runner, monkeypatch, line, stage, left):
+    monkeypatch.setattr(render_jobs, "_CODE", PROCESS.replace("40 %: tracing", line))
+    jobs, _, until = runner
+    jobs.start("picture", ["lippmann", "render", "a b"], "teapot")
+    job = until(lambda job: job.share == 0.4)
+    assert (job.stage, job.seconds_left) == (stage, left)
+    assert job.message()["settings"] == "lippmann render 'a b'"

@@ -85,6 +85,74 @@ def test_the_pointer_moves_the_eye(page):
     tab.assert_clean()
 
 
+def test_keys_work_on_a_fresh_page_and_after_a_click_on_a_tool(page):
+    tab = page()
+    press = tab.page.keyboard.press
+    press("ArrowRight")
+    assert tab.evaluate(f"{STUDIO}.stage.eye.x") > 0
+    press("Home")
+    press("t")
+    press("ArrowRight")
+    turn = state(tab)["turn"][0]
+    assert turn > 0
+    tab.page.locator(".deck label", has_text="Move").click()
+    assert tab.evaluate("document.querySelector('.deck input:checked').value") == "pan"
+    press("ArrowUp")
+    assert state(tab)["shift"][1] > 0
+    assert tab.evaluate("document.querySelector('.deck input:checked').value") == "pan"
+    press("t")
+    tab.page.get_by_role("button", name="Sway").click()
+    press("ArrowRight")
+    assert state(tab)["turn"][0] > turn
+    # Keys of controls stay theirs: a slider that has the focus takes the arrows, and the tools can be reached by them.
+    before = state(tab)["turn"]
+    slider = tab.page.get_by_role("slider", name="Sideways")
+    slider.focus()
+    press("ArrowRight")
+    assert state(tab)["turn"] == before
+    tab.page.locator(".deck input:checked").focus()
+    press("ArrowRight")
+    assert tab.evaluate("document.querySelector('.deck input:checked').value") == "pan"
+    press("e")
+    assert tab.evaluate("document.querySelector('.deck input:checked').value") == "eye"
+    tab.assert_clean()
+
+
+def test_the_bar_speaks_as_people_do_and_resume_is_for_these_settings(page):
+    tab = page()
+    command = tab.evaluate(COMMAND)
+    job = {
+        "type": "job", "number": 1, "kind": "picture", "name": "teapot.png", "phase": "running", "share": 0.42,
+        "stage": "Tracing light", "seconds_left": 131, "line": "", "can_resume": False, "shows": "picture",
+        "command": command, "settings": command,
+    }  # fmt: skip
+    show = f"job => {STUDIO}.jobs.showJob(job)"
+    stage, resume = tab.page.locator(".job-stage"), tab.page.get_by_role("button", name="Resume")
+    told = {
+        None: "Tracing light · 42 %",
+        3: "a few seconds left",
+        43: "about 45 seconds left",
+        9000: "about 3 hours left",
+    }
+    for seconds, words in told.items():
+        tab.evaluate(show, job | {"seconds_left": seconds})
+        assert stage.inner_text().endswith(words)
+    tab.evaluate(show, job)
+    assert stage.inner_text() == "Tracing light · 42 % · about 2 minutes left"
+    assert resume.is_hidden()
+    tab.evaluate(show, job | {"phase": "cancelled"})
+    assert stage.inner_text() == "Cancelled"
+    assert resume.is_hidden()
+    tab.evaluate(show, job | {"phase": "cancelled", "can_resume": True})
+    assert resume.is_visible()
+    tab.evaluate(f"{STUDIO}.store.set({{ scale: 2 }})")
+    tab.wait_for(f"{COMMAND}.includes('--scale 2')")
+    assert resume.is_hidden()
+    tab.page.get_by_role("button", name="Undo").click()
+    tab.wait_until(resume.is_visible)
+    tab.assert_clean()
+
+
 def test_values_are_typed_and_automatic_ones_are_given_back(page):
     tab = page()
     tab.page.get_by_role("spinbutton", name="Size", exact=True).fill("2.5")

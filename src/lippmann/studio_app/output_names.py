@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import os
 from contextlib import suppress
-from itertools import count
+from itertools import count, islice
 from pathlib import Path
 from typing import IO
 
-from lippmann.errors import OutputError
+from lippmann.errors import LippmannError, OutputError
 from lippmann.journal.file_lock import locked
-from lippmann.journal.tile_journal import journal_of
+from lippmann.journal.frame_journal import ENDING as FRAMES_ENDING
+from lippmann.journal.tile_journal import journal_of, read_job
 from lippmann.runtime.private_files import ForeignFileError
 from lippmann.runtime.temporary_names import disk_name
 
@@ -66,6 +67,21 @@ def claim_output(folder: Path, stem: str, ending: str) -> OutputClaim:
 def frames_of(output: Path) -> Path:
     """Folder of the frames of a film."""
     return output.with_name(f"{output.stem}-frames")
+
+
+def is_unfinished(output: Path) -> bool:
+    """Whether tiles of a picture, or frames of a film, are finished and kept: a run goes on with them."""
+    try:
+        if read_job(output) is not None:
+            return True
+    except LippmannError:  # whatever it is, no run goes on with it
+        return False
+    frames = frames_of(output)
+    try:
+        with open(frames / (frames.name + FRAMES_ENDING), "rb") as journal:
+            return len(list(islice(journal, 2))) > 1  # the first line holds the settings
+    except OSError:
+        return False
 
 
 def _is_taken(output: Path) -> bool:

@@ -14,6 +14,7 @@ import signal
 import subprocess
 import sys
 import threading
+import time
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -21,8 +22,10 @@ from pathlib import Path
 from typing import Literal
 
 from lippmann.errors import UsageError
+from lippmann.progress_bar import STAGE_NAMES
 from lippmann.runtime.child_python import python_command
-from lippmann.studio_app.output_names import OutputClaim, claim_output, frames_of
+from lippmann.studio_app.output_names import OutputClaim, claim_output, frames_of, is_unfinished
+from lippmann.studio_app.page_values import shell_line
 
 Kind = Literal["picture", "quilt", "turntable", "print"]
 Shows = Literal["picture", "image", "film"]
@@ -42,7 +45,25 @@ _ENDINGS: dict[Kind, str] = {"picture": ".png", "quilt": ".png", "turntable": ".
 
 _SHOWS: dict[Kind, Shows] = {"picture": "picture", "quilt": "image", "turntable": "film", "print": "picture"}
 
-_PROGRESS = re.compile(r"(\d{1,3}) %: (.{1,200})")
+#: Share, stage and remark of a line of progress.
+_PROGRESS = re.compile(r"(\d{1,3}) %: ([^,\n]{1,80})(?:, (.{1,200}))?")
+#: Stages of a render for those who make no renderers; others are told as they are.
+_STAGE_WORDS = {
+    "load": "Opening the scene",
+    "build": "Preparing the scene",
+    "compile": "Preparing the scene",
+    "probe": "Looking at some pixels",
+    "trace": "Tracing light",
+    "tiles": "Tracing light",
+    "denoise": "Removing noise",
+    "sequence": "Rendering the film",
+    "draw": "Drawing the marks",
+    "write": "Saving the file",
+}
+_WORDS_OF = {STAGE_NAMES[stage]: words for stage, words in _STAGE_WORDS.items()}
+#: A rate is known from so many seconds and such a share on: kernels are compiled first.
+_RATE_SECONDS, _RATE_SHARE = 4.0, 0.05
+_FORESEEN = re.compile(r"about (\d{1,9}) s left")
 
 #: Options of ``lippmann render`` that quilts, whose views have no sub-pixels, lack.
 _NOT_FOR_QUILTS = ("--subpixels", "--no-subpixels")
@@ -60,23 +81,27 @@ class Job:
         Counted from 1.
     kind, words:
         What is made, and its command line from ``lippmann`` on.
+    settings:
+        Command line of the state that is rendered, as the page shows it.
     output:
         The file that it makes.
-    phase, share, stage:
-        How far it is: ``share`` is 0 to 1, or None while that is unknown.
+    phase, share, stage, seconds_left:
+        How far it is: ``share`` is 0 to 1; it and the time left are None while they are unknown.
     line:
         The last line of an ended one: its result, or what went wrong.
     can_resume:
-        Whether a cancelled or failed one goes on where it stopped.
+        Whether a cancelled or failed one has finished parts, with which it goes on.
     """
 
     number: int
     kind: Kind
     words: tuple[str, ...]
     output: Path
+    settings: str = ""
     phase: Phase = "running"
     share: float | None = None
     stage: str = ""
+    seconds_left: float | None = None
     line: str = ""
     can_resume: bool = False
 
@@ -95,6 +120,8 @@ class Job:
             "phase": self.phase,
             "share": self.share,
             "stage": self.stage,
+            "seconds_left": self.seconds_left,
+            "settings": self.settings,
             "line": self.line,
             "can_resume": self.can_resume,
             "shows": self.shows,
@@ -180,7 +207,9 @@ class JobRunner:
             claim = claim_output(self._folder, stem, ending or _ENDINGS[kind])
             self._release_claim()
             self._claim = claim
-            self._jobs.append(Job(len(self._jobs) + 1, kind, command_of(kind, words, claim.output), claim.output))
+            self._jobs.append(
+                Job(len(self._jobs) + 1, kind, command_of(kind, words, claim.output), claim.output, shell_line(words))
+            )
             self._launch()
 
     def resume(self) -> None:
@@ -190,7 +219,9 @@ class JobRunner:
             job = self.last
             if job is None or not job.can_resume:
                 raise UsageError("there is nothing to go on with", fix="start a render")
-            self._jobs[-1] = replace(job, phase="running", share=None, stage="", line="", can_resume=False)
+            self._jobs[-1] = replace(
+                job, phase="running", share=None, stage="", seconds_left=None, line="", can_resume=False
+            )
             self._launch()
 
     def cancel(self) -> None:
@@ -203,7 +234,7 @@ class JobRunner:
             if process is None or self._is_cancelled:
                 return
             self._is_cancelled = True
-            self._jobs[-1] = job = replace(self._jobs[-1], share=None, stage="cancelling")
+            self._jobs[-1] = job = replace(self._jobs[-1], share=None, stage="Cancelling", seconds_left=None)
             process.send_signal(signal.SIGINT if sys.platform != "win32" else signal.SIGTERM)
         self._changed(job)
         threading.Thread(target=_kill_late, args=(process,), daemon=True).start()
@@ -250,7 +281,7 @@ class JobRunner:
 
     def _watch(self, process: subprocess.Popen[str]) -> None:
         """Read what the process says until it ends."""
-        said = ""
+        said, began = "", time.monotonic()
         assert process.stderr is not None
         with process.stderr:
             for line in process.stderr:
@@ -258,7 +289,9 @@ class JobRunner:
                 if told is None:
                     said = line.strip()[:500] or said
                 else:
-                    self._update(share=min(1.0, int(told[1]) / 100), stage=told[2].strip())
+                    share, name, remark = min(1.0, int(told[1]) / 100), told[2].strip(), told[3] or ""
+                    left = seconds_left(share, time.monotonic() - began, remark)
+                    self._update(share, _WORDS_OF.get(name, name.capitalize()), left)
         code = process.wait()
         with self._lock:
             self._process = None
@@ -268,18 +301,28 @@ class JobRunner:
             is_done = code == 0 and job.output.exists()
             phase: Phase = "done" if is_done else "cancelled" if self._is_cancelled else "failed"
             line = said.removeprefix("lippmann: ") if phase == "failed" else str(job.output) if is_done else ""
-            can_resume = not is_done and "--resume" in job.words
+            can_resume = not is_done and "--resume" in job.words and is_unfinished(job.output)
             job = self._jobs[-1] = replace(job, phase=phase, line=line, can_resume=can_resume)
             if not can_resume:
                 self._release_claim()
         self._changed(job)
 
-    def _update(self, *, share: float, stage: str) -> None:
+    def _update(self, share: float, stage: str, seconds_left: float | None) -> None:
         with self._lock:
             if self._is_cancelled:
                 return
-            job = self._jobs[-1] = replace(self._jobs[-1], share=share, stage=stage)
+            job = self._jobs[-1] = replace(self._jobs[-1], share=share, stage=stage, seconds_left=seconds_left)
         self._changed(job)
+
+
+def seconds_left(share: float, elapsed: float, remark: str) -> float | None:
+    """Seconds that a render still takes: as its own ``remark`` foresees, or as its share and its time so far tell."""
+    foreseen = _FORESEEN.search(remark)
+    if foreseen is not None:
+        return float(foreseen[1])
+    if share < _RATE_SHARE or elapsed < _RATE_SECONDS:
+        return None
+    return elapsed * (1.0 - share) / share
 
 
 def _kill_late(process: subprocess.Popen[str]) -> None:

@@ -84,6 +84,7 @@ class Studio {
     if (facts.optics !== null) this.stage.setOptics(facts.optics);
     this.panel.showFacts(facts);
     this.page.showCommand(facts.command, facts.title);
+    this.jobs.showSettings(facts.command);
   }
 
   #changed() {
@@ -119,6 +120,7 @@ class Studio {
   }
 
   isNative = () => this.stage.isNative;
+  isCovered = () => this.jobs.isShown;
   currentTool = () => this.tool;
   look = (place) => this.stage.look(place);
   step = (right, up) => this.stage.step(right, up);

@@ -87,13 +87,6 @@ export function listen(canvas, actions) {
     },
     { passive: false },
   );
-  canvas.addEventListener("keydown", (event) => {
-    const arrow = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] }[event.key];
-    if (arrow === undefined || event.ctrlKey || event.metaKey || event.altKey) return;
-    event.preventDefault();
-    if (actions.currentTool() === "eye" && !actions.isNative()) actions.step(KEY_SHARE * arrow[0], KEY_SHARE * arrow[1]);
-    else drag(actions, KEY_SHARE * arrow[0], KEY_SHARE * arrow[1], event.shiftKey, null);
-  });
 }
 
 function drag(actions, right, up, isShifted, now) {
@@ -110,6 +103,15 @@ function drag(actions, right, up, isShifted, now) {
   }
 }
 
+/** What an arrow key does with the tool; the keys of controls, settings that scroll, and results are their own. */
+function arrow(actions, event) {
+  const [right, up] = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] }[event.key];
+  if (!event.target.matches("body, .stage canvas, header button, .deck button") || actions.isCovered()) return;
+  event.preventDefault();
+  if (actions.currentTool() === "eye" && !actions.isNative()) actions.step(KEY_SHARE * right, KEY_SHARE * up);
+  else drag(actions, KEY_SHARE * right, KEY_SHARE * up, event.shiftKey, null);
+}
+
 /** Keys that work wherever the focus is, but in boxes for text. */
 export function listenToKeys(actions) {
   document.addEventListener("keydown", (event) => {
@@ -123,6 +125,7 @@ export function listenToKeys(actions) {
       return;
     }
     if (event.altKey || isTyping(event.target)) return;
+    if (key.startsWith("arrow")) return arrow(actions, event);
     const tool = TOOLS.find((each) => each.key.toLowerCase() === key);
     const call = tool
       ? () => actions.setTool(tool.name)
@@ -144,7 +147,7 @@ export function listenToKeys(actions) {
 }
 
 function isTyping(target) {
-  return target.matches?.("input:not([type=range]):not([type=checkbox]), select, textarea, dialog *") ?? false;
+  return target.matches?.("input:not([type=range], [type=checkbox], [type=radio]), select, textarea, dialog *") ?? false;
 }
 
 function spread(pointers) {

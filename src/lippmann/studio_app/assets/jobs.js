@@ -14,6 +14,7 @@ const KINDS = [
 export class Jobs {
   #viewer = null;
   #job = null;
+  #settings = "";
 
   /**
    * @param onrender called with the kind to render
@@ -69,12 +70,18 @@ export class Jobs {
     if (job.share === null) this.bar.removeAttribute("value");
     else this.bar.value = job.share;
     this.cancel.hidden = !isRunning;
-    this.resume.hidden = !job.can_resume;
+    this.showSettings(this.#settings);
     this.open.hidden = job.phase !== "done";
     this.dismiss.hidden = isRunning;
     this.button.disabled = isRunning;
     this.stage.textContent = words(job);
     if (isNews && job.phase === "done") this.#show();
+  }
+
+  /** Takes the command line of the page: a picture of other settings is not gone on with. */
+  showSettings(command) {
+    this.#settings = command;
+    this.resume.hidden = !this.#job?.can_resume || this.#job.settings !== command;
   }
 
   /** Shows a finished picture with the viewer, a film as a film. */
@@ -119,10 +126,19 @@ export class Jobs {
 
 function words(job) {
   if (job.phase === "running") {
-    const share = job.share === null ? "" : ` ${Math.round(100 * job.share)} %`;
-    return `${job.stage || "starting"}${share}`;
+    const share = job.share === null ? null : `${Math.round(100 * job.share)} %`;
+    const left = job.seconds_left === null ? null : `${duration(job.seconds_left)} left`;
+    return [job.stage || "Starting", share, left].filter((part) => part !== null).join(" · ");
   }
   if (job.phase === "done") return `${job.name} is ready`;
-  if (job.phase === "cancelled") return job.can_resume ? "Cancelled; finished tiles are kept" : "Cancelled";
+  if (job.phase === "cancelled") return job.can_resume ? "Cancelled; what is finished is kept" : "Cancelled";
   return job.line;
+}
+
+/** A time as people say it: none is known to the second. */
+function duration(seconds) {
+  if (seconds < 8) return "a few seconds";
+  if (seconds < 90) return `about ${5 * Math.round(seconds / 5)} seconds`;
+  if (seconds < 5400) return `about ${Math.round(seconds / 60)} minutes`;
+  return `about ${Math.round(seconds / 3600)} hours`;
 }

@@ -37,6 +37,14 @@ export function buildPage(root, actions) {
     TOOLS.map(({ name, label }) => [name, label]),
     (name) => actions.setTool(name),
   );
+  // A tool that was chosen by the pointer leaves the arrow keys to the picture.
+  let isPointed = false;
+  tools.row.addEventListener("pointerdown", () => (isPointed = true));
+  tools.row.addEventListener("click", ({ target }) => {
+    if (!isPointed || target.type !== "radio") return;
+    isPointed = false;
+    canvas.focus({ preventScroll: true });
+  });
   const sway = toggle("Sway", actions.sway, { class: "toggle", title: "Move the eye by itself (S)" });
   const native = toggle("Native pixels", actions.native, { class: "toggle", title: "The panel's own pixels (N)" });
   const hint = h("span", { class: "hint" });

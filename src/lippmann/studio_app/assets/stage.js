@@ -65,6 +65,7 @@ export class Stage {
   }
 
   step(right, up) {
+    if (this.optics === null) return;
     this.setSwaying(false);
     const reach = eyeAt(this.optics, this.eye.z, right, up);
     this.#setEye({ x: this.eye.x + reach.x, y: this.eye.y + reach.y, z: this.eye.z });
