@@ -7,10 +7,14 @@ import contextlib
 import gc
 import http.client
 import json
+import shlex
+import socket as socketlib
+import struct
 import threading
 import time
 from contextlib import ExitStack, closing
 from dataclasses import replace
+from pathlib import Path
 from urllib.parse import quote
 
 import pytest
@@ -20,12 +24,15 @@ from stand_in import FOLDER, TINY, StandIn, placement, running, said, view
 from starlette.websockets import WebSocketDisconnect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
+from lippmann.errors import SceneError
+from lippmann.scene.readers.load import load_scene
 from lippmann.studio_app import live_socket, uploads
 from lippmann.studio_app import site as studio_site
 from lippmann.studio_app.live_socket import LiveSocket
 from lippmann.studio_app.page_values import state_of_values, values_of_state
 from lippmann.studio_app.pages import static_files
 from lippmann.studio_app.state import StudioState
+from lippmann.studio_app.state_toml import state_of_text
 
 STATE = values_of_state(StudioState(display=TINY))
 
@@ -286,23 +293,201 @@ def post(studio, name, body=b"data", kind="application/octet-stream", **headers)
     return ask(studio, f"/{FOLDER}/files/{name}", "POST", body, Content_Type=kind, **({"Origin": own} | headers))
 
 
-def test_a_dropped_model_can_be_used(studio):
-    status, _, body = post(studio, "my%20model.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
-    path = json.loads(body)["path"]
-    assert status == 200
-    assert path.endswith("my model.obj")
-    with studio.connect() as socket:
-        socket.send(view(STATE | {"scene": path}))
-        assert said(socket, "facts")["title"] == "my model.obj"
+WEDGE = b"v 0 0 0\nv 1 0 0\nv 0 1 1\nf 1 2 3\n"
 
 
-def test_a_bad_model_is_one_line(studio):
-    path = json.loads(post(studio, "bad.glb", b"no model")[2])["path"]
+def kept(studio):
+    """The files that are kept of what was dropped, and the bytes that count."""
+    folder = studio.outputs.parent / "uploads"
+    return sorted(path.name for path in folder.rglob("*") if path.is_file()), studio.session.uploads._bytes
+
+
+def several(studio, files):
+    """Drop several files at once: names and contents."""
+    head = json.dumps([[name, len(body)] for name, body in files.items()]).encode() + b"\n"
+    status, _, body = ask(
+        studio,
+        f"/{FOLDER}/files",
+        "POST",
+        head + b"".join(files.values()),
+        Content_Type="application/octet-stream",
+        Origin=f"http://127.0.0.1:{studio.server.port}",
+    )
+    return status, json.loads(body)
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "my model.obj",
+        "Anna's [new] model, 2nd try (final) #3 & more!.obj",
+        "100% wool %41.obj",
+        "модель.obj",
+        "می‌خواهم.obj",  # with a zero-width non-joiner
+        "模型" * 120 + ".obj",
+        "-o.obj",
+    ],
+)
+def test_a_dropped_model_can_be_used_by_its_name(tmp_path, name):
+    with running(tmp_path) as studio:
+        status, _, body = post(studio, quote(name, safe=""), WEDGE)
+        changes = json.loads(body)["changes"]
+        assert status == 200
+        with studio.connect() as socket:
+            socket.send(view(STATE | changes))
+            facts = said(socket, "facts")
+            assert facts["title"] == name
+            words = shlex.split(facts["command"])
+            assert Path(words[2]).read_bytes() == WEDGE
+            if len(name) < 100:
+                assert Path(words[2]).name == name
+            socket.send(json.dumps({"type": "save", "state": STATE | changes}))
+            saved = said(socket, "saved")
+            assert saved["name"] == f"{name[:-4]}.toml"
+    # After the studio's end the state and the command find the model, and a later studio may open it.
+    assert load_scene(state_of_text(saved["text"]).scene).name
+    with running(tmp_path) as studio, studio.connect() as socket:
+        socket.send(json.dumps({"type": "open", "text": saved["text"]}))
+        assert said(socket, "state")["state"]["scene"] == changes["scene"]
+
+
+def test_another_model_is_placed_as_if_it_were_the_first(tmp_path):
+    with running(tmp_path, StudioState(display=TINY, turn=(30, 0, 0), camera="lens", up="z", seed=7)) as studio:
+        changes = json.loads(post(studio, "a.obj", WEDGE)[2])["changes"]
+        assert {"turn", "camera", "up", "shift", "scale"} <= changes.keys()
+        assert state_of_values({"turn": [9, 9, 9]} | changes) == StudioState(scene=changes["scene"])
+        assert studio.session.state.turn == (30, 0, 0)  # it is the page that sets them, as a step of undo
+
+
+@pytest.mark.parametrize(
+    ("name", "body"),
+    [
+        ("bad.glb", b"no model"),
+        ("bad.obj", b"v 0 0\n"),
+        ("bad.ply", b"ply\nformat ascii 1.0\n"),
+        ("empty.stl", b""),
+        ("bad.exr", b"x"),
+        ("bad.hdr", b"#?RADIANCE\n"),
+        ("photo.png", b"\x89PNG"),
+        ("slice", b"x" * 200),
+        ("a.exe", b"x"),
+        ("model.fbx", b"x"),
+    ],
+)
+def test_a_file_that_cannot_be_opened_changes_nothing(studio, name, body):
+    before = kept(studio)
+    status, _, answer = post(studio, name, body)
+    assert status in (200, 415), answer
+    line = json.loads(answer)["error"]
+    assert name in line
+    assert "\n" not in line
+    assert kept(studio) == before
     with studio.connect() as socket:
-        socket.send(view(STATE | {"scene": path}))
-        line = said(socket, "error")["line"]
-        assert "bad.glb" in line
-        assert "\n" not in line
+        assert said(socket, "hello")["state"]["scene"] == "teapot"
+        socket.send(view(STATE))
+        assert said(socket, "facts")["title"] == "teapot"
+
+
+def test_a_scene_that_the_renderer_refuses_changes_nothing(tmp_path):
+    class Strict(StandIn):
+        def set_scene(self, scene):
+            raise SceneError("no light is seen", where=scene.name)
+
+    with running(tmp_path, make=Strict) as studio:
+        with studio.connect() as socket:
+            socket.send(view(STATE))
+            said(socket, "frame")
+        status, _, body = post(studio, "a.obj", WEDGE)
+        assert (status, "no light is seen" in json.loads(body)["error"]) == (200, True)
+        assert kept(studio) == ([], 0)
+
+
+def test_what_is_dropped_twice_is_kept_once(tmp_path):
+    with running(tmp_path) as studio:
+        paths = {json.loads(post(studio, "a.obj", WEDGE)[2])["path"] for _ in range(2)}
+        assert len(paths) == 1
+        assert kept(studio)[0] == ["a.obj"]
+
+
+def test_a_part_of_a_broken_drop_is_removed_and_its_bytes_given_back(tmp_path):
+    with running(tmp_path) as studio:
+        head = f"POST /{FOLDER}/files/a.obj HTTP/1.1\r\nHost: 127.0.0.1:{studio.server.port}\r\n"
+        head += "Content-Type: application/octet-stream\r\nContent-Length: 1000000\r\n\r\n"
+        with socketlib.create_connection(("127.0.0.1", studio.server.port)) as client:
+            client.sendall(head.encode() + b"v 0 0 0\n" * 1000)
+            wait_until(lambda: kept(studio)[1] == 1000000 and kept(studio)[0])
+        wait_until(lambda: kept(studio) == ([], 0))
+        assert [path.name for path in (tmp_path / "uploads").iterdir()] == []
+
+
+def wait_until(holds):
+    until = time.monotonic() + 10.0
+    while not holds():
+        assert time.monotonic() < until
+        time.sleep(0.01)
+
+
+GLTF = json.dumps(
+    {
+        "asset": {"version": "2.0"},
+        "scenes": [{"nodes": [0]}],
+        "nodes": [{"mesh": 0}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+        "buffers": [{"uri": "data/my%20triangle.bin", "byteLength": 36}],
+        "bufferViews": [{"buffer": 0, "byteLength": 36}],
+        "accessors": [
+            {"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3", "min": [0] * 3, "max": [1] * 3}
+        ],
+    }
+).encode()
+TRIANGLE = struct.pack("<9f", 0, 0, 0, 1, 0, 0, 0, 1, 1)
+
+
+def test_a_model_is_dropped_with_the_files_that_it_names(tmp_path):
+    with running(tmp_path) as studio:
+        long = bytes(range(256)) * 1200  # comes in many pieces
+        files = {"a/preview.png": long, "a/data/my triangle.bin": TRIANGLE, "a/scene.gltf": GLTF, "a/notes": long[7:]}
+        status, answer = several(studio, files)
+        assert (status, Path(answer["path"]).name) == (200, "scene.gltf")
+        assert {name: (Path(answer["path"]).parents[1] / name).read_bytes() for name in files} == files
+        assert len(load_scene(answer["path"]).description.meshes) == 1
+        before = kept(studio)
+        del files["a/data/my triangle.bin"]
+        status, answer = several(studio, files)
+        assert list(answer) == ["error"]
+        assert "my triangle.bin" in answer["error"]
+        assert kept(studio) == before
+
+
+@pytest.mark.parametrize(
+    ("body", "status"),
+    [
+        (b'[["a.obj", 3]]\nabcd', 400),
+        (b'[["a.obj", 9]]\nabcd', 400),
+        (b'[["a.obj", -1], ["b.obj", 5]]\nabcd', 400),
+        (b'[["a.obj", NaN]]\nabcd', 400),
+        (b"[]\n", 400),
+        (b"[1]\n", 400),
+        (b'{"a": 1}\n', 400),
+        (b"no list", 400),
+        (b"[" * 9000 + b"\n", 400),
+        (b'[["../a.obj", 4]]\nabcd', 415),
+        (b'[["/a.obj", 4]]\nabcd', 415),
+        (b'[["a/./b.obj", 4]]\nabcd', 415),
+        (b'[["a\\u0000.obj", 4]]\nabcd', 415),
+        (b'[["a.obj", 2], ["a.obj", 2]]\nabcd', 400),
+        (b'[["a.obj", 2], ["a.obj/b.obj", 2]]\nabcd', 400),
+        (b'[["a.txt", 2], ["b.txt", 2]]\nabcd', 200),
+        (b'[["a.obj", 2], ["b.obj", 2]]\nabcd', 200),
+    ],
+)
+def test_lists_of_files_that_will_not_do_leave_nothing(studio, body, status):
+    before = kept(studio)
+    own = f"http://127.0.0.1:{studio.server.port}"
+    kind = "application/octet-stream"
+    found, _, answer = ask(studio, f"/{FOLDER}/files", "POST", body, Content_Type=kind, Origin=own)
+    assert (found, list(json.loads(answer))) == (status, ["error"])
+    assert kept(studio) == before
 
 
 @pytest.mark.parametrize(
@@ -312,7 +497,7 @@ def test_a_bad_model_is_one_line(studio):
         ("a.glb.html", {}, 415),
         ("..%2fa.glb", {}, 404),
         ("..", {}, 415),
-        (".glb", {}, 415),
+        (".glb", {}, 200),
         ("a%00.glb", {}, 415),
         ("a%0a.glb", {}, 415),
         ("a.glb", {"kind": "application/json"}, 415),

@@ -233,25 +233,47 @@ def test_native_pixels_are_shown_one_by_one(page):
     tab.assert_clean()
 
 
+DROP = """async (files) => {
+  const data = new DataTransfer();
+  for (const [name, text] of files) data.items.add(new File([text], name));
+  document.dispatchEvent(new DragEvent('dragenter', { dataTransfer: data, bubbles: true }));
+  document.dispatchEvent(new DragEvent('drop', { dataTransfer: data, bubbles: true }));
+}"""
+WEDGE = "v 0 0 0\nv 1 0 0\nv 0 1 1\nf 1 2 3\n"
+
+
 def test_models_are_dropped_and_bad_ones_are_one_line(page):
     tab = page()
-    drop = """async ([name, text]) => {
-      const data = new DataTransfer();
-      data.items.add(new File([text], name));
-      document.dispatchEvent(new DragEvent('dragenter', { dataTransfer: data, bubbles: true }));
-      document.dispatchEvent(new DragEvent('drop', { dataTransfer: data, bubbles: true }));
-    }"""
-    tab.evaluate(drop, ["wedge.obj", "v 0 0 0\nv 1 0 0\nv 0 1 1\nf 1 2 3\n"])
-    tab.wait_for(f"{COMMAND}.includes('wedge.obj')")
-    assert tab.evaluate("document.title").startswith("wedge.obj")
+    tab.evaluate(f"{STUDIO}.store.set({{ turn: [30, 0, 0] }})")
+    tab.evaluate(DROP, [["50%25 off, Anna's.obj", WEDGE]])
+    tab.wait_for(f"{COMMAND}.includes('50%25 off, Anna')")
+    assert tab.evaluate("document.title").startswith("50%25 off, Anna's.obj")
     assert tab.evaluate("document.querySelector('.drop-shade').hidden")
-    tab.evaluate(drop, ["bad.glb", "no model"])
-    assert "bad.glb" in tab.wait_for(ALERT)
-    tab.evaluate(drop, ["notes.txt", "x"])
+    assert state(tab)["turn"] == [0, 0, 0]
+    tab.page.keyboard.press("Control+z")
+    assert (state(tab)["scene"], state(tab)["turn"]) == ("teapot", [30, 0, 0])
+    tab.evaluate(DROP, [["notes.txt", "x"]])
     assert "notes.txt: this cannot be opened" in tab.wait_for(f"{ALERT}.includes('notes') && {ALERT}")
-    tab.evaluate(drop, ["mine.toml", 'scene = "teapot"\nscale = 1.75\n'])
+    tab.evaluate(DROP, [["mine.toml", 'scene = "teapot"\nscale = 1.75\n']])
     tab.wait_for(f"{STUDIO}.store.state.scale === 1.75")
+    # A model with the material that it names, and a hidden file of the desktop's.
+    tab.evaluate(DROP, [["red.mtl", "newmtl red\n"], [".DS_Store", "x"], ["two.obj", f"mtllib red.mtl\n{WEDGE}"]])
+    tab.wait_for(f"{COMMAND}.includes('two.obj')")
     tab.assert_clean()
+
+
+def test_a_model_that_cannot_be_opened_changes_nothing_here_nor_in_other_tabs(page, open_tab, studio):
+    tab = page()
+    before = state(tab)
+    tab.evaluate(DROP, [["bad.glb", "no model"]])
+    assert "bad.glb" in tab.wait_for(ALERT)
+    assert state(tab) == before
+    other = open_tab(size=(1440, 900)).open(studio.address)
+    for each in (other, tab):
+        each.page.reload()
+        each.wait_for(f"({STUDIO}?.stage?.header?.number ?? 0) > 0 && {COMMAND} !== ''")
+        assert (state(each)["scene"], each.evaluate(ALERT)) == ("teapot", "")
+        assert max(each.evaluate(PIXEL, [3, 3])[1:3]) > 0
 
 
 def test_everything_has_a_name_and_is_reached_by_keys(page):

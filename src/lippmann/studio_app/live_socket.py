@@ -19,14 +19,13 @@ from lippmann.studio_app.page_values import (
     optics_of,
     shell_line,
     state_of_values,
-    title_of,
     values_of_state,
 )
 from lippmann.studio_app.render_jobs import KINDS, Job
 from lippmann.studio_app.render_thread import Shown, Watcher
 from lippmann.studio_app.session import WITHOUT_FILE, StudioSession, opened_state
 from lippmann.studio_app.state import StudioState
-from lippmann.studio_app.state_toml import text_of_state
+from lippmann.studio_app.state_toml import text_of_state, with_whole_paths
 from lippmann.studio_app.wire import (
     Coding,
     FrameHeader,
@@ -212,8 +211,9 @@ class LiveSocket:
     def _save(self, said: dict[str, Any]) -> None:
         state = self._take_over(said)
         self._session.check_has_file(state, "a saved state")
-        stem = title_of(state).rpartition(".")[0] or title_of(state)
-        self._say({"type": "saved", "name": f"{stem}.toml", "text": text_of_state(state)})
+        title = self._session.title(state)
+        name = f"{title.rpartition('.')[0] or title}.toml"
+        self._say({"type": "saved", "name": name, "text": text_of_state(with_whole_paths(state))})
 
     def _open(self, said: dict[str, Any]) -> None:
         text = said.get("text")
@@ -272,7 +272,7 @@ class LiveSocket:
         is_new = told is None or told[1] is not display
         return {
             "type": "facts",
-            "title": title_of(state),
+            "title": session.title(state),
             "command": self._command_line(state),
             "optics": optics_of(display, subpixels=state.subpixels) if is_new else None,
             "display_size": display_size(state),

@@ -1,4 +1,4 @@
-"""A session with all that it needs: a private folder for dropped files, a live renderer, and an end."""
+"""A session with all that it needs: a folder for dropped files, a live renderer, and an end."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 from lippmann.errors import SceneError
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.runtime.atomic_write import check_writable
-from lippmann.runtime.temporary_names import scratch_folder
 from lippmann.scene import bundled
 from lippmann.scene.readers.load import kind_of_file
 from lippmann.studio_app.session import StudioSession
@@ -21,6 +20,9 @@ if TYPE_CHECKING:
     from lippmann.display import Display
     from lippmann.rendering.live.renderer import LiveRenderer
     from lippmann.scene.scene import Scene
+
+#: Folder of dropped files, beside the outputs.
+_DROPPED = "studio-files"
 
 
 @contextmanager
@@ -66,16 +68,16 @@ def open_session(
         engine_loaded()
         return renderer
 
-    with scratch_folder("lippmann-studio-") as uploads:
-        session = StudioSession(
-            state,
-            uploads=Uploads(Path(uploads)),
-            outputs=folder.resolve(),
-            make_renderer=make_renderer,
-            allow_outside=allow_outside,
-            held=held,
-        )
-        try:
-            yield session
-        finally:
-            session.close()
+    outputs = folder.resolve()
+    session = StudioSession(
+        state,
+        uploads=Uploads(outputs / _DROPPED),
+        outputs=outputs,
+        make_renderer=make_renderer,
+        allow_outside=allow_outside,
+        held=held,
+    )
+    try:
+        yield session
+    finally:
+        session.close()

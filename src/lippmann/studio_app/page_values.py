@@ -17,6 +17,7 @@ from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 from lippmann.display import Display
 from lippmann.display.formats.inline_spec import size_of_short_form
 from lippmann.errors import UsageError
+from lippmann.printable import one_line
 from lippmann.scene.placement import Placement
 from lippmann.studio_app.state import StudioState
 from lippmann.viewer.manifest import optics
@@ -130,7 +131,7 @@ def _value_of(kind: Any, value: object, name: str) -> Any:
         if isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) < 1e12:
             return float(value)
     elif kind is str:
-        if isinstance(value, str) and 0 < len(value) <= _MOST_TEXT and value.isprintable():
+        if isinstance(value, str) and 0 < len(value) <= _MOST_TEXT and one_line(value) == value:
             return value
     elif kind in (int, bool) and type(value) is kind:
         return value

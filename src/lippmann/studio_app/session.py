@@ -10,14 +10,16 @@ from typing import TYPE_CHECKING
 
 from lippmann.display import Display, list_displays
 from lippmann.display.formats.inline_spec import is_short_form
-from lippmann.errors import UsageError
+from lippmann.errors import LippmannError, UsageError
 from lippmann.scene import bundled
 from lippmann.studio_app.command_line import render_command
+from lippmann.studio_app.dropped_scene import ENVIRONMENTS
+from lippmann.studio_app.page_values import title_of
 from lippmann.studio_app.render_jobs import Job, JobRunner, Kind
 from lippmann.studio_app.render_thread import Renderer, RenderThread, Wanted, Watcher
-from lippmann.studio_app.state import StudioState
+from lippmann.studio_app.state import PLACED_BY, StudioState
 from lippmann.studio_app.state_toml import state_of_text
-from lippmann.studio_app.uploads import Uploads
+from lippmann.studio_app.uploads import Dropped, Uploads
 from lippmann.viewing.replay import default_eye
 
 if TYPE_CHECKING:
@@ -39,7 +41,7 @@ class StudioSession:
     state:
         The first state. Its files are open to the pages; other files are not.
     uploads:
-        Folder for dropped files.
+        Keeps dropped files.
     outputs:
         Folder that renders are written into.
     make_renderer:
@@ -68,6 +70,7 @@ class StudioSession:
         self._displays: dict[str, Display] = {}
         self._presets = {display.name: display for display in list_displays()}
         self._files = {name for name in (state.scene, state.environment, state.display) if name is not None}
+        self._titles: dict[str, str] = {}
         self.uploads = uploads
         self.job_listeners: list[Callable[[Job], None]] = []
         self.state_listeners: list[Callable[[], None]] = []
@@ -106,13 +109,40 @@ class StudioSession:
             value = getattr(state, name)
             if value is None or value in known or (name == "display" and is_short_form(value)):
                 continue
+            if self.uploads.holds(Path(value)):
+                continue
             rule = "the page opens what the command was given, and what is dropped onto it"
             raise UsageError(f"'{Path(value).name[:80]}' was not opened", parameter=name, rule=rule)
 
-    def open_file(self, path: Path) -> None:
-        """Let the pages use a file."""
+    def try_dropped(self, dropped: Dropped, then: Callable[[LippmannError | None], None]) -> dict[str, object]:
+        """Show a dropped file once, to nobody.
+
+        Parameters
+        ----------
+        dropped:
+            The file.
+        then:
+            Called in the render thread with the error, or None where the file can be shown.
+
+        Returns
+        -------
+        dict
+            The settings that change where it is shown: another scene is placed as if it were the first one.
+        """
+        path = str(dropped.path)
+        changes: dict[str, object] = {"environment": path}
+        if dropped.path.suffix.lower() not in ENVIRONMENTS:
+            plain = StudioState()
+            changes = {"scene": path, **{name: getattr(plain, name) for name in PLACED_BY}}
         with self._lock:
-            self._files.add(str(path))
+            self._titles[path] = dropped.name
+        self._try(replace(self.state, **changes), then)  # type: ignore[arg-type]
+        return changes
+
+    def title(self, state: StudioState) -> str:
+        """Name of a state's scene for people: of a dropped one the whole name that it had."""
+        with self._lock:
+            return self._titles.get(state.scene) or title_of(state)
 
     def display(self, state: StudioState) -> Display:
         """The display of a state."""
@@ -162,13 +192,21 @@ class StudioSession:
         elif kind == "print" and not _is_print(self.display(state)):
             raise UsageError(f"{self.display(state).name} is no print", fix="choose a print, or render a picture")
         display = state.display if state.display in self._presets else self.display(state).name
-        self.jobs.start(kind, words, f"{Path(state.scene).stem}-{display}", ending)
+        self.jobs.start(kind, words, f"{Path(self.title(state)).stem}-{display}", ending)
 
     def warm_up(self) -> None:
         """Begin to load the scene and to compile its kernels, before a page asks for a frame."""
-        watcher = Watcher(lambda _: self.thread.remove(watcher), lambda _: self.thread.remove(watcher))
+        self._try(self.state, lambda _: None)
+
+    def _try(self, state: StudioState, then: Callable[[LippmannError | None], None]) -> None:
+        """Render a state once; ``then`` gets what went wrong, or None."""
+
+        def end(error: LippmannError | None) -> None:
+            self.thread.remove(watcher)
+            then(error)
+
+        watcher = Watcher(lambda _: end(None), end)
         self.thread.add(watcher)
-        state = self.state
         view = state.view(default_eye(self.display(state)), _FIRST_SIZE)
         self.thread.want(watcher, self.wanted(0, state, view))
 

@@ -6,7 +6,7 @@
     GET  /assets/NAME, /viewer/NAME             scripts, style sheets, the icon
     GET  /pictures/N/...                        manifest and tiles of the picture that the Nth render made
     GET  /results/N/NAME                        the file that it made
-    POST /files/NAME                            a model or an environment dropped onto the page
+    POST /files/NAME, /files                    a model or an environment dropped onto the page, or several files
     WS   /live, /live-panel                     frames and messages, see live_socket.py
 
 All other paths are refused, and so are all without the folder's name, which only the printed address tells.
@@ -14,6 +14,7 @@ All other paths are refused, and so are all without the folder's name, which onl
 
 from __future__ import annotations
 
+import asyncio
 from http import HTTPStatus
 
 import anyio.to_thread
@@ -22,10 +23,11 @@ from starlette.responses import FileResponse, Response
 from starlette.routing import BaseRoute, Route, Router, WebSocketRoute
 from starlette.websockets import WebSocket
 
-from lippmann.errors import PictureError
+from lippmann.errors import LippmannError, PictureError
 from lippmann.studio_app.live_socket import LiveSocket
 from lippmann.studio_app.pages import static_files
 from lippmann.studio_app.session import StudioSession
+from lippmann.studio_app.uploads import Dropped
 from lippmann.studio_app.wire import Coding
 from lippmann.viewer.request_guard import Receive, Scope, Send, send_response
 from lippmann.viewer.responses import RefusedError, Request, json_response, not_found
@@ -58,6 +60,7 @@ class StudioSite:
             _Route("/pictures/{number:int}/{rest:path}", self._picture),
             _Route("/results/{number:int}/{name}", self._result),
             _Route("/files/{name}", self._file, methods=["POST"]),
+            _Route("/files", self._file, methods=["POST"]),
             WebSocketRoute("/live", self._live),
             WebSocketRoute("/live-panel", self._live_panel),
         ]
@@ -109,9 +112,39 @@ class StudioSite:
         return FileResponse(job.output)
 
     async def _file(self, request: ServerRequest) -> Response:
-        path = await self._session.uploads.receive(request.path_params["name"], request)
-        self._session.open_file(path)
-        return _as_response(json_response({"path": str(path)}))
+        """Keep a drop that can be shown, and answer with the settings that show it; another one changes nothing.
+
+        What is wrong with the files is a regular answer: browsers log all others as faults of the page.
+        """
+        session = self._session
+        try:
+            dropped = await session.uploads.receive(request.path_params.get("name", ""), request)
+            try:
+                changes = await self._try(dropped)
+            except BaseException:
+                session.uploads.discard(dropped)
+                raise
+        except LippmannError as error:
+            return _as_response(json_response({"error": str(error)}))
+        return _as_response(json_response({"path": str(dropped.path), "changes": changes}))
+
+    async def _try(self, dropped: Dropped) -> dict[str, object]:
+        loop = asyncio.get_running_loop()
+        tried: asyncio.Future[LippmannError | None] = loop.create_future()
+
+        def end(error: LippmannError | None) -> None:
+            if not tried.done():
+                tried.set_result(error)
+
+        def then(error: LippmannError | None) -> None:
+            if not loop.is_closed():
+                loop.call_soon_threadsafe(end, error)
+
+        changes = self._session.try_dropped(dropped, then)
+        error = await tried
+        if error is not None:
+            raise error
+        return changes
 
 
 class _Route(Route):

@@ -23,6 +23,9 @@ Up = Literal["y", "z"]
 #: What the studio shows where nothing is said.
 FIRST_SCENE, FIRST_DISPLAY = "teapot", "seed-lenticular"
 
+#: Settings by which one scene is placed: another one begins without them.
+PLACED_BY = ("up", "camera", "place", "turn", "shift", "scale", "depth_scale", "pop_out")
+
 
 @dataclass(frozen=True)
 class StudioState:

@@ -17,7 +17,7 @@ import json
 import re
 import sys
 from collections.abc import Callable, Mapping
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any, cast
 
@@ -127,6 +127,18 @@ def text_of_state(state: StudioState, folder: Path | None = None) -> str:
     return "\n".join(lines) + "\n"
 
 
+def with_whole_paths(state: StudioState) -> StudioState:
+    """The state with the whole paths of its files, for one that will lie in a folder that is not known."""
+    names = {name: getattr(state, name) for name in _FILES}
+    whole: dict[str, Any] = {name: str(Path(value).resolve()) for name, value in names.items() if _is_file(value)}
+    return replace(state, **whole)
+
+
+def _is_file(name: str | None) -> bool:
+    """Whether a setting names a file: bundled scenes and presets, whose names are plain words, come before such."""
+    return name is not None and Path(name).exists() and (Path(name).name != name or "." in name)
+
+
 def _toml(value: object) -> str:
     if isinstance(value, bool):
         return "true" if value else "false"
@@ -146,7 +158,7 @@ def _found(name: str, folder: Path) -> str:
 
 def _told_from(name: str, folder: Path) -> str:
     path = Path(name)
-    if not path.is_file():
+    if not _is_file(name):
         return name
     absolute, base = path.resolve(), folder.resolve()
     return absolute.relative_to(base).as_posix() if absolute.is_relative_to(base) else str(absolute)

@@ -51,8 +51,9 @@ class TimedProtocol(H11Protocol):
             self._stop_waiting()
 
     def eof_received(self) -> bool:  # type: ignore[override]
-        """Answer what was asked for before the client ended its side; True keeps ours open for that."""
+        """Answer what was asked for, in whole, before the client ended its side; True keeps ours open for that."""
         is_owed = self.cycle is not None and not self.cycle.response_complete
+        is_owed = is_owed and self.conn.their_state is not h11.SEND_BODY
         if is_owed:
             self.cycle.keep_alive = False
         return is_owed

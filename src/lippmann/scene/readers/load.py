@@ -248,10 +248,25 @@ def kind_of_file(source: str | Path) -> str | None:
     path = Path(source)
     if isinstance(source, str) and not path.suffix and path.name == source and not path.exists():
         return None
-    return _suffix_by_content(path) or _ending(path)
+    return _suffix_by_content(path) or kind_of_name(path)
 
 
-def _ending(path: Path) -> str:
+def unknown_kind(path: Path) -> SceneError | None:
+    """The error of a file whose ending is that of no scene; None for a known ending or none."""
+    return None if kind_of_name(path) in ("", *_READERS) else _unknown_kind(path)
+
+
+def _unknown_kind(path: Path) -> SceneError:
+    suffix = kind_of_name(path)
+    return SceneError(
+        f"'{suffix}' is no known kind of scene file" if suffix else "is no known kind of scene file",
+        where=path.name,
+        rule=f"known are {', '.join(_READERS)}",
+        fix=_ELSEWHERE.get(suffix, ""),
+    )
+
+
+def kind_of_name(path: Path) -> str:
     """The ending that names a file's kind, that of packed volumes in whole."""
     return ".nii.gz" if path.name.lower().endswith(".nii.gz") else path.suffix.lower()
 
@@ -265,7 +280,7 @@ def _from_name(
     series: str | None = None,
 ) -> Scene:
     path = Path(source)
-    suffix = _ending(path)
+    suffix = kind_of_name(path)
     if up is not None and (up not in get_args(Up) or suffix not in _USUAL_UP):
         what = f"'{up}'" if up not in get_args(Up) else f"{path.name} says itself which way is up"
         raise UsageError(what, parameter="up", rule=f"y, z or -y, for {', '.join(_USUAL_UP)}", fix="leave it out")
@@ -297,12 +312,7 @@ def _from_name(
             raise SceneError(f"is no {suffix} file", where=path.name, rule=f"it begins like a {by_content} file")
         reader = _READERS[by_content]
     if reader is None:
-        raise SceneError(
-            f"'{suffix}' is no known kind of scene file" if suffix else "is no known kind of scene file",
-            where=path.name,
-            rule=f"known are {', '.join(_READERS)}",
-            fix=_ELSEWHERE.get(suffix, ""),
-        )
+        raise _unknown_kind(path)
     chosen = {
         key: value for key, value in (("variants", variants), ("depth_map", depth_map), ("series", series)) if value
     }
@@ -368,7 +378,7 @@ def _suffix_by_content(path: Path) -> str | None:
     if head[128:] == DICOM:
         return ".dcm"
     head = head.removeprefix(b"\xef\xbb\xbf").lstrip()
-    if _ending(path) in VTK and head.startswith(b"<"):  # they are XML, too
+    if kind_of_name(path) in VTK and head.startswith(b"<"):  # they are XML, too
         return None
     return next((suffix for beginning, suffix in _BEGINNINGS.items() if head.startswith(beginning)), None)
 

@@ -21,8 +21,7 @@ class Studio {
     this.tool = "eye";
     this.page = buildPage(root, this);
     this.files = new Files({
-      scene: (path) => this.store.set({ scene: path }),
-      environment: (path) => this.store.set({ environment: path }),
+      opened: (changes) => this.#open(changes),
       state: (text) => this.connection.send({ type: "open", text }),
       fail: (line) => this.page.fail(line),
       busy: (line) => this.page.busy(line),
@@ -109,6 +108,12 @@ class Studio {
     if (depth === null) return this.page.fail("There is nothing at this place");
     const [x, y, z] = this.store.state.shift;
     return this.store.set({ shift: [x, y, Math.round(MOVE_DECIMALS * (z - depth)) / MOVE_DECIMALS] });
+  }
+
+  /** Shows what was dropped; another model is seen from the front. */
+  #open(changes) {
+    if ("scene" in changes) this.stage.center();
+    this.store?.set(changes);
   }
 
   // ---- What the user does -------------------------------------------------------------------------------------------

@@ -2,7 +2,6 @@
 
 import { h } from "lippmann/dom.js";
 
-const MODELS = [".glb", ".obj", ".stl", ".ply"];
 const ENVIRONMENTS = [".hdr", ".exr"];
 const STATE = ".toml";
 
@@ -10,15 +9,16 @@ const STATE = ".toml";
 const MOST_STATE = 50_000;
 
 export class Files {
-  /** @param actions `scene(path)`, `environment(path)`, `state(text)`, `fail(line)`, `busy(line or null)` */
+  /** @param actions `opened(changes)`, `state(text)`, `fail(line)`, `busy(line or null)` */
   constructor(actions) {
     this.actions = actions;
-    this.input = h("input", { type: "file", hidden: true, onchange: () => this.#chosen() });
-    this.shade = h("div", { class: "drop-shade", hidden: true }, h("p", {}, "Drop a model: GLB, OBJ, STL or PLY"));
+    this.input = h("input", { type: "file", multiple: true, hidden: true, onchange: () => this.#chosen() });
+    this.shade = h("div", { class: "drop-shade", hidden: true }, h("p", {}, "Drop a model, with the files it needs"));
     this.#listen();
   }
 
-  open(kinds = [...MODELS, STATE]) {
+  /** Opens the dialog; the studio itself says which files it cannot read. */
+  open(kinds = []) {
     this.input.accept = kinds.join(",");
     this.input.value = "";
     this.input.click();
@@ -35,26 +35,24 @@ export class Files {
     setTimeout(() => URL.revokeObjectURL(address), 1000);
   }
 
-  async take(file) {
-    const name = file.name.toLowerCase();
-    const is = (endings) => endings.some((ending) => name.endsWith(ending));
-    if (is([STATE])) {
-      if (file.size > MOST_STATE) this.actions.fail(`${file.name}: this is too long for a state`);
-      else this.actions.state(await file.text());
-    } else if (is(MODELS) || is(ENVIRONMENTS)) await this.#upload(file, is(MODELS) ? "scene" : "environment");
-    else this.actions.fail(`${file.name}: this cannot be opened; GLB, OBJ, STL, PLY, HDR, EXR and TOML can`);
+  /** Takes what was dropped or chosen together: pairs of a path, from the dropped folder on, and its file. */
+  async take(found) {
+    const shown = found.filter(([path]) => !path.split("/").some((part) => part.startsWith(".")));
+    const [[path, file] = []] = shown;
+    if (file === undefined) return;
+    const isState = shown.length === 1 && file.name.toLowerCase().endsWith(STATE);
+    if (!isState) await this.#upload(path.split("/")[0], withList(shown));
+    else if (file.size > MOST_STATE) this.actions.fail(`${file.name}: this is too long for a state`);
+    else this.actions.state(await file.text());
   }
 
-  async #upload(file, kind) {
-    this.actions.busy(`Opening ${file.name}`);
+  async #upload(name, body) {
+    this.actions.busy(`Opening ${name}`);
     try {
-      const response = await fetch(`files/${encodeURIComponent(file.name)}`, {
-        method: "POST",
-        headers: { "Content-Type": "application/octet-stream" },
-        body: file,
-      });
+      const headers = { "Content-Type": "application/octet-stream" };
+      const response = await fetch("files", { method: "POST", headers, body });
       const answer = await response.json();
-      if (response.ok) this.actions[kind](answer.path);
+      if (answer.changes) this.actions.opened(answer.changes);
       else this.actions.fail(answer.error);
     } catch {
       this.actions.fail("The studio does not answer; is `lippmann studio` still running?");
@@ -64,8 +62,7 @@ export class Files {
   }
 
   #chosen() {
-    const [file] = this.input.files;
-    if (file) this.take(file);
+    this.take([...this.input.files].map((file) => [file.name, file]));
   }
 
   #listen() {
@@ -87,8 +84,31 @@ export class Files {
       event.preventDefault();
       depth = 0;
       this.shade.hidden = true;
-      const [file] = event.dataTransfer.files;
-      if (file) this.take(file);
+      // Both lists are emptied once this listener returns.
+      const files = [...event.dataTransfer.files];
+      const entries = [...event.dataTransfer.items].map((item) => item.webkitGetAsEntry?.()).filter(Boolean);
+      const isFlat = !entries.some((entry) => entry.isDirectory);
+      if (isFlat) this.take(files.map((file) => [file.name, file]));
+      else Promise.all(entries.map(filesOf)).then((found) => this.take(found.flat()));
     });
+  }
+}
+
+/** Creates a body of one or several files: a line that lists their names and sizes, and then the files. */
+function withList(found) {
+  const list = JSON.stringify(found.map(([path, file]) => [path, file.size]));
+  return new Blob([`${list}\n`, ...found.map(([, file]) => file)]);
+}
+
+/** Finds the files of a dropped entry, with their paths from it on. */
+async function filesOf(entry) {
+  const path = entry.fullPath.replace(/^\//, "");
+  if (entry.isFile) return [[path, await new Promise((resolve, reject) => entry.file(resolve, reject))]];
+  const reader = entry.createReader();
+  const found = [];
+  for (;;) {
+    const some = await new Promise((resolve, reject) => reader.readEntries(resolve, reject));
+    if (some.length === 0) return found;
+    for (const each of some) found.push(...(await filesOf(each)));
   }
 }

@@ -1,0 +1,57 @@
+"""Which of the files that are dropped together is the scene."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from urllib.parse import quote
+
+from lippmann.errors import SceneError
+from lippmann.scene.readers.load import PHOTOS, kind_of_name, known_suffixes
+from lippmann.scene.readers.volumes.dicom_files import holds_dicom
+
+#: Endings of pictures of the surroundings.
+ENVIRONMENTS = (".hdr", ".exr")
+
+_SLICE = ".dcm"
+
+#: Bytes of a scene file in which names of others are looked for.
+_SEARCHED = 1 << 23
+
+
+def main_file(folder: Path, places: Sequence[Path]) -> Path:
+    """The scene among files that were dropped together, from their folder on.
+
+    Several DICOM slices are one scene, their folder. Otherwise it is the scene file that no other one names, nearest to
+    the top; photographs are scenes only where there is nothing else.
+
+    Raises
+    ------
+    SceneError
+        There is none, or there are several.
+    """
+    if len(places) == 1:
+        return places[0]
+    scenes = [place for place in places if kind_of_name(place) in known_suffixes()]
+    found = [place for place in scenes if kind_of_name(place) not in PHOTOS]
+    if all(kind_of_name(place) == _SLICE for place in found) and holds_dicom(folder):
+        tops = {place.parts[0] for place in places}
+        return Path(tops.pop()) if len(tops) == 1 else Path()
+    found = found or scenes
+    if len(found) > 1:
+        found = [place for place in found if not any(_names(folder / each, place) for each in found if each != place)]
+    top = min((len(place.parts) for place in found), default=0)
+    found = [place for place in found if len(place.parts) == top]
+    if len(found) == 1:
+        return found[0]
+    if not scenes:
+        raise SceneError("no scene is among these files", rule=f"known are {', '.join(known_suffixes())}")
+    rule = "a scene is dropped with the files that it names"
+    raise SceneError(f"{len(found) or len(scenes)} scenes were dropped", rule=rule, fix="drop one")
+
+
+def _names(path: Path, other: Path) -> bool:
+    """Whether a scene file names another one, in text or in percent signs."""
+    with path.open("rb") as file:
+        text = file.read(_SEARCHED)
+    return any(name.encode("utf-8", "surrogateescape") in text for name in (other.name, quote(other.name)))
