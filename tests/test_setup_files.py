@@ -129,3 +129,13 @@ def test_the_container_copies_what_is_there_and_runs_the_check():
         assert all((ROOT / name).exists() for name in line.split()), line
     ignored = (ROOT / ".dockerignore").read_text(encoding="utf-8").split()
     assert not {"src", "tests", "scripts", "Makefile", "pyproject.toml"} & set(ignored)
+
+
+def test_the_citation_is_of_this_version():
+    citation = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
+    assert citation["version"] == VERSION
+    assert re.fullmatch(r"\d{4}-\d{2}-\d{2}", str(citation["date-released"]))
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert f"version {VERSION}, {str(citation['date-released'])[:4]}" in readme
+    assert citation["title"] in readme
+    assert citation["references"][0]["title"] in " ".join(readme.split())

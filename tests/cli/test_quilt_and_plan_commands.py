@@ -52,8 +52,10 @@ def test_views_share_their_light_where_that_is_asked_for(lippmann, tmp_path):
 @pytest.mark.usefixtures("engine")
 def test_a_calibration_names_its_quilt_and_takes_it_back(lippmann, calibration, tmp_path):
     quilt, native = tmp_path / f"x{ENDING}", tmp_path / "native.png"
-    made = lippmann("quilt", "render", "teapot", "-d", calibration, *SMALL, "-o", quilt, "--quiet")
+    plain = tmp_path / "x.png"  # gets the ending of its kind
+    made = lippmann("quilt", "render", "teapot", "-d", calibration, *SMALL, "-o", plain, "--quiet")
     assert (made.code, made.out, made.err) == (0, "", "")
+    assert quilt.exists()
     assert lippmann("weave", quilt, "-d", calibration, "-o", native, "--quiet").code == 0
     assert read_picture(native).pixels.shape == (200, 150, 3)
 
@@ -90,6 +92,22 @@ def test_plan_says_what_to_expect(lippmann, calibration, monkeypatch):
     assert found["memory"]["expected"] > 0
 
 
+@pytest.mark.usefixtures("engine")
+def test_plan_foresees_a_turn(lippmann, monkeypatch):
+    monkeypatch.setattr(forecast, "PROBE_SECONDS", 0.05)
+    words = ("plan", "teapot", "--integrator", "direct", "--method", "full", "--spp", "2", "--json")
+    still, turn = lippmann(*words).json, lippmann(*words, "--turntable", "12").json
+    assert (still["frames"], turn["frames"]) == (1, 12)
+    assert turn["rays"]["primary"] == 12 * still["rays"]["primary"]
+    stages = turn["seconds"]
+    assert stages["total"] == pytest.approx(sum(spent for stage, spent in stages.items() if stage != "total"))
+    assert stages["trace"] > still["seconds"]["trace"]
+    told = lippmann(*words[:-1], "--turntable", "12", "--swing", "40")
+    assert "12 frames" in told.out.splitlines()[0]
+    refused = lippmann(*words, "--turntable", "1")
+    assert (refused.code, refused.err.count("\n")) == (2, 1)
+
+
 def test_bad_input_is_one_line_and_code_2(lippmann, tmp_path):
     def refused(*words):
         outcome = lippmann(*words)
@@ -103,7 +121,6 @@ def test_bad_input_is_one_line_and_code_2(lippmann, tmp_path):
     assert "the name says another quilt; the quilt's ends in _qs8x6a0.75.png" in refused(
         *render, "-o", tmp_path / "x_qs5x9a0.75.png"
     )
-    assert "does not say how many views" in refused(*render, "-o", tmp_path / "x.png")
     assert "the ending '.jpg'" in refused(*render, "-o", tmp_path / "x_qs8x6a0.75.jpg")
     assert "unknown display" in refused(*render, "-d", "portrai")
     assert "no quilt is known" in refused(*render, "-d", "panel-4k")

@@ -195,16 +195,42 @@ def test_a_film_of_quilts_beside_integral_images_is_rendered_by_their_cameras(en
     assert np.array_equal(shown[0], quantize(read_quilt(still).pixels, 8, "srgb"))
 
 
+@pytest.mark.parametrize(("eye", "film"), [((), "turn_qs3x2a0.75.mp4"), (("--eye", "sweep"), "turn.mp4")])
+def test_an_output_that_is_a_film_is_made_of_the_frames_beside_it(engine, lippmann, tmp_path, monkeypatch, eye, film):
+    monkeypatch.chdir(tmp_path)
+    done = lippmann("quilt", "render", "teapot", "--turntable", "2", *SMALL_QUILT, *eye, "-o", "turn.mp4", "--json")
+    assert done.code == 0, done.err
+    assert done.json["video"] == film
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["turn-frames", film]
+    assert len(frames_of(tmp_path / film)[1]) == 2
+    assert len(list((tmp_path / "turn-frames").glob("frame_*_qs3x2a0.75.png"))) == 2
+
+
+def test_an_output_that_is_a_film_of_integral_images(engine, lippmann, moving_ball, tmp_path):
+    done = lippmann("render", moving_ball, "--frames", "0:2", *QUICK, "--fps", "10", "-o", tmp_path / "ball.v1.mp4")
+    assert done.code == 0, done.err
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["ball-v1-frames", "ball.v1.mp4"]
+    assert frames_of(tmp_path / "ball.v1.mp4")[0] == 10
+
+
+def test_quilts_with_a_number_get_the_ending_of_their_kind(engine, lippmann, tmp_path):
+    done = lippmann("quilt", "render", "teapot", "--turntable", "2", *SMALL_QUILT, "-o", tmp_path / "q_%d.png")
+    assert done.code == 0, done.err
+    assert sorted(path.name for path in tmp_path.iterdir()) == [f"q_{number}_qs3x2a0.75.png" for number in (0, 1)]
+
+
 @pytest.mark.parametrize(
     ("words", "message"),
     [
+        (("quilt", "render", "-o", "film.mp4"), "film.mp4: a film needs frames; add --turntable 48, or --frames 0:48"),
+        (("render", "-o", "film.mp4"), "film.mp4: a film needs frames; add --turntable 48, or --frames 0:48"),
+        (("render", "--turntable", "8", "-o", "a.mp4", "--video", "b.mp4"), "--video: the output is a film already"),
         (("render", "--turntable", "1", "-o", "out"), "--turntable: 1 frames; 2 to 100000 frames of a turn"),
         (("render", "--swing", "400", "-o", "out"), "--swing: 400 degrees; above 0 and at most 360 degrees"),
         (("render", "--turntable", "8", "--animation", "hop", "-o", "out"), "--animation: a scene on a turntable"),
         (("render", "--turntable", "8", "--frames", "0:9", "-o", "out"), "there is no frame 8"),
         (("render", "--turntable", "8", "--fps", "9", "-o", "out"), "--fps: a turn has one pose a frame"),
         (("render", "--turntable", "8", "-o", "out", "--video", "x_qs8x6a1.mp4", "--eye", "0,0,9"), "--eye: a quilt's"),
-        (("quilt", "render", "--turntable", "8", "-o", "out_%d.png"), "does not say how many views"),
         (("quilt", "render", "--turntable", "8", "-o", "x_qs8x6a0.75.png"), "x_%04d_qs8x6a0.75.png, or a folder"),
         (("quilt", "render", "--turntable", "8", "--video", "x_qs5x9a0.75.mp4"), "the name says another quilt"),
         (("quilt", "render", "--turntable", "8", "--video", "x.mp4", "--eye", "0,0,0"), "--eye: an eye at z = 0"),

@@ -99,12 +99,14 @@ def test_parallel_views_are_true_to_one_percent_within_the_depth_that_is_resolve
 
 
 @pytest.mark.parametrize("distance", [math.inf, 300.0])
-def test_where_nothing_is_seen_depth_is_infinite_and_comes_back(display, distance):
+def test_where_nothing_is_seen_depth_is_infinite_disparity_nan_and_both_come_back(display, distance):
     cameras = Cameras.of_display(display(distance=distance))
     nothing = np.array([-np.inf, 1.0])
     assert cameras.axial_depth(nothing)[0] == np.inf
     assert cameras.height(cameras.axial_depth(nothing)).tolist() == [-np.inf, pytest.approx(1.0)]
-    assert cameras.disparity_of_height(nothing)[0] == -cameras.baseline / cameras.pixel_pitch
+    disparity = cameras.disparity_of_height(nothing)
+    assert np.isnan(disparity[0])
+    assert cameras.depth_of_disparity(disparity)[0] == np.inf
 
 
 @settings(deadline=None, max_examples=40)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import configparser
 import shutil
 
 import numpy as np
@@ -101,7 +102,8 @@ def test_depth_and_disparity_agree_by_the_file_s_own_parameters(display, picture
     for number in range(9):
         depth = read_pfm(tmp_path / "hci" / f"gt_depth_lowres_Cam{number:03}.pfm").astype(float)
         disparity = read_pfm(tmp_path / "hci" / f"gt_disp_lowres_Cam{number:03}.pfm")
-        np.testing.assert_allclose(disparity, cameras.disparity(1000 * depth), rtol=1e-5, atol=3e-5)
+        hit = np.isfinite(depth)
+        np.testing.assert_allclose(disparity[hit], cameras.disparity(1000 * depth[hit]), rtol=1e-5, atol=3e-5)
 
 
 def test_empty_places_and_nothing_are_infinitely_far(display, picture, tmp_path):
@@ -112,6 +114,24 @@ def test_empty_places_and_nothing_are_infinitely_far(display, picture, tmp_path)
     depth = np.stack([read_pfm(tmp_path / "hci" / f"gt_depth_lowres_Cam{number:03}.pfm") for number in range(16)])
     assert np.isinf(depth).sum() == (~field.mask).sum() > 0
     assert np.unique(depth[np.isfinite(depth)]).tolist() == [np.float32(0.495)]
+    names = [f"gt_disp_{end}.pfm" for end in ("lowres", "highres", *(f"lowres_Cam{number:03}" for number in range(16)))]
+    disparity = np.concatenate([read_pfm(tmp_path / "hci" / name).ravel() for name in names])
+    assert np.array_equal(np.isnan(disparity[-depth.size :]), np.isinf(depth).ravel())
+    written = configparser.ConfigParser()
+    written.read(tmp_path / "hci" / "parameters.cfg")
+    low, high = (float(written["meta"][key]) for key in ("disp_min", "disp_max"))
+    assert (low, high) == (np.nanmin(disparity), np.nanmax(disparity))
+    assert low == pytest.approx(float(read_parameters(tmp_path / "hci" / "parameters.cfg").cameras.disparity(495.0)))
+
+
+def test_disparity_alone_says_where_nothing_is_hit(display, picture, tmp_path):
+    heights = np.full((9, 12), 5.0, dtype=np.float32)
+    heights[2:7, 3:8] = -np.inf
+    there_and_back(picture(display("square", distance=500), maps={"depth": heights}), tmp_path / "hci", "uint8")
+    for path in (tmp_path / "hci").glob("gt_depth_*"):
+        path.unlink()
+    found = read_hci(tmp_path / "hci").image().maps["depth"]
+    np.testing.assert_allclose(found, heights, atol=1e-3)
 
 
 def test_without_depth_there_is_no_ground_truth(display, picture, tmp_path):
@@ -179,8 +199,8 @@ def resize(name):
             "has 2 x 2 values; parameters.cfg says 4 x 3",
         ),
         (
-            lambda f: write_pfm(f / "gt_disp_lowres.pfm", np.full((3, 4), np.nan, np.float32)),
-            "gt_disp_lowres.pfm: holds NaN",
+            lambda f: write_pfm(f / "gt_depth_lowres.pfm", np.full((3, 4), np.nan, np.float32)),
+            "gt_depth_lowres.pfm: holds NaN",
         ),
         (damage("lippmann.json", b"{}"), "lippmann.json: the JSON text that describes the display is damaged"),
         (damage("lippmann.json", b'{"lippmann": 1, "layout": "views"}'), "the layout is 'views'; it must be 'hci'"),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import re
 
 import numpy as np
 import pytest
@@ -64,21 +65,33 @@ def test_tables_for_other_programs(lippmann, without_engine, tmp_path):
         rows = list(csv.DictReader(file))
     assert len(rows) == 3 * len(VARIANTS)
     first = next(row for row in rows if row["method"] == "interpolated, as in the paper")
-    assert (first["light"], first["time saved, %"], first["pixels traced, %"]) == ("cheap", "60.0", "20.0")
+    assert (first["light"], first["time"], first["pixels traced, %"]) == ("cheap", "60 % saved", "20.0")
     assert {row["light"] for row in rows} == {"cheap", "physically based"}
     latex = (tmp_path / "report" / "results.tex").read_text()
     lines = latex.splitlines()
     assert lines[:2] == [r"\begin{tabular}{lllrrrrr}", r"\toprule"]
     assert lines[-2:] == [r"\bottomrule", r"\end{tabular}"]
     assert all(line.count(" & ") == 7 for line in lines if line.endswith(r"\\"))
-    assert r"time saved, \%" in latex
+    assert r"60 \% saved" in latex
     assert "%" not in latex.replace(r"\%", "")
+
+
+def test_lost_time_is_never_a_negative_saving(lippmann, without_engine, tmp_path, monkeypatch):
+    from lippmann.reproduce.experiment import Run
+
+    monkeypatch.setattr(Run, "time_share", property(lambda run: 1.0 if run.comparison is None else 10.07))
+    code, said, _ = lippmann("reproduce", "-o", tmp_path / "report", "--quick")
+    assert code == 0
+    told = {name: (tmp_path / "report" / name).read_text() for name in ("results.csv", "results.tex", "report.html")}
+    for name, text in {"the command": said, **told}.items():
+        assert "10 times as long" in text, name
+        assert not re.search(r"-\d+(\.\d+)? ?\\?%", text), name
 
 
 def test_it_says_what_was_saved(lippmann, without_engine, tmp_path):
     code, said, _ = lippmann("reproduce", "-o", tmp_path / "report", "--quick")
     assert code == 0
-    assert "teapot       interpolated as in the paper: 60 % of the time saved, 31." in said
+    assert "teapot       interpolated as in the paper: time 60 % saved, 31." in said
     assert lippmann("reproduce", "-o", tmp_path / "report", "--quick", "-q") == (0, "", "")
 
 

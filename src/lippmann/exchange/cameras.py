@@ -75,14 +75,17 @@ class Cameras:
         return self.baseline / self.pixel_pitch * (self.focus_distance / axial_depth - 1.0)
 
     def disparity_of_height(self, z: Real) -> Real:
-        """Disparity in pixels per view of points at the height ``z`` (mm, may be -inf) over the lens plane."""
+        """Disparity in pixels per view of points at the height ``z`` (mm) over the lens plane; NaN where it is -inf.
+
+        A ray that meets nothing has no disparity: that of infinity would be a surface to every tool that reads it.
+        """
         is_finite = np.isfinite(z)
         height = np.where(is_finite, z, 0.0)
         share = height / (self.focus_distance - (0.0 if self.parallel else height))
-        return self.baseline / self.pixel_pitch * np.where(is_finite, share, -1.0)
+        return self.baseline / self.pixel_pitch * np.where(is_finite, share, np.nan)
 
     def depth_of_disparity(self, disparity: Real) -> Real:
-        """Distance in mm along the axis of points with this disparity; infinite where float32 cannot resolve it."""
+        """Distance in mm along the axis of points with this disparity; infinite where it is NaN or beyond float32."""
         share = disparity * (self.pixel_pitch / self.baseline) + 1.0
         is_near = share > _INFINITE
         return np.where(is_near, self.focus_distance / np.where(is_near, share, 1.0), np.inf)

@@ -2,7 +2,7 @@
 
 ``input_Cam000.png`` is the top left view; the others follow row by row. Ground truth is depth along the axis in metres
 (``gt_depth_...pfm``) and disparity in pixels per view (``gt_disp_...pfm``), defined in
-:mod:`lippmann.exchange.cameras`:
+:mod:`lippmann.exchange.cameras`. Where a ray meets nothing, depth is infinite and disparity NaN.
 
 - ``..._lowres`` and ``..._highres``: the middle view (with an even number of views the one after the middle). The
   second has ``depth_map_scale`` times the resolution of the first, here 1.
@@ -98,7 +98,7 @@ def write_hci(
             _show_heights(temporary / HEIGHTS, _heights(light_field.maps[DEPTH], light_field.mask)[middle])
             for end in ("lowres", "highres"):
                 truth.write(temporary, middle, end)
-            disparities = truth.disparity[middle][np.isfinite(truth.depth[middle])]
+            disparities = truth.disparity[np.isfinite(truth.disparity)]
         parameters = Parameters(across, down, width, height, cameras)
         write_parameters(temporary / NAME, parameters, _meta(light_field, display, cameras, disparities))
         write_note_file(temporary, light_field.metadata, LAYOUT)
@@ -190,21 +190,22 @@ def _read_truth(folder: Path, parameters: Parameters) -> tuple[NDArray[np.float6
     kinds = [kind for kind in ("depth", "disp") if any(folder.glob(f"gt_{kind}_lowres_Cam*.pfm"))]
     alone = [kind for kind in ("depth", "disp") if (folder / f"gt_{kind}_lowres.pfm").exists()]
     for kind in alone:
-        _read_map(folder / f"gt_{kind}_lowres.pfm", parameters)
+        _read_map(folder, kind, "lowres", parameters)
     if not kinds:
         note = "ground truth of a single view is left out"
         return None, (note,) if alone else ()
-    views = [_read_map(folder / f"gt_{kinds[0]}_lowres_Cam{number:03}.pfm", parameters) for number in range(count)]
+    views = [_read_map(folder, kinds[0], f"lowres_Cam{number:03}", parameters) for number in range(count)]
     truth = np.stack(views).reshape(parameters.down, parameters.across, *views[0].shape).astype(np.float64)
     return truth * _METRE if kinds[0] == "depth" else parameters.cameras.depth_of_disparity(truth), ()
 
 
-def _read_map(path: Path, parameters: Parameters) -> NDArray[np.float32]:
+def _read_map(folder: Path, kind: str, end: str, parameters: Parameters) -> NDArray[np.float32]:
+    path = folder / f"gt_{kind}_{end}.pfm"
     values = read_pfm(path)
     if values.shape != (parameters.height, parameters.width):
         rule = f"{NAME} says {parameters.width} x {parameters.height}"
         raise PictureError(f"has {values.shape[1]} x {values.shape[0]} values", where=str(path), rule=rule)
-    if np.isnan(values).any():
+    if kind == "depth" and np.isnan(values).any():
         raise PictureError("holds NaN", where=str(path))
     return values
 

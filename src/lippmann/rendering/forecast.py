@@ -50,6 +50,8 @@ class Forecast:
     ----------
     size:
         Width and height in pixels.
+    frames:
+        Number of frames; ``rays`` and ``seconds`` are of all of them, the rest is of each.
     spp:
         Samples per pixel, or per sub-pixel where these have rays of their own.
     depth_range, resolvable_range:
@@ -73,6 +75,7 @@ class Forecast:
 
     display: str
     size: tuple[int, int]
+    frames: int
     subpixels: bool
     spp: int
     placement: str
@@ -93,8 +96,12 @@ class Forecast:
 
 
 @exclusive()
-def forecast(scene: Scene, display: Display, request: RenderRequest, progress: ProgressCallback = silent) -> Forecast:
+def forecast(
+    scene: Scene, display: Display, request: RenderRequest, progress: ProgressCallback = silent, *, frames: int = 1
+) -> Forecast:
     """Foresee what rendering ``scene`` for ``display`` will take; nothing but the probe is rendered.
+
+    ``frames`` alike, such as those of a turntable, take compiling once and all else anew for each.
 
     Raises
     ------
@@ -117,17 +124,18 @@ def forecast(scene: Scene, display: Display, request: RenderRequest, progress: P
     found = probe.trace(integrator, session)
     seconds = {
         "load": session.watch.seconds["load"],
-        "build": session.watch.seconds["build"],
-        "trace": found.compile + samples * found.seconds_per_sample,
+        "build": frames * session.watch.seconds["build"],
+        "trace": found.compile + frames * samples * found.seconds_per_sample,
     }
     if request.denoises:
-        seconds["denoise"] = _denoise_seconds(session, source, placement, found)
+        seconds["denoise"] = frames * _denoise_seconds(session, source, placement, found)
     seconds["total"] = sum(seconds.values())
     per_pixel = display.panel.pixel_pitch / display.gap / display.lens_array.pitch
     share_beyond = probe.share_beyond(session, placement) * source.width * source.height / (width * height)
     return Forecast(
         display=display.name,
         size=(width, height),
+        frames=frames,
         subpixels=bool(request.subpixels),
         spp=request.samples,
         placement=placement.mode,
@@ -135,7 +143,10 @@ def forecast(scene: Scene, display: Display, request: RenderRequest, progress: P
         resolvable_range=placement.resolvable_range,
         blur=(abs(placement.depth_range[0]) * per_pixel, abs(placement.depth_range[1]) * per_pixel),
         blurred_share=share_beyond,
-        rays={"primary": samples, **{kind: round(samples * share) for kind, share in found.rays.items()}},
+        rays={
+            "primary": frames * samples,
+            **{kind: round(frames * samples * share) for kind, share in found.rays.items()},
+        },
         memory={
             "expected": _resident() + width * height * memory_model.PICTURE + _working_bytes(source, session),
             "limit": session.memory,

@@ -130,14 +130,9 @@ def _slowdowns(results: Results) -> Markup:
     lines = []
     for variant in COMPARED:
         shares = [results.of(scene, variant.key).time_share for scene in results.runs]
-        said = dict.fromkeys((in_words(min(shares)), in_words(max(shares))))
+        said = dict.fromkeys((tables.in_words(min(shares)), tables.in_words(max(shares))))
         lines.append(element("li", f"{variant.title}: {' to '.join(said)}"))
     return element("ul", *lines)
-
-
-def in_words(time_share: float) -> str:
-    """A share of full tracing's time: a saving in percent, or how many times as long."""
-    return f"{100 * (1 - time_share):.0f} % saved" if time_share <= 1 else f"{time_share:.1f} times as long"
 
 
 def _frame(results: Results) -> str:
@@ -153,7 +148,7 @@ def _time(results: Results) -> list[Markup]:
         f"The paper prints {least} to {most} s for full tracing of its scenes and {low} to {high} % saved by "
         f"interpolation. Its row of the tree says {printed.TREE_PRINTED_PERCENT} %, but the seconds beside it come to "
         f"{printed.TREE_COMPUTED_PERCENT} %. The scenes here are of the same kind and count as its own, not copies of "
-        "them, and the machine is another: compare shares, not seconds. Negative savings are losses."
+        "them, and the machine is another: compare shares, not seconds."
     )
     cheap = (
         "One ray through each pixel and the light models of the paper cost a modern engine next to nothing, so that "

@@ -7,7 +7,7 @@ import io
 from collections.abc import Sequence
 
 from lippmann.reproduce.experiment import Results
-from lippmann.reproduce.tables import comparison, decibels
+from lippmann.reproduce.tables import comparison, decibels, in_words
 
 #: What LaTeX reads as more than a character.
 _LATEX = str.maketrans({"&": r"\&", "%": r"\%", "_": r"\_", "#": r"\#", "$": r"\$", "{": r"\{", "}": r"\}"})
@@ -17,7 +17,7 @@ HEAD = (
     "scene",
     "method",
     "seconds",
-    "time saved, %",
+    "time",
     "pixels traced, %",
     "rays, %",
     "mean PSNR of lenses, dB",
@@ -31,7 +31,7 @@ def rows_of(results: Results) -> list[tuple[str, ...]]:
         for scene, runs in ({} if part is None else part.runs).items():
             for run in runs.values():
                 quality = "" if run.comparison is None else decibels(comparison(run).paper.mean_psnr)
-                figures = (f"{run.seconds:.4g}", f"{run.saved_percent:.1f}", f"{100 * run.traced_share:.1f}")
+                figures = (f"{run.seconds:.4g}", in_words(run.time_share), f"{100 * run.traced_share:.1f}")
                 rows.append((light, scene, run.variant.title, *figures, f"{100 * run.ray_share:.1f}", quality))
     return rows
 

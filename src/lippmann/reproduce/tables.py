@@ -40,8 +40,8 @@ def table_1(display: Display) -> Markup:
 def table_2(results: Results, manner: Manner) -> Markup:
     """Seconds of every scene by full tracing and by the methods of one manner, and what these save."""
     variants = results.of_manner(manner)
-    head = ["Scene", "s", *("s", "saved, s", "saved, %", "pixels traced", "rays") * len(variants)]
-    spans = [("", 1), ("full", 1), *((variant.method, 5) for variant in variants)]
+    head = ["Scene", "s", *("s", "time", "pixels traced", "rays") * len(variants)]
+    spans = [("", 1), ("full", 1), *((variant.method, 4) for variant in variants)]
     if manner is Manner.PAPER:
         head.append("interpolation saves, %")
         spans.append(("the paper", 1))
@@ -50,7 +50,7 @@ def table_2(results: Results, manner: Manner) -> Markup:
         shown = [scene, seconds(results.full(scene).seconds)]
         for variant in variants:
             run = results.of(scene, variant.key)
-            shown += [seconds(run.seconds), seconds(run.saved_seconds), f"{run.saved_percent:.1f}"]
+            shown += [seconds(run.seconds), in_words(run.time_share)]
             shown += [percent(run.traced_share), percent(run.ray_share)]
         if manner is Manner.PAPER:
             shown.append(_printed_saving(scene))
@@ -158,6 +158,13 @@ def percent(share: float) -> str:
 def seconds(value: float) -> str:
     """Seconds with three significant digits or milliseconds, whichever is coarser."""
     return f"{value:.3f}" if abs(value) < 10 else f"{value:.1f}"
+
+
+def in_words(time_share: float) -> str:
+    """A share of full tracing's time: a saving in percent, or how many times as long."""
+    if time_share <= 1:
+        return f"{100 * (1 - time_share):.0f} % saved"
+    return f"{time_share:.{1 if time_share < 10 else 0}f} times as long"
 
 
 def _change(before: str, after: str) -> Markup:

@@ -75,7 +75,7 @@ def reproduce(
     from lippmann.reproduce.run import PAGE
     from lippmann.reproduce.run import reproduce as reproduce_paper
     from lippmann.reproduce.summary import summary
-    from lippmann.reproduce.tables import comparison
+    from lippmann.reproduce.tables import comparison, in_words
 
     console = Console(quiet, as_json)
     with console.progress() as progress:
@@ -87,8 +87,8 @@ def reproduce(
             results.of(scene, Variant("interpolated", manner).key) for manner in (Manner.PAPER, Manner.GLOSS)
         )
         lines.append(
-            f"{scene:<12} interpolated as in the paper: {paper.saved_percent:.0f} % of the time saved, "
-            f"{_decibels(comparison(paper).paper.mean_psnr)}; gloss respected: {gloss.saved_percent:.0f} %, "
+            f"{scene:<12} interpolated as in the paper: time {in_words(paper.time_share)}, "
+            f"{_decibels(comparison(paper).paper.mean_psnr)}; gloss respected: time {in_words(gloss.time_share)}, "
             f"{_decibels(comparison(gloss).paper.mean_psnr)}"
         )
     console.result({"output": str(page), **summary(results)}, "\n".join(lines))

@@ -130,7 +130,7 @@ def replay(
         ),
     ] = None,
     sweep: Annotated[
-        bool, typer.Option("--sweep", help="Write an animation from left to right: .png (APNG) or .mp4.")
+        bool, typer.Option("--sweep", help="Write an animation from left to right: .mp4 or .png (APNG).")
     ] = False,
     frames: Annotated[int, typer.Option("--frames", help="Number of frames of the sweep.")] = 48,
     width: Annotated[
@@ -173,7 +173,7 @@ def replay(
     if path is not None and (sweep or eye is not None):
         raise UsageError("the path says where the eye is", where="--path", fix="leave out --sweep and --eye")
     moves = sweep or path is not None
-    output = output_of(output, picture, "-sweep.png" if moves else "-seen.png")
+    output = output_of(output, picture, "-sweep.mp4" if moves else "-seen.png")
     if moves:
         check_animation_path(output, codec)
         check_writable(output)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
 from lippmann.cli.commands import print as printing
+from lippmann.cli.commands import sequence
 from lippmann.cli.shared import options, parse
 from lippmann.cli.shared.console import Console
 from lippmann.cli.shared.picture_report import depths
@@ -68,6 +70,8 @@ def plan(
     thickness: printing.Thickness = None,
     index: printing.Index = None,
     field: printing.Field = None,
+    turntable: sequence.TurntableFrames = None,
+    swing: sequence.Swing = None,
     state: options.State = None,
     device: options.Device = "auto",
     threads: options.Threads = None,
@@ -91,6 +95,7 @@ def plan(
         index=index,
         field=field,
     )
+    placement = parse.placement(camera, place, turn, shift, scale, depth_scale, pop_out)
     request = RenderRequest(
         method=method,
         integrator=integrator,
@@ -104,7 +109,7 @@ def plan(
         denoise=denoise,
         caustics=caustics,
         clamp_indirect=clamp_indirect,
-        placement=parse.placement(camera, place, turn, shift, scale, depth_scale, pop_out),
+        placement=placement,
         device=device,
         threads=threads,
         memory=parse.memory(memory),
@@ -119,9 +124,18 @@ def plan(
         window=parse.window(window),
         series=series,
     )
+    turning = sequence.Wanted(None, None, None, None, turntable, swing, None, None)
     with console.progress() as progress:
-        loaded = source.load()
-        found = forecast(loaded, target, request, progress)
+        if turning:
+            from lippmann.sequences.frames import find_stand
+
+            motion = sequence.open_moving(source, turning, request)
+            where = find_stand(motion, target, placement)
+            loaded, frames = motion.scene(0), motion.count
+            request = replace(request, placement=where(0))
+        else:
+            loaded, frames = source.load(), 1
+        found = forecast(loaded, target, request, progress, frames=frames)
     for note in found.notes:
         console.remark(note)
     console.result({"scene": loaded.name, **found.to_dict()}, "\n".join(_lines(loaded.name, found)))
@@ -129,12 +143,13 @@ def plan(
 
 def _lines(name: str, found: Forecast) -> list[str]:
     width, height = found.size
+    of_frames = f", {found.frames} frames" if found.frames > 1 else ""
     of_subpixels = ", a ray for every sub-pixel" if found.subpixels else ""
     behind, before = found.blur
     stages = ", ".join(f"{stage} {_duration(spent)}" for stage, spent in found.seconds.items() if stage != "total")
     others = found.rays["shadow"] + found.rays["secondary"]
     return [
-        f"picture   {name} for {found.display}, {width}x{height} pixels{of_subpixels}",
+        f"picture   {name} for {found.display}, {width}x{height} pixels{of_frames}{of_subpixels}",
         f"scene     {depths(*found.depth_range)}",
         f"resolved  {depths(*found.resolvable_range)}",
         f"blur      {100 * found.blurred_share:.0f} % of the pixels see what lies beyond; "

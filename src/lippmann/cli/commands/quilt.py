@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -35,8 +36,8 @@ Output = Annotated[
     typer.Option(
         "--output",
         "-o",
-        help="The quilt to write: NAME_qsCOLUMNSxROWSaASPECT.png, .exr or .tif. By default the scene's name, here. "
-        "Of a sequence a folder, or a name with %04d.",
+        help="The quilt to write: NAME.png, .exr or .tif; _qsCOLUMNSxROWSaASPECT is added. By default the scene's "
+        "name, here. Of a sequence a film (.mp4), a folder, or a name with %04d.",
         show_default=False,
     ),
 ]
@@ -143,13 +144,16 @@ def render(
     grid = None if views is None else parse.size(views, "--views", rule="columns x rows, such as 8x6")
     wanted = quilt_of_display(target, grid, None if size is None else parse.size(size, "--size"))
     moving = sequence.Wanted(frames, fps, animation, camera_path, turntable, swing, video, eye, codec)
-    path = output or Path(f"{Path(scene).stem}{'' if moving else f'{wanted.layout.ending}.png'}")
-    if not moving or (path.suffix and not path.is_dir()):
-        _check_name(path, wanted.layout.ending)
+    path = output or Path(f"{Path(scene).stem}{'' if moving else '.png'}")
+    moving, file = sequence.with_film(moving, path)
+    if file != path:
+        moving = moving if eye is not None else replace(moving, video=_named(path, wanted.layout.ending))
+    elif not moving or (path.suffix and not path.is_dir()):
+        file = _named(path, wanted.layout.ending)
     if not moving:
         if resume:
             raise UsageError("a quilt is rendered in one piece", where="--resume", fix="leave it out")
-        check_output(path, format_for(path, bits)[0])
+        check_output(file, format_for(file, bits)[0])
     request = RenderRequest(
         method=method,
         integrator=integrator,
@@ -183,7 +187,7 @@ def render(
     if moving:
         from lippmann.sequences.forms import QuiltForm
 
-        files = sequence.Files(path, bits, None, resume)
+        files = sequence.Files(file, bits, None, resume)
         sequence.render_frames(source, target, request, moving, files, console, form=QuiltForm(wanted))
         return
     with console.progress() as progress:
@@ -197,7 +201,7 @@ def render(
         made = Quilt(frame.pixels, layout, provenance=frame.provenance, display=target)
         progress(Progress("write", 0, 1))
         writing = time.perf_counter()
-        write_quilt(made, path, bits=bits)
+        write_quilt(made, file, bits=bits)
     spent = add_seconds(made.provenance, load=load_seconds, write=time.perf_counter() - writing)
     console.remark(depth_line(spent))
     for note in spent.notes:
@@ -205,8 +209,8 @@ def render(
     if spent.estimate is not None:
         console.remark(f"estimated PSNR {estimate_in_words(spent.estimate, 'view')}")
     seconds = spent.seconds["total"]
-    values: dict[str, Any] = report(path, (wanted.width, wanted.height), spent)
-    console.result(values | {"display": target.name, "views": wanted.layout.views}, _sentence(path, made, seconds))
+    values: dict[str, Any] = report(file, (wanted.width, wanted.height), spent)
+    console.result(values | {"display": target.name, "views": wanted.layout.views}, _sentence(file, made, seconds))
 
 
 @quilt.command("pack", cls=HelpfulCommand)
@@ -325,13 +329,17 @@ def weave(
     console.result(result, f"{output}: {views.layout.views} views on {width}x{height} pixels of {target.name}")
 
 
-def _check_name(path: Path, ending: str) -> None:
+def _named(path: Path, ending: str) -> Path:
+    """``path`` with the ending of its quilt's layout."""
     from lippmann.errors import OutputError
-    from lippmann.quilts.quilt import layout_of_name
+    from lippmann.quilts.quilt import layout_of_name, names_layout
 
+    if not names_layout(path):
+        return path.with_name(f"{path.stem}{ending}{path.suffix}")
     if layout_of_name(path).ending != ending:
         rule = f"the quilt's ends in {ending}{path.suffix}"
         raise OutputError("the name says another quilt", where=str(path), rule=rule, fix="leave --output out")
+    return path
 
 
 def _sentence(path: Path, made: Quilt, seconds: float) -> str:

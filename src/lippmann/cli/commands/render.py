@@ -145,8 +145,8 @@ def render(
     )
     wanted = sequence.Wanted(frames, fps, animation, camera_path, turntable, swing, video, eye, codec)
     margin = printing.margin_of(marks, target, in_frames=bool(wanted))
-    output = output_of(output, scene, "-frames" if wanted else ".png")
-    if opens and wanted and video is None:
+    wanted, output = sequence.with_film(wanted, output_of(output, scene, "-frames" if wanted else ".png"))
+    if opens and wanted and wanted.video is None:
         raise UsageError("shows a picture or a film", where="--open", fix="add --video film.mp4")
     request = RenderRequest(
         method=method,
@@ -188,8 +188,8 @@ def render(
         files = sequence.Files(output, bits, maps, resume)
         with on_cluster.runner(console, threads) as runner:
             sequence.render_frames(source, target, request, wanted, files, console, runner=runner)
-        if opens and video is not None:
-            view.open_file(video)
+        if opens and wanted.video is not None:
+            view.open_file(wanted.video)
         return
     name, stored = format_for(output, bits)
     _check_layers(layers, name, output)

@@ -6,7 +6,7 @@ import re
 from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -34,7 +34,7 @@ Frames = Annotated[
     typer.Option(
         "--frames",
         help="Render frames of a scene that moves: FIRST:STOP or FIRST:STOP:STEP, such as 0:48 for 0 to 47; 0: is all. "
-        "The output is then a folder or a name with %04d.",
+        "The output is then a film (.mp4), a folder or a name with %04d.",
     ),
 ]
 Fps = Annotated[float | None, typer.Option("--fps", help="Frames per second of an animation and of the film; 24.")]
@@ -49,7 +49,7 @@ TurntableFrames = Annotated[
     typer.Option(
         "--turntable",
         help="Render so many frames of a whole turn of the scene about its upright axis, before a display and light "
-        "at rest. The output is a folder or a name with %04d.",
+        "at rest. The output is a film (.mp4), a folder or a name with %04d.",
         show_default=False,
     ),
 ]
@@ -85,6 +85,8 @@ Codec = Annotated[
     ),
 ]
 
+#: Endings of outputs that are films themselves; ``.png`` stays a picture's.
+_FILMS = (".mp4", ".apng")
 _NUMBER = re.compile(r"%(?:0(\d{1,2}))?d")
 _NUMERAL = re.compile(r"[\d.]+")
 _FOLDER_PATTERN = "frame_%04d"
@@ -137,6 +139,24 @@ class Wanted:
         return False
 
 
+def with_film(wanted: Wanted, output: Path) -> tuple[Wanted, Path]:
+    """Where ``output`` is a film, it becomes the film of frames in a folder beside it, ``NAME-frames``.
+
+    Raises
+    ------
+    UsageError
+        There are no frames, or ``--video`` names another film.
+    """
+    if output.suffix.lower() not in _FILMS or output.is_dir():
+        return wanted, output
+    if not wanted:
+        raise UsageError("a film needs frames", where=str(output), fix="add --turntable 48, or --frames 0:48")
+    if wanted.video is not None:
+        raise UsageError("the output is a film already", where="--video", fix="leave one of them out")
+    # A dot would make the folder's name that of a file.
+    return replace(wanted, video=output), output.with_name(f"{output.stem.replace('.', '-')}-frames")
+
+
 @dataclass(frozen=True)
 class Files:
     """What is written: the output, its bits per value, maps, and whether to go on with an interrupted run."""
@@ -180,7 +200,7 @@ def render_frames(
         raise UsageError("there is no film", where="--codec", fix="add --video FILE.mp4, or leave it out")
     chosen = frame_range(wanted.frames or ":")
     output = files.output
-    motion = _open(source, wanted, request)
+    motion = open_moving(source, wanted, request)
     frames = chosen.of(motion)
     ending = form.quilt.layout.ending if isinstance(form, QuiltForm) else ""
     path_of = numbered(output, len(frames), ending)
@@ -256,7 +276,7 @@ def render_frames(
     )
 
 
-def _open(source: SceneSource, wanted: Wanted, request: RenderRequest) -> Motion:
+def open_moving(source: SceneSource, wanted: Wanted, request: RenderRequest) -> Motion:
     """What moves."""
     if wanted.turns:
         from lippmann.runtime import engine
