@@ -129,7 +129,6 @@ class LiveSocket:
             if said["type"] not in handlers:
                 raise UsageError(f"'{said['type'][:40]}' is no message", rule=f"known are {', '.join(handlers)}")
             handlers[said["type"]](said)
-        await asyncio.sleep(0)  # where messages never end, others get their turn
 
     @contextmanager
     def _errors_said(self) -> Iterator[None]:

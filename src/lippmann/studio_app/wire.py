@@ -147,8 +147,7 @@ def _refuse_constant(name: str) -> float:
 
 
 def _is_shallow(value: object, depth: int = _MOST_DEPTH) -> bool:
-    if isinstance(value, dict):
-        return depth > 0 and all(_is_shallow(part, depth - 1) for part in value.values())
-    if isinstance(value, list):
-        return depth > 0 and all(_is_shallow(part, depth - 1) for part in value)
-    return True
+    if not isinstance(value, (dict, list)):
+        return True
+    parts = value.values() if isinstance(value, dict) else value
+    return depth > 0 and all(_is_shallow(part, depth - 1) for part in parts if isinstance(part, (dict, list)))
