@@ -31,6 +31,7 @@ from lippmann.studio_app import site as studio_site
 from lippmann.studio_app.live_socket import LiveSocket
 from lippmann.studio_app.page_values import state_of_values, values_of_state
 from lippmann.studio_app.pages import static_files
+from lippmann.studio_app.session import StudioSession
 from lippmann.studio_app.state import StudioState
 from lippmann.studio_app.state_toml import state_of_text
 
@@ -400,6 +401,31 @@ def test_a_scene_that_the_renderer_refuses_changes_nothing(tmp_path):
         status, _, body = post(studio, "a.obj", WEDGE)
         assert (status, "no light is seen" in json.loads(body)["error"]) == (200, True)
         assert kept(studio) == ([], 0)
+
+
+def test_a_state_that_cannot_be_shown_changes_nothing(tmp_path):
+    class Strict(StandIn):
+        def frame(self, view, is_stale=None):
+            if view.request.placement.camera == "gone":
+                raise SceneError("no camera is called 'gone'")
+            return super().frame(view)
+
+    with running(tmp_path, make=Strict) as studio, studio.connect() as socket:
+        socket.send(view(STATE))
+        said(socket, "frame")
+        socket.send(json.dumps({"type": "open", "text": 'camera = "gone"\n'}))
+        assert "gone" in said(socket, "error")["line"]
+        assert studio.session.state.camera is None
+        socket.send(json.dumps({"type": "open", "text": f"scale = 2.0\ndisplay = {json.dumps(TINY)}\n"}))
+        assert said(socket, "state")["state"]["scale"] == 2.0
+
+
+def test_the_command_line_may_read_what_the_studio_may(tmp_path):
+    state = StudioState(display=TINY)
+    for allowed in (False, True):
+        session = StudioSession(state, uploads=None, outputs=tmp_path, make_renderer=StandIn, allow_outside=allowed)
+        assert ("--allow-outside" in session.command(state)) == allowed
+        session.close()
 
 
 def test_what_is_dropped_twice_is_kept_once(tmp_path):

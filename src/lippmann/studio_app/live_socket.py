@@ -220,7 +220,14 @@ class LiveSocket:
             raise UsageError("this is no state", rule="the text of a TOML file")
         state = opened_state(text, self._state)
         self._session.check_files(state)
-        self._say({"type": "state", "state": values_of_state(state)})
+
+        def tell(error: LippmannError | None) -> None:
+            if error is None:
+                self._say_soon({"type": "state", "state": values_of_state(state)})
+            else:
+                self._take_error(error)
+
+        self._session.try_state(state, tell)
 
     # ---- From the studio, in other threads -------------------------------------------------------------------------
 

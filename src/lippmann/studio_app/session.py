@@ -136,7 +136,7 @@ class StudioSession:
             changes = {"scene": path, **{name: getattr(plain, name) for name in PLACED_BY}}
         with self._lock:
             self._titles[path] = dropped.name
-        self._try(replace(self.state, **changes), then)  # type: ignore[arg-type]
+        self.try_state(replace(self.state, **changes), then)  # type: ignore[arg-type]
         return changes
 
     def title(self, state: StudioState) -> str:
@@ -173,7 +173,7 @@ class StudioSession:
 
     def command(self, state: StudioState) -> list[str] | None:
         """The command line that renders a state; None for a scene that has no file."""
-        return None if self._held_scene(state) is not None else render_command(state)
+        return None if self._held_scene(state) is not None else self._render_command(state)
 
     def check_has_file(self, state: StudioState, what: str) -> None:
         """Raise :class:`UsageError` if the scene of a state has no file, which ``what`` needs."""
@@ -183,7 +183,7 @@ class StudioSession:
     def render(self, kind: Kind, state: StudioState) -> None:
         """Begin a full render of a state; a UsageError if one is running."""
         self.check_has_file(state, "a render from the page")
-        words = render_command(state)
+        words = self._render_command(state)
         ending: str | None = None
         if kind == "quilt":
             from lippmann.quilts.quilt import quilt_of_display
@@ -196,10 +196,10 @@ class StudioSession:
 
     def warm_up(self) -> None:
         """Begin to load the scene and to compile its kernels, before a page asks for a frame."""
-        self._try(self.state, lambda _: None)
+        self.try_state(self.state, lambda _: None)
 
-    def _try(self, state: StudioState, then: Callable[[LippmannError | None], None]) -> None:
-        """Render a state once; ``then`` gets what went wrong, or None."""
+    def try_state(self, state: StudioState, then: Callable[[LippmannError | None], None]) -> None:
+        """Render a state once, for nobody; ``then`` gets what went wrong, or None, in the render thread."""
 
         def end(error: LippmannError | None) -> None:
             self.thread.remove(watcher)
@@ -214,6 +214,9 @@ class StudioSession:
         """End all work."""
         self.jobs.close()
         self.thread.close()
+
+    def _render_command(self, state: StudioState) -> list[str]:
+        return [*render_command(state), *(("--allow-outside",) if self._allow_outside else ())]
 
     def _held_scene(self, state: StudioState) -> Scene | None:
         return self._held if state.scene == self._held_name else None
