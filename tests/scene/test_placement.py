@@ -45,10 +45,42 @@ def scale_of(placement):
     return np.linalg.norm(placement.world_from_display[:3, 0])
 
 
-def silhouette(placement, points, distance):
-    """Where a viewer in front of the display's middle sees points in the lens plane."""
-    points = in_display(placement, points)
-    return points[:, :2] / (1 - points[:, 2:] / distance)
+def zone(found):
+    """Slopes ``(n, 2)`` of a display's light lines, and of eyes that move level, against the line to its middle eye.
+
+    From the corners of the central micro-image; hexagons of the lens plane are those about the middles of a triangle.
+    """
+    lenses, around = found.lens_array, np.linspace(-1.0, 1.0, 9)
+    half, slant = found.micro_image_pitch / 2, math.radians(lenses.slant)
+    if lenses.layout == "lenticular":
+        across = around[:, None] * half * np.array([math.cos(slant), -math.sin(slant)])
+        level = around[:, None] * half / math.cos(slant) * np.array([1.0, 0.0])
+        return np.concatenate([across, level]) / found.gap
+    if lenses.layout == "square":
+        return np.array(np.meshgrid(around, around)).reshape(2, -1).T * half / found.gap
+    # The tips of a hexagon are as far from its own lens as from the two beyond.
+    right, above = np.array([lenses.pitch, 0.0]), np.array([lenses.pitch / 2, lenses.row_spacing])
+    tips = [
+        np.linalg.solve(pair, (np.square(pair).sum(axis=1)) / 2) for pair in ([right, above], [above, above - right])
+    ]
+    return np.concatenate([tips, np.negative(tips), tips * np.array([1, -1])]) * found.magnification / found.gap
+
+
+def spans(placement, points, found):
+    """Lowest and highest place ``(2, 2)`` in the lens plane at which any view of the view zone shows one of points."""
+    slopes, distance = zone(found)[:, None, :], found.viewing_distance
+    x, y, z = in_display(placement, points).T
+    # An eye at (sx D, sy D, D): its line to the point meets the lens plane at z / D of the way to the eye's foot.
+    share = z / distance if math.isfinite(distance) else 0.0 * z
+    toward = slopes * (z / (1 - share))[:, None]
+    seen = np.stack([x, y], axis=1) / (1 - share)[:, None] - toward
+    return np.stack([seen.min(axis=(0, 1)), seen.max(axis=(0, 1))])
+
+
+def fill(placement, points, found):
+    """Share of the panel, as all eyes of the view zone see it together, from its middle to the farthest side."""
+    seen = np.abs(spans(placement, points, found)).max(axis=0)
+    return float((2 * seen * found.magnification / found.size_mm).max())
 
 
 def options(**fields):
@@ -99,22 +131,24 @@ class TestFit:
         back, front = placed.depth_range
         assert (back, front) == (pytest.approx(-50), pytest.approx(0, abs=1e-9))
         assert placed.resolvable_range == (-50, 50)
-        assert np.ptp(in_display(placed, corners(box(6, 6, 8))), axis=0)[:2] == pytest.approx([FILL * 75] * 2)
-        assert placed.depth_scale == pytest.approx(50 / (8 / 6 * FILL * 75))
-        assert placed.warnings == ("depth 95 mm shown at 53 %: depth_scale=1 shows it whole",)
-        back, front = place(box(6, 6, 8), display(aperture=60.0)).depth_range
+        # Views a quarter to either side show its back 12.5 mm to the other.
+        side = FILL * 75 - 2 * 12.5
+        assert np.ptp(in_display(placed, corners(box(6, 6, 8))), axis=0)[:2] == pytest.approx([side] * 2)
+        assert placed.depth_scale == pytest.approx(50 / (8 / 6 * side))
+        assert placed.warnings == ("depth 61.7 mm shown at 81 %: depth_scale=1 shows it whole",)
+        back, front = place(box(6, 6, 16), display(aperture=60.0)).depth_range
         assert (back, front) == (pytest.approx(-50), pytest.approx(25))
 
     @pytest.mark.parametrize("aperture", [60.0, 200.0])
     def test_what_pops_out_is_held_by_the_resolved_depth_too(self, aperture):
-        placed = place(box(6, 6, 8), display(aperture=aperture), options=options(pop_out=0.6))
+        placed = place(box(6, 6, 16), display(aperture=aperture), options=options(pop_out=0.6))
         assert placed.depth_range == (pytest.approx(-100 / 3), pytest.approx(50))
 
     def test_depth_is_shown_whole_where_that_is_asked_for(self):
         whole = place(box(1, 1, 40), display(), options=options(depth_scale=1.0))
-        assert np.ptp(in_display(whole, corners(box(1, 1, 40))), axis=0) == pytest.approx(
-            [FILL * 75] * 2 + [FILL * 3000]
-        )
+        # 20 mm in front, the rest behind, which a quarter of it to either side does not take off the panel.
+        size = (FILL * 75 + 20 / 2) / (1 + 40 / 2)
+        assert np.ptp(in_display(whole, corners(box(1, 1, 40))), axis=0) == pytest.approx([size, size, 40 * size])
         (warning,) = whole.warnings
         assert "the display resolves -50 to 50 mm" in warning
 
@@ -124,10 +158,9 @@ class TestFit:
         placed = place(box(10, 10, 2), display(), options=given)
         plain = place(box(10, 10, 2), display(), options=options(mode=mode, scale=0.5, turn=(20, 30, 40)))
         points = corners(box(10, 10, 2))
-        if mode == "fit":  # it stands elsewhere in depth
-            assert np.ptp(in_display(placed, points), axis=0)[2] == pytest.approx(
-                0.25 * np.ptp(in_display(plain, points), axis=0)[2]
-            )
+        if mode == "fit":  # it stands elsewhere in depth, and larger, as its views move less
+            depth, full = (scale_of(each) * np.ptp(in_display(each, points), axis=0)[2] for each in (placed, plain))
+            assert depth == pytest.approx(0.25 * full)
         else:
             assert in_display(placed, points) == pytest.approx(in_display(plain, points) * (1, 1, 0.25) + (1, 2, 3))
         assert placed.depth_scale == pytest.approx(0.25)
@@ -139,20 +172,17 @@ class TestFit:
         ball /= np.linalg.norm(ball, axis=1)[:, None]
         bounds = np.stack([ball.min(axis=0), ball.max(axis=0)])
 
-        def fill(**known):
+        def filled(**known):
             placed = place(bounds, display(distance), options=options(turn=(45, 0, 45)), **known)
-            return np.abs(silhouette(placed, ball, distance)).max(axis=0) / (50, 37.5)
+            return fill(placed, ball, display(distance))
 
-        assert fill(extreme_points=lambda: ball).max() == pytest.approx(FILL, abs=0.01)
-        assert fill().max() < 0.8
+        assert filled(extreme_points=lambda: ball) == pytest.approx(FILL, abs=0.01)
+        assert filled() < 0.8
 
     def test_a_near_viewer_sees_the_front_face_whole(self):
         near = display(viewing_distance=100.0, aperture=90.0)
         bounds = box(4, 0.1, 1)
-        placed = place(bounds, near)
-        points = in_display(placed, corners(bounds))
-        seen = points[:, 0] / (1 - points[:, 2] / 100.0)  # where the viewer sees them in the lens plane
-        assert seen.max() == pytest.approx(FILL * 50)
+        assert fill(place(bounds, near), corners(bounds), near) == pytest.approx(FILL)
 
     @pytest.mark.parametrize(
         ("turn", "of", "to"),
@@ -172,7 +202,7 @@ class TestFit:
     def test_the_turned_box_is_what_is_fitted(self):
         bounds = box(1, 1, 4)
         placed = place(bounds, display(), options=options(turn=(90, 0, 0)))
-        assert np.ptp(in_display(placed, corners(bounds)), axis=0)[0] == pytest.approx(FILL * 100)
+        assert np.ptp(in_display(placed, corners(bounds)), axis=0)[0] == pytest.approx(FILL * 100 * 4 / (4 + 1 / 3))
 
     def test_shift_and_scale(self):
         bounds = box(10, 10, 1)
@@ -215,8 +245,7 @@ class TestFit:
     def test_presets_are_filled(self, preset):
         found = load_display(preset)
         placed = place(box(2, 2, 2), found)
-        seen = np.ptp(silhouette(placed, corners(box(2, 2, 2)), found.viewing_distance), axis=0) / found.size_mm
-        assert seen.max() == pytest.approx(FILL, rel=1e-6)
+        assert fill(placed, corners(box(2, 2, 2)), found) == pytest.approx(FILL, rel=1e-6)
         assert placed.depth_range[1] <= found.aperture_distance + 1e-9
         assert not any("blurred" in warning for warning in placed.warnings)
 
@@ -245,8 +274,62 @@ class TestFit:
         assert placed.depth_range == pytest.approx((points[:, 2].min(), points[:, 2].max()), abs=1e-6)
         assert points[:, 2].min() >= -50 - 1e-6
         assert points[:, 2].max() <= 50 + 1e-6
-        fill = np.abs(silhouette(placed, corners(bounds), distance)).max(axis=0) * 2 / found.size_mm
-        assert fill.max() == pytest.approx(FILL, rel=1e-6) or fill.max() < 1e-3
+        filled = fill(placed, corners(bounds), found)
+        assert filled == pytest.approx(FILL, rel=1e-6) or (size[0] + size[1] < 1e-3 and filled < FILL)
+
+
+@st.composite
+def displays(draw):
+    """Of all layouts, with 45 to 90 lenses from side to side."""
+    layout = draw(st.sampled_from(["lenticular", "square", "hexagonal"]))
+    pixels = draw(st.integers(4, 9))
+    width, height = (draw(st.integers(45, 90)) * pixels for _ in range(2))
+    return Display(
+        "test",
+        Panel(width, height, 0.25),
+        LensArray(layout, 0.25 * pixels, slant=draw(st.floats(-35, 35)) if layout == "lenticular" else 0.0),
+        gap=draw(st.floats(1.0, 12.0)),
+        viewing_distance=draw(st.sampled_from([math.inf, 2000.0, 400.0, 90.0])),
+        aperture_distance=draw(st.floats(0.0, 60.0)),
+    )
+
+
+def panel_points(found, points):
+    """All panel points ``(n, 2)`` that show one of points through their own lens, beyond the panel's edges too."""
+    columns, rows = (
+        range(-count // 4, count + count // 4) for count in (found.lens_grid.columns, found.lens_grid.rows)
+    )
+    if found.lens_array.layout == "lenticular":
+        rows = [0]
+    j, i = (a.ravel().astype(float) for a in np.meshgrid(rows, columns, indexing="ij"))
+    x, y = found.project(*(values[:, None] for values in points.T), i, j)
+    owner = found.lens_of(x, y)
+    own = (owner[0] == i) & (owner[1] == j)
+    return np.stack([x[own], y[own]], axis=1)
+
+
+@settings(deadline=None, max_examples=40)
+@given(
+    displays(),
+    st.integers(0, 2**32 - 1),
+    st.tuples(*[st.floats(-180, 180)] * 3),
+    st.none() | st.floats(0, 1),
+    st.none() | st.sampled_from([0.1, 1.0]),
+)
+def test_every_view_shows_all_of_a_fitted_mesh(found, seed, turn, pop_out, depth_scale):
+    rng = np.random.default_rng(seed)
+    mesh = rng.normal(size=(8, 3)) * rng.uniform(0.02, 1.0, 3) + rng.normal(size=3) * 10
+    placed = place(
+        np.stack([mesh.min(axis=0), mesh.max(axis=0)]),
+        found,
+        options=options(turn=turn, pop_out=pop_out, depth_scale=depth_scale),
+        bounds_in=lambda frame: np.stack([f(mesh @ frame[:3, :3].T + frame[:3, 3], axis=0) for f in (np.min, np.max)]),
+        extreme_points=lambda: mesh,
+    )
+    assert fill(placed, mesh, found) <= FILL + 1e-9
+    shown = panel_points(found, in_display(placed, mesh))
+    assert len(shown) > 0
+    assert (np.abs(shown) <= np.array(found.size_mm) / 2).all()
 
 
 class TestCamera:

@@ -165,14 +165,6 @@ class Display:
 
     def reach_of_views(self, z: float) -> tuple[float, float]:
         """Farthest distance from the middle, in mm along x and y, of the panel's light lines at height ``z``."""
-        lenses, slant = self.lens_array, math.radians(self.lens_array.slant)
-        half = 0.5 * lenses.pitch
-        if lenses.layout == "lenticular":
-            cell = half * math.cos(slant), half * abs(math.sin(slant))
-        elif lenses.layout == "square":
-            cell = half, half
-        else:  # the upper corner of a cell, three of which meet
-            cell = half, 0.5 * lenses.row_spacing + half**2 / (2.0 * lenses.row_spacing)
         # A light line meets the panel at q, d away from the middle of its micro-image: at height z it lies at
         # (q - d) / m (1 - z / D) - z d / g.
         nearness = (1.0 - z * self._convergence) / self.magnification
@@ -181,7 +173,7 @@ class Display:
                 abs((0.5 * side - d) * nearness - z * d / self.gap)
                 for d in (self.magnification * edge, -self.magnification * edge)
             )
-            for side, edge in zip(self.size_mm, cell, strict=True)
+            for side, edge in zip(self.size_mm, self.lens_array.half_cell, strict=True)
         )
         return across, along
 

@@ -92,6 +92,17 @@ class LensArray:
         return row_pitch
 
     @property
+    def half_cell(self) -> tuple[float, float]:
+        """Farthest distance in mm along x and y of a lens's edge from its centre; from its axis if lenticular."""
+        half, slant = 0.5 * self.pitch, math.radians(self.slant)
+        if self.layout == "lenticular":
+            return half * math.cos(slant), half * abs(math.sin(slant))
+        if self.layout == "square":
+            return half, half
+        # The upper corner of a cell, three of which meet.
+        return half, 0.5 * self.row_spacing + half**2 / (2.0 * self.row_spacing)
+
+    @property
     def row_spacing(self) -> float:
         """Distance between rows of lens centres in millimetres; infinite for a lenticular sheet, which has one row."""
         if self.layout == "lenticular":

@@ -1,4 +1,4 @@
-"""The cone in which a lenticular display shows its own views, for eyes that move sideways."""
+"""The view zone: the directions in which a display shows its own micro-images."""
 
 from __future__ import annotations
 
@@ -15,3 +15,20 @@ def cone_tangent(display: Display) -> float:
     the eye sees, through every lens, the fraction f of its micro-image, counted from the right edge.
     """
     return 0.5 * display.micro_image_pitch / (display.gap * math.cos(math.radians(display.lens_array.slant)))
+
+
+def zone_slopes(display: Display) -> tuple[float, float]:
+    """Largest slopes, sideways and up, of a display's light lines and views against the line to the viewing point.
+
+    A display shows a point at height z over the lens plane within ``z`` times these slopes of where its middle view
+    shows it. Micro-lenses: half a micro-image over the gap. Lenticular sheets: what their light lines reach across the
+    slanted axis, and eyes that move level over the whole of :func:`cone_tangent`.
+    """
+    across, along = (edge * display.magnification / display.gap for edge in display.lens_array.half_cell)
+    return (cone_tangent(display) if display.lens_array.layout == "lenticular" else across), along
+
+
+def size_seen(display: Display) -> tuple[float, float]:
+    """Width and height in mm of the part of the lens plane whose micro-images lie on the panel."""
+    width, height = display.size_mm
+    return width / display.magnification, height / display.magnification

@@ -1,8 +1,9 @@
-"""How a scene is fitted to a display: its silhouette fills the panel, its depth keeps to what the display resolves.
+"""How a scene is fitted to a display: all its views fill the panel together, its depth keeps to what is resolved.
 
-Size and depth are chosen apart. Seen from the viewing point the silhouette fills the panel's width or height; depth
-that the display would only blur is compressed about the lens plane. That is an affine map of the display's frame:
-straight rays stay straight, and are shaded in the scene's own space.
+Size and depth are chosen together. From view to view a point at height z over the lens plane moves by z times the
+difference of their slopes. The scene is the largest that stays on the panel in every view, once depth that the display
+would only blur is compressed about the lens plane. That is an affine map of the display's frame: straight rays stay
+straight, and are shaded in the scene's own space.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from lippmann.display import Display
+from lippmann.display.view_cone import size_seen, zone_slopes
 from lippmann.scene.camera_placement import FILL
 from lippmann.scene.matrices import Bounds, Vector, depth_scaling, scaling, translation
 from lippmann.scene.values.description import Matrix
@@ -27,8 +29,8 @@ _NOISE = 4.0 * float(np.finfo(np.float32).eps)
 #: No extent above this share of the largest one is noise, so that a small scene far from the origin has a size.
 _LARGEST_NOISE = 1e-3
 
-#: The scale is searched between these multiples of the one that fills the panel where all views are parallel.
-_SEARCHED = (1.0 / 16.0, 2.0)
+#: The size is searched for up to this multiple of the one that fills the panel if the scene had no depth.
+_LARGEST_SIZE = 2.0
 #: In so many rounds, each of which divides what is left into so many parts: to a millionth of a pixel.
 _ROUNDS, _PARTS = 8, 16
 #: What covers the panel in all views reaches beyond them by this share of its size, and is at most so many times as
@@ -71,7 +73,7 @@ def fit_scene(
     pop_out: float | None = None,
     covers: bool = False,
 ) -> Fit:
-    """Fit a scene to a display.
+    """Fit a scene to a display, so that every view of its view zone shows all of it, and all views fill the panel.
 
     In front of the lens plane lies ``pop_out`` of the depth, but no more than the aperture lets through: the rest of it
     moves behind.
@@ -99,49 +101,63 @@ def fit_scene(
     # Where there is no extent, rounding noise must not count as one.
     seen = (points - middle) * (np.array([width, height, depth]) > 0.0)
 
+    def depths(sizes: Bounds) -> tuple[Bounds, Bounds]:
+        """Share of the depth that is shown, and how much of it would lie in front, for sizes ``(m,)``."""
+        shown = np.minimum(1.0, resolved / sizes) if depth_scale is None else np.full(len(sizes), depth_scale)
+        return shown, share * depth * sizes * shown
+
+    def spans(sizes: Bounds) -> tuple[Bounds, Bounds]:
+        """:func:`_spans` of sizes ``(m,)``, in mm per world unit."""
+        shown, front = depths(sizes)
+        heights = np.minimum(front, display.aperture_distance)[:, None] + seen[:, 2] * (sizes * shown)[:, None]
+        return _spans(seen[:, :2], sizes, heights, display)
+
     def at(size: float) -> Fit:
         """The fit of a given size, in mm per world unit."""
-        shown = min(1.0, resolved / size) if depth_scale is None else depth_scale
-        full_front = share * depth * size * shown
+        sizes = np.array([size])
+        shown, full_front = (float(values[0]) for values in depths(sizes))
         front = min(full_front, display.aperture_distance)
-        x, y = (0.0, 0.0) if covers else _center(seen, size, shown, front, display)
+        x, y = (0.0, 0.0) if covers else spans(sizes)[0][0]
         anchor = translation(-middle - (x, y, 0.0))
         matrix = translation((0.0, 0.0, front)) @ depth_scaling(shown) @ scaling(size) @ anchor
         return Fit(matrix, depth * size, shown, front, full_front)
 
     def fills(sizes: Bounds) -> Bounds:
-        """Share of the panel that the silhouette fills, on the axis where it fills more, for sizes ``(m,)``."""
-        shown = np.minimum(1.0, resolved / sizes) if depth_scale is None else np.full(len(sizes), depth_scale)
-        front = np.minimum(share * depth * sizes * shown, display.aperture_distance)
-        nearness, center = _centers(seen, sizes, shown, front, display)
-        widths = [  # an axis at a time: rows of numbers are quicker than pairs
-            sizes * np.ptp((seen[:, axis] - center[:, axis, None]) / nearness, axis=1) / display.size_mm[axis]
-            for axis in (0, 1)
-        ]
-        return np.asarray(np.maximum(*widths), np.float64)
+        """Share of the panel that all views fill together, on the axis where they fill more, for sizes ``(m,)``."""
+        return np.asarray((spans(sizes)[1] / size_seen(display)).max(axis=1), np.float64)
 
     if covers and width > 0.0 and height > 0.0:
-        size = _least_covering((width, height), at, display)
-    elif width > 0.0 or height > 0.0:
-        size = FILL * min(
-            side / extent if extent > 0.0 else np.inf
-            for side, extent in zip(display.size_mm, np.ptp(seen[:, :2], axis=0), strict=True)
-        )
-        if np.isfinite(display.viewing_distance):
-            size = _largest(fills, size)
+        return at(scale * _least_covering((width, height), at, display))
+    if width > 0.0 or height > 0.0:
+        sides = [FILL * side for side in size_seen(display)]
+        size = min(side / extent for side, extent in zip(sides, (width, height), strict=True) if extent > 0.0)
+        most = _LARGEST_SIZE * size
     else:  # a line toward the viewer
-        size = resolved
-    return at(size * scale)
+        most = resolved
+    if depth > 0.0:
+        least = _surely_whole(width, height, depth * (1.0 if depth_scale is None else depth_scale), display)
+        size = _largest(fills, min(least, most), most)
+    return at(scale * size)
 
 
-def _largest(fills: Callable[[Bounds], Bounds], size: float) -> float:
-    """The size, near the given one, whose silhouette fills the panel as it should."""
-    least, most = (np.log(size * factor) for factor in _SEARCHED)
+def _surely_whole(width: float, height: float, depth: float, display: Display) -> float:
+    """A size at which all views surely show the whole scene: all its depth as far off the lens plane, on either side.
+
+    In front, it comes no nearer than half way to the viewing point, where all is seen twice as large.
+    """
+    reach = np.array([width, height]) + 2.0 * depth * np.array(zone_slopes(display))
+    return float(
+        min(FILL / 2.0 * (np.array(size_seen(display)) / reach).min(), display.viewing_distance / (2.0 * depth))
+    )
+
+
+def _largest(fills: Callable[[Bounds], Bounds], least: float, most: float) -> float:
+    """The largest size, between one that is whole and ``most``, up to which all views together fit the panel."""
+    least, most = np.log(least), np.log(most)
     for _ in range(_ROUNDS):
-        places = least + (most - least) * np.arange(1, _PARTS) / _PARTS
+        places = least + (most - least) * np.arange(1, _PARTS + 1) / _PARTS
         fitting = int((fills(np.exp(places)) <= FILL).cumprod().sum())
-        bounds = [least, *places, most]
-        least, most = bounds[fitting], bounds[fitting + 1]
+        least, most = ([least, *places, most][fitting + end] for end in (0, 1))
     return float(np.exp(least))
 
 
@@ -163,34 +179,39 @@ def _least_covering(extents: tuple[float, float], at: Callable[[float], Fit], di
     return size
 
 
-def _center(seen: Bounds, size: float, shown: float, front: float, display: Display) -> tuple[float, float]:
-    """Where, in world units from the box's middle, a scene has its centre as seen from the viewing point."""
-    _, centers = _centers(seen, np.array([size]), np.array([shown]), np.array([front]), display)
-    return float(centers[0, 0]), float(centers[0, 1])
+def _spans(seen: Bounds, sizes: Bounds, heights: Bounds, display: Display) -> tuple[Bounds, Bounds]:
+    """Where all views together show points, for m sizes: the middle ``(m, 2)`` and the span ``(m, 2)``.
 
+    The eye of slope s sees the point (x, y, z) of the display's frame in the lens plane at ``(x - s z) / (1 - z / D)``,
+    and so for y. The middle, in world units, is that which the panel's middle is to show: what lies farthest to either
+    side then lies equally far from it. The span is in mm of the lens plane.
 
-def _centers(seen: Bounds, sizes: Bounds, shown: Bounds, front: Bounds, display: Display) -> tuple[Bounds, Bounds]:
-    """Nearness ``(m, n)`` of points ``(n, 3)`` to the viewing point, and :func:`_center` ``(m, 2)``, for m sizes."""
-    nearness = 1.0 - (front[:, None] + seen[:, 2] * (sizes * shown)[:, None]) / display.viewing_distance
-    center = np.zeros((len(sizes), 2))
-    if np.isfinite(display.viewing_distance):
-        # What lies farthest to either side is to lie equally far from the middle: Newton steps, since that difference
-        # falls as the centre moves, by the two points' own slopes.
-        inverse, each = 1.0 / nearness, np.arange(len(sizes))
-        points = seen[:, 0] * inverse, seen[:, 1] * inverse
-        still = _CENTERED * np.abs(seen[:, :2]).max(initial=0.0)
+    Parameters
+    ----------
+    seen:
+        ``(n, 2)``, world units.
+    sizes:
+        ``(m,)``, mm per world unit.
+    heights:
+        ``(m, n)``, mm over the lens plane.
+    """
+    inverse = 1.0 / (1.0 - heights / display.viewing_distance)
+    each = np.arange(len(sizes))
+    middle, span = np.zeros((len(sizes), 2)), np.zeros((len(sizes), 2))
+    for axis, slope in enumerate(zone_slopes(display)):
+        place, shift = seen[:, axis] * inverse, slope * np.abs(heights) / sizes[:, None] * inverse
+        still = _CENTERED * np.abs(seen[:, axis]).max(initial=0.0)
+        # Newton steps: the difference of the two sides falls as the middle moves, by the two points' own slopes.
         for _ in range(_CENTERINGS):
-            moved = 0.0
-            for axis in (0, 1):
-                silhouette = points[axis] - center[:, axis, None] * inverse
-                right, left = silhouette.argmax(axis=1), silhouette.argmin(axis=1)
-                apart = silhouette[each, right] + silhouette[each, left]
-                step = apart / (inverse[each, right] + inverse[each, left])
-                center[:, axis] += step
-                moved = max(moved, float(np.abs(step).max()))
-            if moved <= still:
+            centered = place - middle[:, axis, None] * inverse
+            right, left = (centered + shift).argmax(axis=1), (centered - shift).argmin(axis=1)
+            reach = (centered + shift)[each, right], (centered - shift)[each, left]
+            span[:, axis] = sizes * (reach[0] - reach[1])
+            step = (reach[0] + reach[1]) / (inverse[each, right] + inverse[each, left])
+            middle[:, axis] += step
+            if np.abs(step).max() <= still:
                 break
-    return nearness, center
+    return middle, span
 
 
 def _extents(bounds: Bounds) -> Vector:
