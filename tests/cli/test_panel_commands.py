@@ -72,6 +72,63 @@ def test_a_quilt_and_its_views_weave_alike(lippmann, views, calibration, tmp_pat
         assert set(np.unique(np.asarray(Image.open(tmp_path / "native0.png")))) <= set(range(0, 240, 5))
 
 
+def disc(width, height):
+    """A white disc in the middle of a black picture, half as wide as its shorter side."""
+    x, y = np.meshgrid(np.arange(width) + 0.5 - width / 2, np.arange(height) + 0.5 - height / 2)
+    return Image.fromarray(np.where(np.hypot(x, y) < min(width, height) / 4, 255, 0).astype(np.uint8)).convert("RGB")
+
+
+@pytest.mark.parametrize(
+    ("fit", "diameter", "said"),
+    [
+        ((), 100, "cover: 62% of the width of the pictures is cut off"),
+        (("--fit", "cover"), 100, "cover: 62% of the width"),
+        (("--fit", "contain"), 38, ""),
+        (("--fit", "stretch"), None, "stretched"),
+    ],
+)
+def test_views_of_another_shape_keep_their_proportions(lippmann, calibration, tmp_path, fit, diameter, said):
+    folder, woven = tmp_path / "views", tmp_path / "woven.png"
+    folder.mkdir()
+    for number in range(3):
+        disc(320, 160).save(folder / f"{number}.png")
+    outcome = lippmann("weave", folder, "-d", calibration, "-o", woven, *fit)
+    assert outcome.code == 0
+    assert said in outcome.err
+    codes = np.asarray(Image.open(woven))[..., 1] > 127
+    if fit == ("--fit", "contain"):
+        assert codes[:40].all()  # paper above and below
+        assert codes[-40:].all()
+        codes = codes[70:130]
+    across, down = np.ptp(np.nonzero(codes.any(axis=0))) + 1, np.ptp(np.nonzero(codes.any(axis=1))) + 1
+    # A lens is 6 pixels wide.
+    assert across == pytest.approx(diameter or 38, abs=8)
+    assert down == pytest.approx(diameter or 100, abs=4)
+
+
+def test_a_quilt_of_another_shape_is_fitted_on_request(lippmann, views, calibration, tmp_path):
+    wide = tmp_path / "x_qs8x6a1.6.png"
+    assert lippmann("quilt", "pack", views, "-o", wide).code == 0
+    refused = lippmann("weave", wide, "-d", calibration, "-o", tmp_path / "native.png")
+    assert refused.code == 2
+    assert "--fit cover" in refused.err
+    assert lippmann("weave", wide, "-d", calibration, "-o", tmp_path / "native.png", "--fit", "cover").code == 0
+
+
+def test_a_replay_of_another_shape_is_framed(lippmann, views, calibration, tmp_path):
+    native, seen = tmp_path / "native.png", tmp_path / "seen.png"
+    assert lippmann("weave", views, "-d", calibration, "-o", native).code == 0
+    outcome = lippmann("replay", native, "--size", "200x120", "-o", seen)
+    assert "it fills 90x120 in the middle" in outcome.err
+    lit = np.asarray(Image.open(seen)).any(axis=(0, 2))
+    assert lit.shape == (200,)
+    assert (lit == (np.abs(np.arange(200) + 0.5 - 100) < 45)).all()
+    assert "in the middle" not in lippmann("replay", native, "--size", "90x120", "-o", seen).err
+    assert lippmann("refocus", native, "--plane", "0", "--size", "90x160", "-o", seen).code == 0
+    lit = np.asarray(Image.open(seen)).any(axis=(1, 2))
+    assert (lit == (np.abs(np.arange(160) + 0.5 - 80) < 60)).all()
+
+
 def test_the_woven_picture_is_replayed(lippmann, views, calibration, tmp_path):
     path, seen = tmp_path / "native.png", tmp_path / "seen.png"
     assert lippmann("weave", views, "-d", calibration, "-o", path).code == 0

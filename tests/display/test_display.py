@@ -490,3 +490,17 @@ def test_foreign_values_are_refused(change, where, said):
         Display.from_dict(values)
     assert caught.value.where == where
     assert said in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("asked", "inside"),
+    [
+        ((400, 300), (400, 300)),
+        ((800, 300), (400, 300)),
+        ((400, 900), (400, 300)),
+        ((33, 25), (33, 25)),
+        ((1, 9), (1, 1)),
+    ],
+)
+def test_the_largest_picture_of_the_panels_shape(asked, inside):
+    assert Panel(1600, 1200, 0.1).size_inside(*asked) == inside

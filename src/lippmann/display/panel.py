@@ -66,6 +66,15 @@ class Panel:
         """Width and height of the pixel area in millimetres."""
         return self.width * self.pixel_pitch, self.height * self.pixel_pitch
 
+    def size_inside(self, width: int, height: int) -> tuple[int, int]:
+        """Width and height in pixels of the largest picture of the panel's shape in one of ``width`` x ``height``.
+
+        A picture that has the panel's shape to half a pixel is filled.
+        """
+        shape = self.width / self.height
+        inside = max(1, min(width, round(height * shape))), max(1, min(height, round(width / shape)))
+        return (width, height) if width == round(height * shape) or height == round(width / shape) else inside
+
     @property
     def subpixel_order(self) -> tuple[int, ...]:
         """The sub-pixels (0 R, 1 G, 2 B) from left to right."""

@@ -141,7 +141,7 @@ def read_photos(
             rule = f"{paths[0].name} has {headers[0].size[0]} x {headers[0].size[1]}"
             what = f"has {header.size[0]} x {header.size[1]} pixels"
             raise PictureError(what, where=str(path), rule=rule, fix='say fit="cover" to fit each by itself')
-    windows = [_window(size, paper, number, len(paths), fit or "cover", shift) for number, size in enumerate(sizes)]
+    windows = [fit_window(size, paper, number, len(paths), fit or "cover", shift) for number, size in enumerate(sizes)]
     width, height = size[0], min(size[1], max(1, max(round(window.box[3] - window.box[1]) for window in windows)))
     if width * height * len(paths) > MOST_PIXELS:
         rule = f"together they have at most {MOST_PIXELS} pixels"
@@ -165,7 +165,7 @@ class _Header(NamedTuple):
     icc: bytes
 
 
-class _Window(NamedTuple):
+class FitWindow(NamedTuple):
     """The rectangle of a photograph that becomes a view, and the part of it that is shown; left, top, right, bottom.
 
     ``cropped`` is the fraction of the photograph's width and height outside it.
@@ -176,9 +176,10 @@ class _Window(NamedTuple):
     cropped: tuple[float, float]
 
 
-def _window(
-    size: tuple[int, int], paper: tuple[float, float], number: int, count: int, fit: Fit, shift: Shift
-) -> _Window:
+def fit_window(
+    size: tuple[float, float], paper: tuple[float, float], number: int, count: int, fit: Fit, shift: Shift
+) -> FitWindow:
+    """The window of photograph ``number`` of ``count`` that becomes a view; ``size`` and ``paper`` in any units."""
     width, height = size
     steps, in_mm = count - 1, shift.unit == "mm"
     pixels = 0.0 if in_mm else abs(shift.amount) * steps
@@ -200,10 +201,10 @@ def _window(
         min(box[2], x + common / 2, float(width)),
         min(box[3], float(height)),
     )
-    return _Window(box, shown, (1 - (shown[2] - shown[0]) / width, 1 - (shown[3] - shown[1]) / height))
+    return FitWindow(box, shown, (1 - (shown[2] - shown[0]) / width, 1 - (shown[3] - shown[1]) / height))
 
 
-def _fitted(picture: Image.Image, window: _Window, size: tuple[int, int]) -> Image.Image:
+def _fitted(picture: Image.Image, window: FitWindow, size: tuple[int, int]) -> Image.Image:
     """The window of a picture as a view of ``size``, on white paper."""
     from PIL import Image
 

@@ -31,7 +31,7 @@ ViewChoice = Literal["nearest", "linear"]
 _BLOCK, _VIEW_BLOCK = 1 << 18, 1 << 24
 
 #: Tolerance of aspect ratios: relative error that rounding in names and panel sizes causes.
-_ASPECT_TOLERANCE = 0.02
+ASPECT_TOLERANCE = 0.02
 
 
 def weave(
@@ -244,9 +244,11 @@ def _check_fit(quilt: Quilt, display: Display) -> None:
         raise PictureError(f"the display {display.name} has {display.lens_array.layout} lenses", rule=rule)
     shape = display.panel.width / display.panel.height
     aspect = quilt.layout.aspect
-    if aspect is not None and abs(aspect / shape - 1) > _ASPECT_TOLERANCE:
+    if aspect is not None and abs(aspect / shape - 1) > ASPECT_TOLERANCE:
         rule = f"the display {display.name} has {shape:.6g}"
-        raise PictureError(f"the quilt has the aspect {aspect:.6g}", rule=rule, fix="use the quilt's display")
+        raise PictureError(
+            f"the quilt has the aspect {aspect:.6g}", rule=rule, fix='use its display, or say fit="cover"'
+        )
 
 
 def _views(fraction: Real, count: int, choice: ViewChoice) -> tuple[NDArray[np.intp], Real]:

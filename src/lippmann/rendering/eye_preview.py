@@ -111,7 +111,7 @@ def render_eye_preview(
     denoiser = request.denoise if scene.lies_off_surfaces else "none"
     plain = replace(request, method="full", denoise=denoiser, order=None, respect_gloss=None, layers=False)
     resolved = resolve(plain, scene, display)
-    width, height = _size_of(display, size)
+    width, height = display.panel.size_inside(*(size or (LONGER_SIDE, LONGER_SIDE)))
     session = open_session(scene, resolved, (width, height), progress=progress)
     placement = session.place(display)
 
@@ -171,11 +171,3 @@ def _choose_samples(asked: RenderRequest, resolved: RenderRequest, pixels: int) 
     if asked.spp is not None or resolved.spp == 1 or resolved.integrator not in POOLED_LIGHT:
         return resolved.samples
     return min(max(1, _SAMPLE_BUDGET // max(1, pixels)), _MOST_SAMPLES)
-
-
-def _size_of(display: Display, size: tuple[int, int] | None) -> tuple[int, int]:
-    """Width and height in pixels of a picture of the panel's shape that keeps to ``size``."""
-    most = (LONGER_SIDE, LONGER_SIDE) if size is None else size
-    scale = min(side / extent for side, extent in zip(most, display.size_mm, strict=True))
-    width, height = (max(1, round(extent * scale)) for extent in display.size_mm)
-    return width, height

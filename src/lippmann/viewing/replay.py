@@ -243,6 +243,17 @@ def default_size(display: Display, widest: int = DEFAULT_WIDTH) -> tuple[int, in
     return max(1, round(panel.width * shrink)), max(1, round(panel.height * shrink))
 
 
+def in_middle(picture: FloatArray, size: tuple[int, int]) -> FloatArray:
+    """A picture in the middle of a black one of ``size`` (width, height), which is no smaller."""
+    height, width = picture.shape[:2]
+    if (width, height) == size:
+        return picture
+    left, top = (size[0] - width) // 2, (size[1] - height) // 2
+    framed = np.zeros((size[1], size[0], 3), dtype=np.float32)
+    framed[top : top + height, left : left + width] = picture
+    return framed
+
+
 def lens_plane_points(display: Display, width: int, height: int) -> Iterator[tuple[slice, Real, Real]]:
     """Rows, x and y in mm of the lens-plane points at the pixels of a ``width`` x ``height`` picture, in blocks."""
     step = max(1, _BLOCK // width)

@@ -15,7 +15,16 @@ from lippmann.errors import UsageError
 
 if TYPE_CHECKING:
     from lippmann.display import Display
-    from lippmann.quilts.photos import Photos, Shift
+    from lippmann.quilts.photos import Shift
+
+FitOption = Annotated[
+    Literal["cover", "contain", "stretch"] | None,
+    typer.Option(
+        "--fit",
+        help="cover: crop; contain: leave white paper; stretch: change proportions. "
+        "Default: cover; pictures must then have one size.",
+    ),
+]
 
 
 def interlace(
@@ -49,14 +58,7 @@ def interlace(
         ),
     ] = None,
     reverse: Annotated[bool, typer.Option("--reverse", help="Take the photographs in reverse order.")] = False,
-    fit: Annotated[
-        Literal["cover", "contain", "stretch"] | None,
-        typer.Option(
-            "--fit",
-            help="cover: crop; contain: leave white paper; stretch: change proportions. "
-            "Default: cover; photographs must then have one size.",
-        ),
-    ] = None,
+    fit: FitOption = None,
     shift: Annotated[
         str | None,
         typer.Option(
@@ -97,7 +99,7 @@ def interlace(
             icc=icc,
             progress=progress,
         )
-        for note in (*read.notes, *_fit_note(read, fit, across=across)):
+        for note in (*read.notes, *fit_note(read.cropped[::-1] if across else read.cropped, fit)):
             console.remark(note)
         choice = views or ("nearest" if across else "linear")
         pixels = write_interlaced(
@@ -168,13 +170,11 @@ def _shift(text: str | None) -> Shift:
     return Shift(float(match[1]), "mm" if match[2] == "mm" else "px")
 
 
-def _fit_note(read: Photos, fit: str | None, *, across: bool) -> list[str]:
-    """What becomes of the photographs' edges, in one line."""
+def fit_note(cropped: tuple[float, float], fit: str | None) -> list[str]:
+    """What becomes of pictures' edges, in one line, by the shares of their width and height that are cut off."""
     if fit == "stretch":
-        return ["the photographs are stretched to the print's proportions"]
-    first, second = read.cropped
-    width, height = (second, first) if across else (first, second)
-    parts = [f"{part:.0%} of the {side}" for part, side in ((width, "width"), (height, "height")) if part >= 0.005]
-    if not parts:
-        return []
-    return [f"{fit or 'cover'}: {' and '.join(parts)} of the photographs is cut off"]
+        return ["the pictures are stretched to the panel's proportions"]
+    parts = [
+        f"{part:.0%} of the {side}" for part, side in zip(cropped, ("width", "height"), strict=True) if part >= 0.005
+    ]
+    return [f"{fit or 'cover'}: {' and '.join(parts)} of the pictures is cut off"] if parts else []

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -191,12 +192,12 @@ def replay(
     else:
         target, transfer = quilt_display(quilt, parse.display(display), str(picture)), quilt.provenance.transfer
     position = default_eye(target) if eye is None else parse.triple(eye, "--eye")
-    pixels = None if size is None else parse.size(size, "--size")
+    pixels, framed = _size_of(size, target, console)
 
     def seen_by(place: tuple[float, float, float]) -> FloatArray:
         if quilt is not None:
-            return replay_quilt(quilt, target, place, size=pixels, linear=filter == "linear")
-        return replay_picture(image, place, size=pixels, filter=filter)
+            return framed(replay_quilt(quilt, target, place, size=pixels, linear=filter == "linear"))
+        return framed(replay_picture(image, place, size=pixels, filter=filter))
 
     def seen_from(place: tuple[float, float, float]) -> FloatArray:
         return seen_by(place) if stereo is None else stereo_pair(seen_by, place, *stereo)
@@ -257,15 +258,17 @@ def refocus(
         check_stack_path(output, bits)
     else:
         check_output(output, format_for(output, bits)[0])
-    pixels = None if size is None else parse.size(size, "--size")
     planes_asked = heights if plane is None else [plane]
     quilt = quilt_of(picture, layout, aspect)
     if quilt is None:
         image = open_picture(picture, display=parse.display(display))
+        pixels, framed = _size_of(size, image.display, console)
         focused, transfer = focal_planes(image, planes_asked, size=pixels), image.provenance.transfer
     else:
         target, transfer = quilt_display(quilt, parse.display(display), str(picture)), quilt.provenance.transfer
+        pixels, framed = _size_of(size, target, console)
         focused = refocus_quilt(quilt, target, planes_asked, size=pixels)
+    focused = (framed(each) for each in focused)
     if plane is not None:
         write_plain_picture(next(focused), output, bits=bits, transfer=transfer)
         console.result({"output": str(output), "plane": plane}, f"{output}: focused at {plane:g} mm")
@@ -274,6 +277,21 @@ def refocus(
         write_planes(focused, heights, output, bits=bits, transfer=transfer, progress=progress)
     line = f"{output}: {len(heights)} planes, focused at {heights[0]:g} to {heights[-1]:g} mm"
     console.result({"output": str(output), "planes": heights}, line)
+
+
+def _size_of(
+    size: str | None, display: Display, console: Console
+) -> tuple[tuple[int, int] | None, Callable[[FloatArray], FloatArray]]:
+    """Pixels of the panel in a picture of ``--size``, None where it is not given, and what frames it to that size."""
+    from lippmann.viewing.replay import checked_size, in_middle
+
+    if size is None:
+        return None, lambda picture: picture
+    whole = checked_size(parse.size(size, "--size"))
+    inside = display.panel.size_inside(*whole)
+    if inside != whole:
+        console.remark(f"the panel has another shape than {size}: it fills {inside[0]}x{inside[1]} in the middle")
+    return inside, lambda picture: in_middle(picture, whole)
 
 
 def quilt_of(picture: Path, layout: str | None, aspect: float | None) -> Quilt | None:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from lippmann.cli.commands import sequence
+from lippmann.cli.commands.interlace import FitOption, fit_note
 from lippmann.cli.shared import options, parse
 from lippmann.cli.shared.console import Console, estimate_in_words
 from lippmann.cli.shared.grouped_help import HelpfulCommand
@@ -294,6 +295,7 @@ def weave(
     choice: Annotated[
         str, typer.Option("--views", help="nearest: one view per sub-pixel; linear: a mixture of two.")
     ] = "linear",
+    fit: FitOption = None,
     layout: Layout = None,
     aspect: Aspect = None,
     bits: options.Bits = None,
@@ -304,6 +306,7 @@ def weave(
     from lippmann.display import load_display
     from lippmann.image.streamed import LARGE
     from lippmann.image.write import can_be_banded, check_output, format_for
+    from lippmann.quilts.fit_views import fit_views
     from lippmann.quilts.weave import weave as weave_views
     from lippmann.quilts.weave import weave_to_file
 
@@ -314,6 +317,10 @@ def weave(
     width, height = target.panel.width, target.panel.height
     with console.progress() as progress:
         views = _views(source, layout_of(layout, aspect), progress)
+        if fit is not None or source.is_dir():  # a quilt of another shape is refused, unless a fit is asked for
+            views, cropped = fit_views(views, width / height, fit or "cover")
+            for note in fit_note(cropped, fit):
+                console.remark(note)
         asked: dict[str, Any] = {"choice": choice, "scene": source.stem, "progress": progress}
         if width * height > LARGE and can_be_banded(name):
             weave_to_file(views, target, output, bits=bits, **asked)
