@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import cast
 
 import numpy as np
 
 from lippmann.image.encoding import converted_values
+from lippmann.image.stored_values import Stored
 from lippmann.quilts.photos import NO_SHIFT, Fit, fit_window
 from lippmann.quilts.quilt import Quilt
 from lippmann.quilts.weave import ASPECT_TOLERANCE
@@ -34,7 +36,8 @@ def fit_views(quilt: Quilt, shape: float, fit: Fit) -> tuple[Quilt, tuple[float,
     left, top = round(window.box[0] * scale), round(window.box[1])
     right, bottom = left + round((window.box[2] - window.box[0]) * scale), top + round(window.box[3] - window.box[1])
     size = (bottom - top) * layout.rows, (right - left) * layout.columns
-    white = converted_values(np.ones((1, 1, 3), np.float32), quilt.values.dtype.name, quilt.provenance.transfer)
+    held = cast(Stored, quilt.values.dtype.name)
+    white = converted_values(np.ones((1, 1, 3), np.float32), held, quilt.provenance.transfer)
     fitted = replace(quilt, values=np.full((*size, 3), white[0, 0], quilt.values.dtype), layout=layout)
     for number in range(layout.views):
         part = quilt.view_values(number)[max(top, 0) : bottom, max(left, 0) : right]
