@@ -6,11 +6,14 @@ Importing this package does no work: the names below are loaded when they are fi
 from __future__ import annotations
 
 import importlib
-from typing import TYPE_CHECKING, Any
 
 from lippmann import _version
 
+TYPE_CHECKING = False  # typing takes as long to load as the interpreter
+
 if TYPE_CHECKING:
+    from typing import Any
+
     from lippmann.api import (
         load_scene,
         plan,

@@ -190,6 +190,22 @@ def test_a_tile_that_kills_its_workers_is_given_up(lab, render, until):
 
 
 @pytest.mark.long
+def test_a_scheduler_that_stands_still_ends_the_render(lab, render, until, monkeypatch):
+    monkeypatch.setattr("lippmann.cluster.runner.SILENCE", 2.0)
+    scheduler = lab.start_scheduler()
+    worker = lab.start_worker()
+    lab.fail("hold")
+    begun = render(lab.address)
+    until(lab.begun)
+    scheduler.send_signal(signal.SIGSTOP)
+    begun.finish(60)
+    assert "has not answered for 2 s" in str(begun.error)
+    lab.kill(scheduler)
+    lab.kill(worker)
+    assert "Traceback" not in lab.log()
+
+
+@pytest.mark.long
 def test_interrupting_leaves_no_tiles_behind(lab, render, until):
     """What nobody waits for any more is not rendered."""
     from lippmann.cluster import connect, parse_target

@@ -387,3 +387,10 @@ def test_check_leaves_nothing(tmp_path):
     atomic_write.check_folder_writable(tmp_path / "views")
     assert names(tmp_path) == ["old.png"]
     assert (tmp_path / "old.png").read_text() == "kept"
+
+
+def test_a_library_that_quotes_the_system_is_understood(tmp_path):
+    with pytest.raises(OutputError, match="cannot be written: no space is left on the disk; free some space"):  # noqa: SIM117
+        with atomic_write.replacing(tmp_path / "x.exr"):
+            raise OSError('Failed to write pixel data to image file "x.part.exr". No space left on device.')
+    assert list(tmp_path.iterdir()) == []

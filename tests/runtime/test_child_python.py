@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import multiprocessing
 import os
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -114,3 +116,11 @@ def test_the_setting_ends_with_the_last_user(monkeypatch):
             pass
         assert os.environ[child_python.VARIABLE] == "1"
     assert os.environ[child_python.VARIABLE] == ""
+
+
+@pytest.mark.skipif(os.name == "nt", reason="there are no signal masks")
+def test_spawned_processes_do_not_hear_interrupts():
+    context = multiprocessing.get_context("spawn")
+    with child_python.spawn_safely(), context.Pool(1) as pool:
+        assert pool.apply(signal.pthread_sigmask, (signal.SIG_BLOCK, ())) == {signal.SIGINT}
+    assert signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, ())

@@ -173,3 +173,15 @@ def test_a_state_loads_no_engine():
         "assert 'mitsuba' not in sys.modules and 'drjit' not in sys.modules"
     )
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+@pytest.mark.parametrize("setting", ["scale", "exposure", "quality"])
+def test_numbers_of_hundreds_of_digits_are_refused_by_their_line(setting):
+    with pytest.raises(UsageError, match=rf"state:2: {setting}: 1000.*a number below 1\.8e308"):
+        state_of_text(f'scene = "teapot"\n{setting} = 1{"0" * 399}\n')
+
+
+def test_a_byte_order_mark_is_no_part_of_a_state(tmp_path):
+    path = tmp_path / "state.toml"
+    path.write_bytes(b"\xef\xbb\xbf" + b'scene = "gears"\n')
+    assert read_state(path).scene == "gears"

@@ -1,34 +1,45 @@
-"""The command line: parse, call the library, leave with an exit code.
+"""The command line: parse, call the library, leave with an exit code (:mod:`~lippmann.cli.outcome`).
 
-0 is success, 1 a failure of the program or the machine, 2 bad input, 130 Ctrl-C.
+Nothing is imported here that takes time: Ctrl-C is one line from the first moment.
 """
 
 from __future__ import annotations
 
-import errno
+# signal, threading, typing and contextlib take as long as the interpreter.
+import _signal  # type: ignore[import-not-found]
+import _thread
 import os
-import re
 import sys
-from contextlib import suppress
-from typing import NoReturn
+import time
 
-from typer import BadParameter
-
-from lippmann.cli.shared import command_clock
-from lippmann.cli.shared.exit_codes import INTERRUPTED
-from lippmann.errors import LippmannError
-from lippmann.printable import one_line
-from lippmann.runtime.input_memory import limit_inputs
-
-#: The base of all complaints about the command line itself; its home moved between releases of typer.
-_ComplaintError = BadParameter.__mro__[2]
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from typing import NoReturn
 
 
 def main(arguments: list[str] | None = None) -> None:
     """Run one command and leave the process with its exit code."""
+    # A process that was started with interrupts ignored leaves them so.
+    is_heard = _signal.getsignal(_signal.SIGINT) is _signal.default_int_handler
+    if is_heard:
+        _signal.signal(_signal.SIGINT, _leave_early)
+    from lippmann.cli import app, outcome
+    from lippmann.cli.shared import standard_streams
+    from lippmann.cli.shared.exit_codes import INTERRUPTED
+
+    del app  # loaded while an interrupt still ends the process at once
+    standard_streams.complete()
     words = list(sys.argv[1:] if arguments is None else arguments)
     debug = "--debug" in words
-    code = run([word for word in words if word != "--debug"], debug=debug)
+    try:
+        if is_heard:
+            sys.unraisablehook = _hear_again
+            _signal.signal(_signal.SIGINT, _signal.default_int_handler)
+        code = outcome.run([word for word in words if word != "--debug"], debug=debug)
+    except KeyboardInterrupt:
+        code = outcome.stopped()
+    if is_heard:
+        _signal.signal(_signal.SIGINT, lambda *_: os._exit(code))
     if code == INTERRUPTED:
         _end_at_once(code)
     sys.exit(code)
@@ -36,40 +47,30 @@ def main(arguments: list[str] | None = None) -> None:
 
 def run(words: list[str], *, debug: bool = False) -> int:
     """Run one command; errors become one line on standard error unless ``debug`` asks for the traceback."""
-    command_clock.start()
-    limit_inputs(None)  # of the command before, in one process
-    from lippmann.cli.app import app
-    from lippmann.cli.shared.option_names import in_options
+    from lippmann.cli import outcome
 
+    return outcome.run(words, debug=debug)
+
+
+def _leave_early(*_: object) -> NoReturn:
+    """Ctrl-C before a command has begun."""
     try:
-        code = app(words, prog_name="lippmann", standalone_mode=False)
-    except SystemExit:
-        raise
-    except BaseException as error:
-        if _is_interrupt(error):
-            return _stopped()
-        if debug:
-            raise
-        if isinstance(error, LippmannError):
-            return _leave(in_options(error), error.exit_code)
-        if isinstance(error, _ComplaintError):
-            return _leave(_usage(error), 2)
-        if isinstance(error, MemoryError):
-            return _leave("out of memory; lower --memory or close other programs", 1)
-        if isinstance(error, OSError) and error.errno == errno.ENAMETOOLONG:
-            return _leave(f"{str(error.filename)[:60]}...: no file can have a name that long", 2)
-        if isinstance(error, Exception):
-            what = " ".join(f"{type(error).__name__}: {error}".split())
-            return _leave(f"internal error: {what}; run again with --debug and report it", 1)
-        raise
-    # Typer makes an exit code of most Ctrl-C.
-    if code == INTERRUPTED:
-        return _stopped()
-    return code if isinstance(code, int) else 0
+        os.write(2, b"lippmann: stopped; nothing was written\n")
+    finally:
+        os._exit(130)
 
 
-def _stopped() -> int:
-    return _leave("stopped; nothing was written", INTERRUPTED)
+def _hear_again(error: sys.UnraisableHookArgs) -> None:
+    """An interrupt that struck where nothing can be raised, such as in a destructor, comes again."""
+    if issubclass(error.exc_type, KeyboardInterrupt):
+        _thread.start_new_thread(_interrupt_soon, ())
+    else:
+        sys.__unraisablehook__(error)
+
+
+def _interrupt_soon() -> None:
+    time.sleep(0.01)  # in the hook itself nothing can be raised either
+    os.kill(os.getpid(), _signal.SIGINT)
 
 
 def _end_at_once(code: int) -> NoReturn:
@@ -81,48 +82,10 @@ def _end_at_once(code: int) -> NoReturn:
     import multiprocessing
 
     for child in multiprocessing.active_children():
-        child.terminate()
+        child.kill()
     for stream in (sys.stdout, sys.stderr):
-        with suppress(OSError, ValueError):
+        try:
             stream.flush()
+        except (OSError, ValueError):
+            continue
     os._exit(code)
-
-
-def _is_interrupt(error: BaseException | None) -> bool:
-    """Whether Ctrl-C is behind an error: typer passes it on as Abort, and Dr.Jit wraps what happens in its loops."""
-    while error is not None:
-        if isinstance(error, KeyboardInterrupt) or type(error).__name__ == "Abort":
-            return True
-        error = error.__cause__ or error.__context__
-    return False
-
-
-#: How typer refuses a word that is not among those listed.
-_NOT_LISTED = re.compile(r"Invalid value for '(--[\w-]+)'.*: (?:Value error, )?('.*?') is not one of (.*)\.")
-
-
-_NO_SUCH = re.compile(r"No such option: (--[\w-]+)")
-#: What people ask for by names that other programs have for it.
-_OTHER_NAMES = {
-    "--dpi": "it is called --ppi here, pixels per inch",
-    "--samples": "it is called --spp here, samples per pixel",
-    "--out": "it is called --output or -o here",
-}
-
-
-def _usage(error: BaseException) -> str:
-    message = " ".join(getattr(error, "format_message", error.__str__)().split())
-    former = _NO_SUCH.search(message)
-    if former is not None and former[1] in _OTHER_NAMES:
-        return f"{former[1]}: {_OTHER_NAMES[former[1]]}"
-    listed = _NOT_LISTED.fullmatch(message)
-    if listed is not None:
-        return f"{listed[1]}: {listed[2]} is not known; known are {listed[3].replace(chr(39), '')}"
-    context = getattr(error, "ctx", None)
-    command = getattr(context, "command_path", "lippmann")
-    return f"{message} See '{command} --help'."
-
-
-def _leave(line: str, code: int) -> int:
-    print(f"lippmann: {one_line(line)}", file=sys.stderr)
-    return code

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import copy
 import logging
+import multiprocessing
 import sys
+import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
@@ -32,8 +34,13 @@ if TYPE_CHECKING:
 
 #: Time limit in seconds for a scheduler to answer.
 CONNECT_SECONDS = 20
+#: Seconds in which a client and the workers of this machine may end by themselves.
+CLOSE_SECONDS = 3
 
-_LOGGERS = ("distributed", "distributed.client", "distributed.nanny", "distributed.scheduler", "distributed.worker")
+_LOGGERS = (
+    *("distributed", "distributed.client", "distributed.nanny", "distributed.scheduler", "distributed.worker"),
+    *("asyncio", "tornado.application"),
+)
 
 
 @dataclass(frozen=True)
@@ -123,7 +130,7 @@ def connect(
             _remark_on_dashboard(client, remark)
             yield Cluster(client, roster, target.address, remark)
     finally:
-        client.close(timeout=5)
+        client.close(timeout=CLOSE_SECONDS)
 
 
 @contextmanager
@@ -133,7 +140,8 @@ def _started_here(distributed: Any, count: int, threads: int | None) -> Iterator
 
     each = max(1, (threads or machine.usable_cores()) // count)
     security = temporary_security()
-    with private_scratch() as folder, spawn_safely():
+    with private_scratch() as folder, spawn_safely(), ExitStack() as stack:
+        stack.callback(_end_children, frozenset(multiprocessing.active_children()))
         # Dask's HTTP servers answer everyone and cannot be disabled, so they get no pages.
         pages: dict[str, Any] = {"distributed.scheduler.http.routes": [], "distributed.worker.http.routes": []}
         with dask.config.set({"temporary-directory": folder, **pages}):
@@ -161,10 +169,31 @@ def _started_here(distributed: Any, count: int, threads: int | None) -> Iterator
                     parameter="cluster",
                     fix="run it again, with fewer workers if memory is short",
                 ) from None
-        with cluster, distributed.Client(cluster, set_as_default=False, name="lippmann") as client:
-            # The active memory manager would remove copies of the scene from workers between tiles.
-            client.amm.stop()
-            yield client
+        stack.callback(_in_time, cluster.close)
+        client = distributed.Client(cluster, set_as_default=False, name="lippmann")
+        stack.callback(_in_time, client.close)
+        # The active memory manager would remove copies of the scene from workers between tiles.
+        client.amm.stop()
+        yield client
+
+
+def _in_time(close: Callable[[], object]) -> None:
+    """Close something of Dask's; its own time limits do not hold where an event loop was interrupted."""
+    thread = threading.Thread(target=_close_quietly, args=(close,), daemon=True)
+    thread.start()
+    thread.join(CLOSE_SECONDS / 2)
+
+
+def _close_quietly(close: Callable[[], object]) -> None:
+    with suppress(Exception):  # what is not closed is killed
+        close()
+
+
+def _end_children(others: frozenset[object]) -> None:
+    """Kill the processes of multiprocessing but ``others``: workers that did not end by themselves."""
+    for child in multiprocessing.active_children():
+        if child not in others:
+            child.kill()
 
 
 @contextmanager

@@ -40,6 +40,8 @@ HOPELESS = 8
 FETCHERS = 32
 #: Time in seconds between two checks of workers and scheduler while no tile arrives.
 PATIENCE = 0.5
+#: Time in seconds without an answer after which a scheduler counts as lost: it needs milliseconds, under load a few s.
+SILENCE = 30.0
 
 _DIED = "its workers died"
 
@@ -247,6 +249,12 @@ class _Run:
         """Detect what no message reports: a lost scheduler, and tiles that wait for workers which are gone."""
         if self.cluster.client.status != "running":
             raise self._lost()
+        if self.cluster.roster.silent_seconds > SILENCE:
+            raise ClusterError(
+                f"the scheduler of {self.cluster.name} has not answered for {SILENCE:.0f} s",
+                parameter="cluster",
+                fix="does it still run? Run again with resume=True: what was rendered is kept",
+            )
         present = frozenset(self.cluster.roster.admitted)
         for key, tile in list(self.in_flight.items()):
             if present and not tile.workers & present:

@@ -17,6 +17,7 @@ from lippmann.cluster.address import (
     is_loopback,
     warn_of_exposure,
 )
+from lippmann.cluster.log_lines import drop_tracebacks
 from lippmann.cluster.private_scratch import private_scratch
 from lippmann.cluster.tasks import THREADS_VARIABLE
 from lippmann.errors import ClusterError, UsageError
@@ -96,6 +97,7 @@ def serve(options: WorkerOptions, *, quiet: bool = False, remark: Callable[[str]
         # Dask reads the variable when it is loaded, here and in the processes that it starts.
         os.environ.setdefault("DASK_DISTRIBUTED__LOGGING__DISTRIBUTED", "error")
     distributed = import_distributed()
+    drop_tracebacks()
     security = options.tls.security()
     warn_of_exposure(options.address, security, remark)
     with private_scratch() as folder, spawn_safely():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
@@ -13,6 +14,8 @@ if TYPE_CHECKING:
 
 #: Time in seconds between two updates of the list of workers.
 INTERVAL = 0.5
+#: Time in seconds for a worker to tell its versions, by way of the scheduler, before it is asked again.
+ANSWER = 10.0
 
 
 class Roster:
@@ -31,6 +34,7 @@ class Roster:
         self._admitted: dict[str, int] = {}
         self._refused: dict[str, str] = {}
         self._unreported: list[str] = []
+        self._asked: float | None = None
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._watch, name="lippmann-roster", daemon=True)
         self.update()
@@ -54,14 +58,22 @@ class Roster:
             lines, self._unreported = tuple(self._unreported), []
             return lines
 
+    @property
+    def silent_seconds(self) -> float:
+        """Seconds for which the scheduler has owed an answer."""
+        asked = self._asked
+        return 0.0 if asked is None else time.monotonic() - asked
+
     def close(self) -> None:
         """Stop the thread that updates the list."""
         self._stop.set()
-        self._thread.join(timeout=10 * INTERVAL)
+        self._thread.join(timeout=2 * INTERVAL)
 
     def update(self) -> None:
         """Update the list, and ask new workers for their versions."""
+        self._asked = time.monotonic()
         present = self._client.nthreads()
+        self._asked = None  # workers are asked below: they may be slow
         known = {*self._admitted, *self._refused}
         answers = {address: self._ask(address) for address in present if address not in known}
         with self._lock:
@@ -78,7 +90,12 @@ class Roster:
                     self._unreported.append(why)
 
     def _ask(self, address: str) -> dict[str, str] | None:
-        answer = self._client.run(make_version_query(), workers=[address], on_error="return").get(address)
+        ask, query = self._client.sync, make_version_query()
+        try:
+            answers = ask(self._client._run, query, workers=[address], on_error="return", callback_timeout=ANSWER)
+        except TimeoutError:
+            return None
+        answer = answers.get(address)
         return answer if isinstance(answer, dict) else None
 
     def _difference(self, versions: Mapping[str, str]) -> str:

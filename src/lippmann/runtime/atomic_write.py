@@ -32,6 +32,7 @@ _REASONS = {
     errno.EPERM: ("permission to write is denied", "choose a place that you may write to"),
     errno.EROFS: ("the file system is read-only", "choose another place"),
     errno.EISDIR: ("a folder of this name is in the way", "choose another name"),
+    errno.ENOENT: ("its folder was removed or renamed", "create it again, or choose another place"),
     errno.ENAMETOOLONG: ("the name is too long", "choose a shorter name"),
 }
 
@@ -260,6 +261,13 @@ def _reported(path: Path, temporary: Path) -> Iterator[None]:
         raise _output_error(path, error) from error
 
 
+def reason_and_fix(error: OSError) -> tuple[str, str]:
+    """What a system's error means in words, and what helps; empty if nothing is known to."""
+    said = str(error).lower()  # libraries quote the system in errors without a number
+    number = error.errno or next((each for each in _REASONS if os.strerror(each).lower() in said), 0)
+    return _REASONS.get(number, (error.strerror or str(error), ""))
+
+
 def _output_error(path: Path, error: OSError) -> OutputError:
-    reason, fix = _REASONS.get(error.errno or 0, (error.strerror or str(error), ""))
+    reason, fix = reason_and_fix(error)
     return OutputError(f"cannot be written: {reason}", where=str(path), fix=fix)

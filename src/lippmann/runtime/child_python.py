@@ -3,16 +3,19 @@
 ``python -c`` puts the working directory first on ``sys.path``, and :mod:`multiprocessing` starts its children so: a
 file ``socket.py`` beside a downloaded scene would run. Python 3.11 and newer omit the entry if ``PYTHONSAFEPATH`` is
 set. For older versions the first statement of the child's code removes it.
+
+Processes of :mod:`multiprocessing` do not hear Ctrl-C, which a terminal sends to all of a command's processes at once:
+who started them ends them.
 """
 
 from __future__ import annotations
 
 import os
+import signal
 import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from functools import partial
 from typing import Any
 
 VARIABLE = "PYTHONSAFEPATH"
@@ -39,7 +42,8 @@ def python_command(code: str, *arguments: str) -> tuple[list[str], dict[str, str
 
 @contextmanager
 def spawn_safely() -> Iterator[None]:
-    """Context in which processes spawned by :mod:`multiprocessing` import nothing from the working directory.
+    """Context in which processes spawned by :mod:`multiprocessing` import nothing from the working directory, and are
+    deaf to Ctrl-C.
 
     Once such a process has started, its ``sys.path`` is a copy of this process's, as usual. The setting belongs to the
     whole process: it begins with the first thread that enters and ends with the last that leaves.
@@ -50,7 +54,7 @@ def spawn_safely() -> Iterator[None]:
         if _users == 1:
             # Children of ``python -E`` are started with ``-E``, too, and ignore the variable.
             reads_variable = _KNOWS_VARIABLE and not sys.flags.ignore_environment
-            _undo = _set_variable() if reads_variable else _prefix_spawned_code()
+            _undo = _wrap_spawn("" if reads_variable else _REMOVE_ENTRY)
     try:
         yield
     finally:
@@ -60,33 +64,33 @@ def spawn_safely() -> Iterator[None]:
                 _undo()
 
 
-def _set_variable() -> Callable[[], None]:
-    """Set :data:`VARIABLE` in this process's environment. The result undoes it."""
-    saved = os.environ.get(VARIABLE)
-    os.environ[VARIABLE] = "1"
-    return partial(_restore_variable, saved)
+def _wrap_spawn(prefix: str) -> Callable[[], None]:
+    """Wrap the one function by which multiprocessing starts children, resource tracker and fork server.
 
-
-def _restore_variable(saved: str | None) -> None:
-    if saved is None:
-        os.environ.pop(VARIABLE, None)
-    else:
-        os.environ[VARIABLE] = saved
-
-
-def _prefix_spawned_code() -> Callable[[], None]:
-    """Put :data:`_REMOVE_ENTRY` before the code of all that multiprocessing starts. The result undoes it.
-
-    Children, resource tracker and fork server are all started by one function of multiprocessing.
+    They get :data:`VARIABLE`, ``prefix`` before their code, and a signal mask without SIGINT, which is inherited from
+    the thread that starts them. The result undoes it.
     """
     from multiprocessing import util
 
     spawn: Any = util.spawnv_passfds
+    saved = os.environ.get(VARIABLE)
+    os.environ[VARIABLE] = "1"
 
-    def spawn_with_prefix(path: Any, args: Any, passfds: Any) -> Any:
+    def wrapped(path: Any, args: Any, passfds: Any) -> Any:
         words = list(args)
-        words[words.index("-c") + 1] = _REMOVE_ENTRY + words[words.index("-c") + 1]
-        return spawn(path, words, passfds)
+        words[words.index("-c") + 1] = prefix + words[words.index("-c") + 1]
+        heard = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        try:
+            return spawn(path, words, passfds)
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, heard)
 
-    util.spawnv_passfds = spawn_with_prefix
-    return partial(setattr, util, "spawnv_passfds", spawn)
+    def undo() -> None:
+        util.spawnv_passfds = spawn
+        if saved is None:
+            os.environ.pop(VARIABLE, None)
+        else:
+            os.environ[VARIABLE] = saved
+
+    util.spawnv_passfds = wrapped
+    return undo

@@ -34,6 +34,9 @@ Mode = Literal["fit", "camera", "display"]
 #: Depth that is scaled by less, or by more than its inverse, leaves nothing that rays could tell apart.
 _LEAST_DEPTH_SCALE = 1e-4
 
+#: Factors and millimetres beyond which float32 coordinates of the scene overflow, or their squares do.
+_MOST = 1e9
+
 
 @dataclass(frozen=True)
 class PlacementOptions:
@@ -82,10 +85,11 @@ class PlacementOptions:
             )
         for name in ("turn", "shift"):
             values = getattr(self, name)
-            if len(values) != 3 or not np.isfinite(values).all():
-                raise UsageError(f"{values!r}", parameter=name, rule="three finite numbers")
-        if not (np.isfinite(self.scale) and self.scale > 0.0):
-            raise UsageError(f"{self.scale:g}", parameter="scale", rule="a factor above 0")
+            if len(values) != 3 or not (np.abs(values) <= _MOST).all():
+                raise UsageError(f"{values!r}", parameter=name, rule=f"three numbers, none beyond {_MOST:g}")
+        if not 1.0 / _MOST <= self.scale <= _MOST:
+            rule = f"a factor from {1.0 / _MOST:g} to {_MOST:g}"
+            raise UsageError(f"{self.scale:g}", parameter="scale", rule=rule)
         if self.depth_scale is not None and not _LEAST_DEPTH_SCALE <= self.depth_scale <= 1.0 / _LEAST_DEPTH_SCALE:
             rule = f"a factor from {_LEAST_DEPTH_SCALE:g} to {1.0 / _LEAST_DEPTH_SCALE:g}"
             raise UsageError(f"{self.depth_scale:g}", parameter="depth_scale", rule=rule)

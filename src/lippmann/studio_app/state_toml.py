@@ -53,7 +53,7 @@ def read_state(path: Path) -> StudioState:
             content = file.read(_MOST_BYTES + 1)
         if len(content) > _MOST_BYTES:
             raise UsageError("this file is too large", where=str(path), rule=_KIND)
-        text = content.decode("utf-8")
+        text = content.decode("utf-8-sig")
     except UnicodeDecodeError:
         raise UsageError("this is not a text file", where=str(path), rule=_KIND) from None
     except OSError as error:
@@ -187,7 +187,10 @@ def _word(value: object) -> str:
 def _number(value: object) -> float:
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         raise UsageError(_shown(value), rule="a number")
-    return float(value)
+    try:
+        return float(value)
+    except OverflowError:  # a whole number of hundreds of digits
+        raise UsageError(_shown(value), rule="a number below 1.8e308") from None
 
 
 def _whole(value: object) -> int:

@@ -177,4 +177,6 @@ def _write_mp4(
         rule = f"PyAV as it is installed has no {encoder.name}"
         raise OutputError("the codec is not there", where=str(place), rule=rule, fix="write H.264") from None
     except (av.error.FFmpegError, ValueError) as error:
+        if isinstance(error, OSError):  # such as a full disk
+            raise
         raise OutputError(f"cannot be written as MP4 ({error})", where=str(place)) from error

@@ -113,7 +113,7 @@ def _read(path: Path) -> str:
             content = file.read(_MAXIMUM_BYTES + 1)
         if len(content) > _MAXIMUM_BYTES:
             raise DisplayError("this file is too large", where=str(path), rule=rule)
-        return content.decode("utf-8")
+        return content.decode("utf-8-sig")
     except UnicodeDecodeError:
         raise DisplayError("this is not a text file", where=str(path), rule=rule) from None
     except OSError as error:

@@ -42,7 +42,7 @@ def read_transfer_function(path: Path) -> TransferFunction:
     if len(data) > _MOST_BYTES:
         raise SceneError(f"has {len(data)} bytes", where=where, rule=f"a transfer function has at most {_MOST_BYTES}")
     try:
-        text = data.decode("utf-8")
+        text = data.decode("utf-8-sig")
         tables = json.loads(text) if path.suffix.lower() == ".json" else tomllib.loads(text)
     except (ValueError, RecursionError) as error:
         raise SceneError(f"cannot be read ({str(error)[:200]})", where=where, rule="TOML, or JSON (.json)") from None

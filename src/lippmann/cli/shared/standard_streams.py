@@ -1,0 +1,78 @@
+"""Standard input, output and error that are closed, full, or read by nobody any more."""
+
+from __future__ import annotations
+
+import errno
+import io
+import os
+import sys
+from contextlib import suppress
+from typing import TextIO, cast
+
+from lippmann.errors import OutputError
+from lippmann.runtime.atomic_write import reason_and_fix
+
+
+class _Stream(io.RawIOBase):
+    """A standard stream whose first failure is told, if at all, and which takes everything from then on."""
+
+    def __init__(self, raw: io.RawIOBase, *, is_told: bool) -> None:
+        super().__init__()
+        self._raw = raw
+        self._is_told = is_told
+        self._failed = False
+
+    def writable(self) -> bool:
+        return True
+
+    def fileno(self) -> int:
+        return self._raw.fileno()
+
+    def isatty(self) -> bool:
+        return self._raw.isatty()
+
+    def write(self, data: object, /) -> int | None:
+        size = memoryview(data).nbytes  # type: ignore[arg-type]
+        if self._failed:
+            return size
+        try:
+            return self._raw.write(data)  # type: ignore[arg-type]
+        except OSError as error:
+            self._failed = True
+            if not self._is_told:
+                return size
+            if error.errno == errno.EPIPE:  # its reader has read enough
+                raise
+            reason, fix = reason_and_fix(error)
+            if error.errno == errno.EBADF:
+                reason, fix = "it is closed", "send it to a file, or to /dev/null"
+            raise OutputError(f"cannot be written: {reason}", where="standard output", fix=fix) from None
+
+
+def complete() -> None:
+    """Let no file that is opened later become a standard stream, where what is printed would land in it.
+
+    A standard output that is closed or full is an :class:`OutputError`; what standard error cannot take is lost.
+    """
+    for descriptor in (0, 1, 2):
+        try:
+            os.fstat(descriptor)
+        except OSError:  # the lowest that is free is taken: this one
+            os.open(os.devnull, os.O_WRONLY if descriptor == 2 else os.O_RDONLY)
+    if sys.stdin is None:
+        sys.stdin = open(0, encoding="utf-8", closefd=False)  # noqa: SIM115  # for the whole process
+    sys.stdout = _standing(sys.stdout, 1, is_told=True)
+    sys.stderr = _standing(sys.stderr, 2, is_told=False)
+
+
+def _standing(stream: TextIO | None, descriptor: int, *, is_told: bool) -> TextIO:
+    if stream is None:
+        raw: io.RawIOBase = io.FileIO(descriptor, "w", closefd=False)
+        encoding, errors, is_terminal = "utf-8", "backslashreplace", False
+    else:
+        with suppress(OSError):
+            stream.flush()
+        raw = cast("io.RawIOBase", getattr(stream.buffer, "raw", stream.buffer))
+        encoding, errors, is_terminal = stream.encoding, stream.errors or "strict", stream.isatty()
+    buffer = io.BufferedWriter(_Stream(raw, is_told=is_told))
+    return io.TextIOWrapper(buffer, encoding, errors, line_buffering=is_terminal or not is_told)
