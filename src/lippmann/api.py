@@ -27,6 +27,7 @@ from lippmann.rendering.request.choices import (
     Caustics,
     Denoiser,
     Device,
+    Effort,
     Integrator,
     Method,
     Order,
@@ -152,6 +153,7 @@ def render(
     integrator: Integrator = "auto",
     depth: int | None = None,
     spp: int | None = None,
+    effort: Effort = "normal",
     quality: float | None = None,
     quality_worst: float | None = None,
     max_time: float | None = None,
@@ -206,6 +208,8 @@ def render(
     spp:
         Samples per pixel, or per sub-pixel; 1 to 2**24. By default 16, for pooled light 2 to 16 as the picture's size
         suggests, 1 for ``classic``, and with a quality or a time as many as that takes.
+    effort:
+        ``draft``: a first look, one sample a pixel and the fast network. ``normal`` (default): as the other values say.
     quality, quality_worst:
         PSNR in dB that the whole picture, or every micro-image, is to reach by its own estimate; above 0, at most 80.
         Where the former is asked for, no micro-image has over 12 dB less.
@@ -270,6 +274,7 @@ def render(
         integrator=integrator,
         depth=depth,
         spp=spp,
+        effort=effort,
         quality=quality,
         quality_worst=quality_worst,
         max_time=max_time,
@@ -319,9 +324,9 @@ def render_to_file(
     runner:
         Who renders the tiles, see :mod:`lippmann.tiles.tiled_render`; by default this process.
     **options:
-        ``method`` (``full``, ``pooled``), ``denoise``, ``integrator``, ``depth``, ``spp``, ``seed``, ``subpixels``,
-        ``pixel_filter``, ``device``, ``threads`` and ``memory`` as for :func:`render`. Others are refused: they need
-        the whole picture at once.
+        ``method`` (``full``, ``pooled``), ``denoise``, ``integrator``, ``depth``, ``spp``, ``effort``, ``seed``,
+        ``subpixels``, ``pixel_filter``, ``device``, ``threads`` and ``memory`` as for :func:`render`. Others are
+        refused: they need the whole picture at once.
 
     Returns
     -------
@@ -368,8 +373,8 @@ def preview(
     camera:
         A camera of the scene by name; None takes the first, or one that frames a scene without any.
     **options:
-        ``integrator``, ``depth``, ``spp``, ``seed``, ``pixel_filter``, ``device``, ``threads`` and ``memory`` as for
-        :func:`render`.
+        ``integrator``, ``depth``, ``spp``, ``effort``, ``seed``, ``pixel_filter``, ``device``, ``threads``, ``memory``
+        as for :func:`render`.
 
     Returns
     -------
@@ -411,10 +416,10 @@ def render_quilt(
         Columns and rows of views, width and height in pixels; by default those that the device is given, see
         :data:`lippmann.quilts.quilt.DEVICE_QUILTS`.
     **options:
-        ``integrator``, ``depth``, ``spp``, ``quality``, ``quality_worst``, ``max_time``, ``seed``, ``pixel_filter``,
-        ``denoise``, ``device``, ``threads`` and ``memory`` as for :func:`render`; every view counts as a micro-image
-        does there. ``method``: ``auto``, ``full``, or ``pooled``, with which neighbouring views share their light
-        before it is denoised.
+        ``integrator``, ``depth``, ``spp``, ``effort``, ``quality``, ``quality_worst``, ``max_time``,
+        ``seed``, ``pixel_filter``, ``denoise``, ``device``, ``threads`` and ``memory`` as for :func:`render`; every
+        view counts as a micro-image does there. ``method``: ``auto``, ``full``, or ``pooled``, with which neighbouring
+        views share their light before it is denoised.
 
     Returns
     -------
@@ -510,8 +515,8 @@ def plan(
     scene, display, placement, progress:
         As for :func:`render`.
     **options:
-        ``integrator``, ``depth``, ``spp``, ``seed``, ``subpixels``, ``pixel_filter``, ``denoise``, ``device``,
-        ``threads`` and ``memory`` as for :func:`render`, of the method ``full``.
+        ``integrator``, ``depth``, ``spp``, ``effort``, ``seed``, ``subpixels``, ``pixel_filter``, ``denoise``,
+        ``device``, ``threads`` and ``memory`` as for :func:`render`, of the method ``full``.
 
     Returns
     -------

@@ -157,3 +157,31 @@ def test_a_time_too_short_for_two_samples_gives_one_and_says_so(lippmann, engine
     assert done.code == 0
     assert (done.json["spp"], done.json["estimate"]) == (1, None)
     assert "there was time for one sample per pixel only" in done.err
+
+
+def test_a_draft_and_a_modest_quality_take_no_more_samples_than_nothing_asked(lippmann, engine, tmp_path, cut_display):
+    """What a picture has anyway is assessed after the fewest samples, however cheap more of them are."""
+    small, out = cut_display(512, 160), tmp_path / "a.png"
+
+    def rendered(*options):
+        done = lippmann("render", "teapot", "--display", small, "--json", "-o", out, *options)
+        assert done.code == 0, done.err
+        return done.json
+
+    usual = rendered()
+    draft = rendered("--effort", "draft")
+    assert (draft["spp"], draft["method"], draft["options"]["denoise_effort"]) == (1, "full", "fast")
+    assert sum(draft["rays"].values()) < sum(usual["rays"].values()) / 2
+    modest = rendered("--quality", 30)
+    assert (modest["spp"], modest["method"]) == (2, "pooled")
+    assert 30 <= modest["estimate"]["psnr"] < usual["estimate"]["psnr"]
+
+
+@pytest.mark.parametrize("option", ["--quality", "--quality-worst", "--spp", "--max-time"])
+@pytest.mark.parametrize("command", [("render",), ("quilt", "render")])
+def test_a_draft_beside_another_goal_is_refused(lippmann, tmp_path, command, option):
+    done = lippmann(*command, "teapot", "--effort", "draft", option, 4, "-o", tmp_path / "a_qs8x6a0.75.png")
+    assert done.code == 2
+    assert done.err.strip() == (
+        f"lippmann: {option}: 4 beside a draft; a draft has one sample a pixel; leave it out, or use --effort normal"
+    )

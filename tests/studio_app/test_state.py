@@ -84,6 +84,16 @@ def test_the_command_line_says_all_but_the_eye(state):
         assert read[name] == getattr(state, name), name
 
 
+def test_a_draft_is_kept_and_said():
+    state = StudioState(effort="draft")
+    assert state_of_text(text_of_state(state)) == state
+    assert words_of_state(state)[-2:] == ["--effort", "draft"]
+    assert state.request().effort == "draft"
+    with pytest.raises(UsageError) as caught:
+        state_of_text('effort = "draft"\nspp = 4\n')
+    assert str(caught.value).startswith("state:2: spp: 4 beside a draft; a draft has one sample a pixel; leave it out")
+
+
 def test_a_file_and_its_command_line_make_the_same_bytes(engine, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "small.toml").write_text(

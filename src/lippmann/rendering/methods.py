@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from lippmann.progress import ProgressCallback
 from lippmann.rendering.adaptive.convergence import Assessor, ErrorTrack
-from lippmann.rendering.adaptive.extra_samples import extra_samples
+from lippmann.rendering.adaptive.extra_samples import extra_samples, is_modest
 from lippmann.rendering.adaptive.method_race import (
     DENOISED_SLOPE,
     MOST_GAINED,
@@ -300,6 +300,8 @@ def _denoised_candidate(job: Job, goal: Goal, batches: FullInBatches, rays: Call
     seconds = 0.0 if goal.max_time is None else denoiser.probe()
 
     def worth_from() -> float:
+        if is_modest(goal):
+            return 0.0
         spent = rays()
         if not spent:
             return 0.0 if _is_dear(job.integrator) else _CHEAP_TOGETHER

@@ -11,7 +11,7 @@ from lippmann.display import Display
 from lippmann.display.pixel_window import PixelWindow
 from lippmann.errors import UsageError
 from lippmann.rendering.live.live_view import LiveView
-from lippmann.rendering.request.choices import Caustics, Denoiser, Integrator, Method, PixelFilter, ToneMap
+from lippmann.rendering.request.choices import Caustics, Denoiser, Effort, Integrator, Method, PixelFilter, ToneMap
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.scene.light_options import LightOptions
 from lippmann.scene.placement import Mode, PlacementOptions
@@ -48,8 +48,8 @@ class StudioState:
         the display resolves.
     light_turn, light_strength, environment_strength:
         See :class:`~lippmann.scene.light_options.LightOptions`.
-    exposure, tone_map, integrator, depth, method, spp, quality, max_time, seed, subpixels, pixel_filter, denoise, \
-caustics, clamp_indirect:
+    exposure, tone_map, integrator, depth, method, spp, effort, quality, max_time, seed, subpixels, pixel_filter, \
+denoise, caustics, clamp_indirect:
         See :class:`~lippmann.rendering.request.render_request.RenderRequest`. Light is traced along paths, also in
         scenes that were made for Whitted ray tracing, whose light the studio does not show.
     eye:
@@ -82,6 +82,7 @@ caustics, clamp_indirect:
     depth: int | None = None
     method: Method = "auto"
     spp: int | None = None
+    effort: Effort = "normal"
     quality: float | None = None
     max_time: float | None = None
     seed: int = 0
@@ -128,6 +129,7 @@ caustics, clamp_indirect:
             integrator=self.integrator,
             depth=self.depth,
             spp=self.spp,
+            effort=self.effort,
             quality=self.quality,
             max_time=self.max_time,
             seed=self.seed,

@@ -225,7 +225,7 @@ def _shown(value: object) -> str:
 
 _RULES: Mapping[str, Callable[[object], object]] = {
     **dict.fromkeys(("scene", "display", "up", "environment", "camera", "place"), _word),
-    **dict.fromkeys(("tone_map", "integrator", "method", "pixel_filter", "denoise", "caustics"), _word),
+    **dict.fromkeys(("tone_map", "integrator", "method", "effort", "pixel_filter", "denoise", "caustics"), _word),
     **dict.fromkeys(("background", "turn", "shift", "eye"), _numbers(3)),
     "light_turn": _numbers(2),
     **dict.fromkeys(("scale", "depth_scale", "pop_out", "light_strength", "environment_strength"), _number),

@@ -31,6 +31,11 @@ from lippmann.rendering.request.render_request import RenderRequest
         ({"quality": 0.0}, "quality"),
         ({"max_time": float("inf")}, "max_time"),
         ({"max_time": float("nan")}, "max_time"),
+        ({"effort": "lazy"}, "effort"),
+        ({"effort": "draft", "spp": 1}, "spp"),
+        ({"effort": "draft", "quality": 30.0}, "quality"),
+        ({"effort": "draft", "quality_worst": 30.0}, "quality_worst"),
+        ({"effort": "draft", "max_time": 5.0}, "max_time"),
     ],
 )
 def test_values_are_checked_one_by_one(options, parameter):

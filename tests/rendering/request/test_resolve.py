@@ -130,3 +130,38 @@ def test_what_is_asked_of_a_photograph_wins(values, expected):
 def test_a_tone_map_of_a_photograph_that_is_asked_for_wins():
     found = resolve(RenderRequest(tone_map="pbr-neutral"), unlit(fills_panel=True), load_display("seed-lenticular"))
     assert found.tone_map == "pbr-neutral"
+
+
+@pytest.mark.parametrize(
+    ("values", "expected"),
+    [
+        ({}, ("full", "oidn-fast")),
+        ({"integrator": "direct"}, ("full", "oidn-fast")),
+        ({"method": "pooled"}, ("pooled", "oidn-fast")),
+        ({"method": "full"}, ("full", "none")),
+        ({"method": "lens-view"}, ("lens-view", "none")),
+        ({"denoise": "oidn-high"}, ("full", "oidn-high")),
+        ({"denoise": "none"}, ("full", "none")),
+        ({"integrator": "classic"}, ("full", "none")),
+        ({"integrator": "normal"}, ("full", "none")),
+    ],
+)
+@pytest.mark.parametrize("name", ["seed-lenticular", "looking-glass-portrait"])
+def test_a_draft_has_one_sample_and_the_fast_network(name, values, expected):
+    if values.get("method") == "lens-view":
+        values = {**values, "subpixels": False}
+    found = resolve(RenderRequest(effort="draft", **values), SCENE, load_display(name))
+    assert (found.spp, found.spp_reserve, found.method, found.denoise) == (1, None, *expected)
+
+
+@pytest.mark.parametrize("form", ["picture", "tiles", "quilt", "forecast"])
+def test_a_draft_is_one_in_every_form(form):
+    found = resolve(RenderRequest(effort="draft"), SCENE, load_display("looking-glass-portrait"), form)
+    assert (found.spp, found.method, found.denoise) == (1, "full", "oidn-fast")
+    plain = resolve(RenderRequest(effort="draft"), SCENE, form="preview")
+    assert (plain.spp, plain.denoise) == (1, "none")
+
+
+def test_a_draft_of_a_photograph_needs_no_network():
+    found = resolve(RenderRequest(effort="draft"), unlit(fills_panel=True), load_display("seed-lenticular"))
+    assert (found.method, found.denoise, found.spp) == ("full", "none", 1)

@@ -52,6 +52,7 @@ OPTION_GROUPS: Mapping[str, tuple[str, ...]] = {
         "--tone-map",
     ),
     "Quality": (
+        "--effort",
         "--quality",
         "--quality-worst",
         "--max-time",

@@ -285,6 +285,14 @@ DepthScale = Annotated[
 PopOut = Annotated[
     float | None, typer.Option("--pop-out", help="Share of the scene's depth in front of the lens plane, 0 to 1.")
 ]
+Effort = Annotated[
+    choices.Effort,
+    typer.Option(
+        "--effort",
+        help="draft: a first look, one sample a pixel and the fast network; normal: as the picture's size suggests, or "
+        "as --spp, --quality or --max-time say.",
+    ),
+]
 Quality = Annotated[
     float | None,
     typer.Option(

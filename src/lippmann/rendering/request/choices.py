@@ -8,6 +8,8 @@ Method = Literal["auto", "full", "lens-view", "interpolated", "pooled"]
 Order = Literal["default", "paper"]
 Integrator = Literal["auto", "classic", "path", "direct", "normal", "depth", "position", "albedo"]
 PixelFilter = Literal["auto", "box", "point"]
+#: How much a picture may take: ``draft`` is one sample and the fast network.
+Effort = Literal["draft", "normal"]
 Device = Literal["auto", "cpu", "gpu"]
 #: ``auto``: ``pbr-neutral`` for physically based light.
 ToneMap = Literal["auto", "none", "pbr-neutral"]

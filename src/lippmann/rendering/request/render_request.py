@@ -16,6 +16,7 @@ from lippmann.rendering.request.choices import (
     Caustics,
     Denoiser,
     Device,
+    Effort,
     Integrator,
     Method,
     Order,
@@ -41,6 +42,7 @@ _WORDS = {
     "integrator": Integrator,
     "pixel_filter": PixelFilter,
     "device": Device,
+    "effort": Effort,
     "denoise": Denoiser,
     "caustics": Caustics,
     "tone_map": ToneMap,
@@ -85,6 +87,9 @@ class RenderRequest:
     spp:
         Samples per pixel, or per sub-pixel; 1 to 2**24. None: 16, for pooled light what the picture's size suggests, or
         with a quality or a time as many as that takes.
+    effort:
+        ``normal``: what the other values say. ``draft``: one sample of each pixel, denoised by the fast network; alone,
+        without samples, a quality or a time.
     quality, quality_worst:
         PSNR in dB that the whole picture (no micro-image being worse by more than 12 dB), or every micro-image, is to
         reach by its own estimate; above 0, at most 80.
@@ -141,6 +146,7 @@ class RenderRequest:
     integrator: Integrator = "auto"
     depth: int | None = None
     spp: int | None = None
+    effort: Effort = "normal"
     quality: float | None = None
     quality_worst: float | None = None
     max_time: float | None = None
@@ -173,6 +179,14 @@ class RenderRequest:
             if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
                 rule = f"a whole number from {low} to {high}"
                 raise UsageError(f"{value!r} will not do", parameter=name, rule=rule)
+        for name in ("spp", "quality", "quality_worst", "max_time"):
+            if self.effort == "draft" and getattr(self, name) is not None:
+                raise UsageError(
+                    f"{getattr(self, name):g} beside a draft",
+                    parameter=name,
+                    rule="a draft has one sample a pixel",
+                    fix='leave it out, or use effort="normal"',
+                )
         for name in ("quality", "quality_worst"):
             value = getattr(self, name)
             if value is not None and not 0 < value <= 80:

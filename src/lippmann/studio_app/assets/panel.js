@@ -7,7 +7,7 @@ import { lightBall, wrapped } from "studio/light_ball.js";
 
 const QUALITIES = [
   ["", "As the picture's size suggests"],
-  ["34", "Draft, 34 dB"],
+  ["draft", "Draft, one sample"],
   ["40", "Good, 40 dB"],
   ["46", "Fine, 46 dB"],
 ];
@@ -172,12 +172,15 @@ export class Panel {
     });
     const background = color("Background", (value) => this.store.set({ background: value && linear(value) }));
     const quality = choice("Quality of a render", QUALITIES, (value) =>
-      this.store.set({ quality: value === "" ? null : Number(value) }),
+      this.store.set({
+        effort: value === "draft" ? "draft" : "normal",
+        quality: value === "" || value === "draft" ? null : Number(value),
+      }),
     );
     this.#rows.push((state) => {
       exposure.show(state.exposure === "auto" ? null : state.exposure, this.facts?.exposure ?? null);
       background.show(state.background && coded(state.background));
-      quality.show(state.quality === null ? "" : String(state.quality));
+      quality.show(state.effort === "draft" ? "draft" : state.quality === null ? "" : String(state.quality));
     });
     return section("Picture", exposure.row, background.row, quality.row);
   }
