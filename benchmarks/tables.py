@@ -12,6 +12,7 @@ from typing import Any
 
 import caustics_tables
 import conformance_tables
+import drafts_tables
 import equal_error_tables
 import equal_time_tables
 import estimate_coverage_tables
@@ -400,6 +401,7 @@ SECTIONS = {
     "equal_time": equal_time_tables.describe,
     "equal_error": equal_error_tables.describe,
     "goals": goals_tables.describe,
+    "drafts": drafts_tables.describe,
     "estimate_coverage": estimate_coverage_tables.describe,
     "reuse": _reuse,
     "weave": _weave,

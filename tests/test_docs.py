@@ -48,7 +48,9 @@ def cheaper(words: list[str]) -> list[str]:
         return [*words, "--size", "384x384", "--spp", "2"]
     if "--sweep" in words:
         return [*words, "--frames", "2"]
-    if words[1] not in ("render", "preview") or any(word.startswith(("--quality", "--max-time")) for word in words):
+    if words[1] not in ("render", "preview") or any(
+        word.startswith(("--effort", "--quality", "--max-time")) for word in words
+    ):
         return words
     kept = list(words)
     if "--spp" in kept:

@@ -166,6 +166,13 @@ def test_values_are_typed_and_automatic_ones_are_given_back(page):
     # The stand-in's scene reaches from -10 to 5 mm, where 8 mm are sharp on both sides.
     tab.page.get_by_role("button", name="Fit into the sharp range").click()
     tab.wait_for(f"{COMMAND}.includes('--depth-scale 0.8')")
+    quality = tab.page.get_by_label("Quality of a render")
+    quality.select_option("draft")
+    tab.wait_for(f"{COMMAND}.includes('--effort draft')")
+    quality.select_option("40")
+    tab.wait_for(f"{COMMAND}.includes('--quality 40') && !{COMMAND}.includes('--effort')")
+    quality.select_option("")
+    tab.wait_for(f"!{COMMAND}.includes('--quality')")
     tab.page.get_by_label("Display", exact=True).select_option("mla-square")
     tab.wait_for(f"{STUDIO}.stage.optics.lenses.layout === 'square'")
     assert "--display mla-square" in tab.wait_for(f"{COMMAND}.includes('mla-square') && {COMMAND}")
