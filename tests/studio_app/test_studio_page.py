@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import json
 
+import imagecodecs
+import numpy as np
 import pytest
 from stand_in import TINY
 
+from lippmann.studio_app.render_jobs import Job
 from lippmann.studio_app.state import StudioState
 
 STUDIO = "window.lippmann.studio"
@@ -364,6 +367,24 @@ def test_a_studio_that_died_is_said(tmp_path, open_tab):
 def test_the_page_is_refused_without_its_token(studio, open_tab):
     tab = open_tab().open(studio.address.replace("secret", "guess"))
     assert json.loads(tab.page.inner_text("body")) == {"error": "there is nothing here"}
+
+
+def test_a_result_of_any_name_is_found(page, studio):
+    """An output that is named after a model with signs that addresses have a meaning for."""
+    tab = page()
+    name = "50%25 off #1, what? 'ü'_qs2x1.png"
+    output = studio.outputs / name
+    output.write_bytes(imagecodecs.png_encode(np.full((4, 8, 3), 255, np.uint8)))
+    runner = studio.session.jobs
+    number = len(runner._jobs) + 1
+    runner._jobs.append(Job(number, "quilt", (), output, phase="done"))
+    tab.evaluate(f"job => {STUDIO}.jobs.showJob(job)", runner._jobs[-1].message())
+    image = "document.querySelector('.result-frame img')?"
+    tab.wait_for(f"{image}.naturalWidth === 8")
+    assert tab.page.get_by_role("link", name="Download").get_attribute("download") == name
+    tab.page.get_by_role("button", name="Back to the live view").click()
+    runner._jobs.pop()
+    tab.assert_clean()
 
 
 def test_a_print_is_rendered_and_seen_through_its_sheet(page, studio):

@@ -91,7 +91,8 @@ export class Jobs {
     this.#viewer = null;
     const frame = h("div", { class: "result-frame" });
     const close = h("button", { type: "button", onclick: () => this.close() }, "Back to the live view");
-    const save = h("a", { class: "button", href: `results/${job.number}/${job.name}`, download: job.name }, "Download");
+    const address = `results/${job.number}/${encodeURIComponent(job.name)}`;
+    const save = h("a", { class: "button", href: address, download: job.name }, "Download");
     const onpanel = h("button", { type: "button", onclick: () => this.onpanel(job.number) }, "Show on the display");
     const title = h("h2", { tabindex: -1 }, job.name);
     const isPicture = job.shows === "picture";
@@ -108,8 +109,8 @@ export class Jobs {
       this.#viewer = createViewer(view, serverSource(job.number), { theme: "dark" });
       this.#viewer.ready.catch(() => {}); // the viewer displays its errors itself
     } else if (job.shows === "film") {
-      frame.append(h("video", { src: `results/${job.number}/${job.name}`, controls: true, loop: true, autoplay: true }));
-    } else frame.append(h("img", { src: `results/${job.number}/${job.name}`, alt: "All views of the quilt" }));
+      frame.append(h("video", { src: address, controls: true, loop: true, autoplay: true }));
+    } else frame.append(h("img", { src: address, alt: "All views of the quilt" }));
   }
 
   get isShown() {
