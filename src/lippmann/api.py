@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal, cast
 
 from lippmann.display import Display, load_display
+from lippmann.display.sheet_layout import with_bleed
 from lippmann.progress import ProgressCallback, silent
 from lippmann.progress_bar import shown
 from lippmann.rendering.request.choices import (
@@ -147,6 +148,7 @@ def render(
     display: Display | str | Path = "seed-lenticular",
     *,
     placement: PlacementOptions | Placement | None = None,
+    bleed: float = 0.0,
     method: Method = "auto",
     order: Order | None = None,
     respect_gloss: bool | None = None,
@@ -187,6 +189,9 @@ def render(
         Where the display stands in the scene: a :class:`~lippmann.scene.placement.PlacementOptions` (by a camera,
         fitted to the panel, or in the display's own millimetres; then turned, moved, scaled), or a placement
         found before. By default a bundled scene's own camera, else fitted.
+    bleed:
+        Of a print, millimetres to go on beyond every edge, which are cut off; 0 to 100. The scene stands where it
+        stands without. Default 0.
     method:
         ``auto`` (default): ``pooled`` where light has noise, else ``full``; for a quality or a time the faster of
         both. ``full`` traces every ray. ``pooled`` denoises, and all micro-images that show a point share its
@@ -292,7 +297,7 @@ def render(
         memory=memory,
     )
     with shown(progress) as told:
-        return render_picture(_scene(scene), _display(display), request, told)
+        return render_picture(_scene(scene), with_bleed(_display(display), bleed), request, told)
 
 
 def render_to_file(
@@ -301,6 +306,7 @@ def render_to_file(
     display: Display | str | Path = "seed-lenticular",
     *,
     placement: PlacementOptions | Placement | None = None,
+    bleed: float = 0.0,
     bits: int | None = None,
     resume: bool = False,
     runner: Runner | None = None,
@@ -313,7 +319,7 @@ def render_to_file(
 
     Parameters
     ----------
-    scene, display, placement, progress:
+    scene, display, placement, bleed, progress:
         As for :func:`render`.
     output:
         The file; ``.tif`` and ``.zarr`` are written in memory that does not grow with the picture.
@@ -344,7 +350,7 @@ def render_to_file(
     with shown(progress) as told:
         return rendered(
             _scene(scene),
-            _display(display),
+            with_bleed(_display(display), bleed),
             request,
             Path(output),
             bits=bits,

@@ -10,7 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lippmann.calibration.alignment_marks import Marks, with_marks
+from lippmann.calibration.alignment_marks import Marks
+from lippmann.calibration.finish import Finish
 from lippmann.display import load_display
 from lippmann.display.formats.print_sheet import Print
 from lippmann.display.pixel_window import PixelWindow
@@ -64,13 +65,13 @@ def test_the_lenses_lie_where_they_lay(lpi, size, margin, distance):
 def test_the_picture_is_kept_and_replays_as_before():
     depth = np.full(picture().pixels.shape[:2], 3.0, dtype=np.float32)
     image = replace(picture(), maps={"depth": depth, "normal": np.stack([depth] * 3, axis=-1)})
-    marked = with_marks(image, 8.0)
+    marked = Finish(margin=8.0).image(image)
     assert marked.display == MARKS.sheet
     for name in ("depth", "normal"):
         np.testing.assert_array_equal(marked.maps[name][M:-M, M:-M], image.maps[name])
         assert marked.maps[name].sum() == image.maps[name].sum()
     np.testing.assert_array_equal(marked.pixels[M:-M, M:-M], image.pixels)
-    assert marked.provenance.options["margin_pixels"] == M
+    assert marked.display.sheet.margin == M
     panel = DISPLAY.panel
     for eye in ((0.0, 0.0, 400.0), (55.0, -20.0, 500.0)):
         seen = replay(marked, eye, size=(panel.width + 2 * M, panel.height + 2 * M))[M:-M, M:-M]
@@ -81,7 +82,7 @@ def test_the_picture_is_kept_and_replays_as_before():
 
 
 def test_the_strips_are_dark_in_the_middle_and_bright_from_the_edge_of_the_field():
-    marked = with_marks(picture(), 8.0)
+    marked = Finish(margin=8.0).image(picture())
     size = marked.display.panel.width, marked.display.panel.height
     edge = 400 * math.tan(math.radians(marked.display.field_of_view / 2))
     strips = [np.s_[round(0.55 * M) : round(0.85 * M), M + 20 : -M - 20]]
@@ -93,7 +94,7 @@ def test_the_strips_are_dark_in_the_middle_and_bright_from_the_edge_of_the_field
 
 
 def test_a_turned_sheet_shows_bars_and_a_shifted_one_changes_all():
-    marked = with_marks(picture(), 8.0)
+    marked = Finish(margin=8.0).image(picture())
     size = marked.display.panel.width, marked.display.panel.height
     strip = np.s_[round(0.55 * M) : round(0.85 * M), M + 20 : -M - 20]
     sheet = marked.display

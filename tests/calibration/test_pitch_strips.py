@@ -38,8 +38,10 @@ def darkness(test, seen):
     """How much of each strip is dark, beyond its label and away from its rim."""
     shares = []
     for strip in test.all_strips:
-        top, height, width = strip.window.top, strip.window.height, strip.window.width
-        shares.append(1 - seen[top + 2 : top + height - 4, width // 4 : width - 20].mean())
+        part = strip.window
+        shares.append(
+            1 - seen[part.top + 2 : part.bottom - 4, part.left + round(0.4 * part.width) : part.right - 20].mean()
+        )
     return np.array(shares)
 
 
@@ -88,7 +90,7 @@ def test_strips_have_the_pitch_that_is_written_beside_them():
     pixels = whole(test)
     width = test.sheet.pixels[0]
     for strip in test.all_strips:
-        row = pixels[strip.window.top + 4, width // 3 :] == 0
+        row = pixels[strip.window.top + 4, width // 3 : strip.window.right] == 0
         edges = np.flatnonzero(np.diff(row.astype(int)) == 1)
         lines = (len(edges) - 1) / (edges[-1] - edges[0]) * 1440
         assert lines == pytest.approx(strip.lpi, rel=1e-3)
@@ -141,5 +143,35 @@ def test_nonsense_is_refused(asked, said):
 
 
 def test_strips_need_pixels():
-    with pytest.raises(UsageError, match="the print is 14 pixels high"):
+    with pytest.raises(UsageError, match="the print is 12 pixels high within its margin"):
         PitchTest(replace(SHEET, size=(60, 1)))
+
+
+def test_paper_is_left_around_the_strips():
+    ink = whole(PitchTest(SHEET)) == 0
+    rows, columns = np.flatnonzero(ink.any(axis=1)), np.flatnonzero(ink.any(axis=0))
+    margin = round(0.1 * ink.shape[0])  # a tenth of 40 mm; larger prints have 5 mm
+    assert rows[0] >= margin - 1
+    assert rows[-1] < ink.shape[0] - margin + 1
+    # The outermost lines of strips may be white.
+    assert margin - 1 <= columns[0] <= margin + 12
+    assert margin - 1 <= ink.shape[1] - 1 - columns[-1] <= margin + 12
+    large = PitchTest(replace(SHEET, size=(200, 100)))
+    assert large.inside.left == large.inside.top == round(5 * 360 / 25.4)
+
+
+@pytest.mark.parametrize(("strips", "step"), [(9, 0.25), (8, 0.25), (1, 0.5), (21, None)])
+def test_the_strip_next_to_the_expected_pitch_is_said(strips, step):
+    test = PitchTest(SHEET, strips=strips, step=step)
+    away = [abs(strip.lpi - SHEET.pitch_on_print) for strip in test.all_strips]
+    assert away[test.expected] == min(away)
+    widths = [label_width(test, strip) for strip in test.all_strips]
+    assert int(np.argmax(widths)) == test.expected
+
+
+def label_width(test, strip):
+    """Columns from the left of a strip in which it differs from bare lines: those of its label."""
+    pixels = whole(test)[strip.window.top : strip.window.bottom, : strip.window.right]
+    bare = pixels[1]  # above the label
+    differs = np.flatnonzero((pixels[: round(0.9 * len(pixels))] != bare).any(axis=0))
+    return differs[-1]

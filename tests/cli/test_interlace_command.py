@@ -87,6 +87,66 @@ def test_bleed_continues_lenses_and_photographs(lippmann, frames, tmp_path):
     np.testing.assert_array_equal(bled[50:-50, 50:-50], plain)
 
 
+def dark(row):
+    return np.flatnonzero((row == 0).all(axis=-1))
+
+
+def test_marks_after_a_bleed_cut_at_the_trim(lippmann, frames, tmp_path):
+    """Cutting lines stand a bleed and a margin from the edge: 3.175 and 8 mm, 50 and 126 pixels of 1/400 inch."""
+    interlace(lippmann, frames, tmp_path / "bled.png", "--size", "30x20mm", "--bleed", "3.175mm")
+    said = lippmann("marks", tmp_path / "bled.png", "--margin", "8mm", "-o", tmp_path / "sheet.png", "--json").json
+    codes = np.asarray(Image.open(tmp_path / "sheet.png"))
+    plain = 472, 315
+    assert codes.shape == (plain[1] + 352, plain[0] + 352, 3)
+    assert said["trim_mm"] == pytest.approx([plain[0] * 25.4 / 400, plain[1] * 25.4 / 400])
+    top, left = codes[3], codes[:, 3]
+    line = round(0.1 / (25.4 / 400))
+    expected = [*range(176 - line, 176), *range(176 + plain[0], 176 + plain[0] + line)]
+    across = [column for column in dark(top) if not 185 < column < 176 + plain[0] - 9]  # without the word TOP
+    assert across == expected
+    assert dark(left).tolist() == [*range(176 - line, 176), *range(176 + plain[1], 176 + plain[1] + line)]
+
+
+def test_a_mirrored_print_is_the_whole_sheet_mirrored_once(lippmann, frames, tmp_path):
+    options = ("--size", "30x20mm", "--bleed", "3mm", "--marks", "5mm")
+    plain = interlace(lippmann, frames, tmp_path / "plain.tif", *options)
+    mirrored = interlace(lippmann, frames, tmp_path / "mirrored.png", *options, "--mirror")
+    np.testing.assert_array_equal(mirrored, plain[:, ::-1])
+    bled = interlace(lippmann, frames, tmp_path / "bled.tif", *options[:-2], "--mirror")
+    np.testing.assert_array_equal(plain[79:-79, 79:-79], bled[:, ::-1])
+    # Marks come later to the mirrored file, by a command that is told nothing; and told again it is mirrored no more.
+    for again in ((), ("--mirror",)):
+        later = tmp_path / "later.tif"
+        assert lippmann("marks", tmp_path / "bled.tif", "--margin", "5mm", "-o", later, *again).code == 0
+        np.testing.assert_array_equal(np.asarray(Image.open(later)), mirrored)
+    across = interlace(lippmann, frames, tmp_path / "a.tif", "--size", "20x30mm", "--lenses", "across")
+    turned = interlace(lippmann, frames, tmp_path / "b.tif", "--size", "20x30mm", "--lenses", "across", "--mirror")
+    np.testing.assert_array_equal(turned, across[:, ::-1])
+
+
+def test_profiles_of_prints_and_panels(lippmann, frames, tmp_path):
+    from lippmann.codecs.icc import srgb_profile
+
+    def profile(path):
+        with Image.open(path) as picture:
+            return picture.info.get("icc_profile")
+
+    interlace(lippmann, frames, tmp_path / "print.tif", "--size", "30x20mm")
+    assert profile(tmp_path / "print.tif") == srgb_profile()
+    own = ImageCms.ImageCmsProfile(ImageCms.createProfile("sRGB")).tobytes()
+    own = own[:24] + bytes(12) + own[36:]  # another one, by its bytes
+    (tmp_path / "own.icc").write_bytes(own)
+    interlace(lippmann, frames, tmp_path / "own.tif", "--size", "30x20mm", "--icc", tmp_path / "own.icc")
+    assert lippmann("marks", tmp_path / "own.tif", "-o", tmp_path / "marked.png").code == 0
+    assert profile(tmp_path / "own.tif") == profile(tmp_path / "marked.png") == own
+    for path in frames:
+        with Image.open(path) as picture:
+            picture.save(path, icc_profile=own)
+    outcome = lippmann("interlace", *frames, "-d", "lkg-portrait", "-o", tmp_path / "lkg.png")
+    assert profile(tmp_path / "lkg.png") is None
+    assert "they are converted to sRGB" in outcome.err
+
+
 def test_profile_is_embedded_and_the_display_is_in_the_file(lippmann, frames, tmp_path):
     data = ImageCms.ImageCmsProfile(ImageCms.createProfile("sRGB")).tobytes()
     for path in frames:
@@ -117,6 +177,11 @@ def test_a_folder_a_display_and_what_is_said(lippmann, frames, tmp_path):
         (("-d", "lkg-portrait", "--lenses", "across"), "--lenses: does not apply"),
         ((*SHEET, "--size", "30x20mm", "--shift", "3"), "--shift: '3' will not do"),
         ((*SHEET, "--size", "30x20mm", "--bleed=-1mm"), "--bleed: -1 mm is out of range"),
+        ((*SHEET, "--size", "30x20mm", "--lenses", "across", "--marks", "8mm"), "--marks: marks are for upright"),
+        ((*SHEET, "--size", "30x20mm", "--icc", "absent.icc"), "absent.icc: cannot be read"),
+        (("-d", "lkg-portrait", "--marks", "8mm"), "--marks: does not apply"),
+        (("-d", "lkg-portrait", "--mirror"), "--mirror: does not apply"),
+        (("-d", "lkg-portrait", "--icc", "a.icc"), "--icc: does not apply"),
     ],
 )
 def test_errors_name_the_option(lippmann, frames, tmp_path, options, message):

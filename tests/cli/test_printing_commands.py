@@ -7,6 +7,7 @@ import pytest
 import tifffile
 from PIL import Image
 
+import lippmann as package
 from lippmann.calibration.pitch_strips import PitchTest
 from lippmann.display import load_display
 from lippmann.display.formats.print_sheet import print_of_texts
@@ -116,7 +117,17 @@ def test_bad_prints_are_one_line_and_code_2(lippmann, tmp_path, words, said):
         (("render", "teapot", "--display", "print:lpi=0,ppi=720,size=9x9cm"), "print: lpi: lpi is 0"),
         (("render", "teapot", "--display", SHORT, "--marks", "1mm"), "1 mm is out of range"),
         (("render", "teapot", "--display", SHORT, "--marks", "wide"), "--marks: 'wide' is not a length"),
-        (("render", "teapot", "--display", "mla-square", "--marks", "9mm"), "mla-square has square lenses"),
+        (
+            ("render", "teapot", "--display", "mla-square", "--marks", "9mm"),
+            "--marks: does not apply to the display mla-square; it applies to prints only",
+        ),
+        (("render", "teapot", "--bleed", "3mm"), "--bleed: does not apply to the display seed-lenticular"),
+        (("render", "teapot", "-d", "lkg-portrait", "--mirror"), "--mirror: does not apply to the display"),
+        (("render", "teapot", "-d", SHORT, "--icc", "absent.icc"), "absent.icc: cannot be read"),
+        (("render", "teapot", "-d", SHORT, "--bleed", "200mm"), "--bleed: 200 mm is out of range"),
+        (("render", "teapot", "-d", SHORT, "--mirror", "--resume"), "--mirror: needs the whole picture at once"),
+        (("render", "teapot", "-d", SHORT, "--mirror", "--turntable", "2"), "--mirror: does not apply to frames"),
+        (("weave", "absent.png", "-d", "lkg-portrait", "--marks", "8mm"), "--marks: does not apply to the display"),
         (("pitch-test", *SHEET, "--strips", "0"), "0 is out of range"),
         (("pitch-test", *SHEET, "--step", "-1"), "-1 is out of range"),
         (("pitch-test",), "--ppi: ppi is missing"),
@@ -135,3 +146,77 @@ def test_a_pitch_test_is_a_tiff(lippmann, tmp_path):
     outcome = lippmann("pitch-test", *SHEET, "-o", tmp_path / "test.png")
     assert outcome.code == 2
     assert "a pitch test is a TIFF file" in outcome.err
+
+
+POINT = (*QUICK, "--pixel-filter", "point", "--scale", "4")
+
+
+def test_a_bleed_goes_on_beyond_the_same_picture(lippmann, engine, tmp_path):
+    plain, bled, sheet = (tmp_path / f"{name}.tif" for name in ("plain", "bled", "sheet"))
+    assert lippmann("render", "teapot", "-d", SHORT, *POINT, "-o", plain).code == 0
+    assert lippmann("render", "teapot", "-d", SHORT, *POINT, "--bleed", "2.54mm", "-o", bled).code == 0
+    first, second = read_picture(plain), read_picture(bled)
+    assert second.pixels.shape == (157 + 40, 315 + 40, 3)  # 2.54 mm are 20 pixels of 1/200 inch
+    np.testing.assert_array_equal(second.pixels[20:-20, 20:-20], first.pixels)
+    np.testing.assert_array_equal(second.world_from_display, first.world_from_display)
+    assert second.pixels[:20].std() > 0  # more of the scene, no white paper
+    everything = ("--bleed", "2.54mm", "--marks", "5mm", "--mirror")
+    assert lippmann("render", "teapot", "-d", SHORT, *POINT, *everything, "-o", sheet).code == 0
+    mirrored = tifffile.imread(sheet)
+    np.testing.assert_array_equal(mirrored[39:-39, 39:-39], tifffile.imread(bled)[:, ::-1])
+    assert lippmann("replay", sheet, "-o", tmp_path / "seen.png").code == 0
+    place = package.PlacementOptions(scale=4)
+    asked = {"integrator": "normal", "spp": 1, "pixel_filter": "point"}
+    image = package.render("teapot", SHORT, placement=place, bleed=2.54, **asked)
+    assert image.display == second.display
+    np.testing.assert_allclose(np.clip(image.pixels, 0, 1), second.pixels, atol=0.01)  # of 8 bits
+
+
+def test_a_woven_print_has_its_trim_whatever_the_bleed(lippmann, tmp_path):
+    views = tmp_path / "views"
+    views.mkdir()
+    rng = np.random.default_rng(8)
+    for number in range(4):
+        codes = rng.integers(0, 256, (20, 40, 3), dtype=np.uint8)
+        Image.fromarray(codes).save(views / f"view_{number}.png")
+    plain, bled, sheet = (tmp_path / f"{name}.tif" for name in ("plain", "bled", "sheet"))
+    assert lippmann("weave", views, "-d", SHORT, "-o", plain).code == 0
+    assert lippmann("weave", views, "-d", SHORT, "--bleed", "2.54mm", "-o", bled).code == 0
+    np.testing.assert_array_equal(tifffile.imread(bled)[20:-20, 20:-20], tifffile.imread(plain))
+    assert (
+        lippmann("weave", views, "-d", SHORT, "--bleed", "2.54mm", "--marks", "5mm", "--mirror", "-o", sheet).code == 0
+    )
+    np.testing.assert_array_equal(tifffile.imread(sheet)[39:-39, 39:-39], tifffile.imread(bled)[:, ::-1])
+
+
+def test_a_job_sheet_is_one_page(lippmann, tmp_path):
+    views = tmp_path / "views"
+    views.mkdir()
+    for number in range(2):
+        Image.new("RGB", (40, 20), (90 * number, 80, 70)).save(views / f"view_{number}.png")
+    picture, sheet, job = tmp_path / "print.tif", tmp_path / "sheet.tif", tmp_path / "job.pdf"
+    assert lippmann("weave", views, "-d", SHORT, "--bleed", "2.54mm", "-o", picture).code == 0
+    outcome = lippmann("marks", picture, "-o", sheet, "--job-sheet", job)
+    assert outcome.code == 0
+    assert "cut to 40.01x19.94 mm" in outcome.out
+    assert job.read_bytes().startswith(b"%PDF")
+    assert job.read_bytes().count(b"/Type /Page ") == 1
+    alone = tmp_path / "alone.pdf"
+    assert lippmann("marks", sheet, "--job-sheet", alone, "--json").json["output"] is None
+    assert alone.exists()
+    for words, said in (
+        ((picture, "--job-sheet", tmp_path / "job.png"), "a job sheet is a .pdf file"),
+        ((picture,), "--output: is missing"),
+        ((picture, "-o", sheet, "--bleed", "3mm"), "--bleed: needs --display"),
+        ((sheet, "-o", tmp_path / "twice.tif"), "a margin with marks already"),
+    ):
+        outcome = lippmann("marks", *words, "--quiet")
+        assert (outcome.code, outcome.err.count("\n"), said in outcome.err) == (2, 1, True), outcome.err
+
+
+def test_marks_are_told_the_bleed_of_a_picture_without_a_record(lippmann, tmp_path):
+    foreign = tmp_path / "foreign.png"
+    Image.new("RGB", (315 + 40, 157 + 40), (90, 80, 70)).save(foreign)
+    outcome = lippmann("marks", foreign, "-d", SHORT, "--bleed", "2.54mm", "-o", tmp_path / "sheet.tif", "--json")
+    assert outcome.json["trim_mm"] == pytest.approx([315 * 0.127, 157 * 0.127])
+    assert read_picture(tmp_path / "sheet.tif").display.sheet.bleed == 20

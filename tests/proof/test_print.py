@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from mitsuba_cameras import camera_rays, in_display, intersect
 
-from lippmann.calibration.alignment_marks import with_marks
+from lippmann.calibration.finish import Finish
 from lippmann.display.formats.print_sheet import Print
 from lippmann.scene.placement import PlacementOptions
 from lippmann.viewing.replay import replay
@@ -95,5 +95,5 @@ def test_without_regard_to_the_distance_it_would_not(glowing, build_once):
 
 def test_the_marked_sheet_shows_the_same(made, glowing, build_once):
     built = build_once(glowing("teapot"))
-    marked = {name: with_marks(image, 5.0) for name, image in made.items()}
+    marked = {name: Finish(margin=5.0).image(image) for name, image in made.items()}
     assert agreement(marked, built, EYES[0], lens_points()) > 0.93

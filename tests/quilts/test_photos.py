@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from PIL import Image, ImageCms
 
+from lippmann.codecs.icc import read_profile
 from lippmann.errors import PictureError, UsageError
 from lippmann.quilts.photos import Shift, natural_order, read_photos
 
@@ -126,7 +127,7 @@ def test_one_profile_is_kept_and_several_become_srgb(tmp_path):
     assert mixed.quilt.view_values(0)[0, 0] == pytest.approx(188, abs=1)  # linear 128/255 as sRGB
     assert (mixed.quilt.view_values(1) == 128).all()
     (tmp_path / "flat.icc").write_bytes(profile(1.0))
-    asked = read_photos([tmp_path / "plain.png"] * 2, (20, 10), PAPER, icc=tmp_path / "flat.icc")
+    asked = read_photos([tmp_path / "plain.png"] * 2, (20, 10), PAPER, profile=read_profile(tmp_path / "flat.icc"))
     assert asked.icc == profile(1.0)
     assert asked.quilt.values[0, 0] == pytest.approx(55, abs=1)  # sRGB 128/255 as linear light
 

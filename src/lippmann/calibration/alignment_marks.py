@@ -8,17 +8,18 @@ marks are:
   |f - 1/2| < 1/4. Under an aligned sheet they look uniformly dark to an eye at the centre of the viewing zone. Bars
   mean a rotated sheet; an equal change of both strips means a shifted one.
 - A cross in a ring in each corner, and left and right at half height. Its upright arm is centred on a lens.
-- Cutting lines at the picture's corners, from 0.6 m outwards, just outside the picture.
+- Cutting lines at the corners of the finished print, in the margin from 0.6 m outwards, just outside the trim: where
+  the picture has a bleed, they point at lines within it.
 - Text: the print's parameters outside the lower strip, ``TOP`` outside the upper one.
 
-All ink is black on white. Every mark is a function of the pixel's position, so that windows of a large print can be
-drawn alone.
+The picture is what the sheet shows, with its bleed. All ink is black on white. Every mark is a function of the pixel's
+position, so that windows of a large print can be drawn alone.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,10 +27,10 @@ from numpy.typing import NDArray
 from lippmann.calibration.labels import label_window, paint_label
 from lippmann.display import Display
 from lippmann.display.pixel_window import PixelWindow
+from lippmann.display.sheet_layout import trim_of, with_margin
 from lippmann.errors import UsageError
-from lippmann.image import IntegralImage, Provenance
+from lippmann.image.stored_values import FloatArray
 
-FloatArray = NDArray[np.float32]
 Real = NDArray[np.float64]
 Ink = NDArray[np.bool_]
 
@@ -54,14 +55,14 @@ class Marks:
     Parameters
     ----------
     display:
-        The display of the picture alone.
+        The display of the picture alone, with its bleed.
     margin:
         Width of the margin in millimetres, 3 to 100; rounded to whole pixels.
 
     Raises
     ------
     UsageError
-        If the margin is out of range, or the lenses are not cylindrical and upright.
+        If the margin is out of range, the lenses are not cylindrical and upright, or there are marks already.
     """
 
     display: Display
@@ -77,6 +78,8 @@ class Marks:
             kind = "slanted" if lenses.slant else lenses.layout
             rule = "marks need upright cylindrical lenses"
             raise UsageError(f"the display {self.display.name} has {kind} lenses", rule=rule)
+        if self.display.sheet is not None and self.display.sheet.margin:
+            raise UsageError("the picture has a margin with marks already", fix="take the picture without it")
 
     @property
     def pixels(self) -> int:
@@ -85,17 +88,19 @@ class Marks:
 
     @property
     def picture(self) -> PixelWindow:
-        """The part of the marked sheet that the picture covers."""
+        """The part of the marked sheet that the picture with its bleed covers."""
         panel = self.display.panel
         return PixelWindow(self.pixels, self.pixels, panel.width, panel.height)
 
     @property
     def sheet(self) -> Display:
         """The display of the marked sheet: the same lenses, continued over the margin."""
-        panel, lattice = self.display.panel, self.display.lattice
-        width, height = panel.width + 2 * self.pixels, panel.height + 2 * self.pixels
-        lenses = replace(self.display.lens_array, pitch=lattice.pitch, offset=(lattice.origin_x, 0.0))
-        return replace(self.display, panel=replace(panel, width=width, height=height), lens_array=lenses)
+        return with_margin(self.display, self.pixels)
+
+    @property
+    def trim(self) -> PixelWindow:
+        """The part of the marked sheet that is left after cutting."""
+        return trim_of(self.sheet)
 
     def caption(self) -> str:
         """The line of text below the picture: pitches, resolution and viewing distance."""
@@ -113,10 +118,10 @@ class Marks:
         for center in self._cross_centers():
             ink |= self._cross(columns, rows, *center)
         pixels = np.where(ink, np.float32(0), np.float32(1))
-        m, inside = self.pixels, self.picture
+        m, inside, trim = self.pixels, self.picture, self.trim
         room = round((1 - _CUT) * 0.8 * m)
         for text, top in (("TOP", 0.1 * m), (self.caption(), inside.bottom + _CUT * m)):
-            line = PixelWindow(inside.left, round(top), inside.width, room)
+            line = PixelWindow(trim.left, round(top), trim.width, room)
             box = label_window(text, line, room, at="bottom")
             paint_label(pixels, window, text, box, ink=0, paper=1)
         return pixels
@@ -137,12 +142,13 @@ class Marks:
         return in_strip & (np.abs(self.lens_phase(column) - 0.5) < 0.25)
 
     def _cuts(self, column: Real, row: Real) -> Ink:
-        """Cutting lines: just outside the picture's edges, in the outer margin near the corners."""
-        inside, m, line = self.picture, self.pixels, self._line
-        right = np.maximum(inside.left - column, column - (inside.right - 1))
-        down = np.maximum(inside.top - row, row - (inside.bottom - 1))
-        is_vertical = (right > 0) & (right <= line) & (down > _CUT * m)
-        is_horizontal = (down > 0) & (down <= line) & (right > _CUT * m)
+        """Cutting lines: just outside the edges of the trim, in the outer margin."""
+        trim, line = self.trim, self._line
+        outwards = trim.left - self.picture.left + _CUT * self.pixels
+        right = np.maximum(trim.left - column, column - (trim.right - 1))
+        down = np.maximum(trim.top - row, row - (trim.bottom - 1))
+        is_vertical = (right > 0) & (right <= line) & (down > outwards)
+        is_horizontal = (down > 0) & (down <= line) & (right > outwards)
         return is_vertical | is_horizontal
 
     def _cross_centers(self) -> list[tuple[float, float]]:
@@ -167,30 +173,6 @@ class Marks:
     @property
     def _line(self) -> int:
         return max(1, round(_LINE / self.display.panel.pixel_pitch))
-
-
-def with_marks(image: IntegralImage, margin: float) -> IntegralImage:
-    """The picture with a margin and its alignment marks, for the display that is larger by the margin.
-
-    Parameters
-    ----------
-    image:
-        The picture of a display with upright cylindrical lenses. Its maps become zero over the margin.
-    margin:
-        Width of the margin in millimetres, 3 to 100.
-
-    Raises
-    ------
-    UsageError
-        If the margin is out of range, or the lenses are not cylindrical and upright.
-    """
-    marks = Marks(image.display, margin)
-    sheet, m = marks.sheet, marks.pixels
-    pixels = marked_rows(marks, lambda first, last: image.pixels[first:last], 0, sheet.panel.height)
-    maps = {name: np.pad(values, ((m, m), (m, m), (0, 0))[: values.ndim]) for name, values in image.maps.items()}
-    return replace(
-        image, pixels=pixels, display=sheet, provenance=marked_provenance(marks, image.provenance), maps=maps
-    )
 
 
 def marked_rows(marks: Marks, rows: Callable[[int, int], FloatArray], first: int, last: int) -> FloatArray:
@@ -220,8 +202,3 @@ def marked_rows(marks: Marks, rows: Callable[[int, int], FloatArray], first: int
         if edge.height > 0:
             pixels[edge.top - first : edge.bottom - first, edge.columns] = marks.draw(edge)[..., None]
     return pixels
-
-
-def marked_provenance(marks: Marks, provenance: Provenance) -> Provenance:
-    """Provenance of the marked picture: that of the picture, with the width of the margin in pixels."""
-    return replace(provenance, options={**provenance.options, "margin_pixels": marks.pixels})

@@ -4,9 +4,11 @@ Strip k (0 on top) of n has the print pitch ``lpi_k = middle + (k - (n - 1)/2) s
 centre is x inches right of the middle of the print has the phase ``f = x lpi_k + 1/2 (mod 1)`` under its lens, and is
 black where |f - 1/2| < 1/4. Seen from the viewing distance of the test, the strip with the right pitch is uniformly
 dark (or bright, depending on the position of the sheet) and changes as a whole when the sheet or the head moves
-sideways. The other strips show bars: as many as they have lenses too many or too few.
+sideways. The other strips show bars: as many as they have lenses too many or too few. The label of the strip next to
+the expected print pitch says so.
 
-All pixels are black or white, so that no printer dithers them. All functions draw windows of the print.
+White paper is left around the strips, as printers do not print to the edge. All pixels are black or white, so that no
+printer dithers them. All functions draw windows of the print.
 """
 
 from __future__ import annotations
@@ -26,6 +28,12 @@ from lippmann.runtime.cached_property import cached_property
 
 #: Largest height of a label in mm; smaller in low strips.
 _LABEL = 6.0
+
+#: Width of the white margin in mm: more than desktop printers leave out; at most so much of the print's shorter side.
+_MARGIN, _MARGIN_SHARE = 5.0, 0.1
+
+#: What the label of the expected strip says after its pitch.
+_EXPECTED = "expected"
 
 #: Height of the white line between strips over that of a strip.
 _GUTTER = 0.04
@@ -72,8 +80,8 @@ class PitchTest:
             rule = f"it must be {least} to {most}"
             raise UsageError(f"{self.strips} is out of range", parameter="strips", rule=rule)
         check_step(self.step)
-        if self.strips + 1 > self.sheet.pixels[1]:
-            rule = f"the print is {self.sheet.pixels[1]} pixels high"
+        if self.strips + 1 > self.inside.height:
+            rule = f"the print is {self.inside.height} pixels high within its margin"
             raise UsageError(f"{self.strips} is out of range", parameter="strips", rule=rule)
         if self.lpi_of(0) <= 0:
             rule = f"the print pitch is about {self.sheet.pitch_on_print:.6g} lenses per inch"
@@ -91,6 +99,18 @@ class PitchTest:
         expected, step = self.sheet.pitch_on_print, self.effective_step
         return round(expected / step) * step if step < expected / 2 else expected
 
+    @property
+    def expected(self) -> int:
+        """The strip whose print pitch is next to the expected one, counted from 0 at the top."""
+        return min(range(self.strips), key=lambda strip: abs(self.lpi_of(strip) - self.sheet.pitch_on_print))
+
+    @property
+    def inside(self) -> PixelWindow:
+        """The print within its margin."""
+        width, height = self.sheet.pixels
+        margin = min(round(_MARGIN * self.sheet.ppi / 25.4), int(_MARGIN_SHARE * min(width, height)))
+        return PixelWindow(margin, margin, width - 2 * margin, height - 2 * margin)
+
     def lpi_of(self, strip: int) -> float:
         """Print pitch in lenses per inch of a strip, counted from 0 at the top."""
         return self.middle + (strip - (self.strips - 1) / 2) * self.effective_step
@@ -98,13 +118,13 @@ class PitchTest:
     @cached_property
     def all_strips(self) -> tuple[Strip, ...]:
         """All strips from the top; the title has the height of a strip above them."""
-        width, height = self.sheet.pixels
-        rows = [height * (k + 1) // (self.strips + 1) for k in range(self.strips + 1)]
+        inside = self.inside
+        rows = [inside.top + inside.height * (k + 1) // (self.strips + 1) for k in range(self.strips + 1)]
         decimals = next((d for d in range(2, 6) if math.isclose(round(self.effective_step, d), self.effective_step)), 6)
         strips = []
         for k in range(self.strips):
-            lpi = self.lpi_of(k)
-            strips.append(Strip(PixelWindow(0, rows[k], width, rows[k + 1] - rows[k]), lpi, f"{lpi:.{decimals}f}"))
+            lpi, window = self.lpi_of(k), PixelWindow(inside.left, rows[k], inside.width, rows[k + 1] - rows[k])
+            strips.append(Strip(window, lpi, f"{lpi:.{decimals}f}"))
         return tuple(strips)
 
     def title(self) -> str:
@@ -116,21 +136,21 @@ class PitchTest:
     def draw(self, window: PixelWindow) -> NDArray[np.uint8]:
         """``(height, width)`` uint8 pixels of a window of the print, 0 black or 255 white."""
         pixels = np.full(window.shape, 255, dtype=np.uint8)
-        width = self.sheet.pixels[0]
+        width, inside, expected = self.sheet.pixels[0], self.inside, self.expected
         tallest = round(_LABEL * self.sheet.ppi / 25.4)
-        head = PixelWindow(0, 0, width, self.all_strips[0].window.top)
+        head = PixelWindow(inside.left, inside.top, inside.width, self.all_strips[0].window.top - inside.top)
         paint_label(pixels, window, self.title(), label_window(self.title(), head, tallest), ink=0, paper=255)
-        columns = np.arange(window.left, window.right)
-        inches = (columns + 0.5 - width / 2) / self.sheet.ppi
-        for strip in self.all_strips:
+        for number, strip in enumerate(self.all_strips):
             part = strip.window.intersection(window)
             if part is None:
                 continue
             gutter = round(_GUTTER * strip.window.height)
             rows = np.arange(part.top, part.bottom) - strip.window.top
+            inches = (np.arange(part.left, part.right) + 0.5 - width / 2) / self.sheet.ppi
             is_dark = np.abs((inches * strip.lpi + 0.5) % 1.0 - 0.5) < 0.25
-            inside = rows < strip.window.height - gutter
-            pixels[part.relative_to(window).rows][inside] = np.where(is_dark, 0, 255)
-            box = label_window(strip.text, strip.window, min(tallest, round(0.7 * strip.window.height)))
-            paint_label(pixels, window, strip.text, box, ink=0, paper=255)
+            is_strip = rows < strip.window.height - gutter
+            pixels[part.relative_to(window).slices][is_strip] = np.where(is_dark, 0, 255)
+            text = f"{strip.text} {_EXPECTED}" if number == expected else strip.text
+            box = label_window(text, strip.window, min(tallest, round(0.7 * strip.window.height)))
+            paint_label(pixels, window, text, box, ink=0, paper=255)
         return pixels

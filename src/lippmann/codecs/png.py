@@ -34,13 +34,15 @@ _CHANNELS = {0: 1, 2: 3, 3: 3, 4: 2, 6: 4}
 
 @dataclass(frozen=True)
 class PngHeader:
-    """What a PNG says of itself before its pixels: size, ``bits`` per channel, channels once decoded, its texts."""
+    """What a PNG says of itself before its pixels: size, ``bits`` per channel, channels once decoded, texts and ICC
+    profile (empty without)."""
 
     width: int
     height: int
     bits: int
     channels: int
     text: Mapping[str, str]
+    icc: bytes = b""
 
 
 def encode_png(
@@ -90,15 +92,18 @@ def png_header(file: BinaryIO, path: Path) -> PngHeader:
     """:func:`read_png_header` of a file that is open, at its beginning; ``path`` is its name, for errors."""
     header: tuple[int, int, int, int] | None = None
     text: dict[str, str] = {}
+    icc = b""
     for kind, body in _chunks(file, path):
         if kind == b"IHDR" and len(body) == 13:
             width, height, bits, color_type = struct.unpack(">IIBB", body[:10])
             header = width, height, bits, _CHANNELS.get(color_type, 0)
         elif kind == b"iTXt":
             text.update(_international_text(body, path))
+        elif kind == b"iCCP":
+            icc = _profile(body, path)
     if header is None or not header[0] or not header[1] or not header[3]:
         raise _damaged(path, "it has no proper header")
-    return PngHeader(*header, text=text)
+    return PngHeader(*header, text=text, icc=icc)
 
 
 def read_png(path: Path) -> Pixels:
@@ -149,7 +154,7 @@ def _chunks(file: BinaryIO, path: Path, *, all_bodies: bool = False) -> Iterator
             raise _damaged(path, f"it ends within its {kind.decode('latin-1')!r} chunk")
         if kind == b"IEND":
             return
-        if not all_bodies and kind not in (b"IHDR", b"iTXt"):
+        if not all_bodies and kind not in (b"IHDR", b"iTXt", b"iCCP"):
             file.seek(length + 4, 1)
             yield kind, b""
             continue
@@ -172,6 +177,14 @@ def _international_text(body: bytes, path: Path) -> dict[str, str]:
         return {keyword.decode("latin-1"): raw.decode("utf-8")}
     except (zlib.error, UnicodeDecodeError) as error:
         raise _damaged(path, f"one of its texts cannot be read ({error})") from error
+
+
+def _profile(body: bytes, path: Path) -> bytes:
+    _, _, packed = body.partition(b"\0")
+    try:
+        return zlib.decompressobj().decompress(packed[1:], _LONGEST_TEXT)  # after the byte of the method, deflate
+    except zlib.error as error:
+        raise _damaged(path, f"its ICC profile cannot be read ({error})") from error
 
 
 def _damaged(path: Path, what: str) -> PictureError:

@@ -43,10 +43,13 @@ _LIBRARY_ERRORS = (
 )
 
 
-def write_tiff(path: Path, values: Pixels, *, description: str, pixel_pitch: float | None = None) -> None:
+def write_tiff(
+    path: Path, values: Pixels, *, description: str, pixel_pitch: float | None = None, icc: bytes = b""
+) -> None:
     """Write ``(H, W, 3)`` uint8, uint16 or float32 values, losslessly compressed (deflate with predictor).
 
-    ``description`` (ASCII) becomes ``ImageDescription``; ``pixel_pitch`` (mm) becomes the resolution in dots per inch.
+    ``description`` (ASCII) becomes ``ImageDescription``; ``pixel_pitch`` (mm) becomes the resolution in dots per inch;
+    ``icc`` is the profile of the values, empty without.
     Pictures of :data:`TILED_FROM` pixels and more are for :func:`write_tiled_tiff`.
     """
     import tifffile
@@ -60,6 +63,7 @@ def write_tiff(path: Path, values: Pixels, *, description: str, pixel_pitch: flo
         description=description,
         metadata=None,
         software="Lippmann",
+        iccprofile=icc or None,
         **_resolution(pixel_pitch),
     )
 
@@ -89,6 +93,7 @@ def write_tiled_tiff(
     dtype: StoredType,
     description: str,
     pixel_pitch: float | None = None,
+    icc: bytes = b"",
 ) -> None:
     """Write a BigTIFF tile by tile, so that the picture need never be in memory.
 
@@ -100,6 +105,8 @@ def write_tiled_tiff(
         Width and height of the picture.
     side:
         Height and width of a tile, a multiple of 16.
+    icc:
+        ICC profile of the values; empty without.
     """
     import tifffile
 
@@ -123,6 +130,7 @@ def write_tiled_tiff(
         description=description,
         metadata=None,
         software="Lippmann",
+        iccprofile=icc or None,
         buffersize=_BUFFER,
         **_resolution(pixel_pitch),
     )
@@ -154,6 +162,8 @@ class TiffPicture:
         NumPy type name of the values.
     description:
         The text of ``ImageDescription``; empty without.
+    icc:
+        ICC profile of the values; empty without.
 
     Raises
     ------
@@ -172,6 +182,7 @@ class TiffPicture:
             description = self._page.tags.get("ImageDescription")
             text = description.value if description is not None else ""
             interleaved = self._page.planarconfig == 1
+            profile = self._page.iccprofile
         if len(shape) == 2:
             shape = (*shape, 1)
         sizes = [size for size in shape if isinstance(size, int) and size >= 1]  # a damaged tag may be anything
@@ -182,6 +193,7 @@ class TiffPicture:
         self.height, self.width, self.channels = sizes
         self.dtype: str = np.dtype(dtype).name
         self.description = text if isinstance(text, str) else ""
+        self.icc = profile if isinstance(profile, bytes) else b""
 
     def read(self) -> Pixels:
         """All values as stored, ``(H, W)`` or ``(H, W, channels)``.

@@ -15,7 +15,7 @@ Geometry (display frame, millimetres, right-handed: origin at the array's centre
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -26,6 +26,7 @@ from lippmann.display.lattice import Lattice
 from lippmann.display.lens_array import LensArray
 from lippmann.display.lens_grid import WHOLE_TOLERANCE, LensGrid, lattice_in_front_of
 from lippmann.display.panel import Panel
+from lippmann.display.sheet import Sheet
 from lippmann.display.validation import Table, check_keys, check_text, number, positive
 from lippmann.errors import DisplayError
 from lippmann.json_values import JsonObject
@@ -61,6 +62,8 @@ class Display:
     aperture_distance:
         Distance in front of the lens plane at which the recorded rays begin, in millimetres: at least 0, below the
         viewing distance. Nothing nearer to the viewer is recorded.
+    sheet:
+        Bleed, margin and printing of a print; None for displays that are no prints.
 
     Notes
     -----
@@ -87,6 +90,7 @@ class Display:
     title: str = ""
     viewing_distance: float = math.inf
     aperture_distance: float = 0.0
+    sheet: Sheet | None = None
 
     def __post_init__(self) -> None:
         check_text(self.name, "name", empty=False)
@@ -103,6 +107,17 @@ class Display:
             raise DisplayError(f"aperture_distance is {aperture_distance:g} mm", where="aperture_distance", rule=rule)
         object.__setattr__(self, "aperture_distance", aperture_distance)
         self._check_pixels_per_lens()
+        self._check_sheet()
+
+    def _check_sheet(self) -> None:
+        if self.sheet is None:
+            return
+        if self.lens_array.layout != "lenticular" or self.lens_array.slant:
+            raise DisplayError("sheet is given", where="sheet", rule="prints have upright cylindrical lenses")
+        least = min(self.panel.width, self.panel.height)
+        if 2 * self.sheet.border >= least:
+            what = f"bleed and margin take {2 * self.sheet.border} of {least} pixels"
+            raise DisplayError(what, where="sheet", rule="they must leave some of the picture")
 
     def _check_pixels_per_lens(self) -> None:
         key, fix = "lens_array.pitch", "look at the units of pitch and pixel_pitch"
@@ -189,7 +204,8 @@ class Display:
         the display's own sampling in the lens plane, or a 150th of the panel's shorter side: ``z = s g / d`` for a
         spread s. Where sub-pixels lie under a slanted sheet, each shows a direction of its own: d is theirs.
         """
-        resolved = max(self.lens_array.pitch, RESOLVED_SHARE * min(self.size_mm))
+        cut_off = 0 if self.sheet is None else 2 * self.sheet.border * self.panel.pixel_pitch
+        resolved = max(self.lens_array.pitch, RESOLVED_SHARE * (min(self.size_mm) - cut_off))
         depth = resolved * self.gap / self.panel.pixel_pitch * (3.0 if self.has_slanted_stripes else 1.0)
         return min(depth, self.viewing_distance), -depth
 
@@ -362,6 +378,7 @@ class Display:
                 "offset": None if lenses.offset is None else list(lenses.offset),
                 "row_pitch": lenses.row_pitch,
             },
+            **({} if self.sheet is None else {"sheet": asdict(self.sheet)}),
         }
 
     @staticmethod
@@ -371,6 +388,8 @@ class Display:
         parts: dict[str, Any] = dict(values)  # any type until the constructors have checked them
         parts["panel"] = Panel(**parts["panel"])
         parts["lens_array"] = LensArray(**parts["lens_array"])
+        if "sheet" in parts:
+            parts["sheet"] = Sheet(**parts["sheet"])
         if parts.get("viewing_distance") == INFINITE:
             parts["viewing_distance"] = math.inf
         return Display(**parts)
@@ -403,6 +422,8 @@ def check_tables(values: Table) -> None:
     check_keys(values, Display, "")
     check_keys(values["panel"], Panel, "panel")
     check_keys(values["lens_array"], LensArray, "lens_array")
+    if "sheet" in values:
+        check_keys(values["sheet"], Sheet, "sheet")
 
 
 def _nonzero(value: Array, ops: ArrayOps) -> Array:

@@ -101,6 +101,7 @@ def encode_tiles(
     dtype: np.dtype[np.generic],
     text: str = "",
     pixel_pitch: float | None = None,
+    icc: bytes = b"",
 ) -> None:
     """Write a TIFF or Zarr file from the tiles of :func:`tiles_of_rows`.
 
@@ -116,6 +117,8 @@ def encode_tiles(
         JSON of the metadata; empty without.
     pixel_pitch:
         Millimetres; becomes the resolution of a TIFF.
+    icc:
+        ICC profile of integer values in a TIFF; empty without.
 
     Raises
     ------
@@ -127,7 +130,9 @@ def encode_tiles(
         places = (window.slices for window in TileGrid(*size, side))
         zarr_array.write_zarr(path, zip(places, tiles, strict=True), size=size, side=side, dtype=dtype, text=text)
         return
-    tiff.write_tiled_tiff(path, tiles, size=size, side=side, dtype=dtype, description=text, pixel_pitch=pixel_pitch)
+    tiff.write_tiled_tiff(
+        path, tiles, size=size, side=side, dtype=dtype, description=text, pixel_pitch=pixel_pitch, icc=icc
+    )
 
 
 def encode_values(
@@ -138,6 +143,7 @@ def encode_values(
     transfer: Transfer,
     text: str = "",
     pixel_pitch: float | None = None,
+    icc: bytes = b"",
 ) -> None:
     """Write a picture file from layers in memory.
 
@@ -153,6 +159,8 @@ def encode_values(
         JSON of the metadata; empty without.
     pixel_pitch:
         Millimetres; becomes the resolution.
+    icc:
+        ICC profile of integer values in PNG and TIFF; empty without.
 
     Raises
     ------
@@ -163,14 +171,15 @@ def encode_values(
     size = values.shape[1], values.shape[0]
     texts = {TEXT_KEY: text} if text else {}
     if name == "png":
-        path.write_bytes(png.encode_png(values, text=texts, pixel_pitch=pixel_pitch, srgb=transfer == "srgb"))
+        encoded = png.encode_png(values, text=texts, pixel_pitch=pixel_pitch, srgb=transfer == "srgb", icc=icc)
+        path.write_bytes(encoded)
     elif name == "exr":
         exr.write_exr(path, _channels(layers), text=texts, pixel_pitch=pixel_pitch)
     elif is_tiled(name, size):
         tiles = tiles_of_rows(lambda first, last: values[first:last], size)
-        encode_tiles(path, name, tiles, size=size, dtype=values.dtype, text=text, pixel_pitch=pixel_pitch)
+        encode_tiles(path, name, tiles, size=size, dtype=values.dtype, text=text, pixel_pitch=pixel_pitch, icc=icc)
     else:
-        tiff.write_tiff(path, values, description=text, pixel_pitch=pixel_pitch)
+        tiff.write_tiff(path, values, description=text, pixel_pitch=pixel_pitch, icc=icc)
 
 
 def _channels(layers: Mapping[str, Layer]) -> dict[str, Layer]:

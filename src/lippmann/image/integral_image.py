@@ -200,14 +200,14 @@ class IntegralImage(Picture):
 
         return refocus(self, plane, size=size)
 
-    def save(self, path: str | Path, bits: int | None = None) -> None:
+    def save(self, path: str | Path, bits: int | None = None, *, icc: bytes = b"") -> None:
         """Write a PNG, OpenEXR, TIFF or Zarr file.
 
         Parameters and errors are those of :func:`lippmann.image.write.write_picture`.
         """
         from lippmann.image.write import write_picture
 
-        write_picture(self, Path(path), bits=bits)
+        write_picture(self, Path(path), bits=bits, icc=icc)
 
     def srgb(self, bits: int = 8) -> NDArray[np.uint8] | NDArray[np.uint16]:
         """Display codes ``(H, W, 3)``, as integer formats hold them: uint8, or uint16 for 16 ``bits``.

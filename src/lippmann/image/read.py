@@ -19,6 +19,7 @@ from lippmann.image.encoding import STORED, TEXT_KEY, FormatName, layers_of_chan
 from lippmann.image.integral_image import IntegralImage
 from lippmann.image.metadata import Metadata, from_text, is_quilt_text
 from lippmann.image.provenance import Provenance
+from lippmann.image.sheet_codes import mirrored_in_file
 from lippmann.image.stored_values import Layer, Stored, Values
 from lippmann.runtime.cached_property import cached_property
 from lippmann.runtime.regular_file import check_kind
@@ -50,6 +51,8 @@ class PictureFile:
         Names of the layers beside the RGB.
     text:
         JSON of the metadata; empty without.
+    icc:
+        ICC profile of the values; empty without.
     pieces:
         Decoder of single tiles, strips or chunks; None for PNG and OpenEXR.
     """
@@ -61,6 +64,7 @@ class PictureFile:
     stored: str
     layers: tuple[str, ...]
     text: str
+    icc: bytes
     pieces: tiff.TiffPicture | zarr_array.ZarrPicture | None
     _decode: Callable[[], dict[str, Layer]]
 
@@ -131,7 +135,8 @@ class PictureFile:
         """The whole picture in memory; ``display`` and errors as in :func:`read_picture`."""
         metadata = self.metadata_for(display)
         values, layers = self.decode()
-        pixels = linear_values(values, metadata.provenance.transfer)
+        pixels = mirrored_in_file(linear_values(values, metadata.provenance.transfer), metadata.display)
+        layers = {name: mirrored_in_file(layer, metadata.display) for name, layer in layers.items()}
         try:
             return IntegralImage(
                 pixels,
@@ -193,7 +198,7 @@ def open_file(path: str | Path) -> PictureFile:
     if zarr_array.is_zarr(path):
         array = zarr_array.ZarrPicture(path)
         size, text = (array.width, array.height), array.text
-        opened = PictureFile(path, "zarr", *size, array.dtype, (), text, array, lambda: {"": array.read()})
+        opened = PictureFile(path, "zarr", *size, array.dtype, (), text, b"", array, lambda: {"": array.read()})
         return _plausible(opened, None)  # the size of a folder shows nothing: chunks without values need no files
     check_kind(path, PictureError)
     try:
@@ -218,19 +223,29 @@ def _opened(path: Path, file: BufferedReader, start: bytes) -> PictureFile:
         header = png.png_header(file, path)
         stored, text = f"uint{max(8, header.bits)}", header.text.get(TEXT_KEY, "")
         size = header.width, header.height
-        return PictureFile(path, "png", *size, stored, (), text, None, lambda: {"": png.decode_png(_whole(file), path)})
+        return PictureFile(
+            path, "png", *size, stored, (), text, header.icc, None, lambda: {"": png.decode_png(_whole(file), path)}
+        )
     if start.startswith(exr.SIGNATURE):
         parts = exr.exr_header(file, path)
         layers = tuple(sorted({name.rpartition(".")[0] for name in parts.channels} - {""}))
         stored, text = parts.channels.get("R", "none"), parts.text.get(TEXT_KEY, "")
         size = parts.width, parts.height
         return PictureFile(
-            path, "exr", *size, stored, layers, text, None, lambda: layers_of_channels(exr.read_exr(path, parts), path)
+            path,
+            "exr",
+            *size,
+            stored,
+            layers,
+            text,
+            b"",
+            None,
+            lambda: layers_of_channels(exr.read_exr(path, parts), path),
         )
     if start.startswith(tiff.SIGNATURES):
         page = tiff.TiffPicture(file, path)
         size, text = (page.width, page.height), page.description
-        return PictureFile(path, "tiff", *size, page.dtype, (), text, page, lambda: {"": page.read()})
+        return PictureFile(path, "tiff", *size, page.dtype, (), text, page.icc, page, lambda: {"": page.read()})
     if not start:
         raise PictureError("is empty", where=str(path), fix="make or fetch it anew")
     raise PictureError("is no picture that is known here", where=str(path), rule="PNG, OpenEXR, TIFF and Zarr are read")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +17,7 @@ from lippmann.image.integral_image import IntegralImage
 from lippmann.image.picture import Picture
 from lippmann.image.provenance import Provenance
 from lippmann.image.read import PictureFile, opaque_colors, open_file
+from lippmann.image.sheet_codes import is_mirrored, mirrored_in_file
 from lippmann.image.stored_values import FloatArray, Indices, Layer, Matrix, Stored, Values
 
 #: Pictures of more pixels are decoded piece by piece: as float32 they would take 400 MB and more.
@@ -127,10 +128,14 @@ class LargePicture(Picture):
 
     def window(self, window: PixelWindow) -> Values:
         """``(rows, columns, 3)`` values of a rectangle as stored."""
-        return self.source.window(window)
+        if is_mirrored(self.display):
+            window = replace(window, left=self.source.width - window.right)
+        return mirrored_in_file(self.source.window(window), self.display)
 
     def take(self, row: Indices, column: Indices, channels: slice = slice(0, 3)) -> FloatArray:
         """Linear RGB ``(..., channels)`` of single pixels; ``row`` and ``column`` broadcast to ``(...)``."""
+        if is_mirrored(self.display):
+            column = self.source.width - 1 - column
         return linear_values(self.source.take(row, column)[..., channels], self.provenance.transfer)
 
 

@@ -26,6 +26,7 @@ from lippmann.image.encoding import (
 )
 from lippmann.image.metadata import Metadata, metadata_of, to_text
 from lippmann.image.picture import Picture
+from lippmann.image.sheet_codes import mirrored_in_file, profile_in_file
 from lippmann.image.stored_values import FloatArray, Layer, Stored, Values
 from lippmann.runtime.atomic_write import check_folder_writable, check_writable, replacing, replacing_folder
 
@@ -71,7 +72,7 @@ def can_be_banded(name: FormatName) -> bool:
     return name in ("tiff", "zarr")
 
 
-def write_picture(picture: Picture, path: Path, *, bits: int | None = None) -> None:
+def write_picture(picture: Picture, path: Path, *, bits: int | None = None, icc: bytes = b"") -> None:
     """Write a picture, in memory or on disk, with its metadata.
 
     Zarr and large TIFF files are written some rows at a time.
@@ -84,6 +85,8 @@ def write_picture(picture: Picture, path: Path, *, bits: int | None = None) -> N
         The file; its ending chooses the format.
     bits:
         Bits per channel, see :func:`format_for`; by default as in the file that the picture came from.
+    icc:
+        ICC profile of a print's codes, see :func:`~lippmann.image.sheet_codes.profile_in_file`.
 
     Raises
     ------
@@ -92,10 +95,10 @@ def write_picture(picture: Picture, path: Path, *, bits: int | None = None) -> N
     """
     target, panel = format_for(path, bits, source=picture.stored), picture.display.panel
     size, transfer = (panel.width, panel.height), picture.provenance.transfer
-    _write(path, target, picture.held_rows, size, transfer, metadata_of(picture), picture.maps)
+    _write(path, target, picture.held_rows, size, transfer, metadata_of(picture), picture.maps, icc=icc)
 
 
-def write_rows(rows: Rows, metadata: Metadata, path: Path, *, bits: int | None = None) -> None:
+def write_rows(rows: Rows, metadata: Metadata, path: Path, *, bits: int | None = None, icc: bytes = b"") -> None:
     """Write a computed picture some rows at a time, as tiled BigTIFF or Zarr.
 
     Parameters
@@ -104,8 +107,8 @@ def write_rows(rows: Rows, metadata: Metadata, path: Path, *, bits: int | None =
         ``rows(first, last)`` computes linear RGB ``(last - first, W, 3)``; called from the top down, once for each row.
     metadata:
         Display, placement and provenance of the picture.
-    path, bits:
-        The file and its bits per channel, see :func:`format_for`.
+    path, bits, icc:
+        As for :func:`write_picture`.
 
     Raises
     ------
@@ -125,7 +128,7 @@ def write_rows(rows: Rows, metadata: Metadata, path: Path, *, bits: int | None =
         return values
 
     size, transfer = (panel.width, panel.height), metadata.provenance.transfer
-    _write(path, target, checked, size, transfer, metadata, in_tiles=True)
+    _write(path, target, checked, size, transfer, metadata, in_tiles=True, icc=icc)
 
 
 def write_plain_picture(
@@ -191,19 +194,24 @@ def _write(
     maps: Mapping[str, Layer] | None = None,
     *,
     in_tiles: bool = False,
+    icc: bytes = b"",
 ) -> None:
     """Write rows of linear floats or codes; ``in_tiles`` writes even a small TIFF tile by tile."""
     name, stored = target
     text = "" if metadata is None else to_text(metadata)
-    pixel_pitch = None if metadata is None else metadata.display.panel.pixel_pitch
+    display = None if metadata is None else metadata.display
+    pixel_pitch = None if display is None else display.panel.pixel_pitch
 
     def converted(first: int, last: int) -> Values:
-        return converted_values(rows(first, last), stored, transfer)
+        return mirrored_in_file(converted_values(rows(first, last), stored, transfer), display)
 
+    icc = profile_in_file(display, stored, transfer, icc)
     with replacing_output(path, name) as temporary:
         if in_tiles or is_tiled(name, size):
             tiles = tiles_of_rows(converted, size)
-            encode_tiles(temporary, name, tiles, size=size, dtype=np.dtype(stored), text=text, pixel_pitch=pixel_pitch)
+            dtype = np.dtype(stored)
+            encode_tiles(temporary, name, tiles, size=size, dtype=dtype, text=text, pixel_pitch=pixel_pitch, icc=icc)
         else:
-            layers = {"": converted(0, size[1]), **(maps or {})}
-            encode_values(temporary, name, layers, transfer=transfer, text=text, pixel_pitch=pixel_pitch)
+            layers: dict[str, Layer] = {"": converted(0, size[1])}
+            layers |= {key: mirrored_in_file(values, display) for key, values in (maps or {}).items()}
+            encode_values(temporary, name, layers, transfer=transfer, text=text, pixel_pitch=pixel_pitch, icc=icc)

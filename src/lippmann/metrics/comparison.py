@@ -241,7 +241,7 @@ def check_comparable(reference: Picture, test: Picture) -> None:
 
 
 def _optics(display: Display) -> Display:
-    return replace(display, name="display", title="")
+    return replace(display, name="display", title="", sheet=None)
 
 
 def _difference(a: Display, b: Display) -> str:

@@ -1,5 +1,7 @@
 """Interlaced prints: photographs woven for a lens sheet, written strip by strip with resolution and ICC profile.
 
+The photographs cover the whole sheet with its bleed.
+
 Lenses along stand upright and part the photographs from left to right: for depth, and for flips that a turn of the
 print shows. Lenses across lie and part them from above to below, for flips: the print is woven lying on its side, the
 photographs' tops on the left, so the first photograph is seen from above.
@@ -7,18 +9,23 @@ photographs' tops on the left, so the first photograph is seen from above.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
 
+from lippmann.calibration.finish import NO_FINISH, Finish
+from lippmann.codecs.icc import Profile, name_of
 from lippmann.codecs.png import encode_png
 from lippmann.codecs.tiff_strips import write_tiff_bands
 from lippmann.codecs.types import Pixels
 from lippmann.display import Display
-from lippmann.errors import OutputError, PictureError
+from lippmann.errors import OutputError, PictureError, UsageError
 from lippmann.image.encoding import FORMATS, TEXT_KEY, converted_values
 from lippmann.image.metadata import Metadata, to_text
+from lippmann.image.sheet_codes import mirrored_in_file, profile_in_file
+from lippmann.image.stored_values import FloatArray
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.quilts.photos import Photos
 from lippmann.quilts.weave import ViewChoice, check_weave, weave_provenance, weave_window
@@ -53,6 +60,7 @@ def write_interlaced(
     lenses: Lenses = "along",
     choice: ViewChoice = "linear",
     scene: str = "",
+    finish: Finish = NO_FINISH,
     progress: ProgressCallback = silent,
 ) -> tuple[int, int]:
     """Weave photographs for a display and write the picture with its resolution and ICC profile.
@@ -64,7 +72,8 @@ def write_interlaced(
     photos:
         The photographs, turned for lenses across.
     display:
-        A lenticular display; for lenses across, an upright one, which is turned to the right by 90 degrees.
+        A lenticular display; for lenses across, an upright one, which is turned to the right by 90 degrees. Of a print
+        it includes the bleed.
     path:
         The PNG or TIFF file. With lenses along it carries the display.
     lenses:
@@ -73,6 +82,8 @@ def write_interlaced(
         ``nearest``: one view per sub-pixel; ``linear``: a mixture of two.
     scene:
         Name for the provenance.
+    finish:
+        Margin with marks (with lenses along only) and mirroring. The photographs have the profile already.
     progress:
         Called after every strip.
 
@@ -84,23 +95,38 @@ def write_interlaced(
     ------
     PictureError
         If the display is not lenticular, or lenses across are slanted.
+    UsageError
+        If a margin is out of range, or is asked for with lenses across.
     OutputError
         If the file cannot be written, or is no PNG or TIFF.
     """
     check_interlaced_path(path)
     check_weave(photos.quilt, display, choice)
-    panel, across = display.panel, lenses == "across"
+    across = lenses == "across"
     if across and not display.lattice.rows_are_alike:
         raise PictureError(f"the lenses of {display.name} are slanted", rule="lenses across are those of a print")
+    if across and finish.margin is not None:
+        raise UsageError("marks are for upright lenses", parameter="marks", fix='use lenses="along"')
+    whole = replace(display, sheet=None)  # no part of which is cut off: the photographs cover it
+    finished = replace(finish, profile=Profile(name_of(photos.icc), photos.icc) if photos.icc else None).display(
+        display
+    )
+    panel = finished.panel
     size = (panel.height, panel.width) if across else (panel.width, panel.height)
-    metadata = Metadata(display, np.eye(4), weave_provenance(photos.quilt, choice, scene))
+    metadata = Metadata(finished, np.eye(4), weave_provenance(photos.quilt, choice, scene))
     text = "" if across else to_text(metadata)  # a display with lying lenses cannot be described
 
-    def rows(first: int, last: int) -> Pixels:
+    def woven(first: int, last: int) -> FloatArray:
         if across:
-            lying = weave_window(photos.quilt, display, choice, (0, panel.height), (first, last))
-            return converted_values(np.rot90(lying, -1), "uint8", "srgb")
-        return converted_values(weave_window(photos.quilt, display, choice, (first, last)), "uint8", "srgb")
+            return np.rot90(weave_window(photos.quilt, whole, choice, (0, panel.height), (first, last)), -1)
+        return weave_window(photos.quilt, whole, choice, (first, last))
+
+    printed = replace(finish, profile=None).rows(woven, display)
+
+    def rows(first: int, last: int) -> Pixels:
+        return mirrored_in_file(converted_values(printed(first, last), "uint8", "srgb"), finished)
+
+    icc = profile_in_file(finished, "uint8", "srgb", photos.icc)
 
     with replacing(path) as temporary:
         if FORMATS[path.suffix.lower()] == "tiff":
@@ -110,7 +136,7 @@ def write_interlaced(
                 rows,
                 pixel_pitch=panel.pixel_pitch,
                 description=text,
-                icc=photos.icc,
+                icc=icc,
                 progress=progress,
             )
         else:
@@ -120,6 +146,6 @@ def write_interlaced(
                 codes[first:last] = rows(first, last)
                 progress(Progress("weave", last, size[1]))
             texts = {TEXT_KEY: text} if text else {}
-            encoded = encode_png(codes, text=texts, pixel_pitch=panel.pixel_pitch, icc=photos.icc)
+            encoded = encode_png(codes, text=texts, pixel_pitch=panel.pixel_pitch, icc=icc)
             temporary.write_bytes(encoded)
     return size

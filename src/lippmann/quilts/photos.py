@@ -6,7 +6,6 @@ no parallax. The part that all photographs have in common is what is fitted.
 
 from __future__ import annotations
 
-import io
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
@@ -16,12 +15,12 @@ from typing import TYPE_CHECKING, Literal, NamedTuple, get_args
 
 import numpy as np
 
+from lippmann.codecs.icc import Profile, convert_picture
 from lippmann.codecs.pillow_formats import RULE, open_picture
 from lippmann.errors import PictureError, UsageError
 from lippmann.image.read import MOST_PIXELS
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.quilts.quilt import Quilt, QuiltLayout
-from lippmann.runtime.regular_file import check_kind
 
 if TYPE_CHECKING:
     from PIL import Image
@@ -95,7 +94,8 @@ def read_photos(
     fit: Fit | None = None,
     shift: Shift = NO_SHIFT,
     turned: bool = False,
-    icc: Path | None = None,
+    profile: Profile | None = None,
+    keeps_profile: bool = True,
     progress: ProgressCallback = silent,
 ) -> Photos:
     """Read photographs as views of a print.
@@ -116,9 +116,10 @@ def read_photos(
     turned:
         Whether photographs are turned by 90 degrees to the left first, for lenses across; ``size``, ``paper`` and
         ``shift`` are those of turned photographs.
-    icc:
-        File of an RGB profile to which all photographs are converted. None: the photographs' own profile is kept;
-        photographs of several profiles become sRGB.
+    profile:
+        ICC profile to which all photographs are converted. None: the photographs' own.
+    keeps_profile:
+        Whether the photographs' own profile is kept; photographs of several profiles become sRGB in any case.
     progress:
         Called after every photograph.
 
@@ -146,7 +147,7 @@ def read_photos(
     if width * height * len(paths) > MOST_PIXELS:
         rule = f"together they have at most {MOST_PIXELS} pixels"
         raise PictureError(f"{len(paths)} views of {width} x {height} pixels", rule=rule, fix="take fewer photographs")
-    target, notes = _common_profile(headers, icc)
+    target, notes = _common_profile(headers, profile, keeps_profile)
     values = np.empty((height, width * len(paths), 3), dtype=np.uint8)
     quilt = Quilt(values, QuiltLayout(len(paths), 1, None), "uint8")
     for number, path in enumerate(paths):
@@ -257,32 +258,23 @@ def _upright(picture: Image.Image, *, turned: bool) -> Image.Image:
     return upright.transpose(Image.Transpose.ROTATE_90) if turned else upright
 
 
-def _common_profile(headers: Sequence[_Header], icc: Path | None) -> tuple[bytes, tuple[str, ...]]:
+def _common_profile(
+    headers: Sequence[_Header], profile: Profile | None, keeps_profile: bool
+) -> tuple[bytes, tuple[str, ...]]:
     """Profile of the print (empty: sRGB), and notes."""
-    if icc is not None:
-        try:
-            check_kind(icc, PictureError)
-            return icc.read_bytes(), (f"colours are converted to the profile {icc.name}",)
-        except OSError as error:
-            raise PictureError(f"cannot be read: {error.strerror}", where=str(icc)) from None
+    if profile is not None:
+        return profile.data, (f"colours are converted to the profile {profile.name}",)
     profiles = {header.icc for header in headers}
-    if len(profiles) == 1:
+    if len(profiles) == 1 and keeps_profile:
         return headers[0].icc, ()
-    return b"", ("the photographs have several colour profiles: they are converted to sRGB",)
+    if profiles == {b""}:
+        return b"", ()
+    several = "several colour profiles" if len(profiles) > 1 else "a colour profile"
+    return b"", (f"the photographs have {several}: they are converted to sRGB",)
 
 
 def _in_profile(picture: Image.Image, source: bytes, target: bytes, path: Path) -> Image.Image:
-    if source == target:
-        return picture
-    from PIL import ImageCms
-
-    def profile(data: bytes) -> ImageCms.ImageCmsProfile:
-        return ImageCms.ImageCmsProfile(io.BytesIO(data) if data else ImageCms.createProfile("sRGB"))
-
     try:
-        converted = ImageCms.profileToProfile(picture, profile(source), profile(target), outputMode="RGB")
-    except (ImageCms.PyCMSError, OSError) as error:
-        rule = "profiles are those of RGB devices"
-        raise PictureError(f"its colours cannot be converted: {error}", where=str(path), rule=rule) from None
-    assert converted is not None  # it is not done in place
-    return converted
+        return convert_picture(picture, source, target)
+    except PictureError as error:
+        raise PictureError(error.what, where=str(path), rule=error.rule) from None

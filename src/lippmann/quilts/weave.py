@@ -3,7 +3,8 @@
 A sub-pixel at the right edge of its lens is seen from the left, so it shows view 0, that of the leftmost camera; one at
 the left edge shows the last view. The view is linear in the position under the lens, which is linear in the tangent of
 the direction. Within the view, the colour is that of the point at which the sub-pixel's light line meets the lens
-plane: a view shows the panel's rectangle in the lens plane, as an off-axis camera focused there sees it.
+plane: a view shows the panel's rectangle in the lens plane, as an off-axis camera focused there sees it. Of a print it
+shows the trim; the bleed repeats the views' edges.
 """
 
 from __future__ import annotations
@@ -15,7 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann._version import VERSION
+from lippmann.calibration.finish import NO_FINISH, Finish
 from lippmann.display import NUMPY, Display
+from lippmann.display.sheet_layout import trim_of
 from lippmann.errors import PictureError, UsageError
 from lippmann.image import IntegralImage, Provenance
 from lippmann.image.metadata import Metadata
@@ -84,6 +87,7 @@ def weave_to_file(
     choice: ViewChoice = "linear",
     scene: str = "",
     bits: int | None = None,
+    finish: Finish = NO_FINISH,
     progress: ProgressCallback = silent,
 ) -> None:
     """Write the native picture that shows the views of a quilt, in memory that does not grow with the panel.
@@ -103,6 +107,8 @@ def weave_to_file(
         Name of the scene, for the provenance.
     bits:
         Bits per value; None for the format's default.
+    finish:
+        What is done to the picture for its print.
     progress:
         Called after every block of rows.
 
@@ -126,7 +132,8 @@ def weave_to_file(
             progress(Progress("weave", stop, display.panel.height))
         return band
 
-    write_rows(rows, Metadata(display, np.eye(4), weave_provenance(quilt, choice, scene)), path, bits=bits)
+    metadata = Metadata(finish.display(display), np.eye(4), weave_provenance(quilt, choice, scene))
+    write_rows(finish.rows(rows, display), metadata, path, bits=bits, icc=finish.icc)
 
 
 def weave_provenance(quilt: Quilt, choice: ViewChoice, scene: str) -> Provenance:
@@ -242,7 +249,8 @@ def _check_fit(quilt: Quilt, display: Display) -> None:
     if display.lens_array.layout != "lenticular":
         rule = "a quilt needs cylindrical lenses"
         raise PictureError(f"the display {display.name} has {display.lens_array.layout} lenses", rule=rule)
-    shape = display.panel.width / display.panel.height
+    trim = trim_of(display)
+    shape = trim.width / trim.height
     aspect = quilt.layout.aspect
     if aspect is not None and abs(aspect / shape - 1) > ASPECT_TOLERANCE:
         rule = f"the display {display.name} has {shape:.6g}"
@@ -266,7 +274,7 @@ def _position_in_view(quilt: Quilt, display: Display, x: Real, y: Real) -> tuple
     lens = display.lens_of(x, y, NUMPY)
     lens_x, lens_y = display.lens_center(*lens, x, y, NUMPY)
     width, height = quilt.view_size
-    panel_width, panel_height = display.size_mm
-    across = (lens_x / panel_width + 0.5) * width - 0.5
-    down = (0.5 - lens_y / panel_height) * height - 0.5
+    trim, pixel = trim_of(display), display.panel.pixel_pitch
+    across = (lens_x / (trim.width * pixel) + 0.5) * width - 0.5
+    down = (0.5 - lens_y / (trim.height * pixel)) * height - 0.5
     return np.clip(across, 0.0, width - 1.0), np.clip(down, 0.0, height - 1.0)

@@ -15,6 +15,7 @@ import numpy as np
 
 from lippmann._version import VERSION
 from lippmann.display import Display
+from lippmann.display.sheet_layout import trimmed
 from lippmann.errors import UsageError
 from lippmann.image.provenance import Provenance
 from lippmann.progress import Progress, ProgressCallback, silent
@@ -122,7 +123,7 @@ class Session:
             return placement
         return place(
             scene.bounds,
-            display,
+            trimmed(display),
             cameras=scene.cameras,
             options=placement,
             home_camera=scene.display_camera,

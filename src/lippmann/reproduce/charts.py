@@ -17,7 +17,7 @@ from xml.etree import ElementTree
 from markupsafe import Markup
 
 from lippmann.reproduce.html import element
-from lippmann.reproduce.plotting import import_matplotlib, plain_matplotlib
+from lippmann.runtime.plotting import import_matplotlib, plain_matplotlib
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist

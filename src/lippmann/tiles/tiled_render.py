@@ -15,10 +15,11 @@ from lippmann.codecs import tiff, zarr_array
 from lippmann.codecs.types import Pixels
 from lippmann.display import Display
 from lippmann.display.pixel_window import TileGrid
-from lippmann.errors import EngineError
+from lippmann.errors import EngineError, UsageError
 from lippmann.image.encoding import FormatName, encode_tiles, encode_values, is_tiled
 from lippmann.image.metadata import Metadata, to_text
 from lippmann.image.provenance import Provenance
+from lippmann.image.sheet_codes import is_mirrored, profile_in_file
 from lippmann.image.write import check_output, format_for, replacing_output
 from lippmann.journal.tile_file import DamagedTile, TileResult
 from lippmann.journal.tile_journal import TileStore, read_job, sweep_beside
@@ -106,6 +107,9 @@ def render_to_file(
     from lippmann.tiles.tile_render import prepare
 
     started = time.perf_counter()
+    if is_mirrored(display):
+        rule = "a picture in tiles is written as it is seen"
+        raise UsageError("mirrors whole pictures only", parameter="mirror", rule=rule, fix="mirror the finished file")
     name, stored = format_for(output, bits)
     check_output(output, name)
     if name == "zarr":
@@ -262,13 +266,14 @@ def _write(
     size, dtype = (job.grid.width, job.grid.height), np.dtype(job.stored)
     text = to_text(Metadata(job.display, prepared.placement.world_from_display, provenance))
     pitch = job.display.panel.pixel_pitch
+    icc = profile_in_file(job.display, job.stored, job.transfer)
     with replacing_output(output, name) as temporary:
         if is_tiled(name, size):
             tiles = _file_tiles(store, progress)
-            encode_tiles(temporary, name, tiles, size=size, dtype=dtype, text=text, pixel_pitch=pitch)
+            encode_tiles(temporary, name, tiles, size=size, dtype=dtype, text=text, pixel_pitch=pitch, icc=icc)
         else:
             layers = _whole(job, store)
-            encode_values(temporary, name, layers, transfer=job.transfer, text=text, pixel_pitch=pitch)
+            encode_values(temporary, name, layers, transfer=job.transfer, text=text, pixel_pitch=pitch, icc=icc)
 
 
 def _file_tiles(store: TileStore, progress: ProgressCallback) -> Iterator[Pixels]:

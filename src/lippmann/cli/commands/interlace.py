@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from lippmann.cli.commands.print import Distance, Field, Index, Lpi, Ppi, PrintLpi, Size, Thickness, print_of
+from lippmann.cli.commands import print as printing
 from lippmann.cli.shared import options
 from lippmann.cli.shared.console import Console
 from lippmann.errors import UsageError
@@ -30,21 +30,21 @@ FitOption = Annotated[
 def interlace(
     photos: Annotated[list[Path], typer.Argument(help="Photographs or frames, in natural order; or their folder.")],
     output: Annotated[Path, typer.Option("--output", "-o", help="The .tif or .png file to write.")],
-    lpi: Lpi = None,
-    print_lpi: PrintLpi = None,
-    ppi: Ppi = None,
-    size: Size = None,
-    viewing_distance: Distance = None,
-    thickness: Thickness = None,
-    index: Index = None,
-    field: Field = None,
+    lpi: printing.Lpi = None,
+    print_lpi: printing.PrintLpi = None,
+    ppi: printing.Ppi = None,
+    size: printing.Size = None,
+    viewing_distance: printing.Distance = None,
+    thickness: printing.Thickness = None,
+    index: printing.Index = None,
+    field: printing.Field = None,
     display: Annotated[
         str | None,
         typer.Option("--display", "-d", help="A lenticular display in place of a print, such as lkg-portrait."),
     ] = None,
-    bleed: Annotated[
-        str | None, typer.Option("--bleed", help="Enlarge the print by this width on every side, such as 3mm.")
-    ] = None,
+    bleed: printing.Bleed = None,
+    marks: printing.MarksMargin = None,
+    mirror: printing.Mirror = False,
     lenses: Annotated[
         Literal["along", "across"],
         typer.Option("--lenses", help="along: upright lenses; across: lying lenses, for flips."),
@@ -70,7 +70,11 @@ def interlace(
     ] = None,
     icc: Annotated[
         Path | None,
-        typer.Option("--icc", help="Convert to this ICC profile (RGB). Default: the photographs' own is kept."),
+        typer.Option(
+            "--icc",
+            help="Of a print: convert to this ICC profile (RGB). Default: the photographs' own is kept.",
+            show_default=False,
+        ),
     ] = None,
     as_json: options.Json = False,
     quiet: options.Quiet = False,
@@ -84,7 +88,9 @@ def interlace(
     texts = {"lpi": lpi, "print_lpi": print_lpi, "ppi": ppi, "size": size, "viewing_distance": viewing_distance}
     texts |= {"thickness": thickness, "index": index, "field": field}
     across = lenses == "across"
-    target = _display(display, texts, bleed, turned=across)
+    target, finish = printing.sheet_of(
+        _display(display, texts, turned=across), bleed=bleed, marks=marks, icc=icc, mirror=mirror
+    )
     paths = natural_order(_pictures(photos))
     if reverse:
         paths.reverse()
@@ -96,14 +102,22 @@ def interlace(
             fit=fit,
             shift=_shift(shift),
             turned=across,
-            icc=icc,
+            profile=finish.profile,
+            keeps_profile=target.sheet is not None,
             progress=progress,
         )
         for note in (*read.notes, *fit_note(read.cropped[::-1] if across else read.cropped, fit)):
             console.remark(note)
         choice = views or ("nearest" if across else "linear")
         pixels = write_interlaced(
-            read, target, output, lenses=lenses, choice=choice, scene=paths[0].stem, progress=progress
+            read,
+            target,
+            output,
+            lenses=lenses,
+            choice=choice,
+            scene=paths[0].stem,
+            finish=finish,
+            progress=progress,
         )
     result: dict[str, Any] = {
         "output": str(output),
@@ -119,20 +133,14 @@ def interlace(
     console.result(result, f"{line}, {target.pixels_per_lens[0]:.4g} a lens")
 
 
-def _display(name: str | None, texts: dict[str, str | None], bleed: str | None, *, turned: bool) -> Display:
-    """The display, or the print with its bleed; lying on its side if ``turned``."""
+def _display(name: str | None, texts: dict[str, str | None], *, turned: bool) -> Display:
+    """The display, or the print; lying on its side if ``turned``."""
     from dataclasses import replace
 
-    from lippmann.display.units import length
-
     if name is None:
-        sheet = print_of(**texts)
-        edge = 0.0 if bleed is None else length(bleed, "--bleed")
-        if edge < 0:
-            raise UsageError(f"{edge:g} mm is out of range", where="--bleed", rule="it is 0 or more")
-        width, height = (side + 2 * edge for side in sheet.size)
-        return replace(sheet, size=(height, width) if turned else (width, height)).display()
-    for option, value in {**texts, "bleed": bleed, "lenses": "across" if turned else None}.items():
+        sheet = printing.print_of(**texts)
+        return (replace(sheet, size=sheet.size[::-1]) if turned else sheet).display()
+    for option, value in {**texts, "lenses": "across" if turned else None}.items():
         if value is not None:
             rule = f"it applies to prints, and --display {name} is given"
             raise UsageError("does not apply", where=f"--{option.replace('_', '-')}", rule=rule)

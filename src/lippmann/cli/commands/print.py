@@ -12,9 +12,9 @@ from lippmann.cli.shared.console import Console
 from lippmann.errors import DisplayError, OutputError, UsageError
 
 if TYPE_CHECKING:
+    from lippmann.calibration.finish import Finish
     from lippmann.display import Display
     from lippmann.display.formats.print_sheet import Print
-    from lippmann.image import IntegralImage
 
 Lpi = Annotated[str | None, typer.Option("--lpi", help="Pitch of the lens sheet in lenses per inch.")]
 PrintLpi = Annotated[
@@ -35,8 +35,21 @@ Field = Annotated[
     str | None,
     typer.Option("--field", help="Field of view in degrees, instead of --thickness. Default: 54."),
 ]
+Bleed = Annotated[
+    str | None,
+    typer.Option("--bleed", help="Of a print: go on by this width beyond every edge, such as 3mm; it is cut off."),
+]
 MarksMargin = Annotated[
-    str | None, typer.Option("--marks", help="Add a margin of this width, such as 10mm, with alignment marks.")
+    str | None,
+    typer.Option("--marks", help="Of a print: add a margin of this width, such as 10mm, with alignment marks."),
+]
+Icc = Annotated[
+    Path | None,
+    typer.Option("--icc", help="Of a print: convert to this ICC profile (RGB). Default: sRGB.", show_default=False),
+]
+Mirror = Annotated[
+    bool,
+    typer.Option("--mirror", help="Of a print: write it mirrored, for ink on the back of the lenses."),
 ]
 
 _PRINT = "print"
@@ -79,60 +92,122 @@ def display_of(name: str, **texts: str | None) -> Display:
     return load_display(name)
 
 
-def margin_of(text: str | None, display: Display, *, in_frames: bool) -> float | None:
-    """The margin of ``--marks`` in mm; None without ``--marks``.
+def sheet_of(
+    display: Display,
+    *,
+    bleed: str | None,
+    marks: str | None,
+    icc: Path | None,
+    mirror: bool,
+    in_frames: bool = False,
+) -> tuple[Display, Finish]:
+    """The display with its bleed, and what is done to its picture afterwards.
 
     Raises
     ------
     UsageError
-        If the margin is out of range, the display has no upright cylindrical lenses, or frames are rendered.
+        If an option is given for a display that is no print or for frames of a moving scene, or a length is out of
+        range.
+    PictureError
+        If the profile cannot be used.
     """
-    if text is None:
-        return None
-    from lippmann.calibration.alignment_marks import Marks
+    from lippmann.calibration.finish import NO_FINISH, Finish
+    from lippmann.codecs.icc import read_profile
+    from lippmann.display.sheet_layout import with_bleed
     from lippmann.display.units import length
 
+    given = {"--bleed": bleed, "--marks": marks, "--icc": icc, "--mirror": mirror or None}
+    asked = [option for option, value in given.items() if value is not None]
+    if not asked:
+        return display, NO_FINISH
+    if display.sheet is None:
+        rule = f"it applies to prints only: --display {_PRINT}"
+        raise UsageError(f"does not apply to the display {display.name}", where=asked[0], rule=rule)
     if in_frames:
-        raise UsageError("does not apply to frames of a moving scene", where="--marks", fix="leave it out")
-    try:
-        return Marks(display, length(text, "--marks")).margin
-    except UsageError as error:
-        parameter = "marks" if error.parameter == "margin" else error.parameter
-        raise UsageError(error.what, where=error.where, parameter=parameter, rule=error.rule, fix=error.fix) from None
-
-
-def marked(image: IntegralImage, margin: float | None) -> IntegralImage:
-    """The picture with a margin of ``margin`` mm and its marks; the picture itself if ``margin`` is None."""
-    if margin is None:
-        return image
-    from lippmann.calibration.alignment_marks import with_marks
-
-    return with_marks(image, margin)
+        raise UsageError("does not apply to frames of a moving scene", where=asked[0], fix="leave it out")
+    display = with_bleed(display, 0.0 if bleed is None else length(bleed, "--bleed"))
+    finish = Finish(
+        None if marks is None else length(marks, "--marks"), mirror, None if icc is None else read_profile(icc)
+    )
+    finish.display(display)  # which checks the margin
+    return display, finish
 
 
 def marks(
     picture: options.Picture,
-    output: options.Output,
-    margin: Annotated[str, typer.Option("--margin", help="Width of the margin with a unit, such as 10mm.")] = "10mm",
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="The file to write; its ending names the format.")
+    ] = None,
+    margin: Annotated[
+        str, typer.Option("--margin", "--marks", help="Width of the margin with a unit, such as 10mm.")
+    ] = "10mm",
     display: options.PictureDisplay = None,
+    bleed: Annotated[
+        str | None,
+        typer.Option("--bleed", help="Bleed that a picture without its own record has on every side, such as 3mm."),
+    ] = None,
+    icc: Icc = None,
+    mirror: Mirror = False,
+    job_sheet: Annotated[
+        Path | None, typer.Option("--job-sheet", help="Write a page for whoever prints and laminates: a .pdf file.")
+    ] = None,
     bits: options.Bits = None,
     as_json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
-    """Add a margin with alignment marks to a picture for print."""
-    from lippmann.calibration.marked_files import write_marked
+    """Add a margin with alignment marks to a picture for print, and write its job sheet."""
+    from lippmann.calibration.finish import Finish, write_finished
+    from lippmann.calibration.job_sheet import check_job_sheet, write_job_sheet
+    from lippmann.codecs.icc import read_profile
+    from lippmann.display.sheet_layout import trimmed
     from lippmann.display.units import length
-    from lippmann.image.streamed import open_picture
+    from lippmann.image.read import open_file
+    from lippmann.image.streamed import picture_of_file
     from lippmann.image.write import check_output, format_for
 
     console = Console(quiet, as_json)
-    check_output(output, format_for(output, bits)[0])
-    width = length(margin, "--margin")
-    image = open_picture(picture, display=parse.display(display))
-    with console.progress() as progress:
-        panel = write_marked(image, output, width, bits=bits, progress=progress).panel
-    result = {"output": str(output), "size": [panel.width, panel.height], "size_mm": list(panel.size_mm)}
-    console.result(result, f"{output}: {panel.width}x{panel.height} pixels, {_size(panel.size_mm)}")
+    if output is None and job_sheet is None:
+        raise UsageError("is missing", where="--output", rule="marks writes a picture, a job sheet or both")
+    if output is not None:
+        check_output(output, format_for(output, bits)[0])
+    if job_sheet is not None:
+        check_job_sheet(job_sheet)
+    file = open_file(picture)
+    target = _display_with_bleed(parse.display(display), bleed)
+    if output is None:
+        printed = file.metadata_for(target).display
+    else:
+        finish = Finish(length(margin, "--margin"), mirror, None if icc is None else read_profile(icc))
+        image = picture_of_file(file, target)
+        with console.progress() as progress:
+            printed = write_finished(image, output, finish, icc=file.icc, bits=bits, progress=progress)
+    if job_sheet is not None:
+        write_job_sheet(printed, job_sheet, (output or picture).name)
+    panel, trim = printed.panel, trimmed(printed).size_mm
+    written = [str(path) for path in (output, job_sheet) if path is not None]
+    result = {
+        "output": None if output is None else str(output),
+        "job_sheet": None if job_sheet is None else str(job_sheet),
+        "size": [panel.width, panel.height],
+        "size_mm": list(panel.size_mm),
+        "trim_mm": list(trim),
+    }
+    line = f"{' and '.join(written)}: {panel.width}x{panel.height} pixels, {_size(panel.size_mm)}"
+    console.result(result, f"{line}, cut to {_size(trim)}")
+
+
+def _display_with_bleed(display: Display | None, bleed: str | None) -> Display | None:
+    """The display that ``marks`` is given, with its bleed; None for the picture's own."""
+    if bleed is None:
+        return display
+    from lippmann.display.sheet_layout import with_bleed
+    from lippmann.display.units import length
+
+    width = length(bleed, "--bleed")
+    if display is None:
+        rule = "a picture with its own record says its bleed itself; of others --display says the trim"
+        raise UsageError("needs --display", where="--bleed", rule=rule)
+    return with_bleed(display, width)
 
 
 def pitch_test(
@@ -185,9 +260,16 @@ def pitch_test(
             progress=progress,
         )
     values = [strip.lpi for strip in test.all_strips]
-    result = {"output": str(output), "size": [width, height], "expected": sheet.pitch_on_print, "strips": values}
     texts = [strip.text for strip in test.all_strips]
+    result = {
+        "output": str(output),
+        "size": [width, height],
+        "expected": sheet.pitch_on_print,
+        "expected_strip": test.expected + 1,
+        "strips": values,
+    }
     line = f"{output}: {strips} strips from {texts[0]} to {texts[-1]} lpi, {sheet.pitch_on_print:.6g} expected"
+    line += f": strip {test.expected + 1} from the top, labelled {texts[test.expected]}"
     console.result(result, f"{line}, {width}x{height} pixels at {sheet.ppi:g} ppi")
 
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
+from lippmann.cli.commands import print as printing
 from lippmann.cli.commands import sequence
 from lippmann.cli.commands.interlace import FitOption, fit_note
 from lippmann.cli.shared import options, parse
@@ -300,11 +301,16 @@ def weave(
     fit: FitOption = None,
     layout: Layout = None,
     aspect: Aspect = None,
+    bleed: printing.Bleed = None,
+    marks: printing.MarksMargin = None,
+    icc: printing.Icc = None,
+    mirror: printing.Mirror = False,
     bits: options.Bits = None,
     as_json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
     """Make a display's native picture from a quilt or a folder of views."""
+    from lippmann.calibration.finish import write_finished
     from lippmann.display import load_display
     from lippmann.image.streamed import LARGE
     from lippmann.image.write import can_be_banded, check_output, format_for
@@ -313,10 +319,12 @@ def weave(
     from lippmann.quilts.weave import weave_to_file
 
     console = Console(quiet, as_json)
-    name, _ = format_for(output, bits)
+    name, stored = format_for(output, bits)
     check_output(output, name)
-    target = load_display(display)
-    width, height = target.panel.width, target.panel.height
+    target, finish = printing.sheet_of(load_display(display), bleed=bleed, marks=marks, icc=icc, mirror=mirror)
+    finish.check_stored(stored, output)
+    panel = finish.display(target).panel
+    width, height = panel.width, panel.height
     with console.progress() as progress:
         views = _views(source, layout_of(layout, aspect), progress)
         if fit is not None or source.is_dir():  # a quilt of another shape is refused, unless a fit is asked for
@@ -325,9 +333,9 @@ def weave(
                 console.remark(note)
         asked: dict[str, Any] = {"choice": choice, "scene": source.stem, "progress": progress}
         if width * height > LARGE and can_be_banded(name):
-            weave_to_file(views, target, output, bits=bits, **asked)
+            weave_to_file(views, target, output, bits=bits, finish=finish, **asked)
         else:
-            weave_views(views, target, **asked).save(output, bits=bits)
+            write_finished(weave_views(views, target, **asked), output, finish, bits=bits)
     result = {
         "output": str(output),
         "size": [width, height],

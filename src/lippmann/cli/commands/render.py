@@ -102,7 +102,10 @@ def render(
     thickness: printing.Thickness = None,
     index: printing.Index = None,
     field: printing.Field = None,
+    bleed: printing.Bleed = None,
     marks: printing.MarksMargin = None,
+    icc: printing.Icc = None,
+    mirror: printing.Mirror = False,
     bits: options.Bits = None,
     resume: Resume = False,
     opens: options.Open = False,
@@ -145,7 +148,7 @@ def render(
         field=field,
     )
     wanted = sequence.Wanted(frames, fps, animation, camera_path, turntable, swing, video, eye, codec)
-    margin = printing.margin_of(marks, target, in_frames=bool(wanted))
+    target, finish = printing.sheet_of(target, bleed=bleed, marks=marks, icc=icc, mirror=mirror, in_frames=bool(wanted))
     wanted, output = sequence.with_film(wanted, output_of(output, scene, "-frames" if wanted else ".png"))
     if opens and wanted and wanted.video is None:
         raise UsageError("shows a picture or a film", where="--open", fix="add --video film.mp4")
@@ -196,13 +199,14 @@ def render(
     name, stored = format_for(output, bits)
     _check_layers(layers, name, output)
     if on_cluster or is_tiled(output, bits, target, request, resume=resume):
-        _check_whole({"--maps": maps, "--marks": margin})
+        _check_whole({"--maps": maps, "--marks": marks, "--icc": icc, "--mirror": mirror})
         with on_cluster.runner(console, threads) as runner:
             _render_tiled(source, target, request, output, console, bits=bits, resume=resume, runner=runner)
         if opens:
             view.view(output, quiet=quiet, as_json=as_json)
         return
     check_output(output, name)
+    finish.check_stored(stored, output)
     if maps is not None:
         check_folder_writable(maps)
     with console.progress() as progress:
@@ -218,8 +222,8 @@ def render(
 
             write_maps(image, maps)
         image, remark = _readable(image, stored, output)
-        image = printing.marked(image, margin)
-        image.save(output, bits=bits)
+        image = finish.image(image)
+        image.save(output, bits=bits, icc=finish.icc)
     written = _with_seconds(image, write=time.perf_counter() - writing)
     remarks(console, image.provenance)
     if remark:

@@ -75,9 +75,10 @@ OPTION_GROUPS: Mapping[str, tuple[str, ...]] = {
         "--thickness",
         "--index",
         "--field",
-        "--marks",
         "--bleed",
+        "--marks",
         "--icc",
+        "--mirror",
     ),
     "Animation": (
         "--turntable",
@@ -153,7 +154,10 @@ EXAMPLES: Mapping[str, tuple[str, ...]] = {
         "lippmann pitch-test --lpi 60 --ppi 720 --size 20x10cm -o test.tif",
         "lippmann pitch-test --lpi 75 --ppi 1440 --size 8x4in --strips 31 -o test.tif",
     ),
-    "marks": ("lippmann marks sheet.tif -o marked.tif", "lippmann marks sheet.png --margin 0.5in -o marked.png"),
+    "marks": (
+        "lippmann marks print.tif -o marked.tif --job-sheet job.pdf",
+        "lippmann marks print.png --margin 0.5in -o marked.png",
+    ),
     "compare": ("lippmann compare reference.exr test.png", "lippmann compare reference.exr test.exr --json"),
     "reproduce": ("lippmann reproduce -o report", "lippmann reproduce --quick -o report"),
     "quilt render": (

@@ -22,6 +22,7 @@ from lippmann.display.display import INFINITE, Display
 from lippmann.display.formats.recorded_depth import default_aperture
 from lippmann.display.lens_array import LensArray
 from lippmann.display.panel import Panel
+from lippmann.display.sheet import Sheet
 from lippmann.display.validation import MAXIMUM_COUNT, finite, number, refuse_unknown
 from lippmann.errors import DisplayError
 
@@ -197,6 +198,7 @@ class Print:
             gap=gap,
             viewing_distance=distance,
             aperture_distance=default_aperture(distance, lens_pitch=lens_pitch, gap=gap, pixel_pitch=pixel),
+            sheet=Sheet(),
         )
 
 

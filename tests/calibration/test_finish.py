@@ -10,8 +10,8 @@ import pytest
 import tifffile
 
 import lippmann.image.streamed
-from lippmann.calibration.alignment_marks import Marks, marked_rows, with_marks
-from lippmann.calibration.marked_files import write_marked
+from lippmann.calibration.alignment_marks import Marks, marked_rows
+from lippmann.calibration.finish import Finish, write_finished
 from lippmann.display.formats.print_sheet import Print
 from lippmann.errors import OutputError, UsageError
 from lippmann.image import IntegralImage, read_picture
@@ -46,7 +46,8 @@ def test_piece_by_piece_gives_the_same(opened, tmp_path, bits):
     whole, large = opened(bits)
     paths = tmp_path / "whole.tif", tmp_path / "large.tif"
     displays = [
-        write_marked(picture, path, 8.0, bits=bits) for picture, path in zip((whole, large), paths, strict=True)
+        write_finished(picture, path, Finish(margin=8.0), bits=bits)
+        for picture, path in zip((whole, large), paths, strict=True)
     ]
     assert displays[0] == displays[1] == Marks(DISPLAY, 8.0).sheet
     first, second = (read_picture(path) for path in paths)
@@ -59,7 +60,7 @@ def test_piece_by_piece_gives_the_same(opened, tmp_path, bits):
 
 def test_bands_fit_together(image):
     marks = Marks(DISPLAY, 8.0)
-    every = with_marks(image, 8.0).pixels
+    every = Finish(margin=8.0).image(image).pixels
     rows = np.cumsum([0, 5, 107, 1, 3, 600, every.shape[0] - 716])
     asked = []
 
@@ -76,10 +77,10 @@ def test_bands_fit_together(image):
 def test_large_pictures_become_tiff(opened, tmp_path):
     _, large = opened(8)
     with pytest.raises(OutputError, match="a picture of this size needs TIFF"):
-        write_marked(large, tmp_path / "sheet.png", 8.0)
+        write_finished(large, tmp_path / "sheet.png", Finish(margin=8.0))
     with pytest.raises(UsageError, match="margin: 1 mm is out of range"):
-        write_marked(large, tmp_path / "sheet.tif", 1.0)
-    slanted = replace(large, display=replace(DISPLAY, lens_array=replace(DISPLAY.lens_array, slant=3.0)))
+        write_finished(large, tmp_path / "sheet.tif", Finish(margin=1.0))
+    slanted = replace(large, display=replace(DISPLAY, sheet=None, lens_array=replace(DISPLAY.lens_array, slant=3.0)))
     with pytest.raises(UsageError, match="slanted lenses"):
-        write_marked(slanted, tmp_path / "sheet.tif", 8.0)
+        write_finished(slanted, tmp_path / "sheet.tif", Finish(margin=8.0))
     assert not list(tmp_path.glob("sheet*"))
