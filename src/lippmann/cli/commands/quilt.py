@@ -312,6 +312,7 @@ def weave(
     """Make a display's native picture from a quilt or a folder of views."""
     from lippmann.calibration.finish import write_finished
     from lippmann.display import load_display
+    from lippmann.display.sheet_layout import trim_of
     from lippmann.image.streamed import LARGE
     from lippmann.image.write import can_be_banded, check_output, format_for
     from lippmann.quilts.fit_views import fit_views
@@ -323,12 +324,12 @@ def weave(
     check_output(output, name)
     target, finish = printing.sheet_of(load_display(display), bleed=bleed, marks=marks, icc=icc, mirror=mirror)
     finish.check_stored(stored, output)
-    panel = finish.display(target).panel
+    panel, trim = finish.display(target).panel, trim_of(target)
     width, height = panel.width, panel.height
     with console.progress() as progress:
         views = _views(source, layout_of(layout, aspect), progress)
         if fit is not None or source.is_dir():  # a quilt of another shape is refused, unless a fit is asked for
-            views, cropped = fit_views(views, width / height, fit or "cover")
+            views, cropped = fit_views(views, trim.width / trim.height, fit or "cover")
             for note in fit_note(cropped, fit):
                 console.remark(note)
         asked: dict[str, Any] = {"choice": choice, "scene": source.stem, "progress": progress}
