@@ -127,11 +127,17 @@ def typical_points(splats: Splats) -> Numbers:
     ends = np.concatenate([axes, -axes], axis=2).transpose(0, 2, 1) * _REACH
     points = (telling.centers[:, None, :].astype(np.float64) + ends).reshape(-1, 3)
     weights = np.repeat(telling.opacities.astype(np.float64), 6)
+    keep = bulk_of(points, weights)
+    return points[keep] if keep.any() else points
+
+
+def bulk_of(points: Numbers, weights: Numbers) -> NDArray[np.bool_]:
+    """Which of points ``(n, 3)`` of weights ``(n,)`` are no floaters, far outside of where nearly all weight is."""
     keep = np.ones(len(points), bool)
     for axis in range(3):
         low, high = _extent(points[:, axis], weights)
         keep &= (points[:, axis] >= low) & (points[:, axis] <= high)
-    return points[keep] if keep.any() else points
+    return keep
 
 
 def _extent(values: Numbers, weights: Numbers) -> tuple[float, float]:

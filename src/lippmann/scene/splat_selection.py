@@ -1,4 +1,4 @@
-"""Which Gaussian splats of a scan are shown, and in which unit its coordinates count."""
+"""Which Gaussian splats or points of a scan are shown, and in which unit its coordinates count."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import numpy as np
 
 from lippmann.errors import UsageError
 from lippmann.scene.matrices import scaling
+from lippmann.scene.point_clouds import crop_cloud, is_cloud
 from lippmann.scene.scene import Scene
 from lippmann.scene.splat_clouds import check_splats, cropped, moved
 from lippmann.scene.values.description import SceneDescription
@@ -26,7 +27,8 @@ class SplatSelection:
     Parameters
     ----------
     crop:
-        Splats are kept whose centres lie in this box of the upright scene, after ``unit_scale``.
+        Splats are kept whose centres lie in this box of the upright scene, after ``unit_scale``; of a cloud of plain
+        points, the points.
     unit_scale:
         Factor on the scene's coordinates, above 0.
     min_opacity:
@@ -62,8 +64,14 @@ class SplatSelection:
         if not asked:
             return scene
         description = scene.description
+        if isinstance(description, SceneDescription) and set(asked) == {"crop"} and is_cloud(description):
+            points = crop_cloud(description, np.reshape(self.crop, (2, 3)))
+            if points is None:
+                raise _leaves_none("point", "crop", scene.name)
+            return replace(scene, description=points)
         if not isinstance(description, SceneDescription) or description.splats is None:
-            raise holds_none(scene, "Gaussian splats", next(iter(asked)))
+            what = "Gaussian splats or cloud of points" if self.crop is not None else "Gaussian splats"
+            raise holds_none(scene, what, next(iter(asked)))
         if self.unit_scale is not None and description.placements:
             raise UsageError(
                 f"'{scene.name}' holds surfaces beside its splats",
@@ -76,7 +84,7 @@ class SplatSelection:
             splats = moved(splats, scaling(self.unit_scale))
             check_splats(splats, scene.name)
         if self.crop is not None:
-            splats = _some(cropped(splats, np.array([self.crop[:3], self.crop[3:]])), "crop", scene.name)
+            splats = _some(cropped(splats, np.reshape(self.crop, (2, 3))), "crop", scene.name)
         if self.min_opacity is not None:
             kept = splats.chosen(splats.opacities >= np.float32(self.min_opacity))
             splats = _some(kept, "min_opacity", scene.name)
@@ -108,5 +116,9 @@ def check_crop(crop: Crop | None) -> None:
 
 def _some(splats: Splats, parameter: str, name: str) -> Splats:
     if splats.count == 0:
-        raise UsageError("leaves no Gaussian splat", where=name, parameter=parameter, fix="ask for less")
+        raise _leaves_none("Gaussian splat", parameter, name)
     return splats
+
+
+def _leaves_none(what: str, parameter: str, name: str) -> UsageError:
+    return UsageError(f"leaves no {what}", where=name, parameter=parameter, fix="ask for less")

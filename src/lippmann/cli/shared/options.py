@@ -60,7 +60,7 @@ Crop = Annotated[
     str | None,
     typer.Option(
         "--crop",
-        help="Of Gaussian splats and volumes, keep what is in the box X0,Y0,Z0,X1,Y1,Z1 (y up, after --unit-scale).",
+        help="Of splats, points and volumes, keep what is in the box X0,Y0,Z0,X1,Y1,Z1 (y up, after --unit-scale).",
         show_default=False,
     ),
 ]

@@ -110,6 +110,7 @@ def as_mesh(thin: Mesh, world_from_mesh: Points, width: float, material: int) ->
         drawn.normals,
         tuple(uvs[sources] for uvs in thin.uvs),
         None if thin.colors is None else thin.colors[sources],
+        points=len(drawn.positions) // max(1, len(elements)) if elements.shape[1] == 1 else 0,
     )
 
 

@@ -18,8 +18,9 @@ from lippmann.color.transfer import decode_srgb
 from lippmann.errors import SceneError
 from lippmann.scene.parsing.files import read_bytes, read_image, resolve
 from lippmann.scene.parsing.ply_header import Element, Header, read_header
-from lippmann.scene.parsing.points_lines import MOST, as_mesh, thinned, width_of
+from lippmann.scene.parsing.points_lines import MOST, thinned
 from lippmann.scene.parsing.triangulation import triangulate
+from lippmann.scene.point_clouds import draw_cloud
 from lippmann.scene.readers.splats.ply import holds_splats, read_splat_ply
 from lippmann.scene.values.description import Instance, Material, Mesh, SceneDescription, Texture
 
@@ -109,12 +110,11 @@ def _cloud(vertex: Columns, element: Element, name: str, notes: list[str], where
     if (step := -(-len(points) // MOST)) > 1:
         notes = [*notes, f"of {len(points)} points one in {step} is drawn"]
         thin = thinned(thin, step)
-    diagonal = float(np.linalg.norm(np.ptp(thin.positions.astype(np.float64), axis=0)))
-    width = width_of(diagonal, len(thin.faces), lines=False)
+    meshes, width = draw_cloud([thin])
     plain = (0.7, 0.7, 0.7) if colors is None else (1.0, 1.0, 1.0)
     material = Material(name, base_color=plain, roughness=0.6, double_sided=True, unlit=colors is not None)
-    mesh = as_mesh(thin, np.eye(4)[None], width.radius, 0)
-    return SceneDescription(name, [mesh], [material], [Instance(0, np.eye(4))], notes=[*notes, width.note])
+    instances = [Instance(number, np.eye(4)) for number in range(len(meshes))]
+    return SceneDescription(name, meshes, [material], instances, notes=[*notes, width.note])
 
 
 def _check_finite(positions: Numbers, where: str) -> None:

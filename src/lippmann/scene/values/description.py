@@ -123,7 +123,8 @@ class Mesh:
     linear or None. Normal maps take the tangent frame of the uv parametrisation. ``fitted``: whether displays are
     fitted to it; not so a light source around the scene. ``stands_for``: the round body that the triangles stand for, a
     ball of radius 1 about the origin, or a rod of radius 1 from there to (0, 0, 1), open at its ends; what can trace
-    such bodies does so instead.
+    such bodies does so instead. ``points``: vertices of each of the balls that stand for points of a cloud, one ball
+    after the other; 0 for other meshes.
     """
 
     name: str
@@ -135,6 +136,7 @@ class Mesh:
     colors: FloatArray | None = None
     fitted: bool = True
     stands_for: Round | None = None
+    points: int = 0
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,0 +1,89 @@
+"""Clouds of plain points, drawn as balls: fitted to their bulk, and cropped."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lippmann.scene.matrices import transform_points
+from lippmann.scene.parsing.points_lines import Width, as_mesh, width_of
+from lippmann.scene.splat_clouds import bulk_of
+from lippmann.scene.values.description import Instance, Matrix, Mesh, SceneDescription
+
+#: How the note of a cloud's width begins.
+_WIDTH_NOTE = width_of(1.0, 1, lines=False).note.split(" of a radius")[0]
+
+
+def draw_cloud(clouds: Sequence[Mesh]) -> tuple[list[Mesh], Width]:
+    """Balls about the points of clouds, whose ``faces`` are points ``(m, 1)``, and how wide they are.
+
+    Strays, far outside of where nearly all points are, have meshes of their own, which displays are not fitted to; see
+    :func:`lippmann.scene.splat_clouds.bulk_of`. The bulk tells how wide points are drawn.
+    """
+    positions = np.concatenate([cloud.positions for cloud in clouds]).astype(np.float64)
+    bulk = bulk_of(positions, np.ones(len(positions)))
+    if not bulk.any():
+        bulk[:] = True
+    width = width_of(float(np.linalg.norm(np.ptp(positions[bulk], axis=0))), len(positions), lines=False)
+    meshes, first = [], 0
+    for cloud in clouds:
+        inside = bulk[first : first + len(cloud.positions)]
+        first += len(cloud.positions)
+        for chosen, fitted in ((inside, cloud.fitted), (~inside, False)):
+            if chosen.any():
+                drawn = as_mesh(_chosen(cloud, chosen), np.eye(4)[None], width.radius, cloud.material)
+                meshes.append(replace(drawn, fitted=fitted))
+    return meshes, width
+
+
+def is_cloud(description: SceneDescription) -> bool:
+    """Whether a scene is a cloud of points alone."""
+    meshes = [description.meshes[mesh] for mesh in description.placements]
+    return bool(meshes) and description.splats is None and all(mesh.points for mesh in meshes)
+
+
+def crop_cloud(description: SceneDescription, box: NDArray[np.float64]) -> SceneDescription | None:
+    """The points of a cloud that lie in a box ``(2, 3)`` of the world, drawn as wide as they need; None if none do."""
+    kept = []
+    for cloud in _points(description.meshes, description.placements):
+        inside = ((cloud.positions >= box[0]) & (cloud.positions <= box[1])).all(axis=1)
+        if inside.any():
+            kept.append(_chosen(cloud, inside))
+    if not kept:
+        return None
+    meshes, width = draw_cloud(kept)
+    notes = [width.note if note.startswith(_WIDTH_NOTE) else note for note in description.notes]
+    instances = [Instance(number, np.eye(4)) for number in range(len(meshes))]
+    return replace(description, meshes=meshes, instances=instances, notes=notes)
+
+
+def _points(meshes: Sequence[Mesh], placements: Mapping[int, Matrix]) -> list[Mesh]:
+    """The points in the world that meshes of balls stand for: the middle of each ball's vertices."""
+    clouds = []
+    for number, places in placements.items():
+        mesh = meshes[number]
+        middles = mesh.positions.reshape(-1, mesh.points, 3).mean(axis=1, dtype=np.float64)
+        for place in places:
+            cloud = replace(
+                mesh,
+                positions=transform_points(place, middles),
+                uvs=tuple(uvs[:: mesh.points] for uvs in mesh.uvs),
+                colors=None if mesh.colors is None else mesh.colors[:: mesh.points],
+                fitted=True,
+            )
+            clouds.append(cloud)
+    return clouds
+
+
+def _chosen(cloud: Mesh, chosen: NDArray[np.bool_]) -> Mesh:
+    return replace(
+        cloud,
+        positions=cloud.positions[chosen],
+        faces=np.arange(np.count_nonzero(chosen), dtype=np.uint32)[:, None],
+        normals=None,
+        uvs=tuple(uvs[chosen] for uvs in cloud.uvs),
+        colors=None if cloud.colors is None else cloud.colors[chosen],
+    )
