@@ -96,8 +96,8 @@ def load_scene(
         ``y``, ``z`` or ``-y``: the axis that points up in a file that does not say so. By default ``y`` in OBJ, PLY and
         SPZ files, ``z`` in STL files, ``-y`` in PLY files of Gaussian splats and in SOG files.
     crop:
-        Of Gaussian splats, points of a cloud and voxels those are kept whose centres lie in the box from ``(x0, y0, z0)`` to
-        ``(x1, y1, z1)``, all in one tuple: coordinates with +y up, after ``unit_scale``.
+        Of Gaussian splats, points of a cloud and voxels those are kept whose centres lie in the box from
+        ``(x0, y0, z0)`` to ``(x1, y1, z1)``, all in one tuple: coordinates with +y up, after ``unit_scale``.
     unit_scale:
         Factor on the coordinates of Gaussian splats, whose files have no unit: what one of their units is in the unit
         that ``crop`` and placements shall count in.
