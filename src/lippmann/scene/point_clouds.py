@@ -69,7 +69,7 @@ def _points(meshes: Sequence[Mesh], placements: Mapping[int, Matrix]) -> list[Me
         for place in places:
             cloud = replace(
                 mesh,
-                positions=transform_points(place, middles),
+                positions=transform_points(place, middles).astype(np.float32),
                 uvs=tuple(uvs[:: mesh.points] for uvs in mesh.uvs),
                 colors=None if mesh.colors is None else mesh.colors[:: mesh.points],
                 fitted=True,

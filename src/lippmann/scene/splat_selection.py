@@ -64,8 +64,8 @@ class SplatSelection:
         if not asked:
             return scene
         description = scene.description
-        if isinstance(description, SceneDescription) and set(asked) == {"crop"} and is_cloud(description):
-            points = crop_cloud(description, np.reshape(self.crop, (2, 3)))
+        if isinstance(description, SceneDescription) and self.crop and len(asked) == 1 and is_cloud(description):
+            points = crop_cloud(description, np.array([self.crop[:3], self.crop[3:]]))
             if points is None:
                 raise _leaves_none("point", "crop", scene.name)
             return replace(scene, description=points)
@@ -84,7 +84,7 @@ class SplatSelection:
             splats = moved(splats, scaling(self.unit_scale))
             check_splats(splats, scene.name)
         if self.crop is not None:
-            splats = _some(cropped(splats, np.reshape(self.crop, (2, 3))), "crop", scene.name)
+            splats = _some(cropped(splats, np.array([self.crop[:3], self.crop[3:]])), "crop", scene.name)
         if self.min_opacity is not None:
             kept = splats.chosen(splats.opacities >= np.float32(self.min_opacity))
             splats = _some(kept, "min_opacity", scene.name)
