@@ -16,7 +16,7 @@ def describe(result: dict[str, Any]) -> str:
     return f"""## Drafts
 
 `drafts.py`: `lippmann render SCENE --display NAME` as a whole command with nothing asked, with `--effort draft`, and
-with `--quality 30` and `34`, in light along paths. Processor time of one run; samples per pixel and the PSNR that the
+with `--quality 30`, in light along paths. Processor time of one run; samples per pixel and the PSNR that the
 picture states of itself, which one sample does not tell.
 
 | scene | display | {" | ".join(asked)} |
