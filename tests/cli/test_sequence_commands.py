@@ -245,3 +245,12 @@ def test_turns_that_cannot_be_are_said_in_one_line(lippmann, moving_ball, tmp_pa
     assert message in done.err
     assert done.err.count("\n") == 1
     assert not list(tmp_path.iterdir())
+
+
+def test_what_ends_before_its_first_frame_leaves_no_folder(lippmann, tmp_path, monkeypatch):
+    def interrupted(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("lippmann.sequences.files.saved_sequence", interrupted)
+    assert lippmann("render", "teapot", "--turntable", "2", "-o", tmp_path / "frames").code == 130
+    assert list(tmp_path.iterdir()) == []

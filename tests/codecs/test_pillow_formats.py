@@ -195,3 +195,28 @@ def test_no_other_module_opens_pictures_with_pillow():
     source = Path(lippmann.codecs.pillow_formats.__file__).parents[1]
     modules = [path for path in source.rglob("*.py") if re.search(r"\b(Image|Pillow)\.open\(", path.read_text("utf-8"))]
     assert modules == [source / "codecs" / "pillow_formats.py"]
+
+
+def test_the_memory_that_is_left_bounds_a_picture_of_16384_pixels_a_side():
+    import struct
+    import zlib
+
+    from lippmann.errors import MemoryLimitError
+    from lippmann.runtime.input_memory import limit_inputs
+
+    def chunk(kind, data):
+        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+    head = struct.pack(">2I5B", 16384, 16384, 8, 2, 0, 0, 0)
+    png = b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", head) + chunk(b"IDAT", b"") + chunk(b"IEND", b"")
+    limit = Pillow.MAX_IMAGE_PIXELS
+    try:
+        limit_inputs(1 << 30)
+        with pytest.raises(MemoryLimitError, match="16384 x 16384 pixels takes 2"), open_picture(io.BytesIO(png)):
+            pass
+        limit_inputs(4 << 30)
+        with open_picture(io.BytesIO(png)) as picture:
+            assert picture.size == (16384, 16384)
+    finally:
+        limit_inputs(None)
+    assert limit == Pillow.MAX_IMAGE_PIXELS

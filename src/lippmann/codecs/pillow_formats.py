@@ -5,7 +5,7 @@ Pillow itself tries dozens of formats, among them ones whose decoder starts anot
 
 from __future__ import annotations
 
-import warnings
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -41,11 +41,15 @@ _BYTES_PER_PIXEL = 8
 RULE = f"{', '.join([*FORMATS.values()][:-1])} and {[*FORMATS.values()][-1]} are read"
 
 
+#: Pillow's limit belongs to the whole process.
+_limit_lock = threading.Lock()
+
+
 @contextmanager
 def open_picture(source: Path | BinaryIO, formats: tuple[str, ...] = (*FORMATS,)) -> Iterator[Image.Image]:
     """The picture of a file or stream, not yet decoded.
 
-    Pillow's warning of large pictures is silenced; its error at twice that size is not.
+    Pillow's own limits on a picture's size do not hold: the memory that is left does.
 
     Parameters
     ----------
@@ -58,8 +62,8 @@ def open_picture(source: Path | BinaryIO, formats: tuple[str, ...] = (*FORMATS,)
     ------
     PIL.UnidentifiedImageError
         If it is of none of the formats.
-    OSError, SyntaxError, PIL.Image.DecompressionBombError
-        If it is missing, damaged or too large; libraries below Pillow raise other errors too.
+    OSError, SyntaxError
+        If it is missing or damaged; libraries below Pillow raise other errors too.
     PictureError
         If it is a pipe or a device.
     MemoryLimitError
@@ -71,12 +75,16 @@ def open_picture(source: Path | BinaryIO, formats: tuple[str, ...] = (*FORMATS,)
         check_kind(source, PictureError)
     Image.init()  # loads all decoders, without which those of the list may be unknown
     known = tuple(name for name in formats if name in Image.OPEN)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", Image.DecompressionBombWarning)
-        with Image.open(source, formats=known) as picture:
-            name = str(source) if isinstance(source, Path) else ""
-            check_input(_BYTES_PER_PIXEL * picture.width * picture.height, f"a picture of {_size(picture)}", where=name)
-            yield picture
+    with _limit_lock:
+        limit, Image.MAX_IMAGE_PIXELS = Image.MAX_IMAGE_PIXELS, None
+        try:
+            opened = Image.open(source, formats=known)  # its head alone
+        finally:
+            Image.MAX_IMAGE_PIXELS = limit
+    with opened as picture:
+        name = str(source) if isinstance(source, Path) else ""
+        check_input(_BYTES_PER_PIXEL * picture.width * picture.height, f"a picture of {_size(picture)}", where=name)
+        yield picture
 
 
 def _size(picture: Image.Image) -> str:

@@ -293,12 +293,11 @@ def _rgb_codes(picture: Image.Image) -> Values:
 @contextmanager
 def _opened_jpeg(path: Path) -> Iterator[Image.Image]:
     """The opened JPEG, not yet decoded; errors of the library about the file become :class:`PictureError`."""
-    from PIL import Image
 
     try:
         with open_picture(path, ("JPEG",)) as picture:
             if max(picture.size) > MOST_SIDE:
                 raise PictureError(f"it has {picture.width} x {picture.height} pixels", where=str(path))
             yield picture
-    except (OSError, SyntaxError, Image.DecompressionBombError) as error:
+    except (OSError, SyntaxError) as error:
         raise PictureError(f"cannot be read: {error}", where=str(path)) from None

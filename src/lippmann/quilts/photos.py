@@ -224,7 +224,7 @@ def _fitted(picture: Image.Image, window: FitWindow, size: tuple[int, int]) -> I
 @contextmanager
 def _opened(path: Path) -> Iterator[Image.Image]:
     """An opened photograph; errors of Pillow become :class:`PictureError`."""
-    from PIL import Image, UnidentifiedImageError
+    from PIL import UnidentifiedImageError
 
     try:
         with open_picture(path) as picture:
@@ -233,7 +233,7 @@ def _opened(path: Path) -> Iterator[Image.Image]:
         raise PictureError("is not there", where=str(path)) from None
     except UnidentifiedImageError:
         raise PictureError("is no picture that is read here", where=str(path), rule=RULE) from None
-    except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
+    except (OSError, SyntaxError, ValueError) as error:
         raise PictureError(f"cannot be read: {error}", where=str(path)) from None
 
 

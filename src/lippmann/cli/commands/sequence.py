@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections import deque
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
@@ -212,7 +212,6 @@ def render_frames(
         raise UsageError(
             "the frames cannot hold layers", where="--layers", rule="OpenEXR can", fix="name them %04d.exr"
         )
-    _check_places(output, path_of(frames[0]), wanted.video)
     done: list[dict[str, Any]] = []
     notes: dict[str, list[str]] = {}
 
@@ -234,6 +233,7 @@ def render_frames(
         return frame
 
     with (
+        _places(output, path_of(frames[0]), wanted.video),
         _kept(output, path_of(frames[0]), console) as progress,
         saved_sequence(
             motion,
@@ -394,15 +394,23 @@ def numbered(output: Path, frames: int, ending: str = "") -> Callable[[int], Pat
     raise OutputError(f"this is one name for {frames} frames", where=str(output), fix=fix)
 
 
-def _check_places(output: Path, first: Path, video: Path | None) -> None:
-    """Make the folder, and see that frames and film can be written, before anything is rendered."""
+@contextmanager
+def _places(output: Path, first: Path, video: Path | None) -> Iterator[None]:
+    """See that frames and film can be written, in a new folder that goes again if no frame comes to lie in it."""
     from lippmann.runtime.atomic_write import check_writable
 
-    if first.parent == output and not output.is_dir():
+    is_new = first.parent == output and not output.is_dir()
+    if is_new:
         try:
             output.mkdir()
         except OSError as error:
             raise OutputError(f"cannot be made ({error.strerror or error})", where=str(output)) from None
-    check_writable(first)
-    if video is not None:
-        check_writable(video)
+    try:
+        check_writable(first)
+        if video is not None:
+            check_writable(video)
+        yield
+    finally:
+        if is_new:
+            with suppress(OSError):  # it holds something
+                output.rmdir()

@@ -243,8 +243,7 @@ def decode_image(data: bytes, name: str, *, where: str) -> Image:
     Raises
     ------
     SceneError
-        The bytes are no picture of a format of :data:`lippmann.codecs.pillow_formats.FORMATS`, are cut short, or decode
-        to more pixels than Pillow's safety limit.
+        The bytes are no picture of a format of :data:`lippmann.codecs.pillow_formats.FORMATS`, or are cut short.
     MemoryLimitError
         They take more than the memory that is left.
     """
