@@ -138,7 +138,7 @@ def engine():
 def shared_scenes() -> Path:
     """Real scenes made by others; the test is skipped where they are absent."""
     if not SHARED_SCENES.is_dir():
-        pytest.skip("the folder ../shared/scenes with real scenes is not there")
+        pytest.skip("the folder ../shared/scenes with real scenes is not found")
     return SHARED_SCENES
 
 

@@ -408,7 +408,7 @@ def render_quilt(
     progress: ProgressCallback | None = None,
     **options: object,
 ) -> Quilt:
-    """Render the views that cameras before a display see, side by side in one picture.
+    """Render the views that cameras in front of a display see, side by side in one picture.
 
     Calls of other threads wait, as of :func:`render`.
 

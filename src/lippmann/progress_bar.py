@@ -24,7 +24,7 @@ STAGE_NAMES = {
     "trace": "tracing",
     "tiles": "rendering tiles",
     "reuse": "reusing",
-    "guides": "looking for guides",
+    "guides": "preparing the denoiser",
     "denoise": "denoising",
     "layers": "adding layers",
     "read": "reading",

@@ -146,7 +146,10 @@ def test_doctor_says_whether_a_render_would_run(lippmann):
     done = lippmann("doctor", "--json")
     assert done.code == 0
     assert done.json["ok"] is True
-    assert "LLVM" in lippmann("doctor").out
+    said = lippmann("doctor").out
+    assert "LLVM" in said
+    for extra in ("cluster", "exchange", "heif", "molecules", "notebook", "usd", "volumes", "vtk"):
+        assert f"extra {extra}" in said
 
 
 def test_version_and_help(lippmann):

@@ -32,6 +32,14 @@ def test_there_and_back(lippmann, picture, tmp_path, layout):
     assert read_picture(tmp_path / "again.png").provenance == read_picture(picture).provenance
 
 
+def test_a_name_without_an_ending_gets_that_of_the_layout(lippmann, picture, tmp_path):
+    for layout, made in (("eslf", "a.png"), ("lftoolbox", "a.mat"), ("hci", "a")):
+        done = lippmann("export", picture, "--as", layout, "-o", tmp_path / "a", "--json")
+        assert done.code == 0, done.err
+        assert done.json["output"] == str(tmp_path / made)
+        assert (tmp_path / made).exists()
+
+
 def test_remarks_and_results_are_told(lippmann, picture, tmp_path):
     done = lippmann("export", picture, "--as", "hci", "-o", tmp_path / "out", "--bits", "16", "--distance", "900")
     assert done.out == f"{tmp_path / 'out'}: 8x1 views of 64x512 pixels, uint16\n"
@@ -77,11 +85,11 @@ def test_bad_input_is_one_line_and_code_2(lippmann, picture, tmp_path):
     assert "holds 'mine.txt', which Lippmann did not write" in refused("export", picture, "--as=hci", "-o", there)
     assert "24 bits per channel" in refused("export", picture, "--as=hci", "-o", out, "--bits", "24")
     assert "--distance: does not apply" in refused("export", picture, "--as=views", "-o", out, "--distance=5")
-    assert "is not there" in refused("export", tmp_path / "no.png", "--as=hci", "-o", out)
-    assert "is not there" in refused("import", tmp_path / "no", "-o", tmp_path / "x.png")
+    assert "not found" in refused("export", tmp_path / "no.png", "--as=hci", "-o", out)
+    assert "not found" in refused("import", tmp_path / "no", "-o", tmp_path / "x.png")
     assert "is no .mat file" in refused("import", tmp_path / "junk.mat", "-o", tmp_path / "x.png")
     assert "there are no views" in refused("import", tmp_path / "empty", "-o", tmp_path / "x.png")
-    assert "parameters.cfg: is not there" in refused("import", tmp_path / "empty", "--as=hci", "-o", tmp_path / "x.png")
+    assert "parameters.cfg: not found" in refused("import", tmp_path / "empty", "--as=hci", "-o", tmp_path / "x.png")
     assert "is no Zarr group" in refused("import", tmp_path / "empty", "--as=zarr", "-o", tmp_path / "x.png")
     assert "the ending '.jpg'" in refused("import", tmp_path / "empty", "-o", tmp_path / "x.jpg")
     assert "unknown display" in refused("import", tmp_path / "empty", "-d", "none", "-o", tmp_path / "x.png")

@@ -175,7 +175,7 @@ def test_a_folder_a_display_and_what_is_said(lippmann, frames, tmp_path):
         (("--lpi", 20, "--ppi", 400), "--size: size is missing"),
         (("-d", "lkg-portrait", "--bleed", "3mm"), "--bleed: does not apply"),
         (("-d", "lkg-portrait", "--lenses", "across"), "--lenses: does not apply"),
-        ((*SHEET, "--size", "30x20mm", "--shift", "3"), "--shift: '3' will not do"),
+        ((*SHEET, "--size", "30x20mm", "--shift", "3"), "--shift: '3'; must be a number with its unit"),
         ((*SHEET, "--size", "30x20mm", "--bleed=-1mm"), "--bleed: -1 mm is out of range"),
         ((*SHEET, "--size", "30x20mm", "--lenses", "across", "--marks", "8mm"), "--marks: marks are for upright"),
         ((*SHEET, "--size", "30x20mm", "--icc", "absent.icc"), "absent.icc: cannot be read"),

@@ -87,7 +87,7 @@ def test_settings_become_options(text, said):
 
 
 def test_an_error_says_the_option_after_the_file():
-    error = UsageError("1 will not do", where="a.png", parameter="quality", rule="a", fix='use method="full"')
-    assert in_options(error) == "a.png: --quality: 1 will not do; a; use --method full"
-    assert str(error) == 'a.png: quality: 1 will not do; a; use method="full"'
+    error = UsageError("1 is too small", where="a.png", parameter="quality", rule="a", fix='use method="full"')
+    assert in_options(error) == "a.png: --quality: 1 is too small; a; use --method full"
+    assert str(error) == 'a.png: quality: 1 is too small; a; use method="full"'
     assert in_options(UsageError("odd", parameter="form")) == "form: odd"

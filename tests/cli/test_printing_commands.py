@@ -131,7 +131,7 @@ def test_bad_prints_are_one_line_and_code_2(lippmann, tmp_path, words, said):
         (("pitch-test", *SHEET, "--strips", "0"), "0 is out of range"),
         (("pitch-test", *SHEET, "--step", "-1"), "-1 is out of range"),
         (("pitch-test",), "--ppi: ppi is missing"),
-        (("marks", "absent.tif"), "absent.tif: is not there"),
+        (("marks", "absent.tif"), "absent.tif: not found"),
     ],
 )
 def test_bad_input_is_one_line_and_code_2(lippmann, tmp_path, words, said):

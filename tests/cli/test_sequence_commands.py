@@ -73,7 +73,7 @@ def test_a_flight(engine, lippmann, tmp_path):
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (("--frames", "0-9", "-o", "out"), "'0-9' will not do"),
+        (("--frames", "0-9", "-o", "out"), "'0-9'; must be FIRST:STOP"),
         (("--frames", "5:2", "-o", "out"), "FIRST:STOP"),
         (("--frames", "0:26", "-o", "out"), "there is no frame 25"),
         (("--frames", "0:2", "-o", "out.png"), "this is one name for 2 frames; out_%04d.png, or a folder"),

@@ -48,7 +48,7 @@ def test_options_change_what_is_seen(lippmann, engine, scan, tmp_path):
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        (["--window", "3"], "--window: '3' will not do; 2 numbers"),
+        (["--window", "3"], "--window: '3'; must be 2 numbers"),
         (["--transfer-function", "bone"], "'bone' is neither a preset nor"),
         (["--series", "2"], "holds no several volumes"),
         (["--denoise", "oidn"], "this scene has a volume, and light that lies on none"),

@@ -236,7 +236,7 @@ def test_encrypted_connections(lab, here, tmp_path, until):
     from lippmann.cluster.runner import runner_on
 
     if shutil.which("openssl") is None:
-        pytest.skip("openssl is not there to make certificates")
+        pytest.skip("openssl is not found to make certificates")
     key, certificate = tmp_path / "key.pem", tmp_path / "cert.pem"
     name = ["-subj", "/CN=lippmann-test", "-days", "2", "-nodes", "-newkey", "rsa:2048"]
     subprocess.run(

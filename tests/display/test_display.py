@@ -237,7 +237,7 @@ def test_hexagonal_ties_do_not_depend_on_noise():
 @given(data=st.data())
 @many
 def test_a_ray_lies_on_its_light_line(displays, data):
-    """It starts before the lens plane, runs away from the viewer and passes its lens and its panel point."""
+    """It starts in front of the lens plane, runs away from the viewer and passes its lens and its panel point."""
     display = data.draw(displays())
     x, y = panel_points(display)
     (ox, oy, oz), (dx, dy, dz) = display.light_ray(x, y)

@@ -158,7 +158,7 @@ def change(folder, **changes):
 
 def test_a_missing_file_is_named(views):
     (views / "view_1_2.png").unlink()
-    with pytest.raises(PictureError, match=r"view_1_2.png: is not there"):
+    with pytest.raises(PictureError, match=r"view_1_2.png: not found"):
         compose(views)
 
 
@@ -220,7 +220,7 @@ def test_a_manifest_that_makes_no_sense_is_named(views, changes, message):
 
 
 def test_a_folder_without_a_manifest(tmp_path, views):
-    with pytest.raises(PictureError, match=r"lippmann.json: is not there; give a folder written by"):
+    with pytest.raises(PictureError, match=r"lippmann.json: not found; give a folder written by"):
         compose(tmp_path)
     for content in (b"", b"{}", b"\xff\xfe", b"[]"):
         (views / MANIFEST).write_bytes(content)

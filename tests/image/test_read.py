@@ -47,7 +47,7 @@ def test_files_may_be_named_by_strings(tmp_path, display, picture):
 
 def test_a_missing_empty_or_foreign_file(tmp_path):
     for name, content, message in (
-        ("missing.png", None, "missing.png: is not there"),
+        ("missing.png", None, "missing.png: not found"),
         ("empty.png", b"", "empty.png: is empty"),
         ("text.png", b"hello", "text.png: is no picture that is known here"),
         ("jpeg.png", b"\xff\xd8\xff\xe0" + bytes(100), "PNG, OpenEXR, TIFF and Zarr are read"),

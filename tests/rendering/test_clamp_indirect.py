@@ -49,7 +49,7 @@ def test_the_limit_is_that_of_what_is_shown():
 
 @pytest.mark.parametrize("limit", [0, -1.0, float("nan"), float("inf")])
 def test_limits_that_mean_nothing_are_refused(limit):
-    with pytest.raises(UsageError, match=r"clamp_indirect: .* will not do; radiance above 0"):
+    with pytest.raises(UsageError, match=r"clamp_indirect: .*; must be radiance above 0"):
         rendered(clamp_indirect=limit)
 
 

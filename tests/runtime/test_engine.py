@@ -110,13 +110,13 @@ def test_named_library_is_an_old_one(tmp_path, device):
 
 def test_named_library_is_missing(tmp_path):
     path = str(tmp_path / "libLLVM.so.19.1")
-    assert f"'{path}' is not there" in start_fails(device="auto", **{llvm.PATH_VARIABLE: path})
+    assert f"'{path}' not found" in start_fails(device="auto", **{llvm.PATH_VARIABLE: path})
 
 
 def test_named_library_is_missing_and_a_gpu_does_not_excuse_it(tmp_path):
     before = "from lippmann.runtime import gpu; gpu.find = lambda: 'Test GPU'\n"
     path = str(tmp_path / "libLLVM.so.19.1")
-    assert f"'{path}' is not there" in start_fails(before, device="auto", **{llvm.PATH_VARIABLE: path})
+    assert f"'{path}' not found" in start_fails(before, device="auto", **{llvm.PATH_VARIABLE: path})
 
 
 def test_named_library_is_a_text_file(tmp_path):
@@ -235,6 +235,15 @@ def test_diagnosis_of_a_machine_that_can_render():
     for old in OLD:
         assert old.version_text in by_name["LLVM"].value
     assert by_name["test render"].ok
+
+
+def test_extras_are_installed_or_say_how(monkeypatch):
+    lines = ["numpy>=1", "h5py>=3; extra == 'exchange'", "no-such-package>=1; extra == 'usd'", "ruff; extra == 'dev'"]
+    monkeypatch.setattr("importlib.metadata.requires", lambda name: lines)
+    exchange, usd = engine._check_extras()
+    assert (exchange.name, exchange.ok, exchange.fix) == ("extra exchange", True, "")
+    assert (usd.ok, usd.needed, usd.value) == (False, False, "without no-such-package")
+    assert usd.fix == "pip install 'lippmann[usd]'"
 
 
 def test_diagnosis_of_a_machine_that_cannot(monkeypatch, tmp_path):

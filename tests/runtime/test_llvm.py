@@ -73,7 +73,7 @@ def test_what_is_no_library(tmp_path):
     empty.touch()
     assert "not a shared library" in llvm.inspect(empty).problem
     assert "folder" in llvm.inspect(tmp_path).problem
-    assert "not there" in llvm.inspect(tmp_path / "none").problem
+    assert "not found" in llvm.inspect(tmp_path / "none").problem
     assert "not an LLVM library" in llvm.inspect(put(tmp_path, "libz.so.1")).problem
 
 
@@ -183,7 +183,7 @@ def test_named_library_is_the_only_one_considered(folder, tmp_path_factory, monk
 @pytest.mark.parametrize(
     ("content", "problem"),
     [
-        (None, "is not there"),
+        (None, "not found"),
         (b"just text", "is not a shared library"),
         (library_bytes("libLLVM-14.so.1"), "is LLVM 14, which is too old"),
         (library_bytes("libLLVM-15.so.1"), "is LLVM 15, which is too old"),
@@ -212,7 +212,7 @@ def test_bare_name_is_looked_up_where_the_loader_looks(folder, monkeypatch, tmp_
     monkeypatch.setenv(llvm.PATH_VARIABLE, "libLLVM.so.19.1")
     assert llvm.choose().path == folder / "libLLVM.so.19.1"
     monkeypatch.setenv(llvm.PATH_VARIABLE, "libLLVM.so.18.1")
-    with pytest.raises(EngineError, match="is not there"):
+    with pytest.raises(EngineError, match="not found"):
         llvm.choose()
 
 

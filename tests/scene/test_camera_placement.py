@@ -16,7 +16,7 @@ from lippmann.scene.values.description import Camera, Instance, Light, Material,
 
 BOUNDS = np.array([[-5.0, -5.0, -30.0], [5.0, 5.0, -1.0]])
 EYE = Camera("eye", np.eye(4), fov_y=0.5, focus_distance=20.0)
-#: Seen from 300 mm; rays begin 10 mm before the lens plane.
+#: Seen from 300 mm; rays begin 10 mm in front of the lens plane.
 DISPLAY = dataclasses.replace(load_display("mla-square"), viewing_distance=300.0, aperture_distance=10.0)
 
 

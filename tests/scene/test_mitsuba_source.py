@@ -163,13 +163,13 @@ def test_a_file_that_mitsuba_refuses(save, engine):
 
 def test_files_that_a_file_names(save, tmp_path):
     mesh = '<shape type="ply"><string name="filename" value="{}"/></shape>'
-    with pytest.raises(SceneError, match=r"room\.xml:1: file 'none\.ply' is not there"):
+    with pytest.raises(SceneError, match=r"room\.xml:1: file 'none\.ply' not found"):
         load_scene(save(mesh.format("none.ply")))
-    with pytest.raises(SceneError, match=r"room\.xml:1: file 'none\.xml' is not there"):
+    with pytest.raises(SceneError, match=r"room\.xml:1: file 'none\.xml' not found"):
         load_scene(save('<include filename="none.xml"/>'))
     (tmp_path / "there.ply").touch()
     load_scene(save(mesh.format("there.ply")))
-    with pytest.raises(SceneError, match=r"file 'elsewhere/there\.ply' is not there"):
+    with pytest.raises(SceneError, match=r"file 'elsewhere/there\.ply' not found"):
         load_scene(save(mesh.format("elsewhere/there.ply")))
     beside = load_scene(save(mesh.format("../there.ply"))).description
     assert dict(beside.content.files) == {"there.ply": tmp_path / "there.ply"}

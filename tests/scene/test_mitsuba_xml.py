@@ -203,7 +203,7 @@ class TestSearchPaths:
             read_mitsuba_xml(save('<shape type="cube"><path value="one"/></shape>'))
 
     def test_missing(self, save):
-        with pytest.raises(SceneError, match=r"room\.xml:2: search path 'none' is not there; it must be a folder"):
+        with pytest.raises(SceneError, match=r"room\.xml:2: search path 'none' not found; it must be a folder"):
             read_mitsuba_xml(save('<path value="none"/>'))
 
 

@@ -135,7 +135,13 @@ class TestFit:
         side = FILL * 75 - 2 * 12.5
         assert np.ptp(in_display(placed, corners(box(6, 6, 8))), axis=0)[:2] == pytest.approx([side] * 2)
         assert placed.depth_scale == pytest.approx(50 / (8 / 6 * side))
-        assert placed.warnings == ("depth 61.7 mm shown at 81 %: depth_scale=1 shows it whole",)
+        assert placed.warnings == (
+            "depth 61.7 mm flattened to 81 %: depth_scale=1 keeps it, soft at its ends; scale=0.81 keeps it sharp, "
+            "in a smaller picture",
+        )
+        smaller = place(box(6, 6, 8), display(aperture=0.0), options=options(scale=0.8))
+        assert smaller.depth_scale == pytest.approx(1.0)
+        assert smaller.warnings == ()
         back, front = place(box(6, 6, 16), display(aperture=60.0)).depth_range
         assert (back, front) == (pytest.approx(-50), pytest.approx(25))
 

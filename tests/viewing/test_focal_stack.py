@@ -96,8 +96,8 @@ def test_the_command_writes_folders_pages_and_animations(lippmann, image, pictur
     [
         (("-o", "a.png"), "say --plane or --planes"),
         (("--plane", 1, "--planes", "0:1:2", "-o", "a.png"), "say --plane or --planes"),
-        (("--planes", "0:1", "-o", "a.png"), "--planes: '0:1' will not do; FIRST:LAST:COUNT"),
-        (("--planes", "0:1:0", "-o", "a.png"), "--planes: '0:1:0' will not do"),
+        (("--planes", "0:1", "-o", "a.png"), "--planes: '0:1'; must be FIRST:LAST:COUNT"),
+        (("--planes", "0:1:0", "-o", "a.png"), "--planes: '0:1:0'; must be FIRST"),
         (("--planes", "0:1:2", "-o", "a.exr"), "a focal stack is a folder, a .tif or an animation"),
         (("--planes", "0:1:2", "--bits", 16, "-o", "a.png"), "animations have 8"),
     ],

@@ -28,7 +28,7 @@ FINE = Display("fine", Panel(160 * 21, 4, 0.5 / 21), LensArray("lenticular", 0.5
 
 
 def bar_at(z: float, half_width: float = 1.0) -> IntegralImage:
-    """The display's picture of a white upright bar at x = 0, ``z`` mm before the lens plane."""
+    """The display's picture of a white upright bar at x = 0, ``z`` mm in front of the lens plane."""
     row, column = np.indices((FINE.panel.height, FINE.panel.width)).astype(float)
     x, y = FINE.panel_point(column + 0.5, row + 0.5)
     (ox, _, oz), (dx, _, dz) = FINE.light_ray(x, y, NUMPY)
@@ -46,7 +46,7 @@ def middle(picture) -> float:
 def test_disparity_is_that_of_the_point_s_depth(z):
     pair = replay_stereo(bar_at(z), (0, 0, 300), eyes=60, size=(1600, 4))
     left, right = np.split(pair, 2, axis=1)
-    # By similar triangles about the point; crossed (the left eye's is farther right) before the screen.
+    # By similar triangles about the point; crossed (the left eye's is farther right) in front of the screen.
     expected = 60 * z / (300 - z)
     # Each eye's place is known to half a lens.
     assert middle(left) - middle(right) == pytest.approx(expected, abs=0.8)

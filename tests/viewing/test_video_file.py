@@ -88,7 +88,9 @@ def test_a_codec_that_cannot_be(tmp_path, monkeypatch):
         write_animation(frames(), tmp_path / "a.png", codec="av1")
     encoder = video_file._Encoder("libnone", {}, "none")
     monkeypatch.setitem(video_file._ENCODERS, "av1", encoder)
-    with pytest.raises(OutputError, match=r"a\.mp4: the codec is not there; PyAV as it is installed has no libnone"):
+    with pytest.raises(
+        OutputError, match=r"a\.mp4: the codec is not installed; PyAV as it is installed has no libnone"
+    ):
         write_animation(frames(), tmp_path / "a.mp4", codec="av1")
     assert os.listdir(tmp_path) == []
 
@@ -116,7 +118,7 @@ def test_places_that_cannot_be(tmp_path):
             check_animation_path(tmp_path / name)
         with pytest.raises(OutputError, match=message):
             write_animation(frames(), tmp_path / name)
-    with pytest.raises(OutputError, match="is not there"):
+    with pytest.raises(OutputError, match="not found"):
         write_animation(frames(), tmp_path / "missing" / "a.mp4")
 
 

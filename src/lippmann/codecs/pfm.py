@@ -36,7 +36,7 @@ def read_pfm(path: Path) -> NDArray[np.float32]:
         check_kind(path, PictureError)
         content = path.read_bytes()
     except FileNotFoundError:
-        raise PictureError("is not there", where=str(path)) from None
+        raise PictureError("not found", where=str(path)) from None
     except OSError as error:
         raise PictureError(f"cannot be read: {error.strerror}", where=str(path)) from error
     found = _HEADER.match(content)

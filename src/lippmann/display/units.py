@@ -114,8 +114,7 @@ def stripe(order: str, key: str) -> SubpixelOffsets:
 
 def _unknown_unit(text: str, unit: str, key: str, known: list[str]) -> DisplayError:
     return DisplayError(
-        f"{text!r} has the unknown unit {unit!r}",
+        f"{text!r} has the unknown unit {unit!r}{suggestion(unit, known)}",
         where=key,
         rule=f"the units here are {', '.join(known)}",
-        fix=suggestion(unit, known),
     )

@@ -87,13 +87,13 @@ def refuse_unknown(given: Iterable[object], known: Collection[str], where: str =
     for key in given:
         if key not in known:
             rule = f"the keys are {', '.join(known)}"
-            raise DisplayError(f"unknown key {key!r}", where=_join(where, key), rule=rule, fix=suggestion(key, known))
+            raise DisplayError(f"unknown key {key!r}{suggestion(key, known)}", where=_join(where, key), rule=rule)
 
 
 def suggestion(word: object, known: Iterable[str]) -> str:
-    """``did you mean 'x'?`` with the nearest known words, or nothing."""
+    """``, did you mean 'x'?`` with the nearest known words, or nothing."""
     near = difflib.get_close_matches(str(word), list(known), n=3, cutoff=0.6)
-    return f"did you mean {' or '.join(repr(name) for name in near)}?" if near else ""
+    return f", did you mean {' or '.join(repr(name) for name in near)}?" if near else ""
 
 
 def _join(where: str, key: object) -> str:

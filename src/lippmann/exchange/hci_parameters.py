@@ -108,7 +108,7 @@ def read_parameters(path: Path) -> Parameters:
             raise PictureError("is no list of parameters", where=str(path), rule="it and its lines are short")
         parser.read_string(text)
     except FileNotFoundError:
-        raise PictureError("is not there", where=str(path)) from None
+        raise PictureError("not found", where=str(path)) from None
     except OSError as error:
         raise PictureError(f"cannot be read: {error.strerror}", where=str(path)) from error
     except (configparser.Error, UnicodeDecodeError):

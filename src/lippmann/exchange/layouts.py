@@ -91,6 +91,11 @@ def stored_in(layout: LayoutName, image_stored: Stored, bits: int | None) -> Sto
     return "float32" if 32 in known else "uint8"
 
 
+def with_ending(layout: str, path: Path) -> Path:
+    """``path`` with the ending that the layout's files have, where it has none."""
+    return path if path.suffix else path.with_suffix(_ENDING.get(_layout_name(layout), ""))
+
+
 def check_target(layout: str, path: Path) -> LayoutName:
     """``layout`` as a :data:`LayoutName`, once ``path`` is known to have an ending that fits it.
 
@@ -222,7 +227,7 @@ def recognize(path: Path) -> LayoutName:
             return "hci"
         return "views"
     if not path.exists():
-        raise PictureError("is not there", where=str(path))
+        raise PictureError("not found", where=str(path))
     for name, ending in _ENDING.items():
         if path.suffix.lower() == ending:
             return name

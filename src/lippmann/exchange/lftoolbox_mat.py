@@ -112,7 +112,7 @@ def read_matlab(path: Path) -> LightField:
         with path.open("rb") as file:
             head = file.read(128)
     except FileNotFoundError:
-        raise PictureError("is not there", where=str(path)) from None
+        raise PictureError("not found", where=str(path)) from None
     except OSError as error:
         raise PictureError(f"cannot be read: {error.strerror}", where=str(path)) from error
     version = head[124:128]

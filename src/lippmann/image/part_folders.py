@@ -336,7 +336,7 @@ def _read_manifest(folder: Path) -> _Manifest:
         values = parse_json(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
         fix = "give a folder written by 'lippmann views' or 'lippmann micro-images'"
-        raise PictureError("is not there", where=str(path), fix=fix) from None
+        raise PictureError("not found", where=str(path), fix=fix) from None
     except OSError as error:
         raise PictureError(f"cannot be read: {error.strerror}", where=str(path)) from error
     except UnicodeDecodeError:

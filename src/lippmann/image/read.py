@@ -205,7 +205,7 @@ def open_file(path: str | Path) -> PictureFile:
         file = path.open("rb")
         start = file.peek(8)[:8]
     except FileNotFoundError:
-        raise PictureError("is not there", where=str(path)) from None
+        raise PictureError("not found", where=str(path)) from None
     except ValueError:
         raise PictureError("is no name of a file", where=repr(str(path))) from None
     except OSError as error:

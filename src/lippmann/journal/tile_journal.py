@@ -158,7 +158,7 @@ class TileStore:
             if result.index != index or result.pixels.shape[:2] != self.grid[index].shape:
                 raise DamagedTile("it is another tile")
         except FileNotFoundError:
-            raise DamagedTile("it is not there") from None
+            raise DamagedTile("not found") from None
         except OSError as error:
             raise DamagedTile(f"it cannot be read: {error.strerror or error}") from error
         except (DamagedTile, ForeignFileError) as error:

@@ -1,8 +1,8 @@
 """Flicker: how much the errors of a picture change from one view to the next.
 
-An eye that moves before a display goes from view to view. An error that all views share is a blemish of the scene; an
-error that differs from view to view flickers. With e = test - reference (coded values), flicker is the mean of
-(e[k + 1] - e[k])^2 over all pairs of neighbouring views.
+An eye that moves in front of a display goes from view to view. An error that all views share is a blemish of the
+scene; an error that differs from view to view flickers. With e = test - reference (coded values), flicker is the mean
+of (e[k + 1] - e[k])^2 over all pairs of neighbouring views.
 
 Independent errors give twice their mean squared error. Half of the flicker, in dB, is therefore on the scale of PSNR.
 *Share* is that half divided by the mean squared error of the same pixels: 0 if all views have the same errors, 1 if the

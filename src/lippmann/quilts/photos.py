@@ -230,7 +230,7 @@ def _opened(path: Path) -> Iterator[Image.Image]:
         with open_picture(path) as picture:
             yield picture
     except FileNotFoundError:
-        raise PictureError("is not there", where=str(path)) from None
+        raise PictureError("not found", where=str(path)) from None
     except UnidentifiedImageError:
         raise PictureError("is no picture that is read here", where=str(path), rule=RULE) from None
     except (OSError, SyntaxError, ValueError) as error:

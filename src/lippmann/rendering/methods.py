@@ -1,4 +1,4 @@
-"""From a scene before a display to a traced frame, by the method that was asked for."""
+"""From a scene in front of a display to a traced frame, by the method that was asked for."""
 
 from __future__ import annotations
 

@@ -369,11 +369,11 @@ def make_integrator(
         if built.has_media:
             if request.clamp_indirect is not None:
                 rule = "this scene has participating media, whose light is not clamped"
-                raise UsageError("will not do", parameter="clamp_indirect", rule=rule, fix="leave it out")
+                raise UsageError("does not apply", parameter="clamp_indirect", rule=rule, fix="leave it out")
             if request.caustics not in ("auto", "paths"):
                 rule = "this scene has participating media, through which photons are not traced"
                 raise UsageError(
-                    f"'{request.caustics}' will not do", parameter="caustics", rule=rule, fix="leave it out"
+                    f"'{request.caustics}' does not apply", parameter="caustics", rule=rule, fix="leave it out"
                 )
             return VolumePathIntegrator(built.mitsuba, request.surfaces, request.integrator, built.background)
         features = make_scene_features(

@@ -31,7 +31,7 @@ def scene_figures(results: Results) -> list[Markup]:
     lenses = results.experiment.display.lens_grid.columns
     text = (
         f"First of each pair what the panel shows, fully traced: {lenses} strips, one behind each lens. Then what an "
-        "eye in the middle before the display sees through the lenses."
+        "eye in the middle in front of the display sees through the lenses."
     )
     shown = []
     for scene in results.runs:
@@ -39,7 +39,9 @@ def scene_figures(results: Results) -> list[Markup]:
         shown += [
             _figure(diagnostic_maps.display_codes(image), f"{scene}: on the panel", f"integral image of the {scene}"),
             _figure(
-                diagnostic_maps.replayed_codes(image), f"{scene}: before the display", f"the {scene} as an eye sees it"
+                diagnostic_maps.replayed_codes(image),
+                f"{scene}: in front of the display",
+                f"the {scene} as an eye sees it",
             ),
         ]
     return [paragraph(text), _gallery(*shown)]

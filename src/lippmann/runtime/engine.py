@@ -10,6 +10,7 @@ import ctypes
 import json
 import os
 import platform
+import re
 import subprocess
 import sys
 import time
@@ -253,9 +254,36 @@ def diagnose(device: DeviceChoice = "auto") -> Diagnosis:
         Check("GPU", on_gpu, (engine.gpu_name if engine and on_gpu else None) or "none in use", needed=False),
         Check("threads", True, str(machine.usable_cores())),
         Check("memory", True, f"{_gib(machine.available_memory())} free of {_gib(machine.total_memory())}"),
+        *_check_extras(),
         render,
     )
     return Diagnosis(checks, engine)
+
+
+def _check_extras() -> list[Check]:
+    """What the package's extras add: installed, or how to install it."""
+    from importlib.metadata import PackageNotFoundError, requires, version  # slow to import
+
+    missing: dict[str, list[str]] = {}
+    for line in requires("lippmann") or ():
+        match = re.match(r"([\w.-]+).*extra == [\"'](\w+)[\"']", line)
+        if match is None or match[2] == "dev":
+            continue
+        absent = missing.setdefault(match[2], [])
+        try:
+            version(match[1])
+        except PackageNotFoundError:
+            absent.append(match[1])
+    return [
+        Check(
+            f"extra {name}",
+            not absent,
+            f"without {', '.join(absent)}" if absent else "installed",
+            f"pip install 'lippmann[{name}]'" if absent else "",
+            needed=False,
+        )
+        for name, absent in sorted(missing.items())
+    ]
 
 
 def _gib(size: int) -> str:

@@ -100,7 +100,7 @@ def inspect(path: Path) -> Library:
     try:
         name, stated = name_of(path)
     except FileNotFoundError:
-        return Library(path, problem="is not there")
+        return Library(path, problem="not found")
     except OSError as error:
         return Library(path, problem=f"cannot be read ({error.strerror})")
     except (ValueError, struct.error):
@@ -154,7 +154,7 @@ def _named(name: str) -> Library:
     if not {os.sep, os.altsep} & set(name):
         # The dynamic loader looks such a name up in its folders, never in the current one.
         path = next((folder / name for folder in search_folders() if (folder / name).is_file()), None)
-    library = inspect(path) if path else Library(Path(name), problem="is not there")
+    library = inspect(path) if path else Library(Path(name), problem="not found")
     if library.problem:
         raise EngineError(
             f"'{name}' {library.problem}",

@@ -1,7 +1,7 @@
 """Where a display stands that is placed by a camera, so that it shows all that the camera sees.
 
-Recorded rays begin at the display's aperture distance before the lens plane. What a camera sees nearer than that would
-be cut open; the lens plane therefore moves toward the eye until nothing is.
+Recorded rays begin at the display's aperture distance in front of the lens plane. What a camera sees nearer than that
+would be cut open; the lens plane therefore moves toward the eye until nothing is.
 """
 
 from __future__ import annotations
@@ -120,7 +120,7 @@ def place_by_camera(
         if focus > most:
             if pop_out is None:
                 warnings.append(
-                    f"the lens plane moved from {focus:.3g} to {most:.3g} scene units before the camera: recorded "
+                    f"the lens plane moved from {focus:.3g} to {most:.3g} scene units in front of the camera: recorded "
                     f"rays begin {display.aperture_distance:g} mm in front of it, and would cut off what is nearer"
                 )
             focus = most
@@ -136,7 +136,7 @@ def place_by_camera(
 
 def _refuse_pop_out(pop_out: float, most: float, display: Display) -> None:
     raise UsageError(
-        f"{pop_out:g} of the visible depth does not fit before the lens plane",
+        f"{pop_out:g} of the visible depth does not fit in front of the lens plane",
         parameter="pop_out",
         rule=f"recorded rays begin {display.aperture_distance:g} mm in front of it",
         fix=f"ask for at most {np.floor(most * 100.0) / 100.0:.2f}, or for a larger aperture_distance of the display",

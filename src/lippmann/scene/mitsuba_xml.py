@@ -103,7 +103,7 @@ def read_mitsuba_xml(path: Path, *, allow_outside: bool = False) -> MitsubaXml:
     ------
     SceneError
         A file is missing, is no XML or no scene, names a plugin or material that Mitsuba does not have, or names a
-        file that is not there or, without ``allow_outside``, not in the scene's folder.
+        file that is not found or, without ``allow_outside``, not in the scene's folder.
     """
     reader = _Reader(path.parent, allow_outside)
     root = reader.file(path, {}, [], "", level=0)

@@ -180,7 +180,7 @@ def place(
     UsageError
         With a camera, ``pop_out`` asks for more in front of the lens plane than recorded rays show.
     SceneError
-        The box is a single point or not finite; the camera is not there, has the whole scene behind it, or a field that
+        The box is a single point or not finite; the camera is not found, has the whole scene behind it, or a field that
         is no field or beyond numbers.
     """
     options = options or PlacementOptions()
@@ -280,7 +280,8 @@ def _fit(
     )
     if options.depth_scale is None and fit.depth_scale < 1.0 - 1e-6:
         warnings.append(
-            f"depth {fit.depth:.3g} mm shown at {100 * fit.depth_scale:.2g} %: depth_scale=1 shows it whole"
+            f"depth {fit.depth:.3g} mm flattened to {100 * fit.depth_scale:.2g} %: depth_scale=1 keeps it, soft at "
+            f"its ends; scale={options.scale * fit.depth_scale:.2g} keeps it sharp, in a smaller picture"
         )
     if options.pop_out is not None and fit.front < fit.full_front * (1.0 - 1e-9):
         warnings.append(

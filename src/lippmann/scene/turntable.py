@@ -42,14 +42,14 @@ def turn_about(axis: Vector, center: Vector | Bounds, degrees: float) -> Matrix:
 
 
 def turning_axis(scene: Scene, options: PlacementOptions) -> Vector:
-    """The axis of the scene's own frame that stands most upright before the viewer, pointing up: a unit vector.
+    """The axis of the scene's own frame that stands most upright in front of the viewer, pointing up: a unit vector.
 
     A model that ``options.turn`` or a camera shows from above thus turns as on a table that is seen from above.
 
     Raises
     ------
     SceneError
-        The camera that the options name is not there.
+        The camera that the options name is not found.
     """
     if options.mode == "camera" or options.camera is not None:
         frame = remove_scale(scene.camera(options.camera))[:3, :3]

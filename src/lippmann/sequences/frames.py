@@ -1,8 +1,8 @@
 """Sequences: one integral image a frame, of a scene that moves or that the display flies through.
 
 The display's place is held fixed over all frames: where the scene is fitted to it, the box around all that the motion
-ever fills is; where it follows a camera, it stays in the same place before that camera. So nothing jumps from frame to
-frame, and a frame is the same whether it is rendered alone or with all others.
+ever fills is; where it follows a camera, it stays in the same place in front of that camera. So nothing
+jumps from frame to frame, and a frame is the same whether it is rendered alone or with all others.
 """
 
 from __future__ import annotations

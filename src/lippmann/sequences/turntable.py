@@ -1,4 +1,4 @@
-"""A scene on a turntable, frame by frame: a whole turn or a swing to and fro, before a display and light at rest."""
+"""A scene on a turntable, frame by frame: a whole turn or a swing to and fro; display and light stand still."""
 
 from __future__ import annotations
 
@@ -180,7 +180,7 @@ def open_turntable(
     Raises
     ------
     UsageError, SceneError
-        A number is out of range; the camera of the placement is not there.
+        A number is out of range; the camera of the placement is not found.
     """
     if classic and scene.classic is not None:
         scene = replace(scene, description=None, views=scene.cameras)
@@ -189,7 +189,7 @@ def open_turntable(
 
 
 def _depth_of(points: Bounds, view: CameraView) -> VisibleDepth | None:
-    """The depth that points before a camera fill; None if there are none."""
+    """The depth that points in front of a camera fill; None if there are none."""
     depths = -transform_points(inverse(view.world_from_camera), points)[:, 2]
     ahead = depths[depths > 0.0]
     return VisibleDepth(float(ahead.min()), float(ahead.max())) if len(ahead) else None

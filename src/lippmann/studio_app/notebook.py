@@ -162,7 +162,7 @@ def state_of_settings(
     Raises
     ------
     UsageError
-        A setting is unknown, its value will not do, or the display is no name.
+        A setting is unknown, its value is out of its range, or the display is no name.
     """
     if not isinstance(display, (str, Path)):
         rule = "the studio takes a name, a file or a short form"

@@ -43,7 +43,7 @@ def state_of_values(values: object) -> StudioState:
         A field is unknown, or a value is of another type or out of its range.
     """
     if not isinstance(values, Mapping):
-        raise UsageError("the state will not do", rule="an object of JSON")
+        raise UsageError("the state", rule="must be an object of JSON")
     kinds = _kinds()
     found: dict[str, Any] = {}
     for name, value in values.items():
@@ -135,7 +135,7 @@ def _value_of(kind: Any, value: object, name: str) -> Any:
             return value
     elif kind in (int, bool) and type(value) is kind:
         return value
-    raise UsageError(f"{str(value)[:60]!r} will not do", parameter=name, rule="a value of the setting's type")
+    raise UsageError(f"{str(value)[:60]!r}", parameter=name, rule="must be a value of the setting's type")
 
 
 def shell_line(words: list[str]) -> str:

@@ -45,7 +45,7 @@ def read_state(path: Path) -> StudioState:
     Raises
     ------
     UsageError
-        The file cannot be read, is no TOML, or holds a setting that is unknown or will not do; with file and line.
+        The file cannot be read, is no TOML, or holds a setting that is unknown or out of its range; with file and line.
     """
     check_kind(path, UsageError)
     try:

@@ -100,15 +100,15 @@ def parse_message(text: object) -> dict[str, Any]:
     UsageError
         It is none.
     """
-    rule = "an object of JSON with a type"
+    rule = "must be an object of JSON with a type"
     if not isinstance(text, str):
-        raise UsageError("the message will not do", rule=rule)
+        raise UsageError("the message", rule=rule)
     try:
         message = json.loads(text, parse_constant=_refuse_constant)
     except (ValueError, RecursionError):
-        raise UsageError("the message will not do", rule=rule) from None
+        raise UsageError("the message", rule=rule) from None
     if not isinstance(message, dict) or not isinstance(message.get("type"), str) or not _is_shallow(message):
-        raise UsageError("the message will not do", rule=rule)
+        raise UsageError("the message", rule=rule)
     return message
 
 
@@ -116,7 +116,7 @@ def number_of(message: dict[str, Any], name: str, low: float, high: float) -> fl
     """A number of a message, within its range; a UsageError otherwise."""
     value = message.get(name)
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not low <= value <= high:
-        raise UsageError(f"{str(value)[:40]!r} will not do", parameter=name, rule=f"a number from {low:g} to {high:g}")
+        raise UsageError(f"{str(value)[:40]!r}", parameter=name, rule=f"must be a number from {low:g} to {high:g}")
     return float(value)
 
 
@@ -124,7 +124,7 @@ def numbers_of(message: dict[str, Any], name: str, count: int, limit: float) -> 
     """So many finite numbers of a message, of at most ``limit`` up or down; a UsageError otherwise."""
     values = message.get(name)
     if not isinstance(values, list) or len(values) != count or not all(_is_number(v, limit) for v in values):
-        raise UsageError(f"{str(values)[:40]!r} will not do", parameter=name, rule=f"{count} numbers")
+        raise UsageError(f"{str(values)[:40]!r}", parameter=name, rule=f"must be {count} numbers")
     return tuple(float(value) for value in values)
 
 

@@ -27,7 +27,7 @@ def check_exportable(display: Display) -> None:
     panel = display.panel
     if panel.width * panel.height > MOST_PIXELS:
         raise UsageError(
-            f"a picture of {panel.width} x {panel.height} pixels will not do",
+            f"a picture of {panel.width} x {panel.height} pixels is too large",
             parameter="export",
             rule=f"a page in one file shows at most {MOST_PIXELS} pixels",
             fix="leave it out: the viewer's server sends what is looked at",
@@ -52,7 +52,7 @@ def export_page(pictures: Sequence[tuple[str, Picture]], path: Path) -> None:
         If the place cannot be written.
     """
     if not 1 <= len(pictures) <= MAX_PICTURES:
-        raise UsageError(f"{len(pictures)} pictures will not do", rule="a page shows one or two")
+        raise UsageError(f"{len(pictures)} pictures", rule="must be one or two")
     for _, image in pictures:
         check_exportable(image.display)
     data = json.dumps([_picture_data(name, image) for name, image in pictures], allow_nan=False, separators=(",", ":"))

@@ -79,6 +79,6 @@ class PictureFile:
         try:
             state = self.path.stat()
         except OSError as error:
-            reason = "is not there" if isinstance(error, FileNotFoundError) else f"cannot be read: {error.strerror}"
+            reason = "not found" if isinstance(error, FileNotFoundError) else f"cannot be read: {error.strerror}"
             raise PictureError(reason, where=str(self.path)) from None
         return f"{state.st_ino:x}-{state.st_size:x}-{state.st_mtime_ns:x}"

@@ -1,4 +1,4 @@
-"""What an eye or a camera before a display sees of a quilt's views, without the display's lenses.
+"""What an eye or a camera in front of a display sees of a quilt's views, without the display's lenses.
 
 View k of N is that of the camera in the middle of the k-th of N equal parts of the field of view, counted from the
 left, even in the tangent. A view shows the panel's rectangle in the lens plane. The direction in which an eye looks

@@ -137,7 +137,7 @@ def head_path(file: Path) -> list[Eye]:
     Raises
     ------
     UsageError
-        If the file cannot be read, a line is no position before the lens plane, or there are none or too many.
+        If the file cannot be read, a line is no position in front of the lens plane, or there are none or too many.
     """
     places: list[Eye] = []
     check_kind(file, UsageError)

@@ -175,7 +175,7 @@ def _write_mp4(
             container.mux(stream.encode())
     except av.codec.codec.UnknownCodecError:
         rule = f"PyAV as it is installed has no {encoder.name}"
-        raise OutputError("the codec is not there", where=str(place), rule=rule, fix="write H.264") from None
+        raise OutputError("the codec is not installed", where=str(place), rule=rule, fix="write H.264") from None
     except (av.error.FFmpegError, ValueError) as error:
         if isinstance(error, OSError):  # such as a full disk
             raise

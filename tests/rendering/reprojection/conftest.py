@@ -74,5 +74,5 @@ def sheet():
 
 @pytest.fixture
 def flat_tracer():
-    """Makes a tracer of flat things before a display."""
+    """Makes a tracer of flat things in front of a display."""
     return FlatTracer

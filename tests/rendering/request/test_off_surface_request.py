@@ -56,7 +56,7 @@ def test_surfaces_beside_splats_have_noise():
         (ALONE, {"layers": True}, "layers: are told of surfaces"),
         (BOTH, {"denoise": "oidn"}, "denoise: oidn goes by the edges of surfaces"),
         (BOTH, {"caustics": "photons"}, "caustics: photons land on surfaces"),
-        (ALONE, {"exposure": 1.0}, "exposure: 1 will not do"),
+        (ALONE, {"exposure": 1.0}, "exposure: 1; must be 0"),
     ],
 )
 def test_what_splats_do_not_have_is_refused(description, options, said):

@@ -73,7 +73,7 @@ def test_sub_pixels_are_numbered_in_32_bits():
     [({"method": "lens-view"}, "method"), ({"subpixels": True}, "subpixels"), ({"layers": True}, "layers")],
 )
 def test_quilts_refuse_what_is_not_theirs(options, parameter):
-    with pytest.raises(UsageError, match="will not do for a quilt") as caught:
+    with pytest.raises(UsageError, match="is not possible in a quilt") as caught:
         check(RenderRequest(**PLAIN | options), "quilt", SHEET)
     assert caught.value.parameter == parameter
 

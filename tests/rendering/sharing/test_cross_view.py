@@ -124,5 +124,5 @@ def test_a_pooled_quilt_is_nearer_to_the_truth_and_knows_it():
 
 
 def test_what_views_cannot_do_is_refused():
-    with pytest.raises(UsageError, match="will not do for a quilt"):
+    with pytest.raises(UsageError, match="is not possible in a quilt"):
         quilt(spp=4, method="lens-view")

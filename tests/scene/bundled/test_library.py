@@ -1,4 +1,4 @@
-"""What all bundled scenes have in common, and how they stand before the display. Their shapes: tests/scene/bundled/."""
+"""What all bundled scenes have in common, and how they stand in front of the display."""
 
 import dataclasses
 import subprocess

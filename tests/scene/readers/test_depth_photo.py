@@ -251,7 +251,7 @@ def test_without_any_depth_there_is_no_scene(tmp_path):
     with pytest.raises(SceneError, match="the depth map tells no depth"):
         scene_of(tmp_path, np.zeros((4, 4), np.float32))
     (tmp_path / "photo.png").write_bytes(encoded(np.zeros((4, 4, 3), np.uint8)))
-    with pytest.raises(SceneError, match=r"^photo\.png: is a picture without depth; a scene has depth; name its map"):
+    with pytest.raises(SceneError, match=r"^photo\.png: needs a depth map; add depth_map"):
         load_scene(tmp_path / "photo.png")
 
 

@@ -36,7 +36,7 @@ def test_a_scene_of_it_comes_nearer_where_the_map_is_brighter(tmp_path):
 def test_another_depth_map_takes_the_place_of_its_own(tmp_path):
     path = tmp_path / "x.heic"
     path.write_bytes(heif(PIXELS))
-    with pytest.raises(SceneError, match=r"x\.heic: is a picture without depth"):
+    with pytest.raises(SceneError, match=r"x\.heic: needs a depth map"):
         load_scene(path)
     np.save(tmp_path / "d.npy", 1.0 / (1.0 + DEPTH))
     assert load_scene(path, depth_map=tmp_path / "d.npy").description.meshes

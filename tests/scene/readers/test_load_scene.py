@@ -67,10 +67,17 @@ def test_up_of_what_says_it_itself_is_refused():
 
 
 @pytest.mark.parametrize(
-    ("name", "said"), [("car.fbx", "open it in Blender, then File > Export > glTF"), ("part.STEP", "FreeCAD")]
+    ("name", "said"),
+    [
+        ("car.fbx", "open it in Blender, then File > Export > glTF"),
+        ("part.STEP", "FreeCAD"),
+        ("cup.3mf", "save it as .stl"),
+        ("cup.zae", "unzip it"),
+        ("water.sdf", "obabel in.sdf"),
+    ],
 )
 def test_files_of_other_programs_are_told_how_to_become_gltf(save, name, said):
-    with pytest.raises(SceneError, match="is no known kind of scene file; .*" + said):
+    with pytest.raises(SceneError, match="is no known kind of scene file: .*" + said):
         load_scene(save(name, b"ISO-10303-21;"))
 
 
@@ -105,7 +112,7 @@ def test_content_counts_where_the_name_says_nothing(save):
         (
             "a.fbx",
             b"Kaydara FBX",
-            r"a\.fbx: '\.fbx' is no known kind of scene file; known are \.blend, \.dat, \.glb, \.gltf",
+            r"a\.fbx: '\.fbx' is no known .*: open it in Blender, .*; known are \.blend, \.dat, \.glb, \.gltf",
         ),
         ("a.obj", b"", r"a\.obj: the file is empty"),
         ("a.glb", b"", r"a\.glb: the file is empty"),

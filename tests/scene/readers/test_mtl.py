@@ -247,9 +247,9 @@ def test_what_is_not_honoured_is_noted(material, picture):
 @pytest.mark.parametrize(
     ("statements", "message"),
     [
-        ("Kd 1 0 0\nmap_Kd none.png\n", r"m\.mtl:3: texture 'none\.png' is not there"),
+        ("Kd 1 0 0\nmap_Kd none.png\n", r"m\.mtl:3: texture 'none\.png' not found"),
         ("map_Kd\n", r"m\.mtl:2: map_Kd without a file"),
-        ("map_Kd -s 1 1\n", r"m\.mtl:2: texture '1' is not there"),
+        ("map_Kd -s 1 1\n", r"m\.mtl:2: texture '1' not found"),
         ("bump -bm x y.png\n", r"m\.mtl:2: 'bump -bm x y\.png'; -bm takes"),
         ("bump -bm 1\n", r"m\.mtl:2: 'bump -bm 1'; -bm takes"),
         ("Kd 1 0 nan\n", r"m\.mtl:2: 'Kd 1 0 nan'; Kd takes finite numbers"),

@@ -182,16 +182,16 @@ def test_an_unknown_material_is_noted(read):
 
 def test_a_missing_library_leaves_a_grey_model_and_a_note(read):
     scene = read("mtllib none.mtl\n" + SQUARE + "usemtl gold\nf 1 2 3\nusemtl tin\nf 1 3 4\n")
-    assert scene.notes == ["model.obj:1: material library 'none.mtl' is not there: its materials are plain grey"]
+    assert scene.notes == ["model.obj:1: material library 'none.mtl' not found: its materials are plain grey"]
     assert [material.base_color for material in scene.materials] == [(0.7, 0.7, 0.7)] * 2
     scene = read("mtllib modle.mat red.mtl\n" + SQUARE + "usemtl red\nf 1 2 3\n", red__mtl="newmtl red\nKd 1 0 0\n")
     assert scene.materials[0].base_color == (1, 0, 0)
-    assert scene.notes == ["model.obj:1: material library 'modle.mat' is not there: its materials are plain grey"]
+    assert scene.notes == ["model.obj:1: material library 'modle.mat' not found: its materials are plain grey"]
 
 
 def test_the_note_on_a_missing_library_names_the_one_that_may_be_meant(read):
     (note,) = read("mtllib coluors.mtl\n" + SQUARE + "f 1 2 3\n", colours__mtl="newmtl a\n").notes
-    assert note.endswith("is not there (is 'colours.mtl' meant?): its materials are plain grey")
+    assert note.endswith("is not found (is 'colours.mtl' meant?): its materials are plain grey")
 
 
 def test_comments_after_names(read):

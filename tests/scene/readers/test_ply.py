@@ -229,7 +229,7 @@ def test_bad_files(read, data, message):
 def test_a_missing_texture(read):
     comment = "comment TextureFile none.png\n"
     data = text_file().replace(b"element vertex", comment.encode() + b"element vertex")
-    with pytest.raises(SceneError, match=r"model\.ply: texture 'none\.png' is not there"):
+    with pytest.raises(SceneError, match=r"model\.ply: texture 'none\.png' not found"):
         read(data)
 
 

@@ -32,11 +32,12 @@ def export(
 ) -> None:
     """Export a picture to the layout of another light-field tool."""
     from lippmann.exchange import export_image
-    from lippmann.exchange.layouts import check_target, is_folder
+    from lippmann.exchange.layouts import check_target, is_folder, with_ending
     from lippmann.image import read_picture
     from lippmann.runtime.atomic_write import check_folder_writable, check_writable
 
     console = Console(quiet, as_json)
+    output = with_ending(layout, output)
     (check_folder_writable if is_folder(check_target(layout, output)) else check_writable)(output)
     image = read_picture(picture, display=parse.display(display))
     with console.progress() as progress:

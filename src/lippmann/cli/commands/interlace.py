@@ -173,8 +173,8 @@ def _shift(text: str | None) -> Shift:
         return Shift()
     match = re.fullmatch(r"([+-]?\d{1,6}(?:\.\d{1,9})?)\s*(px|mm)", text.strip())
     if match is None:
-        rule = "a number with its unit: 12px of the photographs, or 0.4mm on the print"
-        raise UsageError(f"'{text}' will not do", where="--shift", rule=rule)
+        rule = "must be a number with its unit: 12px of the photographs, or 0.4mm on the print"
+        raise UsageError(f"'{text}'", where="--shift", rule=rule)
     return Shift(float(match[1]), "mm" if match[2] == "mm" else "px")
 
 

@@ -12,7 +12,7 @@ import typer
 from lippmann.cli.commands.quilt import Aspect, Layout, layout_of
 from lippmann.cli.commands.sequence import Codec
 from lippmann.cli.shared import options, parse
-from lippmann.cli.shared.console import Console, estimate_in_words
+from lippmann.cli.shared.console import Console, estimate_in_words, samples_in_words
 from lippmann.cli.shared.default_output import output_of
 from lippmann.errors import UsageError
 
@@ -362,8 +362,11 @@ def _info_values(path: Path, file: PictureFile) -> dict[str, Any]:
 def _method(provenance: Provenance) -> str:
     depth, spp, seed = provenance.depth, provenance.spp, provenance.seed
     parts = [provenance.method or "unknown", provenance.integrator]
-    for text, value in (("depth {}", depth), ("{} samples per pixel", spp), ("seed {}", seed)):
-        parts.append("" if value is None else text.format(value))
+    parts += [
+        "" if depth is None else f"depth {depth}",
+        "" if spp is None else samples_in_words(spp),
+        "" if seed is None else f"seed {seed}",
+    ]
     return ", ".join(part for part in parts if part)
 
 

@@ -10,7 +10,7 @@ import typer
 from lippmann.cli.commands import print as printing
 from lippmann.cli.commands import sequence
 from lippmann.cli.shared import options, parse
-from lippmann.cli.shared.console import Console
+from lippmann.cli.shared.console import Console, samples_in_words
 from lippmann.cli.shared.picture_report import depths
 from lippmann.cli.shared.scene_source import SceneSource
 
@@ -156,7 +156,7 @@ def _lines(name: str, found: Forecast) -> list[str]:
         f"resolved  {depths(*found.resolvable_range)}",
         f"blur      {100 * found.blurred_share:.0f} % of the pixels see what lies beyond; "
         f"a pixel's light spreads over {behind:.1f} lenses at the back, {before:.1f} at the front",
-        f"rays      {found.rays['primary'] / 1e6:.1f} M from pixels ({found.spp} samples each), "
+        f"rays      {found.rays['primary'] / 1e6:.1f} M from pixels ({samples_in_words(found.spp, 'each')}), "
         f"about {others / 1e6:.1f} M more",
         f"memory    about {found.memory['expected'] / 2**30:.1f} GiB, "
         f"with a limit of {found.memory['limit'] / 2**30:.1f} GiB for the picture",

@@ -13,7 +13,7 @@ from lippmann.cli.commands import print as printing
 from lippmann.cli.commands import sequence
 from lippmann.cli.commands.interlace import FitOption, fit_note
 from lippmann.cli.shared import options, parse
-from lippmann.cli.shared.console import Console, estimate_in_words
+from lippmann.cli.shared.console import Console, estimate_in_words, samples_in_words
 from lippmann.cli.shared.grouped_help import HelpfulCommand
 from lippmann.cli.shared.picture_report import add_seconds, depth_line, report
 from lippmann.cli.shared.scene_source import SceneSource
@@ -134,7 +134,7 @@ def render(
     as_json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
-    """Render a scene as a quilt: the views of cameras side by side before the display."""
+    """Render a scene as a quilt: the views of cameras side by side in front of the display."""
     from lippmann.display import load_display
     from lippmann.image.write import check_output, format_for
     from lippmann.quilts.files import write_quilt
@@ -365,7 +365,7 @@ def _sentence(path: Path, made: Quilt, seconds: float) -> str:
     millions = sum(made.provenance.rays.values()) / 1e6
     return (
         f"{path}: {made.layout.columns}x{made.layout.rows} views, {width}x{height} pixels, "
-        f"{made.provenance.spp} samples per pixel, {millions:.1f} M rays, {seconds:.1f} s"
+        f"{samples_in_words(made.provenance.spp)}, {millions:.1f} M rays, {seconds:.1f} s"
     )
 
 

@@ -15,7 +15,7 @@ from lippmann.cli.commands import cluster as clusters
 from lippmann.cli.commands import print as printing
 from lippmann.cli.commands import sequence, view
 from lippmann.cli.shared import command_clock, options, parse
-from lippmann.cli.shared.console import Console
+from lippmann.cli.shared.console import Console, samples_in_words
 from lippmann.cli.shared.default_output import output_of
 from lippmann.cli.shared.picture_report import add_seconds, remarks, report
 from lippmann.cli.shared.scene_source import SceneSource
@@ -275,7 +275,7 @@ def _sentence(output: Path, image: IntegralImage) -> str:
     millions = sum(rays.values()) / 1e6
     shares = "".join(f"{100 * share:.1f} % {name}, " for name, share in image.provenance.pixel_shares.items())
     return (
-        f"{output}: {width}x{height} pixels for {image.display.name}, {image.provenance.spp} samples per pixel, "
+        f"{output}: {width}x{height} pixels for {image.display.name}, {samples_in_words(image.provenance.spp)}, "
         f"{shares}{millions:.1f} M rays, {image.provenance.seconds['total']:.1f} s"
     )
 
@@ -343,6 +343,6 @@ def _render_tiled(
     found = f", {rendered.resumed} of {rendered.tiles} tiles found" if rendered.resumed else ""
     console.result(
         values,
-        f"{output}: {width}x{height} pixels for {display.name}, {made.spp} samples per pixel{found}, "
+        f"{output}: {width}x{height} pixels for {display.name}, {samples_in_words(made.spp)}{found}, "
         f"{sum(made.rays.values()) / 1e6:.1f} M rays, {time.perf_counter() - started:.1f} s",
     )

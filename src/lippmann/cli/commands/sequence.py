@@ -48,8 +48,8 @@ TurntableFrames = Annotated[
     int | None,
     typer.Option(
         "--turntable",
-        help="Render so many frames of a whole turn of the scene about its upright axis, before a display and light "
-        "at rest. The output is a film (.mp4), a folder or a name with %04d.",
+        help="Render so many frames of a whole turn of the scene about its upright axis; display and light stand "
+        "still. The output is a film (.mp4), a folder or a name with %04d.",
         show_default=False,
     ),
 ]
@@ -363,8 +363,8 @@ def frame_range(text: str) -> FrameRange:
 
     match = re.fullmatch(r"(\d{1,9})|(\d{0,9}):(\d{0,9})(?::(\d{1,9}))?", text.strip())
     if match is None:
-        rule = "FIRST:STOP or FIRST:STOP:STEP, such as 0:48 for the frames 0 to 47"
-        raise UsageError(f"'{text}' will not do", where="--frames", rule=rule)
+        rule = "must be FIRST:STOP or FIRST:STOP:STEP, such as 0:48 for the frames 0 to 47"
+        raise UsageError(f"'{text}'", where="--frames", rule=rule)
     if match[1]:
         return FrameRange(int(match[1]), int(match[1]) + 1)
     return FrameRange(int(match[2] or 0), int(match[3]) if match[3] else None, int(match[4] or 1))

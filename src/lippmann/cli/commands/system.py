@@ -83,7 +83,7 @@ def displays(as_json: options.Json = False) -> None:
         "lenses": "lenses",
         "pixels_per_lens": "pixels/lens",
         "field_of_view": "field",
-        "depth": "depth behind/before",
+        "depth": "depth behind/in front",
         "title": "",
     }
     table = [header, *({key: _cell(key, row) for key in header} for row in rows)]

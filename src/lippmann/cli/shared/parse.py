@@ -31,9 +31,9 @@ def numbers(text: str, option: str, counts: tuple[int, ...] = (3,)) -> tuple[flo
     try:
         values = tuple(float(part) for part in parts)
     except ValueError:
-        raise UsageError(f"'{text}' will not do", where=option, rule=rule) from None
+        raise UsageError(f"'{text}'", where=option, rule=f"must be {rule}") from None
     if len(values) not in counts or not all(abs(value) < float("inf") for value in values):
-        raise UsageError(f"'{text}' will not do", where=option, rule=rule)
+        raise UsageError(f"'{text}'", where=option, rule=f"must be {rule}")
     return values
 
 
@@ -48,7 +48,7 @@ def steps(text: str, option: str) -> list[float]:
     parts = text.split(":")
     rule = "FIRST:LAST:COUNT, such as -40:40:9"
     if len(parts) != 3 or not re.fullmatch(r"\d{1,4}", parts[2].strip()) or int(parts[2]) < 1:
-        raise UsageError(f"'{text}' will not do", where=option, rule=rule)
+        raise UsageError(f"'{text}'", where=option, rule=f"must be {rule}")
     first, last = numbers(f"{parts[0]},{parts[1]}", option, (2,))
     count = int(parts[2])
     # Rounded, so that a step of 0.1 is said as such.
@@ -100,7 +100,7 @@ def number(text: str, option: str, rule: str) -> float:
     try:
         return float(text)
     except ValueError:
-        raise UsageError(f"'{text}' will not do", where=option, rule=rule) from None
+        raise UsageError(f"'{text}'", where=option, rule=f"must be {rule}") from None
 
 
 def color(text: str | None) -> tuple[float, float, float] | None:

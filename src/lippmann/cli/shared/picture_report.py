@@ -52,7 +52,7 @@ def depth_line(made: Provenance) -> str:
 
 def depths(back: float, front: float) -> str:
     """A range of depth in words."""
-    return f"from {-back:.1f} mm behind to {front:.1f} mm before the lens plane"
+    return f"from {-back:.1f} mm behind to {front:.1f} mm in front of the lens plane"
 
 
 def add_seconds(provenance: Provenance, **seconds: float) -> Provenance:

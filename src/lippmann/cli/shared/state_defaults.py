@@ -16,7 +16,7 @@ def read_defaults(context: typer.Context, state: Path | None) -> Path | None:
     Raises
     ------
     UsageError
-        The file cannot be read, or a setting will not do.
+        The file cannot be read, or a setting is out of its range.
     """
     if state is None or context.resilient_parsing:
         return state

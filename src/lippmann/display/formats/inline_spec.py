@@ -32,7 +32,7 @@ def display_of_short_form(name: str) -> Display:
     Raises
     ------
     DisplayError
-        If a key is missing, doubled or unknown, or a value will not do; names the key.
+        If a key is missing, doubled or unknown, or a value is out of its range; names the key.
     """
     kind, _, rest = name.partition(":")
     try:

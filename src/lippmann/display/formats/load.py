@@ -87,7 +87,7 @@ def load_display(name_or_path: str | os.PathLike[str]) -> Display:
     path = Path(name)
     if path.suffix not in (".toml", ".json") and not path.exists():
         rule = f"the displays are {', '.join(presets)}, or a .toml file, or a Looking Glass's visual.json"
-        raise DisplayError(f"unknown display {name!r}", rule=rule, fix=suggestion(name, presets))
+        raise DisplayError(f"unknown display {name!r}{suggestion(name, presets)}", rule=rule)
     text = _read(path)
     if is_calibration(text):
         return display_of_calibration(text, where=name)

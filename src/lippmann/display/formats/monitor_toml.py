@@ -60,7 +60,7 @@ def monitor_of_tables(values: Table) -> Monitor:
     Raises
     ------
     DisplayError
-        If a key is missing or unknown, or a value will not do; ``where`` is the dotted key.
+        If a key is missing or unknown, or a value is out of its range; ``where`` is the dotted key.
     """
     refuse_unknown(values, ("name", "title", TABLE))
     table = values[TABLE]

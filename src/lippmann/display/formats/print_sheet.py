@@ -211,7 +211,7 @@ def print_of_texts(texts: Mapping[str, str]) -> Print:
     Raises
     ------
     DisplayError
-        If a key is unknown or missing, or a value will not do; ``where`` is the key as written here.
+        If a key is unknown or missing, or a value is out of its range; ``where`` is the key as written here.
     """
     refuse_unknown(texts, KEYS)
     for key in ("ppi", "size"):

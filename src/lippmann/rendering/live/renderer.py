@@ -271,7 +271,7 @@ class LiveRenderer:
             None where nothing is seen there.
         """
         if not (0.0 <= u <= 1.0 and 0.0 <= v <= 1.0):
-            raise UsageError(f"({u:g}, {v:g}) will not do", where="pick", rule="a place in the picture, 0 to 1 each")
+            raise UsageError(f"({u:g}, {v:g})", where="pick", rule="must be a place in the picture, 0 to 1 each")
         heights = self.heights(view)
         height, width = heights.shape
         found = float(heights[min(int(v * height), height - 1), min(int(u * width), width - 1)])
@@ -345,7 +345,7 @@ def _plain(request: RenderRequest, integrator: str, depth: int | None) -> Render
     """The request of a picture of every pixel's own samples."""
     if request.integrator not in ("auto", *_LIGHT):
         rule = f"live pictures show the light of {' and '.join(_LIGHT)}"
-        raise UsageError(f"'{request.integrator}' will not do", parameter="integrator", rule=rule)
+        raise UsageError(f"'{request.integrator}' does not apply", parameter="integrator", rule=rule)
     return RenderRequest(
         method="full",
         denoise="none",

@@ -71,9 +71,9 @@ def _check(request: RenderRequest, name: str, what: str, alone: bool) -> None:
             raise UsageError(why, where=name, parameter=parameter, rule=rule, fix="leave it out")
     if alone and request.exposure not in ("auto", 0.0):
         raise UsageError(
-            f"{request.exposure:g} will not do",
+            f"{request.exposure:g}",
             where=name,
             parameter="exposure",
-            rule=f"the colours of {what} are made for displays, and are no amounts of light",
+            rule=f"must be 0: the colours of {what} are made for displays, and are no amounts of light",
             fix="leave it out",
         )

@@ -126,7 +126,7 @@ def _check_goal(request: RenderRequest) -> None:
         return
     name = "max_time" if request.max_time is not None else "quality" if request.quality is not None else "quality_worst"
     if request.spp == 1:
-        raise UsageError("1 will not do", parameter="spp", rule="two samples or more tell their error")
+        raise UsageError("1", parameter="spp", rule="must be 2 or more, which tell their error")
     if request.method in REUSING:
         raise UsageError(
             f"{request.method} does not know its own error",
@@ -183,4 +183,4 @@ def _check_quilt(request: RenderRequest, display: Display | None) -> None:
         if given:
             value = request.method if name == "method" else "it"
             rule = "every pixel of a quilt is traced, for all colours"
-            raise UsageError(f"{value} will not do for a quilt", parameter=name, rule=rule, fix="leave it out")
+            raise UsageError(f"{value} is not possible in a quilt", parameter=name, rule=rule, fix="leave it out")

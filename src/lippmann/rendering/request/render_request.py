@@ -177,8 +177,8 @@ class RenderRequest:
             if value is None and name != "seed":
                 continue
             if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
-                rule = f"a whole number from {low} to {high}"
-                raise UsageError(f"{value!r} will not do", parameter=name, rule=rule)
+                rule = f"must be a whole number from {low} to {high}"
+                raise UsageError(f"{value!r}", parameter=name, rule=rule)
         for name in ("spp", "quality", "quality_worst", "max_time"):
             if self.effort == "draft" and getattr(self, name) is not None:
                 raise UsageError(
@@ -190,15 +190,15 @@ class RenderRequest:
         for name in ("quality", "quality_worst"):
             value = getattr(self, name)
             if value is not None and not 0 < value <= 80:
-                raise UsageError(f"{value:g} dB will not do", parameter=name, rule="above 0 and at most 80 dB")
+                raise UsageError(f"{value:g} dB", parameter=name, rule="must be above 0 and at most 80 dB")
         if self.exposure != "auto" and not -MOST_EXPOSURE <= self.exposure <= MOST_EXPOSURE:
-            rule = f"'auto', or stops from {-MOST_EXPOSURE} to {MOST_EXPOSURE}"
-            raise UsageError(f"{self.exposure!r} will not do", parameter="exposure", rule=rule)
+            rule = f"must be 'auto', or stops from {-MOST_EXPOSURE} to {MOST_EXPOSURE}"
+            raise UsageError(f"{self.exposure!r}", parameter="exposure", rule=rule)
         if self.clamp_indirect is not None and not 0 < self.clamp_indirect < float("inf"):
-            rule = "radiance above 0, 1 being white"
-            raise UsageError(f"{self.clamp_indirect:g} will not do", parameter="clamp_indirect", rule=rule)
+            rule = "must be radiance above 0, 1 being white"
+            raise UsageError(f"{self.clamp_indirect:g}", parameter="clamp_indirect", rule=rule)
         if self.max_time is not None and not 0 < self.max_time < float("inf"):
-            raise UsageError(f"{self.max_time:g} s will not do", parameter="max_time", rule="seconds above 0")
+            raise UsageError(f"{self.max_time:g} s", parameter="max_time", rule="must be seconds above 0")
 
     @classmethod
     def of(cls, options: Mapping[str, object]) -> RenderRequest:

@@ -62,7 +62,7 @@ def make_classic(name: str) -> ClassicScene:
 
 
 def stage_of(name: str) -> Stage:
-    """Return how a bundled scene stands before the display: its camera, and the placement in millimetres.
+    """Return how a bundled scene stands in front of the display: its camera, and the placement in millimetres.
 
     Raises
     ------

@@ -6,8 +6,8 @@ many millimetres of the paper's display (its Table I: 512 x 512 pixels of 0.2645
 display by the camera puts the scene into it at that scale.
 
 That display begins its rays 10 mm in front of the lens plane, and spreads a point at z over ``|z| / 54.4 mm`` lens
-pitches. The scenes therefore reach from some 50 mm behind the lens plane to just under 10 mm before it: as deep as can
-be without blur.
+pitches. The scenes therefore reach from some 50 mm behind the lens plane to just under 10 mm in front of it: as deep
+as can be without blur.
 """
 
 from __future__ import annotations

@@ -34,7 +34,7 @@ _NAMING_FILES = frozenset(
 
 
 class MissingFileError(SceneError):
-    """A file that a scene file names and that is not there."""
+    """A file that a scene file names and that is not found."""
 
 
 def read_bytes(path: Path, most: int = -1) -> bytes:
@@ -147,7 +147,7 @@ def find_file(
     if not allowed and any(_lies_in(candidate, scene_folder) is False for candidate in candidates):
         raise _outside(name, where, what)
     raise MissingFileError(
-        f"{what} '{name}' is not there", where=where, fix=_near_miss(allowed[0], asset=True) if allowed else ""
+        f"{what} '{name}' not found", where=where, fix=_near_miss(allowed[0], asset=True) if allowed else ""
     )
 
 
@@ -169,7 +169,7 @@ def find_folder(
     for candidate in inside:
         if is_folder(candidate):
             return candidate
-    raise SceneError(f"{what} '{name}' is not there", where=where, rule="it must be a folder")
+    raise SceneError(f"{what} '{name}' not found", where=where, rule="it must be a folder")
 
 
 def _outside(name: str, where: str, what: str) -> SceneError:

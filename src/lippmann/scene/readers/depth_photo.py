@@ -56,9 +56,7 @@ def read_depth_photo(path: Path, *, allow_outside: bool = False, depth_map: Path
         own = None if depth_map is not None else embedded_depth(data, path.name)
     found = own if depth_map is None else read_depth_map(depth_map)
     if found is None:
-        raise SceneError(
-            "is a picture without depth", where=path.name, rule="a scene has depth", fix="name its map: depth_map=..."
-        )
+        raise SceneError("needs a depth map", where=path.name, fix="add depth_map=...")
     height, width = image.pixels.shape[:2]
     rows, columns = found.inverse.shape
     if abs(math.log((width / height) / (columns / rows))) > _ASPECT:

@@ -103,7 +103,10 @@ _ELSEWHERE = {
     ".nrrd": "save it as .nii.gz, in 3D Slicer for instance",
     ".mha": "save it as .nii.gz, in 3D Slicer for instance",
     ".hdr": "save it as .nii or .nii.gz, which hold header and voxels in one file",
-    ".3mf": "save it from the slicer as .stl or .obj",
+    ".3mf": "save it as .stl or .obj, in the slicer or in Blender",
+    ".zae": "unzip it, open the .dae in Blender, then File > Export > glTF 2.0 (.glb)",
+    ".sdf": "save it as .pdb or .cif, in Avogadro or by: obabel in.sdf -O out.pdb",
+    ".mol": "save it as .pdb or .cif, in Avogadro or by: obabel in.mol -O out.pdb",
 }
 
 #: Kinds of files that do not say which way is up, and which way it mostly is: for 3D printing, z.
@@ -258,12 +261,9 @@ def unknown_kind(path: Path) -> SceneError | None:
 
 def _unknown_kind(path: Path) -> SceneError:
     suffix = kind_of_name(path)
-    return SceneError(
-        f"'{suffix}' is no known kind of scene file" if suffix else "is no known kind of scene file",
-        where=path.name,
-        rule=f"known are {', '.join(_READERS)}",
-        fix=_ELSEWHERE.get(suffix, ""),
-    )
+    what = f"'{suffix}' is no known kind of scene file" if suffix else "is no known kind of scene file"
+    way = _ELSEWHERE.get(suffix)
+    return SceneError(f"{what}: {way}" if way else what, where=path.name, rule=f"known are {', '.join(_READERS)}")
 
 
 def kind_of_name(path: Path) -> str:

@@ -87,7 +87,7 @@ def read_obj(path: Path, *, allow_outside: bool = False) -> SceneDescription:
     Raises
     ------
     SceneError
-        The file is missing, cut short or malformed; an index or texture is not there.
+        The file is missing, cut short or malformed; an index or texture is not found.
     """
     where = path.name
     statements = _split_statements(decode_text(read_bytes(path), where), where)

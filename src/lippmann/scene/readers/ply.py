@@ -57,7 +57,7 @@ def read_ply(path: Path, *, allow_outside: bool = False) -> SceneDescription:
     Raises
     ------
     SceneError
-        The file is missing, foreign, cut short, or holds no vertices; its texture is not there.
+        The file is missing, foreign, cut short, or holds no vertices; its texture is not found.
     """
     where = path.name
     data = read_bytes(path)

@@ -48,7 +48,7 @@ export function glideEye(eye, goal, seconds) {
   return farthest < 0.01 ? goal : next;
 }
 
-/** Eye position while swaying: sideways; before a lens array also vertically, at twice the frequency. */
+/** Eye position while swaying: sideways; in front of a lens array also vertically, at twice the frequency. */
 export function swayEye(optics, z, seconds) {
   const turn = (2 * Math.PI * seconds) / SWAY_SECONDS;
   const reach = SWAY_SHARE * halfField(optics, z);

@@ -142,7 +142,7 @@ def test_a_mirror_is_traced_where_care_is_taken(flat_tracer, sheet):
 
 @pytest.mark.parametrize("name", ["square", "hexagonal", "slanted"])
 def test_small_things_that_no_source_has_seen_are_found(name, flat_tracer, sheet):
-    """A spot right before the lens plane is seen by one lens, which is not a key; a wall far behind it by all."""
+    """A spot right in front of the lens plane is seen by one lens, which is not a key; a wall far behind it by all."""
     display = DISPLAYS[name]
     lens = (5.0, 5.0 if name != "slanted" else 0.0)
     x, y = (float(a) for a in display.lens_center(*lens, 0.0, 0.0))

@@ -164,7 +164,7 @@ def test_buffer_shorter_than_it_says_is_refused(writer, read, tmp_path):
 def test_absent_buffer_is_named(writer, tmp_path):
     path = writer.triangle().gltf_and_bin(tmp_path)
     (tmp_path / "scene.bin").unlink()
-    with pytest.raises(SceneError, match=r"buffer 'scene\.bin' is not there"):
+    with pytest.raises(SceneError, match=r"buffer 'scene\.bin' not found"):
         read_gltf(path)
 
 
@@ -173,7 +173,7 @@ def test_absent_texture_is_named(writer, read):
     texture = writer.add("textures", source=image)
     writer.add("materials", normalTexture={"index": texture})
     writer.triangle(material=0)
-    assert "texture 'wood.png' is not there" in _refusal(read, writer)
+    assert "texture 'wood.png' not found" in _refusal(read, writer)
 
 
 @pytest.mark.parametrize(
@@ -273,7 +273,7 @@ def test_draco_beside_uncompressed_data_is_not_needed(writer, read):
 def test_a_missing_buffer_is_not_answered_with_the_file_itself(writer, tmp_path):
     path = writer.triangle().gltf_and_bin(tmp_path)
     (tmp_path / "scene.bin").unlink()
-    with pytest.raises(SceneError, match=r"^scene\.gltf: buffer 'scene\.bin' is not there$"):
+    with pytest.raises(SceneError, match=r"^scene\.gltf: buffer 'scene\.bin' not found$"):
         read_gltf(path)
 
 

@@ -81,7 +81,7 @@ def test_files_outside_the_folder_need_permission(tmp_path, item):
 
 @pytest.mark.parametrize("item", ["INCLUDE nix.inc", f"PLANE CENTER 0 0 0 NORMAL 0 0 1 {PLANAR.format('nix.inc')}"])
 def test_files_that_are_not_there(tmp_path, item):
-    with pytest.raises(SceneError, match=r"^scene\.dat:2: .*'nix\.inc' is not there$"):
+    with pytest.raises(SceneError, match=r"^scene\.dat:2: .*'nix\.inc' not found$"):
         read_tachyon(scene(tmp_path, item))
 
 

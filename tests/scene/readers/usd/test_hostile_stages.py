@@ -51,7 +51,7 @@ def test_layers_in_the_folder_are_read(read):
 
 def test_a_layer_that_is_not_there_is_named(read):
     scene = read(triangle() + 'def Xform "x" (prepend references = @none.usda@) {}\n')
-    assert scene.notes == ["layer 'none.usda' is not there: the scene lacks what it holds"]
+    assert scene.notes == ["layer 'none.usda' not found: the scene lacks what it holds"]
 
 
 def test_layers_that_name_each_other_end(read):

@@ -229,7 +229,7 @@ def test_other_surfaces_are_named(read):
 @pytest.mark.parametrize(
     ("file", "line"),
     [
-        ("none.png", "stage.usda: texture 'none.png' is not there"),
+        ("none.png", "stage.usda: texture 'none.png' not found"),
         (
             "../../secret.png",
             "stage.usda: texture '../../secret.png' lies outside the scene's folder; a scene file may",

@@ -30,7 +30,7 @@ def read_uri(document: Document, uri: str, place: str, what: str) -> tuple[bytes
     Raises
     ------
     SceneError
-        The URI is damaged, points to the network, to a file that is not there, or out of the scene's folder.
+        The URI is damaged, points to the network, to a file that is not found, or out of the scene's folder.
     """
     if uri[:5].lower() == "data:":
         return _decode_data_uri(document, uri, place), place

@@ -37,7 +37,7 @@ class SceneFiles:
         Raises
         ------
         SceneError
-            It is not there, or lies outside; ``where`` is the place that names it, ``what`` the kind of file.
+            It is not found, or lies outside; ``where`` is the place that names it, ``what`` the kind of file.
         """
         try:
             beside = holder.parent != self.folder and (holder.parent / name).is_file()

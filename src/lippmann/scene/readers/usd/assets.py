@@ -71,7 +71,7 @@ class Assets:
         Raises
         ------
         SceneError
-            It is not there, lies outside the stage's folder, or cannot be decoded.
+            It is not found, lies outside the stage's folder, or cannot be decoded.
         """
         key = asset["found"] or f"{asset['folder']}\0{asset['name']}"
         if key not in self._images:

@@ -59,7 +59,7 @@ def check_layers(path: str, folder: str | None) -> list[str]:
             if os.path.isfile(_outer(found)):
                 waiting.append(found)
             else:
-                notes.append(f"layer '{name}' is not there: the scene lacks what it holds")
+                notes.append(f"layer '{name}' not found: the scene lacks what it holds")
     return notes
 
 

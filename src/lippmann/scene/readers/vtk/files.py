@@ -61,7 +61,7 @@ def _surface(name: str, arrays: dict[str, NDArray[np.generic]], notes: list[str]
     positions, faces = np.asarray(arrays["positions"], np.float64), np.asarray(arrays["faces"], np.int64)
     finite = np.asarray((np.abs(positions) < 1e30).all(axis=1))
     if len(faces) and not 0 <= int(faces.min()) <= int(faces.max()) < len(positions):
-        raise SceneError("a face names a point that is not there", where=where)
+        raise SceneError("a face names a point that is not found", where=where)
     whole = np.asarray(finite[faces].all(axis=1))
     if not whole.all():
         notes = [*notes, f"{int((~whole).sum())} triangles with points that are not finite are left out"]
