@@ -14,9 +14,10 @@ _SCENE, _EYE, _SUBPIXELS = "scene", "eye", "subpixels"
 _ASSUMED = {"integrator": "auto"}
 
 
-def render_command(state: StudioState, output: str | None = None) -> list[str]:
+def render_command(state: StudioState, output: str | None = None, *, allow_outside: bool = False) -> list[str]:
     """The words of the ``lippmann render`` command that renders a state; ``shlex.join`` makes a line of them."""
-    return ["lippmann", "render", *words_of_state(state), *(() if output is None else ("--output", output))]
+    words = ["lippmann", "render", *words_of_state(state), *(() if output is None else ("--output", output))]
+    return [*words, "--allow-outside"] if allow_outside else words
 
 
 def words_of_state(state: StudioState) -> list[str]:

@@ -216,7 +216,7 @@ class StudioSession:
         self.thread.close()
 
     def _render_command(self, state: StudioState) -> list[str]:
-        return [*render_command(state), *(("--allow-outside",) if self._allow_outside else ())]
+        return render_command(state, allow_outside=self._allow_outside)
 
     def _held_scene(self, state: StudioState) -> Scene | None:
         return self._held if state.scene == self._held_name else None
