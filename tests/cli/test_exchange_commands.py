@@ -81,7 +81,7 @@ def test_bad_input_is_one_line_and_code_2(lippmann, picture, tmp_path):
     assert "'hdf5' is not known; known are hci, lftoolbox, eslf, zarr, views" in refused(
         "export", picture, "--as=hdf5", "-o", out
     )
-    assert "lftoolbox files end in .mat" in refused("export", picture, "--as=lftoolbox", "-o", out)
+    assert "lftoolbox files end in .mat" in refused("export", picture, "--as=lftoolbox", "-o", tmp_path / "out.png")
     assert "holds 'mine.txt', which Lippmann did not write" in refused("export", picture, "--as=hci", "-o", there)
     assert "24 bits per channel" in refused("export", picture, "--as=hci", "-o", out, "--bits", "24")
     assert "--distance: does not apply" in refused("export", picture, "--as=views", "-o", out, "--distance=5")

@@ -191,7 +191,7 @@ def test_a_missing_library_leaves_a_grey_model_and_a_note(read):
 
 def test_the_note_on_a_missing_library_names_the_one_that_may_be_meant(read):
     (note,) = read("mtllib coluors.mtl\n" + SQUARE + "f 1 2 3\n", colours__mtl="newmtl a\n").notes
-    assert note.endswith("is not found (is 'colours.mtl' meant?): its materials are plain grey")
+    assert note.endswith("not found (is 'colours.mtl' meant?): its materials are plain grey")
 
 
 def test_comments_after_names(read):
