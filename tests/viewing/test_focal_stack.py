@@ -51,7 +51,7 @@ def picture(image, tmp_path):
 
 def coded(image):
     """8-bit sRGB codes of the planes, by the standard's formula."""
-    linear = np.stack([refocus(image, plane, size=(20, 16)) for plane in (-6.0, 0.0, 6.0)]).astype(float)
+    linear = np.stack([refocus(image, plane, size=(24, 18)) for plane in (-6.0, 0.0, 6.0)]).astype(float)
     srgb = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * np.maximum(linear, 1e-9) ** (1 / 2.4) - 0.055)
     return np.round(255 * srgb)
 
@@ -70,7 +70,7 @@ def lippmann(capfd):
 @pytest.mark.parametrize("name", ["stack", "stack.tif", "stack.png", "stack.mp4"])
 def test_the_command_writes_folders_pages_and_animations(lippmann, image, picture, tmp_path, name):
     path = tmp_path / name
-    assert lippmann("refocus", picture, "--planes", "-6:6:3", "--size", "20x16", "-o", path)[0] == 0
+    assert lippmann("refocus", picture, "--planes", "-6:6:3", "--size", "24x18", "-o", path)[0] == 0
     if name == "stack":
         names = ["plane_0_-6mm.png", "plane_1_+0mm.png", "plane_2_+6mm.png"]
         assert sorted(file.name for file in path.glob("plane*")) == names
