@@ -16,15 +16,15 @@ def pixels(path):
         return np.asarray(picture.convert("RGB"))
 
 
-@pytest.mark.parametrize(("sbs", "size"), [("full", (80, 30)), ("half", (40, 30))])
+@pytest.mark.parametrize(("sbs", "size"), [("full", (80, 40)), ("half", (40, 40))])
 def test_side_by_side(lippmann, picture, tmp_path, sbs, size):
     out = tmp_path / "pair.png"
-    words = ("replay", picture, "--sbs", sbs, "--eye", "5,0,700", "--eyes", 60, "--size", "40x30", "-o", out)
+    words = ("replay", picture, "--sbs", sbs, "--eye", "5,0,700", "--eyes", 60, "--size", "40x40", "-o", out)
     done = lippmann(*words, "--json")
     assert done.code == 0
     assert (done.json["stereo"], done.json["eyes"]) == (sbs, 60)
     assert pixels(out).shape[1::-1] == size
-    same = replay_stereo(read_picture(picture), (5, 0, 700), stereo=sbs, eyes=60, size=(40, 30))
+    same = replay_stereo(read_picture(picture), (5, 0, 700), stereo=sbs, eyes=60, size=(40, 40))
     write_plain_picture(same, tmp_path / "same.png")
     np.testing.assert_array_equal(pixels(out), pixels(tmp_path / "same.png"))
     assert "by two eyes 60 mm apart" in lippmann(*words).out
