@@ -79,6 +79,26 @@ def command_section(result: dict[str, Any]) -> str:
     return "\n".join(lines) + "\n"
 
 
+def pages_section(result: dict[str, Any]) -> str:
+    """The section of ``benchmarks/studio_pages.py``."""
+    pages, panel, changes = result["pages"], result["panel"], result["changes"]
+    rates = ", ".join(f"{rate:.1f}" for rate in pages["frames_per_second"])
+    lines = [
+        "## Several pages of one studio (`studio_pages.py`)",
+        "",
+        "A real browser on the machine that traces, and other work beside it: ratios are what counts.",
+        "",
+        "| what moves | frames/s |",
+        "|---|---|",
+        f"| {len(pages['frames_per_second'])} pages turn the teapot ({pages['display']}) | {rates} |",
+        f"| one page turns it ({panel['display']}) | {panel['frames_per_second']:.1f} |",
+        f"| the window on the display beside it: all native pixels | {panel['panel_frames_per_second']:.1f} |",
+        f"| a page that sends {changes['changes_per_second']:.0f} changes a second ({changes['display']}) | "
+        f"{changes['frames_per_second']:.1f} |",
+    ]
+    return "\n".join(lines) + "\n"
+
+
 def _row(name: str, case: dict[str, Any]) -> str:
     if "skipped" in case:
         return f"| {name} | {case['skipped']} | | | | | | |"

@@ -421,6 +421,7 @@ SECTIONS = {
     "viewer": _viewer,
     "studio": studio_tables.section,
     "studio_command": studio_tables.command_section,
+    "studio_pages": studio_tables.pages_section,
     "cluster": _cluster,
     "fuzz": _fuzz,
     "conformance": conformance_tables.describe,
