@@ -77,7 +77,7 @@ def test_the_keywords_of_a_render_are_those_of_a_request():
     """Each with its default, and said in the docstring."""
     request = inspect.signature(RenderRequest).parameters
     parameters = inspect.signature(lippmann.render).parameters
-    own = {"scene", "display", "placement", "progress", "former"}
+    own = {"scene", "display", "placement", "progress", "former", "bleed"}
     assert set(parameters) - own == set(request) - {"placement", "reason", "spp_reserve", "began"}
     for name in set(parameters) - own:
         assert parameters[name].default == request[name].default, name
