@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.codecs.types import Pixels
-from lippmann.color.primaries import REC709, rec709_from_rgb
+from lippmann.color.primaries import REC709, rec709_from_rgb, to_rec709
 from lippmann.errors import PictureError
 from lippmann.runtime.input_memory import check_input
 from lippmann.runtime.quiet_stderr import libraries_silenced
@@ -72,10 +72,9 @@ class ExrHeader:
         if self.chromaticities is None or np.allclose(self.chromaticities, REC709, atol=1e-3):
             return pixels
         try:
-            matrix = rec709_from_rgb(self.chromaticities)
+            return to_rec709(pixels, rec709_from_rgb(self.chromaticities))
         except ValueError as error:
             raise PictureError(str(error), where="chromaticities") from None
-        return np.asarray(np.maximum(pixels @ matrix.astype(np.float32).T, 0.0))
 
 
 def write_exr(
@@ -182,10 +181,17 @@ def _in_display_window(plane: Pixels, header: ExrHeader) -> Pixels:
     if header.window == (0, 0, header.width, header.height) or plane.shape[:2] != (height, width):
         return plane
     whole = np.zeros((header.height, header.width, *plane.shape[2:]), plane.dtype)
-    rows = slice(max(top, 0), max(min(top + height, header.height), 0))
-    columns = slice(max(left, 0), max(min(left + width, header.width), 0))
-    whole[rows, columns] = plane[rows.start - top : rows.stop - top, columns.start - left : columns.stop - left]
+    rows, stored_rows = _overlap(top, height, header.height)
+    columns, stored_columns = _overlap(left, width, header.width)
+    whole[rows, columns] = plane[stored_rows, stored_columns]
     return whole
+
+
+def _overlap(first: int, count: int, size: int) -> tuple[slice, slice]:
+    """What ``count`` stored places from number ``first`` on share with 0 to ``size``: there, and in store."""
+    start = min(max(first, 0), size)
+    stop = max(min(first + count, size), start)
+    return slice(start, stop), slice(start - first, stop - first)
 
 
 def _check_tiles(attribute: bytes, pixels: int, path: Path) -> None:

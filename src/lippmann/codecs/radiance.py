@@ -1,7 +1,7 @@
 """Radiance pictures (``.hdr``, ``.pic``): shared-exponent RGB or XYZ.
 
 Runs of bytes are decoded by imagecodecs. The header is read here, from "Radiance File Formats" (G. Ward, Radiance 4.2):
-imagecodecs 2026.8 ignores its variables, takes XYZ for RGB and knows one order of lines.
+imagecodecs 2026.3.6 ignores its variables, takes XYZ for RGB and knows one order of lines.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.color.primaries import rec709_from_rgb, xyz_from_rgb
+from lippmann.color.primaries import rec709_from_rgb, to_rec709, xyz_from_rgb
 from lippmann.errors import PictureError
 from lippmann.runtime.input_memory import check_input
 
@@ -118,7 +118,7 @@ def read_radiance(data: bytes, header: RadianceHeader, where: str) -> NDArray[np
     if header.by_columns:
         pixels = pixels.transpose(1, 0, 2)
     if matrix is not None:
-        pixels = np.maximum(pixels @ matrix.astype(np.float32).T, 0.0)  # colours beyond the primaries
+        pixels = to_rec709(pixels, matrix)
     return np.ascontiguousarray(pixels / np.asarray(header.exposure, np.float32))
 
 

@@ -48,3 +48,8 @@ def rec709_from_rgb(chromaticities: Sequence[float]) -> Matrix:
     gains = (_BRADFORD @ ours.sum(axis=1)) / (_BRADFORD @ theirs.sum(axis=1))
     adapted = np.linalg.solve(_BRADFORD, gains[:, None] * (_BRADFORD @ theirs))
     return np.asarray(np.linalg.solve(ours, adapted))
+
+
+def to_rec709(pixels: NDArray[np.float32], rec709_from_theirs: Matrix) -> NDArray[np.float32]:
+    """Linear values ``(..., 3)`` as linear RGB of Rec. 709; colours beyond its primaries are clipped at 0."""
+    return np.asarray(np.maximum(pixels @ rec709_from_theirs.astype(np.float32).T, 0.0))

@@ -94,21 +94,23 @@ def test_damaged_and_foreign_files(tmp_path, pixels):
         read_environment(tmp_path / "none.exr")
 
 
-def test_exr_pixels_lie_in_the_display_window(tmp_path, pixels):
-    """A crop of a rendered sky: what is beyond the stored pixels is black."""
+@pytest.mark.parametrize("across", [0, 2, -3, 17, 40, -17])
+@pytest.mark.parametrize("down", [0, 1, -2, 9, 20, -9])
+def test_exr_pixels_lie_in_the_display_window(tmp_path, pixels, across, down):
+    """A crop of a rendered sky, or pixels all beyond it: where none are stored it is black."""
     header = {
         "compression": OpenEXR.ZIP_COMPRESSION,
         "type": OpenEXR.scanlineimage,
-        "dataWindow": (np.array([2, 1], np.int32), np.array([17, 8], np.int32)),
+        "dataWindow": (np.array([across, down], np.int32), np.array([across + 15, down + 7], np.int32)),
         "displayWindow": (np.array([0, 0], np.int32), np.array([15, 7], np.int32)),
     }
     with OpenEXR.File(header, {"RGB": pixels}) as file:
         file.write(str(tmp_path / "sky.exr"))
-    found = read_environment(tmp_path / "sky.exr").pixels
-    assert found.shape == pixels.shape
-    assert (found[1:, 2:] == pixels[:-1, :-2]).all()
-    assert not found[0].any()
-    assert not found[:, :2].any()
+    expected = np.zeros_like(pixels)
+    for row, column in np.ndindex(8, 16):
+        if 0 <= row - down < 8 and 0 <= column - across < 16:
+            expected[row, column] = pixels[row - down, column - across]
+    assert (read_environment(tmp_path / "sky.exr").pixels == expected).all()
 
 
 def test_exr_chromaticities_are_converted(tmp_path):

@@ -114,6 +114,7 @@ def _make_round(
         fits = np.zeros(len(matrices), bool)
         if body is not None and can_wear(dress.mesh, dress.finish):
             fits = keeps_round(body, matrices)
+        if body is not None and fits.any():
             # Of attributes a body has as many as a mesh of one vertex and one face.
             one = replace(dress.mesh, faces=dress.mesh.faces[:1], positions=dress.mesh.positions[:1])
             if one.colors is not None:
@@ -125,11 +126,9 @@ def _make_round(
     made: list[tuple[Shape, Finish]] = []
     for (body, _), pieces in round_pieces.items():
         finish = pieces[0].dress.finish
-        places = np.concatenate([piece.world_from_mesh for piece in pieces])
-        if len(places):
-            bsdf = finish.bsdf
-            shape = ellipsoids(places, bsdf, _attributes(pieces, finish)) if body == "ball" else curves(places, bsdf)
-            made.append((shape, finish))
+        bsdf, places = finish.bsdf, np.concatenate([piece.world_from_mesh for piece in pieces])
+        shape = ellipsoids(places, bsdf, _attributes(pieces, finish)) if body == "ball" else curves(places, bsdf)
+        made.append((shape, finish))
     return made, left
 
 
