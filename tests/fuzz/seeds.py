@@ -17,6 +17,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+import imagecodecs
 import numpy as np
 
 from lippmann.codecs.pfm import write_pfm
@@ -274,8 +275,19 @@ def _splats() -> Iterator[tuple[str, str, bytes]]:
     payload = struct.pack("<4sIIBBBB", b"NGSP", 3, 3, 1, 12, 0, 0) + random.bytes(3 * (9 + 1 + 3 + 3 + 4 + 9))
     yield "spz", "unpacked", payload
     yield "spz", "packed.spz", gzip.compress(payload, mtime=0)
+    yield "spz", "version-4", _spz_4(np.random.default_rng(7).bytes(3 * 29))
     yield "sog", "bundled", _sog()
     yield "gltf", "splats", _gltf_splats()
+
+
+def _spz_4(body: bytes) -> bytes:
+    """Three splats with harmonics of degree 1, of those bytes, and an extension that says what their axes are."""
+    ends = 3 * np.cumsum([9, 1, 3, 3, 4, 9])
+    sections = [body[start:end] for start, end in zip([0, *ends[:-1]], ends, strict=True)]
+    streams = [imagecodecs.zstd_encode(section) for section in sections]
+    head = struct.pack("<4sIIBBBBI12xIII", b"NGSP", 4, 3, 1, 12, 2, 6, 44, 0xADBE0003, 4, 6)
+    sizes = [struct.pack("<QQ", len(p), len(s)) for p, s in zip(streams, sections, strict=True)]
+    return head + b"".join(sizes) + b"".join(streams)
 
 
 def _rows(element: str, names: list[str], kind: str, rows: Any) -> bytes:

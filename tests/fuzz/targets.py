@@ -202,7 +202,8 @@ def _mitsuba(data: bytes, folder: Path) -> object:
 
 def _spz(data: bytes, folder: Path) -> object:
     """A file as it is, or what it packs."""
-    (folder / "s.spz").write_bytes(data if data.startswith(b"\x1f\x8b") else gzip.compress(data, 1))
+    is_whole = data.startswith((b"\x1f\x8b", b"NGSP\4"))
+    (folder / "s.spz").write_bytes(data if is_whole else gzip.compress(data, 1))
     return load_scene(folder / "s.spz").bounds
 
 

@@ -39,7 +39,7 @@ def colors(splats, directions):
 
 
 @settings(max_examples=30, deadline=None)
-@given(st.integers(0, 10**6), st.integers(0, 3), st.booleans(), st.booleans())
+@given(st.integers(0, 10**6), st.integers(0, 4), st.booleans(), st.booleans())
 def test_a_move_takes_places_shapes_and_colors_along(seed, degree, stretches, mirrors):
     random = np.random.default_rng(seed)
     splats = random_splats(degree=degree, seed=seed)

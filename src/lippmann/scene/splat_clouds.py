@@ -48,7 +48,7 @@ def check_splats(splats: Splats, where: str) -> None:
             )
     harmonics = splats.harmonics.shape
     if len(harmonics) != 3 or harmonics[0] != count or harmonics[1] not in COEFFICIENTS or harmonics[2] != 3:
-        raise SceneError(f"splats' harmonics are {harmonics}", where=where, rule=f"({count}, 1, 4, 9 or 16, 3)")
+        raise SceneError(f"splats' harmonics are {harmonics}", where=where, rule=f"({count}, 1, 4, 9, 16 or 25, 3)")
     for name in (*shapes, "harmonics"):
         values = getattr(splats, name)
         finite = np.isfinite(values).reshape(count, -1).all(axis=1)

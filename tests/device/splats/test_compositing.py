@@ -77,7 +77,7 @@ def psnr(found, true):
     return -10 * np.log10(np.mean((np.clip(found, 0, 1) - np.clip(true, 0, 1)) ** 2))
 
 
-@pytest.mark.parametrize("degree", [0, 1, 2, 3])
+@pytest.mark.parametrize("degree", [0, 1, 2, 3, 4])
 def test_splats_of_every_degree_are_those_of_the_twin(degree):
     splats, (origins, directions) = random_splats(300, degree, seed=degree), random_rays(120)
     colors, left = traced(splats, origins, directions)

@@ -15,11 +15,13 @@ from lippmann.device.splats.bvh import LEAF, Integers
 from lippmann.device.splats.table import LEAST_ALPHA, MOST_ALPHA, SplatTable
 from lippmann.runtime.numba_jit import compiled, inlined
 from lippmann.runtime.row_threads import Bands
-from lippmann.scene.values.splats import real_harmonics
+from lippmann.scene.values.splats import COEFFICIENTS, real_harmonics
 
 #: Transmittance below which a ray ends, as in the rasterizer of Kerbl et al. 2023.
 _OPAQUE = 1e-4
 _HEAP = 1024
+#: Harmonics of a direction.
+_BASIS = COEFFICIENTS[-1]
 
 Floats = NDArray[np.float32]
 Numbers = NDArray[np.float64]
@@ -160,7 +162,7 @@ def _composite(
     transmittances: Floats,
 ) -> None:
     keys, items = np.empty(_HEAP), np.empty(_HEAP, np.int64)
-    o, d, inverse, basis, sums = np.empty(3), np.empty(3), np.empty(3), np.empty(16), np.empty(3)
+    o, d, inverse, basis, sums = np.empty(3), np.empty(3), np.empty(3), np.empty(_BASIS), np.empty(3)
     number_of_harmonics = harmonics.shape[2]
     for ray in range(first_ray, last_ray):
         for k in range(3):
@@ -168,7 +170,7 @@ def _composite(
             # Of a ray that runs along a side of boxes, neither side may be at 0 times infinity.
             inverse[k] = 1.0 / d[k] if abs(d[k]) > 1e-20 else 1e20
         values = _harmonics(d[0], d[1], d[2])
-        for j in range(16):
+        for j in range(_BASIS):
             basis[j] = values[j]
         end = float(ends[ray])
         left = 1.0

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field
 
 from lippmann.errors import SceneError
+from lippmann.scene.values.description import Direction
 
 _TYPES = {
     **dict.fromkeys(("char", "int8"), "i1"),
@@ -21,6 +23,12 @@ _BYTE_ORDERS = {"binary_little_endian": "<", "binary_big_endian": ">"}
 #: Digits of a number of entries; no file has room for more.
 _LONGEST_COUNT = 18
 
+# A comment that says which axis points up, and its value: an axis, or a direction.
+_VERTICAL = re.compile(r"vertical[ _-]?axis\s*[:=]?(.*)", re.IGNORECASE)
+_AXIS = re.compile(r"([+-]?)([xyz])\b")
+_NUMBERS = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?")
+_MOST_SQUARED = 1e30
+
 # Properties that are read; others may share a name, as those that only fill a gap do.
 _MEANINGFUL = {"x", "y", "z", "nx", "ny", "nz", "s", "t", "u", "v", "texture_u", "texture_v"}
 _MEANINGFUL |= {"red", "green", "blue", "alpha", "vertex_index", "vertex_indices", "texcoord"}
@@ -33,6 +41,11 @@ class Property:
     name: str
     type: str
     count_type: str | None  # of a list, None for a scalar
+
+    @property
+    def brightest(self) -> float:
+        """Value of full brightness, where it is a colour: reals count to 1, whole numbers to 255 or 65535."""
+        return 1.0 if self.type[0] == "f" else 65535.0 if self.type == "u2" else 255.0
 
 
 @dataclass
@@ -48,7 +61,8 @@ class Element:
 class Header:
     """What a PLY file says of itself: elements, textures, byte order, where its numbers begin, and notes.
 
-    ``order`` is "<" or ">" of a binary file, None of text; ``end`` is the first byte of the numbers.
+    ``order`` is "<" or ">" of a binary file, None of text; ``end`` is the first byte of the numbers; ``up`` is the
+    direction that a comment says is up.
     """
 
     elements: list[Element] = field(default_factory=list)
@@ -56,6 +70,7 @@ class Header:
     order: str | None = None
     end: int = 0
     notes: list[str] = field(default_factory=list)
+    up: Direction | None = None
 
 
 def read_header(data: bytes, where: str) -> Header:
@@ -70,6 +85,7 @@ def read_header(data: bytes, where: str) -> Header:
     if not data.startswith((b"ply\n", b"ply\r")):
         raise SceneError("is no PLY file", where=where, rule="one begins with the line 'ply'")
     header = Header()
+    comments: list[str] = []
     form = ""
     position, number = 0, 0
     while True:
@@ -86,6 +102,7 @@ def read_header(data: bytes, where: str) -> Header:
         if words[0] == "comment":
             if len(words) > 2 and words[1].lower() == "texturefile":
                 header.textures.append(line.split(None, 2)[2])
+            comments.append(line.partition(words[0])[2].strip())
             continue
         if words[0] == "format":
             form = words[1] if len(words) > 1 else ""
@@ -102,7 +119,32 @@ def read_header(data: bytes, where: str) -> Header:
         if len(set(names)) < len(names):
             raise SceneError(f"'{element.name[:40]}' has a property twice", where=where, rule="names tell them apart")
     header.order, header.end = _BYTE_ORDERS.get(form), position
+    _read_up(header, comments)
     return header
+
+
+def _read_up(header: Header, comments: list[str]) -> None:
+    """Take over the last comment that says which axis points up.
+
+    Nerfstudio writes "Vertical Axis: z". Brush writes a direction, "Vertical axis: 0 -1 0", and its older versions
+    always "Vertical axis: y", by which they mean -y, and read z as -z.
+    """
+    is_of_brush = any("exported from brush" in comment.lower() for comment in comments)
+    for comment in comments:
+        found = _VERTICAL.match(comment)
+        if found is None:
+            continue
+        value = found[1].strip().lower()
+        axis = _AXIS.match(value)
+        numbers = _NUMBERS.findall(value)
+        if axis is not None:
+            sign = -1.0 if axis[1] == "-" or (is_of_brush and not axis[1] and axis[2] != "x") else 1.0
+            x, y, z = (sign if each == axis[2] else 0.0 for each in "xyz")
+            header.up = (x, y, z)
+        elif len(numbers) == 3 and 0.0 < sum(float(each) ** 2 for each in numbers) < _MOST_SQUARED:
+            header.up = (float(numbers[0]), float(numbers[1]), float(numbers[2]))
+        else:
+            header.notes.append(f"the comment '{comment[:60]}' names no axis, and is passed over")
 
 
 def _read_declaration(header: Header, words: list[str], where: str) -> None:

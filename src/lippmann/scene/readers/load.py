@@ -16,11 +16,20 @@ from lippmann.scene.mitsuba_source import MitsubaSource
 from lippmann.scene.parsing.files import read_bytes
 from lippmann.scene.parsing.name_hints import closest_name_hint
 from lippmann.scene.readers.ply import UP_NOTE
+from lippmann.scene.readers.splats.sog_folder import holds_sog
 from lippmann.scene.readers.volumes.dicom_files import DICOM, holds_dicom
 from lippmann.scene.scene import Scene, check_description, override_light
 from lippmann.scene.splat_clouds import moved
 from lippmann.scene.splat_selection import Crop, SplatSelection
-from lippmann.scene.values.description import Camera, Color, Environment, Material, Matrix, SceneDescription
+from lippmann.scene.values.description import (
+    Camera,
+    Color,
+    Direction,
+    Environment,
+    Material,
+    Matrix,
+    SceneDescription,
+)
 from lippmann.scene.values.volume import TransferFunction
 from lippmann.scene.values.whitted_lighting import Background
 from lippmann.scene.values.whitted_scene import ClassicScene
@@ -122,12 +131,7 @@ _USUAL_UP: dict[str, Up] = {
     ".stl": "z",
     ".vdb": "y",
 }
-#: Rotations that bring such an axis to +y, about x.
-_UPRIGHT: dict[Up, Matrix] = {
-    "y": np.eye(4),
-    "z": np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, -1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]]),
-    "-y": np.diag([1.0, -1.0, -1.0, 1.0]),
-}
+_DIRECTIONS: dict[Up, Direction] = {"y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0), "-y": (0.0, -1.0, 0.0)}
 
 
 def load_scene(
@@ -280,7 +284,7 @@ def _from_name(
     series: str | None = None,
 ) -> Scene:
     path = Path(source)
-    suffix = kind_of_name(path)
+    suffix = ".sog" if holds_sog(path) else kind_of_name(path)
     if up is not None and (up not in get_args(Up) or suffix not in _USUAL_UP):
         what = f"'{up}'" if up not in get_args(Up) else f"{path.name} says itself which way is up"
         raise UsageError(what, parameter="up", rule=f"y, z or -y, for {', '.join(_USUAL_UP)}", fix="leave it out")
@@ -331,17 +335,17 @@ def _upright(description: SceneDescription, suffix: str, up: Up | None) -> Scene
         return description
     splats = description.splats
     usual: Up = "-y" if splats is not None and suffix == ".ply" else _USUAL_UP[suffix]
-    axis = up or usual
+    is_guessed = up is None and description.up is None
     notes = [note for note in description.notes if note != UP_NOTE or up is None]
-    if up is None and axis == "z":
+    if is_guessed and usual == "z":
         notes.append(f"up is taken as +z, as 3D printing has it, for nothing in {suffix} files says it (else up=y)")
-    if up is None and axis == "-y":
-        notes.append(
-            f"up is taken as -y, as trainers of splats have it, for nothing in {suffix} files says it (else up=y)"
-        )
-    if axis == "y":
+    if is_guessed and usual == "-y":
+        notes.append("up is taken as -y, as trainers of splats have it, for nothing in the file says it (else up=y)")
+    if is_guessed and suffix == ".spz":
+        notes.append("up is taken as +y, as SPZ has it, but some programs leave it at -y (then up=-y)")
+    matrix = _turn_up(_DIRECTIONS[up or usual] if up is not None or description.up is None else description.up)
+    if np.array_equal(matrix, np.eye(4)):
         return replace(description, notes=notes)
-    matrix = _UPRIGHT[axis]
     instances = [
         replace(each, world_from_mesh=matrix @ np.asarray(each.world_from_mesh, np.float64))
         for each in description.instances
@@ -349,6 +353,18 @@ def _upright(description: SceneDescription, suffix: str, up: Up | None) -> Scene
     splats = None if splats is None else moved(splats, matrix)
     volume = None if description.volume is None else moved_volume(description.volume, matrix)
     return replace(description, instances=instances, splats=splats, volume=volume, notes=notes)
+
+
+def _turn_up(direction: Direction) -> Matrix:
+    """The smallest rotation that brings a direction to +y; about x where there are several."""
+    x, y, z = np.asarray(direction, np.float64) / np.linalg.norm(direction)
+    matrix = np.eye(4)
+    if y < -1.0 + 1e-9:  # where single precision would not tell it from -y
+        matrix[:3, :3] = np.diag([1.0, -1.0, -1.0])
+        return matrix
+    cross = np.array([[0.0, -x, 0.0], [x, 0.0, z], [0.0, -z, 0.0]])  # of the axis, direction x (0, 1, 0)
+    matrix[:3, :3] += cross + cross @ cross / (1.0 + y)
+    return matrix
 
 
 def _with_remarks(description: SceneDescription) -> SceneDescription:
@@ -374,6 +390,8 @@ def _suffix_by_content(path: Path) -> str | None:
     """The suffix that the first bytes of a file imply; None if they imply none."""
     if path.is_dir() and holds_dicom(path):
         return ".dcm"
+    if holds_sog(path):
+        return ".sog"
     head = read_bytes(path, 132)
     if head[128:] == DICOM:
         return ".dcm"

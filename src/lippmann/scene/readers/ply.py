@@ -67,11 +67,11 @@ def read_ply(path: Path, *, allow_outside: bool = False) -> SceneDescription:
     columns = _read_body(data, header, where)
     if not all(isinstance(columns.get("vertex", {}).get(axis), np.ndarray) for axis in "xyz"):
         raise SceneError("holds no vertices with x, y and z", where=where)
-    notes = [UP_NOTE, *header.notes]
+    notes = [*header.notes] if header.up else [UP_NOTE, *header.notes]
     elements = {element.name: element for element in header.elements}
     outline = _outline(columns, where)
     if not len(outline.sizes):
-        return _cloud(columns["vertex"], elements["vertex"], path.stem, notes, where)
+        return replace(_cloud(columns["vertex"], elements["vertex"], path.stem, notes, where), up=header.up)
     mesh, owners = _mesh(columns, elements, outline, path.stem, where)
     textures: list[Texture | None] = []
     for name in header.textures:
@@ -90,7 +90,7 @@ def read_ply(path: Path, *, allow_outside: bool = False) -> SceneDescription:
         notes.append(f"only the first of {len(textures)} textures is used: no face says its texnumber")
     materials = [_material(path.stem, texture, mesh) for texture in textures or [None]]
     instances = [Instance(number, np.eye(4)) for number, mesh in enumerate(meshes) if len(mesh.faces)]
-    return SceneDescription(path.stem, meshes, materials, instances, notes=notes)
+    return SceneDescription(path.stem, meshes, materials, instances, notes=notes, up=header.up)
 
 
 def _material(name: str, texture: Texture | None, mesh: Mesh) -> Material:
@@ -374,13 +374,12 @@ def _corner_uvs(face: Columns, outline: _Lists, keep: NDArray[np.bool_]) -> Numb
 
 
 def _colors(columns: Columns, element: Element) -> NDArray[np.float32] | None:
-    """Linear RGB(A); bytes count to 255, other whole numbers to 255 or 65535 by their type, reals to 1."""
-    scalars = {each.name: each.type for each in element.properties if each.count_type is None}
+    """Linear RGB(A)."""
+    scalars = {each.name: each for each in element.properties if each.count_type is None}
     names = [name for name in ("red", "green", "blue", "alpha") if name in scalars]
     if names[:3] != ["red", "green", "blue"]:
         return None
-    tops = [1.0 if scalars[name][0] == "f" else 65535.0 if scalars[name] == "u2" else 255.0 for name in names]
-    values = np.stack([np.asarray(columns[name]) / top for name, top in zip(names, tops, strict=True)], axis=-1)
+    values = np.stack([np.asarray(columns[name]) / scalars[name].brightest for name in names], axis=-1)
     values = np.clip(np.nan_to_num(values), 0.0, 1.0)
     return np.concatenate([decode_srgb(values[:, :3]), values[:, 3:]], axis=1).astype(np.float32)
 

@@ -22,6 +22,7 @@ FloatArray = NDArray[np.float32]
 IndexArray = NDArray[np.uint32]
 Matrix = NDArray[np.float64]
 Color = tuple[float, float, float]
+Direction = tuple[float, float, float]
 
 Wrap = Literal["repeat", "mirror", "clamp"]
 Filter = Literal["linear", "nearest"]
@@ -209,7 +210,8 @@ class SceneDescription:
     ``multiple_scattering`` gives back the light that rough surfaces reflect more than once between microfacets; without
     it they are as dark as glTF's formulas make them. ``physical_lights`` says that the file tells its light sources in
     lux or candela. ``splats`` and ``volume`` stand in the world. ``fills_panel`` says that displays are to show no
-    border of the scene, as of a photograph.
+    border of the scene, as of a photograph. ``up`` is the direction that points up by the file's own words, where its
+    format leaves that open; None where nothing says it.
     """
 
     name: str
@@ -226,6 +228,7 @@ class SceneDescription:
     splats: Splats | None = None
     volume: Volume | None = None
     fills_panel: bool = False
+    up: Direction | None = None
 
     @cached_property
     def placements(self) -> Mapping[int, Matrix]:

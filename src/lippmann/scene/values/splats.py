@@ -14,10 +14,7 @@ FloatArray = NDArray[np.float32]
 Real = TypeVar("Real", float, NDArray[np.float64])
 
 #: Spherical harmonics of a degree and those below it.
-COEFFICIENTS = (1, 4, 9, 16)
-
-#: Largest degree of spherical harmonics.
-MOST_DEGREE = len(COEFFICIENTS) - 1
+COEFFICIENTS = (1, 4, 9, 16, 25)
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +53,7 @@ class Splats:
 
     @property
     def degree(self) -> int:
-        """Degree of the spherical harmonics, 0 to 3."""
+        """Degree of the spherical harmonics, 0 to 4."""
         return COEFFICIENTS.index(self.harmonics.shape[1])
 
     def chosen(self, which: NDArray[np.bool_] | NDArray[np.intp]) -> Splats:
@@ -86,7 +83,7 @@ def joined(parts: Sequence[Splats]) -> Splats:
 
 
 def real_harmonics(x: Real, y: Real, z: Real) -> tuple[Real, ...]:
-    """The 16 real spherical harmonics up to degree 3 of a unit vector, as :class:`Splats` orders and signs them.
+    """The 25 real spherical harmonics up to degree 4 of a unit vector, as :class:`Splats` orders and signs them.
 
     Of numbers, or of arrays of one shape; plain arithmetic, which Numba compiles, too.
     """
@@ -108,6 +105,15 @@ def real_harmonics(x: Real, y: Real, z: Real) -> tuple[Real, ...]:
         -0.4570457994644658 * x * (4.0 * zz - xx - yy),
         1.445305721320277 * z * (xx - yy),
         -0.5900435899266435 * x * (xx - 3.0 * yy),
+        2.5033429417967046 * x * y * (xx - yy),
+        -1.7701307697799304 * y * z * (3.0 * xx - yy),
+        0.9461746957575601 * x * y * (6.0 * zz - xx - yy),
+        -0.6690465435572892 * y * z * (4.0 * zz - 3.0 * xx - 3.0 * yy),
+        0.10578554691520431 * (zz * (8.0 * zz - 24.0 * (xx + yy)) + 3.0 * (xx + yy) * (xx + yy)),
+        -0.6690465435572892 * x * z * (4.0 * zz - 3.0 * xx - 3.0 * yy),
+        0.47308734787878004 * (xx - yy) * (6.0 * zz - xx - yy),
+        -1.7701307697799304 * x * z * (xx - 3.0 * yy),
+        0.6258357354491761 * (xx * (xx - 3.0 * yy) - yy * (3.0 * xx - yy)),
     )
 
 

@@ -1,5 +1,6 @@
 """Files of splats, held against gsply, another program's reader and writer; and files that are damaged."""
 
+import base64
 import gzip
 import io
 import json
@@ -7,6 +8,7 @@ import struct
 import zipfile
 
 import gsply
+import imagecodecs
 import numpy as np
 import pytest
 from gsply.spz import write_spz
@@ -84,6 +86,76 @@ def test_spz_is_read_as_gsply_reads_it(tmp_path, degree):
 
 def spz(version, body, count=1, degree=0, fraction=12):
     return gzip.compress(struct.pack("<4sIIBBBB", b"NGSP", version, count, degree, fraction, 0, 0) + body)
+
+
+def spz_4(count, sections, degree=0, records=b"", table=None):
+    """SPZ of version 4, each section a Zstandard stream, by the description of the format's own library."""
+    packed = [imagecodecs.zstd_encode(section) for section in sections]
+    head = struct.pack("<4sIIBBBB", b"NGSP", 4, count, degree, 12, 2 if records else 0, len(sections))
+    head += struct.pack("<I12x", 32 + len(records) if table is None else table) + records
+    sizes = [struct.pack("<QQ", len(p), len(s)) for p, s in zip(packed, sections, strict=True)]
+    return head + b"".join(sizes) + b"".join(packed)
+
+
+#: A splat at (1.5, -0.25, 2), of opacity 1/5, grey, e^-3 thick, not turned.
+PLAIN = [
+    b"".join(int(v * 4096).to_bytes(3, "little", signed=True) for v in (1.5, -0.25, 2.0)),
+    bytes([51]),
+    bytes([128, 128, 128]),
+    bytes([112, 112, 112]),
+    struct.pack("<I", 3 << 30),
+]
+
+
+#: Three splats of degree 4, as the format's own library writes them (npm: @adobe/spz 0.2.3, with 8 bits everywhere).
+WRITTEN_BY_THE_LIBRARY = """
+TkdTUAQAAAADAAAABAwABiAAAAAAAAAAAAAAAAAAAAAkAAAAAAAAABsAAAAAAAAADAAAAAAAAAADAAAAAAAAABIAAAAAAAAACQAAAAAAAAASAAAAAAAAAAkA
+AAAAAAAAFQAAAAAAAAAMAAAAAAAAAHYAAAAAAAAA2AAAAAAAAAAotS/9IBvZAAAAEAAAIAAAMAAA8P8ACAAAIAAAAAAAAAAA8P8otS/9IAMZAACAukUotS/9
+IAlJAACTgGympqZZgKYotS/9IAlJAABwcHBwcHBwcHAotS/9IAxhAAAAAADAaaWVFv8BAAAotS/9INhtAwBEBkBvn059rVyMu2qaSXioV4a2ZZREc6NSgbFg
+j79unU18rFuKummYSHemVoW0ZJNDcqFRgK9fjr1tnEx7qlqJuGiXRnalVISzY5JBcaBPf65djbxsm0p6qViIt2aWRXSkU4OyYZEBAGQ80xAF
+"""
+
+
+def test_spz_of_version_4_by_the_format_s_own_library(tmp_path):
+    (tmp_path / "a.spz").write_bytes(base64.b64decode(WRITTEN_BY_THE_LIBRARY))
+    splats = splats_of(tmp_path / "a.spz")
+    np.testing.assert_allclose(splats.centers, [[1, 2, 3], [-1, 0.5, 2], [0, 0, -1]], atol=2**-13)
+    np.testing.assert_allclose(splats.scales, np.full((3, 3), np.exp(-3)), rtol=0.04)
+    turns = [[0, 0, 0, 1], [0.5, 0.5, 0.5, 0.5], [0.70710678, 0, 0, 0.70710678]]
+    np.testing.assert_allclose(splats.rotations, turns, atol=2e-3)
+    np.testing.assert_allclose(splats.opacities, 1 / (1 + np.exp([0, -1, 1])), atol=2 / 255)
+    np.testing.assert_allclose(splats.harmonics[:, 0], [[0.5, 0, -0.5], [1, 1, 1], [-1, 0, 1]], atol=0.014)
+    rest = (np.arange(216).reshape(3, 24, 3) * 37 % 100 - 50) / 100
+    np.testing.assert_allclose(splats.harmonics[:, 1:], rest, atol=1 / 256)
+
+
+def test_spz_of_degree_4_in_a_box_of_version_4_and_in_gzip(tmp_path):
+    rest = bytes(range(90, 162))
+    (tmp_path / "four.spz").write_bytes(spz_4(1, [*PLAIN, rest], degree=4))
+    (tmp_path / "three.spz").write_bytes(spz(3, b"".join([*PLAIN, rest]), degree=4))
+    for name in ("four.spz", "three.spz"):
+        splats = splats_of(tmp_path / name)
+        assert splats.degree == 4
+        np.testing.assert_array_equal(splats.centers, [[1.5, -0.25, 2.0]])
+        np.testing.assert_array_equal(splats.rotations, [[0, 0, 0, 1]])
+        np.testing.assert_allclose(splats.harmonics[0, 24], (np.arange(159, 162) - 128) / 128)  # colours side by side
+
+
+@pytest.mark.parametrize(
+    ("number", "place"),
+    # Letters tell where x, y and z point: right, up, back is 4; right, down, front 6; left, front, up 11.
+    [(4, [1.5, -0.25, 2]), (6, [1.5, 0.25, -2]), (7, [-1.5, -0.25, -2]), (11, [-1.5, 2, 0.25]), (8, [1.5, -0.25, -2])],
+)
+def test_spz_that_says_its_axes_is_turned_to_ours(tmp_path, number, place):
+    records = struct.pack("<IIfff", 0xADBE0002, 12, 0, 1, 2) + struct.pack("<III", 0xADBE0003, 4, number)
+    gzipped = gzip.compress(struct.pack("<4sIIBBBB", b"NGSP", 3, 1, 0, 12, 2, 0) + b"".join(PLAIN) + records)
+    for data in (spz_4(1, PLAIN, records=records), gzipped):
+        (tmp_path / "a.spz").write_bytes(data)
+        scene = load_scene(tmp_path / "a.spz")
+        np.testing.assert_allclose(scene.description.splats.centers, [place], atol=1e-6)
+        assert not any("up is taken" in note or "extension" in note for note in scene.notes)
+    (tmp_path / "a.spz").write_bytes(spz_4(1, PLAIN, records=struct.pack("<IIB", 0x12340001, 1, 0)))
+    assert any("extension 0x12340001 is not read" in note for note in load_scene(tmp_path / "a.spz").notes)
 
 
 def test_spz_of_older_versions_by_hand(tmp_path):
@@ -166,9 +238,29 @@ def test_up_is_what_trainers_mostly_have(tmp_path, name, data, usual):
         path.write_bytes(data)
     scene = load_scene(path)
     np.testing.assert_array_equal(scene.description.splats.centers, splats_of(path, up=usual).centers)
-    assert any("up is taken as -y" in note for note in scene.notes) == (usual == "-y")
+    assert any(f"up is taken as {'+y' if usual == 'y' else usual}" in note for note in scene.notes)
     straight = splats_of(path)
     np.testing.assert_array_equal(splats_of(path, up="-y").centers, straight.centers * np.float32([1, -1, -1]))
+
+
+def test_sog_that_is_not_bundled(tmp_path):
+    folder = tmp_path / "scan"
+    with zipfile.ZipFile(io.BytesIO(sog(1))) as archive:
+        archive.extractall(folder)
+    (tmp_path / "a.sog").write_bytes(sog(1))
+    true = splats_of(tmp_path / "a.sog")
+    for path in (folder, folder / "meta.json"):
+        scene = load_scene(path)
+        assert scene.name == "scan"
+        assert any("up is taken as -y" in note for note in scene.notes)
+        np.testing.assert_array_equal(splats_of(path).harmonics, true.harmonics)
+    (folder / "u.webp").unlink()
+    with pytest.raises(LippmannError, match=r"picture 'u\.webp' not found"):
+        load_scene(folder)
+    meta = (folder / "meta.json").read_text().replace("u.webp", "../u.webp")
+    (folder / "meta.json").write_text(meta)
+    with pytest.raises(LippmannError, match=r"meta\.json: .*u\.webp"):
+        load_scene(folder / "meta.json")
 
 
 def header(properties, count=1, form="binary_little_endian"):
@@ -234,10 +326,16 @@ FLOATS = [(name, "float") for name in NAMES]
             "bounds",
         ),
         ("a.spz", b"\x1f\x8b" + bytes(20), "a.spz: is damaged"),
-        ("a.spz", b"NGSP" + bytes(20), "version 4 or later"),
+        ("a.spz", b"NGSP" + bytes(20), "is cut short: 24 of 32 bytes"),
+        ("a.spz", b"NGSP" + bytes(28), "SPZ of version 0"),
+        ("a.spz", spz_4(1, PLAIN)[:-3], "section 4 holds 13 bytes for 4 of 4; is it cut short"),
+        ("a.spz", spz_4(2, PLAIN), "section 0 holds 18 bytes for 9 of 18"),
+        ("a.spz", spz_4(1, PLAIN[:4]), "has 4 streams"),
+        ("a.spz", spz_4(1, PLAIN, table=9), "has its table of sizes at byte 9 of"),
+        ("a.spz", spz_4(1, PLAIN).replace(b"\x28\xb5\x2f\xfd", b"none"), "is damaged"),
         ("a.spz", b"text", "is no SPZ file"),
         ("a.spz", spz(9, b""), "SPZ of version 9"),
-        ("a.spz", spz(3, b"", degree=4), "harmonics of degree 4"),
+        ("a.spz", spz(3, b"", degree=5), "harmonics of degree 5"),
         ("a.spz", spz(3, bytes(10), count=5), "is cut short: 10 of 100 bytes"),
         ("a.spz", gzip.compress(bytes(16)), "is no SPZ file"),
         ("a.sog", b"text", "is no SOG file"),

@@ -79,7 +79,7 @@ class SplatClouds:
             if packed is not None:
                 view = self.document.required_reference(packed, "bufferView", "bufferViews")
                 data, _ = self.accessors.buffers.view(view)
-                found, notes = decode_spz(data, where=self.document.file)
+                found, notes, _ = decode_spz(data, where=self.document.file)
                 self._note(notes, primitive)
                 return found
         attributes = primitive.child("attributes")

@@ -39,7 +39,7 @@ def coefficients_of(rest: int, what: str, *, where: str) -> int:
     """
     known = {3 * (count - 1): count for count in COEFFICIENTS}
     if rest not in known:
-        rule = f"degrees 0 to 3 have {', '.join(str(each) for each in known)}"
+        rule = f"degrees 0 to 4 have {', '.join(str(each) for each in known)}"
         raise SceneError(f"has {rest} {what}", where=where, rule=rule)
     return known[rest]
 

@@ -1,8 +1,10 @@
 """Splats in PLY files: as trainers write them, and packed as SuperSplat does.
 
 Trainers write a vertex for each splat, as the program of Kerbl et al. 2023 does: logarithms of standard deviations,
-logits of opacity, quaternions that begin with w, coefficients one colour after the other. The packed form holds 16
-bytes a splat, in chunks of 256 with bounds of their own (PlayCanvas, "Compressed PLY format").
+logits of opacity, quaternions that begin with w, coefficients one colour after the other. Those of 2D Gaussian
+splatting (Huang et al. 2024) leave out the third standard deviation, which is 0: their splats are discs. Some programs
+write sRGB colours in place of the coefficients of degree 0. The packed form holds 16 bytes a splat, in chunks of 256
+with bounds of their own (PlayCanvas, "Compressed PLY format").
 """
 
 from __future__ import annotations
@@ -26,17 +28,17 @@ from lippmann.scene.readers.splats.activation import (
 from lippmann.scene.values.description import SceneDescription
 from lippmann.scene.values.splats import FloatArray, Splats
 
-#: Properties of a vertex that nothing but a splat has.
-_TRAINED = {"x", "y", "z", "f_dc_0", "f_dc_1", "f_dc_2", "opacity", "scale_0", "scale_1", "scale_2"}
-_TRAINED |= {"rot_0", "rot_1", "rot_2", "rot_3"}
+#: Properties of a vertex, besides a colour, that a splat has; a disc has no third standard deviation.
+_TRAINED = ("x", "y", "z", "opacity", "scale_0", "scale_1", "rot_0", "rot_1", "rot_2", "rot_3")
+_THIRD_SCALE = "scale_2"
+_DC = ("f_dc_0", "f_dc_1", "f_dc_2")
+_RGB = ("red", "green", "blue")
 _PACKED = {"packed_position", "packed_rotation", "packed_scale", "packed_color"}
 
 _CHUNK = 256
 _CORNERS = [f"{end}_{axis}" for end in ("min", "max") for axis in "xyz"]
 _SCALES = [f"{end}_scale_{axis}" for end in ("min", "max") for axis in "xyz"]
 _COLORS = [f"{end}_{color}" for end in ("min", "max") for color in "rgb"]
-
-#: What a quaternion's smaller components are at most.
 
 Rows = NDArray[np.void]
 Words = NDArray[np.uint32]
@@ -58,10 +60,12 @@ def read_splat_ply(data: bytes, header: Header, name: str, where: str) -> SceneD
         The file is cut short, has lists, a wrong number of coefficients, or no splat that is whole; it takes more
         memory than is left.
     """
-    rows = _rows_of(data, header, where)
     element = next(each for each in header.elements if each.name == "vertex")
-    splats, notes = _trained(rows["vertex"], where) if _is_trained(element) else _packed(rows, where)
-    return SceneDescription(name, splats=splats, notes=(*header.notes, *notes))
+    if _is_trained(element):
+        _check_whole(element, where)
+    rows = _rows_of(data, header, where)
+    splats, notes = _trained(rows["vertex"], element, where) if _is_trained(element) else _packed(rows, where)
+    return SceneDescription(name, splats=splats, notes=(*header.notes, *notes), up=header.up)
 
 
 def _names(element: Element) -> set[str]:
@@ -69,7 +73,22 @@ def _names(element: Element) -> set[str]:
 
 
 def _is_trained(element: Element) -> bool:
-    return _names(element) >= _TRAINED
+    """Whether vertices have what nothing but a splat has."""
+    names = _names(element)
+    return not names.isdisjoint(_DC) or names >= {"scale_0", "rot_0"}
+
+
+def _check_whole(element: Element, where: str) -> None:
+    names = _names(element)
+    missing = [name for name in _TRAINED if name not in names]
+    if not names.issuperset(_RGB):
+        missing += [name for name in _DC if name not in names]
+    if missing:
+        raise SceneError(
+            f"holds Gaussian splats without {', '.join(missing)}",
+            where=where,
+            rule=f"each has {', '.join(_TRAINED)}, and f_dc_0, f_dc_1, f_dc_2 or red, green, blue",
+        )
 
 
 def _is_packed(element: Element) -> bool:
@@ -128,26 +147,37 @@ def _floats(rows: Rows, names: list[str]) -> FloatArray:
     return values
 
 
-def _trained(rows: Rows, where: str) -> tuple[Splats, tuple[str, ...]]:
-    rest = sum(name.startswith("f_rest_") for name in rows.dtype.names or ())
+def _trained(rows: Rows, element: Element, where: str) -> tuple[Splats, tuple[str, ...]]:
+    names = _names(element)
+    rest = sum(name.startswith("f_rest_") for name in names)
     count = coefficients_of(rest, "properties f_rest_...", where=where)
     ask_memory(len(rows), count, where=where)
     harmonics = np.empty((len(rows), count, 3), np.float32)
-    harmonics[:, 0] = _floats(rows, [f"f_dc_{color}" for color in range(3)])
+    harmonics[:, 0] = _floats(rows, list(_DC)) if names >= set(_DC) else _coefficients_of_colors(rows, element)
     try:
         for color in range(3):
             own = [f"f_rest_{color * (count - 1) + place}" for place in range(count - 1)]
             harmonics[:, 1:, color] = _floats(rows, own)
     except ValueError:
         raise SceneError("properties f_rest_... leave numbers out", where=where, rule="they count from 0") from None
+    log_scales = np.full((len(rows), 3), -np.inf, np.float32)
+    known = 3 if _THIRD_SCALE in names else 2
+    log_scales[:, :known] = _floats(rows, [f"scale_{axis}" for axis in range(known)])
     return activated(
         _floats(rows, ["x", "y", "z"]),
-        _floats(rows, [f"scale_{axis}" for axis in range(3)]),
+        log_scales,
         _floats(rows, ["rot_1", "rot_2", "rot_3", "rot_0"]),
         sigmoid(_floats(rows, ["opacity"])[:, 0]),
         harmonics,
         where=where,
     )
+
+
+def _coefficients_of_colors(rows: Rows, element: Element) -> FloatArray:
+    """Coefficients of degree 0 of sRGB colours."""
+    brightest = {each.name: each.brightest for each in element.properties}
+    tops = np.array([brightest[name] for name in _RGB], np.float32)
+    return (_floats(rows, list(_RGB)) / tops - np.float32(0.5)) / np.float32(SH_0)
 
 
 @np.errstate(over="ignore", invalid="ignore")  # of damaged bounds, whose splats are left out

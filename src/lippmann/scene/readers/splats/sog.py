@@ -1,4 +1,4 @@
-"""SOG, PlayCanvas's splats in lossless pictures: a zip of meta.json and WebP files, versions 1 and 2.
+"""SOG, PlayCanvas's splats in lossless pictures: meta.json and WebP files, versions 1 and 2, in a zip or a folder.
 
 Each splat is a pixel of each picture. Places are logarithms in 16 bits, split over two pictures; standard deviations
 and colours are entries of a codebook (version 2) or lie between bounds (version 1); coefficients of higher degree
@@ -20,32 +20,40 @@ import numpy as np
 from lippmann.codecs.pillow_formats import open_picture
 from lippmann.errors import LippmannError, SceneError
 from lippmann.runtime.input_memory import check_input
-from lippmann.scene.parsing.files import read_bytes
+from lippmann.scene.parsing.files import read_bytes, resolve
 from lippmann.scene.readers.splats.activation import MOST_SMALL, Bytes, activated, ask_memory, largest_left_out, sigmoid
+from lippmann.scene.readers.splats.sog_folder import META, holds_sog
 from lippmann.scene.values.description import SceneDescription
-from lippmann.scene.values.splats import COEFFICIENTS, MOST_DEGREE, FloatArray
+from lippmann.scene.values.splats import COEFFICIENTS, FloatArray
 
-_META = "meta.json"
 _LARGEST_META = 1 << 20
 #: Splats of a palette lie so many to a row.
 _PALETTE_COLUMNS = 64
 _FIRST_TURN = 252
+#: The highest degree of harmonics that the format has.
+_MOST_BANDS = 3
 
 
 def read_sog(path: Path, *, allow_outside: bool = False) -> SceneDescription:
-    """Read a SOG file. It names no file but those inside it.
+    """Read a SOG file, or its unbundled form: a folder, or the meta.json in it.
+
+    Parameters
+    ----------
+    allow_outside:
+        Let meta.json name pictures outside its own folder.
 
     Raises
     ------
     SceneError, MemoryLimitError
         The file is missing, foreign, damaged, of another version, or takes more memory than is left.
     """
-    del allow_outside
-    where = path.name
+    where = path.name or str(path)
+    if holds_sog(path):
+        folder = path if path.is_dir() else path.parent
+        return _read(_Folder(where, folder, allow_outside), folder.resolve().name)
     try:
         with zipfile.ZipFile(io.BytesIO(read_bytes(path))) as archive:
-            bundle = _Bundle(archive, where)
-            return _read(bundle, path.stem)
+            return _read(_Bundle(where, archive), path.stem)
     except LippmannError:
         raise
     except (zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError, EOFError, OSError, ValueError) as error:
@@ -55,10 +63,9 @@ def read_sog(path: Path, *, allow_outside: bool = False) -> SceneDescription:
 
 
 @dataclass(frozen=True)
-class _Bundle:
-    """The files inside a SOG file."""
+class _Files:
+    """The files that a SOG is made of."""
 
-    archive: zipfile.ZipFile
     where: str
 
     def error(self, what: str, rule: str = "") -> SceneError:
@@ -66,23 +73,20 @@ class _Bundle:
 
     def read(self, name: str, most: int | None = None) -> bytes:
         """A file, whose size unpacked is asked for before it is taken."""
-        try:
-            entry = self.archive.getinfo(name)
-        except KeyError:
-            raise self.error(f"holds no '{name[:60]}'") from None
-        if most is not None and entry.file_size > most:
-            raise self.error(f"'{name}' has {entry.file_size} bytes", f"at most {most}")
-        check_input(entry.file_size, f"'{name[:60]}'", where=self.where)
-        with self.archive.open(entry) as file:
-            return file.read(entry.file_size)
+        raise NotImplementedError
+
+    def _check_size(self, name: str, size: int, most: int | None) -> None:
+        if most is not None and size > most:
+            raise self.error(f"'{name}' has {size} bytes", f"at most {most}")
+        check_input(size, f"'{name[:60]}'", where=self.where)
 
     def meta(self) -> _Meta:
         """What meta.json holds."""
         try:
-            values = json.loads(self.read(_META, _LARGEST_META))
+            values = json.loads(self.read(META, _LARGEST_META))
         except (ValueError, RecursionError) as error:
             raise self.error(f"meta.json: {error}", "it holds JSON") from None
-        return _Meta(self, values, _META)
+        return _Meta(self, values, META)
 
     def pixels(self, name: str, count: int) -> Bytes:
         """The first ``count`` pixels of a picture, ``(count, 4)``."""
@@ -100,10 +104,35 @@ class _Bundle:
 
 
 @dataclass(frozen=True)
+class _Bundle(_Files):
+    archive: zipfile.ZipFile
+
+    def read(self, name: str, most: int | None = None) -> bytes:
+        try:
+            entry = self.archive.getinfo(name)
+        except KeyError:
+            raise self.error(f"holds no '{name[:60]}'") from None
+        self._check_size(name, entry.file_size, most)
+        with self.archive.open(entry) as file:
+            return file.read(entry.file_size)
+
+
+@dataclass(frozen=True)
+class _Folder(_Files):
+    folder: Path
+    allow_outside: bool
+
+    def read(self, name: str, most: int | None = None) -> bytes:
+        path = resolve(self.folder, name, where=self.where, what="picture", allow_outside=self.allow_outside)
+        self._check_size(name, path.stat().st_size, most)
+        return read_bytes(path)
+
+
+@dataclass(frozen=True)
 class _Meta:
     """A JSON object of meta.json, whose members are checked as they are read."""
 
-    bundle: _Bundle
+    bundle: _Files
     values: object
     place: str
 
@@ -147,7 +176,7 @@ class _Meta:
         return [str(name) for name in value[:count]]
 
 
-def _read(bundle: _Bundle, name: str) -> SceneDescription:
+def _read(bundle: _Files, name: str) -> SceneDescription:
     meta = bundle.meta()
     version = meta.get("version")
     if version not in (None, 1, 2):
@@ -216,15 +245,12 @@ def _entries(part: _Meta, codes: Bytes) -> FloatArray:
     return book[codes]
 
 
-def _palette(bundle: _Bundle, shared: _Meta, by_codebook: bool) -> FloatArray:
+def _palette(bundle: _Files, shared: _Meta, by_codebook: bool) -> FloatArray:
     """Coefficients of degrees 1 and up of the palette's entries, ``(m, k - 1, 3)``."""
     picture = bundle.picture(shared.files(2)[0])
     height, width = picture.shape[:2]
-    if by_codebook:
-        own = COEFFICIENTS[shared.whole("bands", MOST_DEGREE)] - 1
-    else:
-        own = next((count - 1 for count in COEFFICIENTS[1:] if _PALETTE_COLUMNS * (count - 1) == width), 0)
-    if own == 0 or width != _PALETTE_COLUMNS * own:
+    own = COEFFICIENTS[shared.whole("bands", _MOST_BANDS)] - 1 if by_codebook else width // _PALETTE_COLUMNS
+    if own + 1 not in COEFFICIENTS[1 : _MOST_BANDS + 1] or width != _PALETTE_COLUMNS * own:
         raise bundle.error(f"shN: a palette {width} pixels wide", "64 entries a row, of 3, 8 or 15 pixels each")
     codes = picture[..., :3].reshape(height * _PALETTE_COLUMNS, own, 3)
     check_input(4 * codes.size, "the palette of harmonics", where=bundle.where)
