@@ -197,6 +197,12 @@ class Display:
         return abs(z) * self.panel.pixel_pitch / self.gap
 
     @property
+    def resolved_size(self) -> float:
+        """Millimetres of the lens plane below which the display's viewers tell nothing apart."""
+        cut_off = 0 if self.sheet is None else 2 * self.sheet.border * self.panel.pixel_pitch
+        return max(self.lens_array.pitch, RESOLVED_SHARE * (min(self.size_mm) - cut_off))
+
+    @property
     def resolvable_depth(self) -> tuple[float, float]:
         """Nearest and farthest z in millimetres that the display resolves, at most up to the viewer.
 
@@ -204,9 +210,7 @@ class Display:
         the display's own sampling in the lens plane, or a 150th of the panel's shorter side: ``z = s g / d`` for a
         spread s. Where sub-pixels lie under a slanted sheet, each shows a direction of its own: d is theirs.
         """
-        cut_off = 0 if self.sheet is None else 2 * self.sheet.border * self.panel.pixel_pitch
-        resolved = max(self.lens_array.pitch, RESOLVED_SHARE * (min(self.size_mm) - cut_off))
-        depth = resolved * self.gap / self.panel.pixel_pitch * (3.0 if self.has_slanted_stripes else 1.0)
+        depth = self.resolved_size * self.gap / self.panel.pixel_pitch * (3.0 if self.has_slanted_stripes else 1.0)
         return min(depth, self.viewing_distance), -depth
 
     @property

@@ -30,7 +30,7 @@ from lippmann.runtime import engine as engines
 from lippmann.runtime import machine
 from lippmann.scene.camera_placement import CameraView, VisibleDepth
 from lippmann.scene.matrices import rotation_of
-from lippmann.scene.placement import Placement, place
+from lippmann.scene.placement import Placement, PlacementOptions, place
 from lippmann.scene.scene import Scene
 from lippmann.scene.values.description import Matrix
 
@@ -107,6 +107,8 @@ class Session:
     def place(self, display: Display) -> Placement:
         """Where ``display`` stands in the scene; light that follows the viewer is turned toward it.
 
+        What the panel's edge cuts in front of the lens plane is said, unless the scene was fitted within it.
+
         Raises
         ------
         UsageError, SceneError
@@ -114,7 +116,30 @@ class Session:
         """
         placement = self.find_place(display)
         self.face_viewer(rotation_of(placement.world_from_display))
+        options = self.request.placement
+        if isinstance(options, PlacementOptions) and not (placement.mode == "fit" and self._is_whole(options)):
+            return replace(placement, warnings=(*placement.warnings, *self._warn_of_cut(display, placement, options)))
         return placement
+
+    def _is_whole(self, options: PlacementOptions) -> bool:
+        """Whether a fitted scene lies within the panel in all views, or is a photograph, which is to be cut."""
+        return self.scene.fills_panel or (options.scale <= 1.0 and not any(options.shift))
+
+    def _warn_of_cut(self, display: Display, placement: Placement, options: PlacementOptions) -> tuple[str, ...]:
+        from lippmann.rendering.transport.cut_edges import find_cut_edges
+
+        cut = self.watch.stage(
+            "build", lambda: find_cut_edges(self.built, trimmed(display), placement.world_from_display)
+        )
+        if cut is None:
+            return ()
+        sides = ", ".join(f"{side} {100 * share:.0f} %" for side, share in cut.shares.items())
+        x, y, z = options.shift
+        fix = f"shift={x:g},{y:g},{z - cut.height:.3g}"
+        if placement.mode == "camera" and options.pop_out != 0.0:
+            fix = f"pop_out=0 or {fix}"
+        what = f"the panel's edge cuts what stands up to {cut.height:.3g} mm in front of it"
+        return (f"{what} ({sides}): {fix} sets it behind",)
 
     def find_place(self, display: Display, bounds_in: Callable[[Matrix], Matrix] | None = None) -> Placement:
         """As :meth:`place`, leaving the light as it is; ``bounds_in`` stands for the scene's, if given."""

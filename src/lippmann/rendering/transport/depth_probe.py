@@ -7,14 +7,18 @@ from typing import TYPE_CHECKING
 import drjit as dr
 import mitsuba as mi
 import numpy as np
+from numpy.typing import NDArray
 
 from lippmann.rendering.transport.first_surface import make_surfaces
 from lippmann.rendering.transport.ray_source import world_ray
 from lippmann.scene.camera_placement import CameraView, VisibleDepth
+from lippmann.scene.values.description import Matrix
 
 if TYPE_CHECKING:
     from lippmann.device.pbr import BuiltScene
     from lippmann.device.whitted.scene import BuiltClassic
+
+Reals = NDArray[np.float64]
 
 #: Rays along each side of the view.
 SIDE = 128
@@ -25,19 +29,32 @@ NEAR_SHARE, FAR_SHARE = 0.01, 0.9
 
 def probe_depth(built: BuiltScene | BuiltClassic, view: CameraView) -> VisibleDepth | None:
     """Depths that ``view`` shows, along the camera's axis in world units; None where it shows nothing."""
-    number = dr.arange(mi.UInt32, SIDE * SIDE)
-    x, y = ((mi.Float64(place) + 0.5) * (2 / SIDE) - 1 for place in (number % SIDE, number // SIDE))
-    x, y, zero = x * view.half_width, y * view.half_height, dr.zeros(mi.Float64, SIDE * SIDE)
-    if view.is_parallel:
-        origin, direction = (x, y, zero), (zero, zero, zero - 1)
-    else:
-        origin, direction = (zero, zero, zero), (x, y, zero - 1)
-    ray = world_ray(np.asarray(view.world_from_camera, dtype=np.float64), origin, direction)
-    hit = make_surfaces(built).first_hit(ray)
-    seen = np.array(hit.hit, dtype=bool)
+    across = (np.arange(SIDE) + 0.5) * (2 / SIDE) - 1
+    plane = np.zeros((SIDE, SIDE, 3))
+    plane[..., 0], plane[..., 1] = across * view.half_width, across[:, None] * view.half_height
+    toward = np.array((0.0, 0.0, -1.0))
+    origins, directions = (plane, toward) if view.is_parallel else (np.zeros(3), plane + toward)
+    seen, points = first_hits(built, view.world_from_camera, origins, directions)
     if not seen.any():
         return None
     eye, back = view.world_from_camera[:3, 3], view.world_from_camera[:3, 2]
-    depths = np.sort(((eye - np.array(hit.p, dtype=np.float64).T) @ back)[seen])
+    depths = np.sort((eye - points[seen]) @ back)
     near, far = np.quantile(depths, (NEAR_SHARE, FAR_SHARE))
     return VisibleDepth(float(near), float(far))
+
+
+def first_hits(
+    built: BuiltScene | BuiltClassic, world_from_frame: Matrix, origins: Reals, directions: Reals
+) -> tuple[NDArray[np.bool_], Reals]:
+    """Whether rays of a frame meet a surface, ``(n,)``, and the points of the world where they do, ``(n, 3)``, else 0.
+
+    ``origins`` and ``directions`` are ``(..., 3)``, of shapes that broadcast to n rays.
+    """
+    origin, direction = (
+        tuple(mi.Float64(np.ascontiguousarray(axis)) for axis in values.reshape(-1, 3).T)
+        for values in np.broadcast_arrays(origins, directions)
+    )
+    hit, point = make_surfaces(built).first_point(world_ray(world_from_frame, origin, direction))
+    point = dr.select(hit, point, 0)
+    dr.eval(hit, point)
+    return np.array(hit, dtype=bool), np.array(point, dtype=np.float64).T

@@ -78,6 +78,10 @@ class Surfaces(Protocol):
         """The first surface that ``ray`` hits."""
         ...
 
+    def first_point(self, ray: Ray3f) -> tuple[Bool, Point3f]:
+        """Whether :meth:`first_hit` is one, and its point: without looking at the surface."""
+        ...
+
     def features(self, ray: Ray3f) -> tuple[Color3f, Normal3f, Float, Bool]:
         """Denoising features of the first surface that is not purely specular.
 
@@ -110,10 +114,7 @@ class PhysicalSurfaces:
 
     def first_hit(self, ray: Ray3f) -> SurfaceHit:
         """The first surface that ``ray`` hits, without those of high null transmittance."""
-        ray = mi.Ray3f(ray)
-        pi = self._scene.ray_intersect_preliminary(ray, coherent=True, active=True)
-        if self._has_null:
-            ray, pi = self._skip_null(ray, pi)
+        ray, pi = self._first(ray)
         si = pi.compute_surface_interaction(ray, mi.RayFlags.All)
         hit = si.is_valid()
         bsdf = si.bsdf(ray)
@@ -126,6 +127,16 @@ class PhysicalSurfaces:
             dr.select(hit, _albedo(si, bsdf, hit), 0),
             dr.gather(mi.UInt32, self._numbers, pointer, hit),
         )
+
+    def first_point(self, ray: Ray3f) -> tuple[Bool, Point3f]:
+        """Whether :meth:`first_hit` is one, and its point: without looking at the surface."""
+        ray, pi = self._first(ray)
+        return pi.is_valid(), ray(pi.t)
+
+    def _first(self, ray: Ray3f) -> tuple[Ray3f, PreliminaryIntersection3f]:
+        ray = mi.Ray3f(ray)
+        pi = self._scene.ray_intersect_preliminary(ray, coherent=True, active=True)
+        return self._skip_null(ray, pi) if self._has_null else (ray, pi)
 
     @dr.syntax
     def _skip_null(self, ray: Ray3f, pi: PreliminaryIntersection3f) -> tuple[Ray3f, PreliminaryIntersection3f]:
@@ -236,6 +247,12 @@ class WhittedSurfaces:
     def first_hit(self, ray: Ray3f) -> SurfaceHit:
         """The first surface that ``ray`` hits."""
         return self._first_hit(self._mirror(mi.Vector3f(ray.o)), self._mirror(mi.Vector3f(ray.d)))
+
+    def first_point(self, ray: Ray3f) -> tuple[Bool, Point3f]:
+        """Whether :meth:`first_hit` is one, and its point: without looking at the surface."""
+        o, d = self._mirror(mi.Vector3f(ray.o)), self._mirror(mi.Vector3f(ray.d))
+        closest = self._built.geometry.closest(o, d, mi.Bool(True), coherent=True)
+        return closest.index != NONE, mi.Point3f(self._mirror(o + d * closest.t))
 
     def features(self, ray: Ray3f) -> tuple[Color3f, Normal3f, Float, Bool]:
         """As :meth:`Surfaces.features`, of the first surface whatever it is."""
