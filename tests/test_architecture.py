@@ -20,6 +20,7 @@ SOURCE = ROOT / "src" / "lippmann"
 ORDER = (
     "_version",
     "printable",
+    "wording",
     "errors",
     "progress",
     "progress_bar",

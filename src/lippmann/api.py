@@ -36,7 +36,7 @@ from lippmann.rendering.request.choices import (
     ToneMap,
 )
 from lippmann.rendering.request.render_request import RenderRequest
-from lippmann.scene.placement import Placement, PlacementOptions
+from lippmann.scene.placement import Placement, PlacementOptions, options_of_sequence, placement_of
 from lippmann.scene.readers.load import load_scene as _load_scene
 from lippmann.scene.scene import Scene
 
@@ -147,7 +147,7 @@ def render(
     scene: Scene | object,
     display: Display | str | Path = "seed-lenticular",
     *,
-    placement: PlacementOptions | Placement | None = None,
+    placement: PlacementOptions | Placement | Mapping[str, object] | None = None,
     bleed: float = 0.0,
     method: Method = "auto",
     order: Order | None = None,
@@ -187,8 +187,8 @@ def render(
         A :class:`~lippmann.display.Display`, a preset's name, or a TOML file. Default ``seed-lenticular``.
     placement:
         Where the display stands in the scene: a :class:`~lippmann.scene.placement.PlacementOptions` (by a camera,
-        fitted to the panel, or in the display's own millimetres; then turned, moved, scaled), or a placement
-        found before. By default a bundled scene's own camera, else fitted.
+        fitted to the panel, or in the display's own millimetres; then turned, moved, scaled), a dict of its options
+        such as ``{"turn": 30}``, or a placement found before. By default a bundled scene's own camera, else fitted.
     bleed:
         Of a print, millimetres to go on beyond every edge, which are cut off; 0 to 100. The scene stands where it
         stands without. Default 0.
@@ -305,7 +305,7 @@ def render_to_file(
     output: str | Path,
     display: Display | str | Path = "seed-lenticular",
     *,
-    placement: PlacementOptions | Placement | None = None,
+    placement: PlacementOptions | Placement | Mapping[str, object] | None = None,
     bleed: float = 0.0,
     bits: int | None = None,
     resume: bool = False,
@@ -402,7 +402,7 @@ def render_quilt(
     scene: Scene | object,
     display: Display | str | Path = "portrait",
     *,
-    placement: PlacementOptions | Placement | None = None,
+    placement: PlacementOptions | Placement | Mapping[str, object] | None = None,
     views: tuple[int, int] | None = None,
     size: tuple[int, int] | None = None,
     progress: ProgressCallback | None = None,
@@ -460,7 +460,7 @@ def render_turntable(
     frames: int | None = None,
     *,
     swing: float | None = None,
-    placement: PlacementOptions | None = None,
+    placement: PlacementOptions | Mapping[str, object] | None = None,
     progress: ProgressCallback | None = None,
     **options: object,
 ) -> Iterator[IntegralImage]:
@@ -498,9 +498,10 @@ def render_turntable(
     from lippmann.sequences.turntable import open_turntable
 
     classic = options.get("integrator") == "classic"
-    motion = open_turntable(_scene(scene), frames, swing=swing, placement=placement, classic=classic)
+    where = options_of_sequence(placement)
+    motion = open_turntable(_scene(scene), frames, swing=swing, placement=where, classic=classic)
     told = progress or silent
-    pictures = render_sequence(motion, display, range(motion.count), placement=placement, progress=told, **options)
+    pictures = render_sequence(motion, display, range(motion.count), placement=where, progress=told, **options)
     return (image for _, image in pictures)
 
 
@@ -508,7 +509,7 @@ def plan(
     scene: Scene | object,
     display: Display | str | Path = "seed-lenticular",
     *,
-    placement: PlacementOptions | Placement | None = None,
+    placement: PlacementOptions | Placement | Mapping[str, object] | None = None,
     progress: ProgressCallback | None = None,
     **options: object,
 ) -> Forecast:
@@ -618,13 +619,11 @@ def _display(source: Display | str | Path) -> Display:
     return source if isinstance(source, Display) else load_display(source)
 
 
-def _request(placement: PlacementOptions | Placement | None, options: Mapping[str, object]) -> RenderRequest:
-    return replace(RenderRequest.of(options), placement=placement or PlacementOptions())
+def _request(placement: object, options: Mapping[str, object]) -> RenderRequest:
+    return replace(RenderRequest.of(options), placement=placement_of(placement))
 
 
-def _placement(
-    placement: PlacementOptions | Placement | None, former: Mapping[str, object], function: str
-) -> PlacementOptions | Placement:
+def _placement(placement: object, former: Mapping[str, object], function: str) -> PlacementOptions | Placement:
     """``placement``, or what former keywords say instead of it, with a warning."""
     for name in former:
         if name not in (*_FORMER_PLACEMENT, "placed"):
@@ -635,9 +634,8 @@ def _placement(
         found = former.get("placed")
         if isinstance(found, Placement):
             return found
-        options = {_FORMER_PLACEMENT[name]: value for name, value in former.items() if name != "placed"}
-        return PlacementOptions(**options)  # type: ignore[arg-type]  # it checks them
-    return placement or PlacementOptions()
+        return placement_of({_FORMER_PLACEMENT[name]: value for name, value in former.items() if name != "placed"})
+    return placement_of(placement)
 
 
 __all__ = ["load_scene", "plan", "preview", "render", "render_quilt", "render_to_file", "studio"]

@@ -411,6 +411,12 @@ def test_resized_keeps_the_optics():
     assert larger.resized(512, 512) == display
 
 
+def test_a_notebook_shows_a_table():
+    page = load_display("mla-square")._repr_html_()
+    for text in ("mla-square", "510x510", "34x34", "15x15", "18.9 deg", "34x34 mm"):
+        assert f">{text}</td>" in page
+
+
 def test_summary_is_plain():
     summary = load_display("panel-4k").summary()
     assert json.loads(json.dumps(summary)) == summary

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import html
 import math
 from dataclasses import replace
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -55,6 +57,14 @@ def test_depth_is_that_of_the_picture():
     assert foreseen.blurred_share == pytest.approx(beyond.mean(), abs=0.03)
     assert foreseen.blur[0] == pytest.approx(-foreseen.depth_range[0] / 24.0)
     assert foreseen.blur[1] == pytest.approx(abs(foreseen.depth_range[1]) / 24.0)
+
+
+def test_a_notebook_shows_a_table():
+    foreseen = lippmann.plan("teapot", SHEET, placement={"turn": 30, "mode": "fit"}, spp=1)
+    page = foreseen._repr_html_()
+    ElementTree.fromstring(page)  # well-formed
+    for text in (*foreseen.in_words().values(), *foreseen.notes):
+        assert f">{html.escape(text)}</td>" in page
 
 
 def test_nothing_beyond_what_is_resolved_is_blurred():

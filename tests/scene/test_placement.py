@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from lippmann.display import Display, LensArray, Panel, list_displays, load_display
 from lippmann.errors import SceneError, UsageError
 from lippmann.scene.fit_placement import FILL, POP_OUT
-from lippmann.scene.placement import PlacementOptions, place
+from lippmann.scene.placement import PlacementOptions, options_of_sequence, place, placement_of
 from lippmann.scene.values.description import Camera
 
 
@@ -476,18 +476,25 @@ class TestDisplayFrame:
 @pytest.mark.parametrize(
     ("fields", "message"),
     [
-        ({"mode": "middle"}, "mode: placement 'middle'; known are fit, camera, display"),
-        ({"scale": 0.0}, "scale: 0; a factor from 1e-09 to 1e\\+09"),
+        ({"mode": "middle"}, "mode: placement 'middle' is not known; known are fit, camera, display"),
+        ({"mode": "disply"}, "mode: placement 'disply' is not known, did you mean 'display'"),
+        ({"camera": 3}, "camera: 3; must be the name of a camera"),
+        ({"scale": "big"}, "scale: 'big'; must be a factor"),
+        ({"pop_out": "half"}, "pop_out: 'half'; must be a share"),
+        ({"turn": "left"}, "turn: 'left'; must be one to three numbers"),
+        ({"turn": ()}, r"turn: \(\); must be one to three numbers"),
+        ({"turn": (1, 2, 3, 4)}, "turn: .*one to three numbers, none beyond 1e"),
+        ({"scale": 0.0}, r"scale: 0\.0; must be a factor from 1e-09 to 1e\+09"),
         ({"scale": -1.0}, "scale: -1"),
         ({"scale": math.nan}, "scale: nan"),
         ({"scale": 1e-200}, "scale: 1e-200"),
         ({"shift": (0, 1e200, 0)}, "shift: "),
-        ({"depth_scale": 0.0}, r"depth_scale: 0; a factor from 0\.0001 to 10000"),
+        ({"depth_scale": 0.0}, r"depth_scale: 0\.0; must be a factor from 0\.0001 to 10000"),
         ({"depth_scale": math.nan}, "depth_scale: nan"),
-        ({"pop_out": 1.01}, r"pop_out: 1\.01; a share of the depth, 0 to 1"),
+        ({"pop_out": 1.01}, r"pop_out: 1\.01; must be a share of the depth, 0 to 1"),
         ({"pop_out": -0.1}, r"pop_out: -0\.1"),
         ({"pop_out": math.nan}, "pop_out: nan"),
-        ({"turn": (1, 2)}, "turn: .*three numbers, none beyond 1e"),
+        ({"shift": 3}, "shift: 3; must be three numbers"),
         ({"shift": (0, math.inf, 0)}, "shift: .*three numbers, none beyond 1e"),
         ({"mode": "fit", "camera": "eye"}, "camera: camera 'eye' beside placement 'fit'"),
         ({"mode": "display", "pop_out": 0.5}, "pop_out: coordinates of the display leave nothing to choose"),
@@ -496,6 +503,27 @@ class TestDisplayFrame:
 def test_options_that_cannot_be(fields, message):
     with pytest.raises(UsageError, match=message):
         PlacementOptions(**fields)
+
+
+@pytest.mark.parametrize(
+    ("turn", "kept"), [(30, (30, 0, 0)), (30.5, (30.5, 0, 0)), ((30, 15), (30, 15, 0)), ([1, 2, 3], (1, 2, 3))]
+)
+def test_a_turn_of_fewer_angles_is_yaw_then_pitch(turn, kept):
+    assert PlacementOptions(turn=turn) == PlacementOptions(turn=kept)
+    assert PlacementOptions(turn=np.array(turn)).turn == kept
+
+
+def test_what_stands_for_a_placement():
+    assert placement_of(None) == PlacementOptions()
+    assert placement_of({"turn": 30, "mode": "fit"}) == PlacementOptions(mode="fit", turn=(30, 0, 0))
+    placed = place(box(10, 10, 10), display())
+    assert placement_of(placed) is placed
+    with pytest.raises(UsageError, match="'trun' is no option of a placement, did you mean 'turn'"):
+        placement_of({"trun": 3})
+    with pytest.raises(UsageError, match="placement: 'fit'; must be a PlacementOptions"):
+        placement_of("fit")
+    with pytest.raises(UsageError, match="a sequence finds the placement of each frame"):
+        options_of_sequence(placed)
 
 
 @pytest.mark.parametrize("mode", ["fit", "display"])

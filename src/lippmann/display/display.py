@@ -31,6 +31,7 @@ from lippmann.display.validation import Table, check_keys, check_text, number, p
 from lippmann.errors import DisplayError
 from lippmann.json_values import JsonObject
 from lippmann.runtime.cached_property import cached_property
+from lippmann.wording import html_table
 
 #: Infinite viewing distances in files.
 INFINITE = "infinite"
@@ -358,6 +359,26 @@ class Display:
             "viewing_distance": self._plain_viewing_distance,
             "aperture_distance": self.aperture_distance,
         }
+
+    def in_words(self) -> dict[str, str]:
+        """Key figures of the display as people read them, by name, in the order of a table."""
+        grid, (across, down) = self.lens_grid, self.pixels_per_lens
+        front, back = self.depth_budget
+        width, height = self.size_mm
+        return {
+            "name": self.name,
+            "pixels": f"{self.panel.width}x{self.panel.height}",
+            "lenses": str(grid.columns) if down is None else f"{grid.columns}x{grid.rows}",
+            "pixels/lens": f"{across:.3g}" if down is None else f"{across:.3g}x{down:.3g}",
+            "field": f"{self.field_of_view:.1f} deg",
+            "depth behind/in front": f"{-back:.0f}/{front:.0f} mm",
+            "panel": f"{width:.0f}x{height:.0f} mm",
+            "title": self.title,
+        }
+
+    def _repr_html_(self) -> str:
+        """The table of :meth:`in_words` for notebooks."""
+        return html_table("Display", self.in_words())
 
     def to_dict(self) -> JsonObject:
         """Plain values for JSON; lengths in millimetres, an infinite distance as ``"infinite"``."""

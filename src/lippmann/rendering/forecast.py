@@ -26,6 +26,7 @@ from lippmann.rendering.session import Session, open_session
 from lippmann.runtime.engine_lock import exclusive
 from lippmann.scene.placement import Placement
 from lippmann.scene.scene import Scene
+from lippmann.wording import depths_in_words, duration_in_words, html_table, samples_in_words
 
 if TYPE_CHECKING:
     from lippmann.rendering.transport.integrator import Integrator
@@ -48,6 +49,8 @@ class Forecast:
 
     Attributes
     ----------
+    scene, display:
+        Their names.
     size:
         Width and height in pixels.
     frames:
@@ -73,6 +76,7 @@ class Forecast:
         One line each: what will be blurred, cut or outside, and what reader and builder had to say.
     """
 
+    scene: str
     display: str
     size: tuple[int, int]
     frames: int
@@ -89,6 +93,32 @@ class Forecast:
     probe: dict[str, float]
     device: str
     notes: tuple[str, ...]
+
+    def in_words(self) -> dict[str, str]:
+        """What people want to know of it, by name, in the order of a table."""
+        width, height = self.size
+        of_frames = f", {self.frames} frames" if self.frames > 1 else ""
+        of_subpixels = ", a ray for every sub-pixel" if self.subpixels else ""
+        back, front = self.blur
+        stages = ", ".join(f"{stage} {duration_in_words(s)}" for stage, s in self.seconds.items() if stage != "total")
+        others = self.rays["shadow"] + self.rays["secondary"]
+        return {
+            "picture": f"{self.scene} for {self.display}, {width}x{height} pixels{of_frames}{of_subpixels}",
+            "scene": depths_in_words(*self.depth_range),
+            "resolved": depths_in_words(*self.resolvable_range),
+            "blur": f"{100 * self.blurred_share:.0f} % of the pixels see what lies beyond; "
+            f"a pixel's light spreads over {back:.1f} lenses at the back, {front:.1f} at the front",
+            "rays": f"{self.rays['primary'] / 1e6:.1f} M from pixels ({samples_in_words(self.spp, 'each')}), "
+            f"about {others / 1e6:.1f} M more",
+            "memory": f"about {self.memory['expected'] / 2**30:.1f} GiB, "
+            f"with a limit of {self.memory['limit'] / 2**30:.1f} GiB for the picture",
+            "time": f"about {duration_in_words(self.seconds['total'])} on {self.device} ({stages})",
+        }
+
+    def _repr_html_(self) -> str:
+        """The table of :meth:`in_words` for notebooks, with the notes below."""
+        notes = {f"note {number}": note for number, note in enumerate(self.notes, start=1)}
+        return html_table("Forecast", {**self.in_words(), **notes})
 
     def to_dict(self) -> dict[str, object]:
         """All of it as plain values for JSON."""
@@ -133,6 +163,7 @@ def forecast(
     per_pixel = display.panel.pixel_pitch / display.gap / display.lens_array.pitch
     share_beyond = probe.share_beyond(session, placement) * source.width * source.height / (width * height)
     return Forecast(
+        scene=scene.name,
         display=display.name,
         size=(width, height),
         frames=frames,

@@ -6,13 +6,16 @@ The display frame is right-handed, in millimetres: origin at the array's centre 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+import contextlib
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from numbers import Real
 from typing import Literal, get_args
 
 import numpy as np
 
 from lippmann.display import Display
+from lippmann.display.validation import suggestion
 from lippmann.errors import SceneError, UsageError
 from lippmann.scene.camera_placement import DepthProbe, frame_whole, place_by_camera
 from lippmann.scene.fit_placement import fit_scene
@@ -52,7 +55,8 @@ class PlacementOptions:
         Name of a camera of the scene; None takes its home camera, or its first.
     turn:
         Degrees by which the scene is turned: yaw about the display's y axis (positive: its front toward +x), then pitch
-        about x (positive: its top toward the viewer), then roll about z (positive: counter-clockwise).
+        about x (positive: its top toward the viewer), then roll about z (positive: counter-clockwise). One number is a
+        yaw, two are yaw and pitch; kept as three.
     shift:
         Millimetres by which the scene is moved in the display frame, last of all.
     scale:
@@ -80,21 +84,18 @@ class PlacementOptions:
 
     def __post_init__(self) -> None:
         if self.mode is not None and self.mode not in get_args(Mode):
-            raise UsageError(
-                f"placement '{self.mode}'", parameter="mode", rule=f"known are {', '.join(get_args(Mode))}"
-            )
-        for name in ("turn", "shift"):
-            values = getattr(self, name)
-            if len(values) != 3 or not (np.abs(values) <= _MOST).all():
-                raise UsageError(f"{values!r}", parameter=name, rule=f"three numbers, none beyond {_MOST:g}")
-        if not 1.0 / _MOST <= self.scale <= _MOST:
-            rule = f"a factor from {1.0 / _MOST:g} to {_MOST:g}"
-            raise UsageError(f"{self.scale:g}", parameter="scale", rule=rule)
-        if self.depth_scale is not None and not _LEAST_DEPTH_SCALE <= self.depth_scale <= 1.0 / _LEAST_DEPTH_SCALE:
-            rule = f"a factor from {_LEAST_DEPTH_SCALE:g} to {1.0 / _LEAST_DEPTH_SCALE:g}"
-            raise UsageError(f"{self.depth_scale:g}", parameter="depth_scale", rule=rule)
-        if self.pop_out is not None and not 0.0 <= self.pop_out <= 1.0:
-            raise UsageError(f"{self.pop_out:g}", parameter="pop_out", rule="a share of the depth, 0 to 1")
+            what = f"placement {self.mode!r} is not known{suggestion(self.mode, get_args(Mode))}"
+            raise UsageError(what, parameter="mode", rule=f"known are {', '.join(get_args(Mode))}")
+        if self.camera is not None and not isinstance(self.camera, str):
+            raise UsageError(f"{self.camera!r}", parameter="camera", rule="must be the name of a camera")
+        object.__setattr__(self, "turn", _three_numbers("turn", self.turn, least=1))
+        object.__setattr__(self, "shift", _three_numbers("shift", self.shift, least=3))
+        factor = "must be a factor from {:g} to {:g}"
+        _check_number("scale", self.scale, 1.0 / _MOST, _MOST, factor)
+        if self.depth_scale is not None:
+            _check_number("depth_scale", self.depth_scale, _LEAST_DEPTH_SCALE, 1.0 / _LEAST_DEPTH_SCALE, factor)
+        if self.pop_out is not None:
+            _check_number("pop_out", self.pop_out, 0.0, 1.0, "must be a share of the depth, {:g} to {:g}")
         if self.camera is not None and self.mode not in (None, "camera"):
             raise UsageError(
                 f"camera '{self.camera}' beside placement '{self.mode}'", parameter="camera", rule="only one"
@@ -103,6 +104,22 @@ class PlacementOptions:
             raise UsageError(
                 "coordinates of the display leave nothing to choose", parameter="pop_out", fix="use shift=0,0,Z instead"
             )
+
+    @classmethod
+    def of(cls, values: Mapping[str, object]) -> PlacementOptions:
+        """The options of a mapping, such as ``{"turn": 30, "scale": 0.9}``.
+
+        Raises
+        ------
+        UsageError
+            A name or a value is not known.
+        """
+        known = [field.name for field in fields(cls)]
+        for name in values:
+            if name not in known:
+                what = f"{name!r} is no option of a placement{suggestion(name, known)}"
+                raise UsageError(what, parameter="placement", rule=f"known are {', '.join(known)}")
+        return cls(**values)  # type: ignore[arg-type]  # checked by __post_init__
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,6 +149,39 @@ class Placement:
         """Factor on the scene's depth beside its other extents."""
         across, _, along = np.linalg.norm(self.world_from_display[:3, :3], axis=0)
         return float(across / along)
+
+
+def placement_of(value: object) -> PlacementOptions | Placement:
+    """What stands for a placement in calls: itself, a mapping of its options, or None for the defaults.
+
+    Raises
+    ------
+    UsageError
+        It is something else, or an option is not known.
+    """
+    if value is None:
+        return PlacementOptions()
+    if isinstance(value, Mapping):
+        return PlacementOptions.of(value)
+    if not isinstance(value, (PlacementOptions, Placement)):
+        rule = 'must be a PlacementOptions, a Placement, or a dict such as {"turn": 30}'
+        raise UsageError(f"{value!r}", parameter="placement", rule=rule)
+    return value
+
+
+def options_of_sequence(value: object) -> PlacementOptions:
+    """:func:`placement_of` for pictures that move: options alone.
+
+    Raises
+    ------
+    UsageError
+        As :func:`placement_of`, or it is a placement found before.
+    """
+    options = placement_of(value)
+    if isinstance(options, Placement):
+        rule = "a sequence finds the placement of each frame by itself"
+        raise UsageError("a placement found before", parameter="placement", rule=rule, fix="give its options instead")
+    return options
 
 
 def place(
@@ -246,6 +296,23 @@ def face_viewer(bounds: Bounds, options: PlacementOptions, warnings: list[str]) 
         return options
     warnings.append(f"the scene is flat and would be seen edge-on: turned to show its {'side' if thin == 0 else 'top'}")
     return replace(options, turn=(-90.0, 0.0, 0.0) if thin == 0 else (0.0, 90.0, 0.0))
+
+
+def _three_numbers(name: str, value: object, *, least: int) -> Vector:
+    """Three numbers of at least ``least``, the others 0."""
+    numbers: list[float] = []
+    with contextlib.suppress(TypeError, ValueError):
+        numbers += np.atleast_1d(np.asarray(value, np.float64)).tolist()
+    if not least <= len(numbers) <= 3 or not (np.abs(numbers) <= _MOST).all():
+        count = "three numbers" if least == 3 else "one to three numbers"
+        raise UsageError(f"{value!r}", parameter=name, rule=f"must be {count}, none beyond {_MOST:g}")
+    x, y, z = (*numbers, *([0.0] * (3 - len(numbers))))
+    return x, y, z
+
+
+def _check_number(name: str, value: object, low: float, high: float, rule: str) -> None:
+    if not isinstance(value, Real) or not low <= float(value) <= high:
+        raise UsageError(f"{value!r}", parameter=name, rule=rule.format(low, high))
 
 
 def _choose_camera(cameras: Sequence[Camera], name: str | None) -> Camera:

@@ -17,7 +17,7 @@ from lippmann.journal.tile_journal import sweep_beside
 from lippmann.progress import ProgressCallback, silent
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.runtime import engine
-from lippmann.scene.placement import PlacementOptions
+from lippmann.scene.placement import options_of_sequence
 from lippmann.sequences.forms import INTEGRAL, Form
 from lippmann.sequences.frames import Stand, find_stand, hold_choice, render_frames, render_tiled_frames
 from lippmann.sequences.motion import Motion
@@ -112,9 +112,7 @@ def saved_sequence(
     from lippmann.tiles.job import made_by
 
     name, stored = format_for(path_of(frames[0]), bits)
-    placement = request.placement
-    if not isinstance(placement, PlacementOptions):
-        raise TypeError("a sequence finds the placement of each frame by itself")
+    placement = options_of_sequence(request.placement)
     started = engine.start(request.device, request.threads)
     denoiser = oidn.denoiser_version() if request.denoise != "none" else None
     options = {name: value for name, value in vars(request).items() if name not in _IMMATERIAL}

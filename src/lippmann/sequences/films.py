@@ -16,7 +16,7 @@ from lippmann.progress import silent
 from lippmann.quilts.quilt import DeviceQuilt, Quilt, QuiltLayout
 from lippmann.rendering.request.choices import REUSING
 from lippmann.rendering.request.render_request import RenderRequest
-from lippmann.scene.placement import PlacementOptions
+from lippmann.scene.placement import options_of_sequence
 from lippmann.sequences.files import SavedFrame
 from lippmann.sequences.forms import INTEGRAL, QuiltForm
 from lippmann.sequences.frames import Stand, find_stand, hold_choice, hold_exposure
@@ -155,10 +155,7 @@ class QuiltCameras:
 
     def _begin(self) -> Stand:
         """Find where the display stands, and what of the request a quilt can honour."""
-        options = self.request.placement
-        if not isinstance(options, PlacementOptions):
-            raise TypeError("a sequence finds the placement of each frame by itself")
-        self._where = find_stand(self.motion, self.display, options)
+        self._where = find_stand(self.motion, self.display, options_of_sequence(self.request.placement))
         held = hold_exposure(self.request, self.motion, self.display, self._where)
         method = "full" if held.method in REUSING else held.method
         self.request = replace(held, method=method, order=None, respect_gloss=None, subpixels=False, layers=False)

@@ -7,7 +7,7 @@ jumps from frame to frame, and a frame is the same whether it is rendered alone 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
@@ -18,7 +18,14 @@ from lippmann.display import Display, load_display
 from lippmann.errors import SceneError, UsageError
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.rendering.request.render_request import RenderRequest
-from lippmann.scene.placement import Mode, Placement, PlacementOptions, place, stand
+from lippmann.scene.placement import (
+    Mode,
+    Placement,
+    PlacementOptions,
+    options_of_sequence,
+    place,
+    stand,
+)
 from lippmann.scene.values.description import Camera, Matrix
 from lippmann.sequences.forms import INTEGRAL, Form, QuiltForm, Shown
 from lippmann.sequences.motion import Motion, open_motion
@@ -133,7 +140,7 @@ def render_sequence(
     display: Display | str | Path = "seed-lenticular",
     frames: FrameRange | Sequence[int] = FrameRange(),
     *,
-    placement: PlacementOptions | None = None,
+    placement: PlacementOptions | Mapping[str, object] | None = None,
     progress: ProgressCallback = silent,
     **options: object,
 ) -> Iterator[tuple[int, IntegralImage]]:
@@ -173,7 +180,7 @@ def render_quilt_sequence(
     display: Display | str | Path = "portrait",
     frames: FrameRange | Sequence[int] = FrameRange(),
     *,
-    placement: PlacementOptions | None = None,
+    placement: PlacementOptions | Mapping[str, object] | None = None,
     views: tuple[int, int] | None = None,
     size: tuple[int, int] | None = None,
     progress: ProgressCallback = silent,
@@ -214,7 +221,7 @@ def sequence_to_files(
     display: Display | str | Path = "seed-lenticular",
     frames: FrameRange | Sequence[int] = FrameRange(),
     *,
-    placement: PlacementOptions | None = None,
+    placement: PlacementOptions | Mapping[str, object] | None = None,
     runner: Runner | None = None,
     bits: int | None = None,
     progress: ProgressCallback = silent,
@@ -252,11 +259,11 @@ def _begin(
     motion: Motion,
     display: Display | str | Path,
     frames: FrameRange | Sequence[int],
-    placement: PlacementOptions | None,
+    placement: PlacementOptions | Mapping[str, object] | None,
 ) -> tuple[Display, Sequence[int], Stand]:
     target = display if isinstance(display, Display) else load_display(display)
     numbers = frames.of(motion) if isinstance(frames, FrameRange) else frames
-    return target, numbers, find_stand(motion, target, placement or PlacementOptions())
+    return target, numbers, find_stand(motion, target, options_of_sequence(placement))
 
 
 def render_frames(

@@ -193,6 +193,27 @@ def test_unreadable_places(tmp_path):
         load_display(tmp_path)
 
 
+@pytest.mark.parametrize(
+    ("called", "name"),
+    [
+        ("Looking Glass Go", "looking-glass-go"),
+        ("looking glass portrait", "looking-glass-portrait"),
+        ("LKG Portrait", "looking-glass-portrait"),
+        ("65 inch", "looking-glass-65"),
+        ('27" landscape', "looking-glass-27-landscape"),
+        ("32 inch portrait, third generation", "looking-glass-32-gen3-portrait"),
+    ],
+)
+def test_devices_by_what_they_are_called(called, name):
+    assert load_display(called).name == name
+
+
+def test_a_name_of_several_devices_is_answered_by_theirs():
+    known = "looking-glass-16-gen2, looking-glass-16-gen3-landscape, looking-glass-16-gen3-portrait"
+    with pytest.raises(DisplayError, match=f"'16 inch' is the name of 3 displays; say which: {known}"):
+        load_display("16 inch")
+
+
 def test_unknown_names_get_near_ones():
     with pytest.raises(DisplayError, match=r"unknown display 'panel4k', did you mean 'panel-4k' .*; .*seed-lenticular"):
         load_display("panel4k")

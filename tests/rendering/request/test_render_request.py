@@ -31,6 +31,16 @@ from lippmann.rendering.request.render_request import RenderRequest
         ({"quality": 0.0}, "quality"),
         ({"max_time": float("inf")}, "max_time"),
         ({"max_time": float("nan")}, "max_time"),
+        ({"quality": "high"}, "quality"),
+        ({"quality": True}, "quality"),
+        ({"max_time": "soon"}, "max_time"),
+        ({"clamp_indirect": "off"}, "clamp_indirect"),
+        ({"exposure": "bright"}, "exposure"),
+        ({"exposure": 41}, "exposure"),
+        ({"subpixels": "yes"}, "subpixels"),
+        ({"layers": "depth"}, "layers"),
+        ({"placement": "fit"}, "placement"),
+        ({"method": ["full"]}, "method"),
         ({"effort": "lazy"}, "effort"),
         ({"effort": "draft", "spp": 1}, "spp"),
         ({"effort": "draft", "quality": 30.0}, "quality"),
@@ -48,6 +58,8 @@ def test_keyword_arguments_are_those_of_a_request():
     assert RenderRequest.of({"spp": 3, "denoise": "none"}) == RenderRequest(spp=3, denoise="none")
     with pytest.raises(UsageError, match="'samples' is no option of a render; known are method, "):
         RenderRequest.of({"samples": 3})
+    with pytest.raises(UsageError, match="'denoiser' is no option of a render, did you mean 'denoise'"):
+        RenderRequest.of({"denoiser": "none"})
     with pytest.raises(UsageError, match="'reason'"):
         RenderRequest.of({"reason": "because"})
 

@@ -12,9 +12,10 @@ import typer
 from lippmann.cli.commands.quilt import Aspect, Layout, layout_of
 from lippmann.cli.commands.sequence import Codec
 from lippmann.cli.shared import options, parse
-from lippmann.cli.shared.console import Console, estimate_in_words, samples_in_words
+from lippmann.cli.shared.console import Console, estimate_in_words
 from lippmann.cli.shared.default_output import output_of
 from lippmann.errors import UsageError
+from lippmann.wording import samples_in_words
 
 if TYPE_CHECKING:
     from lippmann.display import Display

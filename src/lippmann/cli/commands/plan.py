@@ -3,22 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
 import typer
 
 from lippmann.cli.commands import print as printing
 from lippmann.cli.commands import sequence
 from lippmann.cli.shared import options, parse
-from lippmann.cli.shared.console import Console, samples_in_words
-from lippmann.cli.shared.picture_report import depths
+from lippmann.cli.shared.console import Console
 from lippmann.cli.shared.scene_source import SceneSource
-
-if TYPE_CHECKING:
-    from lippmann.rendering.forecast import Forecast
-
-#: Seconds of a minute and of an hour, from which on times are told in them.
-_MINUTE, _HOUR = 60.0, 3600.0
 
 
 def plan(
@@ -140,33 +133,5 @@ def plan(
         found = forecast(loaded, target, request, progress, frames=frames)
     for note in found.notes:
         console.remark(note)
-    console.result({"scene": loaded.name, **found.to_dict()}, "\n".join(_lines(loaded.name, found)))
-
-
-def _lines(name: str, found: Forecast) -> list[str]:
-    width, height = found.size
-    of_frames = f", {found.frames} frames" if found.frames > 1 else ""
-    of_subpixels = ", a ray for every sub-pixel" if found.subpixels else ""
-    behind, before = found.blur
-    stages = ", ".join(f"{stage} {_duration(spent)}" for stage, spent in found.seconds.items() if stage != "total")
-    others = found.rays["shadow"] + found.rays["secondary"]
-    return [
-        f"picture   {name} for {found.display}, {width}x{height} pixels{of_frames}{of_subpixels}",
-        f"scene     {depths(*found.depth_range)}",
-        f"resolved  {depths(*found.resolvable_range)}",
-        f"blur      {100 * found.blurred_share:.0f} % of the pixels see what lies beyond; "
-        f"a pixel's light spreads over {behind:.1f} lenses at the back, {before:.1f} at the front",
-        f"rays      {found.rays['primary'] / 1e6:.1f} M from pixels ({samples_in_words(found.spp, 'each')}), "
-        f"about {others / 1e6:.1f} M more",
-        f"memory    about {found.memory['expected'] / 2**30:.1f} GiB, "
-        f"with a limit of {found.memory['limit'] / 2**30:.1f} GiB for the picture",
-        f"time      about {_duration(found.seconds['total'])} on {found.device} ({stages})",
-    ]
-
-
-def _duration(seconds: float) -> str:
-    if seconds < _MINUTE:
-        return f"{seconds:.2g} s" if seconds < 10 else f"{seconds:.0f} s"
-    if seconds < _HOUR:
-        return f"{seconds / _MINUTE:.1f} min"
-    return f"{seconds / _HOUR:.1f} h"
+    lines = [f"{name:<10}{text}" for name, text in found.in_words().items()]
+    console.result(found.to_dict(), "\n".join(lines))

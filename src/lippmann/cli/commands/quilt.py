@@ -13,12 +13,13 @@ from lippmann.cli.commands import print as printing
 from lippmann.cli.commands import sequence
 from lippmann.cli.commands.interlace import FitOption, fit_note
 from lippmann.cli.shared import options, parse
-from lippmann.cli.shared.console import Console, estimate_in_words, samples_in_words
+from lippmann.cli.shared.console import Console, estimate_in_words
 from lippmann.cli.shared.grouped_help import HelpfulCommand
 from lippmann.cli.shared.picture_report import add_seconds, depth_line, report
 from lippmann.cli.shared.scene_source import SceneSource
 from lippmann.errors import UsageError
 from lippmann.progress import Progress, ProgressCallback
+from lippmann.wording import samples_in_words
 
 if TYPE_CHECKING:
     from lippmann.quilts.quilt import Quilt, QuiltLayout

@@ -15,12 +15,13 @@ from lippmann.cli.commands import cluster as clusters
 from lippmann.cli.commands import print as printing
 from lippmann.cli.commands import sequence, view
 from lippmann.cli.shared import command_clock, options, parse
-from lippmann.cli.shared.console import Console, samples_in_words
+from lippmann.cli.shared.console import Console
 from lippmann.cli.shared.default_output import output_of
 from lippmann.cli.shared.picture_report import add_seconds, remarks, report
 from lippmann.cli.shared.scene_source import SceneSource
 from lippmann.errors import UsageError
 from lippmann.progress import Progress, ProgressCallback
+from lippmann.wording import samples_in_words
 
 if TYPE_CHECKING:
     from lippmann.display import Display

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -76,34 +76,10 @@ def displays(as_json: options.Json = False) -> None:
     """List the bundled displays."""
     from lippmann.display import list_displays
 
-    rows = [display.summary() for display in list_displays()]
-    header = {
-        "name": "name",
-        "pixels": "pixels",
-        "lenses": "lenses",
-        "pixels_per_lens": "pixels/lens",
-        "field_of_view": "field",
-        "depth": "depth behind/in front",
-        "title": "",
-    }
-    table = [header, *({key: _cell(key, row) for key in header} for row in rows)]
-    widths = {key: max(len(line[key]) for line in table) for key in header}
-    lines = ["  ".join(line[key].ljust(widths[key]) for key in header).rstrip() for line in table]
-    Console(as_json=as_json).result({"displays": rows}, "\n".join(lines))
-
-
-def _cell(key: str, row: dict[str, Any]) -> str:
-    if key == "pixels":
-        return "x".join(str(count) for count in row["pixels"])
-    if key == "lenses":
-        columns, rows = row["lenses"]
-        return str(columns) if row["layout"] == "lenticular" else f"{columns}x{rows}"
-    if key == "pixels_per_lens":
-        across, down = row["pixels_per_lens"]
-        return f"{across:.3g}" if down is None else f"{across:.3g}x{down:.3g}"
-    if key == "field_of_view":
-        return f"{row['field_of_view']:.1f} deg"
-    if key == "depth":
-        front, back = row["depth_budget"]
-        return f"{-back:.0f}/{front:.0f} mm"
-    return str(row[key])
+    found = list_displays()
+    table = [display.in_words() for display in found]
+    columns = [[name, *(row[name] for row in table)] for name in table[0]]
+    padded = [[text.ljust(max(map(len, column))) for text in column] for column in columns]
+    lines = ["  ".join(row).rstrip() for row in zip(*padded, strict=True)]
+    result = {"displays": [display.summary() for display in found]}
+    Console(as_json=as_json).result(result, "\n".join(lines))

@@ -45,11 +45,6 @@ class Console:
             yield PlainProgress()
 
 
-def samples_in_words(spp: int | None, of: str = "per pixel") -> str:
-    """``1 sample per pixel``, ``16 samples per pixel``."""
-    return f"{spp} sample{'' if spp == 1 else 's'} {of}"
-
-
 def estimate_in_words(estimate: Mapping[str, object], part: str = "micro-image") -> str:
     """What a picture says of its own error, as :attr:`Provenance.estimate` holds it; a quilt's parts are views."""
     from lippmann.rendering.estimate.psnr import Estimate

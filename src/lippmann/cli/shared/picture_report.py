@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
 from lippmann.cli.shared.console import Console, estimate_in_words
+from lippmann.wording import depths_in_words
 
 if TYPE_CHECKING:
     from lippmann.image import Provenance
@@ -47,12 +48,7 @@ def depth_line(made: Provenance) -> str:
     """Where the scene lies, beside what the display can resolve."""
     ranges = (cast("tuple[float, float]", made.options[key]) for key in ("depth_range", "resolvable_range"))
     (back, front), (far, near) = ranges
-    return f"scene {depths(back, front)}; the display resolves {depths(far, near)}"
-
-
-def depths(back: float, front: float) -> str:
-    """A range of depth in words."""
-    return f"from {-back:.1f} mm behind to {front:.1f} mm in front of the lens plane"
+    return f"scene {depths_in_words(back, front)}; the display resolves {depths_in_words(far, near)}"
 
 
 def add_seconds(provenance: Provenance, **seconds: float) -> Provenance:

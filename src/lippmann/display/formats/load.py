@@ -68,12 +68,13 @@ def load_display(name_or_path: str | os.PathLike[str]) -> Display:
     """The preset of that name, the display of a TOML file or a Looking Glass's ``visual.json``, or of a short form.
 
     A Looking Glass preset goes by the end of its name, too, such as ``portrait`` or
-    ``lkg-portrait``.
+    ``lkg-portrait``, and by what its device is called, such as ``Looking Glass Go`` or ``27 inch landscape``.
 
     Raises
     ------
     DisplayError
-        If there is neither, or the file cannot be read or does not describe a possible display.
+        If there is neither, or the file cannot be read or does not describe a possible display; several devices are
+        called so.
     """
     presets = _preset_texts()
     name = os.fspath(name_or_path)
@@ -86,8 +87,11 @@ def load_display(name_or_path: str | os.PathLike[str]) -> Display:
         return display_of_short_form(name)
     path = Path(name)
     if path.suffix not in (".toml", ".json") and not path.exists():
+        if device := _device_called(name, presets):
+            return _from_toml(presets[device], where=f"{device}.toml", stem=device)
         rule = f"the displays are {', '.join(presets)}, or a .toml file, or a Looking Glass's visual.json"
-        raise DisplayError(f"unknown display {name!r}{suggestion(name, presets)}", rule=rule)
+        known = [*presets, *(preset.removeprefix(_FAMILY) for preset in presets)]
+        raise DisplayError(f"unknown display {name!r}{suggestion(name, known)}", rule=rule)
     text = _read(path)
     if is_calibration(text):
         return display_of_calibration(text, where=name)
@@ -103,6 +107,21 @@ def _preset_texts() -> dict[str, str]:
     folder = files("lippmann.display") / "presets"
     presets = (entry for entry in folder.iterdir() if entry.name.endswith(".toml"))
     return {entry.name[:-5]: entry.read_text(encoding="utf-8") for entry in sorted(presets, key=lambda e: e.name)}
+
+
+def _device_called(name: str, presets: Mapping[str, str]) -> str | None:
+    """The Looking Glass preset whose name and title hold all words of ``name``; None if there is none."""
+    words = _words(name)
+    titles = {device: tomllib.loads(text)["title"] for device, text in presets.items() if device.startswith(_FAMILY)}
+    called = [device for device, title in titles.items() if words and words <= _words(f"{device} {title}")]
+    exact = [device for device in called if words | _words(_FAMILY) == _words(device)]
+    if len(exact or called) > 1:
+        raise DisplayError(f"{name!r} is the name of {len(called)} displays", rule=f"say which: {', '.join(called)}")
+    return next(iter(exact or called), None)
+
+
+def _words(name: str) -> set[str]:
+    return set(re.findall(r"[a-z0-9.]+", name.lower())) - {"inch", "in", "lkg"}
 
 
 def _read(path: Path) -> str:

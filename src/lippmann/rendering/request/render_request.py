@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
+from numbers import Real
 from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
@@ -11,6 +13,7 @@ from numpy.typing import NDArray
 
 from lippmann.color.tone_map import pbr_neutral
 from lippmann.color.transfer import Transfer
+from lippmann.display.validation import suggestion
 from lippmann.errors import UsageError
 from lippmann.rendering.request.choices import (
     Caustics,
@@ -23,7 +26,7 @@ from lippmann.rendering.request.choices import (
     PixelFilter,
     ToneMap,
 )
-from lippmann.scene.placement import Placement, PlacementOptions
+from lippmann.scene.placement import Placement, PlacementOptions, placement_of
 
 if TYPE_CHECKING:
     from lippmann.display import Display
@@ -54,6 +57,13 @@ _RANGES = {
     "seed": (0, 2**32 - 1),
     "threads": (1, 4096),
     "memory": (1, 2**63),
+}
+#: Largest value and rule of the numbers above 0 that may be left open.
+_POSITIVE = {
+    "quality": (80.0, "must be above 0 and at most 80 dB"),
+    "quality_worst": (80.0, "must be above 0 and at most 80 dB"),
+    "max_time": (sys.float_info.max, "must be seconds above 0"),
+    "clamp_indirect": (sys.float_info.max, "must be radiance above 0, 1 being white"),
 }
 
 
@@ -171,7 +181,8 @@ class RenderRequest:
         for name, words in _WORDS.items():
             value, known = getattr(self, name), get_args(words)
             if value not in known and not (name == "order" and value is None):
-                raise UsageError(f"'{value}' is not known", parameter=name, rule=f"known are {', '.join(known)}")
+                what = f"{value!r} is not known{suggestion(value, known)}"
+                raise UsageError(what, parameter=name, rule=f"known are {', '.join(known)}")
         for name, (low, high) in _RANGES.items():
             value = getattr(self, name)
             if value is None and name != "seed":
@@ -187,18 +198,17 @@ class RenderRequest:
                     rule="a draft has one sample a pixel",
                     fix='leave it out, or use effort="normal"',
                 )
-        for name in ("quality", "quality_worst"):
+        for name, (most, rule) in _POSITIVE.items():
             value = getattr(self, name)
-            if value is not None and not 0 < value <= 80:
-                raise UsageError(f"{value:g} dB", parameter=name, rule="must be above 0 and at most 80 dB")
-        if self.exposure != "auto" and not -MOST_EXPOSURE <= self.exposure <= MOST_EXPOSURE:
+            if value is not None and not (_is_number(value) and 0 < value <= most):
+                raise UsageError(f"{value!r}", parameter=name, rule=rule)
+        if self.exposure != "auto" and not (_is_number(self.exposure) and abs(self.exposure) <= MOST_EXPOSURE):
             rule = f"must be 'auto', or stops from {-MOST_EXPOSURE} to {MOST_EXPOSURE}"
             raise UsageError(f"{self.exposure!r}", parameter="exposure", rule=rule)
-        if self.clamp_indirect is not None and not 0 < self.clamp_indirect < float("inf"):
-            rule = "must be radiance above 0, 1 being white"
-            raise UsageError(f"{self.clamp_indirect:g}", parameter="clamp_indirect", rule=rule)
-        if self.max_time is not None and not 0 < self.max_time < float("inf"):
-            raise UsageError(f"{self.max_time:g} s", parameter="max_time", rule="must be seconds above 0")
+        for name in ("respect_gloss", "subpixels", "layers"):
+            if getattr(self, name) not in (None, True, False):
+                raise UsageError(f"{getattr(self, name)!r}", parameter=name, rule="must be True, False or None")
+        object.__setattr__(self, "placement", placement_of(self.placement))
 
     @classmethod
     def of(cls, options: Mapping[str, object]) -> RenderRequest:
@@ -212,7 +222,8 @@ class RenderRequest:
         known = [each.name for each in fields(cls) if each.name not in ("reason", "spp_reserve", "began")]
         for name in options:
             if name not in known:
-                raise UsageError(f"'{name}' is no option of a render", rule=f"known are {', '.join(known)}")
+                what = f"{name!r} is no option of a render{suggestion(name, known)}"
+                raise UsageError(what, rule=f"known are {', '.join(known)}")
         return cls(**options)  # type: ignore[arg-type]  # checked by __post_init__
 
     @property
@@ -275,3 +286,7 @@ class RenderRequest:
     def transfer(self) -> Transfer:
         """How values become codes: those of the classic models are codes already, as their own programs write them."""
         return "linear" if self.integrator == "classic" else "srgb"
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, Real) and not isinstance(value, bool)
