@@ -17,6 +17,7 @@ from lippmann.scene.readers.usd.materials import Surface, SurfaceReader
 from lippmann.scene.readers.usd.meshes import MeshReader, Part
 from lippmann.scene.readers.usd.process import ask_stage
 from lippmann.scene.readers.usd.records import Record
+from lippmann.scene.readers.usd.splats import SplatReader
 from lippmann.scene.values.description import AlphaMode, Instance, Material, Matrix, Mesh, SceneDescription
 
 #: What a mesh without material looks like: the grey that UsdPreviewSurface has, not shiny.
@@ -74,14 +75,22 @@ def describe(tree: Record, arrays: Sequence[NDArray[np.generic]], path: Path, as
     surfaces = [SurfaceReader(assets, notes).read(record) for record in tree["materials"]]
     reader = MeshReader(arrays, surfaces, path.name)
     content = _Content(surfaces)
-    for record in tree["meshes"]:
+    splats = SplatReader(arrays, path.name, notes)
+
+    def worlds_of(record: Record) -> Matrix:
         with np.errstate(invalid="ignore", over="ignore"):  # such places are refused next
             worlds = scene_from_stage @ np.asarray(arrays[record["worlds"]], np.float64)
         if not np.abs(worlds).max() < _FARTHEST:
-            raise SceneError(f"mesh {record['name']} lies beyond all bounds", where=path.name)
+            raise SceneError(f"{record['name']} lies beyond all bounds", where=path.name)
+        return worlds
+
+    for record in tree["splats"]:
+        splats.add(record, worlds_of(record))
+    for record in tree["meshes"]:
+        worlds = worlds_of(record)
         for part in reader.parts(record):
             content.add(part, worlds @ np.diag([part.scale, part.scale, part.scale, 1.0]))
-    if not content.instances:
+    if not content.instances and not splats.placed:
         raise SceneError(
             "the stage shows no meshes", where=path.name, rule="a scene needs some", fix="; ".join([*notes][:3])
         )
@@ -101,6 +110,7 @@ def describe(tree: Record, arrays: Sequence[NDArray[np.generic]], path: Path, as
         environment=lights.environment,
         notes=[*notes, *reader.notes, *assets.notes],
         physical_lights=bool(lights.lights or lights.meshes),
+        splats=splats.joined(),
     )
 
 

@@ -14,6 +14,7 @@ from lippmann.scene.readers.usd.stage_lights import camera_record, light_record
 from lippmann.scene.readers.usd.stage_meshes import PRIMITIVES, mesh_record, primitive_record
 from lippmann.scene.readers.usd.stage_shading import MaterialTable
 from lippmann.scene.readers.usd.stage_skinning import Skinning
+from lippmann.scene.readers.usd.stage_splats import PARTICLES, splat_record
 
 Matrices = NDArray[np.float64]
 
@@ -44,6 +45,7 @@ class Traversal:
         self._worlds: dict[tuple[object, ...], list[Matrices]] = {}
         self._lights: list[Record] = []
         self._cameras: list[Record] = []
+        self._splats: list[Record] = []
         self._copies = 0
         self._unread: dict[str, int] = {}
 
@@ -70,6 +72,7 @@ class Traversal:
             "materials": self._materials.records,
             "lights": self._lights,
             "cameras": self._cameras,
+            "splats": self._splats,
         }
 
     def _visit(self, root: Usd.Prim, base: Matrices, base_from_world: Matrices, depth: int) -> None:
@@ -78,7 +81,10 @@ class Traversal:
         for prim in prims:
             if prim.IsPseudoRoot():
                 continue
+            kind = str(prim.GetTypeName())
             if not prim.IsA(UsdGeom.Imageable):
+                if kind.startswith(PARTICLES):  # which usd-core before 26 does not know
+                    self._leave_out(kind)
                 continue
             if self._is_hidden(prim):
                 prims.PruneChildren()
@@ -87,15 +93,25 @@ class Traversal:
             if prim.IsA(UsdGeom.PointInstancer):
                 self._add_instancer(UsdGeom.PointInstancer(prim), base @ place, depth)
                 prims.PruneChildren()
-            elif prim.IsA(UsdGeom.Mesh) or str(prim.GetTypeName()) in PRIMITIVES:
+            elif prim.IsA(UsdGeom.Mesh) or kind in PRIMITIVES:
                 self._add_mesh(prim, base, place)
+            elif kind.startswith(PARTICLES):
+                self._add_splats(prim, base @ place)
             elif prim.IsA(UsdGeom.Camera):
                 self._cameras.append(camera_record(UsdGeom.Camera(prim), (base @ place)[0], self._time))
             elif prim.HasAPI(UsdLux.LightAPI):
                 self._lights += [light_record(prim, world, self._time, self.notes) for world in base @ place]
             elif prim.IsA(UsdGeom.Boundable) and not prim.IsA(UsdSkel.Root) and not prim.IsA(UsdSkel.Skeleton):
-                kind = str(prim.GetTypeName())
-                self._unread[kind] = self._unread.get(kind, 0) + 1
+                self._leave_out(kind)
+
+    def _leave_out(self, kind: str) -> None:
+        self._unread[kind] = self._unread.get(kind, 0) + 1
+
+    def _add_splats(self, prim: Usd.Prim, worlds: Matrices) -> None:
+        record = splat_record(prim, self._time, self._arrays, self.notes)
+        if record is not None:
+            self._count(len(worlds))
+            self._splats.append({**record, "worlds": self._arrays.add(worlds)})
 
     def _is_hidden(self, prim: Usd.Prim) -> bool:
         imageable = UsdGeom.Imageable(prim)
