@@ -1,6 +1,6 @@
 """Every command does its work, and says so as text and as JSON."""
 
-from __future__ import re
+import re
 
 import numpy as np
 import pytest
