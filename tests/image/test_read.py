@@ -12,7 +12,9 @@ from hypothesis import strategies as st
 from PIL import Image
 
 from lippmann.codecs.exr import write_exr
+from lippmann.codecs.icc import rgb_profile
 from lippmann.codecs.png import encode_png, read_png_header
+from lippmann.color.primaries import REC709
 from lippmann.color.transfer import quantize
 from lippmann.errors import LippmannError, PictureError
 from lippmann.image import Provenance, open_file, read_metadata, read_picture, write_picture
@@ -109,6 +111,36 @@ def test_a_picture_without_a_display(tmp_path, display, picture):
         read_picture(path, display=display("square", lenses=(5, 3)))
 
 
+@pytest.mark.parametrize("options", [{}, {"bits": 1}])
+def test_pictures_of_one_bit_are_read(tmp_path, options):
+    stripes = np.repeat(np.tile(np.repeat([0, 255], 4), 64)[None], 512, axis=0).astype(np.uint8)
+    picture = Image.fromarray(stripes)
+    picture = picture.convert("P", palette=1, colors=2) if options else picture.convert("1")
+    picture.save(tmp_path / "a.png", optimize=True, **options)
+    assert (tmp_path / "a.png").stat().st_size < 512 * 512 / 1100
+    values, _ = open_file(tmp_path / "a.png").decode()
+    np.testing.assert_array_equal(values, np.repeat(stripes[..., None], 3, axis=2))
+
+
+@pytest.mark.parametrize("ending", [".png", ".tif"])
+def test_native_pictures_are_upright(tmp_path, ending):
+    codes = np.random.default_rng(3).integers(0, 256, (9, 12, 3), dtype=np.uint8)
+    exif = Image.Exif()
+    exif[0x112] = 6
+    Image.fromarray(np.rot90(codes).copy()).save(tmp_path / f"a{ending}", exif=exif)
+    file = open_file(tmp_path / f"a{ending}")
+    assert (file.width, file.height) == (12, 9)
+    np.testing.assert_array_equal(file.decode()[0], codes)
+
+
+def test_codes_of_a_display_stay_and_those_of_a_view_become_srgb(tmp_path):
+    codes = np.full((4, 6, 3), 128, np.uint8)
+    (tmp_path / "linear.png").write_bytes(encode_png(codes, text={}, icc=rgb_profile(REC709, 1.0)))
+    file = open_file(tmp_path / "linear.png")
+    assert (file.decode()[0] == 128).all()
+    assert file.decode(as_srgb=True)[0] == pytest.approx(188, abs=1)
+
+
 def test_a_display_given_replaces_the_one_in_the_file(tmp_path, display, picture, provenance):
     picture(display("square")).save(tmp_path / "a.png")
     other = display("lenticular")
@@ -153,9 +185,9 @@ def test_grey_and_opaque_pictures_of_other_programs(tmp_path, display, name, dty
 
 def test_what_no_panel_shows_is_refused(tmp_path, display):
     array = display("square")
-    values = np.zeros((9, 12, 3), dtype=np.float64)
+    values = np.zeros((9, 12, 3), dtype=np.uint32)
     tifffile.imwrite(tmp_path / "a.tif", values, photometric="rgb")
-    with pytest.raises(PictureError, match=r"a.tif: holds values of the type float64; tiff is read with uint8"):
+    with pytest.raises(PictureError, match=r"a.tif: holds values of the type uint32; tiff is read with uint8"):
         read_picture(tmp_path / "a.tif", display=array)
     tifffile.imwrite(tmp_path / "b.tif", np.zeros((4, 9, 12, 3), dtype=np.uint8), photometric="rgb", planarconfig=1)
     assert read_picture(tmp_path / "b.tif", display=array).pixels.shape == (9, 12, 3)  # the first of four pages

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from PIL import Image
 
+from lippmann.codecs.icc import rgb_profile
+from lippmann.color.primaries import REC709
 from lippmann.errors import OutputError, PictureError
 from lippmann.image import PictureFile, encoding
 from lippmann.quilts import files as quilt_files
@@ -123,6 +127,29 @@ def test_views_of_several_depths_become_linear(folder, deep_view):
 
 
 @pytest.mark.parametrize("ending", [".png", ".jpg", ".tif"])
+def test_views_that_lie_are_turned_upright(tmp_path, ending):
+    exif = Image.Exif()
+    exif[0x112] = 6
+    upright = np.zeros((32, 48, 3), np.uint8)
+    upright[:16] = 40, 80, 230
+    for number in range(2):
+        Image.fromarray(np.rot90(upright).copy()).save(tmp_path / f"v{number}{ending}", exif=exif, quality=95)
+    quilt = read_views(tmp_path)
+    assert quilt.view_size == (48, 32)
+    assert np.abs(quilt.view_values(1).astype(int) - upright).max() < 40
+    assert np.abs(quilt.view_values(1).astype(int) - upright)[:12].max() < 8
+
+
+def test_views_of_another_colour_space_become_srgb(tmp_path):
+    linear = rgb_profile(REC709, 1.0)
+    for number, options in enumerate(({"icc_profile": linear}, {})):
+        Image.new("RGB", (8, 8), (128, 128, 128)).save(tmp_path / f"v{number}.png", **options)
+    quilt = read_views(tmp_path)
+    assert quilt.view_values(0)[0, 0] == pytest.approx(188, abs=1)
+    assert (quilt.view_values(1) == 128).all()
+
+
+@pytest.mark.parametrize("ending", [".png", ".jpg", ".tif"])
 def test_every_view_is_opened_once(tmp_path, monkeypatch, ending):
     made = tmp_path / "views"
     made.mkdir()
@@ -131,10 +158,13 @@ def test_every_view_is_opened_once(tmp_path, monkeypatch, ending):
     opened = []
 
     def counted(function):
-        return lambda path, *more: (opened.append(path.name), function(path, *more))[1]
+        return lambda *given: (
+            opened.append(next(one.name for one in given if isinstance(one, Path))),
+            function(*given),
+        )[1]
 
     monkeypatch.setattr(quilt_files, "open_file", counted(quilt_files.open_file))
-    monkeypatch.setattr(quilt_files, "open_picture", counted(quilt_files.open_picture))
+    monkeypatch.setattr(quilt_files, "open_photograph", counted(quilt_files.open_photograph))
     assert read_views(made).layout.views == 3
     assert opened == [f"{number}{ending}" for number in range(3)]
 

@@ -11,6 +11,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO
 
+import numpy as np
+
+from lippmann.codecs.types import Pixels
 from lippmann.errors import PictureError
 from lippmann.runtime.input_memory import check_input
 from lippmann.runtime.regular_file import check_kind
@@ -89,6 +92,18 @@ def open_picture(source: Path | BinaryIO, formats: tuple[str, ...] = (*FORMATS,)
 
 def _size(picture: Image.Image) -> str:
     return f"{picture.width} x {picture.height} pixels"
+
+
+def codes_of(picture: Image.Image) -> Pixels:
+    """Codes ``(h, w, 1 | 3 | 4)`` of an open picture: uint8, or uint16 or float32 where the file holds such greys."""
+    if picture.mode.startswith("I;16") or picture.mode == "I":
+        return np.asarray(np.clip(np.asarray(picture), 0, 65535), np.uint16)[..., None]
+    if picture.mode == "F":
+        return np.asarray(picture, np.float32)[..., None]
+    if picture.mode in ("1", "L"):
+        return np.array(picture.convert("L"))[..., None]
+    has_alpha = "A" in picture.getbands() or "transparency" in picture.info
+    return np.array(picture.convert("RGBA" if has_alpha else "RGB"))
 
 
 def is_allowed(picture: Image.Image) -> bool:

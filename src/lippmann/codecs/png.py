@@ -16,7 +16,10 @@ from typing import BinaryIO
 
 import numpy as np
 
+from lippmann.codecs import orientation as orientations
+from lippmann.codecs.icc import profile_of_cicp, rgb_profile
 from lippmann.codecs.types import Pixels
+from lippmann.color.primaries import REC709
 from lippmann.errors import PictureError
 from lippmann.runtime.input_memory import check_input
 from lippmann.runtime.quiet_stderr import libraries_silenced
@@ -29,13 +32,34 @@ _LEVEL = 4
 #: Longest text that is read, decompressed: a display's description takes a few kilobytes.
 _LONGEST_TEXT = 1 << 24
 
+#: Chunks whose bodies are read; gAMA and cHRM hold fractions in units of 1/100000.
+_READ = (b"IHDR", b"iTXt", b"iCCP", b"cICP", b"sRGB", b"gAMA", b"cHRM", b"eXIf")
+_FRACTION = 100_000
+#: Exponents that differ by less than this share are alike (libpng's PNG_GAMMA_THRESHOLD).
+_ALIKE = 0.05
+
 _CHANNELS = {0: 1, 2: 3, 3: 3, 4: 2, 6: 4}
 
 
 @dataclass(frozen=True)
 class PngHeader:
-    """What a PNG says of itself before its pixels: size, ``bits`` per channel, channels once decoded, texts and ICC
-    profile (empty without)."""
+    """What a PNG says of itself beside its pixels.
+
+    Attributes
+    ----------
+    width, height:
+        Size in pixels, as shown.
+    bits:
+        Bits per channel.
+    channels:
+        Channels once decoded.
+    text:
+        Its international texts.
+    icc:
+        ICC profile of the codes, from the first there is of cICP, iCCP, sRGB, and gAMA with cHRM; empty: sRGB.
+    orientation:
+        The EXIF orientation.
+    """
 
     width: int
     height: int
@@ -43,6 +67,7 @@ class PngHeader:
     channels: int
     text: Mapping[str, str]
     icc: bytes = b""
+    orientation: int = 1
 
 
 def encode_png(
@@ -92,22 +117,26 @@ def png_header(file: BinaryIO, path: Path) -> PngHeader:
     """:func:`read_png_header` of a file that is open, at its beginning; ``path`` is its name, for errors."""
     header: tuple[int, int, int, int] | None = None
     text: dict[str, str] = {}
-    icc = b""
+    found: dict[bytes, bytes] = {}
     for kind, body in _chunks(file, path):
         if kind == b"IHDR" and len(body) == 13:
             width, height, bits, color_type = struct.unpack(">IIBB", body[:10])
             header = width, height, bits, _CHANNELS.get(color_type, 0)
         elif kind == b"iTXt":
             text.update(_international_text(body, path))
-        elif kind == b"iCCP":
-            icc = _profile(body, path)
+        else:
+            found.setdefault(kind, body)
     if header is None or not header[0] or not header[1] or not header[3]:
         raise _damaged(path, "it has no proper header")
-    return PngHeader(*header, text=text, icc=icc)
+    width, height, bits, channels = header
+    orientation = orientations.of_exif(found[b"eXIf"]) if b"eXIf" in found else 1
+    if orientations.lies(orientation):
+        width, height = height, width
+    return PngHeader(width, height, bits, channels, text, _profile(found, path), orientation)
 
 
 def read_png(path: Path) -> Pixels:
-    """Codes of a PNG as stored: ``(H, W)`` or ``(H, W, 2 to 4)`` uint8 or uint16.
+    """Codes of a PNG, upright: ``(H, W)`` or ``(H, W, 2 to 4)`` uint8 or uint16.
 
     Raises
     ------
@@ -132,7 +161,7 @@ def decode_png(data: bytes, path: Path) -> Pixels:
             codes: Pixels = imagecodecs.png_decode(data)
     except (RuntimeError, ValueError) as error:
         raise _damaged(path, str(error)) from error
-    return codes
+    return orientations.upright(codes, header.orientation)
 
 
 def _chunk(kind: bytes, body: bytes) -> bytes:
@@ -154,7 +183,7 @@ def _chunks(file: BinaryIO, path: Path, *, all_bodies: bool = False) -> Iterator
             raise _damaged(path, f"it ends within its {kind.decode('latin-1')!r} chunk")
         if kind == b"IEND":
             return
-        if not all_bodies and kind not in (b"IHDR", b"iTXt", b"iCCP"):
+        if not all_bodies and kind not in _READ:
             file.seek(length + 4, 1)
             yield kind, b""
             continue
@@ -179,12 +208,31 @@ def _international_text(body: bytes, path: Path) -> dict[str, str]:
         raise _damaged(path, f"one of its texts cannot be read ({error})") from error
 
 
-def _profile(body: bytes, path: Path) -> bytes:
-    _, _, packed = body.partition(b"\0")
-    try:
-        return zlib.decompressobj().decompress(packed[1:], _LONGEST_TEXT)  # after the byte of the method, deflate
-    except zlib.error as error:
-        raise _damaged(path, f"its ICC profile cannot be read ({error})") from error
+def _profile(found: Mapping[bytes, bytes], path: Path) -> bytes:
+    """ICC profile of the codes by the chunk that comes first (PNG, third edition, 4.3); empty: sRGB."""
+    code_points = found.get(b"cICP", b"")
+    if len(code_points) == 4:
+        try:
+            return profile_of_cicp(code_points[0], code_points[1])
+        except PictureError as error:
+            raise PictureError(error.what, where=str(path), rule=error.rule, fix=error.fix) from None
+    if b"iCCP" in found:
+        _, _, packed = found[b"iCCP"].partition(b"\0")
+        try:
+            return zlib.decompressobj().decompress(packed[1:], _LONGEST_TEXT)  # after the byte of the method, deflate
+        except zlib.error as error:
+            raise _damaged(path, f"its ICC profile cannot be read ({error})") from error
+    if b"sRGB" in found:
+        return b""
+    gamma = int.from_bytes(found.get(b"gAMA", b""), "big") / _FRACTION
+    places = found.get(b"cHRM", b"")
+    white_first = [number / _FRACTION for number in struct.unpack(">8I", places)] if len(places) == 32 else []
+    return rgb_profile([*white_first[2:], *white_first[:2]] or REC709, _curve(gamma))
+
+
+def _curve(gamma: float) -> float | None:
+    """Exponent from codes to light; None, the curve of sRGB, for its own exponent and without one."""
+    return None if gamma <= 0.0 or abs(gamma * 2.2 - 1.0) < _ALIKE else 1.0 / gamma
 
 
 def _damaged(path: Path, what: str) -> PictureError:

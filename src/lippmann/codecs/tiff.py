@@ -11,14 +11,20 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
+from lippmann.codecs import orientation as orientations
+from lippmann.codecs.icc import rgb_profile
+from lippmann.codecs.tiff_colors import UnreadColorsError, check_colors, gray_or_rgb, is_stored_so, stored_type
 from lippmann.codecs.types import Pixels, StoredType
 from lippmann.errors import PictureError
 from lippmann.runtime.cached_property import cached_property
+from lippmann.runtime.input_memory import check_input
 
 #: Byte order and version of classic and of big TIFF.
 SIGNATURES = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
 
 _MM_PER_INCH = 25.4
+
+_TAGS = ("ImageDescription", "Orientation", "PrimaryChromaticities", "WhitePoint")
 
 #: Pictures of so many pixels are written in tiles, in the form that has no limit of 4 GB; readers of large pictures
 #: need not take in whole rows then.
@@ -136,6 +142,14 @@ def write_tiled_tiff(
     )
 
 
+def _described_profile(tags: dict[str, Any]) -> bytes:
+    """ICC profile of ``PrimaryChromaticities`` and ``WhitePoint`` (pairs of whole numbers); empty without both."""
+    numbers = [*tags.get("PrimaryChromaticities", ()), *tags.get("WhitePoint", ())]
+    if len(numbers) != 16 or not all(numbers[1::2]):
+        return b""
+    return rgb_profile([top / bottom for top, bottom in zip(numbers[::2], numbers[1::2], strict=True)])
+
+
 def _resolution(pixel_pitch: float | None) -> dict[str, Any]:
     if pixel_pitch is None:
         return {}
@@ -157,9 +171,15 @@ class TiffPicture:
     Attributes
     ----------
     width, height, channels:
-        Size in pixels and values per pixel.
+        Size in pixels as shown, and values per pixel.
     dtype:
         NumPy type name of the values.
+    bits:
+        Bits of a pixel in the file.
+    orientation:
+        The tag's value, 1 to 8.
+    in_pieces:
+        Whether tiles or strips can be read one by one: they are stored as shown.
     description:
         The text of ``ImageDescription``; empty without.
     icc:
@@ -168,7 +188,7 @@ class TiffPicture:
     Raises
     ------
     PictureError
-        If the file is damaged, no TIFF, or no flat interleaved picture.
+        If the file is damaged, no TIFF, no flat picture, or its colours are of a kind that is not read.
     """
 
     def __init__(self, file: BinaryIO, path: Path) -> None:
@@ -177,36 +197,47 @@ class TiffPicture:
         self._path, self._file = path, file
         file.seek(0)
         with _reported(path):
-            self._page: Any = tifffile.TiffFile(file).pages[0]
-            shape, dtype = self._page.shape, self._page.dtype
-            description = self._page.tags.get("ImageDescription")
-            text = description.value if description is not None else ""
-            interleaved = self._page.planarconfig == 1
-            profile = self._page.iccprofile
+            page: Any = tifffile.TiffFile(file).pages[0]
+            shape, dtype = page.shape, page.dtype
+            tags = {name: tag.value for name in _TAGS if (tag := page.tags.get(name)) is not None}
+            check_colors(page)
+            separate = page.planarconfig == 2 and page.samplesperpixel > 1
+            profile = page.iccprofile or _described_profile(tags)
+        if separate and len(shape) == 3:
+            shape = (*shape[1:], shape[0])
         if len(shape) == 2:
             shape = (*shape, 1)
         sizes = [size for size in shape if isinstance(size, int) and size >= 1]  # a damaged tag may be anything
-        if len(shape) != 3 or len(sizes) != 3 or dtype is None or not (interleaved or shape[2] == 1):
-            raise PictureError(
-                f"holds an array of shape {shape}", where=str(path), rule="it must be one interleaved picture"
-            )
+        if len(shape) != 3 or len(sizes) != 3 or dtype is None:
+            raise PictureError(f"holds an array of shape {shape}", where=str(path), rule="it must be one flat picture")
+        self._page = page
+        orientation, text = tags.get("Orientation"), tags.get("ImageDescription")
+        self.orientation = int(orientation) if isinstance(orientation, int) else 1
         self.height, self.width, self.channels = sizes
-        self.dtype: str = np.dtype(dtype).name
+        if orientations.lies(self.orientation):
+            self.height, self.width = self.width, self.height
+        self.dtype: str = stored_type(page)
+        self.bits = int(page.bitspersample) * int(page.samplesperpixel)
+        self.in_pieces = is_stored_so(page) and self.orientation <= 1
         self.description = text if isinstance(text, str) else ""
         self.icc = profile if isinstance(profile, bytes) else b""
 
-    def read(self) -> Pixels:
-        """All values as stored, ``(H, W)`` or ``(H, W, channels)``.
+    def read(self, *, turned: bool = True) -> Pixels:
+        """All values, ``(H, W, 1 to 4)``: codes of 8 or 16 bits, or floats; upright, unless ``turned`` is false.
 
         Raises
         ------
         PictureError
             If they cannot be decoded.
+        MemoryLimitError
+            If they take more memory than is left.
         """
+        page = self._page
+        check_input(2 * int(page.size) * np.dtype(page.dtype).itemsize, "its picture", where=str(self._path))
         with _reported(self._path):
             self._check_segments()
-            values: Pixels = self._page.asarray()
-        return values
+            values = gray_or_rgb(page, page.asarray())
+        return orientations.upright(values, self.orientation) if turned else values
 
     @cached_property
     def chunk(self) -> tuple[int, int]:
@@ -251,7 +282,7 @@ class TiffPicture:
 
     def _check_segments(self) -> None:
         """A ValueError if a strip or tile lies (partly) beyond the end: memory would be given to what is claimed."""
-        size, page = self._path.stat().st_size, self._page
+        size, page = self._file.seek(0, 2), self._page
         spans = zip(page.dataoffsets, page.databytecounts, strict=True)
         # Older versions of the library read some numbers as negative ones.
         if any(not 0 <= place <= place + count <= size for place, count in spans):
@@ -267,6 +298,9 @@ def _reported(path: Path) -> Iterator[None]:
     before, log.disabled = log.disabled, True
     try:
         yield
+    except UnreadColorsError as error:
+        rule = "grey, RGB, palettes, L*a*b* and YCbCr of JPEG are read"
+        raise PictureError(str(error), where=str(path), rule=rule, fix="convert it to RGB") from None
     except (tifffile.TiffFileError, *_LIBRARY_ERRORS) as error:
         raise PictureError(f"this TIFF is damaged: {error}", where=str(path), fix="make or fetch it anew") from error
     finally:

@@ -44,10 +44,15 @@ def rec709_from_rgb(chromaticities: Sequence[float]) -> Matrix:
 
     Errors are those of :func:`xyz_from_rgb`.
     """
-    theirs, ours = xyz_from_rgb(chromaticities), xyz_from_rgb(REC709)
-    gains = (_BRADFORD @ ours.sum(axis=1)) / (_BRADFORD @ theirs.sum(axis=1))
-    adapted = np.linalg.solve(_BRADFORD, gains[:, None] * (_BRADFORD @ theirs))
-    return np.asarray(np.linalg.solve(ours, adapted))
+    theirs = xyz_from_rgb(chromaticities)
+    return np.asarray(rec709_from_xyz(theirs.sum(axis=1)) @ theirs)
+
+
+def rec709_from_xyz(white: Matrix) -> Matrix:
+    """``(3, 3)`` from XYZ, whose white is ``white``, to linear RGB of Rec. 709; white becomes (1, 1, 1)."""
+    ours = xyz_from_rgb(REC709)
+    gains = (_BRADFORD @ ours.sum(axis=1)) / (_BRADFORD @ white)
+    return np.asarray(np.linalg.solve(ours, np.linalg.solve(_BRADFORD, gains[:, None] * _BRADFORD)))
 
 
 def to_rec709(pixels: NDArray[np.float32], rec709_from_theirs: Matrix) -> NDArray[np.float32]:

@@ -179,10 +179,10 @@ def read_view_files(paths: Sequence[Sequence[Path]], progress: ProgressCallback 
         If a file is missing or damaged, holds transparent colours, or differs from the first in size or type.
     """
     down, across = len(paths), len(paths[0])
-    first: Values = open_file(paths[0][0]).decode()[0]
+    first: Values = open_file(paths[0][0]).decode(as_srgb=True)[0]
     views = np.empty((down, across, *first.shape), dtype=first.dtype)
     for number, path in enumerate(path for row in paths for path in row):
-        view = first if number == 0 else open_file(path).decode()[0]
+        view = first if number == 0 else open_file(path).decode(as_srgb=True)[0]
         if view.shape != first.shape:
             rule = f"the first view, {paths[0][0].name}, has {_size(first)}"
             raise PictureError(f"has {_size(view)} pixels", where=str(path), rule=rule)

@@ -13,6 +13,7 @@ from typing import cast
 import numpy as np
 
 from lippmann.codecs import exr, png, tiff, zarr_array
+from lippmann.codecs.icc import convert_codes
 from lippmann.display import Display
 from lippmann.errors import PictureError
 from lippmann.image.encoding import STORED, TEXT_KEY, FormatName, layers_of_channels, linear_values
@@ -29,13 +30,14 @@ MOST_PIXELS = 1 << 29
 #: Largest number of pixels in formats that are decoded piece by piece: more than any panel or print has.
 MOST_IN_PIECES = 1 << 32
 
-#: Deflate, the tightest packing of all formats here, makes at most 1032 bytes of one: as many grey pixels of 8 bits.
-_MOST_PIXELS_PER_BYTE = 1100
+#: Deflate, the tightest packing of all formats here, makes at most 1032 bytes of one: as many grey pixels of 8 bits,
+#: and 8 times as many of 1 bit.
+_MOST_PER_BYTE = 1100
 
 
 @dataclass(frozen=True, eq=False)
 class PictureFile:
-    """An open picture file: its header, read once, and its values, decoded on demand.
+    """An open picture file: its header, read once, and its values, upright, decoded on demand.
 
     The file is closed with this object.
 
@@ -44,7 +46,7 @@ class PictureFile:
     path, format:
         Name of the file; format that its first bytes show.
     width, height:
-        Size in pixels.
+        Size in pixels, upright.
     stored:
         NumPy type name of the values; may be a type that is not read.
     layers:
@@ -52,9 +54,9 @@ class PictureFile:
     text:
         JSON of the metadata; empty without.
     icc:
-        ICC profile of the values; empty without.
+        ICC profile of the codes, embedded or made of what the file says of its colours; empty: sRGB.
     pieces:
-        Decoder of single tiles, strips or chunks; None for PNG and OpenEXR.
+        Decoder of single tiles, strips or chunks; None for PNG, OpenEXR, and TIFF whose values are not stored as shown.
     """
 
     path: Path
@@ -67,6 +69,7 @@ class PictureFile:
     icc: bytes
     pieces: tiff.TiffPicture | zarr_array.ZarrPicture | None
     _decode: Callable[[], dict[str, Layer]]
+    _pixel_bits: int = 8
 
     @cached_property
     def metadata(self) -> Metadata | None:
@@ -102,8 +105,13 @@ class PictureFile:
             raise PictureError(f"has {self.width} x {self.height} pixels", where=str(self.path), rule=rule)
         return metadata
 
-    def decode(self) -> tuple[Values, dict[str, Layer]]:
+    def decode(self, *, as_srgb: bool = False) -> tuple[Values, dict[str, Layer]]:
         """RGB of the whole picture, ``(H, W, 3)`` as stored, and the other layers by name.
+
+        Parameters
+        ----------
+        as_srgb:
+            Whether codes are converted to sRGB, as for a picture that is to be looked at. Those of a display are not.
 
         Raises
         ------
@@ -121,7 +129,7 @@ class PictureFile:
         layers = self._decode()
         values = layers.pop("")
         self.check_stored(values.dtype.name)
-        return opaque_colors(values, self.path), layers
+        return opaque_colors(values, self.path, self.icc if as_srgb else b""), layers
 
     def check_stored(self, stored: str) -> Stored:
         """``stored``, a NumPy type name; a :class:`PictureError` if this format is not read with such values."""
@@ -222,9 +230,18 @@ def _opened(path: Path, file: BufferedReader, start: bytes) -> PictureFile:
     if start == png.SIGNATURE:
         header = png.png_header(file, path)
         stored, text = f"uint{max(8, header.bits)}", header.text.get(TEXT_KEY, "")
-        size = header.width, header.height
+        size, pixel = (header.width, header.height), header.bits * header.channels
         return PictureFile(
-            path, "png", *size, stored, (), text, header.icc, None, lambda: {"": png.decode_png(_whole(file), path)}
+            path,
+            "png",
+            *size,
+            stored,
+            (),
+            text,
+            header.icc,
+            None,
+            lambda: {"": png.decode_png(_whole(file), path)},
+            pixel,
         )
     if start.startswith(exr.SIGNATURE):
         parts = exr.exr_header(file, path)
@@ -244,8 +261,10 @@ def _opened(path: Path, file: BufferedReader, start: bytes) -> PictureFile:
         )
     if start.startswith(tiff.SIGNATURES):
         page = tiff.TiffPicture(file, path)
-        size, text = (page.width, page.height), page.description
-        return PictureFile(path, "tiff", *size, page.dtype, (), text, page.icc, page, lambda: {"": page.read()})
+        size, text, pieces = (page.width, page.height), page.description, page if page.in_pieces else None
+        return PictureFile(
+            path, "tiff", *size, page.dtype, (), text, page.icc, pieces, lambda: {"": page.read()}, page.bits
+        )
     if not start:
         raise PictureError("is empty", where=str(path), fix="make or fetch it anew")
     raise PictureError("is no picture that is known here", where=str(path), rule="PNG, OpenEXR, TIFF and Zarr are read")
@@ -263,19 +282,21 @@ def _plausible(file: PictureFile, size: int | None) -> PictureFile:
     if pixels > most:
         rule = f"at most {most} pixels are read"
         raise PictureError(f"claims {file.width} x {file.height} pixels", where=str(file.path), rule=rule)
-    if size is not None and pixels > size * _MOST_PIXELS_PER_BYTE:
+    if size is not None and pixels * min(file._pixel_bits, 8) > 8 * size * _MOST_PER_BYTE:
         what = f"claims {file.width} x {file.height} pixels but has only {size} bytes"
         raise PictureError(what, where=str(file.path), fix="make or fetch it anew")
     return file
 
 
-def opaque_colors(values: Layer, path: Path) -> Values:
+def opaque_colors(values: Layer, path: Path, icc: bytes = b"") -> Values:
     """``(H, W, 3)`` values of ``(H, W)`` or ``(H, W, 1 to 4)`` grey or RGB values, with or without an opaque alpha.
+
+    Codes of the profile ``icc`` become those of sRGB.
 
     Raises
     ------
     PictureError
-        If the shape is another, or alpha hides anything; names ``path``.
+        If the shape is another, alpha hides anything, or the profile is damaged; names ``path``.
     """
     if values.ndim == 2:
         values = values[..., None]
@@ -287,4 +308,9 @@ def opaque_colors(values: Layer, path: Path) -> Values:
         if (values[..., -1] != opaque).any():
             raise PictureError("is partly transparent", where=str(path), rule="a panel is not", fix="flatten it")
         values = values[..., :-1]
+    if icc and values.dtype.kind == "u":
+        try:
+            values = convert_codes(values, icc)
+        except PictureError as error:
+            raise PictureError(error.what, where=str(path), fix=error.fix) from None
     return cast(Values, np.repeat(values, 3, axis=2) if values.shape[2] == 1 else values)

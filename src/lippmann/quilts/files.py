@@ -10,24 +10,22 @@ import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple, cast
+from typing import NamedTuple, cast
 
 import numpy as np
 
-from lippmann.codecs.pillow_formats import open_picture
+from lippmann.codecs.photograph import open_photograph
 from lippmann.errors import OutputError, PictureError
 from lippmann.image.encoding import FORMATS, STORED, FormatName, converted_values, encode_values
 from lippmann.image.part_folders import MANIFEST
-from lippmann.image.read import MOST_PIXELS, open_file
+from lippmann.image.read import MOST_PIXELS, opaque_colors, open_file
 from lippmann.image.stored_values import Stored, Values
 from lippmann.image.write import format_for, replacing_output
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.quilts.quilt import MOST_SIDE, Quilt, QuiltLayout, check_size, layout_of_name, names_layout
 from lippmann.quilts.quilt_metadata import metadata_of_text, quilt_text
 from lippmann.runtime.atomic_write import replacing_folder
-
-if TYPE_CHECKING:
-    from PIL import Image
+from lippmann.runtime.regular_file import check_kind
 
 #: Endings of the picture files that are read; JPEG is not written.
 _JPEG = (".jpg", ".jpeg")
@@ -276,28 +274,13 @@ def _open(path: Path) -> Iterator[_OpenFile]:
     if path.suffix.lower() not in _JPEG:
         file = open_file(path)
         size = file.width, file.height
-        yield _OpenFile(size, lambda: file.check_stored(file.stored), lambda: file.decode()[0], file.text)
+        yield _OpenFile(size, lambda: file.check_stored(file.stored), lambda: file.decode(as_srgb=True)[0], file.text)
         return
-    with _opened_jpeg(path) as picture:
-        size = picture.width, picture.height
-        yield _OpenFile(
-            size, lambda: "uint8", lambda: np.asarray(picture if picture.mode == "RGB" else picture.convert("RGB"))
-        )
-
-
-def _rgb_codes(picture: Image.Image) -> Values:
-    """``(H, W, 3)`` codes of a picture of Pillow's."""
-    return np.asarray(picture if picture.mode == "RGB" else picture.convert("RGB"))
-
-
-@contextmanager
-def _opened_jpeg(path: Path) -> Iterator[Image.Image]:
-    """The opened JPEG, not yet decoded; errors of the library about the file become :class:`PictureError`."""
-
+    check_kind(path, PictureError)
     try:
-        with open_picture(path, ("JPEG",)) as picture:
-            if max(picture.size) > MOST_SIDE:
-                raise PictureError(f"it has {picture.width} x {picture.height} pixels", where=str(path))
-            yield picture
+        with path.open("rb") as stream, open_photograph(stream, path, ("JPEG",)) as photograph:
+            if max(photograph.size) > MOST_SIDE:
+                raise PictureError(f"it has {photograph.size[0]} x {photograph.size[1]} pixels", where=str(path))
+            yield _OpenFile(photograph.size, lambda: "uint8", lambda: opaque_colors(photograph.srgb_codes(), path))
     except (OSError, SyntaxError) as error:
         raise PictureError(f"cannot be read: {error}", where=str(path)) from None

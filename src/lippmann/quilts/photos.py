@@ -16,11 +16,15 @@ from typing import TYPE_CHECKING, Literal, NamedTuple, get_args
 import numpy as np
 
 from lippmann.codecs.icc import Profile, convert_picture
-from lippmann.codecs.pillow_formats import RULE, open_picture
+from lippmann.codecs.photograph import Photograph, open_photograph
+from lippmann.codecs.pillow_formats import RULE
+from lippmann.codecs.types import Pixels
+from lippmann.color.transfer import quantize
 from lippmann.errors import PictureError, UsageError
 from lippmann.image.read import MOST_PIXELS
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.quilts.quilt import Quilt, QuiltLayout
+from lippmann.runtime.regular_file import check_kind
 
 if TYPE_CHECKING:
     from PIL import Image
@@ -30,10 +34,8 @@ Fit = Literal["cover", "contain", "stretch"]
 #: Endings of the pictures in a folder of photographs.
 ENDINGS = (".jpg", ".jpeg", ".png", ".tif", ".tiff", ".webp", ".avif", ".bmp")
 
-#: EXIF tag of the orientation, and its values that exchange width and height.
-_ORIENTATION, _LYING = 0x112, (5, 6, 7, 8)
-
-_PAPER = (255, 255, 255)
+#: The code of white paper.
+_PAPER = 255
 
 
 class Shift(NamedTuple):
@@ -151,8 +153,8 @@ def read_photos(
     values = np.empty((height, width * len(paths), 3), dtype=np.uint8)
     quilt = Quilt(values, QuiltLayout(len(paths), 1, None), "uint8")
     for number, path in enumerate(paths):
-        with _opened(path) as picture:
-            colors = _in_profile(_upright(picture, turned=turned), headers[number].icc, target, path)
+        with _opened(path) as photograph:
+            colors = _in_profile(_on_paper(photograph.codes(), turned=turned), headers[number].icc, target, path)
             quilt.view_values(number)[...] = np.asarray(_fitted(colors, windows[number], (width, height)))
         progress(Progress("read", number + 1, len(paths)))
     cropped = tuple(max(window.cropped[axis] for window in windows) for axis in (0, 1))
@@ -216,19 +218,20 @@ def _fitted(picture: Image.Image, window: FitWindow, size: tuple[int, int]) -> I
     resized = picture.resize(part, Image.Resampling.LANCZOS, box=window.shown)
     if part == size:
         return resized
-    view = Image.new("RGB", size, _PAPER)
+    view = Image.new("RGB", size, (_PAPER,) * 3)
     view.paste(resized, (edges[0], edges[1]))
     return view
 
 
 @contextmanager
-def _opened(path: Path) -> Iterator[Image.Image]:
+def _opened(path: Path) -> Iterator[Photograph]:
     """An opened photograph; errors of Pillow become :class:`PictureError`."""
     from PIL import UnidentifiedImageError
 
+    check_kind(path, PictureError)
     try:
-        with open_picture(path) as picture:
-            yield picture
+        with path.open("rb") as file, open_photograph(file, path) as photograph:
+            yield photograph
     except FileNotFoundError:
         raise PictureError("not found", where=str(path)) from None
     except UnidentifiedImageError:
@@ -238,24 +241,24 @@ def _opened(path: Path) -> Iterator[Image.Image]:
 
 
 def _header(path: Path) -> _Header:
-    with _opened(path) as picture:
-        lying = picture.getexif().get(_ORIENTATION) in _LYING
-        # The profile of a grey or CMYK picture does not describe the RGB that it becomes.
-        icc = picture.info.get("icc_profile") or b"" if picture.mode in ("RGB", "RGBA", "P", "PA") else b""
-        return _Header(picture.size[::-1] if lying else picture.size, icc)
+    with _opened(path) as photograph:
+        return _Header(photograph.size, photograph.icc)
 
 
-def _upright(picture: Image.Image, *, turned: bool) -> Image.Image:
-    """RGB without alpha, upright by its EXIF orientation, then turned to the left if ``turned``."""
-    from PIL import Image, ImageOps
+def _on_paper(codes: Pixels, *, turned: bool) -> Image.Image:
+    """Codes ``(H, W, 1 to 4)`` as RGB on white paper, turned to the left if ``turned``."""
+    from PIL import Image
 
-    upright = ImageOps.exif_transpose(picture)
-    if "A" in upright.getbands() or "transparency" in upright.info:
-        over = upright.convert("RGBA")
-        upright = Image.new("RGB", over.size, _PAPER)
-        upright.paste(over, mask=over.getchannel("A"))
-    upright = upright.convert("RGB")
-    return upright.transpose(Image.Transpose.ROTATE_90) if turned else upright
+    if codes.dtype == np.uint16:
+        codes = ((codes.astype(np.uint32) * 255 + 32767) // 65535).astype(np.uint8)
+    elif codes.dtype.kind == "f":
+        codes = quantize(codes, 8, "srgb")
+    channels = codes.shape[2]
+    if channels in (2, 4):
+        alpha = codes[..., -1:].astype(np.uint32)
+        codes = ((codes[..., :-1] * alpha + _PAPER * (255 - alpha) + 127) // 255).astype(np.uint8)
+    picture = Image.fromarray(np.ascontiguousarray(np.broadcast_to(codes, (*codes.shape[:2], 3))))
+    return picture.transpose(Image.Transpose.ROTATE_90) if turned else picture
 
 
 def _common_profile(

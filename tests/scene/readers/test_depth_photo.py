@@ -8,7 +8,9 @@ import pytest
 from PIL import Image as Pillow
 
 from lippmann.codecs.exr import write_exr
+from lippmann.codecs.icc import rgb_profile
 from lippmann.codecs.pfm import write_pfm
+from lippmann.color.primaries import REC709
 from lippmann.display import load_display
 from lippmann.errors import SceneError, UsageError
 from lippmann.scene.matrices import transform_points
@@ -283,3 +285,58 @@ def test_a_portrait_is_a_scene(tmp_path):
     scene = load_scene(tmp_path / "p.jpg")
     assert scene.bounds[:, 2].tolist() == [0, 0.5]
     assert not scene.in_studio
+
+
+def lying(path, picture, orientation, **options):
+    """The picture as a camera stores it that is held so: its pixels turned, and how to turn them back."""
+    exif = Pillow.Exif()
+    exif[0x112] = orientation
+    turns = {1: 0, 3: 2, 6: 1, 8: 3}[orientation]
+    Pillow.fromarray(np.rot90(picture, turns).copy()).save(path, exif=exif, **options)
+    return path
+
+
+def half_blue():
+    picture = np.full((12, 8, 3), 120, np.uint8)
+    picture[:6] = 40, 80, 230
+    return picture
+
+
+@pytest.mark.parametrize("ending", [".png", ".jpg", ".webp"])
+@pytest.mark.parametrize("orientation", [1, 3, 6, 8])
+def test_photographs_are_upright(tmp_path, ending, orientation):
+    photo = lying(tmp_path / f"a{ending}", np.repeat(np.repeat(half_blue(), 8, 0), 8, 1), orientation, quality=95)
+    np.save(tmp_path / "d.npy", np.where(np.arange(12) < 6, 4.0, 1.0)[:, None] * np.ones((1, 8)))
+    description = load_scene(photo, depth_map=tmp_path / "d.npy").description
+    pixels = description.materials[0].base_color_texture.image.pixels
+    assert np.abs(pixels[4::8, 4::8].astype(int) - half_blue()).max() < 12
+    points = description.meshes[0].positions
+    assert points[points[:, 1] < -0.1, 2].min() > points[points[:, 1] > 0.1, 2].max()  # what is near lies below
+
+
+def test_depth_within_a_photograph_lies_as_its_pixels():
+    data = portrait([[0, 255, 255]])
+    assert embedded_depth(data, "a", 1).inverse.shape == (1, 3)
+    turned = embedded_depth(data, "a", 6).inverse
+    assert turned[:, 0] == pytest.approx([1, 0.25, 0.25], rel=0.01)
+    assert embedded_depth(data, "a", 3).inverse[0] == pytest.approx([0.25, 0.25, 1], rel=0.01)
+
+
+def test_a_depth_map_is_turned_by_its_own_tag(tmp_path):
+    levels = np.array([[10, 20, 30], [40, 50, 60]], np.uint8)
+    found = read_depth_map(lying(tmp_path / "d.png", levels, 6)).inverse
+    assert found == pytest.approx(levels, abs=0.5)
+
+
+def test_a_map_that_lies_as_the_picture_is_stored_is_named(tmp_path):
+    photo = lying(tmp_path / "a.jpg", np.repeat(half_blue(), 2, 1)[:, :6], 6)
+    np.save(tmp_path / "d.npy", np.ones((6, 12)))
+    with pytest.raises(SceneError, match=r"12x6 pixels, the picture 6x12.*turn the map as the picture's EXIF orient"):
+        load_scene(photo, depth_map=tmp_path / "d.npy")
+
+
+def test_a_photograph_of_another_colour_space_becomes_srgb(tmp_path):
+    Pillow.new("RGB", (8, 8), (128, 128, 128)).save(tmp_path / "a.png", icc_profile=rgb_profile(REC709, 1.0))
+    np.save(tmp_path / "d.npy", np.ones((8, 8)))
+    description = load_scene(tmp_path / "a.png", depth_map=tmp_path / "d.npy").description
+    assert description.materials[0].base_color_texture.image.pixels == pytest.approx(188, abs=1)

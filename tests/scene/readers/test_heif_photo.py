@@ -1,10 +1,13 @@
 """HEIF photographs: colours, depth, what is refused."""
 
+import io
 import sys
 
 import numpy as np
 import pytest
+from PIL import Image as Pillow
 
+from lippmann.codecs.icc import rgb_profile
 from lippmann.errors import MemoryLimitError, SceneError
 from lippmann.runtime import input_memory
 from lippmann.scene.readers.heif_photo import read_heif_photo
@@ -12,9 +15,11 @@ from lippmann.scene.readers.load import load_scene
 
 pytest.importorskip("pillow_heif", reason="pillow-heif is not installed")
 
+import pillow_heif
 from heif_files import gradient, heif
 
 PIXELS, DEPTH = gradient()
+P3 = (0.680, 0.320, 0.265, 0.690, 0.150, 0.060, 0.3127, 0.3290)
 
 
 @pytest.mark.parametrize("representation", [None, 0, 1])
@@ -31,6 +36,36 @@ def test_a_scene_of_it_comes_nearer_where_the_map_is_brighter(tmp_path):
     scene = load_scene(path)
     points = scene.description.meshes[0].positions
     assert np.corrcoef(points[:, 0], points[:, 2])[0, 1] > 0.99
+
+
+def saved(picture, **options):
+    stream = io.BytesIO()
+    pillow_heif.from_pillow(picture).save(stream, quality=-1, **options)
+    return stream.getvalue()
+
+
+def test_it_is_upright():
+    exif = Pillow.Exif()
+    exif[0x112] = 6
+    picture = np.zeros((64, 96, 3), np.uint8)
+    picture[:32] = 200
+    data = saved(Pillow.fromarray(np.rot90(picture).copy()), exif=exif.tobytes())
+    image, _ = read_heif_photo(data, "x.heic")
+    assert np.abs(image.pixels.astype(int) - picture).max() < 8
+
+
+@pytest.mark.parametrize(
+    "options", [{"icc_profile": rgb_profile(P3)}, {"color_primaries": 12, "transfer_characteristics": 13}]
+)
+def test_colours_of_p3_become_srgb(options):
+    image, _ = read_heif_photo(saved(Pillow.new("RGB", (64, 64), (90, 128, 150)), **options), "x.heic")
+    assert image.pixels[32, 32] == pytest.approx((78, 129, 152), abs=2)  # by the matrix of CSS Color 4
+
+
+def test_colours_beyond_a_display_are_named():
+    data = saved(Pillow.new("RGB", (64, 64)), color_primaries=9, transfer_characteristics=16)
+    with pytest.raises(SceneError, match=r"x\.heic: its colours are PQ; codes of a standard dynamic range are read"):
+        read_heif_photo(data, "x.heic")
 
 
 def test_another_depth_map_takes_the_place_of_its_own(tmp_path):

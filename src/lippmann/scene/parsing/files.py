@@ -7,15 +7,16 @@ import difflib
 import io
 import os
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.codecs.pillow_formats import RULE, is_allowed, open_picture
-from lippmann.errors import MemoryLimitError, SceneError
+from lippmann.codecs.pillow_formats import RULE, codes_of, is_allowed, open_picture
+from lippmann.errors import MemoryLimitError, PictureError, SceneError
 from lippmann.runtime.input_memory import check_input
 from lippmann.runtime.regular_file import check_kind
 from lippmann.scene.values.description import Image
@@ -247,18 +248,28 @@ def decode_image(data: bytes, name: str, *, where: str) -> Image:
     MemoryLimitError
         They take more than the memory that is left.
     """
+    with decoding(f"texture '{name}'", where), open_picture(io.BytesIO(data)) as picture:
+        pixels = texels_of(picture)
+    return Image(name, pixels)
+
+
+@contextmanager
+def decoding(what: str, where: str) -> Iterator[None]:
+    """Errors of decoding ``what`` as those of the scene file ``where``."""
     from PIL import UnidentifiedImageError
 
     try:
-        with open_picture(io.BytesIO(data)) as picture:
-            pixels = texels_of(picture)
+        yield
     except MemoryLimitError as error:
-        raise MemoryLimitError(f"texture '{name}': {error.what}", where=where, rule=error.rule, fix=error.fix) from None
+        raise MemoryLimitError(f"{what}: {error.what}", where=where, rule=error.rule, fix=error.fix) from None
+    except PictureError as error:
+        raise SceneError(f"{what}: {error.what}", where=where, rule=error.rule, fix=error.fix) from None
     except UnidentifiedImageError:
-        raise SceneError(f"texture '{name}' is not a picture that can be read", where=where, rule=RULE) from None
+        raise SceneError(f"{what} is not a picture that can be read", where=where, rule=RULE) from None
+    except SceneError:
+        raise
     except Exception as error:  # Pillow's decoders pass on whatever their libraries throw at damaged data
-        raise SceneError(f"texture '{name}' cannot be decoded ({error})", where=where) from error
-    return Image(name, pixels)
+        raise SceneError(f"{what} cannot be decoded ({error})", where=where) from error
 
 
 def texels_of(picture: Pillow.Image) -> NDArray[np.generic]:
@@ -271,10 +282,9 @@ def texels_of(picture: Pillow.Image) -> NDArray[np.generic]:
     """
     if not is_allowed(picture):
         raise SceneError(f"a texture is a {picture.format} picture", rule=RULE, fix="convert it")
-    if picture.mode.startswith("I;16") or picture.mode in ("I", "F"):
-        wide = np.asarray(picture).astype(np.float32)
-        return np.asarray(wide[..., None] if picture.mode == "F" else wide[..., None] / np.float32(65535.0))
-    if picture.mode in ("1", "L"):
-        return np.array(picture.convert("L"))[..., None]
-    has_alpha = "A" in picture.getbands() or "transparency" in picture.info
-    return np.array(picture.convert("RGBA" if has_alpha else "RGB"))
+    return texels_of_codes(codes_of(picture))
+
+
+def texels_of_codes(codes: NDArray[np.generic]) -> NDArray[np.generic]:
+    """Codes with those of 16 bits as float32 in [0, 1]."""
+    return codes.astype(np.float32) / np.float32(65535.0) if codes.dtype == np.uint16 else codes

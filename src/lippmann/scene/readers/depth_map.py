@@ -16,6 +16,7 @@ from PIL import UnidentifiedImageError
 from scipy import ndimage
 
 from lippmann.codecs.exr import read_exr, read_exr_header
+from lippmann.codecs.orientation import of_picture, upright
 from lippmann.codecs.pfm import read_pfm
 from lippmann.codecs.pillow_formats import RULE, open_picture
 from lippmann.errors import MemoryLimitError, PictureError, SceneError
@@ -130,15 +131,19 @@ def _picture(data: bytes, where: str) -> DepthMap:
     return DepthMap(without_stairs(values))
 
 
-def _gray(data: bytes, where: str) -> tuple[NDArray[np.generic], bool]:
-    """Values ``(h, w)`` of a grey picture, and whether they have 16 bits."""
+def _gray(data: bytes, where: str, turn: int | None = None) -> tuple[NDArray[np.generic], bool]:
+    """Values ``(h, w)`` of a grey picture, upright, and whether they have 16 bits.
+
+    ``turn`` is its EXIF orientation; None for that in the file.
+    """
     try:
         with open_picture(io.BytesIO(data)) as picture:
+            turn = of_picture(picture) if turn is None else turn
             if picture.mode == "F":
-                return np.asarray(picture, np.float32), False
+                return upright(np.asarray(picture, np.float32), turn), False
             if picture.mode.startswith("I"):
-                return np.asarray(picture).astype(np.int64), True
-            return np.asarray(picture.convert("L")), False
+                return upright(np.asarray(picture).astype(np.int64), turn), True
+            return upright(np.asarray(picture.convert("L")), turn), False
     except MemoryLimitError as error:
         raise MemoryLimitError(error.what, where=where, rule=error.rule, fix=error.fix) from None
     except UnidentifiedImageError:
@@ -147,8 +152,10 @@ def _gray(data: bytes, where: str) -> tuple[NDArray[np.generic], bool]:
         raise SceneError(f"cannot be decoded ({error})", where=where) from error
 
 
-def embedded_depth(data: bytes, where: str) -> DepthMap | None:
+def embedded_depth(data: bytes, where: str, turn: int = 1) -> DepthMap | None:
     """The depth that a JPEG file carries as XMP (GDepth, as Android's portrait pictures have it); None without it.
+
+    Its pixels lie as those of the picture are stored, whose EXIF orientation is ``turn``.
 
     Depth is near + d (far - near) for ``RangeLinear``, and its inverse is linear in d for ``RangeInverse``
     (Depthmap Metadata, developers.google.com/depthmap-metadata).
@@ -168,7 +175,7 @@ def embedded_depth(data: bytes, where: str) -> DepthMap | None:
         raise SceneError(f"has depth that is not readable ({error})", where=where, rule="GDepth in XMP") from None
     if not 0.0 < near < far < np.inf:
         raise SceneError(f"has depth from {near:g} to {far:g}", where=where, rule="near is above 0, far beyond it")
-    values, is_wide = _gray(encoded, where)
+    values, is_wide = _gray(encoded, where, turn)
     share = values.astype(np.float32) / np.float32(65535.0) if is_wide else without_stairs(values) / np.float32(255.0)
     if found.get(b"Format") == b"RangeLinear":
         return of_depth((near + share * (far - near)).astype(np.float32))

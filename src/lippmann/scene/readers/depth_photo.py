@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import math
 from pathlib import Path
 
@@ -9,9 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image as Pillow
 
+from lippmann.codecs.orientation import lies
+from lippmann.codecs.photograph import open_photograph
 from lippmann.errors import SceneError
 from lippmann.runtime.input_memory import check_input
-from lippmann.scene.parsing.files import decode_image, read_bytes
+from lippmann.scene.parsing.files import decoding, read_bytes, texels_of_codes
 from lippmann.scene.readers.depth_layers import Layers, split_layers
 from lippmann.scene.readers.depth_map import embedded_depth, read_depth_map
 from lippmann.scene.readers.heif_photo import read_heif_photo
@@ -30,7 +33,7 @@ _ASPECT = 0.02
 
 
 def read_depth_photo(path: Path, *, allow_outside: bool = False, depth_map: Path | None = None) -> SceneDescription:
-    """Read a photograph with its depth.
+    """Read a photograph with its depth, both as their EXIF orientation turns them.
 
     The picture shows its own colours, unlit, and is 1 high or wide, whichever is less. What the camera saw as a pyramid
     becomes a block: seen along its axis it is the photograph, and parallax is proportional to inverse depth. Where a
@@ -48,22 +51,25 @@ def read_depth_photo(path: Path, *, allow_outside: bool = False, depth_map: Path
     SceneError
         A file is missing or damaged; the picture holds no depth and none is given; their sides differ in proportion.
     """
-    data = read_bytes(path)
+    data, turn = read_bytes(path), 1
     if path.suffix.lower() in HEIF:
         image, own = read_heif_photo(data, path.name)
     else:
-        image = decode_image(data, path.name, where=path.name)
-        own = None if depth_map is not None else embedded_depth(data, path.name)
+        with decoding("the photograph", path.name), open_photograph(io.BytesIO(data), path) as photograph:
+            image, turn = Image(path.name, texels_of_codes(photograph.srgb_codes())), photograph.orientation
+        own = None if depth_map is not None else embedded_depth(data, path.name, turn)
     found = own if depth_map is None else read_depth_map(depth_map)
     if found is None:
         raise SceneError("needs a depth map", where=path.name, fix="add depth_map=...")
     height, width = image.pixels.shape[:2]
     rows, columns = found.inverse.shape
-    if abs(math.log((width / height) / (columns / rows))) > _ASPECT:
+    if not _alike((width, height), (columns, rows)):
+        fits_as_stored = lies(turn) and _alike((height, width), (columns, rows))
         raise SceneError(
             f"the depth map has {columns}x{rows} pixels, the picture {width}x{height}",
             where=path.name,
             rule="their sides have the same proportion",
+            fix=f"turn the map as the picture's EXIF orientation {turn} turns it" if fits_as_stored else "",
         )
     step = math.ceil(math.sqrt(rows * columns / _MOST_POINTS))
     check_input(_BYTES_PER_POINT * (rows // step) * (columns // step), "its height field", where=path.name)
@@ -74,6 +80,11 @@ def read_depth_photo(path: Path, *, allow_outside: bool = False, depth_map: Path
     v, u = ((place + 0.5) / count for place, count in zip(places, (rows, columns), strict=True))
     layers = split_layers(inverse, _colors_at(image, u, v), path.name)
     return _description(path.stem, image, layers, u, v)
+
+
+def _alike(first: tuple[int, int], second: tuple[int, int]) -> bool:
+    """Whether two pictures ``(width, height)`` have sides of one proportion."""
+    return abs(math.log((first[0] / first[1]) / (second[0] / second[1]))) <= _ASPECT
 
 
 def _colors_at(image: Image, u: NDArray[np.float64], v: NDArray[np.float64]) -> NDArray[np.float32]:

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
-from lippmann.errors import SceneError
+from lippmann.codecs.icc import convert_codes, profile_of_cicp
+from lippmann.errors import PictureError, SceneError
 from lippmann.runtime.input_memory import check_input
 from lippmann.runtime.optional_import import check_installed
 from lippmann.scene.readers.depth_map import DepthMap, without_stairs
@@ -25,7 +28,7 @@ def read_heif_photo(data: bytes, where: str) -> tuple[Image, DepthMap | None]:
     Returns
     -------
     Image, DepthMap | None
-        8 bits a channel, in the file's own colour space, upright. Maps are linear in inverse depth; scale and shift do
+        8 bits a channel, sRGB, upright. Maps are linear in inverse depth; scale and shift do
         not matter.
 
     Raises
@@ -54,7 +57,11 @@ def read_heif_photo(data: bytes, where: str) -> tuple[Image, DepthMap | None]:
         raise SceneError(
             f"holds an array {pixels.shape} of {pixels.dtype}", where=where, rule="8 bits a channel are read"
         )
-    image = Image(where, np.ascontiguousarray(pixels[..., :3] if pixels.shape[2] >= 3 else pixels[..., :1]))
+    colors = pixels[..., :3] if pixels.shape[2] >= 3 else pixels[..., :1]
+    try:
+        image = Image(where, np.ascontiguousarray(convert_codes(colors, _profile(file.info))))
+    except PictureError as error:
+        raise SceneError(error.what, where=where, rule=error.rule, fix=error.fix) from None
     if values is None:
         return image, None
     kind = (depths[0].info.get("metadata") or {}).get("representation_type", _INVERSE[1])
@@ -62,3 +69,11 @@ def read_heif_photo(data: bytes, where: str) -> tuple[Image, DepthMap | None]:
         rule = "inverse depth and disparity are read"
         raise SceneError(f"has depth of representation {kind}", where=where, rule=rule, fix="name a map: depth_map=...")
     return image, DepthMap(without_stairs(values))
+
+
+def _profile(info: Mapping[str, Any]) -> bytes:
+    code_points = info.get("nclx_profile") or {}
+    own = info.get("icc_profile") or b""
+    if own or not code_points:
+        return bytes(own)
+    return profile_of_cicp(int(code_points["color_primaries"]), int(code_points["transfer_characteristics"]))

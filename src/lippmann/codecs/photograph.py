@@ -1,0 +1,130 @@
+"""Photographs and views of any format, as a viewer shows them: upright, in a known colour space."""
+
+from __future__ import annotations
+
+import struct
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, BinaryIO
+
+import numpy as np
+
+from lippmann.codecs import orientation as orientations
+from lippmann.codecs import png, tiff
+from lippmann.codecs.icc import adobe_profile, convert_cmyk, convert_codes, is_gray
+from lippmann.codecs.pillow_formats import FORMATS, codes_of, open_picture
+from lippmann.codecs.types import Pixels
+
+if TYPE_CHECKING:
+    from PIL import Image
+
+#: EXIF: the blocks of the camera and of interoperability, a colour space other than sRGB, and that of Adobe RGB.
+_CAMERA, _INTEROP, _COLOR_SPACE, _UNCALIBRATED, _ADOBE = 0x8769, 0xA005, 0xA001, 0xFFFF, "R03"
+
+
+@dataclass(frozen=True, eq=False)
+class Photograph:
+    """An open picture.
+
+    Attributes
+    ----------
+    size:
+        Width and height in pixels, upright.
+    icc:
+        ICC profile of its codes as RGB; empty: sRGB.
+    orientation:
+        How it was turned, 1 to 8; 1 for none.
+    """
+
+    size: tuple[int, int]
+    icc: bytes
+    orientation: int
+    _decode: Callable[[], Pixels]
+
+    def codes(self) -> Pixels:
+        """Codes ``(H, W, 1 to 4)``, uint8 or uint16: grey or RGB, with or without alpha. Float TIFF gives floats."""
+        return self._decode()
+
+    def srgb_codes(self) -> Pixels:
+        """:meth:`codes` in sRGB.
+
+        Raises
+        ------
+        PictureError
+            If the profile is damaged.
+        """
+        return _in_srgb(self._decode(), self.icc)
+
+
+@contextmanager
+def open_photograph(file: BinaryIO, path: Path, formats: tuple[str, ...] = (*FORMATS,)) -> Iterator[Photograph]:
+    """The picture of an open file, not yet decoded; ``path`` is its name, for errors.
+
+    ``formats`` are names of :data:`lippmann.codecs.pillow_formats.FORMATS`.
+
+    Raises
+    ------
+    PictureError
+        If a PNG or TIFF is damaged or of a kind that is not read.
+    PIL.UnidentifiedImageError, OSError, SyntaxError
+        As :func:`lippmann.codecs.pillow_formats.open_picture` of other formats.
+    MemoryLimitError
+        If its pixels take more than the memory that is left.
+    """
+    start = file.read(8)
+    file.seek(0)
+    if start == png.SIGNATURE and "PNG" in formats:
+        header = png.png_header(file, path)
+        size = header.width, header.height
+        yield _photograph(size, header.icc, header.orientation, lambda: _planes(png.decode_png(_whole(file), path)))
+    elif start.startswith(tiff.SIGNATURES) and "TIFF" in formats:
+        page = tiff.TiffPicture(file, path)
+        yield _photograph((page.width, page.height), page.icc, page.orientation, lambda: page.read())
+    else:
+        with open_picture(file, formats) as picture:
+            turn = orientations.of_picture(picture)
+            size = picture.size[::-1] if orientations.lies(turn) else picture.size
+            icc = picture.info.get("icc_profile") or _exif_profile(picture)
+            if picture.mode == "CMYK":
+                yield _photograph(size, b"", turn, lambda: orientations.upright(convert_cmyk(picture, icc), turn))
+            else:
+                yield _photograph(size, icc, turn, lambda: orientations.upright(codes_of(picture), turn))
+
+
+def _photograph(size: tuple[int, int], icc: bytes, orientation: int, decode: Callable[[], Pixels]) -> Photograph:
+    """The photograph with a profile of RGB: greys with one of their own become sRGB."""
+    if is_gray(icc):
+        return Photograph(size, b"", orientation, lambda: _in_srgb(decode(), icc))
+    return Photograph(size, icc, orientation, decode)
+
+
+def _in_srgb(codes: Pixels, icc: bytes) -> Pixels:
+    if not icc or codes.dtype.kind == "f":
+        return codes
+    colors = codes.shape[2] - (codes.shape[2] + 1) % 2
+    return np.concatenate([convert_codes(codes[..., :colors], icc), codes[..., colors:]], axis=2)
+
+
+def _exif_profile(picture: Image.Image) -> bytes:
+    """The profile of Adobe RGB where a camera says so, after DCF 2.0; empty otherwise."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of damage
+            exif = picture.getexif()
+            camera = exif.get_ifd(_CAMERA)
+            says_so = camera.get(_COLOR_SPACE) == _UNCALIBRATED and exif.get_ifd(_INTEROP).get(1) == _ADOBE
+    except (SyntaxError, ValueError, TypeError, LookupError, OSError, struct.error):
+        return b""
+    return adobe_profile() if says_so else b""
+
+
+def _planes(codes: Pixels) -> Pixels:
+    return codes[..., None] if codes.ndim == 2 else codes
+
+
+def _whole(file: BinaryIO) -> bytes:
+    file.seek(0)
+    return file.read()
