@@ -32,6 +32,11 @@ def test_big_endian_is_read(tmp_path):
     assert read_pfm(tmp_path / "x.pfm").tolist() == [[-6], [5]]
 
 
+def test_values_are_as_they_stand_whatever_the_size_of_the_scale(tmp_path):
+    (tmp_path / "x.pfm").write_bytes(b"Pf\n2 1\n-0.003922\n" + np.array([5, -6], "<f4").tobytes())
+    assert read_pfm(tmp_path / "x.pfm").tolist() == [[5, -6]]
+
+
 @pytest.mark.parametrize(
     ("content", "what"),
     [

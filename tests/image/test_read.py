@@ -141,6 +141,65 @@ def test_codes_of_a_display_stay_and_those_of_a_view_become_srgb(tmp_path):
     assert file.decode(as_srgb=True)[0] == pytest.approx(188, abs=1)
 
 
+@pytest.mark.parametrize("kind", [np.float32, np.float16])
+def test_exr_chromaticities_are_converted(tmp_path, kind):
+    """Rec. 2020, with the matrix of ITU-R BT.2087-0; alpha and other layers stay."""
+    names = {"R": 1.0, "G": 0.5, "B": 0.5, "A": 1.0, "depth.V": 7.0}
+    planes = {name: np.full((4, 6), value, kind) for name, value in names.items()}
+    write_exr(
+        tmp_path / "a.exr", planes, text={"chromaticities": (0.708, 0.292, 0.170, 0.797, 0.131, 0.046, 0.3127, 0.3290)}
+    )
+    values, layers = open_file(tmp_path / "a.exr").decode()
+    assert values.dtype == kind
+    to_709 = np.array([[1.6605, -0.5876, -0.0728], [-0.1246, 1.1329, -0.0083], [-0.0182, -0.1006, 1.1187]])
+    assert values[0, 0] == pytest.approx(to_709 @ [1.0, 0.5, 0.5], abs=1e-3)
+    assert (layers["depth"] == 7).all()
+
+
+def test_luminance_and_chroma_are_named(tmp_path):
+    planes = {name: np.zeros((4, 6), np.float32) for name in ("Y", "RY", "BY")}
+    write_exr(tmp_path / "a.exr", planes, text={})
+    data = (tmp_path / "a.exr").read_bytes()
+    # Chroma for every second pixel: the last eight bytes of a channel's entry are its steps.
+    places = [data.index(name + b"\0" + struct.pack("<iIii", 2, 0, 1, 1)) + len(name) + 9 for name in (b"BY", b"RY")]
+    halved = bytearray(data)
+    for place in places:
+        halved[place : place + 8] = struct.pack("<ii", 2, 2)
+    for content in (data, bytes(halved)):
+        (tmp_path / "b.exr").write_bytes(content)
+        with pytest.raises(
+            PictureError, match=r"b\.exr: has luminance and chroma \(Y, RY, BY\); R, G and B are read; conv"
+        ):
+            open_file(tmp_path / "b.exr")
+
+
+def test_what_is_not_shown_is_noted(tmp_path):
+    codes = np.zeros((4, 6, 3), np.uint8)
+    Image.fromarray(codes).save(tmp_path / "a.png", dpi=(100, 200))
+    frames = [Image.fromarray(codes), Image.fromarray(codes + 9)]
+    frames[0].save(tmp_path / "b.png", save_all=True, append_images=frames[1:])
+    tifffile.imwrite(tmp_path / "a.tif", codes, photometric="rgb", resolution=(100, 200), resolutionunit="INCH")
+    with tifffile.TiffWriter(tmp_path / "b.tif") as file:
+        for _ in range(3):
+            file.write(codes, photometric="rgb")
+    curve = np.arange(256, dtype=np.uint16)
+    tifffile.imwrite(tmp_path / "c.tif", codes, photometric="rgb", extratags=[(301, 3, 256, curve.tolist(), True)])
+    plane = {name: np.zeros((4, 6), np.float32) for name in "RGB"}
+    write_exr(tmp_path / "a.exr", plane, text={"pixelAspectRatio": 2.0})
+    wide = "its pixels are 2 times as wide as high: they are shown square"
+    for name, note in (
+        ("a.png", wide),
+        ("b.png", "it holds 2 pictures: the first is shown"),
+        ("a.tif", wide),
+        ("b.tif", "it holds 3 pictures: the first is shown"),
+        ("c.tif", "it has a transfer function of its own: its codes are read as sRGB"),
+        ("a.exr", wide),
+    ):
+        assert open_file(tmp_path / name).notes == (note,), name
+    write_plain_picture(np.zeros((4, 6, 3), np.float32), tmp_path / "plain.png")
+    assert open_file(tmp_path / "plain.png").notes == ()
+
+
 def test_a_display_given_replaces_the_one_in_the_file(tmp_path, display, picture, provenance):
     picture(display("square")).save(tmp_path / "a.png")
     other = display("lenticular")

@@ -140,6 +140,12 @@ def test_views_that_lie_are_turned_upright(tmp_path, ending):
     assert np.abs(quilt.view_values(1).astype(int) - upright)[:12].max() < 8
 
 
+def test_what_views_hold_and_do_not_show_is_noted(tmp_path):
+    for number in range(3):
+        Image.new("RGB", (8, 8)).save(tmp_path / f"v{number}.jpg", dpi=(100, 200 if number else 100))
+    assert read_views(tmp_path).notes == ("v1.jpg: its pixels are 2 times as wide as high: they are shown square",)
+
+
 def test_views_of_another_colour_space_become_srgb(tmp_path):
     linear = rgb_profile(REC709, 1.0)
     for number, options in enumerate(({"icc_profile": linear}, {})):

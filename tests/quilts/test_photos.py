@@ -100,6 +100,19 @@ def test_exif_orientation_is_obeyed(tmp_path):
     assert ends(read_photos(paths, (80, 40), PAPER).quilt.view_values(0)) == pytest.approx((0, 200, 0, 200), abs=2)
 
 
+def test_only_the_first_picture_of_a_file_is_shown_with_a_note(tmp_path):
+    first, second = (Image.new("RGB", (80, 40), color) for color in ("red", "blue"))
+    first.save(tmp_path / "1.webp", save_all=True, append_images=[second])
+    photos = read_photos([tmp_path / "1.webp"] * 2, (20, 10), PAPER)
+    assert photos.notes == ("1.webp: it holds 2 pictures: the first is shown",)
+
+
+def test_greys_of_16_bits_are_not_clipped(tmp_path):
+    Image.fromarray(np.full((40, 80), 32768, np.uint16)).save(tmp_path / "1.png")
+    photos = read_photos([tmp_path / "1.png"] * 2, (20, 10), PAPER)
+    assert (photos.quilt.values == 128).all()
+
+
 # Once: a profile holds the second in which it was made.
 @functools.cache
 def profile(gamma):

@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lippmann.codecs.picture_notes import aspect_note
 from lippmann.codecs.types import Pixels
 from lippmann.color.primaries import REC709, rec709_from_rgb, to_rec709
 from lippmann.errors import PictureError
@@ -25,6 +25,9 @@ from lippmann.runtime.input_memory import check_input
 from lippmann.runtime.quiet_stderr import libraries_silenced
 
 SIGNATURE = b"\x76\x2f\x31\x01"
+
+#: The attribute pixelAspectRatio of square pixels.
+_SQUARE = struct.pack("<f", 1.0)
 
 _TILED, _DEEP, _MULTIPART = 0x200, 0x800, 0x1000
 _DTYPES = {0: "uint32", 1: "float16", 2: "float32"}
@@ -52,6 +55,8 @@ class ExrHeader:
         picture is 0, those beyond it are cropped.
     chromaticities:
         x and y of red, green, blue and white; None for those of Rec. 709.
+    notes:
+        What of it is not shown, each in one line.
     """
 
     width: int
@@ -60,8 +65,9 @@ class ExrHeader:
     text: Mapping[str, str]
     window: tuple[int, int, int, int]
     chromaticities: tuple[float, ...] | None
+    notes: tuple[str, ...] = ()
 
-    def rec709(self, pixels: NDArray[np.float32]) -> NDArray[np.float32]:
+    def rec709(self, pixels: Pixels) -> Pixels:
         """Linear RGB ``(..., 3)`` of the file as that of Rec. 709; colours beyond it are clipped at 0.
 
         Raises
@@ -128,7 +134,10 @@ def exr_header(file: BinaryIO, path: Path) -> ExrHeader:
             raise PictureError("is a deep or multi-part OpenEXR file", where=str(path), rule="one flat part is read")
         attributes = _attributes(file)
         x0, y0, x1, y1 = struct.unpack("<4i", attributes["dataWindow"][1])
-        channels = _channel_list(attributes["channels"][1])
+        channels, subsampled = _channel_list(attributes["channels"][1])
+        if {"RY", "BY"} & {*channels, *subsampled}:
+            what = "has luminance and chroma (Y, RY, BY)"
+            raise PictureError(what, where=str(path), rule="R, G and B are read", fix="convert it to RGB")
         stored_width, stored_height = x1 - x0 + 1, y1 - y0 + 1
         left, top, right, bottom = struct.unpack("<4i", attributes["displayWindow"][1])
         width, height = right - left + 1, bottom - top + 1
@@ -139,6 +148,7 @@ def exr_header(file: BinaryIO, path: Path) -> ExrHeader:
         window = (x0 - left, y0 - top, stored_width, stored_height)
         primaries = attributes.get("chromaticities", ("", b""))[1]
         chromaticities = struct.unpack("<8f", primaries) if primaries else None
+        (aspect,) = struct.unpack("<f", attributes.get("pixelAspectRatio", ("", _SQUARE))[1])
         if version & _TILED:
             _check_tiles(attributes["tiles"][1], stored_width * stored_height, path)
         else:
@@ -146,7 +156,8 @@ def exr_header(file: BinaryIO, path: Path) -> ExrHeader:
         text = {name: value.decode("utf-8") for name, (kind, value) in attributes.items() if kind == "string"}
     except (struct.error, KeyError, IndexError, EOFError, UnicodeDecodeError) as error:
         raise _damaged(path, "it is cut short or its header makes no sense") from error
-    return ExrHeader(width, height, channels, text, window, chromaticities)
+    notes = aspect_note(1.0, aspect) + tuple(f"its channel {name} is subsampled: it is left out" for name in subsampled)
+    return ExrHeader(width, height, channels, text, window, chromaticities, notes)
 
 
 def read_exr(path: Path, header: ExrHeader) -> dict[str, Pixels]:
@@ -230,14 +241,16 @@ def _attributes(file: BinaryIO) -> dict[str, tuple[str, bytes]]:
     return attributes
 
 
-def _channel_list(raw: bytes) -> dict[str, str]:
-    file, channels = io.BytesIO(raw), {}
+def _channel_list(raw: bytes) -> tuple[dict[str, str], list[str]]:
+    """NumPy type names of channels with a value for every pixel, and the names of the others."""
+    file, channels, subsampled = io.BytesIO(raw), {}, []
     while name := _name(file):
         kind, _, x_step, y_step = struct.unpack("<iIii", _exactly(file, 16))
-        # A subsampled channel has no value of its own per pixel and is treated as absent.
         if x_step == y_step == 1:
             channels[name] = _DTYPES[kind]
-    return channels
+        else:
+            subsampled.append(name)
+    return channels, subsampled
 
 
 def _check_chunks(file: BinaryIO, height: int, compression: int) -> None:

@@ -15,6 +15,7 @@ import numpy as np
 from lippmann.codecs import orientation as orientations
 from lippmann.codecs import png, tiff
 from lippmann.codecs.icc import adobe_profile, convert_cmyk, convert_codes, is_gray
+from lippmann.codecs.picture_notes import aspect_note, pictures_note
 from lippmann.codecs.pillow_formats import FORMATS, codes_of, open_picture
 from lippmann.codecs.types import Pixels
 
@@ -37,11 +38,14 @@ class Photograph:
         ICC profile of its codes as RGB; empty: sRGB.
     orientation:
         How it was turned, 1 to 8; 1 for none.
+    notes:
+        What of it is not shown, each in one line.
     """
 
     size: tuple[int, int]
     icc: bytes
     orientation: int
+    notes: tuple[str, ...]
     _decode: Callable[[], Pixels]
 
     def codes(self) -> Pixels:
@@ -79,26 +83,33 @@ def open_photograph(file: BinaryIO, path: Path, formats: tuple[str, ...] = (*FOR
     if start == png.SIGNATURE and "PNG" in formats:
         header = png.png_header(file, path)
         size = header.width, header.height
-        yield _photograph(size, header.icc, header.orientation, lambda: _planes(png.decode_png(_whole(file), path)))
+        yield _photograph(
+            size, header.icc, header.orientation, header.notes, lambda: _planes(png.decode_png(_whole(file), path))
+        )
     elif start.startswith(tiff.SIGNATURES) and "TIFF" in formats:
         page = tiff.TiffPicture(file, path)
-        yield _photograph((page.width, page.height), page.icc, page.orientation, lambda: page.read())
+        yield _photograph((page.width, page.height), page.icc, page.orientation, page.notes, lambda: page.read())
     else:
         with open_picture(file, formats) as picture:
             turn = orientations.of_picture(picture)
             size = picture.size[::-1] if orientations.lies(turn) else picture.size
             icc = picture.info.get("icc_profile") or _exif_profile(picture)
+            notes = aspect_note(*_density(picture)) + pictures_note(getattr(picture, "n_frames", 1))
             if picture.mode == "CMYK":
-                yield _photograph(size, b"", turn, lambda: orientations.upright(convert_cmyk(picture, icc), turn))
+                yield _photograph(
+                    size, b"", turn, notes, lambda: orientations.upright(convert_cmyk(picture, icc), turn)
+                )
             else:
-                yield _photograph(size, icc, turn, lambda: orientations.upright(codes_of(picture), turn))
+                yield _photograph(size, icc, turn, notes, lambda: orientations.upright(codes_of(picture), turn))
 
 
-def _photograph(size: tuple[int, int], icc: bytes, orientation: int, decode: Callable[[], Pixels]) -> Photograph:
+def _photograph(
+    size: tuple[int, int], icc: bytes, orientation: int, notes: tuple[str, ...], decode: Callable[[], Pixels]
+) -> Photograph:
     """The photograph with a profile of RGB: greys with one of their own become sRGB."""
     if is_gray(icc):
-        return Photograph(size, b"", orientation, lambda: _in_srgb(decode(), icc))
-    return Photograph(size, icc, orientation, decode)
+        return Photograph(size, b"", orientation, notes, lambda: _in_srgb(decode(), icc))
+    return Photograph(size, icc, orientation, notes, decode)
 
 
 def _in_srgb(codes: Pixels, icc: bytes) -> Pixels:
@@ -106,6 +117,12 @@ def _in_srgb(codes: Pixels, icc: bytes) -> Pixels:
         return codes
     colors = codes.shape[2] - (codes.shape[2] + 1) % 2
     return np.concatenate([convert_codes(codes[..., :colors], icc), codes[..., colors:]], axis=2)
+
+
+def _density(picture: Image.Image) -> tuple[float, float]:
+    """Pixels per length across and down, of whatever unit; 0 where nothing is said."""
+    across, down = picture.info.get("jfif_density") or picture.info.get("dpi") or (0, 0)
+    return float(across), float(down)
 
 
 def _exif_profile(picture: Image.Image) -> bytes:

@@ -18,6 +18,7 @@ import numpy as np
 
 from lippmann.codecs import orientation as orientations
 from lippmann.codecs.icc import profile_of_cicp, rgb_profile
+from lippmann.codecs.picture_notes import aspect_note, pictures_note
 from lippmann.codecs.types import Pixels
 from lippmann.color.primaries import REC709
 from lippmann.errors import PictureError
@@ -33,7 +34,7 @@ _LEVEL = 4
 _LONGEST_TEXT = 1 << 24
 
 #: Chunks whose bodies are read; gAMA and cHRM hold fractions in units of 1/100000.
-_READ = (b"IHDR", b"iTXt", b"iCCP", b"cICP", b"sRGB", b"gAMA", b"cHRM", b"eXIf")
+_READ = (b"IHDR", b"iTXt", b"iCCP", b"cICP", b"sRGB", b"gAMA", b"cHRM", b"eXIf", b"pHYs", b"acTL")
 _FRACTION = 100_000
 #: Exponents that differ by less than this share are alike (libpng's PNG_GAMMA_THRESHOLD).
 _ALIKE = 0.05
@@ -59,6 +60,8 @@ class PngHeader:
         ICC profile of the codes, from the first there is of cICP, iCCP, sRGB, and gAMA with cHRM; empty: sRGB.
     orientation:
         The EXIF orientation.
+    notes:
+        What of it is not shown, each in one line.
     """
 
     width: int
@@ -68,6 +71,7 @@ class PngHeader:
     text: Mapping[str, str]
     icc: bytes = b""
     orientation: int = 1
+    notes: tuple[str, ...] = ()
 
 
 def encode_png(
@@ -132,7 +136,7 @@ def png_header(file: BinaryIO, path: Path) -> PngHeader:
     orientation = orientations.of_exif(found[b"eXIf"]) if b"eXIf" in found else 1
     if orientations.lies(orientation):
         width, height = height, width
-    return PngHeader(width, height, bits, channels, text, _profile(found, path), orientation)
+    return PngHeader(width, height, bits, channels, text, _profile(found, path), orientation, _notes(found))
 
 
 def read_png(path: Path) -> Pixels:
@@ -206,6 +210,12 @@ def _international_text(body: bytes, path: Path) -> dict[str, str]:
         return {keyword.decode("latin-1"): raw.decode("utf-8")}
     except (zlib.error, UnicodeDecodeError) as error:
         raise _damaged(path, f"one of its texts cannot be read ({error})") from error
+
+
+def _notes(found: Mapping[bytes, bytes]) -> tuple[str, ...]:
+    density, animation = found.get(b"pHYs", b""), found.get(b"acTL", b"")
+    notes = aspect_note(*struct.unpack(">II", density[:8])) if len(density) == 9 else ()
+    return notes + (pictures_note(int.from_bytes(animation[:4], "big")) if len(animation) == 8 else ())
 
 
 def _profile(found: Mapping[bytes, bytes], path: Path) -> bytes:

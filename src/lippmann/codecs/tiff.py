@@ -13,6 +13,7 @@ import numpy as np
 
 from lippmann.codecs import orientation as orientations
 from lippmann.codecs.icc import rgb_profile
+from lippmann.codecs.picture_notes import aspect_note, pictures_note
 from lippmann.codecs.tiff_colors import UnreadColorsError, check_colors, gray_or_rgb, is_stored_so, stored_type
 from lippmann.codecs.types import Pixels, StoredType
 from lippmann.errors import PictureError
@@ -142,6 +143,14 @@ def write_tiled_tiff(
     )
 
 
+def _notes(page: Any, pages: int) -> tuple[str, ...]:
+    density = [page.tags.valueof(name) for name in ("XResolution", "YResolution")]
+    notes = aspect_note(*(top / bottom for top, bottom in density)) if all(density) else ()
+    if "TransferFunction" in page.tags and not page.iccprofile:
+        notes += ("it has a transfer function of its own: its codes are read as sRGB",)
+    return notes + pictures_note(pages)
+
+
 def _described_profile(tags: dict[str, Any]) -> bytes:
     """ICC profile of ``PrimaryChromaticities`` and ``WhitePoint`` (pairs of whole numbers); empty without both."""
     numbers = [*tags.get("PrimaryChromaticities", ()), *tags.get("WhitePoint", ())]
@@ -184,6 +193,8 @@ class TiffPicture:
         The text of ``ImageDescription``; empty without.
     icc:
         ICC profile of the values; empty without.
+    notes:
+        What of it is not shown, each in one line.
 
     Raises
     ------
@@ -197,7 +208,9 @@ class TiffPicture:
         self._path, self._file = path, file
         file.seek(0)
         with _reported(path):
-            page: Any = tifffile.TiffFile(file).pages[0]
+            pages = tifffile.TiffFile(file).pages
+            page: Any = pages[0]
+            self.notes = _notes(page, len(pages))
             shape, dtype = page.shape, page.dtype
             tags = {name: tag.value for name in _TAGS if (tag := page.tags.get(name)) is not None}
             check_colors(page)

@@ -57,6 +57,8 @@ class PictureFile:
         ICC profile of the codes, embedded or made of what the file says of its colours; empty: sRGB.
     pieces:
         Decoder of single tiles, strips or chunks; None for PNG, OpenEXR, and TIFF whose values are not stored as shown.
+    notes:
+        What of the file is not shown, each in one line.
     """
 
     path: Path
@@ -69,6 +71,7 @@ class PictureFile:
     icc: bytes
     pieces: tiff.TiffPicture | zarr_array.ZarrPicture | None
     _decode: Callable[[], dict[str, Layer]]
+    notes: tuple[str, ...] = ()
     _pixel_bits: int = 8
 
     @cached_property
@@ -231,39 +234,42 @@ def _opened(path: Path, file: BufferedReader, start: bytes) -> PictureFile:
         header = png.png_header(file, path)
         stored, text = f"uint{max(8, header.bits)}", header.text.get(TEXT_KEY, "")
         size, pixel = (header.width, header.height), header.bits * header.channels
-        return PictureFile(
-            path,
-            "png",
-            *size,
-            stored,
-            (),
-            text,
-            header.icc,
-            None,
-            lambda: {"": png.decode_png(_whole(file), path)},
-            pixel,
-        )
+
+        def codes() -> dict[str, Layer]:
+            return {"": png.decode_png(_whole(file), path)}
+
+        return PictureFile(path, "png", *size, stored, (), text, header.icc, None, codes, header.notes, pixel)
     if start.startswith(exr.SIGNATURE):
         parts = exr.exr_header(file, path)
         layers = tuple(sorted({name.rpartition(".")[0] for name in parts.channels} - {""}))
         stored, text = parts.channels.get("R", "none"), parts.text.get(TEXT_KEY, "")
         size = parts.width, parts.height
-        return PictureFile(
-            path,
-            "exr",
-            *size,
-            stored,
-            layers,
-            text,
-            b"",
-            None,
-            lambda: layers_of_channels(exr.read_exr(path, parts), path),
-        )
+
+        def linear() -> dict[str, Layer]:
+            layers = layers_of_channels(exr.read_exr(path, parts), path)
+            colors = cast(Values, layers[""])
+            if colors.shape[2] >= 3:
+                layers[""] = np.concatenate(
+                    [parts.rec709(colors[..., :3]), colors[..., 3:]], axis=2, dtype=colors.dtype
+                )
+            return layers
+
+        return PictureFile(path, "exr", *size, stored, layers, text, b"", None, linear, parts.notes)
     if start.startswith(tiff.SIGNATURES):
         page = tiff.TiffPicture(file, path)
         size, text, pieces = (page.width, page.height), page.description, page if page.in_pieces else None
         return PictureFile(
-            path, "tiff", *size, page.dtype, (), text, page.icc, pieces, lambda: {"": page.read()}, page.bits
+            path,
+            "tiff",
+            *size,
+            page.dtype,
+            (),
+            text,
+            page.icc,
+            pieces,
+            lambda: {"": page.read()},
+            page.notes,
+            page.bits,
         )
     if not start:
         raise PictureError("is empty", where=str(path), fix="make or fetch it anew")

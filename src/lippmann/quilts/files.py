@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple, cast
 
@@ -75,8 +76,8 @@ def read_quilt(path: Path, layout: QuiltLayout | None = None) -> Quilt:
         values = file.read()
     stored = cast(Stored, values.dtype.name)
     if metadata is None:
-        return Quilt(values, layout, stored)
-    return Quilt(values, layout, stored, metadata.provenance, metadata.display)
+        return Quilt(values, layout, stored, notes=file.notes)
+    return Quilt(values, layout, stored, metadata.provenance, metadata.display, file.notes)
 
 
 def read_views(folder: Path, layout: QuiltLayout | None = None, *, progress: ProgressCallback = silent) -> Quilt:
@@ -103,7 +104,7 @@ def read_views(folder: Path, layout: QuiltLayout | None = None, *, progress: Pro
     if len(paths) != layout.views:
         rule = f"{layout.columns}x{layout.rows} views are {layout.views}"
         raise PictureError(f"it holds {len(paths)} views", where=str(folder), rule=rule)
-    quilt = None
+    quilt, notes = None, dict[str, str]()
     for number, path in enumerate(paths):
         with _open(path) as file:
             if quilt is None:
@@ -117,9 +118,10 @@ def read_views(folder: Path, layout: QuiltLayout | None = None, *, progress: Pro
                 quilt = _linear_quilt(quilt, number)
             values = file.read()
         quilt.view_values(number)[...] = converted_values(values, quilt.stored, "srgb")
+        notes.update((note, path.name) for note in file.notes if note not in notes)
         progress(Progress("read", number + 1, layout.views))
     assert quilt is not None  # there are views
-    return quilt
+    return replace(quilt, notes=tuple(f"{name}: {note}" for note, name in notes.items()))
 
 
 def _check_held(view_size: tuple[int, int], views: int, folder: Path) -> None:
@@ -260,11 +262,12 @@ def _check_ending(path: Path) -> None:
 
 
 class _OpenFile(NamedTuple):
-    """A picture file whose header is read: its width and height, the type of its values, their decoder, its text."""
+    """A picture file whose header is read: width and height, type of its values, their decoder, notes, text."""
 
     size: tuple[int, int]
     stored: Callable[[], Stored]
     read: Callable[[], Values]
+    notes: tuple[str, ...]
     text: str = ""
 
 
@@ -274,13 +277,17 @@ def _open(path: Path) -> Iterator[_OpenFile]:
     if path.suffix.lower() not in _JPEG:
         file = open_file(path)
         size = file.width, file.height
-        yield _OpenFile(size, lambda: file.check_stored(file.stored), lambda: file.decode(as_srgb=True)[0], file.text)
+        yield _OpenFile(
+            size, lambda: file.check_stored(file.stored), lambda: file.decode(as_srgb=True)[0], file.notes, file.text
+        )
         return
     check_kind(path, PictureError)
     try:
         with path.open("rb") as stream, open_photograph(stream, path, ("JPEG",)) as photograph:
             if max(photograph.size) > MOST_SIDE:
                 raise PictureError(f"it has {photograph.size[0]} x {photograph.size[1]} pixels", where=str(path))
-            yield _OpenFile(photograph.size, lambda: "uint8", lambda: opaque_colors(photograph.srgb_codes(), path))
+            yield _OpenFile(
+                photograph.size, lambda: "uint8", lambda: opaque_colors(photograph.srgb_codes(), path), photograph.notes
+            )
     except (OSError, SyntaxError) as error:
         raise PictureError(f"cannot be read: {error}", where=str(path)) from None

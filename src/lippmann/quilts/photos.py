@@ -158,14 +158,17 @@ def read_photos(
             quilt.view_values(number)[...] = np.asarray(_fitted(colors, windows[number], (width, height)))
         progress(Progress("read", number + 1, len(paths)))
     cropped = tuple(max(window.cropped[axis] for window in windows) for axis in (0, 1))
+    names = {note: path.name for path, header in zip(paths, headers, strict=True) for note in header.notes}
+    notes += tuple(f"{name}: {note}" for note, name in names.items())
     return Photos(quilt, target, (cropped[0], cropped[1]), notes)
 
 
 class _Header(NamedTuple):
-    """Width and height of an upright photograph, and its ICC profile (empty: sRGB)."""
+    """Width and height of an upright photograph, its ICC profile (empty: sRGB), and what of it is not shown."""
 
     size: tuple[int, int]
     icc: bytes
+    notes: tuple[str, ...]
 
 
 class FitWindow(NamedTuple):
@@ -242,7 +245,7 @@ def _opened(path: Path) -> Iterator[Photograph]:
 
 def _header(path: Path) -> _Header:
     with _opened(path) as photograph:
-        return _Header(photograph.size, photograph.icc)
+        return _Header(photograph.size, photograph.icc, photograph.notes)
 
 
 def _on_paper(codes: Pixels, *, turned: bool) -> Image.Image:

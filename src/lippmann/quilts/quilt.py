@@ -127,6 +127,8 @@ class Quilt:
         How the quilt was made.
     display:
         The display that the views are for; None if unknown.
+    notes:
+        What of its files is not shown, each in one line.
     """
 
     values: Values
@@ -134,6 +136,7 @@ class Quilt:
     stored: Stored = "float32"
     provenance: Provenance = field(default_factory=Provenance)
     display: Display | None = None
+    notes: tuple[str, ...] = ()
 
     @property
     def size(self) -> tuple[int, int]:

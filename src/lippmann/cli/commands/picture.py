@@ -354,6 +354,7 @@ def _info_values(path: Path, file: PictureFile) -> dict[str, Any]:
         "size": [file.width, file.height],
         "stored": file.stored,
         "layers": list(file.layers),
+        "notes": list(file.notes),
     }
     if file.metadata is not None:
         values |= file.metadata.to_dict()
@@ -375,6 +376,7 @@ def _info_lines(path: Path, file: PictureFile) -> list[str]:
     lines = [f"{path}: {file.format.upper()}, {file.width}x{file.height}, {file.stored}"]
     if file.layers:
         lines.append(f"layers      {', '.join(file.layers)}")
+    lines += [f"note        {note}" for note in file.notes]
     if file.metadata is None:
         return [*lines, "no Lippmann metadata: commands that need the display take --display"]
     display, provenance = file.metadata.display, file.metadata.provenance

@@ -238,6 +238,8 @@ def pack(
     check_output(output, format_for(output, bits)[0])
     with console.progress() as progress:
         packed = read_views(folder, layout, progress=progress)
+        for note in packed.notes:
+            console.remark(note)
     write_quilt(packed, output, bits=bits)
     width, height = packed.size
     result = {"output": str(output), "size": [width, height], "views": layout.views}
@@ -262,6 +264,8 @@ def unpack(
     console = Console(quiet, as_json)
     check_folder_writable(output)
     found = read_quilt(picture, layout_of(layout, aspect))
+    for note in found.notes:
+        console.remark(note)
     with console.progress() as progress:
         write_views(found, output, format=format, bits=bits, progress=progress)  # type: ignore[arg-type]
     width, height = found.view_size
@@ -329,6 +333,8 @@ def weave(
     width, height = panel.width, panel.height
     with console.progress() as progress:
         views = _views(source, layout_of(layout, aspect), progress)
+        for note in views.notes:
+            console.remark(note)
         if fit is not None or source.is_dir():  # a quilt of another shape is refused, unless a fit is asked for
             views, cropped = fit_views(views, trim.width / trim.height, fit or "cover")
             for note in fit_note(cropped, fit):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -52,11 +53,13 @@ def read_depth_photo(path: Path, *, allow_outside: bool = False, depth_map: Path
         A file is missing or damaged; the picture holds no depth and none is given; their sides differ in proportion.
     """
     data, turn = read_bytes(path), 1
+    notes: tuple[str, ...] = ()
     if path.suffix.lower() in HEIF:
         image, own = read_heif_photo(data, path.name)
     else:
         with decoding("the photograph", path.name), open_photograph(io.BytesIO(data), path) as photograph:
-            image, turn = Image(path.name, texels_of_codes(photograph.srgb_codes())), photograph.orientation
+            image = Image(path.name, texels_of_codes(photograph.srgb_codes()))
+            turn, notes = photograph.orientation, photograph.notes
         own = None if depth_map is not None else embedded_depth(data, path.name, turn)
     found = own if depth_map is None else read_depth_map(depth_map)
     if found is None:
@@ -79,7 +82,8 @@ def read_depth_photo(path: Path, *, allow_outside: bool = False, depth_map: Path
         raise SceneError(f"the depth map has {columns}x{rows} pixels", where=path.name, rule="2 x 2 and more are read")
     v, u = ((place + 0.5) / count for place, count in zip(places, (rows, columns), strict=True))
     layers = split_layers(inverse, _colors_at(image, u, v), path.name)
-    return _description(path.stem, image, layers, u, v)
+    description = _description(path.stem, image, layers, u, v)
+    return replace(description, notes=[*notes, *description.notes])
 
 
 def _alike(first: tuple[int, int], second: tuple[int, int]) -> bool:

@@ -1,0 +1,18 @@
+"""What of a picture file is not shown, in one line each."""
+
+from __future__ import annotations
+
+
+def aspect_note(across: float, down: float) -> tuple[str, ...]:
+    """The note on pixels that are not square, by the pixels per length across and down; none for square ones.
+
+    Programs write whole numbers per inch or per metre, which differ by a part of a hundred at most.
+    """
+    if across <= 0.0 or down <= 0.0 or abs(across / down - 1.0) < 0.01:
+        return ()
+    return (f"its pixels are {down / across:.4g} times as wide as high: they are shown square",)
+
+
+def pictures_note(count: int) -> tuple[str, ...]:
+    """The note on a file of several pictures; none for one."""
+    return (f"it holds {count} pictures: the first is shown",) if count > 1 else ()
