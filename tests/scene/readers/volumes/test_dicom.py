@@ -38,11 +38,114 @@ def test_rescaled_values(tmp_path):
     assert volume.grid[:, 1, 0].tolist() == [-1024, 2 * 30 - 1024, 2 * 60 - 1024, 21]
 
 
-def test_dark_is_bright_where_the_file_says_so(tmp_path):
-    save_series(tmp_path / "mr", [0, 3], PhotometricInterpretation="MONOCHROME1", Modality="MR")
-    volume = load_scene(tmp_path / "mr").description.volume
-    values = volume.grid * volume.slope + volume.intercept
-    assert values[0, 1, 0] > values[1, 1, 0]
+def test_values_stay_whichever_way_viewers_show_them(tmp_path):
+    """MONOCHROME1 says only how the last grey-scale step ends (PS3.3 C.7.6.3.1.2)."""
+    for word in ("MONOCHROME1", "MONOCHROME2"):
+        save_series(tmp_path / word, [0, 3], PhotometricInterpretation=word)
+    scene = load_scene(tmp_path / "MONOCHROME1")
+    volume, other = scene.description.volume, load_scene(tmp_path / "MONOCHROME2").description.volume
+    assert (volume.grid == other.grid).all()
+    assert volume.slope == 1
+    assert "viewers show its low values bright (MONOCHROME1): here, high values are dense" in scene.notes
+
+
+def save_frames(path, **values):
+    """Three frames of one file, which hold 0, 10 and 20; the first lies at (-7, -9, 5)."""
+    frames = np.repeat([0, 10, 20], 20).reshape(3, 4, 5)
+    common = {"NumberOfFrames": 3, "ImagePositionPatient": [-7, -9, 5], "RescaleSlope": None, "RescaleIntercept": None}
+    save_slice(path, frames, **{**common, **values})
+    return load_scene(path)
+
+
+ROW_DOWN, BACK = [1, 0, 0, 0, 0, -1], [0, 1, 0]  # a coronal plane, whose normal leads to the back
+
+
+@pytest.mark.parametrize(
+    ("values", "matrix_step", "first"),
+    [
+        ({"GridFrameOffsetVector": [0, 4, 8]}, [0, 0, 4], [-7, -9, 5]),
+        ({"GridFrameOffsetVector": [0, -4, -8]}, [0, 0, 4], [-7, -9, -3]),
+        ({"GridFrameOffsetVector": [5, 9, 13]}, [0, 0, 4], [-7, -9, 5]),
+        ({"GridFrameOffsetVector": [5, 1, -3]}, [0, 0, 4], [-7, -9, -3]),
+        ({"GridFrameOffsetVector": [0, 4, 8], "ImageOrientationPatient": ROW_DOWN}, [0, 4, 0], [-7, -9, 5]),
+        ({"SpacingBetweenSlices": 2.5}, [0, 0, 2.5], [-7, -9, 5]),
+        ({"SpacingBetweenSlices": 2.5, "SliceVector": [3, 2, 1]}, [0, 0, 2.5], [-7, -9, 5]),
+    ],
+)
+def test_frames_lie_where_one_number_says(tmp_path, values, matrix_step, first):
+    volume = save_frames(tmp_path / "a.dcm", **values).description.volume
+    assert volume.size == (5, 4, 3)
+    left, back, head = volume.world_from_voxel[:3, 2]
+    assert [left, -head, back] == pytest.approx(matrix_step)  # the patient is seen from the front, head up
+    x, y, z = volume.world_from_voxel[:3, 3]
+    assert [x, -z, y] == pytest.approx(first)
+    falls = first[2] == -3 or "SliceVector" in values
+    assert volume.grid[:, 0, 0].tolist() == ([20, 10, 0] if falls else [0, 10, 20])
+
+
+def test_doses_are_scaled(tmp_path):
+    volume = save_frames(tmp_path / "a.dcm", GridFrameOffsetVector=[0, 3, 6], DoseGridScaling="1e-3").description.volume
+    assert volume.slope == 1e-3
+
+
+def test_a_tomogram_of_nuclear_medicine_lies_as_its_detector(tmp_path):
+    import pydicom
+
+    detector = pydicom.Dataset()
+    detector.ImagePositionPatient, detector.ImageOrientationPatient = [-7, -9, 5], [1, 0, 0, 0, 1, 0]
+    own = {"ImagePositionPatient": None, "ImageOrientationPatient": None, "DetectorInformationSequence": [detector]}
+    volume = save_frames(tmp_path / "a.dcm", SpacingBetweenSlices=3, SliceVector=[1, 2, 3], **own).description.volume
+    assert volume.size == (5, 4, 3)
+    assert volume.world_from_voxel.tolist() == [[1, 0, 0, -7], [0, 0, 3, 5], [0, -2, 0, 9], [0, 0, 0, 1]]
+
+
+def test_frames_that_are_moments_are_noted(tmp_path):
+    scene = save_frames(tmp_path / "a.dcm", FrameIncrementPointer=0x00181063, FrameTime=40)
+    assert "its frames are moments (FrameTime): they are shown as slices" in scene.notes
+
+
+@pytest.mark.parametrize(
+    ("values", "spacing"),
+    [
+        ({"ImagerPixelSpacing": [4, 3]}, [3, 4]),
+        ({"NominalScannedPixelSpacing": [4, 3]}, [3, 4]),
+        ({"PixelAspectRatio": [3, 2]}, [1, 1.5]),
+    ],
+)
+def test_sizes_of_pixels_are_told_in_several_ways(tmp_path, values, spacing):
+    save_series(tmp_path / "ct", [0, 3], PixelSpacing=None, **values)
+    scene = load_scene(tmp_path / "ct")
+    assert scene.description.volume.spacing.tolist()[:2] == spacing
+    assert not any("size of pixels" in note for note in scene.notes)
+
+
+@pytest.mark.parametrize(("padding", "limit"), [(900, None), (800, 1000), (1000, 800)])
+def test_padding_is_as_low_as_the_lowest_value(tmp_path, padding, limit):
+    pixels = np.full((4, 5), 40)
+    pixels[0], pixels[1] = 900, -50
+    more = {"PixelPaddingValue": padding, "PixelPaddingRangeLimit": limit}
+    save_slice(tmp_path / "a.dcm", pixels, ImagePositionPatient=[0, 0, 0], **more)
+    assert load_scene(tmp_path / "a.dcm").description.volume.grid[0, :, 0].tolist() == [-50, -50, 40, 40]
+
+
+def test_a_table_of_the_modality(tmp_path):
+    import pydicom
+
+    table = pydicom.Dataset()
+    table.LUTDescriptor, table.ModalityLUTType = [3, 0, 16], "US"
+    table.add_new(0x00283006, "US", [100, 300, 200])
+    plain = {"RescaleSlope": None, "RescaleIntercept": None, "PixelRepresentation": 0}
+    pixels = np.tile([[0], [1], [2], [2]], (1, 5))
+    save_slice(tmp_path / "a.dcm", pixels, ImagePositionPatient=[0, 0, 0], ModalityLUTSequence=[table], **plain)
+    assert load_scene(tmp_path / "a.dcm").description.volume.grid[0, :, 0].tolist() == [100, 300, 200, 200]
+
+
+@pytest.mark.parametrize("stored", [12, 16])
+def test_bits_beyond_those_stored_do_not_count(tmp_path, stored):
+    pixels = np.full((4, 5), 0x1005)
+    bits = {"BitsStored": stored, "HighBit": stored - 1, "PixelRepresentation": 0}
+    save_slice(tmp_path / "a.dcm", pixels, ImagePositionPatient=[0, 0, 0], **bits)
+    assert load_scene(tmp_path / "a.dcm").description.volume.grid[0, 0, 0] == (5 if stored == 12 else 0x1005)
 
 
 def test_missing_and_doubled_slices_are_told(tmp_path):

@@ -30,7 +30,13 @@ _TAGS = [
     *("ImagePositionPatient", "ImageOrientationPatient", "PixelSpacing", "SliceThickness", "SamplesPerPixel"),
     *("SpacingBetweenSlices", "NumberOfFrames", "RescaleSlope", "RescaleIntercept", "PhotometricInterpretation"),
     *("SharedFunctionalGroupsSequence", "PerFrameFunctionalGroupsSequence", "BitsAllocated"),
+    *("GridFrameOffsetVector", "DoseGridScaling", "DetectorInformationSequence", "SliceVector", "ImagerPixelSpacing"),
+    *("NominalScannedPixelSpacing", "PixelAspectRatio", "FrameIncrementPointer"),
 ]
+#: Planes whose normal has so much of the patient's length are axial.
+_AXIAL = 0.9999
+#: FrameTime, FrameTimeVector: of files whose frames are moments.
+_TIMES = (0x00181063, 0x00181065)
 
 
 def main() -> None:
@@ -118,6 +124,7 @@ def _frames(name: str, header: pydicom.Dataset) -> Iterator[Frame]:
     count = int(header.get("NumberOfFrames", 1) or 1)
     shared = _first(header, "SharedFunctionalGroupsSequence")
     own = list(header.get("PerFrameFunctionalGroupsSequence", None) or [])
+    detector = _first(header, "DetectorInformationSequence")
     for index in range(min(count, 1 << 16)):
         groups = [own[index]] if index < len(own) else []
         if shared is not None:
@@ -128,12 +135,16 @@ def _frames(name: str, header: pydicom.Dataset) -> Iterator[Frame]:
                 item = _first(group, sequence)
                 if item is not None and tag in item:
                     return item.get(tag)
-            return header.get(tag)
+            return header.get(tag) if tag in header or detector is None else detector.get(tag)
 
-        position = find("PlanePositionSequence", "ImagePositionPatient")
-        orientation = find("PlaneOrientationSequence", "ImageOrientationPatient")
+        position = _numbers(find("PlanePositionSequence", "ImagePositionPatient"), 3)
+        orientation = _numbers(find("PlaneOrientationSequence", "ImageOrientationPatient"), 6)
         spacing = find("PixelMeasuresSequence", "PixelSpacing")
-        slope = find("PixelValueTransformationSequence", "RescaleSlope")
+        apart = find("PixelMeasuresSequence", "SpacingBetweenSlices")
+        thickness = float(apart or find("PixelMeasuresSequence", "SliceThickness") or 0.0)
+        if count > 1 and not own:
+            position = _frame_position(header, index, position, orientation, thickness)
+        slope = header.get("DoseGridScaling") or find("PixelValueTransformationSequence", "RescaleSlope")
         intercept = find("PixelValueTransformationSequence", "RescaleIntercept")
         yield Frame(
             file=name,
@@ -145,19 +156,49 @@ def _frames(name: str, header: pydicom.Dataset) -> Iterator[Frame]:
             number=float(header.get("InstanceNumber", 0) or 0),
             shape=(int(header.Rows), int(header.Columns)),
             channels=int(header.get("SamplesPerPixel", 1) or 1),
-            is_inverted=str(header.get("PhotometricInterpretation", "")).strip() == "MONOCHROME1",
+            shows_low_bright=str(header.get("PhotometricInterpretation", "")).strip() == "MONOCHROME1",
+            is_moment=header.get("FrameIncrementPointer") in _TIMES,
             is_palette=str(header.get("PhotometricInterpretation", "")).startswith("PALETTE"),
-            position=_numbers(position, 3),
-            orientation=_numbers(orientation, 6),
-            spacing=_numbers(spacing, 2),
-            thickness=float(
-                find("PixelMeasuresSequence", "SpacingBetweenSlices")
-                or find("PixelMeasuresSequence", "SliceThickness")
-                or 0.0
-            ),
+            position=position,
+            orientation=orientation,
+            spacing=_numbers(spacing, 2) or _other_spacing(header),
+            thickness=thickness,
             slope=1.0 if slope is None or slope == "" else float(slope),
             intercept=0.0 if intercept is None or intercept == "" else float(intercept),
         )
+
+
+def _frame_position(
+    header: pydicom.Dataset,
+    index: int,
+    first: tuple[float, ...] | None,
+    orientation: tuple[float, ...] | None,
+    spacing: float,
+) -> tuple[float, ...] | None:
+    """Place of a frame whose file tells that of the first: by its offset (PS3.3 C.8.8.3.2), or at even distances."""
+    if first is None:
+        return None
+    axes = np.reshape(orientation or (1.0, 0.0, 0.0, 0.0, 1.0, 0.0), (2, 3))
+    normal = np.cross(*axes)
+    offsets = header.get("GridFrameOffsetVector", None)
+    if offsets is not None and not isinstance(offsets, str) and index < len(offsets):
+        if float(offsets[0]) == first[2] and abs(normal[2]) > _AXIAL:  # places themselves
+            return (*first[:2], float(offsets[index]))
+        return tuple((np.asarray(first) + normal * float(offsets[index])).tolist())
+    if not spacing:
+        return None
+    slices = header.get("SliceVector", None)
+    place = int(slices[index]) - 1 if slices is not None and index < len(slices) else index
+    return tuple((np.asarray(first) + normal * spacing * place).tolist())
+
+
+def _other_spacing(header: pydicom.Dataset) -> tuple[float, ...] | None:
+    """Distances of rows and columns without PixelSpacing: in the detector, on the film, or their ratio alone."""
+    for name in ("ImagerPixelSpacing", "NominalScannedPixelSpacing"):
+        if found := _numbers(header.get(name), 2):
+            return found
+    ratio = _numbers(header.get("PixelAspectRatio"), 2)
+    return (ratio[0] / ratio[1], 1.0) if ratio is not None and min(ratio) > 0.0 else None
 
 
 def _first(dataset: pydicom.Dataset, sequence: str) -> pydicom.Dataset | None:
@@ -177,7 +218,6 @@ def _fill(frames: list[Frame], lost: dict[str, list[str]], memory: int) -> tuple
     stack = make_stack(frames)
     frames = stack.frames
     is_one_scale = len({(frame.slope, frame.intercept) for frame in frames}) == 1
-    inverted = frames[0].is_inverted
     rows, columns = frames[0].shape
     if len(frames) * rows * columns * 4 > memory:
         raise MemoryError
@@ -212,8 +252,6 @@ def _fill(frames: list[Frame], lost: dict[str, list[str]], memory: int) -> tuple
     if stack.places is not None:
         grid = interpolated(grid, stack.places)
     slope, intercept = (frames[0].slope, frames[0].intercept) if is_one_scale else (1.0, 0.0)
-    if inverted:
-        slope = -slope
     head = {
         "shape": grid.shape,
         "dtype": grid.dtype.str,
@@ -233,7 +271,7 @@ def _pixels(frame: Frame) -> np.ndarray[Any, Any]:
         dataset.file_meta = pydicom.dataset.FileMetaDataset()
         dataset.file_meta.TransferSyntaxUID = syntax = pydicom.uid.ImplicitVRLittleEndian
     try:
-        return np.asarray(dataset.pixel_array)
+        return _measured(dataset, np.asarray(dataset.pixel_array))
     except (RuntimeError, NotImplementedError) as error:
         if not syntax.is_compressed:
             raise
@@ -242,3 +280,19 @@ def _pixels(frame: Frame) -> np.ndarray[Any, Any]:
             rule=f"no decoder is installed that reads them ({_words(error, frame.file)})"[:200],
             fix="pip install pylibjpeg pylibjpeg-libjpeg pylibjpeg-openjpeg",
         ) from None
+
+
+def _measured(dataset: pydicom.Dataset, pixels: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
+    """Pixels through the modality's table, where there is one; padding as low as the lowest value."""
+    padding = dataset.get("PixelPaddingValue")
+    if padding is not None:
+        ends = sorted(
+            int(end) - (1 << 16) * (pixels.dtype.kind == "i" and int(end) >= 1 << 15)  # written as if unsigned
+            for end in (padding, dataset.get("PixelPaddingRangeLimit", padding))
+        )
+        padded = (pixels >= ends[0]) & (pixels <= ends[1])
+        if padded.any() and not padded.all():
+            pixels = np.where(padded, pixels[~padded].min(), pixels)
+    if _first(dataset, "ModalityLUTSequence") is not None:
+        pixels = pydicom.pixels.apply_modality_lut(pixels, dataset)
+    return pixels

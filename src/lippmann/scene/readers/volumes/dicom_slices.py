@@ -35,6 +35,7 @@ class Frame:
 
     ``position`` is that of the middle of the first pixel, ``orientation`` the direction along a row, then down a
     column, ``spacing`` the distance of rows, then of columns; None where the header lacks it.
+    ``is_moment`` says that frames of a file follow each other in time.
     """
 
     file: str
@@ -46,7 +47,8 @@ class Frame:
     number: float
     shape: tuple[int, int]
     channels: int = 1
-    is_inverted: bool = False
+    shows_low_bright: bool = False
+    is_moment: bool = False
     is_palette: bool = False
     position: tuple[float, ...] | None = None
     orientation: tuple[float, ...] | None = None
@@ -110,6 +112,10 @@ def choose_series(frames: list[Frame], wanted: str | None, own: str | None) -> t
             turned = None if frame.orientation is None else tuple(np.round(frame.orientation, _DECIMALS).tolist())
             kinds.setdefault((frame.shape, turned, frame.spacing), []).append(frame)
     largest = max(kinds.values(), key=len)
+    if largest[0].shows_low_bright:
+        notes.append("viewers show its low values bright (MONOCHROME1): here, high values are dense")
+    if largest[0].is_moment:
+        notes.append("its frames are moments (FrameTime): they are shown as slices")
     others = counts[chosen] - len(largest)
     if others:
         notes.append(f"{others} slices of another size or orientation are left out")
