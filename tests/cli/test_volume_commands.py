@@ -29,7 +29,7 @@ def test_the_shortest_command_shows_the_bone(lippmann, engine, scan, tmp_path):
     assert (done.json["method"], done.json["spp"]) == ("full", 1)
     assert "shown by the transfer function 'ct-bone'" in done.err
     lit = pixels(out).max(axis=2) > 60
-    assert np.ptp(np.flatnonzero(lit.any(axis=1))) > 0.8 * 512
+    assert np.ptp(np.flatnonzero(lit.any(axis=1))) > 0.75 * 512  # a fitted scene leaves air for parallax
 
 
 def test_options_change_what_is_seen(lippmann, engine, scan, tmp_path):
