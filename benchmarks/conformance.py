@@ -97,7 +97,7 @@ def _incomplete(folder: Path, reports: list[dict[str, Any]]) -> dict[str, Validi
     present = {path.name.casefold() for path in folder.rglob("*")}
     found = {}
     for report in reports:
-        named = re.search(r"'([^']+)' is not there", report.get("line", ""))
+        named = re.search(r"'([^']+)' not found", report.get("line", ""))
         if named is not None and PureWindowsPath(named[1]).name.casefold() not in present:
             found[report["file"]] = Validity(False, INCOMPLETE)
     return found

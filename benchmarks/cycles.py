@@ -1,6 +1,6 @@
 """A quilt and a native frame against the way it is done today: Blender's Cycles, view by view, with its denoiser.
 
-The glTF teapot in the studio light that Lippmann gives to scenes without any, before a nominal Looking Glass Portrait:
+The glTF teapot in the studio light that Lippmann gives to scenes without any, for a nominal Looking Glass Portrait:
 48 views of 420 x 560 pixels by Cycles at 16 samples with Open Image Denoise, against Lippmann's quilt of the same size
 and its native frame of 1536 x 2048 x 3 sub-pixels, two threads each. Every picture is judged by a long rendering of its
 own program, the quilts on two views, the frame on every 64th row: PSNR of sRGB-coded values in [0, 1]. Lippmann

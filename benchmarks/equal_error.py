@@ -102,7 +102,7 @@ def asked(words: argparse.ArgumentParser) -> tuple[argparse.Namespace, list[tupl
 
 
 def prepare(name: str, display_name: str, caustics: str = "paths") -> Stage:
-    """The scene on the device, before the display."""
+    """The scene on the device, with the display placed in it."""
     import lippmann
     from lippmann.rendering.request.render_request import RenderRequest
     from lippmann.rendering.session import open_session

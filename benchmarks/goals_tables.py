@@ -45,7 +45,7 @@ Rows and clock are those above, and so are the scenes, but for those missing fro
 
 
 def _gained(result: dict[str, Any]) -> str:
-    """What stock views that are not there gained in dB by the last doubling of their samples, least and most."""
+    """What stock views that were not rendered gained in dB by the last doubling of their samples, least and most."""
     scenes = [scene for measured in result["results"].values() for scene in measured.values()]
     found = [way["gained"] for goals in scenes for ways in goals.values() for way in ways.values() if "gained" in way]
     return f"{min(found):.1f} to {max(found):.1f}"

@@ -88,7 +88,7 @@ def small_array() -> Any:
 
 
 def turned() -> Any:
-    """How the scenes are placed before it."""
+    """How the display is placed in the scenes."""
     from lippmann.scene.placement import PlacementOptions
 
     return PlacementOptions(mode="fit", turn=(0.0, 30.0, 0.0))

@@ -87,7 +87,7 @@ def save(name: str, values: Mapping[str, Any]) -> None:
 
 
 def saved(name: str) -> dict[str, Any]:
-    """What ``results/NAME.json`` holds; nothing if it is not there."""
+    """What ``results/NAME.json`` holds; nothing if there is none."""
     path = RESULTS / f"{name}.json"
     values: dict[str, Any] = json.loads(path.read_text()) if path.exists() else {}
     return values

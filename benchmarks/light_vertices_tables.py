@@ -11,7 +11,7 @@ def describe(result: dict[str, Any]) -> str:
     return f"""## Paths joined to light vertices (`light_vertices.py`)
 
 [Light vertices](light-vertices.md): `full`, {result["spp"]} samples a pixel. The suite's scenes on 64 lenses of 8
-pixels, 160 rows; the rooms before an array of 12 x 12 lenses of 8 pixels. PSNR between two pictures of other seeds;
+pixels, 160 rows; the rooms behind an array of 12 x 12 lenses of 8 pixels. PSNR between two pictures of other seeds;
 time of the processors over their number for one, with all preparation of its light.
 
 {table}

@@ -92,7 +92,7 @@ def wanted_cases(displays: Iterable[str], only: str, cases: dict[str, Any]) -> I
         if only not in name:
             continue
         if source != scene and not Path(source).exists():
-            cases[name] = {"skipped": f"{Path(source).name} is not there"}
+            cases[name] = {"skipped": f"{Path(source).name} not found"}
             continue
         yield name, display, source
 

@@ -178,7 +178,7 @@ def _cycles(result: dict[str, Any]) -> str:
     rows = "\n".join(_cycles_rows(result))
     return f"""## Against Blender's Cycles (`cycles.py`)
 
-The glTF teapot before a nominal Looking Glass Portrait: 48 views of {result["view"][0]}x{result["view"][1]} pixels, or
+The glTF teapot for a nominal Looking Glass Portrait: 48 views of {result["view"][0]}x{result["view"][1]} pixels, or
 the native frame of {width}x{height}x3 sub-pixels; two threads each. Every program is judged by its own long rendering
 ({result["reference_spp"]} samples). Target: at no lower PSNR {result["target"]:g} times faster.
 

@@ -130,7 +130,7 @@ class _Run(bpy.types.Operator):
 
 
 class LIPPMANN_OT_preview(_Run):  # noqa: N801  # Blender's convention
-    """Show what the display will show to an eye before its middle"""
+    """Show what the display will show to an eye in front of its middle"""
 
     bl_idname = "lippmann.preview"
     bl_label = "Preview"

@@ -6,7 +6,18 @@ prints that line alone and leaves with the error's exit code; a library caller c
 
 from __future__ import annotations
 
+import difflib
+from collections.abc import Iterable
+from typing import TypeVar
+
 from lippmann.printable import one_line
+
+E = TypeVar("E", bound="LippmannError")
+
+#: Names that a line lists at most.
+_MOST_LISTED = 40
+#: Letters of an unknown name that a line quotes at most.
+_MOST_QUOTED = 80
 
 
 class LippmannError(Exception):
@@ -37,6 +48,29 @@ class LippmannError(Exception):
         self.fix = fix
         super().__init__(str(self))
 
+    @classmethod
+    def unknown(
+        cls: type[E],
+        kind: str,
+        name: object,
+        known: Iterable[str],
+        *,
+        where: str = "",
+        parameter: str = "",
+        rule: str = "",
+        fix: str = "",
+    ) -> E:
+        """The error of a ``kind`` of thing called ``name``, which is none of those known: the likeliest come first.
+
+        ``rule`` stands for the list of all that are known.
+        """
+        names = list(known)
+        listed = ", ".join(names[:_MOST_LISTED]) + (", ..." if len(names) > _MOST_LISTED else "")
+        rule = rule or (f"known are {listed}" if names else "there is none")
+        quoted = str(name)[:_MOST_QUOTED]
+        what = f"unknown {kind} '{quoted}'{suggestion(quoted, names)}" if quoted else f"no {kind}"
+        return cls(what, where=where, parameter=parameter, rule=rule, fix=fix)
+
     def __str__(self) -> str:
         head = ": ".join(part for part in (self.where, self.parameter, self.what) if part)
         line = "; ".join(part for part in (head, self.rule, self.fix) if part)
@@ -46,6 +80,12 @@ class LippmannError(Exception):
     def __reduce__(self) -> tuple[object, ...]:
         # Keyword-only fields are lost by the default pickling, which worker processes rely on.
         return (_rebuild, (type(self), self.what, self.where, self.parameter, self.rule, self.fix))
+
+
+def suggestion(name: object, known: Iterable[str]) -> str:
+    """``, did you mean 'x'?`` with the known names that are most like ``name``; empty if none is."""
+    near = difflib.get_close_matches(str(name), list(known), n=3)
+    return f", did you mean {' or '.join(repr(each) for each in near)}?" if near else ""
 
 
 def _rebuild(kind: type[LippmannError], what: str, where: str, parameter: str, rule: str, fix: str) -> LippmannError:

@@ -209,7 +209,7 @@ def test_steps_are_round_and_half_a_lens_at_most():
 @pytest.mark.parametrize(
     ("asked", "said"),
     [
-        ({"name": "moire"}, "the pattern 'moire' is unknown; known are stripes, pitch, slope, center"),
+        ({"name": "moire"}, "unknown pattern 'moire'; known are stripes, pitch, slope, center"),
         ({"name": "stripes", "views": 1}, "views: 1 is out of range"),
         ({"name": "pitch", "fields": 0}, "fields: 0 is out of range"),
         ({"name": "pitch", "step": 0.0}, "step: 0 is out of range"),

@@ -103,7 +103,7 @@ def test_what_an_eye_sees_of_the_pattern(lippmann, monitor_file, tmp_path):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (("moire", "-d", SHORT), "the pattern 'moire' is unknown"),
+        (("moire", "-d", SHORT), "unknown pattern 'moire'"),
         (("stripes",), "--display"),
         (("stripes", "-d", "mla-square"), "mla-square has square lenses"),
         (("stripes", "-d", "monitor"), "monitor: size: size is missing"),
@@ -135,4 +135,4 @@ def test_bad_input_is_one_line_and_code_2(lippmann, tmp_path, words, said):
 def test_a_foreign_ending_is_refused_first(lippmann, tmp_path):
     outcome = lippmann("calibrate", "pattern", "stripes", "-d", SHORT, "-o", tmp_path / "pattern.jpg")
     assert outcome.code == 2
-    assert "the ending '.jpg' is unknown" in outcome.err
+    assert "unknown ending '.jpg'" in outcome.err

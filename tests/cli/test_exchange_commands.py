@@ -78,7 +78,7 @@ def test_bad_input_is_one_line_and_code_2(lippmann, picture, tmp_path):
         return outcome.err
 
     assert "--as" in refused("export", picture, "-o", out)
-    assert "'hdf5' is not known; known are hci, lftoolbox, eslf, zarr, views" in refused(
+    assert "unknown value 'hdf5'; known are hci, lftoolbox, eslf, zarr, views" in refused(
         "export", picture, "--as=hdf5", "-o", out
     )
     assert "lftoolbox files end in .mat" in refused("export", picture, "--as=lftoolbox", "-o", tmp_path / "out.png")
@@ -91,6 +91,6 @@ def test_bad_input_is_one_line_and_code_2(lippmann, picture, tmp_path):
     assert "there are no views" in refused("import", tmp_path / "empty", "-o", tmp_path / "x.png")
     assert "parameters.cfg: not found" in refused("import", tmp_path / "empty", "--as=hci", "-o", tmp_path / "x.png")
     assert "is no Zarr group" in refused("import", tmp_path / "empty", "--as=zarr", "-o", tmp_path / "x.png")
-    assert "the ending '.jpg'" in refused("import", tmp_path / "empty", "-o", tmp_path / "x.jpg")
+    assert "unknown ending '.jpg'" in refused("import", tmp_path / "empty", "-o", tmp_path / "x.jpg")
     assert "unknown display" in refused("import", tmp_path / "empty", "-d", "none", "-o", tmp_path / "x.png")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["empty", "junk.mat", "there"]

@@ -54,7 +54,7 @@ def test_denoising_brings_a_picture_nearer_to_a_long_one(lippmann, engine, tmp_p
 @pytest.mark.parametrize(
     ("words", "complaint"),
     [
-        (("--denoise", "median"), "--denoise: 'median' is not known"),
+        (("--denoise", "median"), "--denoise: unknown value 'median'"),
         (("--denoise", "oidn", "--integrator", "normal"), "--denoise: normal has no noise"),
     ],
 )

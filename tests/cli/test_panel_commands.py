@@ -160,8 +160,10 @@ def test_bad_input_is_one_line_and_code_2(lippmann, views, calibration, tmp_path
     assert "--display" in refused("weave", views, "-o", native)
     assert "unknown display" in refused("weave", views, "-d", "lkg", "-o", native)
     assert "square lenses" in refused("weave", views, "-d", "mla-square", "-o", native, "--quiet")
-    assert "'cubic' is unknown" in refused("weave", views, "-d", calibration, "-o", native, "--views=cubic", "-q")
-    assert "the ending '.jpg'" in refused("weave", views, "-d", calibration, "-o", tmp_path / "native.jpg")
+    assert "unknown choice of views 'cubic'" in refused(
+        "weave", views, "-d", calibration, "-o", native, "--views=cubic", "-q"
+    )
+    assert "unknown ending '.jpg'" in refused("weave", views, "-d", calibration, "-o", tmp_path / "native.jpg")
     broken = calibration.read_text().replace('{"value": 52.58}', "52.58")
     calibration.write_text(broken)
     assert "pitch is 52.58; it must be wrapped" in refused("weave", views, "-d", calibration, "-o", native)

@@ -121,14 +121,14 @@ def test_bad_input_is_one_line_and_code_2(lippmann, tmp_path):
     assert "the name says another quilt; the quilt's ends in _qs8x6a0.75.png" in refused(
         *render, "-o", tmp_path / "x_qs5x9a0.75.png"
     )
-    assert "the ending '.jpg'" in refused(*render, "-o", tmp_path / "x_qs8x6a0.75.jpg")
+    assert "unknown ending '.jpg'" in refused(*render, "-o", tmp_path / "x_qs8x6a0.75.jpg")
     assert "unknown display" in refused(*render, "-d", "portrai")
     assert "no quilt is known" in refused(*render, "-d", "panel-4k")
     assert "columns x rows, such as 8x6" in refused(*render, "--views", "48")
     assert "such as 512x512" in refused(*render, "--size", "3360")
     assert "no multiple of 8" in refused(*render, "--size", "3361x3360")
     assert "pooled shares denoised light" in refused(*render, "--method", "pooled", "--denoise", "none")
-    assert "--method: 'lens-view' is not known; known are auto, full, pooled" in refused(
+    assert "--method: unknown value 'lens-view'; known are auto, full, pooled" in refused(
         *render, "--method", "lens-view"
     )
     out = tmp_path / "x_qs4x4a1.png"

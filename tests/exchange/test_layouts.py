@@ -73,7 +73,7 @@ def test_another_display_shows_the_same_views(display, picture, tmp_path):
 def test_what_is_not_meant_is_refused(display, picture, tmp_path):
     image = picture(display())
     for words, what in (
-        ((image, tmp_path / "x", "hdf"), "layout: the layout 'hdf' is unknown; known are hci, lftoolbox"),
+        ((image, tmp_path / "x", "hdf"), "layout: unknown layout 'hdf'; known are hci, lftoolbox"),
         ((image, tmp_path / "x.png", "lftoolbox"), "the ending is '.png'; lftoolbox files end in .mat"),
         ((image, tmp_path / "x", "eslf"), "eslf files end in .png"),
     ):
@@ -82,7 +82,7 @@ def test_what_is_not_meant_is_refused(display, picture, tmp_path):
         assert what in str(refused.value)
     with pytest.raises(UsageError, match="distance: does not apply to zarr"):
         export_image(image, tmp_path / "x", "zarr", distance=5.0)
-    with pytest.raises(UsageError, match="the layout 'hdf' is unknown"):
+    with pytest.raises(UsageError, match="unknown layout 'hdf'"):
         import_image(tmp_path, "hdf")
     with pytest.raises(PictureError, match="not found"):
         import_image(tmp_path / "no")

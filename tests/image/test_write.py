@@ -135,8 +135,8 @@ def test_what_is_stored(tmp_path, name, bits, source, stored):
 @pytest.mark.parametrize(
     ("name", "bits", "message"),
     [
-        ("a.jpg", None, r"the ending '.jpg' is unknown; known are .png, .exr, .tif, .tiff"),
-        ("a", None, "the name has no ending; known are .png"),
+        ("a.jpg", None, r"unknown ending '.jpg', did you mean '.png'\?; known are .png, .exr, .tif, .tiff"),
+        ("a", None, "no ending; known are .png"),
         ("a.png", 32, "32 bits per channel are not possible; png has 8 or 16"),
         ("a.exr", 8, "8 bits per channel are not possible; exr has 16 or 32"),
         ("missing/a.png", None, "not found"),

@@ -62,7 +62,7 @@ def start_fails(before: str = "", device: str = "cpu", **environment: str) -> st
 @pytest.mark.parametrize(
     ("arguments", "problem"),
     [
-        ({"device": "tpu"}, "'tpu' is unknown"),
+        ({"device": "tpu"}, "unknown device 'tpu'"),
         ({"threads": 0}, "threads: 0 is out of range"),
         ({"threads": -3}, "threads: -3 is out of range"),
     ],

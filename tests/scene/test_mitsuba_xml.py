@@ -249,27 +249,27 @@ class TestPlugins:
     @pytest.mark.parametrize("kind", ["../../x", "/elsewhere/x", "sphere.so", "nothing", "plugins/sphere", "Sphere"])
     @pytest.mark.parametrize("tag", ["shape", "bsdf", "spectrum", "integrator", "volume"])
     def test_unknown_ones_are_refused(self, save, tag, kind):
-        with pytest.raises(SceneError, match=rf"room\.xml:2: plugin '{kind}' is unknown; scene files name plugins"):
+        with pytest.raises(SceneError, match=rf"room\.xml:2: unknown plugin '{kind}'.*; scene files name plugins"):
             read_mitsuba_xml(save(f'<{tag} type="{kind}"/>'))
 
     def test_by_parameter(self, save):
-        with pytest.raises(SceneError, match=r"plugin '\.\./x' is unknown"):
+        with pytest.raises(SceneError, match=r"unknown plugin '\.\./x'"):
             read_mitsuba_xml(save('<default name="t" value="../x"/><shape type="$t"/>'))
 
     def test_in_included_files(self, save, tmp_path):
         put(tmp_path / "scene" / "red.xml", '<bsdf version="3.0.0" type="../x"/>')
-        with pytest.raises(SceneError, match=r"red\.xml:1: plugin '\.\./x' is unknown"):
+        with pytest.raises(SceneError, match=r"red\.xml:1: unknown plugin '\.\./x'"):
             read_mitsuba_xml(save('<include filename="red.xml"/>'))
 
     def test_a_slip_of_the_pen(self, save):
-        with pytest.raises(SceneError, match="is 'sphere' meant"):
+        with pytest.raises(SceneError, match="did you mean 'sphere'"):
             read_mitsuba_xml(save('<shape type="spere"/>'))
 
     def test_tables_of_refractive_indices(self, save):
         metal = '<bsdf type="conductor"><string name="material" value="{}"/></bsdf>'
         read_mitsuba_xml(save(metal.format("Au")))
         read_mitsuba_xml(save(metal.format("none")))
-        with pytest.raises(SceneError, match=r"material '\.\./\.\./x' is unknown"):
+        with pytest.raises(SceneError, match=r"unknown material '\.\./\.\./x'"):
             read_mitsuba_xml(save(metal.format("../../x")))
 
 

@@ -122,10 +122,10 @@ def test_cameras_by_name():
     assert scene.camera() is cameras[0]
     assert Scene("s", scene.description, home_camera="side").camera() is cameras[1]
     with pytest.raises(
-        SceneError, match=r"no camera is named 'sied'; the scene has 'front', 'side'; is 'side' meant\?"
+        SceneError, match=r"camera: unknown camera 'sied', did you mean 'side'\?; known are front, side"
     ):
         scene.camera("sied")
-    with pytest.raises(SceneError, match="the scene has no cameras"):
+    with pytest.raises(SceneError, match="unknown camera 'front'; there is none"):
         find_camera([], "front")
 
 

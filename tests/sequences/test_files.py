@@ -101,7 +101,7 @@ def test_what_was_chosen_for_the_first_frame_holds(unbroken, moving_ball, displa
     head, line = journal.read_text().splitlines()
     assert json.loads(line)["chosen"] == {"method": "pooled", "denoise": "oidn"}
     journal.write_text(f"{head}\n{line.replace('pooled', 'guessed')}\n")
-    with pytest.raises(UsageError, match="method: 'guessed' is not known"):
+    with pytest.raises(UsageError, match="unknown method 'guessed'"):
         run(moving_ball, display, tmp_path, resume=True)
 
 

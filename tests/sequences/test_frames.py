@@ -155,7 +155,7 @@ def test_contradictions_are_refused(moving_ball, room, display):
         find_stand(flight, display, PlacementOptions(mode="fit"))
     with pytest.raises(UsageError, match="beside a path"):
         find_stand(flight, display, PlacementOptions(camera="x"))
-    with pytest.raises(SceneError, match="no camera is named 'x'"):
+    with pytest.raises(SceneError, match="unknown camera 'x'"):
         find_stand(open_motion(moving_ball), display, PlacementOptions(camera="x"))
     with pytest.raises(UsageError, match="one pose a frame"):
         open_motion(room[0], camera_path=room[1], animation="x")

@@ -122,7 +122,7 @@ def test_a_closed_studio_is_gone(tmp_path, engine):
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        ({"scene": "no-such"}, "no bundled scene or file"),
+        ({"scene": "no-such"}, "unknown bundled scene or file"),
         ({"display": "no-such"}, "no-such"),
         ({"display": 3}, "int is no name of a display"),
         ({"height": 10}, "200 to 4000"),
@@ -131,7 +131,7 @@ def test_a_closed_studio_is_gone(tmp_path, engine):
         ({"framed_by": ["*"]}, "no origin"),
         ({"framed_by": ["https://a.example; script-src *"]}, "no origin"),
         ({"folder": "no/such/folder"}, "folder"),
-        ({"colour": 1}, "'colour' is no setting"),
+        ({"colour": 1}, "unknown setting 'colour'"),
         ({"turn": "left"}, "turn"),
     ],
 )

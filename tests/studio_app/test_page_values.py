@@ -37,7 +37,7 @@ def test_a_state_comes_back():
     ("values", "words"),
     [
         ([], "object"),
-        ({"colour": 1}, "'colour' is no setting"),
+        ({"colour": 1}, "unknown setting 'colour'"),
         ({"scene": ""}, "scene"),
         ({"scene": "a\nb"}, "scene"),
         ({"scene": "a" * 5000}, "scene"),

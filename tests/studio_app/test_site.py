@@ -261,7 +261,7 @@ def test_the_window_on_the_panel_follows_and_sets_nothing(studio):
         window.send(json.dumps({"type": "shown", "frame": 1}))
         assert said(window, "frame")
         window.send(view(STATE))
-        assert "is no message" in said(window, "error")["line"]
+        assert "unknown message" in said(window, "error")["line"]
 
 
 def test_picked_depth_and_saved_states(studio):

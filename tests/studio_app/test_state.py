@@ -144,8 +144,8 @@ def test_files_that_a_state_names_lie_beside_it(tmp_path, monkeypatch):
     ("text", "line"),
     [
         ("turn = 3", "state:1: turn: 3; a list of 3 numbers"),
-        ("scale = 1\n\nlight = 2", "state:3: 'light' is no setting"),
-        ("tunr = [1, 2, 3]", "is 'turn' meant?"),
+        ("scale = 1\n\nlight = 2", "state:3: unknown setting 'light'"),
+        ("tunr = [1, 2, 3]", "did you mean 'turn'"),
         ("scene = ", "not valid TOML"),
         ("scale = 2\nscale = 3\n", "state:2: not valid TOML"),
         ('turn = [1.0, "a", 3.0]', "state:1: turn: 'a'; a number"),

@@ -274,7 +274,7 @@ def test_other_wrong_questions():
     for size in ((0, 5), (5, -1), (1.5, 2), (70000, 2)):
         with pytest.raises(UsageError, match="the size is"):
             replay(image, size=size)
-    with pytest.raises(UsageError, match="the filter 'cubic' is unknown; known are nearest, linear"):
+    with pytest.raises(UsageError, match="unknown filter 'cubic'; known are nearest, linear"):
         replay(image, filter="cubic")
     with pytest.raises(UsageError, match="frames: 0 is out of range"):
         sweep(image, (0, 0, 5), (1, 0, 5), 0)

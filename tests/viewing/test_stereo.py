@@ -115,7 +115,7 @@ def test_a_distance_between_the_eyes_out_of_range(eyes):
 
 
 def test_an_unknown_kind_of_pair():
-    with pytest.raises(UsageError, match="'top' is unknown; known are full, half, anaglyph"):
+    with pytest.raises(UsageError, match="unknown form 'top'; known are full, half, anaglyph"):
         replay_stereo(bar_at(0), stereo="top")
 
 

@@ -111,7 +111,7 @@ def test_a_film_of_two_frames_has_its_times(tmp_path):
 
 def test_places_that_cannot_be(tmp_path):
     for name, message in (
-        ("a.gif", "the ending '.gif' is unknown; animations are .png, .apng, .mp4"),
+        ("a.gif", "unknown ending of an animation '.gif'; known are .png, .apng, .mp4"),
         ("a", "no ending"),
     ):
         with pytest.raises(OutputError, match=message):

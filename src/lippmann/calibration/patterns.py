@@ -119,7 +119,7 @@ class Pattern:
 
     def __post_init__(self) -> None:
         if self.name not in NAMES:
-            raise UsageError(f"the pattern {self.name!r} is unknown", rule=f"known are {', '.join(NAMES)}")
+            raise UsageError.unknown("pattern", self.name, NAMES)
         for parameter, count, (least, most) in (("views", self.views, VIEWS), ("fields", self.fields, FIELDS)):
             if not least <= count <= most:
                 raise UsageError(f"{count} is out of range", parameter=parameter, rule=f"it must be {least} to {most}")

@@ -13,7 +13,7 @@ from typer import BadParameter
 
 from lippmann.cli.shared import command_clock
 from lippmann.cli.shared.exit_codes import INTERRUPTED
-from lippmann.errors import LippmannError
+from lippmann.errors import LippmannError, UsageError
 from lippmann.printable import one_line
 from lippmann.runtime.atomic_write import reason_and_fix
 from lippmann.runtime.input_memory import limit_inputs
@@ -114,7 +114,8 @@ def _usage(error: BaseException) -> str:
         return f"{former[1]}: {_OTHER_NAMES[former[1]]}"
     listed = _NOT_LISTED.fullmatch(message)
     if listed is not None:
-        return f"{listed[1]}: {listed[2]} is not known; known are {listed[3].replace(chr(39), '')}"
+        option, word, known = listed[1], listed[2].strip("'"), listed[3].replace("'", "").split(", ")
+        return str(UsageError.unknown("value", word, known, where=option))
     context = getattr(error, "ctx", None)
     command = getattr(context, "command_path", "lippmann")
     return f"{message} See '{command} --help'."

@@ -216,7 +216,7 @@ class Display:
 
     @property
     def has_slanted_stripes(self) -> bool:
-        """Whether a slanted sheet lies before sub-pixels side by side: every sub-pixel shows a direction of its own."""
+        """Whether a slanted sheet covers sub-pixels that stand side by side: each shows a direction of its own."""
         columns = {column for column, _ in self.panel.subpixel_offsets}
         return self.lens_array.slant != 0.0 and len(columns) > 1
 
@@ -281,8 +281,8 @@ class Display:
         """The panel point whose light line through lens ``(i, j)`` passes the point P; the inverse of a ray.
 
         Lens ``(i, j)`` shows P only if the result is its own, ``lens_of(x, y) == (i, j)``, and lies on the panel. A
-        point nearer than a nanometre to the lens plane counts as lying one nanometre before it: lenses whose centre
-        it hits show it, for all others the result lies very far away.
+        point nearer than a nanometre to the lens plane counts as lying one nanometre in front of it: lenses whose
+        centre it hits show it, for all others the result lies very far away.
         """
         lattice = self.lattice
         scale = self.gap / _nonzero(pz, ops)

@@ -7,7 +7,6 @@ import re
 from collections.abc import Mapping
 
 from lippmann.display.panel import SubpixelOffsets
-from lippmann.display.validation import suggestion
 from lippmann.errors import DisplayError
 
 INCH = 25.4
@@ -64,7 +63,7 @@ def length(
         if not 0 < spacing < math.inf:
             raise DisplayError(f"{text!r} is no length", where=key, rule=f"{symbol} must be above zero")
         return spacing
-    raise _unknown_unit(text, symbol, key, [*scales, *per_inch])
+    raise DisplayError.unknown("unit", symbol, [*scales, *per_inch], where=key)
 
 
 def size(text: str, key: str) -> tuple[float, float]:
@@ -89,7 +88,7 @@ def size(text: str, key: str) -> tuple[float, float]:
     sides = []
     for amount, unit in ((match[1], match[2] or unit_of_height), (match[3], unit_of_height)):
         if unit not in MILLIMETRES:
-            raise _unknown_unit(text, unit, key, list(MILLIMETRES))
+            raise DisplayError.unknown("unit", unit, MILLIMETRES, where=key)
         sides.append(float(amount) * MILLIMETRES[unit])
     return sides[0], sides[1]
 
@@ -110,11 +109,3 @@ def stripe(order: str, key: str) -> SubpixelOffsets:
         raise DisplayError(f"subpixel_offsets is {order!r}", where=key, rule=rule)
     red, green, blue = ((order.index(color) - 1) / 3 for color in "rgb")
     return (red, 0.0), (green, 0.0), (blue, 0.0)
-
-
-def _unknown_unit(text: str, unit: str, key: str, known: list[str]) -> DisplayError:
-    return DisplayError(
-        f"{text!r} has the unknown unit {unit!r}{suggestion(unit, known)}",
-        where=key,
-        rule=f"the units here are {', '.join(known)}",
-    )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import difflib
 import math
 from collections.abc import Collection, Iterable, Mapping
 from numbers import Integral, Real
@@ -86,14 +85,7 @@ def refuse_unknown(given: Iterable[object], known: Collection[str], where: str =
     """Refuse a key that is not known, in the table ``where``."""
     for key in given:
         if key not in known:
-            rule = f"the keys are {', '.join(known)}"
-            raise DisplayError(f"unknown key {key!r}{suggestion(key, known)}", where=_join(where, key), rule=rule)
-
-
-def suggestion(word: object, known: Iterable[str]) -> str:
-    """``, did you mean 'x'?`` with the nearest known words, or nothing."""
-    near = difflib.get_close_matches(str(word), list(known), n=3, cutoff=0.6)
-    return f", did you mean {' or '.join(repr(name) for name in near)}?" if near else ""
+            raise DisplayError.unknown("key", key, known, where=_join(where, key))
 
 
 def _join(where: str, key: object) -> str:

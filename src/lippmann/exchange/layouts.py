@@ -236,7 +236,7 @@ def recognize(path: Path) -> LayoutName:
 
 def _layout_name(text: str) -> LayoutName:
     if text not in LAYOUTS:
-        raise UsageError(f"the layout {text!r} is unknown", parameter="layout", rule=f"known are {', '.join(LAYOUTS)}")
+        raise UsageError.unknown("layout", text, LAYOUTS, parameter="layout")
     return text
 
 

@@ -203,8 +203,7 @@ def _storage(picture: Picture, folder: Path, name: FormatName | None, bits: int 
     if name is None:
         name = "png" if picture.stored in STORED["png"].values() else "exr"
     if name not in STORED:
-        rule = f"known are {', '.join(STORED)}"
-        raise OutputError(f"the format {name!r} is unknown", where=str(folder), rule=rule)
+        raise OutputError.unknown("format", name, STORED, where=str(folder))
     if bits is None and picture.stored in STORED[name].values():
         return name, picture.stored
     return name, stored_as(name, folder, bits, picture.stored)

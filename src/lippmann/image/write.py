@@ -51,8 +51,7 @@ def format_for(path: Path, bits: int | None = None, *, source: Stored = "float32
     """
     name = FORMATS.get(path.suffix.lower())
     if name is None:
-        ending = f"the ending '{path.suffix}' is unknown" if path.suffix else "the name has no ending"
-        raise OutputError(ending, where=str(path), rule=f"known are {', '.join(FORMATS)}")
+        raise OutputError.unknown("ending", path.suffix, FORMATS, where=str(path))
     return name, stored_as(name, path, bits, source)
 
 

@@ -210,7 +210,7 @@ def write_views(
     if format is None:
         format = "png" if quilt.stored in STORED["png"].values() else "exr"
     if format not in STORED:
-        raise OutputError(f"the format {format!r} is unknown", where=str(folder), rule=f"known are {', '.join(STORED)}")
+        raise OutputError.unknown("format", format, STORED, where=str(folder))
     ending = next(ending for ending, name in FORMATS.items() if name == format)
     _, stored = format_for(folder / f"view{ending}", bits, source=quilt.stored)
     digits = len(str(quilt.layout.views - 1))
@@ -258,7 +258,7 @@ def _first_missing(numbers: Iterable[int], first: int) -> int | None:
 
 def _check_ending(path: Path) -> None:
     if path.suffix.lower() not in _READ:
-        raise PictureError(f"the ending '{path.suffix}' is unknown", where=str(path), rule=f"known: {', '.join(_READ)}")
+        raise PictureError.unknown("ending", path.suffix, _READ, where=str(path))
 
 
 class _OpenFile(NamedTuple):

@@ -136,7 +136,7 @@ def read_photos(
     if len(paths) < 2:
         raise UsageError(f"{len(paths)} photographs are given", rule="at least 2 are interlaced")
     if fit is not None and fit not in get_args(Fit):
-        raise UsageError(f"{fit!r} is unknown", parameter="fit", rule=f"known are {', '.join(get_args(Fit))}")
+        raise UsageError.unknown("fit", fit, get_args(Fit), parameter="fit")
     headers = [_header(path) for path in paths]
     sizes = [header.size[::-1] if turned else header.size for header in headers]
     for path, header in zip(paths, headers, strict=True):

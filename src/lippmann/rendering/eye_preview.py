@@ -90,7 +90,7 @@ def render_eye_preview(
     size: tuple[int, int] | None = None,
     progress: ProgressCallback = silent,
 ) -> Preview:
-    """Render what an eye before ``display`` will see of ``scene``.
+    """Render what an eye in front of ``display`` will see of ``scene``.
 
     Parameters
     ----------

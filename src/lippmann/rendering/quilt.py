@@ -42,7 +42,7 @@ def render_quilt(
     request: RenderRequest,
     progress: ProgressCallback = silent,
 ) -> QuiltFrame:
-    """Render the views that cameras before ``display`` see, see
+    """Render the views that cameras in front of ``display`` see, see
     :class:`~lippmann.rendering.transport.ray_source.QuiltRays`.
 
     Before a background of one colour only the part of the views is traced in which the scene's box can be seen.

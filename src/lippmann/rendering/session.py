@@ -287,7 +287,7 @@ class Session:
         if background is None and scene is not None and scene.environment() is None:
             background = (0.0, 0.0, 0.0)
         if not has_pixels and background is not None and max(background) == 0.0:
-            return ()  # glowing surfaces before a black background send no rays on
+            return ()  # glowing surfaces in front of a black background send no rays on
         return nothing_seen(seen_share(frame.pixels if has_pixels else None, background, frame.rays, work))
 
     @property

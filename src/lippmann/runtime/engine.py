@@ -82,7 +82,7 @@ def start(device: DeviceChoice = "auto", threads: int | None = None) -> Engine:
     """
     global _set_here
     if device not in DEVICES:
-        raise UsageError(f"device '{device}' is unknown", rule=f"known are {', '.join(DEVICES)}")
+        raise UsageError.unknown("device", device, DEVICES)
     if threads is not None and threads < 1:
         raise UsageError(f"{threads} is out of range", parameter="threads", rule="it must be at least 1")
     with exclusive():

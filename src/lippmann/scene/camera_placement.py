@@ -159,7 +159,7 @@ def _first_recorded(camera: Camera, focus: float, display: Display, scale: float
 
 
 def _farthest_focus(camera: Camera, nearest: float, display: Display, scale: float) -> float:
-    """The farthest lens plane from which recorded rays still begin before the surface at ``nearest``."""
+    """The farthest lens plane from which recorded rays still begin in front of the surface at ``nearest``."""
     aperture = display.aperture_distance * (1.0 - _MARGIN) / scale
     if camera.fov_y is None:
         return nearest + aperture * _units_per_mm(camera, nearest, display)

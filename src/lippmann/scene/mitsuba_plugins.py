@@ -13,7 +13,6 @@ from importlib.machinery import PathFinder
 from pathlib import Path
 
 from lippmann.errors import EngineError, SceneError
-from lippmann.scene.parsing.name_hints import closest_name_hint
 
 _PLAIN = re.compile(r"\w+", re.ASCII)
 #: A conductor without a table: a perfect mirror.
@@ -24,12 +23,8 @@ def check_plugin(name: str, where: str) -> None:
     """Raise :class:`SceneError` if the installed Mitsuba has no plugin ``name``."""
     known = _plugins()
     if name not in known:
-        raise SceneError(
-            f"plugin '{name[:80]}' is unknown",
-            where=where,
-            rule="scene files name plugins of the installed Mitsuba",
-            fix=closest_name_hint(name, known),
-        )
+        rule = "scene files name plugins of the installed Mitsuba"
+        raise SceneError.unknown("plugin", name, known, where=where, rule=rule)
 
 
 def check_plugins_of(values: Mapping[str, object], where: str) -> None:
@@ -50,12 +45,8 @@ def check_material(name: str, where: str) -> None:
     """Raise :class:`SceneError` if Mitsuba has no table of refractive indices called ``name``."""
     known = _materials()
     if name != _NO_MATERIAL and name not in known:
-        raise SceneError(
-            f"material '{name[:80]}' is unknown",
-            where=where,
-            rule="Mitsuba's own tables and 'none' are known",
-            fix=closest_name_hint(name, known),
-        )
+        rule = "Mitsuba's own tables and 'none' are known"
+        raise SceneError.unknown("material", name, known, where=where, rule=rule)
 
 
 def _check_registered(name: str, where: str) -> None:

@@ -15,7 +15,6 @@ from typing import Literal, get_args
 import numpy as np
 
 from lippmann.display import Display
-from lippmann.display.validation import suggestion
 from lippmann.errors import SceneError, UsageError
 from lippmann.scene.camera_placement import DepthProbe, frame_whole, place_by_camera
 from lippmann.scene.fit_placement import fit_scene
@@ -84,8 +83,7 @@ class PlacementOptions:
 
     def __post_init__(self) -> None:
         if self.mode is not None and self.mode not in get_args(Mode):
-            what = f"placement {self.mode!r} is not known{suggestion(self.mode, get_args(Mode))}"
-            raise UsageError(what, parameter="mode", rule=f"known are {', '.join(get_args(Mode))}")
+            raise UsageError.unknown("placement", self.mode, get_args(Mode), parameter="mode")
         if self.camera is not None and not isinstance(self.camera, str):
             raise UsageError(f"{self.camera!r}", parameter="camera", rule="must be the name of a camera")
         object.__setattr__(self, "turn", _three_numbers("turn", self.turn, least=1))
@@ -117,8 +115,7 @@ class PlacementOptions:
         known = [field.name for field in fields(cls)]
         for name in values:
             if name not in known:
-                what = f"{name!r} is no option of a placement{suggestion(name, known)}"
-                raise UsageError(what, parameter="placement", rule=f"known are {', '.join(known)}")
+                raise UsageError.unknown("option of a placement", name, known, parameter="placement")
         return cls(**values)  # type: ignore[arg-type]  # checked by __post_init__
 
 

@@ -13,7 +13,6 @@ from lippmann.runtime.cached_property import cached_property
 from lippmann.scene.extreme_points import extreme_points_of, used_positions
 from lippmann.scene.light_options import LightOptions
 from lippmann.scene.mitsuba_source import MitsubaSource
-from lippmann.scene.parsing.name_hints import closest_name_hint
 from lippmann.scene.splat_clouds import check_splats, typical_points
 from lippmann.scene.values.description import (
     Camera,
@@ -259,13 +258,7 @@ def find_camera(cameras: Sequence[Camera], name: str) -> Camera:
     for camera in cameras:
         if camera.name == name:
             return camera
-    names = [camera.name for camera in cameras]
-    raise SceneError(
-        f"no camera is named '{name}'",
-        parameter="camera",
-        rule=f"the scene has {', '.join(repr(known) for known in names)}" if names else "the scene has no cameras",
-        fix=closest_name_hint(name, names),
-    )
+    raise SceneError.unknown("camera", name, [camera.name for camera in cameras], parameter="camera")
 
 
 def thin_axis(bounds: Bounds) -> int | None:

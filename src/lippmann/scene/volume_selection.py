@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 
 from lippmann.errors import UsageError
-from lippmann.scene.parsing.name_hints import closest_name_hint
 from lippmann.scene.scene import Scene
 from lippmann.scene.splat_selection import Crop, check_crop, holds_none
 from lippmann.scene.values.description import SceneDescription
@@ -81,12 +80,8 @@ class VolumeSelection:
             transfer = read_transfer_function(Path(asked))
         elif asked is not None:
             if asked not in PRESETS:
-                raise UsageError(
-                    f"'{asked}' is neither a preset nor a .toml or .json file",
-                    parameter="transfer_function",
-                    rule=f"presets are {', '.join(PRESETS)}",
-                    fix=closest_name_hint(str(asked), PRESETS),
-                )
+                rule = f"known are {', '.join(PRESETS)}, or a .toml or .json file"
+                raise UsageError.unknown("preset", asked, PRESETS, parameter="transfer_function", rule=rule)
             transfer = preset(str(asked), sample(volume.grid, volume.slope, volume.intercept))
         if self.window is None:
             return transfer

@@ -127,7 +127,7 @@ class LiveSocket:
                 **({} if self._follows else self._commands()),
             }
             if said["type"] not in handlers:
-                raise UsageError(f"'{said['type'][:40]}' is no message", rule=f"known are {', '.join(handlers)}")
+                raise UsageError.unknown("message", said["type"], handlers)
             handlers[said["type"]](said)
 
     @contextmanager
@@ -204,7 +204,7 @@ class LiveSocket:
     def _render(self, said: dict[str, Any]) -> None:
         kind = said.get("kind")
         if kind not in KINDS:
-            raise UsageError(f"{str(kind)[:40]!r} cannot be rendered", rule=f"known are {', '.join(KINDS)}")
+            raise UsageError.unknown("kind of render", kind, KINDS)
         self._session.render(kind, self._take_over(said))
 
     def _save(self, said: dict[str, Any]) -> None:

@@ -57,8 +57,7 @@ def open_session(
     """
     state.load_display()
     if held is None and kind_of_file(state.scene) is None and state.scene not in bundled.names():
-        rule = f"bundled are {', '.join(bundled.names())}"
-        raise SceneError(f"no bundled scene or file is named '{state.scene}'", rule=rule)
+        raise SceneError.unknown("bundled scene or file", state.scene, bundled.names())
     check_writable(folder / "picture.png")
 
     def make_renderer(scene: Scene, display: Display) -> LiveRenderer:

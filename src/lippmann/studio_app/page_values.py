@@ -48,7 +48,7 @@ def state_of_values(values: object) -> StudioState:
     found: dict[str, Any] = {}
     for name, value in values.items():
         if name not in kinds:
-            raise UsageError(f"'{str(name)[:60]}' is no setting", rule=f"known are {', '.join(kinds)}")
+            raise UsageError.unknown("setting", name, kinds)
         found[name] = _value_of(kinds[name], value, name)
     return StudioState(**found)
 

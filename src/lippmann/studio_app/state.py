@@ -53,7 +53,7 @@ denoise, caustics, clamp_indirect:
         See :class:`~lippmann.rendering.request.render_request.RenderRequest`. Light is traced along paths, also in
         scenes that were made for Whitted ray tracing, whose light the studio does not show.
     eye:
-        The eye's place (mm) of a preview; None: before the middle.
+        The eye's place (mm) of a preview; None: in front of the middle.
 
     Raises
     ------

@@ -24,7 +24,6 @@ from typing import Any, cast
 from lippmann.errors import UsageError
 from lippmann.runtime.atomic_write import replacing
 from lippmann.runtime.regular_file import check_kind
-from lippmann.scene.parsing.name_hints import closest_name_hint
 from lippmann.studio_app.state import StudioState
 
 if sys.version_info >= (3, 11):
@@ -91,8 +90,8 @@ def state_of_text(text: str, *, where: str = "state", folder: Path | None = None
     for name, value in values.items():
         place = f"{where}:{_line_of(text, name)}"
         if name not in known:
-            rule, fix = "settings are the options of lippmann render with _ for -", closest_name_hint(name, known)
-            raise UsageError(f"'{name}' is no setting", where=place, rule=rule, fix=fix or "leave it out")
+            rule = "settings are the options of lippmann render with _ for -"
+            raise UsageError.unknown("setting", name, known, where=place, rule=rule, fix="leave it out")
         try:
             settings[name] = _RULES[name](value)
             # Alone, so that the line of what is wrong is known; what goes together is checked below.

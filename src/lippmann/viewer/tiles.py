@@ -67,7 +67,7 @@ class Tiles:
             If there is no such layer or tile.
         """
         if layer not in self.layers:
-            raise UsageError(f"there is no layer {layer!r}", rule=f"there are {', '.join(self.layers)}")
+            raise UsageError.unknown("layer", layer, self.layers)
         if not (0 <= column < self.columns and 0 <= row < self.rows):
             rule = f"there are {self.columns} x {self.rows}"
             raise UsageError(f"there is no tile in column {column}, row {row}", rule=rule)

@@ -70,7 +70,7 @@ def check_stack_path(path: Path, bits: int | None = None) -> None:
     else:
         if path.suffix.lower() not in ANIMATIONS:
             rule = f"a focal stack is a folder, a .tif or an animation ({', '.join(ANIMATIONS)})"
-            raise OutputError(f"the ending '{path.suffix}' is unknown", where=str(path), rule=rule)
+            raise OutputError.unknown("ending", path.suffix, (".tif", *ANIMATIONS), where=str(path), rule=rule)
         if bits not in (None, 8):
             raise OutputError(f"{bits} bits per channel are not possible", where=str(path), rule="animations have 8")
         check_animation_path(path)

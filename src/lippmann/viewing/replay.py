@@ -107,7 +107,7 @@ def replay(
     eye = checked_eye(default_eye(image.display) if eye is None else eye)
     width, height = checked_size(default_size(image.display) if size is None else size)
     if filter not in get_args(Filter):
-        raise UsageError(f"the filter {filter!r} is unknown", rule=f"known are {', '.join(get_args(Filter))}")
+        raise UsageError.unknown("filter", filter, get_args(Filter))
     subpixels = image.provenance.subpixels if subpixels is None else subpixels
     picture = np.empty((height, width, 3), dtype=np.float32)
     for rows, x, y in lens_plane_points(image.display, width, height):

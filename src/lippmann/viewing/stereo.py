@@ -1,8 +1,8 @@
 """Stereo pairs: what two eyes see, side by side for stereoscopic and tracked monitors, or as an anaglyph.
 
 The left eye's picture is on the left half, uncrossed. Both pictures have the frame of a replay, the panel's rectangle
-in the lens plane: points of that plane have the same place in both (zero disparity), points before it lie farther right
-for the left eye than for the right one (crossed disparity).
+in the lens plane: points of that plane have the same place in both (zero disparity), points in front of it lie farther
+right for the left eye than for the right one (crossed disparity).
 """
 
 from __future__ import annotations
@@ -99,7 +99,7 @@ def replay_stereo(
 def stereo_pair(see: Callable[[Eye], FloatArray], head: Eye, stereo: Stereo, eyes: float = EYE_DISTANCE) -> FloatArray:
     """One picture of the two that ``see`` gives for the eyes of a head; parameters and errors as above."""
     if stereo not in get_args(Stereo):
-        raise UsageError(f"'{stereo}' is unknown", parameter="stereo", rule=f"known are {', '.join(get_args(Stereo))}")
+        raise UsageError.unknown("form", stereo, get_args(Stereo), parameter="stereo")
     left, right = (see(eye) for eye in eyes_of(head, eyes))
     return anaglyph(left, right) if stereo == "anaglyph" else side_by_side(left, right, half=stereo == "half")
 

@@ -74,8 +74,7 @@ def check_animation_path(path: Path, codec: Codec | None = None) -> None:
         If a codec is asked for, and the file is no MP4.
     """
     if path.suffix.lower() not in ANIMATIONS:
-        ending = f"the ending '{path.suffix}' is unknown" if path.suffix else "the name has no ending"
-        raise OutputError(ending, where=str(path), rule=f"animations are {', '.join(ANIMATIONS)}")
+        raise OutputError.unknown("ending of an animation", path.suffix, ANIMATIONS, where=str(path))
     if codec is not None and path.suffix.lower() != ".mp4":
         raise UsageError(
             "only MP4 has a choice of codecs", parameter="codec", fix="name the file .mp4, or leave it out"

@@ -139,8 +139,7 @@ def test_without_subpixels(write):
             '"96 dpi"',
             '"96 lpi"',
             9,
-            "unknown unit 'lpi', did you mean 'ppi' or 'dpi'?; "
-            "the units here are um, µm, mm, cm, m, mil, in, inch, dpi, ppi",
+            "unknown unit 'lpi', did you mean 'ppi' or 'dpi'?; known are um, µm, mm, cm, m, mil, in, inch, dpi, ppi",
         ),
         ('"bgr"', '"rgbw"', 10, "subpixel_offsets is 'rgbw'"),
         ('"lenticular"', '"lentil"', 13, "the layouts are lenticular, square, hexagonal"),

@@ -110,7 +110,7 @@ def test_what_is_saved_comes_back_exactly(tmp_path_factory, pitch, slope, center
         ("pitch = 45.5", "pitch = 0", 8, "pitch is 0; it must lie between"),
         ("pitch = 45.5", "pitch = -1", 8, "pitch is -1"),
         ("pitch = 45.5", 'pitch = "0 px"', 8, "pitch is '0 px'; it must be above zero"),
-        ("pitch = 45.5", 'pitch = "45.5 parsec"', 8, "the units here are um, µm, mm"),
+        ("pitch = 45.5", 'pitch = "45.5 parsec"', 8, "known are um, µm, mm"),
         ("pitch = 45.5", "pitch = 900", 8, "it must cover at least one"),
         ("slope = -6.0", "slope = 0", 9, "slope is 0; it must be at least 0.18"),
         ("slope = -6.0", 'slope = "steep"', 9, "slope is 'steep'"),

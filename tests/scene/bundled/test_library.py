@@ -60,7 +60,10 @@ def test_names_are_the_papers():
 
 @pytest.mark.parametrize("ask", [bundled.make, bundled.make_classic, bundled.stage_of])
 def test_unknown_name_is_an_error_that_lists_the_known(ask):
-    with pytest.raises(SceneError, match="'teapott'; there are teapot, room, small-balls, primitives, tree, gears"):
+    with pytest.raises(
+        SceneError,
+        match=r"'teapott', did you mean 'teapot'\?; known are teapot, room, small-balls, primitives, tree, gears",
+    ):
         ask("teapott")
 
 

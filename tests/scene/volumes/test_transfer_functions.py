@@ -77,7 +77,7 @@ def test_files(tmp_path):
         ("points = [[0, 1], [2, 3]]", "number 1 is no point"),
         ('points = [[0, "#000000", 0], [1, "#000000", 1]]\nper = "cm"', "per"),
         ('points = [[0, "#000000", 0], [1, "#000000", 1]]\nshading = 2', "shading"),
-        ("colour = 3", "'colour': is not known"),
+        ("colour = 3", "unknown key 'colour'"),
         ("points = [", "cannot be read"),
     ],
 )
@@ -118,7 +118,7 @@ def test_the_scene_is_as_large_as_what_can_be_seen():
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        ({"transfer_function": "ct-bones"}, "neither a preset nor a .toml or .json file; presets are .*; is 'ct-bone'"),
+        ({"transfer_function": "ct-bones"}, "unknown preset 'ct-bones', did you mean 'ct-bone'"),
         ({"transfer_function": "not-there.toml"}, "no such file"),
         ({"window": (3, 1)}, "two numbers, the lower first"),
         ({"crop": (50, 50, 50, 60, 60, 60)}, "leaves no voxel"),

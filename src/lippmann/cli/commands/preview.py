@@ -33,7 +33,7 @@ def preview(
         str | None, typer.Option("--pixels", help="Width x height that the picture keeps to; 512x512 by default.")
     ] = None,
     eye: Annotated[
-        str | None, typer.Option("--eye", help="The eye's place: X,Y,Z in mm; by default before the middle.")
+        str | None, typer.Option("--eye", help="The eye's place: X,Y,Z in mm; by default in front of the middle.")
     ] = None,
     up: options.Up = None,
     crop: options.Crop = None,
@@ -84,7 +84,7 @@ def preview(
     as_json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
-    """Show in a second or two what a display will show to an eye before its middle."""
+    """Show in a second or two what a display will show to an eye in front of its middle."""
     from lippmann.image.write import check_output, format_for, write_plain_picture
     from lippmann.rendering.request.render_request import RenderRequest
 

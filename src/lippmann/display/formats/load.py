@@ -42,7 +42,7 @@ from lippmann.display.formats.monitor_toml import TABLE as MONITOR
 from lippmann.display.formats.monitor_toml import monitor_of_tables
 from lippmann.display.formats.recorded_depth import default_aperture
 from lippmann.display.units import MILLIMETRES, length, stripe
-from lippmann.display.validation import Arguments, positive, suggestion
+from lippmann.display.validation import Arguments, positive
 from lippmann.errors import DisplayError
 from lippmann.runtime.regular_file import check_kind
 
@@ -89,9 +89,9 @@ def load_display(name_or_path: str | os.PathLike[str]) -> Display:
     if path.suffix not in (".toml", ".json") and not path.exists():
         if device := _device_called(name, presets):
             return _from_toml(presets[device], where=f"{device}.toml", stem=device)
-        rule = f"the displays are {', '.join(presets)}, or a .toml file, or a Looking Glass's visual.json"
+        rule = f"known are {', '.join(presets)}, or a .toml file, or a Looking Glass's visual.json"
         known = [*presets, *(preset.removeprefix(_FAMILY) for preset in presets)]
-        raise DisplayError(f"unknown display {name!r}{suggestion(name, known)}", rule=rule)
+        raise DisplayError.unknown("display", name, known, rule=rule)
     text = _read(path)
     if is_calibration(text):
         return display_of_calibration(text, where=name)

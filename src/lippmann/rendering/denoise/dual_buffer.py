@@ -18,7 +18,7 @@ they take its place (:mod:`lippmann.rendering.denoise.noisy_blend`), so that wit
 be what they show, whatever a denoiser does. The other half has a say in both, but none of its pixels in its own place,
 so that it can still judge.
 
-Outlines before the background are made sharper first, by the rays of the guides
+Outlines in front of the background are made sharper first, by the rays of the guides
 (:mod:`lippmann.rendering.denoise.outlines`): each half by half of them, so that what these get wrong is told, too.
 
 Errors are small and the curve of the codes is taken as straight, but for pixels that the denoiser made far brighter

@@ -85,9 +85,7 @@ def denoise(
             "a normal without an albedo is no guide", parameter="denoise", fix="give both, or the albedo alone"
         )
     if effort not in get_args(Effort):
-        raise UsageError(
-            f"'{effort}' is not known", parameter="effort", rule=f"known are {', '.join(get_args(Effort))}"
-        )
+        raise UsageError.unknown("effort", effort, get_args(Effort), parameter="effort")
     images = {"color": _picture(color, "color")}
     for name, guide in (("albedo", albedo), ("normal", normal)):
         if guide is not None:

@@ -1,4 +1,4 @@
-"""Noise taken out where surfaces are seen: before sky and background there is none."""
+"""Noise taken out where surfaces are seen: sky and background behind them have none."""
 
 from __future__ import annotations
 

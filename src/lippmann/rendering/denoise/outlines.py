@@ -1,9 +1,9 @@
-"""Outlines before the background, by more rays than paths.
+"""Outlines in front of the background, by more rays than paths.
 
-Where a surface ends before sky or background, a pixel of few samples shows too much of the one and too little of the
-other, and a denoiser cannot know how much of each there should be. The rays of its guides are further samples of just
-that: of what share of the pixel is covered. What the paths lack of the one side is put in place of what they have too
-much of the other, with the colours that either has in the pixels around.
+Where a surface ends in front of sky or background, a pixel of few samples shows too much of the one and too little of
+the other, and a denoiser cannot know how much of each there should be. The rays of its guides are further samples of
+just that: of what share of the pixel is covered. What the paths lack of the one side is put in place of what they have
+too much of the other, with the colours that either has in the pixels around.
 
 It is a control variate: the coverage by the paths alone has the expectation of that by all rays, and the colours come
 of other pixels, so the expectation of a pixel stays what it is.

@@ -67,7 +67,7 @@ def denoise_views(
         Open Image Denoise fails.
     """
     if form not in get_args(Form):
-        raise UsageError(f"'{form}' is not known", parameter="form", rule=f"known are {', '.join(get_args(Form))}")
+        raise UsageError.unknown("form", form, get_args(Form), parameter="form")
     panel = display.panel
     if pixels.shape != (panel.height, panel.width, 3):
         rule = f"the display {display.name} has {panel.width} x {panel.height}"

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from lippmann.color.tone_map import pbr_neutral
 from lippmann.color.transfer import Transfer
-from lippmann.display.validation import suggestion
 from lippmann.errors import UsageError
 from lippmann.rendering.request.choices import (
     Caustics,
@@ -181,8 +180,7 @@ class RenderRequest:
         for name, words in _WORDS.items():
             value, known = getattr(self, name), get_args(words)
             if value not in known and not (name == "order" and value is None):
-                what = f"{value!r} is not known{suggestion(value, known)}"
-                raise UsageError(what, parameter=name, rule=f"known are {', '.join(known)}")
+                raise UsageError.unknown(name, value, known, parameter=name)
         for name, (low, high) in _RANGES.items():
             value = getattr(self, name)
             if value is None and name != "seed":
@@ -222,8 +220,7 @@ class RenderRequest:
         known = [each.name for each in fields(cls) if each.name not in ("reason", "spp_reserve", "began")]
         for name in options:
             if name not in known:
-                what = f"{name!r} is no option of a render{suggestion(name, known)}"
-                raise UsageError(what, rule=f"known are {', '.join(known)}")
+                raise UsageError.unknown("option of a render", name, known)
         return cls(**options)  # type: ignore[arg-type]  # checked by __post_init__
 
     @property

@@ -241,7 +241,7 @@ class SubpixelRays(_OnePicture):
 
 
 class QuiltRays:
-    """Rays of a quilt: views of cameras side by side before a lenticular display, each in a tile of the picture.
+    """Rays of a quilt: views of cameras side by side in front of a lenticular display, each in a tile of the picture.
 
     Camera k of N = ``columns * rows`` stands at the viewing distance D, level with the centre of the display, at
     ``D tan(cone / 2) (2 (k + 0.5) / N - 1)`` to the right of it: in equal steps over the whole view cone. Cameras are

@@ -75,5 +75,5 @@ def stage_of(name: str) -> Stage:
 
 def _module(name: str) -> ModuleType:
     if name not in _MODULES:
-        raise SceneError(f"no bundled scene is named {name!r}", rule=f"there are {', '.join(names())}")
+        raise SceneError.unknown("bundled scene", name, names())
     return import_module(f"{__name__}.{_MODULES[name]}")

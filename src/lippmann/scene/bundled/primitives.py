@@ -1,4 +1,4 @@
-"""Primitives: one of every shape, texture and light that the classic light models know, on a shelf before a wall.
+"""Primitives: one of every shape, texture and light that the classic light models know, on a shelf in front of a wall.
 
 Spheres, tubes, a cone, an endless cylinder, rings, a cube, a plane, flat, smooth and coloured triangles, a bent rod, a
 coloured height field; every texture but the grit, whose grains differ from run to run, and the volume. One unit is

@@ -137,7 +137,7 @@ def _add_pictures(builder: ClassicSceneBuilder) -> None:
 def _hang(
     builder: ClassicSceneBuilder, paint: Callable[[], Pixels], middle: Rows, size: float, right: Rows, up: Rows
 ) -> None:
-    """Hang a square picture before a wall; ``right`` and ``up`` are unit vectors in it, as its viewer sees them."""
+    """Hang a square picture on a wall; ``right`` and ``up`` are unit vectors in it, as its viewer sees them."""
     raised = middle + np.cross(right, up) * LAYOUT.frame / 2
     corners = np.array([raised + size / 2 * (i * right + j * up) for i, j in ((-1, 1), (-1, -1), (1, -1), (1, 1))])
     # A hair wider than the picture, so that rounding cannot wrap its edges round to the other side.

@@ -137,7 +137,7 @@ def _control_net(part: str) -> Array:
         return _tube(_HANDLE_SECTIONS)
     if part == "spout":
         return _tube(_SPOUT_SECTIONS)
-    raise UsageError(f"{part!r} is no part of the teapot", rule=f"the parts are {', '.join(PARTS)}")
+    raise UsageError.unknown("part of the teapot", part, PARTS)
 
 
 def _revolve(profile: Sequence[tuple[float, float]], quarter_circles: Sequence[float]) -> Array:

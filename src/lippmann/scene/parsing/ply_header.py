@@ -109,7 +109,7 @@ def read_header(data: bytes, where: str) -> Header:
         else:
             _read_declaration(header, words, f"{where}:{number}")
     if form != "ascii" and form not in _BYTE_ORDERS:
-        raise SceneError(f"format '{form}'", where=where, rule=f"known are ascii, {', '.join(_BYTE_ORDERS)}")
+        raise SceneError.unknown("format", form, ("ascii", *_BYTE_ORDERS), where=where)
     known = [element.name for element in header.elements]
     if len(set(known)) < len(known):
         twice = next(name for name in known if known.count(name) > 1)

@@ -14,7 +14,6 @@ from lippmann.errors import SceneError, UsageError
 from lippmann.scene.light_options import LightOptions
 from lippmann.scene.mitsuba_source import MitsubaSource
 from lippmann.scene.parsing.files import read_bytes
-from lippmann.scene.parsing.name_hints import closest_name_hint
 from lippmann.scene.readers.ply import UP_NOTE
 from lippmann.scene.readers.splats.sog_folder import holds_sog
 from lippmann.scene.readers.volumes.dicom_files import DICOM, holds_dicom
@@ -265,9 +264,7 @@ def unknown_kind(path: Path) -> SceneError | None:
 
 def _unknown_kind(path: Path) -> SceneError:
     suffix = kind_of_name(path)
-    what = f"'{suffix}' is no known kind of scene file" if suffix else "is no known kind of scene file"
-    way = _ELSEWHERE.get(suffix)
-    return SceneError(f"{what}: {way}" if way else what, where=path.name, rule=f"known are {', '.join(_READERS)}")
+    return SceneError.unknown("kind of scene file", suffix, _READERS, where=path.name, rule=_ELSEWHERE.get(suffix, ""))
 
 
 def kind_of_name(path: Path) -> str:
@@ -304,11 +301,7 @@ def _from_name(
         if source in bundled.names():
             return _from_library(source)
         if not path.exists():
-            raise SceneError(
-                f"no bundled scene or file is named '{source}'",
-                rule=f"bundled are {', '.join(bundled.names())}",
-                fix=closest_name_hint(source, bundled.names()),
-            )
+            raise SceneError.unknown("bundled scene or file", source, bundled.names())
     reader = _READERS.get(suffix)
     by_content = _suffix_by_content(path)
     if by_content is not None:

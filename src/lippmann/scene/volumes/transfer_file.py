@@ -50,7 +50,7 @@ def read_transfer_function(path: Path) -> TransferFunction:
         raise SceneError("holds no table", where=where, rule=f"the keys {', '.join(_KEYS)}")
     for key in tables:
         if key not in _KEYS:
-            raise SceneError("is not known", where=f"{where}: {str(key)[:40]!r}", rule=f"known are {', '.join(_KEYS)}")
+            raise SceneError.unknown("key", key, _KEYS, where=where)
     points = tables.get("points")
     if not isinstance(points, list) or not 2 <= len(points) <= _MOST_POINTS:
         raise SceneError(f"lists no 2 to {_MOST_POINTS} points", where=f"{where}: points", rule=_POINT)

@@ -1,4 +1,4 @@
-/** The picture: a canvas of the display's shape, the eye before it, and what is asked of the studio. */
+/** The picture: a canvas of the display's shape, the eye in front of it, and what is asked of the studio. */
 
 import { clampEye, eyeAt, eyeBounds, swayEye, swayStart } from "lippmann/eye.js";
 

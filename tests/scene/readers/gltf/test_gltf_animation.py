@@ -175,7 +175,7 @@ def test_the_first_animation_is_played_unless_another_is_named(writer, moving):
     assert scene.animation.name == "move"
     assert "of 2 animations 'move' is played" in scene.at(0).notes
     assert moving(writer, animation="other").animation.name == "other"
-    with pytest.raises(SceneError, match=r"no animation is named 'othre'.*is 'other' meant"):
+    with pytest.raises(SceneError, match=r"unknown animation 'othre', did you mean 'other'"):
         moving(writer, animation="othre")
 
 

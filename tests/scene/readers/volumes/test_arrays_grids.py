@@ -36,7 +36,7 @@ def test_archives_tell_spacing_and_name(tmp_path):
     with pytest.raises(SceneError, match="holds a, b; one array is shown; choose it with series"):
         load_scene(tmp_path / "b.npz")
     assert load_scene(tmp_path / "b.npz", series="b").description.volume.size == (2, 3, 3)
-    with pytest.raises(UsageError, match="the file has a, b"):
+    with pytest.raises(UsageError, match="known are a, b"):
         load_scene(tmp_path / "b.npz", series="c")
 
 

@@ -6,7 +6,6 @@ from contextlib import suppress
 from pathlib import Path
 
 from lippmann.errors import SceneError
-from lippmann.scene.parsing.name_hints import closest_name_hint
 from lippmann.scene.readers.gltf.document import check_extensions, open_document
 from lippmann.scene.readers.gltf.json_fields import Fields
 from lippmann.scene.readers.gltf.points_lines import has_points_or_lines
@@ -88,10 +87,4 @@ def _choose(animations: tuple[Animation, ...], name: str | None, file: str) -> A
     for animation in animations:
         if animation.name == name:
             return animation
-    known = [animation.name for animation in animations]
-    raise SceneError(
-        f"no animation is named '{name}'",
-        where=file,
-        rule=f"the file has {', '.join(repr(one) for one in known)}",
-        fix=closest_name_hint(name, known),
-    )
+    raise SceneError.unknown("animation", name, [animation.name for animation in animations], where=file)

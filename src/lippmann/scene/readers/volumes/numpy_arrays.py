@@ -79,7 +79,7 @@ def _of_archive(path: Path, series: str | None) -> tuple[NDArray[np.generic], ND
                 raise SceneError("its spacing is no distance along z, y and x", where=where, rule="three numbers > 0")
         others = [name for name in names if name != SPACING]
         if series is not None and series not in others:
-            raise UsageError(f"'{series}'", parameter="series", rule=f"the file has {', '.join(others[:20])}")
+            raise UsageError.unknown("array", series, others, parameter="series")
         if series is None and len(others) != 1:
             listed = ", ".join(others[:20]) or "no array"
             raise SceneError(f"holds {listed}", where=where, rule="one array is shown", fix="choose it with series=...")
