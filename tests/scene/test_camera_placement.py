@@ -8,8 +8,9 @@ import pytest
 from lippmann import api
 from lippmann.display import load_display
 from lippmann.errors import UsageError
+from lippmann.image import IntegralImage
 from lippmann.scene.camera_placement import FILL, VisibleDepth, place_by_camera
-from lippmann.scene.matrices import inverse
+from lippmann.scene.matrices import inverse, rotation_of
 from lippmann.scene.placement import PlacementOptions, place
 from lippmann.scene.scene import box_corners
 from lippmann.scene.values.description import Camera, Instance, Light, Material, Mesh, SceneDescription
@@ -48,6 +49,35 @@ def test_the_lens_plane_moves_until_nothing_seen_is_cut():
 def test_enlarging_the_scene_leaves_less_room_before_the_lens_plane():
     placed = place_by_camera(EYE, BOUNDS, DISPLAY, scale=2.0, probe=seeing(12.0, 25.0), warnings=[])
     assert 2 * (placed @ (0, 0, -12.0, 1))[2] < 10.0
+
+
+@pytest.mark.parametrize("display", [DISPLAY, load_display("seed-lenticular")])
+def test_a_shifted_lens_shows_what_lies_beside_the_axis_in_the_middle(display):
+    turned = np.array([[0, 0, 1, 3], [0, 1, 0, -2], [-1, 0, 0, 5], [0, 0, 0, 1.0]])
+    camera = dataclasses.replace(EYE, world_from_camera=turned, shift=(0.2, -0.1))
+    bounds = np.array([[-25.0, -8.0, -2.0], [-5.0, 4.0, 12.0]])
+    placement = place(bounds, display, cameras=[camera], options=PlacementOptions(camera="eye"))
+    placed = placement.display_from_world
+    middle = placed @ turned @ (0.2 * 20, -0.1 * 20, -20, 1)
+    np.testing.assert_allclose(middle[:3], 0, atol=1e-6)
+    # The lens plane lies at a right angle to the camera's own axis, its sides where the camera's are.
+    linear = placement.world_from_display[:3, :3]
+    np.testing.assert_allclose(rotation_of(placement.world_from_display)[:3, :3], turned[:3, :3], atol=1e-9)
+    IntegralImage(np.zeros((display.panel.height, display.panel.width, 3)), display, placement.world_from_display)
+    assert placement.depth_scale == pytest.approx(1.0)
+    # The middle of every plane is behind that of the lens plane, as seen by the eye.
+    behind = placed @ turned @ (0.2 * 25, -0.1 * 25, -25, 1)
+    np.testing.assert_allclose(behind[:2], 0, atol=1e-6)
+    assert behind[2] == pytest.approx(-5 / np.linalg.norm(linear[:, 0]))
+    if np.isfinite(display.viewing_distance):
+        np.testing.assert_allclose(placed @ turned @ (0, 0, 0, 1), (0, 0, display.viewing_distance, 1), atol=1e-6)
+
+
+def test_a_shifted_orthographic_camera_moves_its_picture():
+    camera = Camera("flat", np.eye(4), height=10.0, focus_distance=20.0, shift=(1.5, -2.0))
+    placed = place_by_camera(camera, BOUNDS, DISPLAY, warnings=[])
+    for depth in (20, 25):
+        np.testing.assert_allclose((placed @ (1.5, -2.0, -depth, 1))[:2], 0, atol=1e-9)
 
 
 def test_an_orthographic_camera_moves_its_lens_plane_too():

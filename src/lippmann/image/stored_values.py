@@ -30,10 +30,10 @@ _TOLERANCE = 1e-6
 def checked_placement(matrix: object) -> Matrix:
     """``matrix`` as a read-only ``(4, 4)`` float64 array; a :class:`PictureError` if it places no display.
 
-    Columns 0 to 2 are the display's axes in the world: at right angles, right-handed, x and y equally long. That of z
-    may be longer, where the display shows the scene's depth compressed.
+    Columns 0 to 2 are the display's axes in the world: right-handed, x and y at a right angle and equally long. That of
+    z may be longer, where the display shows the scene's depth compressed, and lean, where a camera's lens is shifted.
     """
-    rule = "it must be 4 x 4: a rotation times a scale (that of z may differ), a translation, and (0, 0, 0, 1) below"
+    rule = "it must be 4 x 4: a rotation times a scale (z may differ and lean), a translation, and (0, 0, 0, 1) below"
     try:
         values: Matrix = np.array(matrix, dtype=np.float64)
     except (TypeError, ValueError, OverflowError):
@@ -45,8 +45,8 @@ def checked_placement(matrix: object) -> Matrix:
         lengths = np.linalg.norm(linear, axis=0)
         axes = linear / lengths
         is_regular = np.linalg.det(axes) > 0.0 and abs(lengths[0] / lengths[1] - 1.0) <= _TOLERANCE
-        error = np.abs(axes.T @ axes - np.eye(3)).max()
-    if not (is_regular and error <= _TOLERANCE):
+        is_square = abs(axes[:, 0] @ axes[:, 1]) <= _TOLERANCE
+    if not (is_regular and is_square):
         raise PictureError(f"world_from_display is {values.tolist()}", rule=rule)
     values.flags.writeable = False
     return values

@@ -124,7 +124,7 @@ def render_eye_preview(
     whole = DisplayRays(display, placement.world_from_display, bool(resolved.subpixels))
     source = SinglePixelRays(whole, seen.column, seen.row, seen.channel)
     samples = _choose_samples(request, resolved, source.width)
-    integrator = session.integrator(whole, placement.display_from_world)
+    integrator = session.integrator(whole, placement.display_from_world, placement.exposure)
     plan = make_plan(source.width, 1, samples, memory=session.memory)
     frame = trace_frame(integrator, source, plan, seed=resolved.seed, box_filter=resolved.box_filter, progress=progress)
     picture = _picture(frame.pixels[0], seen)

@@ -150,7 +150,7 @@ def forecast(
     source = whole if window is None else WindowRays(whole, window)
     probe = _Probe(source, request.seed)
     samples = source.width * source.height * request.channels * request.samples
-    integrator = session.integrator(whole, placement.display_from_world)
+    integrator = session.integrator(whole, placement.display_from_world, placement.exposure)
     found = probe.trace(integrator, session)
     seconds = {
         "load": session.watch.seconds["load"],

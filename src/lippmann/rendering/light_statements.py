@@ -45,6 +45,9 @@ def light_notes(
     notes = []
     if request.exposure == "auto" and "exposure" in choices:
         notes.append(f"exposure {choices['exposure']:+.2f} EV: physical light, its median at mid-grey")
+    if request.exposure == "auto" and "camera_exposure" in choices:
+        own = choices["camera_exposure"]
+        notes.append(f"the camera's own exposure ({own:+.2f} EV) counts with a fixed one alone (exposure=0)")
     if _misses_caustics(choices):
         notes.append(
             "no estimate of the error: paths hardly find what mirrors, glass or gloss throw onto other surfaces from "

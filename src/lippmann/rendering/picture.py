@@ -52,7 +52,7 @@ def render_picture(
 
     display_from_world = placement.display_from_world
     source = DisplayRays(display, placement.world_from_display, bool(request.subpixels))
-    integrator = session.integrator(source, display_from_world)
+    integrator = session.integrator(source, display_from_world, placement.exposure)
     window = traced_window(session, display, placement)
     part = source if window is None else WindowRays(source, window)
 
@@ -99,8 +99,9 @@ def choose_exposure(scene: Scene, display: Display, request: RenderRequest) -> f
     from lippmann.rendering.transport.ray_source import DisplayRays
 
     source = DisplayRays(display, placement.world_from_display, bool(session.request.subpixels))
-    session.integrator(source, placement.display_from_world)
-    return cast("float", session.choices.get("exposure", 0.0))
+    session.integrator(source, placement.display_from_world, placement.exposure)
+    # A fixed exposure comes on top of the camera's own.
+    return cast("float", session.choices.get("exposure", 0.0)) - session.counted_exposure(placement.exposure)
 
 
 def traced_window(session: Session, display: Display, placement: Placement) -> PixelWindow | None:

@@ -58,7 +58,8 @@ def render_preview(
     else:
         source = CameraRays(pose, *size)
     session.face_viewer(remove_scale(pose))
-    integrator = session.integrator(source, np.linalg.inv(np.asarray(pose.world_from_camera, dtype=np.float64)))
+    frame_from_world = np.linalg.inv(np.asarray(pose.world_from_camera, dtype=np.float64))
+    integrator = session.integrator(source, frame_from_world, pose.exposure)
     plan = make_plan(*size, request.samples, memory=session.memory)
     frame = trace_frame(integrator, source, plan, seed=request.seed, box_filter=request.box_filter, progress=progress)
     options = {"pixel_filter": request.pixel_filter, "camera": pose.name}

@@ -183,7 +183,7 @@ class Session:
             self.depths[key] = self.watch.stage("build", lambda: probe_depth(self.built, view))
         return self.depths[key]
 
-    def integrator(self, source: RaySource, frame_from_world: Matrix) -> Integrator:
+    def integrator(self, source: RaySource, frame_from_world: Matrix, own_exposure: float = 0.0) -> Integrator:
         """The integrator that the request names, for the built scene.
 
         Parameters
@@ -193,11 +193,15 @@ class Session:
             the same.
         frame_from_world:
             ``(4, 4)``: the frame in which surface properties are told.
+        own_exposure:
+            Stops of the camera from which the picture is taken.
         """
         return self.watch.stage(
             "build",
             lambda: self._in_front(
-                self._prepare_light(make_integrator(self.built, self.request, frame_from_world, source), source),
+                self._prepare_light(
+                    make_integrator(self.built, self.request, frame_from_world, source), source, own_exposure
+                ),
                 frame_from_world,
             ),
         )
@@ -217,7 +221,13 @@ class Session:
             return SplatIntegrator(integrator, built, built.splats, self.engine.threads)
         return integrator
 
-    def _prepare_light(self, integrator: Integrator, source: RaySource) -> Integrator:
+    def counted_exposure(self, own_exposure: float) -> float:
+        """A camera's own exposure where it counts: for light that the file brings, not for the studio's."""
+        scene = self.scene
+        is_lit = scene.has_physical_lights or (scene.environment is not None and not scene.in_studio)
+        return own_exposure if is_lit else 0.0
+
+    def _prepare_light(self, integrator: Integrator, source: RaySource, own_exposure: float) -> Integrator:
         from lippmann.rendering.film.prepared_light import prepare_light, tell_anew
         from lippmann.rendering.transport.path import PathIntegrator
 
@@ -228,6 +238,7 @@ class Session:
                 source,
                 memory_limit(self.request),
                 even_background(self.built, self.request),
+                own_exposure=self.counted_exposure(own_exposure),
                 stands_alone=not self.scene.lies_off_surfaces,
             )
             tell_anew(self.choices, told)

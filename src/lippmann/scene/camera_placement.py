@@ -93,7 +93,7 @@ def place_by_camera(
     SceneError
         The camera has the whole scene behind it, or a field that is no field or beyond numbers.
     """
-    frame = remove_scale(camera)
+    frame = view_frame(camera)
     in_camera = transform_points(inverse(frame), box_corners(bounds))
     farthest, nearest = -float(in_camera[:, 2].min()), max(-float(in_camera[:, 2].max()), 0.0)
     if farthest <= 0.0:
@@ -226,6 +226,20 @@ def _share_contained(camera: Camera, display: Display) -> float:
         return min(1.0, width / (reach * camera.aspect), height / reach)
     shares = width / camera.aspect, height
     return min(shares) / max(shares)
+
+
+def view_frame(camera: Camera) -> Matrix:
+    """``world_from_view``: the camera's frame, in which the middle of its picture lies on the -z axis.
+
+    Depth is that along the camera's own axis. The lens of a perspective camera with a shift is off-axis, which shears
+    the frame; an orthographic one is moved.
+    """
+    right, up = camera.shift
+    if camera.fov_y is None:
+        return np.asarray(remove_scale(camera) @ translation((right, up, 0.0)), np.float64)
+    shear = np.eye(4)
+    shear[:2, 2] = -right, -up
+    return np.asarray(remove_scale(camera) @ shear, np.float64)
 
 
 def remove_scale(camera: Camera) -> Matrix:

@@ -38,10 +38,11 @@ def depth_scaling(factor: float) -> Matrix:
 
 
 def rotation_of(world_from_display: Matrix) -> Matrix:
-    """The rotation alone, ``(4, 4)``, of a display's place: its axes in the world."""
+    """The rotation alone, ``(4, 4)``, of a display's place: its axes in the world, z at a right angle to the panel."""
     matrix = np.eye(4)
     linear = np.asarray(world_from_display, np.float64)[:3, :3]
-    matrix[:3, :3] = linear / np.linalg.norm(linear, axis=0)
+    matrix[:3, :2] = linear[:, :2] / np.linalg.norm(linear[:, :2], axis=0)
+    matrix[:3, 2] = np.cross(matrix[:3, 0], matrix[:3, 1])
     return matrix
 
 

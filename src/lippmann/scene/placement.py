@@ -24,6 +24,7 @@ from lippmann.scene.matrices import (
     depth_scaling,
     inverse,
     rotation,
+    rotation_of,
     scaling,
     transform_points,
     translation,
@@ -124,10 +125,11 @@ class Placement:
     """Position, orientation and scale of a display in a scene.
 
     ``world_from_display`` is ``scale * rotation * depth`` with a translation, 4x4; its scale is in world units per
-    millimetre, and ``depth`` stretches z alone, where the scene's depth is compressed. ``depth_range`` is (back,
+    millimetre, and ``depth`` stretches z alone, where the scene's depth is compressed, or leans it, where a camera's
+    lens is shifted. ``depth_range`` is (back,
     front): the lowest and highest z of the scene's bounding box in millimetres of the display frame;
     ``resolvable_range`` the same for what the display resolves. ``warnings`` say, one line each, what was compressed,
-    and what will be blurred, cut or outside.
+    and what will be blurred, cut or outside. ``exposure`` is that of the camera that places the display, in stops.
     """
 
     world_from_display: Matrix
@@ -135,6 +137,7 @@ class Placement:
     resolvable_range: tuple[float, float]
     mode: Mode
     warnings: tuple[str, ...] = ()
+    exposure: float = 0.0
 
     @property
     def display_from_world(self) -> Matrix:
@@ -144,8 +147,9 @@ class Placement:
     @property
     def depth_scale(self) -> float:
         """Factor on the scene's depth beside its other extents."""
-        across, _, along = np.linalg.norm(self.world_from_display[:3, :3], axis=0)
-        return float(across / along)
+        linear = self.world_from_display[:3, :3]
+        across = np.linalg.norm(linear[:, 0])
+        return float(across / (linear[:, 2] @ rotation_of(self.world_from_display)[:3, 2]))
 
 
 def placement_of(value: object) -> PlacementOptions | Placement:
@@ -234,6 +238,7 @@ def place(
     box(bounds)
     mode = options.mode or ("camera" if options.camera or home_camera else "fit")
     warnings: list[str] = []
+    exposure = 0.0
     if mode == "fit":
         options = face_viewer(bounds, options, warnings)
         points = box_corners(bounds) if extreme_points is None else extreme_points()
@@ -242,6 +247,7 @@ def place(
         )
     elif mode == "camera":
         camera = _choose_camera(cameras, options.camera or home_camera)
+        exposure = camera.exposure
         by_camera = place_by_camera(
             camera,
             bounds,
@@ -260,7 +266,9 @@ def place(
     else:
         display_from_world = _resize(np.eye(4), options)
     display_from_world = translation(options.shift) @ display_from_world
-    return stand(inverse(display_from_world), bounds, display, mode=mode, bounds_in=bounds_in, warnings=warnings)
+    where = inverse(display_from_world)
+    found = stand(where, bounds, display, mode=mode, bounds_in=bounds_in, warnings=warnings)
+    return replace(found, exposure=exposure)
 
 
 def stand(

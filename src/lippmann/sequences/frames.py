@@ -98,10 +98,12 @@ class Stand:
     def __call__(self, frame: int) -> Placement:
         scene = self.motion.scene(frame)
         where = self.motion.display_turn(frame) @ self.first
+        exposure = 0.0
         if self.first_pose is not None:
             camera = cast(Camera, self.motion.camera(frame, self.camera))
-            where = _pose(camera) @ np.linalg.inv(self.first_pose) @ self.first
+            where, exposure = _pose(camera) @ np.linalg.inv(self.first_pose) @ self.first, camera.exposure
         found = stand(where, scene.bounds, self.display, mode=self.mode, bounds_in=scene.bounds_in)
+        found = replace(found, exposure=exposure)
         return found if self.warnings is None else replace(found, warnings=self.warnings)
 
 

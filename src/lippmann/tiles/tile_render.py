@@ -94,7 +94,7 @@ def prepare(job: TileJob, progress: ProgressCallback = silent) -> Prepared:
     job = replace(job, request=request)
     placement = session.place(job.display)
     source = DisplayRays(job.display, placement.world_from_display, bool(request.subpixels))
-    integrator = session.integrator(source, placement.display_from_world)
+    integrator = session.integrator(source, placement.display_from_world, placement.exposure)
     treatment = survey(integrator, source, request) if request.denoises else None
     # Tiles are traced in silence, whoever counts them.
     quiet = replace(session, watch=Stopwatch())

@@ -2,13 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from lippmann import api
+from lippmann.display import load_display
 from lippmann.errors import UsageError
 from lippmann.image import read_picture
-from lippmann.scene.values.description import Instance, Light, Material, Mesh, SceneDescription
+from lippmann.rendering.live.live_view import LiveView
+from lippmann.rendering.live.renderer import LiveRenderer
+from lippmann.rendering.picture import choose_exposure
+from lippmann.rendering.request.render_request import RenderRequest
+from lippmann.scene.matrices import translation
+from lippmann.scene.placement import PlacementOptions
+from lippmann.scene.values.description import Camera, Instance, Light, Material, Mesh, SceneDescription
 
 pytestmark = pytest.mark.usefixtures("engine")
 
@@ -53,6 +62,56 @@ def test_an_exposure_that_is_given_is_kept():
     raised = picture(scene(), exposure=-10.0)
     np.testing.assert_allclose(raised.pixels, plain.pixels * 2.0**-10, rtol=1e-5)
     assert raised.provenance.options["exposure"] == -10.0
+
+
+EYE = Camera("eye", translation((0, 0, 30)), fov_y=0.5, focus_distance=30.0, exposure=2.0)
+
+
+def test_a_cameras_own_exposure_comes_on_top_of_a_fixed_one():
+    plain = scene(cameras=[replace(EYE, exposure=0.0)])
+    raised = scene(cameras=[EYE])
+    placement = {"camera": "eye"}
+    without = picture(plain, exposure=-10.0, placement=placement)
+    image = picture(raised, exposure=-10.0, placement=placement)
+    assert without.pixels.max() > 1.0
+    np.testing.assert_allclose(image.pixels, 4.0 * without.pixels, rtol=1e-5)
+    assert image.provenance.options["exposure"] == -8.0
+    np.testing.assert_array_equal(picture(raised, exposure=-10.0).pixels, picture(plain, exposure=-10.0).pixels)
+    seen = api.preview(raised, size=(32, 32), spp=1, exposure=-10.0, integrator="direct").pixels
+    np.testing.assert_allclose(
+        seen, 4.0 * api.preview(plain, size=(32, 32), spp=1, exposure=-10.0, integrator="direct").pixels, rtol=1e-5
+    )
+
+
+def test_an_automatic_exposure_leaves_the_cameras_out_and_says_so():
+    placement = {"camera": "eye"}
+    image = picture(scene(cameras=[EYE]), placement=placement)
+    plain = picture(scene(cameras=[replace(EYE, exposure=0.0)]), placement=placement)
+    np.testing.assert_array_equal(image.pixels, plain.pixels)
+    assert any("own exposure (+2.00 EV) counts with a fixed one alone" in note for note in image.provenance.notes)
+    # A sequence holds what was measured: the camera's own comes on top again.
+    request = RenderRequest(integrator="direct", method="full", spp=4, placement=PlacementOptions(camera="eye"))
+    held = choose_exposure(scene(cameras=[EYE]), load_display("mla-square"), request)
+    assert held == pytest.approx(image.provenance.options["exposure"] - 2.0)
+
+
+def test_light_of_the_studio_knows_no_exposure_of_a_camera():
+    dark = [scene(illuminance=0.0, physical=False, cameras=[replace(EYE, exposure=stops)]) for stops in (0.0, 2.0)]
+    without, image = (picture(each, placement={"camera": "eye"}).pixels for each in dark)
+    assert without.max() > 0.1
+    np.testing.assert_array_equal(image, without)
+
+
+def test_live_pictures_count_the_cameras_exposure_once():
+    request = RenderRequest(exposure=-10.0, placement=PlacementOptions(camera="eye"))
+    plain, raised = (
+        LiveRenderer(scene(cameras=[replace(EYE, exposure=stops)]), load_display("mla-square")).frame(
+            LiveView((0.0, 0.0, 400.0), (32, 32), request=replace(request, tone_map="none", exposure=exposure))
+        )
+        for stops, exposure in ((0.0, -8.0), (2.0, -10.0))
+    )
+    assert plain.exposure == raised.exposure == -8.0
+    np.testing.assert_array_equal(plain.pixels, raised.pixels)
 
 
 def test_light_that_is_not_physical_stays_as_it_is():

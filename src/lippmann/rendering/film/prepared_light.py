@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import mitsuba as mi
 
 from lippmann.rendering.film.caustic_worth import are_worth_photons
@@ -18,7 +20,7 @@ from lippmann.rendering.transport.ray_source import RaySource
 from lippmann.scene.values.description import Color
 
 #: What :func:`prepare_light` may tell.
-_TOLD = ("caustics", "exposure", "light_vertices", "mirror_images", "seen_chains")
+_TOLD = ("camera_exposure", "caustics", "exposure", "light_vertices", "mirror_images", "seen_chains")
 
 
 def tell_anew(choices: dict[str, object], told: dict[str, object]) -> None:
@@ -34,6 +36,7 @@ def prepare_light(
     source: RaySource,
     memory: int,
     background: Color | None = None,
+    own_exposure: float = 0.0,
     stands_alone: bool = True,
 ) -> dict[str, object]:
     """Make the integrator ready for the picture of ``source``; what there is to say of it in the picture's file.
@@ -50,6 +53,8 @@ def prepare_light(
         Bytes that the photons may take, and light vertices.
     background:
         What rays see that meet nothing, see :func:`~lippmann.rendering.film.exposure.measure_exposure`.
+    own_exposure:
+        Stops of the camera itself, which a fixed exposure comes on top of.
     stands_alone:
         Nothing lies in front of what the integrator shows, such as splats: whole pixels are its own.
 
@@ -62,6 +67,10 @@ def prepare_light(
     integrator.light_vertices = integrator.vertex_passes = integrator.chain_passes = None
     integrator.beam = integrator.gain = integrator.most_indirect = None
     told: dict[str, object] = {}
+    if own_exposure:
+        told["camera_exposure"] = own_exposure
+    if request.exposure != "auto":
+        request = replace(request, exposure=request.exposure + own_exposure)
     has_sharp = has_sharp_surfaces(integrator.scene)
     # A goal may be reached by samples alone, which are to have no blur.
     is_widened = request.shares_light and not request.is_open_ended and has_sharp

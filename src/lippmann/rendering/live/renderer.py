@@ -59,7 +59,8 @@ class _Stand:
         if self.kernels.lit_for is self:
             return
         self.kernels.light(self.view.light, rotation_of(self.placement.world_from_display))
-        self.kernels.expose(self.display, replace(self.request, exposure=exposure), self.placement, measure=False)
+        whole = replace(self.placement, exposure=0.0)  # that of the camera is in it
+        self.kernels.expose(self.display, replace(self.request, exposure=exposure), whole, measure=False)
         self.kernels.lit_for = self
 
 

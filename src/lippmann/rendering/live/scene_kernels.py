@@ -131,6 +131,8 @@ class SceneKernels:
                 background = even_background(self.built, request)
                 self._exposure = measure_exposure(integrator, source, background, request.seed)
             exposure = self._exposure
+        else:
+            exposure += self.session.counted_exposure(placement.exposure)
         gain = gain_of(exposure)
         integrator.gain = dr.opaque(mi.Float, gain)
         if request.clamp_indirect is not None:

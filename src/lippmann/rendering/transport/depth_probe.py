@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from lippmann.rendering.transport.first_surface import make_surfaces
 from lippmann.rendering.transport.ray_source import world_ray
 from lippmann.scene.camera_placement import CameraView, VisibleDepth
+from lippmann.scene.matrices import inverse, transform_points
 from lippmann.scene.values.description import Matrix
 
 if TYPE_CHECKING:
@@ -37,8 +38,7 @@ def probe_depth(built: BuiltScene | BuiltClassic, view: CameraView) -> VisibleDe
     seen, points = first_hits(built, view.world_from_camera, origins, directions)
     if not seen.any():
         return None
-    eye, back = view.world_from_camera[:3, 3], view.world_from_camera[:3, 2]
-    depths = np.sort((eye - points[seen]) @ back)
+    depths = np.sort(-transform_points(inverse(view.world_from_camera), points[seen])[:, 2])
     near, far = np.quantile(depths, (NEAR_SHARE, FAR_SHARE))
     return VisibleDepth(float(near), float(far))
 

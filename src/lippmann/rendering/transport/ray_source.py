@@ -328,12 +328,13 @@ class CameraRays:
         x = (mi.Float64(column) + mi.Float64(jitter.x)) * (2 / self.height) - self.width / self.height
         y = 1 - (mi.Float64(row) + mi.Float64(jitter.y)) * (2 / self.height)
         zero = dr.zeros(mi.Float64, dr.width(x))
+        right, up = self.camera.shift
         if self.camera.fov_y is not None:
             slope = float(np.tan(self.camera.fov_y / 2))
-            origin, direction = (zero, zero, zero), (x * slope, y * slope, zero - 1)
+            origin, direction = (zero, zero, zero), (x * slope + right, y * slope + up, zero - 1)
         else:
             half = (self.camera.height or 2.0) / 2
-            origin, direction = (x * half, y * half, zero), (zero, zero, zero - 1)
+            origin, direction = (x * half + right, y * half + up, zero), (zero, zero, zero - 1)
         return world_ray(_without_scale(self.camera.world_from_camera), origin, direction)
 
 

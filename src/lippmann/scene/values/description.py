@@ -175,7 +175,8 @@ class Camera:
 
     ``fov_y`` is the full vertical angle in radians (perspective), ``height`` the full vertical extent in world units
     (orthographic). ``focus_distance`` (world units) becomes the lens plane when the camera places a display; None means
-    the distance of the scene's centre.
+    the distance of the scene's centre. ``shift`` is where the middle of the picture lies beside the axis, to the right
+    and up: a slope (perspective), or world units (orthographic). ``exposure`` is the camera's own, in stops.
     """
 
     name: str
@@ -184,6 +185,8 @@ class Camera:
     height: float | None = None
     aspect: float = 1.0
     focus_distance: float | None = None
+    shift: tuple[float, float] = (0.0, 0.0)
+    exposure: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)

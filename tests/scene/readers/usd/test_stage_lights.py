@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from pxr import Usd, UsdGeom
 
 from lippmann.scene.scene import Scene
 
@@ -122,6 +123,47 @@ def Camera "flat" {
     assert view.world_from_camera[:3, 3] == pytest.approx([0, 0, 0.5])
     # An aperture is in tenths of a unit, a unit is 0.1 m.
     assert (flat.height, flat.aspect) == pytest.approx((0.2, 2))
+
+
+def test_exposure_and_shift_of_cameras_are_those_of_pxr(read):
+    lens = "focalLength = 50\n float horizontalAperture = 36\n float verticalAperture = 24"
+    offsets = "float horizontalApertureOffset = 5\n float verticalApertureOffset = -2"
+    body = f"""
+def Camera "plain" {{
+    float {lens}
+}}
+def Camera "view" {{
+    float {lens}
+    {offsets}
+    float exposure = 2
+    float exposure:fStop = 4
+    float exposure:iso = 400
+    float exposure:time = 0.5
+    float exposure:responsivity = 1.5
+}}
+def Camera "flat" {{
+    token projection = "orthographic"
+    float {lens}
+    {offsets}
+}}
+def Camera "shut" {{
+    float exposure:time = 0
+}}
+"""
+    scene = read(triangle() + body)
+    plain, view, flat, shut = scene.cameras
+    assert (plain.exposure, plain.shift) == (0.0, (0.0, 0.0))
+    stage = Usd.Stage.CreateInMemory()
+    stage.GetRootLayer().ImportFromString("#usda 1.0\n" + body)
+    camera = UsdGeom.Camera(stage.GetPrimAtPath("/view"))
+    assert 2**view.exposure == pytest.approx(camera.ComputeLinearExposureScale())
+    assert 2**view.exposure == pytest.approx(0.5 * 4 * 1.5 * 4 / 4**2, rel=0.01)
+    # The window of its frustum lies at a distance of 1.
+    assert view.shift == pytest.approx(tuple(camera.GetCamera(Usd.TimeCode.Default()).frustum.window.GetMidpoint()))
+    camera = UsdGeom.Camera(stage.GetPrimAtPath("/flat"))
+    assert flat.shift == pytest.approx(tuple(camera.GetCamera(Usd.TimeCode.Default()).frustum.window.GetMidpoint()))
+    assert shut.exposure == 0.0
+    assert "/shut: an exposure of 0 times the light is passed over" in scene.notes
 
 
 def test_lights_that_are_not_read_are_named(read):

@@ -6,7 +6,7 @@ UsdLux gives radiance: ``color * intensity * 2^exposure``, divided by the emitti
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -162,15 +162,22 @@ def camera_of(record: Record, scene_from_stage: Matrix) -> Camera | None:
     width, height, focal = record["width"], record["height"], record["focal_length"]
     unit = float(np.cbrt(np.linalg.det(scene_from_stage[:3, :3])))
     focus = record["focus_distance"] * unit
-    sizes = np.array([width, height, focal])
+    sizes = np.array([width, height, focal, *record["offsets"]])
     if not (np.isfinite(sizes).all() and np.isfinite(world).all() and min(width, height) > 0.0 and focal > 0.0):
         return None
-    distance = focus if np.isfinite(focus) and focus > 0.0 else None
+    camera = Camera(
+        record["name"],
+        rigid(world),
+        aspect=width / height,
+        focus_distance=focus if np.isfinite(focus) and focus > 0.0 else None,
+        exposure=record["exposure"],
+    )
+    right, up = record["offsets"]
     if record["is_perspective"]:
         angle = 2.0 * math.atan2(height, 2.0 * focal)
-        return Camera(record["name"], rigid(world), fov_y=angle, aspect=width / height, focus_distance=distance)
-    own = _TENTH * height * unit
-    return Camera(record["name"], rigid(world), height=own, aspect=width / height, focus_distance=distance)
+        return replace(camera, fov_y=angle, shift=(right / focal, up / focal))
+    tenth = _TENTH * unit
+    return replace(camera, height=tenth * height, shift=(tenth * right, tenth * up))
 
 
 def _times(record: Record, factor: float) -> Color:

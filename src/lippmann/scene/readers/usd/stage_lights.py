@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,10 @@ _INPUTS = {
     "DomeLight": (),
     "DomeLight_1": (),
 }
+
+
+#: Stops of a camera's exposure beyond which it is no camera's.
+_MOST_STOPS = 32
 
 
 def light_record(prim: Usd.Prim, world: NDArray[np.float64], time: Usd.TimeCode, notes: dict[str, None]) -> Record:
@@ -64,9 +69,15 @@ def light_record(prim: Usd.Prim, world: NDArray[np.float64], time: Usd.TimeCode,
     return record
 
 
-def camera_record(camera: UsdGeom.Camera, world: NDArray[np.float64], time: Usd.TimeCode) -> Record:
-    """A camera: its apertures and focal length in tenths of a scene unit, as a stage has them."""
+def camera_record(
+    camera: UsdGeom.Camera, world: NDArray[np.float64], time: Usd.TimeCode, notes: dict[str, None]
+) -> Record:
+    """A camera: apertures and focal length in tenths of a scene unit, as a stage has them; its exposure in stops."""
     lens = camera.GetCamera(time)
+    scale = float(camera.ComputeLinearExposureScale(time))
+    is_exposed = 2.0**-_MOST_STOPS <= scale <= 2.0**_MOST_STOPS
+    if not is_exposed:
+        notes[f"{camera.GetPath()}: an exposure of {scale:g} times the light is passed over"] = None
     return {
         "name": camera.GetPrim().GetName(),
         "world": world.ravel().tolist(),
@@ -75,6 +86,8 @@ def camera_record(camera: UsdGeom.Camera, world: NDArray[np.float64], time: Usd.
         "height": float(lens.verticalAperture),
         "focal_length": float(lens.focalLength),
         "focus_distance": float(lens.focusDistance),
+        "offsets": [float(lens.horizontalApertureOffset), float(lens.verticalApertureOffset)],
+        "exposure": math.log2(scale) if is_exposed else 0.0,
     }
 
 

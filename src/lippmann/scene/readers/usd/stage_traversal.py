@@ -98,7 +98,7 @@ class Traversal:
             elif kind.startswith(PARTICLES):
                 self._add_splats(prim, base @ place)
             elif prim.IsA(UsdGeom.Camera):
-                self._cameras.append(camera_record(UsdGeom.Camera(prim), (base @ place)[0], self._time))
+                self._cameras.append(camera_record(UsdGeom.Camera(prim), (base @ place)[0], self._time, self.notes))
             elif prim.HasAPI(UsdLux.LightAPI):
                 self._lights += [light_record(prim, world, self._time, self.notes) for world in base @ place]
             elif prim.IsA(UsdGeom.Boundable) and not prim.IsA(UsdSkel.Root) and not prim.IsA(UsdSkel.Skeleton):
