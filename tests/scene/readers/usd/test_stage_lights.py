@@ -166,6 +166,15 @@ def Camera "shut" {{
     assert "/shut: an exposure of 0 times the light is passed over" in scene.notes
 
 
+def test_suns_that_blender_wrote_are_told_of(read):
+    head = '#usda 1.0\n(\n    doc = "Blender v5.0.1"\n    upAxis = "Z"\n    metersPerUnit = 1\n)\n'
+    said = "Blender v5.0.1 writes suns at a quarter of the strength of its other lights"
+    sun = 'def DistantLight "sun" {\n}'
+    assert said in read(triangle() + sun, head=head).notes
+    assert said not in read(triangle() + 'def SphereLight "lamp" {\n}', head=head).notes
+    assert said not in read(triangle() + sun).notes
+
+
 def test_lights_that_are_not_read_are_named(read):
     scene = read(triangle() + 'def PortalLight "p" {}')
     assert scene.notes == ["light sources of type PortalLight are not read"]
