@@ -106,7 +106,8 @@ def load_scene(
     light:
         A :class:`~lippmann.scene.light_options.LightOptions`: turns and scales the scene's light.
     variants:
-        Of a USD stage: ``{"set": "choice"}`` for every prim that has them, ``{"/prim:set": "choice"}`` for one.
+        Of a USD stage: ``{"set": "choice"}`` for every prim that has them, ``{"/prim:set": "choice"}`` for one. Of
+        a glTF file: ``{"materials": "name"}`` for a material variant.
     depth_map:
         The depth of a photograph (``.jpg``, ``.png``, ``.webp``, ``.heic``), as a file; None for one that a JPEG or
         HEIF file holds.

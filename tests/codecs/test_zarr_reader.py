@@ -197,7 +197,7 @@ def test_codecs_of_format_3_are_those_of_the_list(tmp_path, codecs, named):
         ({"codecs": [{"name": "bytes", "configuration": 5}]}, "codec is {...}"),
         ({"codecs": [{"name": "transpose", "configuration": {"order": [0, 0, 1]}}]}, "order is [0, 0, 1]"),
         ({"codecs": [shard(chunk_shape=[3, 3, 3])]}, "chunk_shape of a shard is [3, 3, 3]"),
-        ({"node_type": "group"}, "node_type is 'group'"),
+        ({"node_type": "group"}, "is a Zarr group; it holds no arrays"),
         ({"fill_value": [0, 1]}, "fill_value is [0, 1]"),
         ({"another": {"name": "x"}}, "names the extension 'another'"),
         ({"shape": [4, 6, -3]}, "shape is [4, 6, -3]"),
@@ -239,6 +239,19 @@ def test_format_2_is_read_without_surprises(tmp_path, changed, what):
     fields = json.loads((tmp_path / "x.zarr" / ".zarray").read_text()) | changed
     (tmp_path / "x.zarr" / ".zarray").write_text(json.dumps({k: v for k, v in fields.items() if v is not ...}))
     assert what in refusal(tmp_path / "x.zarr")
+
+
+@pytest.mark.parametrize("version", [2, 3])
+def test_a_group_names_its_arrays(tmp_path, version):
+    zarr = pytest.importorskip("zarr", minversion="3")
+    group = zarr.open_group(str(tmp_path / "field.zarr"), mode="w", zarr_format=version)
+    with pytest.raises(PictureError, match=r"field\.zarr: is a Zarr group; it holds no arrays$"):
+        open_file(tmp_path / "field.zarr")
+    for name in ("view", "maps/depth"):
+        group.create_array(name, shape=(4, 4, 3), dtype="u1")
+    with pytest.raises(PictureError, match=r"it holds the arrays view, maps/depth; name an array: .*field\.zarr/view$"):
+        open_file(tmp_path / "field.zarr")
+    assert open_file(tmp_path / "field.zarr" / "view").width == 4
 
 
 def test_chunks_have_sane_sizes(tmp_path):

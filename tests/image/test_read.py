@@ -16,7 +16,7 @@ from lippmann.codecs.icc import rgb_profile
 from lippmann.codecs.png import encode_png, read_png_header
 from lippmann.color.primaries import REC709
 from lippmann.color.transfer import quantize
-from lippmann.errors import LippmannError, PictureError
+from lippmann.errors import DisplayError, LippmannError, PictureError
 from lippmann.image import Provenance, open_file, read_metadata, read_picture, write_picture
 from lippmann.image.write import write_plain_picture
 
@@ -198,6 +198,13 @@ def test_what_is_not_shown_is_noted(tmp_path):
         assert open_file(tmp_path / name).notes == (note,), name
     write_plain_picture(np.zeros((4, 6, 3), np.float32), tmp_path / "plain.png")
     assert open_file(tmp_path / "plain.png").notes == ()
+
+
+def test_a_display_may_be_named(tmp_path):
+    Image.new("RGB", (512, 512), (255, 0, 0)).save(tmp_path / "a.png")
+    assert read_picture(tmp_path / "a.png", display="seed-lenticular").display.name == "seed-lenticular"
+    with pytest.raises(DisplayError, match="unknown display 'nothing'"):
+        read_metadata(tmp_path / "a.png", display="nothing")
 
 
 def test_a_display_given_replaces_the_one_in_the_file(tmp_path, display, picture, provenance):

@@ -67,6 +67,22 @@ def test_a_film_of_quilts_says_its_layout(tmp_path, codec):
         assert "comment" not in video.metadata
 
 
+def test_views_of_a_film_of_quilts_are_whole_pixels(tmp_path):
+    """5 x 3 views of 103 x 151 pixels, each of its own grey: their last column and row go."""
+    layout = QuiltLayout(5, 3, 1.0)
+    greys = np.linspace(0.05, 0.95, 15).reshape(3, 5)
+    frame = np.repeat(np.kron(greys, np.ones((151, 103)))[..., None], 3, axis=2).astype(np.float32)
+    path = tmp_path / "film_qs5x3a1.mp4"
+    write_animation([frame], path, quilt=layout)
+    with av.open(str(path)) as video:
+        codes = next(video.decode(video=0)).to_ndarray(format="rgb24")
+    assert codes.shape == (450, 510, 3)
+    tiles = codes.reshape(3, 150, 5, 102, 3).astype(float)
+    expected = quantize(greys.astype(np.float32), 8, "srgb")
+    assert np.abs(tiles[..., 0] - expected[:, None, :, None]).max() < 25
+    assert np.abs(tiles[:, 4:-4, :, 4:-4, 0] - expected[:, None, :, None]).max() < 4
+
+
 @pytest.mark.skipif(not hasattr(os, "sched_getscheduler"), reason="this system has no such scheduling policies")
 @pytest.mark.parametrize("codec", ["h264", "hevc", "av1"])
 def test_no_encoder_puts_the_process_into_real_time(tmp_path, codec):

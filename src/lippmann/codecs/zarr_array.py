@@ -13,14 +13,14 @@ from pathlib import Path
 import numpy as np
 
 from lippmann.codecs.types import Attributes, Pixels, StoredType, ZarrArray, ZarrModule
-from lippmann.codecs.zarr_reader import open_array, read_array
+from lippmann.codecs.zarr_reader import array_names, node_kind, open_array, read_array
 from lippmann.errors import MemoryLimitError, PictureError
 from lippmann.runtime.input_memory import check_input
 
 ENDING = ".zarr"
 
-#: The files that make a folder a Zarr array, in the third and the second version of the format.
-MARKS = ("zarr.json", ".zarray")
+#: The files that make a folder a Zarr array or group, in the third and the second version of the format.
+MARKS = ("zarr.json", ".zarray", ".zgroup")
 
 DIMENSIONS = ["row", "column", "color"]
 
@@ -77,7 +77,7 @@ def _created(zarr: ZarrModule, folder: str, shape: Attributes) -> ZarrArray:
 
 
 def is_zarr(path: Path) -> bool:
-    """Whether this is a folder with a Zarr array."""
+    """Whether this is a folder with a Zarr array or group."""
     try:
         return any((path / mark).is_file() for mark in MARKS)
     except (OSError, ValueError):  # no file can have such a name
@@ -106,7 +106,12 @@ class ZarrPicture:
 
     def __init__(self, folder: Path) -> None:
         zarr = load_zarr(folder)
-        metadata, attributes = read_array(folder)
+        try:
+            metadata, attributes = read_array(folder)
+        except PictureError:
+            if node_kind(folder) == "group":
+                raise _group(folder) from None
+            raise
         if len(metadata.shape) != 3 or metadata.shape[2] != 3 or min(metadata.shape) < 1:
             raise PictureError(
                 f"holds an array of shape {metadata.shape}", where=str(folder), rule="it must be (height, width, 3)"
@@ -139,6 +144,13 @@ class ZarrPicture:
             what = f"this Zarr array is damaged: {error}"
             raise PictureError(what, where=str(self._folder), fix="make it anew") from error
         return values
+
+
+def _group(folder: Path) -> PictureError:
+    names = array_names(folder)
+    held = f"it holds the arrays {', '.join(names)}" if names else "it holds no arrays"
+    fix = f"name an array: {folder / names[0]}" if names else ""
+    return PictureError("is a Zarr group", where=str(folder), rule=held, fix=fix)
 
 
 def load_zarr(where: Path) -> ZarrModule:

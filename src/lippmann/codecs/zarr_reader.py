@@ -28,6 +28,9 @@ _MOST_METADATA = 1 << 22
 _SLACK = 1 << 16
 _SLACK_PER_CHUNK = 64
 
+#: Arrays of a group that a line names.
+_MOST_NAMES = 8
+
 _ZSTD = b"\x28\xb5\x2f\xfd"
 
 
@@ -51,6 +54,23 @@ def node_kind(folder: Path, root: Path | None = None) -> Literal["array", "group
     if _json(folder, ARRAY_2, root or folder) is not None:
         return "array"
     return None if _json(folder, GROUP_2, root or folder) is None else "group"
+
+
+def array_names(group: Path) -> list[str]:
+    """Paths of the arrays in a group and those below it, as far as :data:`_MOST_NAMES`; links are left alone."""
+    names: list[str] = []
+    groups = [group]
+    while groups and len(names) < _MOST_NAMES:
+        folder = groups.pop(0)
+        for path in sorted(folder.iterdir()):
+            if path.is_symlink() or not path.is_dir():
+                continue
+            kind = node_kind(path, group)
+            if kind == "array":
+                names.append(path.relative_to(group).as_posix())
+            elif kind == "group" and len(groups) < _MOST_NAMES:
+                groups.append(path)
+    return names[:_MOST_NAMES]
 
 
 def read_attributes(folder: Path) -> Attributes:

@@ -7,6 +7,7 @@ import weakref
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from io import BufferedReader
+from os import PathLike
 from pathlib import Path
 from typing import cast
 
@@ -14,7 +15,7 @@ import numpy as np
 
 from lippmann.codecs import exr, png, tiff, zarr_array
 from lippmann.codecs.icc import convert_codes
-from lippmann.display import Display
+from lippmann.display import Display, load_display
 from lippmann.errors import PictureError
 from lippmann.image.encoding import STORED, TEXT_KEY, FormatName, layers_of_channels, linear_values
 from lippmann.image.integral_image import IntegralImage
@@ -85,14 +86,15 @@ class PictureFile:
         """
         return from_text(self.text, str(self.path)) if self.text else None
 
-    def metadata_for(self, display: Display | None) -> Metadata:
-        """:attr:`metadata` with its display replaced by ``display``, if one is given.
+    def metadata_for(self, display: Display | str | PathLike[str] | None) -> Metadata:
+        """:attr:`metadata` with its display replaced by ``display``, or the one of that name, if one is given.
 
         Raises
         ------
         PictureError
             If the metadata makes no sense, there is no display, or the display has another size.
         """
+        display = load_display(display) if isinstance(display, (str, PathLike)) else display
         metadata = self.metadata
         if metadata is None:
             if is_quilt_text(self.text):
@@ -142,7 +144,7 @@ class PictureFile:
             raise PictureError(f"holds values of the type {stored}", where=str(self.path), rule=rule)
         return cast(Stored, stored)
 
-    def picture(self, display: Display | None = None) -> IntegralImage:
+    def picture(self, display: Display | str | PathLike[str] | None = None) -> IntegralImage:
         """The whole picture in memory; ``display`` and errors as in :func:`read_picture`."""
         metadata = self.metadata_for(display)
         values, layers = self.decode()
@@ -161,7 +163,7 @@ class PictureFile:
             raise PictureError(error.what, where=str(self.path), rule=error.rule, fix=error.fix) from error
 
 
-def read_picture(path: str | Path, *, display: Display | None = None) -> IntegralImage:
+def read_picture(path: str | Path, *, display: Display | str | PathLike[str] | None = None) -> IntegralImage:
     """Read a whole integral image from a PNG, OpenEXR, TIFF or Zarr file.
 
     Parameters
@@ -169,7 +171,8 @@ def read_picture(path: str | Path, *, display: Display | None = None) -> Integra
     path:
         The file.
     display:
-        Display of the picture, instead of the one in the file; required for files of other programs.
+        Display of the picture, or what :func:`lippmann.display.load_display` takes, instead of the one in the file;
+        required for files of other programs.
 
     Raises
     ------
@@ -179,7 +182,7 @@ def read_picture(path: str | Path, *, display: Display | None = None) -> Integra
     return open_file(path).picture(display)
 
 
-def read_metadata(path: str | Path, *, display: Display | None = None) -> Metadata:
+def read_metadata(path: str | Path, *, display: Display | str | PathLike[str] | None = None) -> Metadata:
     """Display, placement and provenance of a picture file, without its pixels.
 
     Parameters
@@ -187,7 +190,8 @@ def read_metadata(path: str | Path, *, display: Display | None = None) -> Metada
     path:
         The file.
     display:
-        Display of the picture, instead of the one in the file; required for files of other programs.
+        Display of the picture, or what :func:`lippmann.display.load_display` takes, instead of the one in the file;
+        required for files of other programs.
 
     Raises
     ------

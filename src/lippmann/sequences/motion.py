@@ -160,7 +160,7 @@ def _open_moving(
         return MovingStage(path, animation=animation, allow_outside=allow_outside, variants=variants)
     from lippmann.scene.readers.gltf_animation.animated_file import MovingGltf
 
-    return MovingGltf(path, animation=animation, allow_outside=allow_outside)
+    return MovingGltf(path, animation=animation, allow_outside=allow_outside, variants=variants)
 
 
 class Flight(Motion):

@@ -98,7 +98,7 @@ def write_animation(
         At least one frame ``(H, W, 3)`` of linear RGB; all have one size.
     path:
         The file: ``.png`` or ``.apng`` for APNG, which repeats forever, or ``.mp4``, which needs even sizes: an odd
-        last column or row is doubled.
+        last column or row is doubled; of quilts, each view loses one, so that views stay whole pixels.
     frames_per_second:
         Frame rate.
     transfer:
@@ -148,6 +148,7 @@ def _write_mp4(
     # SVT-AV1 prints its settings on standard error, unless told to print errors alone before it is first used.
     os.environ.setdefault("SVT_LOG", "1")
 
+    frames = (_even(codes, quilt) for codes in frames)
     head = list(itertools.islice(frames, _REORDERED))
     height, width = head[0].shape[:2]
     options = encoder.options | (encoder.of_few if len(head) < _REORDERED else {})
@@ -159,15 +160,14 @@ def _write_mp4(
                 container.metadata["comment"] = layout_text(quilt)
             stream = container.add_stream(encoder.name, rate=rate, options=options)
             stream.codec_context.codec_tag = encoder.tag
-            stream.width, stream.height, stream.pix_fmt = width + width % 2, height + height % 2, "yuv420p"
+            stream.width, stream.height, stream.pix_fmt = width, height, "yuv420p"
             context = stream.codec_context
             context.color_primaries, context.colorspace = _BT709, _BT709
             context.color_trc, context.color_range = _SRGB_TRANSFER, _LIMITED_RANGE
             with kept_policy():
                 context.open()
             for number, codes in enumerate(itertools.chain(head, frames)):
-                even = np.pad(codes, ((0, height % 2), (0, width % 2), (0, 0)), mode="edge")
-                frame = av.VideoFrame.from_ndarray(even, format="rgb24")
+                frame = av.VideoFrame.from_ndarray(codes, format="rgb24")
                 frame = frame.reformat(format="yuv420p", dst_colorspace="ITU709", dst_color_range="MPEG")
                 frame.pts, frame.time_base = number, 1 / rate
                 container.mux(stream.encode(frame))
@@ -179,3 +179,13 @@ def _write_mp4(
         if isinstance(error, OSError):  # such as a full disk
             raise
         raise OutputError(f"cannot be written as MP4 ({error})", where=str(place)) from error
+
+
+def _even(codes: Pixels, quilt: QuiltLayout | None) -> Pixels:
+    """A frame of even sides."""
+    height, width = codes.shape[:2]
+    if quilt is None or width % quilt.columns or height % quilt.rows:
+        return np.pad(codes, ((0, height % 2), (0, width % 2), (0, 0)), mode="edge")
+    views = codes.reshape(quilt.rows, height // quilt.rows, quilt.columns, width // quilt.columns, 3)
+    whole = views[:, : views.shape[1] - height % 2, :, : views.shape[3] - width % 2]
+    return np.ascontiguousarray(whole).reshape(height - height % 2 * quilt.rows, width - width % 2 * quilt.columns, 3)

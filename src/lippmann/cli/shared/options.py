@@ -84,8 +84,9 @@ Variants = Annotated[
     list[str] | None,
     typer.Option(
         "--variant",
-        metavar="SET=CHOICE",
-        help="Choose a variant of a USD stage, for all prims that have it, or /PRIM:SET=CHOICE for one. Repeatable.",
+        metavar="[SET=]CHOICE",
+        help="Choose a variant: of a USD stage SET=CHOICE, for all prims that have it, or /PRIM:SET=CHOICE for one "
+        "(repeatable); of a glTF file's materials its name.",
         show_default=False,
     ),
 ]

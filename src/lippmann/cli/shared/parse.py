@@ -172,11 +172,12 @@ def angles(text: str | None) -> tuple[float, float, float]:
 
 
 def variants(texts: list[str] | None) -> dict[str, str]:
-    """``SET=CHOICE``, as often as it was given."""
+    """``SET=CHOICE``, as often as it was given; ``NAME`` alone is a material variant of glTF."""
     chosen = {}
     for text in texts or ():
-        name, equals, choice = text.rpartition("=")
+        name, equals, choice = text.rpartition("=") if "=" in text else ("materials", "=", text)
         if not (name and equals and choice):
-            raise UsageError(f"'{text}'", where="--variant", rule="SET=CHOICE, such as shading=red")
+            rule = "SET=CHOICE, such as shading=red, or NAME of a material variant of glTF"
+            raise UsageError(f"'{text}'", where="--variant", rule=rule)
         chosen[name] = choice
     return chosen

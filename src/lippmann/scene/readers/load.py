@@ -88,8 +88,9 @@ VOLUMES = (".nii", ".nii.gz", ".npy", ".npz", ".dcm", ".vdb", ".vol", ".vti")
 VTK = (".vtp", ".vtu", ".vtk", ".vti")
 SEVERAL_VOLUMES = (".nii", ".nii.gz", ".npz", ".dcm", ".vdb")
 
-#: Kinds of files whose variants can be chosen.
+#: USD stages, and kinds of files whose variants can be chosen.
 STAGES = (".usd", ".usda", ".usdc", ".usdz")
+_WITH_VARIANTS = (*STAGES, ".gltf", ".glb")
 
 _PAPER_DEPTH = 2
 
@@ -177,7 +178,8 @@ def load_scene(
     light:
         Direction and strength of the scene's light; None: as the file has them.
     variants:
-        Of a USD stage: ``{"set": "choice"}`` for every prim that has them, ``{"/prim:set": "choice"}`` for one.
+        Of a USD stage: ``{"set": "choice"}`` for every prim that has them, ``{"/prim:set": "choice"}`` for one. Of
+        a glTF file: ``{"materials": "name"}`` for a material variant.
     depth_map:
         The depth of a photograph, as a file; None for one that a JPEG file holds.
     transfer_function, window:
@@ -285,10 +287,9 @@ def _from_name(
     if up is not None and (up not in get_args(Up) or suffix not in _USUAL_UP):
         what = f"'{up}'" if up not in get_args(Up) else f"{path.name} says itself which way is up"
         raise UsageError(what, parameter="up", rule=f"y, z or -y, for {', '.join(_USUAL_UP)}", fix="leave it out")
-    if variants and kind_of_file(source) not in STAGES:
-        raise UsageError(
-            f"{path.name} has no variants", parameter="variants", rule=f"{', '.join(STAGES)} files may have some"
-        )
+    if variants and kind_of_file(source) not in _WITH_VARIANTS:
+        rule = f"{', '.join(_WITH_VARIANTS)} files may have some"
+        raise UsageError(f"{path.name} has no variants", parameter="variants", rule=rule)
     if depth_map is not None and suffix not in PHOTOS:
         raise UsageError(f"{path.name} is no photograph", parameter="depth_map", rule=f"for {', '.join(PHOTOS)} files")
     if series is not None and kind_of_file(source) not in SEVERAL_VOLUMES:

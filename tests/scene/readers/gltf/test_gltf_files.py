@@ -10,8 +10,9 @@ import time
 import numpy as np
 import pytest
 
-from lippmann.errors import SceneError
+from lippmann.errors import SceneError, UsageError
 from lippmann.scene.readers.gltf import read_gltf
+from lippmann.scene.readers.load import load_scene
 
 
 def test_glb_data_uri_and_external_buffer_give_the_same(writer, read, tmp_path):
@@ -302,6 +303,39 @@ def test_variants_and_animations_are_noted(writer, read):
         "of the material variants the default one is shown",
         "animations are not played without frames=...; the scene is shown at rest",
     )
+
+
+def with_variants(writer):
+    """A triangle that is red by default, green at noon, blue at night and in the rain, and of no variant elsewhere."""
+    name = "KHR_materials_variants"
+    for color in ([1, 0, 0, 1], [0, 1, 0, 1], [0, 0, 1, 1]):
+        writer.add("materials", pbrMetallicRoughness={"baseColorFactor": color})
+    mappings = [{"material": 1, "variants": [0]}, {"material": 2, "variants": [1, 2]}]
+    writer.triangle(material=0, extensions={name: {"mappings": mappings}})
+    writer.json["extensionsUsed"] = [name]
+    writer.json["extensions"] = {name: {"variants": [{"name": each} for each in ("noon", "night", "rain", "snow")]}}
+    return writer
+
+
+@pytest.mark.parametrize(("variant", "color"), [("noon", 1), ("night", 2), ("rain", 2), ("snow", 0), (None, 0)])
+def test_a_variant_is_chosen(writer, tmp_path, variant, color):
+    path = tmp_path / "a.glb"
+    path.write_bytes(with_variants(writer).glb())
+    scene = load_scene(path, variants=None if variant is None else {"materials": variant})
+    material = scene.description.materials[scene.description.meshes[0].material]
+    assert np.argmax(material.base_color[:3]) == color
+    told = "of the material variants the default one is shown; there are noon, night, rain, snow"
+    assert (told in scene.notes) == (variant is None)
+
+
+@pytest.mark.parametrize(("chosen", "what"), [({"materials": "dusk"}, "'dusk'"), ({"head": "round"}, "'head=round'")])
+def test_a_variant_that_there_is_not(writer, tmp_path, chosen, what):
+    path = tmp_path / "a.glb"
+    path.write_bytes(with_variants(writer).glb())
+    with pytest.raises(
+        UsageError, match=rf"a\.glb: variants: {what}; the material variants are noon, night, rain, snow"
+    ):
+        load_scene(path, variants=chosen)
 
 
 @pytest.mark.parametrize("json_part", [{}, {"nodes": [{"name": "empty"}], "scenes": [{"nodes": [0]}]}])

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import json
 import struct
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
 
-from lippmann.errors import SceneError
+from lippmann.errors import SceneError, UsageError
 from lippmann.scene.parsing.files import read_bytes
 from lippmann.scene.readers.gltf.json_fields import Fields
 
@@ -81,8 +82,11 @@ _FORMER_MATERIALS = frozenset({"KHR_blend", "KHR_materials_common", "KHR_techniq
 
 # Tools that write the same scene without an extension.
 _UPGRADE = "convert it with 'gltf-pipeline -i in.gltf -o out.glb'"
-DECOMPRESS = "decompress it with 'gltf-transform cp in.glb out.glb'"
+DECOMPRESS = "decompress it with 'gltfpack -noq -i in.glb -o out.glb'"
 #: Extensions of compressed buffer views; the file may hold the same bytes uncompressed, too.
+#: The extension of material variants, how many of them a line names, and the name by which they are chosen.
+VARIANTS, _NAMED, MATERIALS = "KHR_materials_variants", 20, "materials"
+
 MESHOPT = ("EXT_meshopt_compression", "KHR_meshopt_compression")
 
 _PICTURE_FORMATS = {"EXT_texture_webp": "webp", "EXT_texture_avif": "avif"}
@@ -117,6 +121,7 @@ class Document:
     """The JSON of a glTF file, its top-level lists by kind, and its binary chunk (glb only).
 
     ``folder`` holds the files that the document names; ``allow_outside`` lets it name files elsewhere.
+    ``variant`` is the number of the material variant that is shown; None for the materials of no variant.
     """
 
     file: str
@@ -124,6 +129,7 @@ class Document:
     allow_outside: bool
     root: Fields
     binary_chunk: memoryview | None
+    variant: int | None = None
     notes: Notes = field(default_factory=Notes)
     _lists: dict[str, list[Fields]] = field(default_factory=dict)
 
@@ -169,13 +175,22 @@ class Document:
         return SceneError(what, where=self.file, rule=rule, fix=fix)
 
 
-def open_document(path: Path, *, allow_outside: bool) -> Document:
+def open_document(path: Path, *, allow_outside: bool, variants: Mapping[str, str] | None = None) -> Document:
     """Open a ``.glb`` or ``.gltf`` file; which of the two it is, its first bytes tell.
+
+    Parameters
+    ----------
+    allow_outside:
+        Let the file name buffers and images outside its own folder.
+    variants:
+        ``{"materials": NAME}`` chooses a material variant.
 
     Raises
     ------
     SceneError
         The file is missing, empty, cut short, of another format or of another glTF version.
+    UsageError
+        There is no such variant.
     """
     data = read_bytes(path)
     if data[:4] == _MAGIC:
@@ -183,9 +198,30 @@ def open_document(path: Path, *, allow_outside: bool) -> Document:
     else:
         text, binary_chunk = memoryview(data), None
     root = _parse(text, path.name)
-    document = Document(path.name, path.parent, allow_outside, root, binary_chunk)
+    document = Document(path.name, path.parent, allow_outside, root, binary_chunk, _variant(root, variants or {}))
     _check_version(root)
     return document
+
+
+def variant_names(root: Fields) -> list[str]:
+    """Names of the material variants, by their numbers."""
+    listed = root.extension(VARIANTS)
+    return [] if listed is None else [each.text("name") or "" for each in listed.children("variants")]
+
+
+def _variant(root: Fields, variants: Mapping[str, str]) -> int | None:
+    """The number of the variant that is chosen."""
+    if not variants:
+        return None
+    names = variant_names(root)
+    (key, choice), *more = variants.items()
+    if key != MATERIALS or more or choice not in names:
+        told = f"the material variants are {', '.join(names)}" if names else "there are no material variants"
+        what = (
+            choice if key == MATERIALS and not more else ", ".join(f"{key}={value}" for key, value in variants.items())
+        )
+        raise UsageError(f"'{what}'", where=root.file, parameter="variants", rule=told)
+    return names.index(choice)
 
 
 def _chunks(data: bytes, file: str) -> tuple[memoryview, memoryview | None]:
@@ -284,8 +320,10 @@ def check_extensions(document: Document) -> None:
                 fix="export the scene without it",
             )
     for name in document.root.texts("extensionsUsed"):
-        if name == "KHR_materials_variants":
-            document.notes.add("of the material variants the default one is shown")
+        if name == VARIANTS and document.variant is None:
+            names = [name for name in variant_names(document.root) if name]
+            told = f"; there are {', '.join(names[:_NAMED])}" if names else ""
+            document.notes.add(f"of the material variants the default one is shown{told}")
         if not _is_understood(name) and name not in _SILENT:
             document.notes.add(_remark(name))
 

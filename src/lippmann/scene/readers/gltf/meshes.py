@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from lippmann.scene.parsing import points_lines
-from lippmann.scene.readers.gltf.document import Document
+from lippmann.scene.readers.gltf.document import VARIANTS, Document
 from lippmann.scene.readers.gltf.json_fields import Fields
 from lippmann.scene.readers.gltf.materials import Materials
 from lippmann.scene.readers.gltf.primitives import Geometry, Primitives
@@ -68,7 +68,7 @@ class Meshes:
             geometry = self._geometries[key]
             if geometry is None:
                 continue
-            material = self.materials.place(self.document.reference(primitive, "material", "materials"))
+            material = self.materials.place(self._material(primitive))
             if geometry.faces.shape[1] < 3 and not _has_normals(primitive):
                 material = self._without_shading(material)
             if (key, material) not in self._places:
@@ -79,6 +79,15 @@ class Meshes:
                 self.read.append(replace(mesh, fitted=_is_fitted(fields)))
             places.append(self._places[key, material])
         return places
+
+    def _material(self, primitive: Fields) -> int | None:
+        """The primitive's material in the variant that is shown."""
+        mapped = primitive.extension(VARIANTS)
+        if self.document.variant is not None and mapped is not None:
+            for mapping in mapped.children("mappings"):
+                if self.document.variant in mapping.integers("variants"):
+                    return self.document.reference(mapping, "material", "materials")
+        return self.document.reference(primitive, "material", "materials")
 
     def _without_shading(self, material: int) -> int:
         """The index of the same material as points and lines without normals show it."""

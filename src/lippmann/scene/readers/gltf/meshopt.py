@@ -1,4 +1,5 @@
-"""Buffer views compressed by meshoptimizer, as EXT_meshopt_compression describes them (its appendices A and B)."""
+"""Buffer views compressed by meshoptimizer, as EXT_meshopt_compression and KHR_meshopt_compression describe them
+(appendices A and B of both): attributes of version 0, and of version 1, which the latter adds."""
 
 from __future__ import annotations
 
@@ -7,14 +8,20 @@ from numpy.typing import NDArray
 
 Bytes = NDArray[np.uint8]
 
-_ATTRIBUTES, _TRIANGLES, _INDICES = 0xA0, 0xE1, 0xD1
+_ATTRIBUTES, _ATTRIBUTES_1, _TRIANGLES, _INDICES = 0xA0, 0xA1, 0xE1, 0xD1
 _GROUP = 16
-# No group of 16 bytes is encoded in fewer than two bits.
-_MOST_EXPANSION = 64
+#: At best two bits stand for a group of 16 bytes; in version 1 a byte for four columns of a block of 256 elements.
+_MOST_EXPANSION, _MOST_EXPANSION_1 = 64, 1024
 
-# The deltas that a byte holds, the first in its highest bits, for two and for four bits each.
+# The deltas that a byte holds, the first in its highest bits, for two and for four bits each; of one bit each, in its
+# lowest.
+_BITS = [bytes(byte >> place & 1 for place in range(8)) for byte in range(256)]
 _PAIRS = [bytes((byte >> 6, byte >> 4 & 3, byte >> 2 & 3, byte & 3)) for byte in range(256)]
 _NIBBLES = [bytes((byte >> 4, byte & 15)) for byte in range(256)]
+#: Bits of a delta in the four kinds of groups, by the two control bits of a column: in version 0 they are those of 2.
+_KINDS = ((0, 1, 2, 4), (1, 2, 4, 8), (0, 2, 4, 8))
+#: Bytes of a group, its deltas, and the one that says that the byte follows, by the bits of a delta.
+_PACKED = {1: (2, _BITS, 1), 2: (4, _PAIRS, 3), 4: (8, _NIBBLES, 15)}
 
 
 class MeshoptError(Exception):
@@ -29,7 +36,7 @@ def decompress(data: bytes, mode: str, filter_name: str, count: int, stride: int
     mode:
         ``ATTRIBUTES``, ``TRIANGLES`` or ``INDICES``.
     filter_name:
-        ``NONE``, ``OCTAHEDRAL``, ``QUATERNION`` or ``EXPONENTIAL``, which only attributes have.
+        ``NONE``, ``OCTAHEDRAL``, ``QUATERNION``, ``EXPONENTIAL`` or ``COLOR``, which only attributes have.
 
     Raises
     ------
@@ -54,44 +61,88 @@ def _check_header(data: bytes, header: int, tail: int) -> None:
 
 
 def _attributes(data: bytes, count: int, stride: int) -> Bytes:
-    """Elements ``(count, stride)``, from zigzag-coded deltas of each byte to that of the element before."""
-    tail = max(stride, 32)
-    _check_header(data, _ATTRIBUTES, tail)
-    if count * stride > _MOST_EXPANSION * len(data) + _GROUP * stride:
+    """Elements ``(count, stride)``, from the differences of each byte, or word, to that of the element before."""
+    newer = data[:1] == bytes([_ATTRIBUTES_1])
+    tail = stride + (stride // 4 if newer else 0)
+    padded = max(tail, 24 if newer else 32)
+    _check_header(data, _ATTRIBUTES_1 if newer else _ATTRIBUTES, padded)
+    if count * stride > (_MOST_EXPANSION_1 if newer else _MOST_EXPANSION) * len(data) + _GROUP * stride:
         raise MeshoptError("it is cut short")
     elements = np.empty((count, stride), np.uint8)
-    previous = np.frombuffer(data, np.uint8, stride, len(data) - stride)
+    previous = np.frombuffer(data, np.uint8, stride, len(data) - tail)
+    channels = data[len(data) - tail + stride :] or bytes(stride // 4)
     most = min((8192 // stride) & ~15, 256)
-    position, end = 1, len(data) - tail
+    position, end = 1, len(data) - padded
     for start in range(0, count, most):
         block = elements[start : start + most]
+        control = data[position : position + stride // 4] if newer else b""
+        position += len(control)
+        codes = np.empty((stride, len(block)), np.uint8)
         for column in range(stride):
-            deltas, position = _data_block(data, position, end, -(-len(block) // _GROUP))
-            codes = np.frombuffer(deltas, np.uint8, len(block))
-            steps = (codes >> 1) ^ -(codes & 1)
-            block[:, column] = previous[column] + np.cumsum(steps, dtype=np.uint8)
+            how = control[column // 4] >> 2 * (column & 3) & 3 if newer else _OLD
+            codes[column], position = _column(data, position, end, len(block), how)
+        for first in range(0, stride, 4):
+            block[:, first : first + 4] = _summed(
+                codes[first : first + 4], previous[first : first + 4], channels[first // 4]
+            )
         previous = block[-1]
     if position != end:
         raise MeshoptError(f"{end - position} bytes are left over")
     return elements
 
 
-def _data_block(data: bytes, position: int, end: int, groups: int) -> tuple[bytearray, int]:
-    """The deltas of one byte of the elements of a block, 16 a group, and where the next data block begins."""
+#: How a column of bytes is held, beside groups of the first two kinds: all are 0, the bytes themselves, as version 0.
+_ZERO, _LITERAL, _OLD = 2, 3, 4
+
+
+def _column(data: bytes, position: int, end: int, count: int, how: int) -> tuple[Bytes, int]:
+    """The codes of one byte of the elements of a block, and where those of the next begin."""
+    if how == _ZERO:
+        return np.zeros(count, np.uint8), position
+    if how == _LITERAL:
+        if position + count > end:
+            raise MeshoptError("it is cut short")
+        return np.frombuffer(data, np.uint8, count, position), position + count
+    deltas, position = _data_block(data, position, end, -(-count // _GROUP), _KINDS[min(how, 2)])
+    return np.frombuffer(deltas, np.uint8, count), position
+
+
+def _summed(codes: Bytes, previous: Bytes, channel: int) -> Bytes:
+    """Four columns ``(count, 4)`` of their codes ``(4, count)``.
+
+    These are zigzag-coded differences of bytes or of pairs of them, or words, rotated and combined by exclusive or.
+    """
+    kind = channel & 3
+    if kind == 3:
+        raise MeshoptError("a channel of kind 3 is none")
+    width = 1 << kind
+    words = np.ascontiguousarray(codes.reshape(4 // width, width, -1).transpose(0, 2, 1)).view(f"<u{width}")[..., 0]
+    before = np.ascontiguousarray(previous).view(f"<u{width}")[:, None]
+    if kind == 2:
+        turn = channel >> 4
+        turned = words if turn == 0 else (words >> np.uint32(turn)) | (words << np.uint32(32 - turn))
+        found = np.bitwise_xor.accumulate(np.concatenate([before, turned], axis=1), axis=1)[:, 1:]
+    else:
+        found = before + np.cumsum((words >> 1) ^ -(words & 1), axis=1, dtype=words.dtype)
+    return np.concatenate([np.ascontiguousarray(each).view(np.uint8).reshape(-1, width) for each in found], axis=1)
+
+
+def _data_block(data: bytes, position: int, end: int, groups: int, kinds: tuple[int, ...]) -> tuple[bytearray, int]:
+    """The codes of one byte of the elements of a block, 16 a group, and where the next data block begins."""
     header = data[position : position + (groups + 3) // 4]
     position += len(header)
     deltas = bytearray()
     for group in range(groups):
         if position > end:
             raise MeshoptError("it is cut short")
-        kind = header[group >> 2] >> 2 * (group & 3) & 3
-        if kind == 0:
+        bits = kinds[header[group >> 2] >> 2 * (group & 3) & 3]
+        if bits == 0:
             deltas += bytes(_GROUP)
-        elif kind == 3:
+        elif bits == 8:
             deltas += data[position : position + _GROUP]
             position += _GROUP
         else:
-            size, table, sentinel = (4, _PAIRS, 3) if kind == 1 else (8, _NIBBLES, 15)
+            size, table, sentinel = _PACKED[bits]
             values = b"".join([table[byte] for byte in data[position : position + size]])
             position += size
             if sentinel in values:
@@ -219,6 +270,8 @@ def _apply_filter(elements: Bytes, name: str) -> NDArray[np.generic]:
         with np.errstate(over="ignore"):  # infinite numbers are refused where they are used
             numbers: NDArray[np.float32] = np.ldexp(((whole << 8) >> 8).astype(np.float32), whole >> 24).astype("<f4")
         return numbers
+    if name == "COLOR" and stride in (4, 8):
+        return _colors(elements.view("<u1" if stride == 4 else "<u2"))
     raise MeshoptError(f"filter {name[:20]} with a stride of {stride} is none")
 
 
@@ -248,6 +301,21 @@ def _quaternions(values: NDArray[np.signedinteger]) -> NDArray[np.signedinteger]
     bounded = np.clip(np.column_stack([largest, parts]), -1.0, 1.0)
     np.put_along_axis(decoded, places, _rounded(bounded * 32767.0).astype(values.dtype), axis=1)
     return decoded
+
+
+def _colors(values: NDArray[np.unsignedinteger]) -> NDArray[np.unsignedinteger]:
+    """RGBA from luma, two differences of colour and alpha, in as many bits as the highest one of alpha says."""
+    most = np.iinfo(values.dtype).max
+    alpha = values[:, 3].astype(np.int64)
+    scale = alpha.copy()
+    for shift in (1, 2, 4, 8):
+        scale |= scale >> shift
+    luma = values[:, 0].astype(np.int64)
+    orange, green = (values[:, column].astype(f"i{values.dtype.itemsize}").astype(np.int64) for column in (1, 2))
+    alpha = (alpha << 1 & scale) | (alpha & 1)
+    whole = np.stack([luma + orange - green, luma + green, luma - orange - green, alpha], axis=1)
+    scaled = np.trunc(whole * (np.float32(most) / np.maximum(scale, 1).astype(np.float32))[:, None] + 0.5)
+    return np.asarray(scaled.astype(np.int64), values.dtype)
 
 
 def _rounded(values: NDArray[np.float64]) -> NDArray[np.float64]:

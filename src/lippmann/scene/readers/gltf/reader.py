@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -27,21 +28,27 @@ from lippmann.scene.values.description import Camera, Instance, Light, Matrix, M
 _MOST_INSTANCES = 1 << 21
 
 
-def read_gltf(path: Path, *, allow_outside: bool = False) -> SceneDescription:
+def read_gltf(
+    path: Path, *, allow_outside: bool = False, variants: Mapping[str, str] | None = None
+) -> SceneDescription:
     """Read the default scene of a ``.gltf`` or ``.glb`` file as it stands at rest.
 
     Parameters
     ----------
     allow_outside:
         Let the file name buffers and images outside its own folder.
+    variants:
+        ``{"materials": NAME}`` chooses a material variant (KHR_materials_variants).
 
     Raises
     ------
+    UsageError
+        There is no such variant.
     SceneError
         The file, or one that it names, is missing, damaged or beyond its bounds; it requires an extension that is not
         understood; it holds nothing to see.
     """
-    document = open_document(path, allow_outside=allow_outside)
+    document = open_document(path, allow_outside=allow_outside, variants=variants)
     check_extensions(document)
     if document.root.children("animations"):
         document.notes.add("animations are not played without frames=...; the scene is shown at rest")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
 
@@ -21,8 +22,8 @@ class MovingGltf:
     ----------
     animation:
         Its name, or ``None`` for the first one.
-    allow_outside:
-        Let the file name buffers and images outside its own folder.
+    allow_outside, variants:
+        As of :func:`lippmann.scene.readers.gltf.read_gltf`.
 
     Attributes
     ----------
@@ -35,8 +36,15 @@ class MovingGltf:
         As :func:`lippmann.scene.readers.gltf.read_gltf`, and where the file has no (such) animation.
     """
 
-    def __init__(self, path: Path, *, animation: str | None = None, allow_outside: bool = False) -> None:
-        document = open_document(path, allow_outside=allow_outside)
+    def __init__(
+        self,
+        path: Path,
+        *,
+        animation: str | None = None,
+        allow_outside: bool = False,
+        variants: Mapping[str, str] | None = None,
+    ) -> None:
+        document = open_document(path, allow_outside=allow_outside, variants=variants)
         check_extensions(document)
         self._name = path.stem
         self._contents = Contents.of(document)
@@ -53,7 +61,8 @@ class MovingGltf:
     @property
     def content(self) -> object:
         """All values that the animation depends on, but for image files, which belong to the scene."""
-        return self._contents.document.root.values, self._contents.accessors.buffers.all(), self.animation.name
+        document = self._contents.document
+        return document.root.values, document.variant, self._contents.accessors.buffers.all(), self.animation.name
 
     @property
     def duration(self) -> float:
