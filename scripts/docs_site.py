@@ -1,4 +1,5 @@
-"""What MkDocs builds beside the files of ``docs/``: a page for every command, from the command line's own help.
+"""What MkDocs builds beside the files of ``docs/``: a page for every command, from the command line's own help, and one
+of the properties of file formats, from the tables in ``docs/reference/properties``.
 
 MkDocs calls the functions named ``on_...``; ``mkdocs.yml`` names this file as a hook.
 """
@@ -7,6 +8,7 @@ from __future__ import annotations
 
 import html
 import re
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -16,7 +18,13 @@ from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
 from mkdocs.structure.pages import Page
 
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
 COMMANDS = "reference/commands/"
+PROPERTIES = "reference/properties.md"
 #: Roles of Sphinx in docstrings, as Markdown leaves them: ``:class:<code>~a.b.Name</code>``.
 ROLE = re.compile(r":[a-z]+:(?=<code>)(<code>)(?:~[\w.]*\.)?")
 
@@ -30,7 +38,9 @@ def on_config(config: MkDocsConfig) -> MkDocsConfig:
 
 
 def on_files(files: Files, config: MkDocsConfig) -> Files:
-    """Add the pages of the commands."""
+    """Add the pages of the commands and of the properties."""
+    tables = [tomllib.loads(Path(file.abs_src_path).read_text("utf-8")) for file in files if _is_table(file)]
+    files.append(File.generated(config, PROPERTIES, content=properties_page(tables)))
     commands = list(leaves(command_tree()))
     files.append(File.generated(config, f"{COMMANDS}index.md", content=overview(commands)))
     for path, command in commands:
@@ -42,6 +52,25 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 def on_page_content(content: str, page: Page, config: MkDocsConfig, files: Files) -> str:
     """Drop the roles of Sphinx from docstrings."""
     return ROLE.sub(r"\1", content)
+
+
+def properties_page(tables: list[dict[str, Any]]) -> str:
+    """The page of the properties of file formats."""
+    parts = [
+        "# What of a file counts",
+        "Every property of a format that can change a picture or a measure, as its specification lists them. It is "
+        "**honoured**, **noted** (the command says what is shown instead) or **refused** (one line names it). A test "
+        "shows each row.",
+    ]
+    for table in sorted(tables, key=lambda table: str(table["title"]).casefold()):
+        rows = [f"| {_cell(row['name'])} | {row['is']} | {_cell(row['how'])} |" for row in table["rows"]]
+        head = "| property | is | how |\n|---|---|---|"
+        parts.append("\n".join([f"## {table['title']}\n", f"{_cell(table['source'])}.\n", head, *rows]))
+    return "\n\n".join(parts) + "\n"
+
+
+def _is_table(file: File) -> bool:
+    return file.src_uri.startswith("reference/properties/") and file.src_uri.endswith(".toml")
 
 
 def command_tree() -> Any:

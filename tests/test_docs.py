@@ -160,7 +160,7 @@ def test_python_examples_run(page, workplace, engine):
 
 
 def test_links_lead_somewhere():
-    made = re.compile(r"(^|/)commands/[\w-]+\.md$")  # by the site, from the command line's help
+    made = re.compile(r"(^|/)(commands/[\w-]+|properties)\.md$")  # by the site: from help texts, from tables
     for page in PAGES:
         for target in re.findall(r"\]\((?!https?:)([^)#]+)", page.read_text(encoding="utf-8")):
             assert made.search(target) or (page.parent / target).exists(), f"{name(page)} links to {target}"
@@ -200,6 +200,13 @@ def test_the_site_tells_of_every_option_and_function(site):
     functions = (site / "reference" / "python" / "rendering.html").read_text(encoding="utf-8")
     assert 'id="lippmann.render_to_file"' in functions
     assert "placement" in functions
+
+
+def test_the_site_shows_the_tables_of_properties(site):
+    page = (site / "reference" / "properties.html").read_text(encoding="utf-8")
+    for table in (ROOT / "docs" / "reference" / "properties").glob("*.toml"):
+        name = table.read_text(encoding="utf-8").split('name = "')[1].split('"')[0]
+        assert name.replace("&", "&amp;") in page, table.stem
 
 
 def test_pages_of_the_site_load_nothing_from_other_hosts(site):

@@ -83,6 +83,7 @@ OF_P3 = (78, 129, 152)
         ([(b"gAMA", struct.pack(">I", 45_455))], (90, 128, 150)),  # what is written for sRGB
         ([GAMA_LINEAR], (160, 188, 201)),
         ([SRGB_CHUNK, GAMA_LINEAR], (90, 128, 150)),
+        ([(b"sBIT", bytes([5, 6, 5]))], (90, 128, 150)),  # codes reach over the whole range all the same
         ([ICC_LINEAR, SRGB_CHUNK], (160, 188, 201)),
         ([CICP_P3, ICC_LINEAR], OF_P3),
         ([CHRM_P3], OF_P3),
@@ -120,6 +121,12 @@ def test_greys_with_a_profile_of_their_own():
     profile = bytes(imagecodecs.cms_profile("gray", gamma=1.0))
     codes = codes_of(encoded(Image.new("L", (4, 4), 128), "JPEG", icc_profile=profile, quality=100), srgb=False)
     assert codes[0, 0] == pytest.approx((188, 188, 188), abs=1)
+
+
+def test_cmyk_without_a_profile_is_read_as_pillow_reads_it():
+    picture = Image.new("CMYK", (8, 8), (0, 128, 255, 0))
+    codes = codes_of(encoded(picture, "JPEG", quality=100))
+    assert np.abs(codes.astype(int) - np.asarray(picture.convert("RGB"))).max() <= 3
 
 
 def test_a_profile_for_other_colours_does_not_count():

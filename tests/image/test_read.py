@@ -122,6 +122,25 @@ def test_pictures_of_one_bit_are_read(tmp_path, options):
     np.testing.assert_array_equal(values, np.repeat(stripes[..., None], 3, axis=2))
 
 
+def test_interlaced_pictures_and_transparent_colours(tmp_path):
+    """Two pixels by Adam7: the first lies in pass 1, the second in pass 6. tRNS makes white transparent."""
+
+    def chunk(kind, data):
+        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+    head = chunk(b"IHDR", struct.pack(">2I5B", 2, 1, 8, 0, 0, 0, 1))
+    body = chunk(b"IDAT", zlib.compress(b"\0\x50\0\xa0")) + chunk(b"IEND", b"")
+    (tmp_path / "a.png").write_bytes(b"\x89PNG\r\n\x1a\n" + head + body)
+    assert open_file(tmp_path / "a.png").decode()[0][..., 0].tolist() == [[0x50, 0xA0]]
+    for key, what in ((0x50, "partly transparent"), (0x51, "")):
+        (tmp_path / "b.png").write_bytes(b"\x89PNG\r\n\x1a\n" + head + chunk(b"tRNS", struct.pack(">H", key)) + body)
+        if what:
+            with pytest.raises(PictureError, match="partly transparent"):
+                open_file(tmp_path / "b.png").decode()
+        else:
+            assert open_file(tmp_path / "b.png").decode()[0][..., 0].tolist() == [[0x50, 0xA0]]
+
+
 @pytest.mark.parametrize("ending", [".png", ".tif"])
 def test_native_pictures_are_upright(tmp_path, ending):
     codes = np.random.default_rng(3).integers(0, 256, (9, 12, 3), dtype=np.uint8)
@@ -186,6 +205,7 @@ def test_what_is_not_shown_is_noted(tmp_path):
     tifffile.imwrite(tmp_path / "c.tif", codes, photometric="rgb", extratags=[(301, 3, 256, curve.tolist(), True)])
     plane = {name: np.zeros((4, 6), np.float32) for name in "RGB"}
     write_exr(tmp_path / "a.exr", plane, text={"pixelAspectRatio": 2.0})
+    write_exr(tmp_path / "b.exr", plane, text={"whiteLuminance": 100.0})
     wide = "its pixels are 2 times as wide as high: they are shown square"
     for name, note in (
         ("a.png", wide),
@@ -194,6 +214,7 @@ def test_what_is_not_shown_is_noted(tmp_path):
         ("b.tif", "it holds 3 pictures: the first is shown"),
         ("c.tif", "it has a transfer function of its own: its codes are read as sRGB"),
         ("a.exr", wide),
+        ("b.exr", "its attribute whiteLuminance is not used"),
     ):
         assert open_file(tmp_path / name).notes == (note,), name
     write_plain_picture(np.zeros((4, 6, 3), np.float32), tmp_path / "plain.png")

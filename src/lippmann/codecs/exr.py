@@ -29,6 +29,9 @@ SIGNATURE = b"\x76\x2f\x31\x01"
 #: The attribute pixelAspectRatio of square pixels.
 _SQUARE = struct.pack("<f", 1.0)
 
+#: Standard attributes that say how colours or views are meant, and do not count here.
+_UNUSED = ("adoptedNeutral", "lookModTransform", "multiView", "renderingTransform", "whiteLuminance")
+
 _TILED, _DEEP, _MULTIPART = 0x200, 0x800, 0x1000
 _DTYPES = {0: "uint32", 1: "float16", 2: "float32"}
 #: Rows per chunk by compression: none, RLE, ZIPS, ZIP, PIZ, PXR24, B44, B44A, DWAA, DWAB.
@@ -156,7 +159,12 @@ def exr_header(file: BinaryIO, path: Path) -> ExrHeader:
         text = {name: value.decode("utf-8") for name, (kind, value) in attributes.items() if kind == "string"}
     except (struct.error, KeyError, IndexError, EOFError, UnicodeDecodeError) as error:
         raise _damaged(path, "it is cut short or its header makes no sense") from error
-    notes = aspect_note(1.0, aspect) + tuple(f"its channel {name} is subsampled: it is left out" for name in subsampled)
+    unused = tuple(f"its attribute {name} is not used" for name in _UNUSED if name in attributes)
+    notes = (
+        aspect_note(1.0, aspect)
+        + unused
+        + tuple(f"its channel {name} is subsampled: it is left out" for name in subsampled)
+    )
     return ExrHeader(width, height, channels, text, window, chromaticities, notes)
 
 

@@ -18,6 +18,8 @@ from lippmann.runtime.input_memory import check_input
 
 MAGICS = (b"#?RADIANCE", b"#?RGBE")
 
+#: Pixels whose sides differ by no more than this share are square.
+_SQUARE = 0.01
 #: "-Y 512 +X 1024": lines from the top, each from the left. The first axis is that of the lines.
 _SIZE = re.compile(rb"([-+])([XY]) +([0-9]{1,9}) +([-+])([XY]) +([0-9]{1,9})[ \t\r]*\n")
 #: A byte of a file holds less than so many pixels: at best two bytes stand for 127 values of four channels.
@@ -73,6 +75,8 @@ def read_header(data: bytes, where: str) -> RadianceHeader:
             xyz = value.strip() == "32-bit_rle_xyze"
         elif name in ("EXPOSURE", "COLORCORR"):
             exposure = exposure * _numbers(name, value, 1 if name == "EXPOSURE" else 3, where)
+        elif name == "PIXASPECT" and abs(float(_numbers(name, value, 1, where)[0]) - 1.0) > _SQUARE:
+            raise _undecodable(f"its pixels are not square: PIXASPECT is {value.strip()}", where)
         elif name == "PRIMARIES":
             primaries = tuple(_numbers(name, value, 8, where).tolist())
     if not (np.isfinite(exposure).all() and (exposure > 0.0).all()):
