@@ -147,6 +147,7 @@ class PolyData:
     def __init__(self, scalars=None, cells=()):
         self.points = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)], np.float32)
         self.faces = np.array(cells).ravel()
+        self.n_cells = len(cells)
         self.point_data = Values()
         self.active_scalars, self.active_scalars_name = scalars, "heat"
 
@@ -187,7 +188,8 @@ def test_surfaces_grids_and_collections_of_pyvista():
 def test_colours_and_scalars_of_pyvista():
     colors = np.array([[255, 0, 0]] * 4, np.uint8)
     assert (load_scene(PolyData(colors, SQUARE)).description.meshes[0].colors == (1, 0, 0)).all()
-    (mesh,) = load_scene(PolyData(np.array([[255, 0, 0], [0, 255, 0]], np.uint8), SQUARE)).description.meshes
+    triangles = [(3, 0, 1, 2), (3, 0, 2, 3)]
+    (mesh,) = load_scene(PolyData(np.array([[255, 0, 0], [0, 255, 0]], np.uint8), triangles)).description.meshes
     assert mesh.colors[mesh.faces][:, 0].tolist() == [[1, 0, 0], [0, 1, 0]]
     scene = load_scene(PolyData(np.arange(4.0), SQUARE))
     assert "the scalars 'heat' from 0 to 3 are coloured by viridis" in scene.notes

@@ -122,7 +122,7 @@ Series = Annotated[
     typer.Option(
         "--series",
         help="Of several volumes the one to show: a DICOM series' number, description or UID, a NIfTI volume's number, "
-        "an array's name.",
+        "an array's name (also of VTK's files).",
         show_default=False,
     ),
 ]

@@ -86,7 +86,7 @@ _BEGINNINGS = {
 #: Kinds of files that hold volumes, and those of them that may hold several.
 VOLUMES = (".nii", ".nii.gz", ".npy", ".npz", ".dcm", ".vdb", ".vol", ".vti")
 VTK = (".vtp", ".vtu", ".vtk", ".vti")
-SEVERAL_VOLUMES = (".nii", ".nii.gz", ".npz", ".dcm", ".vdb")
+SEVERAL_VOLUMES = (".nii", ".nii.gz", ".npz", ".dcm", ".vdb", *VTK)
 
 #: USD stages, and kinds of files whose variants can be chosen.
 STAGES = (".usd", ".usda", ".usdc", ".usdz")
@@ -186,7 +186,7 @@ def load_scene(
         Of a volume; see :class:`~lippmann.scene.volume_selection.VolumeSelection`, also for ``crop``.
     series:
         Of files with several volumes the one to show: number, name or UID of a DICOM series, number of a NIfTI volume,
-        name of an array.
+        name of an array, also of VTK's files.
 
     Raises
     ------
@@ -337,6 +337,8 @@ def _upright(description: SceneDescription, suffix: str, up: Up | None) -> Scene
         notes.append("up is taken as -y, as trainers of splats have it, for nothing in the file says it (else up=y)")
     if is_guessed and suffix == ".spz":
         notes.append("up is taken as +y, as SPZ has it, but some programs leave it at -y (then up=-y)")
+    if is_guessed and suffix in VTK:
+        notes.append(f"up is taken as +y, for nothing in {suffix} files says it (else up=z)")
     matrix = _turn_up(_DIRECTIONS[up or usual] if up is not None or description.up is None else description.up)
     if np.array_equal(matrix, np.eye(4)):
         return replace(description, notes=notes)

@@ -28,8 +28,10 @@ def test_actors_keep_their_colours_places_and_maps(plotter):
     scene = load_scene(plotter)
     ball, box = scene.description.meshes
     top, bottom = np.argmax(ball.positions[:, 2]), np.argmin(ball.positions[:, 2])
-    assert ball.colors[top, :3].tolist() == [1, 0, 0]
-    assert ball.colors[bottom, :3].tolist() == [0, 0, 0]
+    (uvs,), texels = ball.uvs, scene.description.materials[0].base_color_texture.image.pixels
+    rows, columns = len(texels), texels.shape[1]
+    red, black = (texels[int(uvs[at, 1] * rows), int(uvs[at, 0] * columns)].tolist() for at in (top, bottom))
+    assert (red, black) == ([255, 0, 0, 255], [0, 0, 0, 255])
     assert ball.normals is not None
     assert box.normals is None  # shaded flat
     assert scene.description.materials[1].base_color == (0, 1, 0)
@@ -66,6 +68,55 @@ def test_scalars_of_cells_and_hidden_actors(plotter):
     (mesh,) = load_scene(plotter).description.meshes
     colors = mesh.colors[mesh.faces][:, :, 0]
     assert sorted(colors.mean(axis=1).tolist()) == [0, 0, 1, 1]
+
+
+def test_blocks_keep_their_names_colours_and_opacities(plotter):
+    inner = pyvista.MultiBlock({"ball": pyvista.Sphere(), "none": None, "cone": pyvista.Cone()})
+    _, mapper = plotter.add_composite(pyvista.MultiBlock({"box": pyvista.Cube(), "inner": inner}), color="red")
+    mapper.block_attr[1].opacity = 0.25
+    mapper.block_attr[2].color = "blue"  # of the group, and so of what is in it
+    mapper.block_attr[5].visible = False
+    description = load_scene(plotter).description
+    assert [mesh.name for mesh in description.meshes] == ["MultiBlock/box", "MultiBlock/inner/ball"]
+    box, ball = description.materials
+    assert (box.base_color, box.alpha) == ((1, 0, 0), 0.25)
+    assert (ball.base_color, ball.alpha) == ((0, 0, 1), 1)
+
+
+@pytest.mark.parametrize("way", ["add_mesh", "add_composite"])
+def test_blocks_however_they_are_added(plotter, way):
+    getattr(plotter, way)(pyvista.MultiBlock([pyvista.Sphere(), pyvista.Cube(center=(1.5, 0, 0))]))
+    assert len(load_scene(plotter).description.meshes) == 2
+
+
+def test_what_is_not_taken_over_is_named(plotter):
+    plotter.add_mesh(pyvista.Sphere(), name="net", style="wireframe")
+    plotter.add_mesh(pyvista.Cube(), name="box", show_edges=True, culling="back", backface_params={"color": "red"})
+    plotter.add_mesh_clip_plane(pyvista.Cone(), name="cut", normal="x")
+    plotter.set_background("black", top="white")
+    notes = load_scene(plotter).notes
+    assert "'net': lines or points in place of the surface: not taken over" in notes
+    assert "'box': edges, culling, the look of its back: not taken over" in notes
+    assert "the plotter's background is shown in one colour" in notes
+
+
+def test_images_whose_extent_does_not_begin_at_0(plotter, tmp_path):
+    import vtk
+
+    image = pyvista.ImageData(dimensions=(6, 5, 4), spacing=(0.5, 1, 2), origin=(1, 2, 3))
+    image.direction_matrix = np.array([[0, -1, 0], [1, 0, 0], [0, 0, 1.0]])
+    image["density"] = np.arange(120.0)
+    cut = vtk.vtkExtractVOI()
+    cut.SetInputData(image)
+    cut.SetVOI(2, 5, 1, 4, 3, 3)
+    cut.Update()
+    part = pyvista.wrap(cut.GetOutput())
+    part.save(tmp_path / "part.vti")
+    plotter.add_volume(part)
+    for source in (part, tmp_path / "part.vti", plotter):
+        volume = load_scene(source).description.volume
+        assert volume.world_from_voxel[:3, 3] == pytest.approx(part.GetPoint(0))
+        assert volume.world_from_voxel @ (1, 0, 0, 1) == pytest.approx((*part.GetPoint(1), 1))
 
 
 def test_a_volume_of_a_plotter(plotter):
@@ -113,6 +164,28 @@ def test_files(tmp_path):
     volume = load_scene(tmp_path / "a.vti").description.volume
     assert (volume.size, volume.world_from_voxel[:3, 3].tolist()) == ((3, 2, 1), [5.5, 7, 8.5])
     assert volume.grid.ravel().tolist() == [0, 1, 2, 3, 4, 5]
+
+
+def test_an_array_is_chosen_by_its_name(tmp_path):
+    sphere = pyvista.Sphere()
+    sphere["height"], sphere.cell_data["number"] = sphere.points[:, 2], np.arange(float(sphere.n_cells))
+    sphere.set_active_scalars(None)
+    image = wavelet()
+    image["low"], image["high"] = np.arange(24.0), np.arange(24.0) + 100
+    image.set_active_scalars(None)
+    sphere.save(tmp_path / "a.vtp")
+    image.save(tmp_path / "a.vti")
+    scene = load_scene(tmp_path / "a.vtp")
+    assert scene.description.meshes[0].colors is None
+    assert any("none is shown of 'height', 'number' (series=NAME chooses one)" in note for note in scene.notes)
+    assert any("up is taken as +y, for nothing in .vtp files says it" in note for note in scene.notes)
+    for name, said in (("height", "from -0.5 to 0.5"), ("number", "from 0 to 1679")):
+        scene = load_scene(tmp_path / "a.vtp", series=name)
+        assert any(f"the scalars '{name}' {said} are coloured" in note for note in scene.notes)
+        assert not any("none is shown" in note for note in scene.notes)
+    assert load_scene(tmp_path / "a.vti", series="high").description.volume.grid.ravel()[0] == 100
+    with pytest.raises(LippmannError, match=r"a\.vti: series: 'other'.*the file has 'low', 'high'"):
+        load_scene(tmp_path / "a.vti", series="other")
 
 
 def test_damaged_files_are_refused_in_one_line(tmp_path):

@@ -16,7 +16,10 @@ from lippmann.scene.readers.vtk.data_set import image_of, surface_of
 
 
 def main() -> None:
-    """Answer requests, JSON with ``path`` and ``memory``, by ``.npz``: a surface, a ``grid``, or an ``error``."""
+    """Answer requests, JSON with ``path``, ``series`` and ``memory``, by ``.npz``.
+
+    That holds a surface, a ``grid``, an ``error``, or as ``usage`` the names of the arrays that there are.
+    """
     serve(_answer)
 
 
@@ -24,9 +27,11 @@ def _answer(data: bytes) -> bytes:
     request = json.loads(data)
     limit_memory(request["memory"])
     try:
-        found = _read(request["path"])
+        found = _read(request["path"], request["series"])
     except MemoryError:
         found = {"error": np.array("it takes more memory than is left")}
+    except KeyError as error:
+        found = {"usage": np.array(error.args[0])}
     except LippmannError as error:
         found = {"error": np.array(error.what)}
     except Exception as error:  # noqa: BLE001  # it raises errors of many kinds
@@ -37,22 +42,42 @@ def _answer(data: bytes) -> bytes:
     return written.getvalue()
 
 
-def _read(path: str) -> dict[str, NDArray[np.generic]]:
+def _read(path: str, series: str | None) -> dict[str, NDArray[np.generic]]:
     data = pyvista.read(path)
+    remarks: list[str] = []
+    if isinstance(data, pyvista.DataSet):
+        remarks = _choose(data, series)
+    elif series is not None:
+        raise KeyError("several blocks, of which none can be chosen")
     if isinstance(data, pyvista.ImageData):
         image = image_of(data)
         if image is not None:
             grid, matrix = image
-            note = f"the scalars '{data.active_scalars_name}'"
-            return {"grid": grid, "matrix": matrix, "notes": np.array([note])}
+            remarks.append(f"the scalars '{data.active_scalars_name}'")
+            return {"grid": grid, "matrix": matrix, "notes": np.array(remarks)}
     surface = surface_of(data)
     found: dict[str, NDArray[np.generic]] = {
         "positions": surface.positions,
         "faces": surface.faces,
-        "notes": np.array(surface.notes, dtype=np.str_),
+        "notes": np.array([*remarks, *surface.notes], dtype=np.str_),
     }
     for name in ("normals", "colors"):
         values = getattr(surface, name)
         if values is not None:
             found[name] = values
     return found
+
+
+def _choose(data: pyvista.DataSet, series: str | None) -> list[str]:
+    """Make an array active, by its name; without one a remark on those that are there, where none is active."""
+    tables = {"point": data.point_data, "cell": data.cell_data}
+    other = {data.point_data.active_normals_name, data.point_data.active_texture_coordinates_name}
+    names = [name for table in tables.values() for name in table if name not in other]
+    told = ", ".join(f"'{name[:40]}'" for name in dict.fromkeys(names[:20])) or "no arrays"
+    if series is not None:
+        if series not in names:
+            raise KeyError(told)
+        data.set_active_scalars(series, preference="point" if series in tables["point"] else "cell")
+    elif names and data.active_scalars_name is None:
+        return [f"none of its arrays is active, so that none is shown of {told} (series=NAME chooses one)"]
+    return []

@@ -59,8 +59,8 @@ def surface_of(source: pyvista.DataSet | pyvista.MultiBlock) -> Surface:
         source = source.combine()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of defaults to come, whose new names older versions do not know
-        surface = (source if hasattr(source, "verts") else source.extract_surface()).triangulate()
-    faces = np.asarray(surface.faces).reshape(-1, 4)[:, 1:]
+        surface = source if hasattr(source, "verts") else source.extract_surface()
+        surface, faces, owners = _triangles(surface)
     positions = np.asarray(surface.points, np.float64)
     if len(faces) == 0:
         raise SceneError("the PyVista data set has no surface", rule="there must be at least one face")
@@ -72,7 +72,7 @@ def surface_of(source: pyvista.DataSet | pyvista.MultiBlock) -> Surface:
         colors = _colors(np.asarray(scalars), str(surface.active_scalars_name), notes)
     if colors is not None and len(colors) != len(positions):  # one colour per face
         corners = faces.ravel()
-        colors, positions = np.repeat(colors, 3, axis=0), positions[corners]
+        colors, positions = np.repeat(colors[owners], 3, axis=0), positions[corners]
         normals = None if normals is None else np.asarray(normals)[corners]
         uvs = None if uvs is None else np.asarray(uvs)[corners]
         faces = np.arange(len(corners)).reshape(-1, 3)
@@ -84,6 +84,20 @@ def surface_of(source: pyvista.DataSet | pyvista.MultiBlock) -> Surface:
         colors,
         notes,
     )
+
+
+def _triangles(surface: pyvista.PolyData) -> tuple[pyvista.PolyData, NDArray[np.int64], NDArray[np.int64]]:
+    """A surface, its triangles ``(m, 3)``, and the cell ``(m,)`` that each belongs to.
+
+    Quads are cut as VTK draws them, from their first corner to their third, which colours at points show.
+    """
+    listed = np.asarray(surface.faces, np.int64)
+    if len(listed) == 5 * surface.n_cells and (listed[::5] == 4).all():
+        faces = listed.reshape(-1, 5)[:, [1, 2, 3, 1, 3, 4]].reshape(-1, 3)
+        return surface, faces, np.repeat(np.arange(surface.n_cells), 2)
+    surface = surface.triangulate()
+    faces = np.asarray(surface.faces, np.int64).reshape(-1, 4)[:, 1:]
+    return surface, faces, np.arange(len(faces))
 
 
 def mesh_of(surface: Surface, name: str, material: int) -> Mesh:
@@ -134,13 +148,9 @@ def color_map(name: str) -> NDArray[np.uint8]:
     return table
 
 
-def color_table(
-    values: NDArray[np.float64], low: float, high: float, table: NDArray[np.uint8], *, logarithmic: bool = False
-) -> NDArray[np.uint8]:
+def color_table(values: NDArray[np.float64], low: float, high: float, table: NDArray[np.uint8]) -> NDArray[np.uint8]:
     """Colours ``(n, 4)`` of values: those of a table laid over a range; grey where a value is no number."""
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-        if logarithmic and low > 0.0:
-            values, low, high = np.log(values), float(np.log(low)), float(np.log(high))
         share = (values - low) / (high - low) if high > low else np.zeros(len(values))
     finite = np.isfinite(share)
     index = np.clip(np.where(finite, share, 0.0) * len(table), 0, len(table) - 1).astype(np.int64)
@@ -160,7 +170,7 @@ def image_of(source: pyvista.ImageData) -> tuple[NDArray[np.generic], NDArray[np
     counts = np.array(source.dimensions)
     matrix = np.eye(4)
     matrix[:3, :3] = np.asarray(source.direction_matrix, np.float64) * np.asarray(source.spacing, np.float64)
-    matrix[:3, 3] = source.origin
+    matrix[:3, 3] = np.asarray(source.origin) + matrix[:3, :3] @ np.array(source.extent[::2], np.float64)
     if len(scalars) != counts.prod():
         counts = np.maximum(counts - 1, 1)
         matrix[:3, 3] += matrix[:3, :3] @ np.full(3, 0.5)

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.errors import SceneError
+from lippmann.errors import SceneError, UsageError
 from lippmann.runtime.helper_process import HelperEndedError, HelperProcess
 from lippmann.runtime.input_memory import check_input, input_memory_left
 from lippmann.runtime.optional_import import check_installed
@@ -23,13 +23,15 @@ _MOST_SECONDS = 300.0
 _process = HelperProcess("from lippmann.scene.readers.vtk.child import main; main()", _MOST_SECONDS)
 
 
-def read_vtk(path: Path, *, allow_outside: bool = False) -> SceneDescription:
+def read_vtk(path: Path, *, allow_outside: bool = False, series: str | None = None) -> SceneDescription:
     """Read a data set of VTK's: its outer surface, or of an image with scalars the volume.
 
     Parameters
     ----------
     allow_outside:
         Without effect: such files name no others.
+    series:
+        Name of the array that is shown; None for the active one.
 
     Raises
     ------
@@ -37,16 +39,20 @@ def read_vtk(path: Path, *, allow_outside: bool = False) -> SceneDescription:
         PyVista is not installed; the file is missing or damaged, or has no surface.
     MemoryLimitError
         It holds more than the memory that is left.
+    UsageError
+        There is no array of that name.
     """
     where = path.name
     read_bytes(path, 64)
     check_installed("pyvista", "vtk", "VTK's files need it", where)
-    request = json.dumps({"path": str(path.resolve()), "memory": input_memory_left()}).encode()
+    request = json.dumps({"path": str(path.resolve()), "series": series, "memory": input_memory_left()}).encode()
     try:
         answer = _process.ask(request, where=where)
     except HelperEndedError as error:
         raise SceneError(f"VTK breaks down at the file ({error})", where=where, fix="is it whole?") from None
     with np.load(io.BytesIO(answer), allow_pickle=False) as found:
+        if "usage" in found:
+            raise UsageError(f"'{series}'", where=where, parameter="series", rule=f"the file has {found['usage']}")
         if "error" in found:
             raise SceneError(f"is no data set that is understood ({found['error']})", where=where)
         arrays = {name: found[name] for name in found.files}

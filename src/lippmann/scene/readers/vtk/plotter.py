@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,8 +11,18 @@ from numpy.typing import NDArray
 
 from lippmann.color.transfer import decode_srgb
 from lippmann.errors import SceneError
-from lippmann.scene.readers.vtk.data_set import COLORED, Surface, color_table, image_of, mesh_of, surface_of
-from lippmann.scene.values.description import Camera, Color, Instance, Material, Mesh, SceneDescription
+from lippmann.scene.readers.vtk.data_set import COLORED, Surface, image_of, mesh_of, surface_of
+from lippmann.scene.values.description import (
+    Camera,
+    Color,
+    Image,
+    Instance,
+    Material,
+    Mesh,
+    SceneDescription,
+    Texture,
+    Wrap,
+)
 from lippmann.scene.values.volume import TransferFunction, Volume
 from lippmann.scene.volumes.grid import storable
 
@@ -21,8 +32,10 @@ if TYPE_CHECKING:
 #: Name of the plotter's camera in the scene.
 CAMERA = "plotter"
 
-#: VTK's numbers of ways to shade.
+#: VTK's numbers of ways to shade, to draw, and to composite volumes.
 _FLAT, _PBR = 0, 3
+_SURFACE = 2
+_COMPOSITE = 0
 
 _COLORS = "colours of the plotter"
 
@@ -30,8 +43,8 @@ _COLORS = "colours of the plotter"
 def from_plotter(plotter: pyvista.Plotter) -> SceneDescription:
     """Surfaces and a volume of a plotter's first renderer, its camera and its background.
 
-    Actors keep their places, colours, colour maps and opacities. Edges, points, text and other annotations are not
-    shown; light sources are not taken over.
+    Actors and the blocks of composite ones keep their places, colours, colour maps, textures and opacities. Edges,
+    points, text and other annotations are not shown; light sources are not taken over.
 
     Raises
     ------
@@ -55,72 +68,172 @@ def from_plotter(plotter: pyvista.Plotter) -> SceneDescription:
         if source is None or not actor.GetVisibility():
             ignored += 1
             continue
+        title = str(name).partition("(Addr=")[0]
+        left_out = _left_out(actor, mapper)
+        if left_out:
+            notes.append(f"'{title[:40]}': {', '.join(left_out)}: not taken over")
         if actor.IsA("vtkVolume"):
-            volumes.append(_volume(actor, source, str(name)))
+            volumes.append(_volume(actor, source, title))
             continue
-        try:
-            surface = _surface(mapper, source)
-        except SceneError:
-            notes.append(f"'{str(name)[:40]}' has no surface, and is not shown")
-            continue
-        if actor.prop.GetInterpolation() == _FLAT:
-            surface = replace(surface, normals=None)
-        meshes.append(mesh_of(surface, str(name), len(materials)))
-        materials.append(_material(actor.prop, str(name), has_colors=surface.colors is not None))
-        instances.append(Instance(len(meshes) - 1, _matrix(actor.GetMatrix())))
+        for block in _blocks(mapper, source, title):
+            try:
+                surface, texture, is_mapped = _surface(mapper, block, actor)
+            except SceneError:
+                notes.append(f"'{block.name[:40]}' has no surface, and is not shown")
+                continue
+            if actor.prop.GetInterpolation() == _FLAT:
+                surface = replace(surface, normals=None)
+            meshes.append(mesh_of(surface, block.name, len(materials)))
+            materials.append(_material(actor.prop, block, texture, is_mapped=is_mapped))
+            instances.append(Instance(len(meshes) - 1, _matrix(actor.GetMatrix())))
     if ignored:
         notes.append(f"{ignored} annotations and hidden objects of the plotter are not shown")
     if len(volumes) > 1:
         raise SceneError(f"the plotter shows {len(volumes)} volumes", rule="one is rendered")
     if not meshes and not volumes:
         raise SceneError("the plotter shows no surface and no volume", rule="there must be something to see")
+    if renderer.GetGradientBackground() or renderer.GetTexturedBackground():
+        notes.append("the plotter's background is shown in one colour")
     notes.append("the plotter's light sources are not taken over")
     return SceneDescription(
         "pyvista",
         meshes,
         materials,
         instances,
-        cameras=[_camera(renderer)],
+        cameras=[_camera(renderer, plotter.window_size)],
         background=_linear(renderer.background_color.float_rgb),
         notes=notes,
         volume=volumes[0] if volumes else None,
     )
 
 
-def _surface(mapper: Any, source: Any) -> Surface:
-    """The surface of an actor's data, with the colours that its mapper gives them."""
-    shown = source.copy(deep=False)
-    shown.set_active_scalars(None)
-    name = mapper.array_name
+def _left_out(actor: Any, mapper: Any) -> list[str]:
+    """What changes an actor's picture in the plotter and is not shown."""
+    found = []
+    if mapper.GetClippingPlanes() is not None and mapper.GetClippingPlanes().GetNumberOfItems():
+        found.append("clipping planes")
+    if actor.IsA("vtkVolume"):
+        if mapper.GetCropping():
+            found.append("cropping")
+        if mapper.GetBlendMode() != _COMPOSITE:
+            found.append("its way of blending")
+        return found
+    look = actor.prop
+    if look.GetRepresentation() != _SURFACE:
+        found.append("lines or points in place of the surface")
+    elif look.GetEdgeVisibility():
+        found.append("edges")
+    if look.GetBackfaceCulling() or look.GetFrontfaceCulling():
+        found.append("culling")
+    if actor.GetBackfaceProperty() is not None:
+        found.append("the look of its back")
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class _Block:
+    """Data that an actor draws: all of it, or a block with a colour and an opacity of its own, if it has any."""
+
+    name: str
+    data: Any
+    color: tuple[float, float, float] | None = None
+    opacity: float | None = None
+
+
+def _blocks(mapper: Any, source: Any, name: str) -> Iterator[_Block]:
+    """The data of an actor: of a composite one the visible leaves, with the attributes of the groups around them."""
+    if not source.IsA("vtkCompositeDataSet"):
+        yield _Block(name, source)
+        return
+    attributes = mapper.GetCompositeDataDisplayAttributes()
+
+    def leaves(group: _Block) -> Iterator[_Block]:
+        for number, data in enumerate(group.data):
+            is_empty = data is None or not (data.IsA("vtkCompositeDataSet") or data.n_points)
+            if is_empty or (attributes.HasBlockVisibility(data) and not attributes.GetBlockVisibility(data)):
+                continue
+            block = replace(group, name=f"{group.name}/{group.data.get_block_name(number) or number}", data=data)
+            if attributes.HasBlockColor(data):
+                color = [0.0, 0.0, 0.0]
+                attributes.GetBlockColor(data, color)
+                block = replace(block, color=(color[0], color[1], color[2]))
+            if attributes.HasBlockOpacity(data):
+                block = replace(block, opacity=float(attributes.GetBlockOpacity(data)))
+            if data.IsA("vtkCompositeDataSet"):
+                yield from leaves(block)
+            else:
+                yield block
+
+    yield from leaves(_Block(name, source))
+
+
+def _surface(mapper: Any, block: _Block, actor: Any) -> tuple[Surface, Texture | None, bool]:
+    """The surface of an actor's data, its texture, and whether its colours are those of scalars."""
+    shown = block.data.copy(deep=False)
+    texture = None
+    if mapper.GetScalarVisibility() and block.color is None:
+        texture = _map_scalars(mapper, shown)
+    else:
+        shown.set_active_scalars(None)
+    surface = surface_of(shown)
+    is_mapped = texture is not None or surface.colors is not None
+    return surface, texture if is_mapped else _texture(actor.GetTexture()), is_mapped
+
+
+def _map_scalars(mapper: Any, shown: Any) -> Texture | None:
+    """Give data the colours that VTK's own mapper has for their scalars, or coordinates in the texture returned.
+
+    Numbers at points are looked up in each pixel, by a texture of the colour map, with a row for what is no number.
+    """
     of_cells = mapper.scalar_map_mode == "cell"
-    table = source.cell_data if of_cells else source.point_data
-    if mapper.scalar_visibility and name in table:
-        values = np.asarray(table[name])
-        own = shown.cell_data if of_cells else shown.point_data
-        own[_COLORS] = _colors(mapper, values)
+    name = getattr(mapper, "array_name", None)
+    if name:
+        shown.set_active_scalars(name, preference="cell" if of_cells else "point")
+    mapper.Modified()  # else it may return the colours of other data
+    mapped = mapper.MapScalars(shown, 1.0)
+    coordinates, picture = mapper.GetColorCoordinates(), mapper.GetColorTextureMap()
+    shown.set_active_scalars(None)
+    if mapped is not None:
+        (shown.cell_data if of_cells else shown.point_data)[_COLORS] = _values(mapped)
         shown.set_active_scalars(_COLORS, preference="cell" if of_cells else "point")
-    return surface_of(shown)
+    elif coordinates is not None and picture is not None:
+        shown.point_data.active_texture_coordinates = _values(coordinates)
+        return Texture(_texels(picture), srgb=True, wrap_u="clamp", wrap_v="clamp", filter="nearest")
+    return None
 
 
-def _colors(mapper: Any, values: NDArray[np.generic]) -> NDArray[np.uint8]:
-    if mapper.color_mode == "direct":
-        return np.asarray(values if values.dtype == np.uint8 else np.clip(values, 0, 1) * 255, np.uint8)
-    numbers = np.asarray(values, np.float64)
-    if numbers.ndim > 1:
-        numbers = np.linalg.norm(numbers, axis=1)
-    low, high = mapper.scalar_range
-    lookup = mapper.lookup_table
-    return color_table(numbers, low, high, np.asarray(lookup.values), logarithmic=bool(lookup.log_scale))
+def _texture(texture: Any) -> Texture | None:
+    if texture is None or texture.GetInput() is None:
+        return None
+    wrap: Wrap = "repeat" if texture.GetRepeat() else "clamp"
+    smooth = bool(texture.GetInterpolate())
+    return Texture(_texels(texture.GetInput()), True, wrap, wrap, "linear" if smooth else "nearest")
 
 
-def _material(look: Any, name: str, *, has_colors: bool) -> Material:
-    opacity = float(look.opacity)
+def _texels(picture: Any) -> Image:
+    """A picture of VTK's, whose rows begin at the bottom."""
+    width, height, _ = picture.GetDimensions()
+    values = _values(picture.GetPointData().GetScalars())
+    pixels = np.asarray(values, np.uint8).reshape(height, width, -1)[::-1]
+    return Image("plotter", np.ascontiguousarray(pixels))
+
+
+def _values(array: Any) -> NDArray[np.generic]:
+    from vtkmodules.util.numpy_support import vtk_to_numpy
+
+    return np.array(vtk_to_numpy(array))
+
+
+def _material(look: Any, block: _Block, texture: Texture | None, *, is_mapped: bool) -> Material:
+    opacity = float(look.opacity) if block.opacity is None else block.opacity
     is_physical = look.GetInterpolation() == _PBR
+    color = _linear(look.color.float_rgb if block.color is None else block.color)
     # With colours of its own a surface may let light through where they say so.
-    blends = opacity < 1.0 or has_colors
+    blends = opacity < 1.0 or is_mapped or texture is not None
     return Material(
-        name=name,
-        base_color=(1.0, 1.0, 1.0) if has_colors else _linear(look.color.float_rgb),
+        name=block.name,
+        base_color=(1.0, 1.0, 1.0) if is_mapped else color,
+        base_color_texture=texture,
         alpha=opacity,
         alpha_mode="blend" if blends else "opaque",
         metallic=float(look.metallic) if is_physical else 0.0,
@@ -152,7 +265,7 @@ def _volume(actor: Any, source: Any, name: str) -> Volume:
     return Volume(stored, _matrix(actor.GetMatrix()) @ matrix, transfer)
 
 
-def _camera(renderer: Any) -> Camera:
+def _camera(renderer: Any, window: tuple[int, int]) -> Camera:
     """The camera as it is set; else as the plotter would set it when it is shown, around all that it holds."""
     camera = renderer.camera
     eye, focus, up = (np.array(value, float) for value in (camera.position, camera.focal_point, camera.up))
@@ -169,9 +282,13 @@ def _camera(renderer: Any) -> Camera:
     right /= np.linalg.norm(right) or 1.0
     pose = np.eye(4)
     pose[:3, 0], pose[:3, 1], pose[:3, 2], pose[:3, 3] = right, np.cross(back, right), back, eye
+    # The middle of the picture lies beside the axis by a share of its half sides.
+    half = camera.parallel_scale if camera.parallel_projection else np.tan(np.radians(camera.view_angle) / 2.0)
+    right, up = camera.GetWindowCenter()
+    shift = float(right * half * window[0] / window[1]), float(up * half)
     if camera.parallel_projection:
-        return Camera(CAMERA, pose, height=2.0 * float(camera.parallel_scale), focus_distance=distance)
-    return Camera(CAMERA, pose, fov_y=float(np.radians(camera.view_angle)), focus_distance=distance)
+        return Camera(CAMERA, pose, height=2.0 * float(half), focus_distance=distance, shift=shift)
+    return Camera(CAMERA, pose, fov_y=float(np.radians(camera.view_angle)), focus_distance=distance, shift=shift)
 
 
 def _matrix(matrix: Any) -> NDArray[np.float64]:
