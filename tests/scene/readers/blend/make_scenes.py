@@ -140,5 +140,97 @@ def empty():
     save("empty.blend")
 
 
-for make in (everything, moving, outside, empty):
+def shader_of(material):
+    material.use_nodes = True
+    return material.node_tree.nodes["Principled BSDF"]
+
+
+def aside():
+    """A backdrop in a collection that is put aside, and one that is put aside but shown by an instance."""
+    scene = fresh()
+    put(scene, "Cube", cube())
+    for name in ("kept", "shown"):
+        collection = bpy.data.collections.new(name)
+        scene.collection.children.link(collection)
+        collection.objects.link(bpy.data.objects.new(f"{name} member", cube(f"{name} member", 9.0)))
+        bpy.context.view_layer.layer_collection.children[name].exclude = True
+    put(scene, "Copy", None, (3, 0, 0), instance_type="COLLECTION", instance_collection=bpy.data.collections["shown"])
+    bpy.context.view_layer.update()
+    save("aside.blend")
+
+
+def pictures():
+    """One colour as linear numbers and as codes, and roughness 0.5 as numbers and as a picture of codes."""
+    scene = fresh()
+    kinds = {
+        "float": ((0.5, 0.2, 0.1), {"float_buffer": True}, "Linear Rec.709", "Base Color"),
+        "linear": ((0.5, 0.2, 0.1), {}, "Non-Color", "Base Color"),
+        "codes": ((0.735, 0.484, 0.349), {}, "sRGB", "Base Color"),
+        "rough": ((0.5, 0.5, 0.5), {}, "Non-Color", "Roughness"),
+        "rough codes": ((0.735, 0.735, 0.735), {}, "sRGB", "Roughness"),
+    }
+    for place, (name, (color, kind, space, socket)) in enumerate(kinds.items()):
+        picture = bpy.data.images.new(name, 4, 4, **kind)
+        picture.colorspace_settings.name = space
+        picture.pixels[:] = [*color, 1.0] * 16
+        picture.pack()
+        material = bpy.data.materials.new(name)
+        shader, tree = shader_of(material), material.node_tree
+        node = tree.nodes.new("ShaderNodeTexImage")
+        node.image = picture
+        tree.links.new(node.outputs["Color"], shader.inputs[socket])
+        mesh = cube(name)
+        mesh.uv_layers.new()
+        mesh.materials.append(material)
+        put(scene, name, mesh, (2.0 * place, 0.0, 0.0))
+    save("pictures.blend")
+
+
+def lights():
+    scene = fresh()
+    put(scene, "Cube", cube())
+    for name, kind, settings in (
+        ("warm", "POINT", {"use_temperature": True, "temperature": 3000.0}),
+        ("sized", "SPOT", {"normalize": False, "shadow_soft_size": 0.5}),
+    ):
+        made = light(kind, energy=100.0)
+        for key, value in settings.items():
+            if hasattr(made, key):  # from Blender 4.5 on
+                setattr(made, key, value)
+        put(scene, name, made)
+    save("lights.blend")
+
+
+def shifted():
+    scene = fresh()
+    put(scene, "Cube", cube())
+    for name, kind in (("lens", "PERSP"), ("flat", "ORTHO")):
+        camera = bpy.data.cameras.new(name)
+        camera.type, camera.lens, camera.sensor_width, camera.ortho_scale = kind, 50.0, 36.0, 6.0
+        camera.shift_x, camera.shift_y = 0.1, -0.05
+        put(scene, name, camera, (0.0, -5.0, 0.0), rotation_euler=(1.5707963, 0.0, 0.0))
+    save("shifted.blend")
+
+
+def working_spaces():
+    """One scene in three working spaces; before Blender 5 there is but one."""
+    for space in ("Linear Rec.709", "Linear Rec.2020", "ACEScg"):
+        scene = fresh()
+        background = scene.world.node_tree.nodes["Background"]
+        background.inputs["Color"].default_value = (0.9, 0.2, 0.2, 1.0)
+        material = bpy.data.materials.new("red")
+        shader = shader_of(material)
+        shader.inputs["Base Color"].default_value = (0.8, 0.1, 0.1, 1.0)
+        shader.inputs["Emission Color"].default_value = (0.1, 0.9, 0.2, 1.0)
+        shader.inputs["Emission Strength"].default_value = 3.0
+        mesh = cube()
+        mesh.materials.append(material)
+        put(scene, "Cube", mesh)
+        put(scene, "Bulb", light("POINT", energy=100.0, color=(1.0, 0.2, 0.2)))
+        if space != "Linear Rec.709" and hasattr(bpy.data, "colorspace"):
+            bpy.ops.wm.set_working_color_space(working_space=space, convert_colors=True)
+        save(f"{space.split()[-1]}.blend")
+
+
+for make in (everything, moving, outside, empty, aside, pictures, lights, shifted, working_spaces):
     make()

@@ -10,7 +10,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lippmann.scene.extreme_points import extreme_points_of
-from lippmann.scene.readers.blend.in_blender.additions import add_focus, add_lights, scale_to_metres
+from lippmann.scene.readers.blend.in_blender.additions import (
+    add_focus,
+    add_lights,
+    add_shifts,
+    leave_out,
+    scale_to_metres,
+)
 from lippmann.scene.readers.blend.in_blender.glb import Glb
 from lippmann.scene.readers.gltf import read_gltf
 from lippmann.scene.scene import bounds_of
@@ -121,3 +127,28 @@ def test_focus(read):
         glb.root["scenes"][0]["nodes"].append(glb.append("nodes", {"name": name, "camera": camera}))
     add_focus(glb, {"near": 3.0, "mesh": 4.0}, 0.5)
     assert [each.focus_distance for each in read(glb).cameras] == [1.5, None]
+
+
+def test_what_is_put_aside_loses_its_mesh_but_not_below_what_shows_it(read):
+    glb = document("A", "Copy", "B")
+    nodes = glb.root["nodes"]
+    for node in nodes[1:]:
+        node.pop("extensions")
+    nodes[1] |= {"mesh": 0, "children": [3]}
+    nodes[3] |= {"mesh": 0, "translation": [5.0, 0.0, 0.0]}
+    nodes[2]["children"] = [glb.append("nodes", {"name": "A", "mesh": 0, "translation": [0.0, 7.0, 0.0]})]
+    glb.root["scenes"][0]["nodes"] = [0, 1, 2]
+    leave_out(glb, {"A"}, {"Copy"})
+    (places,) = read(glb).placements.values()
+    assert sorted(place[:3, 3].tolist() for place in places) == [[0, 0, 0], [0, 7, 0], [5, 0, 0]]
+
+
+@pytest.mark.parametrize(("kind", "shift"), [("perspective", (0.25, -0.5)), ("orthographic", (2.5, -5.0))])
+def test_lens_shifts_are_slopes_or_lengths(read, kind, shift):
+    glb = document("Camera")
+    lens = {"perspective": {"yfov": 1.0}} if kind == "perspective" else {"orthographic": {"xmag": 1.0, "ymag": 1.0}}
+    glb.root["cameras"] = [{"type": kind, **lens}]
+    glb.root["nodes"][1] = {"name": "Camera", "camera": 0}
+    add_shifts(glb, {"Camera": (0.25, -0.5), "other": (9.0, 9.0)}, 10.0)
+    (camera,) = read(glb).cameras
+    assert camera.shift == shift

@@ -39,20 +39,23 @@ def glow(description, name):
 def test_a_point_light_sends_its_watts_all_around(everything):
     bulb = lamp(everything, "Bulb")
     assert bulb.kind == "point"
-    assert bulb.color == pytest.approx(np.array([1.0, 0.5, 0.25]) * 100.0 / (4.0 * math.pi))
+    assert bulb.color == pytest.approx(np.array([1.0, 0.5, 0.25]) * 100.0 / (4.0 * math.pi), rel=1e-4)
     assert bulb.world_from_light[:3, 3] == pytest.approx([1.0, 3.0, -2.0])
 
 
 def test_a_spot_is_as_strong_as_a_point_light_along_its_axis(everything):
     cone = lamp(everything, "Cone")
-    assert (cone.kind, cone.color) == ("spot", pytest.approx([50.0 / (4.0 * math.pi)] * 3))
+    assert (cone.kind, cone.color) == ("spot", pytest.approx([50.0 / (4.0 * math.pi)] * 3, rel=1e-4))
     assert cone.outer_angle == pytest.approx(0.5)
     assert 0.2 < cone.inner_angle < 0.4
     assert -cone.world_from_light[:3, 2] == pytest.approx([0.0, -1.0, 0.0])
 
 
 def test_a_sun_is_an_irradiance(everything):
-    assert (lamp(everything, "Sky").kind, lamp(everything, "Sky").color) == ("directional", pytest.approx([3.0] * 3))
+    assert (lamp(everything, "Sky").kind, lamp(everything, "Sky").color) == (
+        "directional",
+        pytest.approx([3.0] * 3, rel=1e-4),
+    )
 
 
 @pytest.mark.parametrize(("name", "area"), [("Panel", 4.0), ("Disc", math.pi)])
@@ -120,7 +123,7 @@ def test_lengths_are_metres_and_light_falls_the_same(moving):
     bulb = lamp(moving, "Bulb")
     assert bulb.world_from_light[1, 3] == pytest.approx(3.0)
     # 300 units from the cube's middle in Blender, 3 m here.
-    assert np.array(bulb.color) / 3.0**2 == pytest.approx([4.0e4 / (4.0 * math.pi) / 300.0**2] * 3)
+    assert np.array(bulb.color) / 3.0**2 == pytest.approx([4.0e4 / (4.0 * math.pi) / 300.0**2] * 3, rel=1e-4)
     assert moving.cameras[0].focus_distance == pytest.approx(5.0)
     assert any("shown at its frame" in note for note in moving.notes)
 
@@ -151,3 +154,49 @@ def test_files_that_blender_cannot_give(real_blender, real_scenes, monkeypatch, 
     cut.write_bytes(b"BLENDER-v405" + bytes(100))
     with pytest.raises(SceneError, match=r"^cut\.blend: Blender fails at the file \("):
         read_blend(cut)
+
+
+def test_collections_put_aside_are_not_shown_but_by_their_instances(read_real):
+    scene = read_real("aside.blend")
+    assert sorted(mesh.name for mesh in scene.meshes) == ["cube", "shown member"]
+    assert sum(len(places) for places in scene.placements.values()) == 2
+
+
+def test_pictures_are_codes_for_colours_and_numbers_for_the_rest(read_real):
+    materials = {material.name: material for material in read_real("pictures.blend").materials}
+    for name in ("float", "linear", "codes"):
+        codes = materials[name].base_color_texture.image.pixels[0, 0, :3]
+        assert codes / 255 == pytest.approx([0.735, 0.484, 0.349], abs=0.006), name
+    for name in ("rough", "rough codes"):
+        green = materials[name].metallic_roughness_texture.image.pixels[0, 0, 1]
+        assert green / 255 == pytest.approx(0.5, abs=0.01), name
+
+
+def test_lights_with_a_temperature_or_the_strength_of_their_surface(read_real):
+    scene = read_real("lights.blend")
+    warm, sized = lamp(scene, "warm"), lamp(scene, "sized")
+    assert warm.color[0] > 1.3 * warm.color[1] > 1.3 * warm.color[2]
+    assert sized.color == pytest.approx([100.0 * 4.0 * math.pi * 0.25 / (4.0 * math.pi)] * 3, rel=1e-3)
+
+
+def test_shifted_lenses(read_real):
+    cameras = {camera.name: camera for camera in read_real("shifted.blend").cameras}
+    # Shares of the sensor's width, 36 mm in front of a lens of 50 mm; of the 6 units that a flat camera sees.
+    assert cameras["lens"].shift == pytest.approx((0.1 * 36 / 50, -0.05 * 36 / 50), rel=1e-4)
+    assert cameras["flat"].shift == pytest.approx((0.6, -0.3), rel=1e-4)
+
+
+@pytest.mark.parametrize("space", ["Rec.2020", "ACEScg"])
+def test_colours_of_other_working_spaces(read_real, space):
+    def colors(name):
+        scene = read_real(f"{name}.blend")
+        (material,) = (each for each in scene.materials if each.name == "red")
+        return [
+            *material.base_color,
+            *material.emission,
+            *np.array(scene.lights[0].color) * (4.0 * math.pi / 100.0),
+            *scene.environment.pixels[0, 0] / 2,
+        ]
+
+    assert colors("Rec.709")[:3] == pytest.approx([0.8, 0.1, 0.1], abs=1e-3)
+    assert colors(space) == pytest.approx(colors("Rec.709"), abs=0.01)

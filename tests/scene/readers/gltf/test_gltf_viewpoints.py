@@ -44,11 +44,20 @@ def test_focus_distance_in_extras(writer, read, holder):
 
 
 @pytest.mark.parametrize(
-    "extras", [{"focus_distance": "far"}, {"focus_distance": -1}, {"focus_distance": True}, [1], 7]
+    "extras",
+    [
+        {"lens_shift": [1.0]},
+        {"lens_shift": ["a", 2.0]},
+        {"focus_distance": "far"},
+        {"focus_distance": -1},
+        {"focus_distance": True},
+        [1],
+        7,
+    ],
 )
 def test_foreign_extras_are_left_alone(writer, read, extras):
     camera = _camera(writer, read, type="perspective", perspective=PERSPECTIVE, extras=extras)
-    assert camera.focus_distance is None
+    assert (camera.focus_distance, camera.shift) == (None, (0.0, 0.0))
 
 
 def test_a_camera_stands_where_its_node_does_without_its_scale(writer, read):

@@ -9,14 +9,16 @@ from lippmann.scene.readers.gltf.json_fields import Fields
 from lippmann.scene.readers.gltf.nodes import rigid
 from lippmann.scene.values.description import Camera, Light, Matrix
 
+_FARTHEST = 1e18  # world units
 _SMALLEST_CONE = 1e-3  # radians; a thinner one would light nothing
 
 
 def read_camera(fields: Fields, node: Fields, world: Matrix) -> Camera:
     """The camera on ``node``, whose matrix is ``world``.
 
-    ``extras.focus_distance`` of the camera, else of its node, gives the focus distance in world units; glTF itself has
-    none. Near and far planes bound no ray and are left out.
+    ``extras.focus_distance`` of the camera, else of its node, gives the focus distance in world units,
+    ``extras.lens_shift`` of the node :attr:`Camera.shift`; glTF itself has neither. Near and far planes bound no ray
+    and are left out.
 
     Raises
     ------
@@ -24,7 +26,7 @@ def read_camera(fields: Fields, node: Fields, world: Matrix) -> Camera:
         A camera of unknown type, or one without extent.
     """
     name = node.text("name") or fields.text("name") or fields.place
-    focus = _focus_distance(fields) or _focus_distance(node)
+    focus, shift = _focus_distance(fields) or _focus_distance(node), _lens_shift(node)
     kind = fields.text("type")
     lens = fields.child(kind) if kind in ("perspective", "orthographic") else None
     if lens is None:
@@ -36,20 +38,32 @@ def read_camera(fields: Fields, node: Fields, world: Matrix) -> Camera:
         aspect = lens.number("aspectRatio", 1.0, minimum=0.0)
         if aspect == 0.0:
             raise lens.error("aspectRatio", "it must be above 0")
-        return Camera(name, rigid(world), fov_y=angle, aspect=aspect, focus_distance=focus)
+        return Camera(name, rigid(world), fov_y=angle, aspect=aspect, focus_distance=focus, shift=shift)
     width, height = (abs(lens.optional_number(key) or 0.0) for key in ("xmag", "ymag"))
     if width == 0.0 or height == 0.0:
         raise lens.error("xmag" if width == 0.0 else "ymag", "it must not be 0")
-    return Camera(name, rigid(world), height=2.0 * height, aspect=width / height, focus_distance=focus)
+    return Camera(name, rigid(world), height=2.0 * height, aspect=width / height, focus_distance=focus, shift=shift)
 
 
 def _focus_distance(fields: Fields) -> float | None:
-    # Extras may hold anything: a value that is no distance is another program's.
-    extras = fields.values.get("extras")
-    value = extras.get("focus_distance") if isinstance(extras, dict) else None
+    value = _extra(fields, "focus_distance")
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         return None
-    return float(value) if 0.0 < value < 1e18 else None
+    return float(value) if 0.0 < value < _FARTHEST else None
+
+
+def _lens_shift(node: Fields) -> tuple[float, float]:
+    value = _extra(node, "lens_shift")
+    numbers = value if isinstance(value, list) and len(value) == 2 else [0.0, 0.0]
+    if not all(isinstance(each, float) and abs(each) < _FARTHEST for each in numbers):
+        return 0.0, 0.0
+    return numbers[0], numbers[1]
+
+
+def _extra(fields: Fields, name: str) -> object:
+    """A value of the extras, which may hold anything: one of another kind than ours is another program's."""
+    extras = fields.values.get("extras")
+    return extras.get(name) if isinstance(extras, dict) else None
 
 
 def read_light(node: Fields, world: Matrix, document: Document) -> Light | None:

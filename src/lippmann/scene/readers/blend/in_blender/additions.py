@@ -59,6 +59,37 @@ def add_focus(glb: Glb, distances: dict[str, float], unit: float) -> None:
             node.setdefault("extras", {})["focus_distance"] = distances[node["name"]] * unit
 
 
+def add_shifts(glb: Glb, shifts: dict[str, tuple[float, float]], unit: float) -> None:
+    """Give cameras, by their objects' names, where their pictures' middles lie; see :func:`.lights.lens_shifts`."""
+    for node in glb.root.get("nodes", []):
+        if "camera" in node and node.get("name") in shifts:
+            is_flat = glb.root["cameras"][node["camera"]]["type"] == "orthographic"
+            shift = [value * (unit if is_flat else 1.0) for value in shifts[node["name"]]]
+            node.setdefault("extras", {})["lens_shift"] = shift
+
+
+def leave_out(glb: Glb, names: set[str], instancers: set[str]) -> None:
+    """Take the meshes off the nodes of objects that no render of the view layer shows.
+
+    Parameters
+    ----------
+    names:
+        Of those objects. Their nodes stay, as others may hang on them.
+    instancers:
+        Names of objects that show a collection: what stands below their nodes is shown, whatever its own is.
+    """
+    nodes = glb.root.get("nodes", [])
+    waiting = [index for scene in glb.root.get("scenes", []) for index in scene.get("nodes", [])]
+    while waiting:
+        node = nodes[waiting.pop()]
+        name = node.get("name", "")
+        if name in names:
+            node.pop("mesh", None)
+        elif name in instancers:
+            continue
+        waiting += node.get("children", [])
+
+
 def scale_to_metres(glb: Glb, unit: float) -> None:
     """Bring a document whose unit of length is ``unit`` metres to metres."""
     if unit == 1.0:

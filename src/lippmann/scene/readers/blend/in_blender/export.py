@@ -8,11 +8,13 @@ from typing import Any
 
 import bpy
 
-from .additions import add_focus, add_lights, scale_to_metres
+from .additions import add_focus, add_lights, add_shifts, leave_out, scale_to_metres
 from .glb import Glb
-from .lights import describe_lights, focus_distances
+from .lights import describe_lights, focus_distances, lens_shifts
+from .plain_values import plain_values
 from .remarks import remark_lights, remark_materials, remark_objects
 from .render_view import as_rendered
+from .working_space import materials_to_rec709
 from .world import write_world
 
 SCENE, WORLD = "scene.glb", "world.exr"
@@ -62,13 +64,20 @@ def export_scene(folder: Path, *, is_animated: bool = False) -> Exported:
         for look in (remark_objects, remark_materials, remark_lights):
             look(depsgraph, remark)
         lights = describe_lights(depsgraph, remark)
-        focus = focus_distances(scene)
-        bpy.ops.export_scene.gltf(filepath=str(path), **_options(is_animated=is_animated))
+        focus, shifts = focus_distances(scene), lens_shifts(scene)
+        shown = set(view_layer.objects)
+        aside = {item.name for item in scene.objects if item not in shown}
+        instancers = {item.name for item in shown if item.instance_type == "COLLECTION"}
+        with plain_values(remark):
+            bpy.ops.export_scene.gltf(filepath=str(path), **_options(is_animated=is_animated))
     if not is_animated and any(item.animation_data and item.animation_data.action for item in scene.objects):
         remark(f"the scene is shown at its frame {scene.frame_current}: frames of motion are for sequences")
     glb = Glb.read(path)
+    leave_out(glb, aside, instancers)
+    materials_to_rec709(glb)
     add_lights(glb, lights, unit)
     add_focus(glb, focus, unit)
+    add_shifts(glb, shifts, unit)
     scale_to_metres(glb, unit)
     glb.write(path)
     world = folder / WORLD

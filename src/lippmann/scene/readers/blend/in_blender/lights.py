@@ -10,6 +10,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from .working_space import rec709
+
 #: Half-angle of the thinnest cone, radians.
 _THINNEST = 2e-3
 
@@ -43,6 +45,22 @@ def focus_distances(scene: Any) -> dict[str, float]:
         if distance > 0.0:
             distances[item.name] = distance
     return distances
+
+
+def lens_shifts(scene: Any) -> dict[str, tuple[float, float]]:
+    """Where the picture's middle lies beside each camera's axis, right and up, by the camera's name, if anywhere.
+
+    A slope; of orthographic cameras a length in Blender's units.
+    """
+    shifts = {}
+    for item in scene.objects:
+        if item.type != "CAMERA" or not (item.data.shift_x or item.data.shift_y):
+            continue
+        corners = item.data.view_frame(scene=scene)
+        x, y, z = (sum(corner[axis] for corner in corners) / len(corners) for axis in range(3))
+        scale = -z if item.data.type == "PERSP" else 1.0
+        shifts[item.name] = (x / scale, y / scale)
+    return shifts
 
 
 def _describe(item: Any, remark: Any) -> dict[str, Any] | None:
@@ -103,6 +121,7 @@ def _color(light: Any, name: str, remark: Any) -> tuple[list[float], float]:
     color = [max(float(channel), 0.0) for channel in light.color]
     if getattr(light, "use_temperature", False):
         color = [own * float(warm) for own, warm in zip(color, light.temperature_color, strict=True)]
+    color = rec709(color)
     tree = light.node_tree if light.use_nodes else None
     if tree is None:
         return color, 1.0
@@ -112,4 +131,4 @@ def _color(light: Any, name: str, remark: Any) -> tuple[list[float], float]:
         return color, 1.0
     own = emission.inputs["Color"].default_value
     factor = float(emission.inputs["Strength"].default_value)
-    return [channel * max(float(shade), 0.0) for channel, shade in zip(color, own, strict=False)], factor
+    return [channel * shade for channel, shade in zip(color, rec709(own), strict=True)], factor

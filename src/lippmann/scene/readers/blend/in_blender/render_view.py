@@ -9,40 +9,51 @@ from typing import Any
 import bpy
 
 
-@contextmanager
-def as_rendered(scene: Any, view_layer: Any) -> Iterator[None]:
-    """Let the viewport show what renders show, at their levels of detail; at the end all is as it was."""
-    changed: list[tuple[Any, str, Any]] = []
+class Changes:
+    """Values of Blender's data that are set for a while."""
 
-    def change(owner: Any, name: str, value: Any) -> None:
+    def __init__(self) -> None:
+        self._before: list[tuple[Any, str, Any]] = []
+
+    def set(self, owner: Any, name: str, value: Any) -> None:
+        """Set a value, and keep the one before."""
         before = getattr(owner, name)
         if before != value:
             setattr(owner, name, value)
-            changed.append((owner, name, before))
+            self._before.append((owner, name, before))
 
+    def undo(self) -> None:
+        """Set all values as they were."""
+        for owner, name, before in reversed(self._before):
+            setattr(owner, name, before)
+
+
+@contextmanager
+def as_rendered(scene: Any, view_layer: Any) -> Iterator[None]:
+    """Let the viewport show what renders show, at their levels of detail; at the end all is as it was."""
+    changes = Changes()
     hidden = [item for item in view_layer.objects if item.hide_get(view_layer=view_layer)]
     layers = [layer for layer in _layers(view_layer.layer_collection) if layer.hide_viewport]
     try:
         for collection in bpy.data.collections:
             if collection.library is None:
-                change(collection, "hide_viewport", collection.hide_render)
+                changes.set(collection, "hide_viewport", collection.hide_render)
         for layer in layers:
-            change(layer, "hide_viewport", False)
+            changes.set(layer, "hide_viewport", False)
         for item in scene.objects:
             if item.library is not None:
                 continue
-            change(item, "hide_viewport", item.hide_render)
+            changes.set(item, "hide_viewport", item.hide_render)
             for modifier in item.modifiers:
-                change(modifier, "show_viewport", modifier.show_render)
+                changes.set(modifier, "show_viewport", modifier.show_render)
                 if modifier.type in ("SUBSURF", "MULTIRES"):
-                    change(modifier, "levels", modifier.render_levels)
+                    changes.set(modifier, "levels", modifier.render_levels)
         for item in hidden:
             item.hide_set(False, view_layer=view_layer)
         view_layer.update()
         yield
     finally:
-        for owner, name, before in reversed(changed):
-            setattr(owner, name, before)
+        changes.undo()
         for item in hidden:
             item.hide_set(True, view_layer=view_layer)
         view_layer.update()

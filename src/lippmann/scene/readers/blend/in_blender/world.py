@@ -72,6 +72,9 @@ def _render(world: Any, path: Path, width: int) -> None:
         scene.render.image_settings.file_format = "OPEN_EXR"
         scene.render.image_settings.color_mode = "RGB"
         scene.render.image_settings.color_depth = "32"
+        # Else the picture holds numbers of the file's working space.
+        scene.render.image_settings.color_management = "OVERRIDE"
+        scene.render.image_settings.linear_colorspace_settings.name = "Linear Rec.709"
         scene.render.filepath = str(path)
         bpy.ops.render.render(scene=scene.name, write_still=True)
     finally:
