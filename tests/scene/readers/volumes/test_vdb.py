@@ -10,9 +10,9 @@ from lippmann.runtime import input_memory
 from lippmann.scene.readers.load import load_scene
 from lippmann.scene.readers.volumes import vdb
 from lippmann.scene.readers.volumes.vdb import read_vdb
-from lippmann.scene.readers.volumes.vdb_module import module_name
+from lippmann.scene.readers.volumes.vdb_module import find_module
 
-needs_openvdb = pytest.mark.skipif(module_name() is None, reason="OpenVDB's Python module is not installed")
+needs_openvdb = pytest.mark.skipif(find_module() is None, reason="OpenVDB's Python module is not installed")
 
 HERE = Path(__file__).parent
 X, Y, Z = np.mgrid[0:9, 0:7, 0:5]
@@ -93,8 +93,8 @@ def test_constant_regions_are_there():
 
 
 def test_the_module_is_named(monkeypatch):
-    monkeypatch.setattr(vdb, "module_name", lambda: None)
-    with pytest.raises(SceneError, match=r"grids\.vdb: OpenVDB's Python module is not installed; conda-forge"):
+    monkeypatch.setattr(vdb, "find_module", lambda: None)
+    with pytest.raises(SceneError, match=r"grids\.vdb: OpenVDB's Python module is not installed; Blender's wheel"):
         volume()
 
 

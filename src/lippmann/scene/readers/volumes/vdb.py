@@ -13,7 +13,7 @@ from lippmann.runtime.helper_process import HelperEndedError, HelperProcess
 from lippmann.runtime.input_memory import check_input, input_memory_left
 from lippmann.scene.parsing.files import read_bytes
 from lippmann.scene.readers.volumes.description import describe_volume
-from lippmann.scene.readers.volumes.vdb_module import module_name
+from lippmann.scene.readers.volumes.vdb_module import find_module
 from lippmann.scene.values.description import SceneDescription
 
 #: First bytes of such a file.
@@ -48,12 +48,12 @@ def read_vdb(path: Path, *, allow_outside: bool = False, series: str | None = No
     where = path.name
     if read_bytes(path, len(_BEGINNING)) != _BEGINNING:
         raise SceneError("is no OpenVDB file", where=where, rule="it begins with ' BDV'")
-    if module_name() is None:
+    if find_module() is None:
         raise SceneError(
             "OpenVDB's Python module is not installed",
             where=where,
-            rule="conda-forge's openvdb and Debian's python3-openvdb have it",
-            fix="install it, or save an array by its copyToArray as .npy",
+            rule="Blender's wheel (pip install bpy), conda-forge's openvdb and Debian's python3-openvdb have it",
+            fix="install one, or save an array by its copyToArray as .npy",
         )
     request = json.dumps({"path": str(path.resolve()), "series": series, "memory": input_memory_left()}).encode()
     try:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import importlib
+import importlib.util
 import io
 import json
 import os
@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.runtime.helper_process import limit_memory, serve
-from lippmann.scene.readers.volumes.vdb_module import module_name
+from lippmann.scene.readers.volumes.vdb_module import find_module
 
 #: Kinds of grids that hold one number a voxel.
 _SCALAR = ("float", "double", "half", "int32", "int64")
@@ -50,8 +50,17 @@ def _answer(data: bytes) -> bytes:
     return written.getvalue()
 
 
+def _load() -> Any:
+    spec = find_module()
+    if spec is None or spec.loader is None:
+        raise ImportError("OpenVDB's Python module is gone")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
 def _read(path: str, series: str | None, memory: int) -> dict[str, NDArray[np.generic]]:
-    openvdb = importlib.import_module(module_name() or "openvdb")
+    openvdb = _load()
     told = openvdb.readAllGridMetadata(path)
     names = [str(each.name) for each in told]
     scalar = [number for number, each in enumerate(told) if str(each.valueTypeName) in _SCALAR]
