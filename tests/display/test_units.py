@@ -54,7 +54,7 @@ def test_what_is_no_length_is_refused(text):
         units.length(text, "gap")
 
 
-@pytest.mark.parametrize("text", ["", "x", "60lpi", "nan", "inf", "1e", "0x3"])
+@pytest.mark.parametrize("text", ["", "x", "60lpi", "nan", "inf", "1e", "0x3", "9" * 400])
 def test_what_is_no_plain_number_is_refused(text):
     with pytest.raises(DisplayError, match="is not a number"):
         units.plain_number(text, "lpi")

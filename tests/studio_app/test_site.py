@@ -8,6 +8,7 @@ import gc
 import http.client
 import json
 import shlex
+import signal
 import socket as socketlib
 import struct
 import threading
@@ -545,6 +546,23 @@ def test_dropped_files_have_a_limit(studio, monkeypatch):
     status, _, body = post(studio, "a.glb", b"x" * 50)
     assert status == 507
     assert b"too many models" in body
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGXFSZ"), reason="the system has no limit on the size of files")
+def test_a_disk_that_takes_no_more_keeps_nothing_of_a_drop(studio):
+    resource = pytest.importorskip("resource")
+    before, (_, most) = kept(studio), resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1000, most))
+    try:
+        status, _, body = post(studio, "a.obj", WEDGE * 1000)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (most, most))
+    assert status == 507
+    assert json.loads(body)["error"] == (
+        "the file cannot be kept: the file would be larger than the system allows here; choose another place"
+    )
+    assert kept(studio) == before
+    assert post(studio, "a.obj", WEDGE)[0] == 200
 
 
 def test_a_long_message_ends_the_connection(studio):

@@ -278,6 +278,8 @@ def test_other_wrong_questions():
         replay(image, filter="cubic")
     with pytest.raises(UsageError, match="frames: 0 is out of range"):
         sweep(image, (0, 0, 5), (1, 0, 5), 0)
+    with pytest.raises(UsageError, match="frames: 1000000 is out of range; it must be from 1 to 100000"):
+        sweep(image, (0, 0, 5), (1, 0, 5), 1_000_000)
     with pytest.raises(UsageError, match=r"no view \(0, 4\); the display sheet has 1 x 4"):
         eye_of_view(SHEET, 0, 4)
     assert len(view_grid(SHEET).right) == 4

@@ -95,9 +95,10 @@ def size(text: str, key: str) -> tuple[float, float]:
 
 def plain_number(text: str, key: str) -> float:
     """The finite number of a text; a :class:`DisplayError` if it is none."""
-    if re.fullmatch(_NUMBER, text.strip()) is None:
-        raise DisplayError(f"{text!r} is not a number", where=key, rule="it must be a number without a unit")
-    return float(text)
+    value = float(text) if re.fullmatch(_NUMBER, text.strip()) else math.inf
+    if math.isinf(value):  # also of more digits than numbers have
+        raise DisplayError(f"{text[:60]!r} is not a number", where=key, rule="it must be a number without a unit")
+    return value
 
 
 def stripe(order: str, key: str) -> SubpixelOffsets:

@@ -19,6 +19,7 @@ from starlette.requests import ClientDisconnect, Request
 
 from lippmann.errors import SceneError
 from lippmann.runtime import private_files
+from lippmann.runtime.atomic_write import reason_and_fix
 from lippmann.runtime.temporary_names import disk_name, sweep, temporary_folder
 from lippmann.scene.readers.load import unknown_kind
 from lippmann.studio_app.dropped_scene import ENVIRONMENTS, main_file
@@ -217,5 +218,6 @@ def _refusal(error: Exception) -> Exception:
         return RefusedError(HTTPStatus.BAD_REQUEST, "two of the files have the same name")
     if isinstance(error, private_files.ForeignFileError):
         return RefusedError(HTTPStatus.INSUFFICIENT_STORAGE, f"the folder for dropped files {error}")
-    reason = error.strerror if isinstance(error, OSError) else None
-    return RefusedError(HTTPStatus.INSUFFICIENT_STORAGE, f"the file cannot be kept: {reason or error}")
+    assert isinstance(error, OSError)
+    said = "; ".join(filter(None, reason_and_fix(error)))
+    return RefusedError(HTTPStatus.INSUFFICIENT_STORAGE, f"the file cannot be kept: {said}")

@@ -31,6 +31,9 @@ Filter = Literal["nearest", "linear"]
 #: Default limit on the width of the picture, in pixels.
 DEFAULT_WIDTH = 2048
 
+#: Frames of a sweep at most: an hour of film.
+MOST_FRAMES = 100_000
+
 #: Distance in mm of an eye at infinity: over a panel of a metre its lines of sight are parallel to 1e-7 pixels.
 FAR = 1e12
 
@@ -187,8 +190,8 @@ def sweep(
 
 def path_of_eye(start: Eye, stop: Eye, frames: int) -> list[Eye]:
     """Positions of an eye that moves from ``start`` to ``stop`` in equal steps; errors are those of :func:`sweep`."""
-    if frames < 1:
-        raise UsageError(f"{frames} is out of range", parameter="frames", rule="it must be at least 1")
+    if not 1 <= frames <= MOST_FRAMES:
+        raise UsageError(f"{frames} is out of range", parameter="frames", rule=f"it must be from 1 to {MOST_FRAMES}")
     places = np.linspace(checked_eye(start), checked_eye(stop), frames)
     return [(float(x), float(y), float(z)) for x, y, z in places]
 
