@@ -140,3 +140,21 @@ def test_a_damaged_profile_is_named():
     del profile[200:]
     with pytest.raises(PictureError, match="colours cannot be converted"):
         codes_of(encoded(Image.new("RGB", (4, 4)), "PNG", icc_profile=bytes(profile)))
+
+
+def test_a_picture_that_its_file_cannot_hold_is_refused_before_memory_is_given():
+    for picture in (Image.new("RGB", (4, 4)), Image.new("1", (4, 4))):
+        data = bytearray(encoded(picture, "TIFF"))
+        with Image.open(io.BytesIO(data)) as opened:
+            entry = data.index(struct.pack("<HHL", 256, opened.tag_v2.tagtype[256], 1))
+        kind = struct.unpack_from("<H", data, entry + 2)[0]
+        struct.pack_into("<H" if kind == 3 else "<L", data, entry + 8, 60000)
+        struct.pack_into("<H" if kind == 3 else "<L", data, entry + 20, 60000)
+        with pytest.raises(PictureError, match="claims 60000 x 60000 pixels but has only"):
+            codes_of(bytes(data))
+
+
+@pytest.mark.filterwarnings("error")
+def test_damaged_exif_is_passed_over_without_a_warning():
+    data = encoded(Image.new("RGB", (8, 8), (9, 90, 200)), "JPEG", exif=b"Exif\0\0MM\0*\0\0\0\xff")
+    assert codes_of(data).shape == (8, 8, 3)

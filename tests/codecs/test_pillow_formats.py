@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import tifffile
 import trimesh
 from PIL import EpsImagePlugin
 from PIL import Image as Pillow
@@ -171,6 +172,12 @@ def test_two_pictures_in_one_jpeg_file_are_a_jpeg_file():
     first, second = (Pillow.new("RGB", (5, 4), color) for color in ("red", "blue"))
     first.save(stream, "MPO", save_all=True, append_images=[second])
     assert decode_image(stream.getvalue(), "camera.jpg", where="f").pixels.shape == (4, 5, 3)
+
+
+def test_greys_of_16_bits_whose_0_is_white():
+    stream = io.BytesIO()
+    tifffile.imwrite(stream, np.array([[0, 65535]], np.uint16), photometric="miniswhite")
+    assert decode_image(stream.getvalue(), "skin.tif", where="f").pixels[..., 0].tolist() == [[1.0, 0.0]]
 
 
 @pytest.mark.parametrize("kind", ["ICO", "PCX", "SGI", "PDF", "EPS"])

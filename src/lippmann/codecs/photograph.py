@@ -14,6 +14,7 @@ import numpy as np
 
 from lippmann.codecs import orientation as orientations
 from lippmann.codecs import png, tiff
+from lippmann.codecs.claims import check_claim
 from lippmann.codecs.icc import adobe_profile, convert_cmyk, convert_codes, is_gray
 from lippmann.codecs.picture_notes import aspect_note, pictures_note
 from lippmann.codecs.pillow_formats import FORMATS, codes_of, open_picture
@@ -79,16 +80,20 @@ def open_photograph(file: BinaryIO, path: Path, formats: tuple[str, ...] = (*FOR
         If its pixels take more than the memory that is left.
     """
     start = file.read(8)
+    length = file.seek(0, 2)
     file.seek(0)
     if start == png.SIGNATURE and "PNG" in formats:
         header = png.png_header(file, path)
         size = header.width, header.height
+        check_claim(size, header.bits * header.channels, length, path)
         yield _photograph(
             size, header.icc, header.orientation, header.notes, lambda: _planes(png.decode_png(_whole(file), path))
         )
     elif start.startswith(tiff.SIGNATURES) and "TIFF" in formats:
         page = tiff.TiffPicture(file, path)
-        yield _photograph((page.width, page.height), page.icc, page.orientation, page.notes, lambda: page.read())
+        size = page.width, page.height
+        check_claim(size, page.bits, length, path)
+        yield _photograph(size, page.icc, page.orientation, page.notes, lambda: page.read())
     else:
         with open_picture(file, formats) as picture:
             turn = orientations.of_picture(picture)

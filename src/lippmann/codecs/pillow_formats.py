@@ -6,6 +6,7 @@ Pillow itself tries dozens of formats, among them ones whose decoder starts anot
 from __future__ import annotations
 
 import threading
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -36,6 +37,9 @@ FORMATS = {
 
 #: What Pillow calls a JPEG file with several pictures, of which the first is taken.
 _SEVERAL = "MPO"
+
+#: The tag of PhotometricInterpretation.
+_PHOTOMETRIC = 262
 
 #: What Pillow holds of a pixel in four channels, and as much again in the array that is made of it.
 _BYTES_PER_PIXEL = 8
@@ -81,7 +85,9 @@ def open_picture(source: Path | BinaryIO, formats: tuple[str, ...] = (*FORMATS,)
     with _limit_lock:
         limit, Image.MAX_IMAGE_PIXELS = Image.MAX_IMAGE_PIXELS, None
         try:
-            opened = Image.open(source, formats=known)  # its head alone
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")  # of damaged EXIF
+                opened = Image.open(source, formats=known)  # its head alone
         finally:
             Image.MAX_IMAGE_PIXELS = limit
     with opened as picture:
@@ -97,13 +103,19 @@ def _size(picture: Image.Image) -> str:
 def codes_of(picture: Image.Image) -> Pixels:
     """Codes ``(h, w, 1 | 3 | 4)`` of an open picture: uint8, or uint16 or float32 where the file holds such greys."""
     if picture.mode.startswith("I;16") or picture.mode == "I":
-        return np.asarray(np.clip(np.asarray(picture), 0, 65535), np.uint16)[..., None]
+        codes = np.asarray(np.clip(np.asarray(picture), 0, 65535), np.uint16)[..., None]
+        return ~codes if _is_white_zero(picture) else codes
     if picture.mode == "F":
         return np.asarray(picture, np.float32)[..., None]
     if picture.mode in ("1", "L"):
         return np.array(picture.convert("L"))[..., None]
     has_alpha = "A" in picture.getbands() or "transparency" in picture.info
     return np.array(picture.convert("RGBA" if has_alpha else "RGB"))
+
+
+def _is_white_zero(picture: Image.Image) -> bool:
+    """Whether a TIFF holds greys of 16 bits whose 0 is white, which Pillow leaves as they are (13.0)."""
+    return picture.format == "TIFF" and getattr(picture, "tag_v2", {}).get(_PHOTOMETRIC) == 0
 
 
 def is_allowed(picture: Image.Image) -> bool:

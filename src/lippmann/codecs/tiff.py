@@ -215,6 +215,9 @@ class TiffPicture:
             tags = {name: tag.value for name in _TAGS if (tag := page.tags.get(name)) is not None}
             check_colors(page)
             separate = page.planarconfig == 2 and page.samplesperpixel > 1
+            self.dtype: str = stored_type(page)
+            self.bits = int(page.bitspersample) * int(page.samplesperpixel)
+            stored_as_shown = is_stored_so(page)
             profile = page.iccprofile or _described_profile(tags)
         if separate and len(shape) == 3:
             shape = (*shape[1:], shape[0])
@@ -229,14 +232,12 @@ class TiffPicture:
         self.height, self.width, self.channels = sizes
         if orientations.lies(self.orientation):
             self.height, self.width = self.width, self.height
-        self.dtype: str = stored_type(page)
-        self.bits = int(page.bitspersample) * int(page.samplesperpixel)
-        self.in_pieces = is_stored_so(page) and self.orientation <= 1
+        self.in_pieces = stored_as_shown and self.orientation <= 1
         self.description = text if isinstance(text, str) else ""
         self.icc = profile if isinstance(profile, bytes) else b""
 
-    def read(self, *, turned: bool = True) -> Pixels:
-        """All values, ``(H, W, 1 to 4)``: codes of 8 or 16 bits, or floats; upright, unless ``turned`` is false.
+    def read(self) -> Pixels:
+        """All values, ``(H, W, 1 to 4)``, upright: codes of 8 or 16 bits, or floats.
 
         Raises
         ------
@@ -250,7 +251,7 @@ class TiffPicture:
         with _reported(self._path):
             self._check_segments()
             values = gray_or_rgb(page, page.asarray())
-        return orientations.upright(values, self.orientation) if turned else values
+        return orientations.upright(values, self.orientation)
 
     @cached_property
     def chunk(self) -> tuple[int, int]:

@@ -14,6 +14,7 @@ from typing import cast
 import numpy as np
 
 from lippmann.codecs import exr, png, tiff, zarr_array
+from lippmann.codecs.claims import check_claim
 from lippmann.codecs.icc import convert_codes
 from lippmann.display import Display, load_display
 from lippmann.errors import PictureError
@@ -30,10 +31,6 @@ from lippmann.runtime.regular_file import check_kind
 MOST_PIXELS = 1 << 29
 #: Largest number of pixels in formats that are decoded piece by piece: more than any panel or print has.
 MOST_IN_PIECES = 1 << 32
-
-#: Deflate, the tightest packing of all formats here, makes at most 1032 bytes of one: as many grey pixels of 8 bits,
-#: and 8 times as many of 1 bit.
-_MOST_PER_BYTE = 1100
 
 
 @dataclass(frozen=True, eq=False)
@@ -292,9 +289,8 @@ def _plausible(file: PictureFile, size: int | None) -> PictureFile:
     if pixels > most:
         rule = f"at most {most} pixels are read"
         raise PictureError(f"claims {file.width} x {file.height} pixels", where=str(file.path), rule=rule)
-    if size is not None and pixels * min(file._pixel_bits, 8) > 8 * size * _MOST_PER_BYTE:
-        what = f"claims {file.width} x {file.height} pixels but has only {size} bytes"
-        raise PictureError(what, where=str(file.path), fix="make or fetch it anew")
+    if size is not None:
+        check_claim((file.width, file.height), file._pixel_bits, size, file.path)
     return file
 
 

@@ -5,6 +5,7 @@ import io
 
 import numpy as np
 import pytest
+import tifffile
 from PIL import Image as Pillow
 
 from lippmann.codecs.exr import write_exr
@@ -50,6 +51,20 @@ def test_depth_of_every_kind_of_file(tmp_path, ending):
     found = read_depth_map(saved(tmp_path / f"d{ending}", DEPTH)).inverse
     scale = 1000 if ending == ".png" else 1
     assert found * scale == pytest.approx(INVERSE, nan_ok=True)
+
+
+@pytest.mark.parametrize("kind", [np.float16, np.float32, np.float64, np.uint16])
+def test_depth_in_tiff_of_any_kind(tmp_path, kind):
+    scale = 1000 if kind is np.uint16 else 1
+    tifffile.imwrite(tmp_path / "d.tif", np.nan_to_num(scale * DEPTH).astype(kind), extratags=[(274, 3, 1, 3, True)])
+    found = read_depth_map(tmp_path / "d.tif").inverse[::-1, ::-1]  # orientation 3
+    assert found * scale == pytest.approx(INVERSE, nan_ok=True)
+
+
+def test_nearness_in_tiff_whose_0_is_white(tmp_path):
+    levels = np.array([[0, 128, 255]], np.uint8)
+    tifffile.imwrite(tmp_path / "d.tif", 255 - levels, photometric="miniswhite")
+    assert read_depth_map(tmp_path / "d.tif").inverse == pytest.approx(levels, abs=0.5)
 
 
 def test_the_sky_is_infinitely_far(tmp_path):

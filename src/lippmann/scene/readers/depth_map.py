@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from PIL import UnidentifiedImageError
 from scipy import ndimage
 
+from lippmann.codecs import tiff
 from lippmann.codecs.exr import read_exr, read_exr_header
 from lippmann.codecs.orientation import of_picture, upright
 from lippmann.codecs.pfm import read_pfm
@@ -137,6 +138,10 @@ def _gray(data: bytes, where: str, turn: int | None = None) -> tuple[NDArray[np.
     ``turn`` is its EXIF orientation; None for that in the file.
     """
     try:
+        if data.startswith(
+            tiff.SIGNATURES
+        ):  # whose floats of 16 bits, and greys whose 0 is white, Pillow does not read
+            return _luminance(tiff.TiffPicture(io.BytesIO(data), Path(where)).read())
         with open_picture(io.BytesIO(data)) as picture:
             turn = of_picture(picture) if turn is None else turn
             if picture.mode == "F":
@@ -150,6 +155,13 @@ def _gray(data: bytes, where: str, turn: int | None = None) -> tuple[NDArray[np.
         raise SceneError("is no depth map", where=where, rule=f".pfm, .npy, .exr, {RULE}") from None
     except Exception as error:  # Pillow's decoders pass on whatever their libraries throw at damaged data
         raise SceneError(f"cannot be decoded ({error})", where=where) from error
+
+
+def _luminance(values: NDArray[np.generic]) -> tuple[NDArray[np.generic], bool]:
+    """Grey of ``(h, w, 1 to 4)`` values, by the weights of Rec. 601, and whether they are whole numbers of 16 bits."""
+    if values.shape[2] >= 3 and values.dtype == np.uint8:
+        return np.rint(values[..., :3] @ np.array([0.299, 0.587, 0.114])).astype(np.uint8), False
+    return values[..., 0], values.dtype.kind in "iu" and values.dtype.itemsize > 1
 
 
 def embedded_depth(data: bytes, where: str, turn: int = 1) -> DepthMap | None:

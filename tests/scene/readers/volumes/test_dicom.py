@@ -99,6 +99,41 @@ def test_a_tomogram_of_nuclear_medicine_lies_as_its_detector(tmp_path):
     assert volume.world_from_voxel.tolist() == [[1, 0, 0, -7], [0, 0, 3, 5], [0, -2, 0, 9], [0, 0, 0, 1]]
 
 
+def group(**sequences):
+    """A functional group: sequences of one item each, by name and value."""
+    import pydicom
+
+    made = pydicom.Dataset()
+    for sequence, (name, value) in sequences.items():
+        item = pydicom.Dataset()
+        setattr(item, name, value)
+        setattr(made, sequence, [item])
+    return made
+
+
+def test_frames_of_enhanced_files_lie_by_their_groups(tmp_path):
+    plain = {"ImagePositionPatient": None, "ImageOrientationPatient": None, "PixelSpacing": None}
+    shared = group(
+        PlaneOrientationSequence=("ImageOrientationPatient", [1, 0, 0, 0, 1, 0]),
+        PixelMeasuresSequence=("PixelSpacing", [2, 1]),
+    )
+    own = [group(PlanePositionSequence=("ImagePositionPatient", [-7, -9, 4 * k])) for k in (2, 1, 0)]
+    sequences = {"SharedFunctionalGroupsSequence": [shared], "PerFrameFunctionalGroupsSequence": own}
+    volume = save_frames(tmp_path / "a.dcm", **plain, **sequences).description.volume
+    assert volume.grid[:, 0, 0].tolist() == [20, 10, 0]
+    assert volume.world_from_voxel.tolist() == [[1, 0, 0, -7], [0, 0, 4, 0], [0, -2, 0, 9], [0, 0, 0, 1]]
+
+
+def test_frames_of_ultrasound_lie_in_the_volume_of_the_probe(tmp_path):
+    plain = {"ImagePositionPatient": None, "ImageOrientationPatient": None}
+    shared = group(PlaneOrientationVolumeSequence=("ImageOrientationVolume", [1, 0, 0, 0, 1, 0]))
+    own = [group(PlanePositionVolumeSequence=("ImagePositionVolume", [0, 0, 2 * k])) for k in (0, 1, 2)]
+    sequences = {"SharedFunctionalGroupsSequence": [shared], "PerFrameFunctionalGroupsSequence": own}
+    volume = save_frames(tmp_path / "a.dcm", **plain, **sequences).description.volume
+    assert volume.spacing.tolist() == [1, 2, 2]
+    assert volume.grid[:, 0, 0].tolist() == [0, 10, 20]
+
+
 def test_frames_that_are_moments_are_noted(tmp_path):
     scene = save_frames(tmp_path / "a.dcm", FrameIncrementPointer=0x00181063, FrameTime=40)
     assert "its frames are moments (FrameTime): they are shown as slices" in scene.notes

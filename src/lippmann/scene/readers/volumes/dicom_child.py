@@ -35,6 +35,8 @@ _TAGS = [
 ]
 #: Planes whose normal has so much of the patient's length are axial.
 _AXIAL = 0.9999
+#: Groups of a frame that tell its place: in the patient, and in the volume of an ultrasound probe.
+_PLACES = ("PlanePositionSequence", "PlanePositionVolumeSequence")
 #: FrameTime, FrameTimeVector: of files whose frames are moments.
 _TIMES = (0x00181063, 0x00181065)
 
@@ -138,11 +140,13 @@ def _frames(name: str, header: pydicom.Dataset) -> Iterator[Frame]:
             return header.get(tag) if tag in header or detector is None else detector.get(tag)
 
         position = _numbers(find("PlanePositionSequence", "ImagePositionPatient"), 3)
+        position = position or _numbers(find("PlanePositionVolumeSequence", "ImagePositionVolume"), 3)
         orientation = _numbers(find("PlaneOrientationSequence", "ImageOrientationPatient"), 6)
+        orientation = orientation or _numbers(find("PlaneOrientationVolumeSequence", "ImageOrientationVolume"), 6)
         spacing = find("PixelMeasuresSequence", "PixelSpacing")
         apart = find("PixelMeasuresSequence", "SpacingBetweenSlices")
         thickness = float(apart or find("PixelMeasuresSequence", "SliceThickness") or 0.0)
-        if count > 1 and not own:
+        if count > 1 and not any(name in group for name in _PLACES for group in own[index : index + 1]):
             position = _frame_position(header, index, position, orientation, thickness)
         slope = header.get("DoseGridScaling") or find("PixelValueTransformationSequence", "RescaleSlope")
         intercept = find("PixelValueTransformationSequence", "RescaleIntercept")
