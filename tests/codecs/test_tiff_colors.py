@@ -136,6 +136,12 @@ def test_samples_that_are_no_alpha_are_left_out(tmp_path):
     np.testing.assert_array_equal(read(path, in_pieces=True), four)
 
 
+def test_stacks_of_layers_are_refused(tmp_path):
+    path = written(tmp_path / "a.tif", np.zeros((2, 2, 40), np.uint8), photometric="minisblack", planarconfig="contig")
+    with pytest.raises(PictureError, match=r"holds an array of shape \(2, 2, 40\); it must be one flat picture"):
+        read(path)
+
+
 def test_colours_multiplied_by_alpha(tmp_path):
     values = np.array([[[40, 20, 0, 100], [0, 0, 0, 0], [9, 8, 7, 255]]], np.uint8)
     path = written(tmp_path / "a.tif", values, photometric="rgb", extrasamples=["assocalpha"])

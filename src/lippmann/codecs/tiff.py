@@ -25,6 +25,9 @@ SIGNATURES = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
 
 _MM_PER_INCH = 25.4
 
+#: Values of a pixel: colours, alpha and what painting programs add; more is a stack of layers, or damage.
+_MOST_SAMPLES = 32
+
 _TAGS = ("ImageDescription", "Orientation", "PrimaryChromaticities", "WhitePoint")
 
 #: Pictures of so many pixels are written in tiles, in the form that has no limit of 4 GB; readers of large pictures
@@ -224,7 +227,7 @@ class TiffPicture:
         if len(shape) == 2:
             shape = (*shape, 1)
         sizes = [size for size in shape if isinstance(size, int) and size >= 1]  # a damaged tag may be anything
-        if len(shape) != 3 or len(sizes) != 3 or dtype is None:
+        if len(shape) != 3 or len(sizes) != 3 or sizes[2] > _MOST_SAMPLES or dtype is None:
             raise PictureError(f"holds an array of shape {shape}", where=str(path), rule="it must be one flat picture")
         self._page = page
         orientation, text = tags.get("Orientation"), tags.get("ImageDescription")
