@@ -166,6 +166,30 @@ def Camera "shut" {{
     assert "/shut: an exposure of 0 times the light is passed over" in scene.notes
 
 
+@pytest.mark.parametrize(
+    "name",
+    [
+        "float inputs:diffuse = 0.5",
+        "float inputs:specular = 0",
+        "bool inputs:shadow:enable = 0",
+        "color3f inputs:shadow:color = (1, 0, 0)",
+        "float inputs:shaping:focus = 2",
+        "rel light:filters = </m>",
+        "rel collection:lightLink:includes = </m>",
+        "rel collection:shadowLink:excludes = </m>",
+    ],
+)
+def test_what_a_light_is_asked_for_and_not_given_is_named(read, name):
+    apis = 'prepend apiSchemas = ["ShapingAPI", "ShadowAPI"]'
+    scene = read(triangle() + f'def SphereLight "lamp" ({apis}) {{\n{name}\n}}')
+    assert f"/lamp: {name.split()[1]} not honoured" in scene.notes
+
+
+def test_clipping_planes_of_a_camera_are_named(read):
+    scene = read(triangle() + 'def Camera "eye" {\nfloat4[] clippingPlanes = [(0, 0, 1, 5)]\n}')
+    assert "/eye: clippingPlanes not honoured" in scene.notes
+
+
 def test_suns_that_blender_wrote_are_told_of(read):
     head = '#usda 1.0\n(\n    doc = "Blender v5.0.1"\n    upAxis = "Z"\n    metersPerUnit = 1\n)\n'
     said = "Blender v5.0.1 writes suns at a quarter of the strength of its other lights"

@@ -24,6 +24,18 @@ _INPUTS = {
 }
 
 
+#: What changes a light source and is not read: attributes, and relationships.
+_IGNORED = (
+    *("inputs:diffuse", "inputs:specular"),
+    *("inputs:shadow:enable", "inputs:shadow:color", "inputs:shadow:distance", "inputs:shadow:falloff"),
+    *("inputs:shaping:ies:file", "inputs:shaping:focus"),
+)
+_LINKS = ("lightLink", "shadowLink")
+_IGNORED_TARGETS = (
+    "light:filters",
+    *(f"collection:{link}:{end}" for link in _LINKS for end in ("includes", "excludes")),
+)
+
 #: Stops of a camera's exposure beyond which it is no camera's.
 _MOST_STOPS = 32
 
@@ -61,9 +73,10 @@ def light_record(prim: Usd.Prim, world: NDArray[np.float64], time: Usd.TimeCode,
     path = texture.Get(time) if texture else None
     if path is not None and path.path:
         record["texture"] = asset_record(texture, path, time)
-    ignored = [name for name in ("inputs:shaping:ies:file", "inputs:shaping:focus") if _is_authored(prim, name)]
-    if UsdLux.LightAPI(prim).GetFiltersRel().HasAuthoredTargets():
-        ignored.append("light:filters")
+    ignored = [name for name in _IGNORED if _is_authored(prim, name)]
+    for name in _IGNORED_TARGETS:
+        if prim.HasRelationship(name) and prim.GetRelationship(name).HasAuthoredTargets():
+            ignored.append(name)
     if ignored:
         notes[f"{prim.GetPath()}: {', '.join(ignored)} not honoured"] = None
     return record
@@ -75,6 +88,8 @@ def camera_record(
     """A camera: apertures and focal length in tenths of a scene unit, as a stage has them; its exposure in stops."""
     lens = camera.GetCamera(time)
     scale = float(camera.ComputeLinearExposureScale(time))
+    if len(camera.GetClippingPlanesAttr().Get(time) or []):
+        notes[f"{camera.GetPath()}: clippingPlanes not honoured"] = None
     is_exposed = 2.0**-_MOST_STOPS <= scale <= 2.0**_MOST_STOPS
     if not is_exposed:
         notes[f"{camera.GetPath()}: an exposure of {scale:g} times the light is passed over"] = None
