@@ -183,6 +183,8 @@ def test_what_a_light_is_asked_for_and_not_given_is_named(read, name):
     apis = 'prepend apiSchemas = ["ShapingAPI", "ShadowAPI"]'
     scene = read(triangle() + f'def SphereLight "lamp" ({apis}) {{\n{name}\n}}')
     assert f"/lamp: {name.split()[1]} not honoured" in scene.notes
+    usual = "float inputs:diffuse = 1\nbool inputs:shadow:enable = 1\nasset inputs:shaping:ies:file = @@"
+    assert not read(triangle() + f'def SphereLight "lamp" ({apis}) {{\n{usual}\n}}').notes
 
 
 def test_clipping_planes_of_a_camera_are_named(read):

@@ -73,7 +73,7 @@ def light_record(prim: Usd.Prim, world: NDArray[np.float64], time: Usd.TimeCode,
     path = texture.Get(time) if texture else None
     if path is not None and path.path:
         record["texture"] = asset_record(texture, path, time)
-    ignored = [name for name in _IGNORED if _is_authored(prim, name)]
+    ignored = [name for name in _IGNORED if _is_changed(prim, name, time)]
     for name in _IGNORED_TARGETS:
         if prim.HasRelationship(name) and prim.GetRelationship(name).HasAuthoredTargets():
             ignored.append(name)
@@ -106,6 +106,8 @@ def camera_record(
     }
 
 
-def _is_authored(prim: Usd.Prim, name: str) -> bool:
-    attribute = prim.GetAttribute(name)
-    return bool(attribute and attribute.HasAuthoredValue())
+def _is_changed(prim: Usd.Prim, name: str, time: Usd.TimeCode) -> bool:
+    """Whether an attribute has another value than the schema gives it."""
+    value = prim.GetAttribute(name).Get(time) if prim.HasAttribute(name) else None
+    usual = prim.GetPrimDefinition().GetAttributeFallbackValue(name)
+    return value not in (None, usual) and getattr(value, "path", "set") != ""
