@@ -5,13 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import tifffile
-from PIL import Image
+from PIL import Image, ImageCms
 
 import lippmann as package
 from lippmann.calibration.pitch_strips import PitchTest
 from lippmann.display import load_display
 from lippmann.display.formats.print_sheet import print_of_texts
 from lippmann.image import read_picture
+from lippmann.image.read import open_file
 
 SHEET = ("--lpi", "20", "--ppi", "200", "--size", "40x20mm", "--viewing-distance", "30cm")
 SHORT = "print:lpi=20,ppi=200,size=40x20mm,viewing-distance=30cm"
@@ -125,7 +126,7 @@ def test_bad_prints_are_one_line_and_code_2(lippmann, tmp_path, words, said):
         (("render", "teapot", "-d", "lkg-portrait", "--mirror"), "--mirror: does not apply to the display"),
         (("render", "teapot", "-d", SHORT, "--icc", "absent.icc"), "absent.icc: cannot be read"),
         (("render", "teapot", "-d", SHORT, "--bleed", "200mm"), "--bleed: 200 mm is out of range"),
-        (("render", "teapot", "-d", SHORT, "--mirror", "--resume"), "--mirror: needs the whole picture at once"),
+        (("render", "teapot", "-d", SHORT, "--maps", "maps", "--resume"), "--maps: needs the whole picture at once"),
         (("render", "teapot", "-d", SHORT, "--mirror", "--turntable", "2"), "--mirror: does not apply to frames"),
         (("weave", "absent.png", "-d", "lkg-portrait", "--marks", "8mm"), "--marks: does not apply to the display"),
         (("pitch-test", *SHEET, "--strips", "0"), "0 is out of range"),
@@ -170,6 +171,35 @@ def test_a_bleed_goes_on_beyond_the_same_picture(lippmann, engine, tmp_path):
     image = package.render("teapot", SHORT, placement=place, bleed=2.54, **asked)
     assert image.display == second.display
     np.testing.assert_allclose(np.clip(image.pixels, 0, 1), second.pixels, atol=0.01)  # of 8 bits
+
+
+@pytest.mark.parametrize("name", ["a.tif", "a.png"])
+def test_a_print_in_tiles_is_finished_as_one_in_memory(lippmann, engine, tmp_path, name):
+    profile = tmp_path / "own.icc"
+    profile.write_bytes(ImageCms.ImageCmsProfile(ImageCms.createProfile("sRGB")).tobytes())
+    finish = ("--bleed", "2.54mm", "--marks", "5mm", "--mirror", "--icc", profile)
+    for folder, more in (("whole", ()), ("tiled", ("--resume",))):
+        (tmp_path / folder).mkdir()
+        output = tmp_path / folder / name
+        done = lippmann("render", "teapot", "-d", SHORT, *POINT, *finish, *more, "-o", output)
+        assert done.code == 0, done.err
+        assert [path.name for path in output.parent.iterdir()] == [name]
+    whole, tiled = (open_file(tmp_path / folder / name) for folder in ("whole", "tiled"))
+    assert tiled.metadata.display == whole.metadata.display
+    assert tiled.icc == whole.icc == profile.read_bytes()
+    first, second = (np.asarray(Image.open(tmp_path / folder / name)).astype(int) for folder in ("whole", "tiled"))
+    assert np.abs(first - second).max() <= 1  # tiles are rounded to codes once more
+
+
+def test_zarr_may_be_mirrored(lippmann, engine, tmp_path):
+    for name, more in (("plain.zarr", ()), ("mirrored.zarr", ("--mirror",))):
+        assert lippmann("render", "teapot", "-d", SHORT, *POINT, *more, "-o", tmp_path / name).code == 0
+    plain, mirrored = (open_file(tmp_path / name) for name in ("plain.zarr", "mirrored.zarr"))
+    np.testing.assert_array_equal(
+        read_picture(tmp_path / "mirrored.zarr").pixels, read_picture(tmp_path / "plain.zarr").pixels
+    )
+    assert mirrored.metadata.display.sheet.mirrored
+    assert not plain.metadata.display.sheet.mirrored
 
 
 def test_a_woven_print_has_its_trim_whatever_the_bleed(lippmann, tmp_path):

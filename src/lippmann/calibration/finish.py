@@ -11,14 +11,13 @@ import numpy as np
 from lippmann.calibration.alignment_marks import Marks, marked_rows
 from lippmann.codecs.icc import Profile, convert_codes
 from lippmann.codecs.tiff_strips import write_tiff_bands
-from lippmann.color.transfer import dequantize, quantize
+from lippmann.color.transfer import Transfer, dequantize, quantize
 from lippmann.display import Display
 from lippmann.display.sheet import Sheet
 from lippmann.errors import OutputError, PictureError
 from lippmann.image import IntegralImage
 from lippmann.image.encoding import stored_values
 from lippmann.image.metadata import Metadata, to_text
-from lippmann.image.picture import Picture
 from lippmann.image.sheet_codes import mirrored_in_file, profile_in_file
 from lippmann.image.stored_values import FloatArray, Stored, Values
 from lippmann.image.streamed import LargePicture
@@ -81,16 +80,16 @@ class Finish:
         """The finished picture; its maps become zero over the margin. Errors as of :meth:`display`."""
         if self == NO_FINISH:
             return image
-        self.check_colors(image)
+        self.check_colors(image.provenance.transfer)
         display = self.display(image.display)
         pixels = self.rows(image.rows, image.display, icc)(0, display.panel.height)
         m = (display.panel.width - image.display.panel.width) // 2
         maps = {name: np.pad(values, ((m, m), (m, m), (0, 0))[: values.ndim]) for name, values in image.maps.items()}
         return replace(image, pixels=pixels, display=display, maps=maps)
 
-    def check_colors(self, picture: Picture) -> None:
+    def check_colors(self, transfer: Transfer) -> None:
         """Refuse to convert pictures of data, whose codes stand for no colours."""
-        if self.profile is not None and picture.provenance.transfer != "srgb":
+        if self.profile is not None and transfer != "srgb":
             raise PictureError("its values are data, no colours", parameter="icc", fix="leave it out")
 
     def check_stored(self, stored: Stored, path: Path) -> None:
@@ -147,7 +146,7 @@ def write_finished(
     """
     name, stored = format_for(path, bits, source=picture.stored)
     finish.check_stored(stored, path)
-    finish.check_colors(picture)
+    finish.check_colors(picture.provenance.transfer)
     embedded = finish.icc or icc
     if isinstance(picture, IntegralImage):
         finished = finish.image(picture, icc)

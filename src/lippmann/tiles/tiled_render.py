@@ -7,20 +7,23 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
+from lippmann.calibration.finish import NO_FINISH, Finish
 from lippmann.codecs import tiff, zarr_array
 from lippmann.codecs.types import Pixels
 from lippmann.display import Display
 from lippmann.display.pixel_window import TileGrid
-from lippmann.errors import EngineError, UsageError
-from lippmann.image.encoding import FormatName, encode_tiles, encode_values, is_tiled
+from lippmann.errors import EngineError
+from lippmann.image import IntegralImage
+from lippmann.image.encoding import FormatName, encode_tiles, encode_values, is_tiled, linear_values
 from lippmann.image.metadata import Metadata, to_text
 from lippmann.image.provenance import Provenance
 from lippmann.image.sheet_codes import is_mirrored, profile_in_file
-from lippmann.image.write import check_output, format_for, replacing_output
+from lippmann.image.stored_values import FloatArray, Layer, Values
+from lippmann.image.write import can_be_banded, check_output, format_for, replacing_output, write_rows
 from lippmann.journal.tile_file import DamagedTile, TileResult
 from lippmann.journal.tile_journal import TileStore, read_job, sweep_beside
 from lippmann.progress import Progress, ProgressCallback, silent
@@ -78,6 +81,7 @@ def render_to_file(
     *,
     bits: int | None = None,
     resume: bool = False,
+    finish: Finish = NO_FINISH,
     runner: Runner | None = None,
     progress: ProgressCallback = silent,
 ) -> Rendered:
@@ -92,6 +96,8 @@ def render_to_file(
         See :func:`lippmann.image.write.format_for`.
     resume:
         Go on with what an earlier run left, if there is anything.
+    finish:
+        What is done to the picture of a print, once its tiles are there.
     runner:
         Who renders the tiles; by default this process.
 
@@ -107,10 +113,10 @@ def render_to_file(
     from lippmann.tiles.tile_render import prepare
 
     started = time.perf_counter()
-    if is_mirrored(display):
-        rule = "a picture in tiles is written as it is seen"
-        raise UsageError("mirrors whole pictures only", parameter="mirror", rule=rule, fix="mirror the finished file")
     name, stored = format_for(output, bits)
+    finish.check_stored(stored, output)
+    finish.check_colors(request.transfer)
+    printed = finish.display(display)
     check_output(output, name)
     if name == "zarr":
         zarr_array.load_zarr(output)
@@ -139,14 +145,17 @@ def render_to_file(
         traced = time.perf_counter()
         progress(Progress("write", 0, len(job.grid)))
         try:
-            _write(output, name, prepared, provenance, store, progress)
+            if finish == NO_FINISH and not is_mirrored(display):
+                _write(output, name, prepared, provenance, store, progress)
+            else:
+                _write_print(output, bits, prepared, provenance, store, finish, progress)
         except DamagedTile as error:
             raise EngineError(f"a tile was damaged while the file was written: {error}", fix="run it again") from error
         left = store.finish()
     ended = time.perf_counter()
     seconds = {"build": built - started, "trace": traced - built, "write": ended - traced, "total": ended - started}
     return Rendered(
-        display, replace(provenance, seconds=seconds, notes=(*provenance.notes, *left)), len(job.grid), resumed
+        printed, replace(provenance, seconds=seconds, notes=(*provenance.notes, *left)), len(job.grid), resumed
     )
 
 
@@ -274,6 +283,54 @@ def _write(
         else:
             layers = _whole(job, store)
             encode_values(temporary, name, layers, transfer=job.transfer, text=text, pixel_pitch=pitch, icc=icc)
+
+
+def _write_print(
+    output: Path,
+    bits: int | None,
+    prepared: Prepared,
+    provenance: Provenance,
+    store: TileStore,
+    finish: Finish,
+    progress: ProgressCallback,
+) -> None:
+    """Write the sheet of a print: with its marks, in its profile, mirrored."""
+    job, world_from_display = prepared.job, prepared.placement.world_from_display
+    if can_be_banded(format_for(output, bits)[0]):
+        printed = finish.display(job.display)
+
+        def rows(first: int, last: int) -> Values:
+            progress(Progress("write", first, printed.panel.height))
+            return finished(first, last)
+
+        finished = finish.rows(_Rows(job, store).linear, job.display)
+        write_rows(rows, Metadata(printed, world_from_display, provenance), output, bits=bits, icc=finish.icc)
+        return
+    layers = _whole(job, store)
+    pixels = linear_values(cast(Values, layers.pop("")), job.transfer)
+    image = IntegralImage(pixels, job.display, world_from_display, provenance, cast("dict[str, Layer]", layers))
+    finish.image(image).save(output, bits=bits, icc=finish.icc)
+
+
+class _Rows:
+    """Rows of a picture from its tiles, asked for from the top down."""
+
+    def __init__(self, job: TileJob, store: TileStore) -> None:
+        self._job, self._store = job, store
+        self._bands: dict[int, Values] = {}
+
+    def linear(self, first: int, last: int) -> FloatArray:
+        """Linear RGB ``(last - first, W, 3)``."""
+        side, columns = self._job.side, self._job.grid.columns
+        numbers = range(first // side, -(-last // side))
+        self._bands = {
+            number: self._bands[number]
+            if number in self._bands
+            else np.concatenate([self._store.get(number * columns + c).pixels for c in range(columns)], axis=1)
+            for number in numbers
+        }
+        band = np.concatenate([self._bands[number] for number in numbers])
+        return linear_values(band[first - numbers[0] * side : last - numbers[0] * side], self._job.transfer)
 
 
 def _file_tiles(store: TileStore, progress: ProgressCallback) -> Iterator[Pixels]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -24,6 +24,7 @@ from lippmann.progress import Progress, ProgressCallback
 from lippmann.wording import samples_in_words
 
 if TYPE_CHECKING:
+    from lippmann.calibration.finish import Finish
     from lippmann.display import Display
     from lippmann.image import IntegralImage
     from lippmann.rendering.request.render_request import RenderRequest
@@ -200,9 +201,14 @@ def render(
     name, stored = format_for(output, bits)
     _check_layers(layers, name, output)
     if on_cluster or is_tiled(output, bits, target, request, resume=resume):
-        _check_whole({"--maps": maps, "--marks": marks, "--icc": icc, "--mirror": mirror})
+        if maps is not None:
+            fix = "leave it out: a file that ends in .exr holds each pixel's error and samples itself"
+            rule = "with --resume, to Zarr and beyond the memory pictures are rendered in tiles"
+            raise UsageError("needs the whole picture at once", where="--maps", rule=rule, fix=fix)
         with on_cluster.runner(console, threads) as runner:
-            _render_tiled(source, target, request, output, console, bits=bits, resume=resume, runner=runner)
+            _render_tiled(
+                source, target, request, output, console, bits=bits, resume=resume, finish=finish, runner=runner
+            )
         if opens:
             view.view(output, quiet=quiet, as_json=as_json)
         return
@@ -256,18 +262,6 @@ def _check_layers(layers: bool, name: str, output: Path) -> None:
             rule="OpenEXR can",
             fix="give the output the ending .exr",
         )
-
-
-def _check_whole(asked: Mapping[str, object]) -> None:
-    """Refuse what can only be done to a picture in one piece."""
-    for option, value in asked.items():
-        if value:
-            raise UsageError(
-                "needs the whole picture at once",
-                where=option,
-                rule="with --resume, to Zarr and beyond the memory pictures are rendered in tiles",
-                fix="leave it out",
-            )
 
 
 def _sentence(output: Path, image: IntegralImage) -> str:
@@ -326,6 +320,7 @@ def _render_tiled(
     *,
     bits: int | None,
     resume: bool,
+    finish: Finish,
     runner: Runner | None,
 ) -> None:
     """Render into a file tile by tile, and say what came of it."""
@@ -334,7 +329,15 @@ def _render_tiled(
     started = time.perf_counter()
     with _kept(output, console) as progress:
         rendered = render_to_file(
-            source.load(), display, request, output, bits=bits, resume=resume, runner=runner, progress=progress
+            source.load(),
+            display,
+            request,
+            output,
+            bits=bits,
+            resume=resume,
+            finish=finish,
+            runner=runner,
+            progress=progress,
         )
     made = rendered.provenance
     remarks(console, made)
