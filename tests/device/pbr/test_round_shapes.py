@@ -15,6 +15,7 @@ import lippmann
 from lippmann.device.pbr.round_shapes import keeps_round
 from lippmann.device.pbr.scene import build_description
 from lippmann.display import Display, LensArray, Panel
+from lippmann.errors import SceneError
 from lippmann.scene.scene import Scene
 from lippmann.scene.values.description import Instance, Material, Mesh, SceneDescription
 
@@ -55,6 +56,17 @@ def placed(linear, offset):
     matrix = np.eye(4)
     matrix[:3, :3], matrix[:3, 3] = linear, offset
     return matrix
+
+
+@pytest.mark.parametrize(("body", "each"), [(ball, 640), (rod, 900)])
+def test_more_bodies_than_the_memory_holds_are_refused_with_how_many_fit(body, each):
+    places = np.tile(np.eye(4), (2000, 1, 1))
+    description, fitting = scene_of(body(), places), 1500
+    with pytest.raises(SceneError) as refusal:
+        build_description(description, memory=fitting * each)
+    assert str(refusal.value).startswith("round: memory: 2,000 balls and rods need 1.")
+    assert f"about {fitting:,} such copies; allow more memory, or place fewer copies" in str(refusal.value)
+    build_description(scene_of(body(), places[:fitting]), memory=fitting * each)
 
 
 def rays(count, aim, spread, seed):

@@ -86,14 +86,19 @@ def choose_instances(meshes: Mapping[K, CopiedMesh], memory: int, *, name: str =
     if need > max(memory, sum(mesh.bytes_once for mesh in meshes.values())):
         triangles = sum(mesh.triangles * mesh.copies for mesh in meshes.values())
         copies = sum(mesh.copies for mesh in meshes.values())
-        raise SceneError(
-            f"{copies:,} placed meshes of {triangles:,} triangles need {_size(need)}",
-            where=name,
-            parameter="memory",
-            rule=f"the scene may take {_size(memory)}, about {int(copies * memory / need):,} such copies",
-            fix="allow more memory, or place fewer copies",
-        )
+        raise too_many(f"{copies:,} placed meshes of {triangles:,} triangles", copies, need, memory, name)
     return chosen
+
+
+def too_many(what: str, copies: int, need: int, memory: int, name: str) -> SceneError:
+    """The error of copies that need more bytes than there are."""
+    return SceneError(
+        f"{what} need {_size(need)}",
+        where=name,
+        parameter="memory",
+        rule=f"the scene may take {_size(memory)}, about {int(copies * memory / need):,} such copies",
+        fix="allow more memory, or place fewer copies",
+    )
 
 
 def _bytes_of(meshes: Mapping[K, CopiedMesh], instanced: set[K]) -> int:

@@ -18,6 +18,8 @@ from lippmann.device.pbr.materials import Finish
 from lippmann.device.types import BSDF, Shape
 from lippmann.scene.values.description import FloatArray, Matrix, Mesh, Round
 
+#: Bytes of a body: in its shape, in the acceleration structure, and while both are built (measured for a million).
+BYTES: dict[Round, int] = {"ball": 640, "rod": 900}
 #: Share of a rod's radius by which its section may differ from a circle.
 _OVAL = 1e-3
 

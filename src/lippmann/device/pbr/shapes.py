@@ -15,10 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.device.pbr.emitters import glow
-from lippmann.device.pbr.instancing import CopiedMesh, choose_instances
+from lippmann.device.pbr.instancing import CopiedMesh, choose_instances, too_many
 from lippmann.device.pbr.material_groups import Variant
 from lippmann.device.pbr.materials import Finish
-from lippmann.device.pbr.round_shapes import can_wear, curves, ellipsoids, keeps_round
+from lippmann.device.pbr.round_shapes import BYTES, can_wear, curves, ellipsoids, keeps_round
 from lippmann.device.pbr.texture_lookup import ALPHA_ATTRIBUTE, COLOR_ATTRIBUTE, MEMBER_ATTRIBUTE, uv_attribute
 from lippmann.device.types import Float, Shape
 from lippmann.scene.values.description import FloatArray, IndexArray, Matrix, Mesh, Round
@@ -55,6 +55,10 @@ class Piece:
         return np.tile(values, (len(self.world_from_mesh), *[1] * (values.ndim - 1)))
 
 
+#: Pieces that stand for round bodies, by body and finish.
+RoundPieces = dict[tuple[Round, int], list[Piece]]
+
+
 def has_volume(matrices: Matrix) -> NDArray[np.bool_]:
     """Whether placements ``(k, 4, 4)`` keep volume: a flat or singular one shows nothing."""
     finite = np.asarray(np.isfinite(matrices).all(axis=(1, 2)))
@@ -81,7 +85,9 @@ def make_shapes(
     SceneError
         The shapes do not fit the memory.
     """
-    round_shapes, placements = _make_round(placements)
+    round_pieces, placements = _choose_round(placements)
+    memory -= _bytes_of_round(round_pieces, memory, name)
+    round_shapes = _make_round(round_pieces)
     # Meshes that are always placed together, as the primitives of one glTF mesh are, share their instances.
     together: dict[tuple[bool, bytes], list[Piece]] = {}
     for dress, matrices in placements:
@@ -103,11 +109,11 @@ def make_shapes(
     return shapes, finishes
 
 
-def _make_round(
+def _choose_round(
     placements: Sequence[tuple[Dress, Matrix]],
-) -> tuple[list[tuple[Shape, Finish]], list[tuple[Dress, Matrix]]]:
-    """Shapes of what stands for round bodies that can be traced as such, and the placements that are left."""
-    round_pieces: dict[tuple[Round, int], list[Piece]] = {}
+) -> tuple[RoundPieces, list[tuple[Dress, Matrix]]]:
+    """What stands for round bodies that can be traced as such, by body and finish; and the placements that are left."""
+    round_pieces: RoundPieces = {}
     left: list[tuple[Dress, Matrix]] = []
     for dress, matrices in placements:
         body = dress.mesh.stands_for
@@ -123,13 +129,27 @@ def _make_round(
             round_pieces.setdefault((body, id(dress.finish)), []).append(piece)
         if not fits.all():
             left.append((dress, matrices[~fits]))
+    return round_pieces, left
+
+
+def _bytes_of_round(round_pieces: RoundPieces, memory: int, name: str) -> int:
+    """What round bodies take; a :class:`SceneError` where that is more than ``memory``."""
+    counts = {key: sum(len(piece.world_from_mesh) for piece in pieces) for key, pieces in round_pieces.items()}
+    need, count = sum(BYTES[body] * each for (body, _), each in counts.items()), sum(counts.values())
+    if need > memory:
+        raise too_many(f"{count:,} balls and rods", count, need, memory, name)
+    return need
+
+
+def _make_round(round_pieces: RoundPieces) -> list[tuple[Shape, Finish]]:
+    """A shape for each body and finish."""
     made: list[tuple[Shape, Finish]] = []
     for (body, _), pieces in round_pieces.items():
         finish = pieces[0].dress.finish
         bsdf, places = finish.bsdf, np.concatenate([piece.world_from_mesh for piece in pieces])
         shape = ellipsoids(places, bsdf, _attributes(pieces, finish)) if body == "ball" else curves(places, bsdf)
         made.append((shape, finish))
-    return made, left
+    return made
 
 
 def _is_instantiable(dress: Dress) -> bool:
