@@ -34,5 +34,7 @@ def test_a_tiff_is_not_turned_twice(tmp_path):
     exif[0x112] = 6
     Image.new("RGB", (5, 4)).save(tmp_path / "a.tif", exif=exif)
     with Image.open(tmp_path / "a.tif") as picture:
+        assert of_picture(picture) == 6
+        picture.load()
         assert of_picture(picture) == 1
         assert picture.size == (4, 5)

@@ -174,6 +174,19 @@ def test_two_pictures_in_one_jpeg_file_are_a_jpeg_file():
     assert decode_image(stream.getvalue(), "camera.jpg", where="f").pixels.shape == (4, 5, 3)
 
 
+@pytest.mark.parametrize("kind", ["PNG", "JPEG", "TIFF"])
+@pytest.mark.parametrize("orientation", range(1, 9))
+def test_textures_stay_as_stored(kind, orientation):
+    exif = Pillow.Exif()
+    exif[0x112] = orientation
+    texels = np.repeat(np.repeat(np.array([[0, 90, 160], [255, 40, 200]], np.uint8), 8, axis=0), 8, axis=1)
+    stream = io.BytesIO()
+    Pillow.fromarray(texels).save(stream, kind, exif=exif, **({"quality": 95} if kind == "JPEG" else {}))
+    found = decode_image(stream.getvalue(), "skin", where="f").pixels[..., 0]
+    assert found.shape == texels.shape
+    assert np.abs(found.astype(int) - texels).max() < 12
+
+
 def test_greys_of_16_bits_whose_0_is_white():
     stream = io.BytesIO()
     tifffile.imwrite(stream, np.array([[0, 65535]], np.uint16), photometric="miniswhite")

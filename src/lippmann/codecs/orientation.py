@@ -30,6 +30,11 @@ def upright(values: Pixels, orientation: int) -> Pixels:
     return np.ascontiguousarray(values[::down, ::across])
 
 
+def as_stored(values: Pixels, orientation: int) -> Pixels:
+    """Values as they are stored of values that are upright."""
+    return upright(values, {6: 8, 8: 6}.get(orientation, orientation))
+
+
 def lies(orientation: int) -> bool:
     """Whether stored rows are shown as columns."""
     return 5 <= orientation <= 8
@@ -49,9 +54,7 @@ def of_exif(data: bytes) -> int:
 
 
 def of_picture(picture: Image.Image) -> int:
-    """The orientation of an open picture; of a TIFF 1, as Pillow turns those when it decodes them."""
-    if picture.format == "TIFF":
-        picture.load()
+    """The orientation of an open picture. Pillow turns a TIFF itself when it decodes it; then it is 1."""
     return _orientation(picture.getexif)
 
 

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from lippmann.codecs.orientation import as_stored, of_picture
 from lippmann.codecs.pillow_formats import RULE, codes_of, is_allowed, open_picture
 from lippmann.errors import MemoryLimitError, PictureError, SceneError
 from lippmann.runtime.input_memory import check_input
@@ -241,6 +242,8 @@ def read_image(path: Path, *, where: str) -> Image:
 def decode_image(data: bytes, name: str, *, where: str) -> Image:
     """Texels ``(h, w, 1 | 3 | 4)`` of an encoded picture: uint8, or float32 in [0, 1] where the file holds 16 bits.
 
+    They lie as they are stored, whatever the picture's EXIF orientation.
+
     Raises
     ------
     SceneError
@@ -249,7 +252,8 @@ def decode_image(data: bytes, name: str, *, where: str) -> Image:
         They take more than the memory that is left.
     """
     with decoding(f"texture '{name}'", where), open_picture(io.BytesIO(data)) as picture:
-        pixels = texels_of(picture)
+        turn = of_picture(picture) if picture.format == "TIFF" else 1  # those alone Pillow turns by itself
+        pixels = as_stored(texels_of(picture), turn)
     return Image(name, pixels)
 
 
