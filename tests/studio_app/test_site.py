@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 import gc
 import http.client
+import io
 import json
 import shlex
 import signal
@@ -19,9 +20,11 @@ from dataclasses import replace
 from pathlib import Path
 from urllib.parse import quote
 
+import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from PIL import Image
 from stand_in import FOLDER, TINY, StandIn, placement, running, said, view
 from starlette.websockets import WebSocketDisconnect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
@@ -486,6 +489,26 @@ def test_a_model_is_dropped_with_the_files_that_it_names(tmp_path):
         assert list(answer) == ["error"]
         assert "my triangle.bin" in answer["error"]
         assert kept(studio) == before
+
+
+def test_a_photograph_is_dropped_with_its_depth_map(tmp_path):
+    def png(pixels):
+        held = io.BytesIO()
+        Image.fromarray(pixels).save(held, "PNG")
+        return held.getvalue()
+
+    photo, depth = png(np.zeros((20, 30, 3), np.uint8)), png(np.tile(np.arange(30, dtype=np.uint8), (20, 1)))
+    volume = io.BytesIO()
+    np.save(volume, np.tile(np.arange(1.0, 31.0), (20, 1)))
+    with running(tmp_path) as studio:
+        for name, data in (("my photo_depth.png", depth), ("my photo-depth.npy", volume.getvalue())):
+            status, answer = several(studio, {name: data, "my photo.png": photo})
+            assert (status, Path(answer["path"]).name) == (200, "my photo.png")
+            assert load_scene(answer["path"]).fills_panel
+        status, answer = several(studio, {"a.png": photo, "b.png": depth})
+        assert "named like it: photo.jpg and photo_depth.png" in answer["error"]
+        status, answer = several(studio, {"a.png": photo})
+        assert "a_depth.png" in answer["error"]
 
 
 @pytest.mark.parametrize(

@@ -7,6 +7,7 @@ from pathlib import Path
 from urllib.parse import quote
 
 from lippmann.errors import SceneError
+from lippmann.scene.readers.depth_photo import depth_beside
 from lippmann.scene.readers.load import PHOTOS, kind_of_name, known_suffixes
 from lippmann.scene.readers.volumes.dicom_files import holds_dicom
 
@@ -23,7 +24,7 @@ def main_file(folder: Path, places: Sequence[Path]) -> Path:
     """The scene among files that were dropped together, from their folder on.
 
     Several DICOM slices are one scene, their folder. Otherwise it is the scene file that no other one names, nearest to
-    the top; photographs are scenes only where there is nothing else.
+    the top; photographs are scenes only where there is nothing else, and their depth maps never.
 
     Raises
     ------
@@ -32,7 +33,8 @@ def main_file(folder: Path, places: Sequence[Path]) -> Path:
     """
     if len(places) == 1:
         return places[0]
-    scenes = [place for place in places if kind_of_name(place) in known_suffixes()]
+    of_photos = {depth_beside(folder / place) for place in places if kind_of_name(place) in PHOTOS}
+    scenes = [place for place in places if kind_of_name(place) in known_suffixes() and folder / place not in of_photos]
     found = [place for place in scenes if kind_of_name(place) not in PHOTOS]
     if all(kind_of_name(place) == _SLICE for place in found) and holds_dicom(folder):
         tops = {place.parts[0] for place in places}
@@ -47,6 +49,8 @@ def main_file(folder: Path, places: Sequence[Path]) -> Path:
     if not scenes:
         raise SceneError("no scene is among these files", rule=f"known are {', '.join(known_suffixes())}")
     rule = "a scene is dropped with the files that it names"
+    if all(kind_of_name(place) in PHOTOS for place in scenes):
+        rule = "a photograph is dropped with its depth map, named like it: photo.jpg and photo_depth.png"
     raise SceneError(f"{len(found) or len(scenes)} scenes were dropped", rule=rule, fix="drop one")
 
 

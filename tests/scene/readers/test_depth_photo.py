@@ -268,8 +268,25 @@ def test_without_any_depth_there_is_no_scene(tmp_path):
     with pytest.raises(SceneError, match="the depth map tells no depth"):
         scene_of(tmp_path, np.zeros((4, 4), np.float32))
     (tmp_path / "photo.png").write_bytes(encoded(np.zeros((4, 4, 3), np.uint8)))
-    with pytest.raises(SceneError, match=r"^photo\.png: needs a depth map; add depth_map"):
+    with pytest.raises(
+        SceneError, match=r"^photo\.png: needs a depth map; add depth_map=\.\.\., or lay photo_depth\.png"
+    ):
         load_scene(tmp_path / "photo.png")
+
+
+@pytest.mark.parametrize("name", ["photo_depth.png", "photo-Depth.npy", "photo depth map.PNG", "photo_disparity.png"])
+def test_a_map_that_is_named_like_the_photograph_belongs_to_it(tmp_path, name):
+    ramp = np.tile(np.arange(20, dtype=np.uint8) * 9, (20, 1))
+    path, beside = tmp_path / "photo.png", tmp_path / name
+    path.write_bytes(encoded(np.zeros((20, 20, 3), np.uint8)))
+    (tmp_path / "photograph_depth.png").write_bytes(b"of another one")
+    if beside.suffix == ".npy":
+        saved(beside, 1.0 + ramp)
+    else:
+        beside.write_bytes(encoded(ramp))
+    found, named = load_scene(path), load_scene(path, depth_map=beside)
+    assert found.notes == (f"depth from {name}, which lies beside it", *named.notes)
+    np.testing.assert_array_equal(found.description.meshes[0].positions, named.description.meshes[0].positions)
 
 
 def test_maps_of_other_proportions_are_refused(tmp_path):

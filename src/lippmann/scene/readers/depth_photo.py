@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import io
 import math
+import os
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -23,6 +25,10 @@ from lippmann.scene.values.description import Image, Instance, Material, Mesh, S
 
 #: Endings of HEIF pictures.
 HEIF = (".heic", ".heif", ".hif")
+#: How the name of a depth map goes on after that of its photograph, and how it ends.
+_DEPTH = re.compile(
+    r"[-_. ]?(depth|depthmap|depth[-_ ]map|disparity)(\.(png|jpe?g|webp|tiff?|exr|pfm|npy))", re.IGNORECASE
+)
 #: How deep the height field is, over the shorter side of the picture; displays scale it to what they resolve.
 DEPTH = 0.5
 #: Points of the height field; of larger depth maps one pixel in so many is taken.
@@ -45,7 +51,8 @@ def read_depth_photo(path: Path, *, allow_outside: bool = False, depth_map: Path
     allow_outside:
         Without effect: the files are named by the caller.
     depth_map:
-        A depth map; None for one within the picture (XMP GDepth in JPEG files, an auxiliary picture in HEIF files).
+        A depth map; None for one within the picture (XMP GDepth in JPEG files, an auxiliary picture in HEIF files), or
+        one beside it (:func:`depth_beside`).
 
     Raises
     ------
@@ -61,9 +68,14 @@ def read_depth_photo(path: Path, *, allow_outside: bool = False, depth_map: Path
             image = Image(path.name, texels_of_codes(photograph.srgb_codes()))
             turn, notes = photograph.orientation, photograph.notes
         own = None if depth_map is not None else embedded_depth(data, path.name, turn)
-    found = own if depth_map is None else read_depth_map(depth_map)
-    if found is None:
-        raise SceneError("needs a depth map", where=path.name, fix="add depth_map=...")
+    if depth_map is None and own is None:
+        depth_map = depth_beside(path)
+        if depth_map is None:
+            fix = f"add depth_map=..., or lay {path.stem[:40]}_depth.png beside it"
+            raise SceneError("needs a depth map", where=path.name, fix=fix)
+        notes = (*notes, f"depth from {depth_map.name}, which lies beside it")
+    found = read_depth_map(depth_map) if depth_map is not None else own
+    assert found is not None
     height, width = image.pixels.shape[:2]
     rows, columns = found.inverse.shape
     if not _alike((width, height), (columns, rows)):
@@ -84,6 +96,16 @@ def read_depth_photo(path: Path, *, allow_outside: bool = False, depth_map: Path
     layers = split_layers(inverse, _colors_at(image, u, v), path.name)
     description = _description(path.stem, image, layers, u, v)
     return replace(description, notes=[*notes, *description.notes])
+
+
+def depth_beside(photograph: Path) -> Path | None:
+    """The depth map beside a photograph, named like it: ``photo_depth.png`` beside ``photo.jpg``; None without."""
+    stem = photograph.stem
+    try:
+        names = sorted(name for name in os.listdir(photograph.parent) if name.startswith(stem))
+    except OSError:
+        return None
+    return next((photograph.with_name(name) for name in names if _DEPTH.fullmatch(name[len(stem) :])), None)
 
 
 def _alike(first: tuple[int, int], second: tuple[int, int]) -> bool:
