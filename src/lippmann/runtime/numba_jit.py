@@ -3,15 +3,19 @@
 Numba caches compiled code beside the source, or in the user's cache folder if that is read-only. It checks the file of
 a kernel for changes. Kernels use functions of other modules, so here a cached kernel is invalid as soon as any module
 of its package (``rendering/reprojection``, ``metrics``) has changed.
+
+Numba itself is imported when a kernel is first called: it takes longer to load than some pictures to trace.
 """
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import os
 import sys
+import threading
 import uuid
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar, cast
@@ -30,13 +34,6 @@ if "numba" not in sys.modules and os.path.exists(_SETTINGS_FILE):
         fix="start from another folder, or set variables NUMBA_... in the environment",
     )
 
-from numba import njit  # noqa: E402
-from numba.core import config  # noqa: E402
-from numba.core.compiler_lock import global_compiler_lock  # noqa: E402
-
-# Numba looks for the file again whenever it compiles.
-config._config_fname = os.devnull
-
 Kernel = TypeVar("Kernel", bound=Callable[..., Any])
 
 #: Numba numbers the files of one function's variants, and enters a number into its index before it writes the file. Of
@@ -44,28 +41,44 @@ Kernel = TypeVar("Kernel", bound=Callable[..., Any])
 #: the index says. Names that no other process gives exclude that.
 _process = uuid.uuid4().hex[:12]
 
-#: Held by the thread that compiles.
-_lock = cast("Any", global_compiler_lock)
-
-
-def _after_fork() -> None:
-    """Set up the child: with a name of its own, and Numba's lock released."""
-    global _process
-    _process = uuid.uuid4().hex[:12]
-    _lock.release()
-
-
-if hasattr(os, "register_at_fork"):  # not on Windows, which has no fork
-    # While a thread compiles, Numba and LLVM hold locks that nobody would release in the child: a fork waits for it.
-    os.register_at_fork(before=_lock.acquire, after_in_parent=_lock.release, after_in_child=_after_fork)
+#: Held while dispatchers are made.
+_making = threading.RLock()
 
 #: Without the interpreter's lock, and divisions as the processor does them.
 _OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy"}
 
 
+class Deferred:
+    """A kernel whose Numba dispatcher is made when it is first needed; it has the dispatcher's attributes."""
+
+    def __init__(self, kernel: Callable[..., Any], options: Mapping[str, Any], *, kept: bool) -> None:
+        functools.update_wrapper(self, kernel)
+        self._kernel, self._options, self._kept = kernel, options, kept
+        self._dispatcher: Any = None
+
+    def __call__(self, *arguments: Any) -> Any:
+        return self.dispatcher()(*arguments)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.dispatcher(), name)
+
+    def dispatcher(self) -> Any:
+        """The dispatcher; kernels that this one may call have theirs then, under the names by which it calls them."""
+        with _making:
+            if self._dispatcher is None:
+                self._dispatcher = _numba().njit(**_OPTIONS, **self._options)(self._kernel)
+                if self._kept:
+                    _keep(self._dispatcher, Path(self._kernel.__code__.co_filename).parent)
+                names = self._kernel.__globals__
+                for name, value in list(names.items()):
+                    if isinstance(value, Deferred):
+                        names[name] = value.dispatcher()
+        return self._dispatcher
+
+
 def compiled(kernel: Kernel) -> Kernel:
     """Compile a kernel, cached on disk; it runs without the interpreter's lock."""
-    return _cached(kernel, {})
+    return cast("Kernel", Deferred(kernel, {}, kept=True))
 
 
 def uncounted(kernel: Kernel) -> Kernel:
@@ -73,25 +86,46 @@ def uncounted(kernel: Kernel) -> Kernel:
 
     The counts are shared by all threads and would dominate the run time.
     """
-    return _cached(kernel, {"_nrt": False})
+    return cast("Kernel", Deferred(kernel, {"_nrt": False}, kept=True))
 
 
 def inlined(kernel: Kernel) -> Kernel:
     """Compile a function that is inlined into kernels."""
-    return cast("Kernel", cast("Any", njit)(**_OPTIONS, inline="always")(kernel))
+    return cast("Kernel", Deferred(kernel, {"inline": "always"}, kept=False))
 
 
-def _cached(kernel: Kernel, options: dict[str, Any]) -> Kernel:
-    dispatcher = cast("Any", njit)(**_OPTIONS, **options)(kernel)
+@cache
+def _numba() -> Any:
+    import numba
+    from numba.core import config
+    from numba.core.compiler_lock import global_compiler_lock
+
+    # Numba looks for its file of settings again whenever it compiles.
+    config._config_fname = os.devnull
+    lock = cast("Any", global_compiler_lock)
+
+    def after_fork() -> None:
+        """Set up the child: with a name of its own, and Numba's lock released."""
+        global _process
+        _process = uuid.uuid4().hex[:12]
+        lock.release()
+
+    if hasattr(os, "register_at_fork"):  # not on Windows, which has no fork
+        # While a thread compiles, Numba and LLVM hold locks that nobody would release in the child: a fork waits.
+        os.register_at_fork(before=lock.acquire, after_in_parent=lock.release, after_in_child=after_fork)
+    return numba
+
+
+def _keep(dispatcher: Any, folder: Path) -> None:
+    """Cache what a dispatcher compiles on disk."""
     try:
         dispatcher.enable_caching()
         file = dispatcher._cache._cache_file
-        file._source_stamp = source_stamp(Path(kernel.__code__.co_filename).parent)
+        file._source_stamp = source_stamp(folder)
         pattern = file._data_name_pattern.replace("{number", "{process}.{number")
         file._data_name = lambda number: pattern.format(process=_process, number=number)
     except RuntimeError:
         pass  # neither the package nor the user's folder is writable: each process compiles the kernel
-    return cast("Kernel", dispatcher)
 
 
 @cache

@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from lippmann.errors import SceneError
 from lippmann.scene.values.splats import COEFFICIENTS, Splats, real_harmonics, rotation_matrices
@@ -69,6 +68,8 @@ def moved(splats: Splats, matrix: Numbers) -> Splats:
 
     The harmonics turn by the matrix's rotation, or rotation and mirroring; a stretch leaves them alone.
     """
+    from scipy.spatial.transform import Rotation  # here: it takes longer to load than most scenes
+
     linear = np.asarray(matrix, np.float64)[:3, :3]
     left, stretches, right = np.linalg.svd(linear)
     turn = left @ right

@@ -12,7 +12,6 @@ from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from lippmann.device.pbr.materials import Finish
 from lippmann.device.types import BSDF, Shape
@@ -57,6 +56,7 @@ def keeps_round(body: Round, matrices: Matrix) -> NDArray[np.bool_]:
 def ellipsoids(matrices: Matrix, bsdf: BSDF, attributes: Mapping[str, FloatArray]) -> Shape:
     """One shape of balls at places ``(k, 4, 4)``, whose ``attributes`` are ``(k, n)``."""
     import mitsuba as mi
+    from scipy.spatial.transform import Rotation
 
     # The image of the unit ball under U S V^T is that under U S: V only turns the ball.
     turn, scales, _ = np.linalg.svd(matrices[:, :3, :3])

@@ -9,6 +9,7 @@ import mitsuba as mi
 import numpy as np
 
 from lippmann.device.kernel_ops import larger, smaller, upload
+from lippmann.device.syntax import syntax
 from lippmann.device.types import Bool, Float, Int32, Point3f, UInt32, Vector3f
 from lippmann.device.whitted.bvh import GRID, LEAF, make_bvh
 from lippmann.device.whitted.clip_planes import Clipping
@@ -71,7 +72,7 @@ class ShapeTracer:
             light = self._past_walked(o, d, t, light)
         return light
 
-    @dr.syntax
+    @syntax
     def _nearest_walked(self, o: Point3f, d: Vector3f, t: Float, index: UInt32, active: Bool) -> tuple[Float, UInt32]:
         kinds = self._formulas(self._table.walked_rows)
         foot, scale, shift, node, end = self._start(o, d)
@@ -87,7 +88,7 @@ class ShapeTracer:
             node += step
         return t, index
 
-    @dr.syntax
+    @syntax
     def _nearest_of_list(
         self, rows: range, o: Point3f, d: Vector3f, t: Float, index: UInt32, active: Bool
     ) -> tuple[Float, UInt32]:
@@ -98,7 +99,7 @@ class ShapeTracer:
             number += 1
         return t, index
 
-    @dr.syntax
+    @syntax
     def _nearer_of_row(
         self, kinds: list[Kind], number: UInt32, o: Point3f, d: Vector3f, t: Float, index: UInt32
     ) -> tuple[Float, UInt32]:
@@ -123,7 +124,7 @@ class ShapeTracer:
             index = dr.select(good, number, index)
         return t, index
 
-    @dr.syntax
+    @syntax
     def _past_walked(self, o: Point3f, d: Vector3f, t: Float, light: Float) -> Float:
         kinds = self._formulas(self._table.walked_rows)
         foot, scale, shift, node, end = self._start(o, d)
@@ -136,7 +137,7 @@ class ShapeTracer:
             node += step
         return light
 
-    @dr.syntax
+    @syntax
     def _past_buffered(
         self, buffer: LightBufferLookup, source: UInt32, o: Point3f, d: Vector3f, t: Float, light: Float
     ) -> Float:
@@ -149,7 +150,7 @@ class ShapeTracer:
             place = dr.select(near < depth, place + 1, end)
         return light
 
-    @dr.syntax
+    @syntax
     def _past_list(self, rows: range, o: Point3f, d: Vector3f, t: Float, light: Float) -> Float:
         kinds = self._formulas(rows)
         number = mi.UInt32(rows.start)
@@ -158,7 +159,7 @@ class ShapeTracer:
             number += 1
         return light
 
-    @dr.syntax
+    @syntax
     def _past_row(self, kinds: list[Kind], number: UInt32, o: Point3f, d: Vector3f, t: Float, light: Float) -> Float:
         row = fetch(self.rows, number, True)
         if dr.hint(len(kinds) == 1, mode="scalar"):

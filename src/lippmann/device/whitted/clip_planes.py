@@ -9,6 +9,7 @@ import mitsuba as mi
 import numpy as np
 
 from lippmann.device.kernel_ops import upload
+from lippmann.device.syntax import syntax
 from lippmann.device.types import Bool, Float, Point3f
 from lippmann.scene.values.whitted_shapes import Numbers
 
@@ -33,7 +34,7 @@ class Clipping:
             return kept
         return self._look_up(group, p, active)
 
-    @dr.syntax
+    @syntax
     def _look_up(self, group: Float, p: Point3f, active: Bool) -> Bool:
         slot = mi.UInt32(mi.Int32(group) + 1)
         plane = dr.gather(mi.UInt32, self._starts, slot, active)

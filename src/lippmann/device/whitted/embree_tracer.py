@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.device.kernel_ops import upload
+from lippmann.device.syntax import syntax
 from lippmann.device.types import (
     Bool,
     Float,
@@ -96,7 +97,7 @@ class EngineTracer:
         hit = pi.is_valid()
         return dr.select(hit, pi.t, t), dr.select(hit, self._index(self._all, pi), _NONE), pi.prim_uv
 
-    @dr.syntax
+    @syntax
     def _closest_kept(self, o: Point3f, d: Vector3f, t: Float, active: Bool) -> tuple[Float, UInt32, Point2f]:
         """As :meth:`closest`, behind what is clipped away."""
         index, uv, distance = mi.UInt32(_NONE), mi.Point2f(0), mi.Float(t)
@@ -127,7 +128,7 @@ class EngineTracer:
             light = dr.select(self._solid.ray_test(ray, coherent=False, active=light > 0), 0, light)
         return self._filter_light(o, d, t, light) if self._airy else light
 
-    @dr.syntax
+    @syntax
     def _filter_light(self, o: Point3f, d: Vector3f, t: Float, light: Float) -> Float:
         """Light past each surface in turn."""
         start = mi.Float(0)

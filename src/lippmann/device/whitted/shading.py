@@ -12,6 +12,7 @@ import numpy as np
 
 from lippmann.device.kernel_ops import upload
 from lippmann.device.sobol import SampleStream
+from lippmann.device.syntax import syntax
 from lippmann.device.types import Bool, Color3f, Float, Point3f, UInt32, Vector3f
 from lippmann.device.whitted.geometry import FAR, Geometry, Surface
 from lippmann.device.whitted.intersections import xyz
@@ -117,7 +118,7 @@ class Shader:
     def _sees_light(self, finish: Finish) -> Bool:
         return (finish.diffuse > LEAST) | (finish.phong > LEAST)
 
-    @dr.syntax
+    @syntax
     def _direct_light(
         self, surface: Surface, finish: Finish, color: Color3f, d: Vector3f, active: Bool
     ) -> tuple[Color3f, Color3f, UInt32]:
@@ -155,7 +156,7 @@ class Shader:
         cosine = dr.dot(n, half)
         return dr.select(cosine > LEAST, dr.power(dr.maximum(cosine, 0) * dr.rsqrt(dr.dot(half, half)), exponent), 0)
 
-    @dr.syntax
+    @syntax
     def _open_sky(
         self, samples: int, surface: Surface, stream: SampleStream, hits: UInt32, active: Bool
     ) -> tuple[Float, UInt32]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import drjit as dr
 import mitsuba as mi
 
+from lippmann.device.syntax import syntax
 from lippmann.device.types import Bool, Float, MitsubaScene, Point2f, Point3f, Ray3f, UInt32, Vector3f
 from lippmann.rendering.transport.ray_source import RaySource
 from lippmann.rendering.transport.sharp_events import follows_sharply, sharp_lobe
@@ -54,7 +55,7 @@ class Lanes:
         return Lanes(column, row, channel, mi.Point2f(x, y), emitter, events, lobe)
 
 
-@dr.syntax
+@syntax
 def begins(scene: MitsubaScene, source: RaySource, lanes: Lanes) -> Bool:
     """Whether the chain from each point gets as far as its last event."""
     begun = source.rays(lanes.column, lanes.row, lanes.channel, lanes.point)
@@ -70,7 +71,7 @@ def begins(scene: MitsubaScene, source: RaySource, lanes: Lanes) -> Bool:
     return arrived
 
 
-@dr.syntax
+@syntax
 def approached(
     scene: MitsubaScene, source: RaySource, lanes: Lanes, middle: Point3f, radius: Float
 ) -> tuple[Point2f, Point2f, Ray3f, Bool]:

@@ -6,7 +6,6 @@ import time
 from typing import Any, Literal, Protocol, cast
 
 import numpy as np
-from numba.core import event
 from numpy.typing import NDArray
 
 from lippmann.color.transfer import Transfer
@@ -108,6 +107,8 @@ def trace_reused(
     MemoryLimitError
         If picture, points and the smallest wavefront do not fit into ``memory``.
     """
+    from numba.core import event
+
     most_lanes = wavefront_lanes(memory, source.width, source.height, samples)
     started = time.perf_counter()
     points = PointImage.empty(source.height, source.width)

@@ -12,6 +12,7 @@ import drjit as dr
 import mitsuba as mi
 
 from lippmann.device.sobol import SampleStream
+from lippmann.device.syntax import syntax
 from lippmann.device.types import Bool, Ray3f, Spectrum
 from lippmann.rendering.transport.path import DIMENSIONS_PER_VERTEX, PathIntegrator
 from lippmann.rendering.transport.photon_map import PhotonMap
@@ -34,7 +35,7 @@ class CausticBlur:
         self._narrow = photons
         self._wide = PhotonMap(photons.halves, WIDER * photons.radius)
 
-    @dr.syntax
+    @syntax
     def sample(self, ray: Ray3f, stream: SampleStream, active: Bool) -> Spectrum:
         """One sample of it along ``ray`` (world space) per lane."""
         paths = self._paths

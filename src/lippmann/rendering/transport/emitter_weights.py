@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from lippmann.device.kernel_ops import divide
 from lippmann.device.sobol import PIXEL_DIMENSION, SampleStream
+from lippmann.device.syntax import syntax
 from lippmann.device.types import Float, Ray3f, UInt32
 from lippmann.rendering.transport.light_sampling import LightSampler, SceneLightSampler, WeightedLightSampler
 from lippmann.rendering.transport.path import PathIntegrator
@@ -95,7 +96,7 @@ def _second_moments(integrator: PathIntegrator, source: RaySource, emitters: int
     return means
 
 
-@dr.syntax
+@syntax
 def _squared_contributions(
     integrator: PathIntegrator, ray: Ray3f, stream: SampleStream, emitter: UInt32, emitters: Float
 ) -> Float:

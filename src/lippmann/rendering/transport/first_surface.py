@@ -13,6 +13,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from lippmann.device.syntax import syntax
 from lippmann.device.types import (
     Bool,
     BSDFPtr,
@@ -138,7 +139,7 @@ class PhysicalSurfaces:
         pi = self._scene.ray_intersect_preliminary(ray, coherent=True, active=True)
         return self._skip_null(ray, pi) if self._has_null else (ray, pi)
 
-    @dr.syntax
+    @syntax
     def _skip_null(self, ray: Ray3f, pi: PreliminaryIntersection3f) -> tuple[Ray3f, PreliminaryIntersection3f]:
         """Ray and hit behind the surfaces of high null transmittance."""
         crossings = mi.UInt32(0)
@@ -158,7 +159,7 @@ class PhysicalSurfaces:
             crossings += 1
         return mi.Ray3f(o, d), pi
 
-    @dr.syntax
+    @syntax
     def features(self, ray: Ray3f) -> tuple[Color3f, Normal3f, Float, Bool]:
         """As :meth:`Surfaces.features`."""
         o, d = mi.Point3f(ray.o), mi.Vector3f(ray.d)  # current ray

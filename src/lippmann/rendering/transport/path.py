@@ -18,6 +18,7 @@ import mitsuba as mi
 
 from lippmann.device.pbr.surface_point import widen_lobes
 from lippmann.device.sobol import SampleStream
+from lippmann.device.syntax import syntax
 from lippmann.device.types import (
     Bool,
     BSDFPtr,
@@ -132,7 +133,7 @@ class PathIntegrator:
         radiance, counts, _ = self.sample_with_hit(ray, stream, active)
         return radiance, counts
 
-    @dr.syntax
+    @syntax
     def sample_with_hit(
         self, ray: Ray3f, stream: SampleStream, active: Bool, without_seen: bool = False
     ) -> tuple[Spectrum, RayCounts, FirstHit]:

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.device.kernel_ops import upload
+from lippmann.device.syntax import syntax
 from lippmann.device.types import Bool, Color3f, Float, Point3f, SurfaceInteraction3f, UInt32, Vector3f
 from lippmann.rendering.transport.sharp_events import is_sharp
 
@@ -153,7 +154,7 @@ class PhotonMap:
         mixed ^= cell[:, 2] * np.uint32(_PRIMES[2])
         return np.asarray(mixed & np.uint32(self._mask), dtype=np.uint32)
 
-    @dr.syntax
+    @syntax
     def gather(
         self,
         si: SurfaceInteraction3f,

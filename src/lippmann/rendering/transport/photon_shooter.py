@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from lippmann.device.kernel_ops import divide, upload
 from lippmann.device.sobol import SampleStream
+from lippmann.device.syntax import syntax
 from lippmann.device.types import (
     Bool,
     Color3f,
@@ -130,7 +131,7 @@ class PhotonShooter:
         active &= si.is_valid() & point.is_met(si, ds.dist)
         return ray, dr.select(active, power * point.cosine(si, ds.d) * point.area, 0)
 
-    @dr.syntax
+    @syntax
     def _follow(
         self, ray: Ray3f, power: Color3f, active: Bool, stream: SampleStream, landed: _Landed, surfaces: int
     ) -> None:

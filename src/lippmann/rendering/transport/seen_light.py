@@ -25,6 +25,7 @@ import mitsuba as mi
 from lippmann.device.pbr.gltf_bsdf import SHARP_FIRST, SHARP_LOBE
 from lippmann.device.pbr.surface_point import widen_lobes
 from lippmann.device.sobol import SampleStream, hash32
+from lippmann.device.syntax import syntax
 from lippmann.device.types import (
     Bool,
     BSDFPtr,
@@ -92,7 +93,7 @@ def most_of_chain(chains: Float) -> Float:
     return MOST_OF_ONE * _OF_CHAINS * (chains / _OF_CHAINS) ** _POWER
 
 
-@dr.syntax
+@syntax
 def seen_light(
     integrator: PathIntegrator,
     pixel: PixelRays,
@@ -142,7 +143,7 @@ def seen_light(
     )
 
 
-@dr.syntax
+@syntax
 def _chain(
     integrator: PathIntegrator, ray: Ray3f, stream: SampleStream, path: UInt32, active: Bool
 ) -> tuple[Spectrum, UInt32, UInt32 | None]:

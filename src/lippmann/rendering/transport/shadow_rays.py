@@ -12,6 +12,7 @@ import drjit as dr
 import mitsuba as mi
 
 from lippmann.device.pbr.straight_through import is_instance, may_pass
+from lippmann.device.syntax import syntax
 from lippmann.device.types import Bool, MitsubaScene, Point3f, Ray3f, Shape, Spectrum, UInt32
 
 #: Straight-through surfaces that one ray may cross before it counts as blocked. Bounds the loop between many panes.
@@ -38,7 +39,7 @@ class ShadowRays:
         divided: tuple[MitsubaScene, MitsubaScene] = _divided(scene) if has_null else (scene, None)
         self.opaque, self.asked = divided
 
-    @dr.syntax
+    @syntax
     def transmittance(self, ray: Ray3f, end: Point3f, active: Bool) -> tuple[Spectrum, UInt32]:
         """Transmittance in [0, 1] along ``ray``, which stops short of ``end``, and the rays traced for it.
 

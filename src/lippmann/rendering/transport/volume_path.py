@@ -17,6 +17,7 @@ import mitsuba as mi
 
 from lippmann.device.pbr.media import surrounding_medium
 from lippmann.device.sobol import SampleStream
+from lippmann.device.syntax import syntax
 from lippmann.device.types import (
     Bool,
     Interaction3f,
@@ -76,7 +77,7 @@ class VolumePathIntegrator:
         radiance, counts, _ = self.sample_with_hit(ray, stream, active)
         return radiance, counts
 
-    @dr.syntax
+    @syntax
     def sample_with_hit(self, ray: Ray3f, stream: SampleStream, active: Bool) -> tuple[Spectrum, RayCounts, FirstHit]:
         """As :meth:`sample`, with the first surface, boundaries of media included.
 
@@ -204,7 +205,7 @@ class VolumePathIntegrator:
 
         return radiance, RayCounts(secondary, shadow), FirstHit(first_distance, view_dependent)
 
-    @dr.syntax
+    @syntax
     def _medium_at_start(self, ray: Ray3f, si: SurfaceInteraction3f, active: Bool) -> tuple[MediumPtr, UInt32]:
         """The medium at the origin of ``ray``, whose first surface is ``si``, and the rays traced to find it.
 
@@ -226,7 +227,7 @@ class VolumePathIntegrator:
             searching &= si.is_valid()
         return medium, crossings
 
-    @dr.syntax
+    @syntax
     def _transmittance(
         self,
         reference: Interaction3f,

@@ -16,6 +16,7 @@ import drjit as dr
 import mitsuba as mi
 
 from lippmann.device.sobol import SampleStream
+from lippmann.device.syntax import syntax
 from lippmann.device.types import Array, Bool, Color3f, Float, Ray3f, UInt32, Vector3f
 from lippmann.device.whitted.background_fog import background_color, clearness
 from lippmann.device.whitted.geometry import FAR, NONE, Hit, Surface
@@ -95,7 +96,7 @@ class WhittedIntegrator:
         none = dr.zeros(mi.UInt32, dr.width(hit.t))
         return radiance, RayCounts(none, shadow), FirstHit(_distance(hit, active), view_dependent)
 
-    @dr.syntax
+    @syntax
     def _follow(self, ray: _Ray, stream: SampleStream, active: Bool) -> tuple[Color3f, RayCounts, FirstHit]:
         """Trace a ray and the tree of reflected and transmitted rays below it."""
         radiance, shadow, secondary = mi.Color3f(0), mi.UInt32(0), mi.UInt32(0)
