@@ -138,3 +138,32 @@ def test_a_child_forked_while_a_kernel_is_compiled_compiles_and_keeps_kernels_un
     assert child[:2] == ["21", "5.0"]
     assert parent[0] == "5.0"
     assert child[-1] != parent[-1]
+
+
+DEFERRED = """
+import sys
+from lippmann.runtime.numba_jit import inlined, uncounted
+
+@inlined
+def double(x):
+    return 2 * x
+
+@uncounted
+def fourfold(x):
+    return double(double(x))
+
+@uncounted
+def eightfold(x):
+    return fourfold(double(x))
+
+print("numba" in sys.modules, eightfold.__name__)
+print(eightfold(1), fourfold(1.5), "numba" in sys.modules)
+"""
+
+
+def test_numba_is_loaded_when_a_kernel_is_first_called(tmp_path):
+    path = tmp_path / "kernels.py"
+    path.write_text(DEFERRED)
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+    done = subprocess.run([sys.executable, str(path)], env=environment, capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines() == ["False eightfold", "8 6.0 True"]

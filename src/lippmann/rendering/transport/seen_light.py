@@ -17,7 +17,7 @@ with ever more of them nothing is left out.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import drjit as dr
 import mitsuba as mi
@@ -106,9 +106,11 @@ def seen_light(
 
     Between them stands what of the sum is from single chains beyond ``most``.
     """
-    light, excess = mi.Spectrum(0), None if most is None else mi.Spectrum(0)
+    light = mi.Spectrum(0)
+    excess: Any = None if most is None else mi.Spectrum(0)
     takes_shadow_rays = len(integrator.without_size) > 0
-    rays, shadow = mi.UInt32(0), mi.UInt32(0) if takes_shadow_rays else None
+    rays = mi.UInt32(0)
+    shadow: Any = mi.UInt32(0) if takes_shadow_rays else None
     number = mi.UInt32(0)
     of_chains = SampleStream(hash32(stream.key ^ _CHAINS), stream.index, stream.half)
     first = stream.index * chains
