@@ -135,7 +135,7 @@ def test_what_has_no_faces():
 
 
 class Values(dict):
-    active_normals = None
+    active_normals = active_normals_name = active_texture_coordinates_name = None
 
 
 class PolyData:
@@ -157,6 +157,8 @@ class PolyData:
 
 
 class UnstructuredGrid:
+    active_scalars_name, point_data, cell_data = None, Values(), Values()
+
     def extract_surface(self):
         return PolyData(cells=[(4, 0, 1, 2, 3)])
 
@@ -164,6 +166,9 @@ class UnstructuredGrid:
 class MultiBlock:
     def combine(self):
         return UnstructuredGrid()
+
+    def recursive_iterator(self, skip_none):
+        return iter([UnstructuredGrid()])
 
 
 @pytest.fixture

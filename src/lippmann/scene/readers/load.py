@@ -42,6 +42,9 @@ STUDIO, NO_ENVIRONMENT = "studio", "none"
 #: Pictures, which are scenes if they have depth.
 PHOTOS = (".jpg", ".jpeg", ".png", ".webp", ".heic", ".heif", ".hif")
 
+#: Data sets of VTK.
+VTK = (".vtp", ".vtu", ".vtk", ".vti", ".vtr", ".vts")
+
 # Suffix -> "module:function" of its reader: read(path, *, allow_outside) gives a SceneDescription, a MitsubaSource or a
 # ClassicScene.
 _READERS = {
@@ -62,7 +65,7 @@ _READERS = {
     ".xml": "lippmann.scene.mitsuba_source:read_mitsuba",
     **dict.fromkeys((".nii", ".nii.gz"), "lippmann.scene.readers.volumes.nifti:read_nifti"),
     **dict.fromkeys((".npy", ".npz"), "lippmann.scene.readers.volumes.numpy_arrays:read_array"),
-    **dict.fromkeys((".vtp", ".vtu", ".vtk", ".vti"), "lippmann.scene.readers.vtk.files:read_vtk"),
+    **dict.fromkeys(VTK, "lippmann.scene.readers.vtk.files:read_vtk"),
     ".dcm": "lippmann.scene.readers.volumes.dicom:read_dicom",
     ".vdb": "lippmann.scene.readers.volumes.vdb:read_vdb",
     ".vol": "lippmann.scene.readers.volumes.mitsuba_grid:read_mitsuba_grid",
@@ -85,7 +88,6 @@ _BEGINNINGS = {
 
 #: Kinds of files that hold volumes, and those of them that may hold several.
 VOLUMES = (".nii", ".nii.gz", ".npy", ".npz", ".dcm", ".vdb", ".vol", ".vti")
-VTK = (".vtp", ".vtu", ".vtk", ".vti")
 SEVERAL_VOLUMES = (".nii", ".nii.gz", ".npz", ".dcm", ".vdb", *VTK)
 
 #: USD stages, and kinds of files whose variants can be chosen.
@@ -109,6 +111,8 @@ _ELSEWHERE = {
     ".stp": "open it in FreeCAD, then File > Export > glTF (.glb)",
     ".iges": "open it in FreeCAD, then File > Export > glTF (.glb)",
     ".igs": "open it in FreeCAD, then File > Export > glTF (.glb)",
+    ".vtm": "save its blocks as one data set, in PyVista by: pyvista.read('a.vtm').combine().save('a.vtu')",
+    ".pvd": "name one of the files that it lists",
     ".nrrd": "save it as .nii.gz, in 3D Slicer for instance",
     ".mha": "save it as .nii.gz, in 3D Slicer for instance",
     ".hdr": "save it as .nii or .nii.gz, which hold header and voxels in one file",
@@ -125,7 +129,7 @@ _USUAL_UP: dict[str, Up] = {
     ".npz": "y",
     ".obj": "y",
     ".ply": "y",
-    **dict.fromkeys((".vtp", ".vtu", ".vtk", ".vti"), "y"),
+    **dict.fromkeys(VTK, "y"),
     ".sog": "-y",
     ".spz": "y",
     ".stl": "z",
@@ -392,7 +396,7 @@ def _suffix_by_content(path: Path) -> str | None:
     if head[128:] == DICOM:
         return ".dcm"
     head = head.removeprefix(b"\xef\xbb\xbf").lstrip()
-    if kind_of_name(path) in VTK and head.startswith(b"<"):  # they are XML, too
+    if b"<VTKFile" in head or (kind_of_name(path) in VTK and head.startswith(b"<")):  # they are XML, too
         return None
     return next((suffix for beginning, suffix in _BEGINNINGS.items() if head.startswith(beginning)), None)
 

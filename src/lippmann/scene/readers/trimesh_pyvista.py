@@ -14,7 +14,15 @@ from numpy.typing import ArrayLike, NDArray
 from lippmann.errors import SceneError
 from lippmann.scene.parsing.files import texels_of
 from lippmann.scene.readers.volumes.description import describe_volume
-from lippmann.scene.readers.vtk.data_set import COLORED, GREY, image_of, linear_colors, mesh_of, surface_of
+from lippmann.scene.readers.vtk.data_set import (
+    COLORED,
+    GREY,
+    image_of,
+    linear_colors,
+    mesh_of,
+    surface_of,
+    unshown_arrays,
+)
 from lippmann.scene.readers.vtk.plotter import from_plotter
 from lippmann.scene.values.description import (
     AlphaMode,
@@ -209,7 +217,10 @@ def from_pyvista(source: pyvista.DataSet | pyvista.MultiBlock) -> SceneDescripti
     surface = surface_of(source)
     material = GREY if surface.colors is None else COLORED
     mesh = mesh_of(surface, "pyvista", 0)
-    return SceneDescription("pyvista", [mesh], [material], [Instance(0, np.eye(4))], notes=[_UP_NOTE, *surface.notes])
+    notes = [_UP_NOTE, *surface.notes]
+    if surface.colors is None and (names := unshown_arrays(source)):
+        notes.append(f"none of its arrays is active in all of it, so that none is shown of {names}")
+    return SceneDescription("pyvista", [mesh], [material], [Instance(0, np.eye(4))], notes=notes)
 
 
 def adapter_for(source: object) -> Callable[[object], SceneDescription] | None:

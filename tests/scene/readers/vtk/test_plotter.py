@@ -188,6 +188,28 @@ def test_an_array_is_chosen_by_its_name(tmp_path):
         load_scene(tmp_path / "a.vti", series="other")
 
 
+def test_arrays_that_not_all_blocks_have_are_named():
+    sphere = pyvista.Sphere()
+    sphere["height"] = sphere.points[:, 2]
+    both = pyvista.MultiBlock([sphere, pyvista.Cube(center=(2, 0, 0))])
+    said = "none of its arrays is active in all of it, so that none is shown of 'height'"
+    assert any(note.startswith(said) for note in load_scene(both).notes)
+    assert not any("none is shown" in note for note in load_scene(sphere).notes)
+    assert not any("none is shown" in note for note in load_scene(pyvista.MultiBlock([sphere, sphere])).notes)
+
+
+def test_grids_of_other_kinds(tmp_path):
+    steps = [np.array([0.0, 1.0, 3.0])] * 3
+    grid = pyvista.RectilinearGrid(*steps)
+    grid.save(tmp_path / "a.vtr")
+    pyvista.StructuredGrid(*np.meshgrid(*steps, indexing="ij")).save(tmp_path / "a.vts")
+    for name in ("a.vtr", "a.vts"):
+        assert load_scene(tmp_path / name).bounds.tolist() == [[0, 0, 0], [3, 3, 3]]
+    pyvista.MultiBlock([grid]).save(tmp_path / "a.vtm")
+    with pytest.raises(SceneError, match=r"a\.vtm: .*combine\(\)\.save"):
+        load_scene(tmp_path / "a.vtm")
+
+
 def test_damaged_files_are_refused_in_one_line(tmp_path):
     pyvista.Sphere().save(tmp_path / "a.vtp")
     data = (tmp_path / "a.vtp").read_bytes()

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from lippmann.errors import LippmannError
 from lippmann.runtime.helper_process import limit_memory, serve
-from lippmann.scene.readers.vtk.data_set import image_of, surface_of
+from lippmann.scene.readers.vtk.data_set import image_of, surface_of, unshown_arrays
 
 
 def main() -> None:
@@ -70,14 +70,10 @@ def _read(path: str, series: str | None) -> dict[str, NDArray[np.generic]]:
 
 def _choose(data: pyvista.DataSet, series: str | None) -> list[str]:
     """Make an array active, by its name; without one a remark on those that are there, where none is active."""
-    tables = {"point": data.point_data, "cell": data.cell_data}
-    other = {data.point_data.active_normals_name, data.point_data.active_texture_coordinates_name}
-    names = [name for table in tables.values() for name in table if name not in other]
-    told = ", ".join(f"'{name[:40]}'" for name in dict.fromkeys(names[:20])) or "no arrays"
     if series is not None:
-        if series not in names:
-            raise KeyError(told)
-        data.set_active_scalars(series, preference="point" if series in tables["point"] else "cell")
-    elif names and data.active_scalars_name is None:
-        return [f"none of its arrays is active, so that none is shown of {told} (series=NAME chooses one)"]
+        if series not in data.array_names:
+            raise KeyError(", ".join(f"'{name[:40]}'" for name in data.array_names[:20]) or "no arrays")
+        data.set_active_scalars(series, preference="point" if series in data.point_data else "cell")
+    elif names := unshown_arrays(data):
+        return [f"none of its arrays is active, so that none is shown of {names} (series=NAME chooses one)"]
     return []

@@ -100,6 +100,20 @@ def _triangles(surface: pyvista.PolyData) -> tuple[pyvista.PolyData, NDArray[np.
     return surface, faces, np.arange(len(faces))
 
 
+def unshown_arrays(source: pyvista.DataSet | pyvista.MultiBlock) -> str:
+    """Names of the arrays of a data set without active ones, or of the blocks of an uncoloured collection; or empty."""
+    if hasattr(source, "combine"):
+        blocks = list(source.recursive_iterator(skip_none=True))
+    else:
+        blocks = [source] if source.active_scalars_name is None else []
+    names: dict[str, None] = {}
+    for block in blocks:
+        points = block.point_data
+        other = (points.active_normals_name, points.active_texture_coordinates_name)
+        names.update(dict.fromkeys(name for table in (points, block.cell_data) for name in table if name not in other))
+    return ", ".join(f"'{name[:40]}'" for name in [*names][:20])
+
+
 def mesh_of(surface: Surface, name: str, material: int) -> Mesh:
     """The triangles as a scene's mesh, whose material has that index."""
     uvs = surface.uvs

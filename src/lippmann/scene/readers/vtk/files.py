@@ -1,4 +1,4 @@
-"""VTK's files: surfaces (``.vtp``, ``.vtu``, ``.vtk``) in colour, and images (``.vti``) as volumes."""
+"""VTK's files: surfaces in colour, and images (``.vti``) with numbers as volumes."""
 
 from __future__ import annotations
 
