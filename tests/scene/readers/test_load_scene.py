@@ -209,7 +209,7 @@ def test_single_scattering_is_noted(save):
         load_scene(save("a.xml", XML.encode()), multiple_scattering=False)
 
 
-@pytest.mark.parametrize("background", [(1, 2), (0, 0, -1), (0, 0, np.nan), (1, 1, 1, 1)])
+@pytest.mark.parametrize("background", [(1, 2), (0, 0, -1), (0, 0, np.nan), (1e300, 0, 0), (1, 1, 1, 1)])
 def test_backgrounds_that_are_no_colour(background):
     with pytest.raises(UsageError, match=r"background: .*three numbers of 0 or more"):
         load_scene(triangle(), background=background)

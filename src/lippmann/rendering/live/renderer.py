@@ -290,7 +290,7 @@ class LiveRenderer:
             raise SceneError(
                 f"{what} cannot be shown live",
                 rule="live pictures show surfaces",
-                fix="use preview or render, which trace them",
+                fix="lippmann preview and lippmann render trace them",
             )
         request = replace(_moving(self._machine), device=self._machine.device, threads=self._machine.threads)
         session = open_session(

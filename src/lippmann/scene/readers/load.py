@@ -73,6 +73,9 @@ _READERS = {
     **dict.fromkeys(PHOTOS, "lippmann.scene.readers.depth_photo:read_depth_photo"),
 }
 
+#: Radiance whose square single precision holds.
+_BRIGHTEST = 1e18
+
 # First bytes of a file -> its suffix, for unmistakable formats.
 _BEGINNINGS = {
     b"BLENDER": ".blend",
@@ -467,6 +470,7 @@ def _background(background: Color | None) -> Color | None:
     if background is None:
         return None
     values = tuple(float(value) for value in background)
-    if len(values) != 3 or not np.isfinite(values).all() or min(values) < 0.0:
-        raise UsageError(f"{background!r}", parameter="background", rule="three numbers of 0 or more, linear RGB")
+    if len(values) != 3 or not all(0.0 <= value <= _BRIGHTEST for value in values):
+        rule = f"three numbers of 0 or more, linear RGB, none beyond {_BRIGHTEST:g}"
+        raise UsageError(f"{background!r}", parameter="background", rule=rule)
     return (values[0], values[1], values[2])
