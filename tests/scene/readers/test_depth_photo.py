@@ -365,6 +365,12 @@ def test_a_map_that_lies_as_the_picture_is_stored_is_named(tmp_path):
     np.save(tmp_path / "d.npy", np.ones((6, 12)))
     with pytest.raises(SceneError, match=r"12x6 pixels, the picture 6x12.*turn the map as the picture's EXIF orient"):
         load_scene(photo, depth_map=tmp_path / "d.npy")
+    upright = lying(tmp_path / "b.jpg", np.repeat(half_blue(), 2, 1)[:, :6], 1)
+    turned = lying(tmp_path / "d.png", np.zeros((6, 12), np.uint8), 1)
+    with pytest.raises(
+        SceneError, match=r"12x6 pixels, the picture 6x12; their sides have the same proportion; turn one"
+    ):
+        load_scene(upright, depth_map=turned)
 
 
 def test_a_photograph_of_another_colour_space_becomes_srgb(tmp_path):

@@ -79,12 +79,12 @@ def read_depth_photo(path: Path, *, allow_outside: bool = False, depth_map: Path
     height, width = image.pixels.shape[:2]
     rows, columns = found.inverse.shape
     if not _alike((width, height), (columns, rows)):
-        fits_as_stored = lies(turn) and _alike((height, width), (columns, rows))
+        fix = f"turn the map as the picture's EXIF orientation {turn} turns it" if lies(turn) else "turn one of them"
         raise SceneError(
             f"the depth map has {columns}x{rows} pixels, the picture {width}x{height}",
             where=path.name,
             rule="their sides have the same proportion",
-            fix=f"turn the map as the picture's EXIF orientation {turn} turns it" if fits_as_stored else "",
+            fix=fix if _alike((height, width), (columns, rows)) else "",
         )
     step = math.ceil(math.sqrt(rows * columns / _MOST_POINTS))
     check_input(_BYTES_PER_POINT * (rows // step) * (columns // step), "its height field", where=path.name)
