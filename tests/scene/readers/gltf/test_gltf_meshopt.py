@@ -210,13 +210,13 @@ def test_version_1_of_the_library_s_own_encoder(kind, stride):
     imagecodecs = pytest.importorskip("imagecodecs")
     if not hasattr(imagecodecs, "meshopt_encode"):
         pytest.skip("this imagecodecs has no meshoptimizer")
-    for count in (1, 16, 255, 600):
+    for count in (1, 16, 300):
         elements = np.ascontiguousarray(changing(kind, count, stride))
         for level in (0, 3):
             data = bytes(imagecodecs.meshopt_encode(elements, level=level))
             assert data[0] == 0xA1
             assert decompress(data, "ATTRIBUTES", "NONE", count, stride) == elements.tobytes()
-    for end in range(0, len(data), 7):
+    for end in range(0, len(data), len(data) // 8 + 1):
         with pytest.raises(MeshoptError):
             decompress(data[:end], "ATTRIBUTES", "NONE", count, stride)
 
