@@ -20,6 +20,7 @@ import first_picture_tables
 import goals_tables
 import kernel_profile_tables
 import light_vertices_tables
+import photon_share_tables
 import scene_file_tables
 import studio_tables
 from harness import RESULTS, saved
@@ -397,6 +398,7 @@ SECTIONS = {
     "methods": _methods,
     "first_picture": first_picture_tables.describe,
     "caustics": caustics_tables.describe,
+    "photon_share": photon_share_tables.describe,
     "light_vertices": light_vertices_tables.describe,
     "equal_time": equal_time_tables.describe,
     "equal_error": equal_error_tables.describe,

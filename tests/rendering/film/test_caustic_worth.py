@@ -2,73 +2,43 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 import pytest
 
-from lippmann.rendering.film.caustic_worth import LEAST_WORTH, variance_by_paths
-from lippmann.rendering.transport.photon_map import Photons
-
-SIDE = 64
-
-
-def spread(count, size=1.0, seed=2):
-    """Photons that light a square of this size evenly with an irradiance of 0.5."""
-    random = np.random.default_rng(seed)
-    position = np.zeros((count, 3), np.float32)
-    position[:, :2] = size * random.random((count, 2))
-    power = np.full((count, 3), 0.5 * size**2 / count, np.float32)
-    up = np.tile(np.float32([0, 0, 1]), (count, 1))
-    return Photons(position, up, up, power, np.ones(count, np.uint32))
-
-
-def wall(size=1.0):
-    """Points of a square wall, as a picture sees them."""
-    y, x = (np.mgrid[0:SIDE, 0:SIDE] + 0.5) * size / SIDE
-    return np.stack([x.ravel(), y.ravel(), 0 * x.ravel()], axis=1)
-
-
-@pytest.mark.parametrize("size", [1.0, 40.0])
-@pytest.mark.parametrize("radiance", [0.1, 30.0])
-def test_it_is_the_variance_of_what_paths_meet(size, radiance):
-    """A white wall: a path meets the emitter by the chance E / (pi L), and brings L then."""
-    photons = spread(3000, size)
-    found = variance_by_paths(photons, np.full(3000, radiance), wall(size), SIDE**2)
-    chance = 0.5 / (math.pi * radiance)
-    hits = np.random.default_rng(1).random(200_000) < min(1.0, chance)
-    assert radiance**2 * chance == pytest.approx(0.5 * radiance / math.pi)
-    # At the sides of the square fewer points lie about a photon.
-    assert found == pytest.approx(0.5 * radiance / math.pi, rel=0.1)
-    if radiance == 30.0:
-        assert found == pytest.approx(np.var(radiance * hits), rel=0.1)
-
-
-def test_what_shows_no_surface_counts_as_dark():
-    photons = spread(500)
-    whole = variance_by_paths(photons, np.full(500, 2.0), wall(), SIDE**2)
-    assert variance_by_paths(photons, np.full(500, 2.0), wall(), 4 * SIDE**2) == pytest.approx(whole / 4)
-
-
-def test_emitters_without_size_are_never_found():
-    radiance = np.full(500, 1e-9)
-    radiance[7] = np.inf
-    assert variance_by_paths(spread(500), radiance, wall(), SIDE**2) == math.inf
-
-
-def test_without_photons_there_is_nothing_to_miss():
-    assert variance_by_paths(Photons.dark(0), np.zeros(0), wall(), SIDE**2) == 0
+from lippmann.rendering.film.caustic_worth import LEAST_WORTH, are_worth_photons
 
 
 @pytest.mark.parametrize(
-    ("intensity", "exposure", "expected"), [(4e4, 0, "photons"), (40, 0, None), (40, 9, "photons")]
+    ("light", "radiance", "share", "samples", "gain", "expected"),
+    [
+        (0.1, 0.0, 0.0, 1, 1.0, True),
+        (0.01, 0.0, 0.0, 1, 1.0, False),  # paths never meet an emitter without size, and show no noise
+        (0.01, 0.0, 0.0, 1, 8.0, True),
+        (0.01, 0.0, 0.0, 16, 1.0, True),  # what is missing stays
+        (0.01, 500.0, 0.5, 1, 1.0, True),
+        (1e-4, 500.0, 1.0, 16, 1.0, False),
+        (0.01, 0.01, 1.0, 1, 1.0, False),  # a wide emitter, whose light paths meet without noise
+        (0.01, 0.01, 1.0, 1, 8.0, True),
+    ],
 )
-def test_photons_are_left_out_where_paths_hardly_make_noise(engine, intensity, exposure, expected):
-    """A glass ball before a wall under an emitter of some size, bright, dim, and dim but exposed by nine stops."""
+def test_photons_are_worth_what_paths_miss_or_show_as_noise(light, radiance, share, samples, gain, expected):
+    assert are_worth_photons(np.full(8, light), radiance, share, samples, gain) == expected
+
+
+def test_single_bright_pixels_count_as_white():
+    light = np.zeros(10_000)
+    light[7] = 1000.0
+    assert not are_worth_photons(light, 0.0, 0.0, 1, 1.0)
+    light[:4] = 1000.0
+    assert are_worth_photons(light, 0.0, 0.0, 1, 1.0)
+
+
+def caustics_of(walls, ball, light, **options):
+    """How the caustics come of a glass ball at a depth, between walls at others, under a light; and the picture."""
     import lippmann
     from lippmann.display import Display, LensArray, Panel
     from lippmann.scene.placement import PlacementOptions
-    from lippmann.scene.values.description import Instance, Light, Material, Mesh, SceneDescription
+    from lippmann.scene.values.description import Instance, Material, Mesh, SceneDescription
 
     trimesh = pytest.importorskip("trimesh")
     shapes = [trimesh.creation.box((300, 200, 2)), trimesh.creation.icosphere(3, 18)]
@@ -77,19 +47,40 @@ def test_photons_are_left_out_where_paths_hardly_make_noise(engine, intensity, e
         Material("wall", base_color=(0.6, 0.6, 0.6), roughness=1.0, specular=0.0),
         Material("glass", transmission=1.0, roughness=0.0, ior=1.5, thickness=1.0),
     ]
-    behind, before, above = np.eye(4), np.eye(4), np.eye(4)
-    behind[2, 3], before[2, 3] = -20, 4
-    above[:3, 3] = 60, 40, 90
-    light = Light("point", (intensity,) * 3, above, radius=10.0)
-    instances = [Instance(0, behind), Instance(1, before)]
+    instances = [Instance(0, at(0, 0, depth)) for depth in walls] + [Instance(1, at(0, 0, ball))]
     scene = lippmann.load_scene(SceneDescription("ball", meshes, materials, instances, lights=[light]))
     display = Display("test", Panel(96, 64, 1.0), LensArray("square", 8.0), 30.0, "", 500.0, 80.0)
-    options = {"placement": PlacementOptions(mode="display"), "method": "full", "spp": 4, "integrator": "path"}
-    picture = lippmann.render(scene, display, exposure=exposure, **options)
-    assert picture.provenance.options.get("caustics") == expected
-    asked = lippmann.render(scene, display, exposure=exposure, caustics="photons", **options)
-    assert asked.provenance.options["caustics"] == "photons"
+    placed = PlacementOptions(mode="display")
+    picture = lippmann.render(scene, display, placement=placed, method="full", spp=4, integrator="path", **options)
+    return picture.provenance.options.get("caustics"), picture
+
+
+def at(x, y, z):
+    place = np.eye(4)
+    place[:3, 3] = x, y, z
+    return place
+
+
+@pytest.mark.parametrize(
+    ("intensity", "exposure", "expected"), [(4e4, 0, "photons"), (40, 0, None), (40, 9, "photons")]
+)
+def test_photons_are_left_out_where_paths_hardly_make_noise(engine, intensity, exposure, expected):
+    """A glass ball before a wall under an emitter of some size, bright, dim, and dim but exposed by nine stops."""
+    from lippmann.scene.values.description import Light
+
+    light = Light("point", (intensity,) * 3, at(60, 40, 90), radius=10.0)
+    way, picture = caustics_of([-20], 4, light, exposure=exposure)
+    assert way == expected
+    asked_way, asked = caustics_of([-20], 4, light, exposure=exposure, caustics="photons")
+    assert asked_way == "photons"
     # What is left out would not be seen.
     if expected is None:
-        apart = np.square(picture.pixels - asked.pixels).mean()
-        assert apart < LEAST_WORTH
+        assert np.square(picture.pixels - asked.pixels).mean() < LEAST_WORTH
+
+
+def test_they_are_left_out_where_the_eye_does_not_look(engine):
+    """A glass ball under a point light before a wall that is seen, and behind it before another one."""
+    from lippmann.scene.values.description import Light
+
+    assert caustics_of([-20], 4, Light("point", (4e4,) * 3, at(30, 20, 60)), exposure=0)[0] == "photons"
+    assert caustics_of([-20, -90], -50, Light("point", (4e4,) * 3, at(0, 0, -26)), exposure=0)[0] is None

@@ -250,3 +250,27 @@ def test_the_kernel_keeps_the_flux():
     points = np.float32(np.stack([*random.uniform(-0.8, 0.8, (2, 2000)), np.zeros(2000)], axis=1))
     found = looked_up(PhotonMap((photons, photons), 0.05), points, 1, 1)
     assert found.mean() == pytest.approx(2.5, rel=0.01)
+
+
+@pytest.mark.parametrize("count", [1, 300, 20_000])
+def test_points_without_photons_are_not_looked_up(engine, count):
+    """A small patch of photons in a world ten thousand times as wide; all points in reach are looked up."""
+    import mitsuba as mi
+
+    from lippmann.rendering.transport.photon_map import PhotonMap, Photons
+
+    random = np.random.default_rng(5)
+    spot = np.float32([31.7, -0.3, 8.1])
+    photons = Photons.dark(count)
+    position = spot + random.normal(0, 0.02, (count, 3)).astype(np.float32) * np.float32([1, 0, 1])
+    half = Photons(position, photons.normal, photons.toward, photons.power, photons.surfaces)
+    radius = 0.004
+    found = PhotonMap((half, half), radius)
+
+    def share(points):
+        return np.array(found.may_reach(mi.Point3f(points.astype(np.float32).T), mi.Bool(True))).mean()
+
+    way = random.normal(size=(count, 3))
+    way *= random.uniform(0, radius, (count, 1)) / np.linalg.norm(way, axis=1, keepdims=True)
+    assert share(position + way) == 1
+    assert share(spot + random.uniform(-200, 200, (50_000, 3)) * [1, 0, 1]) < 0.05

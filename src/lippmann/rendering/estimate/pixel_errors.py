@@ -17,7 +17,7 @@ Floats = NDArray[np.float32]
 #: The share of an outlier's estimate that is no estimate but the error itself.
 OUTLIERS_CERTAIN = 0.7
 #: The share by which the blur of caustics is told too high where light is smooth, see
-#: :mod:`lippmann.rendering.transport.caustic_blur`; and that by which no error is less than stated.
+#: :mod:`lippmann.rendering.film.caustic_blur`; and that by which no error is less than stated.
 BLUR_TOO_MUCH, MOST_LESS = 8 / 9, 0.9
 _NOTHING = 1e-30
 

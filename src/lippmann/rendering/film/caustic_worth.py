@@ -1,56 +1,58 @@
-"""How noisy caustics would be if they were left to paths: whether photons are worth their time."""
+"""How much a picture would lack if caustics were left to paths: whether photons are worth their time."""
 
 from __future__ import annotations
 
-import math
-
+import drjit as dr
+import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.rendering.transport.photon_map import Photons
+from lippmann.device.kernel_ops import divide
+from lippmann.device.sobol import SampleStream
+from lippmann.rendering.film.scattered_rays import ScatteredRays
+from lippmann.rendering.film.seen_region import SEEN_SIDE
+from lippmann.rendering.transport.path import PathIntegrator
+from lippmann.rendering.transport.photon_map import PhotonMap
+from lippmann.rendering.transport.ray_source import RaySource
+from lippmann.rendering.transport.shown_caustics import ShownCaustics
 
-#: Mean variance of a sample, in linear radiance, below which photons would not be missed: the rest of a path's light
-#: has thirty times as much as a rule, and photons take a third of its time.
+#: Mean squared error of a sample, in linear radiance, below which photons would not be missed: the rest of a path's
+#: light has thirty times as much as a rule, and photons take up to half of a picture's time.
 LEAST_WORTH = 3e-4
-#: Points that are seen lie about a photon if they are nearer than this part of the diagonal of what is seen.
-_REACH = 0.03
 
 
-def are_worth_photons(variance: float, gain: float) -> bool:
-    """Whether caustics of this :func:`variance_by_paths` would be seen to be noisy, once light is multiplied by
-    ``gain``."""
-    return variance * gain**2 > LEAST_WORTH
+def are_worth_photons(light: NDArray[np.floating], radiance: float, share: float, samples: int, gain: float) -> bool:
+    """Whether caustics would be seen to be noisy, or missing, by paths alone.
 
-
-def variance_by_paths(
-    photons: Photons, radiance: NDArray[np.floating], seen: NDArray[np.floating], looked: int
-) -> float:
-    """Mean variance of one path's caustic light over a picture, at most.
-
-    Sharp events keep radiance: where light from an emitter of radiance L makes the irradiance E, it comes from a part
-    E / (pi L) of the directions that a white matt surface samples, and brings L each time: its variance is at most
-    L E / pi.
+    Sharp events keep radiance: where light from an emitter of radiance L shows as the radiance C, it comes from a part
+    C / L of the directions that a white matt surface samples, and brings L each time: the variance of a path is C L.
+    Paths never meet an emitter without size: the squared error is that of C itself, which more samples do not lessen.
+    No pixel is wrong by more than white, so that both count up to there.
 
     Parameters
     ----------
-    photons:
-        Those of a pilot that are seen.
+    light:
+        C of some pixels, spread over the picture.
     radiance:
-        ``(n,)``: that of each photon's emitter; infinite for emitters without size.
-    seen:
-        ``(m, 3)``: points that are seen, in equal parts of the picture.
-    looked:
-        Parts of the picture, those included that show no surface.
+        Mean of L over emitters of some size.
+    share:
+        Share of C that comes from those.
+    samples:
+        Of each pixel, about.
+    gain:
+        Factor by which the picture is exposed.
     """
-    from scipy.spatial import cKDTree
+    shown = np.minimum(light * gain, 1)
+    met = share * min(1.0, radiance * gain) + (1 - share) * shown * samples
+    return float((shown * met).mean()) > LEAST_WORTH
 
-    if not len(photons):
-        return 0.0
-    if np.isinf(radiance).any():
-        return math.inf
-    reach = _REACH * float(np.linalg.norm(np.ptp(seen, axis=0)))
-    about = cKDTree(seen).query_ball_point(photons.position, reach, return_length=True)
-    # What is seen in mirrors alone counts as if one point saw it.
-    parts_of_area = np.maximum(about, 1) / (looked * math.pi * reach**2)
-    flux = photons.power.max(axis=1).astype(np.float64)
-    return float((flux * radiance * parts_of_area).sum() / math.pi)
+
+def shown_light(integrator: PathIntegrator, source: RaySource, photons: PhotonMap, seed: int) -> NDArray[np.float64]:
+    """``(n,)``: radiance of the caustics in pixels spread over the picture of ``source``, before the gain."""
+    few = ScatteredRays(source, SEEN_SIDE)
+    pixel = dr.arange(mi.UInt32, few.width * few.height)
+    row, column = divide(pixel, few.width)
+    stream = SampleStream.of_pixels(pixel, mi.UInt32(0), dr.opaque(mi.UInt32, seed))
+    ray = few.rays(column, row, mi.UInt32(0), mi.Point2f(0.5))
+    shown = ShownCaustics(integrator, photons).sample(ray, stream, mi.Bool(True))
+    return np.array(dr.max(shown), dtype=np.float64)

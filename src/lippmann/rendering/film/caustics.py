@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.rendering.film.caustic_worth import are_worth_photons, variance_by_paths
+from lippmann.rendering.film.caustic_worth import are_worth_photons, shown_light
 from lippmann.rendering.film.exposure import gain_of
 from lippmann.rendering.film.memory_model import PHOTON, too_small
-from lippmann.rendering.film.seen_region import SEEN_SIDE, region_about, seen_points
+from lippmann.rendering.film.seen_chains import expected_samples
+from lippmann.rendering.film.seen_region import region_about, seen_points
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.rendering.transport.casters import find_casters, hides_caustics
 from lippmann.rendering.transport.caustic_photons import (
@@ -27,7 +28,7 @@ from lippmann.rendering.transport.caustic_photons import (
 from lippmann.rendering.transport.integrator import Integrator
 from lippmann.rendering.transport.pass_schedule import PassSchedule
 from lippmann.rendering.transport.path import PathIntegrator
-from lippmann.rendering.transport.photon_map import Photons
+from lippmann.rendering.transport.photon_map import PhotonMap
 from lippmann.rendering.transport.ray_source import RaySource
 
 #: Samples of a pixel that one pass of photons serves, at least; and the first one of a picture that may need no more.
@@ -46,7 +47,6 @@ def stretches(integrator: Integrator, first: int, samples: int) -> Iterator[int]
         for name, passes in (
             ("photons", integrator.photon_passes),
             ("light_vertices", integrator.vertex_passes),
-            ("seen_chains", integrator.chain_passes),
         ):
             if passes is not None:
                 number, left = passes.schedule.at(first)
@@ -56,7 +56,7 @@ def stretches(integrator: Integrator, first: int, samples: int) -> Iterator[int]
         first, samples = first + count, samples - count
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Caustics:
     """How a picture's caustics come.
 
@@ -64,13 +64,20 @@ class Caustics:
     ----------
     way:
         ``photons``, ``paths`` or ``none``.
-    variance:
-        Mean variance of one path's caustic light, in linear radiance without an exposure; infinite where it was not
-        asked for.
+    light, radiance, share, samples:
+        Of the caustics, their emitters and the picture, without an exposure, see
+        :func:`~lippmann.rendering.film.caustic_worth.are_worth_photons`; infinite where they were not asked for.
     """
 
     way: Literal["photons", "paths", "none"]
-    variance: float = math.inf
+    light: NDArray[np.float64] = field(default_factory=lambda: np.full(1, np.inf))
+    radiance: float = math.inf
+    share: float = 1.0
+    samples: int = 1
+
+    def are_worth_photons(self, gain: float) -> bool:
+        """Whether paths alone would miss them, or show their noise."""
+        return are_worth_photons(self.light, self.radiance, self.share, self.samples, gain)
 
 
 def give_photons(integrator: PathIntegrator, request: RenderRequest, source: RaySource, memory: int) -> Caustics | None:
@@ -103,7 +110,17 @@ def give_photons(integrator: PathIntegrator, request: RenderRequest, source: Ray
             return _left_to_paths(integrator)
         raise too_small(memory, "photons of caustics", required)
     seen = seen_points(integrator, source)
-    noise = _Noise(seen, request)
+    found = Caustics("photons")
+
+    def are_worth(pilot: PhotonMap, radiance: float, share: float) -> bool:
+        nonlocal found
+        if request.caustics != "auto":
+            return True
+        light = shown_light(integrator, source, pilot, request.seed)
+        found = Caustics("photons", light, radiance, share, expected_samples(request))
+        # Where there is no exposure yet, no light is known to be bright.
+        return request.exposure == "auto" or found.are_worth_photons(gain_of(request.exposure))
+
     photons = CausticPhotons(
         integrator.scene,
         integrator.features,
@@ -113,13 +130,13 @@ def give_photons(integrator: PathIntegrator, request: RenderRequest, source: Ray
         seed=request.seed,
         region=region_about(seen),
         kept=max(1, min(passes, int(KEPT_SHARE * memory) // required)),
-        is_missed=noise.is_seen,
+        are_worth=are_worth,
     )
     if photons.are_none:
         return None
     integrator.photons = photons.of_pass(0)
     integrator.photon_passes = photons
-    return Caustics("photons", noise.variance)
+    return found
 
 
 def _schedule(pixels: int, is_open_ended: bool) -> PassSchedule:
@@ -136,21 +153,3 @@ def take_photons(integrator: PathIntegrator) -> None:
 
 def _left_to_paths(integrator: PathIntegrator) -> Caustics | None:
     return Caustics("paths") if hides_caustics(integrator.scene) else None
-
-
-class _Noise:
-    """Tells by a pilot whether the noise of caustics would be seen by paths."""
-
-    def __init__(self, seen: NDArray[np.float64], request: RenderRequest) -> None:
-        self._seen = seen
-        self._exposure = request.exposure
-        self._is_asked = request.caustics == "auto" and len(seen) > 0
-        #: See :class:`Caustics`.
-        self.variance = math.inf
-
-    def is_seen(self, photons: Photons, radiance: NDArray[np.float64]) -> bool:
-        """Whether it would; where there is no exposure yet, no light is known to be bright."""
-        if not self._is_asked:
-            return True
-        self.variance = variance_by_paths(photons, radiance, self._seen, SEEN_SIDE**2)
-        return self._exposure == "auto" or are_worth_photons(self.variance, gain_of(self._exposure))

@@ -72,12 +72,11 @@ class ImageSearch:
     ----------
     images:
         Small ones; None where there are none.
-    found_none, none_small:
-        Whether it was made and found no image; none that is small, of emitters that are all looked for.
+    none_small:
+        Whether it was made and found no small image, of emitters that are all looked for.
     """
 
     images: MirrorImages | None
-    found_none: bool = False
     none_small: bool = False
 
 
@@ -102,7 +101,7 @@ def search_images(scene: MitsubaScene, source: RaySource, samples: int, memory: 
     lanes = min(memory_model.preferred_lanes(), room)
     looks_for_all = not _has_uneven_environment(scene)
     if not len(targets):
-        return ImageSearch(None, found_none=True, none_small=looks_for_all)
+        return ImageSearch(None, none_small=looks_for_all)
     if lanes < memory_model.SMALLEST_LANES:
         return ImageSearch(None)
     search = _Search(scene, targets, rays)
@@ -112,7 +111,7 @@ def search_images(scene: MitsubaScene, source: RaySource, samples: int, memory: 
     if len(found) and searches > fewest:
         found = _Found.joined([found, search.from_pixels(pixels, range(fewest, searches), lanes)])
     images = found.boxes(pixels)
-    return ImageSearch(images, found_none=not len(found), none_small=looks_for_all and images is None)
+    return ImageSearch(images, none_small=looks_for_all and images is None)
 
 
 @dataclass(frozen=True, eq=False)

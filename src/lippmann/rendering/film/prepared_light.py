@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import mitsuba as mi
 
-from lippmann.rendering.film.caustic_worth import are_worth_photons
 from lippmann.rendering.film.caustics import give_photons, take_photons
 from lippmann.rendering.film.exposure import gain_of, measure_exposure
 from lippmann.rendering.film.lit_surfaces import give_light_vertices
@@ -64,7 +63,7 @@ def prepare_light(
         ``memory`` bytes do not hold the photons that were asked for.
     """
     integrator.photons = integrator.photon_passes = integrator.seen_chains = integrator.mirror_images = None
-    integrator.light_vertices = integrator.vertex_passes = integrator.chain_passes = None
+    integrator.light_vertices = integrator.vertex_passes = None
     integrator.beam = integrator.gain = integrator.most_indirect = None
     told: dict[str, object] = {}
     if own_exposure:
@@ -81,7 +80,7 @@ def prepare_light(
     if exposure == "auto":
         exposure = measure_exposure(integrator, source, background, request.seed)
     gain = gain_of(exposure) if exposure else 1.0
-    if caustics is not None and not are_worth_photons(caustics.variance, gain):
+    if caustics is not None and not caustics.are_worth_photons(gain):
         take_photons(integrator)
         caustics = None
     if caustics is not None:
@@ -97,8 +96,8 @@ def prepare_light(
         chains = give_chains(integrator, request, source, memory)
         if chains.without_images:
             told["mirror_images"] = "none"
-        if chains.numbers:
-            told["seen_chains"] = chains.numbers[0] if len(chains.numbers) == 1 else list(chains.numbers)
+        if chains.number:
+            told["seen_chains"] = chains.number
             if is_widened:
-                integrator.beam = beam_of(source, request.samples * chains.numbers[0])
+                integrator.beam = beam_of(source, request.samples * chains.number)
     return told

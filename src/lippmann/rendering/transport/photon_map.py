@@ -30,6 +30,11 @@ STEEPEST = 4.0
 #: Least slope of a plane, and least area in faces of a cell, by which light in a cell is divided.
 _LEAST_SLOPE, _LEAST_AREA = 0.01, 0.05
 _PRIMES = (73856093, 19349663, 83492791)
+#: Bits for each bucket that tell which wide cells have photons in reach; how many there are at least in all; and the
+#: width of these cells in radii: one look-up in fifty is made for nothing.
+_NEAR_BITS, _FEWEST_BITS, _NEAR_WIDTH = 16, 1 << 10, 4
+#: What a photon is in reach of, in radii: a look-up's, and rounding.
+_IN_REACH = 1.01
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,13 +134,17 @@ class PhotonMap:
         # Opaque to the compiler, so that all sets of photons share a kernel.
         self._last_bucket = dr.opaque(mi.UInt32, self._mask)
         starts, ordered, before = [], [], 0
+        near = np.zeros(max(_FEWEST_BITS, _NEAR_BITS * (self._mask + 1)), bool)
         for half in halves:
-            bucket = self._bucket_numbers(half.position)
+            # In single precision as on the device, so that both find the same cells.
+            cell = np.floor(half.position / np.float32(radius)).astype(np.int32).astype(np.uint32)
+            bucket = _mixed(cell) & np.uint32(self._mask)
             order = np.argsort(bucket, kind="stable")
             edges = np.searchsorted(bucket[order], np.arange(self._mask + 2))
             starts.append(edges + before)
             before += len(half)
             ordered.append(half.chosen(order))
+            _mark_near(near, half.position, radius)
         photons = Photons.joined(ordered)
         if not len(photons):  # gathers need something to point at
             photons = Photons.dark(1)
@@ -145,14 +154,15 @@ class PhotonMap:
             upload(_rows_of_four(getattr(photons, name))) for name in ("position", "normal", "toward")
         )
         self._power_and_surfaces = upload(_rows_of_four(photons.power, photons.surfaces))
+        self._near = upload(np.packbits(near, bitorder="little").view("<u4"))
+        self._last_near = dr.opaque(mi.UInt32, len(near) - 1)
         self._r = dr.opaque(mi.Float, radius)
 
-    def _bucket_numbers(self, position: Floats) -> NDArray[np.uint32]:
-        # In single precision as on the device, so that both find the same cells.
-        cell = np.floor(position / np.float32(self.radius)).astype(np.int32).astype(np.uint32)
-        mixed = cell[:, 0] * np.uint32(_PRIMES[0]) ^ cell[:, 1] * np.uint32(_PRIMES[1])
-        mixed ^= cell[:, 2] * np.uint32(_PRIMES[2])
-        return np.asarray(mixed & np.uint32(self._mask), dtype=np.uint32)
+    def may_reach(self, p: Point3f, active: Bool) -> Bool:
+        """Whether photons may be in reach of a look-up: of most points in a large world none are."""
+        cell = _mixed_number(dr.floor(p / (_NEAR_WIDTH * self._r))) & self._last_near
+        word = dr.gather(mi.UInt32, self._near, cell >> 5, active)
+        return (word >> (cell & 31) & 1) != 0
 
     @syntax
     def gather(
@@ -208,7 +218,7 @@ class PhotonMap:
         step, first = mi.UInt32(parts), mi.UInt32(part)
         density *= mi.Float(step)
         first_bucket = half * (self._last_bucket + 2)
-        looking = mi.Bool(active)
+        looking = active & self.may_reach(p, active)
         # What does not change is no state: else Dr.Jit would record the loops a second time, without it.
         while dr.hint(
             looking,
@@ -219,7 +229,7 @@ class PhotonMap:
             from_center = (cell + 0.5) * r - p
             touches = dr.abs(dr.dot(from_center, normal)) < reach
             touches &= dr.squared_norm(dr.maximum(dr.abs(from_center) - 0.5 * r, 0)) < r * r
-            bucket = first_bucket + self._bucket(cell)
+            bucket = first_bucket + (_mixed_number(cell) & self._last_bucket)
             number = dr.gather(mi.UInt32, self._start, bucket, looking)
             number += (first - number) & (step - 1)
             end = dr.gather(mi.UInt32, self._start, bucket + 1, looking)
@@ -259,9 +269,25 @@ class PhotonMap:
             looking &= corner < end_corner
         return Gathered(total * density, chosen, color * weights * density)
 
-    def _bucket(self, cell: Point3f) -> UInt32:
-        x, y, z = (mi.UInt32(mi.Int32(part)) * prime for part, prime in zip(cell, _PRIMES, strict=True))
-        return (x ^ y ^ z) & self._last_bucket
+
+def _mixed(cell: NDArray[np.uint32]) -> NDArray[np.uint32]:
+    """``(n,)``: hashes of cells ``(n, 3)``."""
+    x, y, z = (cell[:, axis] * np.uint32(prime) for axis, prime in enumerate(_PRIMES))
+    return np.asarray(x ^ y ^ z, dtype=np.uint32)
+
+
+def _mixed_number(cell: Point3f) -> UInt32:
+    """:func:`_mixed` on the device."""
+    x, y, z = (mi.UInt32(mi.Int32(part)) * prime for part, prime in zip(cell, _PRIMES, strict=True))
+    return x ^ y ^ z
+
+
+def _mark_near(near: NDArray[np.bool_], position: Floats, radius: float) -> None:
+    """Mark the hashes of the wide cells from whose points photons are in reach."""
+    width = np.float32(_NEAR_WIDTH) * np.float32(radius)
+    for corner in itertools.product((-1, 1), repeat=3):
+        cell = np.floor((position + np.float32(_IN_REACH * radius) * np.array(corner, np.float32)) / width)
+        near[_mixed(cell.astype(np.int32).astype(np.uint32)) & np.uint32(len(near) - 1)] = True
 
 
 def _area_in_cell(place: Vector3f, normal: Vector3f, side: Float) -> Float:

@@ -1,0 +1,94 @@
+"""Caustics that a picture shows: what photons bring to the first rough surface along camera rays."""
+
+from __future__ import annotations
+
+import drjit as dr
+import mitsuba as mi
+
+from lippmann.device.sobol import SampleStream
+from lippmann.device.syntax import syntax
+from lippmann.device.types import Bool, BSDFPtr, Ray3f, Spectrum, SurfaceInteraction3f, UInt32, Vector3f
+from lippmann.rendering.transport.caustic_light import caustic_light
+from lippmann.rendering.transport.path import DIMENSIONS_PER_VERTEX, GATHER_DIMENSION, PathIntegrator
+from lippmann.rendering.transport.photon_map import PhotonMap
+from lippmann.rendering.transport.shadow_rays import MAX_CROSSINGS
+from lippmann.rendering.transport.sharp_events import (
+    facing_normal,
+    follows_sharply,
+    has_wide_lobes,
+    lambertian,
+    sharp_lobe,
+)
+
+#: Radius of a wider look-up over that of the picture's.
+WIDER = 2.0
+
+
+class ShownCaustics:
+    """Radiance of the caustics that rays of ``integrator`` show, by the ``photons``.
+
+    Where it is their ``blur``: what that adds, of either sign, by look-ups of :data:`WIDER` radii. It is that of
+    Lambertian lobes; the gloss of the same surfaces is taken to be blurred no more.
+    """
+
+    # Not a dataclass: Dr.Jit would take it for loop state and write its fields.
+    def __init__(self, integrator: PathIntegrator, photons: PhotonMap, blur: bool = False) -> None:
+        self._paths, self._photons = integrator, photons
+        self._wide = PhotonMap(photons.halves, WIDER * photons.radius) if blur else None
+
+    @syntax
+    def sample(self, ray: Ray3f, stream: SampleStream, active: Bool) -> Spectrum:
+        """One sample of it along ``ray`` (world space) per lane."""
+        paths = self._paths
+        context = mi.BSDFContext()
+        o, d = mi.Point3f(ray.o), mi.Vector3f(ray.d)
+        active = mi.Bool(active)
+        shown = mi.Spectrum(0)
+        throughput = mi.Spectrum(1)
+        depth, crossings = mi.UInt32(0), mi.UInt32(0)
+        # What does not change is no state: else Dr.Jit would record the loop a second time, without it.
+        while dr.hint(active, label="sharp", exclude=[paths, context, stream]):
+            toward = mi.Ray3f(o, d)
+            si = paths.scene.ray_intersect(toward, mi.RayFlags.All, True, active)
+            active &= si.is_valid() & (depth < paths.depth)
+            bsdf = si.bsdf(toward)
+            lobe = sharp_lobe(si, bsdf, active)
+            shown += throughput * self._light(si, bsdf, lobe, depth, stream, active)
+
+            dimension = (depth * 2 + crossings) * DIMENSIONS_PER_VERTEX + 1
+            bs, weight = bsdf.sample(context, si, stream.next_1d(dimension + 1), stream.next_2d(dimension + 2), active)
+            active &= follows_sharply(si, lobe, bs)
+            throughput *= weight
+            if mi.has_flag(bs.sampled_type, mi.BSDFFlags.Null):
+                crossings += 1
+            else:
+                depth += 1
+            active &= (dr.max(throughput) > 0) & (crossings < MAX_CROSSINGS)
+            onward = si.spawn_ray(si.to_world(bs.wo))
+            o, d = mi.Point3f(onward.o), mi.Vector3f(onward.d)
+        if dr.hint(paths.gain is not None, mode="scalar"):
+            shown *= paths.gain
+        return shown
+
+    def _light(
+        self,
+        si: SurfaceInteraction3f,
+        bsdf: BSDFPtr,
+        lobe: Vector3f,
+        depth: UInt32,
+        stream: SampleStream,
+        active: Bool,
+    ) -> Spectrum:
+        surfaces, seen, lambert = self._paths.depth - depth - 1, mi.Bool(True), lambertian(si, bsdf, active)
+        if self._wide is None:
+            wide = has_wide_lobes(si, bsdf, active)
+            lands = active & (wide | (dr.max(lambert) > 0))
+            choice = stream.next_1d(GATHER_DIMENSION)
+            photons = self._photons
+            return caustic_light(photons, si, bsdf, lobe, lambert, wide, stream, surfaces, choice, seen, lands)
+        lands, normal, half = active & (dr.max(lambert) > 0), facing_normal(si), mi.UInt32(stream.half)
+        wider, usual = (
+            photons.gather(si, normal, lobe, half, surfaces, mi.Float(0), seen, lands).irradiance
+            for photons in (self._wide, self._photons)
+        )
+        return dr.select(lands, lambert * (wider - usual) * dr.inv_pi, 0)
