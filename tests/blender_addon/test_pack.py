@@ -51,6 +51,10 @@ def test_the_license_is_whole(packed):
     assert "END OF TERMS AND CONDITIONS" in text
 
 
+#: Beside the standard library, what Blender's own Python has.
+_BLENDERS = {"bpy", "mathutils", "numpy"}
+
+
 def test_it_holds_every_module_that_it_imports_and_nothing_of_lippmann(packed):
     with zipfile.ZipFile(packed) as file:
         names = set(file.namelist())
@@ -63,6 +67,6 @@ def test_it_holds_every_module_that_it_imports_and_nothing_of_lippmann(packed):
                 module = "/".join(filter(None, (folder, *node.module.split("."))))
                 assert f"{module}.py" in names
             elif isinstance(node, ast.ImportFrom):
-                assert node.module.partition(".")[0] in {*sys.stdlib_module_names, "bpy"}
+                assert node.module.partition(".")[0] in {*sys.stdlib_module_names, *_BLENDERS}
             elif isinstance(node, ast.Import):
-                assert {each.name.partition(".")[0] for each in node.names} <= {*sys.stdlib_module_names, "bpy"}
+                assert {each.name.partition(".")[0] for each in node.names} <= {*sys.stdlib_module_names, *_BLENDERS}

@@ -50,7 +50,7 @@ def test_quilts_keep_within_what_players_take(image):
 @pytest.mark.parametrize(
     ("name", "kind", "message"),
     [
-        ("film.avi", OutputError, "animations are"),
+        ("film.avi", OutputError, "unknown ending of an animation '.avi'"),
         ("film_qs.mp4", PictureError, "does not say how many views"),
         ("film_qs0x4a1.mp4", PictureError, "columns"),
     ],

@@ -17,8 +17,9 @@ from lippmann.codecs import png, tiff
 from lippmann.codecs.claims import check_claim
 from lippmann.codecs.icc import adobe_profile, convert_cmyk, convert_codes, is_gray
 from lippmann.codecs.picture_notes import aspect_note, pictures_note
-from lippmann.codecs.pillow_formats import FORMATS, codes_of, open_picture
+from lippmann.codecs.pillow_formats import BYTES_PER_PIXEL, FORMATS, codes_of, open_picture
 from lippmann.codecs.types import Pixels
+from lippmann.runtime.input_memory import check_input
 
 if TYPE_CHECKING:
     from PIL import Image
@@ -86,6 +87,8 @@ def open_photograph(file: BinaryIO, path: Path, formats: tuple[str, ...] = (*FOR
         header = png.png_header(file, path)
         size = header.width, header.height
         check_claim(size, header.bits * header.channels, length, path)
+        # As much as of other formats: what follows makes colours of greys.
+        check_input(BYTES_PER_PIXEL * size[0] * size[1], f"a picture of {size[0]} x {size[1]} pixels", where=str(path))
         yield _photograph(
             size, header.icc, header.orientation, header.notes, lambda: _planes(png.decode_png(_whole(file), path))
         )

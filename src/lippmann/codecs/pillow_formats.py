@@ -42,7 +42,7 @@ _SEVERAL = "MPO"
 _PHOTOMETRIC = 262
 
 #: What Pillow holds of a pixel in four channels, and as much again in the array that is made of it.
-_BYTES_PER_PIXEL = 8
+BYTES_PER_PIXEL = 8
 
 #: The rule that a refusal quotes.
 RULE = f"{', '.join([*FORMATS.values()][:-1])} and {[*FORMATS.values()][-1]} are read"
@@ -92,7 +92,7 @@ def open_picture(source: Path | BinaryIO, formats: tuple[str, ...] = (*FORMATS,)
             Image.MAX_IMAGE_PIXELS = limit
     with opened as picture:
         name = str(source) if isinstance(source, Path) else ""
-        check_input(_BYTES_PER_PIXEL * picture.width * picture.height, f"a picture of {_size(picture)}", where=name)
+        check_input(BYTES_PER_PIXEL * picture.width * picture.height, f"a picture of {_size(picture)}", where=name)
         yield picture
 
 

@@ -39,7 +39,8 @@ def syntax(kernel: Kernel) -> Kernel:
 
 
 def _transform(kernel: FunctionType) -> Callable[..., Any]:
-    digest = hashlib.sha256(marshal.dumps(kernel.__code__))
+    # Version 2: later ones write references, which differ with how often an object happens to be used.
+    digest = hashlib.sha256(marshal.dumps(kernel.__code__, 2))
     digest.update(f"{dr.__version__} {sys.version}".encode())
     key = digest.hexdigest()
     module = Path(importlib.util.cache_from_source(kernel.__code__.co_filename))
