@@ -34,7 +34,8 @@ REST_VARIANCE, CLEAN_REST_VARIANCE = 0.01, 0.001
 #: their number, in codes: below the first a denoiser shows it as well without chains, above the second it does better
 #: (0.0006 to 0.001 for a sky in smooth gloss, 0.008 to 0.02 for spots of light in beads, metal and varnish).
 SPREAD, LEAST_SPREAD, MOST_SPREAD = 4, 1.5e-4, 3e-3
-#: Chains of each path where it is the only one of its pixel; their number goes with one over the root of the samples'.
+#: Chains of each path where it is the only one of its pixel, or where a quality is asked for and there are photons;
+#: otherwise their number goes with one over the root of the samples'.
 OF_ONE_SAMPLE = 8
 #: Chains of a path by which what single ones meet is held to be too bright or not.
 USUAL = 2
@@ -90,12 +91,15 @@ def give_chains(integrator: PathIntegrator, request: RenderRequest, source: RayS
         if not shows_image(SPREAD * look.variance_of_means(SPREAD, samples * USUAL)):
             return GivenChains()
     search = search_images(integrator.scene, source, samples, memory)
-    if integrator.photons is not None and search.none_small:
+    # By its first samples a picture tells how far it is from its quality: they must know what few paths meet.
+    is_judged = integrator.photons is not None and request.has_quality
+    without_images = integrator.photons is not None and search.none_small
+    if without_images and not is_judged:
         return GivenChains(without_images=True)
-    number = chains_of(samples)
+    number = OF_ONE_SAMPLE if is_judged else chains_of(samples)
     integrator.seen_chains = dr.opaque(mi.UInt32, number)
     integrator.mirror_images = search.images
-    return GivenChains(number)
+    return GivenChains(number, without_images)
 
 
 def shows_image(variance: float) -> bool:
