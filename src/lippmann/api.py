@@ -16,7 +16,6 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, cast
 
@@ -621,7 +620,7 @@ def _display(source: Display | str | Path) -> Display:
 
 
 def _request(placement: object, options: Mapping[str, object]) -> RenderRequest:
-    return replace(RenderRequest.of(options), placement=placement_of(placement))
+    return RenderRequest.of({**options, "placement": placement})
 
 
 def _placement(placement: object, former: Mapping[str, object], function: str) -> PlacementOptions | Placement:

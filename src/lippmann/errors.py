@@ -7,7 +7,7 @@ prints that line alone and leaves with the error's exit code; a library caller c
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from typing import TypeVar
 
 from lippmann.printable import one_line
@@ -70,6 +70,15 @@ class LippmannError(Exception):
         quoted = str(name)[:_MOST_QUOTED]
         what = f"unknown {kind} '{quoted}'{suggestion(quoted, names)}" if quoted else f"no {kind}"
         return cls(what, where=where, parameter=parameter, rule=rule, fix=fix)
+
+    @classmethod
+    def refuse_unknown(
+        cls, kind: str, names: Iterable[object], known: Collection[str], *, where: str = "", parameter: str = ""
+    ) -> None:
+        """Raise :meth:`unknown` of the first name, if any, that is not known."""
+        for name in names:
+            if name not in known:
+                raise cls.unknown(kind, name, known, where=where, parameter=parameter)
 
     def __str__(self) -> str:
         head = ": ".join(part for part in (self.where, self.parameter, self.what) if part)

@@ -56,7 +56,8 @@ def test_a_kernel_is_transformed_once_at_its_first_call(run, tmp_path):
     assert not list(tmp_path.glob("**/*.syntax"))
     assert run() == first
     assert run() == ["defined halvings", "[3, 1, 0] [2]"]
-    assert run(KERNELS.replace("x / 2", "x / 4"))[1:] == ["transformed", "[2, 1, 0] [1]"]
+    # Of another length: Python takes a module of the same second and size for the same.
+    assert run(KERNELS.replace("x / 2", "x / 4.0"))[1:] == ["transformed", "[2, 1, 0] [1]"]
 
 
 def test_what_is_kept_may_be_damaged(run, tmp_path):

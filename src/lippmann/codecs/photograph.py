@@ -96,7 +96,7 @@ def open_photograph(file: BinaryIO, path: Path, formats: tuple[str, ...] = (*FOR
         page = tiff.TiffPicture(file, path)
         size = page.width, page.height
         check_claim(size, page.bits, length, path)
-        yield _photograph(size, page.icc, page.orientation, page.notes, lambda: page.read())
+        yield _photograph(size, page.icc, page.orientation, page.notes, page.read)
     else:
         with open_picture(file, formats) as picture:
             turn = orientations.of_picture(picture)

@@ -12,7 +12,6 @@ import functools
 import hashlib
 import importlib.util
 import marshal
-import os
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -20,6 +19,9 @@ from types import CodeType, FunctionType
 from typing import Any, TypeVar, cast
 
 import drjit as dr
+
+from lippmann.errors import OutputError
+from lippmann.runtime.atomic_write import replacing
 
 Kernel = TypeVar("Kernel", bound=Callable[..., Any])
 
@@ -48,8 +50,11 @@ def _transform(kernel: FunctionType) -> Callable[..., Any]:
     code = _read(kept, key)
     if code is None:
         made = cast("FunctionType", dr.syntax(kernel))
-        if not sys.dont_write_bytecode:
-            _write(kept, marshal.dumps((key, made.__code__)))
+        # Where nothing can be kept, each process transforms the kernel.
+        with contextlib.suppress(OutputError):
+            if not sys.dont_write_bytecode:
+                with replacing(kept) as unfinished:
+                    unfinished.write_bytes(marshal.dumps((key, made.__code__)))
         return made
     function = FunctionType(code, kernel.__globals__, kernel.__name__, kernel.__defaults__)
     function.__kwdefaults__ = kernel.__kwdefaults__
@@ -62,14 +67,3 @@ def _read(path: Path, key: str) -> CodeType | None:
     except (OSError, ValueError, EOFError, TypeError):  # not there, or damaged
         return None
     return code if found == key and isinstance(code, CodeType) else None
-
-
-def _write(path: Path, content: bytes) -> None:
-    """Write a file whole, or not at all where the folder is read-only or full."""
-    unfinished = path.with_name(f"{path.name}.{os.getpid()}")
-    try:
-        unfinished.write_bytes(content)
-        unfinished.replace(path)
-    except OSError:
-        with contextlib.suppress(OSError):
-            unfinished.unlink()

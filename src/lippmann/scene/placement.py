@@ -114,9 +114,7 @@ class PlacementOptions:
             A name or a value is not known.
         """
         known = [field.name for field in fields(cls)]
-        for name in values:
-            if name not in known:
-                raise UsageError.unknown("option of a placement", name, known, parameter="placement")
+        UsageError.refuse_unknown("option of a placement", values, known, parameter="placement")
         return cls(**values)  # type: ignore[arg-type]  # checked by __post_init__
 
 
@@ -126,10 +124,10 @@ class Placement:
 
     ``world_from_display`` is ``scale * rotation * depth`` with a translation, 4x4; its scale is in world units per
     millimetre, and ``depth`` stretches z alone, where the scene's depth is compressed, or leans it, where a camera's
-    lens is shifted. ``depth_range`` is (back,
-    front): the lowest and highest z of the scene's bounding box in millimetres of the display frame;
-    ``resolvable_range`` the same for what the display resolves. ``warnings`` say, one line each, what was compressed,
-    and what will be blurred, cut or outside. ``exposure`` is that of the camera that places the display, in stops.
+    lens is shifted. ``depth_range`` is (back, front): the lowest and highest z of the scene's bounding box in
+    millimetres of the display frame; ``resolvable_range`` the same for what the display resolves. ``warnings`` say, one
+    line each, what was compressed, and what will be blurred, cut or outside. ``exposure`` is that of the camera that
+    places the display, in stops.
     """
 
     world_from_display: Matrix

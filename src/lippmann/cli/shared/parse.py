@@ -143,14 +143,16 @@ def placement(
     """Where the display is to stand, from the options of those names."""
     from lippmann.scene.placement import PlacementOptions
 
-    return PlacementOptions(
-        mode=place,  # type: ignore[arg-type]  # it is checked there
-        camera=camera,
-        turn=angles(turn),
-        shift=(0.0, 0.0, 0.0) if shift is None else triple(shift, "--shift"),
-        scale=scale,
-        depth_scale=None if depth_scale == "auto" else number(depth_scale, "--depth-scale", "auto, or a factor"),
-        pop_out=pop_out,
+    return PlacementOptions.of(
+        {
+            "mode": place,
+            "camera": camera,
+            "turn": 0.0 if turn is None else angles(turn),
+            "shift": (0.0, 0.0, 0.0) if shift is None else triple(shift, "--shift"),
+            "scale": scale,
+            "depth_scale": None if depth_scale == "auto" else number(depth_scale, "--depth-scale", "auto, or a factor"),
+            "pop_out": pop_out,
+        }
     )
 
 
@@ -162,13 +164,10 @@ def light(turn: str | None, strength: float, environment_strength: float) -> Lig
     return LightOptions((azimuth, elevation[0] if elevation else 0.0), strength, environment_strength)
 
 
-def angles(text: str | None) -> tuple[float, float, float]:
-    """Yaw, pitch and roll in degrees from what was typed."""
-    if text is None:
-        return 0.0, 0.0, 0.0
-    values = numbers(text, "--turn", (1, 2, 3))
-    yaw, pitch, roll = (*values, *([0.0] * (3 - len(values))))
-    return math.fmod(yaw, 360.0), pitch, roll
+def angles(text: str) -> tuple[float, ...]:
+    """Yaw, or yaw and pitch, or yaw, pitch and roll in degrees from what was typed."""
+    yaw, *others = numbers(text, "--turn", (1, 2, 3))
+    return math.fmod(yaw, 360.0), *others
 
 
 def variants(texts: list[str] | None) -> dict[str, str]:

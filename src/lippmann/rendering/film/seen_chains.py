@@ -1,7 +1,7 @@
 """How many chains of sharp events each path of a picture comes with: one number, or none.
 
 Where photons divide light anyway, each path comes with them, unless a search (:mod:`.image_search`) finds that the
-picture shows no emitter so small that paths miss its image.
+picture shows no emitter so small that paths miss its image; where a quality is asked for, then too.
 
 Without photons, chains cost a quarter of a path each. They pay beside a denoiser alone, and where seen light is an
 image that a few of them, spread evenly over the pixel, show well: a sky in smooth gloss. Light that one chain in many
@@ -84,16 +84,17 @@ def give_chains(integrator: PathIntegrator, request: RenderRequest, source: RayS
         if in_time < FEWEST_IN_TIME:
             return GivenChains()
         samples = min(samples, in_time)
-    if integrator.photons is None and (not is_clean or _is_reached_by_few(request)):
-        return GivenChains()
-    if integrator.photons is None:
+    has_photons = integrator.photons is not None
+    if not has_photons:
+        if not is_clean or _is_reached_by_few(request):
+            return GivenChains()
         look = SeenLook(integrator, source, samples, request.transfer, request.seed)
         if not shows_image(SPREAD * look.variance_of_means(SPREAD, samples * USUAL)):
             return GivenChains()
     search = search_images(integrator.scene, source, samples, memory)
     # By its first samples a picture tells how far it is from its quality: they must know what few paths meet.
-    is_judged = integrator.photons is not None and request.has_quality
-    without_images = integrator.photons is not None and search.none_small
+    is_judged = has_photons and request.has_quality
+    without_images = has_photons and search.none_small
     if without_images and not is_judged:
         return GivenChains(without_images=True)
     number = OF_ONE_SAMPLE if is_judged else chains_of(samples)

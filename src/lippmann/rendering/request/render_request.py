@@ -218,9 +218,7 @@ class RenderRequest:
             A name or a value is not known.
         """
         known = [each.name for each in fields(cls) if each.name not in ("reason", "spp_reserve", "began")]
-        for name in options:
-            if name not in known:
-                raise UsageError.unknown("option of a render", name, known)
+        UsageError.refuse_unknown("option of a render", options, known)
         return cls(**options)  # type: ignore[arg-type]  # checked by __post_init__
 
     @property

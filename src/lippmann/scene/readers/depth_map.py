@@ -138,9 +138,8 @@ def _gray(data: bytes, where: str, turn: int | None = None) -> tuple[NDArray[np.
     ``turn`` is its EXIF orientation; None for that in the file.
     """
     try:
-        if data.startswith(
-            tiff.SIGNATURES
-        ):  # whose floats of 16 bits, and greys whose 0 is white, Pillow does not read
+        # Pillow does not read floats of 16 bits in a TIFF, nor greys whose 0 is white.
+        if data.startswith(tiff.SIGNATURES):
             return _luminance(tiff.TiffPicture(io.BytesIO(data), Path(where)).read())
         with open_picture(io.BytesIO(data)) as picture:
             turn = of_picture(picture) if turn is None else turn

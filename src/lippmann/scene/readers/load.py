@@ -89,8 +89,7 @@ _BEGINNINGS = {
     b"{": ".gltf",
 }
 
-#: Kinds of files that hold volumes, and those of them that may hold several.
-VOLUMES = (".nii", ".nii.gz", ".npy", ".npz", ".dcm", ".vdb", ".vol", ".vti")
+#: Kinds of files that may hold several volumes, or arrays of which one is shown.
 SEVERAL_VOLUMES = (".nii", ".nii.gz", ".npz", ".dcm", ".vdb", *VTK)
 
 #: USD stages, and kinds of files whose variants can be chosen.

@@ -48,9 +48,7 @@ def read_transfer_function(path: Path) -> TransferFunction:
         raise SceneError(f"cannot be read ({str(error)[:200]})", where=where, rule="TOML, or JSON (.json)") from None
     if not isinstance(tables, Mapping):
         raise SceneError("holds no table", where=where, rule=f"the keys {', '.join(_KEYS)}")
-    for key in tables:
-        if key not in _KEYS:
-            raise SceneError.unknown("key", key, _KEYS, where=where)
+    SceneError.refuse_unknown("key", tables, _KEYS, where=where)
     points = tables.get("points")
     if not isinstance(points, list) or not 2 <= len(points) <= _MOST_POINTS:
         raise SceneError(f"lists no 2 to {_MOST_POINTS} points", where=f"{where}: points", rule=_POINT)

@@ -61,25 +61,25 @@ def _as_exported(node: Any, remark: Any) -> Any:
     if uses == {"color", "number"}:
         remark(f"picture '{image.name}': a material takes its colours for colours and for numbers; one of both is off")
         return None
-    if uses == ({"color"} if is_linear else {"number"}):
-        values = np.empty(image.size[0] * image.size[1] * image.channels, np.float32)
-        image.pixels.foreach_get(values)
-        values = values.reshape(-1, image.channels)
-        colors = values[:, : min(image.channels, 3)]
-        if is_linear and colors.max(initial=0.0) > 1.0:
-            remark(f"picture '{image.name}': colours brighter than white are cut")
-        colors[...] = _encode(colors) if is_linear else _decode(colors)
-        # Blender's pictures have four channels, whatever files have.
-        pixels = np.ones((len(values), 4), np.float32)
-        pixels[:, : image.channels] = values
-        if image.channels < 3:
-            pixels[:, :3] = values[:, :1]
-        copy = bpy.data.images.new(image.name, *image.size, alpha=image.channels == 4)
-        copy.colorspace_settings.name = "sRGB" if is_linear else "Non-Color"
-        copy.pixels.foreach_set(pixels.ravel())
-        copy.pack()
-        return copy
-    return None
+    if uses != ({"color"} if is_linear else {"number"}):
+        return None
+    values = np.empty(image.size[0] * image.size[1] * image.channels, np.float32)
+    image.pixels.foreach_get(values)
+    values = values.reshape(-1, image.channels)
+    colors = values[:, : min(image.channels, 3)]
+    if is_linear and colors.max(initial=0.0) > 1.0:
+        remark(f"picture '{image.name}': colours brighter than white are cut")
+    colors[...] = _encode(colors) if is_linear else _decode(colors)
+    # Blender's pictures have four channels, whatever files have.
+    pixels = np.ones((len(values), 4), np.float32)
+    pixels[:, : image.channels] = values
+    if image.channels < 3:
+        pixels[:, :3] = values[:, :1]
+    copy = bpy.data.images.new(image.name, *image.size, alpha=image.channels == 4)
+    copy.colorspace_settings.name = "sRGB" if is_linear else "Non-Color"
+    copy.pixels.foreach_set(pixels.ravel())
+    copy.pack()
+    return copy
 
 
 def _uses(node: Any, seen: set[str]) -> set[str]:
@@ -97,6 +97,7 @@ def _uses(node: Any, seen: set[str]) -> set[str]:
     return found
 
 
+# Blender's Python has nothing of the program's own.
 def _encode(values: Any) -> Any:
     """sRGB codes, 0 to 1, of linear values (IEC 61966-2-1)."""
     values = np.clip(values, 0.0, 1.0)
