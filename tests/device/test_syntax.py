@@ -15,8 +15,8 @@ import drjit as dr
 from lippmann.device import syntax
 from kernels import halvings
 
-transform = dr.syntax
-dr.syntax = lambda kernel: print("transformed") or transform(kernel)
+transform = syntax.transform_syntax
+syntax.transform_syntax = lambda kernel: print("transformed") or transform(kernel)
 print("defined", halvings.__name__)
 print(halvings(mi.Float(8, 2, 1)), halvings(mi.Float(8), least=3))
 """

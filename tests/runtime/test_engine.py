@@ -184,6 +184,22 @@ def test_start_is_whole_and_can_be_repeated():
 
 
 @needs_good
+def test_kernels_of_mitsuba_are_transformed_when_they_are_first_called():
+    code = (
+        "from lippmann.runtime import engine; engine.start('cpu')\n"
+        "import drjit as dr, drjit.ast, mitsuba as mi\n"
+        "print(drjit.ast._syntax_counter, dr.syntax is drjit.ast.syntax)\n"
+        "scene = {**mi.cornell_box(), 'integrator': {'type': 'prb'}}\n"
+        "scene['sensor']['film'] |= {'width': 8, 'height': 8}\n"
+        "picture = mi.render(mi.load_dict(scene), spp=4)\n"
+        "print(drjit.ast._syntax_counter, 0.1 < float(dr.mean(picture, axis=None).array[0]) < 1)\n"
+    )
+    run = python(code)
+    assert run.returncode == 0, run.stderr
+    assert run.stdout.split() == ["0", "True", "1", "True"]
+
+
+@needs_good
 @needs_cpu_only
 def test_device_of_choice_without_a_gpu_is_the_cpu_and_the_gpu_is_an_error():
     code = (

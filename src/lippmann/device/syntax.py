@@ -19,6 +19,7 @@ from types import CodeType, FunctionType
 from typing import Any, TypeVar, cast
 
 import drjit as dr
+from drjit.ast import syntax as transform_syntax
 
 from lippmann.errors import OutputError
 from lippmann.runtime.atomic_write import replacing
@@ -49,7 +50,7 @@ def _transform(kernel: FunctionType) -> Callable[..., Any]:
     kept = module.with_name(f"{module.stem}.{kernel.__qualname__}.syntax")
     code = _read(kept, key)
     if code is None:
-        made = cast("FunctionType", dr.syntax(kernel))
+        made = cast("FunctionType", transform_syntax(kernel))
         # Where nothing can be kept, each process transforms the kernel.
         with contextlib.suppress(OutputError):
             if not sys.dont_write_bytecode:

@@ -6,7 +6,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
+import functools
 import json
 import os
 import platform
@@ -14,9 +16,10 @@ import re
 import subprocess
 import sys
 import time
+from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, cast
 
 from lippmann.errors import EngineError, UsageError
 from lippmann.runtime import gpu, llvm, machine
@@ -93,7 +96,8 @@ def start(device: DeviceChoice = "auto", threads: int | None = None) -> Engine:
         engine = _on_gpu() if kind == "gpu" else _on_cpu(dr, library)
         if mi.variant() != engine.variant:
             try:
-                mi.set_variant(engine.variant)
+                with _syntax_at_first_call(dr):
+                    mi.set_variant(engine.variant)
             except ImportError as error:
                 raise EngineError(f"Mitsuba cannot use '{engine.variant}': {error}", fix=_REINSTALL) from error
             _set_here = engine.variant
@@ -128,12 +132,41 @@ def _load() -> tuple[Any, Any]:
     try:
         # Dr.Jit loads LLVM in the background, during the import of Mitsuba.
         import drjit
-        import mitsuba
+
+        with _syntax_at_first_call(drjit):
+            import mitsuba
     except (ImportError, NameError) as error:
         # Dr.Jit raises NameError while it reports a missing library: the reason is in the context.
         reason = error.__context__ if isinstance(error, NameError) and error.__context__ else error
         raise EngineError(f"Mitsuba cannot be loaded: {reason}", fix=_fix_of_import(str(reason))) from error
     return drjit, mitsuba
+
+
+@contextlib.contextmanager
+def _syntax_at_first_call(dr: Any) -> Iterator[None]:
+    """Let :func:`drjit.syntax` transform kernels when they are first called.
+
+    Mitsuba's differentiable integrators are loaded with it and with a variant: each kernel's source is parsed and
+    compiled again, and no render here calls one.
+    """
+    transform = dr.syntax
+
+    def syntax(kernel: Callable[..., Any] | None = None, **options: Any) -> Callable[..., Any]:
+        if kernel is None or options:
+            return cast("Callable[..., Any]", transform(kernel, **options))
+
+        @functools.wraps(kernel)
+        def call(*arguments: Any, **keywords: Any) -> Any:
+            return transformed()(*arguments, **keywords)
+
+        transformed = functools.cache(lambda: transform(kernel))
+        return call
+
+    dr.syntax = syntax
+    try:
+        yield
+    finally:
+        dr.syntax = transform
 
 
 def search_package_alone(mi: Any) -> None:
