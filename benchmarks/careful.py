@@ -53,7 +53,7 @@ def _measured(scene: Any, display: Any, light: str) -> dict[str, Any]:
 
     def rendered(seed: int, **options: Any) -> tuple[Any, float]:
         started = time.process_time()
-        options = {"integrator": light, "denoise": "none", "spp": SPP, **options}
+        options = {"tone_map": "none", "integrator": light, "denoise": "none", "spp": SPP, **options}
         image = lippmann.render(scene, display, seed=seed, **options)
         return image, time.process_time() - started
 

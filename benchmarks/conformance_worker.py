@@ -38,12 +38,16 @@ def main(reading: int, writing: int, memory: int) -> None:
 def _render(request: dict[str, Any], display: lippmann.Display, memory: int) -> dict[str, Any]:
     try:
         scene = lippmann.load_scene(request["file"], allow_outside=request["allow_outside"])
-        image = lippmann.render(scene, display, spp=SAMPLES, layers=True, denoise="none", memory=memory)
+        image = lippmann.render(
+            scene, display, spp=SAMPLES, layers=True, denoise="none", memory=memory, tone_map="none"
+        )
         shown = np.isfinite(image.maps["depth"])
         sides = np.ptp(scene.bounds, axis=0)
         light = image.pixels[shown]
         if request["picture"] is not None:
-            seen = lippmann.preview(scene, (PICTURE, PICTURE), spp=PICTURE_SAMPLES, memory=memory).pixels
+            seen = lippmann.preview(
+                scene, (PICTURE, PICTURE), spp=PICTURE_SAMPLES, memory=memory, tone_map="none"
+            ).pixels
             write_plain_picture(seen, Path(request["picture"]))
         return {
             "outcome": "rendered",

@@ -23,13 +23,14 @@ def describe(result: dict[str, Any]) -> str:
         f"""## A quality that is asked for (`goals.py`)
 
 Seconds, judging included, until a picture says of itself that it has the PSNR (`--quality`), and the samples per
-pixel that it took: by `full`, by `full --denoise oidn`, and by `pooled`, which stops at plain samples where these are
-there sooner (then in italics), as `auto` does. Plain samples are trusted from 16 on, or from 4 where they are 8 dB
-better than what is asked for, or 8 and 4 dB; denoised ones from 2, or up to 8 where samples cost less than a look at
-them. Where photons show that surfaces may mirror emitters, both are trusted from 16 on, and beyond a margin plain ones
-from 8 on, denoised ones from 2. No picture has more than {result["most_samples"]}. Where full does not get there with
-these, its time is drawn out by the law of its noise (*): that is long where fireflies of caustics come late, and
-outweighs other scenes in the mean. Where another does not, its cell is empty. *Stock views*
+pixel that it took: by `full`, by `full --denoise oidn`, and by `pooled`, which at the time stopped at plain samples
+where these were there sooner (then in italics); it no longer does. Plain samples are trusted from 16 on, or from 4
+where they are 8 dB better than what is asked for, or 8 and 4 dB; denoised ones from 2, or at the time up to 8 where
+samples cost less than a look at them. Where photons show that surfaces may mirror emitters, both are trusted from 16
+on, and beyond a margin plain ones from 8 on, denoised ones from 2. No picture has more than {result["most_samples"]}.
+Where full does not get there with these, its time is drawn out by the law of its noise (*): that is long where
+fireflies of caustics come late, and outweighs other scenes in the mean. Where another does not, its cell is empty.
+*Stock views*
 are Mitsuba's own `path` along the same rays, each view denoised with albedo and normals: they know nothing of their
 error, so they are told it, and stop with the fewest samples (a power of two) that are enough, 256 at most. Where these
 are not, their time is drawn out by the law of noise, too, though what is denoised gains less: {_gained(result)} dB by

@@ -32,11 +32,11 @@ def main() -> None:
     def coded(image: lippmann.IntegralImage) -> np.ndarray:
         return image.with_pixels(encode_srgb(np.clip(image.pixels, 0, 1))).micro_images().astype(np.float64)
 
-    reference = coded(lippmann.render(scene, spp=REFERENCE_SPP, seed=12345))
+    reference = coded(lippmann.render(scene, spp=REFERENCE_SPP, seed=12345, tone_map="none"))
     rows = []
     for method, options, parameters in CASES:
-        lippmann.render(scene, method=method, **parameters)
-        runs = [lippmann.render(scene, method=method, **parameters) for _ in range(3)]
+        lippmann.render(scene, method=method, tone_map="none", **parameters)
+        runs = [lippmann.render(scene, method=method, tone_map="none", **parameters) for _ in range(3)]
         error = ((coded(runs[0]) - reference) ** 2).mean(axis=(2, 3, 4))
         seconds = [run.stats["seconds"] for run in runs]
         rows.append(

@@ -70,7 +70,7 @@ def _measure(case: Case, name: str) -> Iterator[dict[str, Any]]:
         seconds: dict[str, list[float]] = {way: [] for way in ways}
         for run in range(-case.warm_up, case.runs):
             for way in ways:
-                images[way] = lippmann.render(scene, display, **case.light, **WAYS[way])
+                images[way] = lippmann.render(scene, display, tone_map="none", **case.light, **WAYS[way])
                 if run >= 0:
                     spent = images[way].provenance.seconds
                     seconds[way].append(spent["trace"] + spent["reuse"])

@@ -84,3 +84,32 @@ def test_the_keywords_of_a_render_are_those_of_a_request():
     described = inspect.getdoc(lippmann.render)
     for name in parameters:
         assert name in described.split("Returns")[0], name
+
+
+def test_the_command_line_and_python_have_the_same_defaults():
+    """One call, one picture: each option of a command that a request has, too, says the same where it is left out."""
+    from lippmann.cli.commands.plan import plan
+    from lippmann.cli.commands.preview import preview
+    from lippmann.cli.commands.quilt import render as quilt
+    from lippmann.cli.commands.render import render
+
+    request = inspect.signature(RenderRequest).parameters
+    for command in (render, preview, plan, quilt):
+        options = inspect.signature(command).parameters
+        shared = set(options) & set(request)
+        assert {"spp", "exposure", "tone_map", "denoise", "seed"} - set(options) <= {"denoise"}
+        for name in shared:
+            assert options[name].default == request[name].default, (command.__module__, name)
+
+
+def test_the_command_line_and_python_make_the_same_picture(engine, tmp_path, cut_display):
+    from lippmann.cli import run
+    from lippmann.image import read_picture
+
+    display = cut_display(48, 16)
+    assert run(["render", "teapot", "--display", str(display), "--spp", "2", "-o", str(tmp_path / "a.png")]) == 0
+    lippmann.render("teapot", display, spp=2).save(tmp_path / "b.png")
+    first, second = (read_picture(tmp_path / name) for name in ("a.png", "b.png"))
+    np.testing.assert_array_equal(first.pixels, second.pixels)
+    assert first.provenance.options == second.provenance.options
+    assert first.provenance.options["tone_map"] == "pbr-neutral"

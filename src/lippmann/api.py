@@ -166,7 +166,7 @@ def render(
     caustics: Caustics = "auto",
     clamp_indirect: float | None = None,
     exposure: float | Literal["auto"] = "auto",
-    tone_map: ToneMap = "none",
+    tone_map: ToneMap = "auto",
     layers: bool = False,
     device: Device = "auto",
     threads: int | None = None,
@@ -193,10 +193,10 @@ def render(
         Of a print, millimetres to go on beyond every edge, which are cut off; 0 to 100. The scene stands where it
         stands without. Default 0.
     method:
-        ``auto`` (default): ``pooled`` where light has noise, else ``full``; for a quality or a time the faster of
-        both. ``full`` traces every ray. ``pooled`` denoises, and all micro-images that show a point share its
-        light. ``lens-view`` reprojects points from micro-image to micro-image and traces the missed pixels;
-        ``interpolated`` averages those of every other micro-image from its neighbours.
+        ``auto`` (default): ``pooled`` where light has noise, else ``full``. ``full`` traces every ray. ``pooled``
+        denoises, and all micro-images that show a point share its light. ``lens-view`` reprojects points from
+        micro-image to micro-image and traces the missed pixels; ``interpolated`` averages those of every other
+        micro-image from its neighbours.
     order:
         For ``lens-view`` and ``interpolated``: ``paper`` goes lens by lens as the paper does; ``default`` in the order
         that traces fewer pixels.
@@ -239,8 +239,9 @@ def render(
         Stops (EV) by which light is raised or lowered, -40 to 40. ``auto`` (default): 0, and for scenes with physical
         light sources what brings the median of what is lit to mid-grey.
     tone_map:
-        ``none`` (default): values are light. ``pbr-neutral``: highlights are compressed instead of clipped (Khronos PBR
-        Neutral). ``auto``: the latter where light is physically based.
+        ``none``: values are light, as data are to be. ``pbr-neutral``: highlights are compressed instead of clipped
+        (Khronos PBR Neutral). ``auto`` (default): the latter where light is physically based, unless ``load_scene`` was
+        given the colour of the background. (``render_to_file`` to TIFF or Zarr keeps light then.)
     layers:
         Add depth, position, normal, albedo and shape of what each pixel sees to the picture's maps. Default False.
     device:

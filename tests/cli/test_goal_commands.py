@@ -134,14 +134,14 @@ def test_auto_is_the_default_and_says_what_it_took(lippmann, engine, tmp_path, s
     assert np.array_equal(read_picture(out).pixels, read_picture(plain).pixels)
 
 
-def test_auto_takes_the_noise_out_where_that_reaches_the_quality_sooner(lippmann, engine, tmp_path, small):
+def test_a_quality_is_reached_by_the_denoised_picture(lippmann, engine, tmp_path, small):
     words = ("render", "teapot", "--display", small, "--quality", 38, "--json", "-o")
     done = lippmann(*words, tmp_path / "a.png")
     assert done.code == 0, done.err
     options, plain = done.json["options"], lippmann(*words, tmp_path / "b.png", "--denoise", "none").json
     assert options["denoise"] == "oidn"
     assert options["denoise_effort"] in ("fast", "high")
-    assert "auto: pooled: after" in done.err
+    assert "auto: pooled: " in done.err
     assert done.json["method"] == "pooled"
     assert done.json["estimate"]["psnr"] >= 38
     assert done.json["spp"] < plain["spp"]

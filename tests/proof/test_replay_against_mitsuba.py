@@ -75,7 +75,13 @@ def rendered(scene, sheet, subpixels=False, placement=FITTED):
     common = {"method": "full", "spp": 1, "pixel_filter": "point", "subpixels": subpixels, "placement": placement}
     display = sheet.display()
     position, normal = (render(scene, display, integrator=name, **common) for name in ("position", "normal"))
-    return Pictures(position, normal, render(scene, display, integrator="path", depth=1, **common), sheet, subpixels)
+    return Pictures(
+        position,
+        normal,
+        render(scene, display, integrator="path", depth=1, tone_map="none", **common),
+        sheet,
+        subpixels,
+    )
 
 
 def compare(pictures, built, eye, size=(31, 37)):

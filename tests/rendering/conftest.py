@@ -37,7 +37,11 @@ class JudgedScene:
 
         scale = self.display.size_mm[0] / 2
         return lippmann.render(
-            self.scene, self.display, placement=PlacementOptions(mode="display", scale=scale), seed=seed, **options
+            self.scene,
+            self.display,
+            placement=PlacementOptions(mode="display", scale=scale),
+            seed=seed,
+            **({"tone_map": "none"} | options),
         )
 
     def picture(self, samples, method="full", denoise="none", seed=7):

@@ -42,7 +42,7 @@ def test_it_is_the_replay_of_the_whole_picture(teapot, name, eye):
     # A point on a boundary between pixels may fall to either side.
     assert (np.abs(found.pixels - replayed).max(axis=2) > 1e-4).mean() < 0.01
 
-    light = {"spp": 64, "denoise": "none", "placement": placed}
+    light = {"spp": 64, "denoise": "none", "placement": placed, "tone_map": "none"}
     whole = lippmann.render(teapot, display, method="full", **light)
     assert whole.provenance.subpixels == (name == "slanted")
     found = render_eye_preview(teapot, display, eye, RenderRequest(**light), (60, 60))

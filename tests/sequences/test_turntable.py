@@ -21,7 +21,7 @@ from lippmann.sequences.forms import QuiltForm
 from lippmann.sequences.frames import find_stand, render_quilt_sequence, render_sequence
 from lippmann.sequences.turntable import Turntable, open_turntable
 
-QUICK = {"integrator": "direct", "spp": 4, "device": "cpu"}
+QUICK = {"integrator": "direct", "spp": 4, "device": "cpu", "tone_map": "none"}
 
 
 @pytest.fixture(scope="module")

@@ -22,7 +22,7 @@ from lippmann.tiles.tiled_render import render_to_file
 
 #: Four tiles.
 DISPLAY, SIDE = load_display("seed-lenticular").resized(128, 128), 64
-SHARED = RenderRequest(method="pooled", denoise="oidn-fast", integrator="direct", spp=2, threads=2)
+SHARED = RenderRequest(method="pooled", denoise="oidn-fast", integrator="direct", spp=2, threads=2, tone_map="none")
 DENOISED = replace(SHARED, method="full")
 SUBPIXELS = replace(SHARED, subpixels=True)
 WAYS = [
@@ -52,7 +52,7 @@ def in_tiles(settings):
 
 
 def in_one_piece(settings):
-    asked = ("method", "denoise", "integrator", "spp", "seed", "threads", "subpixels")
+    asked = ("method", "denoise", "integrator", "spp", "seed", "threads", "subpixels", "tone_map")
     options = {name: getattr(settings, name) for name in asked}
     return coded(api.render("teapot", DISPLAY, memory=1 << 30, **options).pixels)
 

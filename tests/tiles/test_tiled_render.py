@@ -29,7 +29,7 @@ from lippmann.tiles.tiled_render import render_to_file
 #: 12 tiles of 32 x 32 pixels, all alike.
 DISPLAY = load_display("seed-lenticular").resized(128, 96)
 SIDE = 32
-SETTINGS = RenderRequest(method="full", integrator="direct", spp=2, memory=1 << 30)
+SETTINGS = RenderRequest(method="full", integrator="direct", spp=2, memory=1 << 30, tone_map="none")
 TILES = 12
 
 

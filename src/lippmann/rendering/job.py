@@ -12,7 +12,6 @@ from lippmann.progress import ProgressCallback
 from lippmann.rendering.estimate.pixel_errors import PixelErrors
 from lippmann.rendering.estimate.psnr import Estimate
 from lippmann.rendering.film.wavefront import Frame
-from lippmann.rendering.request.choices import Method
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.rendering.session import Session
 from lippmann.rendering.transport.integrator import Integrator
@@ -77,8 +76,6 @@ class Traced:
         How it was done, and what stages of its own that took.
     errors:
         Those of the pixels, where they are known.
-    method:
-        What won, where methods competed.
     """
 
     frame: Frame
@@ -88,4 +85,3 @@ class Traced:
     options: dict[str, object] = field(default_factory=dict)
     seconds: dict[str, float] = field(default_factory=dict)
     errors: PixelErrors | None = None
-    method: Method | None = None

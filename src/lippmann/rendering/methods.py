@@ -2,29 +2,20 @@
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.progress import ProgressCallback
-from lippmann.rendering.adaptive.convergence import Assessor, ErrorTrack
-from lippmann.rendering.adaptive.extra_samples import extra_samples, is_modest
-from lippmann.rendering.adaptive.method_race import (
-    DENOISED_SLOPE,
-    MOST_GAINED,
-    MOST_GAINED_WIDE,
-    MOST_GAINED_WIDE_AND_DEAR,
-    WIDE_LENS,
-    MethodRace,
-)
+from lippmann.rendering.adaptive.extra_samples import extra_samples
+from lippmann.rendering.adaptive.goal import Goal, goal_of
 from lippmann.rendering.adaptive.sample_allocation import SampleAllocation
-from lippmann.rendering.adaptive.stopping import Goal, Outcome, goal_of, reach
-from lippmann.rendering.denoise.cost_model import denoising_cost, effort_of, look_cost, traced_work
+from lippmann.rendering.adaptive.stopping import Costs, Outcome, reach
+from lippmann.rendering.adaptive.tuning import TUNING
+from lippmann.rendering.denoise.cost_model import denoising_cost, effort_of, traced_work
 from lippmann.rendering.denoise.dual_buffer import Denoised
 from lippmann.rendering.denoise.guided_denoiser import GuidedDenoiser
 from lippmann.rendering.denoise.light_apart import clean_light, without_excess
@@ -32,7 +23,8 @@ from lippmann.rendering.denoise.oidn import Effort
 from lippmann.rendering.denoise.outlines import by_coverage
 from lippmann.rendering.denoise.subpixels import SubpixelBatches
 from lippmann.rendering.estimate.denoised_psnr import DenoisedEstimator
-from lippmann.rendering.estimate.psnr import ERROR_LAYER, Parts, PictureEstimator
+from lippmann.rendering.estimate.pixel_errors import PixelErrors
+from lippmann.rendering.estimate.psnr import ERROR_LAYER, Estimate, Parts, PictureEstimator
 from lippmann.rendering.film.sample_batches import FullInBatches, trace_in_batches
 from lippmann.rendering.film.wavefront import Frame, RayTotals, trace_frame
 from lippmann.rendering.film.wavefront_plan import make_plan
@@ -40,7 +32,7 @@ from lippmann.rendering.job import Job, Traced
 from lippmann.rendering.light_statements import is_among_mirrors
 from lippmann.rendering.reprojection.common.point_image import STATUS_LAYER, TRACED
 from lippmann.rendering.reprojection.renderer import trace_reused as trace_reprojected
-from lippmann.rendering.request.choices import Denoiser, Method
+from lippmann.rendering.request.choices import Method
 from lippmann.rendering.request.preconditions import why_no_estimate
 from lippmann.rendering.transport.integrator import Integrator, ReusableIntegrator
 from lippmann.rendering.transport.path import PathIntegrator
@@ -51,9 +43,6 @@ Floats = NDArray[np.float32]
 #: The layer of a picture with the number of samples that each pixel had.
 SAMPLES_LAYER = "samples"
 
-#: Samples per pixel that are taken at once where paths come without chains and look up no photons: launches have a cost
-#: of their own.
-_CHEAP_TOGETHER = 4.0
 #: Samples per pixel from which on cheap ones are divided among the pixels.
 FEWEST_DIVIDED = 8
 #: Share of the pixels that may show images of small emitters where noise is to tell which need more samples.
@@ -76,10 +65,9 @@ def trace_samples(job: Job) -> Traced:
         return _denoised_whole(job, _one_stream(job, why))
     if job.treatment is not None:
         return _denoised_part(job)
-    if job.request.denoise == "none" and not job.request.is_open_ended:
-        return _fixed_samples(job)
-    goal = goal_of(job.request) or Goal(spp=job.request.samples)
-    return _until(job, replace(goal, part="view") if isinstance(job.source, QuiltRays) else goal)
+    if job.request.is_open_ended:
+        return _samples_for_goal(job)
+    return _fixed_samples(job) if job.request.denoise == "none" else _denoised_samples(job)
 
 
 def trace_reused(job: Job) -> Traced:
@@ -137,85 +125,78 @@ def _fixed_samples(job: Job) -> Traced:
     return Traced(frame, job.request.samples, _estimator(job).estimate(errors))
 
 
-def _most_gained(job: Job) -> float:
-    """By how much pooling gains at most, by the lenses of a display; views of a quilt count as narrow ones."""
-    source = job.source
-    if isinstance(source, QuiltRays) or source.display.pixels_per_lens[0] < WIDE_LENS:
-        return MOST_GAINED
-    return MOST_GAINED_WIDE_AND_DEAR if _is_dear(job.integrator) else MOST_GAINED_WIDE
-
-
-def _is_dear(integrator: Integrator) -> bool:
+def _is_costly(integrator: Integrator) -> bool:
     """Whether each sample comes with chains, or looks up photons."""
     if not isinstance(integrator, PathIntegrator):
         return False
     return integrator.photons is not None or integrator.seen_chains is not None
 
 
-def _until(job: Job, goal: Goal) -> Traced:
-    """As many samples as the goal takes, the noise taken out of them where that is asked for or proves better."""
+def _denoised_samples(job: Job) -> Traced:
+    """So many samples, denoised; more where the number was left open and the picture is not clean with them."""
+    batches = _batches(job)
+    denoiser = _denoiser(job, batches)
+    picture = _denoised(job, batches, denoiser)
+    estimator = _estimator(job, DenoisedEstimator)
+    sampler = allocation(job, batches, picture) if divides_samples(job) else batches
+    reserve, samples = job.request.spp_reserve, job.request.samples
+    while samples:
+        sampler.add(samples, job.progress)
+        errors = picture.squared_error()
+        estimate = estimator.estimate(errors)
+        samples, reserve = extra_samples(estimate, batches.samples, reserve), None
+    return _traced(job, batches, picture, denoiser, errors=errors, estimate=estimate)
+
+
+def _samples_for_goal(job: Job) -> Traced:
+    """As many samples as the goal takes: plain ones where the noise is to stay, else always denoised ones."""
+    batches = _batches(job)
+    denoiser = None if job.request.denoise == "none" else _denoiser(job, batches)
+    if denoiser is None:
+        picture: FullInBatches | Denoised = batches
+        estimator = _estimator(job)
+        costs = Costs(estimator.first)
+    else:
+        picture = _denoised(job, batches, denoiser)
+        estimator = _estimator(job, DenoisedEstimator)
+        is_early = goal_of(job.request).is_modest or _is_costly(job.integrator)
+        first = TUNING.first_look_costly if is_early else TUNING.first_look
+        costs = Costs(first, TUNING.denoised_slope, 0.0 if job.request.max_time is None else denoiser.probe())
+    goal = _timed_goal(job)
+    outcome = reach(goal, batches, picture, estimator, costs, job.progress)
+    if outcome.estimate is None and goal.seconds_left(time.perf_counter() - (goal.began or 0.0)) < costs.assessment:
+        # The time is up after one sample, and denoising takes longer than what is left.
+        picture, denoiser = batches, None
+    notes = _end_notes(goal, outcome)
+    return _traced(job, batches, picture, denoiser, errors=outcome.errors, estimate=outcome.estimate, notes=notes)
+
+
+def _timed_goal(job: Job) -> Goal:
+    """The goal of the request; its time counts from the request's beginning and holds what follows the last sample."""
     writing = _SECONDS_PER_PIXEL_WRITTEN * job.source.width * job.source.height
     began = time.perf_counter() if job.request.began is None else job.request.began
-    goal = replace(goal, began=began, reserve=writing)
-    batches = _batches(job)
-    estimator = _estimator(job)
+    part = "view" if isinstance(job.source, QuiltRays) else "micro-image"
+    return replace(goal_of(job.request), began=began, reserve=writing, part=part)
 
-    def rays() -> float:
-        return _rays_per_pixel(job, batches.rays)
 
-    plain = _Candidate(batches, ErrorTrack(batches, estimator))
-    denoised = None if job.request.denoise == "none" else _denoised_candidate(job, goal, batches, rays)
-    if denoised is None:
-        assessor: Assessor = plain.track
-    elif job.request.denoise == "auto":
-        assessor = MethodRace(goal, plain.track, denoised.track, rays, _most_gained(job))
-    else:
-        assessor = denoised.track
-    add: Callable[[int, ProgressCallback], None] = batches.add
-    if denoised is not None and divides_samples(job):
-        assert isinstance(denoised.renderer, Denoised)
-        add = allocation(job, batches, denoised.renderer).add
-    outcome = reach(goal, add, assessor, job.progress, probe=batches.probe)
-    more = extra_samples(outcome, job.request.spp_reserve)
-    if more:
-        outcome = _with_more(outcome, more, add, assessor, job.progress)
-    options: dict[str, object] = {}
-    notes = _end_notes(goal, outcome)
-    method = job.request.method
-    won = denoised or plain
-    if isinstance(assessor, MethodRace):
-        assert denoised is not None
-        reason = assessor.reason
-        if outcome.estimate is None and goal.seconds_left(time.perf_counter() - began) >= denoised.track.seconds():
-            # An assessment takes more: it cleans halves.
-            reason = "a single sample, which tells no error, is best without its noise"
-        elif assessor.leader == "plain":
-            won = plain
-        if method == "full":
-            method = "full" if won is plain else "pooled"
-            options["auto"] = f"{method}: {reason}"
-        elif won is plain:
-            notes = (*notes, f"the light is not pooled: {reason}")
-    frame = Frame(won.renderer.picture(), batches.rays, batches.seconds_compile, batches.seconds_trace)
+def _traced(
+    job: Job,
+    batches: FullInBatches,
+    picture: FullInBatches | Denoised,
+    denoiser: GuidedDenoiser | None,
+    *,
+    errors: PixelErrors | None,
+    estimate: Estimate | None,
+    notes: tuple[str, ...] = (),
+) -> Traced:
+    """The picture of batches, with the maps of its samples and errors."""
+    frame = Frame(picture.picture(), batches.rays, batches.seconds_compile, batches.seconds_trace)
     frame.maps[SAMPLES_LAYER] = batches.samples_of_pixels()
-    if outcome.errors is not None:
-        frame.maps[ERROR_LAYER] = np.maximum(outcome.errors.values, 0)
-    seconds = {} if denoised is None or denoised.denoiser is None else {"denoise": denoised.denoiser.seconds}
-    options |= _denoiser_options(job, won.denoiser)
-    return Traced(frame, outcome.samples, outcome.estimate, notes, options, seconds, method=method)
-
-
-def _with_more(
-    outcome: Outcome,
-    more: int,
-    add: Callable[[int, ProgressCallback], None],
-    assessor: Assessor,
-    progress: ProgressCallback,
-) -> Outcome:
-    add(more, progress)
-    samples = outcome.samples + more
-    assessment = assessor.assess(samples, 1.0)
-    return replace(outcome, estimate=assessment.estimate, errors=assessment.errors, samples=samples)
+    if errors is not None:
+        frame.maps[ERROR_LAYER] = np.maximum(errors.values, 0)
+    seconds = {} if denoiser is None else {"denoise": denoiser.seconds}
+    options = {} if denoiser is None else _denoiser_options(denoiser)
+    return Traced(frame, batches.samples, estimate, notes, options, seconds, errors)
 
 
 def divides_samples(job: Job) -> bool:
@@ -226,27 +207,16 @@ def divides_samples(job: Job) -> bool:
     """
     images = job.integrator.mirror_images if isinstance(job.integrator, PathIntegrator) else None
     few = images is None or images.with_images <= MOST_WITH_IMAGES * job.traced.width * job.traced.height
-    is_worth = job.request.samples >= FEWEST_DIVIDED or _is_dear(job.integrator)
+    is_worth = job.request.samples >= FEWEST_DIVIDED or _is_costly(job.integrator)
     return few and is_worth and not job.request.is_open_ended
 
 
 def allocation(job: Job, batches: FullInBatches, denoised: Denoised | None = None) -> SampleAllocation:
-    """Divides the samples of ``batches``: by the ``denoised`` picture where it is at hand, else by a fast look."""
+    """Divides the samples of ``batches``: by the ``denoised`` picture where it is at hand, else by a quick one."""
     threads = job.session.engine.threads
-
-    def rays() -> float:
-        return _rays_per_pixel(job, batches.rays)
-
-    def look() -> Denoised:
-        quick = _denoiser(job, rays, "fast")
-        assert quick is not None
-        return Denoised(batches, quick.denoise, job.request.transfer, threads, coverage=quick.coverage)
-
-    def cost() -> float:
-        spent = rays()
-        return denoising_cost("fast") / spent if spent else math.inf
-
-    return SampleAllocation(batches, denoised, (look, cost), threads)
+    denoiser = _denoiser(job, batches, "fast")
+    quick = Denoised(batches, denoiser.denoise, job.request.transfer, threads, coverage=denoiser.coverage)
+    return SampleAllocation(batches, denoised, quick, denoising_cost("fast") / job.traced.channels, threads)
 
 
 def _batches(job: Job) -> FullInBatches:
@@ -264,26 +234,12 @@ def _batches(job: Job) -> FullInBatches:
 
 
 def _denoised_part(job: Job) -> Traced:
-    """So many samples without their noise, for a picture that is put together and assessment elsewhere."""
+    """So many samples without their noise, for a picture that is put together and assessed elsewhere."""
     batches = _batches(job)
     batches.add(job.request.samples, job.progress)
-    denoiser = _denoiser(job, lambda: _rays_per_pixel(job, batches.rays))
-    assert denoiser is not None
-    denoised = _denoised(job, batches, denoiser)
-    errors = denoised.squared_error()
-    frame = Frame(denoised.picture(), batches.rays, batches.seconds_compile, batches.seconds_trace)
-    frame.maps[ERROR_LAYER] = np.maximum(errors.values, 0)
-    seconds = {"denoise": denoiser.seconds}
-    return Traced(frame, batches.samples, options=_denoiser_options(job, denoiser), seconds=seconds, errors=errors)
-
-
-@dataclass(frozen=True)
-class _Candidate:
-    """A picture that grows, the track of its error, and its denoiser."""
-
-    renderer: FullInBatches | Denoised
-    track: ErrorTrack
-    denoiser: GuidedDenoiser | None = None
+    denoiser = _denoiser(job, batches)
+    picture = _denoised(job, batches, denoiser)
+    return _traced(job, batches, picture, denoiser, errors=picture.squared_error(), estimate=None)
 
 
 def _denoised(job: Job, batches: FullInBatches, denoiser: GuidedDenoiser) -> Denoised:
@@ -291,24 +247,6 @@ def _denoised(job: Job, batches: FullInBatches, denoiser: GuidedDenoiser) -> Den
     return Denoised(
         batches, denoiser.denoise, job.request.transfer, job.session.engine.threads, share, denoiser.coverage
     )
-
-
-def _denoised_candidate(job: Job, goal: Goal, batches: FullInBatches, rays: Callable[[], float]) -> _Candidate:
-    denoiser = _denoiser(job, rays)
-    assert denoiser is not None
-    renderer = _denoised(job, batches, denoiser)
-    seconds = 0.0 if goal.max_time is None else denoiser.probe()
-
-    def worth_from() -> float:
-        if is_modest(goal):
-            return 0.0
-        spent = rays()
-        if not spent:
-            return 0.0 if _is_dear(job.integrator) else _CHEAP_TOGETHER
-        return batches.samples * look_cost(spent) / spent
-
-    track = ErrorTrack(renderer, _estimator(job, DenoisedEstimator), DENOISED_SLOPE, seconds, worth_from)
-    return _Candidate(renderer, track, denoiser)
 
 
 def _rays_per_pixel(job: Job, rays: RayTotals) -> float:
@@ -358,25 +296,24 @@ def _reused(job: Job) -> Traced:
 
 def _denoised_whole(job: Job, traced: Traced) -> Traced:
     """What was traced without its noise, where that is asked for and nothing is known of the error anyway."""
-    denoiser = _denoiser(job, lambda: _rays_per_pixel(job, traced.frame.rays))
-    if denoiser is None:
+    if job.request.denoise == "none":
         return traced
     frame, source = traced.frame, job.traced
+    denoiser = _denoiser(job, frame)
     noisy = frame.pixels
     if frame.coverage is not None and (further := denoiser.coverage()) is not None:
         noisy = by_coverage(noisy, frame.coverage, further[0] + further[1], threads=job.session.engine.threads)
     (cleaned,) = clean_light(noisy, frame.seen, denoiser, None)
     cleaned = without_excess(cleaned, frame.excess)
     frame.pixels = source.own_colors(cleaned) if isinstance(source, SubpixelRays) else cleaned
-    return replace(traced, options=_denoiser_options(job, denoiser), seconds={"denoise": denoiser.seconds})
+    return replace(traced, options=_denoiser_options(denoiser), seconds={"denoise": denoiser.seconds})
 
 
-def _denoiser(job: Job, rays_per_pixel: Callable[[], float], effort: Effort | None = None) -> GuidedDenoiser | None:
-    """By the effort that so many rays are worth, or by that which is given."""
-    asked: Denoiser = "oidn" if job.request.denoise == "auto" else job.request.denoise
-    if asked == "none":
-        return None
-    common = job.treatment
+def _denoiser(job: Job, samples: FullInBatches | Frame, effort: Effort | None = None) -> GuidedDenoiser:
+    """By the effort that the rays of ``samples`` are worth, or by that which is given."""
+    common, asked = job.treatment, job.request.denoise
+    if common is not None:
+        effort = common.effort
     return GuidedDenoiser(
         job.session.built,
         job.traced,
@@ -385,17 +322,14 @@ def _denoiser(job: Job, rays_per_pixel: Callable[[], float], effort: Effort | No
         box_filter=job.request.box_filter,
         memory=job.session.memory,
         threads=job.session.engine.threads,
-        effort=lambda: effort or (effort_of(asked, rays_per_pixel()) if common is None else common.effort),
+        effort=lambda: effort or effort_of(asked, _rays_per_pixel(job, samples.rays)),
         exposure=None if common is None else common.exposure,
-        # Where a denoised picture is free to be the best one, it shares its light.
-        shares=job.request.shares_light or job.request.denoise == "auto",
+        shares=job.request.shares_light,
         progress=job.progress,
     )
 
 
-def _denoiser_options(job: Job, denoiser: GuidedDenoiser | None) -> dict[str, object]:
-    if denoiser is None:
-        return {}
+def _denoiser_options(denoiser: GuidedDenoiser) -> dict[str, object]:
     return {"denoise": "oidn", "denoise_effort": denoiser.used, "denoise_form": denoiser.form()}
 
 

@@ -77,7 +77,6 @@ def render_picture(
             **traced.options,
             **placed_options(request, placement),
         },
-        method=traced.method,
         estimate=traced.estimate,
         notes=(*placement.warnings, *traced.notes),
     )

@@ -94,7 +94,6 @@ def render_quilt(
             "window": list(astuple(source.window)),
             **placed_options(request, placement),
         },
-        method=traced.method,
         estimate=traced.estimate,
         notes=(*placement.warnings, *traced.notes),
     )

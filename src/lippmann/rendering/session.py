@@ -250,12 +250,11 @@ class Session:
         *,
         samples: int,
         options: Mapping[str, object],
-        method: str | None = None,
         estimate: Estimate | None = None,
         notes: tuple[str, ...] = (),
         has_pixels: bool = True,
     ) -> Provenance:
-        """How a picture of ``frame`` was made, for its file; ``method`` is the request's where it is None.
+        """How a picture of ``frame`` was made, for its file.
 
         ``has_pixels`` says that the frame holds the picture, not its size alone.
         """
@@ -263,7 +262,7 @@ class Session:
         height, width = frame.pixels.shape[:2]
         rays, work = frame.rays, height * width * samples * request.channels
         return Provenance(
-            method=method or request.method,
+            method=request.method,
             integrator=request.integrator,
             depth=request.surfaces,
             spp=samples,
@@ -363,7 +362,7 @@ def _without_pooling(request: RenderRequest, built: BuiltScene | BuiltClassic) -
             rule="this scene has participating media, whose light lies on none",
             fix='use method="full"',
         )
-    return replace(request, denoise="none") if request.denoise == "auto" else request
+    return request
 
 
 def memory_limit(request: RenderRequest) -> int:

@@ -124,6 +124,7 @@ def engine_renderer(
             depth=PHYSICAL_DEPTH if physical else paper_values.RAY_DEPTH,
             spp=PHYSICAL_SAMPLES if physical else 1,
             pixel_filter="box" if physical else "point",
+            tone_map="none",
             device=cast("Device", device),
             threads=threads,
         )

@@ -57,6 +57,7 @@ class Scene:
     None for all others; ``home_may_move`` says that it need not be kept to exactly where a display shows more or less.
     ``studio`` says whether the built-in studio may light a scene that has no lights. ``light`` changes the direction
     and the strength of its light: :attr:`environment` and :attr:`lights` are those after that change.
+    ``has_chosen_background`` says that the background is of a colour that the caller asked for.
 
     A scene from Mitsuba knows its ``bounds``, ``cameras``, ``lights`` and hence ``environment``, ``background`` and
     ``notes`` only once the engine has started: asked before, they start it.
@@ -70,6 +71,7 @@ class Scene:
     classic: ClassicScene | None = field(default=None, repr=False)
     views: tuple[Camera, ...] = field(default=(), repr=False)
     light: LightOptions = field(default_factory=LightOptions, repr=False)
+    has_chosen_background: bool = field(default=False, repr=False)
 
     def __post_init__(self) -> None:
         if self.description is None and self.classic is None:

@@ -32,6 +32,7 @@ from lippmann.rendering.estimate.denoised_psnr import estimate_denoised
 from lippmann.rendering.estimate.pixel_errors import OWN_NOISE, ErrorSums
 from lippmann.rendering.estimate.psnr import Estimate, estimate_of_sums
 from lippmann.rendering.film import memory_model
+from lippmann.rendering.request.choices import tone_map_of
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.rendering.session import memory_limit
 from lippmann.runtime import engine as engines
@@ -116,6 +117,7 @@ def render_to_file(
     name, stored = format_for(output, bits)
     finish.check_stored(stored, output)
     finish.check_colors(request.transfer)
+    request = replace(request, tone_map=tone_map_of(request.tone_map, output))
     printed = finish.display(display)
     check_output(output, name)
     if name == "zarr":

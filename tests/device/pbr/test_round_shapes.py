@@ -163,7 +163,7 @@ def test_a_picture_of_round_bodies_is_that_of_fine_triangles():
     )
     triangles = replace(round_one, meshes=[replace(mesh, stands_for=None) for mesh in round_one.meshes])
     assert sorted(shapes_of(round_one)) == ["Ellipsoids"] * 2 + ["LinearCurve"]
-    options = {"method": "full", "denoise": "none", "spp": 64, "integrator": "direct"}
+    options = {"method": "full", "denoise": "none", "spp": 64, "integrator": "direct", "tone_map": "none"}
     found, expected = (
         lippmann.render(Scene(name, each), display, **options).pixels
         for name, each in (("a", round_one), ("b", triangles))

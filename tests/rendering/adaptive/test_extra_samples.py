@@ -2,27 +2,27 @@
 
 import pytest
 
-from lippmann.rendering.adaptive.extra_samples import CLEAN, extra_samples
-from lippmann.rendering.adaptive.stopping import Outcome
+from lippmann.rendering.adaptive.extra_samples import extra_samples
+from lippmann.rendering.adaptive.tuning import TUNING
 from lippmann.rendering.estimate.psnr import Estimate
 
+CLEAN = TUNING.clean
 
-def after(psnr, samples=8):
-    estimate = Estimate(psnr, psnr - 1, psnr + 1, psnr - 5, psnr - 6, psnr - 4, (0, 0))
-    return Outcome("samples", estimate, samples, (), None)
+
+def of(psnr):
+    return Estimate(psnr, psnr - 1, psnr + 1, psnr - 5, psnr - 6, psnr - 4, (0, 0))
 
 
 def test_clean_pictures_and_asked_numbers_stay():
-    assert extra_samples(after(CLEAN), 64) == 0
-    assert extra_samples(after(20.0), None) == 0
-    assert extra_samples(Outcome("samples", None, 1, (), None), 64) == 0
+    assert extra_samples(of(CLEAN), 8, 64) == 0
+    assert extra_samples(of(20.0), 8, None) == 0
 
 
 @pytest.mark.parametrize(("psnr", "total"), [(CLEAN - 0.1, 16), (CLEAN - 3.0, 24), (CLEAN - 20.0, 32)])
 def test_as_many_as_the_estimate_suggests_but_no_more_than_there_may_be(psnr, total):
-    assert extra_samples(after(psnr), 32) == total - 8
+    assert extra_samples(of(psnr), 8, 32) == total - 8
 
 
 def test_few_samples_grow_by_small_steps():
-    assert extra_samples(after(CLEAN - 0.1, samples=2), 8) == 2
-    assert extra_samples(after(CLEAN - 9.0, samples=2), 8) == 6
+    assert extra_samples(of(CLEAN - 0.1), 2, 8) == 2
+    assert extra_samples(of(CLEAN - 9.0), 2, 8) == 6

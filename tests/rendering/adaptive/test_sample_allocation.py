@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from unittest import mock
 
 import numpy as np
@@ -12,7 +13,8 @@ from hypothesis import strategies as st
 import lippmann
 from lippmann.color.transfer import encode_srgb
 from lippmann.progress import Progress
-from lippmann.rendering.adaptive.sample_allocation import MOST_OF_LOOK, SampleAllocation
+from lippmann.rendering.adaptive.sample_allocation import SampleAllocation
+from lippmann.rendering.adaptive.tuning import TUNING
 
 SHAPE = (16, 24)
 
@@ -73,7 +75,7 @@ def steep():
 def test_about_half_goes_to_all_pixels(had, samples, for_all, each):
     batches, look = Recorded(had), Noisy(steep())
     reports = []
-    SampleAllocation(batches, None, (lambda: look, lambda: 0.0)).add(samples, reports.append)
+    SampleAllocation(batches, None, look, 0.0).add(samples, reports.append)
     assert batches.for_all == [for_all]
     assert batches.samples == had + samples
     assert reports[-1].done == pytest.approx(reports[-1].total)
@@ -89,15 +91,18 @@ def test_about_half_goes_to_all_pixels(had, samples, for_all, each):
 
 def test_a_look_that_is_too_dear_is_left_out():
     batches, look = Recorded(), Noisy(steep())
-    SampleAllocation(batches, None, (lambda: look, lambda: MOST_OF_LOOK * 1.01)).add(16)
+    SampleAllocation(batches, None, look, TUNING.most_of_look * 8 * 1.01).add(16)
     assert batches.for_all == [8, 8]
     assert not batches.chosen
     assert look.asked == 0
+    batches = Recorded()
+    SampleAllocation(batches, None, look, TUNING.most_of_look * 8 * 0.99).add(16)
+    assert look.asked == 1
 
 
 def test_a_picture_that_is_clean_already_is_looked_at_first():
     batches, look, clean = Recorded(8), Noisy(None), Noisy(steep(), is_current=True)
-    SampleAllocation(batches, clean, (lambda: look, lambda: 0.0)).add(24)
+    SampleAllocation(batches, clean, look, 0.0).add(24)
     assert (look.asked, clean.asked) == (0, 1)
     assert len(batches.chosen) == 1
 
@@ -106,21 +111,21 @@ def test_noise_that_is_even_gives_all_pixels_the_same():
     noise = np.random.default_rng(1).exponential(size=SHAPE).astype(np.float32)
     for each in (noise, np.ones(SHAPE, np.float32), np.zeros(SHAPE, np.float32)):
         batches = Recorded()
-        SampleAllocation(batches, None, (lambda each=each: Noisy(each), lambda: 0.0)).add(16)
+        SampleAllocation(batches, None, Noisy(each), 0.0).add(16)
         assert batches.for_all == [8, 8]
         assert not batches.chosen
 
 
 def test_dear_pixels_are_chosen_for_more_noise_alone(monkeypatch):
-    monkeypatch.setattr("lippmann.rendering.adaptive.sample_allocation.LEAST_NOISE", 0.0)
+    monkeypatch.setattr("lippmann.rendering.adaptive.sample_allocation.TUNING", replace(TUNING, least_noise=0.0))
     rays = np.ones(SHAPE, np.float32)
     rays[:8] = 10
     batches, noise = Recorded(rays=rays), np.ones(SHAPE, np.float32)
-    SampleAllocation(batches, None, (lambda: Noisy(noise), lambda: 0.0)).add(16)
+    SampleAllocation(batches, None, Noisy(noise), 0.0).add(16)
     assert batches.chosen[0][0][9:].all()
     noise[:8] = 20
     batches = Recorded(rays=rays)
-    SampleAllocation(batches, None, (lambda: Noisy(noise), lambda: 0.0)).add(16)
+    SampleAllocation(batches, None, Noisy(noise), 0.0).add(16)
     assert not batches.chosen[0][0][9:].any()
 
 
@@ -129,8 +134,9 @@ def test_chosen_pixels_cost_what_all_would_have(seed, samples, number):
     random = np.random.default_rng(seed)
     rays = random.uniform(1, 9, SHAPE).astype(np.float32)
     batches = Recorded(rays=rays, batches=number)
-    with mock.patch("lippmann.rendering.adaptive.sample_allocation.LEAST_NOISE", 0.0):
-        SampleAllocation(batches, None, (lambda: Noisy(random.exponential(size=SHAPE)), lambda: 0.0)).add(samples)
+    every = replace(TUNING, least_noise=0.0)
+    with mock.patch("lippmann.rendering.adaptive.sample_allocation.TUNING", every):
+        SampleAllocation(batches, None, Noisy(random.exponential(size=SHAPE)), 0.0).add(samples)
     ((chosen, each, mean),) = batches.chosen
     assert each % number == 0
     assert sum(batches.for_all) + mean == samples
@@ -147,7 +153,9 @@ def test_a_room_by_as_many_rays(monkeypatch):
     display = lippmann.load_display("seed-lenticular").resized(128, 96)
 
     def room(method="pooled", spp=16, seed=1, **options):
-        return lippmann.render("room", display, integrator="path", method=method, spp=spp, seed=seed, **options)
+        return lippmann.render(
+            "room", display, integrator="path", method=method, spp=spp, seed=seed, tone_map="none", **options
+        )
 
     references = [coded(room("full", 128, seed)) for seed in (8, 9)]
 

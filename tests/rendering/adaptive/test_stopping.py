@@ -9,19 +9,24 @@ from lippmann.display import Display
 from lippmann.display.lens_array import LensArray
 from lippmann.display.panel import Panel
 from lippmann.progress import Progress
-from lippmann.rendering.adaptive.convergence import ErrorTrack
-from lippmann.rendering.adaptive.stopping import STEP, TOLERANCE, Goal, reach
+from lippmann.rendering.adaptive.goal import Goal
+from lippmann.rendering.adaptive.stopping import Costs, reach
+from lippmann.rendering.adaptive.tuning import TUNING
 from lippmann.rendering.estimate.pixel_errors import OWN_NOISE, PixelErrors
-from lippmann.rendering.estimate.psnr import Estimate, PictureEstimator
+from lippmann.rendering.estimate.psnr import PictureEstimator
 
 SHOWN = Display("test", Panel(64, 64, 0.25), LensArray("square", 2.0), gap=6.8)
 
 
 class Noise:
-    """A renderer whose squared error is ``error * samples**-slope``; a sample takes ``seconds`` of its own clock."""
+    """A renderer whose squared error is ``error * samples**-slope``; a sample takes ``seconds`` of its own clock.
 
-    def __init__(self, error=0.05, slope=1.0, seconds=0.01, floor=0.0):
+    A probe says that it takes ``probed``.
+    """
+
+    def __init__(self, error=0.05, slope=1.0, seconds=0.01, floor=0.0, probed=None):
         self.error, self.slope, self.seconds, self.floor = error, slope, seconds, floor
+        self.probed = seconds if probed is None else probed
         self.samples, self.now = 0, 0.0
         self.random = np.random.default_rng(1)
 
@@ -34,13 +39,17 @@ class Noise:
         expected = self.error * self.samples**-self.slope + self.floor
         return PixelErrors((expected * self.random.chisquare(1, (64, 64))).astype(np.float32), None, OWN_NOISE)
 
+    def probe(self):
+        return self.probed
+
     def clock(self):
         return self.now
 
 
-def run(goal, renderer, reports=None):
+def run(goal, renderer, reports=None, *, estimator=PictureEstimator, costs=None):
     listen = reports.append if reports is not None else lambda _: None
-    return reach(goal, renderer.add, ErrorTrack(renderer, PictureEstimator(SHOWN)), listen, renderer.clock)
+    told = estimator(SHOWN)
+    return reach(goal, renderer, renderer, told, costs or Costs(told.first), listen, renderer.clock)
 
 
 @pytest.mark.parametrize("slope", [0.8, 1.0, 1.5])
@@ -49,46 +58,37 @@ def test_the_quality_is_reached_without_wasting_samples(slope):
     outcome = run(Goal(quality_worst=40), renderer)
     assert outcome.end == "quality"
     assert outcome.estimate.worst >= 40
-    assert outcome.estimate.worst_low >= 40 - TOLERANCE
+    assert outcome.estimate.worst_low >= 40 - TUNING.tolerance
     # The worst of 64 lenses of 64 pixels is about 2 dB worse than all together.
     assert outcome.estimate.worst < 42
     assert len(outcome.rounds) <= 9
     assert outcome.samples == renderer.samples
 
 
-class Sooner(PictureEstimator):
-    first = fewest = 4
-
-
-@pytest.mark.parametrize(("dear_until", "first"), [(0, 4), (5, 8), (100, 8)])
-def test_the_first_look_waits_while_it_takes_more_than_samples(dear_until, first):
-    """Not longer than for 8 samples; whatever comes then is a multiple of the batches again."""
-    renderer = Noise(error=0.2)
-    track = ErrorTrack(renderer, Sooner(SHOWN), worth_from=lambda: dear_until if renderer.samples else 0)
-    outcome = reach(Goal(quality=40), renderer.add, track, clock=renderer.clock)
-    found = [each.samples for each in outcome.rounds]
-    assert found[0] == first
-    assert all(samples % STEP == 0 for samples in found[1:])
+@pytest.mark.parametrize("first", [2, 4])
+def test_the_first_look_is_where_the_costs_say_and_later_rounds_are_multiples_of_the_batches(first):
+    outcome = run(Goal(quality=40), Noise(error=0.2), costs=Costs(first))
+    counts = [each.samples for each in outcome.rounds]
+    assert counts[0] == first
+    assert all(samples % TUNING.step == 0 for samples in counts[1:])
 
 
 def test_what_very_few_samples_say_multiplies_them_no_more_than_other_rounds():
-    class FromTwo(PictureEstimator):
-        first = 2
-
-    renderer = Noise(error=0.5)
-    outcome = reach(
-        Goal(quality=30, spp=1000), renderer.add, ErrorTrack(renderer, FromTwo(SHOWN)), clock=renderer.clock
-    )
+    outcome = run(Goal(quality=30, spp=1000), Noise(error=0.5), costs=Costs(2))
     assert [each.samples for each in outcome.rounds][:3] == [2, 8, 16]
 
 
-def test_where_time_is_short_no_look_waits():
+def test_where_time_is_short_there_are_fewer_samples_than_a_first_look_has():
     renderer = Noise(error=0.2, seconds=1.0)
-    track = ErrorTrack(renderer, Sooner(SHOWN), worth_from=lambda: 100.0)
-    goal = Goal(quality=40, max_time=5.5)
-    outcome = reach(goal, renderer.add, track, clock=renderer.clock, probe=lambda: 1.0)
-    assert renderer.now <= 5.5
-    assert outcome.rounds[0].samples == 4
+    outcome = run(Goal(quality=40, max_time=4.0), renderer, costs=Costs(4))
+    assert renderer.now <= 4.0
+    assert outcome.rounds[0].samples == 3
+
+
+def test_a_picture_that_converges_slowly_gets_larger_rounds():
+    """The expected power of the samples counts until rounds have shown the true one."""
+    plain, denoised = (run(Goal(quality=30), Noise(), costs=Costs(4, slope)).rounds for slope in (1.0, 0.4))
+    assert denoised[-1].samples >= plain[-1].samples
 
 
 def test_the_mean_asks_for_less_than_the_worst():
@@ -110,43 +110,26 @@ def test_time_ends_it_with_the_best_so_far():
 def test_the_first_round_fits_the_time(seconds, samples):
     """A probe tells how many samples there is time for; one of every pixel is the least that is a picture."""
     renderer = Noise(seconds=seconds)
-    goal = Goal(max_time=10.0)
-    outcome = reach(
-        goal, renderer.add, ErrorTrack(renderer, PictureEstimator(SHOWN)), clock=renderer.clock, probe=lambda: seconds
-    )
+    outcome = run(Goal(max_time=10.0), renderer)
     assert renderer.now <= max(10.0, seconds)
     assert (outcome.end, outcome.samples) == ("time", samples)
     assert (outcome.estimate is None) == (outcome.samples == 1)
 
 
 def test_a_probe_that_promised_too_much_is_not_believed_twice():
-    renderer = Noise(seconds=1.0)
-    outcome = reach(
-        Goal(max_time=10.0),
-        renderer.add,
-        ErrorTrack(renderer, PictureEstimator(SHOWN)),
-        clock=renderer.clock,
-        probe=lambda: 1.2,
-    )
-    assert (outcome.samples, renderer.now <= 10.0) == (9, True)
-    slow = Noise(seconds=30.0)
-    outcome = reach(
-        Goal(max_time=40.0), slow.add, ErrorTrack(slow, PictureEstimator(SHOWN)), clock=slow.clock, probe=lambda: 25.0
-    )
+    renderer = Noise(seconds=1.0, probed=1.2)
+    assert (run(Goal(max_time=10.0), renderer).samples, renderer.now <= 10.0) == (9, True)
+    slow = Noise(seconds=30.0, probed=25.0)
+    outcome = run(Goal(max_time=40.0), slow)
     assert (outcome.samples, outcome.estimate) == (1, None)
 
 
-def test_without_a_limit_of_time_nothing_is_probed():
-    def never():
-        raise AssertionError("no probe is wanted")
+def test_without_a_limit_of_time_nothing_is_probed(monkeypatch):
+    def never(_):
+        raise AssertionError("no probe is due")
 
-    renderer = Noise()
-    assert (
-        reach(
-            Goal(spp=8), renderer.add, ErrorTrack(renderer, PictureEstimator(SHOWN)), clock=renderer.clock, probe=never
-        ).samples
-        == 8
-    )
+    monkeypatch.setattr(Noise, "probe", never)
+    assert run(Goal(spp=8), Noise()).samples == 8
 
 
 def test_samples_end_it():
@@ -191,34 +174,3 @@ def test_reports_climb_to_the_end_and_say_where_the_picture_stands():
     assert all(report.done <= report.total for report in reports)
     assert "of 40 dB, about" in reports[-1].note
     assert reports[-1].note.endswith("s left")
-
-
-def test_missing_is_by_the_likely_value_and_by_the_low_end():
-    wide = Estimate(45, 44, 46, 41.0, 38.0, 43.0, (0, 0))
-    assert Goal(quality_worst=40).missing(wide) == pytest.approx(1.0)
-    narrow = Estimate(45, 44.9, 45.1, 41.0, 40.8, 41.2, (0, 0))
-    assert Goal(quality_worst=42).missing(narrow) == pytest.approx(1.0)
-    assert Goal(quality=44).missing(wide) <= 0
-
-
-def test_among_mirrors_few_samples_need_a_margin_of_their_own_for_the_worst():
-    from lippmann.rendering.estimate.denoised_psnr import DenoisedEstimator
-    from lippmann.rendering.estimate.psnr import AMONG_MIRRORS, FEW_AMONG_MIRRORS, NO_MARGIN, Estimate, Margin
-
-    plain, denoised = PictureEstimator(SHOWN), DenoisedEstimator(SHOWN)
-    assert plain.margin(8) == Margin(4.0, 4.0)
-    assert denoised.margin(2) == NO_MARGIN
-    for each in (plain, denoised):
-        each.expect_mirrors()
-        assert each.fewest == 16
-        assert each.margin(16) == NO_MARGIN
-    assert (plain.first, denoised.first) == (8, 2)
-    assert plain.margin(8) == Margin(4.0, 8.0)
-    assert denoised.margin(8) == AMONG_MIRRORS
-    assert denoised.margin(2) == denoised.margin(4) == FEW_AMONG_MIRRORS
-    assert FEW_AMONG_MIRRORS.whole > AMONG_MIRRORS.whole
-    estimate = Estimate(38.0, 37.0, 39.0, 26.0, 25.0, 27.0, (0, 0))
-    assert Goal(quality=35).missing(estimate) == pytest.approx(-3)
-    # The worst micro-image may have 12 dB less than the whole.
-    assert Goal(quality=35).missing(estimate, AMONG_MIRRORS) == pytest.approx(23 + 5 - 26)
-    assert Goal(quality=35).missing(estimate, Margin(2.0, 0.0)) == pytest.approx(-1)

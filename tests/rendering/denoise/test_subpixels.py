@@ -84,7 +84,15 @@ def test_a_denoiser_is_given_all_colours(integrator, as_denoised):
 
 def picture(method="pooled", samples=2, seed=5, **options):
     return lippmann.render(
-        "room", SHEET, subpixels=True, integrator="direct", method=method, spp=samples, seed=seed, **options
+        "room",
+        SHEET,
+        subpixels=True,
+        integrator="direct",
+        method=method,
+        spp=samples,
+        seed=seed,
+        tone_map="none",
+        **options,
     )
 
 

@@ -144,12 +144,12 @@ def test_the_mean_is_that_of_full_and_the_error_what_it_says(integrator, subpixe
 
 def test_a_quality_that_is_asked_for_is_kept(integrator):
     from lippmann.color.transfer import encode_srgb
-    from lippmann.rendering.adaptive.convergence import ErrorTrack
-    from lippmann.rendering.adaptive.stopping import Goal, reach
+    from lippmann.rendering.adaptive.goal import Goal
+    from lippmann.rendering.adaptive.stopping import Costs, reach
     from lippmann.rendering.estimate.psnr import PictureEstimator
 
     renderer = batches(integrator, seed=5)
-    outcome = reach(Goal(quality_worst=30), renderer.add, ErrorTrack(renderer, PictureEstimator(SHOWN)))
+    outcome = reach(Goal(quality_worst=30), renderer, renderer, PictureEstimator(SHOWN), Costs(4))
     long = batches(integrator, seed=6)
     long.add(768)
     errors = np.square(encode_srgb(renderer.picture()) - encode_srgb(long.picture())).mean(axis=2)

@@ -10,7 +10,7 @@ import lippmann
 
 pytestmark = pytest.mark.usefixtures("engine")
 
-LIGHT = {"integrator": "path", "depth": 3, "pixel_filter": "box"}
+LIGHT = {"integrator": "path", "depth": 3, "pixel_filter": "box", "tone_map": "none"}
 
 
 @pytest.fixture(scope="module")

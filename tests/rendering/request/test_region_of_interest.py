@@ -52,7 +52,9 @@ def test_nothing_of_the_scene_is_outside_a_panels_window(ball, display, place):
     )
     found = panel_window(corners, display)
     assert found is not None
-    image = lippmann.render(ball, display, integrator="direct", spp=2, subpixels=True, denoise="none", placement=at)
+    image = lippmann.render(
+        ball, display, integrator="direct", spp=2, subpixels=True, denoise="none", placement=at, tone_map="none"
+    )
     seen = (image.pixels != np.float32(BACKDROP)).any(axis=-1)
     inside = np.zeros_like(seen)
     inside[found.top : found.top + found.height, found.left : found.left + found.width] = True
@@ -90,7 +92,13 @@ def test_nothing_of_the_scene_is_outside_a_quilts_windows(ball, display, monkeyp
 
 def test_denoised_frames_are_traced_where_the_scene_is(ball):
     display = DISPLAYS[0]
-    options = {"subpixels": True, "placement": PlacementOptions(scale=0.6), "seed": 3, "integrator": "direct"}
+    options = {
+        "subpixels": True,
+        "placement": PlacementOptions(scale=0.6),
+        "seed": 3,
+        "integrator": "direct",
+        "tone_map": "none",
+    }
     image = lippmann.render(ball, display, spp=4, denoise="oidn-fast", layers=True, **options)
     assert 0 < image.stats["traced_fraction"] < 0.7
     fine = lippmann.render(ball, display, spp=64, denoise="none", **options)

@@ -36,13 +36,14 @@ def test_light_is_pooled_unless_something_else_is_said(values):
 
 
 @pytest.mark.parametrize("goal", [{"quality_worst": 30.0}, {"quality": 30.0}, {"max_time": 5.0}])
-def test_a_goal_opens_the_contest(goal):
-    found = decided(**goal)
-    assert (found.method, found.denoise) == ("full", "auto")
+def test_a_goal_is_reached_by_pooled_light(goal):
+    for found in (decided(**goal), decided(method="pooled", **goal)):
+        assert (found.method, found.denoise, found.spp) == ("pooled", "oidn", None)
+    assert decided(method="pooled", denoise="oidn-fast", **goal).denoise == "oidn-fast"
 
 
 @pytest.mark.parametrize("goal", [{"quality_worst": 30.0}, {"quality": 30.0}, {"max_time": 5.0}])
-def test_light_that_cannot_be_pooled_has_no_contest(goal):
+def test_light_that_cannot_be_pooled_is_not_pooled_for_a_goal(goal):
     found = decided(integrator="classic", **goal)
     assert (found.method, found.denoise) == ("full", "none")
     assert "the light of classic is not pooled" in found.reason
@@ -57,17 +58,6 @@ def test_what_is_asked_for_wins(denoise):
 
 def test_pooled_light_is_denoised():
     assert decided(method="pooled").denoise == "oidn"
-
-
-@pytest.mark.parametrize("goal", [{"quality_worst": 30.0}, {"quality": 30.0}])
-def test_a_quality_opens_the_contest_for_pooled_light_too(goal):
-    found = decided(method="pooled", **goal)
-    assert (found.method, found.denoise) == ("pooled", "auto")
-    assert decided(method="pooled", denoise="oidn-fast", **goal).denoise == "oidn-fast"
-
-
-def test_the_best_pooled_light_of_a_time_is_pooled():
-    assert decided(method="pooled", max_time=5.0).denoise == "oidn"
 
 
 @pytest.mark.parametrize("method", ["full", "lens-view", "interpolated"])
@@ -165,3 +155,11 @@ def test_a_draft_is_one_in_every_form(form):
 def test_a_draft_of_a_photograph_needs_no_network():
     found = resolve(RenderRequest(effort="draft"), unlit(fills_panel=True), load_display("seed-lenticular"))
     assert (found.method, found.denoise, found.spp) == ("full", "none", 1)
+
+
+def test_tones_are_mapped_unless_a_colour_of_the_background_was_asked_for():
+    assert decided().tone_map == "pbr-neutral"
+    assert decided(tone_map="none").tone_map == "none"
+    before_white = load_scene("teapot", background=(1.0, 1.0, 1.0))
+    assert resolve(RenderRequest(), before_white).tone_map == "none"
+    assert resolve(RenderRequest(tone_map="pbr-neutral"), before_white).tone_map == "pbr-neutral"

@@ -109,7 +109,12 @@ def test_threads_do_not_matter():
 
 def quilt(**options):
     made = lippmann.render_quilt(
-        "teapot", "portrait", size=(384, 384), integrator="direct", **{"seed": 5, "denoise": "oidn-fast", **options}
+        "teapot",
+        "portrait",
+        size=(384, 384),
+        integrator="direct",
+        tone_map="none",
+        **{"seed": 5, "denoise": "oidn-fast", **options},
     )
     return made.pixels, made.provenance
 

@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 
 from lippmann.display import Display, LensArray, Panel
-from lippmann.image import read_picture
 from lippmann.metrics import view_flicker
 
 pytestmark = pytest.mark.usefixtures("engine")
@@ -260,18 +259,12 @@ def test_a_promised_quality_is_reached_by_the_whole_command(tmp_path, small, cap
     assert json.loads(capfd.readouterr().out)["micro_images"]["worst"]["psnr"] >= 33
 
 
-def test_a_quality_that_samples_reach_by_themselves_takes_no_pooling(tmp_path, small, capfd):
-    words = ("render", "tree", "--integrator", "path", "--display", small, "--json")
-    pictures = {}
-    for name, more in (("pooled", ()), ("full", ()), ("obeyed", ("--denoise", "oidn-fast"))):
-        method = "full" if name == "full" else "pooled"
-        path = tmp_path / f"{name}.exr"
-        assert command(*words, "--method", method, "--quality", 30, *more, "-o", path) == 0
-        pictures[name] = json.loads(capfd.readouterr().out), read_picture(path)
-    told = pictures["pooled"][0]
-    assert told["method"] == "pooled"
-    assert "denoise" not in told["options"]
-    assert told["seconds"]["denoise"] == 0
-    assert any(note.startswith("the light is not pooled: the quality is within reach") for note in told["notes"])
-    np.testing.assert_allclose(pictures["pooled"][1].pixels, pictures["full"][1].pixels, rtol=1e-5)
-    assert pictures["obeyed"][0]["options"]["denoise_effort"] == "fast"
+def test_a_quality_is_reached_by_pooled_light_however_few_samples_it_takes(tmp_path, small, capfd):
+    words = ("render", "tree", "--integrator", "path", "--display", small, "--json", "-o", tmp_path / "a.exr")
+    assert command(*words, "--quality", 30) == 0
+    told = json.loads(capfd.readouterr().out)
+    assert (told["method"], told["options"]["denoise"]) == ("pooled", "oidn")
+    assert told["options"]["auto"].startswith("pooled: ")
+    assert told["estimate"]["psnr"] >= 30
+    assert command(*words, "--method", "pooled", "--denoise", "oidn-fast", "--quality", 30) == 0
+    assert json.loads(capfd.readouterr().out)["options"]["denoise_effort"] == "fast"

@@ -117,7 +117,7 @@ def test_parallel_cameras_for_a_display_without_viewing_distance():
 
 
 def small_quilt(**options):
-    return lippmann.render_quilt("teapot", SHEET, views=(3, 4), size=(256, 256), **options)
+    return lippmann.render_quilt("teapot", SHEET, views=(3, 4), size=(256, 256), **({"tone_map": "none"} | options))
 
 
 def test_a_quilt_is_the_direct_pictures_of_its_cameras():

@@ -179,10 +179,10 @@ class TestPictures:
         assert any("participating media" in note for note in image.provenance.notes)
         assert image.pixels.mean() > 0.05
 
-    def test_seek_a_quality_without_the_denoiser(self):
+    def test_seek_a_quality_denoised_but_not_pooled(self):
         image = lippmann.render(fog_room(homogeneous()), self.display, quality_worst=15.0)
         assert image.provenance.method == "full"
-        assert "denoise" not in image.provenance.options
+        assert image.provenance.options["denoise"] == "oidn"
 
     @pytest.mark.parametrize("method", ["pooled", "lens-view", "interpolated"])
     def test_share_no_light(self, method):

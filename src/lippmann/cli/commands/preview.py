@@ -14,6 +14,7 @@ from lippmann.cli.shared.default_output import output_of
 from lippmann.cli.shared.picture_report import add_seconds, depth_line, report
 from lippmann.cli.shared.scene_source import SceneSource
 from lippmann.errors import UsageError
+from lippmann.rendering.request.choices import tone_map_of
 
 if TYPE_CHECKING:
     from lippmann.progress import ProgressCallback
@@ -109,7 +110,7 @@ def preview(
         effort=effort,
         seed=seed,
         exposure=parse.exposure(exposure),
-        tone_map=parse.tone_map(tone_map, output, background),
+        tone_map=tone_map_of(tone_map, output),
         subpixels=subpixels,
         pixel_filter=pixel_filter,
         denoise=denoise,

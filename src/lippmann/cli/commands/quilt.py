@@ -19,6 +19,7 @@ from lippmann.cli.shared.picture_report import add_seconds, depth_line, report
 from lippmann.cli.shared.scene_source import SceneSource
 from lippmann.errors import UsageError
 from lippmann.progress import Progress, ProgressCallback
+from lippmann.rendering.request.choices import tone_map_of
 from lippmann.wording import samples_in_words
 
 if TYPE_CHECKING:
@@ -55,7 +56,7 @@ Method = Annotated[
     Literal["auto", "full", "pooled"],
     typer.Option(
         "--method",
-        help="auto: what is fastest for the quality asked for; full: every ray is traced; "
+        help="auto: pooled where light has noise; full: every ray is traced; "
         "pooled: neighbouring views share their light before it is denoised.",
     ),
 ]
@@ -169,7 +170,7 @@ def render(
         max_time=max_time,
         seed=seed,
         exposure=parse.exposure(exposure),
-        tone_map=parse.tone_map(tone_map, output, background),
+        tone_map=tone_map_of(tone_map, path),
         pixel_filter=pixel_filter,
         denoise=denoise,
         caustics=caustics,

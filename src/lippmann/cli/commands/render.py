@@ -21,6 +21,7 @@ from lippmann.cli.shared.picture_report import add_seconds, remarks, report
 from lippmann.cli.shared.scene_source import SceneSource
 from lippmann.errors import UsageError
 from lippmann.progress import Progress, ProgressCallback
+from lippmann.rendering.request.choices import tone_map_of
 from lippmann.wording import samples_in_words
 
 if TYPE_CHECKING:
@@ -168,7 +169,7 @@ def render(
         began=None if wanted else command_clock.began(),
         seed=seed,
         exposure=parse.exposure(exposure),
-        tone_map=parse.tone_map(tone_map, output, background),
+        tone_map=tone_map_of(tone_map, output),
         subpixels=subpixels,
         pixel_filter=pixel_filter,
         denoise=denoise,

@@ -245,7 +245,7 @@ Method = Annotated[
     choices.Method,
     typer.Option(
         "--method",
-        help="auto: pooled, or what is fastest for a quality asked for; full: every ray is traced, for references; "
+        help="auto: pooled where light has noise, else full; full: every ray is traced, for references; "
         "lens-view: points are carried from lens to lens and missed pixels traced; "
         "interpolated: those of every other lens are averaged; "
         "pooled: noise is taken out, and all lenses that see a point share its light.",
@@ -316,7 +316,7 @@ Denoise = Annotated[
     typer.Option(
         "--denoise",
         help="none, or oidn: take the noise out with Open Image Denoise, with the effort that the rays deserve; "
-        "oidn-fast and oidn-high name it. auto: with --method pooled, and where --method auto finds that better.",
+        "oidn-fast and oidn-high name it. auto: with --method pooled, which auto takes.",
     ),
 ]
 Layers = Annotated[

@@ -9,17 +9,12 @@ from typing import TYPE_CHECKING, Literal
 from lippmann.errors import UsageError
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from lippmann.cli.shared.console import Console
     from lippmann.display import Display
-    from lippmann.rendering.request.choices import ToneMap
     from lippmann.scene.light_options import LightOptions
     from lippmann.scene.placement import PlacementOptions
     from lippmann.scene.splat_selection import Crop
 
-#: Endings of formats for data, whose values are not for the eye alone.
-_DATA = (".exr", ".tif", ".tiff", ".zarr")
 _MEMORY_UNITS = {"": 1, "k": 2**10, "m": 2**20, "g": 2**30, "t": 2**40}
 
 
@@ -87,12 +82,6 @@ def quality(asked: float | None, former: float | None, console: Console) -> floa
     if asked is not None:
         raise UsageError("is what --quality asks for", where="--quality-mean", rule="only one", fix="leave it out")
     return former
-
-
-def tone_map(kind: ToneMap, output: Path | None, background: str | None) -> ToneMap:
-    """Left open, data stay as they are, and so does a background whose colour was asked for."""
-    is_data = output is not None and output.suffix.lower() in _DATA
-    return "none" if kind == "auto" and (is_data or background is not None) else kind
 
 
 def number(text: str, option: str, rule: str) -> float:

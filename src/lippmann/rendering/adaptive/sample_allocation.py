@@ -10,27 +10,20 @@ the noise, as in the leaves of a tree that fills the picture, all pixels get the
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.progress import ProgressCallback, of_part, silent
+from lippmann.rendering.adaptive.tuning import TUNING
 from lippmann.rendering.denoise.local_statistics import mean_around
 from lippmann.runtime.row_threads import Bands
 
 Floats = NDArray[np.float32]
 
-#: Samples of a chosen pixel for one of all; and the pixels to either side over which noise and cost are averaged.
-SAMPLES_OF_CHOSEN, RADIUS = 4, 1
 #: Samples per pixel that a picture has had before any are chosen.
 FEWEST = 2
-#: Share of the noise that chosen pixels hold, at least. If the error of a pixel fell as the inverse of its samples,
-#: 0.63 would be even, but a part of what is seen of it is chance. Scenes with 0.74 and less lose (docs/research).
-LEAST_NOISE = 0.75
-#: A look at the denoised picture may cost so much of what the samples so far did.
-MOST_OF_LOOK = 0.25
 
 
 class Batches(Protocol):
@@ -66,23 +59,22 @@ class SampleAllocation:
     batches:
         The samples of the picture.
     denoised:
-        What a denoiser makes of them, where that is at hand from time to time; else None.
-    look:
-        Gives what a denoiser makes of them in short time, for one look; and what that costs of the samples so far.
+        The denoised picture, used where it is current; None where there is none.
+    quick:
+        A denoised picture that takes little time, used where the other is not current.
+    quick_cost:
+        What that takes, in rays per pixel.
     threads:
         CPU threads.
     """
 
     def __init__(
-        self,
-        batches: Batches,
-        denoised: Denoising | None,
-        look: tuple[Callable[[], Denoising], Callable[[], float]],
-        threads: int = 1,
+        self, batches: Batches, denoised: Denoising | None, quick: Denoising, quick_cost: float, threads: int = 1
     ) -> None:
         self._batches = batches
         self._denoised = denoised
-        self._look, self._look_cost = look
+        self._quick = quick
+        self._quick_cost = quick_cost
         self._threads = threads
 
     def add(self, samples: int, progress: ProgressCallback = silent) -> None:
@@ -97,15 +89,18 @@ class SampleAllocation:
             batches.add(for_all, of_part(progress, 0.0, share, samples))
         if not rest:
             return
-        if noise is None and self._look_cost() <= MOST_OF_LOOK:
-            noise = self._look().noise()
+        if noise is None and self._quick_cost <= TUNING.most_of_look * self._rays_per_pixel():
+            noise = self._quick.noise()
         report = of_part(progress, share, 1.0 - share, samples)
-        each = batches.batches * max(1, round(SAMPLES_OF_CHOSEN * rest / batches.batches))
+        each = batches.batches * max(1, round(TUNING.chosen_samples * rest / batches.batches))
         chosen = None if noise is None else self._chosen(noise, rest / each)
         if chosen is None:
             batches.add(rest, report)
         else:
             batches.add_at(chosen, each, rest, report)
+
+    def _rays_per_pixel(self) -> float:
+        return self._batches.samples * float(self._batches.rays_of_sample().mean())
 
     def _for_all(self, samples: int) -> int:
         """How many of a round go to all pixels: about half, so that batches get the same where there are enough."""
@@ -120,7 +115,7 @@ class SampleAllocation:
         """The noisiest pixels for their cost that together cost this share of what all do; None if it is not theirs."""
         bands = Bands(self._threads)
         around, cost = (
-            mean_around(np.ascontiguousarray(values, dtype=np.float32), RADIUS, bands).ravel()
+            mean_around(np.ascontiguousarray(values, dtype=np.float32), TUNING.noise_radius, bands).ravel()
             for values in (noise, self._batches.rays_of_sample())
         )
         order = np.argsort(-around / cost, kind="stable")
@@ -128,4 +123,4 @@ class SampleAllocation:
         chosen = np.zeros(around.size, dtype=np.bool_)
         chosen[order[: 1 + np.searchsorted(spent, share * spent[-1])]] = True
         own, total = float(around[chosen].sum(dtype=np.float64)), float(around.sum(dtype=np.float64))
-        return chosen.reshape(noise.shape) if total > 0 and own >= LEAST_NOISE * total else None
+        return chosen.reshape(noise.shape) if total > 0 and own >= TUNING.least_noise * total else None

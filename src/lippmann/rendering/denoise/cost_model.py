@@ -17,8 +17,6 @@ SHADOW_COST = 0.5
 HIGH_FROM = 100.0
 #: What one run of the network costs, in rays per pixel.
 RUN_COST: dict[Effort, float] = {"fast": 3.0, "high": 15.0}
-#: What it costs to share the light of a picture, in rays per pixel.
-SHARING_COST = 1.2
 #: How strongly light that differs is kept apart where micro-images share it, by how much noise there is left to share.
 #: Between 30 and 200 it moves the PSNR of the bundled scenes by less than 0.5 dB (docs/research/pooled-light.md).
 SHARING_STOP: dict[Effort, float] = {"fast": 40.0, "high": 100.0}
@@ -45,13 +43,3 @@ def effort_of(denoise: Denoiser, rays_per_pixel: float) -> Effort:
 def denoising_cost(effort: Effort) -> float:
     """Rays per pixel that are worth a picture cleaned by halves, guides included."""
     return 2 * RUN_COST[effort] + GUIDE_COST * GUIDE_SAMPLES[effort]
-
-
-def pooling_cost(effort: Effort) -> float:
-    """The same where micro-images share the light of each half."""
-    return denoising_cost(effort) + 2 * SHARING_COST
-
-
-def look_cost(rays_per_pixel: float) -> float:
-    """The same with the effort that so many traced rays deserve: what it takes to see what pooling makes of them."""
-    return pooling_cost(effort_of("oidn", rays_per_pixel))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Literal
 
 Method = Literal["auto", "full", "lens-view", "interpolated", "pooled"]
@@ -11,7 +12,8 @@ PixelFilter = Literal["auto", "box", "point"]
 #: How much a picture may take: ``draft`` is one sample and the fast network.
 Effort = Literal["draft", "normal"]
 Device = Literal["auto", "cpu", "gpu"]
-#: ``auto``: ``pbr-neutral`` for physically based light.
+#: ``auto``: ``pbr-neutral`` for physically based light, but before a background whose colour was asked for, and in
+#: files for data.
 ToneMap = Literal["auto", "none", "pbr-neutral"]
 Denoiser = Literal["auto", "none", "oidn", "oidn-fast", "oidn-high"]
 #: ``auto``: photons where a few find that there are caustics.
@@ -23,3 +25,11 @@ REUSING: tuple[Method, ...] = ("lens-view", "interpolated")
 LIGHT: tuple[Integrator, ...] = ("classic", "path", "direct")
 #: Those whose light can be pooled.
 POOLED_LIGHT: tuple[Integrator, ...] = ("path", "direct")
+
+#: Endings of formats for data, whose values are not for the eye alone.
+_DATA = (".exr", ".tif", ".tiff", ".zarr")
+
+
+def tone_map_of(kind: ToneMap, output: Path) -> ToneMap:
+    """The tone map of a picture that is written to ``output``: left open, files for data keep light as it is."""
+    return "none" if kind == "auto" and output.suffix.lower() in _DATA else kind

@@ -76,7 +76,7 @@ class RenderRequest:
     Parameters
     ----------
     method:
-        ``auto``: ``pooled`` where light has noise, else ``full``; for a quality or a time the better of the two.
+        ``auto``: ``pooled`` where light has noise, else ``full``.
         ``full`` traces every ray. ``pooled`` denoises, and all micro-images that show a point share its light.
         ``lens-view`` reprojects points from micro-image to micro-image and traces the missed pixels. ``interpolated``
         averages the missed pixels of every other micro-image from its neighbours.
@@ -128,7 +128,8 @@ class RenderRequest:
         what brings the median of what is lit to mid-grey. The background's colour stays as it is.
     tone_map:
         How light becomes what the display shows: ``none`` as it is, ``pbr-neutral`` by
-        :func:`lippmann.color.tone_map.pbr_neutral`, "auto" by that where light is physically based.
+        :func:`lippmann.color.tone_map.pbr_neutral`, "auto" by that where light is physically based and the
+        background is not of a colour that was asked for.
     layers:
         Add depth, position, normal, albedo and shape of what each pixel sees to the picture's maps.
     placement:
@@ -166,7 +167,7 @@ class RenderRequest:
     caustics: Caustics = "auto"
     clamp_indirect: float | None = None
     exposure: float | Literal["auto"] = "auto"
-    tone_map: ToneMap = "none"
+    tone_map: ToneMap = "auto"
     layers: bool = False
     placement: PlacementOptions | Placement = field(default_factory=PlacementOptions)
     device: Device = "auto"

@@ -4,11 +4,10 @@ The scene decides the light: scenes made for the classic light models are render
 their file and one sample in the middle of each pixel; all others by ``path``, with samples spread over the pixel. The
 display decides about sub-pixels: behind a slanted sheet each has a direction of its own, and rays of its own.
 
-What is asked for decides the method. Light is pooled, so that few samples make a clean picture, with as many samples as
-the size of the picture allows in a short time. A quality or a time is a goal: full rendering and pooled light, made of
-the same samples, compete for it, see :mod:`lippmann.rendering.adaptive.method_race`; for a quality they do so where
-pooled light is asked for, too. Methods that reuse points have errors that no estimate covers, and are taken only by
-name, as is full rendering, for references.
+Light is pooled, so that few samples make a clean picture, with as many samples as the size of the picture allows in a
+short time, or as a quality or a time takes. With ever more samples the pooled picture converges to that of full
+rendering, see :mod:`lippmann.rendering.denoise.noisy_blend`. Methods that reuse points have errors that no estimate
+covers, and are taken only by name, as is full rendering, for references.
 """
 
 from __future__ import annotations
@@ -61,9 +60,8 @@ def resolve(
     -------
     RenderRequest
         With an integrator, a pixel filter, a depth, a method and a choice about sub-pixels; ``reason`` says why it is
-        that method, if the user left it open. ``spp`` stays None where a quality or a time says when to stop, and
-        ``denoise`` stays "auto" where plain and pooled pictures compete; ``exposure`` stays "auto" where it is to be
-        measured.
+        that method, if the user left it open. ``spp`` stays None where a quality or a time says when to stop;
+        ``exposure`` stays "auto" where it is to be measured.
 
     Raises
     ------
@@ -173,7 +171,7 @@ def _with_light(request: RenderRequest, scene: Scene, of_own_camera: bool) -> Re
         raise _no_light(integrator, "exposure")
     tone_map = request.tone_map
     if tone_map == "auto":
-        tone_map = "pbr-neutral" if integrator in POOLED_LIGHT else "none"
+        tone_map = "pbr-neutral" if integrator in POOLED_LIGHT and not scene.has_chosen_background else "none"
     if tone_map != "none" and integrator not in POOLED_LIGHT:
         raise _no_light(integrator, "tone_map")
     return replace(
@@ -206,10 +204,9 @@ def _with_fast_denoiser(request: RenderRequest) -> RenderRequest:
 
 
 def _with_method(request: RenderRequest, form: Form) -> RenderRequest:
-    """Method and denoiser, as far as they can be told before the first sample."""
+    """Method and denoiser."""
     if request.method == "pooled" and request.denoise == "auto":
-        # Where the samples themselves come to the quality first, no light needs to be pooled.
-        return request if request.has_quality else replace(request, denoise="oidn")
+        return replace(request, denoise="oidn")
     if request.method != "auto":
         return replace(request, denoise="none") if request.denoise == "auto" else request
     if request.denoise != "auto":
@@ -221,8 +218,6 @@ def _with_method(request: RenderRequest, form: Form) -> RenderRequest:
         return _full(request, "none", f"full: the light of {request.integrator} is not pooled")
     if form == "preview":
         return _full(request, "none", "full: a plain picture has no micro-images to share light")
-    if request.is_open_ended:
-        return _full(request, "auto", "full")
     return replace(request, method="pooled", denoise="oidn", reason="pooled: light shared between micro-images")
 
 

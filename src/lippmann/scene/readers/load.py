@@ -221,6 +221,7 @@ def load_scene(
             VolumeSelection(None, transfer_function, window).of(scene)
         )
     scene = scene if light is None else replace(scene, light=light)
+    scene = scene if color is None else replace(scene, has_chosen_background=True)
     studio = scene.studio and str(environment) != NO_ENVIRONMENT
     if scene.classic is not None and color is not None:
         scene = replace(scene, classic=replace(scene.classic, background=Background(color=color)))

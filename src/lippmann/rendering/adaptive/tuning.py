@@ -1,0 +1,75 @@
+"""Tuned constants of adaptive sampling, each with its unit and the benchmark that set it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class AdaptiveTuning:
+    """Constants of the stopping rule, of the reserve of samples, and of their allocation to pixels.
+
+    Attributes
+    ----------
+    step:
+        Samples per pixel: rounds end at multiples of it, so that all batches get the same (the number of batches).
+    first_look, first_look_costly:
+        Samples per pixel before a denoised picture is first assessed: few where a sample is costly beside the network
+        (photons, chains of seen light) or the goal is modest (``goals.py``).
+    least_growth, most_growth:
+        Factors on the samples by which one round grows: smaller ones cost an assessment each, larger ones overshoot
+        (``goals.py``).
+    surer_growth:
+        The most where the quality is likely there and only the interval is too wide: intervals narrow faster than
+        pictures converge (``goals.py``).
+    plain_slope, denoised_slope:
+        Powers of the sample count by which squared errors fall: of Monte Carlo noise by theory, of denoised pictures
+        0.5 to 0.8 where it was measured (``equal_error.py``).
+    slope_range:
+        Powers that are believed of two noisy estimates.
+    tolerance:
+        dB by which a quality that was asked for may be missed, but with a probability of 2.5 %
+        (``estimate_coverage.py``).
+    most_below:
+        dB that a micro-image may have less than the whole picture for which a quality was asked.
+    time_share:
+        Share of the time left that a round is planned to take: rates vary from round to round.
+    modest_quality:
+        PSNR in dB that a default picture has anyway (``defaults.py``).
+    clean, aim:
+        Estimated PSNR in dB from which on a default picture gets no more samples, and that for which they are reckoned.
+        The estimate is of light before tone mapping, which brings out the noise of highlights by up to 1.5 dB
+        (``equal_time.py``).
+    chosen_samples:
+        Samples of a noisy pixel for one of all in the second half of a picture's samples (``equal_time.py``).
+    noise_radius:
+        Pixels to either side over which noise and cost are averaged, as halves of one pixel differ by chance.
+    least_noise:
+        Share of the noise that the chosen pixels hold, at least; 0.63 would be even by theory, scenes with 0.74 and
+        less lose (docs/research/adaptive-sampling.md).
+    most_of_look:
+        Share of the cost of the samples so far that a denoised picture may cost which only shows where they are needed.
+    """
+
+    step: int = 8
+    first_look: int = 4
+    first_look_costly: int = 2
+    least_growth: float = 1.2
+    most_growth: float = 4.0
+    surer_growth: float = 2.0
+    plain_slope: float = 1.0
+    denoised_slope: float = 0.6
+    slope_range: tuple[float, float] = (0.3, 1.2)
+    tolerance: float = 1.0
+    most_below: float = 12.0
+    time_share: float = 0.9
+    modest_quality: float = 34.0
+    clean: float = 35.5
+    aim: float = 35.0
+    chosen_samples: int = 4
+    noise_radius: int = 1
+    least_noise: float = 0.75
+    most_of_look: float = 0.25
+
+
+TUNING = AdaptiveTuning()
