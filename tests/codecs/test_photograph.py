@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from PIL import Image, ImageCms
 
+from lippmann.codecs import photograph, png
 from lippmann.codecs.icc import rgb_profile
 from lippmann.codecs.photograph import open_photograph
 from lippmann.codecs.png import encode_png
@@ -23,9 +24,9 @@ UPRIGHT[:8], UPRIGHT[8:], UPRIGHT[:, :4] = (40, 80, 230), (40, 170, 60), (220, 4
 
 
 def codes_of(data, *, srgb=True):
-    with open_photograph(io.BytesIO(data), Path("a")) as photograph:
-        codes = photograph.srgb_codes() if srgb else photograph.codes()
-        assert photograph.size == codes.shape[1::-1]
+    with open_photograph(io.BytesIO(data), Path("a")) as opened:
+        codes = opened.srgb_codes() if srgb else opened.codes()
+        assert opened.size == codes.shape[1::-1]
         return codes
 
 
@@ -158,3 +159,13 @@ def test_a_picture_that_its_file_cannot_hold_is_refused_before_memory_is_given()
 def test_damaged_exif_is_passed_over_without_a_warning():
     data = encoded(Image.new("RGB", (8, 8), (9, 90, 200)), "JPEG", exif=b"Exif\0\0MM\0*\0\0\0\xff")
     assert codes_of(data).shape == (8, 8, 3)
+
+
+def test_a_png_asks_for_memory_and_reads_its_header_once(monkeypatch):
+    calls = []
+    header = png.png_header
+    monkeypatch.setattr(png, "png_header", lambda *given: calls.append("header") or header(*given))
+    for module in (photograph, png):
+        monkeypatch.setattr(module, "check_input", lambda size, *_, **__: calls.append(size))
+    np.testing.assert_array_equal(codes_of(encode_png(UPRIGHT, text={})), UPRIGHT)
+    assert calls == ["header", 8 * UPRIGHT.shape[0] * UPRIGHT.shape[1]]

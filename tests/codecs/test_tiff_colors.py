@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import struct
 from pathlib import Path
 
 import numpy as np
@@ -88,6 +89,39 @@ def test_ycbcr_of_jpeg(tmp_path):
     with tifffile.TiffFile(tmp_path / "a.tif") as file:
         assert file.pages[0].photometric == 6
     assert np.abs(read(tmp_path / "a.tif")[8::16, 8::16].astype(int) - RGB).max() < 12
+
+
+@pytest.mark.parametrize("compression", ["raw", "tiff_lzw"])
+def test_ycbcr_without_jpeg(tmp_path, compression):
+    coded = Image.fromarray(RGB).convert("YCbCr")
+    coded.save(tmp_path / "a.tif", compression=compression)
+    assert np.abs(read(tmp_path / "a.tif").astype(int) - np.asarray(coded.convert("RGB"))).max() <= 1
+
+
+def test_ycbcr_of_video(tmp_path):
+    """Coefficients of Rec. 709 and codes from 16 to 235, about 128: white, black, red, the latter by hand."""
+    codes = np.array([[[235, 128, 128], [16, 128, 128], [63, 102, 240]]], np.uint8)
+    tags = [
+        (529, 5, 3, [2126, 10000, 7152, 10000, 722, 10000], True),
+        (530, 3, 2, [1, 1], True),
+        (532, 5, 6, [16, 1, 235, 1, 128, 1, 240, 1, 128, 1, 240, 1], True),
+    ]
+    path = written(tmp_path / "a.tif", codes, photometric="rgb", extratags=tags)
+    data = path.read_bytes()
+    before, after = struct.pack("<HHII", 262, 3, 1, 2), struct.pack("<HHII", 262, 3, 1, 6)
+    assert data.count(before) == 1
+    path.write_bytes(data.replace(before, after))
+    assert np.abs(read(path).astype(int) - [[[255, 255, 255], [0, 0, 0], [255, 0, 0]]]).max() <= 2
+
+
+def test_subsampled_ycbcr_without_jpeg_is_named(tmp_path):
+    Image.fromarray(RGB).convert("YCbCr").save(tmp_path / "a.tif")
+    data = (tmp_path / "a.tif").read_bytes()
+    plain = struct.pack("<HHIHH", 530, 3, 2, 1, 1)
+    assert data.count(plain) == 1
+    (tmp_path / "a.tif").write_bytes(data.replace(plain, struct.pack("<HHIHH", 530, 3, 2, 2, 2)))
+    with pytest.raises(PictureError, match="its colours are subsampled YCbCr without JPEG of 8 bits"):
+        read(tmp_path / "a.tif")
 
 
 @pytest.mark.parametrize("kind", [np.uint8, np.uint16, np.float32])

@@ -42,6 +42,15 @@ def others(folder, names, size=(4, 3)):
     return folder
 
 
+def test_what_views_hold_and_do_not_show_is_noted(tmp_path):
+    folder = others(tmp_path / "x", [f"{number}.png" for number in range(2)])
+    for name, (across, down) in (("0.png", (100, 100)), ("1.png", (100, 200))):
+        Image.new("RGB", (4, 3)).save(folder / name, dpi=(across, down))
+    assert read_view_folder(folder, grid=(2, 1)).notes == (
+        "1.png: its pixels are 2 times as wide as high: they are shown square",
+    )
+
+
 @pytest.mark.parametrize(
     ("names", "grid"),
     [

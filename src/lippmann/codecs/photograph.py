@@ -90,7 +90,7 @@ def open_photograph(file: BinaryIO, path: Path, formats: tuple[str, ...] = (*FOR
         # As much as of other formats: what follows makes colours of greys.
         check_input(BYTES_PER_PIXEL * size[0] * size[1], f"a picture of {size[0]} x {size[1]} pixels", where=str(path))
         yield _photograph(
-            size, header.icc, header.orientation, header.notes, lambda: _planes(png.decode_png(_whole(file), path))
+            size, header.icc, header.orientation, header.notes, lambda: _planes(png.decode_png(file, header, path))
         )
     elif start.startswith(tiff.SIGNATURES) and "TIFF" in formats:
         page = tiff.TiffPicture(file, path)
@@ -148,8 +148,3 @@ def _exif_profile(picture: Image.Image) -> bytes:
 
 def _planes(codes: Pixels) -> Pixels:
     return codes[..., None] if codes.ndim == 2 else codes
-
-
-def _whole(file: BinaryIO) -> bytes:
-    file.seek(0)
-    return file.read()

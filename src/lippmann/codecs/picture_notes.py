@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 
 def aspect_note(across: float, down: float) -> tuple[str, ...]:
     """The note on pixels that are not square, by the pixels per length across and down; none for square ones.
@@ -16,3 +18,19 @@ def aspect_note(across: float, down: float) -> tuple[str, ...]:
 def pictures_note(count: int) -> tuple[str, ...]:
     """The note on a file of several pictures; none for one."""
     return (f"it holds {count} pictures: the first is shown",) if count > 1 else ()
+
+
+class FileNotes:
+    """Notes on several files: one of a kind, with the first file that it is of."""
+
+    def __init__(self) -> None:
+        self._files: dict[str, str] = {}
+
+    def add(self, name: str, notes: Iterable[str]) -> None:
+        """Take the notes on the file ``name``."""
+        for note in notes:
+            self._files.setdefault(note, name)
+
+    def lines(self) -> tuple[str, ...]:
+        """All of them, in one line each."""
+        return tuple(f"{name}: {note}" for note, name in self._files.items())

@@ -6,7 +6,6 @@ carry text and resolution are written and read here, after the PNG specification
 
 from __future__ import annotations
 
-import io
 import struct
 import zlib
 from collections.abc import Iterator, Mapping
@@ -72,6 +71,11 @@ class PngHeader:
     icc: bytes = b""
     orientation: int = 1
     notes: tuple[str, ...] = ()
+
+    @property
+    def size(self) -> int:
+        """Bytes of its codes once decoded."""
+        return self.width * self.height * self.channels * max(1, self.bits // 8)
 
 
 def encode_png(
@@ -146,23 +150,27 @@ def read_png(path: Path) -> Pixels:
     ------
     PictureError
         If a check sum is wrong or the pixels cannot be decoded.
+    MemoryLimitError
+        If they take more than the memory that is left.
     """
-    return decode_png(path.read_bytes(), path)
+    with path.open("rb") as file:
+        header = png_header(file, path)
+        check_input(header.size, "its picture", where=str(path))
+        return decode_png(file, header, path)
 
 
-def decode_png(data: bytes, path: Path) -> Pixels:
-    """:func:`read_png` of the bytes of a file; ``path`` is its name, for errors."""
+def decode_png(file: BinaryIO, header: PngHeader, path: Path) -> Pixels:
+    """:func:`read_png` of an open file whose ``header`` is read, for callers who have asked for the memory."""
     import imagecodecs
 
-    header = png_header(io.BytesIO(data), path)
-    size = header.width * header.height * header.channels * max(1, header.bits // 8)
-    check_input(size, "its picture", where=str(path))
     # libpng reports a wrong check sum of most chunks on standard error and goes on; so all are looked at first.
-    for _ in _chunks(io.BytesIO(data), path, all_bodies=True):
+    file.seek(0)
+    for _ in _chunks(file, path, all_bodies=True):
         pass
+    file.seek(0)
     try:
         with libraries_silenced():
-            codes: Pixels = imagecodecs.png_decode(data)
+            codes: Pixels = imagecodecs.png_decode(file.read())
     except (RuntimeError, ValueError) as error:
         raise _damaged(path, str(error)) from error
     return orientations.upright(codes, header.orientation)

@@ -316,7 +316,7 @@ def _reported(path: Path) -> Iterator[None]:
     try:
         yield
     except UnreadColorsError as error:
-        rule = "grey, RGB, palettes, L*a*b* and YCbCr of JPEG are read"
+        rule = "grey, RGB, palettes, L*a*b* and YCbCr are read"
         raise PictureError(str(error), where=str(path), rule=rule, fix="convert it to RGB") from None
     except (tifffile.TiffFileError, *_LIBRARY_ERRORS) as error:
         raise PictureError(f"this TIFF is damaged: {error}", where=str(path), fix="make or fetch it anew") from error

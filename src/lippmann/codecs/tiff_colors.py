@@ -30,12 +30,13 @@ def check_colors(page: Any) -> None:
     """Raise :class:`UnreadColorsError` if the page's colours are of a kind that is not read."""
     kind, bits = int(page.photometric), page.bitspersample
     read = kind in (_WHITE_IS_ZERO, _BLACK_IS_ZERO, _RGB, _PALETTE)
-    read |= kind == _YCBCR and int(page.compression) in _JPEG
+    read |= kind == _YCBCR and (int(page.compression) in _JPEG or _is_plain_ycbcr(page))
     read |= kind in (_CIELAB, _ICCLAB) and bits in (8, 16) and page.samplesperpixel >= 3
     read &= kind not in (_WHITE_IS_ZERO, _PALETTE) or page.dtype is None or np.dtype(page.dtype).kind != "f"
     if not read:
         name = getattr(page.photometric, "name", str(kind))
-        name = {"SEPARATED": "CMYK", "MINISWHITE": "white-is-zero floats"}.get(name, name)
+        names = {"SEPARATED": "CMYK", "MINISWHITE": "white-is-zero floats", "YCBCR": "subsampled YCbCr without JPEG"}
+        name = names.get(name, name)
         raise UnreadColorsError(f"its colours are {name} of {bits} bits")
 
 
@@ -78,6 +79,8 @@ def gray_or_rgb(page: Any, values: Pixels) -> Pixels:
         values = values[..., : values.shape[-1] - unspecified]
     if kind == _PALETTE:
         return _looked_up(values[..., 0], np.asarray(page.colormap))
+    if kind == _YCBCR and int(page.compression) not in _JPEG:
+        return np.concatenate([_rgb_of_ycbcr(page, values[..., :3]), values[..., 3:]], axis=-1)
     if kind in (_CIELAB, _ICCLAB):
         return _srgb_of_lab(values[..., :3], biased=kind == _ICCLAB)
     if values.dtype.kind == "f":
@@ -91,6 +94,32 @@ def gray_or_rgb(page: Any, values: Pixels) -> Pixels:
     if kind == _WHITE_IS_ZERO:
         values = np.concatenate([~values[..., :1], values[..., 1:]], axis=-1)
     return _unassociated(values) if _is_associated(page) else values
+
+
+def _is_plain_ycbcr(page: Any) -> bool:
+    """Whether every pixel has a brightness and two differences of 8 bits; by default four pixels share the latter."""
+    return page.bitspersample == 8 and tuple(page.tags.valueof("YCbCrSubSampling", default=(2, 2))) == (1, 1)
+
+
+def _rgb_of_ycbcr(page: Any, codes: Pixels) -> NDArray[np.uint8]:
+    """RGB codes of Y, Cb and Cr (TIFF 6.0, section 21)."""
+    red, green, blue = _fractions(page, "YCbCrCoefficients", (299, 1000, 587, 1000, 114, 1000))
+    bounds = _fractions(page, "ReferenceBlackWhite", (0, 1, 255, 1, 128, 1, 255, 1, 128, 1, 255, 1))
+    (y0, y1), (b0, b1), (r0, r1) = bounds[:2], bounds[2:4], bounds[4:6]
+    y, cb, cr = (codes[..., channel].astype(np.float64) for channel in range(3))
+    y = (y - y0) * (255.0 / (y1 - y0))
+    r = y + (cr - r0) * (127.0 / (r1 - r0)) * (2.0 - 2.0 * red)
+    b = y + (cb - b0) * (127.0 / (b1 - b0)) * (2.0 - 2.0 * blue)
+    g = (y - red * r - blue * b) / green
+    return np.rint(np.clip(np.nan_to_num(np.stack([r, g, b], axis=-1)), 0.0, 255.0)).astype(np.uint8)
+
+
+def _fractions(page: Any, name: str, default: tuple[int, ...]) -> list[float]:
+    """Numbers of a tag of fractions."""
+    parts = page.tags.valueof(name, default=default)
+    if len(parts) != len(default):
+        raise ValueError(f"its {name} are {len(parts) // 2} numbers")
+    return [top / bottom for top, bottom in zip(parts[::2], parts[1::2], strict=True)]
 
 
 def _is_associated(page: Any) -> bool:

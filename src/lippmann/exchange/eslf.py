@@ -103,4 +103,4 @@ def read_eslf(path: Path, *, lens: tuple[int, int] | None = None) -> LightField:
         raise PictureError("is not in colour", where=str(path), rule="ESLF is RGB, or RGB and a weight")
     values: NDArray[Any] = codes.reshape(shape[2], down, shape[3], across, codes.shape[2]).transpose(1, 3, 0, 2, 4)
     maps = {} if values.shape[4] == 3 else {WEIGHT: decode_weights(values[..., 3])}
-    return LightField(values[..., :3], metadata, maps)
+    return LightField(values[..., :3], metadata, maps, notes=header.notes)

@@ -121,19 +121,19 @@ def read_hci(folder: Path, *, progress: ProgressCallback = silent) -> LightField
     metadata = read_note_file(folder, LAYOUT)
     names = _view_names(folder, parameters)
     paths = [[folder / name for name in row] for row in names]
-    values = read_view_files(paths, progress)
+    values, notes = read_view_files(paths, progress)
     if values.shape[2:4] != shape[2:]:
         rule = f"{NAME} says {parameters.width} x {parameters.height}"
         raise PictureError(f"has {values.shape[3]} x {values.shape[2]} pixels", where=str(paths[0][0]), rule=rule)
     cameras = parameters.cameras
     if metadata is not None and np.isinf(metadata.display.viewing_distance):
         cameras = Cameras(cameras.baseline, cameras.focus_distance, cameras.pixel_pitch, parallel=True)
-    depth, notes = _read_truth(folder, parameters)
+    depth, left_out = _read_truth(folder, parameters)
     maps = {}
     if depth is not None:
         with np.errstate(all="ignore"):  # an overflow is infinitely far
             maps[DEPTH] = cameras.height(depth.astype(np.float64)).astype(np.float32)
-    return LightField(values, metadata, maps, cameras, notes=notes)
+    return LightField(values, metadata, maps, cameras, notes=notes + left_out)
 
 
 # ---- Views ---------------------------------------------------------------------------------------------------------

@@ -14,6 +14,7 @@ from typing import get_args
 
 import numpy as np
 
+from lippmann.codecs.picture_notes import FileNotes
 from lippmann.color.transfer import Transfer
 from lippmann.display import Display
 from lippmann.errors import PictureError
@@ -96,7 +97,8 @@ def read_view_folder(
     """
     metadata = read_note_file(folder, LAYOUT)
     paths = _in_rows(_numbered(folder), folder, grid)
-    return LightField(read_view_files(paths, progress), metadata)
+    values, notes = read_view_files(paths, progress)
+    return LightField(values, metadata, notes=notes)
 
 
 def _numbered(folder: Path) -> Mapping[Place, Path]:
@@ -168,8 +170,10 @@ def write_view(path: Path, name: FormatName, values: Values, transfer: Transfer)
     encode_values(path, name, {"": values.copy()}, transfer=transfer)
 
 
-def read_view_files(paths: Sequence[Sequence[Path]], progress: ProgressCallback = silent) -> Values:
-    """The views of rows of picture files, ``(t, s, v, u, 3)``, in the type in which they are stored.
+def read_view_files(
+    paths: Sequence[Sequence[Path]], progress: ProgressCallback = silent
+) -> tuple[Values, tuple[str, ...]]:
+    """The views of rows of picture files, ``(t, s, v, u, 3)``, in the type in which they are stored, and notes.
 
     ``progress`` is called after every file.
 
@@ -179,10 +183,14 @@ def read_view_files(paths: Sequence[Sequence[Path]], progress: ProgressCallback 
         If a file is missing or damaged, holds transparent colours, or differs from the first in size or type.
     """
     down, across = len(paths), len(paths[0])
-    first: Values = open_file(paths[0][0]).decode(as_srgb=True)[0]
+    file, notes = open_file(paths[0][0]), FileNotes()
+    first: Values = file.decode(as_srgb=True)[0]
     views = np.empty((down, across, *first.shape), dtype=first.dtype)
     for number, path in enumerate(path for row in paths for path in row):
-        view = first if number == 0 else open_file(path).decode(as_srgb=True)[0]
+        if number:
+            file = open_file(path)
+        notes.add(path.name, file.notes)
+        view = file.decode(as_srgb=True)[0] if number else first
         if view.shape != first.shape:
             rule = f"the first view, {paths[0][0].name}, has {_size(first)}"
             raise PictureError(f"has {_size(view)} pixels", where=str(path), rule=rule)
@@ -191,7 +199,7 @@ def read_view_files(paths: Sequence[Sequence[Path]], progress: ProgressCallback 
             raise PictureError(f"holds {view.dtype} values", where=str(path), rule=rule)
         views[divmod(number, across)] = view
         progress(Progress("read", number + 1, down * across))
-    return views
+    return views, notes.lines()
 
 
 def _size(view: Values) -> str:

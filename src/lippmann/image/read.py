@@ -25,6 +25,7 @@ from lippmann.image.provenance import Provenance
 from lippmann.image.sheet_codes import mirrored_in_file
 from lippmann.image.stored_values import Layer, Stored, Values
 from lippmann.runtime.cached_property import cached_property
+from lippmann.runtime.input_memory import check_input
 from lippmann.runtime.regular_file import check_kind
 
 #: Largest number of pixels decoded at once; a file that claims more is damaged, or meant to fill the memory.
@@ -237,7 +238,8 @@ def _opened(path: Path, file: BufferedReader, start: bytes) -> PictureFile:
         size, pixel = (header.width, header.height), header.bits * header.channels
 
         def codes() -> dict[str, Layer]:
-            return {"": png.decode_png(_whole(file), path)}
+            check_input(header.size, "its picture", where=str(path))
+            return {"": png.decode_png(file, header, path)}
 
         return PictureFile(path, "png", *size, stored, (), text, header.icc, None, codes, header.notes, pixel)
     if start.startswith(exr.SIGNATURE):
@@ -275,11 +277,6 @@ def _opened(path: Path, file: BufferedReader, start: bytes) -> PictureFile:
     if not start:
         raise PictureError("is empty", where=str(path), fix="make or fetch it anew")
     raise PictureError("is no picture that is known here", where=str(path), rule="PNG, OpenEXR, TIFF and Zarr are read")
-
-
-def _whole(file: BufferedReader) -> bytes:
-    file.seek(0)
-    return file.read()
 
 
 def _plausible(file: PictureFile, size: int | None) -> PictureFile:

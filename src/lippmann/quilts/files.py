@@ -16,6 +16,7 @@ from typing import NamedTuple, cast
 import numpy as np
 
 from lippmann.codecs.photograph import open_photograph
+from lippmann.codecs.picture_notes import FileNotes
 from lippmann.errors import OutputError, PictureError
 from lippmann.image.encoding import FORMATS, STORED, FormatName, converted_values, encode_values
 from lippmann.image.part_folders import MANIFEST
@@ -104,7 +105,7 @@ def read_views(folder: Path, layout: QuiltLayout | None = None, *, progress: Pro
     if len(paths) != layout.views:
         rule = f"{layout.columns}x{layout.rows} views are {layout.views}"
         raise PictureError(f"it holds {len(paths)} views", where=str(folder), rule=rule)
-    quilt, notes = None, dict[str, str]()
+    quilt, notes = None, FileNotes()
     for number, path in enumerate(paths):
         with _open(path) as file:
             if quilt is None:
@@ -118,10 +119,10 @@ def read_views(folder: Path, layout: QuiltLayout | None = None, *, progress: Pro
                 quilt = _linear_quilt(quilt, number)
             values = file.read()
         quilt.view_values(number)[...] = converted_values(values, quilt.stored, "srgb")
-        notes.update((note, path.name) for note in file.notes if note not in notes)
+        notes.add(path.name, file.notes)
         progress(Progress("read", number + 1, layout.views))
     assert quilt is not None  # there are views
-    return replace(quilt, notes=tuple(f"{name}: {note}" for note, name in notes.items()))
+    return replace(quilt, notes=notes.lines())
 
 
 def _check_held(view_size: tuple[int, int], views: int, folder: Path) -> None:

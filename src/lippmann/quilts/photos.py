@@ -17,6 +17,7 @@ import numpy as np
 
 from lippmann.codecs.icc import Profile, convert_picture
 from lippmann.codecs.photograph import Photograph, open_photograph
+from lippmann.codecs.picture_notes import FileNotes
 from lippmann.codecs.pillow_formats import RULE
 from lippmann.codecs.types import Pixels
 from lippmann.color.transfer import quantize
@@ -158,9 +159,10 @@ def read_photos(
             quilt.view_values(number)[...] = np.asarray(_fitted(colors, windows[number], (width, height)))
         progress(Progress("read", number + 1, len(paths)))
     cropped = tuple(max(window.cropped[axis] for window in windows) for axis in (0, 1))
-    names = {note: path.name for path, header in zip(paths, headers, strict=True) for note in header.notes}
-    notes += tuple(f"{name}: {note}" for note, name in names.items())
-    return Photos(quilt, target, (cropped[0], cropped[1]), notes)
+    of_files = FileNotes()
+    for path, header in zip(paths, headers, strict=True):
+        of_files.add(path.name, header.notes)
+    return Photos(quilt, target, (cropped[0], cropped[1]), notes + of_files.lines())
 
 
 class _Header(NamedTuple):
