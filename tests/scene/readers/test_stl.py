@@ -42,6 +42,33 @@ def test_facets(read, data):
     assert mesh.normals is None
 
 
+def colored_file(header, numbers):
+    data = bytearray(binary_file(header))
+    for facet, number in enumerate(numbers):
+        struct.pack_into("<H", data, 84 + 50 * facet + 48, number)
+    return bytes(data)
+
+
+@pytest.mark.parametrize(
+    ("header", "numbers", "expected"),
+    [
+        # VisCAM and SolidView: 1 bit "has a colour", then red, green, blue; without a colour the reader's own grey.
+        (b"", (0b1_11111_00000_00000, 0), ((1, 0, 0), (0.7, 0.7, 0.7))),
+        # Materialise: 1 bit "has the colour of the object", then blue, green, red.
+        (b"COLOR=\x00\xff\x00\xff", (0b0_00000_00000_11111, 1 << 15), ((1, 0, 0), (0, 1, 0))),
+    ],
+)
+def test_colours_of_facets(read, header, numbers, expected):
+    scene = read(colored_file(header, numbers))
+    (mesh,), (material,) = scene.meshes, scene.materials
+    np.testing.assert_allclose(mesh.colors[mesh.faces[:, 0]][:, :3] * material.base_color, expected, atol=1e-6)
+
+
+def test_numbers_of_facets_that_are_no_colours(read):
+    assert read(colored_file(b"", (1 << 15, 7))).meshes[0].colors is None
+    assert read(colored_file(b"COLOR=".rjust(80), (1, 7))).meshes[0].colors is None
+
+
 def test_several_solids(read):
     assert len(read(text_file(3)).meshes[0].faces) == 6
 

@@ -10,14 +10,19 @@ import re
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
+from lippmann.color.transfer import decode_srgb, encode_srgb
 from lippmann.errors import SceneError
 from lippmann.scene.parsing.files import decode_text, read_bytes
 from lippmann.scene.values.description import FloatArray, Instance, Material, Mesh, SceneDescription
 
 _HEADER = 84  # bytes
-#: A facet: its normal, which nobody needs, three vertices, and a number without meaning.
+#: A facet: its normal, which nobody needs, three vertices, and a number in which some programs write its colour.
 _FACET = np.dtype([("normal", "<f4", 3), ("vertices", "<f4", (3, 3)), ("attribute", "<u2")])
+
+#: In a header of Materialise's programs, before the bytes R, G, B, A of facets without a colour of their own.
+_OWN_COLOR = b"COLOR="
 
 # Lines that hold names or remarks: free text in which any word may stand.
 _REMARK = re.compile(r"(?m)^[ \t]*(?:(?:end)?solid\b|#|//|;).*$|(?:[ \t]#|//|;).*$")
@@ -40,12 +45,19 @@ def read_stl(path: Path, *, allow_outside: bool = False) -> SceneDescription:
     data = read_bytes(path)
     notes: list[str] = []
     binary = _is_binary(data)
-    positions = _binary_positions(data, where) if binary else _text_positions(decode_text(data, where), where)
+    colors = None
+    if binary:
+        facets = _binary_facets(data, where)
+        positions = np.ascontiguousarray(facets["vertices"].reshape(-1, 3), np.float32)
+        colors = _facet_colors(data[:80], facets["attribute"])
+    else:
+        positions = _text_positions(decode_text(data, where), where)
     if len(positions) == 0:
         raise SceneError("holds no facets", where=where)
-    material = Material(path.stem, base_color=(0.7, 0.7, 0.7), roughness=0.6, double_sided=True)
+    plain = (0.7, 0.7, 0.7) if colors is None else (1.0, 1.0, 1.0)
+    material = Material(path.stem, base_color=plain, roughness=0.6, double_sided=True)
     faces = np.arange(len(positions), dtype=np.uint32).reshape(-1, 3)
-    mesh = Mesh(path.stem, positions, faces, material=0)
+    mesh = Mesh(path.stem, positions, faces, material=0, colors=colors)
     return SceneDescription(path.stem, [mesh], [material], [Instance(0, np.eye(4))], notes=notes)
 
 
@@ -54,7 +66,7 @@ def _is_binary(data: bytes) -> bool:
     return b"\0" in data[:_HEADER] or _SOLID.search(data[:_LONGEST_REMARKS].lower()) is None
 
 
-def _binary_positions(data: bytes, where: str) -> FloatArray:
+def _binary_facets(data: bytes, where: str) -> NDArray[np.void]:
     if len(data) < _HEADER:
         raise SceneError("is no STL file", where=where, rule=f"it begins with 'solid' or has {_HEADER} bytes of header")
     count = int.from_bytes(data[80:84], "little")
@@ -66,8 +78,28 @@ def _binary_positions(data: bytes, where: str) -> FloatArray:
             rule=f"they take {expected} bytes",
             fix="is it cut short, or no STL file?",
         )
-    facets = np.frombuffer(data, _FACET, count, _HEADER)
-    return np.ascontiguousarray(facets["vertices"].reshape(-1, 3), np.float32)
+    return np.frombuffer(data, _FACET, count, _HEADER)
+
+
+def _facet_colors(header: bytes, numbers: NDArray[np.uint16]) -> FloatArray | None:
+    """Linear RGBA ``(3 facets, 4)`` of the corners; None of a file whose facets have no colours.
+
+    A colour has five bits a channel. With ``COLOR=`` in the header (Materialise) red is in the lowest bits, and facets
+    whose highest bit is set have the header's colour. Without (VisCAM, SolidView) red is in the highest bits; facets
+    whose highest bit is set have a colour; all others are 0.
+    """
+    is_set = numbers >> 15 == 1
+    parts = np.stack([numbers >> shift & 31 for shift in (0, 5, 10)], axis=1) / 31.0
+    start = header.find(_OWN_COLOR) + len(_OWN_COLOR)
+    own = header[start : start + 3]
+    if start >= len(_OWN_COLOR) and len(own) == 3:
+        codes = np.where(is_set[:, None], np.frombuffer(own, np.uint8) / 255.0, parts)
+    elif is_set.any() and not numbers[~is_set].any():
+        codes = np.where(is_set[:, None], parts[:, ::-1], encode_srgb(0.7))
+    else:
+        return None
+    colors = np.concatenate([decode_srgb(codes), np.ones((len(codes), 1))], axis=1)
+    return np.repeat(colors.astype(np.float32), 3, axis=0)
 
 
 def _text_positions(text: str, where: str) -> FloatArray:
