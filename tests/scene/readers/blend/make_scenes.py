@@ -212,6 +212,54 @@ def shifted():
     save("shifted.blend")
 
 
+def otherwise():
+    """What renders show and displays do not, or otherwise."""
+    scene = fresh()
+    scene.render.film_transparent = True
+    holes = bpy.data.collections.new("holes")
+    scene.collection.children.link(holes)
+    holes.objects.link(bpy.data.objects.new("Hole", cube("hole")))
+    layer = bpy.context.view_layer
+    layer.layer_collection.children["holes"].holdout = True
+    layer.material_override = bpy.data.materials.new("clay")
+    put(scene, "Catcher", cube("catcher"), is_shadow_catcher=True)
+    put(scene, "Ghost", cube("ghost"), visible_camera=False)
+    lamp = put(scene, "Oval", light("SPOT", energy=50.0), scale=(2.0, 1.0, 1.0))
+    lamp.light_linking.receiver_collection = holes
+
+    material = bpy.data.materials.new("mixed")
+    shader, tree = shader_of(material), material.node_tree
+    mix, clear, node = (tree.nodes.new(f"ShaderNode{name}") for name in ("MixShader", "BsdfTransparent", "TexImage"))
+    node.image, node.extension = bpy.data.images.new("decal", 4, 4), "CLIP"
+    tree.links.new(node.outputs["Color"], shader.inputs["Base Color"])
+    tree.links.new(clear.outputs[0], mix.inputs[1])
+    tree.links.new(shader.outputs[0], mix.inputs[2])
+    tree.links.new(mix.outputs[0], tree.nodes["Material Output"].inputs["Surface"])
+    mesh = cube("mixed")
+    mesh.materials.append(material)
+    put(scene, "Mixed", mesh)
+    if hasattr(scene, "compositing_node_group"):  # from Blender 5 on
+        scene.compositing_node_group = bpy.data.node_groups.new("compositor", "CompositorNodeTree")
+        scene.compositing_node_group.nodes.new("CompositorNodeBlur")
+    else:
+        scene.use_nodes = True
+        scene.node_tree.nodes.new("CompositorNodeBlur")
+    save("otherwise.blend")
+
+
+def flat():
+    """An orthographic camera in a file of centimetres, for pictures of pixels that are not square."""
+    scene = fresh()
+    scene.unit_settings.scale_length = 0.01
+    put(scene, "Cube", cube("cube", 100.0))
+    camera = bpy.data.cameras.new("flat")
+    camera.type, camera.ortho_scale = "ORTHO", 300.0
+    scene.camera = put(scene, "flat", camera, (0.0, -500.0, 0.0), rotation_euler=(1.5707963, 0.0, 0.0))
+    scene.render.resolution_x = scene.render.resolution_y = 96
+    scene.render.pixel_aspect_x = 2.0
+    save("flat.blend")
+
+
 def working_spaces():
     """One scene in three working spaces; before Blender 5 there is but one."""
     for space in ("Linear Rec.709", "Linear Rec.2020", "ACEScg"):
@@ -232,5 +280,5 @@ def working_spaces():
         save(f"{space.split()[-1]}.blend")
 
 
-for make in (everything, moving, outside, empty, aside, pictures, lights, shifted, working_spaces):
+for make in (everything, moving, outside, empty, aside, pictures, lights, shifted, otherwise, flat, working_spaces):
     make()

@@ -11,11 +11,13 @@ from hypothesis import strategies as st
 
 from lippmann.scene.extreme_points import extreme_points_of
 from lippmann.scene.readers.blend.in_blender.additions import (
+    add_default_material,
     add_focus,
     add_lights,
-    add_shifts,
     leave_out,
+    leave_out_unseen,
     scale_to_metres,
+    set_frames,
 )
 from lippmann.scene.readers.blend.in_blender.glb import Glb
 from lippmann.scene.readers.gltf import read_gltf
@@ -144,11 +146,40 @@ def test_what_is_put_aside_loses_its_mesh_but_not_below_what_shows_it(read):
 
 
 @pytest.mark.parametrize(("kind", "shift"), [("perspective", (0.25, -0.5)), ("orthographic", (2.5, -5.0))])
-def test_lens_shifts_are_slopes_or_lengths(read, kind, shift):
+def test_frames_are_slopes_or_lengths(read, kind, shift):
     glb = document("Camera")
     lens = {"perspective": {"yfov": 1.0}} if kind == "perspective" else {"orthographic": {"xmag": 1.0, "ymag": 1.0}}
     glb.root["cameras"] = [{"type": kind, **lens}]
     glb.root["nodes"][1] = {"name": "Camera", "camera": 0}
-    add_shifts(glb, {"Camera": (0.25, -0.5), "other": (9.0, 9.0)}, 10.0)
+    set_frames(glb, {"Camera": (0.25, -0.5, 0.6, 0.4), "other": (9.0, 9.0, 1.0, 1.0)}, 10.0)
     (camera,) = read(glb).cameras
     assert camera.shift == shift
+    assert camera.aspect == pytest.approx(1.5)
+    assert (camera.height if camera.fov_y is None else np.tan(camera.fov_y / 2)) == pytest.approx(
+        8.0 if camera.fov_y is None else 0.4
+    )
+
+
+def test_faces_without_a_material_are_of_a_dull_grey(read):
+    glb = document("A")
+    for part in glb.root["meshes"][0]["primitives"]:
+        part.pop("material", None)
+    add_default_material(glb)
+    (material,) = read(glb).materials
+    assert (material.base_color, material.metallic, material.roughness) == ((0.8, 0.8, 0.8), 0.0, 1.0)
+
+
+def test_what_cameras_do_not_see_is_left_out_unless_it_glows(read):
+    glb, notes = document("A", "B"), []
+    mesh = glb.root["meshes"][0]
+    glowing = glb.append("materials", {"emissiveFactor": [1, 1, 1]})
+    parts = [{**part, "material": glowing} for part in mesh["primitives"]]
+    for node in glb.root["nodes"][1:]:
+        node.pop("extensions")
+        node["mesh"] = 0 if node["name"] == "A" else glb.append("meshes", {"primitives": parts})
+    leave_out_unseen(glb, {"A", "B"}, notes.append)
+    assert notes == [
+        "object 'A': cameras do not see it: it is left out, and so are its shadows",
+        "object 'B': cameras do not see it in Blender; it glows, and is shown",
+    ]
+    assert [node["name"] for node in glb.root["nodes"] if "mesh" in node][-1] == "B"

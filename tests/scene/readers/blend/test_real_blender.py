@@ -186,6 +186,31 @@ def test_shifted_lenses(read_real):
     assert cameras["flat"].shift == pytest.approx((0.6, -0.3), rel=1e-4)
 
 
+def test_what_renders_show_otherwise_is_named(read_real):
+    scene = read_real("otherwise.blend")
+    said = "\n".join(scene.notes)
+    for line in (
+        "pictures are transparent where the world is shown",
+        "object 'Hole': a holdout is shown as any object",
+        "object 'Catcher': a shadow catcher is shown as any object",
+        "object 'Ghost': cameras do not see it: it is left out, and so are its shadows",
+        "the material 'clay' that overrides the view layer's is not applied",
+        "light 'Oval': its scale, which makes its cone wider or narrower, is not honoured",
+        "light 'Oval': it is linked to some objects, and lights all",
+        "material 'mixed': its picture, clipped at its edges in Blender, goes on with the last pixels",
+        "glTF has no word for its nodes (Mix Shader, Transparent BSDF)",
+        "the nodes of the compositor are not applied",
+    ):
+        assert line in said, line
+    assert "ghost" not in [mesh.name for mesh in scene.meshes]
+
+
+def test_a_flat_camera_of_a_file_in_centimetres(read_real):
+    (camera,) = read_real("flat.blend").cameras
+    # Twice as wide as high: its 3 m are the longer side.
+    assert (camera.height, camera.aspect) == (pytest.approx(1.5), pytest.approx(2.0))
+
+
 @pytest.mark.parametrize("space", ["Rec.2020", "ACEScg"])
 def test_colours_of_other_working_spaces(read_real, space):
     def colors(name):

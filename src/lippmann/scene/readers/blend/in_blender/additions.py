@@ -52,6 +52,18 @@ def add_lights(glb: Glb, lights: dict[str, dict[str, Any]], unit: float) -> None
             glb.root[key] = value
 
 
+def add_default_material(glb: Glb) -> None:
+    """Give faces without a material that of Cycles, a dull grey; glTF's own is white metal."""
+    bare = [part for mesh in glb.root.get("meshes", []) for part in mesh["primitives"] if "material" not in part]
+    if bare:
+        surface = {"baseColorFactor": [0.8, 0.8, 0.8, 1], "metallicFactor": 0, "roughnessFactor": 1}
+        dull = {"name": "default", "pbrMetallicRoughness": surface, "extensions": {_SPECULAR: {"specularFactor": 0}}}
+        glb.use_extension(_SPECULAR)
+        index = glb.append("materials", dull)
+        for part in bare:
+            part["material"] = index
+
+
 def add_focus(glb: Glb, distances: dict[str, float], unit: float) -> None:
     """Give cameras, by their objects' names, the distance of their focus."""
     for node in glb.root.get("nodes", []):
@@ -59,13 +71,34 @@ def add_focus(glb: Glb, distances: dict[str, float], unit: float) -> None:
             node.setdefault("extras", {})["focus_distance"] = distances[node["name"]] * unit
 
 
-def add_shifts(glb: Glb, shifts: dict[str, tuple[float, float]], unit: float) -> None:
-    """Give cameras, by their objects' names, where their pictures' middles lie; see :func:`.lights.lens_shifts`."""
+def set_frames(glb: Glb, frames: dict[str, tuple[float, ...]], unit: float) -> None:
+    """Give cameras, by their objects' names, what their pictures hold; see :func:`.lights.camera_frames`."""
     for node in glb.root.get("nodes", []):
-        if "camera" in node and node.get("name") in shifts:
-            is_flat = glb.root["cameras"][node["camera"]]["type"] == "orthographic"
-            shift = [value * (unit if is_flat else 1.0) for value in shifts[node["name"]]]
-            node.setdefault("extras", {})["lens_shift"] = shift
+        if "camera" not in node or node.get("name") not in frames:
+            continue
+        lens = glb.root["cameras"][node["camera"]]
+        scale = unit if lens["type"] == "orthographic" else 1.0
+        x, y, half_width, half_height = (value * scale for value in frames[node["name"]])
+        if lens["type"] == "orthographic":
+            lens["orthographic"] |= {"xmag": half_width, "ymag": half_height}
+        else:
+            lens["perspective"] |= {"yfov": 2.0 * math.atan(half_height), "aspectRatio": half_width / half_height}
+        if x or y:
+            node.setdefault("extras", {})["lens_shift"] = [x, y]
+
+
+def leave_out_unseen(glb: Glb, names: set[str], remark: Any) -> None:
+    """Take the meshes of objects that cameras do not see off their nodes, unless they glow."""
+    for node in glb.root.get("nodes", []):
+        if "mesh" not in node or node.get("name") not in names:
+            continue
+        parts = glb.root["meshes"][node["mesh"]]["primitives"]
+        materials = [glb.root["materials"][part["material"]] for part in parts if "material" in part]
+        if any(any(material.get("emissiveFactor", ())) for material in materials):
+            remark(f"object '{node['name']}': cameras do not see it in Blender; it glows, and is shown")
+        else:
+            del node["mesh"]
+            remark(f"object '{node['name']}': cameras do not see it: it is left out, and so are its shadows")
 
 
 def leave_out(glb: Glb, names: set[str], instancers: set[str]) -> None:

@@ -8,11 +8,19 @@ from typing import Any
 
 import bpy
 
-from .additions import add_focus, add_lights, add_shifts, leave_out, scale_to_metres
+from .additions import (
+    add_default_material,
+    add_focus,
+    add_lights,
+    leave_out,
+    leave_out_unseen,
+    scale_to_metres,
+    set_frames,
+)
 from .glb import Glb
-from .lights import describe_lights, focus_distances, lens_shifts
+from .lights import camera_frames, describe_lights, focus_distances
 from .plain_values import plain_values
-from .remarks import remark_lights, remark_materials, remark_objects
+from .remarks import remark_lights, remark_materials, remark_objects, remark_scene, unseen_objects
 from .render_view import as_rendered
 from .working_space import materials_to_rec709
 from .world import write_world
@@ -64,7 +72,9 @@ def export_scene(folder: Path, *, is_animated: bool = False) -> Exported:
         for look in (remark_objects, remark_materials, remark_lights):
             look(depsgraph, remark)
         lights = describe_lights(depsgraph, remark)
-        focus, shifts = focus_distances(scene), lens_shifts(scene)
+        focus, frames = focus_distances(scene), camera_frames(scene)
+        unseen = unseen_objects(depsgraph, view_layer, remark)
+        remark_scene(scene, view_layer, remark)
         shown = set(view_layer.objects)
         aside = {item.name for item in scene.objects if item not in shown}
         instancers = {item.name for item in shown if item.instance_type == "COLLECTION"}
@@ -74,10 +84,12 @@ def export_scene(folder: Path, *, is_animated: bool = False) -> Exported:
         remark(f"the scene is shown at its frame {scene.frame_current}: frames of motion are for sequences")
     glb = Glb.read(path)
     leave_out(glb, aside, instancers)
+    leave_out_unseen(glb, unseen, remark)
     materials_to_rec709(glb)
+    add_default_material(glb)
     add_lights(glb, lights, unit)
     add_focus(glb, focus, unit)
-    add_shifts(glb, shifts, unit)
+    set_frames(glb, frames, unit)
     scale_to_metres(glb, unit)
     glb.write(path)
     world = folder / WORLD

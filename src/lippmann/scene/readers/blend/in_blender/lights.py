@@ -47,20 +47,21 @@ def focus_distances(scene: Any) -> dict[str, float]:
     return distances
 
 
-def lens_shifts(scene: Any) -> dict[str, tuple[float, float]]:
-    """Where the picture's middle lies beside each camera's axis, right and up, by the camera's name, if anywhere.
+def camera_frames(scene: Any) -> dict[str, tuple[float, ...]]:
+    """What each camera's picture holds: its middle, right of the camera's axis and up, and half its width and height.
 
-    A slope; of orthographic cameras a length in Blender's units.
+    Slopes; of orthographic cameras lengths in Blender's units. By the camera's name, for pictures of the scene's size.
     """
-    shifts = {}
+    frames = {}
     for item in scene.objects:
-        if item.type != "CAMERA" or not (item.data.shift_x or item.data.shift_y):
+        if item.type != "CAMERA" or item.data.type not in ("PERSP", "ORTHO"):
             continue
         corners = item.data.view_frame(scene=scene)
-        x, y, z = (sum(corner[axis] for corner in corners) / len(corners) for axis in range(3))
-        scale = -z if item.data.type == "PERSP" else 1.0
-        shifts[item.name] = (x / scale, y / scale)
-    return shifts
+        scale = -corners[0].z if item.data.type == "PERSP" else 1.0
+        ends = [(min(corner[axis] for corner in corners), max(corner[axis] for corner in corners)) for axis in (0, 1)]
+        middles = [(low + high) / 2.0 / scale for low, high in ends]
+        frames[item.name] = (*middles, *((high - low) / 2.0 / scale for low, high in ends))
+    return frames
 
 
 def _describe(item: Any, remark: Any) -> dict[str, Any] | None:
@@ -86,17 +87,27 @@ def _describe(item: Any, remark: Any) -> dict[str, Any] | None:
         described |= {"kind": "spot", "outer": outer, "inner": _inner(outer, light.spot_blend)}
         if light.use_square:
             remark(f"light '{item.name}': its square cone is read as a round one")
+        scales = item.matrix_world.to_scale()
+        if max(scales) - min(scales) > 1e-3 * max(map(abs, scales)):
+            remark(f"light '{item.name}': its scale, which makes its cone wider or narrower, is not honoured")
     return described
 
 
 def _inner(outer: float, blend: float) -> float:
-    """Half-angle within which a spot of Blender's has its whole strength.
+    """Half-angle within which a spot has its whole strength, so that as much light leaves it as in Cycles.
 
-    Blender's edge is soft in the tangent of the angle from the axis, over the share ``blend`` of the cone.
+    Cycles' edge is a smoothstep of the cosine of the angle from the axis, over the share ``blend`` of 1 - cos(outer):
+    half of the light there is lost. Readers of glTF have an edge that falls evenly with the angle.
     """
-    if outer >= math.pi / 2.0:
-        return outer * (1.0 - blend)
-    return min(math.atan(math.tan(outer) * (1.0 - blend)), outer * 0.999)
+    light = (1.0 - math.cos(outer)) * (1.0 - blend / 2.0)
+    least, most = 0.0, outer * 0.999
+    for _ in range(40):
+        inner = (least + most) / 2.0
+        if 1.0 - (math.sin(outer) - math.sin(inner)) / (outer - inner) < light:
+            least = inner
+        else:
+            most = inner
+    return least
 
 
 def _area(item: Any, color: list[float], power: float, remark: Any, *, is_normalized: bool) -> dict[str, Any] | None:

@@ -40,6 +40,7 @@ def as_rendered(scene: Any, view_layer: Any) -> Iterator[None]:
                 changes.set(collection, "hide_viewport", collection.hide_render)
         for layer in layers:
             changes.set(layer, "hide_viewport", False)
+        changes.set(scene.render, "simplify_subdivision", scene.render.simplify_subdivision_render)
         for item in scene.objects:
             if item.library is not None:
                 continue
