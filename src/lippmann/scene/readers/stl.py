@@ -95,7 +95,7 @@ def _facet_colors(header: bytes, numbers: NDArray[np.uint16]) -> FloatArray | No
     if start >= len(_OWN_COLOR) and len(own) == 3:
         codes = np.where(is_set[:, None], np.frombuffer(own, np.uint8) / 255.0, parts)
     elif is_set.any() and not numbers[~is_set].any():
-        codes = np.where(is_set[:, None], parts[:, ::-1], encode_srgb(0.7))
+        codes = np.where(is_set[:, None], parts[:, ::-1], encode_srgb(np.array(0.7)))
     else:
         return None
     colors = np.concatenate([decode_srgb(codes), np.ones((len(codes), 1))], axis=1)
