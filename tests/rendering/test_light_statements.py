@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from lippmann.rendering.estimate.psnr import Estimate
-from lippmann.rendering.light_statements import is_among_mirrors, light_notes, stated_error
+from lippmann.rendering.light_statements import light_notes, stated_error
 from lippmann.rendering.request.render_request import RenderRequest
 
 ESTIMATE = Estimate(40.0, 38.0, 43.0, 34.0, 30.0, 37.0, (3, 0))
@@ -19,16 +19,6 @@ def test_intervals_of_few_samples_among_mirrors_reach_down_farther(samples, low,
     assert stated == ESTIMATE.to_dict() | {"psnr_low": low, "worst_low": worst_low}
     notes = light_notes(RenderRequest(), ESTIMATE, samples, {"caustics": caustics})
     assert any("missed bright light among mirrors" in note for note in notes) == (samples < 16)
-
-
-def test_where_a_search_found_no_small_image_a_quality_takes_no_margin_and_intervals_are_as_wide():
-    searched = {**AMONG_MIRRORS, "mirror_images": "none"}
-    assert is_among_mirrors(AMONG_MIRRORS)
-    assert not is_among_mirrors(searched)
-    assert stated_error(ESTIMATE, 2, searched) == stated_error(ESTIMATE, 2, AMONG_MIRRORS)
-    assert light_notes(RenderRequest(), ESTIMATE, 2, searched) == light_notes(
-        RenderRequest(), ESTIMATE, 2, AMONG_MIRRORS
-    )
 
 
 def test_no_psnr_is_below_nothing():

@@ -18,23 +18,18 @@ def stated_error(estimate: Estimate | None, samples: int, choices: Mapping[str, 
     samples:
         Of each pixel.
     choices:
-        What was chosen for the picture, by the names of its options, and found: ``caustics``, ``mirror_images`` here.
+        What was chosen for the picture, by the names of its options, and found: ``caustics`` here.
     """
     if estimate is None or _misses_caustics(choices):
         return None
-    return (stated_among_mirrors(estimate, samples) if _has_caustics(choices) else estimate).to_dict()
+    return (stated_among_mirrors(estimate, samples) if is_among_mirrors(choices) else estimate).to_dict()
 
 
 def is_among_mirrors(choices: Mapping[str, object]) -> bool:
     """Whether sharp surfaces may mirror emitters so small that samples miss them.
 
-    Caustics tell that are not left to paths, unless a search has found no such image. A quality is then reached without
-    a margin; but intervals of few samples stay as wide, as bright water had a worst micro-image 1.4 dB below its own.
+    Caustics tell that are not left to paths.
     """
-    return _has_caustics(choices) and choices.get("mirror_images") != "none"
-
-
-def _has_caustics(choices: Mapping[str, object]) -> bool:
     return choices.get("caustics", "paths") != "paths"
 
 
@@ -53,7 +48,7 @@ def light_notes(
             "no estimate of the error: paths hardly find what mirrors, glass or gloss throw onto other surfaces from "
             "emitters as small as here; photons bring it (caustics)"
         )
-    if estimate is not None and samples < FEWEST_AMONG_MIRRORS and _has_caustics(choices):
+    if estimate is not None and samples < FEWEST_AMONG_MIRRORS and is_among_mirrors(choices):
         notes.append(
             f"fewer than {FEWEST_AMONG_MIRRORS} samples may all have missed bright light among mirrors: intervals of "
             "the PSNR reach down farther"

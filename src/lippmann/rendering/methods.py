@@ -45,8 +45,6 @@ SAMPLES_LAYER = "samples"
 
 #: Samples per pixel from which on cheap ones are divided among the pixels.
 FEWEST_DIVIDED = 8
-#: Share of the pixels that may show images of small emitters where noise is to tell which need more samples.
-MOST_WITH_IMAGES = 0.01
 #: What putting a picture together and writing it takes, as a rule.
 _SECONDS_PER_PIXEL_WRITTEN = 1e-7
 
@@ -202,13 +200,11 @@ def _traced(
 def divides_samples(job: Job) -> bool:
     """Whether samples are divided among the pixels by their noise.
 
-    Not where a quality is promised, nor among many images of small emitters: what is noisy is seen there, but not what
-    all samples of a pixel have missed. Few samples that are cheap are taken in one launch.
+    Not where a quality is promised: what is noisy is seen, but not what all samples of a pixel have missed. Few samples
+    that are cheap are taken in one launch.
     """
-    images = job.integrator.mirror_images if isinstance(job.integrator, PathIntegrator) else None
-    few = images is None or images.with_images <= MOST_WITH_IMAGES * job.traced.width * job.traced.height
     is_worth = job.request.samples >= FEWEST_DIVIDED or _is_costly(job.integrator)
-    return few and is_worth and not job.request.is_open_ended
+    return is_worth and not job.request.is_open_ended
 
 
 def allocation(job: Job, batches: FullInBatches, denoised: Denoised | None = None) -> SampleAllocation:

@@ -172,27 +172,6 @@ def test_narrow_lobes_are_weighed_as_paths_weigh_them():
     assert further.var(axis=0).mean() < 0.5 * plain.var(axis=0).mean()
 
 
-@pytest.mark.parametrize("all_kinds", [False, True])
-def test_aimed_chains_bring_what_chains_at_random_bring(all_kinds):
-    """Boxes about images of emitters take noise away, and no light."""
-    import mitsuba as mi
-
-    from lippmann.rendering.film.image_search import search_images
-
-    if all_kinds:
-        scene = scene_of_all_events()
-        scene["light"] |= {"radius": 0.05, "emitter": {"type": "area", "radiance": rgb(200, 150, 100)}}
-        integrator, source = prepared(mi.load_dict(scene), has_null=True)
-    else:
-        integrator, source = described(small_emitter_in_glazed_balls())
-    random = pictures(integrator, source, 8, seeds=range(40))
-    integrator.mirror_images = search_images(integrator.scene, source, 64, 1 << 30).images
-    aimed = pictures(integrator, source, 8, seeds=range(40, 80))
-    integrator.mirror_images = None
-    agree(random, aimed)
-    assert aimed.var(axis=0).mean() < 0.8 * random.var(axis=0).mean()
-
-
 def test_emitters_without_size_are_seen_in_narrow_lobes():
     """No ray meets them: chains sample them where the half vector makes the event sharp, and paths leave out just that.
 

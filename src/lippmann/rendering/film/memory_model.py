@@ -34,8 +34,6 @@ COUNTS = 8
 PHOTON = 128
 #: One ray from an emitter to a light vertex, with what it takes to trace it, in bytes.
 LIGHT_VERTEX = 256
-#: One lane of the search for mirror images, and what is kept of it for a pixel, in bytes.
-IMAGE_SEARCH_LANE, MIRROR_IMAGES = 256, 16
 #: What reuse of points takes: points without colours, plain rows, maps and lists of pixels. The paper's order takes
 #: the most: 6 for points, 4 for lenses, 8 for places beside centres, 12 for the sorted list.
 POINT_IMAGE = 32

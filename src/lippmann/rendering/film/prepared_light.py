@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import drjit as dr
 import mitsuba as mi
 
 from lippmann.rendering.film.caustics import give_photons, take_photons
 from lippmann.rendering.film.exposure import gain_of, measure_exposure
 from lippmann.rendering.film.lit_surfaces import give_light_vertices
-from lippmann.rendering.film.seen_chains import give_chains
+from lippmann.rendering.film.seen_chains import count_chains
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.rendering.transport.beam import beam_of
 from lippmann.rendering.transport.casters import has_sharp_surfaces
@@ -19,7 +20,7 @@ from lippmann.rendering.transport.ray_source import RaySource
 from lippmann.scene.values.description import Color
 
 #: What :func:`prepare_light` may tell.
-_TOLD = ("camera_exposure", "caustics", "exposure", "light_vertices", "mirror_images", "seen_chains")
+_TOLD = ("camera_exposure", "caustics", "exposure", "light_vertices", "seen_chains")
 
 
 def tell_anew(choices: dict[str, object], told: dict[str, object]) -> None:
@@ -62,7 +63,7 @@ def prepare_light(
     MemoryLimitError
         ``memory`` bytes do not hold the photons that were asked for.
     """
-    integrator.photons = integrator.photon_passes = integrator.seen_chains = integrator.mirror_images = None
+    integrator.photons = integrator.photon_passes = integrator.seen_chains = None
     integrator.light_vertices = integrator.vertex_passes = None
     integrator.beam = integrator.gain = integrator.most_indirect = None
     told: dict[str, object] = {}
@@ -92,12 +93,10 @@ def prepare_light(
         told["light_vertices"] = POINTS
     if request.clamp_indirect is not None:
         integrator.most_indirect = mi.Float(request.clamp_indirect / gain)
-    if has_sharp and stands_alone:
-        chains = give_chains(integrator, request, source, memory)
-        if chains.without_images:
-            told["mirror_images"] = "none"
-        if chains.number:
-            told["seen_chains"] = chains.number
-            if is_widened:
-                integrator.beam = beam_of(source, request.samples * chains.number)
+    chains = count_chains(integrator.scene, request) if stands_alone else 0
+    if chains:
+        integrator.seen_chains = dr.opaque(mi.UInt32, chains)
+        told["seen_chains"] = chains
+        if is_widened:
+            integrator.beam = beam_of(source, request.samples * chains)
     return told

@@ -61,7 +61,6 @@ from lippmann.rendering.transport.sharp_events import (
 if TYPE_CHECKING:
     from lippmann.rendering.transport.caustic_photons import CausticPhotons
     from lippmann.rendering.transport.light_vertices import LightVertexPasses, LightVertices
-    from lippmann.rendering.transport.mirror_images import MirrorImages
 
 #: Sample dimensions used at one vertex.
 DIMENSIONS_PER_VERTEX = 4
@@ -115,8 +114,6 @@ class PathIntegrator:
         self.vertex_passes: LightVertexPasses | None = None
         #: Chains of sharp events that stand for the seen light of each path, see :mod:`.seen_light`; None for none.
         self.seen_chains: UInt32 | None = None
-        #: Images of small emitters at which chains are aimed; None for chains at random.
-        self.mirror_images: MirrorImages | None = None
         #: Beam of a sample, by which lobes of curved surfaces are widened; None for lobes as they are.
         self.beam: Beam | None = None
         self.shadow_rays = ShadowRays(scene, features.has_null)

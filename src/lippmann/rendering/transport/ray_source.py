@@ -76,17 +76,8 @@ class PixelRays:
 
     def ray(self, stream: SampleStream) -> Ray3f:
         """The ray of each lane's sample."""
-        return self.through(stream.next_2d(PIXEL_DIMENSION) if self._box_filter else mi.Point2f(0.5))
-
-    def through(self, point: Point2f) -> Ray3f:
-        """Rays through points of the lanes' pixels, in [0, 1)^2."""
+        point = stream.next_2d(PIXEL_DIMENSION) if self._box_filter else mi.Point2f(0.5)
         return self._source.rays(*self._at, point)
-
-    @property
-    def number(self) -> UInt32:
-        """Index of each lane's pixel, or sub-pixel, in the whole picture."""
-        column, row, channel = self._at
-        return pixel_number(self._source, column, row) * self._source.channels + channel
 
 
 class _OnePicture:

@@ -17,7 +17,7 @@ with ever more of them nothing is left out.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, cast
 
 import drjit as dr
 import mitsuba as mi
@@ -46,9 +46,6 @@ from lippmann.rendering.transport.path import PathIntegrator
 from lippmann.rendering.transport.ray_source import PixelRays
 from lippmann.rendering.transport.shadow_rays import MAX_CROSSINGS
 from lippmann.rendering.transport.sharp_events import follows_sharply, is_sharp, sharp_lobe
-
-if TYPE_CHECKING:
-    from lippmann.rendering.transport.mirror_images import MirrorImages
 
 #: Linear value of a pixel, white being 1, up to which one of :data:`_OF_CHAINS` chains counts. One of fewer counts
 #: for more of it, as fewer highlights are met by one alone: the limit of a chain goes with this power of their number.
@@ -120,14 +117,7 @@ def seen_light(
         tracing, label="chains", exclude=[integrator, of_chains, pixel, stream, chains, first, most, takes_shadow_rays]
     ):
         further = of_chains.at(first + number)
-        weight = mi.Float(1)
-        if dr.hint(integrator.mirror_images is not None, mode="scalar"):
-            point, weight = cast("MirrorImages", integrator.mirror_images).point(pixel.number, further)
-            ray = pixel.through(point)
-        else:
-            ray = pixel.ray(further)
-        met, traced, tests = _chain(integrator, ray, further, stream.index, tracing)
-        met *= weight
+        met, traced, tests = _chain(integrator, pixel.ray(further), further, stream.index, tracing)
         met = dr.select(dr.isfinite(dr.sum(met)), met, 0)
         light += met
         if dr.hint(most is not None, mode="scalar"):
