@@ -71,8 +71,7 @@ def measure(name: str, file: Path | None, reference_samples: int) -> dict[str, A
 
 def _by_paths(stage: Stage) -> None:
     """All light by paths."""
-    paths = stage.integrator
-    paths.photons = paths.photon_passes = paths.seen_chains = paths.beam = None
+    stage.integrator = stage.integrator.lit_with(photons=None, photon_passes=None, chains=None)
 
 
 def picture(stage: Stage, way: str, method: str, samples: int) -> Picture:

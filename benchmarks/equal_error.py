@@ -248,11 +248,14 @@ def light_up(stage: Any, request: Any, memory: int = 4 << 30) -> None:
 
     ``stage`` has the session, the integrator and the source of a :class:`Stage`.
     """
-    from lippmann.rendering.film.prepared_light import prepare_light, tell_anew
+    from lippmann.rendering.preparation.prepare import prepare_light
 
     # All pictures of a stage are exposed alike.
     request = replace(request, exposure=stage.session.choices.get("exposure", 0.0))
-    tell_anew(stage.session.choices, prepare_light(stage.integrator, request, stage.source, memory))
+    light = prepare_light(stage.integrator, request, stage.source, memory)
+    stage.session.choices.clear()
+    stage.session.choices.update(light.choices)
+    stage.integrator = stage.integrator.lit_by(light)
 
 
 def trace_lit(stage: Stage, samples: int, seed: int) -> Picture:

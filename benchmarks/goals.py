@@ -81,9 +81,8 @@ def _reference(stage: Stage, seed: int) -> Picture:
 def _picture(stage: Stage, options: dict[str, Any]) -> Picture:
     from lippmann.rendering.methods import trace
 
-    job = _job(stage, options)
-    light_up(stage, job.request)
-    picture: Picture = trace(job).frame.pixels
+    light_up(stage, _job(stage, options).request)
+    picture: Picture = trace(_job(stage, options)).frame.pixels
     return picture
 
 
@@ -144,7 +143,7 @@ def _stock_views(stage: Stage, samples: int) -> Picture:
     source, scene = stage.source, stage.built.mitsuba
     stock = mi.load_dict({"type": "path", "max_depth": stage.session.request.surfaces + 1, "rr_depth": 5})
     background = stage.integrator.features.background
-    gain = 1.0 if stage.integrator.gain is None else float(np.array(stage.integrator.gain).ravel()[0])
+    gain = 1.0 if stage.integrator.light.gain is None else float(np.array(stage.integrator.light.gain).ravel()[0])
     rows = max(1, (1 << 20) // (source.width * samples))
     picture = np.empty((source.height, source.width, 3), np.float32)
     for first in range(0, source.height, rows):
@@ -172,11 +171,11 @@ def _reached(stage: Stage, quality: float, options: dict[str, Any]) -> dict[str,
     """Seconds and samples, and where it ended."""
     from lippmann.rendering.methods import trace
 
-    job = _job(stage, {"quality": quality, "spp": MOST_SAMPLES, **options})
+    options = {"quality": quality, "spp": MOST_SAMPLES, **options}
 
     def lit() -> Any:
-        light_up(stage, job.request)
-        return trace(job)
+        light_up(stage, _job(stage, options).request)
+        return trace(_job(stage, options))
 
     seconds, traced = timed(lit)
     assert traced.estimate is not None

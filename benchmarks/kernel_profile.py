@@ -26,6 +26,7 @@ import argparse
 import copy
 import statistics
 from contextlib import nullcontext
+from dataclasses import replace
 from typing import Any
 from unittest import mock
 
@@ -90,7 +91,8 @@ def _kernels(stage: Stage) -> dict[str, Any]:
     from lippmann.rendering.film import wavefront
     from lippmann.rendering.film.wavefront import samples_of_tile
     from lippmann.rendering.film.wavefront_plan import make_plan
-    from lippmann.rendering.transport import caustic_light, path
+    from lippmann.rendering.transport import caustic_light, path, path_techniques
+    from lippmann.rendering.transport.shadow_rays import ShadowRays
 
     source, paths = stage.source, stage.integrator
     plan = make_plan(source.width, source.height, SAMPLES, memory=4 << 30)
@@ -110,10 +112,7 @@ def _kernels(stage: Stage) -> dict[str, Any]:
             return mi.Spectrum(0), dr.zeros(mi.DirectionSample3f), mi.UInt32(0)
 
     def alike(kind: type[path.PathIntegrator]) -> path.PathIntegrator:
-        other = kind(paths.scene, paths.features, paths.depth)
-        for name in ("light_sampler", "gain", "photons", "light_vertices", "beam"):
-            setattr(other, name, getattr(paths, name))
-        return other
+        return kind(paths.scene, paths.features, paths.depth, light=paths.light)
 
     usual = caustic_light.PHOTON_PARTS
 
@@ -124,7 +123,11 @@ def _kernels(stage: Stage) -> dict[str, Any]:
             caustic_light.PHOTON_PARTS = parts
             with mock.patch.object(wavefront, "in_strips", return_value=0) if in_rows else nullcontext():
                 pixels, stream = samples_of_tile(source, plan, tile, run, seed, True)
-            with mock.patch.object(path, "caustic_light", return_value=mi.Spectrum(0)) if is_dark else nullcontext():
+            with (
+                mock.patch.object(path_techniques, "caustic_light", return_value=mi.Spectrum(0))
+                if is_dark
+                else nullcontext()
+            ):
                 radiance, counts = integrator.sample(pixels.ray(stream), stream, mi.Bool(True))
             dr.eval(radiance, counts.secondary, counts.shadow)
             return np.array(counts.secondary)
@@ -152,11 +155,12 @@ def _kernels(stage: Stage) -> dict[str, Any]:
         dr.eval(way, steps)
         return np.array(steps) - 1
 
-    before = alike(path.PathIntegrator)
-    if before.features.has_null:
-        before.shadow_rays.opaque, before.shadow_rays.asked = None, paths.scene
-    if paths.photons is not None:
-        before.photons = _unaligned(paths.photons)
+    light, undivided = paths.light, ShadowRays(paths.scene, has_null=False)
+    if paths.features.has_null:
+        undivided.opaque, undivided.asked = None, paths.scene
+    if light.photons is not None:
+        light = replace(light, photons=_unaligned(light.photons))
+    before = path.PathIntegrator(paths.scene, paths.features, paths.depth, light=light, shadow_rays=undivided)
     kernels = {
         "whole": traced(paths),
         "before": traced(before, parts=1, in_rows=True),
@@ -165,7 +169,7 @@ def _kernels(stage: Stage) -> dict[str, Any]:
         "emitters": traced(alike(Unlit)),
         "walks": walks,
     }
-    if paths.photons is not None:
+    if paths.light.photons is not None:
         kernels["photons"] = traced(paths, is_dark=True)
     return kernels
 

@@ -56,20 +56,20 @@ def _room(name: str) -> Stage:
 
 
 def _measured(stage: Stage) -> dict[str, Any]:
-    from lippmann.rendering.film import prepared_light
+    from lippmann.rendering.preparation import prepare
 
     seconds: dict[str, list[float]] = {"alone": [], "joined": []}
     halves: dict[str, list[Any]] = {"alone": [], "joined": []}
     for run in range(RUNS + 1):
         for way, found in seconds.items():
-            left_out = mock.patch.object(prepared_light, "give_light_vertices", return_value=False)
+            left_out = mock.patch.object(prepare, "trace_light_vertices", return_value=None)
             with left_out if way == "alone" else nullcontext():
                 took, picture = once(partial(trace_lit, stage, SAMPLES, 1001 * (run + 1)))
             if run:  # the first is the warm-up
                 found.append(took)
             halves[way].append(coded(picture))
             if way == "joined":
-                is_joined = stage.integrator.light_vertices is not None
+                is_joined = stage.integrator.light.light_vertices is not None
     return {
         "is_joined": is_joined,
         "halves": {way: psnr(np.square(pair[0] - pair[1]).mean()) for way, pair in halves.items()},

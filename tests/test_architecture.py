@@ -59,6 +59,7 @@ ORDER = (
     "rendering.estimate",
     "rendering.transport",
     "rendering.film",
+    "rendering.preparation",
     "rendering.sharing",
     "rendering.denoise",
     "rendering.adaptive",
@@ -404,3 +405,61 @@ def test_a_render_is_followed_in_twelve_hops():
     assert len(WALK) <= 12
     ranks = [ORDER.index(module.rpartition(".")[0]) for module, _ in WALK]
     assert sum(after > before for before, after in itertools.pairwise(ranks)) <= 3
+
+
+#: Names by which integrators go in the source.
+INTEGRATORS = re.compile(r"(^|_)(integrator|paths)$")
+
+
+def writes_to_integrators(source: str) -> list[int]:
+    """Lines that assign an attribute of an integrator, or set one by its name, outside a class's own ``__init__``."""
+    found = []
+
+    def is_integrator(node: ast.AST) -> bool:
+        name = node.id if isinstance(node, ast.Name) else node.attr if isinstance(node, ast.Attribute) else ""
+        return INTEGRATORS.search(name) is not None
+
+    for node in ast.walk(ast.parse(source)):
+        written: list[ast.expr] = []
+        if isinstance(node, ast.Assign):
+            written = [part for target in node.targets for part in ast.walk(target) if isinstance(part, ast.Attribute)]
+        elif isinstance(node, (ast.AugAssign, ast.AnnAssign)):
+            written = [node.target]
+        elif isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in ("setattr", "delattr"):
+            found += [node.lineno] if is_integrator(node.args[0]) else []
+        found += [part.lineno for part in written if isinstance(part, ast.Attribute) and is_integrator(part.value)]
+        if isinstance(node, ast.ClassDef) and node.name.endswith("Integrator"):
+            methods = [each for each in node.body if isinstance(each, ast.FunctionDef) and each.name != "__init__"]
+            stores = [part for each in methods for part in ast.walk(each) if isinstance(part, ast.Attribute)]
+            found += [
+                part.lineno
+                for part in stores
+                if isinstance(part.ctx, ast.Store) and isinstance(part.value, ast.Name) and part.value.id == "self"
+            ]
+    return found
+
+
+def test_integrators_are_written_by_their_own_init_alone():
+    """What a picture needs is handed over when an integrator is made: see ``rendering.preparation``."""
+    found = {
+        f"{path.relative_to(ROOT)}:{line}"
+        for path in (SOURCE / "rendering").rglob("*.py")
+        for line in writes_to_integrators(path.read_text(encoding="utf-8"))
+    }
+    assert found == set()
+
+
+@pytest.mark.parametrize(
+    ("source", "expected"),
+    [
+        ("integrator.gain = 1", [1]),
+        ("self._integrator.gain, x = 1, 2", [1]),
+        ("setattr(paths, name, 1)", [1]),
+        ("integrator.depth += 1", [1]),
+        ("class PathIntegrator:\n def __init__(self): self.a = 1\n def b(self): self.a = 2", [3]),
+        ("self._integrator = integrator", []),
+        ("integrator = integrator.lit_by(light)", []),
+    ],
+)
+def test_writes_to_integrators_are_found(source, expected):
+    assert writes_to_integrators(source) == expected

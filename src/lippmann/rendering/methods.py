@@ -127,7 +127,7 @@ def _is_costly(integrator: Integrator) -> bool:
     """Whether each sample comes with chains, or looks up photons."""
     if not isinstance(integrator, PathIntegrator):
         return False
-    return integrator.photons is not None or integrator.seen_chains is not None
+    return integrator.light.photons is not None or integrator.light.chains is not None
 
 
 def _denoised_samples(job: Job) -> Traced:

@@ -199,9 +199,7 @@ class Session:
         return self.watch.stage(
             "build",
             lambda: self._in_front(
-                self._prepare_light(
-                    make_integrator(self.built, self.request, frame_from_world, source), source, own_exposure
-                ),
+                self._prepare_light(make_integrator(self.built, self.request, frame_from_world), source, own_exposure),
                 frame_from_world,
             ),
         )
@@ -228,21 +226,26 @@ class Session:
         return own_exposure if is_lit else 0.0
 
     def _prepare_light(self, integrator: Integrator, source: RaySource, own_exposure: float) -> Integrator:
-        from lippmann.rendering.film.prepared_light import prepare_light, tell_anew
+        from lippmann.device.pbr import BuiltScene
+        from lippmann.rendering.preparation.prepare import prepare_light
         from lippmann.rendering.transport.path import PathIntegrator
 
-        if isinstance(integrator, PathIntegrator):
-            told = prepare_light(
-                integrator,
-                self.request,
-                source,
-                memory_limit(self.request),
-                even_background(self.built, self.request),
-                own_exposure=self.counted_exposure(own_exposure),
-                stands_alone=not self.scene.lies_off_surfaces,
-            )
-            tell_anew(self.choices, told)
-        return integrator
+        if not isinstance(integrator, PathIntegrator):
+            return integrator
+        light = prepare_light(
+            integrator,
+            self.request,
+            source,
+            memory_limit(self.request),
+            even_background(self.built, self.request),
+            own_exposure=self.counted_exposure(own_exposure),
+            stands_alone=not self.scene.lies_off_surfaces,
+            weighs_emitters=isinstance(self.built, BuiltScene) and not self.built.borrowed,
+        )
+        # Of an earlier picture nothing is left.
+        self.choices.clear()
+        self.choices.update(light.choices)
+        return integrator.lit_by(light)
 
     def provenance(
         self,
@@ -382,16 +385,12 @@ def _build(scene: Scene, request: RenderRequest, engine: engines.Engine, memory:
     return build(scene, engine, memory=memory)
 
 
-def make_integrator(
-    built: BuiltScene | BuiltClassic, request: RenderRequest, frame_from_world: Matrix, source: RaySource | None
-) -> Integrator:
-    """The integrator that a resolved request names.
+def make_integrator(built: BuiltScene | BuiltClassic, request: RenderRequest, frame_from_world: Matrix) -> Integrator:
+    """The integrator that a resolved request names, with no light prepared.
 
-    ``source`` and ``frame_from_world`` are those of :meth:`Session.integrator`; without a source emitters are sampled
-    by the scene's own weights.
+    ``frame_from_world`` is that of :meth:`Session.integrator`.
     """
     from lippmann.device.whitted.scene import BuiltClassic
-    from lippmann.rendering.transport.emitter_weights import make_light_sampler
     from lippmann.rendering.transport.path import PathIntegrator
     from lippmann.rendering.transport.scene_features import make_scene_features
     from lippmann.rendering.transport.surface_property import SurfaceIntegrator
@@ -414,10 +413,7 @@ def make_integrator(
         features = make_scene_features(
             built.mitsuba, background=built.background, has_null=built.has_null, absorption=built.absorption
         )
-        integrator = PathIntegrator(built.mitsuba, features, request.surfaces, name=request.integrator)
-        if source is not None and not built.borrowed:
-            integrator.light_sampler = make_light_sampler(integrator, source)
-        return integrator
+        return PathIntegrator(built.mitsuba, features, request.surfaces, name=request.integrator)
     return SurfaceIntegrator(built.mitsuba, cast("SurfaceProperty", request.integrator), frame_from_world)
 
 

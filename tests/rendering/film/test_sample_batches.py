@@ -197,10 +197,10 @@ def test_a_probe_tells_the_time_and_leaves_no_trace(integrator):
 
 
 def test_samples_of_one_pass_are_taken_together():
-    """Each stretch begins when the integrator has the photons of its pass."""
+    """Each stretch of samples has the photons of its pass."""
     import mitsuba as mi
 
-    from lippmann.rendering.film.caustics import stretches
+    from lippmann.rendering.film.sample_batches import _stretches
     from lippmann.rendering.transport.pass_schedule import PassSchedule
     from lippmann.rendering.transport.path import PathIntegrator
     from lippmann.rendering.transport.scene_features import make_scene_features
@@ -213,11 +213,11 @@ def test_samples_of_one_pass_are_taken_together():
 
     scene = mi.load_dict({"type": "scene", "sky": {"type": "constant"}})
     integrator = PathIntegrator(scene, make_scene_features(scene, has_null=False), 3)
-    assert list(stretches(integrator, 7, 100)) == [100]
-    integrator.photon_passes = Passes()
-    found = [(count, integrator.photons) for count in stretches(integrator, 20, 50)]
+    assert list(_stretches(integrator, 7, 100)) == [(integrator, 100)]
+    integrator = integrator.lit_with(photon_passes=Passes())
+    found = [(count, each.light.photons) for each, count in _stretches(integrator, 20, 50)]
     assert found == [(12, "photons 0"), (32, "photons 1"), (6, "photons 2")]
-    assert list(stretches(integrator, 64, 32)) == [32]
+    assert [count for _, count in _stretches(integrator, 64, 32)] == [32]
 
 
 def corner():
@@ -291,7 +291,9 @@ def test_rays_of_a_sample_are_told_pixel_by_pixel(integrator):
 
 def test_chosen_pixels_take_each_sample_once_across_passes_of_photons(engine, monkeypatch):
     """Each pass has a part of the samples; what a part of a batch comes to is rounded, not lost."""
-    monkeypatch.setattr("lippmann.rendering.film.sample_batches.stretches", lambda *_: iter((1, 2, 1)))
+    monkeypatch.setattr(
+        "lippmann.rendering.film.sample_batches._stretches", lambda each, *_: ((each, n) for n in (1, 2, 1))
+    )
     found = batches(SampleNumbers())
     found.add_at(corner(), 16, 4)
     assert np.array_equal(found.samples_of_pixels(), np.where(corner(), 16, 0))
@@ -306,15 +308,13 @@ def test_wavefronts_of_any_size_share_a_kernel(engine):
 
     import lippmann
     from lippmann.rendering.film import sample_batches
-    from lippmann.rendering.film.prepared_light import prepare_light
     from lippmann.rendering.request.render_request import RenderRequest
     from lippmann.rendering.session import open_session
 
     request = RenderRequest(integrator="path", caustics="auto", spp=8, exposure=0.0)
     session = open_session(lippmann.load_scene("room"), request)
     integrator = session.integrator(rays(), np.diag([0.3, 0.3, 0.3, 1.0]))
-    prepare_light(integrator, request, rays(), 1 << 30)
-    assert integrator.photons is not None
+    assert integrator.light.photons is not None
     found = batches(integrator, for_denoiser=True)
     with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True), pytest.MonkeyPatch.context() as patch:
         patch.setattr(sample_batches, "compile_seconds", lambda: 0.0)  # it takes the history

@@ -64,7 +64,7 @@ def sampling_weights(scene):
 
 @pytest.mark.parametrize("order", [("sky", "bright", "faint"), ("faint", "sky", "bright"), ("bright", "faint", "sky")])
 def test_emitters_are_sampled_by_their_contribution(order):
-    from lippmann.rendering.transport.emitter_weights import UNIFORM_SHARE, estimate_emitter_weights
+    from lippmann.rendering.preparation.emitter_weights import UNIFORM_SHARE, estimate_emitter_weights
 
     weights = estimate_emitter_weights(*stage(room(order)))
     by_name = dict(zip(order, weights, strict=True))
@@ -77,7 +77,7 @@ def test_emitters_of_a_scene_with_another_sky_are_told_apart():
     """The new sky comes first among a scene's objects."""
     import mitsuba as mi
 
-    from lippmann.rendering.transport.emitter_weights import UNIFORM_SHARE, estimate_emitter_weights
+    from lippmann.rendering.preparation.emitter_weights import UNIFORM_SHARE, estimate_emitter_weights
     from lippmann.scene.mitsuba_source import with_sky
 
     sky = mi.load_dict({"type": "constant", "radiance": 3.0})
@@ -88,7 +88,7 @@ def test_emitters_of_a_scene_with_another_sky_are_told_apart():
 
 
 def test_the_scene_stays_as_it_was():
-    from lippmann.rendering.transport.emitter_weights import estimate_emitter_weights, make_light_sampler
+    from lippmann.rendering.preparation.emitter_weights import estimate_emitter_weights, make_light_sampler
 
     integrator, source = stage(room())
     first = estimate_emitter_weights(integrator, source)
@@ -165,7 +165,7 @@ def test_white_furnace_is_one_by_any_weights(weights):
         }
     )
     integrator, source = stage(scene, depth=8)
-    integrator.light_sampler = WeightedLightSampler(scene, np.array(weights))
+    integrator = integrator.lit_with(sampler=WeightedLightSampler(scene, np.array(weights)))
     pixels = picture(integrator, source, 512, 1)
     blocks = pixels.reshape(4, 6, 4, 6, 3).mean(axis=(1, 3, 4))
     assert blocks == pytest.approx(1.0, abs=0.02)
@@ -176,7 +176,7 @@ def test_delta_emitters_give_the_same_picture_by_any_weights():
     """A point light, a spot light and a sun above a floor: no scattered ray hits them, and their pdf has no angle."""
     import mitsuba as mi
 
-    from lippmann.rendering.transport.emitter_weights import make_light_sampler
+    from lippmann.rendering.preparation.emitter_weights import make_light_sampler
     from lippmann.rendering.transport.light_sampling import WeightedLightSampler
 
     transform = mi.ScalarTransform4f
@@ -200,15 +200,14 @@ def test_delta_emitters_give_the_same_picture_by_any_weights():
         make_light_sampler(integrator, source),
         WeightedLightSampler(integrator.scene, np.array([0.15, 0.6, 0.25])),
     ):
-        integrator.light_sampler = lights
-        weighted = picture(integrator, source, samples, 4)
+        weighted = picture(integrator.lit_with(sampler=lights), source, samples, 4)
         assert np.abs(weighted - uniform).max() < 0.02 * uniform.max()
         assert weighted.mean() == pytest.approx(uniform.mean(), rel=1e-3)
 
 
 def test_more_emitters_than_are_weighed_have_a_picture():
     """Beyond the most emitters the scene's own sampling is used, and each light still arrives."""
-    from lippmann.rendering.transport.emitter_weights import MAX_EMITTERS, make_light_sampler
+    from lippmann.rendering.preparation.emitter_weights import MAX_EMITTERS, make_light_sampler
     from lippmann.rendering.transport.light_sampling import SceneLightSampler
 
     count = MAX_EMITTERS + 1
@@ -223,12 +222,12 @@ def test_more_emitters_than_are_weighed_have_a_picture():
 
 
 def test_the_picture_stays_and_its_noise_falls():
-    from lippmann.rendering.transport.emitter_weights import make_light_sampler
+    from lippmann.rendering.preparation.emitter_weights import make_light_sampler
 
     integrator, source = stage(room())
     runs, samples = 12, 16
     even = np.stack([picture(integrator, source, samples, seed) for seed in range(runs)])
-    integrator.light_sampler = make_light_sampler(integrator, source)
+    integrator = integrator.lit_with(sampler=make_light_sampler(integrator, source))
     weighted = np.stack([picture(integrator, source, samples, 100 + seed) for seed in range(runs)])
     assert weighted.var(axis=0, ddof=1).mean() < 0.5 * even.var(axis=0, ddof=1).mean()
     blocks = [x.reshape(runs, 4, 6, 4, 6, 3).mean(axis=(2, 4)) for x in (even, weighted)]
@@ -239,7 +238,7 @@ def test_the_picture_stays_and_its_noise_falls():
 
 def test_emitters_without_contribution_are_sampled_uniformly():
     """A camera that sees no surface."""
-    from lippmann.rendering.transport.emitter_weights import estimate_emitter_weights, make_light_sampler
+    from lippmann.rendering.preparation.emitter_weights import estimate_emitter_weights, make_light_sampler
     from lippmann.rendering.transport.light_sampling import SceneLightSampler
     from lippmann.rendering.transport.ray_source import CameraRays
     from lippmann.scene.values.description import Camera
@@ -255,7 +254,7 @@ def test_emitters_without_contribution_are_sampled_uniformly():
 
 
 def test_invalid_contributions_do_not_count(monkeypatch):
-    from lippmann.rendering.transport import emitter_weights
+    from lippmann.rendering.preparation import emitter_weights
 
     integrator, source = stage(room())
     whole = emitter_weights.estimate_emitter_weights(integrator, source)
@@ -273,7 +272,7 @@ def test_invalid_contributions_do_not_count(monkeypatch):
 
 
 def test_no_emitter_one_or_very_many_keep_the_weights_of_the_scene(monkeypatch):
-    from lippmann.rendering.transport import emitter_weights
+    from lippmann.rendering.preparation import emitter_weights
     from lippmann.rendering.transport.light_sampling import SceneLightSampler
 
     for order in ((), ("bright",)):

@@ -124,9 +124,8 @@ def pictures(integrator, source, joined, *, seeds, spp=8):
     plan = make_plan(SIDE, SIDE, spp, memory=2**30)
     found = []
     for seed in seeds:
-        integrator.light_vertices = passes(integrator, seed).of_pass(0) if joined else None
-        found.append(trace_frame(integrator, source, plan, seed=seed).pixels)
-    integrator.light_vertices = None
+        lit = integrator.lit_with(light_vertices=passes(integrator, seed).of_pass(0) if joined else None)
+        found.append(trace_frame(lit, source, plan, seed=seed).pixels)
     return np.stack(found).astype(np.float64)
 
 
@@ -166,7 +165,7 @@ def test_weights_are_those_of_the_light_sampler_in_use():
     from lippmann.rendering.transport.light_sampling import WeightedLightSampler
 
     integrator, source = prepared(room("sphere", "point"))
-    integrator.light_sampler = WeightedLightSampler(integrator.scene, np.array([0.7, 0.05, 0.25]))
+    integrator = integrator.lit_with(sampler=WeightedLightSampler(integrator.scene, np.array([0.7, 0.05, 0.25])))
     plain, joined = (pictures(integrator, source, way, seeds=range(24)) for way in (False, True))
     agree(plain, joined)
 
@@ -184,12 +183,11 @@ def test_a_limit_on_indirect_light_holds_for_joins():
     import mitsuba as mi
 
     integrator, source = prepared(room("point"), depth=2)
-    integrator.most_indirect = mi.Float(0.02)
-    limited = pictures(integrator, source, True, seeds=range(4))
-    integrator.most_indirect = mi.Float(0.0)
-    none = pictures(integrator, source, True, seeds=range(4))
-    integrator.depth = 1
-    direct = pictures(integrator, source, False, seeds=range(4))
+    limited, none = (
+        pictures(integrator.lit_with(most_indirect=mi.Float(most)), source, True, seeds=range(4))
+        for most in (0.02, 0.0)
+    )
+    direct = pictures(prepared(room("point"), depth=1)[0], source, False, seeds=range(4))
     assert none == pytest.approx(direct, rel=1e-4, abs=1e-5)
     assert direct.mean() < limited.mean() < direct.mean() + 0.06
 

@@ -66,7 +66,7 @@ def described(description):
 
 
 def prepared(scene, *, has_null):
-    from lippmann.rendering.film.caustics import give_photons
+    from lippmann.rendering.preparation.photons import shoot_photons
     from lippmann.rendering.request.render_request import RenderRequest
     from lippmann.rendering.transport.path import PathIntegrator
     from lippmann.rendering.transport.ray_source import CameraRays
@@ -78,20 +78,24 @@ def prepared(scene, *, has_null):
     pose[2, 3] = 3.0
     source = CameraRays(Camera("eye", pose, fov_y=0.6), SIDE, SIDE)
     request = RenderRequest(integrator="path", caustics="photons", spp=8)
-    caustics = give_photons(integrator, request, source, 1 << 30)
-    assert caustics is not None
+    caustics = shoot_photons(integrator, request, source, 1 << 30)
     assert caustics.way == "photons"
-    return integrator, source
+    return integrator.lit_with(photons=caustics.photons, photon_passes=caustics.passes), source
 
 
-def pictures(integrator, source, chains, *, seeds, spp=8):
+def chained(integrator, chains):
+    """The integrator with so many chains of each path."""
     import drjit as dr
     import mitsuba as mi
 
+    return integrator.lit_with(chains=dr.opaque(mi.UInt32, chains) if chains else None)
+
+
+def pictures(integrator, source, chains, *, seeds, spp=8):
     from lippmann.rendering.film.wavefront import trace_frame
     from lippmann.rendering.film.wavefront_plan import make_plan
 
-    integrator.seen_chains = dr.opaque(mi.UInt32, chains) if chains else None
+    integrator = chained(integrator, chains)
     plan = make_plan(SIDE, SIDE, spp, memory=2**30)
     return np.stack([trace_frame(integrator, source, plan, seed=seed).pixels for seed in seeds]).astype(np.float64)
 
@@ -103,26 +107,17 @@ def all_events(engine):
     return prepared(mi.load_dict(scene_of_all_events()), has_null=True)
 
 
-@pytest.mark.parametrize("beam", [False, pytest.param(True, marks=pytest.mark.long)])
-def test_every_kind_of_surface_shows_as_much_light(all_events, beam):
-    from lippmann.rendering.transport.beam import beam_of
-
+def test_every_kind_of_surface_shows_as_much_light(all_events):
     integrator, source = all_events
-    integrator.beam = beam_of(source, 8) if beam else None
     plain, further = (pictures(integrator, source, chains, seeds=range(40)) for chains in (0, 3))
-    integrator.beam = None
     agree(plain, further)
 
 
 def test_so_it_does_without_photons(all_events):
     """Whatever brings the caustics: a path's events are told apart for the chains alone."""
     integrator, source = all_events
-    photons, integrator.photons = integrator.photons, None
-    passes, integrator.photon_passes = integrator.photon_passes, None
-    try:
-        plain, further = (pictures(integrator, source, chains, seeds=range(40)) for chains in (0, 4))
-    finally:
-        integrator.photons, integrator.photon_passes = photons, passes
+    integrator = integrator.lit_with(photons=None, photon_passes=None)
+    plain, further = (pictures(integrator, source, chains, seeds=range(40)) for chains in (0, 4))
     agree(plain, further)
 
 
@@ -177,6 +172,7 @@ def test_emitters_without_size_are_seen_in_narrow_lobes():
 
     Lobes narrow enough to be sharp, wide enough for pixels to agree.
     """
+    from lippmann.rendering.transport.path import PathIntegrator
     from lippmann.scene.values.description import Light
 
     scene = small_emitter_in_glazed_balls()
@@ -186,16 +182,14 @@ def test_emitters_without_size_are_seen_in_narrow_lobes():
     integrator, source = described(replace(scene, lights=lights))
     assert len(integrator.without_size) == 2
     for depth in (1, 6):
-        integrator.depth = depth
-        plain, further = (pictures(integrator, source, chains, seeds=range(40)) for chains in (0, 5))
+        paths = PathIntegrator(integrator.scene, integrator.features, depth, light=integrator.light)
+        plain, further = (pictures(paths, source, chains, seeds=range(40)) for chains in (0, 5))
         agree(plain, further)
         assert further.var(axis=0).mean() < 0.7 * plain.var(axis=0).mean()
 
 
 def test_their_highlights_go_past_a_denoiser():
     """All that is seen in sharp lobes is told apart, that of emitters without size, too."""
-    import drjit as dr
-    import mitsuba as mi
 
     from lippmann.rendering.film.sample_batches import FullInBatches
     from lippmann.scene.values.description import Light
@@ -203,8 +197,7 @@ def test_their_highlights_go_past_a_denoiser():
     scene = small_emitter_in_glazed_balls()
     light = Light("directional", (3.0, 3.0, 3.0), np.eye(4))
     integrator, source = described(replace(scene, lights=[light]))
-    integrator.seen_chains = dr.opaque(mi.UInt32, 8)
-    batches = FullInBatches(integrator, source, seed=1, memory=1 << 30, for_denoiser=True)
+    batches = FullInBatches(chained(integrator, 8), source, seed=1, memory=1 << 30, for_denoiser=True)
     batches.add(16)
     assert batches.seen().max() > 1
     assert (batches.picture() - batches.seen()).max() < 1
@@ -214,31 +207,26 @@ def test_their_highlights_go_past_a_denoiser():
 def test_gain_limit_and_background_are_those_of_paths(all_events):
     import mitsuba as mi
 
+    from lippmann.rendering.transport.path import PathIntegrator
+
     integrator, source = all_events
-    before = integrator.gain, integrator.most_indirect, integrator.features
-    try:
-        integrator.gain, integrator.most_indirect = mi.Float(3.0), mi.Float(0.5)
-        integrator.features = replace(integrator.features, background=(0.1, 0.2, 0.3))
-        plain, further = (pictures(integrator, source, chains, seeds=range(20)) for chains in (0, 3))
-        agree(plain, further)
-    finally:
-        integrator.gain, integrator.most_indirect, integrator.features = before
+    features = replace(integrator.features, background=(0.1, 0.2, 0.3))
+    light = replace(integrator.light, gain=mi.Float(3.0), most_indirect=mi.Float(0.5))
+    paths = PathIntegrator(integrator.scene, features, integrator.depth, light=light)
+    plain, further = (pictures(paths, source, chains, seeds=range(20)) for chains in (0, 3))
+    agree(plain, further)
 
 
 def test_chains_count_as_rays_and_depend_on_the_seed_alone(all_events):
-    import drjit as dr
-    import mitsuba as mi
 
     from lippmann.rendering.film.sample_batches import FullInBatches
 
     integrator, source = all_events
-    integrator.seen_chains = dr.opaque(mi.UInt32, 4)
-    whole = FullInBatches(integrator, source, seed=5, memory=1 << 30)
+    whole = FullInBatches(chained(integrator, 4), source, seed=5, memory=1 << 30)
     whole.add(8)
-    again = FullInBatches(integrator, source, seed=5, memory=(1 << 21))
+    again = FullInBatches(chained(integrator, 4), source, seed=5, memory=(1 << 21))
     again.add(8)
     assert whole.picture() == pytest.approx(again.picture(), rel=1e-5)
-    integrator.seen_chains = None
     plain = FullInBatches(integrator, source, seed=5, memory=1 << 30)
     plain.add(8)
     lanes = SIDE * SIDE * 8
@@ -276,20 +264,17 @@ def test_chains_count_the_emitter_samples_of_their_path():
 
 def test_seen_light_is_told_apart_and_is_all_that_is_seen(all_events):
     """The emitter's mirror images and the sky's; not what lies on matt surfaces."""
-    import drjit as dr
-    import mitsuba as mi
 
     from lippmann.rendering.film.sample_batches import FullInBatches
     from lippmann.rendering.film.wavefront import trace_frame
     from lippmann.rendering.film.wavefront_plan import make_plan
 
     integrator, source = all_events
-    integrator.seen_chains = dr.opaque(mi.UInt32, 4)
+    integrator = chained(integrator, 4)
     both = [FullInBatches(integrator, source, seed=5, memory=1 << 30, for_denoiser=keeps) for keeps in (True, False)]
     for batches in both:
         batches.add(16)
     frame = trace_frame(integrator, source, make_plan(SIDE, SIDE, 16, memory=2**30), seed=5, for_denoiser=True)
-    integrator.seen_chains = None
     picture, seen, halves = both[0].picture(), both[0].seen(), both[0].seen_halves()
     assert np.array_equal(picture, both[1].picture())
     assert both[1].seen() is None
@@ -342,7 +327,6 @@ def test_what_one_chain_brings_beyond_a_limit_is_excess(all_events):
 
 def test_of_many_chains_each_counts_as_a_whole(all_events):
     """The emitter is 15 times white: one of 8 chains counts up to 5.7 of that, one of 64 as a whole."""
-    import drjit as dr
     import mitsuba as mi
 
     from lippmann.rendering.film.sample_batches import FullInBatches
@@ -353,18 +337,15 @@ def test_of_many_chains_each_counts_as_a_whole(all_events):
     assert 5 < most_of_chain(8.0) < 6
     assert 20 < most_of_chain(64.0) < 30
     integrator, source = all_events
-    integrator.seen_chains = dr.opaque(mi.UInt32, 4)
-    try:
-        few = [FullInBatches(integrator, source, seed=seed, memory=1 << 30, for_denoiser=True) for seed in range(16)]
-        many, limited = (FullInBatches(integrator, source, seed=5, memory=1 << 30, for_denoiser=True) for _ in range(2))
-        for each in few:
-            each.add(2)
-        many.add(16)
-        integrator.gain = mi.Float(0.25)
-        limited.add(2)
-        frame = trace_frame(integrator, source, make_plan(SIDE, SIDE, 2, memory=2**30), seed=5, for_denoiser=True)
-    finally:
-        integrator.seen_chains = integrator.gain = None
+    four = chained(integrator, 4)
+    dim = four.lit_with(gain=mi.Float(0.25))
+    few = [FullInBatches(four, source, seed=seed, memory=1 << 30, for_denoiser=True) for seed in range(16)]
+    many, limited = (FullInBatches(each, source, seed=5, memory=1 << 30, for_denoiser=True) for each in (four, dim))
+    for each in few:
+        each.add(2)
+    many.add(16)
+    limited.add(2)
+    frame = trace_frame(dim, source, make_plan(SIDE, SIDE, 2, memory=2**30), seed=5, for_denoiser=True)
     assert FullInBatches(integrator, source, memory=1 << 30).excess() is None
     assert many.excess().max() == 0
     assert limited.excess().max() == frame.excess.max() == 0  # the gain leaves less than 5.7
@@ -378,7 +359,6 @@ def test_of_many_chains_each_counts_as_a_whole(all_events):
 
 def test_sky_at_outlines_stays_with_paths(engine):
     """Samples of both sides belong together: of a ball as bright as its sky nothing would be seen."""
-    import drjit as dr
     import mitsuba as mi
 
     from lippmann.rendering.film.wavefront import trace_frame
@@ -401,8 +381,7 @@ def test_sky_at_outlines_stays_with_paths(engine):
     source = CameraRays(Camera("eye", pose, fov_y=0.6), SIDE, SIDE)
     plan = make_plan(SIDE, SIDE, 4, memory=2**30)
     plain = trace_frame(integrator, source, plan, for_denoiser=True)
-    integrator.seen_chains = dr.opaque(mi.UInt32, 4)
-    further = trace_frame(integrator, source, plan, for_denoiser=True)
+    further = trace_frame(chained(integrator, 4), source, plan, for_denoiser=True)
     assert plain.seen is None
     assert np.abs(further.seen).max() == 0
     assert further.pixels == pytest.approx(plain.pixels, rel=1e-5)

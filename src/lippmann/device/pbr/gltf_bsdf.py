@@ -201,7 +201,7 @@ def _bsdf_class(variant: str) -> type[BSDF]:
         # ---- narrow lobes ----
 
         def _narrow(self, lobe: Lobe) -> Bool:
-            return lobe.own < NARROW_ALPHA
+            return lobe.alpha.x < NARROW_ALPHA
 
         def _narrow_body(self, point: Point) -> Bool:
             return self._narrow(point.lobe) if self._is_glossy else mi.Bool(False)

@@ -149,13 +149,12 @@ class Lobe:
     """A microfacet lobe seen from one direction: ``wi`` in the frame of its own normal (None: the surface's).
 
     ``tilted`` says that the normal may differ from the surface's; ``alpha`` is the width along the frame's x and y,
-    ``own`` the larger one as the surface has it, before a beam widens it.
+    of which that along x is the larger.
     """
 
     frame: Frame3f | None
     wi: Vector3f
     alpha: Point2f
-    own: Float
     tilted: bool = False
 
 

@@ -20,18 +20,12 @@ from lippmann.device.pbr.gltf_bsdf_parameters import (
 )
 from lippmann.device.pbr.texture_lookup import Place, Signal
 from lippmann.device.pbr.thin_film import thin_film_reflectance
-from lippmann.device.types import Bool, Color3f, Float, SurfaceInteraction3f, Vector3f
+from lippmann.device.types import Bool, Color3f, Float, Vector3f
 
 #: Reflectance of the clear coat seen head-on (refractive index 1.5).
 COAT_F0 = 0.04
 #: GGX width from which on what a lobe shows is much the same for all samples.
 MUCH_THE_SAME_ALPHA = 0.1
-
-
-def widen_lobes(si: SurfaceInteraction3f, by: Float) -> None:
-    """Have the squares of all GGX widths at an interaction grow by ``by``; no lobe gets wider than 1."""
-    # Derivatives of texture coordinates by pixels, which rays without differentials leave at 0 and no texture reads.
-    si.duv_dx = mi.Vector2f(by, 0)
 
 
 def surface_point(model: SurfaceModel, place: Place) -> Point:
@@ -69,18 +63,17 @@ def _lobe(
     anisotropy: Anisotropy | None = None,
 ) -> Lobe:
     wi = mi.Vector3f(place.si.wi.x, place.si.wi.y, dr.abs(place.si.wi.z))
-    own = dr.clip(dr.square(roughness.eval(place)), microfacet.MIN_ALPHA, 1)
-    alpha = mi.Point2f(dr.minimum(dr.sqrt(dr.square(own) + place.si.duv_dx.x), 1))
+    alpha = mi.Point2f(dr.clip(dr.square(roughness.eval(place)), microfacet.MIN_ALPHA, 1))
     if normal_map is None and anisotropy is None:
-        return Lobe(None, wi, alpha, own)
+        return Lobe(None, wi, alpha)
     normal = mapped_normal(normal_map, place, flip)
     frame = mi.Frame3f(normal)
     if anisotropy is not None:
         along, strength = _direction(anisotropy, place)
         frame.s = dr.normalize(along - normal * dr.dot(along, normal))
         frame.t = dr.cross(normal, frame.s)
-        alpha.x, own = (dr.lerp(width, 1, dr.square(strength)) for width in (alpha.x, own))
-    return Lobe(frame, frame.to_local(wi), alpha, own, tilted=normal_map is not None)
+        alpha.x = dr.lerp(alpha.x, 1, dr.square(strength))
+    return Lobe(frame, frame.to_local(wi), alpha, tilted=normal_map is not None)
 
 
 def _direction(anisotropy: Anisotropy, place: Place) -> tuple[Vector3f, Float]:

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from lippmann.rendering.denoise.cost_model import effort_of, traced_work
 from lippmann.rendering.denoise.oidn import Effort
-from lippmann.rendering.film.scattered_rays import ScatteredRays
 from lippmann.rendering.film.wavefront import trace_frame
 from lippmann.rendering.film.wavefront_plan import make_plan
+from lippmann.rendering.preparation.scattered_rays import ScatteredRays
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.rendering.transport.integrator import Integrator
 from lippmann.rendering.transport.ray_source import DisplayRays

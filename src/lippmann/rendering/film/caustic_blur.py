@@ -60,7 +60,7 @@ class SquaredBlur:
 
         Values of single pixels are noisy, and may be negative; their sums are not biased.
         """
-        passes = self._integrator.photon_passes if isinstance(self._integrator, PathIntegrator) else None
+        passes = self._integrator.light.photon_passes if isinstance(self._integrator, PathIntegrator) else None
         if passes is None:
             return None
         pixels = self._source.width * self._source.height

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Sequence
-from typing import cast
 
 import drjit as dr
 import mitsuba as mi
@@ -28,7 +27,6 @@ from lippmann.rendering.estimate.pixel_errors import OWN_NOISE, PixelErrors
 from lippmann.rendering.film import memory_model
 from lippmann.rendering.film.batched_picture import STREAMS, BatchedPicture
 from lippmann.rendering.film.caustic_blur import SquaredBlur
-from lippmann.rendering.film.caustics import stretches
 from lippmann.rendering.film.lane_order import STRIP_ROWS, in_strips, pixel_at, to_rows
 from lippmann.rendering.film.wavefront import (
     Frame,
@@ -109,7 +107,7 @@ class FullInBatches(BatchedPicture):
         self._window = window or PixelWindow(0, 0, source.width, source.height)
         pixels = self._window.pixels
         keeps_coverage = for_denoiser and isinstance(integrator, PathIntegrator)
-        keeps_seen = keeps_coverage and cast("PathIntegrator", integrator).seen_chains is not None
+        keeps_seen = isinstance(integrator, PathIntegrator) and for_denoiser and integrator.light.chains is not None
         further = memory_model.COVERAGE * source.channels * keeps_coverage + memory_model.SEEN * keeps_seen
         further += memory_model.COUNTS * for_denoiser
         batches, self._lanes = _sizes(pixels, source.channels, memory, further)
@@ -130,11 +128,11 @@ class FullInBatches(BatchedPicture):
         together = self.samples + samples
         started, done, compiled = time.perf_counter(), 0, 0.0
         self._errors = None
-        for stretch in stretches(self._integrator, self.samples, samples):
+        for integrator, stretch in _stretches(self._integrator, self.samples, samples):
             taken = list(self._taken)
             for run in self._runs(stretch):
                 with dr.scoped_set_flag(dr.JitFlag.KernelHistory, done == 0):
-                    sums = self._trace(run, together)
+                    sums = self._trace(integrator, run, together)
                     if done == 0:
                         compiled = compile_seconds()
                 self._keep(run, sums)
@@ -167,14 +165,15 @@ class FullInBatches(BatchedPicture):
         started, done = time.perf_counter(), 0
         self._errors = None
         per_batch, before, gone = each // number, 0, 0
-        for stretch in stretches(self._integrator, self.samples, mean):
+        for integrator, stretch in _stretches(self._integrator, self.samples, mean):
             gone += stretch
             count = round(per_batch * gone / mean) - before
             if count:
                 starts = [had + place * count for had in self._per_stream() for place in range(self._batches_of_stream)]
                 lanes = self._lanes // channels
                 for run in cut_batches(len(pixels), tuple(range(number)), tuple(starts), count, lanes, lanes + 1):
-                    self._keep(run, self._trace(run, sum(self._taken) + number * count, pixels), pixels)
+                    together = sum(self._taken) + number * count
+                    self._keep(run, self._trace(integrator, run, together, pixels), pixels)
                     done += (run.last - run.first) * channels * run.count * len(run.batches)
                     progress(Progress("trace", done, len(pixels) * channels * each))
                 self._further[pixels] += np.uint32(count)
@@ -211,7 +210,8 @@ class FullInBatches(BatchedPicture):
         """Of one sample of each of so many pixels, if the picture has them."""
         pixels = min(pixels, self._sums.shape[1])
         started = time.perf_counter()
-        self._trace(Run(0, pixels, (0,), (0,), 1, self._sums.shape[1] // pixels), self.samples + 1)
+        run = Run(0, pixels, (0,), (0,), 1, self._sums.shape[1] // pixels)
+        self._trace(self._integrator, run, self.samples + 1)
         return time.perf_counter() - started
 
     def _runs(self, samples: int) -> Iterator[Run]:
@@ -232,7 +232,9 @@ class FullInBatches(BatchedPicture):
                 strip = STRIP_ROWS * self._window.width
                 yield from cut_batches(pixels, batches, tuple(starts), count, lanes, strip)
 
-    def _trace(self, run: Run, together: int, chosen: NDArray[np.uint32] | None = None) -> dict[str, Floats]:
+    def _trace(
+        self, integrator: Integrator, run: Run, together: int, chosen: NDArray[np.uint32] | None = None
+    ) -> dict[str, Floats]:
         """What :func:`~lippmann.rendering.film.wavefront.sums_of` gives for a run; excess by the samples that every
         pixel then has ``together``, and what single ones had more.
 
@@ -268,12 +270,24 @@ class FullInBatches(BatchedPicture):
         pixels = PixelRays(self._source, column, row, channel, self._box_filter)
         samples = dr.opaque(mi.Float, together) + mi.Float(further * self.batches)
         samples = None if self._covered is None else samples
-        traced = sample_pixels(self._integrator, pixels, stream, samples)
+        traced = sample_pixels(integrator, pixels, stream, samples)
         evaluate(traced, lanes, self.rays)
         sums = sums_of(traced, channels, number, run.count)
         if self._rays_of_pixels is not None:
             sums["rays"] = rays_of(traced, channels * number * run.count)
         return {name: to_rows(part, window.width) for name, part in sums.items()} if run.in_strips else sums
+
+
+def _stretches(integrator: Integrator, first: int, samples: int) -> Iterator[tuple[Integrator, int]]:
+    """Parts of ``samples`` of each pixel from number ``first`` on, each with the integrator that has its light."""
+    while samples > 0:
+        count, current = samples, integrator
+        if isinstance(integrator, PathIntegrator):
+            light, served = integrator.light.at(first)
+            count = min(samples, served or samples)
+            current = integrator if light is integrator.light else integrator.lit_by(light)
+        yield current, count
+        first, samples = first + count, samples - count
 
 
 def trace_in_batches(

@@ -153,9 +153,14 @@ class LiveTracer:
 
     def __init__(self, display: Display, integrator: LiveIntegrator, *, subpixels: bool, box_filter: bool) -> None:
         self._rays = _Rays(display, subpixels, box_filter)
-        self._integrator = integrator
-        self._kernel = Frozen(self._sample, integrator, changes=True)
+        # In a list, that the kernel may read another one's arrays.
+        self._integrator = [integrator]
+        self._kernel = Frozen(self._sample, self._integrator, changes=True)
         self._warm_up()
+
+    def trace_by(self, integrator: LiveIntegrator) -> None:
+        """Gather light by another integrator of the same scene and depth."""
+        self._integrator[0] = integrator
 
     @property
     def recordings(self) -> int:
@@ -187,7 +192,7 @@ class LiveTracer:
     ) -> tuple[Array, ...]:
         ray, stream = self._rays.sampled((column, row, channel), stream_of, sample, seed, rows)
         stream.half = stream_of
-        integrator = self._integrator
+        (integrator,) = self._integrator
         if isinstance(integrator, PathIntegrator):
             radiance, _, hit = integrator.sample_with_hit(ray, stream, mi.Bool(True))
             distance = hit.distance

@@ -10,18 +10,18 @@ import mitsuba as mi
 import numpy as np
 
 from lippmann.display import Display
-from lippmann.rendering.film.exposure import gain_of, measure_exposure
 from lippmann.rendering.film.memory_model import BYTES_PER_LANE
 from lippmann.rendering.live.emitter_updates import EmitterUpdates
 from lippmann.rendering.live.hull_bounds import bounds_by_hull
 from lippmann.rendering.live.live_tracer import FeatureTracer, LiveIntegrator, LiveTracer
+from lippmann.rendering.preparation.emitter_weights import make_light_sampler
+from lippmann.rendering.preparation.exposure import gain_of, measure_exposure
 from lippmann.rendering.request.region_of_interest import even_background
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.rendering.session import Session, make_integrator
-from lippmann.rendering.transport.emitter_weights import make_light_sampler
 from lippmann.rendering.transport.first_surface import make_surfaces
-from lippmann.rendering.transport.light_sampling import SceneLightSampler
 from lippmann.rendering.transport.path import PathIntegrator
+from lippmann.rendering.transport.prepared_light import PreparedLight
 from lippmann.rendering.transport.ray_source import DisplayRays
 from lippmann.scene.light_options import LightOptions
 from lippmann.scene.placement import Placement
@@ -98,6 +98,7 @@ class SceneKernels:
             self._tracers[kind] = LiveTracer(
                 display, self._integrator(request), subpixels=kind.subpixels, box_filter=kind.box_filter
             )
+        self._tracers[kind].trace_by(self._integrator(request))
         return self._tracers[kind]
 
     def feature_tracer(self, display: Display, request: RenderRequest) -> FeatureTracer:
@@ -119,33 +120,35 @@ class SceneKernels:
         integrator = self._integrator(request)
         if not isinstance(integrator, PathIntegrator):
             return 0.0
-        exposure = request.exposure
+        exposure, sampler = request.exposure, integrator.light.sampler
         source = DisplayRays(display, placement.world_from_display, bool(request.subpixels))
-        is_new = integrator.gain is None
-        integrator.gain = dr.opaque(mi.Float, 1.0)
-        if (measure or is_new) and not self.built.borrowed:
-            integrator.light_sampler = SceneLightSampler(integrator.scene)
-            integrator.light_sampler = make_light_sampler(integrator, source)
+        if (measure or integrator.light.gain is None) and not self.built.borrowed:
+            sampler = make_light_sampler(integrator.lit_by(PreparedLight()), source)
         if exposure == "auto":
             if measure or self._exposure is None:
+                plain = integrator.lit_by(PreparedLight(sampler, gain=dr.opaque(mi.Float, 1.0)))
                 background = even_background(self.built, request)
-                self._exposure = measure_exposure(integrator, source, background, request.seed)
+                self._exposure = measure_exposure(plain, source, background, request.seed)
             exposure = self._exposure
         else:
             exposure += self.session.counted_exposure(placement.exposure)
-        gain = gain_of(exposure)
-        integrator.gain = dr.opaque(mi.Float, gain)
-        if request.clamp_indirect is not None:
-            integrator.most_indirect = dr.opaque(mi.Float, request.clamp_indirect / gain)
+        gain, clamp = gain_of(exposure), request.clamp_indirect
+        most_indirect = None if clamp is None else dr.opaque(mi.Float, clamp / gain)
+        light = PreparedLight(sampler, dr.opaque(mi.Float, gain), most_indirect)
+        self._integrators[_traced_by(request)] = integrator.lit_by(light)
         return exposure
 
     def _integrator(self, request: RenderRequest) -> LiveIntegrator:
-        kind = request.integrator, request.surfaces
+        kind = _traced_by(request)
         if kind not in self._integrators:
-            made = make_integrator(self.built, request, np.eye(4), None)
+            made = make_integrator(self.built, request, np.eye(4))
             assert isinstance(made, LiveIntegrator)
             self._integrators[kind] = made
         return self._integrators[kind]
+
+
+def _traced_by(request: RenderRequest) -> tuple[str, int]:
+    return request.integrator, request.surfaces
 
 
 def _kind(display: Display, request: RenderRequest) -> _Kind:

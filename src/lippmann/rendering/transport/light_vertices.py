@@ -84,6 +84,8 @@ class Arrival:
 
     Attributes
     ----------
+    vertices:
+        The light vertices.
     albedo:
         Of the Lambertian part of the surface's scattering.
     reach:
@@ -93,7 +95,8 @@ class Arrival:
     """
 
     # Not a dataclass: Dr.Jit would take it for loop state and write its fields.
-    def __init__(self, albedo: Color3f, reach: Float, half: UInt32) -> None:
+    def __init__(self, vertices: LightVertices, albedo: Color3f, reach: Float, half: UInt32) -> None:
+        self.vertices = vertices
         self.albedo = albedo
         self.reach = reach
         self.half = half
@@ -102,6 +105,26 @@ class Arrival:
         """Of what the surface scatters from ``wo``, ``direction`` in the world: the BSDF times the cosine."""
         share = lambertian_share(si, self.albedo, scattered, wo)
         return JointLight(share, self.reach * dr.abs(dr.dot(si.n, direction)), dr.abs(wo.z), self.half)
+
+    def weigh(
+        self,
+        si: SurfaceInteraction3f,
+        ds: DirectionSample3f,
+        scattered: Spectrum,
+        plain: Float,
+        pdf: Float,
+        is_direct: Bool,
+        active: Bool,
+    ) -> Spectrum:
+        """MIS weight of an emitter sample at ``si`` that was taken with ``pdf`` and scatters as said.
+
+        ``plain`` is the weight where light vertices bring nothing, as they do where the way to the emitter is not
+        ``is_direct``: rays from emitters do not pass holes and panes.
+        """
+        joint = self.joint(si, mi.Color3f(scattered), si.to_local(ds.d), ds.d)
+        joint.reach = dr.select(is_direct, joint.reach, 0)
+        scattered_pdf = dr.select(ds.delta, 0, joint.cosine * dr.inv_pi)
+        return self.vertices.weight(joint, ds, plain, pdf, scattered_pdf, active)
 
 
 def reach_of(si: SurfaceInteraction3f, bsdf: BSDFPtr, d: Vector3f, pdf: Float, active: Bool) -> Float:

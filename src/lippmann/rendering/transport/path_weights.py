@@ -5,7 +5,7 @@ from __future__ import annotations
 import drjit as dr
 import mitsuba as mi
 
-from lippmann.device.types import Float, Spectrum, UInt32
+from lippmann.device.types import Bool, Float, Spectrum, UInt32
 
 #: Surfaces after which Russian roulette may end a path.
 ROULETTE_DEPTH = 5
@@ -45,3 +45,18 @@ def first_emitter_samples(sample: UInt32) -> tuple[UInt32, UInt32]:
     later = before + LATER_EMITTER_SAMPLES * (sample - FIRST_SAMPLES)
     first = dr.select(early, FIRST_EMITTER_SAMPLES * sample, later)
     return dr.select(early, mi.UInt32(FIRST_EMITTER_SAMPLES), LATER_EMITTER_SAMPLES), first
+
+
+class Clamp:
+    """Limit on what indirect light brings at once; None for no limit."""
+
+    # Not a dataclass: Dr.Jit would take it for loop state and write its fields.
+    def __init__(self, most: Float | None) -> None:
+        self._most = most
+
+    def limited(self, light: Spectrum, is_indirect: Bool | None = None) -> Spectrum:
+        """``light`` with no component above the limit, its hue unchanged; where it is indirect, if that is told."""
+        if self._most is None:
+            return light
+        clamped = light * dr.minimum(1, self._most / dr.maximum(dr.max(light), 1e-20))
+        return clamped if is_indirect is None else dr.select(is_indirect, clamped, light)

@@ -17,19 +17,17 @@ with ever more of them nothing is left out.
 
 from __future__ import annotations
 
-from typing import Any, cast
+from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 
 from lippmann.device.pbr.gltf_bsdf import SHARP_FIRST, SHARP_LOBE
-from lippmann.device.pbr.surface_point import widen_lobes
 from lippmann.device.sobol import SampleStream, hash32
 from lippmann.device.syntax import syntax
 from lippmann.device.types import (
     Bool,
     BSDFPtr,
-    Color3f,
     Float,
     Point2f,
     PreliminaryIntersection3f,
@@ -37,15 +35,14 @@ from lippmann.device.types import (
     Spectrum,
     SurfaceInteraction3f,
     UInt32,
-    Vector2f,
     Vector3f,
 )
-from lippmann.rendering.transport.beam import Beam, turn_of_normals, widening
 from lippmann.rendering.transport.integrator import FirstHit, PixelSample, RayCounts
 from lippmann.rendering.transport.path import PathIntegrator
+from lippmann.rendering.transport.path_vertex import LastVertex, Scattering, Vertex
 from lippmann.rendering.transport.ray_source import PixelRays
 from lippmann.rendering.transport.shadow_rays import MAX_CROSSINGS
-from lippmann.rendering.transport.sharp_events import follows_sharply, is_sharp, sharp_lobe
+from lippmann.rendering.transport.sharp_events import follows_sharply, is_sharp
 
 #: Linear value of a pixel, white being 1, up to which one of :data:`_OF_CHAINS` chains counts. One of fewer counts
 #: for more of it, as fewer highlights are met by one alone: the limit of a chain goes with this power of their number.
@@ -66,14 +63,15 @@ def sample_pixel(
     Where ``samples`` are given, those of the pixel so far, these included, it is told apart, and so is coverage.
     """
     ray = pixel.ray(stream)
-    if integrator.seen_chains is None:
+    light = integrator.light
+    if light.chains is None:
         radiance, counts, hit = integrator.sample_with_hit(ray, stream, active)
         return PixelSample(radiance, counts, covered=None if samples is None else _covered(hit))
     rest, counts, hit = integrator.sample_with_hit(ray, stream, active, without_seen=True)
-    chains = mi.Float(integrator.seen_chains)
-    scale = dr.rcp(chains) if integrator.gain is None else integrator.gain / chains
+    chains = mi.Float(light.chains)
+    scale = dr.rcp(chains) if light.gain is None else light.gain / chains
     most = None if samples is None else most_of_chain(samples * chains) / (scale * chains)
-    seen, excess, traced = seen_light(integrator, pixel, stream, integrator.seen_chains, active, most)
+    seen, excess, traced = seen_light(integrator, pixel, stream, light.chains, active, most)
     seen *= scale
     counts = RayCounts(counts.secondary + traced.secondary, counts.shadow + traced.shadow)
     if samples is None:
@@ -143,7 +141,7 @@ def _chain(
 
     Shadow rays are None where no emitter is without size.
     """
-    scene = integrator.scene
+    scene, techniques = integrator.scene, integrator.absorption
     context = mi.BSDFContext()
     context.type_mask |= SHARP_FIRST
     o, d = mi.Point3f(ray.o), mi.Vector3f(ray.d)
@@ -152,70 +150,45 @@ def _chain(
     depth, crossings = mi.UInt32(0), mi.UInt32(0)
     rays = dr.select(active, mi.UInt32(1), mi.UInt32(0))
     shadow = mi.UInt32(0) if len(integrator.without_size) > 0 else None
-    vertex = mi.Point3f(0)
-    vertex_pdf, vertex_delta, vertex_samples = mi.Float(1), mi.Bool(True), mi.UInt32(1)
+    last = LastVertex.eye()
     all_specular = mi.Bool(True)
     at_first = integrator.first_emitter_samples(path)
-    # What does not change is no state, and rays are told by origin and direction: else Dr.Jit would record the loop a
-    # second time, without what is the same in all turns.
-    absorption: Color3f = mi.Color3f(0) if integrator.features.has_absorption else None
-    width: Vector2f = None
-    spread: Vector2f = None
-    is_beam: Bool = None
-    needed = mi.RayFlags.All
-    if dr.hint(integrator.beam is not None, mode="scalar"):
-        beam = cast("Beam", integrator.beam)
-        width, spread, is_beam = mi.Vector2f(beam.width), mi.Vector2f(beam.spread), mi.Bool(True)
-        needed = mi.RayFlags.All | mi.RayFlags.dNSdUV
+    states = techniques.begin()
 
     pi = scene.ray_intersect_preliminary(ray, coherent=True, active=active)
     active &= _may_show_light(pi)
-    while dr.hint(active, label="chain", exclude=[integrator, scene, context, stream, at_first, needed]):
+    # What does not change is no state, and rays are told by origin and direction: else Dr.Jit would record the loop a
+    # second time, without what is the same in all turns.
+    while dr.hint(active, label="chain", exclude=[integrator, scene, context, stream, at_first]):
         toward = mi.Ray3f(o, d)
-        si = pi.compute_surface_interaction(toward, ray_flags=needed)
+        si = pi.compute_surface_interaction(toward)
         bsdf = si.bsdf(toward)
-        if dr.hint(integrator.features.has_absorption, mode="scalar"):
-            throughput *= dr.exp(-absorption * dr.select(si.is_valid(), si.t, 0))
-        emission = integrator.emission(si, vertex, vertex_pdf, vertex_delta, vertex_samples, depth)
+        throughput = techniques.travel(states, si, throughput)
+        emission = integrator.emission(si, last, depth, techniques, states, mi.UInt32(0))
         light += integrator.limited(throughput * emission, depth)
 
-        continues = active & si.is_valid() & (depth < integrator.depth)
-        lobe = sharp_lobe(si, bsdf, continues)
-        continues &= _has_no_width(bsdf) | (dr.squared_norm(lobe) > 0)
-        turn = mi.Float(0)
-        if dr.hint(integrator.beam is not None, mode="scalar"):
-            width += spread * dr.select(si.is_valid(), si.t, 0)
-            turn = dr.select(continues & is_beam, turn_of_normals(si, width), 0)
-            widen_lobes(si, widening(turn))
         dimension = (depth * 2 + crossings) * _DIMENSIONS_PER_VERTEX + 1
+        continues = active & si.is_valid() & (depth < integrator.depth)
+        vertex = Vertex(si, bsdf, d, depth, continues, throughput, stream, dimension, states)
+        continues &= _has_no_width(bsdf) | (dr.squared_norm(vertex.lobe) > 0)
         if dr.hint(len(integrator.without_size) > 0, mode="scalar"):
             point = stream.next_2d(dimension + _EMITTER_DIMENSION)
-            drawn, tests = _without_size(integrator, si, bsdf, lobe, point, continues)
+            drawn, tests = _without_size(integrator, si, bsdf, vertex.lobe, point, continues)
             light += integrator.limited(throughput * drawn, depth + 1)
             shadow += tests
         bs, weight = bsdf.sample(context, si, stream.next_1d(dimension), stream.next_2d(dimension + 1), continues)
-        passes = mi.has_flag(bs.sampled_type, mi.BSDFFlags.Null)
-        continues &= passes | follows_sharply(si, lobe, bs)
+        scattering = Scattering(vertex, bs, weight)
+        passes = scattering.passes
+        states = techniques.scatter(vertex, scattering)
+        continues &= passes | follows_sharply(si, vertex.lobe, bs)
         throughput *= weight
-        if dr.hint(integrator.beam is not None, mode="scalar"):
-            is_beam &= ~mi.has_flag(bs.sampled_type, mi.BSDFFlags.DiffuseReflection)
-            spread += dr.select(mi.has_flag(bs.sampled_type, mi.BSDFFlags.GlossyReflection), 2 * turn, 0)
-        if dr.hint(integrator.features.has_absorption, mode="scalar"):
-            crosses = mi.has_flag(bs.sampled_type, mi.BSDFFlags.Transmission) & ~passes
-            inside = dr.dot(bs.wo, mi.Vector3f(0, 0, 1)) < 0
-            absorption = dr.select(
-                crosses, dr.select(inside, integrator.features.absorption_of(si.shape), 0), absorption
-            )
         onward = si.spawn_ray(si.to_world(bs.wo))
         o, d = mi.Point3f(onward.o), mi.Vector3f(onward.d)
         samples_here = dr.select(all_specular, at_first, mi.UInt32(1))
         if ~passes:
-            smooth = mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
-            vertex = mi.Point3f(si.p)
-            vertex_pdf = bs.pdf
-            vertex_delta = mi.has_flag(bs.sampled_type, mi.BSDFFlags.Delta)
-            vertex_samples = samples_here
-            all_specular &= ~smooth
+            is_delta = mi.has_flag(bs.sampled_type, mi.BSDFFlags.Delta)
+            last = LastVertex(mi.Point3f(si.p), bs.pdf, is_delta, samples_here)
+            all_specular &= ~mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
             depth += 1
         else:
             crossings += 1

@@ -9,7 +9,8 @@ from lippmann.device.sobol import SampleStream
 from lippmann.device.syntax import syntax
 from lippmann.device.types import Bool, BSDFPtr, Ray3f, Spectrum, SurfaceInteraction3f, UInt32, Vector3f
 from lippmann.rendering.transport.caustic_light import caustic_light
-from lippmann.rendering.transport.path import DIMENSIONS_PER_VERTEX, GATHER_DIMENSION, PathIntegrator
+from lippmann.rendering.transport.path import DIMENSIONS_PER_VERTEX, PathIntegrator
+from lippmann.rendering.transport.path_techniques import GATHER_DIMENSION
 from lippmann.rendering.transport.photon_map import PhotonMap
 from lippmann.rendering.transport.shadow_rays import MAX_CROSSINGS
 from lippmann.rendering.transport.sharp_events import (
@@ -66,9 +67,7 @@ class ShownCaustics:
             active &= (dr.max(throughput) > 0) & (crossings < MAX_CROSSINGS)
             onward = si.spawn_ray(si.to_world(bs.wo))
             o, d = mi.Point3f(onward.o), mi.Vector3f(onward.d)
-        if dr.hint(paths.gain is not None, mode="scalar"):
-            shown *= paths.gain
-        return shown
+        return paths.exposed(shown)
 
     def _light(
         self,

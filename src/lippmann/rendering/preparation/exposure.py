@@ -16,9 +16,9 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.rendering.film.scattered_rays import ScatteredRays
 from lippmann.rendering.film.wavefront import trace_frame
 from lippmann.rendering.film.wavefront_plan import make_plan
+from lippmann.rendering.preparation.scattered_rays import ScatteredRays
 from lippmann.rendering.transport.integrator import Integrator
 from lippmann.rendering.transport.ray_source import RaySource
 from lippmann.scene.values.description import Color

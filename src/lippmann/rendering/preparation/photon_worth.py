@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from lippmann.device.kernel_ops import divide
 from lippmann.device.sobol import SampleStream
-from lippmann.rendering.film.scattered_rays import ScatteredRays
-from lippmann.rendering.film.seen_region import SEEN_SIDE
+from lippmann.rendering.preparation.scattered_rays import ScatteredRays
+from lippmann.rendering.preparation.seen_region import SEEN_SIDE
 from lippmann.rendering.transport.path import PathIntegrator
 from lippmann.rendering.transport.photon_map import PhotonMap
 from lippmann.rendering.transport.ray_source import RaySource

@@ -57,13 +57,15 @@ def stage(scene):
     )
 
 
-def given(integrator, source, *, gain=1.0, memory=1 << 30, **options):
-    from lippmann.rendering.film.lit_surfaces import give_light_vertices
+def given(integrator, source, /, *, gain=1.0, memory=1 << 30, **options):
+    from lippmann.rendering.preparation.light_vertices import trace_light_vertices
     from lippmann.rendering.request.render_request import RenderRequest
 
-    integrator.light_vertices = integrator.vertex_passes = None
     request = RenderRequest(**({"integrator": "path", "spp": 16} | options))
-    return give_light_vertices(integrator, request, source, memory, gain)
+    passes = trace_light_vertices(integrator, request, source, memory, gain)
+    if passes is None:
+        return None
+    return integrator.lit_with(light_vertices=passes.of_pass(0), vertex_passes=passes)
 
 
 def batches(integrator, source, memory=1 << 30, spp=16, seed=5):
@@ -76,9 +78,7 @@ def batches(integrator, source, memory=1 << 30, spp=16, seed=5):
 
 def test_a_small_emitter_beside_a_wall_is_worth_it():
     integrator, source = stage(room(small()))
-    assert given(integrator, source)
-    joined = batches(integrator, source).traced_halves()
-    integrator.light_vertices = integrator.vertex_passes = None
+    joined = batches(given(integrator, source), source).traced_halves()
     plain = batches(integrator, source).traced_halves()
     noise = [np.square(np.clip(a, 0, 1) - np.clip(b, 0, 1)).mean() for a, b in (joined, plain)]
     assert noise[0] < 0.4 * noise[1]
@@ -96,14 +96,7 @@ def test_a_small_emitter_beside_a_wall_is_worth_it():
 )
 def test_other_pictures_are_left_to_paths(emitter, options):
     integrator, source = stage(room(emitter))
-    if "integrator" in options:
-        from lippmann.rendering.film.lit_surfaces import give_light_vertices
-        from lippmann.rendering.request.render_request import RenderRequest
-
-        assert not give_light_vertices(integrator, RenderRequest(**options), source, 1 << 30, 1.0)
-    else:
-        assert not given(integrator, source, **options)
-    assert integrator.light_vertices is integrator.vertex_passes is None
+    assert given(integrator, source, **options) is None
 
 
 def test_nothing_is_joined_where_indirect_light_is_dim():
@@ -127,14 +120,14 @@ def test_scenes_of_many_emitters_are_left_to_paths():
 
 
 def test_passes_serve_their_samples_and_pictures_do_not_depend_on_the_memory(monkeypatch):
-    import lippmann.rendering.film.lit_surfaces as module
+    import lippmann.rendering.preparation.light_vertices as module
 
     monkeypatch.setattr(module, "PASS_SAMPLES", 4)
     integrator, source = stage(room(small()))
-    assert given(integrator, source, seed=3)
-    served = []
-    of_pass = integrator.vertex_passes.of_pass
-    monkeypatch.setattr(integrator.vertex_passes, "of_pass", lambda number: served.append(number) or of_pass(number))
+    integrator = given(integrator, source, seed=3)
+    served, passes = [], integrator.light.vertex_passes
+    of_pass = passes.of_pass
+    monkeypatch.setattr(passes, "of_pass", lambda number: served.append(number) or of_pass(number))
     whole = batches(integrator, source)
     assert sorted(set(served)) == [0, 1, 2, 3]
     again = batches(integrator, source, memory=1 << 21)

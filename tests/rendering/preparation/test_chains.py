@@ -94,7 +94,7 @@ def test_pictures_with_them_state_their_error_as_before(balls):
     ],
 )
 def test_as_many_samples_are_counted_on_as_a_quality_takes(asked, samples):
-    from lippmann.rendering.film.seen_chains import expected_samples
+    from lippmann.rendering.preparation.chains import expected_samples
     from lippmann.rendering.request.render_request import RenderRequest
 
     assert expected_samples(RenderRequest(**asked)) == samples

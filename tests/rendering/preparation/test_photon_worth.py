@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lippmann.rendering.film.caustic_worth import LEAST_WORTH, are_worth_photons
+from lippmann.rendering.preparation.photon_worth import LEAST_WORTH, are_worth_photons
 
 
 @pytest.mark.parametrize(

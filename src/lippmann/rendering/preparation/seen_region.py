@@ -7,7 +7,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.rendering.film.scattered_rays import ScatteredRays
+from lippmann.rendering.preparation.scattered_rays import ScatteredRays
 from lippmann.rendering.transport.path import PathIntegrator
 from lippmann.rendering.transport.ray_source import RaySource
 

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.rendering.film.caustic_worth import are_worth_photons, shown_light
-from lippmann.rendering.film.exposure import gain_of
 from lippmann.rendering.film.memory_model import PHOTON, too_small
-from lippmann.rendering.film.seen_chains import expected_samples
-from lippmann.rendering.film.seen_region import region_about, seen_points
+from lippmann.rendering.preparation.chains import expected_samples
+from lippmann.rendering.preparation.exposure import gain_of
+from lippmann.rendering.preparation.photon_worth import are_worth_photons, shown_light
+from lippmann.rendering.preparation.seen_region import region_about, seen_points
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.rendering.transport.casters import find_casters, hides_caustics
 from lippmann.rendering.transport.caustic_photons import (
@@ -25,7 +24,6 @@ from lippmann.rendering.transport.caustic_photons import (
     emissions,
     no_photons,
 )
-from lippmann.rendering.transport.integrator import Integrator
 from lippmann.rendering.transport.pass_schedule import PassSchedule
 from lippmann.rendering.transport.path import PathIntegrator
 from lippmann.rendering.transport.photon_map import PhotonMap
@@ -37,25 +35,6 @@ PASS_SAMPLES, FIRST_PASS_SAMPLES = 32, 4
 KEPT_SHARE = 0.25
 
 
-def stretches(integrator: Integrator, first: int, samples: int) -> Iterator[int]:
-    """Numbers of samples that make ``samples``, from ``first`` on; the integrator is ready for each in turn."""
-    if not isinstance(integrator, PathIntegrator):
-        yield samples
-        return
-    while samples > 0:
-        count = samples
-        for name, passes in (
-            ("photons", integrator.photon_passes),
-            ("light_vertices", integrator.vertex_passes),
-        ):
-            if passes is not None:
-                number, left = passes.schedule.at(first)
-                setattr(integrator, name, passes.of_pass(number))
-                count = min(count, left)
-        yield count
-        first, samples = first + count, samples - count
-
-
 @dataclass(frozen=True, eq=False)
 class Caustics:
     """How a picture's caustics come.
@@ -63,13 +42,17 @@ class Caustics:
     Attributes
     ----------
     way:
-        ``photons``, ``paths`` or ``none``.
+        ``photons``, ``paths`` or ``none``; None where there are none.
+    photons, passes:
+        See :class:`~lippmann.rendering.transport.prepared_light.PreparedLight`.
     light, radiance, share, samples:
         Of the caustics, their emitters and the picture, without an exposure, see
-        :func:`~lippmann.rendering.film.caustic_worth.are_worth_photons`; infinite where they were not asked for.
+        :func:`~lippmann.rendering.preparation.photon_worth.are_worth_photons`; infinite where they were not asked for.
     """
 
-    way: Literal["photons", "paths", "none"]
+    way: Literal["photons", "paths", "none"] | None
+    photons: PhotonMap | None = None
+    passes: CausticPhotons | None = None
     light: NDArray[np.float64] = field(default_factory=lambda: np.full(1, np.inf))
     radiance: float = math.inf
     share: float = 1.0
@@ -80,8 +63,8 @@ class Caustics:
         return are_worth_photons(self.light, self.radiance, self.share, self.samples, gain)
 
 
-def give_photons(integrator: PathIntegrator, request: RenderRequest, source: RaySource, memory: int) -> Caustics | None:
-    """Give the integrator the photons for the picture of ``source``; how caustics come, or None if there are none.
+def shoot_photons(integrator: PathIntegrator, request: RenderRequest, source: RaySource, memory: int) -> Caustics:
+    """How the caustics come in the picture of ``source``, with their photons.
 
     Raises
     ------
@@ -89,15 +72,14 @@ def give_photons(integrator: PathIntegrator, request: RenderRequest, source: Ray
         ``memory`` bytes do not hold the photons that were asked for; where nothing was, they are left to paths.
     """
     if request.integrator != "path" or request.surfaces < 2:
-        return None
+        return Caustics(None)
     if request.caustics == "paths":
         return _left_to_paths(integrator)
     if request.caustics == "none":
-        integrator.photons = no_photons()
-        return Caustics("none")
+        return Caustics("none", no_photons())
     casters = find_casters(integrator.scene)
     if casters.pairs == 0:
-        return None
+        return Caustics(None)
     pixels = source.width * source.height * source.channels
     schedule = _schedule(pixels, request.is_open_ended)
     passes = 1 if request.is_open_ended else -(-request.samples // schedule.most)
@@ -117,7 +99,7 @@ def give_photons(integrator: PathIntegrator, request: RenderRequest, source: Ray
         if request.caustics != "auto":
             return True
         light = shown_light(integrator, source, pilot, request.seed)
-        found = Caustics("photons", light, radiance, share, expected_samples(request))
+        found = Caustics("photons", light=light, radiance=radiance, share=share, samples=expected_samples(request))
         # Where there is no exposure yet, no light is known to be bright.
         return request.exposure == "auto" or found.are_worth_photons(gain_of(request.exposure))
 
@@ -132,11 +114,7 @@ def give_photons(integrator: PathIntegrator, request: RenderRequest, source: Ray
         kept=max(1, min(passes, int(KEPT_SHARE * memory) // required)),
         are_worth=are_worth,
     )
-    if photons.are_none:
-        return None
-    integrator.photons = photons.of_pass(0)
-    integrator.photon_passes = photons
-    return found
+    return Caustics(None) if photons.are_none else replace(found, photons=photons.of_pass(0), passes=photons)
 
 
 def _schedule(pixels: int, is_open_ended: bool) -> PassSchedule:
@@ -146,10 +124,5 @@ def _schedule(pixels: int, is_open_ended: bool) -> PassSchedule:
     return PassSchedule(max(FIRST_PASS_SAMPLES, fewest) if is_open_ended else most, most)
 
 
-def take_photons(integrator: PathIntegrator) -> None:
-    """Leave all caustics to paths."""
-    integrator.photons = integrator.photon_passes = None
-
-
-def _left_to_paths(integrator: PathIntegrator) -> Caustics | None:
-    return Caustics("paths") if hides_caustics(integrator.scene) else None
+def _left_to_paths(integrator: PathIntegrator) -> Caustics:
+    return Caustics("paths" if hides_caustics(integrator.scene) else None)

@@ -10,10 +10,17 @@ from numpy.typing import NDArray
 from lippmann.device.kernel_ops import divide
 from lippmann.device.sobol import SampleStream
 from lippmann.rendering.film.memory_model import LIGHT_VERTEX
-from lippmann.rendering.film.scattered_rays import ScatteredRays
-from lippmann.rendering.film.seen_region import region_about, seen_points
+from lippmann.rendering.preparation.scattered_rays import ScatteredRays
+from lippmann.rendering.preparation.seen_region import region_about, seen_points
 from lippmann.rendering.request.render_request import RenderRequest
-from lippmann.rendering.transport.light_vertices import MOST_EMITTERS, POINTS, Arrival, LightVertexPasses, reach_of
+from lippmann.rendering.transport.light_vertices import (
+    MOST_EMITTERS,
+    POINTS,
+    Arrival,
+    LightVertexPasses,
+    LightVertices,
+    reach_of,
+)
 from lippmann.rendering.transport.pass_schedule import PassSchedule
 from lippmann.rendering.transport.path import PathIntegrator
 from lippmann.rendering.transport.ray_source import RaySource
@@ -35,10 +42,10 @@ LOOK_SIDE, LOOK_PATHS, MOST = 64, 4, 4.0
 _SEED = 0x6C697473
 
 
-def give_light_vertices(
+def trace_light_vertices(
     integrator: PathIntegrator, request: RenderRequest, source: RaySource, memory: int, gain: float
-) -> bool:
-    """Join the paths of the picture of ``source`` to light vertices, if that saves noise; whether it does.
+) -> LightVertexPasses | None:
+    """Light vertices for the picture of ``source``, if joining its paths to them saves noise; else None.
 
     A look at the first indirect light that the picture shows tells it: how it varies between paths that find it
     themselves, and between such as are joined.
@@ -51,15 +58,15 @@ def give_light_vertices(
         Exposure of the picture.
     """
     if request.integrator != "path" or request.surfaces < 2 or memory < 2 * POINTS * LIGHT_VERTEX:
-        return False
+        return None
     if not request.is_open_ended and request.samples < FEWEST_SAMPLES:
-        return False
+        return None
     look = _Look(integrator, source)
     if not 0 < look.emitters <= MOST_EMITTERS:
-        return False
+        return None
     alone = look.variance(gain)
     if alone < LEAST_SAVED:
-        return False
+        return None
     passes = LightVertexPasses(
         integrator.scene,
         integrator.light_sampler,
@@ -67,14 +74,9 @@ def give_light_vertices(
         request.seed,
         region_about(seen_points(integrator, source)),
     )
-    if passes.are_none:
-        return False
-    integrator.light_vertices = passes.of_pass(0)
-    if alone - look.variance(gain) < LEAST_SAVED:
-        integrator.light_vertices = None
-        return False
-    integrator.vertex_passes = passes
-    return True
+    if passes.are_none or alone - look.variance(gain, passes.of_pass(0)) < LEAST_SAVED:
+        return None
+    return passes
 
 
 class _Look:
@@ -88,15 +90,15 @@ class _Look:
         #: Number of emitters that have a place in the scene.
         self.emitters = int(np.count_nonzero(flags & has_place))
 
-    def variance(self, gain: float) -> float:
-        """Mean variance of a path, joined to the integrator's light vertices where it has any."""
-        ways = [np.minimum(light * gain, MOST).reshape(3, -1, LOOK_PATHS) for light in self._traced()]
+    def variance(self, gain: float, vertices: LightVertices | None = None) -> float:
+        """Mean variance of a path, joined to light vertices where there are any."""
+        ways = [np.minimum(light * gain, MOST).reshape(3, -1, LOOK_PATHS) for light in self._traced(vertices)]
         return sum(float(pixels.var(axis=2, ddof=1, dtype=np.float64).mean()) for pixels in ways)
 
-    def _traced(self) -> list[Floats]:
+    def _traced(self, vertices: LightVertices | None) -> list[Floats]:
         """``(3, lanes)``: light that comes by the second surface, and what joins bring, where there are any."""
         integrator, few = self._integrator, self._few
-        scene, vertices = integrator.scene, integrator.light_vertices
+        scene = integrator.scene
         lane = dr.arange(mi.UInt32, few.width * few.height * LOOK_PATHS)
         place, path = divide(lane, LOOK_PATHS)
         row, column = divide(place, few.width)
@@ -115,7 +117,7 @@ class _Look:
         arrival = None
         if vertices is not None:
             reach = reach_of(second, scatters, ray.d, dr.abs(wo.z) * dr.inv_pi, smooth)
-            arrival = Arrival(lambertian(second, scatters, smooth), reach, mi.UInt32(0))
+            arrival = Arrival(vertices, lambertian(second, scatters, smooth), reach, mi.UInt32(0))
         light, _, _ = integrator.direct_light(second, scatters, stream.next_2d(1), smooth, arrival=arrival)
         found = [dr.select(active, albedo * light, 0)]
         if vertices is not None:

@@ -1,0 +1,91 @@
+"""Prepares the light of a picture: emitter weights, photons, exposure, light vertices, and chains of seen light."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import drjit as dr
+import mitsuba as mi
+
+from lippmann.rendering.preparation.chains import count_chains
+from lippmann.rendering.preparation.emitter_weights import make_light_sampler
+from lippmann.rendering.preparation.exposure import gain_of, measure_exposure
+from lippmann.rendering.preparation.light_vertices import trace_light_vertices
+from lippmann.rendering.preparation.photons import shoot_photons
+from lippmann.rendering.request.render_request import RenderRequest
+from lippmann.rendering.transport.light_vertices import POINTS
+from lippmann.rendering.transport.path import PathIntegrator
+from lippmann.rendering.transport.prepared_light import PreparedLight
+from lippmann.rendering.transport.ray_source import RaySource
+from lippmann.scene.values.description import Color
+
+
+def prepare_light(
+    paths: PathIntegrator,
+    request: RenderRequest,
+    source: RaySource,
+    memory: int,
+    background: Color | None = None,
+    own_exposure: float = 0.0,
+    stands_alone: bool = True,
+    weighs_emitters: bool = True,
+) -> PreparedLight:
+    """The light of the picture of ``source``, for an integrator of the same paths (:meth:`PathIntegrator.lit_by`).
+
+    Parameters
+    ----------
+    paths:
+        Paths in the scene, whatever their light.
+    request:
+        How the picture is to be made.
+    source:
+        Rays of the whole picture: parts of one picture must be given the same.
+    memory:
+        Bytes that the photons may take, and light vertices.
+    background:
+        What rays see that meet nothing, see :func:`~lippmann.rendering.preparation.exposure.measure_exposure`.
+    own_exposure:
+        Stops of the camera itself, which a fixed exposure comes on top of.
+    stands_alone:
+        Nothing lies in front of what the integrator shows, such as splats: whole pixels are its own.
+    weighs_emitters:
+        Emitters are sampled by what they bring to the picture, not by the scene's own weights.
+
+    Raises
+    ------
+    MemoryLimitError
+        ``memory`` bytes do not hold the photons that were asked for.
+    """
+    light, choices = PreparedLight(), dict[str, object]()
+    if weighs_emitters:
+        light = replace(light, sampler=make_light_sampler(paths.lit_by(light), source))
+    if own_exposure:
+        choices["camera_exposure"] = own_exposure
+    if request.exposure != "auto":
+        request = replace(request, exposure=request.exposure + own_exposure)
+
+    caustics = shoot_photons(paths.lit_by(light), request, source, memory)
+    light = replace(light, photons=caustics.photons, photon_passes=caustics.passes)
+    exposure = request.exposure
+    if exposure == "auto":
+        exposure = measure_exposure(paths.lit_by(light), source, background, request.seed)
+    gain = gain_of(exposure) if exposure else 1.0
+    if not caustics.are_worth_photons(gain):
+        light = replace(light, photons=None, photon_passes=None)
+    elif caustics.way is not None:
+        choices["caustics"] = caustics.way
+    if exposure:
+        light = replace(light, gain=mi.Float(gain))
+        choices["exposure"] = exposure
+
+    passes = trace_light_vertices(paths.lit_by(light), request, source, memory, gain)
+    if passes is not None:
+        light = replace(light, light_vertices=passes.of_pass(0), vertex_passes=passes)
+        choices["light_vertices"] = POINTS
+    if request.clamp_indirect is not None:
+        light = replace(light, most_indirect=mi.Float(request.clamp_indirect / gain))
+    chains = count_chains(paths.scene, request) if stands_alone else 0
+    if chains:
+        light = replace(light, chains=dr.opaque(mi.UInt32, chains))
+        choices["seen_chains"] = chains
+    return replace(light, choices=choices)

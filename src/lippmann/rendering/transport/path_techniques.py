@@ -1,0 +1,300 @@
+"""What a path does beside plain next-event estimation and BSDF sampling, each technique an object with hooks.
+
+The path loop (:mod:`.path`) calls every hook of every technique in turn; one that has nothing to do there hands on what
+it is given. Per-lane state of a technique is a value that :meth:`Technique.begin` makes and :meth:`Technique.scatter`
+makes anew after each vertex; it is state of the loop, so that all of it has to change on the way.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+
+from lippmann.device.types import (
+    Bool,
+    Color3f,
+    DirectionSample3f,
+    Emitter,
+    Float,
+    Spectrum,
+    SurfaceInteraction3f,
+    UInt32,
+)
+from lippmann.rendering.transport.caustic_light import caustic_light
+from lippmann.rendering.transport.light_vertices import Arrival, JointLight, LightVertices, reach_of
+from lippmann.rendering.transport.path_vertex import Scattering, Vertex
+from lippmann.rendering.transport.path_weights import Clamp
+from lippmann.rendering.transport.photon_map import PhotonMap
+from lippmann.rendering.transport.scene_features import SceneFeatures
+from lippmann.rendering.transport.sharp_events import MOST_EVENTS, is_sharp, lambertian_share
+
+#: Sample dimension, from a vertex's first, of the photon chosen there, and of the light vertex that it is joined to.
+GATHER_DIMENSION, JOIN_DIMENSION = 1 << 24, 1 << 25
+
+
+class Technique:
+    """A technique that does nothing."""
+
+    # Not a dataclass, nor are those below: Dr.Jit would take them for loop state and write their fields.
+    def begin(self) -> Any:
+        """State of a path that begins at the eye."""
+        return ()
+
+    def travel(self, state: Any, si: SurfaceInteraction3f, throughput: Spectrum) -> Spectrum:
+        """Throughput of a path that has come to ``si``, whether that is valid or not."""
+        return throughput
+
+    def weigh_emission(
+        self, state: Any, half: UInt32, ds: DirectionSample3f, weight: Float, emitter_pdf: Float, active: Bool
+    ) -> Float | Spectrum:
+        """MIS weight of the emitter ``ds`` that a path has met, which was ``weight`` without the technique."""
+        return weight
+
+    def meet_emitter(self, state: Any, depth: UInt32, si: SurfaceInteraction3f, emission: Spectrum) -> Spectrum:
+        """The part of what a path meets at ``si`` that is left to it."""
+        return emission
+
+    def arrive(self, state: Any, vertex: Vertex, radiance: Spectrum, shadow: UInt32) -> tuple[Spectrum, UInt32]:
+        """Radiance and number of shadow rays of a path, with what the technique adds at a vertex."""
+        return radiance, shadow
+
+    def sample_emitter(self, state: Any, vertex: Vertex, ds: DirectionSample3f, light: Spectrum) -> Spectrum:
+        """The part of the light of an emitter sample that is left to the path."""
+        return light
+
+    def scatter(self, state: Any, vertex: Vertex, scattering: Scattering) -> Any:
+        """State after a vertex."""
+        return state
+
+
+class Absorption(Technique):
+    """Beer-Lambert absorption inside solid coloured glass. State: its coefficients where the path travels, per unit."""
+
+    def __init__(self, features: SceneFeatures) -> None:
+        self._features = features
+
+    def begin(self) -> Color3f:
+        return mi.Color3f(0)
+
+    def travel(self, state: Color3f, si: SurfaceInteraction3f, throughput: Spectrum) -> Spectrum:
+        return throughput * dr.exp(-state * dr.select(si.is_valid(), si.t, 0))
+
+    def arrive(self, state: Color3f, vertex: Vertex, radiance: Spectrum, shadow: UInt32) -> tuple[Spectrum, UInt32]:
+        vertex.is_in_clear = dr.max(state) == 0
+        return radiance, shadow
+
+    def scatter(self, state: Color3f, vertex: Vertex, scattering: Scattering) -> Color3f:
+        bs = scattering.bs
+        crosses = mi.has_flag(bs.sampled_type, mi.BSDFFlags.Transmission) & ~scattering.passes
+        inside = dr.dot(bs.wo, mi.Vector3f(0, 0, 1)) < 0
+        return dr.select(crosses, dr.select(inside, self._features.absorption_of(vertex.si.shape), 0), state)
+
+
+@dataclass
+class _Caustics:
+    """State of :class:`PhotonGathering`.
+
+    ``is_seen``: all events were sharp. ``sharp``: sharp events since the last rough one, straight-through surfaces
+    excluded. ``by_photons``: share of the light met by sharp events from that one on that photons bring.
+    """
+
+    is_seen: Bool
+    sharp: UInt32
+    by_photons: Spectrum
+
+
+class PhotonGathering(Technique):
+    """Caustics by photons, in place of paths that meet their emitters.
+
+    Parameters
+    ----------
+    photons:
+        Looked up at each rough surface.
+    depth:
+        Surfaces of a path.
+    environment:
+        Emitter whose light stays with paths; None where there is none.
+    """
+
+    def __init__(self, photons: PhotonMap, depth: int, environment: Emitter | None) -> None:
+        self._photons, self._depth, self._environment = photons, depth, environment
+
+    def begin(self) -> _Caustics:
+        return _Caustics(mi.Bool(True), mi.UInt32(0), mi.Spectrum(0))
+
+    def meet_emitter(self, state: _Caustics, depth: UInt32, si: SurfaceInteraction3f, emission: Spectrum) -> Spectrum:
+        is_caustic = ~state.is_seen & (state.sharp > 0) & (state.sharp <= MOST_EVENTS) & si.is_valid()
+        return dr.select(is_caustic, emission * (1 - state.by_photons), emission)
+
+    def arrive(self, state: _Caustics, vertex: Vertex, radiance: Spectrum, shadow: UInt32) -> tuple[Spectrum, UInt32]:
+        lands = vertex.active & (vertex.has_wide_lobes | (dr.max(vertex.albedo) > 0))
+        choice = vertex.stream.next_1d(vertex.dimension + GATHER_DIMENSION)
+        light = caustic_light(
+            self._photons,
+            vertex.si,
+            vertex.bsdf,
+            vertex.lobe,
+            vertex.albedo,
+            vertex.has_wide_lobes,
+            vertex.stream,
+            self._depth - vertex.depth - 1,
+            choice,
+            state.is_seen,
+            lands,
+        )
+        return radiance + vertex.throughput * light, shadow
+
+    def sample_emitter(self, state: _Caustics, vertex: Vertex, ds: DirectionSample3f, light: Spectrum) -> Spectrum:
+        is_caustic = ~state.is_seen & (state.sharp < MOST_EVENTS)
+        is_caustic &= is_sharp(vertex.si, vertex.lobe, vertex.si.to_local(ds.d))
+        if self._environment is not None:
+            is_caustic &= ds.emitter != mi.EmitterPtr(self._environment)
+        return dr.select(is_caustic, light * (1 - state.by_photons), light)
+
+    def scatter(self, state: _Caustics, vertex: Vertex, scattering: Scattering) -> _Caustics:
+        is_rough, wo = scattering.is_rough, scattering.bs.wo
+        share = lambertian_share(vertex.si, vertex.albedo, scattering.scattered, wo)
+        share = dr.select(vertex.has_wide_lobes & (vertex.si.wi.z * wo.z > 0), 1, share)
+        event = dr.select(scattering.is_event, mi.UInt32(1), mi.UInt32(0))
+        return _Caustics(
+            state.is_seen & ~is_rough,
+            dr.select(is_rough, mi.UInt32(0), state.sharp + event),
+            dr.select(is_rough, share, state.by_photons),
+        )
+
+
+class SeenLightApart(Technique):
+    """Leaves out light that is met by sharp events alone, which chains bring (:mod:`.seen_light`).
+
+    That of emitters without size is left out as well, if there are such; sky behind nothing is not. State: whether all
+    events were sharp.
+    """
+
+    def __init__(self, has_without_size: bool) -> None:
+        self._has_without_size = has_without_size
+
+    def begin(self) -> Bool:
+        return mi.Bool(True)
+
+    def meet_emitter(self, state: Bool, depth: UInt32, si: SurfaceInteraction3f, emission: Spectrum) -> Spectrum:
+        return dr.select(state & ((depth > 0) | si.is_valid()), 0, emission)
+
+    def sample_emitter(self, state: Bool, vertex: Vertex, ds: DirectionSample3f, light: Spectrum) -> Spectrum:
+        if not self._has_without_size:
+            return light
+        is_seen = state & ds.delta & is_sharp(vertex.si, vertex.lobe, vertex.si.to_local(ds.d))
+        return dr.select(is_seen, 0, light)
+
+    def scatter(self, state: Bool, vertex: Vertex, scattering: Scattering) -> Bool:
+        return state & ~scattering.is_rough
+
+
+@dataclass
+class _Joint:
+    """State of :class:`LightVertexJoins`.
+
+    ``departure``: pdf of the way here from a vertex that was joined; 0 from others. The rest is that of a
+    :class:`~.light_vertices.JointLight`.
+    """
+
+    departure: Float
+    share: Spectrum
+    reach: Float
+    cosine: Float
+
+
+class LightVertexJoins(Technique):
+    """Joins each vertex of a path to a light vertex; light that comes both ways is shared by MIS.
+
+    Parameters
+    ----------
+    vertices:
+        The light vertices.
+    depth:
+        Surfaces of a path.
+    has_absorption:
+        Whether a path may travel in coloured glass, to which nothing is joined.
+    clamp:
+        Limit on what one join brings.
+    """
+
+    def __init__(self, vertices: LightVertices, depth: int, has_absorption: bool, clamp: Clamp) -> None:
+        self._vertices, self._depth, self._has_absorption, self._clamp = vertices, depth, has_absorption, clamp
+
+    def begin(self) -> _Joint:
+        return _Joint(mi.Float(0), mi.Spectrum(0), mi.Float(0), mi.Float(0))
+
+    def weigh_emission(
+        self, state: _Joint, half: UInt32, ds: DirectionSample3f, weight: Float, emitter_pdf: Float, active: Bool
+    ) -> Spectrum:
+        joint = JointLight(state.share, state.reach, state.cosine, half)
+        return self._vertices.weight(joint, ds, weight, joint.cosine * dr.inv_pi, emitter_pdf, active)
+
+    def arrive(self, state: _Joint, vertex: Vertex, radiance: Spectrum, shadow: UInt32) -> tuple[Spectrum, UInt32]:
+        vertex.arrival = self._arrival(state, vertex)
+        choice = vertex.stream.next_1d(vertex.dimension + JOIN_DIMENSION)
+        half = mi.UInt32(vertex.stream.half)
+        light, tests = self._vertices.join(
+            vertex.si, vertex.bsdf, choice, half, self._joins(vertex), not self._has_absorption
+        )
+        return radiance + self._clamp.limited(vertex.throughput * light), shadow + tests
+
+    def _arrival(self, state: _Joint, vertex: Vertex) -> Arrival:
+        reach = reach_of(vertex.si, vertex.bsdf, vertex.d, state.departure, vertex.active)
+        return Arrival(self._vertices, vertex.albedo, reach, mi.UInt32(vertex.stream.half))
+
+    def _joins(self, vertex: Vertex) -> Bool:
+        joins = vertex.smooth & (vertex.depth + 1 < self._depth)
+        return joins & vertex.is_in_clear if self._has_absorption else joins
+
+    def scatter(self, state: _Joint, vertex: Vertex, scattering: Scattering) -> _Joint:
+        bs, passes = scattering.bs, scattering.passes
+        assert vertex.arrival is not None
+        joint = vertex.arrival.joint(vertex.si, scattering.scattered, bs.wo, vertex.si.to_world(bs.wo))
+        departs = self._joins(vertex) & ~passes & ~mi.has_flag(bs.sampled_type, mi.BSDFFlags.Delta)
+        if self._has_absorption:
+            departs &= bs.wo.z * vertex.si.wi.z > 0
+        return _Joint(dr.select(departs, bs.pdf, 0), joint.share, dr.select(passes, 0, joint.reach), joint.cosine)
+
+
+class Techniques:
+    """Techniques of one kernel, each hook called in turn; ``states`` are a list of theirs."""
+
+    def __init__(self, *techniques: Technique) -> None:
+        self._each = techniques
+
+    def begin(self) -> list[Any]:
+        return [each.begin() for each in self._each]
+
+    def travel(self, states: list[Any], si: SurfaceInteraction3f, throughput: Spectrum) -> Spectrum:
+        for each, state in zip(self._each, states, strict=True):
+            throughput = each.travel(state, si, throughput)
+        return throughput
+
+    def weigh_emission(
+        self, states: list[Any], half: UInt32, ds: DirectionSample3f, weight: Float, emitter_pdf: Float, active: Bool
+    ) -> Float | Spectrum:
+        for each, state in zip(self._each, states, strict=True):
+            weight = each.weigh_emission(state, half, ds, weight, emitter_pdf, active)
+        return weight
+
+    def meet_emitter(self, states: list[Any], depth: UInt32, si: SurfaceInteraction3f, emission: Spectrum) -> Spectrum:
+        for each, state in zip(self._each, states, strict=True):
+            emission = each.meet_emitter(state, depth, si, emission)
+        return emission
+
+    def arrive(self, vertex: Vertex, radiance: Spectrum, shadow: UInt32) -> tuple[Spectrum, UInt32]:
+        for each, state in zip(self._each, vertex.states, strict=True):
+            radiance, shadow = each.arrive(state, vertex, radiance, shadow)
+        return radiance, shadow
+
+    def sample_emitter(self, vertex: Vertex, ds: DirectionSample3f, light: Spectrum) -> Spectrum:
+        for each, state in zip(self._each, vertex.states, strict=True):
+            light = each.sample_emitter(state, vertex, ds, light)
+        return light
+
+    def scatter(self, vertex: Vertex, scattering: Scattering) -> list[Any]:
+        return [each.scatter(state, vertex, scattering) for each, state in zip(self._each, vertex.states, strict=True)]

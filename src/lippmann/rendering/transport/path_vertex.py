@@ -1,0 +1,138 @@
+"""Vertices of a path, as its loop and its techniques see them.
+
+No class here but :class:`LastVertex` is a dataclass: Dr.Jit would take it for loop state and write its fields.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import mitsuba as mi
+
+from lippmann.device.sobol import SampleStream
+from lippmann.device.types import (
+    Bool,
+    BSDFPtr,
+    BSDFSample3f,
+    Color3f,
+    Float,
+    Point3f,
+    Spectrum,
+    SurfaceInteraction3f,
+    UInt32,
+    Vector3f,
+)
+from lippmann.rendering.transport.light_vertices import Arrival
+from lippmann.rendering.transport.sharp_events import follows_sharply, has_wide_lobes, lambertian, sharp_lobe
+
+
+@dataclass
+class LastVertex:
+    """Where a path last scattered; straight-through surfaces do not count.
+
+    Attributes
+    ----------
+    p:
+        The point.
+    pdf:
+        Per steradian, of the direction taken there.
+    is_delta:
+        Whether the lobe had no width.
+    emitter_samples:
+        How many are taken there.
+    """
+
+    p: Point3f
+    pdf: Float
+    is_delta: Bool
+    emitter_samples: UInt32
+
+    @classmethod
+    def eye(cls) -> LastVertex:
+        """Before the first surface: all light that is met counts."""
+        return cls(mi.Point3f(0), mi.Float(1), mi.Bool(True), mi.UInt32(1))
+
+
+class Vertex:
+    """A surface that a path has met.
+
+    Attributes
+    ----------
+    si, bsdf:
+        The point, and its BSDF.
+    d:
+        World-space direction of the ray that came here.
+    depth:
+        Surfaces that the path has met before, straight-through ones excluded.
+    active:
+        Lanes that go on from here.
+    throughput:
+        Of the path up to here.
+    stream, dimension:
+        Random numbers, and the first dimension that is the vertex's own.
+    states:
+        Of the path's techniques.
+    is_in_clear:
+        Whether the ray came through a medium that absorbs nothing.
+    arrival:
+        By what emitter samples are weighed against light vertices; None for nothing.
+    """
+
+    def __init__(
+        self,
+        si: SurfaceInteraction3f,
+        bsdf: BSDFPtr,
+        d: Vector3f,
+        depth: UInt32,
+        active: Bool,
+        throughput: Spectrum,
+        stream: SampleStream,
+        dimension: UInt32,
+        states: list[Any],
+    ) -> None:
+        self.si, self.bsdf, self.d = si, bsdf, d
+        self.depth, self.active, self.throughput = depth, active, throughput
+        self.stream, self.dimension, self.states = stream, dimension, states
+        self.is_in_clear: Bool = mi.Bool(True)
+        self.arrival: Arrival | None = None
+
+    @property
+    def smooth(self) -> Bool:
+        """Whether emitters are sampled here."""
+        return self.active & mi.has_flag(self.bsdf.flags(), mi.BSDFFlags.Smooth)
+
+    # Each is worked out where it is first asked for, which has to be outside the loop over emitter samples.
+    @cached_property
+    def lobe(self) -> Vector3f:
+        return sharp_lobe(self.si, self.bsdf, self.active)
+
+    @cached_property
+    def albedo(self) -> Color3f:
+        """Of the Lambertian part of the surface's scattering."""
+        return lambertian(self.si, self.bsdf, self.active)
+
+    @cached_property
+    def has_wide_lobes(self) -> Bool:
+        return has_wide_lobes(self.si, self.bsdf, self.active)
+
+
+class Scattering:
+    """A direction that a path takes from a vertex: the BSDF sample ``bs``, and its ``weight``."""
+
+    def __init__(self, vertex: Vertex, bs: BSDFSample3f, weight: Spectrum) -> None:
+        self.bs, self.weight = bs, weight
+        self.passes = mi.has_flag(bs.sampled_type, mi.BSDFFlags.Null)
+        self.is_event = vertex.active & ~self.passes
+        self._vertex = vertex
+
+    @cached_property
+    def is_rough(self) -> Bool:
+        """Whether the path turns from seeing an image to gathering light."""
+        return self.is_event & ~follows_sharply(self._vertex.si, self._vertex.lobe, self.bs)
+
+    @property
+    def scattered(self) -> Color3f:
+        """The BSDF times the cosine."""
+        return mi.Color3f(self.weight) * self.bs.pdf
