@@ -36,7 +36,15 @@ GATHER_DIMENSION, JOIN_DIMENSION = 1 << 24, 1 << 25
 
 
 class Technique:
-    """A technique that does nothing."""
+    """A technique that does nothing.
+
+    Attributes
+    ----------
+    reads:
+        What it asks a vertex for by name; worked out before its hooks are called, as one of them is in a loop.
+    """
+
+    reads: tuple[str, ...] = ()
 
     # Not a dataclass, nor are those below: Dr.Jit would take them for loop state and write their fields.
     def begin(self) -> Any:
@@ -122,6 +130,8 @@ class PhotonGathering(Technique):
     def __init__(self, photons: PhotonMap, depth: int, environment: Emitter | None) -> None:
         self._photons, self._depth, self._environment = photons, depth, environment
 
+    reads = ("lobe", "albedo", "has_wide_lobes")
+
     def begin(self) -> _Caustics:
         return _Caustics(mi.Bool(True), mi.UInt32(0), mi.Spectrum(0))
 
@@ -176,6 +186,8 @@ class SeenLightApart(Technique):
     def __init__(self, has_without_size: bool) -> None:
         self._has_without_size = has_without_size
 
+    reads = ("lobe",)
+
     def begin(self) -> Bool:
         return mi.Bool(True)
 
@@ -223,6 +235,8 @@ class LightVertexJoins(Technique):
 
     def __init__(self, vertices: LightVertices, depth: int, has_absorption: bool, clamp: Clamp) -> None:
         self._vertices, self._depth, self._has_absorption, self._clamp = vertices, depth, has_absorption, clamp
+
+    reads = ("albedo",)
 
     def begin(self) -> _Joint:
         return _Joint(mi.Float(0), mi.Spectrum(0), mi.Float(0), mi.Float(0))
@@ -287,6 +301,8 @@ class Techniques:
         return emission
 
     def arrive(self, vertex: Vertex, radiance: Spectrum, shadow: UInt32) -> tuple[Spectrum, UInt32]:
+        for name in dict.fromkeys(name for each in self._each for name in each.reads):
+            getattr(vertex, name)
         for each, state in zip(self._each, vertex.states, strict=True):
             radiance, shadow = each.arrive(state, vertex, radiance, shadow)
         return radiance, shadow

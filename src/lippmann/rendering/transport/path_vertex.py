@@ -103,7 +103,7 @@ class Vertex:
         """Whether emitters are sampled here."""
         return self.active & mi.has_flag(self.bsdf.flags(), mi.BSDFFlags.Smooth)
 
-    # Each is worked out where it is first asked for, which has to be outside the loop over emitter samples.
+    # Each is worked out where it is first asked for: outside the loop over emitter samples, see Technique.reads.
     @cached_property
     def lobe(self) -> Vector3f:
         return sharp_lobe(self.si, self.bsdf, self.active)
