@@ -74,6 +74,8 @@ def _all() -> Iterator[tuple[str, str, bytes]]:
         picture = image(stored, **maps)
         bits = {"uint8": 8, "uint16": 16, "float16": 16, "float32": 32}[stored]
         yield f"picture-{target}", name, _written(lambda path, p=picture, b=bits: write_picture(p, path, bits=b), name)
+    for name, data in _tiffs():
+        yield "photograph", name, data
     for target, name in (("tiff", "8.tif"), ("zarr", "8.zarr")):
         yield f"pieces-{target}", name, _written(lambda path: write_picture(image("uint8"), path), name)
     yield "metadata", "full", to_text(metadata_of(image())).encode()
@@ -139,6 +141,33 @@ def _encoded(pixels: Any, kind: str) -> bytes:
     stream = io.BytesIO()
     Pillow.fromarray(pixels).save(stream, kind)
     return stream.getvalue()
+
+
+def _tiffs() -> Iterator[tuple[str, bytes]]:
+    """Small TIFF files of every kind of colours."""
+    import tifffile
+    from PIL import Image as Pillow
+
+    codes = np.random.default_rng(4).integers(0, 256, (4, 6, 3)).astype(np.uint8)
+    for kind in ("palette", "ycbcr", "jpeg"):
+        picture = Pillow.fromarray(codes)
+        picture = picture.quantize(8) if kind == "palette" else picture.convert("YCbCr")
+        stream = io.BytesIO()
+        picture.save(stream, "TIFF", compression="jpeg" if kind == "jpeg" else None)
+        yield f"{kind}.tif", stream.getvalue()
+    alpha = np.concatenate([codes, codes[..., :1]], axis=-1)
+    for kind, values, options in (
+        ("lab", codes, {"photometric": "cielab"}),
+        ("planes", np.moveaxis(codes, -1, 0), {"photometric": "rgb", "planarconfig": "separate"}),
+        ("bits", codes[..., 0] < 99, {"photometric": "minisblack"}),
+        ("half", codes.astype(np.float16), {"photometric": "rgb"}),
+        ("associated", alpha, {"photometric": "rgb", "extrasamples": ["assocalpha"]}),
+        ("turned", codes, {"photometric": "rgb", "extratags": [(274, 3, 1, 6, True)]}),
+        ("white-is-zero", codes[..., 0], {"photometric": "miniswhite", "compression": "lzw"}),
+    ):
+        stream = io.BytesIO()
+        tifffile.imwrite(stream, values, metadata=None, software="", **options)
+        yield f"{kind}.tif", stream.getvalue()
 
 
 def _tile(index: int) -> TileResult:
@@ -254,6 +283,11 @@ def _splats() -> Iterator[tuple[str, str, bytes]]:
     names = ["x", "y", "z", *(f"f_dc_{n}" for n in range(3)), *(f"f_rest_{n}" for n in range(9)), "opacity"]
     names += [*(f"scale_{n}" for n in range(3)), *(f"rot_{n}" for n in range(4))]
     yield "ply-splats", "trained", _rows("vertex", names, "float", random.normal(size=(3, len(names))).astype("<f4"))
+    discs = [name for name in names if name != "scale_2"]
+    yield "ply-splats", "discs", _rows("vertex", discs, "float", random.normal(size=(3, len(discs))).astype("<f4"))
+    colored = ["red" if name == "f_dc_0" else {"f_dc_1": "green", "f_dc_2": "blue"}.get(name, name) for name in names]
+    colored = [name for name in colored if not name.startswith("f_rest")]
+    yield "ply-splats", "colours", _rows("vertex", colored, "float", random.random((3, len(colored))).astype("<f4"))
     bounds = [f"{end}{part}{axis}" for part in ("_", "_scale_") for end in ("min", "max") for axis in "xyz"]
     bounds += [f"{end}_{color}" for end in ("min", "max") for color in "rgb"]
     chunk = _rows("chunk", bounds, "float", np.repeat([-1, 1, -4, -1, 0, 1], 3).astype("<f4")[None])
