@@ -30,6 +30,20 @@ def test_values():
     assert read(file_of(PIXELS)).tolist() == PIXELS.tolist()
 
 
+def test_runs_of_pixels_as_older_programs_write_them():
+    """1, 1, 1, n repeats the pixel before n times; of runs one after the other the next counts 256 times as much."""
+    first, second = PIXELS[0, :1], PIXELS[1, :1]
+    body = coded(first[None]) + bytes((1, 1, 1, 0x57, 1, 1, 1, 0x02)) + coded(second[None])
+    data = file_of(PIXELS[:0], size="-Y 2 +X 301") + body + bytes((1, 1, 1, 1))
+    found = read(data).reshape(-1, 3)
+    assert found[:600].tolist() == np.repeat(first, 600, axis=0).tolist()
+    assert found[600:].tolist() == np.repeat(second, 2, axis=0).tolist()
+    with pytest.raises(PictureError, match="cannot be decoded"):
+        read(data[:-4])
+    with pytest.raises(PictureError, match="cannot be decoded"):
+        read(file_of(PIXELS[:0], size="-Y 2 +X 301") + bytes((1, 1, 1, 9)))
+
+
 @pytest.mark.parametrize("rows", "+-")
 @pytest.mark.parametrize("columns", "+-")
 @pytest.mark.parametrize("lines_first", "XY")

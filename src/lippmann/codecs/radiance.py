@@ -22,8 +22,10 @@ MAGICS = (b"#?RADIANCE", b"#?RGBE")
 _SQUARE = 0.01
 #: "-Y 512 +X 1024": lines from the top, each from the left. The first axis is that of the lines.
 _SIZE = re.compile(rb"([-+])([XY]) +([0-9]{1,9}) +([-+])([XY]) +([0-9]{1,9})[ \t\r]*\n")
-#: A byte of a file holds less than so many pixels: at best two bytes stand for 127 values of four channels.
-_PIXELS_PER_BYTE = 16
+#: A byte of a file holds less than so many pixels: at best four bytes repeat a pixel 255 times.
+_PIXELS_PER_BYTE = 64
+#: How lines begin whose channels lie apart, in runs of bytes. Others have pixels, and runs of these.
+_NEW_RUNS = b"\2\2"
 #: Primaries and white of files that name none; such RGB is taken as that of Rec. 709, as all programs take it.
 _PRIMARIES = (0.640, 0.330, 0.290, 0.600, 0.150, 0.060, 1.0 / 3.0, 1.0 / 3.0)
 
@@ -113,8 +115,11 @@ def read_radiance(data: bytes, header: RadianceHeader, where: str) -> NDArray[np
     check_input(32 * header.height * header.width, "its picture", where=where)
     lines, length = (header.width, header.height) if header.by_columns else (header.height, header.width)
     plain = f"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y {lines} +X {length}\n".encode()
+    body = data[header.start :]
+    if not (8 <= length < 1 << 15 and body[:2] == _NEW_RUNS):
+        body = _without_old_runs(body, lines * length)
     try:
-        pixels = np.asarray(imagecodecs.rgbe_decode(plain + data[header.start :]), np.float32)
+        pixels = np.asarray(imagecodecs.rgbe_decode(plain + body), np.float32)
         matrix = _matrix(header)
     except (RuntimeError, ValueError) as error:
         raise _undecodable(str(error), where) from None
@@ -124,6 +129,23 @@ def read_radiance(data: bytes, header: RadianceHeader, where: str) -> NDArray[np
     if matrix is not None:
         pixels = to_rec709(pixels, matrix)
     return np.ascontiguousarray(pixels / np.asarray(header.exposure, np.float32))
+
+
+def _without_old_runs(body: bytes, count: int) -> bytes:
+    """Scan lines without runs: 1, 1, 1, n repeats the pixel before n times, and if others follow, 256 n times, ...
+
+    The result has at most ``count`` pixels.
+    """
+    codes = np.frombuffer(body, np.uint8, len(body) // 4 * 4).reshape(-1, 4)
+    is_run = (codes[:, :3] == 1).all(axis=1)
+    if not is_run.any() or is_run[0]:
+        return body
+    places = np.arange(len(codes))
+    last = np.maximum.accumulate(np.where(is_run, 0, places))
+    shifts = np.minimum(8 * (places - last - 1), 40)  # beyond, any number is more than a picture has
+    repeats = np.where(is_run, codes[:, 3].astype(np.int64) << np.maximum(shifts, 0), 1)
+    repeats = np.diff(np.minimum(np.cumsum(np.minimum(repeats, count)), count), prepend=0)
+    return np.repeat(codes[last], repeats, axis=0).tobytes()
 
 
 def _matrix(header: RadianceHeader) -> NDArray[np.float64] | None:

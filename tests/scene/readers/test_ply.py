@@ -81,6 +81,18 @@ def test_colours_of_any_type(read):
         assert (mesh.colors == (1, 0, 0)).all()
 
 
+@pytest.mark.parametrize("names", ["red green blue", "diffuse_red diffuse_green diffuse_blue", "r g b"])
+def test_names_of_colours_and_what_is_not_shown(read, names):
+    head = "".join(f"property uchar {name}\n" for name in names.split())
+    scene = read(
+        f"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n{head}"
+        "property float intensity\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n"
+        "0 0 0 255 0 0 1\n1 0 0 255 0 0 1\n0 1 0 255 0 0 1\n3 0 1 2\n".encode()
+    )
+    assert scene.meshes[0].colors[:, :3].tolist() == [[1, 0, 0]] * 3
+    assert "of vertices not shown: intensity" in scene.notes
+
+
 def test_colours_and_uvs_of_faces_part_the_vertices(read):
     face = "property list uchar float texcoord\nproperty uchar red\nproperty uchar green\nproperty uchar blue\n"
     rows = "\n".join(" ".join(map(str, vertex)) for vertex in VERTICES)

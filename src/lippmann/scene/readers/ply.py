@@ -29,6 +29,13 @@ UP_NOTE = "up is taken as +y, for nothing in the data says it (else up=z)"
 # Numbers may be followed by remarks, as in the header.
 _REMARK = re.compile(rb"(?m)^[ \t]*comment\b.*$|#.*$")
 _UV_NAMES = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"))
+_COLOR_NAMES = (
+    ("red", "green", "blue", "alpha"),
+    ("diffuse_red", "diffuse_green", "diffuse_blue", "diffuse_alpha"),
+    ("r", "g", "b", "a"),
+)
+#: Properties of vertices that are shown.
+_SHOWN = {"x", "y", "z", "nx", "ny", "nz"}.union(*_UV_NAMES, *_COLOR_NAMES)
 
 #: More vertices than any file has.
 _MOST_VERTICES = 1 << 53
@@ -69,6 +76,9 @@ def read_ply(path: Path, *, allow_outside: bool = False) -> SceneDescription:
         raise SceneError("holds no vertices with x, y and z", where=where)
     notes = [*header.notes] if header.up else [UP_NOTE, *header.notes]
     elements = {element.name: element for element in header.elements}
+    unread = sorted({each.name for each in elements["vertex"].properties} - _SHOWN)
+    if unread:
+        notes.append(f"of vertices not shown: {', '.join(name[:40] for name in unread[:20])}")
     outline = _outline(columns, where)
     if not len(outline.sizes):
         return replace(_cloud(columns["vertex"], elements["vertex"], path.stem, notes, where), up=header.up)
@@ -376,9 +386,10 @@ def _corner_uvs(face: Columns, outline: _Lists, keep: NDArray[np.bool_]) -> Numb
 def _colors(columns: Columns, element: Element) -> NDArray[np.float32] | None:
     """Linear RGB(A)."""
     scalars = {each.name: each for each in element.properties if each.count_type is None}
-    names = [name for name in ("red", "green", "blue", "alpha") if name in scalars]
-    if names[:3] != ["red", "green", "blue"]:
+    names = next((names for names in _COLOR_NAMES if scalars.keys() >= set(names[:3])), None)
+    if names is None:
         return None
+    names = tuple(name for name in names if name in scalars)
     values = np.stack([np.asarray(columns[name]) / scalars[name].brightest for name in names], axis=-1)
     values = np.clip(np.nan_to_num(values), 0.0, 1.0)
     return np.concatenate([decode_srgb(values[:, :3]), values[:, 3:]], axis=1).astype(np.float32)

@@ -172,6 +172,21 @@ def test_hidden_prims_and_guides_are_not_shown(read):
     assert [mesh.name for mesh in scene.meshes] == ["/seen"]
 
 
+def test_the_purpose_of_a_prim_wins_over_that_of_what_holds_it(read):
+    scene = read(
+        'def Xform "proxies" (\n) {\nuniform token purpose = "proxy"\n'
+        + triangle("inherits")
+        + triangle("own", 'uniform token purpose = "render"')
+        + "}"
+    )
+    assert [mesh.name for mesh in scene.meshes] == ["/proxies/own"]
+
+
+def test_meshes_that_are_light_sources_are_named(read):
+    scene = read(triangle("glow").replace('"glow"', '"glow" (prepend apiSchemas = ["MeshLightAPI"])', 1))
+    assert "/glow: the light that its surface sends out (MeshLightAPI) is not read" in scene.notes
+
+
 PRIMITIVES = {
     "Sphere": ("double radius = 2", (4, 4, 4), 4 / 3 * np.pi * 8),
     "Cube": ("double size = 2", (2, 2, 2), 8),

@@ -119,6 +119,21 @@ def test_images_whose_extent_does_not_begin_at_0(plotter, tmp_path):
         assert volume.world_from_voxel @ (1, 0, 0, 1) == pytest.approx((*part.GetPoint(1), 1))
 
 
+@pytest.mark.parametrize(("of_points", "flag"), [(True, 2), (False, 32)])
+def test_hidden_voxels_count_as_the_lowest(of_points, flag):
+    image = pyvista.ImageData(dimensions=(3, 3, 3))
+    data = image.point_data if of_points else image.cell_data
+    values = np.arange(1.0, 28.0 if of_points else 9.0)
+    data["v"], ghosts = values, np.zeros(len(values), np.uint8)
+    ghosts[-2:] = flag
+    ghosts[0] = 1  # of a neighbouring piece, and shown
+    data["vtkGhostType"] = ghosts
+    image.set_active_scalars("v")
+    scene = load_scene(image).description
+    assert any("2 voxels are no finite numbers" in note for note in scene.notes)
+    assert scene.volume.grid.ravel()[[0, -1]].tolist() == [1.0, 1.0]
+
+
 def test_a_volume_of_a_plotter(plotter):
     image = pyvista.ImageData(dimensions=(5, 4, 3), spacing=(1, 2, 3), origin=(7, 8, 9))
     image["density"] = np.arange(60.0)

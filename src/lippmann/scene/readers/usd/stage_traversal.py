@@ -86,9 +86,12 @@ class Traversal:
                 if kind.startswith(PARTICLES):  # which usd-core before 26 does not know
                     self._leave_out(kind)
                 continue
-            if self._is_hidden(prim):
+            imageable = UsdGeom.Imageable(prim)
+            if imageable.GetVisibilityAttr().Get(self._time) == UsdGeom.Tokens.invisible:
                 prims.PruneChildren()
                 continue
+            if imageable.ComputePurpose() in (UsdGeom.Tokens.guide, UsdGeom.Tokens.proxy):
+                continue  # what is below may have a purpose of its own
             place = base_from_world @ self._world(prim)
             if prim.IsA(UsdGeom.PointInstancer):
                 self._add_instancer(UsdGeom.PointInstancer(prim), base @ place, depth)
@@ -116,17 +119,13 @@ class Traversal:
             self._count(len(worlds))
             self._splats.append({**record, "worlds": self._arrays.add(worlds)})
 
-    def _is_hidden(self, prim: Usd.Prim) -> bool:
-        imageable = UsdGeom.Imageable(prim)
-        if imageable.GetVisibilityAttr().Get(self._time) == UsdGeom.Tokens.invisible:
-            return True
-        return imageable.GetPurposeAttr().Get() in (UsdGeom.Tokens.guide, UsdGeom.Tokens.proxy)
-
     def _world(self, prim: Usd.Prim) -> Matrices:
         """``world_from_prim``; USD's matrices act on row vectors."""
         return np.array(self._transforms.GetLocalToWorldTransform(prim), np.float64).T
 
     def _add_mesh(self, prim: Usd.Prim, base: Matrices, place: Matrices) -> None:
+        if prim.HasAPI(UsdLux.LightAPI):
+            self.notes[f"{prim.GetPath()}: the light that its surface sends out (MeshLightAPI) is not read"] = None
         skin = self._skinning.of(prim)
         if skin is not None:
             place = self._world(skin.skeleton)

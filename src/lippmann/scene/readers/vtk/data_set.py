@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 #: The colour map of numbers, as PyVista has it.
 COLOR_MAP = "viridis"
+#: The array that tells which points and cells are hidden, and the bit that says so.
+_GHOSTS, _HIDDEN_POINT, _HIDDEN_CELL = "vtkGhostType", 2, 32
 #: Colour of what is no number, in sRGB codes.
 _NO_NUMBER = (160, 160, 160, 255)
 
@@ -176,7 +178,7 @@ def color_table(values: NDArray[np.float64], low: float, high: float, table: NDA
 def image_of(source: pyvista.ImageData) -> tuple[NDArray[np.generic], NDArray[np.float64]] | None:
     """Grid ``(nz, ny, nx)`` and ``world_from_voxel`` ``(4, 4)`` of an image's active scalars, if they are numbers.
 
-    Scalars of cells lie in the middles of cells.
+    Scalars of cells lie in the middles of cells. Those of hidden points and cells are no numbers.
     """
     scalars = source.active_scalars
     if scalars is None or np.asarray(scalars).dtype.kind not in "iufb" or np.asarray(scalars).ndim != 1:
@@ -185,10 +187,15 @@ def image_of(source: pyvista.ImageData) -> tuple[NDArray[np.generic], NDArray[np
     matrix = np.eye(4)
     matrix[:3, :3] = np.asarray(source.direction_matrix, np.float64) * np.asarray(source.spacing, np.float64)
     matrix[:3, 3] = np.asarray(source.origin) + matrix[:3, :3] @ np.array(source.extent[::2], np.float64)
-    if len(scalars) != counts.prod():
+    is_of_points = len(scalars) == counts.prod()
+    if not is_of_points:
         counts = np.maximum(counts - 1, 1)
         matrix[:3, 3] += matrix[:3, :3] @ np.full(3, 0.5)
     if len(scalars) != counts.prod():
         return None
     width, height, depth = counts.tolist()
-    return np.asarray(scalars).reshape(depth, height, width), matrix
+    table, flag = (source.point_data, _HIDDEN_POINT) if is_of_points else (source.cell_data, _HIDDEN_CELL)
+    values = np.asarray(scalars)
+    if _GHOSTS in table:
+        values = np.where(np.asarray(table[_GHOSTS]) & flag, np.float32(np.nan), values)
+    return values.reshape(depth, height, width), matrix
