@@ -386,10 +386,10 @@ def _corner_uvs(face: Columns, outline: _Lists, keep: NDArray[np.bool_]) -> Numb
 def _colors(columns: Columns, element: Element) -> NDArray[np.float32] | None:
     """Linear RGB(A)."""
     scalars = {each.name: each for each in element.properties if each.count_type is None}
-    names = next((names for names in _COLOR_NAMES if scalars.keys() >= set(names[:3])), None)
-    if names is None:
+    known = next((names for names in _COLOR_NAMES if scalars.keys() >= set(names[:3])), ())
+    names = [name for name in known if name in scalars]
+    if not names:
         return None
-    names = tuple(name for name in names if name in scalars)
     values = np.stack([np.asarray(columns[name]) / scalars[name].brightest for name in names], axis=-1)
     values = np.clip(np.nan_to_num(values), 0.0, 1.0)
     return np.concatenate([decode_srgb(values[:, :3]), values[:, 3:]], axis=1).astype(np.float32)
