@@ -71,9 +71,7 @@ REPROJECTION = [
     "common.gap_kernels",
     "common.pixel_tracer",
     "lenticular.forward_warp",
-    "lenticular.linear_rows",
     "paper_order_kernels",
-    "retrace.point_tracking",
     "retrace.region_growing",
 ]
 KERNELS = [*(f"rendering.reprojection.{name}" for name in REPROJECTION), "metrics.kernels", "quilts.weave_kernel"]

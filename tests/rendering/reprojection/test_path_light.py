@@ -79,6 +79,6 @@ def test_micro_images_have_the_mean_colors_of_full_tracing(scenes, full, name, p
     expected, _ = means_of_lenses(reference)
     wrong = np.abs(means - expected).max(axis=1)[counts >= 64]
     # A carried colour has its own pixel's noise, not that of the pixel it comes to: means differ, but not to one side.
-    assert wrong.max() < (0.04 if careful else 0.08)
+    assert wrong.max() < (0.045 if careful else 0.08)
     assert wrong.mean() < (0.008 if careful else 0.02)
     assert np.abs(np.average(means - expected, axis=0, weights=counts)).max() < (0.004 if careful else 0.008)

@@ -16,7 +16,7 @@ from lippmann.rendering.reprojection.paper_order_kernels import carry
 from lippmann.runtime.row_threads import Bands
 
 #: The mean of two colours is taken whatever they are.
-_ANY_COLOR = Rules(careful=False, tolerance=1.0, coded=False, probe_rows=1, longest_gap=1, overhang=0)
+_ANY_COLOR = Rules(careful=False, tolerance=1.0, coded=False, probe_rows=1, probe_stride=1, longest_gap=1, overhang=0)
 
 
 class PaperOrder:
@@ -86,13 +86,7 @@ class PaperOrder:
     def _average(self, numbers: Pixels) -> None:
         if not len(numbers):
             return
-        field = self._field
-        lens = field.lens.ravel()[numbers].astype(np.int64)
-        column = lens % field.columns
-        sides = [
-            field.corresponding(numbers.astype(np.int64), np.where(exists, lens + side, -1))
-            for side, exists in ((-1, column > 0), (1, column + 1 < field.columns))
-        ]
+        sides = self._field.corresponding_beside(numbers)
         self._bands.pixels(gap_kernels.average, len(numbers), self._points, numbers, *sides, _ANY_COLOR)
 
     def _missed(self, columns: range) -> Pixels:

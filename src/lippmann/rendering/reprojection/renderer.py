@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import time
-from typing import Any, Literal, Protocol, cast
+from typing import Any, Literal, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.color.transfer import Transfer
-from lippmann.display import Display
 from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.rendering.film.memory_model import PICTURE, POINT_IMAGE, SMALLEST_LANES, lanes_within
 from lippmann.rendering.film.wavefront import Frame
 from lippmann.rendering.reprojection.common.gap_filling import Settled
-from lippmann.rendering.reprojection.common.pixel_tracer import Pixels, PixelTracer
+from lippmann.rendering.reprojection.common.pixel_tracer import PixelTracer
 from lippmann.rendering.reprojection.common.point_image import (
     INTERPOLATED,
     REPROJECTED,
@@ -22,43 +21,15 @@ from lippmann.rendering.reprojection.common.point_image import (
     TRACED,
     PointImage,
 )
-from lippmann.rendering.reprojection.common.thresholds import Rules, choose_rules
-from lippmann.rendering.reprojection.retrace.adaptive_retrace import choose_looks, search
+from lippmann.rendering.reprojection.common.thresholds import choose_rules
+from lippmann.rendering.reprojection.default_order import DefaultOrder
+from lippmann.rendering.reprojection.paper_order import PaperOrder
 from lippmann.rendering.transport.integrator import ReusableIntegrator
 from lippmann.rendering.transport.ray_source import DisplayRays
 from lippmann.runtime.row_threads import Bands
 
 ReuseMethod = Literal["lens-view", "interpolated"]
 ReuseOrder = Literal["default", "paper"]
-
-
-class Maker(Protocol):
-    """What makes the micro-images of one kind of display, in one order."""
-
-    def lens_view(self) -> None:
-        """Every micro-image from others; what no point reached is traced."""
-        ...
-
-    def interpolated(self) -> None:
-        """Every other micro-image so; what no point reached of the rest is averaged from its neighbours."""
-        ...
-
-
-class SearchedMaker(Maker, Protocol):
-    """One whose pictures can be searched for what was falsified."""
-
-    @property
-    def reach(self) -> int:
-        """Columns of a micro-image, about."""
-        ...
-
-    def lens_numbers(self) -> NDArray[np.int32]:
-        """The lens of every pixel, ``(H, W)``."""
-        ...
-
-    def follow(self, surprised: Pixels, lens: NDArray[np.int32], wanted: NDArray[np.bool_]) -> None:
-        """Want the pixels of other lenses that should see the points of surprising ones."""
-        ...
 
 
 def trace_reused(
@@ -126,16 +97,14 @@ def trace_reused(
             bands=bands,
         )
         settled = _report(progress, source.width * source.height)
+        arguments = source.display, points, tracer, bands
         if order == "paper":
-            _make(_paper_maker(source.display, points, tracer, bands, settled), method)
+            _make(PaperOrder(*arguments, settled), method)
         else:
-            rules = choose_rules(source.display, careful=careful, coded=transfer == "srgb")
-            maker = _default_maker(source.display, points, tracer, bands, rules, settled)
+            maker = DefaultOrder(*arguments, choose_rules(careful=careful, coded=transfer == "srgb"), settled)
             _make(maker, method)
             if careful:
-                lens = maker.lens_numbers()
-                looks = choose_looks(source.display, maker.reach)
-                search(points, lens, maker.reach, looks, tracer, bands, rules, maker.follow, settled)
+                maker.correct()
     progress(Progress("trace", 1, 1))
     seconds_compile = tracer.seconds_compile + (compiling.duration if compiling.done else 0.0)
     return Frame(
@@ -166,29 +135,11 @@ def wavefront_lanes(memory: int, width: int, height: int, samples: int) -> int:
     return max(needed, lanes_within(memory, kept, needed, f"{width}x{height} pixels and their points"))
 
 
-def _make(maker: Maker, method: ReuseMethod) -> None:
+def _make(maker: PaperOrder | DefaultOrder, method: ReuseMethod) -> None:
     if method == "lens-view":
         maker.lens_view()
     else:
         maker.interpolated()
-
-
-def _default_maker(
-    display: Display, points: PointImage, tracer: PixelTracer, bands: Bands, rules: Rules, settled: Settled
-) -> SearchedMaker:
-    if display.lattice.rows_are_alike:
-        from lippmann.rendering.reprojection.lenticular.renderer import StraightRenderer
-
-        return StraightRenderer(display, points, tracer, bands, rules, settled)
-    from lippmann.rendering.reprojection.arrays.renderer import ArrayRenderer
-
-    return ArrayRenderer(display, points, tracer, bands, rules, settled)
-
-
-def _paper_maker(display: Display, points: PointImage, tracer: PixelTracer, bands: Bands, settled: Settled) -> Maker:
-    from lippmann.rendering.reprojection.paper_order import PaperOrder
-
-    return PaperOrder(display, points, tracer, bands, settled)
 
 
 def _report(progress: ProgressCallback, total: int) -> Settled:

@@ -34,7 +34,7 @@ class LineTracer:
 def the_rules(**others):
     from lippmann.rendering.reprojection.common.thresholds import Rules
 
-    return Rules(True, 0.06, False, probe_rows=4, longest_gap=3, overhang=0)._replace(**others)
+    return Rules(True, 0.06, False, probe_rows=4, probe_stride=16, longest_gap=3, overhang=0)._replace(**others)
 
 
 def shown(colors, disparities):
@@ -49,6 +49,7 @@ def shown(colors, disparities):
 def fill(truth, rules, edges, known=()):
     """The picture after filling all runs, and the tracer that was asked."""
     from lippmann.rendering.reprojection.common.gap_filling import Gaps
+    from lippmann.rendering.reprojection.common.lens_map import LensField
     from lippmann.rendering.reprojection.common.point_image import PointImage
     from lippmann.runtime.row_threads import Bands
 
@@ -56,11 +57,12 @@ def fill(truth, rules, edges, known=()):
     tracer = LineTracer(truth)
     counts = []
     bands = Bands(1)
-    gaps = Gaps(points, np.array([edges], dtype=np.int64), tracer, bands, rules, counts.append)
+    field = LensField(np.zeros(truth.status.shape, np.int32), np.zeros((1, 2)), np.array([edges], dtype=np.int64), 1)
+    gaps = Gaps(points, field, tracer, bands, rules, counts.append)
     tracer.trace(np.array(known, dtype=np.uint32), points)
     gaps.unsettled[:] = True
     gaps.trace_samples()
-    gaps.complete()
+    gaps.fill()
     assert sum(counts) == sum(map(len, tracer.lists)) - len(known)
     assert not gaps.unsettled.any()
     return points, tracer
@@ -72,8 +74,8 @@ def test_no_pixel_stays_missed_and_traced_ones_are_true(widths, data):
     edges, width = np.cumsum([0, *widths]), sum(widths)
     values = data.draw(st.lists(st.sampled_from([0.1, 0.5, 0.9]), min_size=width, max_size=width))
     truth = shown(values, np.full(width, GAP))
-    careful, middles = data.draw(st.booleans()), data.draw(st.booleans())
-    rules = the_rules(careful=careful, middles=middles, longest_gap=3 if careful else 5, overhang=0 if careful else 1)
+    careful = data.draw(st.booleans())
+    rules = the_rules(careful=careful, longest_gap=3 if careful else 5, overhang=0 if careful else 1)
     points, tracer = fill(truth, rules, edges)
     assert np.all(points.status >= 0)
     traced = np.concatenate(tracer.lists)
@@ -108,14 +110,12 @@ def test_care_traces_the_whole_gap_between_different_things(what):
     assert np.array_equal(points.fragile, truth.fragile)
 
 
-@pytest.mark.parametrize(("middles", "rounds"), [(True, 2), (False, 1)])
-def test_without_care_each_side_takes_its_part(middles, rounds):
+def test_without_care_the_middle_is_traced_and_each_side_takes_its_part():
     truth = shown([0.2] * 6 + [0.9] * 6, [GAP] * 6 + [0.1] * 6)
-    rules = the_rules(careful=False, longest_gap=5, overhang=1, middles=middles)
-    points, tracer = fill(truth, rules, [0, 12])
-    assert sum(len(part) > 0 for part in tracer.lists) == rounds
+    points, tracer = fill(truth, the_rules(careful=False, longest_gap=5, overhang=1), [0, 12])
+    assert sum(len(part) > 0 for part in tracer.lists) == 2
     wrong = np.flatnonzero(points.color[0, :, 0] != truth.color[0, :, 0])
-    assert len(wrong) <= (1 if middles else 2)
+    assert len(wrong) <= 1
     assert np.all(np.abs(wrong - 5.5) <= 2)
 
 
@@ -129,7 +129,7 @@ def test_no_more_than_the_overhang_is_extrapolated(missed, overhang, extrapolate
     columns = np.arange(8)[-missed:] if at_end else np.arange(missed)
     points.status[0] = TRACED
     points.status[0, columns] = MISSED
-    arguments = np.array([[0, 8]]), np.ones((1, 1), np.bool_), np.zeros(1, np.int64)
+    arguments = np.array([[0, 8]]), np.ones((1, 1), np.bool_)
     gap_kernels.bridge(0, 1, points, *arguments, the_rules(overhang=overhang), gap_kernels.TRACE_ALL)
     assert np.all(points.status[0, columns] == (REPROJECTED if extrapolated else WANTED))
 

@@ -7,8 +7,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lippmann.display import load_display
-
 pytestmark = pytest.mark.usefixtures("engine")
 
 # The first call compiles.
@@ -51,17 +49,13 @@ def test_colors_differ_by_their_largest_channel_as_they_are_coded():
     assert color_difference(color, 0, 0, 0, 2, False) == pytest.approx(0.75)  # codes end at 0 and 1
 
 
-def test_rules_follow_the_display():
+def test_care_tolerates_less_and_probes_more():
     from lippmann.rendering.reprojection.common.thresholds import choose_rules
 
-    few = load_display("seed-lenticular")
-    many = few.resized(3840, 2160)
-    careful, quick = choose_rules(few, careful=True, coded=True), choose_rules(few, careful=False, coded=False)
+    careful, quick = choose_rules(careful=True, coded=True), choose_rules(careful=False, coded=False)
     assert careful.careful
     assert careful.coded
     assert not quick.careful
     assert not quick.coded
     assert careful.tolerance < quick.tolerance
-    assert careful.probe_rows < quick.probe_rows < choose_rules(many, careful=False, coded=False).probe_rows
-    assert choose_rules(many, careful=False, coded=False).middles
-    assert not quick.middles
+    assert careful.probe_rows < quick.probe_rows

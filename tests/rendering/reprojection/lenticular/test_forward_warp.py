@@ -14,17 +14,16 @@ QUICK = settings(max_examples=60, deadline=None)
 
 
 def the_rows():
-    from lippmann.rendering.reprojection.common.epipolar_rows import Rows
+    from lippmann.rendering.reprojection.lenticular.forward_warp import Rows
 
     first = np.arange(LENSES + 1, dtype=np.int64) * WIDTH
-    offset = np.full(LENSES, -(WIDTH - 1) / 2)
-    return Rows(first, offset, first[:-1] - offset)
+    return Rows(first, first[:-1] + (WIDTH - 1) / 2)
 
 
 def the_rules(**others):
     from lippmann.rendering.reprojection.common.thresholds import Rules
 
-    return Rules(True, 0.5, False, probe_rows=100, longest_gap=3, overhang=0)._replace(**others)
+    return Rules(True, 0.5, False, probe_rows=100, probe_stride=16, longest_gap=3, overhang=0)._replace(**others)
 
 
 def plane(rows, level, slope, color, height=2):
@@ -33,7 +32,7 @@ def plane(rows, level, slope, color, height=2):
 
     points = PointImage.empty(height, WIDTH * LENSES)
     for lens in range(LENSES):
-        o = rows.offset[lens] + np.arange(WIDTH)
+        o = np.arange(WIDTH) - (WIDTH - 1) / 2
         # The lens at c shows at its place o the point at x = c - o / s, all in pixels.
         s = (level - slope * o) / (1 - slope * rows.center[lens])
         x = rows.center[lens] - o / s
@@ -54,18 +53,13 @@ def forget(points, rows, lenses):
         points.disparity[:, columns] = BACKGROUND
 
 
-def draw(points, rows, targets, sources, rules, plain=True):
+def draw(points, rows, targets, sources, rules):
     from lippmann.rendering.reprojection.lenticular.forward_warp import receive
-    from lippmann.rendering.reprojection.lenticular.linear_rows import Lines, find_plain
 
     height = len(points.status)
-    lines = Lines.empty(height, LENSES)
-    done = np.setdiff1d(np.arange(LENSES), targets)
-    if plain:
-        find_plain(0, height, points, rows, done, rules, lines)
     unsettled = np.zeros((height, LENSES), dtype=np.bool_)
     targets, sources = np.array(targets, dtype=np.int64), np.array(sources, dtype=np.int64)
-    receive(0, height, points, rows, targets, sources, rules, lines, unsettled)
+    receive(0, height, points, rows, targets, sources, rules, unsettled)
     return unsettled
 
 
@@ -74,10 +68,9 @@ def draw(points, rows, targets, sources, rules, plain=True):
     st.floats(-0.9, 0.9).filter(lambda s: abs(s) > 0.02),
     st.floats(-0.01, 0.01),
     st.booleans(),
-    st.booleans(),
     st.floats(-0.4, 0.4),
 )
-def test_a_plane_is_reprojected_exactly(level, slope, plain, careful, tilt):
+def test_a_plane_is_reprojected_exactly(level, slope, careful, tilt):
     """Colours that are linear along the plane's line of sight come out as they are, wherever a source reaches."""
     from lippmann.rendering.reprojection.common.point_image import MISSED, REPROJECTED
 
@@ -93,11 +86,11 @@ def test_a_plane_is_reprojected_exactly(level, slope, plain, careful, tilt):
     points = plane(rows, level, slope, color)
     forget(points, rows, [1, 2, 3])
     rules = the_rules(careful=careful)
-    draw(points, rows, [2], [[0, 4]], rules, plain)
+    draw(points, rows, [2], [[0, 4]], rules)
     columns = slice(rows.first[2], rows.first[3])
     found = points.status[0, columns] == REPROJECTED
     # Who reaches what: a pixel at o of the target is seen at o + (c' - c) s under the source.
-    o, s = rows.offset[2] + np.arange(WIDTH), truth.disparity[0, columns].astype(float)
+    o, s = np.arange(WIDTH) - (WIDTH - 1) / 2, truth.disparity[0, columns].astype(float)
     half = (WIDTH - 1) / 2
     reached = (np.abs(o + 2 * WIDTH * s) <= half) | (np.abs(o - 2 * WIDTH * s) <= half)
     sure = np.minimum(np.abs(np.abs(o + 2 * WIDTH * s) - half), np.abs(np.abs(o - 2 * WIDTH * s) - half)) > 0.05
@@ -140,14 +133,13 @@ def test_the_nearest_wins_of_one_source_whichever_is_drawn_first():
 
 
 @pytest.mark.parametrize("careful", [False, True])
-@pytest.mark.parametrize("plain", [False, True])
-def test_the_nearer_source_has_the_larger_share(careful, plain):
+def test_the_nearer_source_has_the_larger_share(careful):
     rows = the_rows()
     for sources, expected in (([1, 4], 0.3), ([0, 3], 0.4)):
         points = plane(rows, -1e-4, 0.0, constant(0.2))
         points.color[:, 24:] = 0.5
         forget(points, rows, [2])
-        draw(points, rows, [2], [sources], the_rules(careful=careful), plain)
+        draw(points, rows, [2], [sources], the_rules(careful=careful))
         assert points.color[0, 17:23] == pytest.approx(expected, abs=1e-3)
 
 
@@ -215,24 +207,22 @@ def test_care_leaves_fragile_points_and_edges_to_tracing(careful):
     assert not missed[5:7].any()
 
 
-@pytest.mark.parametrize("plain", [False, True])
 @pytest.mark.parametrize("column", [12, 28])
-def test_one_fragile_pixel_of_one_source_is_enough(column, plain):
+def test_one_fragile_pixel_of_one_source_is_enough(column):
     from lippmann.rendering.reprojection.common.point_image import MISSED
 
     rows = the_rows()
     points = plane(rows, -1e-4, 0.0, constant(0.2))
     points.fragile[:, column] = True
     forget(points, rows, [2])
-    draw(points, rows, [2], [[1, 3]], the_rules(), plain)
+    draw(points, rows, [2], [[1, 3]], the_rules())
     missed = points.status[0, 16:24] == MISSED
     assert missed[4]
     assert not missed[1:3].any()
     assert not missed[6]
 
 
-@pytest.mark.parametrize("plain", [False, True])
-def test_care_leaves_to_tracing_what_the_sources_dispute(plain):
+def test_care_leaves_to_tracing_what_the_sources_dispute():
     from lippmann.rendering.reprojection.common.point_image import MISSED, REPROJECTED
 
     rows = the_rows()
@@ -240,7 +230,7 @@ def test_care_leaves_to_tracing_what_the_sources_dispute(plain):
         points = plane(rows, -1e-4, 0.0, constant(0.2))
         points.color[:, 24:32] += apart
         forget(points, rows, [2])
-        draw(points, rows, [2], [[1, 3]], the_rules(tolerance=0.06), plain)
+        draw(points, rows, [2], [[1, 3]], the_rules(tolerance=0.06))
         assert np.all(points.status[:, 17:23] == expected)
         if expected == REPROJECTED:
             assert points.color[0, 17:23] == pytest.approx(0.2 + apart / 2, abs=1e-4)
@@ -258,7 +248,7 @@ def test_where_an_outline_may_reach_farther_points_are_not_taken(careful, source
     for lens in (1, 3)[:sources]:
         points.disparity[:, 8 * lens : 8 * lens + 4] = -0.05
     forget(points, rows, [2])
-    draw(points, rows, [2], [[1, 3]], the_rules(careful=careful), plain=False)
+    draw(points, rows, [2], [[1, 3]], the_rules(careful=careful))
     missed = points.status[0, 16:24] == MISSED
     # The outline of the left source ends between the places 2.6 and 3.6, that of the right one between 3.4 and 4.4.
     assert missed[3] == (careful and sources == 1)

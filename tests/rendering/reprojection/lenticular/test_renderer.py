@@ -32,25 +32,21 @@ def rules(careful=True, **others):
     from lippmann.rendering.reprojection.common.thresholds import Rules
 
     if careful:
-        return Rules(True, 0.06, False, probe_rows=4, longest_gap=3, overhang=0)._replace(**others)
-    return Rules(False, 0.12, False, probe_rows=8, longest_gap=5, overhang=1, middles=False)._replace(**others)
+        return Rules(True, 0.06, False, probe_rows=4, probe_stride=16, longest_gap=3, overhang=0)._replace(**others)
+    return Rules(False, 0.12, False, probe_rows=8, probe_stride=32, longest_gap=5, overhang=1)._replace(**others)
 
 
 def make(display, tracer, the_rules, method="lens_view", threads=1):
     from lippmann.rendering.reprojection.common.point_image import PointImage
-    from lippmann.rendering.reprojection.lenticular.renderer import StraightRenderer
-    from lippmann.rendering.reprojection.retrace.adaptive_retrace import Look, Looks, search
+    from lippmann.rendering.reprojection.default_order import DefaultOrder
     from lippmann.runtime.row_threads import Bands
 
     points = PointImage.empty(display.panel.height, display.panel.width)
     counts = []
-    bands = Bands(threads)
-    renderer = StraightRenderer(display, points, tracer, bands, the_rules, counts.append)
+    renderer = DefaultOrder(display, points, tracer, Bands(threads), the_rules, counts.append)
     getattr(renderer, method)()
     if the_rules.careful:
-        lens = renderer.lens_numbers()
-        looks = Looks((Look(6, 4),), (Look(6, 8),))
-        search(points, lens, renderer.reach, looks, tracer, bands, the_rules, renderer.follow, counts.append)
+        renderer.correct()
     assert sum(counts) == len(tracer.traced) == len(np.unique(tracer.traced))
     return points
 
@@ -120,11 +116,11 @@ def test_threads_do_not_matter(flat_tracer, sheet, method, careful):
             assert np.array_equal(one, two)
 
 
-def test_care_keeps_mirrors_and_a_thin_thing_that_one_lens_shows(flat_tracer, sheet):
+def test_care_keeps_mirrors_and_a_thin_thing_that_one_key_lens_shows(flat_tracer, sheet):
     display = display_of(16, 64)
     mirror = sheet(-12.0, lambda x, y: np.stack([0.5 + 0.4 * np.sin(30 * x)] * 3, -1), lambda x, y: y < 0, mirror=True)
     twigs = [
-        sheet(-1.0, soft, lambda x, y, b=b: (np.abs(x - 3) < 4) & (np.abs(y - b) < 0.5)) for b in (8.5, 12.5, 16.5)
+        sheet(-1.0, soft, lambda x, y, b=b: (np.abs(x + 61) < 4) & (np.abs(y - b) < 0.5)) for b in (8.5, 12.5, 16.5)
     ]
     tracer = flat_tracer(display, [mirror, *twigs])
     wrong = error(make(display, tracer, rules()), tracer.full()) > 0.1

@@ -22,20 +22,28 @@ class KnownTracer:
         self.traced += len(numbers)
 
 
-def found(truth, taken, at_edges=(), follow=lambda *_: None):
+def the_field():
+    from lippmann.rendering.reprojection.common.lens_map import LensField
+
+    edges = np.arange(LENSES + 1) * WIDE
+    lens = np.broadcast_to(np.repeat(np.arange(LENSES, dtype=np.int32), WIDE), (HEIGHT, LENSES * WIDE))
+    center = np.stack([edges[:-1] + (WIDE - 1) / 2, np.zeros(LENSES)], axis=1)
+    return LensField(lens, center, np.broadcast_to(edges, (HEIGHT, LENSES + 1)), LENSES)
+
+
+def found(truth, taken, of_edges=(), disparity=1.5):
+    """The picture ``taken`` after the search; things at the usual disparity are seen through one lens only."""
     from lippmann.rendering.reprojection.common.point_image import REPROJECTED, PointImage
     from lippmann.rendering.reprojection.common.thresholds import Rules
-    from lippmann.rendering.reprojection.retrace.adaptive_retrace import Look, Looks, search
+    from lippmann.rendering.reprojection.retrace.adaptive_retrace import Neighborhoods, Surroundings, search
     from lippmann.runtime.row_threads import Bands
 
     points = PointImage.empty(HEIGHT, LENSES * WIDE)
-    points.color[:], points.disparity[:], points.status[:] = taken, -0.1, REPROJECTED
-    rules = Rules(True, 0.06, False, probe_rows=4, longest_gap=3, overhang=0)
-    lens = np.broadcast_to(np.repeat(np.arange(LENSES, dtype=np.int32), WIDE), points.status.shape)
+    points.color[:], points.disparity[:], points.status[:] = taken, disparity, REPROJECTED
+    rules = Rules(True, 0.06, False, probe_rows=4, probe_stride=16, longest_gap=3, overhang=0)
     tracer, counts = KnownTracer(truth), []
-    bands = Bands(1)
-    looks = Looks(tuple(Look(*look) for look in at_edges), (Look(6, 8),))
-    search(points, lens, WIDE, looks, tracer, bands, rules, follow, counts.append)
+    neighborhoods = Neighborhoods(tuple(Surroundings(*each) for each in of_edges), (Surroundings(6, 8),))
+    search(points, the_field(), neighborhoods, tracer, Bands(1), rules, counts.append)
     assert sum(counts) == tracer.traced
     return points
 
@@ -72,27 +80,32 @@ def test_a_thing_is_found_whole_from_one_wrong_edge():
     assert np.count_nonzero(points.status == 0) < 0.3 * points.status.size
 
 
-@pytest.mark.parametrize("at_edges", [(), ((6, 4),)])
-def test_what_begins_under_the_next_lens_is_looked_for(at_edges):
+@pytest.mark.parametrize("of_edges", [(), ((6, 4),)])
+def test_what_begins_under_the_next_lens_is_looked_for(of_edges):
     truth = picture()
     truth[10:16, 2 * WIDE + 4 : 3 * WIDE] = 0.9
     taken = truth.copy()
     truth[11:14, 3 * WIDE : 3 * WIDE + 6] = 0.9  # goes on under the next lens, where no source saw it
-    points = found(truth, taken, at_edges)
-    assert np.array_equal(points.color, truth) == (len(at_edges) > 0)
+    points = found(truth, taken, of_edges)
+    assert np.array_equal(points.color, truth) == (len(of_edges) > 0)
 
 
-def test_surprises_are_followed_and_looked_around():
+def test_the_search_goes_on_around_wrong_predictions():
     truth, taken = picture(), picture()
     truth[10:14, WIDE + 1 : WIDE + 7] = 0.9
-    truth[18:20, WIDE + 1 : 2 * WIDE] = 0.9  # apart from the first, and within the six rows of the wider look
+    truth[18:20, WIDE + 1 : 2 * WIDE] = 0.9  # apart from the first, and within six rows of it
     taken[11, WIDE + 3] = 0.9
-    followed = []
-    points = found(truth, taken, follow=lambda surprised, lens, wanted: followed.extend(surprised.tolist()))
-    assert np.array_equal(points.color, truth)
-    row, column = np.divmod(np.array(followed), LENSES * WIDE)
-    assert set(row) == {10, 11, 12, 13, 18, 19}
-    assert np.all(truth[row, column] != taken[row, column])
+    assert np.array_equal(found(truth, taken).color, truth)
+
+
+def test_points_that_were_wrongly_predicted_are_traced_under_the_neighbouring_lenses():
+    truth, taken = picture(), picture()
+    truth[16, WIDE + 3] = taken[16, WIDE + 4] = 0.9
+    untraced = np.count_nonzero(found(truth, taken).status[16, 2 * WIDE :] == 1)
+    # At a disparity of -1/8 the next lens shows the point one pixel back, so seven pixels on.
+    points = found(truth, taken, disparity=-0.125)
+    assert points.status[16, WIDE + 10] == 0
+    assert np.count_nonzero(points.status[16, 2 * WIDE :] == 1) < untraced
 
 
 def test_an_outline_before_the_background_is_an_edge():
@@ -108,54 +121,26 @@ def test_an_outline_before_the_background_is_an_edge():
     assert np.array_equal(np.flatnonzero(wanted[0]), [4, 5])
 
 
-def test_surprising_points_are_followed_to_the_neighbouring_lenses():
-    from lippmann.rendering.reprojection.common.epipolar_rows import Rows
-    from lippmann.rendering.reprojection.common.point_image import REPROJECTED, PointImage
-    from lippmann.rendering.reprojection.retrace.region_growing import follow_across
-
-    first = np.arange(4, dtype=np.int64) * WIDE
-    offset = np.full(3, -3.5)
-    rows = Rows(first, offset, first[:-1] - offset)
-    points = PointImage.empty(1, 24)
-    points.status[:] = REPROJECTED
-    points.disparity[:] = -0.05
-    points.disparity[0, 12] = -0.125  # nearer; one lens on it is seen one pixel further back
-    lens = np.repeat(np.arange(3, dtype=np.int32), WIDE)[None]
-    wanted = np.zeros((1, 24), dtype=np.bool_)
-    follow_across(points, rows, np.array([12], np.uint32), lens, wanted)
-    assert {5, 19} <= set(np.flatnonzero(wanted[0]).tolist()) <= {5, 6, 19, 20}
-    # What lies nearer there already hides it.
-    points.disparity[0, :8], points.disparity[0, 16:] = -0.01, -0.01
-    wanted[:] = False
-    points.disparity[0, 12] = -0.02
-    points.disparity[0, 0:8], points.disparity[0, 16:24] = 0.1, 0.1
-    follow_across(points, rows, np.array([12], np.uint32), lens, wanted)
-    assert not wanted.any()
-
-
-def test_arrays_are_looked_through_more_closely_than_few_and_many_cylinders():
+def test_arrays_are_searched_more_closely_than_cylinders():
     from lippmann.display import load_display
-    from lippmann.rendering.reprojection.retrace.adaptive_retrace import Look, choose_looks
+    from lippmann.rendering.reprojection.retrace.adaptive_retrace import Surroundings, choose_neighborhoods
 
-    few = load_display("seed-lenticular")
-    assert choose_looks(few, 8).at_edges == (Look(6, 3),)
-    # Many lenses: rays are dearer than rounds.
-    assert choose_looks(few.resized(3840, 2160), 8).at_edges == ()
+    straight = choose_neighborhoods(load_display("seed-lenticular"), 8)
     for name in ("mla-square", "mla-hexagonal"):
-        looks = choose_looks(load_display(name), 15)
-        assert looks.at_edges == (Look(1, 1),)
-        assert looks.at_surprises == (Look(4, 1), Look(15, 3))
+        array = choose_neighborhoods(load_display(name), 15)
+        assert array.of_edges[0].share < straight.of_edges[0].share
+        assert array.of_wrong == (Surroundings(4, 1), Surroundings(15, 3))
 
 
 @pytest.mark.parametrize("share", [2, 3, 4, 8])
-def test_a_look_comes_to_every_row_and_column(share):
+def test_surroundings_come_to_every_row_and_column(share):
     from lippmann.rendering.reprojection.common.point_image import REPROJECTED, PointImage
-    from lippmann.rendering.reprojection.retrace.region_growing import look_around
+    from lippmann.rendering.reprojection.retrace.region_growing import mark_surroundings
 
     points = PointImage.empty(HEIGHT, LENSES * WIDE)
     points.status[:] = REPROJECTED
     wanted = np.zeros(points.status.shape, dtype=np.bool_)
-    look_around(points, WIDE, 8, share, np.array([16 * LENSES * WIDE + 3 * WIDE]), wanted)
+    mark_surroundings(points, WIDE, 8, share, np.array([16 * LENSES * WIDE + 3 * WIDE]), wanted)
     row, column = np.nonzero(wanted)
     assert set(row) == set(range(8, 25))
     assert set(column) == set(range(2 * WIDE, 5 * WIDE))

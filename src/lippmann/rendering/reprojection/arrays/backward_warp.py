@@ -13,25 +13,22 @@ is not taken.
 
 from __future__ import annotations
 
+from math import gcd, sqrt
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.rendering.reprojection.arrays.bilinear import color_at, is_trusted
-from lippmann.rendering.reprojection.arrays.epipolar_march import look_along
+from lippmann.rendering.reprojection.arrays.epipolar_march import look_along, mark_nearest
 from lippmann.rendering.reprojection.common.array_types import BoolArray, RealArray
 from lippmann.rendering.reprojection.common.lens_map import LensField
 from lippmann.rendering.reprojection.common.point_image import BACKGROUND, REPROJECTED, TRACED, PointImage
-from lippmann.rendering.reprojection.common.thresholds import (
-    ONE_POINT,
-    ONE_PROBED_SURFACE,
-    Rules,
-    alike,
-    coded_value,
-    nearer,
-)
+from lippmann.rendering.reprojection.common.schedule import Lenses, Step
+from lippmann.rendering.reprojection.common.thresholds import Rules, alike, coded_value, nearer
+from lippmann.rendering.reprojection.common.tuning import TUNING
 from lippmann.runtime.numba_jit import compiled, uncounted
+from lippmann.runtime.row_threads import Bands
 
 
 class Gathering(NamedTuple):
@@ -56,6 +53,51 @@ class Gathering(NamedTuple):
     probe_reach: int
 
 
+class BackwardWarp:
+    """Makes micro-images of lenses of any layout from others."""
+
+    def __init__(self, points: PointImage, field: LensField, bands: Bands, rules: Rules) -> None:
+        self._points = points
+        self._field = field
+        self._bands = bands
+        self._rules = rules
+        self._probe_stride = rules.probe_stride
+        self._probe_shift = scatter_shift(self._probe_stride)
+        self._nearest = np.zeros(points.status.shape, dtype=np.float32)
+
+    def probes(self, row: int) -> NDArray[np.int64]:
+        """Columns of the probes in a row."""
+        return np.arange(row * self._probe_shift % self._probe_stride, self._field.lens.shape[1], self._probe_stride)
+
+    def receive(self, step: Step, unsettled: BoolArray) -> None:
+        """Give the targets of a step the points of their sources; ``unsettled`` as for :func:`gather`."""
+        lenses = len(self._field.center)
+        target = np.zeros(lenses, dtype=np.bool_)
+        target[step.targets] = True
+        source = np.full((lenses, 2), -1, dtype=np.int64)
+        source[step.targets] = step.sources
+        gathering = Gathering(target, source, self._probe_stride, self._probe_shift, round(sqrt(self._probe_stride)))
+        arguments = self._points, self._field, gathering, self._rules, self._nearest, unsettled
+        self._bands.lines(gather, len(unsettled), *arguments)
+
+    def finish(self, lenses: Lenses) -> None:
+        """Others receive from these lenses now."""
+        done = np.zeros(len(self._field.center), dtype=np.bool_)
+        done[lenses] = True
+        self._bands.lines(mark_nearest, len(self._nearest), self._points, self._field, done, self._nearest)
+
+
+def scatter_shift(stride: int) -> int:
+    """Columns by which probes ``stride`` apart move from row to row: they visit all columns and leave no large holes.
+
+    About the golden section of the stride.
+    """
+    shift = round((sqrt(5) - 1) / 2 * stride)
+    while gcd(shift, stride) > 1:
+        shift -= 1
+    return shift
+
+
 @uncounted
 def probed_limit(points: PointImage, field: LensField, row: int, column: int, gathering: Gathering) -> float:
     """Nothing farther than this disparity is to be expected at a pixel, say the probes around it; 0: no one knows."""
@@ -76,7 +118,7 @@ def probed_limit(points: PointImage, field: LensField, row: int, column: int, ga
                     farthest = s
             c += stride
     # Probes that see one surface vouch for all of it; between different ones only the nearer is sure.
-    return farthest if alike(nearest, farthest, ONE_PROBED_SURFACE) else nearest
+    return farthest if alike(nearest, farthest, TUNING.one_probed_surface) else nearest
 
 
 @compiled
@@ -159,7 +201,7 @@ def _gather_pixel(
         return False
     total, mean = 0.0, 0.0
     for k in range(len(depth)):
-        if share[k] > 0.0 and not alike(depth[k], front, ONE_POINT):
+        if share[k] > 0.0 and not alike(depth[k], front, TUNING.one_point):
             share[k] = 0.0
         if share[k] == 0.0:
             # What no source gave is no number, perhaps: even nothing of it would count.
@@ -170,7 +212,7 @@ def _gather_pixel(
         mean += share[k] * depth[k]
     mean /= total
     limit = probed_limit(points, field, row, column, gathering)
-    if limit != 0.0 and nearer(limit, mean) and not alike(limit, mean, ONE_PROBED_SURFACE):
+    if limit != 0.0 and nearer(limit, mean) and not alike(limit, mean, TUNING.one_probed_surface):
         return False
     if nearer(beside_nearest, mean) and (rules.careful or outlines == asked):
         return False

@@ -8,13 +8,9 @@ import numpy as np
 
 from lippmann.rendering.reprojection.common.lens_map import LensField
 from lippmann.rendering.reprojection.common.point_image import PointImage
-from lippmann.rendering.reprojection.common.thresholds import ON_CENTER, ONE_SURFACE, Rules, alike, color_difference
+from lippmann.rendering.reprojection.common.thresholds import Rules, alike, color_difference
+from lippmann.rendering.reprojection.common.tuning import TUNING
 from lippmann.runtime.numba_jit import inlined, uncounted
-
-#: Pixels that stand for missing ones must have this share of a place together ...
-SMALLEST_SHARE = 0.25
-#: ... and be alike in colour to this part of the tolerance.
-RIM_TOLERANCE = 0.4
 
 
 class Place(NamedTuple):
@@ -49,10 +45,10 @@ class Place(NamedTuple):
 def place_at(points: PointImage, field: LensField, lens: int, x: float, y: float) -> Place:
     """The place (x, y) under ``lens``. At the rim of a micro-image those pixels that there are stand for the others."""
     height, width = points.status.shape
-    column, row = int(np.floor(x + ON_CENTER)), int(np.floor(y + ON_CENTER))
+    column, row = int(np.floor(x + TUNING.on_center)), int(np.floor(y + TUNING.on_center))
     u, v = x - column, y - row
-    u = 0.0 if u < ON_CENTER else u
-    v = 0.0 if v < ON_CENTER else v
+    u = 0.0 if u < TUNING.on_center else u
+    v = 0.0 if v < TUNING.on_center else v
     a, b, c, d = (1.0 - u) * (1.0 - v), u * (1.0 - v), (1.0 - u) * v, u * v
     total, s, low, high = 0.0, 0.0, 0.0, 0.0
     count = 0
@@ -76,8 +72,8 @@ def place_at(points: PointImage, field: LensField, lens: int, x: float, y: float
             c = 0.0
         else:
             d = 0.0
-    whole = total > 1.0 - ON_CENTER
-    found = (whole or (count > 1 and total >= SMALLEST_SHARE)) and alike(low, high, ONE_SURFACE)
+    whole = total > 1.0 - TUNING.on_center
+    found = (whole or (count > 1 and total >= TUNING.smallest_share)) and alike(low, high, TUNING.one_surface)
     share = 1.0 / total if total > 0.0 else 0.0
     # Rounding must not put what is infinitely far away any farther or nearer.
     disparity = s * share if low < high else low
@@ -89,7 +85,7 @@ def is_trusted(points: PointImage, place: Place, rules: Rules) -> bool:
     """Whether the colour at a place may be seen from elsewhere: no pixel of it is fragile, no edge runs through it."""
     first_row, first_column = -1, -1
     trusted = True
-    tolerance = rules.tolerance if place.whole else RIM_TOLERANCE * rules.tolerance
+    tolerance = rules.tolerance if place.whole else TUNING.rim_tolerance * rules.tolerance
     for k in range(4):
         weight = place.a if k == 0 else (place.b if k == 1 else (place.c if k == 2 else place.d))
         if weight == 0.0:

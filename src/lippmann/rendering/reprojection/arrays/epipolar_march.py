@@ -8,13 +8,9 @@ from lippmann.rendering.reprojection.arrays.bilinear import Place, place_at
 from lippmann.rendering.reprojection.common.array_types import IntArray, RealArray
 from lippmann.rendering.reprojection.common.lens_map import LensField
 from lippmann.rendering.reprojection.common.point_image import BACKGROUND, PointImage
-from lippmann.rendering.reprojection.common.thresholds import ONE_SURFACE, alike, nearer
+from lippmann.rendering.reprojection.common.thresholds import alike, nearer
+from lippmann.rendering.reprojection.common.tuning import TUNING
 from lippmann.runtime.numba_jit import uncounted
-
-#: A root is found when the surface lies this near to the line, in pixels; farther away than the second it is none.
-CLOSE, TOO_FAR = 0.02, 0.2
-#: Halvings of a step at most.
-MOST_HALVINGS = 8
 
 
 @uncounted
@@ -96,12 +92,12 @@ def look_along(
                 place = place_at(points, field, source, here_x, here_y)
                 if place.found and nearer(s, place.disparity):
                     # A smooth surface is near, or a nearer one ends here.
-                    if passes and not alike(near, place.disparity, ONE_SURFACE) and nearer(near, beside):
+                    if passes and not alike(near, place.disparity, TUNING.one_surface) and nearer(near, beside):
                         beside = near
                     in_front = True
                 else:
                     # It comes out from behind another surface and enters this one within a step, or it was before it.
-                    comes_out = not fresh and not alike(before_shown, place.disparity, ONE_SURFACE)
+                    comes_out = not fresh and not alike(before_shown, place.disparity, TUNING.one_surface)
                     if place.found and (in_front or comes_out):
                         found, t = _enter(points, field, source, x, y, shift_x, shift_y, before, s)
                         if found.found:
@@ -134,8 +130,8 @@ def _enter(
     excess = s - place.disparity
     low, high = front, back
     low_excess, high_excess = np.nan, excess
-    for _ in range(MOST_HALVINGS):
-        if abs(excess) * pixels <= CLOSE:
+    for _ in range(TUNING.most_halvings):
+        if abs(excess) * pixels <= TUNING.close:
             break
         s = 0.5 * (low + high)
         if not np.isnan(low_excess):
@@ -145,7 +141,7 @@ def _enter(
             s = place.disparity
         here = place_at(points, field, source, x + s * shift_x, y + s * shift_y)
         if not here.found:
-            if place.found and abs(excess) * pixels <= TOO_FAR:
+            if place.found and abs(excess) * pixels <= TUNING.too_far:
                 break
             return here, s
         place = here
@@ -154,6 +150,6 @@ def _enter(
             low, low_excess = s, excess
         else:
             high, high_excess = s, excess
-    if abs(excess) * pixels > TOO_FAR:
+    if abs(excess) * pixels > TUNING.too_far:
         return Place(False, False, 0, 0, 0.0, 0.0, 0.0, 0.0, 0.0), s
     return place, place.disparity

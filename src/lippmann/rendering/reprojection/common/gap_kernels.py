@@ -17,16 +17,8 @@ import numpy as np
 from lippmann.rendering.reprojection.common.array_types import BoolArray, IntArray
 from lippmann.rendering.reprojection.common.point_image import INTERPOLATED, MISSED, REPROJECTED, WANTED, PointImage
 from lippmann.rendering.reprojection.common.thresholds import Rules, alike, color_difference
+from lippmann.rendering.reprojection.common.tuning import TUNING
 from lippmann.runtime.numba_jit import inlined, uncounted
-
-#: Disparities of one surface change by at most this part per pixel within a micro-image ...
-ONE_SURFACE_PER_PIXEL = 0.06
-#: ... or its height by this part of the gap: near to the lens plane disparities are huge and change their sign.
-HEIGHT_PER_PIXEL = 0.02
-
-#: Where :func:`average` is careful, neighbours must agree to this part of the tolerance: nothing is known of what lies
-#: between them, and the two may be wrong in the same sense.
-AVERAGED_TOLERANCE = 0.5
 
 #: What :func:`bridge` does with gaps between different surfaces or colours: want all of their pixels, want the middle
 #: one, or give every pixel the colour of the nearest one that is known.
@@ -40,13 +32,11 @@ def scatter_samples(
     points: PointImage,
     first: IntArray,
     unsettled: BoolArray,
-    counts: IntArray,
     rules: Rules,
 ) -> None:
     """Want some of the missed pixels, ``longest_gap`` apart at most.
 
-    ``counts (H,)`` grows by the pixels wanted in each row. From row to row the places shift, so that upright lines do
-    not slip through.
+    From row to row the places shift, so that upright lines do not slip through.
     """
     gap = rules.longest_gap
     beyond = gap - 1 - rules.overhang
@@ -75,12 +65,10 @@ def scatter_samples(
                     column = a + ((b - a) * i + rounding) // steps
                     if start <= column < stop:
                         points.status[row, column] = WANTED
-                        counts[row] += 1
                         none = False
                 if none and start == begin and stop == end:
                     # The stub of a micro-image that the panel cuts off: something must be known of every run.
                     points.status[row, start] = WANTED
-                    counts[row] += 1
                 start = stop
 
 
@@ -91,14 +79,12 @@ def bridge(
     points: PointImage,
     first: IntArray,
     unsettled: BoolArray,
-    counts: IntArray,
     rules: Rules,
     otherwise: int,
 ) -> None:
     """Fill the gaps between known pixels that belong together, and decide on the others.
 
-    ``otherwise`` is :data:`TRACE_ALL`, :data:`TRACE_MIDDLE` or :data:`TAKE_NEAREST`; ``counts (H,)`` grows by the
-    pixels wanted in each row.
+    ``otherwise`` is :data:`TRACE_ALL`, :data:`TRACE_MIDDLE` or :data:`TAKE_NEAREST`.
     """
     for row in range(first_row, last_row):
         for k in range(unsettled.shape[1]):
@@ -118,10 +104,9 @@ def bridge(
                     if otherwise == TRACE_ALL:
                         for column in range(start, stop):
                             points.status[row, column] = WANTED
-                        counts[row] += stop - start
                         settled = False
                     elif otherwise == TRACE_MIDDLE:
-                        counts[row] += _want_middle(points, row, begin, end, start, stop)
+                        _want_middle(points, row, begin, end, start, stop)
                         settled = False
                     else:
                         _take_nearest(points, row, begin, end, start, stop)
@@ -142,8 +127,8 @@ def _fill(points: PointImage, row: int, begin: int, end: int, start: int, stop: 
     if b - a > rules.longest_gap or ((start == begin or stop == end) and stop - start > rules.overhang):
         return False
     s, t = np.float64(points.disparity[row, a]), np.float64(points.disparity[row, b])
-    flat = abs(s - t) <= HEIGHT_PER_PIXEL * (b - a) * abs(s * t)
-    if not (flat or alike(s, t, ONE_SURFACE_PER_PIXEL * (b - a))):
+    flat = abs(s - t) <= TUNING.height_per_pixel * (b - a) * abs(s * t)
+    if not (flat or alike(s, t, TUNING.one_surface_per_pixel * (b - a))):
         return False
     if rules.careful and (points.fragile[row, a] != points.fragile[row, b]):
         return False
@@ -164,17 +149,13 @@ def _fill(points: PointImage, row: int, begin: int, end: int, start: int, stop: 
 
 
 @inlined
-def _want_middle(points: PointImage, row: int, begin: int, end: int, start: int, stop: int) -> int:
-    """Returns how many pixels that are."""
+def _want_middle(points: PointImage, row: int, begin: int, end: int, start: int, stop: int) -> None:
     if start == begin and stop == end:
         points.status[row, start] = WANTED
         points.status[row, stop - 1] = WANTED
-        return 2 if stop - start > 1 else 1
-    if stop - start == 1:
-        return 0
-    column = start if start == begin else (stop - 1 if stop == end else (start + stop) // 2)
-    points.status[row, column] = WANTED
-    return 1
+    elif stop - start > 1:
+        column = start if start == begin else (stop - 1 if stop == end else (start + stop) // 2)
+        points.status[row, column] = WANTED
 
 
 @inlined
@@ -214,7 +195,7 @@ def average(
             or points.fragile[one_row, one_column]
             or points.fragile[other_row, other_column]
             or color_difference(points.color, one_row, one_column, other_row, other_column, rules.coded)
-            > AVERAGED_TOLERANCE * rules.tolerance
+            > TUNING.averaged_tolerance * rules.tolerance
         ):
             continue
         for channel in range(3):
@@ -222,46 +203,3 @@ def average(
             points.color[row, column, channel] = np.float32(0.5) * total
         points.disparity[row, column] = points.disparity[one_row, one_column]
         points.status[row, column] = INTERPOLATED
-
-
-@uncounted
-def list_pixels(
-    first_row: int,
-    last_row: int,
-    points: PointImage,
-    first: IntArray,
-    unsettled: BoolArray,
-    status: int,
-    starts: IntArray,
-    numbers: IntArray,
-) -> None:
-    """Enter the linear numbers of the pixels of one ``status`` into ``numbers``, each row's from ``starts (H,)`` on."""
-    width = points.status.shape[1]
-    for row in range(first_row, last_row):
-        entry = starts[row]
-        for k in range(unsettled.shape[1]):
-            if unsettled[row, k]:
-                for column in range(first[row, k], first[row, k + 1]):
-                    if points.status[row, column] == status:
-                        numbers[entry] = row * width + column
-                        entry += 1
-
-
-@uncounted
-def count_pixels(
-    first_row: int,
-    last_row: int,
-    points: PointImage,
-    first: IntArray,
-    unsettled: BoolArray,
-    status: int,
-    counts: IntArray,
-) -> None:
-    """How many pixels of one ``status`` each row holds."""
-    for row in range(first_row, last_row):
-        count = 0
-        for k in range(unsettled.shape[1]):
-            if unsettled[row, k]:
-                for column in range(first[row, k], first[row, k + 1]):
-                    count += points.status[row, column] == status
-        counts[row] = count

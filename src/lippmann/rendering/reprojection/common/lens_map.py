@@ -30,8 +30,8 @@ class LensField(NamedTuple):
     center:
         ``(lenses, 2)`` their centres (x, y); of cylindrical lenses the foot of a perpendicular on the axis.
     first:
-        ``(H, runs + 1)`` columns at which the stretches of one lens begin and end in each row. Rows of fewer stretches
-        end with empty ones.
+        ``(H, runs + 1)`` columns at which the stretches of one lens begin and end in each row. Stretches may be empty.
+        Under straight cylindrical lenses there is one for each lens.
     columns:
         Lenses in a row.
     """
@@ -54,14 +54,35 @@ class LensField(NamedTuple):
     @staticmethod
     def of(display: Display) -> LensField:
         """The field of ``display``."""
-        grid = display.lens_grid
-        i, j = pixel_lenses(display)
-        lens = (j * np.int32(grid.columns) + i).astype(np.int32)
+        grid, panel = display.lens_grid, display.panel
+        if display.lattice.rows_are_alike:
+            across = np.arange(panel.width) + 0.5
+            i, _ = display.lens_of(*display.panel_point(across, np.full(panel.width, 0.5)), NUMPY)
+            edges = np.searchsorted(i, np.arange(grid.columns + 1))
+            lens = np.broadcast_to(i.astype(np.int32), (panel.height, panel.width))
+            first = np.broadcast_to(edges, (panel.height, len(edges)))
+        else:
+            i, j = pixel_lenses(display)
+            lens = (j * np.int32(grid.columns) + i).astype(np.int32)
+            first = _stretches(lens)
         rows, columns = (a.ravel().astype(np.float64) for a in np.indices((grid.rows, grid.columns)))
         zero = np.zeros_like(columns)
         x, y = display.lens_center(columns, rows, zero, zero, NUMPY)
         u, v = display.pixel_coordinates(x, y)
-        return LensField(lens, np.stack([u - 0.5, v - 0.5], axis=1), _stretches(lens), grid.columns)
+        return LensField(lens, np.stack([u - 0.5, v - 0.5], axis=1), first, grid.columns)
+
+    def lens_beside(self, down: int, right: int) -> NDArray[np.int64]:
+        """``(lenses,)``: the lens so many rows down and columns to the right of each; -1 for none."""
+        j, i = np.divmod(np.arange(len(self.center)), self.columns)
+        exists = (i + right >= 0) & (i + right < self.columns) & (j + down >= 0) & (j + down < self.rows)
+        return np.where(exists, (j + down) * self.columns + i + right, -1)
+
+    def corresponding_beside(self, numbers: NDArray[np.uint32]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """:meth:`corresponding` under the lenses to the left and to the right."""
+        place = numbers.astype(np.int64)
+        lens = self.lens[np.divmod(place, self.lens.shape[1])]
+        left, right = (self.corresponding(place, self.lens_beside(0, side)[lens]) for side in (-1, 1))
+        return left, right
 
     def corresponding(self, numbers: NDArray[np.int64], other: NDArray[np.int64]) -> NDArray[np.int64]:
         """The pixels of the lenses ``other`` (-1: none) whose light lines are nearest to parallel to those of pixels.

@@ -17,13 +17,12 @@ from lippmann.rendering.film.wavefront import RayTotals, compile_seconds
 from lippmann.rendering.reprojection.common.array_types import BoolArray, IntArray, RealArray
 from lippmann.rendering.reprojection.common.frozen_kernel import Frozen, aligned
 from lippmann.rendering.reprojection.common.point_image import BACKGROUND, SMALLEST_HEIGHT, TRACED, PointImage
+from lippmann.rendering.reprojection.common.thresholds import alike, nearer
+from lippmann.rendering.reprojection.common.tuning import TUNING
 from lippmann.rendering.transport.integrator import ReusableIntegrator
 from lippmann.rendering.transport.ray_source import DisplayRays
 from lippmann.runtime.numba_jit import uncounted
 from lippmann.runtime.row_threads import Bands
-
-#: Samples of one pixel whose disparities differ by more than this part of the nearest's see different surfaces.
-_ONE_SURFACE = 0.2
 
 Pixels = NDArray[np.uint32]
 
@@ -149,15 +148,15 @@ def _enter(
             r, g, b = r + red[k], g + green[k], b + blue[k]
             s = disparity[k]
             total += s
-            if s > 0.0 if (s > 0.0) != (nearest > 0.0) else s < nearest:
+            if nearer(s, nearest):
                 nearest = s
-            if farthest > 0.0 if (farthest > 0.0) != (s > 0.0) else farthest < s:
+            if nearer(farthest, s):
                 farthest = s
             is_fragile |= fragile[k] != 0
         points.color[row, column, 0] = r / samples
         points.color[row, column, 1] = g / samples
         points.color[row, column, 2] = b / samples
-        one_surface = abs(nearest - farthest) <= _ONE_SURFACE * max(abs(nearest), abs(farthest))
+        one_surface = alike(nearest, farthest, TUNING.one_surface)
         points.disparity[row, column] = total / samples if one_surface else nearest
         points.fragile[row, column] = is_fragile or not one_surface
         points.status[row, column] = TRACED

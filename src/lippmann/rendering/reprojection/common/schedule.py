@@ -1,9 +1,9 @@
 """In which order micro-images are made, and from which others each receives its points.
 
-Key lenses some way apart come first; then those halfway between receive points from the done ones on either side, and
-so on down to neighbours. Points of a surface at height z are seen through ``|z| / gap`` lenses, so that a surface far
-from the lens plane is already known from the keys, and a nearer one is traced where the finer steps first meet it: each
-lens receives from the nearest lenses that are done, and whole steps are traced at once.
+Key lenses some way apart come first, along both axes of the array. The steps between them receive points from the
+nearest finished lenses on either side: first between two lenses of a row, then between two of a column. Points of a
+surface at height z are seen through ``|z| / gap`` lenses, so that a surface far from the lens plane is already known
+from the keys, and a nearer one is traced where the finer steps first meet it. All lenses of a step are traced at once.
 """
 
 from __future__ import annotations
@@ -13,53 +13,62 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-Lenses = NDArray[np.int64]
+from lippmann.rendering.reprojection.common.tuning import TUNING
 
-#: Distance of the key lenses. Farther apart they save more on surfaces far from the lens plane, at the price of one
-#: more round of tracing, whose own cost counts on displays of few lenses.
-KEY_STRIDE, FEW_LENSES = 16, 128
-KEY_STRIDE_OF_FEW = {True: 4, False: 2}
+Lenses = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
 class Step:
-    """Lenses ``targets (n,)`` made together, from ``sources (n, 2)`` to the left and right (-1: none)."""
+    """Lenses ``targets (n,)`` made together, from ``sources (n, 2)`` on either side (-1: none)."""
 
     targets: Lenses
     sources: Lenses
 
 
-def few_lenses(lenses: int) -> bool:
-    """Whether a display has so few lenses in a row that whatever is done once per round costs more than rays do."""
-    return lenses < FEW_LENSES
+def refine(columns: Lenses, rows: int, width: int) -> tuple[Lenses, list[Step]]:
+    """Keys, and the steps between them, for the lenses of some ``columns`` in all ``rows``.
 
-
-def key_stride(lenses: int, careful: bool = False) -> int:
-    """Distance of the key lenses on a display of so many lenses in a row; with care rays are dearer than rounds."""
-    return KEY_STRIDE_OF_FEW[careful] if few_lenses(lenses) else KEY_STRIDE
-
-
-def refine(lenses: Lenses, stride: int) -> tuple[Lenses, list[Step]]:
-    """Keys every ``stride`` (a power of two) of ``lenses``, the last one among them, and the steps between."""
-    count = len(lenses)
-    done = np.union1d(np.arange(0, count, stride), [count - 1])
-    keys = lenses[done]
+    Lens (i, j) has the number ``j * width + i``. The last column and the last row are keys, too.
+    """
+    done_columns, across = _refine_axis(columns)
+    done_rows, down = _refine_axis(np.arange(rows))
+    keys = _grid(done_columns, done_rows, width)
     steps = []
-    while stride > 1:
-        stride //= 2
+    for along_row, along_column in zip(across, down, strict=True):
+        sides = [_grid(along_row.sources[:, side], done_rows, width) for side in range(2)]
+        steps.append(Step(_grid(along_row.targets, done_rows, width), np.stack(sides, axis=1)))
+        done_columns = np.concatenate([done_columns, along_row.targets])
+        sides = [_grid(done_columns, along_column.sources[:, side], width) for side in range(2)]
+        steps.append(Step(_grid(done_columns, along_column.targets, width), np.stack(sides, axis=1)))
+        done_rows = np.concatenate([done_rows, along_column.targets])
+    return keys, [step for step in steps if len(step.targets)]
+
+
+def odd_and_even(columns: int, rows: int) -> tuple[Lenses, Step]:
+    """Odd columns of lenses, counted from 1, and the step that makes the even ones between their odd neighbours.
+
+    The last column of an even number has a neighbour to its left only.
+    """
+    even = np.arange(1, columns, 2)
+    first = np.arange(rows) * columns
+    right = np.where(even + 1 < columns, first[:, None] + even + 1, -1)
+    targets = first[:, None] + even
+    return np.arange(0, columns, 2), Step(targets.ravel(), np.stack([targets - 1, right], axis=-1).reshape(-1, 2))
+
+
+def _refine_axis(places: Lenses) -> tuple[Lenses, list[Step]]:
+    """Keys of the lenses ``places`` along one axis, the last one among them, and a step for each smaller stride."""
+    count = len(places)
+    done = np.union1d(np.arange(0, count, TUNING.strides[0]), [count - 1])
+    keys, steps = places[done], []
+    for stride in TUNING.strides[1:]:
         new = np.setdiff1d(np.arange(0, count, stride), done)
         after = np.searchsorted(done, new)
-        if len(new):
-            steps.append(Step(lenses[new], lenses[np.stack([done[after - 1], done[after]], axis=1)]))
+        steps.append(Step(places[new], places[np.stack([done[after - 1], done[after]], axis=1)]))
         done = np.union1d(done, new)
     return keys, steps
 
 
-def odd_and_even(lenses: int) -> tuple[Lenses, Step]:
-    """Odd micro-images, counted from 1, and the step that makes the even ones between their odd neighbours.
-
-    The last micro-image of an even number has a neighbour to its left only.
-    """
-    even = np.arange(1, lenses, 2)
-    right = np.where(even + 1 < lenses, even + 1, -1)
-    return np.arange(0, lenses, 2), Step(even, np.stack([even - 1, right], axis=1))
+def _grid(columns: Lenses, rows: Lenses, width: int) -> Lenses:
+    return (rows[:, None] * width + columns).ravel()

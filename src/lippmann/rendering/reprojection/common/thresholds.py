@@ -6,21 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lippmann.display import Display
 from lippmann.rendering.reprojection.common.array_types import RealArray
-from lippmann.rendering.reprojection.common.schedule import few_lenses
 from lippmann.runtime.numba_jit import inlined
-
-#: Neighbouring pixels see one surface if their disparities differ by at most this part of the larger: a surface that
-#: turns away from the viewer by up to 75 degrees, on a display with a field of 18 degrees and 8 pixels under a lens.
-ONE_SURFACE = 0.2
-#: Two views of one point: left and right source agree to this part.
-ONE_POINT = 0.15
-#: Two probes that see one surface, some pixels apart.
-ONE_PROBED_SURFACE = 0.3
-
-#: A point this near to a pixel's centre, in pixels, lies on it: rounding must not decide whether a piece reaches it.
-ON_CENTER = 1e-3
 
 
 class Rules(NamedTuple):
@@ -36,36 +23,29 @@ class Rules(NamedTuple):
     coded:
         Compare colours on a scale like the eye's (square root), else as they are.
     probe_rows:
-        Every so many rows have probes.
+        Every so many rows have probes, two in each micro-image, under straight cylindrical lenses.
+    probe_stride:
+        One pixel in so many is a probe, under all other lenses.
     longest_gap:
         Pixels from one traced pixel to the next in what no point reached; what lies between them is bridged.
     overhang:
         Pixels at the end of a micro-image that may be extrapolated.
-    middles:
-        Trace the middle of a gap between different surfaces, else each of them is taken to reach halfway.
     """
 
     careful: bool
     tolerance: float
     coded: bool
     probe_rows: int
+    probe_stride: int
     longest_gap: int
     overhang: int
-    middles: bool = True
 
 
-def choose_rules(display: Display, *, careful: bool, coded: bool) -> Rules:
-    """Rules for a display.
-
-    Parameters
-    ----------
-    careful, coded:
-        As in :class:`Rules`.
-    """
+def choose_rules(*, careful: bool, coded: bool) -> Rules:
+    """The rules of a picture; ``careful`` and ``coded`` as in :class:`Rules`."""
     if careful:
-        return Rules(True, 0.06, coded, probe_rows=4, longest_gap=3, overhang=0)
-    few = few_lenses(display.lens_grid.columns)
-    return Rules(False, 0.12, coded, probe_rows=8 if few else 16, longest_gap=5, overhang=1, middles=not few)
+        return Rules(True, 0.06, coded, probe_rows=4, probe_stride=16, longest_gap=3, overhang=0)
+    return Rules(False, 0.12, coded, probe_rows=16, probe_stride=32, longest_gap=5, overhang=1)
 
 
 @inlined

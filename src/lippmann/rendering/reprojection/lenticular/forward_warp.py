@@ -1,4 +1,4 @@
-"""Points of finished micro-images drawn into others, row by row under straight cylindrical lenses, compiled.
+"""Forward warp of finished micro-images into others, row by row under straight cylindrical lenses. Compiled.
 
 Two neighbouring pixels of one micro-image that see one smooth surface are the ends of a piece of it. The piece is
 drawn into the other micro-image with its colour and disparity in between: no holes open up, and no colour is taken from
@@ -18,27 +18,62 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.rendering.reprojection.common.array_types import BoolArray, IntArray, RealArray
-from lippmann.rendering.reprojection.common.epipolar_rows import Rows
+from lippmann.rendering.reprojection.common.lens_map import LensField
 from lippmann.rendering.reprojection.common.point_image import BACKGROUND, REPROJECTED, TRACED, PointImage
-from lippmann.rendering.reprojection.common.thresholds import (
-    ON_CENTER,
-    ONE_POINT,
-    ONE_PROBED_SURFACE,
-    ONE_SURFACE,
-    Rules,
-    alike,
-    coded_value,
-    color_difference,
-    nearer,
-)
-from lippmann.rendering.reprojection.lenticular.linear_rows import Lines, draw_plain, prepare
+from lippmann.rendering.reprojection.common.schedule import Lenses, Step
+from lippmann.rendering.reprojection.common.thresholds import Rules, alike, coded_value, color_difference, nearer
+from lippmann.rendering.reprojection.common.tuning import TUNING
 from lippmann.runtime.numba_jit import compiled, inlined, uncounted
+from lippmann.runtime.row_threads import Bands
 
-#: A piece stretched to more pixels than this is seen too obliquely by its source.
-LONGEST_PIECE = 3.0
 #: Column of a row's first probe in eighths of a micro-image; the second lies half a micro-image on. Four rows of probes
 #: visit all eight places, so that no upright line escapes them.
 PROBE_PLACES = (0, 2, 1, 3)
+
+
+class Rows(NamedTuple):
+    """The columns of the micro-images in every row, lens by lens from the left.
+
+    A row of pixels is a world of its own (an epipolar plane): a point of disparity s that lens c shows at panel
+    position ``c + o`` appears under lens c' at ``c' + o + (c' - c) s``.
+
+    Attributes
+    ----------
+    first:
+        ``(lenses + 1,)`` first column of each micro-image; its last one ends where the next begins.
+    center:
+        ``(lenses,)`` the lens's centre, in pixels from the centre of column 0.
+    """
+
+    first: NDArray[np.int64]
+    center: NDArray[np.float64]
+
+
+class ForwardWarp:
+    """Makes micro-images of straight cylindrical lenses from others."""
+
+    def __init__(self, points: PointImage, field: LensField, bands: Bands, rules: Rules) -> None:
+        self._points = points
+        self._bands = bands
+        self._rules = rules
+        self._rows = Rows(field.first[0].copy(), field.center[:, 0].copy())
+
+    def probes(self, row: int) -> NDArray[np.int64]:
+        """Columns of the probes in a row: two in each micro-image of some rows."""
+        if row % self._rules.probe_rows:
+            return np.empty(0, np.int64)
+        first, count = self._rows.first[:-1], np.diff(self._rows.first)
+        place = count * (PROBE_PLACES[row // self._rules.probe_rows % 4] + np.array([[0], [4]])) // 8
+        return np.unique((first + place)[place < count])
+
+    def receive(self, step: Step, unsettled: BoolArray) -> None:
+        """Give the targets of a step the points of their sources; ``unsettled`` as for :func:`receive`."""
+        self._bands.lines(
+            receive, len(unsettled), self._points, self._rows, step.targets, step.sources, self._rules, unsettled
+        )
+
+    def finish(self, lenses: Lenses) -> None:
+        """Others receive from these lenses now, which takes no preparation."""
 
 
 class Scratch(NamedTuple):
@@ -69,7 +104,6 @@ def receive(
     targets: IntArray,
     sources: IntArray,
     rules: Rules,
-    lines: Lines,
     unsettled: BoolArray,
 ) -> None:
     """Give the micro-images ``targets (n,)`` the points of ``sources (n, 2)``, to the left and right (-1: none).
@@ -80,12 +114,11 @@ def receive(
     widest = 1
     for t in range(len(targets)):
         widest = max(widest, rows.first[targets[t] + 1] - rows.first[targets[t]])
-    where, shifts = prepare(rows, targets, sources)
-    limits = np.empty((len(targets), 4))
+    limits = np.empty((len(targets), 3))
     scratch = Scratch(
         np.empty((2, widest)), np.empty((2, widest), np.int64), np.empty((2, widest)), np.empty((2, widest))
     )
-    _receive(first_row, last_row, points, rows, targets, rules, lines, unsettled, where, shifts, limits, scratch)
+    _receive(first_row, last_row, points, rows, targets, sources, rules, unsettled, limits, scratch)
 
 
 @uncounted
@@ -95,34 +128,29 @@ def _receive(
     points: PointImage,
     rows: Rows,
     targets: IntArray,
+    sources: IntArray,
     rules: Rules,
-    lines: Lines,
     unsettled: BoolArray,
-    where: IntArray,
-    shifts: RealArray,
     limits: RealArray,
     scratch: Scratch,
 ) -> None:
     for row in range(first_row, last_row):
         has_probes = row % rules.probe_rows == 0
         for t in range(len(targets)):
-            lens, left, right = targets[t], where[t, 0], where[t, 1]
+            lens, left, right = targets[t], sources[t, 0], sources[t, 1]
             if has_probes or row == first_row:
                 probed_limits(points, rows, row, lens, rules.probe_rows, limits, t)
+            weight = 0.5
             if left >= 0 and right >= 0:
-                missed = draw_plain(points, row, has_probes, where, shifts, t, rules, lines, limits[t, 3])
-                if missed >= 0:
-                    unsettled[row, lens] = missed > 0
-                    continue
+                weight = (rows.center[right] - rows.center[lens]) / (rows.center[right] - rows.center[left])
             for side in range(2):
                 source = left if side == 0 else right
+                for place in range(rows.first[lens + 1] - rows.first[lens]):
+                    scratch.piece[side, place] = -1
+                    scratch.hidden[side, place] = BACKGROUND
                 if source >= 0:
                     draw(points, rows, row, source, lens, side, scratch)
-                else:
-                    for place in range(where[t, 3]):
-                        scratch.piece[side, place] = -1
-                        scratch.hidden[side, place] = BACKGROUND
-            settle(points, rows, row, lens, scratch, shifts[t, 4], limits, t, rules, unsettled)
+            settle(points, rows, row, lens, scratch, weight, limits, t, rules, unsettled)
 
 
 @inlined
@@ -137,14 +165,10 @@ def draw(
 ) -> None:
     """Draw one row of the micro-image ``source`` into that of ``target``: fills row ``side`` of ``scratch``."""
     disparity, piece, part, hidden = scratch.disparity, scratch.piece, scratch.part, scratch.hidden
-    count = rows.first[target + 1] - rows.first[target]
-    for place in range(count):
-        piece[side, place] = -1
-        hidden[side, place] = BACKGROUND
     begin = rows.first[source]
     shift = rows.center[target] - rows.center[source]
-    base = rows.offset[source] - rows.offset[target]
-    last = float(count - 1)
+    base = begin - rows.first[target] + shift
+    last = float(rows.first[target + 1] - rows.first[target] - 1)
     known = False
     here, s = 0.0, 0.0
     for column in range(begin, rows.first[source + 1]):
@@ -155,11 +179,15 @@ def draw(
         s = np.float64(points.disparity[row, column])
         here = base + (column - begin) + shift * s
         if known:
-            if alike(s, s_before, ONE_SURFACE):
+            if alike(s, s_before, TUNING.one_surface):
                 length = here - before
-                if 0.0 < length <= LONGEST_PIECE and here >= -ON_CENTER and before <= last + ON_CENTER:
-                    low = max(0.0, np.ceil(before - ON_CENTER))
-                    high = min(last, np.floor(here + ON_CENTER))
+                if (
+                    0.0 < length <= TUNING.longest_piece
+                    and here >= -TUNING.on_center
+                    and before <= last + TUNING.on_center
+                ):
+                    low = max(0.0, np.ceil(before - TUNING.on_center))
+                    high = min(last, np.floor(here + TUNING.on_center))
                     for place in range(int(low), int(high) + 1):
                         along = (place - before) / length
                         between = s_before + along * (s - s_before)
@@ -190,13 +218,11 @@ def probed_limits(
 ) -> None:
     """What the probes above and below ``row`` say of the stretches of a micro-image before, between and after them.
 
-    ``limits[entry, :3]``: nothing farther than this disparity is to be expected there; 0 where nothing is known.
-    ``limits[entry, 3]`` holds for the whole width.
+    ``limits[entry]``: nothing farther than this disparity is to be expected there; 0 where nothing is known.
     """
     height = points.status.shape[0]
     above = (row // probe_rows) * probe_rows
     below = min(above + probe_rows, (height - 1) // probe_rows * probe_rows)
-    limits[entry, 3] = 0.0
     for stretch in range(3):
         nearest, farthest = 0.0, 0.0
         for number in range(2):
@@ -214,10 +240,7 @@ def probed_limits(
                 elif nearer(farthest, s):
                     farthest = s
         # Probes that see one surface vouch for all of it; between different ones only the nearer is sure.
-        limit = farthest if alike(nearest, farthest, ONE_PROBED_SURFACE) else nearest
-        limits[entry, stretch] = limit
-        if limits[entry, 3] == 0.0 or (limit != 0.0 and nearer(limit, limits[entry, 3])):
-            limits[entry, 3] = limit
+        limits[entry, stretch] = farthest if alike(nearest, farthest, TUNING.one_probed_surface) else nearest
 
 
 @inlined
@@ -248,7 +271,7 @@ def settle(
         from_left, from_right = piece[0, place] >= 0, piece[1, place] >= 0
         if not (from_left or from_right):
             continue
-        if from_left and from_right and not alike(s[0, place], s[1, place], ONE_POINT):
+        if from_left and from_right and not alike(s[0, place], s[1, place], TUNING.one_point):
             from_left = nearer(s[0, place], s[1, place])
             from_right = not from_left
         share = 1.0 if not from_right else (0.0 if not from_left else weight)
@@ -260,7 +283,7 @@ def settle(
 
         stretch = 0 if place < first_probe else (1 if place < second_probe else 2)
         limit = limits[entry, stretch]
-        if limit != 0.0 and nearer(limit, depth) and not alike(limit, depth, ONE_PROBED_SURFACE):
+        if limit != 0.0 and nearer(limit, depth) and not alike(limit, depth, TUNING.one_probed_surface):
             continue
         beside_left, beside_right = nearer(hidden[0, place], depth), nearer(hidden[1, place], depth)
         if (beside_left and beside_right) or (rules.careful and (beside_left or beside_right)):

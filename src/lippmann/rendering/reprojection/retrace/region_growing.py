@@ -1,11 +1,9 @@
 """The search for what reprojection has falsified, from the edges outward. Compiled.
 
-Every pixel beside an edge is traced. Where one turns out other than it was taken for, a *surprise*, there is more to be
-found: all pixels around it are traced next, a few in the wider surroundings, and those under the neighbouring lenses
-where its point should be seen; and so on until there are no surprises left. Smooth outlines, which reprojection got
-right, end the search at once; a small thing that one pixel has given away is followed to its end.
-
-It works for every lens layout: it only needs to know which lens a pixel belongs to.
+Every pixel beside an edge is traced. Where the traced colour differs from the predicted one, there is more to be found:
+all pixels around are traced next, a few in the wider surroundings, and those under the neighbouring lenses where the
+point should be seen; and so on until all predictions are right. Smooth outlines, which reprojection got right, end the
+search at once; a small thing that one pixel has given away is followed to its end.
 """
 
 from __future__ import annotations
@@ -14,17 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.rendering.reprojection.common.array_types import BoolArray, IntArray, RealArray
-from lippmann.rendering.reprojection.common.epipolar_rows import Rows
+from lippmann.rendering.reprojection.common.lens_map import LensField
 from lippmann.rendering.reprojection.common.point_image import BACKGROUND, TRACED, PointImage
-from lippmann.rendering.reprojection.common.thresholds import coded_value, color_difference, nearer
+from lippmann.rendering.reprojection.common.thresholds import Rules, alike, coded_value, color_difference, nearer
+from lippmann.rendering.reprojection.common.tuning import TUNING
 from lippmann.runtime.numba_jit import compiled, uncounted
-
-#: A traced pixel that differs from what it was taken for by more than this share of the tolerance is a surprise.
-SURPRISE = 0.7
-#: Pixels around a surprise that are all traced: columns and rows to either side.
-NEAR_COLUMNS, NEAR_ROWS = 3, 3
-#: A pixel of a neighbouring lens is looked at if what it shows lies farther away by this part.
-_BEHIND = 0.05
 
 
 @uncounted
@@ -53,48 +45,50 @@ def mark_edges(
 
 
 @compiled
-def surprises(
-    points: PointImage, numbers: IntArray, expected: RealArray, tolerance: float, coded: bool
+def wrong_predictions(
+    points: PointImage, numbers: IntArray, predicted: RealArray, tolerance: float, coded: bool
 ) -> NDArray[np.uint32]:
-    """Those of the pixels ``numbers`` whose colour is not what was ``expected (n, 3)``."""
+    """Those of the pixels ``numbers`` whose colour is not the ``predicted (n, 3)`` one."""
     width = points.status.shape[1]
-    found = np.empty(len(numbers), np.uint32)
+    wrong = np.empty(len(numbers), np.uint32)
     count = 0
     for i in range(len(numbers)):
         row, column = divmod(int(numbers[i]), width)
         for channel in range(3):
-            one = coded_value(expected[i, channel], coded)
+            one = coded_value(predicted[i, channel], coded)
             other = coded_value(points.color[row, column, channel], coded)
-            if abs(one - other) > tolerance * SURPRISE:
-                found[count] = numbers[i]
+            if abs(one - other) > tolerance * TUNING.deviation:
+                wrong[count] = numbers[i]
                 count += 1
                 break
-    return found[:count]
+    return wrong[:count]
 
 
 @uncounted
-def surround(points: PointImage, lens: IntArray, surprised: IntArray, wanted: BoolArray) -> None:
-    """Set ``wanted`` for the untraced pixels near to the pixels ``surprised``, under the same lens."""
+def mark_near(points: PointImage, lens: IntArray, numbers: IntArray, wanted: BoolArray) -> None:
+    """Set ``wanted`` for the untraced pixels near to the pixels ``numbers``, under the same lens."""
     height, width = points.status.shape
-    for i in range(len(surprised)):
-        row, column = divmod(int(surprised[i]), width)
-        for r in range(max(0, row - NEAR_ROWS), min(height, row + NEAR_ROWS + 1)):
-            for c in range(max(0, column - NEAR_COLUMNS), min(width, column + NEAR_COLUMNS + 1)):
+    for i in range(len(numbers)):
+        row, column = divmod(int(numbers[i]), width)
+        for r in range(max(0, row - TUNING.around), min(height, row + TUNING.around + 1)):
+            for c in range(max(0, column - TUNING.around), min(width, column + TUNING.around + 1)):
                 if points.status[r, c] != TRACED and lens[r, c] == lens[row, column]:
                     wanted[r, c] = True
 
 
 @compiled
-def look_around(points: PointImage, reach: int, rows: int, share: int, around: IntArray, wanted: BoolArray) -> None:
-    """Set ``wanted`` for a few untraced pixels, one in ``share``, in the wider surroundings of the pixels ``around``.
+def mark_surroundings(
+    points: PointImage, reach: int, rows: int, share: int, numbers: IntArray, wanted: BoolArray
+) -> None:
+    """Set ``wanted`` for a few untraced pixels, one in ``share``, in the wider surroundings of the pixels ``numbers``.
 
     These are the micro-image, which is about ``reach`` columns wide, and those beside it, so many ``rows`` up and down.
     """
     height, width = points.status.shape
     # Surroundings overlap: one visit to each row of a micro-image is enough.
     visited = np.zeros((height, width // max(1, reach) + 1), np.bool_)
-    for i in range(len(around)):
-        row, column = divmod(int(around[i]), width)
+    for i in range(len(numbers)):
+        row, column = divmod(int(numbers[i]), width)
         cell = column // max(1, reach)
         for r in range(max(0, row - rows), min(height, row + rows + 1)):
             if visited[r, cell]:
@@ -107,29 +101,50 @@ def look_around(points: PointImage, reach: int, rows: int, share: int, around: I
 
 
 @uncounted
-def follow_across(points: PointImage, rows: Rows, surprised: IntArray, lens: IntArray, wanted: BoolArray) -> None:
-    """Set ``wanted`` for the untraced pixels under the two neighbouring lenses where the points of the pixels
-    ``surprised`` should be seen, if what is shown there lies behind them. For straight lenticular displays."""
-    width = points.status.shape[1]
-    lenses = len(rows.center)
-    for i in range(len(surprised)):
-        row, column = divmod(int(surprised[i]), width)
+def follow_points(
+    points: PointImage, field: LensField, neighbors: IntArray, numbers: IntArray, rules: Rules, wanted: BoolArray
+) -> None:
+    """Set ``wanted (H, W)`` for untraced pixels under the ``neighbors (lenses, n)`` that should show the points of the
+    pixels ``numbers``, and do not.
+
+    A point lies between four pixels of another lens. It is missing there if none of them shows that surface in that
+    colour, and none anything nearer, which may hide it.
+    """
+    height, width = points.status.shape
+    for i in range(len(numbers)):
+        row, column = divmod(int(numbers[i]), width)
         s = np.float64(points.disparity[row, column])
-        if s == BACKGROUND:
+        if s == np.float32(BACKGROUND):
             continue
-        source = lens[row, column]
-        for target in (source - 1, source + 1):
-            if target < 0 or target >= lenses:
+        lens = field.lens[row, column]
+        for k in range(neighbors.shape[1]):
+            target = neighbors[lens, k]
+            if target < 0:
                 continue
-            shift = rows.center[target] - rows.center[source]
-            place = rows.offset[source] + (column - rows.first[source]) + shift * s - rows.offset[target]
-            count = rows.first[target + 1] - rows.first[target]
-            if not (place > -1.0 and place < count):
+            x = column + (field.center[target, 0] - field.center[lens, 0]) * (1.0 + s)
+            y = row + (field.center[target, 1] - field.center[lens, 1]) * (1.0 + s)
+            if not (x > -1.0 and x < width and y > -1.0 and y < height):
                 continue
-            low = int(np.floor(place))
-            for c in range(max(0, low), min(count - 1, low + 1) + 1):
-                there = rows.first[target] + c
-                shown = np.float64(points.disparity[row, there])
-                behind = nearer(s, shown) and abs(s - shown) > _BEHIND * max(abs(s), abs(shown))
-                if points.status[row, there] != TRACED and behind:
-                    wanted[row, there] = True
+            left, top = int(np.floor(x)), int(np.floor(y))
+            missing = True
+            for r in range(max(0, top), min(height, top + 2)):
+                for c in range(max(0, left), min(width, left + 2)):
+                    if field.lens[r, c] != target:
+                        continue
+                    shown = np.float64(points.disparity[r, c])
+                    if alike(s, shown, TUNING.one_point):
+                        # What looks different from every side is not the same anywhere.
+                        if (
+                            points.fragile[row, column]
+                            or points.fragile[r, c]
+                            or color_difference(points.color, row, column, r, c, rules.coded) <= rules.tolerance
+                        ):
+                            missing = False
+                    elif nearer(shown, s):
+                        missing = False
+            if not missing:
+                continue
+            for r in range(max(0, top), min(height, top + 2)):
+                for c in range(max(0, left), min(width, left + 2)):
+                    if field.lens[r, c] == target and points.status[r, c] != TRACED:
+                        wanted[r, c] = True

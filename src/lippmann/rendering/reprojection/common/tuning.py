@@ -1,0 +1,76 @@
+"""The numbers that the methods are tuned by.
+
+``benchmarks/reuse.py`` (light as in the paper) and ``benchmarks/careful.py`` (sampled light) measure their effect.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+
+class Tuning(NamedTuple):
+    """A named tuple, not a dataclass, so that compiled kernels can read it.
+
+    Attributes
+    ----------
+    strides:
+        Distances of the micro-images, in lenses, from the first round (keys) to the last. A stride of 16 instead of 2
+        traces a quarter fewer pixels of 512x512 at the same PSNR; with quarters instead of halves of it there are half
+        as many rounds, for 0 to 2 % more pixels of the picture traced.
+    one_surface:
+        Neighbouring pixels see one surface if their disparities differ by at most this part of the larger: a surface
+        that turns away from the viewer by up to 75 degrees, on a display with a field of 18 degrees and 8 pixels under
+        a lens.
+    one_point:
+        Sources on two sides show one point if their disparities agree to this part.
+    one_probed_surface:
+        Two probes, some pixels apart, see one surface if their disparities agree to this part.
+    one_surface_per_pixel:
+        Across a gap disparities of one surface change by at most this part per pixel ...
+    height_per_pixel:
+        ... or its height by this part of the display's gap: near to the lens plane disparities are huge and change
+        their sign.
+    on_center:
+        Pixels. A point this near to a pixel's centre lies on it: rounding must not decide.
+    longest_piece:
+        Pixels. A piece between two pixels of the source that is stretched to more is seen too obliquely by it.
+    smallest_share:
+        Pixels that stand for missing ones at the rim of a micro-image must have this bilinear weight together ...
+    rim_tolerance:
+        ... and be alike in colour to this part of the tolerance.
+    close, too_far:
+        Pixels. A line of sight enters a surface where the two are this close; farther apart than ``too_far`` it does
+        not.
+    most_halvings:
+        Steps at most to find that place.
+    averaged_tolerance:
+        A careful mean takes neighbours that agree to this part of the tolerance: nothing is known of what lies between
+        them, and the two may be wrong in the same sense.
+    deviation:
+        Part of the tolerance by which a traced pixel must differ from its predicted colour for the search to go on.
+    around:
+        Pixels to either side of such a pixel that are all traced.
+    most_rounds:
+        Rounds of the search at most. They die out by themselves; what is left then is a handful of pixels.
+    """
+
+    strides: tuple[int, int, int] = (16, 4, 1)
+    one_surface: float = 0.2
+    one_point: float = 0.15
+    one_probed_surface: float = 0.3
+    one_surface_per_pixel: float = 0.06
+    height_per_pixel: float = 0.02
+    on_center: float = 1e-3
+    longest_piece: float = 3.0
+    smallest_share: float = 0.25
+    rim_tolerance: float = 0.4
+    close: float = 0.02
+    too_far: float = 0.2
+    most_halvings: int = 8
+    averaged_tolerance: float = 0.5
+    deviation: float = 0.7
+    around: int = 3
+    most_rounds: int = 16
+
+
+TUNING = Tuning()
