@@ -79,22 +79,3 @@ def test_pictures_with_them_state_their_error_as_before(balls):
     apart = np.square(np.clip(first.pixels, 0, 1) - np.clip(second.pixels, 0, 1)).mean() / 2
     told = first.provenance.estimate
     assert told["psnr_low"] - 3 < -10 * np.log10(apart) < told["psnr_high"] + 3
-
-
-@pytest.mark.parametrize(
-    ("asked", "samples"),
-    [
-        ({"spp": 5}, 5),
-        ({"quality": 20.0}, 8),
-        ({"quality": 36.0, "denoise": "none"}, 39),
-        ({"quality": 42.0}, 15),  # beside a denoiser
-        ({"quality": 60.0}, 128),
-        ({"quality_worst": 20.0}, 128),
-        ({"max_time": 3.0}, 128),
-    ],
-)
-def test_as_many_samples_are_counted_on_as_a_quality_takes(asked, samples):
-    from lippmann.rendering.preparation.chains import expected_samples
-    from lippmann.rendering.request.render_request import RenderRequest
-
-    assert expected_samples(RenderRequest(**asked)) == samples

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -122,7 +124,7 @@ def test_scenes_of_many_emitters_are_left_to_paths():
 def test_passes_serve_their_samples_and_pictures_do_not_depend_on_the_memory(monkeypatch):
     import lippmann.rendering.preparation.light_vertices as module
 
-    monkeypatch.setattr(module, "PASS_SAMPLES", 4)
+    monkeypatch.setattr(module, "TUNING", replace(module.TUNING, vertex_pass_samples=4))
     integrator, source = stage(room(small()))
     integrator = given(integrator, source, seed=3)
     served, passes = [], integrator.light.vertex_passes

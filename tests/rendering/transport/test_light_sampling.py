@@ -64,12 +64,13 @@ def sampling_weights(scene):
 
 @pytest.mark.parametrize("order", [("sky", "bright", "faint"), ("faint", "sky", "bright"), ("bright", "faint", "sky")])
 def test_emitters_are_sampled_by_their_contribution(order):
-    from lippmann.rendering.preparation.emitter_weights import UNIFORM_SHARE, estimate_emitter_weights
+    from lippmann.rendering.preparation.emitter_weights import estimate_emitter_weights
+    from lippmann.rendering.preparation.tuning import TUNING
 
     weights = estimate_emitter_weights(*stage(room(order)))
     by_name = dict(zip(order, weights, strict=True))
     assert weights.sum() == pytest.approx(1)
-    assert by_name["sky"] == pytest.approx(UNIFORM_SHARE / 3)
+    assert by_name["sky"] == pytest.approx(TUNING.uniform_share / 3)
     assert by_name["bright"] > 3 * by_name["faint"] > 3 * by_name["sky"]
 
 
@@ -77,14 +78,15 @@ def test_emitters_of_a_scene_with_another_sky_are_told_apart():
     """The new sky comes first among a scene's objects."""
     import mitsuba as mi
 
-    from lippmann.rendering.preparation.emitter_weights import UNIFORM_SHARE, estimate_emitter_weights
+    from lippmann.rendering.preparation.emitter_weights import estimate_emitter_weights
+    from lippmann.rendering.preparation.tuning import TUNING
     from lippmann.scene.mitsuba_source import with_sky
 
     sky = mi.load_dict({"type": "constant", "radiance": 3.0})
     integrator, source = stage(with_sky(mi.load_dict(room(("bright", "faint"))), sky))
     weights = estimate_emitter_weights(integrator, source)
     unseen = [number for number, emitter in enumerate(integrator.scene.emitters()) if emitter.is_environment()]
-    assert weights[unseen] == pytest.approx(UNIFORM_SHARE / 3)
+    assert weights[unseen] == pytest.approx(TUNING.uniform_share / 3)
 
 
 def test_the_scene_stays_as_it_was():
@@ -207,10 +209,11 @@ def test_delta_emitters_give_the_same_picture_by_any_weights():
 
 def test_more_emitters_than_are_weighed_have_a_picture():
     """Beyond the most emitters the scene's own sampling is used, and each light still arrives."""
-    from lippmann.rendering.preparation.emitter_weights import MAX_EMITTERS, make_light_sampler
+    from lippmann.rendering.preparation.emitter_weights import make_light_sampler
+    from lippmann.rendering.preparation.tuning import TUNING
     from lippmann.rendering.transport.light_sampling import SceneLightSampler
 
-    count = MAX_EMITTERS + 1
+    count = TUNING.most_weighed_emitters + 1
     lights = {
         f"light{i}": {"type": "point", "position": [0.0, 0.0, 0.5], "intensity": 1.0 / count} for i in range(count)
     }
@@ -279,7 +282,7 @@ def test_no_emitter_one_or_very_many_keep_the_weights_of_the_scene(monkeypatch):
         integrator, source = stage(room(order))
         assert emitter_weights.estimate_emitter_weights(integrator, source).tolist() == [1.0] * len(order)
         assert isinstance(emitter_weights.make_light_sampler(integrator, source), SceneLightSampler)
-    monkeypatch.setattr(emitter_weights, "MAX_EMITTERS", 2)
+    monkeypatch.setattr(emitter_weights, "TUNING.most_weighed_emitters", 2)
     integrator, source = stage(room())
     assert emitter_weights.estimate_emitter_weights(integrator, source) == pytest.approx(np.full(3, 1 / 3))
 

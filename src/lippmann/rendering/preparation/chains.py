@@ -9,25 +9,19 @@ from __future__ import annotations
 import numpy as np
 
 from lippmann.device.types import MitsubaScene
+from lippmann.rendering.preparation.tuning import TUNING
 from lippmann.rendering.request.choices import REUSING
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.rendering.transport.casters import has_sharp_surfaces
 
-#: Chains of a path.
-CHAINS = 4
-#: Variance of a path's light in codes: of usual scenes, and where a denoiser takes most of it away.
-REST_VARIANCE, CLEAN_REST_VARIANCE = 0.01, 0.001
-#: Samples that a picture is taken to need at most, and at least, of which it is not known.
-OPEN_ENDED, FEWEST_OPEN_ENDED = 128, 8
-
 
 def count_chains(scene: MitsubaScene, request: RenderRequest) -> int:
-    """Chains of each path: :data:`CHAINS` in denoised pictures of sharp surfaces, else 0.
+    """Chains of each path: as many as ``TUNING`` has for denoised pictures of sharp surfaces, else 0.
 
     None where all rays of a pixel are one, or its points are taken from others: further chains show nothing then.
     """
     is_denoised = request.denoise != "none" and request.box_filter and request.method not in REUSING
-    return CHAINS if is_denoised and has_sharp_surfaces(scene) else 0
+    return TUNING.chains if is_denoised and has_sharp_surfaces(scene) else 0
 
 
 def expected_samples(request: RenderRequest) -> int:
@@ -38,6 +32,6 @@ def expected_samples(request: RenderRequest) -> int:
     if not request.is_open_ended:
         return request.samples
     if request.quality is None or request.quality_worst is not None:
-        return OPEN_ENDED
-    rest = REST_VARIANCE if request.denoise == "none" else CLEAN_REST_VARIANCE
-    return int(np.clip(rest * 10 ** (request.quality / 10), FEWEST_OPEN_ENDED, OPEN_ENDED))
+        return TUNING.open_ended_samples
+    rest = TUNING.rest_variance if request.denoise == "none" else TUNING.clean_rest_variance
+    return int(np.clip(rest * 10 ** (request.quality / 10), TUNING.fewest_open_ended, TUNING.open_ended_samples))

@@ -18,18 +18,11 @@ from lippmann.device.kernel_ops import divide
 from lippmann.device.sobol import PIXEL_DIMENSION, SampleStream
 from lippmann.device.syntax import syntax
 from lippmann.device.types import Float, Ray3f, UInt32
+from lippmann.rendering.preparation.tuning import TUNING
 from lippmann.rendering.transport.light_sampling import LightSampler, SceneLightSampler, WeightedLightSampler
 from lippmann.rendering.transport.path import PathIntegrator
 from lippmann.rendering.transport.ray_source import RaySource
 
-#: Pilot paths in all, and the fewest for each emitter.
-PILOT_PATHS, MIN_PATHS_PER_EMITTER = 1 << 14, 1 << 8
-#: Scenes of more emitters are sampled uniformly.
-MAX_EMITTERS = 1 << 10
-#: Surfaces along a pilot path at which emitters are sampled.
-PILOT_SURFACES = 3
-#: Share of the probability that is uniform over all emitters.
-UNIFORM_SHARE = 0.2
 #: Dimensions of the sample stream at one surface.
 DIMENSIONS_PER_SURFACE = 4
 #: Seed of the pilot paths: the picture's own would make the probabilities depend on it.
@@ -40,7 +33,7 @@ def make_light_sampler(integrator: PathIntegrator, source: RaySource) -> LightSa
     """Make the light sampler of one picture, by the contributions of the emitters to the pixels of ``source``.
 
     It depends on the scene, the ray depth and the rays alone. Where uniform sampling is as good as anything known (a
-    single emitter, more than :data:`MAX_EMITTERS`, no contribution found), the scene's own weights are used.
+    single emitter, very many, no contribution found), the scene's own weights are used.
 
     Parameters
     ----------
@@ -58,7 +51,7 @@ def estimate_emitter_weights(integrator: PathIntegrator, source: RaySource) -> N
     """Estimate sampling probabilities of the emitters, ``(emitters,)``, adding up to 1.
 
     They are the roots of the second moments of the emitters' contributions to the pixels of ``source``, mixed with a
-    uniform share of :data:`UNIFORM_SHARE`, in the order of ``mi.Scene.emitters()``.
+    uniform share, in the order of ``mi.Scene.emitters()``.
 
     Parameters
     ----------
@@ -69,10 +62,13 @@ def estimate_emitter_weights(integrator: PathIntegrator, source: RaySource) -> N
     """
     count = len(integrator.scene.emitters())
     uniform = np.full(count, 1 / max(count, 1))
-    if not 1 < count <= MAX_EMITTERS:
+    if not 1 < count <= TUNING.most_weighed_emitters:
         return uniform
     roots = np.sqrt(_second_moments(integrator, source, count))
-    return UNIFORM_SHARE * uniform + (1 - UNIFORM_SHARE) * roots / roots.sum() if roots.sum() > 0 else uniform
+    if roots.sum() == 0:
+        return uniform
+    share = TUNING.uniform_share
+    return np.asarray(share * uniform + (1 - share) * roots / roots.sum())
 
 
 def _second_moments(integrator: PathIntegrator, source: RaySource, emitters: int) -> NDArray[np.float64]:
@@ -80,7 +76,7 @@ def _second_moments(integrator: PathIntegrator, source: RaySource, emitters: int
 
     All emitters are sampled along the same paths, so that the estimates differ by nothing else.
     """
-    paths = max(PILOT_PATHS // emitters, MIN_PATHS_PER_EMITTER)
+    paths = max(TUNING.pilot_paths // emitters, TUNING.pilot_paths_of_emitter)
     lane = dr.arange(mi.UInt32, paths * emitters)
     emitter, path = divide(lane, dr.opaque(mi.UInt32, paths))
     stream = SampleStream.of_pixels(mi.UInt32(0), path, dr.opaque(mi.UInt32, _SEED))
@@ -127,5 +123,5 @@ def _squared_contributions(
         onward = si.spawn_ray(si.to_world(bs.wo))
         o, d = mi.Point3f(onward.o), mi.Vector3f(onward.d)
         surface += 1
-        active &= (dr.max(throughput) > 0) & (surface < min(integrator.depth, PILOT_SURFACES))
+        active &= (dr.max(throughput) > 0) & (surface < min(integrator.depth, TUNING.pilot_surfaces))
     return squares

@@ -19,23 +19,13 @@ from numpy.typing import NDArray
 from lippmann.rendering.film.wavefront import trace_frame
 from lippmann.rendering.film.wavefront_plan import make_plan
 from lippmann.rendering.preparation.scattered_rays import ScatteredRays
+from lippmann.rendering.preparation.tuning import TUNING
 from lippmann.rendering.transport.integrator import Integrator
 from lippmann.rendering.transport.ray_source import RaySource
 from lippmann.scene.values.description import Color
 
-#: Linear radiance that the median of what is lit gets.
-MID_GREY = 0.18
-#: Pixels looked at along each side of the picture, samples of each, and bytes that the look may take.
-SIDE, SAMPLES, MEMORY = 64, 4, 1 << 26
-#: Pixels along each side of a block of a look; and the share of them that is lit where a block counts.
-BLOCK, LIT_SHARE = 8, 0.25
-#: The median of blocks counts where it is that many times the median of pixels (at most 1.4 times on bundled scenes),
-#: and less than this share of a block's light is in both of two looks.
-NOISY, ALIKE = 2.0, 0.5
 #: Tells the seed of the second look from that of the first.
 _SECOND = 0x3C6EF372
-#: Exposures are rounded to this part of a stop, so that all machines that render a picture choose the same.
-STEPS = 100
 #: Rec. 709 luminance of linear RGB.
 _LUMINANCE = (0.212671, 0.715160, 0.072169)
 
@@ -57,8 +47,10 @@ def measure_exposure(integrator: Integrator, source: RaySource, background: Colo
     background:
         What rays see that meet nothing, which is not counted; None for an environment, which is.
     """
-    few = ScatteredRays(source, SIDE)
-    plan = make_plan(few.width, few.height, SAMPLES, channels=few.channels, memory=MEMORY)
+    few = ScatteredRays(source, TUNING.exposure_side)
+    plan = make_plan(
+        few.width, few.height, TUNING.exposure_samples, channels=few.channels, memory=TUNING.exposure_memory
+    )
 
     def look(seed: int) -> NDArray[np.float32]:
         return trace_frame(integrator, few, plan, seed=seed, box_filter=True).pixels
@@ -80,12 +72,12 @@ def exposure_for(
     if not lit.any():
         return 0.0
     median = float(np.median(luminance[lit]))
-    if _median_of_blocks(luminance, lit, lit) > NOISY * median:
+    if _median_of_blocks(luminance, lit, lit) > TUNING.noisy * median:
         again = look_again().astype(np.float64) @ _LUMINANCE
         both = (luminance + again) / 2
-        if _median_of_blocks(np.minimum(luminance, again), both, lit) < ALIKE:
+        if _median_of_blocks(np.minimum(luminance, again), both, lit) < TUNING.alike:
             median = _median_of_blocks(both, lit, lit)
-    return round(math.log2(MID_GREY / median) * STEPS) / STEPS
+    return round(math.log2(TUNING.mid_grey / median) * TUNING.exposure_steps) / TUNING.exposure_steps
 
 
 def _median_of_blocks(
@@ -93,7 +85,7 @@ def _median_of_blocks(
 ) -> float:
     """Median over blocks of pixels of the sum of ``values`` over another sum, of lit pixels; 0 where no block has
     enough of these."""
-    counts = _sums_of_blocks(lit) >= LIT_SHARE * BLOCK**2
+    counts = _sums_of_blocks(lit) >= TUNING.lit_share * TUNING.exposure_block**2
     if not counts.any():
         return 0.0
     shares = _sums_of_blocks(np.where(lit, values, 0.0))[counts] / _sums_of_blocks(np.where(lit, over, 0.0))[counts]
@@ -101,6 +93,7 @@ def _median_of_blocks(
 
 
 def _sums_of_blocks(values: NDArray[np.generic]) -> NDArray[np.float64]:
-    rows, columns = (size // BLOCK for size in values.shape)
-    blocks = values[: rows * BLOCK, : columns * BLOCK].reshape(rows, BLOCK, columns, BLOCK)
+    side = TUNING.exposure_block
+    rows, columns = (size // side for size in values.shape)
+    blocks = values[: rows * side, : columns * side].reshape(rows, side, columns, side)
     return np.asarray(blocks.sum(axis=(1, 3)), dtype=np.float64)

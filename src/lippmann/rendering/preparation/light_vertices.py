@@ -12,6 +12,7 @@ from lippmann.device.sobol import SampleStream
 from lippmann.rendering.film.memory_model import LIGHT_VERTEX
 from lippmann.rendering.preparation.scattered_rays import ScatteredRays
 from lippmann.rendering.preparation.seen_region import region_about, seen_points
+from lippmann.rendering.preparation.tuning import TUNING
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.rendering.transport.light_vertices import (
     MOST_EMITTERS,
@@ -28,16 +29,6 @@ from lippmann.rendering.transport.sharp_events import lambertian
 
 Floats = NDArray[np.float32]
 
-#: Mean variance that light vertices must take from a sample, in linear exposed radiance, to be worth their time: a path
-#: has four times as much as a rule, and joins take a fifth to a half of its time.
-LEAST_SAVED = 2e-3
-#: Samples of a pixel below which paths bring more in the time of the joins: with one, these gain 0.8 dB in `room` and
-#: take a third of the time, which is worth 1.5 dB.
-FEWEST_SAMPLES = 2
-#: Samples of a pixel that one set of light vertices serves.
-PASS_SAMPLES = 32
-#: Pixels of the look, to the side of a square; paths in each; and exposed radiance that one of them counts for at most.
-LOOK_SIDE, LOOK_PATHS, MOST = 64, 4, 4.0
 #: Seed of the look.
 _SEED = 0x6C697473
 
@@ -59,22 +50,22 @@ def trace_light_vertices(
     """
     if request.integrator != "path" or request.surfaces < 2 or memory < 2 * POINTS * LIGHT_VERTEX:
         return None
-    if not request.is_open_ended and request.samples < FEWEST_SAMPLES:
+    if not request.is_open_ended and request.samples < TUNING.fewest_joined_samples:
         return None
     look = _Look(integrator, source)
     if not 0 < look.emitters <= MOST_EMITTERS:
         return None
     alone = look.variance(gain)
-    if alone < LEAST_SAVED:
+    if alone < TUNING.least_saved:
         return None
     passes = LightVertexPasses(
         integrator.scene,
         integrator.light_sampler,
-        PassSchedule(PASS_SAMPLES, PASS_SAMPLES),
+        PassSchedule(TUNING.vertex_pass_samples, TUNING.vertex_pass_samples),
         request.seed,
         region_about(seen_points(integrator, source)),
     )
-    if passes.are_none or alone - look.variance(gain, passes.of_pass(0)) < LEAST_SAVED:
+    if passes.are_none or alone - look.variance(gain, passes.of_pass(0)) < TUNING.least_saved:
         return None
     return passes
 
@@ -84,7 +75,7 @@ class _Look:
 
     def __init__(self, integrator: PathIntegrator, source: RaySource) -> None:
         self._integrator = integrator
-        self._few = ScatteredRays(source, LOOK_SIDE)
+        self._few = ScatteredRays(source, TUNING.vertex_side)
         flags = np.array([int(emitter.flags()) for emitter in integrator.scene.emitters()], np.uint32)
         has_place = int(mi.EmitterFlags.Surface | mi.EmitterFlags.DeltaPosition)
         #: Number of emitters that have a place in the scene.
@@ -92,15 +83,16 @@ class _Look:
 
     def variance(self, gain: float, vertices: LightVertices | None = None) -> float:
         """Mean variance of a path, joined to light vertices where there are any."""
-        ways = [np.minimum(light * gain, MOST).reshape(3, -1, LOOK_PATHS) for light in self._traced(vertices)]
+        limited = (np.minimum(light * gain, TUNING.vertex_most) for light in self._traced(vertices))
+        ways = (light.reshape(3, -1, TUNING.vertex_paths) for light in limited)
         return sum(float(pixels.var(axis=2, ddof=1, dtype=np.float64).mean()) for pixels in ways)
 
     def _traced(self, vertices: LightVertices | None) -> list[Floats]:
         """``(3, lanes)``: light that comes by the second surface, and what joins bring, where there are any."""
         integrator, few = self._integrator, self._few
         scene = integrator.scene
-        lane = dr.arange(mi.UInt32, few.width * few.height * LOOK_PATHS)
-        place, path = divide(lane, LOOK_PATHS)
+        lane = dr.arange(mi.UInt32, few.width * few.height * TUNING.vertex_paths)
+        place, path = divide(lane, TUNING.vertex_paths)
         row, column = divide(place, few.width)
         stream = SampleStream.of_pixels(place, path, dr.opaque(mi.UInt32, _SEED))
         si = scene.ray_intersect(few.rays(column, row, mi.UInt32(0), mi.Point2f(0.5)))

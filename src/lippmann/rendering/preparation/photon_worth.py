@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from lippmann.device.kernel_ops import divide
 from lippmann.device.sobol import SampleStream
 from lippmann.rendering.preparation.scattered_rays import ScatteredRays
-from lippmann.rendering.preparation.seen_region import SEEN_SIDE
+from lippmann.rendering.preparation.tuning import TUNING
 from lippmann.rendering.transport.path import PathIntegrator
 from lippmann.rendering.transport.photon_map import PhotonMap
 from lippmann.rendering.transport.ray_source import RaySource
@@ -49,7 +49,7 @@ def are_worth_photons(light: NDArray[np.floating], radiance: float, share: float
 
 def shown_light(integrator: PathIntegrator, source: RaySource, photons: PhotonMap, seed: int) -> NDArray[np.float64]:
     """``(n,)``: radiance of the caustics in pixels spread over the picture of ``source``, before the gain."""
-    few = ScatteredRays(source, SEEN_SIDE)
+    few = ScatteredRays(source, TUNING.seen_side)
     pixel = dr.arange(mi.UInt32, few.width * few.height)
     row, column = divide(pixel, few.width)
     stream = SampleStream.of_pixels(pixel, mi.UInt32(0), dr.opaque(mi.UInt32, seed))

@@ -8,17 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.rendering.preparation.scattered_rays import ScatteredRays
+from lippmann.rendering.preparation.tuning import TUNING
 from lippmann.rendering.transport.path import PathIntegrator
 from lippmann.rendering.transport.ray_source import RaySource
-
-#: Rays that tell what is seen, to the side of a square; the share of their ends that may lie apart from the others, to
-#: either side; and by how much of its size the box about the others is widened.
-SEEN_SIDE, APART, WIDER = 64, 0.002, 0.25
 
 
 def seen_points(integrator: PathIntegrator, source: RaySource) -> NDArray[np.float64]:
     """``(n, 3)``: what the picture's rays meet first, of some of them that lie evenly in it."""
-    few = ScatteredRays(source, SEEN_SIDE)
+    few = ScatteredRays(source, TUNING.seen_side)
     place = dr.arange(mi.UInt32, few.width * few.height)
     row = place // few.width
     ray = few.rays(place - row * few.width, row, mi.UInt32(0), mi.Point2f(0.5))
@@ -31,7 +28,7 @@ def region_about(points: NDArray[np.float64]) -> NDArray[np.float64] | None:
     """Corners ``(2, 3)`` of a box about points that are seen; None where there are none."""
     if not len(points):
         return None
-    corners: NDArray[np.float64] = np.quantile(points, [APART, 1 - APART], axis=0)
+    corners: NDArray[np.float64] = np.quantile(points, [TUNING.apart, 1 - TUNING.apart], axis=0)
     middle, size = corners.mean(axis=0), np.ptp(corners, axis=0)
-    reach = (0.5 + WIDER) * size + WIDER * size.max()
+    reach = (0.5 + TUNING.wider) * size + TUNING.wider * size.max()
     return np.stack([middle - reach, middle + reach])

@@ -1,0 +1,87 @@
+"""Tuned constants of the preparation of light, each with its unit, the benchmark that set it and what others cost."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class PreparationTuning:
+    """Constants of chains, exposure, emitter weights and light vertices.
+
+    Attributes
+    ----------
+    chains:
+        Chains of seen light with each path of a denoised picture. With 2, pictures of one sample lose 0.4 dB in the
+        mean of ten scenes and clear coat 2.6 dB; with 8 they gain 0.3 dB and tracing takes a quarter longer
+        (docs/research/seen-light.md).
+    open_ended_samples, fewest_open_ended:
+        Samples per pixel that a picture is taken to need at most, and at least, where something else says when to stop.
+    rest_variance, clean_rest_variance:
+        Mean squared error of one sample, in codes, of usual scenes; and what a denoiser leaves of it.
+    pilot_paths, pilot_paths_of_emitter:
+        Paths by which emitters are weighed, in all, and of each emitter at least.
+    pilot_surfaces:
+        Surfaces along such a path at which emitters are sampled.
+    most_weighed_emitters:
+        Scenes of more emitters are sampled uniformly.
+    uniform_share:
+        Share of the sampling probability that is uniform over all emitters, for what the pilot paths missed.
+    mid_grey:
+        Linear radiance that the median of what is lit gets: photographic mid-grey.
+    exposure_side, exposure_samples, exposure_memory:
+        Pixels looked at for the exposure along each side of the picture, samples of each, and bytes that this may take.
+    exposure_block, lit_share:
+        Pixels along each side of a block, and the share of them that is lit where a block counts.
+    noisy, alike:
+        The median of blocks counts where it is ``noisy`` times the median of pixels (at most 1.4 times on bundled
+        scenes), and less than the share ``alike`` of a block's light is in both of two looks.
+    exposure_steps:
+        Exposures are rounded to this part of a stop, so that all machines that render a picture choose the same.
+    least_saved:
+        Mean variance in exposed radiance that light vertices must take from a sample: a path has four times as much
+        as a rule, and joins take a fifth to a half of its time (``light_vertices.py``).
+    fewest_joined_samples:
+        Samples per pixel below which paths bring more in the time of the joins: with one, joins gain 0.8 dB in `room`
+        and take a third of the time, which is worth 1.5 dB (``light_vertices.py``).
+    vertex_pass_samples:
+        Samples per pixel that one set of light vertices serves.
+    vertex_side, vertex_paths, vertex_most:
+        Pixels to the side of the look that decides on light vertices, paths in each, and the exposed radiance that one
+        of them counts for at most.
+    seen_side, apart, wider:
+        Rays that tell what is seen, to the side of a square; the share of their ends that may lie apart from the
+        others, to either side; and by how much of its size the box about the others is widened.
+    """
+
+    chains: int = 4
+    open_ended_samples: int = 128
+    fewest_open_ended: int = 8
+    rest_variance: float = 0.01
+    clean_rest_variance: float = 0.001
+    pilot_paths: int = 1 << 14
+    pilot_paths_of_emitter: int = 1 << 8
+    pilot_surfaces: int = 3
+    most_weighed_emitters: int = 1 << 10
+    uniform_share: float = 0.2
+    mid_grey: float = 0.18
+    exposure_side: int = 64
+    exposure_samples: int = 4
+    exposure_memory: int = 1 << 26
+    exposure_block: int = 8
+    lit_share: float = 0.25
+    noisy: float = 2.0
+    alike: float = 0.5
+    exposure_steps: int = 100
+    least_saved: float = 2e-3
+    fewest_joined_samples: int = 2
+    vertex_pass_samples: int = 32
+    vertex_side: int = 64
+    vertex_paths: int = 4
+    vertex_most: float = 4.0
+    seen_side: int = 64
+    apart: float = 0.002
+    wider: float = 0.25
+
+
+TUNING = PreparationTuning()
