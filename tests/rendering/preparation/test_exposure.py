@@ -42,8 +42,12 @@ def scene(*, physical=True, illuminance=SUN, **rest):
     )
 
 
+#: Light as it is, not as it is shown.
+LINEAR = {"integrator": "direct", "tone_map": "none"}
+
+
 def picture(what, **options):
-    return api.render(what, "mla-square", spp=4, integrator="direct", method="full", **options)
+    return api.render(what, "mla-square", spp=4, method="full", **LINEAR, **options)
 
 
 def test_the_median_of_what_is_lit_is_mid_grey():
@@ -77,9 +81,9 @@ def test_a_cameras_own_exposure_comes_on_top_of_a_fixed_one():
     np.testing.assert_allclose(image.pixels, 4.0 * without.pixels, rtol=1e-5)
     assert image.provenance.options["exposure"] == -8.0
     np.testing.assert_array_equal(picture(raised, exposure=-10.0).pixels, picture(plain, exposure=-10.0).pixels)
-    seen = api.preview(raised, size=(32, 32), spp=1, exposure=-10.0, integrator="direct").pixels
+    seen = api.preview(raised, size=(32, 32), spp=1, exposure=-10.0, **LINEAR).pixels
     np.testing.assert_allclose(
-        seen, 4.0 * api.preview(plain, size=(32, 32), spp=1, exposure=-10.0, integrator="direct").pixels, rtol=1e-5
+        seen, 4.0 * api.preview(plain, size=(32, 32), spp=1, exposure=-10.0, **LINEAR).pixels, rtol=1e-5
     )
 
 
@@ -127,12 +131,12 @@ def test_the_background_keeps_its_colour():
 
 def test_previews_quilts_tiles_and_reuse_choose_alike(tmp_path):
     whole = picture(scene())
-    preview = api.preview(scene(), (64, 64), spp=4, integrator="direct")
+    preview = api.preview(scene(), (64, 64), spp=4, **LINEAR)
     assert np.median(preview.pixels[preview.pixels.max(-1) > 0]) == pytest.approx(0.18, rel=0.05)
-    reused = api.render(scene(), "mla-square", spp=1, integrator="direct", method="lens-view")
+    reused = api.render(scene(), "mla-square", spp=1, method="lens-view", **LINEAR)
     assert reused.provenance.options["exposure"] == pytest.approx(whole.provenance.options["exposure"], abs=0.02)
     path = tmp_path / "a.exr"
-    done = api.render_to_file(scene(), path, "mla-square", spp=4, integrator="direct", method="full")
+    done = api.render_to_file(scene(), path, "mla-square", spp=4, method="full", **LINEAR)
     assert done.provenance.options["exposure"] == whole.provenance.options["exposure"]
     np.testing.assert_allclose(read_picture(path).pixels, whole.pixels, rtol=2e-3)
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -282,7 +284,7 @@ def test_no_emitter_one_or_very_many_keep_the_weights_of_the_scene(monkeypatch):
         integrator, source = stage(room(order))
         assert emitter_weights.estimate_emitter_weights(integrator, source).tolist() == [1.0] * len(order)
         assert isinstance(emitter_weights.make_light_sampler(integrator, source), SceneLightSampler)
-    monkeypatch.setattr(emitter_weights, "TUNING.most_weighed_emitters", 2)
+    monkeypatch.setattr(emitter_weights, "TUNING", replace(emitter_weights.TUNING, most_weighed_emitters=2))
     integrator, source = stage(room())
     assert emitter_weights.estimate_emitter_weights(integrator, source) == pytest.approx(np.full(3, 1 / 3))
 
