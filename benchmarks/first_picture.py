@@ -30,8 +30,8 @@ from lippmann.color.transfer import encode_srgb, quantize
 from lippmann.display import Display
 from lippmann.rendering.film.wavefront import trace_frame
 from lippmann.rendering.film.wavefront_plan import make_plan
+from lippmann.rendering.request.plan import resolve
 from lippmann.rendering.request.render_request import RenderRequest
-from lippmann.rendering.request.resolve import resolve
 from lippmann.rendering.session import open_session
 from lippmann.rendering.transport.ray_source import DisplayRays
 from lippmann.viewing.replay import default_eye

@@ -88,7 +88,7 @@ def _picture(stage: Stage, options: dict[str, Any]) -> Picture:
 
 def _job(stage: Stage, options: dict[str, Any]) -> Any:
     from lippmann.rendering.job import Job
-    from lippmann.rendering.request.resolve import resolve
+    from lippmann.rendering.request.plan import resolve
 
     session = replace(stage.session, request=resolve(replace(stage.session.request, **options), stage.session.scene))
     return Job(session, stage.integrator, stage.source, stage.display_from_world)

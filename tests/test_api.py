@@ -78,7 +78,7 @@ def test_the_keywords_of_a_render_are_those_of_a_request():
     request = inspect.signature(RenderRequest).parameters
     parameters = inspect.signature(lippmann.render).parameters
     own = {"scene", "display", "placement", "progress", "former", "bleed"}
-    assert set(parameters) - own == set(request) - {"placement", "reason", "spp_reserve", "began"}
+    assert set(parameters) - own == set(request) - {"placement", "plan", "began"}
     for name in set(parameters) - own:
         assert parameters[name].default == request[name].default, name
     described = inspect.getdoc(lippmann.render)

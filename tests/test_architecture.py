@@ -379,7 +379,7 @@ def test_paths_of_one_machine_are_recognised(line):
 WALK = (
     ("cli.commands.render", "render"),
     ("rendering.picture", "render_picture"),
-    ("rendering.request.resolve", "resolve"),
+    ("rendering.request.plan", "resolve"),
     ("rendering.session", "open_session"),
     ("rendering.methods", "trace"),
     ("rendering.methods", "trace_samples"),

@@ -84,6 +84,7 @@ def test_white_furnace_is_one_in_every_pixel(name):
         SHEETS[name].display(),
         placement=PlacementOptions(mode="display"),
         spp=64,
+        tone_map="none",
     )
     # Lamps and lobes are both sampled: means of 64 scatter by 1 % on the ball, and 14 000 pixels within 6 times that.
     assert np.abs(picture.pixels - 1).max() < 0.1

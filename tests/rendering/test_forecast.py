@@ -108,3 +108,15 @@ def test_what_rendering_would_refuse_is_refused():
         lippmann.plan("teapot", load_display("panel-8k"), memory=1 << 20)
     with pytest.raises(UsageError, match="has no noise"):
         lippmann.plan("teapot", SHEET, integrator="depth", denoise="oidn")
+
+
+def test_the_plan_is_that_of_the_picture():
+    foreseen = lippmann.plan("teapot", SHEET)
+    told = lippmann.render("teapot", SHEET).provenance.options["plan"]
+    assert told == [
+        f"{name}: {foreseen.in_words()[name]}" for name in foreseen.plan if name not in ("window", "wavefronts")
+    ]
+    assert foreseen.plan["samples"]["value"] == foreseen.spp
+    assert foreseen.to_dict()["plan"] == foreseen.plan
+    assert foreseen.plan["window"]["value"] == "all pixels"
+    assert foreseen.plan["wavefronts"]["value"] >= 1

@@ -178,7 +178,6 @@ def test_frames_that_are_rendered_in_tiles_are_kept_too(engine, moving_ball, dis
 
 def command(scene, folder, *more):
     words = ("render", scene, "--frames", "0:24:3", "-o", folder / "f_%02d.png", "--integrator", "direct", "--spp", "1")
-    words = (*words, "--tone-map", "none")
     start = "from lippmann.cli import main; main()"
     return [sys.executable, "-c", start, *map(str, (*words, "--device", "cpu", *more))]
 

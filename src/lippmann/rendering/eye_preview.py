@@ -19,8 +19,8 @@ from lippmann.rendering.film.wavefront_plan import make_plan
 from lippmann.rendering.picture import placed_options
 from lippmann.rendering.preview import Preview
 from lippmann.rendering.request.choices import LIGHT, POOLED_LIGHT
+from lippmann.rendering.request.plan import resolve
 from lippmann.rendering.request.render_request import RenderRequest
-from lippmann.rendering.request.resolve import resolve
 from lippmann.rendering.session import open_session
 from lippmann.runtime.engine_lock import exclusive
 from lippmann.scene.scene import Scene

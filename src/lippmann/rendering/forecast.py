@@ -19,9 +19,10 @@ from lippmann.progress import Progress, ProgressCallback, silent
 from lippmann.rendering.film import memory_model
 from lippmann.rendering.film.wavefront_plan import make_plan
 from lippmann.rendering.picture import traced_window
+from lippmann.rendering.request.plan import resolve
 from lippmann.rendering.request.preconditions import why_no_estimate
+from lippmann.rendering.request.render_plan import shown_value
 from lippmann.rendering.request.render_request import RenderRequest
-from lippmann.rendering.request.resolve import resolve
 from lippmann.rendering.session import Session, open_session
 from lippmann.runtime.engine_lock import exclusive
 from lippmann.scene.placement import Placement
@@ -29,6 +30,7 @@ from lippmann.scene.scene import Scene
 from lippmann.wording import depths_in_words, duration_in_words, html_table, samples_in_words
 
 if TYPE_CHECKING:
+    from lippmann.display.pixel_window import PixelWindow
     from lippmann.rendering.transport.integrator import Integrator
     from lippmann.rendering.transport.ray_source import DisplayRays, WindowRays
 
@@ -70,6 +72,9 @@ class Forecast:
     seconds:
         By stage: ``load`` and ``build`` as they were, ``trace`` and ``denoise`` as foreseen, ``total``; writing the
         file is not in it.
+    plan:
+        Value and reason of all that is decided before the first sample, by name; ``window`` is what is traced of the
+        picture, ``wavefronts`` how many there are.
     probe:
         ``samples`` that were traced, and ``seconds`` that they took.
     notes:
@@ -90,6 +95,7 @@ class Forecast:
     rays: dict[str, int]
     memory: dict[str, int]
     seconds: dict[str, float]
+    plan: dict[str, dict[str, object]]
     probe: dict[str, float]
     device: str
     notes: tuple[str, ...]
@@ -113,6 +119,7 @@ class Forecast:
             "memory": f"about {self.memory['expected'] / 2**30:.1f} GiB, "
             f"with a limit of {self.memory['limit'] / 2**30:.1f} GiB for the picture",
             "time": f"about {duration_in_words(self.seconds['total'])} on {self.device} ({stages})",
+            **{name: f"{shown_value(each['value'])} ({each['reason']})" for name, each in self.plan.items()},
         }
 
     def _repr_html_(self) -> str:
@@ -183,10 +190,29 @@ def forecast(
             "limit": session.memory,
         },
         seconds=seconds,
+        plan=_plan(session, source, window),
         probe={"samples": found.samples, "seconds": found.seconds},
         device=session.engine.gpu_name or f"cpu, {session.engine.threads} threads",
         notes=(*session.notes, *placement.warnings),
     )
+
+
+def _plan(
+    session: Session, source: DisplayRays | WindowRays, window: PixelWindow | None
+) -> dict[str, dict[str, object]]:
+    """The plan with what the pilot, the scene's box and the memory came to."""
+    request = session.request
+    assert request.plan is not None
+    plan = request.plan.with_pilot(session.choices).to_dict()
+    if window is None:
+        traced: dict[str, object] = {"value": "all pixels", "reason": "the picture's every pixel is traced"}
+    else:
+        place = f"{window.width}x{window.height} pixels at {window.left},{window.top}"
+        traced = {"value": place, "reason": "no others see the scene's box; the background is of one colour"}
+    waves = make_plan(source.width, source.height, request.samples, channels=source.channels, memory=session.memory)
+    number = len(waves.tiles) * len(waves.passes)
+    reason = f"up to {waves.lanes} samples each, as the memory and the caches hold"
+    return {**plan, "window": traced, "wavefronts": {"value": number, "reason": reason}}
 
 
 @dataclass(frozen=True)

@@ -13,9 +13,9 @@ from lippmann.display.pixel_window import PixelWindow
 from lippmann.image import IntegralImage
 from lippmann.progress import ProgressCallback, silent
 from lippmann.rendering.request.choices import REUSING
+from lippmann.rendering.request.plan import resolve
 from lippmann.rendering.request.region_of_interest import even_background, panel_window, scene_corners
 from lippmann.rendering.request.render_request import RenderRequest
-from lippmann.rendering.request.resolve import resolve
 from lippmann.rendering.session import Session, open_session
 from lippmann.runtime.engine_lock import exclusive
 from lippmann.scene.placement import Placement

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from lippmann.image import Provenance
 from lippmann.progress import ProgressCallback, silent
 from lippmann.rendering.film.wavefront_plan import make_plan
+from lippmann.rendering.request.plan import resolve
 from lippmann.rendering.request.render_request import RenderRequest
-from lippmann.rendering.request.resolve import resolve
 from lippmann.rendering.session import open_session
 from lippmann.runtime.engine_lock import exclusive
 from lippmann.scene.camera_placement import remove_scale

@@ -24,7 +24,9 @@ from lippmann.rendering.estimate.psnr import Estimate
 from lippmann.rendering.film.wavefront_plan import make_plan
 from lippmann.rendering.light_statements import light_notes, stated_error
 from lippmann.rendering.request.choices import POOLED_LIGHT, REUSING
+from lippmann.rendering.request.plan import follow
 from lippmann.rendering.request.region_of_interest import even_background
+from lippmann.rendering.request.render_plan import Choice
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.runtime import engine as engines
 from lippmann.runtime import machine
@@ -280,7 +282,7 @@ class Session:
             rays={"primary": rays.primary, "shadow": rays.shadow, "secondary": rays.secondary},
             seconds=_stage_seconds(self.watch, frame),
             estimate=stated_error(estimate, samples, self.choices),
-            options={**options, **self.choices},
+            options={**options, **self.choices, **self._plan_options()},
             notes=(
                 *self.notes,
                 *notes,
@@ -289,6 +291,11 @@ class Session:
                 *self._warn_of_emptiness(frame, work, has_pixels),
             ),
         )
+
+    def _plan_options(self) -> dict[str, object]:
+        """The plan as files hold it, a line for each choice."""
+        plan = self.request.plan
+        return {} if plan is None else {"plan": plan.with_pilot(self.choices).lines()}
 
     def _warn_of_emptiness(self, frame: Frame, work: int, has_pixels: bool) -> tuple[str, ...]:
         from lippmann.rendering.film.seen_share import nothing_seen, seen_share
@@ -325,7 +332,7 @@ def open_session(
     Parameters
     ----------
     scene, request:
-        What is rendered, and how: what :func:`~lippmann.rendering.request.resolve.resolve` returned.
+        What is rendered, and how: what :func:`~lippmann.rendering.request.plan.resolve` returned.
     size:
         Width and height of the picture in pixels, which must fit the memory; None where it is rendered in tiles.
     memory:
@@ -356,8 +363,9 @@ def _without_pooling(request: RenderRequest, built: BuiltScene | BuiltClassic) -
 
     if not (isinstance(built, BuiltScene) and built.has_media) or request.integrator not in POOLED_LIGHT:
         return request
-    if request.method == "pooled" and request.reason:
-        return replace(request, method="full", reason="full: participating media, whose light lies on no surface")
+    if request.method == "pooled" and request.plan is not None and request.reason:
+        plan = replace(request.plan, method=Choice("full", "participating media, whose light lies on no surface"))
+        return follow(plan, request)
     if request.method == "pooled" or request.method in REUSING:
         raise UsageError(
             f"{request.method} shares the light of surfaces",

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 _Made: TypeAlias = "tuple[int, Provenance, dict[str, str]]"
 
 #: What of a request changes nothing in the pictures, or is told apart.
-_IMMATERIAL = ("device", "threads", "reason", "placement")
+_IMMATERIAL = ("device", "threads", "plan", "placement")
 
 
 @dataclass(frozen=True, eq=False)

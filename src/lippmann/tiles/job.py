@@ -21,8 +21,8 @@ from lippmann.display.pixel_window import PixelWindow, TileGrid
 from lippmann.errors import UsageError
 from lippmann.journal.fingerprint import content_hash, in_words
 from lippmann.rendering.film import memory_model
+from lippmann.rendering.request.plan import resolve
 from lippmann.rendering.request.render_request import RenderRequest
-from lippmann.rendering.request.resolve import resolve
 from lippmann.rendering.session import memory_limit
 from lippmann.runtime.cached_property import cached_property
 from lippmann.scene.mitsuba_source import MitsubaSource
@@ -44,7 +44,7 @@ FEWEST_WINDOWS = 4
 #: The most memory that tiles with surroundings are planned for where no limit is given.
 MOST_MEMORY = 4 << 30
 #: What of a request changes nothing in the picture.
-_IMMATERIAL = ("device", "threads", "memory", "reason", "began", "spp_reserve")
+_IMMATERIAL = ("device", "threads", "memory", "began", "plan")
 
 
 @dataclass(frozen=True, eq=False)

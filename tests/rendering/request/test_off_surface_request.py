@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from lippmann.errors import UsageError
+from lippmann.rendering.request.plan import resolve
 from lippmann.rendering.request.render_request import RenderRequest
-from lippmann.rendering.request.resolve import resolve
 from lippmann.scene.readers.load import load_scene
 from lippmann.scene.values.description import Instance, Material, Mesh, SceneDescription
 from lippmann.scene.values.splats import Splats

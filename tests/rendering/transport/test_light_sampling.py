@@ -292,8 +292,8 @@ def test_no_emitter_one_or_very_many_keep_the_weights_of_the_scene(monkeypatch):
 def test_two_renders_of_one_scene_leave_each_other_alone(engine):
     """Prepared in either order, or both before either is traced, each gives the bytes that it gives alone."""
     import lippmann
+    from lippmann.rendering.request.plan import resolve
     from lippmann.rendering.request.render_request import RenderRequest
-    from lippmann.rendering.request.resolve import resolve
     from lippmann.rendering.session import open_session
     from lippmann.rendering.transport.ray_source import CameraRays
     from lippmann.scene.values.description import Camera

@@ -201,7 +201,7 @@ class TestPictures:
 
     def test_what_has_no_media_has_the_integrator_for_surfaces(self):
         """So that its pictures stay the same to the last bit."""
-        from lippmann.rendering.request.resolve import resolve
+        from lippmann.rendering.request.plan import resolve
         from lippmann.rendering.session import open_session
         from lippmann.rendering.transport.path import PathIntegrator
         from lippmann.rendering.transport.ray_source import DisplayRays

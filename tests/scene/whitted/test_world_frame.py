@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lippmann.errors import SceneError, UsageError
+from lippmann.rendering.request.plan import resolve
 from lippmann.rendering.request.render_request import RenderRequest
-from lippmann.rendering.request.resolve import resolve
 from lippmann.scene.readers.load import load_scene
 from lippmann.scene.scene import bounds_of
 from lippmann.scene.values.whitted_camera import ClassicCamera

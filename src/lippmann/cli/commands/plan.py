@@ -133,5 +133,5 @@ def plan(
         found = forecast(loaded, target, request, progress, frames=frames)
     for note in found.notes:
         console.remark(note)
-    lines = [f"{name:<10}{text}" for name, text in found.in_words().items()]
+    lines = [f"{name:<15}{text}" for name, text in found.in_words().items()]
     console.result(found.to_dict(), "\n".join(lines))

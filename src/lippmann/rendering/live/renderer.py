@@ -18,8 +18,8 @@ from lippmann.progress import ProgressCallback, silent
 from lippmann.rendering.live.develop import develop
 from lippmann.rendering.live.live_view import LiveFrame, LiveView
 from lippmann.rendering.live.seen_pixels import EyeMap, PixelSet, window_pixels
+from lippmann.rendering.request.plan import resolve
 from lippmann.rendering.request.render_request import RenderRequest
-from lippmann.rendering.request.resolve import resolve
 from lippmann.rendering.session import open_session
 from lippmann.runtime.engine_lock import exclusive
 from lippmann.scene.matrices import rotation_of

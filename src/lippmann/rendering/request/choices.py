@@ -26,6 +26,9 @@ LIGHT: tuple[Integrator, ...] = ("classic", "path", "direct")
 #: Those whose light can be pooled.
 POOLED_LIGHT: tuple[Integrator, ...] = ("path", "direct")
 
+#: Why a value is this one that was not left open.
+ASKED = "as asked for"
+
 #: Endings of formats for data, whose values are not for the eye alone.
 _DATA = (".exr", ".tif", ".tiff", ".zarr")
 

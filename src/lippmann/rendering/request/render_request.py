@@ -15,6 +15,7 @@ from lippmann.color.tone_map import pbr_neutral
 from lippmann.color.transfer import Transfer
 from lippmann.errors import UsageError
 from lippmann.rendering.request.choices import (
+    ASKED,
     Caustics,
     Denoiser,
     Device,
@@ -29,6 +30,7 @@ from lippmann.scene.placement import Placement, PlacementOptions, placement_of
 
 if TYPE_CHECKING:
     from lippmann.display import Display
+    from lippmann.rendering.request.render_plan import RenderPlan
 
 #: Samples per pixel where nothing is said and light is not pooled.
 DEFAULT_SPP = 16
@@ -70,7 +72,7 @@ _POSITIVE = {
 class RenderRequest:
     """How a picture is to be made, and where the display stands.
 
-    Every value is checked by itself here. :func:`~lippmann.rendering.request.resolve.resolve` fills in what is "auto"
+    Every value is checked by itself here. :func:`~lippmann.rendering.request.plan.resolve` fills in what is "auto"
     or None and checks what belongs together.
 
     Parameters
@@ -136,11 +138,8 @@ class RenderRequest:
         Where the display stands in the scene: options, or a placement found before.
     device, threads, memory:
         Where it runs, on how many CPU threads (None: all cores), and in how many bytes (None: 60 % of what is free).
-    reason:
-        Why the method is this one, where it was left open; set by the resolver.
-    spp_reserve:
-        Where the number of samples was left open: how many a picture may have that is not clean with ``spp``. Set by
-        the resolver.
+    plan:
+        Why the values are these, once all of them are decided: see :mod:`~lippmann.rendering.request.plan`.
     began:
         When the work began that ``max_time`` limits, in seconds of :func:`time.perf_counter`; None: with the rendering.
 
@@ -173,8 +172,7 @@ class RenderRequest:
     device: Device = "auto"
     threads: int | None = None
     memory: int | None = None
-    reason: str = field(default="", compare=False)
-    spp_reserve: int | None = field(default=None, compare=False)
+    plan: RenderPlan | None = field(default=None, compare=False, repr=False)
     began: float | None = field(default=None, compare=False)
 
     def __post_init__(self) -> None:
@@ -218,9 +216,21 @@ class RenderRequest:
         UsageError
             A name or a value is not known.
         """
-        known = [each.name for each in fields(cls) if each.name not in ("reason", "spp_reserve", "began")]
+        known = [each.name for each in fields(cls) if each.name not in ("plan", "began")]
         UsageError.refuse_unknown("option of a render", options, known)
         return cls(**options)  # type: ignore[arg-type]  # checked by __post_init__
+
+    @property
+    def reason(self) -> str:
+        """The method and why it is this one, where it was left open; else nothing."""
+        plan = self.plan
+        is_told = plan is None or plan.method.reason == ASKED
+        return "" if is_told or plan is None else f"{plan.method.value}: {plan.method.reason}"
+
+    @property
+    def spp_reserve(self) -> int | None:
+        """Samples that a picture may have which is not clean with ``spp``; None for no more."""
+        return None if self.plan is None else self.plan.reserve.value
 
     @property
     def denoises(self) -> bool:

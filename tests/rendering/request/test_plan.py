@@ -1,4 +1,4 @@
-"""What ``auto`` takes, and that it takes nothing where the user has chosen."""
+"""What a plan decides and why, and that it decides nothing where the user has chosen."""
 
 from __future__ import annotations
 
@@ -7,8 +7,10 @@ import pytest
 
 from lippmann.display import load_display
 from lippmann.rendering.denoise.cost_model import HIGH_FROM, denoising_cost, effort_of, traced_work
+from lippmann.rendering.request.choices import ASKED
+from lippmann.rendering.request.plan import resolve
+from lippmann.rendering.request.render_plan import Choice
 from lippmann.rendering.request.render_request import RenderRequest
-from lippmann.rendering.request.resolve import resolve
 from lippmann.scene.readers.load import load_scene
 from lippmann.scene.values.description import Instance, Material, Mesh, SceneDescription
 
@@ -163,3 +165,61 @@ def test_tones_are_mapped_unless_a_colour_of_the_background_was_asked_for():
     before_white = load_scene("teapot", background=(1.0, 1.0, 1.0))
     assert resolve(RenderRequest(), before_white).tone_map == "none"
     assert resolve(RenderRequest(tone_map="pbr-neutral"), before_white).tone_map == "pbr-neutral"
+
+
+def test_every_value_that_was_asked_for_is_kept_and_said_to_be():
+    asked = {
+        "integrator": "direct",
+        "depth": 3,
+        "method": "full",
+        "denoise": "oidn-high",
+        "subpixels": True,
+        "pixel_filter": "point",
+        "exposure": 1.5,
+        "tone_map": "none",
+        "caustics": "paths",
+    }
+    planned = resolve(RenderRequest(spp=5, **asked), SCENE, load_display("seed-lenticular"))
+    for name, value in asked.items():
+        choice = planned.plan.entries[name]
+        assert (choice.value, choice.reason) == (value, ASKED), name
+        assert getattr(planned, name) == value
+    assert planned.plan.samples == Choice(5)
+    assert planned.reason == ""
+
+
+def test_whatever_is_left_open_has_a_reason():
+    planned = resolve(RenderRequest(), SCENE, load_display("looking-glass-portrait"))
+    plan = planned.plan
+    assert all(choice.reason and choice.reason != ASKED for choice in plan.entries.values())
+    assert (plan.samples.value, plan.reserve.value, plan.subpixels.value) == (4, 16, True)
+    assert plan.to_dict()["samples"] == {"value": 4, "reason": plan.samples.reason}
+    assert f"samples: 4 ({plan.samples.reason})" in plan.lines()
+    # A picture may be planned again, as a sequence's frames are: its values are asked for then.
+    again = resolve(planned, SCENE, load_display("looking-glass-portrait"))
+    assert again == planned
+
+
+@pytest.mark.parametrize(
+    ("width", "samples", "reserve"),
+    [(64, 16, 128), (512, 4, 32), (1024, 4, 32), (1500, 4, 16), (4200, 4, 8), (6000, 4, None)],
+)
+def test_samples_and_reserve_follow_the_size(width, samples, reserve):
+    plan = resolve(RenderRequest(), SCENE, load_display("seed-lenticular"), size=(width, width)).plan
+    assert (plan.samples.value, plan.reserve.value) == (samples, reserve)
+    foreseen = resolve(RenderRequest(), SCENE, load_display("seed-lenticular"), "forecast", size=(width, width)).plan
+    assert foreseen == plan
+    tiled = resolve(RenderRequest(), SCENE, load_display("seed-lenticular"), "tiles", size=(width, width)).plan
+    assert (tiled.samples.value, tiled.reserve.value) == (samples, None)
+
+
+def test_a_pilots_results_take_the_place_of_what_it_decides():
+    plan = resolve(RenderRequest(), SCENE).plan
+    told = plan.with_pilot({"caustics": "photons", "exposure": 2.0, "seen_chains": 8})
+    assert told.entries["caustics"].value == "photons"
+    assert told.entries["seen_chains"].value == 8
+    # This scene has no physical light sources, so no pilot measured its exposure.
+    assert told.entries["exposure"].value == 0.0
+    assert plan.with_pilot({}).entries["caustics"].value == "none"
+    asked = resolve(RenderRequest(caustics="paths"), SCENE).plan
+    assert asked.with_pilot({"caustics": "paths"}).entries["caustics"].reason == ASKED
