@@ -94,7 +94,6 @@ PILOT_REASONS = {
     "caustics": "photons where a few of them find light that mirrors, glass or gloss throw",
     "light_vertices": "a small emitter beside a surface makes indirect light noisy",
     "seen_chains": "chains for each path through a first mirror or glass",
-    "mirror_images": "a search for images of small emitters in mirrors",
 }
 
 
