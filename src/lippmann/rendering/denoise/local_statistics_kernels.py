@@ -8,7 +8,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from lippmann.runtime.numba_jit import compiled, inlined
+from lippmann.runtime.numba_jit import inlined, uncounted
 
 #: Pictures and their rows.
 RealArray: TypeAlias = NDArray[np.floating]
@@ -17,7 +17,7 @@ RealArray: TypeAlias = NDArray[np.floating]
 _BLOCK = 64
 
 
-@compiled
+@uncounted
 def row_mean_rows(first: int, last: int, values: RealArray, radius: int, mean: RealArray) -> None:
     """Rows ``[first, last)`` of ``mean``: that of the ``radius`` pixels to either side in ``values``, both ``(H, W)``.
 
@@ -36,28 +36,24 @@ def row_mean_rows(first: int, last: int, values: RealArray, radius: int, mean: R
             mean[row, column] = total / (min(column + radius, width - 1) - max(column - radius, 0) + 1)
 
 
-@compiled
+@uncounted
 def column_mean_rows(first: int, last: int, values: RealArray, radius: int, mean: RealArray) -> None:
     """Rows ``[first, last)`` of ``mean``: that of the ``radius`` pixels above and below in ``values``, cut likewise."""
     height, width = values.shape
-    totals = np.zeros(width, dtype=np.float64)
-    for row in range(first // _BLOCK * _BLOCK, last):
-        if row % _BLOCK == 0:
-            totals[:] = 0
-            for other in range(max(0, row - radius), min(row + radius + 1, height)):
-                for column in range(width):
-                    totals[column] += values[other, column]
-        else:
-            if row + radius < height:
-                for column in range(width):
-                    totals[column] += values[row + radius, column]
-            if row > radius:
-                for column in range(width):
-                    totals[column] -= values[row - radius - 1, column]
-        if row >= first:
-            count = min(row + radius, height - 1) - max(row - radius, 0) + 1
-            for column in range(width):
-                mean[row, column] = totals[column] / count
+    for start in range(first // _BLOCK * _BLOCK, last, _BLOCK):
+        for column in range(width):
+            total = 0.0
+            for other in range(max(0, start - radius), min(start + radius + 1, height)):
+                total += values[other, column]
+            for row in range(start, min(start + _BLOCK, last)):
+                if row > start:
+                    if row + radius < height:
+                        total += values[row + radius, column]
+                    if row > radius:
+                        total -= values[row - radius - 1, column]
+                if row >= first:
+                    count = min(row + radius, height - 1) - max(row - radius, 0) + 1
+                    mean[row, column] = total / count
 
 
 @inlined
@@ -67,7 +63,7 @@ def _pixels_around(row: int, column: int, height: int, width: int, radius: int) 
     return rows * (min(column + radius, width - 1) - max(column - radius, 0) + 1)
 
 
-@compiled
+@uncounted
 def others_mean_rows(first: int, last: int, values: RealArray, mean: RealArray, radius: int, others: RealArray) -> None:
     """Rows ``[first, last)`` of ``others``: ``mean``, that of ``values`` around each pixel, without the pixel itself.
 
@@ -81,7 +77,7 @@ def others_mean_rows(first: int, last: int, values: RealArray, mean: RealArray, 
             others[row, column] = of_others / (count - 1) if count > 1 else 0.0
 
 
-@compiled
+@uncounted
 def known_rows(
     first: int,
     last: int,
@@ -112,7 +108,7 @@ def known_rows(
             known[row, column] = max(of_others - errors * math.sqrt(variance), 0.0)
 
 
-@compiled
+@uncounted
 def judged_rows(
     first: int,
     last: int,
@@ -143,7 +139,7 @@ def judged_rows(
             error[row, column] = of_error
 
 
-@compiled
+@uncounted
 def compared_rows(
     first: int,
     last: int,
