@@ -75,9 +75,9 @@ def _is_table(file: File) -> bool:
 
 def command_tree() -> Any:
     """The command line as a tree of Click's commands."""
-    from lippmann.cli.app import app
+    from lippmann.cli.app import make_app
 
-    return typer.main.get_command(app)
+    return typer.main.get_command(make_app())
 
 
 def leaves(command: Any, path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], Any]]:

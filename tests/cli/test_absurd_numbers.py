@@ -34,9 +34,9 @@ ABSURD = ("9" * 400, "1e-200", "nan", "inf", "-1")
 
 def options_of(command):
     """The options with a value of a command, such as ``quilt render``."""
-    from lippmann.cli.app import app
+    from lippmann.cli.app import make_app
 
-    found = typer.main.get_command(app)
+    found = typer.main.get_command(make_app())
     for word in command.split():
         found = found.commands[word]
     of_values = [each for each in found.params if each.param_type_name == "option" and not each.is_flag]
@@ -60,7 +60,7 @@ def test_absurd_numbers_are_right_or_told_in_one_line(lippmann, picture, tmp_pat
 
 
 def test_every_command_with_numbers_is_tried():
-    from lippmann.cli.app import app
+    from lippmann.cli.app import make_app
 
     def walk(command, words):
         for name, each in getattr(command, "commands", {}).items():
@@ -70,4 +70,4 @@ def test_every_command_with_numbers_is_tried():
 
     # These serve pages, work for a cluster, or take no number but a port and threads.
     without = {"worker", "displays", "doctor", "studio", "show", "view", "compare", "reproduce", "quilt sizes"}
-    assert set(walk(typer.main.get_command(app), [])) - without - {"calibrate page"} == set(NEEDED)
+    assert set(walk(typer.main.get_command(make_app()), [])) - without - {"calibrate page"} == set(NEEDED)

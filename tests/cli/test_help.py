@@ -9,13 +9,13 @@ import sys
 import pytest
 import typer
 
-from lippmann.cli.app import app
+from lippmann.cli.app import COMMANDS, app_of, make_app
 from lippmann.cli.shared.grouped_help import COMMAND_GROUPS, EXAMPLES, OPTION_GROUPS
 
 
 def commands(command=None, words=()):
     """All commands by their words."""
-    command = command or typer.main.get_command(app)
+    command = command or typer.main.get_command(make_app())
     found = {}
     for name, each in getattr(command, "commands", {}).items():
         if hasattr(each, "commands"):
@@ -49,7 +49,7 @@ def test_every_option_of_the_large_commands_has_a_group():
 
 
 def test_every_command_has_a_group():
-    top = typer.main.get_command(app)
+    top = typer.main.get_command(make_app())
     assert {name for names in COMMAND_GROUPS.values() for name in names} >= set(top.commands)
 
 
@@ -118,3 +118,17 @@ def test_a_picture_is_opened_once_it_is_written(lippmann, engine, tmp_path, monk
     assert opened == [(out, True)]
     refused = lippmann("render", "teapot", "--turntable", 4, "--open", "-o", tmp_path / "f")
     assert (refused.code, refused.err.startswith("lippmann: --open: shows a picture or a film; ")) == (2, True)
+
+
+def test_the_first_help_tells_of_each_command_what_its_own_does():
+    whole, outline = (typer.main.get_command(app).commands for app in (make_app(), app_of(["--help"])))
+    assert {name: each.help.strip().split("\n")[0] for name, each in whole.items()} == {
+        name: each.help for name, each in outline.items()
+    }
+
+
+def test_a_command_comes_without_the_others_and_a_wrong_word_with_all(monkeypatch):
+    assert list(typer.main.get_command(app_of(["render", "--help"])).commands) == ["render"]
+    assert set(typer.main.get_command(app_of(["rendre"])).commands) == set(COMMANDS)
+    monkeypatch.setenv("_LIPPMANN_COMPLETE", "complete_bash")
+    assert app_of([]) is make_app()

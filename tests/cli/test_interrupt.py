@@ -17,7 +17,7 @@ def test_an_interrupt_inside_a_compiled_loop_is_an_interrupt(monkeypatch, capsys
         except KeyboardInterrupt as error:
             raise RuntimeError("dr.while_loop(): encountered an exception") from error
 
-    monkeypatch.setattr(lippmann.cli.app, "app", wrapped)
+    monkeypatch.setattr(lippmann.cli.app, "app_of", lambda words: wrapped)
     assert lippmann.cli.run(["info", "x.png"]) == 130
     assert capsys.readouterr().err == "lippmann: stopped; nothing was written\n"
 

@@ -9,11 +9,11 @@ from pathlib import Path
 import pytest
 
 import lippmann as package
-from lippmann.cli.app import app
+from lippmann.cli.app import make_app
 from lippmann.cli.shared.option_names import in_options, option_of, translated
 from lippmann.errors import UsageError
 
-assert app  # whose making says which commands there are
+assert make_app  # whose module says which commands there are
 SOURCE = Path(package.__file__).parent
 #: Parameters of the library that no command has.
 OF_THE_LIBRARY = {"form", "effort", "stereo", "pick", "framed_by", "height", "row_step", "placement"}

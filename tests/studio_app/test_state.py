@@ -65,10 +65,10 @@ def test_the_command_line_says_all_but_the_eye(state):
     """Words are read as the command reads them: by its own parser, without the work."""
     import typer
 
-    from lippmann.cli.app import app
+    from lippmann.cli.app import make_app
     from lippmann.cli.shared import parse
 
-    command = typer.main.get_command(app).commands["render"]
+    command = typer.main.get_command(make_app()).commands["render"]
     words = words_of_state(state)
     assert shlex.split(shlex.join(words)) == words
     read = command.make_context("render", list(words)).params

@@ -27,15 +27,16 @@ def main(arguments: list[str] | None = None) -> None:
     from lippmann.cli.shared import standard_streams
     from lippmann.cli.shared.exit_codes import INTERRUPTED
 
-    del app  # loaded while an interrupt still ends the process at once
     standard_streams.complete()
     words = list(sys.argv[1:] if arguments is None else arguments)
     debug = "--debug" in words
+    words = [word for word in words if word != "--debug"]
+    app.app_of(words)  # while an interrupt still ends the process at once
     try:
         if is_heard:
             sys.unraisablehook = _hear_again
             _signal.signal(_signal.SIGINT, _signal.default_int_handler)
-        code = outcome.run([word for word in words if word != "--debug"], debug=debug)
+        code = outcome.run(words, debug=debug)
     except KeyboardInterrupt:
         code = outcome.stopped()
     if is_heard:

@@ -1,67 +1,121 @@
-"""The commands by name. Each lives beside its kin; nothing heavy is loaded before one is called."""
+"""The commands by name. Each lives beside its kin; the module of one is loaded when it is called, or helped with."""
 
 from __future__ import annotations
 
+import importlib
+import os
+from collections.abc import Mapping, Sequence
+from functools import cache
 from typing import Annotated
 
 import typer
 
 from lippmann._version import VERSION
-from lippmann.cli.commands import (
-    calibrate,
-    cluster,
-    compare,
-    exchange,
-    interlace,
-    picture,
-    plan,
-    preview,
-    quilt,
-    render,
-    studio,
-    system,
-    view,
-)
-from lippmann.cli.commands import print as printing
 from lippmann.cli.shared.grouped_help import HelpfulCommand, HelpfulGroup
 from lippmann.cli.shared.option_names import commands_are
 
-app = typer.Typer(
-    cls=HelpfulGroup,
-    help="Render 3D scenes into the native pixels of integral-imaging displays.",
-    add_completion=True,
-    rich_markup_mode=None,
-)
+#: Set where a shell asks for what a line may go on with.
+_COMPLETION = "_LIPPMANN_COMPLETE"
 
-app.command("render", cls=HelpfulCommand)(render.render)
-app.command("preview", cls=HelpfulCommand)(preview.preview)
-app.command("plan", cls=HelpfulCommand)(plan.plan)
-app.command("worker", cls=HelpfulCommand)(cluster.worker)
-app.command("displays", cls=HelpfulCommand)(system.displays)
-app.command("doctor", cls=HelpfulCommand)(system.doctor)
-app.command("info", cls=HelpfulCommand)(picture.info)
-app.command("views", cls=HelpfulCommand)(picture.views)
-app.command("micro-images", cls=HelpfulCommand)(picture.micro_images)
-app.command("compose", cls=HelpfulCommand)(picture.compose)
-app.command("replay", cls=HelpfulCommand)(picture.replay)
-app.command("refocus", cls=HelpfulCommand)(picture.refocus)
-app.command("export", cls=HelpfulCommand)(exchange.export)
-app.command("import", cls=HelpfulCommand)(exchange.import_)
-app.command("studio", cls=HelpfulCommand)(studio.studio)
-app.command("show", cls=HelpfulCommand)(studio.show)
-app.command("view", cls=HelpfulCommand)(view.view)
-app.add_typer(quilt.quilt, name="quilt")
-app.command("weave", cls=HelpfulCommand)(quilt.weave)
-app.command("interlace", cls=HelpfulCommand)(interlace.interlace)
-app.add_typer(calibrate.calibrate, name="calibrate")
-app.command("pitch-test", cls=HelpfulCommand)(printing.pitch_test)
-app.command("marks", cls=HelpfulCommand)(printing.marks)
-app.command("compare", cls=HelpfulCommand)(compare.compare)
-app.command("reproduce", cls=HelpfulCommand)(compare.reproduce)
+#: Module and name of each command or group of commands, and the first line of its help.
+COMMANDS: Mapping[str, tuple[str, str, str]] = {
+    "render": ("render", "render", "Render a scene into the native pixels of a display."),
+    "preview": (
+        "preview",
+        "preview",
+        "Show in a second or two what a display will show to an eye in front of its middle.",
+    ),
+    "plan": (
+        "plan",
+        "plan",
+        "Say what 'render' will show and take, without rendering: depth, blur, rays, memory and time.",
+    ),
+    "worker": ("cluster", "worker", "Run a Dask worker for renders on a cluster, until its scheduler ends."),
+    "displays": ("system", "displays", "List the bundled displays."),
+    "doctor": ("system", "doctor", "Check the rendering engine of this machine and say how to fix what is missing."),
+    "info": ("picture", "info", "Show a picture's display, size and provenance."),
+    "views": ("picture", "views", "Split a picture into views: one picture per direction, one pixel per lens."),
+    "micro-images": ("picture", "micro_images", "Split a picture into micro-images: one picture per lens."),
+    "compose": ("picture", "compose", "Join views or micro-images into the native picture."),
+    "replay": ("picture", "replay", "Simulate what an eye in front of the display sees."),
+    "refocus": (
+        "picture",
+        "refocus",
+        "Refocus on a plane, or on several, as a camera whose aperture is as wide as the field of view.",
+    ),
+    "export": ("exchange", "export", "Export a picture to the layout of another light-field tool."),
+    "import": ("exchange", "import_", "Import a light field of another tool as a picture for a display."),
+    "studio": ("studio", "studio", "Set up a display by hand in a browser, see live what it will show, and render."),
+    "show": (
+        "studio",
+        "show",
+        "Show a picture on the display itself: a window to put full screen there, native pixels one to one.",
+    ),
+    "view": ("view", "view", "View a picture in a browser as its display shows it."),
+    "quilt": ("quilt", "quilt", "Quilts: all views side by side in one picture."),
+    "weave": ("quilt", "weave", "Make a display's native picture from a quilt or a folder of views."),
+    "interlace": ("interlace", "interlace", "Interlace photographs or frames for a lenticular print or display."),
+    "calibrate": ("calibrate", "calibrate", "Calibrate the pitch, slope and centre of a slanted monitor."),
+    "pitch-test": (
+        "print",
+        "pitch_test",
+        "Write a pitch test: strips at slightly different print pitches, to find the sheet's.",
+    ),
+    "marks": ("print", "marks", "Add a margin with alignment marks to a picture for print, and write its job sheet."),
+    "compare": (
+        "compare",
+        "compare",
+        "Compare a picture with a reference: PSNR, worst micro-images, SSIM of views, the paper's metrics.",
+    ),
+    "reproduce": ("compare", "reproduce", "Reproduce the paper's tables and figures and write a report."),
+}
 
 
-@app.callback(invoke_without_command=True)
-def top(
+def app_of(words: Sequence[str]) -> typer.Typer:
+    """The command line as far as these words need it: modules of other commands take time to load."""
+    if _COMPLETION in os.environ:
+        return make_app()
+    first = words[0] if words else "--help"
+    if first in ("--help", "--version"):
+        return _outline()
+    return make_app(first if first in COMMANDS else "")
+
+
+@cache
+def make_app(command: str = "") -> typer.Typer:
+    """The command line with all commands, or with this one alone."""
+    app = _empty()
+    for name in (command,) if command else COMMANDS:
+        module, attribute, _ = COMMANDS[name]
+        found = getattr(importlib.import_module(f"lippmann.cli.commands.{module}"), attribute)
+        if isinstance(found, typer.Typer):
+            app.add_typer(found, name=name)
+        else:
+            app.command(name, cls=HelpfulCommand)(found)
+    return app
+
+
+@cache
+def _outline() -> typer.Typer:
+    """The command line for its own help: commands have their names and the first line of theirs."""
+    app = _empty()
+    for name, (_, _, line) in COMMANDS.items():
+        app.command(name, cls=HelpfulCommand, help=line)(lambda: None)
+    return app
+
+
+def _empty() -> typer.Typer:
+    app = typer.Typer(
+        cls=HelpfulGroup,
+        help="Render 3D scenes into the native pixels of integral-imaging displays.",
+        add_completion=True,
+        rich_markup_mode=None,
+    )
+    app.callback(invoke_without_command=True)(_top)
+    return app
+
+
+def _top(
     context: typer.Context,
     version: Annotated[bool, typer.Option("--version", help="Print the version and leave.")] = False,
 ) -> None:
@@ -74,4 +128,4 @@ def top(
         raise typer.Exit
 
 
-commands_are(app)
+commands_are(make_app)

@@ -26,10 +26,10 @@ def run(words: list[str], *, debug: bool = False) -> int:
     """Run one command; errors become one line on standard error unless ``debug`` asks for the traceback."""
     command_clock.start()
     limit_inputs(None)  # of the command before, in one process
-    from lippmann.cli.app import app
+    from lippmann.cli.app import app_of
 
     try:
-        code = app(words, prog_name="lippmann", standalone_mode=False)
+        code = app_of(words)(words, prog_name="lippmann", standalone_mode=False)
         sys.stdout.flush()
     except SystemExit:
         raise

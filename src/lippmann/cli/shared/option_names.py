@@ -7,7 +7,7 @@ they become ``--respect-gloss``, ``--method full`` and ``--resume``.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
@@ -56,13 +56,13 @@ def _as_option(match: re.Match[str]) -> str:
     return f"{option} {plain if quoted is None else quoted}"
 
 
-def commands_are(app: typer.Typer) -> None:
-    """Say which commands there are: their options are the words of what follows."""
-    _apps[:] = [app]
+def commands_are(make_app: Callable[[], typer.Typer]) -> None:
+    """Say which commands there are, once one has to know: their options are the words of what follows."""
+    _makers[:] = [make_app]
     _options.cache_clear()
 
 
-_apps: list[typer.Typer] = []
+_makers: list[Callable[[], typer.Typer]] = []
 
 
 @cache
@@ -71,7 +71,7 @@ def _options() -> Mapping[str, str]:
     import typer
 
     names: dict[str, str] = {}
-    for command in (each for app in _apps for each in _commands(typer.main.get_command(app))):
+    for command in (each for make in _makers for each in _commands(typer.main.get_command(make()))):
         for parameter in command.params:
             if parameter.name is not None:
                 long = [option for option in parameter.opts if option.startswith("--")]
