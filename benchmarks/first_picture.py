@@ -13,12 +13,9 @@ from __future__ import annotations
 import argparse
 import tempfile
 import time
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
-import drjit as dr
-import mitsuba as mi
 import numpy as np
 from PIL import Image, ImageDraw
 
@@ -28,13 +25,12 @@ from harness import save, saved
 from lippmann.color.tone_map import pbr_neutral
 from lippmann.color.transfer import encode_srgb, quantize
 from lippmann.display import Display
-from lippmann.rendering.film.wavefront import trace_frame
-from lippmann.rendering.film.wavefront_plan import make_plan
 from lippmann.rendering.request.plan import resolve
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.rendering.session import open_session
 from lippmann.rendering.transport.ray_source import DisplayRays
 from lippmann.viewing.replay import default_eye
+from reference_pixels import trace_pixels
 
 DISPLAYS = (
     "seed-lenticular",
@@ -52,24 +48,6 @@ SEEN = 150
 CELL, LABEL = 150, 14
 BACKGROUND = (30, 30, 30)
 PICTURE = Path(__file__).parent.parent / "docs" / "images" / "first-pictures.png"
-
-
-class PixelRays:
-    """Rays of single pixels of a display, as a picture one pixel high."""
-
-    def __init__(self, source: DisplayRays, columns: np.ndarray, rows: np.ndarray) -> None:
-        self.width, self.height, self.channels = len(columns), 1, source.channels
-        self._source = source
-        self._columns, self._rows = mi.UInt32(columns.astype(np.uint32)), mi.UInt32(rows.astype(np.uint32))
-
-    def tiles(self) -> Iterator[tuple[slice, slice]]:
-        yield slice(0, 1), slice(0, self.width)
-
-    def rays(self, column, row, channel, jitter):
-        del row
-        place = mi.UInt32(column)
-        at = (dr.gather(mi.UInt32, table, place) for table in (self._columns, self._rows))
-        return self._source.rays(*at, channel, jitter)
 
 
 def eye_pixels(display: Display) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -107,19 +85,15 @@ def judge(model: object, name: str, image_path: Path) -> tuple[dict[str, object]
     source = DisplayRays(display, placement.world_from_display, bool(request.subpixels))
     integrator = session.integrator(source, placement.display_from_world)
 
-    def trace(columns, rows, integrator, spp):
-        rays = PixelRays(source, columns, rows)
-        plan = make_plan(rays.width, 1, spp, channels=rays.channels, memory=session.memory)
-        return trace_frame(integrator, rays, plan, seed=991, box_filter=True).pixels[0]
-
     rng = np.random.default_rng(5)
     columns, rows = rng.integers(0, display.panel.width, JUDGED), rng.integers(0, display.panel.height, JUDGED)
-    reference = encode_srgb(pbr_neutral(trace(columns, rows, integrator, REFERENCE_SAMPLES)))
+    reference = encode_srgb(pbr_neutral(trace_pixels(session, source, integrator, columns, rows, REFERENCE_SAMPLES)))
     error = np.mean((picture[rows, columns] - reference) ** 2)
 
     surfaces = replace(session, request=replace(request, integrator="depth"))
     u, v, inside = eye_pixels(display)
-    depth = trace(u.ravel(), v.ravel(), surfaces.integrator(source, placement.display_from_world), 1)
+    distances = surfaces.integrator(source, placement.display_from_world)
+    depth = trace_pixels(session, source, distances, u.ravel(), v.ravel(), 1)
     hit = (depth[:, 1] != 0.0).reshape(u.shape) & inside
     seen = picture[v, u]
     down, across = np.flatnonzero(hit.any(axis=1)), np.flatnonzero(hit.any(axis=0))

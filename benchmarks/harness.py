@@ -78,12 +78,13 @@ def machine() -> dict[str, Any]:
     }
 
 
-def save(name: str, values: Mapping[str, Any]) -> None:
+def save(name: str, values: Mapping[str, Any], *, show: bool = True) -> None:
     """Write ``results/NAME.json`` and show it."""
     RESULTS.mkdir(exist_ok=True)
     text = json.dumps({"machine": machine(), **values}, indent=2)
     (RESULTS / f"{name}.json").write_text(text + "\n")
-    print(text, file=sys.stderr)
+    if show:
+        print(text, file=sys.stderr)
 
 
 def saved(name: str) -> dict[str, Any]:
