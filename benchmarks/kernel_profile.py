@@ -12,7 +12,7 @@ still something to do.
 *Before*: pixels in the order of rows (:mod:`lippmann.rendering.film.lane_order`), opaque surfaces without an
 acceleration structure of their own where others let rays straight through
 (:mod:`lippmann.rendering.transport.shadow_rays`), look-ups of all photons about a point by every sample
-(``PHOTON_PARTS`` of :mod:`lippmann.rendering.transport.caustic_light`), and photons in NumPy's memory, whose rows
+(``photon_parts`` of :mod:`lippmann.rendering.transport.tuning`), and photons in NumPy's memory, whose rows
 cannot be fetched at once (:mod:`lippmann.device.kernel_ops`).
 
 python benchmarks/kernel_profile.py [--scenes NAME,...]
@@ -114,13 +114,14 @@ def _kernels(stage: Stage) -> dict[str, Any]:
     def alike(kind: type[path.PathIntegrator]) -> path.PathIntegrator:
         return kind(paths.scene, paths.features, paths.depth, light=paths.light)
 
-    usual = caustic_light.PHOTON_PARTS
+    tuning = caustic_light.TUNING
+    usual = tuning.photon_parts
 
     def traced(
         integrator: path.PathIntegrator, parts: int = usual, in_rows: bool = False, is_dark: bool = False
     ) -> Any:
         def call(seed: int) -> Any:
-            caustic_light.PHOTON_PARTS = parts
+            caustic_light.TUNING = replace(tuning, photon_parts=parts)
             with mock.patch.object(wavefront, "in_strips", return_value=0) if in_rows else nullcontext():
                 pixels, stream = samples_of_tile(source, plan, tile, run, seed, True)
             with (

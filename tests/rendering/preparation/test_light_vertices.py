@@ -110,11 +110,12 @@ def test_nothing_is_joined_where_indirect_light_is_dim():
 
 
 def test_scenes_of_many_emitters_are_left_to_paths():
-    from lippmann.rendering.transport.light_vertices import MOST_EMITTERS
+    from lippmann.rendering.transport.tuning import TUNING
 
     scene = room(small())
     more = {
-        f"point {k}": {"type": "point", "position": [-0.8, 0.8, -0.7], "intensity": 1e-3} for k in range(MOST_EMITTERS)
+        f"point {k}": {"type": "point", "position": [-0.8, 0.8, -0.7], "intensity": 1e-3}
+        for k in range(TUNING.most_vertex_emitters)
     }
     assert not given(*stage(scene | more))
     del more["point 0"]

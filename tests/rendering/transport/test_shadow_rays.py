@@ -1,5 +1,7 @@
 """Shadow rays: what dims them, what blocks them, and that opaque shapes apart from the others change nothing."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -91,7 +93,7 @@ def test_scenes_that_are_not_divided_give_the_same(monkeypatch, undivided):
             "group": {"type": "ref", "id": "group"},
         }
     else:
-        monkeypatch.setattr(module, "MOST_OPAQUE", 0)
+        monkeypatch.setattr(module, "TUNING", replace(module.TUNING, most_opaque=0))
     scene = mi.load_dict(described)
     whole = module.ShadowRays(scene, has_null=True)
     assert (whole.opaque, whole.asked) == (None, scene)

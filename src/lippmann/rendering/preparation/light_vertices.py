@@ -15,8 +15,6 @@ from lippmann.rendering.preparation.seen_region import region_about, seen_points
 from lippmann.rendering.preparation.tuning import TUNING
 from lippmann.rendering.request.render_request import RenderRequest
 from lippmann.rendering.transport.light_vertices import (
-    MOST_EMITTERS,
-    POINTS,
     Arrival,
     LightVertexPasses,
     LightVertices,
@@ -26,6 +24,7 @@ from lippmann.rendering.transport.pass_schedule import PassSchedule
 from lippmann.rendering.transport.path import PathIntegrator
 from lippmann.rendering.transport.ray_source import RaySource
 from lippmann.rendering.transport.sharp_events import lambertian
+from lippmann.rendering.transport.tuning import TUNING as TRANSPORT
 
 Floats = NDArray[np.float32]
 
@@ -48,12 +47,12 @@ def trace_light_vertices(
     gain:
         Exposure of the picture.
     """
-    if request.integrator != "path" or request.surfaces < 2 or memory < 2 * POINTS * LIGHT_VERTEX:
+    if request.integrator != "path" or request.surfaces < 2 or memory < 2 * TRANSPORT.light_vertices * LIGHT_VERTEX:
         return None
     if not request.is_open_ended and request.samples < TUNING.fewest_joined_samples:
         return None
     look = _Look(integrator, source)
-    if not 0 < look.emitters <= MOST_EMITTERS:
+    if not 0 < look.emitters <= TRANSPORT.most_vertex_emitters:
         return None
     alone = look.variance(gain)
     if alone < TUNING.least_saved:

@@ -13,10 +13,10 @@ from lippmann.rendering.preparation.exposure import gain_of, measure_exposure
 from lippmann.rendering.preparation.light_vertices import trace_light_vertices
 from lippmann.rendering.preparation.photons import shoot_photons
 from lippmann.rendering.request.render_request import RenderRequest
-from lippmann.rendering.transport.light_vertices import POINTS
 from lippmann.rendering.transport.path import PathIntegrator
 from lippmann.rendering.transport.prepared_light import PreparedLight
 from lippmann.rendering.transport.ray_source import RaySource
+from lippmann.rendering.transport.tuning import TUNING
 from lippmann.scene.values.description import Color
 
 
@@ -81,7 +81,7 @@ def prepare_light(
     passes = trace_light_vertices(paths.lit_by(light), request, source, memory, gain)
     if passes is not None:
         light = replace(light, light_vertices=passes.of_pass(0), vertex_passes=passes)
-        choices["light_vertices"] = POINTS
+        choices["light_vertices"] = TUNING.light_vertices
     if request.clamp_indirect is not None:
         light = replace(light, most_indirect=mi.Float(request.clamp_indirect / gain))
     chains = count_chains(paths.scene, request) if stands_alone else 0

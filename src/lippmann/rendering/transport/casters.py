@@ -25,9 +25,8 @@ from lippmann.device.types import (
     UInt32,
     Vector3f,
 )
+from lippmann.rendering.transport.tuning import TUNING
 
-#: Emitters are small whose area is less than this part of the square of the scene's diagonal.
-SMALL = 1e-3
 #: The point met on the way from an emitter is the one that was drawn if it is nearer than this part of the way, and
 #: their normals agree to this cosine: the back of a thin body is another point.
 _SAME_POINT, _SAME_SIDE = 1e-5, 0.5
@@ -166,7 +165,7 @@ def _has_small_emitter(scene: MitsubaScene) -> bool:
     if any(mi.has_flag(emitter.flags(), mi.EmitterFlags.Delta) for emitter in scene.emitters()):
         return True
     box = scene.bbox()
-    small = SMALL * float(dr.squared_norm(box.max - box.min))
+    small = TUNING.small_emitter * float(dr.squared_norm(box.max - box.min))
     return any(_area(shape) < small for shape in scene.shapes() if shape.is_emitter())
 
 

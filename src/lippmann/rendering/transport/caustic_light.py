@@ -9,9 +9,7 @@ from lippmann.device.sobol import SampleStream
 from lippmann.device.types import Bool, BSDFPtr, Color3f, Float, Spectrum, SurfaceInteraction3f, UInt32, Vector3f
 from lippmann.rendering.transport.photon_map import PhotonMap
 from lippmann.rendering.transport.sharp_events import facing_normal
-
-#: Parts of the photons about a point that is seen: a power of two. Successive samples of a pixel look at one part each.
-PHOTON_PARTS = 4
+from lippmann.rendering.transport.tuning import TUNING
 
 
 def caustic_light(
@@ -43,7 +41,7 @@ def caustic_light(
     seen:
         Whether the point is seen by sharp events alone.
     """
-    parts = dr.select(seen, mi.UInt32(PHOTON_PARTS), 1)
+    parts = dr.select(seen, mi.UInt32(TUNING.photon_parts), 1)
     part = (stream.key + stream.index) & (parts - 1)
     half = mi.UInt32(stream.half)
     found = photons.gather(si, facing_normal(si), lobe, half, further, choice, seen, active, part, parts)

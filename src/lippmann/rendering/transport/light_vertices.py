@@ -40,17 +40,10 @@ from lippmann.rendering.transport.pass_schedule import PassSchedule
 from lippmann.rendering.transport.path_weights import mis_weight
 from lippmann.rendering.transport.photon_map import are_inside
 from lippmann.rendering.transport.sharp_events import lambertian_share
+from lippmann.rendering.transport.tuning import TUNING
 
 Floats = NDArray[np.float32]
 
-#: Points of each half of a picture, before those are left out that scatter nothing.
-POINTS = 1 << 16
-#: Rays of the pilot for each emitter, and in all.
-PILOT_OF_EMITTER, PILOT = 1 << 12, 1 << 16
-#: Share of the rays that goes to all emitters alike, those included of which the pilot met nothing.
-UNIFORM_SHARE = 0.1
-#: Scenes of more emitters are to be left to paths: each has a start of its own in the kernel of rays.
-MOST_EMITTERS = 1 << 6
 _SEED_STEPS = (0x2C1B3C6D, 0x297A2D39)
 _PILOT_STEP, _PASS_STEP = 0x846CA68B, 0x7FEB352D
 
@@ -277,10 +270,11 @@ class LightVertexPasses:
         """The light vertices of pass ``number``, from 0 on."""
         assert self._chances is not None
         if self._current is None or self._current[0] != number:
-            chosen, chances = _dealt(self._chances, POINTS)
+            chosen, chances = _dealt(self._chances, TUNING.light_vertices)
             seeds = [(self._seed + step + number * _PASS_STEP) % 2**32 for step in _SEED_STEPS]
             first, second = (self._rays.meet(chosen, chances, seed)[0] for seed in seeds)
-            self._current = number, LightVertices(self._scene, (first, second), POINTS, self._rays.densities(chances))
+            densities = self._rays.densities(chances)
+            self._current = number, LightVertices(self._scene, (first, second), TUNING.light_vertices, densities)
         return self._current[1]
 
     def _pilot(self, region: NDArray[np.float64] | None) -> NDArray[np.float64] | None:
@@ -289,14 +283,14 @@ class LightVertexPasses:
         if senders == 0:
             return None
         even = np.full(senders, 1 / senders)
-        chosen, chances = _dealt(even, min(PILOT_OF_EMITTER * senders, PILOT))
+        chosen, chances = _dealt(even, min(TUNING.vertex_pilot_of_emitter * senders, TUNING.vertex_pilot))
         points, met = self._rays.meet(chosen, chances, (self._seed + _PILOT_STEP) % 2**32)
         seen = are_inside(points.position, region)
         if not seen.any():
             return None
         power = points.glow[seen].max(axis=1).astype(np.float64)
         sums = np.bincount(chosen[met][seen], power, minlength=senders)
-        return np.asarray(UNIFORM_SHARE * even + (1 - UNIFORM_SHARE) * sums / sums.sum())
+        return np.asarray(TUNING.vertex_uniform_share * even + (1 - TUNING.vertex_uniform_share) * sums / sums.sum())
 
 
 def _dealt(chances: NDArray[np.float64], count: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]:

@@ -44,7 +44,6 @@ from lippmann.rendering.transport.path_techniques import (
 )
 from lippmann.rendering.transport.path_vertex import LastVertex, Scattering, Vertex
 from lippmann.rendering.transport.path_weights import (
-    ROULETTE_DEPTH,
     Clamp,
     first_emitter_samples,
     mis_weight,
@@ -53,6 +52,7 @@ from lippmann.rendering.transport.path_weights import (
 from lippmann.rendering.transport.prepared_light import PreparedLight
 from lippmann.rendering.transport.scene_features import SceneFeatures
 from lippmann.rendering.transport.shadow_rays import MAX_CROSSINGS, ShadowRays
+from lippmann.rendering.transport.tuning import TUNING
 
 #: Sample dimensions used at one vertex.
 DIMENSIONS_PER_VERTEX = 4
@@ -212,7 +212,7 @@ class PathIntegrator:
 
             # ---- Russian roulette ----
             survival = roulette_survival(throughput, eta)
-            at_risk = continues & (depth >= ROULETTE_DEPTH) & ~passes
+            at_risk = continues & (depth >= TUNING.roulette_depth) & ~passes
             throughput = dr.select(at_risk, throughput * dr.rcp(survival), throughput)
             continues &= ~at_risk | (stream.next_1d(dimension + 3) < survival)
 

@@ -6,12 +6,7 @@ import drjit as dr
 import mitsuba as mi
 
 from lippmann.device.types import Bool, Float, Spectrum, UInt32
-
-#: Surfaces after which Russian roulette may end a path.
-ROULETTE_DEPTH = 5
-#: Emitter samples at the first surface of a path that is not purely specular: ``FIRST_EMITTER_SAMPLES`` in each of a
-#: pixel's first ``FIRST_SAMPLES`` samples, then ``LATER_EMITTER_SAMPLES``. Powers of two keep all points stratified.
-FIRST_EMITTER_SAMPLES, LATER_EMITTER_SAMPLES, FIRST_SAMPLES = 4, 2, 4
+from lippmann.rendering.transport.tuning import TUNING
 
 
 def mis_weight(pdf: Float, *others: Float) -> Float:
@@ -40,11 +35,11 @@ def first_emitter_samples(sample: UInt32) -> tuple[UInt32, UInt32]:
     The start is the index of the first of them in the pixel's sequence of points, which all paths of the pixel share
     without gaps.
     """
-    early = sample < FIRST_SAMPLES
-    before = FIRST_EMITTER_SAMPLES * FIRST_SAMPLES
-    later = before + LATER_EMITTER_SAMPLES * (sample - FIRST_SAMPLES)
-    first = dr.select(early, FIRST_EMITTER_SAMPLES * sample, later)
-    return dr.select(early, mi.UInt32(FIRST_EMITTER_SAMPLES), LATER_EMITTER_SAMPLES), first
+    early = sample < TUNING.early_samples
+    before = TUNING.early_emitter_samples * TUNING.early_samples
+    later = before + TUNING.later_emitter_samples * (sample - TUNING.early_samples)
+    first = dr.select(early, TUNING.early_emitter_samples * sample, later)
+    return dr.select(early, mi.UInt32(TUNING.early_emitter_samples), TUNING.later_emitter_samples), first
 
 
 class Clamp:

@@ -19,14 +19,10 @@ from lippmann.device.kernel_ops import upload
 from lippmann.device.syntax import syntax
 from lippmann.device.types import Bool, Color3f, Float, Point3f, SurfaceInteraction3f, UInt32, Vector3f
 from lippmann.rendering.transport.sharp_events import is_sharp
+from lippmann.rendering.transport.tuning import TUNING
 
 Floats = NDArray[np.float32]
 
-#: The least cosine between the normals of a photon and of the point, and how far photons may lie from the tangent plane
-#: there, in radii.
-LEAST_AGREEMENT, FARTHEST_FROM_PLANE = 0.7, 0.4
-#: Limit on what interpolated normals may add to light that grazes the true surface.
-STEEPEST = 4.0
 #: Least slope of a plane, and least area in faces of a cell, by which light in a cell is divided.
 _LEAST_SLOPE, _LEAST_AREA = 0.01, 0.05
 _PRIMES = (73856093, 19349663, 83492791)
@@ -206,7 +202,7 @@ class PhotonMap:
         p = mi.Point3f(si.p)
         base = dr.floor(p / r) - 1
         # How far the tangent plane's slab reaches from the centre of a cell that it touches.
-        reach = r * (FARTHEST_FROM_PLANE + 0.5 * dr.sum(dr.abs(normal)))
+        reach = r * (TUNING.farthest_from_plane + 0.5 * dr.sum(dr.abs(normal)))
         total = mi.Color3f(0)
         weights = mi.Float(0)  # of the photons met so far; one of them is chosen by reservoir sampling
         chosen = mi.Vector3f(0, 0, 1)
@@ -244,8 +240,8 @@ class PhotonMap:
                     fits = near & dr.all(dr.floor(q / r) == cell)
                     n = dr.gather(mi.Vector4f, self._normal, number, near).xyz
                     d = dr.gather(mi.Vector4f, self._toward, number, near).xyz
-                    fits &= (dr.dot(n, normal) > LEAST_AGREEMENT) & (dr.dot(d, normal) > 0)
-                    fits &= dr.abs(dr.dot(apart, normal)) < FARTHEST_FROM_PLANE * r
+                    fits &= (dr.dot(n, normal) > TUNING.least_agreement) & (dr.dot(d, normal) > 0)
+                    fits &= dr.abs(dr.dot(apart, normal)) < TUNING.farthest_from_plane * r
                     brought = dr.gather(mi.Vector4f, self._power_and_surfaces, number, fits)
                     fits &= brought.w <= mi.Float(surfaces)
                     wo = si.to_local(d)
@@ -260,7 +256,7 @@ class PhotonMap:
                     choice = dr.select(taken, choice / share, (choice - share) / (1 - share))
                     chosen = dr.select(taken, d, chosen)
                     # Photons know the true surface; it is shaded by its interpolated normal.
-                    power *= dr.minimum(dr.abs(wo.z) / dr.dot(d, normal), STEEPEST)
+                    power *= dr.minimum(dr.abs(wo.z) / dr.dot(d, normal), TUNING.steepest)
                     total += power
                     color = dr.select(taken, power / weight, color)
                 number += step
@@ -339,8 +335,8 @@ def irradiance_of_cell(photons: Photons, position: Floats, normal: Floats, side:
         flat = np.linalg.svd(n[None])[2][1:]  # two directions in the plane
         area = max(ConvexHull(meetings * side @ flat.T).volume, _LEAST_AREA * side**2)
         fits = (np.floor(photons.position / side) == cell).all(axis=1)
-        fits &= (photons.normal @ n > LEAST_AGREEMENT) & (photons.toward @ n > 0)
-        fits &= np.abs((photons.position - point) @ n) < FARTHEST_FROM_PLANE * side
+        fits &= (photons.normal @ n > TUNING.least_agreement) & (photons.toward @ n > 0)
+        fits &= np.abs((photons.position - point) @ n) < TUNING.farthest_from_plane * side
         found[number] = photons.power[fits].sum(axis=0) / area
     return found
 
@@ -352,9 +348,9 @@ def irradiance_by_all(
     apart = photons.position[None] - position[:, None]
     distance2 = (apart**2).sum(axis=2)
     fits = distance2 < radius**2
-    fits &= np.einsum("nk,mk->mn", photons.normal, normal) > LEAST_AGREEMENT
+    fits &= np.einsum("nk,mk->mn", photons.normal, normal) > TUNING.least_agreement
     fits &= np.einsum("nk,mk->mn", photons.toward, normal) > 0
-    fits &= np.abs(np.einsum("mnk,mk->mn", apart, normal)) < FARTHEST_FROM_PLANE * radius
+    fits &= np.abs(np.einsum("mnk,mk->mn", apart, normal)) < TUNING.farthest_from_plane * radius
     fits &= photons.surfaces[None] <= surfaces
     weight = np.where(fits, 1 - distance2 / radius**2, 0)
     return np.asarray(weight @ photons.power * 2 / (math.pi * radius**2), dtype=np.float32)

@@ -43,10 +43,8 @@ from lippmann.rendering.transport.path_vertex import LastVertex, Scattering, Ver
 from lippmann.rendering.transport.ray_source import PixelRays
 from lippmann.rendering.transport.shadow_rays import MAX_CROSSINGS
 from lippmann.rendering.transport.sharp_events import follows_sharply, is_sharp
+from lippmann.rendering.transport.tuning import TUNING
 
-#: Linear value of a pixel, white being 1, up to which one of :data:`_OF_CHAINS` chains counts. One of fewer counts
-#: for more of it, as fewer highlights are met by one alone: the limit of a chain goes with this power of their number.
-MOST_OF_ONE, _OF_CHAINS, _POWER = 0.3, 256.0, 0.75
 #: Tells the streams of chains from those of paths.
 _CHAINS = 0x5EE21147
 #: Sample dimensions used at one vertex.
@@ -85,7 +83,8 @@ def _covered(hit: FirstHit) -> Float:
 
 def most_of_chain(chains: Float) -> Float:
     """Linear value, white being 1, up to which one of so many ``chains`` of a pixel counts."""
-    return MOST_OF_ONE * _OF_CHAINS * (chains / _OF_CHAINS) ** _POWER
+    most, number = TUNING.most_of_one, TUNING.of_chains
+    return most * number * (chains / number) ** TUNING.most_power
 
 
 @syntax

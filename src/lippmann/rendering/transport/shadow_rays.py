@@ -14,12 +14,10 @@ import mitsuba as mi
 from lippmann.device.pbr.straight_through import is_instance, may_pass
 from lippmann.device.syntax import syntax
 from lippmann.device.types import Bool, MitsubaScene, Point3f, Ray3f, Shape, Spectrum, UInt32
+from lippmann.rendering.transport.tuning import TUNING
 
 #: Straight-through surfaces that one ray may cross before it counts as blocked. Bounds the loop between many panes.
 MAX_CROSSINGS = 64
-#: Opaque primitives beyond which a second acceleration structure takes more memory than its time is worth: of so many
-#: it takes some 100 MB.
-MOST_OPAQUE = 1 << 20
 
 
 class ShadowRays:
@@ -83,7 +81,7 @@ def _divided(scene: MitsubaScene) -> tuple[MitsubaScene, MitsubaScene]:
     # Instances need their groups, which no scene tells. A kernel of the GPU traces rays in one scene alone: those in a
     # second one meet nothing, and Dr.Jit only warns.
     undivided = dr.backend_v(mi.Float) == dr.JitBackend.CUDA or any(is_instance(shape) for shape in others)
-    if undivided or not opaque or sum(shape.primitive_count() for shape in opaque) > MOST_OPAQUE:
+    if undivided or not opaque or sum(shape.primitive_count() for shape in opaque) > TUNING.most_opaque:
         return None, scene
     return _scene_of(opaque), _scene_of(others)
 

@@ -18,12 +18,10 @@ import mitsuba as mi
 
 from lippmann.device.pbr.gltf_bsdf import LAMBERTIAN, SHARP_LOBE, WIDE_LOBES
 from lippmann.device.types import Bool, BSDFPtr, BSDFSample3f, Color3f, SurfaceInteraction3f, Vector3f
+from lippmann.rendering.transport.tuning import TUNING
 
 #: Sharp events between an emitter and a caustic, at most; light of more is left to paths.
 MOST_EVENTS = 6
-#: Cosine between half vector and normal from which on a reflection is sharp: that of 0.05 rad, 2.5 times the width of
-#: the widest lobe that counts as narrow.
-LEAST_COSINE = math.cos(0.05)
 
 
 def sharp_lobe(si: SurfaceInteraction3f, bsdf: BSDFPtr, active: Bool) -> Vector3f:
@@ -36,7 +34,7 @@ def is_sharp(si: SurfaceInteraction3f, lobe: Vector3f, wo: Vector3f) -> Bool:
     """Whether scattering from ``wo`` to ``si.wi`` is sharp, by a lobe from :func:`sharp_lobe`."""
     half = dr.normalize(si.wi + wo)
     reflected = si.wi.z * wo.z > 0
-    return (dr.squared_norm(lobe) > 0) & (~reflected | (dr.dot(half, lobe) > LEAST_COSINE))
+    return (dr.squared_norm(lobe) > 0) & (~reflected | (dr.dot(half, lobe) > math.cos(TUNING.least_cosine_angle)))
 
 
 def follows_sharply(si: SurfaceInteraction3f, lobe: Vector3f, bs: BSDFSample3f) -> Bool:

@@ -20,22 +20,20 @@ from lippmann.rendering.transport.sharp_events import (
     lambertian,
     sharp_lobe,
 )
-
-#: Radius of a wider look-up over that of the picture's.
-WIDER = 2.0
+from lippmann.rendering.transport.tuning import TUNING
 
 
 class ShownCaustics:
     """Radiance of the caustics that rays of ``integrator`` show, by the ``photons``.
 
-    Where it is their ``blur``: what that adds, of either sign, by look-ups of :data:`WIDER` radii. It is that of
+    Where it is their ``blur``: what that adds, of either sign, by look-ups of wider radii. It is that of
     Lambertian lobes; the gloss of the same surfaces is taken to be blurred no more.
     """
 
     # Not a dataclass: Dr.Jit would take it for loop state and write its fields.
     def __init__(self, integrator: PathIntegrator, photons: PhotonMap, blur: bool = False) -> None:
         self._paths, self._photons = integrator, photons
-        self._wide = PhotonMap(photons.halves, WIDER * photons.radius) if blur else None
+        self._wide = PhotonMap(photons.halves, TUNING.wider_look_up * photons.radius) if blur else None
 
     @syntax
     def sample(self, ray: Ray3f, stream: SampleStream, active: Bool) -> Spectrum:

@@ -31,9 +31,10 @@ from lippmann.device.types import (
 )
 from lippmann.rendering.transport.integrator import FirstHit, RayCounts
 from lippmann.rendering.transport.light_sampling import LightSampler, SceneLightSampler
-from lippmann.rendering.transport.path_weights import ROULETTE_DEPTH, mis_weight, roulette_survival
+from lippmann.rendering.transport.path_weights import mis_weight, roulette_survival
 from lippmann.rendering.transport.scene_features import Color
 from lippmann.rendering.transport.shadow_rays import MAX_CROSSINGS
+from lippmann.rendering.transport.tuning import TUNING
 
 #: Collisions, null collisions included, along one path or shadow ray: bounds the loop in media that are all but opaque.
 MAX_COLLISIONS = 1 << 16
@@ -194,7 +195,7 @@ class VolumePathIntegrator:
 
             # ---- Russian roulette ----
             survival = roulette_survival(throughput, eta)
-            at_risk = continues & bounces & (depth >= ROULETTE_DEPTH)
+            at_risk = continues & bounces & (depth >= TUNING.roulette_depth)
             throughput = dr.select(at_risk, throughput * dr.rcp(survival), throughput)
             continues &= ~at_risk | (stream.next_1d(dimension + 6) < survival)
 

@@ -1,0 +1,74 @@
+"""Tuned constants of the transport of light, each with its unit, the benchmark that set it and what others cost."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class TransportTuning:
+    """Constants of paths, of chains of seen light, of photons' look-ups and of light vertices.
+
+    Attributes
+    ----------
+    roulette_depth:
+        Surfaces after which Russian roulette may end a path.
+    early_emitter_samples, later_emitter_samples, early_samples:
+        Emitter samples at the first surface of a path that is not purely specular: ``early_emitter_samples`` in each of
+        a pixel's first ``early_samples`` samples, then ``later_emitter_samples``. Powers of two keep all points
+        stratified.
+    most_of_one, of_chains, most_power:
+        Linear value of a pixel, white being 1, up to which one of ``of_chains`` chains counts. One of fewer counts for
+        more of it, as fewer highlights are met by one alone: the limit of a chain goes with this power of their number
+        (docs/research/seen-light.md).
+    least_cosine_angle:
+        Radians between half vector and normal up to which a reflection is sharp: 2.5 times the width of the widest lobe
+        that counts as narrow.
+    small_emitter:
+        Emitters are small whose area is less than this part of the square of the scene's diagonal.
+    most_opaque:
+        Opaque primitives beyond which a second acceleration structure takes more memory than its time is worth: of so
+        many it takes some 100 MB.
+    least_agreement, farthest_from_plane:
+        The least cosine between the normals of a photon and of the point that it is looked up at, and how far it may
+        lie from the tangent plane there, in radii.
+    steepest:
+        Limit on what interpolated normals may add to light that grazes the true surface.
+    photon_parts:
+        Parts of the photons about a point that is seen: a power of two. Successive samples of a pixel look at one part
+        each (``kernel_profile.py``).
+    wider_look_up:
+        Radius of a wider look-up over that of the picture's, by which blur is told.
+    light_vertices:
+        Points of each half of a picture, before those are left out that scatter nothing.
+    vertex_pilot_of_emitter, vertex_pilot:
+        Rays of their pilot for each emitter, and in all.
+    vertex_uniform_share:
+        Share of the rays that goes to all emitters alike, those included of which the pilot met nothing.
+    most_vertex_emitters:
+        Scenes of more emitters are left to paths: each has a start of its own in the kernel of rays.
+    """
+
+    roulette_depth: int = 5
+    early_emitter_samples: int = 4
+    later_emitter_samples: int = 2
+    early_samples: int = 4
+    most_of_one: float = 0.3
+    of_chains: float = 256.0
+    most_power: float = 0.75
+    least_cosine_angle: float = 0.05
+    small_emitter: float = 1e-3
+    most_opaque: int = 1 << 20
+    least_agreement: float = 0.7
+    farthest_from_plane: float = 0.4
+    steepest: float = 4.0
+    photon_parts: int = 4
+    wider_look_up: float = 2.0
+    light_vertices: int = 1 << 16
+    vertex_pilot_of_emitter: int = 1 << 12
+    vertex_pilot: int = 1 << 16
+    vertex_uniform_share: float = 0.1
+    most_vertex_emitters: int = 1 << 6
+
+
+TUNING = TransportTuning()
