@@ -215,6 +215,7 @@ def render(
         suggests, 1 for ``classic``, and with a quality or a time as many as that takes.
     effort:
         ``draft``: a first look, one sample a pixel and the fast network. ``normal`` (default): as the other values say.
+        ``final``: until it is estimated at 40 dB, as for a print.
     quality, quality_worst:
         PSNR in dB that the whole picture, or every micro-image, is to reach by its own estimate; above 0, at most 80.
         Where the former is asked for, no micro-image has over 12 dB less.

@@ -177,6 +177,17 @@ def test_a_draft_and_a_modest_quality_take_no_more_samples_than_nothing_asked(li
     assert 30 <= modest["estimate"]["psnr"] < usual["estimate"]["psnr"]
 
 
+def test_a_final_picture_says_that_it_is_good(lippmann, engine, tmp_path, small):
+    done = lippmann("render", "teapot", "--display", small, "--effort", "final", "--json", "-o", tmp_path / "a.png")
+    assert done.code == 0, done.err
+    assert done.json["estimate"]["psnr"] >= 40
+    assert done.json["spp"] <= 256
+    assert "quality: 40 (a final picture)" in done.json["options"]["plan"]
+    refused = lippmann("render", "teapot", "--effort", "final", "--spp", 4, "-o", tmp_path / "b.png")
+    assert refused.code == 2
+    assert refused.err.startswith("lippmann: --spp: 4 beside a final picture; it works until it is good by itself;")
+
+
 @pytest.mark.parametrize("option", ["--quality", "--quality-worst", "--spp", "--max-time"])
 @pytest.mark.parametrize("command", [("render",), ("quilt", "render")])
 def test_a_draft_beside_another_goal_is_refused(lippmann, tmp_path, command, option):

@@ -223,3 +223,29 @@ def test_a_pilots_results_take_the_place_of_what_it_decides():
     assert plan.with_pilot({}).entries["caustics"].value == "none"
     asked = resolve(RenderRequest(caustics="paths"), SCENE).plan
     assert asked.with_pilot({"caustics": "paths"}).entries["caustics"].reason == ASKED
+
+
+@pytest.mark.parametrize(
+    ("form", "values", "expected"),
+    [
+        ("picture", {}, ("pooled", 40.0, 256)),
+        ("quilt", {}, ("pooled", 40.0, 256)),
+        ("picture", {"method": "full"}, ("full", 40.0, 256)),
+        ("picture", {"method": "lens-view"}, ("lens-view", None, 64)),
+        ("picture", {"integrator": "classic"}, ("full", None, 64)),
+        ("tiles", {}, ("pooled", None, 64)),
+        ("forecast", {}, ("pooled", None, 64)),
+        ("preview", {}, ("full", None, 64)),
+    ],
+)
+def test_a_final_picture_works_for_a_quality_where_it_can(form, values, expected):
+    display = None if form == "preview" else load_display("seed-lenticular")
+    planned = resolve(RenderRequest(effort="final", **values), SCENE, display, form)
+    assert (planned.method, planned.quality, planned.spp) == expected
+    assert planned.spp_reserve is None
+    assert "final" in planned.plan.samples.reason
+
+
+def test_a_photograph_is_final_with_one_ray():
+    planned = resolve(RenderRequest(effort="final"), unlit(fills_panel=True), load_display("seed-lenticular"))
+    assert (planned.spp, planned.quality, planned.denoise) == (1, None, "none")

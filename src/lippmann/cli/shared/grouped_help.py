@@ -25,7 +25,6 @@ OPTION_GROUPS: Mapping[str, tuple[str, ...]] = {
         "--integrator",
         "--depth",
         "--allow-outside",
-        "--single-scattering",
     ),
     "Placement": ("--camera", "--place", "--turn", "--shift", "--scale", "--depth-scale", "--pop-out"),
     "Display": (
@@ -59,11 +58,7 @@ OPTION_GROUPS: Mapping[str, tuple[str, ...]] = {
         "--spp",
         "--method",
         "--denoise",
-        "--order",
-        "--respect-gloss",
-        "--pixel-filter",
         "--caustics",
-        "--clamp-indirect",
         "--seed",
     ),
     "Output": ("--output", "--open", "--bits", "--layers", "--maps", "--resume", "--json", "--quiet"),
@@ -95,6 +90,7 @@ OPTION_GROUPS: Mapping[str, tuple[str, ...]] = {
     ),
     "Cluster": ("--cluster", "--tls-ca", "--tls-cert", "--tls-key"),
     "Machine": ("--device", "--threads", "--memory"),
+    "Rarely needed": ("--pixel-filter", "--clamp-indirect", "--single-scattering", "--order", "--respect-gloss"),
 }
 _REST, _HELP = "Options", "--help"
 

@@ -291,7 +291,7 @@ Effort = Annotated[
     typer.Option(
         "--effort",
         help="draft: a first look, one sample a pixel and the fast network; normal: as the picture's size suggests, or "
-        "as --spp, --quality or --max-time say.",
+        "as --spp, --quality or --max-time say; final: until it is estimated at 40 dB, as for a print.",
     ),
 ]
 Quality = Annotated[
@@ -315,8 +315,9 @@ Denoise = Annotated[
     choices.Denoiser,
     typer.Option(
         "--denoise",
-        help="none, or oidn: take the noise out with Open Image Denoise, with the effort that the rays deserve; "
-        "oidn-fast and oidn-high name it. auto: with --method pooled, which auto takes.",
+        metavar="[auto|none|oidn]",
+        help="none, or oidn: take the noise out with Open Image Denoise, with the effort that the rays deserve. "
+        "auto: with --method pooled, which auto takes.",
     ),
 ]
 Layers = Annotated[

@@ -9,8 +9,8 @@ Method = Literal["auto", "full", "lens-view", "interpolated", "pooled"]
 Order = Literal["default", "paper"]
 Integrator = Literal["auto", "classic", "path", "direct", "normal", "depth", "position", "albedo"]
 PixelFilter = Literal["auto", "box", "point"]
-#: How much a picture may take: ``draft`` is one sample and the fast network.
-Effort = Literal["draft", "normal"]
+#: How much a picture may take: ``draft`` is one sample and the fast network, ``final`` a quality for a print.
+Effort = Literal["draft", "normal", "final"]
 Device = Literal["auto", "cpu", "gpu"]
 #: ``auto``: ``pbr-neutral`` for physically based light, but before a background whose colour was asked for, and in
 #: files for data.

@@ -63,6 +63,28 @@ class SampleBudget:
 BUDGET = SampleBudget()
 
 
+@dataclass(frozen=True)
+class FinalPicture:
+    """What a picture of the effort ``final`` is to have.
+
+    Attributes
+    ----------
+    quality:
+        PSNR in dB, by its own estimate: noise of 2.5 codes of 8 bits, which a print hides (``goals.py``).
+    most:
+        Samples per pixel with which it is given up.
+    samples:
+        Samples per pixel where no goal can be followed: in tiles, forecasts, plain pictures and reused points.
+    """
+
+    quality: float = 40.0
+    most: int = 256
+    samples: int = 64
+
+
+FINAL = FinalPicture()
+
+
 def make_plan(
     scene: Scene, display: Display | None, request: RenderRequest, form: Form, size: tuple[int, int] | None
 ) -> RenderPlan:
@@ -90,6 +112,7 @@ def make_plan(
         method=method,
         denoise=denoise,
         samples=samples,
+        quality=_quality(facts, method.value),
         reserve=_reserve(facts, method.value, samples.value, values),
         subpixels=subpixels,
         pixel_filter=_pixel_filter(facts, samples.value),
@@ -147,6 +170,7 @@ def follow(plan: RenderPlan, request: RenderRequest) -> RenderRequest:
         method=plan.method.value,
         denoise=plan.denoise.value,
         spp=plan.samples.value,
+        quality=plan.quality.value,
         subpixels=plan.subpixels.value,
         pixel_filter=plan.pixel_filter.value,
         exposure=plan.exposure.value,
@@ -179,6 +203,11 @@ class _Facts:
     @property
     def is_pooled_light(self) -> bool:
         return self.integrator in POOLED_LIGHT
+
+    def is_final(self, method: Method) -> bool:
+        """Whether a quality is worked for because the picture is to be final."""
+        has_goal = self.form in ("picture", "quilt") and method not in REUSING and self.is_pooled_light
+        return self.request.effort == "final" and has_goal and not self.is_one_ray
 
     @property
     def is_denoised_draft(self) -> bool:
@@ -300,6 +329,10 @@ def _samples(facts: _Facts, method: Method, subpixels: bool, values: int | None)
         return Choice(None, "as many as the goal takes")
     if facts.is_one_ray:
         return Choice(1, "one ray through each pixel's middle shows it")
+    if facts.is_final(method):
+        return Choice(FINAL.most, "a final picture, at most")
+    if request.effort == "final":
+        return Choice(FINAL.samples, "a final picture, where no quality can be worked for")
     if facts.integrator == "classic" and classic is not None:
         more = classic.camera.antialiasing if facts.form == "preview" else 0
         return Choice(1 + more, "as the scene's file says")
@@ -311,8 +344,16 @@ def _samples(facts: _Facts, method: Method, subpixels: bool, values: int | None)
     return Choice(samples, f"about a million for the picture, but {fewest} to {BUDGET.most} of each pixel")
 
 
+def _quality(facts: _Facts, method: Method) -> Choice[float | None]:
+    if facts.is_final(method):
+        return Choice(FINAL.quality, "a final picture")
+    if facts.request.quality is not None:
+        return Choice(facts.request.quality)
+    return Choice(None, "none was asked for")
+
+
 def _reserve(facts: _Facts, method: Method, samples: int | None, values: int | None) -> Choice[int | None]:
-    if facts.request.spp is not None or facts.is_draft or samples is None:
+    if facts.request.spp is not None or facts.request.effort != "normal" or samples is None:
         return Choice(None, "the number of samples, or the goal, was asked for")
     if facts.form not in ("picture", "forecast") or method != "pooled" or values is None:
         return Choice(None, "a pooled picture in one piece has one")

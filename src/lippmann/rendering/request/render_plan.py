@@ -37,7 +37,9 @@ class RenderPlan:
         As of a :class:`~lippmann.rendering.request.render_request.RenderRequest`; ``exposure`` and ``caustics`` are
         "auto" where a pilot decides. ``denoise`` is ``oidn`` where the network's effort follows the traced rays.
     samples:
-        Samples per pixel, or sub-pixel; None where a goal says when to stop.
+        Samples per pixel, or sub-pixel; where a goal says when to stop the most of them, or None.
+    quality:
+        PSNR in dB that is to be reached; None for none.
     reserve:
         Samples that a picture may have that is not clean with those; None for no more.
     pilot:
@@ -49,6 +51,7 @@ class RenderPlan:
     method: Choice[Method]
     denoise: Choice[Denoiser]
     samples: Choice[int | None]
+    quality: Choice[float | None]
     reserve: Choice[int | None]
     subpixels: Choice[bool]
     pixel_filter: Choice[PixelFilter]

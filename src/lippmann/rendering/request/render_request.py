@@ -99,8 +99,9 @@ class RenderRequest:
         Samples per pixel, or per sub-pixel; 1 to 2**24. None: 16, for pooled light what the picture's size suggests, or
         with a quality or a time as many as that takes.
     effort:
-        ``normal``: what the other values say. ``draft``: one sample of each pixel, denoised by the fast network; alone,
-        without samples, a quality or a time.
+        ``normal``: what the other values say. ``draft``: one sample of each pixel, denoised by the fast network.
+        ``final``: until the picture is estimated at 40 dB, with at most 256 samples per pixel; 64 samples in tiles,
+        forecasts and plain pictures. Neither goes with samples, a quality or a time.
     quality, quality_worst:
         PSNR in dB that the whole picture (no micro-image being worse by more than 12 dB), or every micro-image, is to
         reach by its own estimate; above 0, at most 80.
@@ -188,11 +189,12 @@ class RenderRequest:
                 rule = f"must be a whole number from {low} to {high}"
                 raise UsageError(f"{value!r}", parameter=name, rule=rule)
         for name in ("spp", "quality", "quality_worst", "max_time"):
-            if self.effort == "draft" and getattr(self, name) is not None:
+            if self.effort != "normal" and getattr(self, name) is not None:
+                is_draft = self.effort == "draft"
                 raise UsageError(
-                    f"{getattr(self, name):g} beside a draft",
+                    f"{getattr(self, name):g} beside a {self.effort}{'' if is_draft else ' picture'}",
                     parameter=name,
-                    rule="a draft has one sample a pixel",
+                    rule="a draft has one sample a pixel" if is_draft else "it works until it is good by itself",
                     fix='leave it out, or use effort="normal"',
                 )
         for name, (most, rule) in _POSITIVE.items():

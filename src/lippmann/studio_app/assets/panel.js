@@ -8,7 +8,7 @@ import { lightBall, wrapped } from "studio/light_ball.js";
 const QUALITIES = [
   ["", "As the picture's size suggests"],
   ["draft", "Draft, one sample"],
-  ["40", "Good, 40 dB"],
+  ["final", "Final, 40 dB"],
   ["46", "Fine, 46 dB"],
 ];
 const SUBPIXELS = [
@@ -173,14 +173,14 @@ export class Panel {
     const background = color("Background", (value) => this.store.set({ background: value && linear(value) }));
     const quality = choice("Quality of a render", QUALITIES, (value) =>
       this.store.set({
-        effort: value === "draft" ? "draft" : "normal",
-        quality: value === "" || value === "draft" ? null : Number(value),
+        effort: value === "draft" || value === "final" ? value : "normal",
+        quality: Number(value) || null,
       }),
     );
     this.#rows.push((state) => {
       exposure.show(state.exposure === "auto" ? null : state.exposure, this.facts?.exposure ?? null);
       background.show(state.background && coded(state.background));
-      quality.show(state.effort === "draft" ? "draft" : state.quality === null ? "" : String(state.quality));
+      quality.show(state.effort !== "normal" ? state.effort : state.quality === null ? "" : String(state.quality));
     });
     return section("Picture", exposure.row, background.row, quality.row);
   }
