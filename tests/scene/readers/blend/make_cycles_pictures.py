@@ -100,10 +100,12 @@ def excluded():
     bpy.context.view_layer.layer_collection.children["aside"].exclude = True
 
 
-def linear_texture():
+def pictured(*, space, is_float, colors=((0.5, 0.2, 0.1), (0.05, 0.3, 0.6))):
+    """A plane with a picture of two colours, of numbers in a colour space."""
     fresh()
-    picture = bpy.data.images.new("linear", 4, 4, float_buffer=True)
-    picture.pixels[:] = [0.5, 0.2, 0.1, 1.0] * 8 + [0.05, 0.3, 0.6, 1.0] * 8
+    picture = bpy.data.images.new("picture", 4, 4, float_buffer=is_float)
+    picture.colorspace_settings.name = space
+    picture.pixels[:] = [channel for color in colors for channel in (*color, 1.0) * 8]
     picture.pack()
     material = paint("pictured")
     tree = material.node_tree
@@ -114,12 +116,34 @@ def linear_texture():
     bpy.context.object.data.materials.append(material)
 
 
+def linear_texture():
+    pictured(space="Linear Rec.709", is_float=True)
+
+
+def picture_of_another_space():
+    pictured(space="ACEScg", is_float=False, colors=((0.5, 0.3, 0.2), (0.2, 0.3, 0.5)))
+
+
+def work_in_acescg():
+    if hasattr(bpy.data, "colorspace"):  # from Blender 5 on
+        bpy.ops.wm.set_working_color_space(working_space="ACEScg", convert_colors=True)
+
+
+def picture_in_working_space():
+    pictured(space="Linear Rec.709", is_float=True)
+    work_in_acescg()
+
+
+def vertices_in_working_space():
+    vertex_colors()
+    work_in_acescg()
+
+
 def working_space():
     fresh((0.3, 0.1, 0.1))
     put("Cube", cube(material=paint("red", (0.8, 0.1, 0.1))), (0.0, 0.0, 0.4))
     light("POINT", (1.0, -2.0, 3.0), energy=300.0, color=(1.0, 0.2, 0.2))
-    if hasattr(bpy.data, "colorspace"):  # from Blender 5 on
-        bpy.ops.wm.set_working_color_space(working_space="ACEScg", convert_colors=True)
+    work_in_acescg()
 
 
 def shift():
@@ -258,6 +282,9 @@ SCENES = {
         lights,
         excluded,
         linear_texture,
+        picture_of_another_space,
+        picture_in_working_space,
+        vertices_in_working_space,
         working_space,
         shift,
         tall,
@@ -300,5 +327,6 @@ if __name__ == "__main__":
         bpy.context.view_layer.update()
         path = Path(words[0], f"{name}.blend")
         bpy.ops.wm.save_as_mainfile(filepath=str(path), check_existing=False)
+        bpy.ops.wm.open_mainfile(filepath=str(path))  # as any program finds it
         bpy.context.scene.render.filepath = str(path.with_suffix(".exr"))
         bpy.ops.render.render(write_still=True)

@@ -17,10 +17,13 @@ MAKE = Path(__file__).with_name("make_cycles_pictures.py")
 #: Scenes of ``make_cycles_pictures.py`` that are shown as they are, without a note.
 PLAIN = (
     *("temperature", "excluded", "linear_texture", "shift", "tall", "collections", "modifiers", "geometry_nodes"),
-    *("principled", "vertex_colors", "slots"),
+    *("principled", "vertex_colors", "slots", "picture_of_another_space"),
 )
 #: Those of which a note says what is shown otherwise.
-NOTED = ("not_normalized", "lights", "working_space", "unseen")
+NOTED = (
+    *("not_normalized", "lights", "working_space", "unseen"),
+    *("picture_in_working_space", "vertices_in_working_space"),
+)
 
 
 @pytest.fixture(scope="module")

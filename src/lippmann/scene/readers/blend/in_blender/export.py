@@ -22,7 +22,7 @@ from .lights import camera_frames, describe_lights, focus_distances
 from .plain_values import plain_values
 from .remarks import remark_lights, remark_materials, remark_objects, remark_scene, unseen_objects
 from .render_view import as_rendered
-from .working_space import materials_to_rec709
+from .working_space import materials_to_rec709, vertex_colors_to_rec709
 from .world import write_world
 
 SCENE, WORLD = "scene.glb", "world.exr"
@@ -86,6 +86,7 @@ def export_scene(folder: Path, *, is_animated: bool = False) -> Exported:
     leave_out(glb, aside, instancers)
     leave_out_unseen(glb, unseen, remark)
     materials_to_rec709(glb)
+    vertex_colors_to_rec709(glb)
     add_default_material(glb)
     add_lights(glb, lights, unit)
     add_focus(glb, focus, unit)

@@ -8,15 +8,21 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import bpy
 import numpy as np
 
 from .render_view import Changes
+from .working_space import rec709_from_scene
+from .world import write_linear
 
 #: Names of colour spaces, by their beginnings, whose numbers are in proportion to light, or no colours at all.
 _LINEAR = ("Linear", "Non-Color", "Raw", "ACEScg", "ACES2065")
+#: Of these, those whose numbers are taken as they stand, as numbers of the working space.
+_BARE = ("Non-Color", "Raw")
 #: Nodes that take in a picture's colour as numbers.
 _NUMBER_NODES = ("NORMAL_MAP", "SEPARATE_COLOR", "SEPRGB", "BUMP", "DISPLACEMENT")
 
@@ -56,30 +62,58 @@ def _trees() -> list[Any]:
 def _as_exported(node: Any, remark: Any) -> Any:
     """A copy of the node's picture in the numbers that glTF has where the node is used; None where they are so."""
     image = node.image
-    is_linear = image.is_float or image.colorspace_settings.name.startswith(_LINEAR)
+    space = image.colorspace_settings.name
+    is_linear = image.is_float or space.startswith(_LINEAR)
     uses = _uses(node, set())
     if uses == {"color", "number"}:
         remark(f"picture '{image.name}': a material takes its colours for colours and for numbers; one of both is off")
         return None
-    if uses != ({"color"} if is_linear else {"number"}):
+    is_color = uses == {"color"}
+    if not uses or (not image.is_float and space.startswith("sRGB") if is_color else is_linear):
         return None
-    values = np.empty(image.size[0] * image.size[1] * image.channels, np.float32)
-    image.pixels.foreach_get(values)
-    values = values.reshape(-1, image.channels)
+    is_bare = not is_color or image.is_float or space.startswith(_BARE)
+    values = _pixels(image) if is_bare else _light_of(image)
     colors = values[:, : min(image.channels, 3)]
-    if is_linear and colors.max(initial=0.0) > 1.0:
+    if is_color and is_bare and image.channels >= 3:
+        colors[...] = colors @ rec709_from_scene()
+    if is_color and colors.max(initial=0.0) > 1.0:
         remark(f"picture '{image.name}': colours brighter than white are cut")
-    colors[...] = _encode(colors) if is_linear else _decode(colors)
+    colors[...] = _encode(colors) if is_color else _decode(colors)
     # Blender's pictures have four channels, whatever files have.
     pixels = np.ones((len(values), 4), np.float32)
     pixels[:, : image.channels] = values
     if image.channels < 3:
         pixels[:, :3] = values[:, :1]
     copy = bpy.data.images.new(image.name, *image.size, alpha=image.channels == 4)
-    copy.colorspace_settings.name = "sRGB" if is_linear else "Non-Color"
+    copy.colorspace_settings.name = "sRGB" if is_color else "Non-Color"
     copy.pixels.foreach_set(pixels.ravel())
     copy.pack()
     return copy
+
+
+def _pixels(image: Any) -> Any:
+    """The numbers ``(pixels, channels)`` of a picture: of floats those of the working space, of bytes as stored."""
+    values = np.empty(image.size[0] * image.size[1] * image.channels, np.float32)
+    image.pixels.foreach_get(values)
+    return values.reshape(-1, image.channels)
+
+
+def _light_of(image: Any) -> Any:
+    """Linear Rec. 709 ``(pixels, channels)`` of a picture of bytes in any colour space, as Blender converts it."""
+    scene = bpy.data.scenes.new("lippmann picture")
+    loaded = None
+    try:
+        write_linear(scene, "RGBA")
+        with TemporaryDirectory() as folder:
+            path = str(Path(folder, "picture.exr"))
+            image.save_render(path, scene=scene)
+            loaded = bpy.data.images.load(path)
+            loaded.colorspace_settings.name = "Non-Color"
+            return _pixels(loaded)[:, : image.channels]
+    finally:
+        bpy.data.scenes.remove(scene)
+        if loaded is not None:
+            bpy.data.images.remove(loaded)
 
 
 def _uses(node: Any, seen: set[str]) -> set[str]:

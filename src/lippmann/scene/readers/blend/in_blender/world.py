@@ -69,18 +69,21 @@ def _render(world: Any, path: Path, width: int) -> None:
         scene.render.resolution_x, scene.render.resolution_y = width, width // 2
         scene.render.resolution_percentage = 100
         scene.render.use_compositing = scene.render.use_sequencer = False
-        scene.render.image_settings.file_format = "OPEN_EXR"
-        scene.render.image_settings.color_mode = "RGB"
-        scene.render.image_settings.color_depth = "32"
-        # Else the picture holds numbers of the file's working space.
-        scene.render.image_settings.color_management = "OVERRIDE"
-        scene.render.image_settings.linear_colorspace_settings.name = "Linear Rec.709"
+        write_linear(scene, "RGB")
         scene.render.filepath = str(path)
         bpy.ops.render.render(scene=scene.name, write_still=True)
     finally:
         bpy.data.scenes.remove(scene)
         bpy.data.objects.remove(camera)
         bpy.data.cameras.remove(lens)
+
+
+def write_linear(scene: Any, mode: str) -> None:
+    """Let a scene's pictures be OpenEXR of floats in linear Rec. 709, not of the file's working space."""
+    settings = scene.render.image_settings
+    settings.file_format, settings.color_mode, settings.color_depth = "OPEN_EXR", mode, "32"
+    settings.color_management = "OVERRIDE"
+    settings.linear_colorspace_settings.name = "Linear Rec.709"
 
 
 def _width(world: Any) -> int:
