@@ -96,7 +96,7 @@ PILOT_REASONS = {
     "camera_exposure": "the camera's own, from the scene",
     "caustics": "photons where a few of them find light that mirrors, glass or gloss throw",
     "light_vertices": "a small emitter beside a surface makes indirect light noisy",
-    "seen_chains": "chains for each path through a first mirror or glass",
+    "seen_chains": "chains of seen light with each path: a denoised scene with mirrors, glass or smooth gloss",
 }
 
 
