@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import re
 import subprocess
 import tempfile
 from pathlib import Path
@@ -41,7 +42,9 @@ def main() -> None:
         subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
         told = subprocess.run([str(program), "--version"], check=True, capture_output=True, text=True).stdout
         rows = [_compare(path) for path in sorted(Path(folder).glob("*.exr"))]
-    save("blend_cycles", {"blender": told.split()[1], "rows": rows})
+    version = re.search(r"Blender ([0-9.]+)", told)
+    assert version is not None
+    save("blend_cycles", {"blender": version[1], "rows": rows})
 
 
 def _compare(path: Path) -> dict[str, Any]:

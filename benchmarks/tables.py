@@ -410,6 +410,7 @@ SECTIONS = {
     "cycles": _cycles,
     "splats": scene_file_tables.splats,
     "blender": scene_file_tables.blender,
+    "blend_cycles": scene_file_tables.blend_cycles,
     "volumes": scene_file_tables.volumes,
     "formats": scene_file_tables.formats,
     "tachyon": _tachyon,
