@@ -131,7 +131,7 @@ def _without_noise(stage: Stage, picture: Picture, guides: Any, effort: Any) -> 
     """Each view denoised by itself."""
     from lippmann.rendering.denoise.pixel_order import denoise_views
 
-    clean: Picture = denoise_views(picture, stage.display, guides, form="views", effort=effort)
+    clean: Picture = denoise_views(picture, stage.display, guides, effort=effort)
     return clean
 
 

@@ -160,9 +160,7 @@ class GuidedDenoiser:
     def _cleaned(self, pixels: Floats, guides: Guides, turned: bool) -> Floats:
         source = self._source
         if isinstance(source, DisplayRays) and self.form() == "views":
-            return denoise_views(
-                pixels, source.display, guides, form="views", effort=self.used, turned=turned, threads=self._threads
-            )
+            return denoise_views(pixels, source.display, guides, effort=self.used, turned=turned, threads=self._threads)
         if not self._surfaces:
             self._surfaces = [SurfacePart.of(guides.normal[tile]) for tile in source.tiles()]
         result = np.empty_like(pixels)

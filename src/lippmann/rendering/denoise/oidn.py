@@ -37,7 +37,6 @@ def denoise(
     albedo: NDArray[np.generic] | None = None,
     normal: NDArray[np.generic] | None = None,
     *,
-    hdr: bool = True,
     clean_guides: bool = False,
     exposure: float | None = None,
     effort: Effort = "high",
@@ -53,10 +52,8 @@ def denoise(
     albedo, normal:
         Guides of the same shape: reflectance in [0, 1], and vectors with components in [-1, 1] of any frame (the zero
         vector where nothing is seen). They may be noisy. A normal needs an albedo beside it.
-    hdr:
-        Values above 1 count; else they are taken for 1, and values below 0 for 0.
     clean_guides:
-        The guides hold no noise, see :func:`clean_guide`: finer detail is kept, and so would noise be. With the effort
+        The guides hold no noise: finer detail is kept, and so would noise be. With the effort
         ``high`` that takes twice the time.
     exposure:
         What values are multiplied by for the network, and divided by again: the same for all parts of one picture. None
@@ -93,7 +90,7 @@ def denoise(
             if images[name].shape != images["color"].shape:
                 rule = f"that of the picture is {images['color'].shape}"
                 raise UsageError(f"the {name} has the shape {images[name].shape}", parameter="denoise", rule=rule)
-    options = {"hdr": hdr, "cleanAux": clean_guides and albedo is not None}
+    options = {"hdr": True, "cleanAux": clean_guides and albedo is not None}
     if not turned:
         return _filtered(images, options, effort, threads, exposure)
     shown = {name: _turned(image) for name, image in images.items()}
@@ -111,13 +108,6 @@ def _turned(image: FloatArray) -> FloatArray:
     height, width = image.shape[:2]
     before = (-height % NETWORK_STEP, 0), (-width % NETWORK_STEP, 0), (0, 0)
     return np.pad(image[::-1, ::-1], before, mode="reflect")
-
-
-def clean_guide(
-    guide: NDArray[np.generic], kind: Literal["albedo", "normal"], *, threads: int | None = None
-) -> FloatArray:
-    """A guide without its noise, so that ``clean_guides`` holds. As :func:`denoise`."""
-    return _filtered({kind: _picture(guide, kind)}, {}, "high", threads)
 
 
 def _picture(values: NDArray[np.generic], name: str) -> FloatArray:

@@ -13,20 +13,18 @@ its place under the next lens. The guides tell that before any light is denoised
 
 from __future__ import annotations
 
-from typing import Literal, get_args
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lippmann.display import Display
-from lippmann.errors import UsageError
 from lippmann.image.micro_images import Permutation, micro_images_as_views
 from lippmann.image.views import view_grid
 from lippmann.rendering.denoise.oidn import Effort, denoise
 from lippmann.rendering.film.feature_buffers import Guides
 
 FloatArray = NDArray[np.float32]
-Form = Literal["auto", "raw", "views"]
 
 #: Views with fewer pixels on a side are no pictures that the network knows: see ``docs/background/denoising.md``.
 SMALLEST_VIEW = 48
@@ -38,53 +36,48 @@ _NORMAL_WEIGHT = 0.5
 def denoise_views(
     pixels: NDArray[np.generic],
     display: Display,
-    guides: Guides | None = None,
+    guides: Guides,
     *,
-    form: Form = "auto",
     effort: Effort = "high",
     turned: bool = False,
     threads: int | None = None,
 ) -> FloatArray:
-    """An integral image without its noise.
+    """An integral image without its noise, view by view.
 
     Parameters
     ----------
     pixels:
-        ``(H, W, 3)`` finite linear RGB of the display's panel.
+        ``(H, W, 3)`` finite linear RGB of the panel of a display that :func:`has_exact_views`.
     guides:
-        Albedo and normal of the same pixels, from :func:`~lippmann.rendering.film.feature_buffers.trace_guides`. None
-        does without, at the price of one to four dB.
-    form:
-        ``raw``, ``views`` (where these are exact), or what :func:`best_form` says.
+        Albedo and normal of the same pixels, from :func:`~lippmann.rendering.film.feature_buffers.trace_guides`.
     effort, turned, threads:
         As those of :func:`~lippmann.rendering.denoise.oidn.denoise`.
 
     Raises
     ------
     UsageError
-        ``pyoidn`` is missing, the sizes differ, or the display has no exact views to denoise.
+        ``pyoidn`` is missing.
     EngineError
         Open Image Denoise fails.
     """
-    if form not in get_args(Form):
-        raise UsageError.unknown("form", form, get_args(Form), parameter="form")
-    panel = display.panel
-    if pixels.shape != (panel.height, panel.width, 3):
-        rule = f"the display {display.name} has {panel.width} x {panel.height}"
-        raise UsageError(f"the pixels have the shape {pixels.shape}", parameter="denoise", rule=rule)
-    layers = [pixels, *(() if guides is None else (guides.albedo, guides.normal))]
-    if (best_form(display, guides) if form == "auto" else form) == "raw":
-        return _denoised(layers, effort, turned, threads)
-    return _by_views(layers, display, effort, turned, threads)
+    permutation = Permutation(display)
+    layers = (pixels, guides.albedo, guides.normal)
+    views = [micro_images_as_views(permutation.split(layer), display) for layer in layers]
+    result = np.empty(views[0].shape, dtype=np.float32)
+    for place in np.ndindex(result.shape[:2]):
+        color, albedo, normal = (layer[place] for layer in views)
+        # The guides follow mirrors and glass without chance, so what noise they have lies along edges alone.
+        result[place] = denoise(color, albedo, normal, clean_guides=True, effort=effort, turned=turned, threads=threads)
+    return permutation.join(micro_images_as_views(result, display))
 
 
-def best_form(display: Display, guides: Guides | None) -> Literal["raw", "views"]:
+def best_form(display: Display, guides: Guides) -> Literal["raw", "views"]:
     """The form that leaves less error, as far as display and guides tell.
 
     Views, where they are exact and large enough for the network, and where neighbours in a view are more alike than
     neighbours on the panel.
     """
-    if not has_exact_views(display) or guides is None:
+    if not has_exact_views(display):
         return "raw"
     _, _, rows, columns = _view_shape(display)
     if min(rows, columns) < SMALLEST_VIEW:
@@ -122,29 +115,3 @@ def _mean_step(values: FloatArray, axis: int) -> float:
 def _view_shape(display: Display) -> tuple[int, ...]:
     rows, columns, ny, nx = Permutation(display).shape
     return (1, nx, ny, columns) if display.lens_array.layout == "lenticular" else (ny, nx, rows, columns)
-
-
-def _by_views(
-    layers: list[NDArray[np.generic]], display: Display, effort: Effort, turned: bool, threads: int | None
-) -> FloatArray:
-    if not has_exact_views(display):
-        raise UsageError(
-            f"the lenses of the display {display.name} do not cover whole pixels",
-            parameter="form",
-            rule="its views cannot be put together again",
-            fix="use raw",
-        )
-    permutation = Permutation(display)
-    views = [micro_images_as_views(permutation.split(layer), display) for layer in layers]
-    result = np.empty(views[0].shape, dtype=np.float32)
-    for place in np.ndindex(result.shape[:2]):
-        result[place] = _denoised([layer[place] for layer in views], effort, turned, threads)
-    return permutation.join(micro_images_as_views(result, display))
-
-
-def _denoised(layers: list[NDArray[np.generic]], effort: Effort, turned: bool, threads: int | None) -> FloatArray:
-    color, *guides = layers
-    if not guides:
-        return denoise(color, effort=effort, turned=turned, threads=threads)
-    # The guides follow mirrors and glass without chance, so what noise they have lies along edges alone.
-    return denoise(color, *guides, clean_guides=True, effort=effort, turned=turned, threads=threads)
